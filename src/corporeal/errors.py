@@ -1,0 +1,33 @@
+"""What can go wrong for a user. Each error says what happened, where, and what to do next."""
+
+
+class UserError(Exception):
+    """Something the user can put right; the CLI prints it in one line and exits with code 2."""
+
+
+class UnknownChoiceError(UserError):
+    """A name that is not on the menu."""
+
+    def __init__(self, kind: str, given: str, menu: list[str]) -> None:
+        super().__init__(f"Unknown {kind} {given!r}. Choose one of: {', '.join(sorted(menu))}.")
+
+
+class OutOfRangeError(UserError):
+    """A physical value outside the range its source allows."""
+
+    def __init__(self, what: str, value: float, low: float, high: float, unit: str) -> None:
+        super().__init__(
+            f"{what} is {value:.4g} {unit}, outside the measured "
+            f"range [{low:.4g}, {high:.4g}] {unit}. Check the units, or add a source."
+        )
+
+
+class BadFileError(UserError):
+    """An input file that cannot be used: what is wrong in it, and what to do."""
+
+    def __init__(self, path: object, what: str, next_step: str = "") -> None:
+        super().__init__(f"{path}: {what}{' ' + next_step if next_step else ''}")
+
+
+class SimulationError(UserError):
+    """The simulation cannot go on; what it computed so far is kept."""

@@ -1,0 +1,1 @@
+"""Pure array maths on points and triangles."""

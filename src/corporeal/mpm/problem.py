@@ -1,0 +1,200 @@
+"""What an engine is given and what it gives back: the contract that every engine keeps."""
+
+from dataclasses import dataclass, field
+from typing import Literal, Protocol
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from corporeal.types import Push
+
+
+@dataclass(frozen=True)
+class Body:
+    """One object: particles that share a velocity field; P particles, S surface points."""
+
+    name: str
+    position: Float[np.ndarray, "P 3"]
+    """[m]"""
+    velocity: Float[np.ndarray, "P 3"]
+    """[m/s]"""
+    volume: Float[np.ndarray, " P"]
+    """Rest volume [m³]."""
+    density: Float[np.ndarray, " P"]
+    """[kg/m³]"""
+    law: Int[np.ndarray, " P"]
+    """``types.Law`` values."""
+    young: Float[np.ndarray, " P"]
+    """[Pa]"""
+    poisson: Float[np.ndarray, " P"]
+    yield_stress: Float[np.ndarray, " P"]
+    """Von Mises yield stress [Pa]; unused by laws without it."""
+    hardening: Float[np.ndarray, " P"]
+    """Linear isotropic hardening modulus H [Pa]."""
+    friction_angle: Float[np.ndarray, " P"]
+    """Drucker–Prager friction angle φ [rad]."""
+    cohesion: Float[np.ndarray, " P"]
+    """Drucker–Prager cohesion c [Pa]."""
+    viscosity: Float[np.ndarray, " P"]
+    """Kelvin–Voigt damping: τ gains J η (∇v + ∇vᵀ) [Pa s]."""
+    rigid: bool = False
+    """Six degrees of freedom; the elastic fields are then unused."""
+    surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    """Points on the surface [m]: a rigid body touches planes through them."""
+    push: Push | None = None
+
+
+@dataclass(frozen=True)
+class Plane:
+    """The floor or a wall: free space is where normal · x > offset."""
+
+    normal: tuple[float, float, float]
+    """Unit, out of the wall into free space."""
+    offset: float
+    """[m]"""
+
+
+FLOOR = Plane((0.0, 0.0, 1.0), 0.0)
+
+
+@dataclass(frozen=True)
+class Problem:
+    """Bodies, what they may touch, and the forces. B bodies, W planes. Nothing in it tunes."""
+
+    bodies: tuple[Body, ...]
+    cell: float
+    """Grid spacing dx [m]."""
+    friction: Float[np.ndarray, "B+W B+W"]
+    """Coulomb μ of every pair: bodies first, then planes. Symmetric."""
+    restitution: Float[np.ndarray, "B+W B+W"]
+    """Newton's e, used only where rigid meets rigid or a plane. Symmetric."""
+    planes: tuple[Plane, ...] = (FLOOR,)
+    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    """[m/s²]"""
+    gravity_ramp: float = 0.0
+    """Gravity grows linearly to its full value over this time [s]."""
+    contact: Literal["multi", "single"] = "multi"
+    """One velocity field per body, or the control: one for all, which glues what touches."""
+    transfer: Literal["apic", "flip"] = "flip"
+    """APIC, or affine FLIP that forgets at each body's own wave speed (granular and plastic laws
+    stay with APIC)."""
+    courant: float = 0.4
+    """Largest fraction of a cell that a wave may cross in one step."""
+
+
+@dataclass(frozen=True)
+class Snapshot:
+    """Every particle now; bodies in the problem's order, particles in the body's order."""
+
+    time: float
+    """[s]"""
+    position: Float[np.ndarray, "P 3"]
+    """[m]"""
+    velocity: Float[np.ndarray, "P 3"]
+    """[m/s]"""
+    deformation: Float[np.ndarray, "P 3 3"]
+    """Elastic deformation gradient F [-]; the rotation of a rigid body."""
+    motion: Float[np.ndarray, "P 3 3"]
+    """Total deformation gradient, plastic part included [-]: what a picture of the body follows."""
+    plastic_strain: Float[np.ndarray, " P"]
+    """Accumulated equivalent plastic strain [-]."""
+
+
+@dataclass(frozen=True)
+class Measure:
+    """The ledger now. Work and impulses are accumulated since time 0."""
+
+    time: float
+    """[s]"""
+    mass: Float[np.ndarray, " B"]
+    """[kg]"""
+    centre: Float[np.ndarray, "B 3"]
+    """Centre of mass [m]."""
+    momentum: Float[np.ndarray, "B 3"]
+    """[kg m/s]"""
+    angular_momentum: Float[np.ndarray, "B 3"]
+    """About the origin, affine part included [kg m²/s]."""
+    kinetic: Float[np.ndarray, " B"]
+    """½ Σ m (|v|² + dx²/4 ‖C‖²) [J]."""
+    elastic: Float[np.ndarray, " B"]
+    """[J]"""
+    potential: Float[np.ndarray, " B"]
+    """-m g · x, with the full gravity [J]."""
+    speed: float
+    """Largest particle speed [m/s]."""
+    external_impulse: Float[np.ndarray, "B 3"]
+    """Of gravity and push [N s]."""
+    plane_impulse: Float[np.ndarray, "W B 3"]
+    """Of plane w on body b [N s]."""
+    pair_impulse: Float[np.ndarray, "B B"]
+    """Sum of normal impulse magnitudes between two bodies [N s]. Symmetric."""
+    push_work: float
+    """[J]; gravity's work is in ``potential``."""
+    friction_loss: float
+    """[J]"""
+    plastic_loss: float
+    """[J]"""
+    viscous_loss: float
+    """[J]"""
+    first_contact: Float[np.ndarray, "B+W B+W"]
+    """Time of the first impulse of each pair [s]; nan: none yet."""
+    last_contact: Float[np.ndarray, "B+W B+W"]
+    """Time of the latest impulse of each pair [s]; nan: none yet."""
+    contact_point: Float[np.ndarray, "B+W B+W 3"]
+    """Where each pair first touched: impulse-weighted mean of that step's nodes [m]; nan: none."""
+    lost: Bool[np.ndarray, " P"]
+    """Particles that are not finite or left the domain."""
+
+
+@dataclass
+class Steps:
+    """How time was cut."""
+
+    count: int = 0
+    smallest: float = float("inf")
+    """[s]"""
+    largest: float = 0.0
+    """[s]"""
+
+
+class Engine(Protocol):
+    """A solver of one problem."""
+
+    steps: Steps
+
+    @property
+    def time(self) -> float:
+        """Simulated time so far [s]."""
+        ...
+
+    def advance(self, until: float) -> None:
+        """Step until exactly ``until`` [s], choosing steps by stability.
+
+        Raises:
+            SimulationError: A particle is not finite or left the domain; the message says which
+                body, when, and what to do. The state is that of the last good check.
+
+        """
+        ...
+
+    def snapshot(self) -> Snapshot:
+        """Copy every particle's state."""
+        ...
+
+    def measure(self) -> Measure:
+        """Add up the ledger."""
+        ...
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Everything needed to go on later exactly as if nothing had happened."""
+        ...
+
+    def restore(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from what ``save`` returned, on an engine built from the same problem."""
+        ...
+
+
+MENU = {
+    "warp": "corporeal.mpm.warp:WarpEngine",
+    "reference": "corporeal.mpm.reference:ReferenceEngine",
+}

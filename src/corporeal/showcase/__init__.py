@@ -1,0 +1,1 @@
+"""Our own props, and the scenes made of them."""

@@ -1,0 +1,1 @@
+"""The verbs. One file, one function, one command, one folder of results."""

@@ -1,0 +1,388 @@
+"""The things that flow through the house, in the order they appear. Read this file first.
+
+Every array states its shape and its unit. All quantities are SI. Frames are right-handed with +Z
+up and the floor at z = 0; quaternions are (w, x, y, z); cameras follow OpenCV. A name ``x_of_y``
+is an index array: for each y, which x. Letters in shapes: V vertices, T triangles, P particles,
+N points, K parts.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from enum import Enum
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+
+Vector = tuple[float, float, float]
+
+# ---------------------------------------------------------------- what comes in
+
+
+@dataclass(frozen=True)
+class Finish:
+    """How a surface looks: a physically based material, as glTF defines it."""
+
+    name: str
+    colour: tuple[float, float, float, float] = (1.0, 1.0, 1.0, 1.0)
+    """Base colour factor, linear RGBA."""
+    texture: UInt8[np.ndarray, "H W C"] | None = None
+    """Base colour picture, sRGB (C = 3) or sRGB with alpha (C = 4)."""
+    metallic: float = 0.0
+    roughness: float = 1.0
+    transmission: float = 0.0
+    glow: float = 0.0
+    """Emitted light as a multiple of the base colour."""
+    alpha_mode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
+    alpha_cutoff: float = 0.5
+
+
+@dataclass(frozen=True)
+class Surface:
+    """One triangle mesh with one finish, posed in the world."""
+
+    name: str
+    """The mesh's or node's name in the file, for people and for the recogniser."""
+    object: int
+    """Index into ``Scene.objects``."""
+    finish: int
+    """Index into ``Scene.finishes``."""
+    vertices: Float[np.ndarray, "V 3"]
+    """World position [m]."""
+    triangles: Int[np.ndarray, "T 3"]
+    """Vertex numbers, anticlockwise seen from outside."""
+    normals: Float[np.ndarray, "V 3"] | None = None
+    """Unit shading normals."""
+    uv: Float[np.ndarray, "V 2"] | None = None
+    """Texture coordinates as in glTF: v runs down."""
+    colours: Float[np.ndarray, "V C"] | None = None
+    """Linear RGB or RGBA that multiplies the finish, in [0, 1]."""
+    extras: dict = field(default_factory=dict)
+    """What the file says of this node beside its shape (``substance``, ``shell_thickness_m``)."""
+
+
+@dataclass(frozen=True)
+class Push:
+    """A uniform acceleration of one whole object within a time window."""
+
+    acceleration: Vector
+    """[m/s²]"""
+    start: float = 0.0
+    """[s]"""
+    end: float = float("inf")
+    """[s]"""
+
+
+@dataclass(frozen=True)
+class SceneObject:
+    """One separable thing, and how it starts."""
+
+    name: str
+    class_name: str
+    """What it is, in words ("soda can"); the name without its number when the file says no more."""
+    real_extent: float
+    """Largest extent of the real thing [m]."""
+    scale: float = 1.0
+    """Scene size over real size."""
+    velocity: Vector = (0.0, 0.0, 0.0)
+    """[m/s]"""
+    push: Push | None = None
+    source: str = ""
+    """The file it came from."""
+    credit: str = ""
+    """Licence and attribution, where the file states them."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """Several objects in space, the forces on them, and how long to watch."""
+
+    name: str
+    source: str
+    objects: tuple[SceneObject, ...]
+    surfaces: tuple[Surface, ...]
+    finishes: tuple[Finish, ...]
+    metres_per_unit: float = 1.0
+    """What one unit of the file was taken to be [m]."""
+    gravity: Vector = (0.0, 0.0, -9.81)
+    """[m/s²]"""
+    duration: float = 2.0
+    """[s]"""
+    fps: int = 60
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know about the input, in sentences."""
+
+    @property
+    def object_of_triangle(self) -> Int[np.ndarray, " T"]:
+        """For each triangle of all surfaces in order, its object."""
+        return np.repeat(
+            np.array([s.object for s in self.surfaces], dtype=np.int64),
+            [len(s.triangles) for s in self.surfaces],
+        )
+
+
+# ---------------------------------------------------------------- what it is, in words
+
+
+@dataclass(frozen=True)
+class PartWords:
+    """What somebody or something said about one part."""
+
+    name: str
+    material: str | None
+    """A name from the library; None: unknown, which is a normal answer."""
+    structure: Literal["solid", "shell"] | None = None
+    """How the part is made; None: not said, the shape decides."""
+    thickness: float | None = None
+    """Wall thickness of a shell, where it is known [m]."""
+    answered_by: Literal["annotation", "recording", "model", "metadata", "unknown"] = "unknown"
+    margin: float = 0.0
+    """How sure: 0 (a guess) to 1 (stated outright)."""
+    reason: str = ""
+    """Why this answer, in one sentence."""
+
+
+@dataclass(frozen=True)
+class ObjectWords:
+    """One object's parts, in words."""
+
+    name: str
+    class_name: str
+    parts: tuple[PartWords, ...]
+
+
+@dataclass(frozen=True)
+class Inventory:
+    """What is in the scene, in words only. Objects are in the scene's order."""
+
+    objects: tuple[ObjectWords, ...]
+    transcript: tuple[dict, ...] = ()
+    """Every question put to a model with its answer, as data."""
+
+
+@dataclass(frozen=True)
+class Part:
+    """One entry of the catalogue of parts."""
+
+    name: str
+    object: int
+    found_by: str
+    """How the part was told apart: "node", "material", "whole object" …"""
+
+
+@dataclass(frozen=True)
+class Parts:
+    """Which point belongs to which object and part. A mesh's points are its triangles, in order."""
+
+    object_of_point: Int[np.ndarray, " N"]
+    part_of_point: Int[np.ndarray, " N"]
+    """Index into ``catalogue``; -1: none."""
+    confidence: Float[np.ndarray, " N"]
+    """In [0, 1]."""
+    catalogue: tuple[Part, ...]
+
+
+# ---------------------------------------------------------------- what it is made of
+
+
+class Law(Enum):
+    """How a material answers to strain: an elastic energy and, for two of them, a plastic map."""
+
+    COROTATED = 0
+    NEO_HOOKEAN = 1
+    HENCKY = 2
+    DRUCKER_PRAGER = 3
+    """Hencky elasticity with the Drucker–Prager cone: sand, soil, snow."""
+    VON_MISES = 4
+    """Hencky elasticity with the von Mises cylinder: metals, plasticine."""
+
+
+@dataclass(frozen=True)
+class Range:
+    """An interval of measured values with the usual one, and where it was read."""
+
+    low: float
+    typical: float
+    high: float
+    source: str
+    """Citation key, resolved in ``materials/sources.toml``."""
+
+    def __contains__(self, value: float) -> bool:
+        return self.low <= value <= self.high
+
+
+@dataclass(frozen=True)
+class Ground:
+    """Why one value is what it is."""
+
+    value: float
+    """SI."""
+    range: Range
+    """The measured interval the value was chosen from, SI."""
+    chosen_by: str
+    """"typical", "model", "annotation", "fallback" …"""
+    reason: str
+
+
+@dataclass(frozen=True)
+class Material:
+    """A grounded material: numbers that were looked up, never invented. All SI."""
+
+    name: str
+    law: Law
+    young: float
+    """Young's modulus [Pa]."""
+    poisson: float
+    """Poisson's ratio [-]."""
+    density: float
+    """Mass density [kg/m³]."""
+    yield_stress: float | None = None
+    """Von Mises yield stress [Pa]; None where the law does not yield."""
+    friction_angle: float | None = None
+    """Internal friction angle of a granular material [rad]."""
+    cohesion: float | None = None
+    """Of a granular material [Pa]."""
+    hardening: float = 0.0
+    """Linear isotropic hardening modulus of a metal [Pa]."""
+    friction: float = 0.5
+    """This surface's own sliding friction, combined where no pair is measured [-]."""
+    restitution: float = 0.5
+    """Normal restitution where rigid meets rigid [-]."""
+    loss: float = 0.0
+    """Loss factor of small vibrations [-]."""
+    shell_thickness: float | None = None
+    """How thin such things are usually made [m]; None: solid as a rule."""
+    grounds: dict[str, Ground] = field(default_factory=dict)
+    """Field name → why, for every measured number above."""
+
+
+@dataclass(frozen=True)
+class Structure:
+    """How one part is built."""
+
+    kind: Literal["solid", "shell"]
+    thickness: float | None = None
+    """Wall thickness of a shell [m]."""
+    reason: str = ""
+
+
+@dataclass(frozen=True)
+class MaterialField:
+    """What every part is made of; K parts in the catalogue's order."""
+
+    materials: tuple[Material, ...]
+    """One per part."""
+    structures: tuple[Structure, ...]
+    """One per part."""
+    words: tuple[PartWords, ...]
+    """The answer each material was chosen from, one per part."""
+    friction: Float[np.ndarray, "K+1 K+1"]
+    """Sliding friction between parts [-]; the last row and column are the floor and the walls."""
+    restitution: Float[np.ndarray, "K+1 K+1"]
+    """Newton's coefficient between rigid parts [-]; last row and column as above."""
+
+
+# ---------------------------------------------------------------- what is simulated
+
+
+@dataclass(frozen=True)
+class Treatment:
+    """How one part enters the simulation: real numbers, simulated numbers, and why they differ."""
+
+    kind: Literal["rigid", "deformable", "shell"]
+    young_real: float
+    """[Pa]"""
+    young: float
+    """Simulated Young's modulus [Pa]."""
+    poisson: float
+    density: float
+    """Simulated density [kg/m³]."""
+    yield_stress: float | None
+    """Simulated yield stress [Pa]."""
+    thickness: float | None
+    """Simulated wall thickness of a shell [m]."""
+    strain: float
+    """Estimated largest strain that decided it [-]."""
+    impact_speed: float
+    """Estimated [m/s]."""
+    wave_speed: float
+    """Simulated longitudinal wave speed [m/s]; 0 when rigid."""
+    step: float
+    """Largest stable time step of this part [s]; inf when rigid."""
+    why: str
+
+
+@dataclass(frozen=True)
+class Particles:
+    """Material points ready to simulate."""
+
+    position: Float[np.ndarray, "P 3"]
+    """World position [m]."""
+    velocity: Float[np.ndarray, "P 3"]
+    """World velocity [m/s]."""
+    volume: Float[np.ndarray, " P"]
+    """Rest volume [m³]."""
+    density: Float[np.ndarray, " P"]
+    """Simulated density [kg/m³]: a thickened shell's is smaller than its material's."""
+    object: Int[np.ndarray, " P"]
+    """Which object owns the point; each object has its own velocity field."""
+    part: Int[np.ndarray, " P"]
+    """Index into the catalogue of parts, and so into materials and treatments."""
+    cell: float
+    """Grid spacing dx that the particles were spaced for [m]."""
+    treatments: tuple[Treatment, ...]
+    """One per part."""
+    surface: Float[np.ndarray, "S 3"]
+    """Points on the surfaces of rigid objects, for their contacts [m]."""
+    object_of_surface: Int[np.ndarray, " S"]
+    mass_real: tuple[float, ...]
+    """Estimated mass of every part [kg]: what the particles' masses must add up to."""
+    fills: tuple[str, ...] = ()
+    """How each part was filled, in words, for the report."""
+
+    @property
+    def count(self) -> int:
+        """Number of particles P."""
+        return len(self.position)
+
+    @property
+    def mass(self) -> Float[np.ndarray, " P"]:
+        """Particle mass [kg]."""
+        return self.volume * self.density
+
+
+@dataclass(frozen=True)
+class Frame:
+    """The scene at one instant."""
+
+    time: float
+    """[s]"""
+    position: Float[np.ndarray, "P 3"]
+    """[m]"""
+    deformation: Float[np.ndarray, "P 3 3"]
+    """Deformation gradient F [-]; a rigid object's is its rotation."""
+
+
+@dataclass(frozen=True)
+class Trajectory:
+    """The scene over time. Frames stay on disk and are read one by one."""
+
+    folder: Path
+    """Holds ``frames/00000.npz`` … and ``ledger.npz``."""
+    time: Float[np.ndarray, " F"]
+    """[s]"""
+    ledger: dict[str, np.ndarray]
+    """Per frame: energies [J], momentum per object [kg m/s], impulses [N s], penetration [m]."""
+    frames: Sequence[Frame]
+    """Reads frame i from disk when asked for."""
+
+
+@dataclass(frozen=True)
+class Film:
+    """A finished film."""
+
+    path: Path
+    fps: int
+    width: int
+    height: int

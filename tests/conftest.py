@@ -1,0 +1,40 @@
+"""Shared by all tests: shapes are checked, and the network is refused."""
+
+import os
+import socket
+
+import pytest
+from jaxtyping import install_import_hook
+
+os.environ.setdefault("NUMBA_THREADING_LAYER", "workqueue")
+
+# Kernels are excluded: neither Warp nor numba can read a wrapped function.
+install_import_hook(
+    [
+        "corporeal.types",
+        "corporeal.mpm.problem",
+        "corporeal.mpm.elasticity",
+        "corporeal.mpm.plasticity",
+        "corporeal.stages",
+        "corporeal.formats",
+        "corporeal.store",
+    ],
+    "beartype.beartype",
+)
+
+
+@pytest.fixture(autouse=True)
+def no_network(monkeypatch):
+    """Refuse every connection but those to this machine."""
+    connect = socket.socket.connect
+
+    def guarded(self, address):
+        if self.family in (socket.AF_INET, socket.AF_INET6) and address[0] not in (
+            "127.0.0.1",
+            "::1",
+            "localhost",
+        ):
+            raise AssertionError(f"a test tried to reach {address}")
+        return connect(self, address)
+
+    monkeypatch.setattr(socket.socket, "connect", guarded)
