@@ -1,0 +1,234 @@
+"""Save and load anything that flows, and keep a run's folders honest.
+
+A stage's folder holds ``data.npz`` (the result), and ``meta.json`` with its freshness key, its
+configuration and its seconds. ``meta.json`` is written last, by an atomic rename: a folder without
+it is unfinished, whatever else lies in it.
+"""
+
+import errno
+import hashlib
+import json
+import os
+import zipfile
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import fields, is_dataclass
+from enum import Enum
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from corporeal import __version__, types
+from corporeal.errors import BadFileError, UserError
+
+META = "meta.json"
+DATA = "data.npz"
+TREE = "tree"
+KNOWN: dict[str, Any] = {
+    name: kind
+    for name, kind in vars(types).items()
+    if isinstance(kind, type) and kind.__module__ == types.__name__
+}
+
+
+class DiskError(UserError):
+    """The disk refuses what a stage wants to keep."""
+
+
+@contextmanager
+def writing(path: Path) -> Iterator[None]:
+    """Turn a failure to write below ``path`` into one clear sentence.
+
+    Raises:
+        DiskError: The disk is full, read-only, over a quota or not ours.
+
+    """
+    try:
+        yield
+    except OSError as error:
+        reasons = {
+            errno.ENOSPC: "the disk is full. Free some space",
+            errno.EDQUOT: "the disk quota is used up. Free some space",
+            errno.EFBIG: "the file would exceed the allowed size. Raise the limit (ulimit -f)",
+            errno.EROFS: "the disk is read-only. Choose another folder with --out",
+            errno.EACCES: "permission denied. Choose another folder with --out",
+        }
+        if error.errno not in reasons:
+            raise
+        raise DiskError(
+            f"Cannot write {path}: {reasons[error.errno]}, then run the same command again: "
+            "finished stages are kept."
+        ) from error
+
+
+def write_bytes(path: Path, data: bytes) -> None:
+    """Write a file so that it is either whole or absent."""
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(f".{path.name}.{os.getpid()}.part")
+        try:
+            with partial.open("wb") as file:
+                file.write(data)
+                file.flush()
+                os.fsync(file.fileno())
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def write_json(path: Path, value: Any) -> None:
+    """Write JSON that any parser reads: no NaN, no infinity."""
+    text = json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False)
+    write_bytes(path, text.encode())
+
+
+def read_json(path: Path) -> Any:
+    """Read JSON.
+
+    Raises:
+        BadFileError: The file is damaged.
+
+    """
+    try:
+        return json.loads(path.read_text(encoding="utf-8"))
+    except (ValueError, OSError) as error:
+        raise BadFileError(path, f"cannot be read as JSON ({error}).", "Delete it.") from error
+
+
+def plain(value: Any) -> Any:
+    """Turn arrays, enums, paths and dataclasses into what JSON knows; not finite becomes null."""
+    if is_dataclass(value) and not isinstance(value, type):
+        return {f.name: plain(getattr(value, f.name)) for f in fields(value)}
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, list | tuple):
+        return [plain(v) for v in value]
+    return _plain_leaf(value)
+
+
+def _plain_leaf(value: Any) -> Any:
+    if isinstance(value, Enum):
+        return value.name.lower()
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, np.ndarray):
+        return plain(value.tolist())
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, float) and not np.isfinite(value):
+        return None
+    return value
+
+
+# ---------------------------------------------------------------- anything that flows ↔ npz
+
+
+def save(path: Path, value: Any) -> None:
+    """Save any value made of the types in ``types.py``, containers, arrays and numbers."""
+    arrays: dict[str, Any] = {}
+    tree = json.dumps(_encode(value, arrays), allow_nan=True)
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(f".{os.getpid()}.part.npz")
+        try:
+            np.savez(partial, **{TREE: np.frombuffer(tree.encode(), np.uint8)}, **arrays)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
+
+
+def load(path: Path) -> Any:
+    """Load what ``save`` saved.
+
+    Raises:
+        BadFileError: The file is absent or damaged.
+
+    """
+    try:
+        with np.load(path, allow_pickle=False) as file:
+            tree = json.loads(bytes(file[TREE]).decode())
+            return _decode(tree, file)
+    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+        raise BadFileError(
+            path, f"cannot be read ({error}).", "Delete the folder it is in and run again."
+        ) from error
+
+
+def _encode(value: Any, arrays: dict[str, Any]) -> Any:
+    if isinstance(value, np.ndarray):
+        name = f"a{len(arrays)}"
+        arrays[name] = value
+        return {"array": name}
+    if is_dataclass(value) and not isinstance(value, type):
+        content = {f.name: _encode(getattr(value, f.name), arrays) for f in fields(value)}
+        return {"type": type(value).__name__, "fields": content}
+    if isinstance(value, tuple | list):
+        return {"list": [_encode(v, arrays) for v in value], "tuple": isinstance(value, tuple)}
+    if isinstance(value, dict):
+        return {"dict": [[k, _encode(v, arrays)] for k, v in value.items()]}
+    if isinstance(value, Enum):
+        return {"type": type(value).__name__, "member": value.name}
+    return {"path": str(value)} if isinstance(value, Path) else {"value": _plain_number(value)}
+
+
+def _plain_number(value: Any) -> Any:
+    return value.item() if isinstance(value, np.generic) else value
+
+
+def _decode(tree: dict, arrays: Any) -> Any:
+    if "value" in tree:
+        return tree["value"]
+    if "array" in tree:
+        return arrays[tree["array"]]
+    if "list" in tree:
+        items = [_decode(v, arrays) for v in tree["list"]]
+        return tuple(items) if tree["tuple"] else items
+    if "dict" in tree:
+        return {k: _decode(v, arrays) for k, v in tree["dict"]}
+    if "path" in tree:
+        return Path(tree["path"])
+    kind = KNOWN[tree["type"]]
+    if "member" in tree:
+        return kind[tree["member"]]
+    return kind(**{k: _decode(v, arrays) for k, v in tree["fields"].items()})
+
+
+# ---------------------------------------------------------------- stage folders
+
+
+def key(stage: str, config: Any, inputs: list[str]) -> str:
+    """Name a result by all it depends on: the stage, its configuration, what came before."""
+    text = json.dumps([__version__, stage, plain(config), inputs], sort_keys=True)
+    return hashlib.sha256(text.encode()).hexdigest()[:20]
+
+
+def digest(path: Path) -> str:
+    """Name a file, or a folder's files, by content."""
+    files = sorted(p for p in path.rglob("*") if p.is_file()) if path.is_dir() else [path]
+    total = hashlib.sha256()
+    for file in files:
+        total.update(file.name.encode())
+        with file.open("rb") as stream:
+            while block := stream.read(1 << 20):
+                total.update(block)
+    return total.hexdigest()[:20]
+
+
+def fresh(folder: Path, wanted: str) -> bool:
+    """Whether ``folder`` holds the finished result named ``wanted``."""
+    path = folder / META
+    return path.exists() and read_json(path).get("key") == wanted
+
+
+def finish(folder: Path, wanted: str, config: Any, seconds: float) -> None:
+    """Declare the folder finished."""
+    meta = {"key": wanted, "config": config, "seconds": round(seconds, 3), "version": __version__}
+    write_json(folder / META, meta)
+
+
+def begin(folder: Path) -> None:
+    """Declare the folder unfinished."""
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        (folder / META).unlink(missing_ok=True)

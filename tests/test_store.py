@@ -1,0 +1,69 @@
+import errno
+import os
+
+import numpy as np
+import pytest
+
+from corporeal import store
+from corporeal.types import Finish, Law, Material, Range, Scene, SceneObject, Surface
+
+
+def a_scene():
+    surface = Surface("s", 0, 0, np.eye(3), np.array([[0, 1, 2]]), extras={"substance": "steel"})
+    picture = np.zeros((2, 2, 3), np.uint8)
+    thing = SceneObject("box_0", "box", 1.0, velocity=(0.0, 0.0, -2.0))
+    return Scene("s", "s.glb", (thing,), (surface,), (Finish("red", texture=picture),))
+
+
+def test_a_scene_comes_back_as_it_was(tmp_path):
+    store.save(tmp_path / "scene.npz", a_scene())
+    again = store.load(tmp_path / "scene.npz")
+    assert again.objects == a_scene().objects
+    np.testing.assert_array_equal(again.surfaces[0].vertices, np.eye(3))
+    assert again.surfaces[0].extras == {"substance": "steel"}
+    assert again.finishes[0].texture.dtype == np.uint8
+
+
+def test_enums_nothing_and_infinity_come_back(tmp_path):
+    material = Material("steel", Law.VON_MISES, 2e11, 0.3, 7850.0)
+    store.save(tmp_path / "m.npz", {"m": material, "limit": float("inf")})
+    again = store.load(tmp_path / "m.npz")
+    assert again == {"m": material, "limit": float("inf")}
+
+
+def test_json_never_contains_nan(tmp_path):
+    store.write_json(tmp_path / "x.json", {"a": np.float64("nan"), "b": [np.inf, 1]})
+    assert store.read_json(tmp_path / "x.json") == {"a": None, "b": [None, 1]}
+
+
+def test_a_damaged_result_is_named_in_one_sentence(tmp_path):
+    store.save(tmp_path / "scene.npz", a_scene())
+    data = (tmp_path / "scene.npz").read_bytes()
+    (tmp_path / "scene.npz").write_bytes(data[: len(data) // 2])
+    with pytest.raises(store.BadFileError, match="Delete the folder"):
+        store.load(tmp_path / "scene.npz")
+
+
+def test_a_folder_is_finished_only_once_it_says_so(tmp_path):
+    name = store.key("fill", {"detail": "draft"}, ["abc"])
+    store.begin(tmp_path)
+    store.save(tmp_path / store.DATA, a_scene())
+    assert not store.fresh(tmp_path, name)
+    store.finish(tmp_path, name, {"detail": "draft"}, 1.0)
+    assert store.fresh(tmp_path, name)
+    assert not store.fresh(tmp_path, store.key("fill", {"detail": "fine"}, ["abc"]))
+
+
+def test_a_full_disk_is_one_clear_error_and_leaves_no_half_file(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    monkeypatch.setattr(os, "fsync", full)
+    with pytest.raises(store.DiskError, match="disk is full"):
+        store.write_bytes(tmp_path / "film.mp4", b"x")
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_a_range_knows_what_it_contains():
+    assert 2.0 in Range(1.0, 2.0, 3.0, "book")
+    assert 4.0 not in Range(1.0, 2.0, 3.0, "book")
