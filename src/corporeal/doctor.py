@@ -1,0 +1,92 @@
+"""What works on this machine, and what would be gained by what."""
+
+import os
+import platform
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from importlib.metadata import PackageNotFoundError, version
+from importlib.util import find_spec
+
+from corporeal import __version__
+
+KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
+LIBRARIES = {"embreex": "films and pictures", "igl": "filling of meshes", "DracoPy": "Draco files"}
+PACKAGES = {"igl": "libigl"}
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One line of the examination."""
+
+    what: str
+    works: bool
+    found: str
+    advice: str = ""
+    """What to do, or what would be gained; empty when there is nothing to say."""
+
+
+def examine() -> list[Finding]:
+    """Look at everything; a broken piece is a finding, never an exception."""
+    checks: list[Callable[[], list[Finding]]] = [_machine, _engines, _libraries, _encoder, _keys]
+    return [finding for check in checks for finding in check()]
+
+
+def _machine() -> list[Finding]:
+    system = f"corporeal {__version__}, Python {platform.python_version()}, {platform.platform()}"
+    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
+    free = shutil.disk_usage(".").free / 1e9
+    return [
+        Finding("system", True, system),
+        Finding("processor", True, f"{cores} cores"),
+        Finding("disk", free > 1, f"{free:.0f} GB free", "" if free > 1 else "Free some space."),
+    ]
+
+
+def _engines() -> list[Finding]:
+    try:
+        import warp as wp
+
+        wp.config.log_level = wp.LOG_ERROR
+        wp.init()
+        cards = [device.name for device in wp.get_cuda_devices()]
+    except Exception as error:  # whatever is broken in a native library belongs in the table
+        return [Finding("warp engine", False, str(error), "Reinstall: pip install warp-lang.")]
+    gpu = ", ".join(cards) or "no CUDA GPU: simulations run on the processor"
+    return [
+        Finding("warp engine", True, f"Warp {version('warp-lang')}, on the processor"),
+        Finding("GPU", bool(cards), gpu, "" if cards else "Not needed."),
+        Finding("reference engine", True, "NumPy, slow: for checking"),
+    ]
+
+
+def _libraries() -> list[Finding]:
+    return [_library(module, use) for module, use in LIBRARIES.items()]
+
+
+def _library(module: str, use: str) -> Finding:
+    package = PACKAGES.get(module, module)
+    try:
+        return Finding(package, find_spec(module) is not None, f"{version(package)}, for {use}")
+    except PackageNotFoundError:
+        return Finding(package, False, "missing", f"pip install {package} (for {use}).")
+
+
+def _encoder() -> list[Finding]:
+    try:
+        import imageio_ffmpeg
+
+        path = imageio_ffmpeg.get_ffmpeg_version()
+    except Exception as error:  # as above
+        return [Finding("ffmpeg", False, str(error), "pip install imageio-ffmpeg (for films).")]
+    return [Finding("ffmpeg", True, f"{path}, a separate program, for films")]
+
+
+def _keys() -> list[Finding]:
+    present = [name for name in KEYS if os.environ.get(name)]
+    found = ", ".join(present) or "no API key in the environment"
+    advice = (
+        "Not needed: this version asks no model over the network. Materials come from your "
+        "annotation, from recordings (--vlm replay:FOLDER) or from the names in the file."
+    )
+    return [Finding("model keys", bool(present), found, advice)]
