@@ -1,1 +1,1 @@
-"""Files in and out."""
+"""Files of other programs: read with suspicion, written plainly."""
