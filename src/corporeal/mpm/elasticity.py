@@ -1,0 +1,208 @@
+"""Elastic laws: energies and stresses of fixed corotated, Neo-Hookean and Hencky solids.
+
+All functions take stacks of deformation gradients F. ``psi_`` is the stored energy per rest
+volume Ψ [J/m³], ``pk1_`` the first Piola–Kirchhoff stress P = ∂Ψ/∂F [Pa], ``tau_`` the Kirchhoff
+stress τ = P Fᵀ [Pa]. Letters: F = R S = U Σ Vᵀ, J = det F, ε = ln Σ, μ and λ Lamé's constants.
+"""
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from corporeal.types import Law
+
+Matrices = Float[np.ndarray, "P 3 3"]
+Vectors = Float[np.ndarray, "P 3"]
+Scalars = Float[np.ndarray, " P"]
+Number = Float[np.ndarray, " P"] | float
+
+
+def lame(young: Number, poisson: Number) -> tuple[Number, Number]:
+    """Lamé's constants (μ, λ) [Pa].
+
+    μ = E / 2(1 + ν),  λ = E ν / ((1 + ν)(1 - 2ν))
+    """
+    return (
+        young / (2.0 * (1.0 + poisson)),
+        young * poisson / ((1.0 + poisson) * (1.0 - 2.0 * poisson)),
+    )
+
+
+def p_wave_speed(young: Number, poisson: Number, density: Number) -> Number:
+    """Longitudinal wave speed c_p [m/s] of an isotropic solid at rest.
+
+    c_p = sqrt((λ + 2μ) / ρ) = sqrt(E (1 - ν) / (ρ (1 + ν)(1 - 2ν)))
+    """
+    return (young * (1.0 - poisson) / (density * (1.0 + poisson) * (1.0 - 2.0 * poisson))) ** 0.5
+
+
+# ---------------------------------------------------------------- decompositions
+
+
+def signed_svd(F: Matrices) -> tuple[Matrices, Vectors, Matrices]:
+    """F = U Σ Vᵀ with rotations U and V; the smallest stretch carries the sign of det F.
+
+    Returns:
+        U, the stretches Σ in descending order, and V (not its transpose).
+
+    """
+    U, stretch, Vt = np.linalg.svd(F)
+    mirror_u, mirror_v = np.sign(np.linalg.det(U)), np.sign(np.linalg.det(Vt))
+    U[:, :, 2] *= mirror_u[:, None]
+    Vt[:, 2, :] *= mirror_v[:, None]
+    stretch[:, 2] *= mirror_u * mirror_v
+    return U, stretch, transpose(Vt)
+
+
+def polar(F: Matrices) -> tuple[Matrices, Matrices]:
+    """F = R S with a rotation R (never a reflection) and a symmetric S."""
+    U, stretch, V = signed_svd(F)
+    return U @ transpose(V), (V * stretch[:, None, :]) @ transpose(V)
+
+
+def transpose(A: Matrices) -> Matrices:
+    """Transpose every matrix of a stack."""
+    return np.swapaxes(A, -1, -2)
+
+
+def from_stretches(U: Matrices, stretch: Vectors, V: Matrices) -> Matrices:
+    """U Σ Vᵀ."""
+    return (U * stretch[:, None, :]) @ transpose(V)
+
+
+# ---------------------------------------------------------------- fixed corotated
+
+
+def psi_corotated(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+    """Ψ = μ Σ (σ_i - 1)² + λ/2 (J - 1)²  (Stomakhin et al. 2012)."""
+    stretch = signed_svd(F)[1]
+    J = np.linalg.det(F)
+    return mu * np.sum((stretch - 1.0) ** 2, axis=1) + 0.5 * lam * (J - 1.0) ** 2
+
+
+def tau_corotated(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """τ = 2μ (F - R) Fᵀ + λ J (J - 1) 1."""
+    J = np.linalg.det(F)
+    return 2.0 * _per(mu) * (F - polar(F)[0]) @ transpose(F) + _isotropic(lam * J * (J - 1.0))
+
+
+def pk1_corotated(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """P = 2μ (F - R) + λ J (J - 1) F⁻ᵀ."""
+    J = np.linalg.det(F)
+    return 2.0 * _per(mu) * (F - polar(F)[0]) + _per(lam * J * (J - 1.0)) * _inverse_transpose(F)
+
+
+# ---------------------------------------------------------------- Neo-Hookean
+
+
+def psi_neo_hookean(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+    """Ψ = μ/2 (‖F‖² - 3 - 2 ln J) + λ/2 (ln J)²; not a number where matter is inside out."""
+    log_j = _log_j(F)
+    return 0.5 * mu * (np.sum(F * F, axis=(1, 2)) - 3.0 - 2.0 * log_j) + 0.5 * lam * log_j**2
+
+
+def tau_neo_hookean(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """τ = μ (F Fᵀ - 1) + λ ln J 1."""
+    return _per(mu) * (F @ transpose(F)) + _isotropic(lam * _log_j(F) - mu)
+
+
+def pk1_neo_hookean(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """P = μ (F - F⁻ᵀ) + λ ln J F⁻ᵀ."""
+    inverse = _inverse_transpose(F)
+    return _per(mu) * (F - inverse) + _per(lam * _log_j(F)) * inverse
+
+
+# ---------------------------------------------------------------- Hencky
+
+
+def log_strain(stretch: Vectors) -> Vectors:
+    """ε = ln Σ; not a number where matter is inside out."""
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.log(stretch)
+
+
+def psi_log_strain(strain: Vectors, mu: Scalars, lam: Scalars) -> Scalars:
+    """Ψ = μ ‖ε‖² + λ/2 (tr ε)² of principal logarithmic strains."""
+    return mu * np.sum(strain**2, axis=1) + 0.5 * lam * np.sum(strain, axis=1) ** 2
+
+
+def psi_hencky(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+    """Ψ = μ ‖ε‖² + λ/2 (tr ε)²  ("StVK" in the graphics literature, but on logarithmic strain)."""
+    return psi_log_strain(log_strain(signed_svd(F)[1]), mu, lam)
+
+
+def tau_hencky(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """τ = U (2μ ε + λ tr ε 1) Uᵀ."""
+    U, stretch, _ = signed_svd(F)
+    return from_stretches(U, _principal_tau(log_strain(stretch), mu, lam), U)
+
+
+def pk1_hencky(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """P = U (2μ Σ⁻¹ ε + λ tr ε Σ⁻¹) Vᵀ."""
+    U, stretch, V = signed_svd(F)
+    return from_stretches(U, _principal_tau(log_strain(stretch), mu, lam) / stretch, V)
+
+
+# ---------------------------------------------------------------- all laws
+
+PSI = {
+    Law.COROTATED: psi_corotated,
+    Law.NEO_HOOKEAN: psi_neo_hookean,
+    Law.HENCKY: psi_hencky,
+    Law.DRUCKER_PRAGER: psi_hencky,
+    Law.VON_MISES: psi_hencky,
+}
+TAU = {
+    Law.COROTATED: tau_corotated,
+    Law.NEO_HOOKEAN: tau_neo_hookean,
+    Law.HENCKY: tau_hencky,
+    Law.DRUCKER_PRAGER: tau_hencky,
+    Law.VON_MISES: tau_hencky,
+}
+PK1 = {
+    Law.COROTATED: pk1_corotated,
+    Law.NEO_HOOKEAN: pk1_neo_hookean,
+    Law.HENCKY: pk1_hencky,
+    Law.DRUCKER_PRAGER: pk1_hencky,
+    Law.VON_MISES: pk1_hencky,
+}
+
+
+def psi(law: Int[np.ndarray, " P"], F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+    """Give the stored energy per rest volume Ψ [J/m³] of particles with different laws."""
+    out = np.empty(len(F))
+    for rule, chosen in _by_law(law):
+        out[chosen] = PSI[rule](F[chosen], mu[chosen], lam[chosen])
+    return out
+
+
+def tau(law: Int[np.ndarray, " P"], F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """Give the Kirchhoff stress τ [Pa] of particles with different laws."""
+    out = np.empty_like(F)
+    for rule, chosen in _by_law(law):
+        out[chosen] = TAU[rule](F[chosen], mu[chosen], lam[chosen])
+    return out
+
+
+def _by_law(law: Int[np.ndarray, " P"]) -> list[tuple[Law, np.ndarray]]:
+    return [(Law(value), np.flatnonzero(law == value)) for value in np.unique(law).tolist()]
+
+
+def _principal_tau(strain: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
+    return 2.0 * mu[:, None] * strain + (lam * np.sum(strain, axis=1))[:, None]
+
+
+def _log_j(F: Matrices) -> Scalars:
+    with np.errstate(invalid="ignore", divide="ignore"):
+        return np.log(np.linalg.det(F))
+
+
+def _per(scalar: Scalars) -> Float[np.ndarray, "P 1 1"]:
+    return scalar[:, None, None]
+
+
+def _isotropic(scalar: Scalars) -> Matrices:
+    return _per(scalar) * np.eye(3)
+
+
+def _inverse_transpose(F: Matrices) -> Matrices:
+    return transpose(np.linalg.inv(F))

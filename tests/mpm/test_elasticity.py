@@ -1,0 +1,126 @@
+"""What every elastic law owes to its energy."""
+
+import numpy as np
+import pytest
+
+from corporeal.mpm import elasticity
+from corporeal.types import Law
+
+MU, LAM = elasticity.lame(1e3, 0.3)
+
+
+def some_rotations(count, rng):
+    q, r = np.linalg.qr(rng.standard_normal((count, 3, 3)))
+    q *= np.sign(np.diagonal(r, axis1=1, axis2=2))[:, None, :]
+    q[:, :, 0] *= np.linalg.det(q)[:, None]
+    return q
+
+
+def some_deformations(count=40, seed=0):
+    """Random rotations and stretches between 0.4 and 2.5."""
+    rng = np.random.default_rng(seed)
+    stretch = np.exp(rng.uniform(-0.9, 0.9, (count, 3)))
+    return elasticity.from_stretches(
+        some_rotations(count, rng), stretch, some_rotations(count, rng)
+    )
+
+
+def constants(count):
+    return np.full(count, MU), np.full(count, LAM)
+
+
+@pytest.mark.parametrize("law", Law)
+def test_stress_is_the_derivative_of_the_energy(law):
+    F, h = some_deformations(), 1e-5
+    pk1 = elasticity.PK1[law](F, *constants(len(F)))
+    slope = np.zeros_like(F)
+    for i in range(3):
+        for j in range(3):
+            step = np.zeros((3, 3))
+            step[i, j] = h
+            up = elasticity.PSI[law](F + step, *constants(len(F)))
+            down = elasticity.PSI[law](F - step, *constants(len(F)))
+            slope[:, i, j] = (up - down) / (2 * h)
+    error = np.abs(slope - pk1).max(axis=(1, 2)) / np.abs(pk1).max(axis=(1, 2))
+    assert error.max() < 1e-6
+
+
+@pytest.mark.parametrize("law", Law)
+def test_kirchhoff_stress_is_pk1_times_f_transposed_and_symmetric(law):
+    F = some_deformations()
+    tau = elasticity.TAU[law](F, *constants(len(F)))
+    pk1 = elasticity.PK1[law](F, *constants(len(F)))
+    scale = np.abs(tau).max()
+    assert np.abs(tau - pk1 @ elasticity.transpose(F)).max() < 1e-11 * scale
+    assert np.abs(tau - elasticity.transpose(tau)).max() < 1e-11 * scale
+
+
+@pytest.mark.parametrize("law", Law)
+def test_a_pure_rotation_costs_neither_stress_nor_energy(law):
+    R = some_rotations(40, np.random.default_rng(1))
+    assert np.abs(elasticity.TAU[law](R, *constants(len(R)))).max() < 1e-11 * MU
+    assert np.abs(elasticity.PSI[law](R, *constants(len(R)))).max() < 1e-11 * MU
+
+
+@pytest.mark.parametrize("law", Law)
+def test_turning_the_observer_turns_the_stress_and_keeps_the_energy(law):
+    F = some_deformations()
+    Q = some_rotations(len(F), np.random.default_rng(2))
+    tau = elasticity.TAU[law](F, *constants(len(F)))
+    turned = elasticity.TAU[law](Q @ F, *constants(len(F)))
+    expected = Q @ tau @ elasticity.transpose(Q)
+    assert np.abs(turned - expected).max() < 1e-10 * np.abs(tau).max()
+
+
+@pytest.mark.parametrize("law", Law)
+def test_all_laws_agree_with_linear_elasticity_at_small_strain(law):
+    rng = np.random.default_rng(3)
+    gradient = 1e-6 * rng.standard_normal((20, 3, 3))
+    strain = 0.5 * (gradient + elasticity.transpose(gradient))
+    linear = 2 * MU * strain + LAM * np.trace(strain, axis1=1, axis2=2)[:, None, None] * np.eye(3)
+    tau = elasticity.TAU[law](np.eye(3) + gradient, *constants(20))
+    assert np.abs(tau - linear).max() < 2e-5 * np.abs(linear).max()
+
+
+def test_mixed_laws_are_answered_particle_by_particle():
+    F = some_deformations(5)
+    law = np.array([law.value for law in Law])
+    tau = elasticity.tau(law, F, *constants(5))
+    psi = elasticity.psi(law, F, *constants(5))
+    for i, rule in enumerate(Law):
+        assert np.allclose(tau[i], elasticity.TAU[rule](F[i : i + 1], *constants(1))[0])
+        assert np.allclose(psi[i], elasticity.PSI[rule](F[i : i + 1], *constants(1))[0])
+
+
+def test_the_decomposition_is_accurate_for_flat_and_mirrored_matter():
+    rng = np.random.default_rng(4)
+    for stretch in ([1.0, 0.5, 1e-4], [1.0, 0.8, -0.3], [3.0, 1.0, 0.3], [1.0, 1.0, 1.0]):
+        F = elasticity.from_stretches(
+            some_rotations(50, rng), np.tile(np.array(stretch), (50, 1)), some_rotations(50, rng)
+        )
+        U, found, V = elasticity.signed_svd(F)
+        assert np.abs(elasticity.from_stretches(U, found, V) - F).max() < 1e-13
+        assert np.allclose(found, stretch, atol=1e-13)
+        for rotation in (U, V, elasticity.polar(F)[0]):
+            assert np.allclose(np.linalg.det(rotation), 1.0)
+            assert np.abs(rotation @ elasticity.transpose(rotation) - np.eye(3)).max() < 1e-13
+        R, S = elasticity.polar(F)
+        assert np.abs(R @ S - F).max() < 1e-13
+        assert np.abs(S - elasticity.transpose(S)).max() < 1e-13
+
+
+def test_the_wave_speed_of_steel_is_six_kilometres_per_second():
+    assert elasticity.p_wave_speed(200e9, 0.29, 7850.0) == pytest.approx(5780, rel=0.01)
+    mu, lam = elasticity.lame(200e9, 0.29)
+    assert elasticity.p_wave_speed(200e9, 0.29, 7850.0) == pytest.approx(
+        np.sqrt((lam + 2 * mu) / 7850.0)
+    )
+
+
+def test_a_confined_bar_shortens_by_the_p_wave_modulus():
+    strain = 1e-7
+    F = np.diag([1.0, 1.0, 1.0 - strain])[None]
+    for law in Law:
+        tau = elasticity.TAU[law](F, *constants(1))[0]
+        assert tau[2, 2] == pytest.approx(-(LAM + 2 * MU) * strain, rel=1e-6)
+        assert tau[0, 0] == pytest.approx(-LAM * strain, rel=1e-6)
