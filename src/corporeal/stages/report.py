@@ -1,0 +1,260 @@
+"""Report: one self-contained page that shows what was assumed, what happened, and how sure it is.
+
+The page holds its film and figures, so that it can be mailed. Every number carries the measured
+range it was chosen from and where that range was read.
+"""
+
+import base64
+import html
+from collections.abc import Mapping
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+from typing import Any
+
+from corporeal.types import Film, Ground, MaterialField, Particles, Parts, Scene, Treatment
+
+UNITS = {
+    "young": ("Young's modulus E", "Pa"),
+    "poisson": ("Poisson's ratio ν", ""),
+    "density": ("density ρ", "kg/m³"),
+    "yield_stress": ("yield stress σ_y", "Pa"),
+    "friction_angle": ("friction angle φ", "rad"),
+    "cohesion": ("cohesion c", "Pa"),
+    "hardening": ("hardening modulus H", "Pa"),
+    "friction": ("surface friction μ", ""),
+    "restitution": ("restitution e", ""),
+    "loss": ("loss factor η", ""),
+    "shell_thickness": ("wall thickness", "m"),
+}
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"))
+LAWS = {
+    "COROTATED": "fixed corotated",
+    "NEO_HOOKEAN": "Neo-Hookean",
+    "HENCKY": "Hencky",
+    "DRUCKER_PRAGER": "Hencky + Drucker–Prager",
+    "VON_MISES": "Hencky + von Mises",
+}
+WHO = {
+    "annotation": "your annotation",
+    "recording": "a recorded answer",
+    "model": "a model",
+    "metadata": "the file's own words",
+    "unknown": "nobody: a neutral stand-in",
+}
+
+
+@dataclass(frozen=True)
+class Story:
+    """Everything the page tells."""
+
+    scene: Scene
+    parts: Parts
+    field: MaterialField
+    particles: Particles
+    film: Film
+    audit: Mapping[str, Any]
+    figures: Mapping[str, Path]
+    """Caption → picture, in order."""
+    sources: Mapping[str, str]
+    """Citation key → where it was read."""
+    expectations: tuple[tuple[str, str, bool], ...] = ()
+    """What should be seen: sentence, measured value in words, whether it was."""
+
+
+def report(story: Story, path: Path) -> None:
+    """Write the page to ``path``."""
+    audit = story.audit
+    page = Template(files("corporeal.stages").joinpath("report.html").read_text(encoding="utf-8"))
+    text = page.substitute(
+        title=_safe(story.scene.name),
+        summary=_summary(story),
+        film=_data(story.film.path, "video/mp4"),
+        width=story.film.width,
+        figures="".join(_figure(caption, file) for caption, file in story.figures.items()),
+        verdict=_verdict(audit),
+        expectations=_expectations(story),
+        parts="".join(_part_row(story, k) for k in range(len(story.parts.catalogue))),
+        grounds="".join(_grounds(story, k) for k in range(len(story.parts.catalogue))),
+        audit=_audit_table(audit),
+        sources=_sources(story),
+        credits=_credits(story.scene),
+        settings=_settings(audit),
+    )
+    path.write_text(text, encoding="utf-8")
+
+
+# ---------------------------------------------------------------- sentences
+
+
+def _summary(story: Story) -> str:
+    scene, field = story.scene, story.field
+    things = ", ".join(_safe(o.name.replace("_", " ")) for o in scene.objects)
+    unknown = sum(w.answered_by == "unknown" for w in field.words)
+    asked = any(w.answered_by in ("model", "recording") for w in field.words)
+    sentences = [
+        f"{len(scene.objects)} object{'s' * (len(scene.objects) != 1)} ({things}), "
+        f"{len(field.materials)} part{'s' * (len(field.materials) != 1)}, "
+        f"{scene.duration:g} s simulated with {story.particles.count:,} particles.",
+        "A vision-language model chose the materials from pictures."
+        if asked
+        else "No vision-language model looked at pictures of this scene: materials come from "
+        "annotations and from the words in the file.",
+    ]
+    if unknown:
+        sentences.append(
+            f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got a "
+            "neutral stand-in material: name it with --annotations."
+        )
+    return " ".join(sentences)
+
+
+def _verdict(audit: Mapping[str, Any]) -> str:
+    warnings = list(audit.get("warnings", ()))
+    if not warnings:
+        return '<p class="good">The audit found nothing to warn about.</p>'
+    items = "".join(f"<li>{_safe(w)}</li>" for w in warnings)
+    return f'<div class="warn"><b>Read this before you trust the film.</b><ul>{items}</ul></div>'
+
+
+def _expectations(story: Story) -> str:
+    if not story.expectations:
+        return ""
+    rows = "".join(
+        f'<tr><td class="{"yes" if met else "no"}">{"✓" if met else "✗"}</td>'
+        f"<td>{_safe(sentence)}</td><td>{_safe(value)}</td></tr>"
+        for sentence, value, met in story.expectations
+    )
+    return f"<h2>What must be seen in this scene</h2><table>{rows}</table>"
+
+
+# ---------------------------------------------------------------- tables
+
+
+def _part_row(story: Story, k: int) -> str:
+    part, material = story.parts.catalogue[k], story.field.materials[k]
+    treatment, words = story.particles.treatments[k], story.field.words[k]
+    yields = "–" if material.yield_stress is None else si(material.yield_stress, "Pa")
+    cells = (
+        _safe(story.scene.objects[part.object].name),
+        _safe(part.name),
+        f"<b>{_safe(material.name)}</b>",
+        f"{WHO[words.answered_by]}",
+        LAWS[material.law.name],
+        si(material.young, "Pa"),
+        f"{material.poisson:.3g}",
+        f"{material.density:.4g}",
+        yields,
+        f"{story.particles.mass_real[k]:.3g}",
+        _safe(story.field.structures[k].kind),
+        _safe(treatment.kind),
+        simulated(treatment),
+    )
+    return "<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
+
+
+def simulated(treatment: Treatment) -> str:
+    """Say which Young's modulus was simulated, and how far it is from the real one."""
+    if treatment.kind == "rigid":
+        return "rigid"
+    ratio = treatment.young / treatment.young_real
+    factor = "as real" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × real"
+    return f"{si(treatment.young, 'Pa')} ({factor})"
+
+
+def _grounds(story: Story, k: int) -> str:
+    part, material = story.parts.catalogue[k], story.field.materials[k]
+    treatment, words = story.particles.treatments[k], story.field.words[k]
+    rows = "".join(
+        _ground_row(name, ground) for name, ground in material.grounds.items() if name in UNITS
+    )
+    fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
+    return (
+        f"<details><summary><b>{_safe(part.name)}</b> of "
+        f"{_safe(story.scene.objects[part.object].name)}: {_safe(material.name)}</summary>"
+        f"<p>{_safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})<br>"
+        f"{_safe(story.field.structures[k].reason)} {_safe(fill)}<br>{_safe(treatment.why)}</p>"
+        "<table><tr><th>quantity</th><th>value</th><th>place in the measured range</th>"
+        f"<th>chosen by</th><th>why</th><th>source</th></tr>{rows}</table></details>"
+    )
+
+
+def _ground_row(name: str, ground: Ground) -> str:
+    label, unit = UNITS[name]
+    low, high = ground.range.low, ground.range.high
+    place = 0.5 if high <= low else min(max((ground.value - low) / (high - low), 0), 1)
+    bar = f'<div class="bar"><i style="left:{place:.1%}"></i></div>'
+    return (
+        f"<tr><td>{label}</td><td>{si(ground.value, unit)}</td>"
+        f"<td>{si(low, unit)} {bar} {si(high, unit)}</td><td>{_safe(ground.chosen_by)}</td>"
+        f"<td>{_safe(ground.reason)}</td><td>{_safe(ground.range.source)}</td></tr>"
+    )
+
+
+AUDIT_ROWS = (
+    ("momentum_residual", "momentum not accounted for, relative", ".2g"),
+    ("energy_growth", "energy created, relative", ".2g"),
+    ("max_penetration_dx", "deepest penetration, in grid cells", ".2f"),
+    ("max_penetration_m", "deepest penetration [m]", ".2g"),
+    ("particles", "particles", ",d"),
+    ("steps", "time steps", ",d"),
+    ("dt_min", "smallest step [s]", ".2g"),
+    ("dt_max", "largest step [s]", ".2g"),
+    ("nan_count", "numbers that are not numbers", "d"),
+    ("particles_out_of_domain", "particles lost", "d"),
+)
+
+
+def _audit_table(audit: Mapping[str, Any]) -> str:
+    rows = [(label, audit.get(key), spec) for key, label, spec in AUDIT_ROWS]
+    return "".join(
+        f"<tr><td>{label}</td><td>{'–' if value is None else format(value, spec)}</td></tr>"
+        for label, value, spec in rows
+    )
+
+
+def _sources(story: Story) -> str:
+    used = sorted({g.range.source for m in story.field.materials for g in m.grounds.values()})
+    items = (f"<dt>{_safe(k)}</dt><dd>{_safe(story.sources.get(k, k))}</dd>" for k in used)
+    return "".join(items)
+
+
+def _credits(scene: Scene) -> str:
+    credits = dict.fromkeys(o.credit for o in scene.objects if o.credit)
+    return "".join(f"<li>{_safe(c)}</li>" for c in credits) or "<li>none stated in the files</li>"
+
+
+def _settings(audit: Mapping[str, Any]) -> str:
+    seconds = audit.get("seconds", {})
+    spent = ", ".join(f"{stage} {value:.1f} s" for stage, value in seconds.items())
+    memory = audit.get("peak_memory_mb")
+    peak = "" if memory is None else f" Peak memory {memory:,.0f} MB."
+    settings = ", ".join(f"{k} {_safe(str(v))}" for k, v in audit.get("settings", {}).items())
+    return f"{settings}.<br>Time: {spent}.{peak}"
+
+
+# ---------------------------------------------------------------- small things
+
+
+def si(value: float, unit: str) -> str:
+    """Write a number with three digits and an SI prefix where the unit takes one."""
+    if unit not in ("Pa", "m") or value == 0:
+        return f"{value:.3g} {unit}".strip()
+    for size, prefix in PREFIXES:
+        if abs(value) >= size * 0.9995:
+            return f"{value / size:.3g} {prefix}{unit}"
+    return f"{value:.3g} {unit}"
+
+
+def _safe(text: str) -> str:
+    return html.escape(str(text))
+
+
+def _data(path: Path, kind: str) -> str:
+    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
+
+
+def _figure(caption: str, path: Path) -> str:
+    image = f'<img src="{_data(path, "image/png")}" alt="{_safe(caption)}">'
+    return f"<figure>{image}<figcaption>{_safe(caption)}</figcaption></figure>"
