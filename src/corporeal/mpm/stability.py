@@ -1,0 +1,92 @@
+"""How fast waves run, how large a step that allows, and how far the step budget reaches."""
+
+from math import inf, log, sqrt
+
+COURANT = 0.4
+"""Fraction of a cell that a wave may cross in one step; the default of ``Problem.courant``."""
+
+POISSON_LIMIT = 0.49
+"""Nearly incompressible bodies are simulated at this Poisson's ratio, with their true μ."""
+
+
+def p_wave_speed(young: float, poisson: float, density: float) -> float:
+    """Longitudinal wave speed c_p [m/s] of an isotropic solid.
+
+    c_p = sqrt( E (1 - ν) / (ρ (1 + ν) (1 - 2ν)) )
+
+    It grows without bound as ν → 1/2. Source: Landau & Lifshitz, Theory of Elasticity, §22.
+
+    Args:
+        young: Young's modulus E [Pa].
+        poisson: Poisson's ratio ν [-], below 1/2.
+        density: Mass density ρ [kg/m³].
+
+    """
+    return sqrt(young * (1 - poisson) / (density * (1 + poisson) * (1 - 2 * poisson)))
+
+
+def young_from_speed(speed: float, poisson: float, density: float) -> float:
+    """Young's modulus [Pa] of the solid whose c_p is ``speed`` [m/s]: ``p_wave_speed`` inverted."""
+    return density * speed**2 * (1 + poisson) * (1 - 2 * poisson) / (1 - poisson)
+
+
+def bounded_poisson(young: float, poisson: float) -> tuple[float, float]:
+    """Cap the bulk modulus and keep the shear modulus: (E, ν) with ν ≤ 0.49 and the same μ.
+
+    μ = E / 2(1 + ν). Above ν = 0.49 steps shrink and quadratic splines lock, while μ, which
+    carries the shape, no longer changes.
+    """
+    bounded = min(poisson, POISSON_LIMIT)
+    return young * (1 + bounded) / (1 + poisson), bounded
+
+
+def stable_step(wave: float, motion: float, cell: float, courant: float = COURANT) -> float:
+    """Largest stable time step [s]: dt = s dx / (c_p + |v|) (Courant, Friedrichs, Lewy).
+
+    Args:
+        wave: Wave speed c_p [m/s].
+        motion: Largest particle speed |v| [m/s].
+        cell: Grid spacing dx [m].
+        courant: s [-].
+
+    """
+    speed = wave + motion
+    return courant * cell / speed if speed > 0 else inf
+
+
+def yield_speed(yield_stress: float | None, wave: float, density: float) -> float:
+    """Impact speed v_y = σ_y / (ρ c_p) [m/s] at which a plane impact on a rigid wall yields.
+
+    From σ = ρ c v behind an elastic front (Kolsky, Stress Waves in Solids, ch. 2).
+    """
+    return inf if yield_stress is None else yield_stress / (density * wave)
+
+
+def thin_wall(ratio: float) -> tuple[float, float, float]:
+    """Factors on (E, σ_y, ρ) for a wall simulated thicker than it is.
+
+    With r = t / t_num: E r³ keeps the bending stiffness E t³/12(1 - ν²), σ_y r² the moment of the
+    plastic hinge σ_y t²/4, ρ r the areal mass ρ t.
+    """
+    return ratio**3, ratio**2, ratio
+
+
+def compress_speed(speed: float, fastest: float, limit: float) -> float:
+    """Order-preserving compression of wave speeds [m/s] so that ``fastest`` becomes ``limit``.
+
+    Speeds up to the knee k = limit/2 stay; above it f(c) = k (c/k)^p with p chosen so that
+    f(fastest) = limit. f is continuous, strictly increasing and never above c.
+    """
+    knee = limit / 2
+    if fastest <= limit or speed <= knee:
+        return speed
+    return knee * (speed / knee) ** (log(2) / log(fastest / knee))
+
+
+def capped_young(young: float, poisson: float, density: float, cell: float) -> float:
+    """Apply the published cap on Young's modulus [Pa], kept as a baseline and control only.
+
+    E_sim = min(E, ρ (s dx/dt₀)² (1+ν)(1-2ν)/(1-ν)) with dt₀ = 1e-4 s and s = 0.5. The capped
+    value depends on ρ and ν alone, so the order of stiffness is lost.
+    """
+    return min(young, young_from_speed(0.5 * cell / 1e-4, poisson, density))

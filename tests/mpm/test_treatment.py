@@ -1,0 +1,207 @@
+"""What the treatment rule gives: the table of the physics page, and the rule's own promises."""
+
+from dataclasses import replace
+from itertools import pairwise
+from math import pi
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from corporeal.mpm.stability import compress_speed, p_wave_speed
+from corporeal.mpm.treatment import QUALITIES, Motion, PartGeometry, judge, plan
+from corporeal.types import Law, Material, Structure
+
+SOLID = Structure("solid")
+FALL = Motion(impact_speed=3.0, acceleration=9.81)
+
+RUBBER = Material("rubber", Law.COROTATED, 5e6, 0.49, 1100.0)
+STEEL = Material("steel", Law.VON_MISES, 200e9, 0.3, 7850.0, yield_stress=300e6)
+ALUMINIUM = Material("aluminium", Law.VON_MISES, 68e9, 0.34, 2700.0, yield_stress=40e6)
+CERAMIC = Material("ceramic", Law.HENCKY, 73e9, 0.22, 2550.0)
+TERRACOTTA = Material("terracotta", Law.HENCKY, 15e9, 0.2, 1900.0)
+WOOD = Material("wood", Law.HENCKY, 12e9, 0.38, 700.0)
+FOAM = Material("seat foam", Law.NEO_HOOKEAN, 50e3, 0.2, 30.0)
+SAND = Material("sand", Law.DRUCKER_PRAGER, 55e6, 0.3, 1600.0, friction_angle=0.58, cohesion=0.0)
+SNOW = Material("snow", Law.DRUCKER_PRAGER, 2e6, 0.2, 250.0, friction_angle=0.6, cohesion=1e3)
+MUD = Material("mud", Law.DRUCKER_PRAGER, 5e6, 0.35, 1700.0, friction_angle=0.4, cohesion=2e3)
+
+
+def shell(thickness):
+    return Structure("shell", thickness)
+
+
+def sphere(material, diameter, structure=SOLID, number=0):
+    return PartGeometry(
+        number, material, structure, (diameter,) * 3, pi / 6 * diameter**3, pi * diameter**2
+    )
+
+
+def cylinder(material, diameter, height, structure=SOLID, number=0):
+    size = tuple(sorted((diameter, diameter, height)))
+    area = pi * diameter * height + pi * diameter**2 / 2
+    return PartGeometry(number, material, structure, size, pi / 4 * diameter**2 * height, area)
+
+
+def block(material, a, b, c, number=0):
+    area = 2 * (a * b + b * c + c * a)
+    return PartGeometry(number, material, SOLID, tuple(sorted((a, b, c))), a * b * c, area)
+
+
+DUCK = PartGeometry(0, RUBBER, shell(0.002), (0.084, 0.110, 0.126), 397e-6, 0.030)
+CAN = cylinder(ALUMINIUM, 0.066, 0.115, shell(1e-4))
+VASE = PartGeometry(0, CERAMIC, shell(0.005), (0.188, 0.188, 0.281), 792e-6, 0.317)
+VASE_OUTSIDE = cylinder(CERAMIC, 0.188, 0.281, shell(0.005))
+FRAME = PartGeometry(0, WOOD, SOLID, (0.712, 0.788, 0.827), 0.0129, 1.2)
+BALL = sphere(RUBBER, 0.1)
+
+# name: part, wave speed [m/s] and substeps per second at 8 cells across; None: rigid.
+TABLE = {
+    "duck shell": (DUCK, 27, 6e3),
+    "drinks can": (CAN, 38, 12e3),
+    "mud": (block(MUD, 0.085, 0.4, 0.4), 69, 17e3),
+    "rubber ball, hollow": (sphere(RUBBER, 0.084, shell(0.003)), 40, 9e3),
+    "rubber ball, solid": (BALL, 279, 56e3),
+    "seat foam": (block(FOAM, 0.45, 0.6, 0.6), 44, 2e3),
+    "sand": (block(SAND, 0.33, 2, 2), 212, 13e3),
+    "snow": (block(SNOW, 0.241, 1.2, 1.2), 94, 8e3),
+    "ceramic vase": (VASE, None, None),
+    "ceramic vase, modelled by its outside": (VASE_OUTSIDE, None, None),
+    "hardwood frame": (FRAME, None, None),
+    "steel ball": (sphere(STEEL, 0.1), None, None),
+    "terracotta pot": (cylinder(TERRACOTTA, 0.307, 0.251, shell(0.012)), None, None),
+    "trunk": (cylinder(WOOD, 0.12, 1.0), None, None),
+}
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_the_rule_gives_what_the_physics_page_says_at_three_metres_per_second(name):
+    part, wave, _ = TABLE[name]
+    assert judge(part, FALL).rigid == (wave is None)
+
+
+@pytest.mark.parametrize("name", [n for n, row in TABLE.items() if row[1]])
+def test_true_stiffness_costs_the_steps_that_the_physics_page_says(name, monkeypatch):
+    part, wave, steps = TABLE[name]
+    generous = replace(QUALITIES["draft"], steps_per_second=1e9, particles=10**9)
+    monkeypatch.setitem(QUALITIES, "draft", generous)
+    (treatment,) = plan([part], [FALL], "draft").treatments
+    assert treatment.wave_speed == pytest.approx(wave, rel=0.25)
+    assert 1 / treatment.step == pytest.approx(steps, rel=0.35)
+    assert treatment.young <= treatment.young_real
+
+
+def test_a_can_yields_where_the_same_metal_hit_slower_does_not():
+    assert judge(CAN, FALL).yield_speed == pytest.approx(2.4, abs=0.1)
+
+
+def test_a_vase_of_ceramic_would_flex_fifteen_times_less_than_a_can():
+    vase, can = judge(VASE_OUTSIDE, FALL), judge(CAN, FALL)
+    assert vase.strain == pytest.approx(0.002, rel=0.25)
+    assert can.strain > 10 * vase.strain
+
+
+def test_loose_sand_is_never_rigid_even_at_rest():
+    part = block(SAND, 0.3, 1, 1)
+    assert not judge(part, Motion(0.0, 9.81)).rigid
+
+
+def test_a_thin_twig_is_not_called_rigid_by_its_wave_speed_alone():
+    twig = cylinder(WOOD, 0.004, 1.0)
+    assert not judge(twig, Motion(0.1, 9.81)).rigid
+    assert judge(cylinder(WOOD, 0.04, 1.0), Motion(0.1, 9.81)).rigid
+
+
+def test_the_verdict_depends_neither_on_detail_nor_on_company():
+    company = sphere(RUBBER, 0.3, number=1)
+    kinds = {
+        plan(parts, [FALL] * 2, detail).treatments[0].kind
+        for detail in QUALITIES
+        for parts in ([VASE_OUTSIDE], [VASE_OUTSIDE, company])
+    }
+    assert kinds == {"rigid"}
+
+
+def test_one_soft_part_makes_its_whole_object_deformable():
+    cushion = block(FOAM, 0.17, 0.6, 0.6)
+    frame, foam = plan([FRAME, cushion], [FALL], "draft").treatments
+    assert (frame.kind, foam.kind) == ("deformable", "deformable")
+    assert "by itself it would be rigid" in frame.why
+
+
+def test_a_thickened_wall_keeps_its_bending_stiffness_and_areal_mass():
+    (can,) = plan([CAN], [FALL], "draft").treatments
+    t, t_num = 1e-4, can.thickness
+    assert can.kind == "shell"
+    assert t_num == pytest.approx(2 * 0.066 / 8)
+    assert can.density * t_num == pytest.approx(2700 * t)
+    assert can.young * t_num**3 == pytest.approx(68e9 * t**3)
+    assert can.yield_stress * t_num**2 == pytest.approx(40e6 * t**2)
+
+
+def test_a_rigid_shell_keeps_its_mass():
+    (vase,) = plan([VASE_OUTSIDE], [FALL], "draft").treatments
+    assert vase.kind == "rigid"
+    assert vase.density * vase.thickness == pytest.approx(2550 * 0.005)
+
+
+def test_rubber_keeps_its_shear_modulus_when_its_bulk_is_capped():
+    tyre = replace(RUBBER, poisson=0.4999)
+    (ball,) = plan([sphere(tyre, 0.5)], [FALL], "fine").treatments
+    assert ball.poisson == 0.49
+    shear = ball.young / (2 * (1 + ball.poisson))
+    assert shear == pytest.approx(tyre.young / (2 * (1 + tyre.poisson)))
+
+
+def test_a_step_budget_keeps_the_order_of_stiffness_and_the_yield_speed():
+    copper = Material("copper", Law.VON_MISES, 110e9, 0.35, 8940.0, yield_stress=100e6)
+    parts = [sphere(m, 0.1, number=k) for k, m in enumerate((FOAM, RUBBER, WOOD, copper))]
+    foam, rubber, wood, copper_part = plan(
+        [*parts[:2], replace(parts[2], object=0), replace(parts[3], object=1)], [FALL] * 2, "draft"
+    ).treatments
+    assert foam.wave_speed < rubber.wave_speed < copper_part.wave_speed < wood.wave_speed
+    assert foam.young < rubber.young < wood.young < copper_part.young
+    assert foam.young == 50e3
+    assert copper_part.young < copper_part.young_real == 110e9
+    real = 100e6 / (8940 * p_wave_speed(110e9, 0.35, 8940))
+    assert copper_part.yield_stress / (8940 * copper_part.wave_speed) == pytest.approx(real)
+    steps = 1 / min(t.step for t in (foam, rubber, wood, copper_part))
+    assert steps == pytest.approx(QUALITIES["draft"].steps_per_second, rel=1e-6)
+
+
+@given(
+    st.lists(st.floats(0.1, 1e4), min_size=2, max_size=8, unique=True),
+    st.floats(0.2, 1e4),
+)
+def test_compression_is_monotone_and_never_stiffens(speeds, limit):
+    speeds = sorted(speeds)
+    squeezed = [compress_speed(c, speeds[-1], limit) for c in speeds]
+    assert all(a <= b for a, b in pairwise(squeezed))
+    assert all(s <= c * (1 + 1e-12) for s, c in zip(squeezed, speeds, strict=True))
+    assert squeezed[-1] <= limit * (1 + 1e-9)
+
+
+def test_the_published_cap_loses_the_order_of_stiffness():
+    tyre = replace(RUBBER, poisson=0.4999, young=20e6)
+    foam = Material("foam", Law.NEO_HOOKEAN, 5e6, 0.375, 30.0)
+    parts = [sphere(tyre, 0.125, number=0), sphere(foam, 0.125, number=1)]
+    rubber, soft = plan(parts, [FALL] * 2, "draft", "capped").treatments
+    assert rubber.young_real > soft.young_real
+    assert rubber.young < soft.young
+    assert rubber.young == pytest.approx(0.004e6, rel=0.1)
+
+
+@pytest.mark.parametrize("detail", QUALITIES)
+def test_the_grid_obeys_all_three_bounds(detail):
+    parts = [sphere(RUBBER, 0.02), block(FOAM, 0.8, 0.9, 1.0, number=1)]
+    found = plan(parts, [FALL] * 2, detail)
+    quality = QUALITIES[detail]
+    assert 1.0 / found.cell <= quality.cells_along * 1.001
+    assert 8 * 0.72 / found.cell**3 <= quality.particles
+    assert 0.02 / found.cell <= quality.cells_across * 1.001
+
+
+def test_a_scene_of_stones_still_gets_a_grid():
+    found = plan([sphere(STEEL, 0.1)], [FALL], "draft")
+    assert found.cell == pytest.approx(0.1 / 8)
+    assert found.treatments[0].step == float("inf")
