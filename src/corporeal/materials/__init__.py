@@ -1,0 +1,26 @@
+"""The measured library: what a material is like, in which range, and who measured it."""
+
+from corporeal.materials.contact import Friction, combine, friction_between, restitution_between
+from corporeal.materials.library import Entry, citation, find, library, read
+from corporeal.materials.lint import lint
+from corporeal.materials.quantities import QUANTITIES, Quantity, si
+from corporeal.materials.tables import markdown, show, table
+
+__all__ = [
+    "QUANTITIES",
+    "Entry",
+    "Friction",
+    "Quantity",
+    "citation",
+    "combine",
+    "find",
+    "friction_between",
+    "library",
+    "lint",
+    "markdown",
+    "read",
+    "restitution_between",
+    "show",
+    "si",
+    "table",
+]
