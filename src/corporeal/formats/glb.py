@@ -1,0 +1,248 @@
+"""Read a glTF 2.0 scene (.glb, .gltf) as a Scene: Z up, metres as in the file.
+
+Triangles, looks, names and extras are kept. Skins, animations and morphs are left at rest. Any
+file gives a scene or one ``BadFileError`` that names the place in the file.
+"""
+
+from collections import Counter
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from corporeal.formats.glb_extras import object_of_extras, scene_of_extras, written_by_us
+from corporeal.formats.gltf_document import Document, Entry
+from corporeal.formats.gltf_finishes import Wardrobe
+from corporeal.formats.gltf_nodes import Placed, walk
+from corporeal.formats.gltf_primitives import LARGEST_COORDINATE, Piece, read_primitive
+from corporeal.formats.words import everyday, numbered, safe, unique
+from corporeal.types import Scene, Surface
+
+Objects = Literal["auto", "one", "nodes"]
+READABLE = (
+    "KHR_materials_",
+    "KHR_texture_",
+    "KHR_lights_",
+    "EXT_texture_webp",
+    "KHR_mesh_quantization",
+    "KHR_draco_mesh_compression",
+    "KHR_xmp",
+)
+"""Beginnings of extensions that are understood, or that can be left out without changing shapes."""
+
+
+@dataclass(frozen=True)
+class _Shape:
+    """One placed primitive, before it is known to which object it belongs."""
+
+    node: int
+    name: str
+    finish: int
+    piece: Piece
+    extras: dict
+
+
+@dataclass(frozen=True)
+class Model:
+    """A scene as read, and whether its motion is the file's own word or a default."""
+
+    scene: Scene
+    ours: bool
+    """Our writer made the file: gravity, duration, velocities and pushes are stated in it."""
+
+
+def read_glb(path: Path, objects: Objects = "auto") -> Scene:
+    """Read one file.
+
+    Args:
+        path: A .glb or .gltf file; its companions must lie beside it.
+        objects: "one": the whole file is one object. "nodes": every node on the first level that
+            branches is one. "auto": the nodes that say their class in their extras, as our own
+            files do; without any, the whole file.
+
+    Raises:
+        BadFileError: The file cannot be used.
+
+    """
+    return read_model(path, objects).scene
+
+
+def read_model(path: Path, objects: Objects = "auto") -> Model:
+    """Do as ``read_glb``, and tell whether the file is one of our own."""
+    document = Document(Path(path))
+    _check_extensions(document)
+    tree = list(walk(document))
+    wardrobe = Wardrobe(document)
+    shapes = _shapes(document, tree, wardrobe)
+    if not shapes:
+        document.root.fail(
+            "the scene holds no triangles.", "Export a mesh; points, lines and splats are not used."
+        )
+    owner = _owners(tree, {s.node for s in shapes}, objects)
+    scene = _scene(document, tree, shapes, owner)
+    finishes, warnings = tuple(wardrobe.finishes), tuple(document.warnings)
+    return Model(replace(scene, finishes=finishes, warnings=warnings), written_by_us(document))
+
+
+def _check_extensions(document: Document) -> None:
+    for name in document.required:
+        if not name.startswith(READABLE) and "meshopt" not in name:
+            document.root.fail(
+                f"the file needs the extension {name[:60]!r}, which is not supported.",
+                "Export it without that extension.",
+            )
+
+
+def _shapes(document: Document, tree: list[Placed], wardrobe: Wardrobe) -> list[_Shape]:
+    meshes: dict[str, list[tuple[int, Piece]]] = {}
+    shapes = []
+    if document.root.has("animations"):
+        document.warn("is animated; its rest pose is used.")
+    for placed in tree:
+        mesh = placed.node.refer("mesh", "meshes")
+        if mesh is None:
+            continue
+        if placed.node.has("skin"):
+            document.warn("is skinned; its skeleton is ignored and the mesh stands as modelled.")
+        if mesh.pointer not in meshes:
+            meshes[mesh.pointer] = _pieces(mesh, wardrobe)
+        name = _name(placed.node, mesh)
+        extras = placed.node.value.get("extras")
+        for finish, piece in meshes[mesh.pointer]:
+            document.spend(placed.node, len(piece.vertices) + len(piece.triangles))
+            posed = _posed(piece, placed)
+            kept = dict(extras) if isinstance(extras, dict) else {}
+            shapes.append(_Shape(placed.number, name, finish, posed, kept))
+    return shapes
+
+
+def _pieces(mesh: Entry, wardrobe: Wardrobe) -> list[tuple[int, Piece]]:
+    name = mesh.text("name")[:80] or mesh.pointer
+    pieces = []
+    for primitive in mesh.children("primitives"):
+        finish, dress = wardrobe.dress(primitive)
+        piece = read_primitive(primitive, name, dress)
+        if piece is not None:
+            pieces.append((finish, piece))
+    return pieces
+
+
+def _name(node: Entry, mesh: Entry) -> str:
+    """Return the name that says most: the node's, unless only the mesh's has an everyday word."""
+    own, other = node.text("name"), mesh.text("name")
+    if everyday(own) or not everyday(other):
+        return safe(own) or safe(other) or "surface"
+    return safe(other)
+
+
+def _posed(piece: Piece, placed: Placed) -> Piece:
+    """Return the piece in the world; a mirrored one keeps its outside out."""
+    with np.errstate(all="ignore"):
+        linear, shift = placed.world_from_node[:3, :3], placed.world_from_node[:3, 3]
+        vertices = piece.vertices @ linear.T + shift
+        mirrored = np.linalg.det(linear) < 0
+        if not np.all(np.abs(vertices) < LARGEST_COORDINATE):
+            placed.node.fail("its transform moves the mesh out of any reasonable place.")
+    return Piece(
+        vertices,
+        piece.triangles[:, ::-1] if mirrored else piece.triangles,
+        _turned(piece.normals, linear),
+        piece.uv,
+        piece.colours,
+    )
+
+
+def _turned(normals: np.ndarray | None, linear: np.ndarray) -> np.ndarray | None:
+    """Return unit normals under a linear map (its cofactors); None where they are not unit."""
+    if normals is None:
+        return None
+    a, b, c = linear.T
+    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
+    turned = normals @ (cofactors * np.sign(np.linalg.det(linear) or 1.0)).T
+    length = np.linalg.norm(turned, axis=1, keepdims=True)
+    if not (length > 1e-12).all():
+        return None
+    # Normals that are unit already pass unrounded, so that reading what we wrote changes nothing.
+    return turned if np.allclose(length, 1, atol=1e-4) else turned / length
+
+
+def _owners(tree: list[Placed], shaped: set[int], objects: Objects) -> dict[int, int]:
+    """Return, for each node with triangles, the node that is its object; -1: the whole file."""
+    if objects == "one":
+        return dict.fromkeys(shaped, -1)
+    heads = _branches(tree, shaped) if objects == "nodes" else _declared(tree)
+    owner: dict[int | None, int] = {None: -1}
+    for p in tree:
+        above = owner[p.parent]
+        owner[p.number] = p.number if above < 0 and p.number in heads else above
+    found = {k: owner[k] for k in shaped}
+    if set(found.values()) == {-1}:
+        return found
+    # What hangs outside every object becomes one of its own, node by node.
+    return {k: (k if o < 0 else o) for k, o in found.items()}
+
+
+def _declared(tree: list[Placed]) -> set[int]:
+    """Return the nodes whose extras name a class."""
+    extras = {p.number: p.node.value.get("extras") for p in tree}
+    return {k for k, e in extras.items() if isinstance(e, dict) and isinstance(e.get("class"), str)}
+
+
+def _branches(tree: list[Placed], shaped: set[int]) -> set[int]:
+    """Return the nodes on the first level, from the root down, where the shapes part ways."""
+    below = Counter()
+    for p in reversed(tree):
+        below[p.number] += p.number in shaped
+        if p.parent is not None:
+            below[p.parent] += below[p.number]
+    children: dict[int | None, list[int]] = {}
+    for p in tree:
+        if below[p.number]:
+            children.setdefault(p.parent, []).append(p.number)
+    level = children.get(None, [])
+    while len(level) == 1 and level[0] not in shaped:
+        level = children.get(level[0], [])
+    return set(level)
+
+
+def _scene(
+    document: Document, tree: list[Placed], shapes: list[_Shape], owner: dict[int, int]
+) -> Scene:
+    """Gather the shapes under their objects, in the file's order."""
+    nodes: dict[int, Entry | None] = {-1: None} | {p.number: p.node for p in tree}
+    groups: dict[int, list[_Shape]] = {}
+    for shape in shapes:
+        groups.setdefault(owner[shape.node], []).append(shape)
+    things = [object_of_extras(document, nodes[h], _extent(g)) for h, g in groups.items()]
+    counted = numbered([t.class_name for t in things])
+    names = unique([t.name or n for t, n in zip(things, counted, strict=True)])
+    return Scene(
+        name=safe(document.path.stem) or "scene",
+        source=str(document.path),
+        objects=tuple(replace(t, name=n) for t, n in zip(things, names, strict=True)),
+        surfaces=tuple(_surface(s, k) for k, g in enumerate(groups.values()) for s in g),
+        finishes=(),
+        **scene_of_extras(document, tree[0].node),
+    )
+
+
+def _extent(shapes: list[_Shape]) -> float:
+    low = np.min([s.piece.vertices.min(axis=0) for s in shapes], axis=0)
+    high = np.max([s.piece.vertices.max(axis=0) for s in shapes], axis=0)
+    return float(np.max(high - low))
+
+
+def _surface(shape: _Shape, k: int) -> Surface:
+    piece = shape.piece
+    return Surface(
+        name=shape.name,
+        object=k,
+        finish=shape.finish,
+        vertices=piece.vertices,
+        triangles=np.ascontiguousarray(piece.triangles),
+        normals=piece.normals,
+        uv=piece.uv,
+        colours=piece.colours,
+        extras=shape.extras,
+    )

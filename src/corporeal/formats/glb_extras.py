@@ -1,0 +1,103 @@
+"""What a glTF file says in ``extras``: anybody's class and size, and our own files' motion."""
+
+import math
+
+from corporeal.formats.glb_writer import GENERATOR
+from corporeal.formats.gltf_document import Document, Entry
+from corporeal.formats.words import everyday, safe
+from corporeal.types import Push, SceneObject
+
+NO_MOTION = (0.0, 0.0, 0.0)
+
+
+def written_by_us(document: Document) -> bool:
+    """Tell whether the extras mean what our writer means by them."""
+    asset = document.root.child("asset")
+    return asset is not None and asset.text("generator") == GENERATOR
+
+
+def scene_of_extras(document: Document, root: Entry) -> dict:
+    """Return gravity, duration and fps of a file of ours; empty for other files."""
+    if not written_by_us(document) or not isinstance(root.value.get("extras"), dict):
+        return {}
+    extras = root.needed("extras")
+    return {
+        "gravity": extras.numbers("gravity_m_s2", (0.0, 0.0, -9.81)),
+        "duration": extras.number("duration_s", 2.0),
+        "fps": extras.whole("fps", 60, most=1000) or 60,
+    }
+
+
+def object_of_extras(document: Document, head: Entry | None, extent: float) -> SceneObject:
+    """Return an object as its node describes it; ``head`` None: the whole file is the object.
+
+    A name stays empty where the file gives none of use; the extent is the mesh's own [m].
+    """
+    extras = _extras(document, head)
+    asset = document.root.child("asset")
+    copyright = asset.text("copyright") if asset else ""
+    real = _real_extent(extras) or extent
+    ours = written_by_us(document)
+    return SceneObject(
+        name=safe(head.text("name")) if head and extras.text("class") else "",
+        class_name=_class(document, head, extras),
+        real_extent=real,
+        scale=extent / real if real > 0 else 1.0,
+        velocity=_vector(extras.numbers("velocity_m_s", NO_MOTION)) if ours else NO_MOTION,
+        push=_push(extras) if ours else None,
+        source=extras.text("source") or str(document.path),
+        credit=(extras.text("credit") or copyright)[:500],
+    )
+
+
+def _extras(document: Document, head: Entry | None) -> Entry:
+    if head is not None and isinstance(head.value.get("extras"), dict):
+        return head.needed("extras")
+    return Entry(document, {}, head.pointer if head else "")
+
+
+def _class(document: Document, head: Entry | None, extras: Entry) -> str:
+    said = " ".join(extras.text("class").split())[:60]
+    if said:
+        return said
+    stem = everyday(document.path.stem)
+    if head is None:
+        return stem or _first_word(document) or "object"
+    return everyday(head.text("name")) or _mesh_word(head) or stem or "object"
+
+
+def _mesh_word(node: Entry) -> str:
+    mesh = node.refer("mesh", "meshes")
+    return everyday(mesh.text("name")) if mesh else ""
+
+
+def _first_word(document: Document) -> str:
+    """Return the first everyday word among nodes and meshes, for a file called scene.glb."""
+    for group in ("nodes", "meshes"):
+        for entry in document.entries(group):
+            if everyday(entry.text("name")):
+                return everyday(entry.text("name"))
+    return ""
+
+
+def _real_extent(extras: Entry) -> float | None:
+    """Return the largest stated extent [m]; a nonsensical one counts as not stated."""
+    said = extras.value.get("real_extent_m")
+    values = said if isinstance(said, list) else [said]
+    numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
+    good = [float(x) for x in numbers if 0 < x < 1e6]
+    return max(good) if good and len(good) == len(values) else None
+
+
+def _push(extras: Entry) -> Push | None:
+    push = extras.child("push")
+    if push is None:
+        return None
+    end = math.inf if push.value.get("end_s") is None else push.number("end_s", 0.0)
+    acceleration = _vector(push.numbers("acceleration_m_s2", NO_MOTION))
+    return Push(acceleration, push.number("start_s", 0.0), end)
+
+
+def _vector(numbers: tuple[float, ...]) -> tuple[float, float, float]:
+    x, y, z = numbers
+    return (x, y, z)

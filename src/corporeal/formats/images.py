@@ -1,0 +1,60 @@
+"""Pictures from untrusted bytes."""
+
+import io
+import warnings
+
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image, ImageFile
+
+FORMATS = ("PNG", "JPEG", "WEBP")
+MAX_PIXELS = 2**27
+"""A picture that claims more is refused before it is unpacked."""
+MAX_SIDE = 4096
+"""Larger pictures are halved until they fit; nobody renders more of one object [px]."""
+
+
+def decode_image(data: bytes) -> UInt8[np.ndarray, "H W C"]:
+    """Return a PNG, JPEG or WebP picture as sRGB, or sRGB with alpha where it has some.
+
+    Raises:
+        ValueError: The bytes are no such picture, or it is broken or absurdly large.
+
+    """
+    if not data:
+        raise ValueError("the picture is empty (0 bytes)")
+    try:
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")
+            return _decode(data)
+    except Image.DecompressionBombError:
+        raise ValueError("the picture claims more pixels than any texture has") from None
+    except MemoryError:
+        raise ValueError("the picture does not fit into memory") from None
+    except ValueError:
+        raise
+    except Exception as problem:  # Pillow's decoders raise almost anything on broken input
+        raise ValueError(f"the picture is broken ({str(problem)[:80]})") from None
+
+
+def _decode(data: bytes) -> np.ndarray:
+    with Image.open(io.BytesIO(data), formats=FORMATS) as picture:
+        if picture.width * picture.height > MAX_PIXELS:
+            size = f"{picture.width} × {picture.height}"
+            raise ValueError(f"the picture claims {size} pixels, too many to unpack")
+        picture.load()
+        return np.array(_eight_bit(_small(picture)), dtype=np.uint8)
+
+
+def _small(picture: ImageFile.ImageFile) -> Image.Image:
+    factor = 1
+    while max(picture.size) > factor * MAX_SIDE:
+        factor *= 2
+    return picture if factor == 1 else picture.reduce(factor)
+
+
+def _eight_bit(picture: Image.Image) -> Image.Image:
+    if picture.mode.startswith("I"):  # 16 bits a pixel: Pillow would clip instead of scaling
+        return Image.fromarray((np.asarray(picture) >> 8).astype(np.uint8)).convert("RGB")
+    alpha = "A" in picture.mode or "transparency" in picture.info
+    return picture.convert("RGBA" if alpha else "RGB")

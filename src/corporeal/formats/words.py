@@ -1,0 +1,53 @@
+"""Everyday words out of file, node and mesh names."""
+
+import re
+
+VENDORS = frozenset(
+    "khronos smallhouse kenney gazebo kaolin polyhaven market gso playcanvas bullet aws robomaker "
+    "residential sketchfab ycb objaverse abo chefmate google scanned collada blender maya".split()
+)
+"""Where models come from says nothing about what they are."""
+FILLERS = frozenset(
+    "notex visual textured texture model mesh meshes scene root node object obj geometry geom lib "
+    "lowpoly lp low poly high hp lod final copy export untitled default material mat group fbx dae "
+    "gltf glb draft version defaultmaterial rootnode nonetype the a an of by".split()
+)
+
+
+def everyday(name: str) -> str:
+    """Return the words of a name that say what a thing is: "soda can coke"; may be empty."""
+    name = re.sub(r"\.[A-Za-z0-9]{2,4}$", "", name)
+    name = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", name)
+    words = [w.lower() for w in re.split(r"[^A-Za-zÀ-ÿ]+", name)]
+    kept = [w for w in words if len(w) > 1 and w not in VENDORS and w not in FILLERS]
+    return " ".join(kept)[:60].strip()
+
+
+def safe(name: str) -> str:
+    """Return a name that can stand in a path or a table: word characters, spaces, dots, dashes."""
+    kept = re.sub(r"[^\w .()-]+", "_", name).strip(" .")
+    return kept[:80]
+
+
+def unique(names: list[str]) -> list[str]:
+    """Return the names, later doubles numbered, so that each occurs once."""
+    taken: set[str] = set()
+    result = []
+    for name in names:
+        k, fresh = 1, name
+        while fresh in taken:
+            fresh, k = f"{name}_{k}", k + 1
+        taken.add(fresh)
+        result.append(fresh)
+    return result
+
+
+def numbered(classes: list[str]) -> list[str]:
+    """Return a node name ``<class>_<k>`` for each class, k counting within the class."""
+    counts: dict[str, int] = {}
+    names = []
+    for words in classes:
+        stem = safe(words).replace(" ", "_") or "object"
+        k = counts[stem] = counts.get(stem, -1) + 1
+        names.append(f"{stem}_{k}")
+    return unique(names)
