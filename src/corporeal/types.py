@@ -36,6 +36,8 @@ class Finish:
     """Emitted light as a multiple of the base colour."""
     alpha_mode: Literal["OPAQUE", "MASK", "BLEND"] = "OPAQUE"
     alpha_cutoff: float = 0.5
+    translucency: float = 0.0
+    """Share of the diffuse light that comes through from behind: leaves, lampshades."""
 
 
 @dataclass(frozen=True)

@@ -1,0 +1,125 @@
+"""Where the picture is taken from: automatic placement above the floor."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.types import Vector
+
+VIEW: Vector = (0.80, -0.62, 0.36)
+"""Three-quarter view: things face +x."""
+FILL = 0.84
+"""Share of the picture that the motion takes at most."""
+
+
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole that looks at a target, +z up in the picture."""
+
+    eye: Vector
+    """[m]"""
+    target: Vector
+    """[m]"""
+    field_of_view: float = 30.0
+    """Vertical [deg]."""
+    width: int = 640
+    height: int = 480
+
+
+def axes(view: Sequence[float] | np.ndarray) -> Float[np.ndarray, "3 3"]:
+    """Rows: right, up and back of a camera that stands in direction ``view`` from its target."""
+    back = np.asarray(view, dtype=float)
+    back = back / np.linalg.norm(back)
+    right = np.cross([0.0, 0.0, 1.0], back)
+    if np.linalg.norm(right) < 1e-6:
+        right = np.array([0.0, 1.0, 0.0])
+    right /= np.linalg.norm(right)
+    return np.stack([right, np.cross(back, right), back])
+
+
+def place(
+    boxes: Float[np.ndarray, "F B 2 3"],
+    size: tuple[int, int],
+    view: Vector | None = None,
+    fill: float = FILL,
+) -> Camera:
+    """See every box of every frame, as large as the picture allows.
+
+    boxes: lower and upper corners [m] of B objects in F frames; nan where an object is absent.
+    The direction is ``view`` where given, else the one near ``VIEW`` in which the objects hide
+    each other least.
+    """
+    corners = _corners(boxes)
+    direction = _above(view) if view is not None else _clearest(corners)
+    points = corners.reshape(-1, 3)
+    points = points[np.isfinite(points).all(axis=1)]
+    if len(points) == 0:
+        points = np.zeros((1, 3))
+    frame = axes(direction)
+    local = points @ frame.T
+    tangent = np.tan(np.radians(15.0)) * np.array([size[0] / size[1], 1.0]) * fill
+    centre, distance = _fit(local, tangent)
+    target = centre @ frame
+    eye = target + distance * frame[2]
+    return Camera(tuple(eye.tolist()), tuple(target.tolist()), 30.0, *size)
+
+
+def _fit(local: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, float]:
+    """Target (camera axes) and distance at which all points lie inside the view pyramid.
+
+    Each side of the pyramid is a plane that must touch the points: |x - cx| ≤ (c + D - z) tan.
+    """
+    left, right = (sign * local[:, :2] + tangent * local[:, 2:] for sign in (-1, 1))
+    low, high = left.max(axis=0), right.max(axis=0)
+    centre = (high - low) / 2
+    depth = ((high + low) / 2 / tangent).max()
+    middle = (local[:, 2].min() + local[:, 2].max()) / 2
+    extent = max(float(np.ptp(local, axis=0).max()), 1e-9)
+    nearest = local[:, 2].max() + 0.05 * extent
+    return np.array([centre[0], centre[1], middle]), max(depth, nearest) - middle
+
+
+def _above(view: Vector) -> np.ndarray:
+    """Lift the wished direction so that the eye stays above the floor."""
+    v = np.asarray(view, dtype=float)
+    length = np.linalg.norm(v)
+    v = v / length if length > 0 and np.isfinite(length) else np.asarray(VIEW)
+    return np.array([v[0], v[1], max(v[2], 0.12)])
+
+
+def _corners(boxes: np.ndarray) -> np.ndarray:
+    """(F, B, 8, 3)."""
+    pick = (np.arange(8)[:, None] >> np.arange(3)) & 1
+    return boxes[:, :, pick, np.arange(3)]
+
+
+def _clearest(corners: np.ndarray) -> np.ndarray:
+    """Turn about the vertical in steps until the objects stand beside each other."""
+    best, least = np.asarray(VIEW), np.inf
+    for turn in (0, -25, 25, -50, 50):
+        angle = np.radians(turn)
+        c, s = np.cos(angle), np.sin(angle)
+        view = np.array([c * VIEW[0] - s * VIEW[1], s * VIEW[0] + c * VIEW[1], VIEW[2]])
+        cost = _overlap(corners @ axes(view)[:2].T) + 0.06 * abs(turn) / 25
+        if cost < least - 1e-9:
+            best, least = view, cost
+    return best
+
+
+def _overlap(flat: np.ndarray) -> float:
+    """Mean share of an object's rectangle in the picture that another one covers."""
+    low, high = flat.min(axis=2), flat.max(axis=2)
+    count = low.shape[1]
+    shares = []
+    for i in range(count):
+        for j in range(i + 1, count):
+            both = np.minimum(high[:, i], high[:, j]) - np.maximum(low[:, i], low[:, j])
+            area = np.clip(both, 0, None).prod(axis=-1)
+            small = np.minimum(
+                (high[:, i] - low[:, i]).prod(axis=-1), (high[:, j] - low[:, j]).prod(axis=-1)
+            )
+            shares.append(area / np.maximum(small, 1e-12))
+    shares = [s[np.isfinite(s)] for s in shares]
+    return float(np.mean(np.concatenate(shares))) if shares and sum(map(len, shares)) else 0.0

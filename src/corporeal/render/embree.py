@@ -1,0 +1,331 @@
+"""A ray caster on Embree: sun with soft shadow, sky with occlusion, one reflection, endless floor.
+
+The picture is cast in bands of rows, each on its own from rays to colours, so that bands share
+nothing and run in threads (Embree and the compiled loops release Python's lock). Linear light
+throughout; a filmic curve and sRGB at the end.
+"""
+
+import os
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from embreex.mesh_construction import TriangleMesh
+from embreex.rtcore_scene import EmbreeScene
+
+from corporeal.render import kernels, kernels_light
+from corporeal.render.camera import Camera, axes
+from corporeal.render.kernels import NOTHING, Samples
+from corporeal.render.kernels_light import CHANNELS, GLOSSY, SHARP, Lamps
+from corporeal.render.look import Look, linear, pack, positions, sees_through, vertex_normals
+from corporeal.types import Scene
+
+Quality = Literal["draft", "normal", "fine"]
+BAND = 32
+"""Rows of pixels cast together, at least: bands overlap by a dozen."""
+LAYERS = 4
+"""Of see-through surfaces, one behind the other."""
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How many rays."""
+
+    grid: int
+    """Samples a pixel: grid × grid."""
+    every: int
+    """Light is asked for at every so-many-th sample in each direction."""
+    sky: int
+    """Rays to the sky where light is asked for."""
+
+
+SAMPLING: dict[str, Sampling] = {
+    "draft": Sampling(2, 2, 3),
+    "normal": Sampling(2, 1, 2),
+    "fine": Sampling(3, 1, 4),
+}
+
+
+@dataclass(frozen=True)
+class Light:
+    """The studio. Colours are light, or sRGB where they are written in hex."""
+
+    sun: tuple[float, float, float] = (-0.69, -0.41, 0.90)
+    """Towards the sun, as seen from the camera: right, ahead, up."""
+    sun_colour: tuple[float, float, float] = (3.0, 2.75, 2.4)
+    softness: float = 0.07
+    zenith: tuple[float, float, float] = (0.62, 0.74, 0.95)
+    horizon: tuple[float, float, float] = (1.0, 0.96, 0.90)
+    floor: str = "#c4bbae"
+    backdrop: tuple[str, str] = ("#bccbdb", "#efe9e0")
+
+
+class Stage:
+    """A scene's surfaces, ready to be hit; ``pose`` moves them."""
+
+    def __init__(self, scene: Scene, light: Light | None = None) -> None:
+        self.look: Look = pack(scene)
+        self.light = light or Light()
+        rest = positions(scene)
+        rest = np.where(np.isfinite(rest), rest, 0.0)
+        low, high = (f(rest, axis=0) if len(rest) else np.zeros(3) for f in (np.min, np.max))
+        self.size = max(float(np.linalg.norm(high - low)), 1e-9)
+        self.origin = np.array([*(low + high)[:2] / 2, 0.0])
+        self.centre = ((low + high) / 2 - self.origin).astype(np.float32)
+        self.see_through = sees_through(self.look)
+        self.pose(rest, vertex_normals(scene))
+
+    def pose(self, vertices: np.ndarray, normals: np.ndarray) -> None:
+        """Stand like this from now on: vertices (V, 3) [m] and unit normals (V, 3)."""
+        local = np.nan_to_num(vertices - self.origin, nan=0.0, posinf=0.0, neginf=0.0)
+        self.normals = np.ascontiguousarray(normals, dtype=np.float32)
+        local = np.ascontiguousarray(local, dtype=np.float32)
+        if hasattr(self, "vertices") and np.array_equal(local, self.vertices):
+            return
+        self.vertices = local
+        self.scene = EmbreeScene()
+        if len(self.look.triangles):
+            TriangleMesh(self.scene, self.vertices, self.look.triangles)
+        self.hit(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+
+    def hit(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, ...]:
+        """Nearest triangle (-1: none), barycentric u, v and distance of each ray."""
+        if not len(self.look.triangles) or not len(o):
+            none = np.zeros(len(o), np.float32)
+            return np.full(len(o), -1, np.int32), none, none, none
+        r = self.scene.run(o, d, output=True)
+        return r["primID"], r["u"], r["v"], r["tfar"]
+
+    def free(self, o: np.ndarray, d: np.ndarray, ray: np.ndarray) -> np.ndarray:
+        """Whether each ray gets away; holes and glass let it through (by ``ray``'s fixed dice)."""
+        if not len(self.look.triangles) or not len(o):
+            return np.ones(len(o), np.bool_)
+        if not self.see_through:
+            return self.scene.run(o, d, query="OCCLUDED") < 0
+        free = np.zeros(len(o), np.bool_)
+        alive = np.arange(len(o))
+        for depth in range(2 * LAYERS):
+            prim, u, v, t = self.hit(o, d)
+            free[alive[prim < 0]] = True
+            on = kernels.passes(self.look, prim, u, v, ray[alive], depth)
+            if not on.any():
+                break
+            o = _beyond(o[on], d[on], t[on], self.size)
+            d, alive = np.ascontiguousarray(d[on]), alive[on]
+        return free
+
+
+def render(
+    stage: Stage, camera: Camera, quality: Quality = "normal", threads: int | None = None
+) -> np.ndarray:
+    """One picture (height, width, 3) uint8. Equal input gives equal bytes."""
+    job = _Job(stage, camera, SAMPLING[quality])
+    out = np.empty((camera.height, camera.width, 3), np.uint8)
+    threads = threads or os.cpu_count() or 1
+    band = max(BAND, -(-camera.height // (2 * threads)))
+    rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(lambda r: job.band(r, out), rows):
+            pass
+    return out
+
+
+def identify(stage: Stage, camera: Camera, grid: int = 1) -> tuple[np.ndarray, np.ndarray]:
+    """For each sample, the triangle it sees (-1: none) and its depth [m]; rows first."""
+    job = _Job(stage, camera, Sampling(grid, 1, 1))
+    o, d = job.rays((0, camera.height))
+    prim, _, _, t = stage.hit(o, d)
+    shape = camera.height * grid, camera.width * grid
+    return prim.reshape(shape), t.reshape(shape)
+
+
+def _beyond(o: np.ndarray, d: np.ndarray, t: np.ndarray, size: float) -> np.ndarray:
+    return np.ascontiguousarray(o + (t + np.float32(2e-5 * size))[:, None] * d, dtype=np.float32)
+
+
+def lamps(stage: Stage, camera: Camera) -> Lamps:
+    """Turn the studio with the camera: the sun stands at the same side of every picture."""
+    light = stage.light
+    back = np.subtract(camera.eye, camera.target)
+    right, _, _ = axes(back)
+    ahead = np.array([-right[1], right[0], 0.0])
+    sun = light.sun[0] * right + light.sun[1] * ahead + [0, 0, light.sun[2]]
+
+    def colour(text: str) -> np.ndarray:
+        return linear(np.array([int(text[k : k + 2], 16) for k in (1, 3, 5)]) / 255)
+
+    f = np.float32
+    return Lamps(
+        sun=(sun / np.linalg.norm(sun)).astype(f),
+        side=right.astype(f),
+        sun_colour=np.array(light.sun_colour, f),
+        softness=light.softness,
+        zenith=np.array(light.zenith, f),
+        horizon=np.array(light.horizon, f),
+        floor=np.array([*colour(light.floor), 0.0], f),
+        backdrop=np.array([colour(c) for c in light.backdrop], f),
+        size=stage.size,
+        centre=stage.centre,
+    )
+
+
+class _Job:
+    """One picture being taken."""
+
+    def __init__(self, stage: Stage, camera: Camera, sampling: Sampling) -> None:
+        self.stage, self.camera, self.sampling = stage, camera, sampling
+        self.frame = axes(np.subtract(camera.eye, camera.target))
+        self.eye = np.subtract(camera.eye, stage.origin)
+        self.tangent = float(np.tan(np.radians(camera.field_of_view) / 2))
+        self.lamps = lamps(stage, camera)
+        self.pixel = 2 * self.tangent / (camera.height * sampling.grid)
+
+    def rays(self, rows: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
+        size = self.camera.width, self.camera.height
+        return kernels.rays(self.eye, self.frame, self.tangent, size, rows, self.sampling.grid)
+
+    def band(self, rows: tuple[int, int], out: np.ndarray) -> None:
+        """Cast some rows with as many more above and below as the light filter looks at."""
+        grid, every = self.sampling.grid, self.sampling.every
+        height, width = self.camera.height, self.camera.width
+        halo = -(-6 * every // grid)
+        wide = max(rows[0] - halo, 0), min(rows[1] + halo, height)
+        o, d = self.rays(wide)
+        light = np.empty((len(o), 3), np.float32)
+        kernels_light.backdrop(self.lamps, wide, height, width, grid, light)
+        shape = (wide[1] - wide[0]) * grid, width * grid
+        hit = self.stage.hit(o, d)
+        looked = kernels.worth(hit[0], shape, every)
+        index = np.flatnonzero(looked)
+        hit = tuple(x[index] for x in hit)
+        self.layer((o, d), index, (wide[0] * grid, *shape), light, hit)
+        kernels.fill(light, looked, shape, every)
+        line = width * grid * grid
+        mine = light[(rows[0] - wide[0]) * line : (rows[1] - wide[0]) * line]
+        kernels_light.develop(mine, rows, (width, height), grid, out)
+
+    def layer(
+        self,
+        rays: tuple[np.ndarray, np.ndarray],
+        index: np.ndarray,
+        place: tuple[int, int, int],
+        light: np.ndarray,
+        hit: tuple[np.ndarray, ...],
+        depth: int = 0,
+    ) -> None:
+        """Shade what rays ``index`` (origins, directions) hit, over what is behind, into light.
+
+        place: first row of samples, rows, columns.
+        """
+        o, d = rays
+        s = self.meet(o, d, index, hit)
+        thin = index[s.traits[index, 4] < 1]
+        if len(thin) and depth < LAYERS:
+            behind = _beyond(s.point[thin], d[thin], np.zeros(1, np.float32), self.stage.size)
+            start = np.zeros_like(o)
+            start[thin] = behind
+            beyond = self.stage.hit(behind, d[thin])
+            self.layer((start, d), thin, place, light, beyond, depth + 1)
+        on = index[s.kind[index] != NOTHING]
+        arriving = self.gather(s, d, on, place)
+        near = np.zeros_like(light)
+        kernels_light.shade(s, on, d, arriving, self.lamps, near)
+        kernels_light.blend(s, on, near, self.lamps, light)
+
+    def meet(
+        self, o: np.ndarray, d: np.ndarray, index: np.ndarray, hit: tuple[np.ndarray, ...]
+    ) -> Samples:
+        """First surface that is not a hole."""
+        stage, s = self.stage, kernels.samples(len(o))
+        o, e = o[index], d[index]
+        walked = np.zeros(len(index), np.float32)
+        for _ in range(4 * LAYERS):
+            prim, u, v, t = hit
+            kernels.meet(
+                stage.look, stage.vertices, stage.normals, self.lamps.floor, self.pixel,
+                o, e, prim, u, v, t, index, s,
+            )  # fmt: skip
+            if walked.any():
+                s.depth[index] += walked
+            hole = (s.traits[index, 4] == 0) & (prim >= 0)
+            if not hole.any():
+                break
+            o, e = _beyond(o[hole], e[hole], t[hole], stage.size), np.ascontiguousarray(e[hole])
+            index, walked = index[hole], walked[hole] + t[hole]
+            hit = stage.hit(o, e)
+        return s
+
+    def gather(
+        self, s: Samples, d: np.ndarray, on: np.ndarray, place: tuple[int, int, int]
+    ) -> np.ndarray:
+        """Light (G, CHANNELS) that arrives at the samples ``on``."""
+        first, height, width = place
+        every = self.sampling.every
+        rows = np.arange(-first % every, height, every)
+        chosen = (rows[:, None] * width + np.arange(0, width, every)).ravel()
+        shape = len(rows), -(-width // every)
+        present = np.zeros(len(s.kind), np.bool_)
+        present[on] = True
+        active = present[chosen]
+        lattice = np.zeros((len(chosen), CHANNELS), np.float32)
+        lattice[active] = self.ask(s, d, chosen[active], place, self.sampling.sky)
+        normal = s.normal[chosen].reshape(*shape, 3)
+        depth = np.log(np.maximum(s.depth[chosen], 1e-12)).reshape(shape)
+        grid = active.reshape(shape)
+        lattice = lattice.reshape(*shape, CHANNELS)
+        kernels_light.smooth(lattice, normal, depth, grid)
+        light = np.zeros((len(s.kind), CHANNELS), np.float32)
+        missing = kernels_light.spread(
+            s, on, (height, width), lattice, normal, depth, grid, every, light
+        )
+        lone = np.flatnonzero(missing)
+        light[lone] = self.ask(s, d, lone, place, 2 * self.sampling.sky)
+        sharp = on[(s.traits[on, 1] <= SHARP) & (s.kind[on] == kernels.THING)]
+        if len(sharp):
+            self.reflect(s, d, sharp, np.zeros(len(sharp), np.int64), light, sharp)
+        return light
+
+    def ask(
+        self, s: Samples, d: np.ndarray, index: np.ndarray, place: tuple[int, int, int], sky: int
+    ) -> np.ndarray:
+        """Send rays to sky and sun and along the mirrored direction."""
+        stage, every = self.stage, self.sampling.every
+        row, column = index // place[2] + place[0], index % place[2]
+        cells = ((row // every % 4) * 4 + column // every % 4) * 7 % 16
+        pixels = row * 65536 + column
+        light = np.zeros((len(index), CHANNELS), np.float32)
+        o, w = (np.empty((len(index), 3), np.float32) for _ in range(2))
+        for number in range(sky):
+            kernels_light.sky_rays(s, index, cells, self.lamps, number, sky, o, w)
+            free = stage.free(o, w, pixels + number)
+            kernels_light.gather_sky(s, index, w, free, self.lamps, np.float32(1 / sky), light)
+        ask = np.empty(len(index), np.bool_)
+        kernels_light.sun_rays(s, index, cells, pixels, self.lamps, o, w, ask)
+        light[ask, 3] = stage.free(o[ask], w[ask], pixels[ask])
+        self.reflect(s, d, index, cells, light, np.arange(len(index)))
+        return light
+
+    def reflect(
+        self,
+        s: Samples,
+        d: np.ndarray,
+        index: np.ndarray,
+        cells: np.ndarray,
+        light: np.ndarray,
+        rows: np.ndarray,
+    ) -> None:
+        """Write what glossy surfaces mirror into light[rows, 4:]."""
+        stage = self.stage
+        o, w = (np.empty((len(index), 3), np.float32) for _ in range(2))
+        kernels_light.mirror_rays(s, index, d, cells, self.lamps, o, w)
+        prim = np.full(len(index), -1, np.int32)
+        u, v, t = (np.zeros(len(index), np.float32) for _ in range(3))
+        glossy = (s.traits[index, 1] < GLOSSY) & (s.kind[index] == kernels.THING)
+        if glossy.any():
+            prim[glossy], u[glossy], v[glossy], t[glossy] = stage.hit(o[glossy], w[glossy])
+        seen = np.zeros((len(index), 3), np.float32)
+        kernels_light.mirrored(
+            stage.look, stage.normals, self.lamps, s, index, w, prim, u, v, t, seen, 0
+        )
+        light[rows, 4:] = seen
