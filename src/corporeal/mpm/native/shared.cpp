@@ -1,0 +1,83 @@
+// What every native piece shares. Warp pastes each piece into a function body, so helpers are
+// static members of local structs. Vectors are GCC/clang extensions: they compile on any CPU.
+typedef float f8 __attribute__((vector_size(32)));
+typedef int i8 __attribute__((vector_size(32)));
+typedef float f8u __attribute__((vector_size(32), aligned(4)));
+typedef int i8u __attribute__((vector_size(32), aligned(4)));
+typedef unsigned long long u64;
+
+// A particle's place is fixed point: 2^22 units per cell, relative to its field's window.
+const int PLACE = 22, UNIT = 1 << 22, HALF = 1 << 21;
+const float PER_UNIT = 1.0f / 4194304.0f;
+
+// Channels of a particle batch [channel][8]. Velocity gradients are per cell: dx times the usual.
+const int XI = 0, VE = 3, AF = 6, DE = 15, ST = 24, MA = 30, VO = 31, EP = 32, VC = 33, MT = 34,
+          ID = 35, TM = 36, NC = 45;
+// Columns of the table of materials.
+const int LAW = 0, MU = 1, LAMBDA = 2, YIELD = 3, HARD = 4, CONE = 5, APEX = 6, VISC = 7, KEEP = 8,
+          RHO = 9, PUSH = 10, NM = 16;
+// Columns of a task's report.
+const int SPEED2 = 0, WAVE2 = 1, PLASTIC = 2, VISCOUS = 3, ASTRAY = 4, WORK = 5, NR = 8;
+const int NB = 32;      // ints of a block's record: start, end, coordinates 3, neighbours 27
+const int MOST = 6;     // fields that may meet at one node
+
+struct Field {
+  float *part, *node, *material;
+  int *table, *block, *where;
+  u64 *near;
+  double *point;            // rigid: [P][5] place in the body's frame, mass, volume
+  double *rigid;            // rigid: its state, see rigid.cpp
+  double *surface;          // rigid: [S][3] in the body's frame
+  double mass;
+  int origin[3], dim[3];    // in blocks; the window's corner and size
+  int blocks, pool, rigids, points, surfaces, pushed;
+};
+struct World {
+  Field *field;
+  int *task, *contact_memory, *list;
+  double *report, *plane, *friction, *restitution, *ledger, *pair_memory, *near_memory;
+  double dx, dt, time, kick[3];
+  int fields, planes, tasks, contacts, pairs, nears, most_contacts, most_pairs, most_nears, full;
+  int most_list, multi;
+};
+
+struct Simd {
+  static inline f8 all(float a) { return f8{a, a, a, a, a, a, a, a}; }
+  static inline f8 pick(i8 m, f8 a, f8 b) { return m ? a : b; }
+  static inline f8 root(f8 a) { return __builtin_elementwise_sqrt(a); }
+  static inline f8 high(f8 a, f8 b) { return a > b ? a : b; }
+  static inline f8 low(f8 a, f8 b) { return a < b ? a : b; }
+  static inline f8 size(f8 a) { return (f8)((i8)a & 0x7fffffff); }
+  static inline bool any(i8 m) {
+    return m[0] | m[1] | m[2] | m[3] | m[4] | m[5] | m[6] | m[7];
+  }
+  static inline f8 flo(i8 a) { return __builtin_convertvector(a, f8); }
+  static inline i8 whole(f8 a) { return __builtin_convertvector(a, i8); }
+  // Rows of eight lanes to lanes of eight rows.
+  static inline void turn(f8 *r) {
+    f8 a[8], b[8];
+    for (int i = 0; i < 4; i++) {
+      a[2 * i] = __builtin_shufflevector(r[2 * i], r[2 * i + 1], 0, 8, 1, 9, 4, 12, 5, 13);
+      a[2 * i + 1] = __builtin_shufflevector(r[2 * i], r[2 * i + 1], 2, 10, 3, 11, 6, 14, 7, 15);
+    }
+    for (int i = 0; i < 2; i++) {
+      b[4 * i] = __builtin_shufflevector(a[4 * i], a[4 * i + 2], 0, 1, 8, 9, 4, 5, 12, 13);
+      b[4 * i + 1] = __builtin_shufflevector(a[4 * i], a[4 * i + 2], 2, 3, 10, 11, 6, 7, 14, 15);
+      b[4 * i + 2] = __builtin_shufflevector(a[4 * i + 1], a[4 * i + 3], 0, 1, 8, 9, 4, 5, 12, 13);
+      b[4 * i + 3] =
+          __builtin_shufflevector(a[4 * i + 1], a[4 * i + 3], 2, 3, 10, 11, 6, 7, 14, 15);
+    }
+    for (int i = 0; i < 4; i++) {
+      r[i] = __builtin_shufflevector(b[i], b[i + 4], 0, 1, 2, 3, 8, 9, 10, 11);
+      r[i + 4] = __builtin_shufflevector(b[i], b[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
+    }
+  }
+  // Quadratic B-spline weights at a fraction f in [0.5, 1.5).
+  static inline void spline(f8 f, f8 *w) {
+    f8 a = 1.5f - f, b = f - 1.0f, c = f - 0.5f;
+    w[0] = 0.5f * a * a;
+    w[1] = 0.75f - b * b;
+    w[2] = 0.5f * c * c;
+  }
+};
+World *world = (World *)memory.data;
