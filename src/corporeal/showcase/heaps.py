@@ -1,0 +1,85 @@
+"""Granular heaps on the ground: mud, sand, snow."""
+
+import numpy as np
+
+from corporeal.showcase import paint, sdf, shape
+from corporeal.showcase.mesh import Model, Part, pictured, plain
+
+
+def mud_pile() -> Model:
+    """Wet mud, 0.42 m across and 71 mm high: lumpy, glossy, slumped at the rim."""
+    rng = np.random.default_rng(5)
+    rim = _outline(0.205, 3, 0.06)
+    fine = sdf.noise3(2, 2.0)
+    angle, place = rng.random(16) * 2 * np.pi, 0.15 * np.sqrt(rng.random(16))
+    wide, tall = 0.034 + 0.03 * rng.random(16), 0.010 + 0.020 * rng.random(16)
+    lumps = np.stack([place * np.cos(angle), place * np.sin(angle), wide, tall], 1)
+
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        s = _share(x, y, rim)
+        z = bed = 0.042 * (1 - 0.62 * s**2)
+        for cx, cy, w, h in lumps:
+            # Soft maximum: clods melt into each other.
+            clod = h * np.exp(-(((x - cx) ** 2 + (y - cy) ** 2) / w**2)) + bed
+            z = 0.5 * (z + clod + np.sqrt((z - clod) ** 2 + 3e-5))
+        return (1 - s**5) ** 0.6 * (z - 0.004 + 0.0012 * _relief(fine, x, y, 0.07))
+
+    colours = ("#2a2018", "#453527", "#5f4b38")
+    look = pictured("wet mud", paint.speckle(512, 81, *colours, falloff=1.2, contrast=0.12), 0.22)
+    return Model("mud_pile", (Part("mud", shape.mound(height, rim, 64, 144, 0.25), look, "mud"),))
+
+
+def sand_pile() -> Model:
+    """Dry sand, 2 m across, poured at 25 degrees, with wind ripples."""
+    rim = _outline(1.0, 8, 0.025)
+    dune, fine = sdf.noise3(4, 2.2), sdf.noise3(9, 1.0)
+
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        s = _share(x, y, rim)
+        cone = np.tan(np.radians(25)) * (1 - s - 0.28 * np.exp(-((s / 0.33) ** 2)))
+        phase = (x * 0.8 + 0.5 * y + 0.035 * _relief(dune, x, y, 0.3)) / 0.10
+        strength = 0.5 + 0.5 * np.clip(_relief(dune, y, x, 0.5), -1, 1)
+        ripple = np.sin(2 * np.pi * phase) * np.clip((1 - s) * 4, 0, 1) * strength
+        grain = 0.012 * _relief(dune, x, y, 0.35) + 0.0008 * _relief(fine, x, y, 0.08)
+        return cone + 0.0055 * ripple + np.clip((1 - s) * 5, 0, 1) * grain
+
+    colours = ("#b28a54", "#dcb77e", "#f1d9aa")
+    look = pictured("dry sand", paint.speckle(512, 91, *colours, falloff=0.35, contrast=0.16), 0.95)
+    return Model(
+        "sand_pile", (Part("sand", shape.mound(height, rim, 84, 168, 0.35), look, "sand"),)
+    )
+
+
+def snow_heap() -> Model:
+    """Drift of fresh snow, 1.2 m across and 0.24 m high."""
+    rim = _outline(0.60, 12, 0.05)
+    soft = sdf.noise3(17, 2.6)
+
+    def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
+        s = _share(x, y, rim)
+        return 0.20 * (1 - s**2.4) ** 1.7 * (1 + 0.11 * _relief(soft, x, y, 0.25))
+
+    look = plain("fresh snow", "#f3f7fc", 0.85)
+    return Model("snow_heap", (Part("snow", shape.mound(height, rim, 60, 128), look, "snow"),))
+
+
+def _outline(radius: float, seed: int, wobble: float) -> shape.Plan:
+    """Draw a rim that wanders smoothly: radius [m] as a function of the angle."""
+    c = np.random.default_rng(seed).standard_normal((2, 5)) / np.arange(1, 6) ** 1.2
+
+    def rim(angle: np.ndarray) -> np.ndarray:
+        waves = [
+            c[0, k] * np.cos((k + 1) * angle) + c[1, k] * np.sin((k + 1) * angle) for k in range(5)
+        ]
+        return radius * (1 + wobble * np.sum(waves, axis=0))
+
+    return rim
+
+
+def _share(x: np.ndarray, y: np.ndarray, rim: shape.Plan) -> np.ndarray:
+    """Distance from the centre as a share of the rim's."""
+    return np.clip(np.hypot(x, y) / rim(np.arctan2(y, x)), 0, 1)
+
+
+def _relief(noise: sdf.Field, x: np.ndarray, y: np.ndarray, wavelength: float) -> np.ndarray:
+    return noise(np.stack([x, y, 0 * x], -1).reshape(-1, 3) / wavelength).reshape(x.shape)

@@ -1,0 +1,199 @@
+"""Mesh, Part, Model: what a prop is made of."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import manifold3d as m3
+import numpy as np
+from jaxtyping import Float, Int, UInt8
+from numpy.typing import ArrayLike
+from scipy.spatial.transform import Rotation
+
+from corporeal.types import Finish
+
+Point = tuple[float, float, float]
+STILL: Point = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """A closed triangle surface. Vertices on seams are doubled at identical positions."""
+
+    vertices: Float[np.ndarray, "V 3"]
+    """Position [m]; z is up and the floor is z = 0."""
+    faces: Int[np.ndarray, "T 3"]
+    """Vertex numbers, anticlockwise seen from outside."""
+    normals: Float[np.ndarray, "V 3"]
+    """Unit shading normal."""
+    uv: Float[np.ndarray, "V 2"]
+    """Texture coordinates; v runs up."""
+    colours: Float[np.ndarray, "V 3"]
+    """Linear RGB that multiplies the finish."""
+
+    def moved(self, by: ArrayLike = STILL, turn: ArrayLike = STILL) -> "Mesh":
+        """Turn by xyz Euler angles [degrees], then shift [m]."""
+        rotation = Rotation.from_euler("xyz", np.asarray(turn), degrees=True).as_matrix()
+        return replace(
+            self,
+            vertices=self.vertices @ rotation.T + np.asarray(by, float),
+            normals=self.normals @ rotation.T,
+        )
+
+    def tinted(self, colours: ArrayLike) -> "Mesh":
+        """Multiply the finish by one linear colour, or by one per vertex."""
+        return replace(self, colours=np.broadcast_to(colours, self.vertices.shape).astype(float))
+
+
+@dataclass(frozen=True)
+class Part:
+    """One closed piece of one substance."""
+
+    name: str
+    mesh: Mesh
+    finish: Finish
+    substance: str
+    """A name from the material library."""
+    shell: float = 0.0
+    """Wall of what is hollow in life but modelled by its outside [m]; 0: solid as modelled."""
+
+
+@dataclass(frozen=True)
+class Model:
+    """A thing: its parts, standing on z = 0 and facing +x."""
+
+    name: str
+    parts: tuple[Part, ...]
+
+    def moved(self, by: ArrayLike = STILL, turn: ArrayLike = STILL) -> "Model":
+        """Turn by xyz Euler angles [degrees], then shift [m]."""
+        return replace(
+            self, parts=tuple(replace(p, mesh=p.mesh.moved(by, turn)) for p in self.parts)
+        )
+
+    def bounds(self) -> Float[np.ndarray, "2 3"]:
+        """Lowest and highest corner [m]."""
+        points = np.concatenate([p.mesh.vertices for p in self.parts])
+        return np.stack([points.min(0), points.max(0)])
+
+
+def linear(hex_colour: str) -> Float[np.ndarray, "3"]:
+    """'#rrggbb' in sRGB to linear RGB in [0, 1] (IEC 61966-2-1)."""
+    c = np.array([int(hex_colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
+
+
+def plain(
+    name: str, colour: str, roughness: float, metallic: float = 0.0, glow: float = 0.0
+) -> Finish:
+    """Make a finish of one colour, given as '#rrggbb'."""
+    red, green, blue = (float(x) for x in linear(colour).round(6))
+    return Finish(name, (red, green, blue, 1.0), metallic=metallic, roughness=roughness, glow=glow)
+
+
+def pictured(
+    name: str, texture: UInt8[np.ndarray, "H W 3"], roughness: float, metallic: float = 0.0
+) -> Finish:
+    """Make a finish that carries a picture."""
+    return Finish(name, texture=texture, metallic=metallic, roughness=roughness)
+
+
+def make(
+    vertices: ArrayLike,
+    faces: ArrayLike,
+    uv: ArrayLike | None = None,
+    normals: ArrayLike | None = None,
+) -> Mesh:
+    """Fill in what is missing: smooth normals over welded positions, zero UV; colour white."""
+    v, f = np.asarray(vertices, float), np.asarray(faces, np.int64)
+    n = smooth_normals(v, f) if normals is None else np.asarray(normals, float)
+    t = np.zeros((len(v), 2)) if uv is None else np.asarray(uv, float)
+    return Mesh(v, f, n, t, np.ones_like(v))
+
+
+def weld(
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "T 3"]
+) -> tuple[Float[np.ndarray, "W 3"], Int[np.ndarray, "S 3"]]:
+    """Merge vertices at the same position (to 1e-7 m); drop triangles that collapse."""
+    _, first, number = np.unique(
+        np.round(vertices, 7), axis=0, return_index=True, return_inverse=True
+    )
+    f = number.reshape(-1)[faces]
+    return vertices[first], f[_spread(f)]
+
+
+def smooth_normals(
+    vertices: Float[np.ndarray, "V 3"], faces: Int[np.ndarray, "T 3"]
+) -> Float[np.ndarray, "V 3"]:
+    """Area-weighted vertex normals, shared by all vertices at one position."""
+    _, number = np.unique(np.round(vertices, 7), axis=0, return_inverse=True)
+    number = number.reshape(-1)
+    shared = number[faces]
+    keep = _spread(shared)
+    return corner_normals(vertices, faces[keep], shared[keep], number.max() + 1)[number]
+
+
+def corner_normals(
+    vertices: Float[np.ndarray, "V 3"],
+    faces: Int[np.ndarray, "T 3"],
+    numbers: Int[np.ndarray, "T 3"],
+    count: int,
+) -> Float[np.ndarray, "count 3"]:
+    """Area-weighted unit normals of ``count`` points; ``numbers`` says which point a corner is."""
+    a, b, c = (vertices[faces[:, i]] for i in range(3))
+    total = np.zeros((count, 3))
+    for i in range(3):
+        np.add.at(total, numbers[:, i], np.cross(b - a, c - a))
+    return unit(total)
+
+
+def unit(vectors: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
+    """Scale to length one; zero stays zero."""
+    return vectors / (np.linalg.norm(vectors, axis=-1, keepdims=True) + 1e-30)
+
+
+def together(meshes: Sequence[Mesh]) -> Mesh:
+    """Concatenate without any boolean: for pieces that stay apart, such as leaves."""
+    start = np.cumsum([0] + [len(m.vertices) for m in meshes])
+    return Mesh(
+        np.concatenate([m.vertices for m in meshes]),
+        np.concatenate([m.faces + s for m, s in zip(meshes, start, strict=False)]),
+        np.concatenate([m.normals for m in meshes]),
+        np.concatenate([m.uv for m in meshes]),
+        np.concatenate([m.colours for m in meshes]),
+    )
+
+
+def union(meshes: Sequence[Mesh]) -> Mesh:
+    """Boolean union; normals, UV and colours ride along."""
+    return _mesh(m3.Manifold.batch_boolean([_solid(m) for m in meshes], m3.OpType.Add))
+
+
+def cut(mesh: Mesh, *away: Mesh) -> Mesh:
+    """Boolean difference. Walls that ``away`` leaves face its inside: its normals turn round."""
+    solid = _solid(mesh)
+    for other in away:
+        solid = solid - _solid(replace(other, normals=-other.normals))
+    return _mesh(solid)
+
+
+def _spread(faces: Int[np.ndarray, "T 3"]) -> np.ndarray:
+    """Which triangles have three different corners."""
+    a, b, c = faces.T
+    return (a != b) & (b != c) & (c != a)
+
+
+def _solid(mesh: Mesh) -> m3.Manifold:
+    properties = np.hstack([mesh.vertices, mesh.normals, mesh.uv, mesh.colours])
+    surface = m3.Mesh(properties.astype(np.float32), mesh.faces.astype(np.uint32))
+    surface.merge()
+    solid = m3.Manifold(surface)
+    if solid.status() != m3.Error.NoError or solid.is_empty():
+        raise ValueError(f"This mesh bounds no solid ({solid.status()}). Close it first.")
+    return solid
+
+
+def _mesh(solid: m3.Manifold) -> Mesh:
+    surface = solid.to_mesh()
+    p = np.asarray(surface.vert_properties, float)
+    faces = np.asarray(surface.tri_verts, np.int64)
+    return Mesh(p[:, :3], faces, unit(p[:, 3:6]), p[:, 6:8], p[:, 8:11])

@@ -1,0 +1,269 @@
+"""The seven showcase scenes: who stands where before the first step, and what is done to them.
+
+Metres, z up, floor at z = 0. A thing that falls from far above starts lower, at the speed that it
+has there: the film begins when something is about to happen. Nothing numerical is in a scene.
+"""
+
+import math
+from collections.abc import Callable
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from corporeal.errors import UnknownChoiceError
+from corporeal.showcase.mesh import STILL, Model, Part, Point, cut, together
+from corporeal.showcase.models import MODELS
+from corporeal.types import Push, Scene, SceneObject, Surface
+
+GRAVITY = 9.81
+"""[m/s²]"""
+
+
+@dataclass(frozen=True)
+class Placed:
+    """One model in a scene."""
+
+    model: str
+    """A name from ``MODELS``."""
+    at: Point = STILL
+    """Where its origin, the middle of its foot, stands [m]."""
+    turn: Point = STILL
+    """xyz Euler angles [degrees]."""
+    velocity: Point = STILL
+    """[m/s]"""
+    push: Push | None = None
+
+
+@dataclass(frozen=True)
+class Composition:
+    """What stands where, what should be seen, and from where to look."""
+
+    story: str
+    """What should be seen, in one sentence."""
+    things: tuple[Placed, ...]
+    view: Point
+    """Direction from the scene to the camera."""
+    duration: float
+    """[s]"""
+    planted: dict[int, int] = field(default_factory=dict)
+    """Place of a thing that stands in another → place of that other, which makes room for it."""
+
+
+def fallen(height: float, gap: float) -> Point:
+    """Velocity [m/s] after falling from ``height`` down to ``gap`` above what will be hit [m].
+
+    v = √(2 g (h - d))
+    """
+    return (0.0, 0.0, -round(math.sqrt(2 * GRAVITY * (height - gap)), 3))
+
+
+def duck_on_mud() -> Composition:
+    """Drop the duck from the height of a table onto soft mud.
+
+    A flat foot of 60 × 45 mm is carried by mud of cohesion c = 1.7 kPa with about 6.5 c (Prandtl's
+    bearing capacity at φ = 5°): 23 N. What the duck brings from 0.8 m, 0.6 J, is used up over some
+    25 mm: an imprint that stays.
+    """
+    duck = Placed("rubber_duck", (0.01, 0, 0.345), (4, -6, 10), fallen(0.8, 0.28))
+    return Composition(
+        "The mud yields under the duck and keeps its imprint; the duck rests on it undeformed.",
+        (Placed("mud_pile"), duck),
+        view=(0.80, -0.62, 0.36),
+        duration=1.5,
+    )
+
+
+def duck_on_can() -> Composition:
+    """Throw the duck down onto an empty can that lies on its side.
+
+    A can is strong along its axis (about 1 kN before it buckles) and weak across it: a plastic
+    dent of depth δ in a tube takes P = 16 √(2π/3) m_p √(2 δ / t), m_p = σ_y t²/4
+    (Wierzbicki and Suh 1988): 70 N at 1 mm, 230 N at 10 mm with 285 MPa and t = 0.1 mm. To go
+    10 mm deep it takes (2/3) P δ = 1.5 J. Dropped from table height the duck has 0.6 J and keeps
+    most of it as its own bounce; thrown down hard, at 7 m/s, it has 1.9 J.
+    """
+    can = Placed("soda_can", (-0.0575, 0, 0.0331), (0, 90, 0))
+    duck = Placed("rubber_duck", (0.0, 0.0, 0.20), (0, 6, -15), (0.0, 0.0, -7.0))
+    return Composition(
+        "The duck deforms and recovers; the can keeps a dent where it was hit.",
+        (can, duck),
+        view=(0.62, -0.80, 0.36),
+        duration=1.5,
+    )
+
+
+def vase_ball_armchair() -> Composition:
+    """Shove the vase into the ball so that it rolls against the armchair's stretcher.
+
+    The shove of 18 m/s² for 0.1 s brings the vase to 1.4 m/s over 7 cm, against the floor's
+    friction. Two kilograms at 1.4 m/s send the half kilogram of the ball off at 1.9 m/s; it rolls
+    after 8 cm or so. The chair stands askew, so that the ball leaves sideways and does not come
+    back to the vase.
+    """
+    shove = Push((18.0, 0.0, 0.0), start=0.05, end=0.15)
+    return Composition(
+        "Force passes through a row of things that part again: vase, ball, armchair.",
+        (
+            Placed("vase", (-0.976, 0.0, 0.0), push=shove),
+            Placed("ball", (-0.689, 0.0, 0.0)),
+            Placed("armchair", (0.0, 0.225, 0.0), (0, 0, 210)),
+        ),
+        view=(-0.42, -0.92, 0.42),
+        duration=2.0,
+    )
+
+
+def lamp_on_couch() -> Composition:
+    """Let the lamp topple onto the couch, shade first over one arm."""
+    return Composition(
+        "The cushions give far and spring back; the lamp keeps its shape and lifts off again.",
+        (Placed("couch"), Placed("floor_lamp", (0.14, 0.72, 1.02), (82, 0, 4))),
+        view=(0.80, -0.62, 0.36),
+        duration=2.0,
+    )
+
+
+def ficus_pushed() -> Composition:
+    """Push the whole ficus with 3 m/s² for a quarter of a second."""
+    return Composition(
+        "The foliage sways and the pot stays put.",
+        (Placed("potted_ficus", push=Push((0.0, 3.0, 0.0), 0.1, 0.35)),),
+        view=(0.80, -0.62, 0.36),
+        duration=2.0,
+    )
+
+
+def tree_and_ball_in_sand() -> Composition:
+    """Drop a ball on a heap of sand that a young tree stands in, 0.2 m deep."""
+    return Composition(
+        "Sand flows: the ball digs in, the heap slumps about the trunk.",
+        (
+            Placed("sand_pile"),
+            Placed("small_tree", (-0.12, -0.10, 0.11)),
+            Placed("ball", (0.42, 0.30, 0.62), velocity=fallen(1.2, 0.4)),
+        ),
+        view=(0.80, -0.62, 0.36),
+        duration=1.5,
+        planted={1: 0},
+    )
+
+
+def steel_and_rubber() -> Composition:
+    """Drop two balls of one size side by side from half a metre."""
+    return Composition(
+        "The same fall, and different rebounds.",
+        (
+            Placed("steel_ball", (0, -0.10, 0.25), velocity=fallen(0.5, 0.25)),
+            Placed("rubber_ball", (0, 0.10, 0.25), velocity=fallen(0.5, 0.25)),
+        ),
+        view=(0.80, -0.25, 0.20),
+        duration=1.5,
+    )
+
+
+SCENES: dict[str, Callable[[], Composition]] = {
+    "duck-on-mud": duck_on_mud,
+    "duck-on-can": duck_on_can,
+    "vase-ball-armchair": vase_ball_armchair,
+    "lamp-on-couch": lamp_on_couch,
+    "ficus-pushed": ficus_pushed,
+    "tree-and-ball-in-sand": tree_and_ball_in_sand,
+    "steel-and-rubber": steel_and_rubber,
+}
+
+
+def build(name: str) -> Scene:
+    """Build a showcase scene.
+
+    Raises:
+        UnknownChoiceError: There is no scene of this name.
+
+    """
+    composition = _chosen(name)
+    models = place(composition)
+    finishes = {id(p.finish): p.finish for m in models for p in m.parts}
+    places = list(finishes)
+    surfaces = tuple(
+        _surface(part, k, places.index(id(part.finish)))
+        for k, model in enumerate(models)
+        for part in model.parts
+    )
+    objects = tuple(
+        _scene_object(model, placed, _count_before(models, k))
+        for k, (model, placed) in enumerate(zip(models, composition.things, strict=True))
+    )
+    return Scene(
+        name=name,
+        source="showcase",
+        objects=objects,
+        surfaces=surfaces,
+        finishes=tuple(finishes.values()),
+        gravity=(0.0, 0.0, -GRAVITY),
+        duration=composition.duration,
+        fps=60,
+    )
+
+
+def view(name: str) -> Point:
+    """Direction from the scene to a camera that shows it well.
+
+    Raises:
+        UnknownChoiceError: There is no scene of this name.
+
+    """
+    return _chosen(name).view
+
+
+def place(composition: Composition) -> list[Model]:
+    """Build the models and put them where they stand."""
+    models = [MODELS[t.model]().moved(t.at, t.turn) for t in composition.things]
+    for inner, outer in composition.planted.items():
+        models[outer] = _make_room(models[outer], models[inner])
+    return models
+
+
+def _make_room(heap: Model, guest: Model) -> Model:
+    solid = guest.parts[0].mesh
+    parts = tuple(
+        Part(p.name, cut(p.mesh, together([solid])), p.finish, p.substance, p.shell)
+        for p in heap.parts
+    )
+    return Model(heap.name, parts)
+
+
+def _chosen(name: str) -> Composition:
+    if name not in SCENES:
+        raise UnknownChoiceError("showcase scene", name, list(SCENES))
+    return SCENES[name]()
+
+
+def _count_before(models: list[Model], k: int) -> int:
+    return sum(m.name == models[k].name for m in models[:k])
+
+
+def _surface(part: Part, k: int, finish: int) -> Surface:
+    mesh = part.mesh
+    tinted = not np.allclose(mesh.colours, 1)
+    return Surface(
+        name=part.name,
+        object=k,
+        finish=finish,
+        vertices=mesh.vertices,
+        triangles=mesh.faces,
+        normals=mesh.normals,
+        uv=mesh.uv * [1, -1] + [0, 1],
+        colours=mesh.colours if tinted else None,
+        extras={"substance": part.substance, "shell_thickness_m": part.shell},
+    )
+
+
+def _scene_object(model: Model, placed: Placed, number: int) -> SceneObject:
+    return SceneObject(
+        name=f"{model.name}_{number}",
+        class_name=model.name.replace("_", " "),
+        real_extent=round(float(np.ptp(model.bounds(), axis=0).max()), 4),
+        velocity=placed.velocity,
+        push=placed.push,
+        source="showcase",
+        credit="The corporeal authors, Apache-2.0",
+    )

@@ -1,0 +1,173 @@
+"""Signed distances [m], negative inside: primitives, smooth booleans, a mesher with true normals.
+
+Formulas after Inigo Quilez, "Distance functions" and "Smooth minimum".
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import fast_simplification
+import numpy as np
+from jaxtyping import Float
+from numpy.typing import ArrayLike
+from scipy.ndimage import map_coordinates
+from scipy.spatial.transform import Rotation
+from skimage.measure import marching_cubes
+
+from corporeal.showcase.mesh import STILL, Mesh, make, unit, weld
+
+Points = Float[np.ndarray, "N 3"]
+Distances = Float[np.ndarray, " N"]
+Field = Callable[[Points], Distances]
+"""From points [m] to signed distances [m]."""
+
+
+def ellipsoid(centre: ArrayLike, radii: ArrayLike, turn: ArrayLike = STILL) -> Field:
+    """Ellipsoid about a centre, turned by xyz Euler angles [degrees]; exact on its surface."""
+    c, r = np.asarray(centre, float), np.asarray(radii, float)
+    axes = Rotation.from_euler("xyz", np.asarray(turn), degrees=True).as_matrix()
+
+    def field(p: Points) -> Distances:
+        q = (p - c) @ axes
+        k0, k1 = np.linalg.norm(q / r, axis=1), np.linalg.norm(q / r**2, axis=1)
+        return k0 * (k0 - 1) / (k1 + 1e-9)
+
+    return field
+
+
+def sphere(centre: ArrayLike, radius: float) -> Field:
+    """Sphere."""
+    return lambda p: np.linalg.norm(p - np.asarray(centre, float), axis=1) - radius
+
+
+def capsule(start: ArrayLike, end: ArrayLike, first: float, last: float) -> Field:
+    """Stick from start to end whose radius goes from first to last."""
+    a, axis = np.asarray(start, float), np.asarray(end, float) - np.asarray(start, float)
+
+    def field(p: Points) -> Distances:
+        t = np.clip((p - a) @ axis / (axis @ axis), 0, 1)
+        return np.linalg.norm(p - a - t[:, None] * axis, axis=1) - (first + (last - first) * t)
+
+    return field
+
+
+def cylinder(radius: float, low: float, high: float, fillet: float) -> Field:
+    """Upright cylinder between two heights, its edges rounded by ``fillet``."""
+
+    def field(p: Points) -> Distances:
+        side = np.hypot(p[:, 0], p[:, 1]) - radius
+        ends = np.abs(p[:, 2] - (low + high) / 2) - (high - low) / 2
+        d = np.stack([side, ends], 1) + fillet
+        return np.minimum(d.max(1), 0) + np.linalg.norm(np.maximum(d, 0), axis=1) - fillet
+
+    return field
+
+
+def torus(centre: ArrayLike, major: float, minor: float, tall: float = 1.0) -> Field:
+    """Ring in the xz plane; ``tall`` stretches it along z."""
+
+    def field(p: Points) -> Distances:
+        q = p - np.asarray(centre, float)
+        return np.hypot(np.hypot(q[:, 0], q[:, 2] / tall) - major, q[:, 1]) - minor
+
+    return field
+
+
+def above(height: float) -> Field:
+    """All that lies above a height."""
+    return lambda p: height - p[:, 2]
+
+
+def join(*fields: Field, k: float) -> Field:
+    """Smooth union: seams blend over about k [m]."""
+
+    def field(p: Points) -> Distances:
+        d = fields[0](p)
+        for other in fields[1:]:
+            e = other(p)
+            h = np.maximum(k - np.abs(d - e), 0) / k
+            d = np.minimum(d, e) - h * h * k / 4
+        return d
+
+    return field
+
+
+def both(f: Field, g: Field, k: float = 1e-4) -> Field:
+    """Smooth intersection."""
+    outside = join(lambda p: -f(p), lambda p: -g(p), k=k)
+    return lambda p: -outside(p)
+
+
+def minus(f: Field, g: Field, k: float = 1e-4) -> Field:
+    """Smooth difference."""
+    return both(f, lambda p: -g(p), k)
+
+
+def rough(f: Field, noise: Field, depth: float, wavelength: float) -> Field:
+    """Push the surface in and out by noise of this depth and wavelength [m]."""
+    return lambda p: f(p) + depth * noise(p / wavelength)
+
+
+def noise3(seed: int, falloff: float = 1.8, n: int = 48) -> Field:
+    """Periodic fractal noise of period 4 and unit variance, from filtered white noise."""
+    frequency = np.fft.fftfreq(n, 1 / n)
+    k = np.sqrt(sum(np.square(g) for g in np.meshgrid(*[frequency] * 3, indexing="ij")))
+    white = np.fft.fftn(np.random.default_rng(seed).standard_normal((n, n, n)))
+    volume = np.fft.ifftn(white / np.maximum(k, 2) ** falloff * (k > 0)).real
+    volume /= volume.std()
+    return lambda p: map_coordinates(volume, (np.asarray(p) * n / 4).T, order=1, mode="grid-wrap")
+
+
+@dataclass(frozen=True)
+class Sampling:
+    """How finely a field becomes triangles."""
+
+    low: Sequence[float] | np.ndarray
+    """Lowest corner of a box that holds the surface [m]."""
+    high: Sequence[float] | np.ndarray
+    """Highest corner [m]."""
+    step: float
+    """Spacing of the grid [m]."""
+    triangles: int
+    """How many to keep."""
+
+
+def mesh(f: Field, sampling: Sampling) -> Mesh:
+    """March over the box, thin out, pull back onto the surface, shade with the true gradient."""
+    step = sampling.step
+    v, faces = _march(f, sampling)
+    if sampling.triangles < len(faces):
+        thinned = fast_simplification.simplify(v, faces, target_count=sampling.triangles)
+        v, faces = weld(thinned[0], thinned[1])
+    for _ in range(3):
+        g = gradient(f, v, step / 4)
+        reach = np.clip(f(v), -step / 2, step / 2)[:, None]
+        v = v - reach * g / np.maximum((g * g).sum(1, keepdims=True), 0.25)
+    return make(v, faces, normals=unit(gradient(f, v, step / 3)))
+
+
+def gradient(f: Field, p: Points, h: float) -> Points:
+    """Central differences over ±h [m]."""
+    e = np.eye(3) * h
+    return np.stack([f(p + e[i]) - f(p - e[i]) for i in range(3)], 1) / (2 * h)
+
+
+def _march(f: Field, sampling: Sampling) -> tuple[np.ndarray, np.ndarray]:
+    """Marching cubes on a regular grid, welded."""
+    step = sampling.step
+    # An odd offset keeps grid points off flat faces: a distance of exactly zero would tear them.
+    axes = [
+        np.arange(a - 2.318 * step, b + 3 * step, step)
+        for a, b in zip(sampling.low, sampling.high, strict=True)
+    ]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+    values = f(grid).reshape([len(a) for a in axes])
+    if min(np.take(values, end, axis).min() for axis in range(3) for end in (0, -1)) < 0:
+        raise ValueError(
+            f"The surface leaves the box {sampling.low} to {sampling.high} m and would stay open. "
+            "Widen the box."
+        )
+    v, faces, _, _ = marching_cubes(
+        values, 0.0, spacing=(step, step, step), gradient_direction="descent"
+    )
+    return weld(v + np.array([a[0] for a in axes]), faces)

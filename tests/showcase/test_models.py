@@ -1,0 +1,83 @@
+"""Every prop is a body: closed, shaded outwards, of real size, with real matter in it."""
+
+import numpy as np
+import pytest
+
+from corporeal.showcase import check
+from corporeal.showcase.models import MODELS
+
+# Matter [cm³] and size [mm] of each prop: wall area × wall where hollow, volume where solid.
+TABLE = {
+    "rubber_duck": (63.9, (126, 84, 110)),
+    "soda_can": (5.18, (66, 66, 115)),
+    "mud_pile": (4820, (389, 439, 71)),
+    "vase": (792.3, (188, 188, 281)),
+    "ball": (455.8, (220, 220, 220)),
+    "armchair": (97480, (788, 712, 923)),
+    "floor_lamp": (1964, (430, 430, 1550)),
+    "couch": (535400, (895, 1754, 839)),
+    "potted_ficus": (11640, (820, 874, 1264)),
+    "small_tree": (5509, (1108, 1029, 1793)),
+    "sand_pile": (445100, (1969, 2030, 330)),
+    "snow_heap": (97920, (1238, 1182, 241)),
+    "steel_ball": (522.7, (100, 100, 100)),
+    "rubber_ball": (522.7, (100, 100, 100)),
+    "snowman": (213500, (687, 1145, 1202)),
+    "book": (954.2, (158, 210, 32)),
+    "mug": (139.2, (113, 82, 94)),
+    "cushion": (17630, (469, 469, 154)),
+}
+
+
+def picture_bytes(part):
+    return b"" if part.finish.texture is None else part.finish.texture.tobytes()
+
+
+@pytest.fixture(scope="module")
+def models():
+    return {name: make() for name, make in MODELS.items()}
+
+
+def test_the_menu_has_the_eighteen_props():
+    assert set(MODELS) == set(TABLE)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_every_part_is_closed_and_faces_outwards(models, name):
+    for part in models[name].parts:
+        body = check.inspect(part)
+        assert body.closed, part.name
+        assert body.shaded_outwards > 0.95, part.name
+        assert np.allclose(np.linalg.norm(part.mesh.normals, axis=1), 1, atol=1e-6)
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_a_prop_has_its_real_size_and_matter(models, name):
+    matter, size = TABLE[name]
+    model = models[name]
+    low, high = model.bounds()
+    assert low[2] == pytest.approx(0, abs=1e-4), "it stands on the floor"
+    assert 1e3 * (high - low) == pytest.approx(size, abs=1)
+    assert 1e6 * sum(check.inspect(p).matter for p in model.parts) == pytest.approx(
+        matter, rel=0.02
+    )
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_parts_touch_and_do_not_overlap(models, name):
+    assert check.overlap(models[name].parts) < 1.5e-3
+
+
+@pytest.mark.parametrize("name", TABLE)
+def test_the_same_code_makes_the_same_prop(models, name):
+    for first, again in zip(models[name].parts, MODELS[name]().parts, strict=True):
+        assert np.array_equal(first.mesh.vertices, again.mesh.vertices)
+        assert np.array_equal(first.mesh.faces, again.mesh.faces)
+        assert np.array_equal(first.mesh.uv, again.mesh.uv)
+        assert picture_bytes(first) == picture_bytes(again)
+
+
+def test_textures_are_small(models):
+    for part in (p for m in models.values() for p in m.parts):
+        texture = part.finish.texture
+        assert texture is None or (texture.dtype == np.uint8 and max(texture.shape[:2]) <= 512)
