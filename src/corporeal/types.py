@@ -279,9 +279,10 @@ class MaterialField:
     """One per part."""
     words: tuple[PartWords, ...]
     """The answer each material was chosen from, one per part."""
-    friction: Float[np.ndarray, "K+1 K+1"]
-    """Sliding friction between parts [-]; the last row and column are the floor and the walls."""
-    restitution: Float[np.ndarray, "K+1 K+1"]
+    friction: Float[np.ndarray, "K1 K1"]
+    """Sliding friction between parts [-], K1 = K + 1; the last row and column are the floor and the
+    walls."""
+    restitution: Float[np.ndarray, "K1 K1"]
     """Newton's coefficient between rigid parts [-]; last row and column as above."""
 
 

@@ -1,7 +1,7 @@
 """What an engine is given and what it gives back: the contract that every engine keeps."""
 
 from dataclasses import dataclass, field
-from typing import Literal, Protocol
+from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -59,14 +59,17 @@ FLOOR = Plane((0.0, 0.0, 1.0), 0.0)
 
 @dataclass(frozen=True)
 class Problem:
-    """Bodies, what they may touch, and the forces. B bodies, W planes. Nothing in it tunes."""
+    """Bodies, what they may touch, and the forces; nothing in it tunes.
+
+    B bodies, W planes, BW = B + W.
+    """
 
     bodies: tuple[Body, ...]
     cell: float
     """Grid spacing dx [m]."""
-    friction: Float[np.ndarray, "B+W B+W"]
+    friction: Float[np.ndarray, "BW BW"]
     """Coulomb μ of every pair: bodies first, then planes. Symmetric."""
-    restitution: Float[np.ndarray, "B+W B+W"]
+    restitution: Float[np.ndarray, "BW BW"]
     """Newton's e, used only where rigid meets rigid or a plane. Symmetric."""
     planes: tuple[Plane, ...] = (FLOOR,)
     gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
@@ -157,6 +160,7 @@ class Steps:
     """[s]"""
 
 
+@runtime_checkable
 class Engine(Protocol):
     """A solver of one problem."""
 

@@ -1,0 +1,204 @@
+"""What happened, as numbers: who touched whom and when, what bounced, what kept a dent where."""
+
+from itertools import combinations
+from math import degrees
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.mpm.shape import Dent, dent, rigid_fit, shape_error, where_it_was
+from corporeal.types import Particles, Scene, Trajectory
+
+REST = 0.3
+"""A dent is what is left after so long at rest [s]."""
+APART = 0.1
+"""Bodies have separated when they stay apart so long [s]."""
+SAMPLES = 8
+"""Frames that are averaged over the rest."""
+
+Ledger = dict[str, np.ndarray]
+
+
+def outcome(scene: Scene, particles: Particles, trajectory: Trajectory) -> dict[str, Any]:
+    """Say what was seen. All SI; None where something did not happen.
+
+    ``objects[name]``: ``at_rest``; ``rms_speed_end`` [m/s]; ``shape_error_end`` and
+    ``shape_error_max`` [-]; ``dent_depth_m``, ``dent_depth_dx``, ``dent_place`` (on the object as
+    it started, [x, y, z]), ``dent_share``; ``dent_from_contact_m`` {other: distance of the dent's
+    centroid from where the two first touched}; ``deepest_squeeze_m`` (largest displacement once
+    rigid motion is removed, at any time); ``moved_m`` [x, y, z] and ``moved_level_m`` (of the
+    centre of mass); ``turned_deg``; ``fall_m``, ``rebound_m``, ``rebound_ratio``;
+    ``rest_drift_m`` (of the centre in the last 0.3 s); ``length_m`` (longest side).
+
+    ``pairs["a|b"]`` (scene order; "floor" comes last): ``first_contact_s``, ``contact_point``,
+    ``separated``, ``gap_end_m``, ``gap_end_dx``, ``largest_gap_after_m``, ``impulse``.
+
+    ``order``: pairs of objects [a, b] by first contact, the floor and things that touch from the
+    first frame on left out. ``cell_m``, ``duration_s``.
+    """
+    names = [o.name for o in scene.objects]
+    bodies = Bodies(particles, trajectory)
+    pairs = pair_rows(names, particles.cell, trajectory)
+    return {
+        "objects": {name: object_row(b, names, bodies) for b, name in enumerate(names)},
+        "pairs": pairs,
+        "order": order(pairs, float(trajectory.time[1]) if len(trajectory.time) > 1 else 0.0),
+        "cell_m": particles.cell,
+        "duration_s": float(trajectory.time[-1]),
+    }
+
+
+class Bodies:
+    """Particle positions of every object over time; one pass over the frames on disk."""
+
+    def __init__(self, particles: Particles, trajectory: Trajectory) -> None:
+        self.cell, self.time, self.ledger = particles.cell, trajectory.time, trajectory.ledger
+        self.trajectory = trajectory
+        count = len(trajectory.ledger["mass"][0])
+        self.members = [np.flatnonzero(particles.object == b) for b in range(count)]
+        first = trajectory.frames[0].position.astype(float)
+        self.start = [first[m] for m in self.members]
+        self.error = np.zeros((len(self.time), count))
+        self.squeeze = np.zeros(count)
+        self.last: list[list[np.ndarray]] = [[] for _ in range(count)]
+        sampled = set(self.resting_frames().tolist())
+        for k in range(len(self.time)):
+            self._take(k, k in sampled)
+
+    def _take(self, k: int, keep: bool) -> None:
+        position = self.trajectory.frames[k].position.astype(float)
+        for b, mine in enumerate(self.members):
+            now, start = position[mine], self.start[b]
+            self.error[k, b] = shape_error(start, now)
+            fit = rigid_fit(start, now, np.ones(len(start)))
+            shift = np.linalg.norm(fit.undo(now) - start, axis=1)
+            self.squeeze[b] = max(self.squeeze[b], float(np.sort(shift)[-8:].mean()))
+            if keep:
+                self.last[b].append(now)
+
+    def resting_frames(self) -> np.ndarray:
+        """Numbers of up to ``SAMPLES`` frames in the last 0.3 s."""
+        late = np.flatnonzero(self.time >= self.time[-1] - REST - 1e-9)
+        return np.unique(np.linspace(late[0], late[-1], SAMPLES).astype(int))
+
+    def at(self, k: int, body: int) -> Float[np.ndarray, "N 3"]:
+        """One object's particles in frame k [m]."""
+        return self.trajectory.frames[k].position[self.members[body]].astype(float)
+
+
+def object_row(body: int, names: list[str], bodies: Bodies) -> dict[str, Any]:
+    """Say what happened to one object."""
+    ledger, cell, start = bodies.ledger, bodies.cell, bodies.start[body]
+    mark = dent(start, bodies.last[body], cell)
+    centre = ledger["centre"][:, body]
+    late = bodies.resting_frames()
+    drift = float(np.linalg.norm(np.ptp(centre[late], axis=0)))
+    moved = centre[-1] - centre[0]
+    fit = rigid_fit(start, bodies.last[body][-1], np.ones(len(start)))
+    rms = ledger["rms_speed"][late, body]
+    return {
+        "at_rest": bool(rms.max() * REST < cell),
+        "rms_speed_end": float(rms[-1]),
+        "shape_error_end": float(bodies.error[-1, body]),
+        "shape_error_max": float(bodies.error[:, body].max()),
+        "dent_depth_m": mark.depth,
+        "dent_depth_dx": mark.depth / cell,
+        "dent_place": None if mark.share == 0 else mark.place.tolist(),
+        "dent_share": mark.share,
+        "dent_from_contact_m": dent_distances(body, mark, names, bodies),
+        "deepest_squeeze_m": float(bodies.squeeze[body]),
+        "moved_m": moved.tolist(),
+        "moved_level_m": float(np.hypot(moved[0], moved[1])),
+        "turned_deg": degrees(fit.angle),
+        "rest_drift_m": drift,
+        "length_m": float(np.ptp(start, axis=0).max()),
+        **bounce(centre[:, 2], ledger["first_contact"][-1, body], bodies.time, cell),
+    }
+
+
+def dent_distances(
+    body: int, mark: Dent, names: list[str], bodies: Bodies
+) -> dict[str, float | None]:
+    """Distance on the undeformed body from each first contact to the dent's centroid [m]."""
+    found: dict[str, float | None] = {}
+    for other, name in enumerate([*names, "floor"]):
+        instant = bodies.ledger["first_contact"][-1, body, other]
+        if other == body or not np.isfinite(instant):
+            continue
+        point = bodies.ledger["contact_point"][-1, body, other]
+        frame = min(int(np.searchsorted(bodies.time, instant)), len(bodies.time) - 1)
+        struck = where_it_was(point, bodies.at(frame, body), bodies.start[body])
+        found[name] = None if mark.share == 0 else float(np.linalg.norm(mark.place - struck))
+    return found
+
+
+def bounce(
+    height: Float[np.ndarray, " F"],
+    first_contact: Float[np.ndarray, " N"],
+    time: Float[np.ndarray, " F"],
+    cell: float,
+) -> dict[str, float | None]:
+    """How far a body fell before it first touched anything, and how high it came back.
+
+    The rebound is measured from the lowest point of the centre of mass that follows the contact; a
+    fall of less than half a cell has no ratio.
+    """
+    none: dict[str, float | None] = {"fall_m": None, "rebound_m": None, "rebound_ratio": None}
+    if np.isnan(first_contact).all():
+        return none
+    k = max(0, min(int(np.searchsorted(time, np.nanmin(first_contact))), len(time) - 1) - 1)
+    rising = np.flatnonzero(np.diff(height[k:]) > 0)
+    if len(rising) == 0:
+        return none | {"fall_m": float(height[0] - height[k])}
+    low = k + int(rising[0])
+    fall, rebound = float(height[0] - height[low]), float(height[low:].max() - height[low])
+    return {
+        "fall_m": fall,
+        "rebound_m": rebound,
+        "rebound_ratio": rebound / fall if fall > cell / 2 else None,
+    }
+
+
+def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str, dict[str, Any]]:
+    """Say what happened between every two objects, and between each object and the floor."""
+    ledger, time = trajectory.ledger, trajectory.time
+    rows = {}
+    for a, c in combinations(range(len(names) + 1), 2):
+        instant = float(ledger["first_contact"][-1, a, c])
+        touched = bool(np.isfinite(instant))
+        floor = c == len(names)
+        gap = None if floor else ledger["gap"][:, a, c]
+        after = None if gap is None or not touched else gap[time > instant]
+        impulse = (
+            np.linalg.norm(ledger["plane_impulse"][-1, 0, a])
+            if floor
+            else ledger["pair_impulse"][-1, a, c]
+        )
+        rows[f"{names[a]}|{'floor' if floor else names[c]}"] = {
+            "first_contact_s": instant if touched else None,
+            "contact_point": ledger["contact_point"][-1, a, c].tolist() if touched else None,
+            "separated": None if after is None else separated(after, time[time > instant], cell),
+            "gap_end_m": None if gap is None else float(gap[-1]),
+            "gap_end_dx": None if gap is None else float(gap[-1]) / cell,
+            "largest_gap_after_m": float(after.max()) if after is not None and len(after) else None,
+            "impulse": float(impulse),
+        }
+    return rows
+
+
+def separated(gap: Float[np.ndarray, " F"], time: Float[np.ndarray, " F"], cell: float) -> bool:
+    """Whether two bodies stay more than a cell apart for 0.1 s or longer."""
+    apart = np.concatenate([[False], gap > cell, [False]]).astype(int)
+    edges = np.flatnonzero(np.diff(apart)).reshape(-1, 2)
+    return any(time[last - 1] - time[first] >= APART - 1e-9 for first, last in edges)
+
+
+def order(pairs: dict[str, dict[str, Any]], first_frame: float) -> list[list[str]]:
+    """Pairs of objects by the time they first touched, those that touched at the start left out."""
+    met = [
+        (row["first_contact_s"], name)
+        for name, row in pairs.items()
+        if not name.endswith("|floor") and (row["first_contact_s"] or 0.0) > first_frame
+    ]
+    return [name.split("|") for _, name in sorted(met)]

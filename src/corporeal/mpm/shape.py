@@ -1,0 +1,106 @@
+"""How a body's shape changed: what remains of its displacement once its rigid motion is removed."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+ROUNDS, TRUSTED = 5, 0.7
+"""The rigid fit is repeated on the trusted share of points that fitted best."""
+
+
+@dataclass(frozen=True)
+class RigidFit:
+    """x ≈ R (X - centre) + moved."""
+
+    rotation: Float[np.ndarray, "3 3"]
+    centre: Float[np.ndarray, " 3"]
+    """[m]"""
+    moved: Float[np.ndarray, " 3"]
+    """[m]"""
+
+    def undo(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
+        """Bring points back to where the body started [m]."""
+        return (points - self.moved) @ self.rotation + self.centre
+
+    @property
+    def angle(self) -> float:
+        """How far the body turned [rad]."""
+        return float(np.arccos(np.clip((np.trace(self.rotation) - 1) / 2, -1, 1)))
+
+
+def rigid_fit(
+    start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"], weight: Float[np.ndarray, " N"]
+) -> RigidFit:
+    """Best rigid motion from one set of points to another (Kabsch 1976)."""
+    share = weight / weight.sum()
+    centre, moved = share @ start, share @ now
+    u, _, vt = np.linalg.svd((start - centre).T @ ((now - moved) * share[:, None]))
+    mirror = np.diag([1.0, 1.0, np.sign(np.linalg.det(u @ vt))])
+    return RigidFit((u @ mirror @ vt).T, centre, moved)
+
+
+def trusted_fit(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) -> RigidFit:
+    """Rigid motion of the part of a body that kept its shape: a dent does not tilt it."""
+    weight = np.ones(len(start))
+    fit = rigid_fit(start, now, weight)
+    for _ in range(ROUNDS):
+        error = np.linalg.norm(fit.undo(now) - start, axis=1)
+        fit = rigid_fit(start, now, (error <= np.quantile(error, TRUSTED)).astype(float))
+    return fit
+
+
+def diagonal(points: Float[np.ndarray, "N 3"]) -> float:
+    """Diagonal of the bounding box [m]."""
+    return float(np.linalg.norm(np.ptp(points, axis=0)))
+
+
+def shape_error(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) -> float:
+    """RMS distance after the best rigid fit over the bounding box's diagonal [-]."""
+    fit = rigid_fit(start, now, np.ones(len(start)))
+    return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / diagonal(start)
+
+
+@dataclass(frozen=True)
+class Dent:
+    """A residual change of shape."""
+
+    depth: float
+    """Largest residual displacement, averaged over one cell's worth of particles [m]."""
+    place: Float[np.ndarray, " 3"]
+    """Centroid, weighted by displacement squared, on the body as it started [m]; nan: no dent."""
+    share: float
+    """Share of the particles that moved more than the threshold [-]."""
+
+
+def dent(
+    start: Float[np.ndarray, "N 3"], now: list[Float[np.ndarray, "N 3"]], threshold: float
+) -> Dent:
+    """Residual displacement of a body, averaged over its last frames so that vibration cancels.
+
+    Args:
+        start: Where the particles started [m].
+        now: Where they are in each of the last frames [m].
+        threshold: Smaller displacements are no dent [m].
+
+    """
+    shift = np.mean([trusted_fit(start, x).undo(x) - start for x in now], axis=0)
+    size = np.linalg.norm(shift, axis=1)
+    dented = size > threshold
+    depth = float(np.sort(size)[-8:].mean())
+    if not dented.any():
+        return Dent(depth, np.full(3, np.nan), 0.0)
+    place = np.average(start[dented], axis=0, weights=size[dented] ** 2)
+    return Dent(depth, place, float(dented.mean()))
+
+
+def where_it_was(
+    point: Float[np.ndarray, " 3"],
+    now: Float[np.ndarray, "N 3"],
+    start: Float[np.ndarray, "N 3"],
+) -> Float[np.ndarray, " 3"]:
+    """Take a point on a body now back to where that bit of the body started [m]."""
+    _, nearest = KDTree(now).query(point, k=min(8, len(now)))
+    nearest = np.atleast_1d(nearest)
+    return point + np.mean(start[nearest] - now[nearest], axis=0)
