@@ -35,7 +35,8 @@ class Entry:
 
     def fail(self, what: str, next_step: str = EXPORT_AGAIN) -> NoReturn:
         """Refuse the file because of this entry."""
-        raise BadFileError(self.document.path, f"at {self.pointer}: {what}", next_step)
+        where = f"at {self.pointer}: " if self.pointer else ""
+        raise BadFileError(self.document.path, where + what, next_step)
 
     def has(self, key: str) -> bool:
         """Tell whether the file says anything under the key."""
@@ -152,6 +153,11 @@ class Document:
         said = f"{self.path.name}: {sentence}"
         if said not in self.warnings:
             self.warnings.append(said)
+
+    def warn_of(self, what: str, problem: BadFileError) -> None:
+        """Remember that something was left out, and the problem behind it."""
+        said = str(problem).removeprefix(f"{self.path}: ").removesuffix(EXPORT_AGAIN).strip()
+        self.warn(f"{what} is left out: {said}")
 
     def spend(self, entry: Entry, rows: int) -> None:
         """Count the rows to be unpacked: a small file can ask for the same ones a million times."""

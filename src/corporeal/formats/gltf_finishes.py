@@ -42,7 +42,7 @@ class Wardrobe:
         try:
             material = primitive.refer("material", "materials")
         except BadFileError as problem:
-            self._complain(primitive, problem)
+            self.document.warn_of("a material", problem)
             material = None
         key = material.pointer if material else ""
         if key not in self._dresses:
@@ -56,7 +56,7 @@ class Wardrobe:
         try:
             return self._read_sound(material, name)
         except BadFileError as problem:
-            self._complain(material, problem)
+            self.document.warn_of(f"the look of material {name!r}", problem)
             return Dress(replace(PLAIN, name=name))
 
     def _read_sound(self, material: Entry, name: str) -> Dress:
@@ -88,7 +88,7 @@ class Wardrobe:
                 item.fail("its picture is in a format that is not supported.")
             return self._image(image)
         except BadFileError as problem:
-            self._complain(texture, problem)
+            self.document.warn_of("a texture", problem)
             return None
 
     def _image(self, image: Entry) -> np.ndarray | None:
@@ -109,10 +109,6 @@ class Wardrobe:
             words = f"texture {image.text('name')!r} ({image.pointer})"
             self.document.warn(f"{words} is left out: {problem}.")
             return None
-
-    def _complain(self, entry: Entry, problem: BadFileError) -> None:
-        said = str(problem).removeprefix(f"{self.document.path}: at ")
-        self.document.warn(f"part of the look of {entry.pointer} is left out: {said}")
 
 
 class _Base:

@@ -96,8 +96,7 @@ class _Source:
         try:
             stored = self._stored(name, widths)
         except BadFileError as problem:
-            said = str(problem).removeprefix(f"{document.path}: at ")
-            document.warn(f"{name} of mesh {self.mesh!r} is left out: {said}")
+            document.warn_of(f"{name} of mesh {self.mesh!r}", problem)
             return None
         if stored is None:
             return None

@@ -30,13 +30,13 @@ def safe(name: str) -> str:
 
 
 def unique(names: list[str]) -> list[str]:
-    """Return the names, later doubles numbered, so that each occurs once."""
+    """Return the names, later doubles counted up ("duck_0", "duck_1"), so that each occurs once."""
     taken: set[str] = set()
     result = []
     for name in names:
-        k, fresh = 1, name
+        stem, k, fresh = re.sub(r"_\d+$", "", name), 1, name
         while fresh in taken:
-            fresh, k = f"{name}_{k}", k + 1
+            fresh, k = f"{stem}_{k}", k + 1
         taken.add(fresh)
         result.append(fresh)
     return result

@@ -1,0 +1,209 @@
+"""Read ``scene.toml``: what is where, how it starts, what pushes it. Lengths [m], times [s].
+
+There is nothing numerical to tune in it: quality is one word on the command line (``--detail``).
+
+::
+
+    file = "scene.glb"            # or one [[object]] per file
+    duration = 2.0
+    fps = 60
+    gravity = [0, 0, -9.81]
+    [[object]]
+    name = "duck_0"               # of an object in ``file``, or a name to give
+    file = "duck.glb"
+    position = [0, 0, 0.4]        # the middle of the underside of its bounding box
+    velocity = [0, 0, -2]
+    extent = 0.1                  # its largest extent
+    class = "rubber duck"
+    push = { acceleration = [3, 0, 0], from = 0.0, to = 0.5 }
+"""
+
+import math
+import tomllib
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, NoReturn
+
+from corporeal.errors import BadFileError
+from corporeal.types import Push, Vector
+
+SCENE_KEYS = ("file", "duration", "fps", "gravity", "object")
+OBJECT_KEYS = ("name", "file", "class", "extent", "position", "velocity", "push")
+PUSH_KEYS = ("acceleration", "from", "to")
+LONGEST = 60.0
+"""[s]"""
+FASTEST = 1000.0
+"""Speed [m/s] and acceleration [m/s²] beyond which an entry is taken for a slip."""
+FARTHEST = 1000.0
+"""[m]"""
+
+
+@dataclass(frozen=True)
+class ObjectEntry:
+    """What one [[object]] says; None: nothing."""
+
+    name: str | None = None
+    file: Path | None = None
+    class_name: str | None = None
+    extent: float | None = None
+    """[m]"""
+    position: Vector | None = None
+    """Middle of the underside of the bounding box [m]."""
+    velocity: Vector | None = None
+    """[m/s]"""
+    push: Push | None = None
+
+
+@dataclass(frozen=True)
+class SceneFile:
+    """What a scene file says; None: nothing."""
+
+    path: Path
+    file: Path | None = None
+    duration: float | None = None
+    """[s]"""
+    fps: int | None = None
+    gravity: Vector | None = None
+    """[m/s²]"""
+    objects: tuple[ObjectEntry, ...] = ()
+
+
+def read_scene_file(path: Path) -> SceneFile:
+    """Read and check a scene file.
+
+    Raises:
+        BadFileError: It is no TOML, has an unknown key, or a value of the wrong kind or size.
+
+    """
+    table = _Table(path, "", _load(path))
+    table.only(SCENE_KEYS)
+    objects = tuple(_object(t) for t in table.tables("object"))
+    file = table.file("file")
+    if file is None and not any(o.file for o in objects):
+        table.fail("names no model.", 'Give file = "scene.glb", or a file in each [[object]].')
+    for k, entry in enumerate(objects):
+        if entry.file is None and (file is None or entry.name is None):
+            table.fail(f"object {k + 1} names no file.", "Give it a file, or a name within file.")
+    return SceneFile(
+        path=path,
+        file=file,
+        duration=table.number("duration", 0.01, LONGEST),
+        fps=table.whole("fps", 1, 1000),
+        gravity=table.vector("gravity", FASTEST),
+        objects=objects,
+    )
+
+
+def _object(table: "_Table") -> ObjectEntry:
+    table.only(OBJECT_KEYS)
+    return ObjectEntry(
+        name=table.text("name"),
+        file=table.file("file"),
+        class_name=table.text("class"),
+        extent=table.number("extent", 1e-4, FARTHEST),
+        position=table.vector("position", FARTHEST),
+        velocity=table.vector("velocity", FASTEST),
+        push=_push(table),
+    )
+
+
+def _push(table: "_Table") -> Push | None:
+    push = table.table("push")
+    if push is None:
+        return None
+    push.only(PUSH_KEYS)
+    acceleration = push.vector("acceleration", FASTEST)
+    if acceleration is None:
+        push.fail("'acceleration' is missing.", "Give it as [x, y, z] in m/s².")
+    start = push.number("from", 0.0, LONGEST)
+    end = push.number("to", 0.0, LONGEST)
+    start, end = 0.0 if start is None else start, math.inf if end is None else end
+    if end <= start:
+        push.fail(f"it ends at {end} s, before it begins at {start} s.", "Swap from and to.")
+    return Push(acceleration, start, end)
+
+
+def _load(path: Path) -> dict[str, Any]:
+    if not path.is_file():
+        raise BadFileError(path, "there is no such file.", "Check the path.")
+    try:
+        return tomllib.loads(path.read_bytes().decode("utf-8"))
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
+        step = "See the example in the documentation."
+        raise BadFileError(path, f"is not valid TOML ({str(problem)[:100]}).", step) from None
+    except OSError as problem:
+        raise BadFileError(path, f"cannot be read ({problem.strerror}).") from None
+
+
+@dataclass(frozen=True)
+class _Table:
+    """One table of the file and where it stands."""
+
+    path: Path
+    where: str
+    value: dict[str, Any]
+
+    def fail(self, what: str, next_step: str) -> NoReturn:
+        raise BadFileError(self.path, f"{self.where}{what}", next_step)
+
+    def only(self, allowed: tuple[str, ...]) -> None:
+        for key in self.value:
+            if key == "wind":
+                self.fail("wind comes in a later version.", "Use push, or leave wind out.")
+            if key not in allowed:
+                self.fail(f"unknown key {key[:40]!r}.", f"Allowed here: {', '.join(allowed)}.")
+
+    def tables(self, key: str) -> "list[_Table]":
+        items = self.value.get(key, [])
+        if not isinstance(items, list) or not all(isinstance(x, dict) for x in items):
+            self.fail(f"{key!r} is not a list of tables.", f"Write [[{key}]] before each.")
+        return [_Table(self.path, f"{key} {k + 1}: ", x) for k, x in enumerate(items)]
+
+    def table(self, key: str) -> "_Table | None":
+        item = self.value.get(key)
+        if item is None:
+            return None
+        if not isinstance(item, dict):
+            self.fail(f"{key!r} is not a table.", f"Allowed in it: {', '.join(PUSH_KEYS)}.")
+        return _Table(self.path, f"{self.where}{key}: ", item)
+
+    def text(self, key: str) -> str | None:
+        x = self.value.get(key)
+        if x is not None and (not isinstance(x, str) or not x.strip()):
+            self.fail(f"{key!r} is {_shown(x)}, not a text.", "Put it in quotes.")
+        return x
+
+    def file(self, key: str) -> Path | None:
+        name = self.text(key)
+        return None if name is None else self.path.parent / name
+
+    def number(self, key: str, low: float, high: float) -> float | None:
+        x = self.value.get(key)
+        if x is None:
+            return None
+        if not isinstance(x, int | float) or isinstance(x, bool) or not low <= x <= high:
+            self.fail(f"{key!r} is {_shown(x)}.", f"Give a number from {low:g} to {high:g}.")
+        return float(x)
+
+    def whole(self, key: str, low: int, high: int) -> int | None:
+        x = self.number(key, low, high)
+        if x is None:
+            return None
+        if not x.is_integer():
+            self.fail(f"{key!r} is {x}.", "Give a whole number.")
+        return int(x)
+
+    def vector(self, key: str, most: float) -> Vector | None:
+        x = self.value.get(key)
+        if x is None:
+            return None
+        numbers = isinstance(x, list) and len(x) == 3
+        if not numbers or not all(isinstance(c, int | float) and abs(c) <= most for c in x):
+            step = f"Give three numbers, [x, y, z], each at most {most:g} in size."
+            self.fail(f"{key!r} is {_shown(x)}.", step)
+        return (float(x[0]), float(x[1]), float(x[2]))
+
+
+def _shown(x: Any) -> str:
+    text = repr(x)
+    return text if len(text) <= 40 else text[:37] + "…"

@@ -1,0 +1,82 @@
+"""The objects of a scene as bodies in space: their boxes, moved, resized, looked at for overlap."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import igl
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.geometry import placing
+from corporeal.types import Scene, Surface, Vector
+
+SAMPLES = 2000
+"""Vertices of an object that are looked up in another."""
+TOUCH = 0.01
+"""Share of them that may lie inside before the two are said to overlap."""
+
+
+def box_of(surfaces: Sequence[Surface]) -> Float[np.ndarray, "2 3"]:
+    """Return the low and the high corner [m]."""
+    low = np.min([s.vertices.min(axis=0) for s in surfaces], axis=0)
+    return np.stack([low, np.max([s.vertices.max(axis=0) for s in surfaces], axis=0)])
+
+
+def boxes_of(scene: Scene) -> Float[np.ndarray, "N 2 3"]:
+    """Return the box of every object [m]."""
+    return np.stack([box_of(_surfaces(scene, k)) for k in range(len(scene.objects))])
+
+
+def moved(scene: Scene, shift: Vector | Float[np.ndarray, "3"], k: int | None = None) -> Scene:
+    """Return the scene with object ``k``, or with everything, shifted [m]."""
+    return _reshaped(scene, k, lambda x: x + np.asarray(shift))
+
+
+def resized(scene: Scene, k: int, extent: float) -> Scene:
+    """Scale one object about the middle of its underside to its real extent [m]."""
+    low, high = box_of(_surfaces(scene, k))
+    foot = np.array([*(low + high)[:2] / 2, low[2]])
+    factor = extent / max(float((high - low).max()), 1e-12)
+    thing = replace(scene.objects[k], real_extent=extent, scale=1.0)
+    scene = replace(scene, objects=(*scene.objects[:k], thing, *scene.objects[k + 1 :]))
+    return _reshaped(scene, k, lambda x: foot + (x - foot) * factor)
+
+
+def scaled(scene: Scene, factor: float) -> Scene:
+    """Scale everything about the origin, which lies on the floor; real extents stay real."""
+    scene = replace(
+        scene,
+        metres_per_unit=scene.metres_per_unit * factor,
+        objects=tuple(replace(o, scale=o.scale * factor) for o in scene.objects),
+    )
+    return _reshaped(scene, None, lambda x: x * factor)
+
+
+def intersecting(scene: Scene) -> list[tuple[int, int]]:
+    """Return the pairs of objects of which one holds vertices of the other."""
+    pairs = placing.overlapping(boxes_of(scene))
+    return [(a, b) for a, b in pairs if _inside(scene, a, b) or _inside(scene, b, a)]
+
+
+def _inside(scene: Scene, a: int, b: int) -> bool:
+    """Tell whether vertices of ``a`` lie within ``b``, by the generalised winding number."""
+    points = np.concatenate([s.vertices for s in _surfaces(scene, a)])
+    points = points[:: max(1, len(points) // SAMPLES)]
+    winding = np.zeros(len(points))
+    for s in _surfaces(scene, b):
+        winding += np.asarray(igl.fast_winding_number(s.vertices, s.triangles, points), float)
+    return bool(np.mean(winding > 0.5) > TOUCH)
+
+
+def _surfaces(scene: Scene, k: int) -> list[Surface]:
+    return [s for s in scene.surfaces if s.object == k]
+
+
+def _reshaped(scene: Scene, k: int | None, change) -> Scene:
+    return replace(
+        scene,
+        surfaces=tuple(
+            replace(s, vertices=change(s.vertices)) if k in (None, s.object) else s
+            for s in scene.surfaces
+        ),
+    )

@@ -1,0 +1,342 @@
+"""Put what the files hold into one scene: on the floor, apart from each other, in metres."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from corporeal.errors import BadFileError, UserError
+from corporeal.formats.glb import read_model
+from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
+from corporeal.formats.typical_extents import doubt
+from corporeal.formats.words import safe, unique
+from corporeal.geometry import placing
+from corporeal.geometry.arrangement import (
+    box_of,
+    boxes_of,
+    intersecting,
+    moved,
+    resized,
+    scaled,
+)
+from corporeal.types import Scene, SceneObject
+
+MODELS = (".glb", ".gltf")
+SHORTEST, LONGEST = 1.0, 3.0
+"""Bounds of the time that is watched when nobody says how long [s]."""
+
+
+@dataclass(frozen=True)
+class AssembleConfig:
+    """How files become a scene."""
+
+    objects: Literal["auto", "one", "nodes"] = "auto"
+    """What counts as one object within a file: the nodes that state a class, else the whole file
+    (auto); the whole file (one); every branch below the root (nodes)."""
+    stack: bool = False
+    """Put the files above each other, the first at the bottom, instead of side by side."""
+    drop: float = 0.0
+    """Hang each object this many times its own size above what it stands on."""
+    extent: tuple[str, ...] = ()
+    """Real largest extents, such as "duck=0.1" [m]."""
+    working_extent: float | None = None
+    """Scale the whole scene so that its largest extent is this [m]."""
+    duration: float | None = None
+    """How long to watch [s]; by default as the scene file says, else as the falls need."""
+    fps: int | None = None
+    """Frames per second of the film."""
+
+
+DEFAULT = AssembleConfig()
+
+
+@dataclass(frozen=True)
+class _Block:
+    """The objects of one file, which keep their arrangement among themselves."""
+
+    scene: Scene
+    ours: bool
+    entry: ObjectEntry | None
+    """What a scene file says of the whole block; None: it is the scene file's ``file``."""
+
+
+def assemble(inputs: Sequence[Path], config: AssembleConfig = DEFAULT) -> Scene:
+    """Return one scene from GLB or glTF files, a folder of them, or one ``scene.toml``.
+
+    Raises:
+        UserError: A file cannot be used, or the options don't fit what the files hold.
+
+    """
+    _check(config)
+    plan = _plan([Path(p) for p in inputs])
+    blocks = _sized(_named(_read(plan, config)), config.extent)
+    scene = _merged(plan, _placed(blocks, plan, config.stack))
+    scene = _at_working_extent(scene, config.working_extent)
+    scene = _dropped(scene, config.drop)
+    return _timed(_with_overlaps_told(scene), blocks, plan, config)
+
+
+def _check(config: AssembleConfig) -> None:
+    for name, value, low, high in (
+        ("drop", config.drop, 0.0, 100.0),
+        ("working extent", config.working_extent, 1e-3, 1e3),
+        ("duration", config.duration, 0.01, 60.0),
+        ("fps", config.fps, 1, 1000),
+    ):
+        if value is not None and not low <= value <= high:
+            raise UserError(f"The {name} is {value}. Give a number from {low:g} to {high:g}.")
+
+
+# ---------------------------------------------------------------- what the files hold
+
+
+def _plan(inputs: list[Path]) -> SceneFile:
+    """Return the inputs as if somebody had written a scene file for them."""
+    if not inputs:
+        raise UserError("No input. Name a .glb file, several of them, or a scene.toml.")
+    if any(p.suffix.lower() == ".toml" for p in inputs):
+        if len(inputs) > 1:
+            step = "Name the models in the scene file instead."
+            raise BadFileError(inputs[0], "a scene file stands alone.", step)
+        return read_scene_file(inputs[0])
+    files = [f for p in inputs for f in (_models_in(p) if p.is_dir() else [_model(p)])]
+    if len(files) == 1:
+        return SceneFile(files[0], file=files[0])
+    return SceneFile(inputs[0], objects=tuple(ObjectEntry(file=f) for f in files))
+
+
+def _models_in(folder: Path) -> list[Path]:
+    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in MODELS)
+    if not found:
+        step = "Name a .glb file, or a folder that holds some."
+        raise BadFileError(folder, "the folder holds no .glb or .gltf file.", step)
+    return found
+
+
+def _model(path: Path) -> Path:
+    if path.exists() and path.suffix.lower() not in MODELS:
+        step = "Convert it to .glb, for example with Blender."
+        raise BadFileError(path, "is not a .glb, .gltf or .toml file.", step)
+    return path
+
+
+def _read(plan: SceneFile, config: AssembleConfig) -> list[_Block]:
+    """Read every file once for each time it is asked for, with what is said of its objects."""
+    blocks = []
+    if plan.file is not None:
+        model = read_model(plan.file, config.objects)
+        blocks.append(_Block(model.scene, model.ours, None))
+    for entry in plan.objects:
+        if entry.file is None:
+            blocks[0] = replace(blocks[0], scene=_told(blocks[0].scene, entry, plan))
+            continue
+        single = entry.name or entry.class_name or entry.extent
+        model = read_model(entry.file, "one" if single else config.objects)
+        scene = model.scene
+        for k in range(len(scene.objects)):
+            scene = _with_object(scene, k, entry)
+        blocks.append(_Block(scene, model.ours, entry))
+    return blocks
+
+
+def _told(scene: Scene, entry: ObjectEntry, plan: SceneFile) -> Scene:
+    """Apply an entry to the object of the scene's own file that it names."""
+    names = [o.name for o in scene.objects]
+    if entry.name not in names:
+        step = f"Choose one of: {', '.join(names)}."
+        raise BadFileError(plan.path, f"{plan.file} has no object {entry.name!r}.", step)
+    return _with_object(scene, names.index(entry.name), entry)
+
+
+def _with_object(scene: Scene, k: int, entry: ObjectEntry) -> Scene:
+    thing = scene.objects[k]
+    thing = replace(
+        thing,
+        name=entry.name or thing.name,
+        class_name=entry.class_name or thing.class_name,
+        velocity=entry.velocity or thing.velocity,
+        push=entry.push or thing.push,
+    )
+    objects = (*scene.objects[:k], thing, *scene.objects[k + 1 :])
+    scene = replace(scene, objects=objects)
+    return scene if entry.extent is None else resized(scene, k, entry.extent)
+
+
+def _named(blocks: list[_Block]) -> list[_Block]:
+    """Return the blocks with names that occur once in the whole scene."""
+    names = iter(unique([safe(o.name) for b in blocks for o in b.scene.objects]))
+    return [
+        replace(
+            b,
+            scene=replace(
+                b.scene, objects=tuple(replace(o, name=next(names)) for o in b.scene.objects)
+            ),
+        )
+        for b in blocks
+    ]
+
+
+# ---------------------------------------------------------------- how large
+
+
+def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
+    """Give objects the extents asked for, and tell where the others look implausible."""
+    wanted = [_extent_of(text, len(blocks), blocks[0].scene) for text in extents]
+    used = set()
+    for i, block in enumerate(blocks):
+        scene, told = block.scene, []
+        for k, thing in enumerate(scene.objects):
+            hits = [w for w in wanted if _means(w[0], thing)]
+            used.update(hits)
+            if hits:
+                scene = resized(scene, k, hits[-1][1])
+            elif sentence := doubt(thing.name, thing.class_name, thing.real_extent * thing.scale):
+                told.append(sentence)
+        told = [s for s in told if not block.ours]
+        blocks[i] = replace(block, scene=replace(scene, warnings=(*scene.warnings, *told)))
+    for name, _ in wanted:
+        if name not in {n for n, _ in used}:
+            names = [o.name for b in blocks for o in b.scene.objects]
+            raise UserError(f"--extent: no object {name!r}. Choose one of: {', '.join(names)}.")
+    return blocks
+
+
+def _extent_of(text: str, blocks: int, scene: Scene) -> tuple[str, float]:
+    """Return name and metres of "duck=0.1", or of "0.1" where there is a single object."""
+    name, _, number = text.rpartition("=")
+    try:
+        metres = float(number)
+    except ValueError:
+        metres = math.nan
+    if not name and blocks == len(scene.objects) == 1:
+        name = scene.objects[0].name
+    if not name or not 1e-4 <= metres <= 1000:
+        raise UserError(f"--extent {text!r}: write NAME=METRES, for example duck=0.1.")
+    return name, metres
+
+
+def _means(words: str, thing: SceneObject) -> bool:
+    """Tell whether somebody who types these words means this object."""
+    said = set(words.lower().replace("_", " ").split())
+    return words == thing.name or said <= set(thing.class_name.lower().split())
+
+
+def _at_working_extent(scene: Scene, extent: float | None) -> Scene:
+    """Scale everything about the origin, which lies on the floor."""
+    if extent is None:
+        return scene
+    return scaled(scene, extent / float(np.ptp(box_of(scene.surfaces), axis=0).max()))
+
+
+# ---------------------------------------------------------------- where
+
+
+def _placed(blocks: list[_Block], plan: SceneFile, stack: bool) -> list[_Block]:
+    """Move each block to its position, or onto the floor beside or above the others."""
+    free = [i for i, b in enumerate(blocks) if b.entry and b.entry.position is None]
+    fixed = [i for i in range(len(blocks)) if i not in free]
+    for i in fixed:
+        blocks[i] = replace(blocks[i], scene=_fixed(blocks[i], plan))
+    if not free:
+        return blocks
+    boxes = np.stack([box_of(blocks[i].scene.surfaces) for i in free])
+    shifts = placing.stacked(boxes) if stack else placing.side_by_side(boxes)
+    if fixed:
+        right = max(box_of(blocks[i].scene.surfaces)[1, 0] for i in fixed)
+        width = (boxes + shifts[:, None])[..., 0]
+        shifts[:, 0] += right - width.min() + placing.GAP * np.ptp(width)
+    for i, shift in zip(free, shifts, strict=True):
+        blocks[i] = replace(blocks[i], scene=moved(blocks[i].scene, shift))
+    return blocks
+
+
+def _fixed(block: _Block, plan: SceneFile) -> Scene:
+    """Return a block where the scene file puts it, or as its own file poses it, above the floor."""
+    scene = block.scene
+    box = box_of(scene.surfaces)
+    if block.entry is not None and block.entry.position is not None:
+        return moved(scene, placing.onto_floor(box[None])[0] + block.entry.position)
+    if len(scene.objects) == 1 and not block.ours:
+        scene = moved(scene, placing.onto_floor(box[None])[0])
+    elif box[0, 2] < 0 or not block.ours:
+        scene = moved(scene, np.array([0.0, 0.0, -box[0, 2]]))
+    names = [o.name for o in scene.objects]
+    for entry in plan.objects:
+        if entry.file is None and entry.position is not None:
+            k = names.index(safe(entry.name or ""))
+            own = box_of([s for s in scene.surfaces if s.object == k])
+            scene = moved(scene, placing.onto_floor(own[None])[0] + entry.position, k)
+    return scene
+
+
+def _dropped(scene: Scene, drop: float) -> Scene:
+    """Hang every object a number of times its size above what it stands on."""
+    if drop == 0:
+        return scene
+    for k, rise in enumerate(placing.lifted(boxes_of(scene), drop)):
+        scene = moved(scene, np.array([0.0, 0.0, rise]), k)
+    return scene
+
+
+def _with_overlaps_told(scene: Scene) -> Scene:
+    """Warn of objects that stand in each other: they would burst apart."""
+    pairs = ((scene.objects[a].name, scene.objects[b].name) for a, b in intersecting(scene))
+    told = tuple(f"{a} and {b} overlap at the start." for a, b in pairs)
+    return replace(scene, warnings=scene.warnings + told)
+
+
+# ---------------------------------------------------------------- the whole, and how long
+
+
+def _merged(plan: SceneFile, blocks: list[_Block]) -> Scene:
+    objects, surfaces, finishes, warnings = [], [], [], []
+    for scene in (b.scene for b in blocks):
+        o, f = len(objects), len(finishes)
+        surfaces += [replace(s, object=s.object + o, finish=s.finish + f) for s in scene.surfaces]
+        objects += scene.objects
+        finishes += scene.finishes
+        warnings += scene.warnings
+    return Scene(
+        name=_title(plan, blocks),
+        source=str(plan.path),
+        objects=tuple(objects),
+        surfaces=tuple(surfaces),
+        finishes=tuple(finishes),
+        warnings=tuple(dict.fromkeys(warnings)),
+    )
+
+
+def _title(plan: SceneFile, blocks: list[_Block]) -> str:
+    """Return the scene's name: the scene file's, or its folder's, or the models'."""
+    if plan.path.suffix.lower() == ".toml":
+        stem = plan.path.stem
+        return safe(plan.path.resolve().parent.name if stem == "scene" else stem) or "scene"
+    return safe("-".join(b.scene.name for b in blocks))[:60] or "scene"
+
+
+def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: AssembleConfig) -> Scene:
+    """Settle gravity, duration and fps: the options first, then the scene file, then our GLB."""
+    own = blocks[0].scene if len(blocks) == 1 and blocks[0].ours else None
+    scene = replace(
+        scene,
+        gravity=plan.gravity or (own or scene).gravity,
+        fps=config.fps or plan.fps or (own or scene).fps,
+    )
+    stated = config.duration or plan.duration or (own.duration if own else None)
+    return replace(scene, duration=stated or _watched(scene))
+
+
+def _watched(scene: Scene) -> float:
+    """Return three times the longest fall and a second more [s], and never less than the pushes."""
+    fall = 0.0
+    g = -scene.gravity[2]
+    for thing, height in zip(scene.objects, boxes_of(scene)[:, 0, 2], strict=True):
+        v = thing.velocity[2]
+        if g > 0:
+            fall = max(fall, (v + math.sqrt(v * v + 2 * g * max(height, 0.0))) / g)
+    ends = [o.push.end for o in scene.objects if o.push and math.isfinite(o.push.end)]
+    pushed = max(ends, default=0.0) + 0.5
+    return round(max(min(max(3 * fall + 1, SHORTEST), LONGEST), pushed), 1)
