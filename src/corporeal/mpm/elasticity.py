@@ -27,14 +27,6 @@ def lame(young: Number, poisson: Number) -> tuple[Number, Number]:
     )
 
 
-def p_wave_speed(young: Number, poisson: Number, density: Number) -> Number:
-    """Longitudinal wave speed c_p [m/s] of an isotropic solid at rest.
-
-    c_p = sqrt((λ + 2μ) / ρ) = sqrt(E (1 - ν) / (ρ (1 + ν)(1 - 2ν)))
-    """
-    return (young * (1.0 - poisson) / (density * (1.0 + poisson) * (1.0 - 2.0 * poisson))) ** 0.5
-
-
 # ---------------------------------------------------------------- decompositions
 
 
@@ -46,7 +38,7 @@ def signed_svd(F: Matrices) -> tuple[Matrices, Vectors, Matrices]:
 
     """
     U, stretch, Vt = np.linalg.svd(F)
-    mirror_u, mirror_v = np.sign(np.linalg.det(U)), np.sign(np.linalg.det(Vt))
+    mirror_u, mirror_v = np.sign(determinant(U)), np.sign(determinant(Vt))
     U[:, :, 2] *= mirror_u[:, None]
     Vt[:, 2, :] *= mirror_v[:, None]
     stretch[:, 2] *= mirror_u * mirror_v
@@ -57,6 +49,11 @@ def polar(F: Matrices) -> tuple[Matrices, Matrices]:
     """F = R S with a rotation R (never a reflection) and a symmetric S."""
     U, stretch, V = signed_svd(F)
     return U @ transpose(V), (V * stretch[:, None, :]) @ transpose(V)
+
+
+def determinant(F: Matrices) -> Scalars:
+    """Triple product of the rows; a tenth of the time of a factorisation."""
+    return np.sum(F[:, 0] * np.cross(F[:, 1], F[:, 2]), axis=1)
 
 
 def transpose(A: Matrices) -> Matrices:
@@ -75,19 +72,19 @@ def from_stretches(U: Matrices, stretch: Vectors, V: Matrices) -> Matrices:
 def psi_corotated(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     """Ψ = μ Σ (σ_i - 1)² + λ/2 (J - 1)²  (Stomakhin et al. 2012)."""
     stretch = signed_svd(F)[1]
-    J = np.linalg.det(F)
+    J = determinant(F)
     return mu * np.sum((stretch - 1.0) ** 2, axis=1) + 0.5 * lam * (J - 1.0) ** 2
 
 
 def tau_corotated(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """τ = 2μ (F - R) Fᵀ + λ J (J - 1) 1."""
-    J = np.linalg.det(F)
+    J = determinant(F)
     return 2.0 * _per(mu) * (F - polar(F)[0]) @ transpose(F) + _isotropic(lam * J * (J - 1.0))
 
 
 def pk1_corotated(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """P = 2μ (F - R) + λ J (J - 1) F⁻ᵀ."""
-    J = np.linalg.det(F)
+    J = determinant(F)
     return 2.0 * _per(mu) * (F - polar(F)[0]) + _per(lam * J * (J - 1.0)) * _inverse_transpose(F)
 
 
@@ -193,7 +190,7 @@ def _principal_tau(strain: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
 
 def _log_j(F: Matrices) -> Scalars:
     with np.errstate(invalid="ignore", divide="ignore"):
-        return np.log(np.linalg.det(F))
+        return np.log(determinant(F))
 
 
 def _per(scalar: Scalars) -> Float[np.ndarray, "P 1 1"]:

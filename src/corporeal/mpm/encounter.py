@@ -1,0 +1,312 @@
+"""Which fields meet where in one step, and what comes of it: the reference engine's contact.
+
+Order: list the nodes; look at the surfaces there; choose normals; measure gaps; solve all
+impulses together, rigid bodies and walls included.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from corporeal.mpm import contact, elasticity
+from corporeal.mpm.matter import Matter, State
+from corporeal.mpm.problem import Problem
+from corporeal.mpm.stencil import Stencil
+
+POINT_REACH = 0.3
+"""Surface points of rigid bodies are watched this far above a wall [dx]."""
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One step's stage."""
+
+    problem: Problem
+    matter: Matter
+    state: State
+    grid: Stencil
+    mass: Float[np.ndarray, " A"]
+    """Of every slot [kg]."""
+    kick: Float[np.ndarray, "B 3"]
+    """Velocity that gravity and push gave each body in this step [m/s]."""
+
+    @property
+    def single(self) -> bool:
+        """Whether all bodies share one field."""
+        return self.problem.contact == "single"
+
+    def is_rigid(self, field: int) -> bool:
+        """Whether a field moves with six degrees of freedom."""
+        return not self.single and self.problem.bodies[field].rigid
+
+    @property
+    def wall_mover(self) -> int:
+        """Movers are the bodies, then the slots, then the one immovable thing."""
+        return len(self.problem.bodies) + self.grid.count
+
+    def mover_of_slot(self, slot: Int[np.ndarray, " E"]) -> Int[np.ndarray, " E"]:
+        """Give the rigid body that owns the slot, or the slot itself."""
+        bodies = len(self.problem.bodies)
+        stiff = np.array([self.is_rigid(f) for f in range(bodies)])
+        field = self.grid.field[slot]
+        return np.where(stiff[field], field, bodies + slot)
+
+    def movers(self, velocity: Float[np.ndarray, "A 3"]) -> contact.Movers:
+        """Everything that an impulse can move, with its velocity after forces."""
+        bodies, still = len(self.problem.bodies), np.zeros((1, 3))
+        stiff = np.array([self.is_rigid(b) for b in range(bodies)])
+        inertia = np.zeros((self.wall_mover + 1, 3, 3))
+        inertia[:bodies] = np.where(
+            stiff[:, None, None], self.state.inverse_inertia(self.matter), 0.0
+        )
+        spin = np.zeros((self.wall_mover + 1, 3))
+        spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
+        light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, 1e-300), 0.0)
+        return contact.Movers(
+            np.concatenate([np.where(stiff, 1.0 / self.matter.total, 0.0), light, [0.0]]),
+            inertia,
+            np.concatenate([self.state.centre, self.grid.index * self.problem.cell, still]),
+            np.concatenate([self.state.speed, velocity, still]),
+            spin,
+        )
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Some possible contacts of one pair; E of them."""
+
+    pair: tuple[int, int]
+    """Two bodies, or a body and B + plane."""
+    a: Int[np.ndarray, " E"]
+    c: Int[np.ndarray, " E"]
+    point: Float[np.ndarray, "E 3"]
+    normal: Float[np.ndarray, "E 3"]
+    gap: Float[np.ndarray, " E"]
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """What came of it."""
+
+    velocity: Float[np.ndarray, "A 3"]
+    """Of every slot after contact [m/s]."""
+    speed: Float[np.ndarray, "B 3"]
+    """Of rigid bodies [m/s]."""
+    spin: Float[np.ndarray, "B 3"]
+    """Of rigid bodies [rad/s]."""
+    pair: Int[np.ndarray, "E 2"]
+    contacts: contact.Contacts
+    impulse: Float[np.ndarray, "E 3"]
+    """-J on the first and +J on the second of each pair [N s]."""
+    friction_loss: float
+    """[J]"""
+
+
+def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meeting:
+    """Let everything that touches exchange impulses."""
+    touches = [_possible(touch) for touch in find(scene)]
+    problem = scene.problem
+    pair = np.array([t.pair for t in touches for _ in range(len(t.gap))], dtype=np.int64)
+    pair = pair.reshape(-1, 2)
+    contacts = contact.Contacts(
+        *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _COLUMNS),
+        friction=_friction(problem)[pair[:, 0], pair[:, 1]],
+    )
+    movers = scene.movers(velocity)
+    before = contacts.approach(movers)
+    speed = np.sum(before * contacts.normal, axis=1)
+    rebound = _rebound(scene, pair, contacts)
+    target, hit = contact.target_speeds(contacts, speed, rebound, problem.cell, dt)
+    sweeps = contact.SWEEPS_OF_A_HIT if hit else contact.SWEEPS
+    impulse = contact.solve(contacts, movers, target, sweeps)
+    after = contacts.approach(movers)
+    bodies = len(problem.bodies)
+    return Meeting(
+        velocity=movers.velocity[bodies:-1],
+        speed=movers.velocity[:bodies],
+        spin=movers.spin[:bodies],
+        pair=pair,
+        contacts=contacts,
+        impulse=impulse,
+        friction_loss=contact.friction_loss(impulse, contacts.normal, before, after),
+    )
+
+
+def _possible(touch: Touch) -> Touch:
+    """Leave out what is no contact at all."""
+    real = np.isfinite(touch.gap)
+    columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
+    return Touch(touch.pair, **columns)
+
+
+_COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
+
+
+def _joined(columns: list[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
+    if not columns:
+        return np.zeros(empty, dtype=np.int64 if empty == (0,) else np.float64)
+    return np.concatenate(columns)
+
+
+def _friction(problem: Problem) -> Float[np.ndarray, "N N"]:
+    """μ of every pair; a single field has the mean of its bodies against a plane."""
+    friction = np.array(problem.friction, dtype=np.float64)
+    if problem.contact == "single":
+        bodies = len(problem.bodies)
+        friction[:bodies, bodies:] = friction[:bodies, bodies:].mean(axis=0, keepdims=True)
+    return friction
+
+
+def _rebound(
+    scene: Scene, pair: Int[np.ndarray, "E 2"], contacts: contact.Contacts
+) -> contact.Rebound:
+    problem = scene.problem
+    bodies, planes = len(problem.bodies), len(problem.planes)
+    stiff = np.array([scene.is_rigid(b) for b in range(bodies)] + [True] * planes)
+    kick = np.concatenate([scene.kick, np.zeros((planes, 3))])
+    first, second = pair.T
+    both = stiff[first] & stiff[second]
+    return contact.Rebound(
+        pair=first * (bodies + planes) + second,
+        restitution=np.where(both, np.asarray(problem.restitution)[first, second], 0.0),
+        kick=np.sum((kick[first] - kick[second]) * contacts.normal, axis=1),
+    )
+
+
+# ---------------------------------------------------------------- finding contacts
+
+
+def find(scene: Scene) -> list[Touch]:
+    """List everything that touches or may touch in this step."""
+    fields = np.unique(scene.grid.field).tolist()
+    rows = {f: np.flatnonzero((scene.grid.field == f) & (scene.mass > 0.0)) for f in fields}
+    pairs = {p: _common(scene.grid, rows, p) for p in combinations(fields, 2)}
+    walls = {(f, w): _near(scene, rows[f], w) for f in fields for w in _walls(scene, f)}
+    shown = [slot for both in pairs.values() for slot in both] + list(walls.values())
+    look = Look.at(scene, np.concatenate([np.zeros(0, np.int64), *shown]))
+    touches = [_between(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])]
+    touches += [_on_wall(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
+    return touches + _points_on_walls(scene)
+
+
+def _common(
+    grid: Stencil, rows: dict[int, np.ndarray], pair: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Slots of two fields at the nodes where both have mass."""
+    a, c = rows[pair[0]], rows[pair[1]]
+    _, in_a, in_c = np.intersect1d(
+        grid.key[a], grid.key[c], assume_unique=True, return_indices=True
+    )
+    return a[in_a], c[in_c]
+
+
+def _walls(scene: Scene, field: int) -> range:
+    """Planes that a field meets on nodes: all, or none when it has surface points instead."""
+    pointed = scene.is_rigid(field) and len(scene.problem.bodies[field].surface) > 0
+    return range(0 if pointed else len(scene.problem.planes))
+
+
+def _near(scene: Scene, slot: np.ndarray, wall: int) -> np.ndarray:
+    reach = (contact.WALL_REACH + 0.01) * scene.problem.cell
+    return slot[_height(scene, slot, wall) <= reach]
+
+
+def _height(scene: Scene, slot: np.ndarray, wall: int) -> np.ndarray:
+    plane = scene.problem.planes[wall]
+    return scene.grid.index[slot] @ np.array(plane.normal) * scene.problem.cell - plane.offset
+
+
+@dataclass(frozen=True)
+class Look:
+    """How fields look from some slots. M links, each one particle seen from one slot."""
+
+    mean: Float[np.ndarray, "A 3"]
+    """X̄: mean offset of the field's matter from the node [m]; 0 where nobody looks."""
+    outward: Float[np.ndarray, "A 3"]
+    """g = Σ J V₀ ∇N [m²]."""
+    slot: Int[np.ndarray, " M"]
+    particle: Int[np.ndarray, " M"]
+    offset: Float[np.ndarray, "M 3"]
+    """x_p - x_i [m]."""
+
+    @classmethod
+    def at(cls, scene: Scene, slots: Int[np.ndarray, " S"]) -> "Look":
+        """Visit once more the particles around the slots, and only them."""
+        grid, matter = scene.grid, scene.matter
+        wanted = np.zeros(grid.count, dtype=bool)
+        wanted[slots] = True
+        particle, near = np.nonzero(wanted[grid.slot])
+        slot, offset = grid.slot[particle, near], -grid.arm[particle, near]
+        weight = grid.weight[particle, near] * matter.mass[particle]
+        volume = matter.volume * elasticity.determinant(scene.state.F)
+        gradient = volume[particle][:, None] * grid.gradient(particle, near)
+
+        def total(values: np.ndarray) -> np.ndarray:
+            return np.stack([np.bincount(slot, v, grid.count) for v in values.T], axis=1)
+
+        full = np.where(scene.mass > 0.0, scene.mass, 1.0)[:, None]
+        mean = total(weight[:, None] * offset) / full
+        return cls(mean, total(gradient), slot, particle, offset)
+
+    def reach(
+        self, scene: Scene, slots: Int[np.ndarray, " E"], normals: Float[np.ndarray, "E 3 3"]
+    ) -> Float[np.ndarray, "E 3"]:
+        """How far the fields at some slots reach along candidate normals [m]: max x·n + R."""
+        order = np.argsort(slots)
+        low = np.searchsorted(slots[order], self.slot, "left")
+        seen = np.flatnonzero(np.searchsorted(slots[order], self.slot, "right") > low)
+        row, particle = order[low[seen]], self.particle[seen]
+        n = normals[row]
+        along = np.einsum("mqd,md->mq", n, self.offset[seen])
+        stretched = np.linalg.norm(n @ scene.state.F[particle], axis=2)
+        out = np.full((len(slots), 3), -np.inf)
+        extent = scene.matter.half_spacing[particle][:, None] * stretched
+        np.maximum.at(out, row, along + extent)
+        return out
+
+
+def _between(
+    scene: Scene, look: Look, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
+) -> Touch:
+    """Contacts of two fields on their common nodes, with separating-axis normals, smoothed."""
+    a, c = slots
+    cell, index = scene.problem.cell, scene.grid.index[a]
+    candidates = contact.candidate_normals(look.outward[a], look.outward[c])
+    reach_a = look.reach(scene, a, candidates)
+    reach_c = -look.reach(scene, c, -candidates)
+    normal = contact.separating_normal(candidates, reach_a, reach_c, cell)
+    normal = contact.smooth_normals(normal, np.minimum(scene.mass[a], scene.mass[c]), index)
+    gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
+    gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
+    movers = scene.mover_of_slot(a), scene.mover_of_slot(c)
+    return Touch(pair, *movers, index * cell, normal, gap)
+
+
+def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) -> Touch:
+    """Contacts of a field with a plane, on nodes."""
+    field, wall = pair
+    cell, bodies = scene.problem.cell, len(scene.problem.bodies)
+    normal = np.tile(-np.array(scene.problem.planes[wall].normal), (len(slot), 1))
+    gap = contact.gap_to_wall(look.mean[slot], _height(scene, slot, wall), normal, cell)
+    point = scene.grid.index[slot] * cell
+    there = np.full(len(slot), scene.wall_mover)
+    return Touch((field, bodies + wall), scene.mover_of_slot(slot), there, point, normal, gap)
+
+
+def _points_on_walls(scene: Scene) -> list[Touch]:
+    """Contacts of rigid bodies with planes, on the bodies' surface points."""
+    problem, state, bodies = scene.problem, scene.state, len(scene.problem.bodies)
+    touches = []
+    for b in filter(scene.is_rigid, range(bodies)):
+        point = state.centre[b] + scene.matter.surface[b] @ state.rotation[b].T
+        for w, plane in enumerate(problem.planes):
+            height = point @ np.array(plane.normal) - plane.offset
+            near = np.flatnonzero(height < POINT_REACH * problem.cell)
+            if len(near) == 0:
+                continue
+            normal = np.tile(-np.array(plane.normal), (len(near), 1))
+            mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover)
+            touches.append(Touch((b, bodies + w), mover, wall, point[near], normal, height[near]))
+    return touches

@@ -1,0 +1,90 @@
+"""What a run has done so far: impulses, work, losses and contacts, for the reference engine."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from corporeal.mpm import contact
+
+
+@dataclass
+class Ledger:
+    """Accumulated since time 0; B bodies, W planes."""
+
+    external_impulse: Float[np.ndarray, "B 3"]
+    """[N s]"""
+    plane_impulse: Float[np.ndarray, "W B 3"]
+    """[N s]"""
+    pair_impulse: Float[np.ndarray, "B B"]
+    """[N s]"""
+    push_work: Float[np.ndarray, ""]
+    """[J]"""
+    friction_loss: Float[np.ndarray, ""]
+    """[J]"""
+    plastic_loss: Float[np.ndarray, ""]
+    """[J]"""
+    viscous_loss: Float[np.ndarray, ""]
+    """[J]"""
+    first_contact: Float[np.ndarray, "N N"]
+    """[s]; nan: none yet."""
+    last_contact: Float[np.ndarray, "N N"]
+    """[s]"""
+    contact_point: Float[np.ndarray, "N N 3"]
+    """[m]"""
+
+    @classmethod
+    def blank(cls, bodies: int, planes: int) -> "Ledger":
+        """Open a ledger at time 0."""
+        everything = bodies + planes
+        return cls(
+            external_impulse=np.zeros((bodies, 3)),
+            plane_impulse=np.zeros((planes, bodies, 3)),
+            pair_impulse=np.zeros((bodies, bodies)),
+            push_work=np.zeros(()),
+            friction_loss=np.zeros(()),
+            plastic_loss=np.zeros(()),
+            viscous_loss=np.zeros(()),
+            first_contact=np.full((everything, everything), np.nan),
+            last_contact=np.full((everything, everything), np.nan),
+            contact_point=np.full((everything, everything, 3), np.nan),
+        )
+
+    def as_arrays(self) -> dict[str, np.ndarray]:
+        """Copy everything into a dict."""
+        return {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
+
+    def as_measured(self) -> dict:
+        """Copy everything, scalars as floats, under the names of ``Measure``."""
+        return {k: float(v) if v.ndim == 0 else v for k, v in self.as_arrays().items()}
+
+    def enter(
+        self,
+        pair: Int[np.ndarray, "E 2"],
+        impulse: Float[np.ndarray, "E 3"],
+        contacts: contact.Contacts,
+        time: float,
+    ) -> None:
+        """Enter one step's contact impulses.
+
+        Args:
+            pair: The two partners of every contact: bodies, or B + plane in second place.
+            impulse: J [N s], -J on the first and +J on the second.
+            contacts: Where they act.
+            time: Now [s].
+
+        """
+        bodies = len(self.external_impulse)
+        size = np.sum(impulse * contacts.normal, axis=1)
+        for a, c in np.unique(pair[size > 0.0], axis=0):
+            mine = np.flatnonzero((pair[:, 0] == a) & (pair[:, 1] == c))
+            if c >= bodies:
+                self.plane_impulse[c - bodies, a] -= impulse[mine].sum(axis=0)
+            else:
+                self.pair_impulse[a, c] += size[mine].sum()
+                self.pair_impulse[c, a] = self.pair_impulse[a, c]
+            if np.isnan(self.first_contact[a, c]):
+                place = np.average(contacts.point[mine], axis=0, weights=size[mine])
+                self.first_contact[[a, c], [c, a]] = time
+                self.contact_point[[a, c], [c, a]] = place
+            self.last_contact[[a, c], [c, a]] = time

@@ -1,0 +1,184 @@
+"""All particles of a problem in one list: what never changes of them, and what does."""
+
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from corporeal.mpm import elasticity, rigid
+from corporeal.mpm.problem import Problem
+from corporeal.types import Law
+
+APIC_LAWS = (Law.DRUCKER_PRAGER.value, Law.VON_MISES.value)
+"""Granular and plastic matter keeps APIC."""
+
+
+@dataclass(frozen=True)
+class Matter:
+    """What never changes; all bodies' particles in one list."""
+
+    body: Int[np.ndarray, " P"]
+    mass: Float[np.ndarray, " P"]
+    volume: Float[np.ndarray, " P"]
+    law: Int[np.ndarray, " P"]
+    mu: Float[np.ndarray, " P"]
+    lam: Float[np.ndarray, " P"]
+    yield_stress: Float[np.ndarray, " P"]
+    hardening: Float[np.ndarray, " P"]
+    friction_angle: Float[np.ndarray, " P"]
+    cohesion: Float[np.ndarray, " P"]
+    viscosity: Float[np.ndarray, " P"]
+    rigid: Bool[np.ndarray, " P"]
+    wave_speed: Float[np.ndarray, " P"]
+    """Longitudinal wave speed at rest [m/s]; 0 where rigid."""
+    memory_speed: Float[np.ndarray, " P"]
+    """Wave speed of the particle's whole body [m/s]; inf where APIC is kept."""
+    total: Float[np.ndarray, " B"]
+    """Mass of each body [kg]."""
+    centre: Float[np.ndarray, "B 3"]
+    """Where each body's centre of mass starts [m]."""
+    inertia: Float[np.ndarray, "B 3 3"]
+    """Of each body at the start, about its centre [kg m²]; used where rigid."""
+    arm: Float[np.ndarray, "P 3"]
+    """Position at the start, from the body's centre [m]."""
+    surface: tuple[Float[np.ndarray, "S 3"], ...]
+    """Surface points of each body at the start, from its centre [m]."""
+
+    @classmethod
+    def of(cls, problem: Problem) -> "Matter":
+        """Gather what the bodies say of their particles."""
+        bodies = problem.bodies
+
+        def gathered(name: str) -> np.ndarray:
+            return np.concatenate([np.asarray(getattr(b, name), np.float64) for b in bodies])
+
+        volume, density, law = gathered("volume"), gathered("density"), gathered("law")
+        mu, lam = elasticity.lame(gathered("young"), gathered("poisson"))
+        body = np.repeat(np.arange(len(bodies)), [len(b.position) for b in bodies])
+        stiff = np.array([b.rigid for b in bodies])[body]
+        wave = np.where(stiff, 0.0, np.sqrt((lam + 2.0 * mu) / density))
+        fastest = np.array([wave[body == b].max() for b in range(len(bodies))])[body]
+        affine = stiff | np.isin(law, APIC_LAWS) | (problem.transfer == "apic")
+        masses = [rigid.mass_of(b.position, b.volume * b.density, b.volume) for b in bodies]
+        centre = np.stack([m.centre for m in masses])
+        return cls(
+            body=body,
+            mass=volume * density,
+            volume=volume,
+            law=law.astype(np.int64),
+            mu=np.asarray(mu),
+            lam=np.asarray(lam),
+            yield_stress=gathered("yield_stress"),
+            hardening=gathered("hardening"),
+            friction_angle=gathered("friction_angle"),
+            cohesion=gathered("cohesion"),
+            viscosity=gathered("viscosity"),
+            rigid=stiff,
+            wave_speed=wave,
+            memory_speed=np.where(affine, np.inf, fastest),
+            total=np.array([m.total for m in masses]),
+            centre=centre,
+            inertia=np.stack([m.inertia for m in masses]),
+            arm=np.concatenate(
+                [b.position - m.centre for b, m in zip(bodies, masses, strict=True)]
+            ),
+            surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
+        )
+
+    @cached_property
+    def half_spacing(self) -> Float[np.ndarray, " P"]:
+        """r0: half the distance between particles at rest [m]."""
+        return 0.5 * np.cbrt(self.volume)
+
+    def fit(
+        self, body: int, position: Float[np.ndarray, "P 3"], velocity: Float[np.ndarray, "P 3"]
+    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """Rigid motion of one body closest to its particles': velocity, angular momentum."""
+        mine = self.body == body
+        whole = rigid.mass_of(position[mine], self.mass[mine], self.volume[mine])
+        return rigid.fit_motion(whole, position[mine], self.mass[mine], velocity[mine])
+
+
+@dataclass(frozen=True)
+class State:
+    """What changes. Arrays are replaced, never written to, so an old state stays good."""
+
+    time: Float[np.ndarray, ""]
+    position: Float[np.ndarray, "P 3"]
+    velocity: Float[np.ndarray, "P 3"]
+    affine: Float[np.ndarray, "P 3 3"]
+    """C: velocity gradient a particle carries [1/s]."""
+    F: Float[np.ndarray, "P 3 3"]
+    """Elastic deformation gradient."""
+    motion: Float[np.ndarray, "P 3 3"]
+    plastic: Float[np.ndarray, " P"]
+    volume: Float[np.ndarray, " P"]
+    """v_c of granular matter."""
+    centre: Float[np.ndarray, "B 3"]
+    """The rest is used for rigid bodies: centre of mass [m] …"""
+    speed: Float[np.ndarray, "B 3"]
+    """… its velocity [m/s] …"""
+    spin_momentum: Float[np.ndarray, "B 3"]
+    """… angular momentum about it [kg m²/s] …"""
+    rotation: Float[np.ndarray, "B 3 3"]
+    """… and how far the body has turned."""
+
+    @classmethod
+    def start(cls, problem: Problem, matter: Matter) -> "State":
+        """Bodies as the problem has them: undeformed, with their particles' velocities."""
+        position = np.concatenate([np.asarray(b.position, np.float64) for b in problem.bodies])
+        velocity = np.concatenate([np.asarray(b.velocity, np.float64) for b in problem.bodies])
+        count, bodies = len(position), len(problem.bodies)
+        identity = np.broadcast_to(np.eye(3), (count, 3, 3))
+        fits = [matter.fit(b, position, velocity) for b in range(bodies)]
+        state = cls(
+            time=np.zeros(()),
+            position=position,
+            velocity=velocity,
+            affine=np.zeros((count, 3, 3)),
+            F=identity,
+            motion=identity,
+            plastic=np.zeros(count),
+            volume=np.zeros(count),
+            centre=matter.centre,
+            speed=np.stack([linear for linear, _ in fits]),
+            spin_momentum=np.stack([angular for _, angular in fits]),
+            rotation=np.tile(np.eye(3), (bodies, 1, 1)),
+        )
+        return state.follow_rigid(matter)
+
+    def spin(self, matter: Matter) -> Float[np.ndarray, "B 3"]:
+        """ω of every body [rad/s]; meaningful where rigid."""
+        return np.einsum("bij,bj->bi", self.inverse_inertia(matter), self.spin_momentum)
+
+    def inverse_inertia(self, matter: Matter) -> Float[np.ndarray, "B 3 3"]:
+        """I⁻¹ of every body in the world frame [1/(kg m²)]; meaningful where rigid."""
+        return np.stack(
+            [
+                rigid.world_inverse_inertia(R, inertia)
+                for R, inertia in zip(self.rotation, matter.inertia, strict=True)
+            ]
+        )
+
+    def follow_rigid(self, matter: Matter) -> "State":
+        """Put the particles of rigid bodies where the bodies are: x = X + R r₀, v = V + ω × r."""
+        if not matter.rigid.any():
+            return self
+        body, stiff = matter.body, matter.rigid[:, None]
+        spin = self.spin(matter)[body]
+        arm = np.einsum("pij,pj->pi", self.rotation[body], matter.arm)
+        affine = np.stack([rigid.cross_matrix(w) for w in self.spin(matter)])[body]
+        still = np.eye(3)
+        return replace(
+            self,
+            position=np.where(stiff, self.centre[body] + arm, self.position),
+            velocity=np.where(stiff, self.speed[body] + np.cross(spin, arm), self.velocity),
+            affine=np.where(stiff[:, None], affine, self.affine),
+            F=np.where(stiff[:, None], still, self.F),
+            motion=np.where(stiff[:, None], still, self.motion),
+        )
+
+    def as_arrays(self) -> dict[str, np.ndarray]:
+        """Copy everything into a dict."""
+        return {f.name: np.array(getattr(self, f.name)) for f in fields(self)}

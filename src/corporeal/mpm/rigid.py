@@ -1,0 +1,89 @@
+"""Rigid bodies: six degrees of freedom made from particles."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+
+Vector3 = Float[np.ndarray, "3"]
+Matrix3 = Float[np.ndarray, "3 3"]
+
+
+class Mass(NamedTuple):
+    """How a body resists being moved and turned."""
+
+    total: float
+    """[kg]"""
+    centre: Vector3
+    """Centre of mass [m]."""
+    inertia: Matrix3
+    """Moment of inertia about the centre [kg m²]."""
+
+
+def mass_of(
+    position: Float[np.ndarray, "P 3"],
+    mass: Float[np.ndarray, " P"],
+    volume: Float[np.ndarray, " P"],
+) -> Mass:
+    """Mass, centre and inertia of particles, each a small cube of edge h = V^(1/3).
+
+    I = Σ m (|r|² 1 - r rᵀ) + Σ m h²/6 1; without the cubes' own inertia a coarse body would spin
+    up too easily.
+    """
+    total = float(mass.sum())
+    centre = mass @ position / total
+    r = position - centre
+    own = np.sum(mass * volume ** (2.0 / 3.0)) / 6.0
+    spread = (r * mass[:, None]).T @ r
+    return Mass(total, centre, (np.trace(spread) + own) * np.eye(3) - spread)
+
+
+def fit_motion(
+    mass: Mass,
+    position: Float[np.ndarray, "P 3"],
+    particle_mass: Float[np.ndarray, " P"],
+    velocity: Float[np.ndarray, "P 3"],
+) -> tuple[Vector3, Vector3]:
+    """Velocity of the centre [m/s] and angular momentum about it [kg m²/s] of moving particles."""
+    r = position - mass.centre
+    linear = particle_mass @ velocity / mass.total
+    about = np.sum(particle_mass[:, None] * np.cross(r, velocity - linear), axis=0)
+    points = mass_of(position, particle_mass, np.zeros(len(position)))
+    spin = np.linalg.lstsq(points.inertia, about, rcond=1e-12)[0]
+    return linear, mass.inertia @ spin
+
+
+def rotation(turn: Vector3) -> Matrix3:
+    """Give the rotation matrix of a rotation vector [rad] (Rodrigues' formula)."""
+    angle = float(np.linalg.norm(turn))
+    K = cross_matrix(turn)
+    if angle < 1e-8:
+        return np.eye(3) + K + 0.5 * K @ K
+    return np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * K @ K
+
+
+def turned(R: Matrix3, spin: Vector3, dt: float) -> Matrix3:
+    """Give R after turning with constant ω [rad/s] for dt [s], kept orthonormal to round-off."""
+    U, _, Vt = np.linalg.svd(rotation(spin * dt) @ R)
+    return U @ Vt
+
+
+def cross_matrix(a: Vector3) -> Matrix3:
+    """Give [a]×, the matrix for which [a]× b = a × b."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def world_inverse_inertia(R: Matrix3, inertia: Matrix3) -> Matrix3:
+    """I⁻¹ in the world frame of a body turned by R: R I₀⁻¹ Rᵀ."""
+    return R @ np.linalg.inv(inertia) @ R.T
+
+
+def effective_inverse_mass(
+    inverse_mass: float, inverse_inertia: Matrix3, arm: Vector3, direction: Vector3
+) -> float:
+    """How much a unit impulse at ``arm`` from the centre changes the speed there [1/kg].
+
+    1/m_eff = 1/M + (r × d)ᵀ I⁻¹ (r × d)
+    """
+    lever = np.cross(arm, direction)
+    return inverse_mass + float(lever @ inverse_inertia @ lever)
