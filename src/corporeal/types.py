@@ -143,6 +143,8 @@ class PartWords:
     """How sure: 0 (a guess) to 1 (stated outright)."""
     reason: str = ""
     """Why this answer, in one sentence."""
+    values: dict[str, float] = field(default_factory=dict)
+    """Numbers that a person stated: field of ``Material`` → value, SI."""
 
 
 @dataclass(frozen=True)
@@ -343,6 +345,8 @@ class Particles:
     """Estimated mass of every part [kg]: what the particles' masses must add up to."""
     fills: tuple[str, ...] = ()
     """How each part was filled, in words, for the report."""
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know about resolution and treatments, in sentences."""
 
     @property
     def count(self) -> int:

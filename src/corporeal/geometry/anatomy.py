@@ -1,0 +1,171 @@
+"""What a mesh models: bodies, walls with both faces or open sheets; and which faces are outer."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.shape import Shape, sphere_directions
+from corporeal.geometry.spread import sample_surface
+
+THIN = 0.1
+"""Walls are thinner than this share of the shortest side."""
+
+
+class Build(IntEnum):
+    """How a piece of mesh is to be read."""
+
+    BODY = 0
+    """It encloses what it is made of."""
+    WALL = 1
+    """It is a thin wall, modelled with both faces: a vase, a bowl."""
+    SHEET = 2
+    """It is an open surface: a leaf, a vessel modelled with one face."""
+
+
+def pieces(mesh: Mesh) -> Int[np.ndarray, " T"]:
+    """Give each triangle the number of its connected piece."""
+    f = mesh.triangles
+    links = coo_matrix(
+        (np.ones(2 * len(f)), (f[:, [0, 1]].ravel(), f[:, [1, 2]].ravel())),
+        shape=(len(mesh.vertices),) * 2,
+    )
+    label = connected_components(links, directed=False)[1][f[:, 0]]
+    return np.unique(label, return_inverse=True)[1].reshape(-1)
+
+
+def sheets(mesh: Mesh, piece: Int[np.ndarray, " T"]) -> np.ndarray:
+    """Which triangles belong to open pieces that enclose next to nothing."""
+    corners, areas = mesh.corners, mesh.areas
+    area = np.bincount(piece, areas)
+    middle = np.stack(
+        [np.bincount(piece, areas * corners.mean(axis=1)[:, k]) / area for k in range(3)], axis=1
+    )
+    a, b, c = np.swapaxes(corners - middle[piece][:, None], 0, 1)
+    volume = np.abs(np.bincount(piece, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6))
+    edges, owner = boundary(mesh)
+    length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
+    rim = np.bincount(piece[owner], length, minlength=len(area))
+    is_sheet = (rim > 0.05 * np.sqrt(area)) & (2 * volume / area < 0.03 * np.sqrt(area))
+    return (is_sheet | (np.bincount(piece) < 4))[piece]
+
+
+def boundary(mesh: Mesh) -> tuple[Int[np.ndarray, "B 2"], Int[np.ndarray, " B"]]:
+    """Edges that an odd number of triangles share, and a triangle of each."""
+    f = mesh.triangles
+    edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
+    _, edge, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    odd = np.flatnonzero(count[edge.reshape(-1)] % 2 == 1)
+    return edges[odd], odd % len(f)
+
+
+def longest_rim(mesh: Mesh) -> float:
+    """Length of the longest opening [m]."""
+    edges, _ = boundary(mesh)
+    if not len(edges):
+        return 0.0
+    n = len(mesh.vertices)
+    links = coo_matrix((np.ones(len(edges)), (edges[:, 0], edges[:, 1])), shape=(n, n))
+    loop = connected_components(links, directed=False)[1][edges[:, 0]]
+    length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
+    return float(np.bincount(loop, length).max())
+
+
+def build_of(shape: Shape, size: tuple[float, float, float], rng: np.random.Generator) -> Build:
+    """Tell a body from a thin wall and an open vessel.
+
+    Two opinions on what is inside: the winding number, and whether at least 24 of 26 directions
+    are blocked (what it stands on blocks too). Where they share less than 0.9 of their union, the
+    thing is a wall if it is thin (2 V / A) and most of its surface has another surface close
+    behind it; an open sheet or vessel if they share less than 0.6 and it has an opening as long as
+    it is wide; and a body with holes otherwise.
+    """
+    mesh = shape.mesh
+    used = mesh.vertices[np.unique(mesh.triangles)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    points = low + rng.uniform(0, 1, (6000, 3)) * (high - low)
+    inside = shape.inside(points)
+    enclosed = _standing(mesh, low, high).sightings(points) >= 24
+    either = (inside | enclosed).sum()
+    shared = (inside & enclosed).sum()
+    if either < 10 or shared >= 0.9 * either:
+        return Build.BODY
+    volume = inside.mean() * float(np.prod(high - low))
+    thin = 2 * volume / float(mesh.areas.sum()) < THIN * size[0]
+    if thin and np.mean(wall_behind(shape, rng) < 2 * THIN * size[0]) > 0.6:
+        return Build.WALL
+    open_vessel = shared < 0.6 * either and longest_rim(mesh) > size[1]
+    return Build.SHEET if open_vessel else Build.BODY
+
+
+def _standing(mesh: Mesh, low: np.ndarray, high: np.ndarray) -> Shape:
+    """Add what it stands on, so that a missing underside does not count as an opening."""
+    z = low[2] - 1e-4 * (high[2] - low[2])
+    floor = np.array(
+        [[low[0], low[1], z], [high[0], low[1], z], [high[0], high[1], z], [low[0], high[1], z]]
+    )
+    n = len(mesh.vertices)
+    faces = np.array([[n, n + 1, n + 2], [n, n + 2, n + 3]])
+    return Shape(
+        Mesh(np.concatenate([mesh.vertices, floor]), np.concatenate([mesh.triangles, faces]))
+    )
+
+
+def wall_behind(
+    shape: Shape, rng: np.random.Generator, count: int = 2000
+) -> Float[np.ndarray, " count"]:
+    """Thickness behind random points of the surface [m], straight down; inf: nothing behind."""
+    points, triangle = sample_surface(shape.mesh, count, rng)
+    inward = -shape.mesh.normals[triangle]
+    step = 1e-5 * shape.mesh.extent
+    return shape.reach(points + step * inward, inward) + step
+
+
+@dataclass(frozen=True)
+class Skin:
+    """The triangles between inside and outside, wound so that their normals point outside."""
+
+    shape: Shape
+    numbers: Int[np.ndarray, " T"]
+    """Their numbers in the mesh they were taken from."""
+
+
+def outer_skin(shape: Shape, rng: np.random.Generator) -> Skin:
+    """Leave out surface that is buried where pieces overlap: nothing can touch it."""
+    mesh = shape.mesh
+    step = 1e-5 * mesh.extent
+    crossing = np.zeros(len(mesh.triangles))
+    for weights in rng.dirichlet((2, 2, 2), 2):
+        points = np.einsum("k,tkd->td", weights, mesh.corners)
+        # The winding number falls by one across a triangle, from behind to before it.
+        behind = shape.winding(points - step * mesh.normals)
+        crossing += (np.abs(behind) > 0.5).astype(float) - (np.abs(behind - 1) > 0.5)
+    kept = np.flatnonzero(crossing)
+    wound = np.where(crossing[kept, None] > 0, mesh.triangles[kept], mesh.triangles[kept][:, ::-1])
+    return Skin(Shape(Mesh(mesh.vertices, np.ascontiguousarray(wound))), kept)
+
+
+def convex_side(skin: Shape) -> np.ndarray:
+    """Which triangles of a wall with both faces are its outer face.
+
+    A triangle is on the outer face when it sees at least as much of the open as the triangle
+    behind it through the wall.
+    """
+    mesh = skin.mesh
+    centres, normals = mesh.corners.mean(axis=1), mesh.normals
+    step = 1e-5 * mesh.extent
+    open_to = np.zeros(len(centres))
+    for direction in sphere_directions(48):
+        facing = normals @ direction
+        seen = np.flatnonzero(facing > 0.05)
+        free = skin.reach(centres[seen] + step * normals[seen], np.tile(direction, (len(seen), 1)))
+        open_to[seen] += facing[seen] * ~np.isfinite(free)
+    behind = skin.hit(centres - step * normals, -normals)
+    other = np.where(behind >= 0, open_to[behind], 0.0)
+    return open_to >= other

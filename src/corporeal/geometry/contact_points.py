@@ -1,0 +1,53 @@
+"""Points on the outside of a rigid object, through which it touches planes exactly."""
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import ConvexHull, QhullError
+
+from corporeal.geometry.shape import sphere_directions
+from corporeal.geometry.spread import sample_surface, thin_out
+from corporeal.geometry.survey import Anatomy
+
+MOST, EXTREMES = 5000, 600
+
+
+def contact_points(
+    anatomy: Anatomy, spacing: float, rng: np.random.Generator
+) -> Float[np.ndarray, "S 3"]:
+    """Cover the outside evenly, at most ``MOST`` points, the farthest corners first [m].
+
+    The corners in ``EXTREMES`` directions and straight down make the object rest exactly.
+
+    Args:
+        anatomy: The object.
+        spacing: Wanted between points [m]; larger where it takes too many.
+        rng: Source of the samples.
+
+    """
+    corners = extremes(anatomy.vertices)
+    faces = [m.sheet for m in anatomy.members if len(m.sheet.triangles)]
+    if anatomy.skin is not None and len(anatomy.skin.numbers):
+        faces.append(anatomy.skin.shape.mesh)
+    area = sum(float(f.areas.sum()) for f in faces)
+    distance = max(0.83 * spacing, np.sqrt(0.69 * area / (MOST - len(corners))))
+    count = int(np.clip(8 * area / distance**2, 500, 60_000))
+    samples = [sample_surface(f, max(1, int(count * f.areas.sum() / area)), rng)[0] for f in faces]
+    points = np.concatenate(samples) if samples else np.zeros((0, 3))
+    points = points[rng.permutation(len(points))]
+    points = points[thin_out(points, distance, corners)]
+    return np.concatenate([corners, points])[:MOST]
+
+
+def extremes(vertices: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "E 3"]:
+    """Corners that lie farthest in some direction [m], and all that are lowest."""
+    try:
+        hull = vertices[ConvexHull(vertices).vertices]
+    except QhullError:  # flat
+        hull = vertices
+    directions = np.concatenate([sphere_directions(EXTREMES), np.eye(3), -np.eye(3)])
+    chosen = np.unique(np.argmax(hull @ directions.T, axis=0))
+    span = float(np.ptp(hull[:, 2])) or 1.0
+    lowest = np.flatnonzero(hull[:, 2] < hull[:, 2].min() + 1e-6 * span)
+    if len(lowest) > EXTREMES:
+        lowest = lowest[:: len(lowest) // EXTREMES + 1]
+    return hull[np.union1d(chosen, lowest)]

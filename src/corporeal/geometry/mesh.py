@@ -1,0 +1,159 @@
+"""A welded triangle mesh and its measures: areas, volumes, consistent winding."""
+
+from dataclasses import dataclass
+
+import igl
+import numpy as np
+from jaxtyping import Float, Int
+
+
+@dataclass(frozen=True)
+class Mesh:
+    """Triangles that share vertices."""
+
+    vertices: Float[np.ndarray, "V 3"]
+    """[m]"""
+    triangles: Int[np.ndarray, "T 3"]
+
+    @property
+    def corners(self) -> Float[np.ndarray, "T 3 3"]:
+        """Position of each triangle's corners [m]."""
+        return self.vertices[self.triangles]
+
+    @property
+    def area_vectors(self) -> Float[np.ndarray, "T 3"]:
+        """Normal times area of each triangle [m²]."""
+        a, b, c = np.swapaxes(self.corners, 0, 1)
+        return 0.5 * np.cross(b - a, c - a)
+
+    @property
+    def areas(self) -> Float[np.ndarray, " T"]:
+        """Of each triangle [m²]."""
+        return np.linalg.norm(self.area_vectors, axis=1)
+
+    @property
+    def normals(self) -> Float[np.ndarray, "T 3"]:
+        """Unit normals."""
+        vectors = self.area_vectors
+        return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
+
+    @property
+    def extent(self) -> float:
+        """Diagonal of the axis-aligned box [m]; 0 when there are no triangles."""
+        if not len(self.triangles):
+            return 0.0
+        used = self.vertices[np.unique(self.triangles)]
+        return float(np.linalg.norm(np.ptp(used, axis=0)))
+
+    def only(self, chosen: np.ndarray) -> "Mesh":
+        """Return the chosen triangles, on the same vertices."""
+        return Mesh(self.vertices, np.ascontiguousarray(self.triangles[chosen]))
+
+
+def weld(
+    vertices: Float[np.ndarray, "V 3"],
+    triangles: Int[np.ndarray, "T 3"],
+    tolerance: float = 1e-6,
+) -> tuple[Mesh, Int[np.ndarray, " kept"]]:
+    """Join vertices that coincide and drop triangles without area and repeated ones.
+
+    Exporters split vertices at texture seams and write two-sided faces twice; both break winding
+    numbers.
+
+    Args:
+        vertices: [m]
+        triangles: Vertex numbers.
+        tolerance: Of the diagonal of the box.
+
+    Returns:
+        The mesh, and for each of its triangles the number it had.
+
+    """
+    vertices = np.ascontiguousarray(vertices, dtype=np.float64)
+    triangles = np.ascontiguousarray(triangles, dtype=np.int64)
+    if not len(triangles):
+        return Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)), np.zeros(0, dtype=np.int64)
+    # Relative to one corner, so that rounding means the same everywhere in the world.
+    origin = vertices[triangles.ravel()].min(axis=0)
+    size = float(np.linalg.norm(np.ptp(vertices[triangles.ravel()], axis=0)))
+    keys = np.round((vertices - origin) / max(tolerance * size, 1e-300)).astype(np.int64)
+    _, first, joined = np.unique(keys, axis=0, return_index=True, return_inverse=True)
+    welded = joined.reshape(-1)[triangles]
+    ordered = np.sort(welded, axis=1)
+    _, kept = np.unique(ordered, axis=0, return_index=True)
+    kept = np.sort(kept)
+    mesh = Mesh(vertices[first], np.ascontiguousarray(welded[kept]))
+    real = mesh.areas > 1e-14 * size**2
+    return mesh.only(real), kept[real]
+
+
+def signed_volume(mesh: Mesh) -> float:
+    """Volume [m³] by the divergence theorem; exact when the mesh is closed, negative inside out."""
+    centre = mesh.vertices[mesh.triangles].mean(axis=(0, 1))
+    a, b, c = np.swapaxes(mesh.corners - centre, 0, 1)
+    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+
+
+def openness(mesh: Mesh) -> float:
+    """Length of the boundary edges over the root of the area [-]; 0 when closed.
+
+    An edge is on the boundary when the triangles beside it do not pass it once each way.
+    """
+    f = mesh.triangles
+    edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
+    _, edge, count = np.unique(
+        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
+    )
+    odd = count[edge.reshape(-1)] % 2 == 1
+    length = np.linalg.norm(mesh.vertices[edges[odd, 0]] - mesh.vertices[edges[odd, 1]], axis=1)
+    return float(length.sum() / np.sqrt(mesh.areas.sum()))
+
+
+def orient(mesh: Mesh) -> Mesh:
+    """Wind every patch consistently and outward, without filling cavities.
+
+    Within a patch the majority of the file's own winding wins. A closed patch that is inside out
+    is turned, unless it lies inside a closed patch that is not: then it is a cavity.
+    """
+    if not len(mesh.triangles):
+        return mesh
+    turned, patch = (np.asarray(a) for a in igl.bfs_orient(mesh.triangles))
+    agrees = np.zeros(len(turned), dtype=bool)
+    for roll in range(3):
+        agrees |= np.all(np.roll(turned, roll, axis=1) == mesh.triangles, axis=1)
+    vote = np.bincount(patch, mesh.areas * np.where(agrees, 1.0, -1.0))
+    turned = _flip(turned, vote[patch] < 0)
+    mesh = Mesh(mesh.vertices, turned)
+    volume, closed = _patch_volumes(mesh, patch)
+    if volume[closed].sum() < 0:
+        mesh, volume = Mesh(mesh.vertices, _flip(turned, np.ones(len(turned), bool))), -volume
+    wrong = closed & (volume < 0)
+    right = closed & (volume > 0)
+    if wrong.any() and right.any():
+        _, example = np.unique(patch, return_index=True)
+        around = igl.fast_winding_number(
+            mesh.vertices, mesh.only(right[patch]).triangles, mesh.corners[example].mean(axis=1)
+        )
+        wrong &= np.abs(around) < 0.5
+    return Mesh(mesh.vertices, _flip(mesh.triangles, wrong[patch]))
+
+
+def _flip(triangles: np.ndarray, which: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(np.where(which[:, None], triangles[:, ::-1], triangles))
+
+
+def _patch_volumes(mesh: Mesh, patch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Signed volume of each patch about its own middle [m³], and whether it is nearly closed.
+
+    The area vectors of a closed surface add up to nothing.
+    """
+    corners, vectors, areas = mesh.corners, mesh.area_vectors, mesh.areas
+    total = np.bincount(patch, areas)
+    middle = np.stack(
+        [np.bincount(patch, areas * corners.mean(axis=1)[:, k]) / total for k in range(3)], axis=1
+    )
+    a, b, c = np.swapaxes(corners - middle[patch][:, None], 0, 1)
+    volume = np.bincount(patch, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
+    left = np.stack([np.bincount(patch, vectors[:, k]) for k in range(3)], axis=1)
+    closed = (np.linalg.norm(left, axis=1) < 0.05 * total) & (np.bincount(patch) >= 4)
+    return volume, closed

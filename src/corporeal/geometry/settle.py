@@ -1,0 +1,113 @@
+"""Points inside a shape that lie evenly and follow its surface."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from corporeal.geometry.shape import Shape
+from corporeal.geometry.spread import repel
+
+ROUNDS, STEPS = 8, 5
+REACH = 1.2
+"""Of the repulsion, in spacings."""
+
+
+@dataclass(frozen=True)
+class Skin:
+    """The nearest piece of surface as a plane, for points near enough to feel it; M of N points."""
+
+    which: np.ndarray
+    """Their numbers."""
+    foot: Float[np.ndarray, "M 3"]
+    """A point on the plane [m]."""
+    inward: Float[np.ndarray, "M 3"]
+    """Unit, from the surface towards the point."""
+
+    def depth(self, points: np.ndarray) -> Float[np.ndarray, " M"]:
+        """Distance below the plane [m]."""
+        return np.einsum("md,md->m", points[self.which] - self.foot, self.inward)
+
+
+def settle(
+    points: Float[np.ndarray, "N 3"],
+    shape: Shape,
+    outer: Shape,
+    spacing: float,
+    deepest: Float[np.ndarray, " N"] | None = None,
+    held: Bool[np.ndarray, " N"] | None = None,
+) -> Float[np.ndarray, "N 3"]:
+    """Spread points evenly inside, the outermost layer half a spacing below the surface.
+
+    Repulsion between neighbours alternates with the surface, which draws the nearest layer to half
+    a spacing of depth and leaves nothing shallower. A stair-stepped lattice would act as teeth in
+    contact; a layer that follows the face does not.
+
+    Args:
+        points: Where to start, inside [m].
+        shape: What they must stay in.
+        outer: The part of its surface that meets the outside.
+        spacing: [m]
+        deepest: How far below the surface each may be, for walls [m]; None: anywhere.
+        held: Points that do not move but repel.
+
+    Returns:
+        Positions [m].
+
+    """
+    start, points = points, points.copy()
+    free = np.ones(len(points), dtype=bool) if held is None else ~held
+    limit = np.full(len(points), np.inf) if deepest is None else deepest
+    limit = np.maximum(limit - 0.5 * spacing, 0.5 * spacing)
+    if not free.any():
+        return points
+    near = np.flatnonzero(free)
+    for turn in range(ROUNDS):
+        distance, skin = _feel(points, near, shape, outer, spacing)
+        near = near[(distance < 4 * spacing) | np.isfinite(limit[near])]
+        for _ in range(STEPS):
+            move = repel(points, REACH * spacing)
+            move *= np.minimum(1, 0.3 * spacing / (np.linalg.norm(move, axis=1) + 1e-300))[:, None]
+            points[free] += move[free]
+            _press(points, skin, spacing, limit, draw=turn >= 2)
+    for _ in range(4):
+        _press(points, _feel(points, near, shape, outer, spacing)[1], spacing, limit, draw=False)
+    return _stay_inside(points, start, shape, free)
+
+
+def _feel(
+    points: np.ndarray, which: np.ndarray, shape: Shape, outer: Shape, spacing: float
+) -> tuple[np.ndarray, Skin]:
+    distance, triangle, foot = outer.closest(points[which])
+    inward = (points[which] - foot) / np.maximum(distance, 1e-300)[:, None]
+    inward[distance < 1e-6 * spacing] = -outer.mesh.normals[triangle[distance < 1e-6 * spacing]]
+    doubtful = np.flatnonzero(distance < 0.45 * spacing)
+    out = doubtful[~shape.inside(points[which[doubtful]])]
+    inward[out] = -inward[out]
+    return distance, Skin(which, foot, inward)
+
+
+def _press(
+    points: np.ndarray, skin: Skin, spacing: float, limit: np.ndarray, *, draw: bool
+) -> None:
+    """Apply the surface to the points, in place."""
+    depth = skin.depth(points)
+    half = 0.5 * spacing
+    wanted = depth
+    if draw:
+        wanted = np.where(depth < 0.85 * spacing, depth + 0.3 * (half - depth), depth)
+    wanted = np.clip(wanted, half, limit[skin.which])
+    points[skin.which] += (wanted - depth)[:, None] * skin.inward
+
+
+def _stay_inside(
+    points: np.ndarray, start: np.ndarray, shape: Shape, free: np.ndarray
+) -> np.ndarray:
+    """Take back, by halves and then wholly, what ended outside: gaps narrower than a spacing."""
+    lost = np.flatnonzero(free)
+    for share in (0.5, 0.25, 0.0):
+        lost = lost[~shape.inside(points[lost])]
+        if not len(lost):
+            break
+        points[lost] = start[lost] + share * (points[lost] - start[lost])
+    return points

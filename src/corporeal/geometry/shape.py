@@ -1,0 +1,100 @@
+"""Questions about points near a mesh: inside or outside, how far, what can be seen."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+import igl
+import numpy as np
+import trimesh
+from jaxtyping import Bool, Float, Int
+from trimesh.ray.ray_pyembree import RayMeshIntersector
+
+from corporeal.geometry.mesh import Mesh
+
+
+@dataclass(frozen=True)
+class Shape:
+    """A welded, consistently wound mesh, ready to be asked."""
+
+    mesh: Mesh
+
+    @cached_property
+    def _winding(self) -> igl.FastWindingNumberBVH:
+        tree = igl.FastWindingNumberBVH()
+        tree.init(self.mesh.vertices, self.mesh.triangles)
+        return tree
+
+    @cached_property
+    def _closest(self) -> igl.AABB:
+        tree = igl.AABB()
+        tree.init(self.mesh.vertices, self.mesh.triangles)
+        return tree
+
+    @cached_property
+    def _rays(self) -> RayMeshIntersector:
+        mesh = trimesh.Trimesh(self.mesh.vertices, self.mesh.triangles, process=False)
+        return RayMeshIntersector(mesh)
+
+    def winding(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
+        """Generalised winding number: about ±1 inside, about 0 outside.
+
+        Barill et al. 2018, *Fast winding numbers for soups and clouds*, as in libigl.
+        """
+        if not len(points):
+            return np.zeros(0)
+        return np.asarray(self._winding.winding_number(np.ascontiguousarray(points))).reshape(-1)
+
+    def inside(self, points: Float[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
+        """Whether each point is inside, tolerating holes and flipped surfaces."""
+        return np.abs(self.winding(points)) > 0.5
+
+    def closest(
+        self, points: Float[np.ndarray, "N 3"]
+    ) -> tuple[Float[np.ndarray, " N"], Int[np.ndarray, " N"], Float[np.ndarray, "N 3"]]:
+        """Distance to the surface [m], the triangle, and the point on it [m]."""
+        if not len(points):
+            return np.zeros(0), np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+        squared, triangle, point = self._closest.squared_distance(
+            self.mesh.vertices, self.mesh.triangles, np.ascontiguousarray(points)
+        )
+        return np.sqrt(np.asarray(squared)), np.asarray(triangle), np.asarray(point)
+
+    def sightings(self, points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
+        """How many of 26 evenly spread directions hit the surface."""
+        hits = np.zeros(len(points), dtype=np.int64)
+        for direction in sphere_directions(26):
+            hits += self._rays.intersects_any(points, np.tile(direction, (len(points), 1)))
+        return hits
+
+    def reach(
+        self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]
+    ) -> Float[np.ndarray, " N"]:
+        """Distance to the first hit along each ray [m]; inf: none."""
+        length = np.full(len(origins), np.inf)
+        if len(origins):
+            where, ray, _ = self._rays.intersects_location(origins, directions, multiple_hits=False)
+            length[ray] = np.einsum("ij,ij->i", where - origins[ray], directions[ray])
+        return length
+
+    def hit(
+        self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]
+    ) -> Int[np.ndarray, " N"]:
+        """First triangle along each ray; -1: none."""
+        return np.asarray(self._rays.intersects_first(origins, directions))
+
+
+def sphere_directions(count: int) -> Float[np.ndarray, "count 3"]:
+    """Spread unit vectors evenly over the sphere (Fibonacci)."""
+    i = np.arange(count) + 0.5
+    polar = np.arccos(1 - 2 * i / count)
+    turn = np.pi * (1 + 5**0.5) * i
+    return np.stack(
+        [np.cos(turn) * np.sin(polar), np.sin(turn) * np.sin(polar), np.cos(polar)], axis=1
+    )
+
+
+def random_rotation(rng: np.random.Generator) -> Float[np.ndarray, "3 3"]:
+    """Draw a uniformly random rotation matrix."""
+    q, r = np.linalg.qr(rng.normal(size=(3, 3)))
+    q = q * np.sign(np.diag(r))
+    return q * np.sign(np.linalg.det(q))

@@ -1,0 +1,164 @@
+"""Points spread evenly and without a lattice: jittered starts, dart throwing, repulsion."""
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from numba import njit
+
+from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.shape import Shape, random_rotation
+
+
+def scatter(shape: Shape, spacing: float, rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
+    """One jittered point per cube of ``spacing``, where it falls inside the shape.
+
+    The cubes stand in a random frame, so that no row of them follows a face. Each point stands
+    for spacing³. Blocks of 4³ cubes that the surface does not reach are asked only once.
+    """
+    used = shape.mesh.vertices[np.unique(shape.mesh.triangles)]
+    frame, centre = random_rotation(rng), used.mean(axis=0)
+    turned = (used - centre) @ frame
+    low, block = turned.min(axis=0), 4 * spacing
+    counts = np.ceil(np.ptp(turned, axis=0) / block).astype(int) + 1
+    # A random shift, so that a thin plate is not hit or missed as a whole.
+    low = low - rng.uniform(0, 1, 3) * spacing
+    centres = low + (np.indices(counts).reshape(3, -1).T + 0.5) * block
+    world = centres @ frame.T + centre
+    distance = shape.closest(world)[0]
+    mixed = distance < np.sqrt(3) / 2 * block
+    whole = ~mixed & shape.inside(world)
+    offsets = (np.indices((4, 4, 4)).reshape(3, -1).T - 1.5) * spacing
+    found = []
+    for chosen, ask in ((whole, False), (mixed, True)):
+        points = (centres[chosen][:, None] + offsets).reshape(-1, 3)
+        points = points + rng.uniform(-0.5, 0.5, points.shape) * spacing
+        points = points @ frame.T + centre
+        found.append(points[shape.inside(points)] if ask else points)
+    return np.concatenate(found)
+
+
+def sample_surface(
+    mesh: Mesh, count: int, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "N 3"], Int[np.ndarray, " N"]]:
+    """Points spread over the triangles by area, stratified along their order.
+
+    Returns:
+        Positions [m] and the triangle of each.
+
+    """
+    edge = np.cumsum(mesh.areas)
+    where = (np.arange(count) + rng.uniform(0, 1, count)) / count * edge[-1]
+    triangle = np.minimum(np.searchsorted(edge, where, side="right"), len(edge) - 1)
+    u, v = rng.uniform(0, 1, (2, count))
+    root = np.sqrt(u)
+    weights = np.stack([1 - root, root * (1 - v), root * v], axis=1)
+    return np.einsum("nk,nkd->nd", weights, mesh.corners[triangle]), triangle
+
+
+def thin_out(
+    points: Float[np.ndarray, "N 3"], distance: float, taken: Float[np.ndarray, "M 3"] | None = None
+) -> Bool[np.ndarray, " N"]:
+    """Choose points in the given order so that no two chosen are closer than ``distance``.
+
+    With many points in random order this is dart throwing: blue noise of density about
+    0.69 / distance² on a surface.
+
+    Args:
+        points: Candidates [m]; earlier ones win.
+        distance: [m]
+        taken: Points that are chosen already.
+
+    """
+    before = np.zeros((0, 3)) if taken is None else taken
+    everything = np.concatenate([before, points])
+    if not len(points):
+        return np.zeros(0, dtype=bool)
+    return _darts(everything, len(before), distance)[len(before) :]
+
+
+def _buckets(count: int) -> int:
+    return 1 << max(4, int(2 * count - 1).bit_length())
+
+
+@njit(cache=True)
+def _bucket_of(i, j, k, size):
+    return ((i * 73856093) ^ (j * 19349663) ^ (k * 83492791)) & (size - 1)
+
+
+@njit(cache=True)
+def _throw(points, cells, before, distance, head):
+    n = len(points)
+    following = np.full(n, -1, np.int64)
+    chosen = np.zeros(n, np.bool_)
+    for p in range(n):
+        free = True
+        if p >= before:
+            for i in range(-1, 2):
+                for j in range(-1, 2):
+                    for k in range(-1, 2):
+                        q = head[
+                            _bucket_of(cells[p, 0] + i, cells[p, 1] + j, cells[p, 2] + k, len(head))
+                        ]
+                        while q >= 0 and free:
+                            d = points[p] - points[q]
+                            free = d[0] ** 2 + d[1] ** 2 + d[2] ** 2 >= distance**2
+                            q = following[q]
+        if free:
+            chosen[p] = True
+            b = _bucket_of(cells[p, 0], cells[p, 1], cells[p, 2], len(head))
+            following[p] = head[b]
+            head[b] = p
+    return chosen
+
+
+def _darts(points: np.ndarray, before: int, distance: float) -> np.ndarray:
+    cells = np.floor((points - points.min(axis=0)) / distance).astype(np.int64)
+    head = np.full(_buckets(len(points)), -1, np.int64)
+    return _throw(np.ascontiguousarray(points), cells, before, distance, head)
+
+
+def repel(
+    points: Float[np.ndarray, "N 3"], reach: float, gain: float = 0.2
+) -> Float[np.ndarray, "N 3"]:
+    """Displacement of every point away from its neighbours.
+
+    Δ_i = gain Σ_j (reach - l_ij) d_ij / l_ij over neighbours nearer than ``reach`` [m].
+    """
+    low = points.min(axis=0)
+    # A far stray point must not make the table of cells large; wider cells are only slower.
+    width = max(
+        reach, float(np.prod(np.ptp(points, axis=0) + reach) / (64 * len(points) + 1e6)) ** (1 / 3)
+    )
+    cells = np.floor((points - low) / width).astype(np.int64) + 1
+    shape = cells.max(axis=0) + 2
+    key = (cells[:, 0] * shape[1] + cells[:, 1]) * shape[2] + cells[:, 2]
+    order = np.argsort(key, kind="stable")
+    start = np.zeros(int(np.prod(shape)) + 1, np.int64)
+    np.cumsum(np.bincount(key, minlength=len(start) - 1), out=start[1:])
+    moved = _repel(points[order], key[order], start, (shape[1] * shape[2], shape[2]), reach)
+    result = np.empty_like(moved)
+    result[order] = gain * moved
+    return result
+
+
+@njit(cache=True, fastmath=True)
+def _repel(points, key, start, stride, reach):
+    moved = np.zeros_like(points)
+    for p in range(len(points)):
+        x, y, z = points[p]
+        for i in range(-1, 2):
+            for j in range(-1, 2):
+                row = key[p] + i * stride[0] + j * stride[1]
+                # Three neighbouring cells of a row lie one after the other; each pair once.
+                for q in range(max(start[row - 1], p + 1), start[row + 2]):
+                    dx, dy, dz = x - points[q, 0], y - points[q, 1], z - points[q, 2]
+                    squared = dx * dx + dy * dy + dz * dz
+                    if 0.0 < squared < reach * reach:
+                        length = np.sqrt(squared)
+                        f = (reach - length) / length
+                        moved[p, 0] += f * dx
+                        moved[p, 1] += f * dy
+                        moved[p, 2] += f * dz
+                        moved[q, 0] -= f * dx
+                        moved[q, 1] -= f * dy
+                        moved[q, 2] -= f * dz
+    return moved

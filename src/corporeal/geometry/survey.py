@@ -1,0 +1,196 @@
+"""One object taken apart: which triangles enclose which part, how large everything is."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from corporeal.geometry.anatomy import Build, Skin, build_of, outer_skin, pieces, sheets
+from corporeal.geometry.extent import oriented_size
+from corporeal.geometry.mesh import Mesh, openness, orient, signed_volume, weld
+from corporeal.geometry.shape import Shape
+from corporeal.geometry.spread import scatter
+
+PROBES = 30_000
+"""Points that measure an object's volume; the error of a ball's is about 0.1 %."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """One part of an object, measured."""
+
+    part: int
+    body: Mesh
+    """Its triangles that enclose something, alone or with other parts."""
+    sheet: Mesh
+    """Its open sheets."""
+    closed: bool
+    """Whether ``body`` is closed by itself."""
+    build: Build
+    volume: float
+    """Enclosed by the object and belonging to this part [m³]."""
+    size: tuple[float, float, float]
+    """Extents of its smallest box, shortest first [m]."""
+
+    @property
+    def body_area(self) -> float:
+        """Of every face that encloses something [m²]."""
+        return float(self.body.areas.sum())
+
+    @property
+    def sheet_area(self) -> float:
+        """Of the open sheets, one side [m²]."""
+        return float(self.sheet.areas.sum())
+
+
+@dataclass(frozen=True)
+class Anatomy:
+    """One object, measured."""
+
+    shape: Shape | None
+    """Everything that encloses something; None: only sheets."""
+    skin: Skin | None
+    """Where it meets the outside."""
+    part_of_triangle: Int[np.ndarray, " T"]
+    """Of ``shape``."""
+    members: tuple[Member, ...]
+    probes: Float[np.ndarray, "N 3"]
+    """Points evenly inside [m]."""
+    part_of_probe: Int[np.ndarray, " N"]
+    vertices: Float[np.ndarray, "V 3"]
+    """Every corner of the object [m]."""
+
+    @property
+    def everything(self) -> Mesh:
+        """All triangles of the object."""
+        meshes = [m for member in self.members for m in (member.body, member.sheet)]
+        return Mesh(self.vertices, np.concatenate([m.triangles for m in meshes]))
+
+    def label(self, points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
+        """Part of each point inside: the smallest around it, else that of the nearest face."""
+        if self.shape is None or not len(points):
+            return np.zeros(len(points), dtype=np.int64)
+        closed = [m for m in self.members if m.closed]
+        return label(points, self.shape, self.part_of_triangle, closed)
+
+
+def survey(
+    vertices: Float[np.ndarray, "V 3"],
+    triangles: Int[np.ndarray, "T 3"],
+    part_of_triangle: Int[np.ndarray, " T"],
+    rng: np.random.Generator,
+) -> Anatomy:
+    """Weld an object's triangles, find what they enclose, and measure every part.
+
+    Args:
+        vertices: [m]
+        triangles: All of the object's.
+        part_of_triangle: Index into the catalogue of parts.
+        rng: Source of the probes.
+
+    """
+    mesh, kept = weld(vertices, triangles)
+    part = part_of_triangle[kept]
+    mesh = orient(mesh)
+    piece = pieces(mesh) if len(kept) else kept
+    build = np.where(sheets(mesh, piece), Build.SHEET, Build.BODY) if len(kept) else kept
+    for group in groups(piece, part, build != Build.SHEET):
+        shape = Shape(mesh.only(group))
+        build[group] = build_of(shape, oriented_size(shape.mesh.corners.reshape(-1, 3)), rng)
+    solid = build != Build.SHEET
+    shape = Shape(mesh.only(solid)) if solid.any() else None
+    probes, spacing = probe(shape, rng)
+    closed = {k: closes(mesh.only(solid & (part == k))) for k in np.unique(part)}
+    alone = [
+        Member(int(k), mesh.only(solid & (part == k)), mesh.only(~solid & (part == k)), closed[k],
+               Build(int(build[part == k].min())), 0.0,
+               oriented_size(mesh.corners[part == k].reshape(-1, 3)))
+        for k in np.unique(part)
+    ]  # fmt: skip
+    owner = (
+        label(probes, shape, part[solid], [m for m in alone if m.closed])
+        if shape is not None
+        else np.zeros(0, dtype=np.int64)
+    )
+    members = tuple(_with_volume(m, alone, owner, spacing**3) for m in alone)
+    return Anatomy(
+        shape=shape,
+        skin=outer_skin(shape, rng) if shape is not None else None,
+        part_of_triangle=part[solid],
+        members=members,
+        probes=probes,
+        part_of_probe=owner,
+        vertices=mesh.vertices,
+    )
+
+
+def groups(piece: np.ndarray, part: np.ndarray, among: np.ndarray) -> list[np.ndarray]:
+    """Masks of the triangles that share pieces or parts, and so are read as one thing."""
+    if not among.any():
+        return []
+    _, p = np.unique(piece[among], return_inverse=True)
+    _, q = np.unique(part[among], return_inverse=True)
+    p, q = p.reshape(-1), q.reshape(-1) + p.max() + 1
+    links = coo_matrix((np.ones(len(p)), (p, q)), shape=(q.max() + 1,) * 2)
+    label = np.full(len(piece), -1)
+    label[among] = connected_components(links, directed=False)[1][p]
+    return [label == k for k in range(label.max() + 1)]
+
+
+def closes(mesh: Mesh) -> bool:
+    """Whether a mesh is closed but for cracks, so that "inside it" has a meaning."""
+    return len(mesh.triangles) >= 4 and openness(mesh) < 0.1
+
+
+def probe(shape: Shape | None, rng: np.random.Generator) -> tuple[np.ndarray, float]:
+    """About ``PROBES`` points evenly inside, each standing for spacing³."""
+    if shape is None:
+        return np.zeros((0, 3)), 0.0
+    used = shape.mesh.vertices[np.unique(shape.mesh.triangles)]
+    low, high = used.min(axis=0), used.max(axis=0)
+    span = np.maximum(high - low, 1e-3 * (high - low).max())
+    spacing = float(np.prod(span) / 4000) ** (1 / 3)
+    points = scatter(shape, spacing, rng)
+    for _ in range(2):
+        if len(points) > 0.7 * PROBES:
+            break
+        # Too few to trust their number: grow by a bounded step.
+        spacing *= max(len(points) / PROBES, 1 / 40) ** (1 / 3)
+        points = scatter(shape, spacing, rng)
+    return points, spacing
+
+
+def label(
+    points: np.ndarray, shape: Shape, part_of_triangle: np.ndarray, closed: list[Member]
+) -> np.ndarray:
+    """Part of each point: the smallest closed part around it, else that of the nearest face."""
+    names = {m.part for m in closed}
+    rest = np.flatnonzero(~np.isin(part_of_triangle, list(names)))
+    if len(names) + (len(rest) > 0) == 1:
+        only = part_of_triangle[0]
+        return np.full(len(points), only, dtype=np.int64)
+    result = np.full(len(points), -1, dtype=np.int64)
+    for member in sorted(closed, key=lambda m: -abs(signed_volume(m.body))):
+        used = member.body.vertices[np.unique(member.body.triangles)]
+        low, high = used.min(axis=0), used.max(axis=0)
+        near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
+        result[near[Shape(member.body).inside(points[near])]] = member.part
+    left = np.flatnonzero(result < 0)
+    faces = rest if len(rest) else np.arange(len(part_of_triangle))
+    result[left] = part_of_triangle[faces[Shape(shape.mesh.only(faces)).closest(points[left])[1]]]
+    return result
+
+
+def _with_volume(member: Member, members: list[Member], owner: np.ndarray, each: float) -> Member:
+    """Count the probes; where the mesh is closed and agrees, its own exact volume is better."""
+    volume = float((owner == member.part).sum()) * each
+    exact = abs(signed_volume(member.body)) if member.closed else 0.0
+    few = (owner == member.part).sum() < 1000
+    whole = len(members) == 1 and member.closed
+    if exact > 0 and (abs(exact - volume) < 0.03 * exact or (few and not whole)):
+        volume = exact
+    return Member(
+        member.part, member.body, member.sheet, member.closed, member.build, volume, member.size
+    )
