@@ -8,6 +8,8 @@ from scipy.spatial import KDTree
 
 ROUNDS, TRUSTED = 5, 0.7
 """The rigid fit is repeated on the trusted share of points that fitted best."""
+NEIGHBOURS = 32
+"""Particles around a place that tell where it was."""
 
 
 @dataclass(frozen=True)
@@ -101,6 +103,7 @@ def where_it_was(
     start: Float[np.ndarray, "N 3"],
 ) -> Float[np.ndarray, " 3"]:
     """Take a point on a body now back to where that bit of the body started [m]."""
-    _, nearest = KDTree(now).query(point, k=min(8, len(now)))
+    _, nearest = KDTree(now).query(point, k=min(NEIGHBOURS, len(now)))
     nearest = np.atleast_1d(nearest)
-    return point + np.mean(start[nearest] - now[nearest], axis=0)
+    fit = rigid_fit(start[nearest], now[nearest], np.ones(len(nearest)))
+    return fit.undo(point[None])[0]

@@ -1,0 +1,200 @@
+"""The audit finds what is wrong, and says what it means; the outcome tells what was seen."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from corporeal.mpm.audit import audit, breaches, energy_growth, momentum_residual, outcome
+from corporeal.mpm.frames import Layout, gather, write_frame, write_layout
+from corporeal.types import (
+    Frame,
+    Law,
+    Material,
+    MaterialField,
+    Particles,
+    PartWords,
+    Scene,
+    SceneObject,
+    Structure,
+    Treatment,
+)
+
+CELL, FPS, STEPS = 0.01, 100, 81
+SCENE = Scene(
+    "made up",
+    "",
+    (SceneObject("clay_0", "clay", 0.1), SceneObject("stone_0", "stone", 0.04)),
+    (),
+    (),
+    fps=FPS,
+    duration=(STEPS - 1) / FPS,
+)
+CLAY = Material("clay", Law.VON_MISES, 5e6, 0.4, 1700.0, yield_stress=1e5)
+TREATMENT = Treatment(
+    "deformable", 5e6, 5e6, 0.4, 1700.0, 1e5, None, 0.1, 1.0, 60.0, 1e-4, "Deformable."
+)
+HIT = 0.2
+"""The stone strikes at this time [s], at x = y = 0.02 m."""
+
+
+def cube(size, centre):
+    axis = np.arange(CELL / 4, size, CELL / 2) - size / 2
+    return np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3) + centre
+
+
+CLAY_START = cube(0.1, (0.0, 0.0, 0.05))
+STONE_START = cube(0.04, (0.02, 0.02, 0.22))
+
+
+def stone_height(t):
+    """Falls 10 cm in 0.2 s, is thrown back 4 cm, and stays there (a story, not physics)."""
+    return 0.22 - 0.1 * (t / HIT) ** 2 if t < HIT else min(0.12 + (t - HIT) * 0.2, 0.16)
+
+
+def positions(t):
+    clay = CLAY_START.copy()
+    if t >= HIT:
+        near = np.hypot(clay[:, 0] - 0.02, clay[:, 1] - 0.02) < 0.015
+        clay[near & (clay[:, 2] > 0.07), 2] -= 0.02
+    return clay, STONE_START + np.array([0, 0, stone_height(t) - 0.22])
+
+
+def row(t):
+    clay, stone = positions(t)
+    mass = np.array([1.7, 0.1])
+    first, point = np.full((3, 3), np.nan), np.full((3, 3, 3), np.nan)
+    first[0, 2] = first[2, 0] = 0.001
+    point[0, 2] = point[2, 0] = 0.0
+    if t >= HIT:
+        first[0, 1] = first[1, 0] = HIT
+        point[0, 1] = point[1, 0] = (0.02, 0.02, 0.1)
+    return {
+        "time": np.float64(t),
+        "mass": mass,
+        "centre": np.stack([clay.mean(0), stone.mean(0)]),
+        "momentum": np.zeros((2, 3)),
+        "kinetic": np.zeros(2),
+        "elastic": np.zeros(2),
+        "potential": np.zeros(2),
+        "external_impulse": np.zeros((2, 3)),
+        "plane_impulse": np.zeros((1, 2, 3)),
+        "pair_impulse": np.zeros((2, 2)),
+        "push_work": np.float64(0),
+        "friction_loss": np.float64(0),
+        "plastic_loss": np.float64(0),
+        "viscous_loss": np.float64(0),
+        "first_contact": first,
+        "contact_point": point,
+        "flow": np.ones(2),
+        "rms_speed": np.zeros(2),
+        "gap": np.array([[np.inf, stone.min(0)[2] - 0.1], [stone.min(0)[2] - 0.1, np.inf]]),
+        "overlap": np.zeros((2, 2)),
+        "plane_depth": np.zeros((1, 2)),
+        "steps": np.int64(5),
+        "dt_min": np.float64(1e-4),
+        "dt_max": np.float64(1e-4),
+        "nan": np.int64(0),
+        "lost": np.int64(0),
+    }
+
+
+@pytest.fixture(scope="module")
+def story(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("story")
+    counts = [len(CLAY_START), len(STONE_START)]
+    owner = np.repeat([0, 1], counts)
+    layout = Layout(object=owner, rigid=np.array([False, True]))
+    write_layout(folder, layout)
+    still = np.broadcast_to(np.eye(3), (sum(counts), 3, 3))
+    for k in range(STEPS):
+        frame = Frame(time=k / FPS, position=np.concatenate(positions(k / FPS)), deformation=still)
+        write_frame(folder, k, frame, layout, row(k / FPS))
+    volume = np.where(owner == 0, 1e-3 / counts[0], 6.4e-5 / counts[1])
+    particles = Particles(
+        position=np.concatenate([CLAY_START, STONE_START]),
+        velocity=np.zeros((sum(counts), 3)),
+        volume=volume,
+        density=np.full(sum(counts), 1700.0),
+        object=owner,
+        part=owner.copy(),
+        cell=CELL,
+        treatments=(TREATMENT, replace(TREATMENT, kind="rigid")),
+        surface=np.zeros((0, 3)),
+        object_of_surface=np.zeros(0, dtype=np.int64),
+        mass_real=(1.7, 6.4e-5 * 1700),
+    )
+    field = MaterialField(
+        (CLAY, CLAY),
+        (Structure("solid"),) * 2,
+        (PartWords("lump", "clay"), PartWords("pebble", "clay")),
+        np.full((3, 3), 0.5),
+        np.full((3, 3), 0.5),
+    )
+    return SCENE, particles, field, gather(folder, STEPS)
+
+
+def test_the_imprint_is_where_the_stone_struck(story):
+    clay = outcome(story[0], story[1], story[3])["objects"]["clay_0"]
+    assert clay["dent_depth_m"] == pytest.approx(0.02, rel=0.05)
+    np.testing.assert_allclose(clay["dent_place"][:2], [0.02, 0.02], atol=0.003)
+    assert clay["dent_from_contact_m"]["stone_0"] < 0.02
+    assert clay["dent_from_contact_m"]["floor"] > 0.06
+    assert clay["at_rest"]
+
+
+def test_the_stone_bounced_and_kept_its_shape(story):
+    seen = outcome(story[0], story[1], story[3])
+    stone, pair = seen["objects"]["stone_0"], seen["pairs"]["clay_0|stone_0"]
+    assert stone["shape_error_end"] < 1e-6
+    assert stone["dent_place"] is None
+    assert stone["fall_m"] == pytest.approx(0.1, abs=2e-3)
+    assert stone["rebound_m"] == pytest.approx(0.04, abs=2e-3)
+    assert stone["rebound_ratio"] == pytest.approx(0.4, abs=0.03)
+    assert pair["first_contact_s"] == HIT
+    assert pair["separated"]
+    assert pair["gap_end_m"] == pytest.approx(0.04, abs=CELL)
+    assert seen["order"] == [["clay_0", "stone_0"]]
+
+
+def test_a_sound_run_has_no_warnings(story):
+    found = audit(*story)
+    assert found["warnings"] == []
+    assert found["mass_error"] < 1e-9
+    assert [p["object"] for p in found["parts"]] == ["clay_0", "stone_0"]
+
+
+def test_momentum_from_nowhere_is_found(story):
+    ledger = dict(story[3].ledger)
+    ledger["momentum"] = ledger["momentum"].copy()
+    ledger["momentum"][40:, 1, 0] += 0.02
+    assert momentum_residual(ledger, SCENE, CELL) == pytest.approx(0.02 / 2)
+
+
+def test_energy_from_nowhere_is_found_and_dissipation_is_not_mistaken_for_it(story):
+    ledger = dict(story[3].ledger)
+    fall = np.linspace(0, 1.0, STEPS)[:, None] * [0, 2.0]
+    ledger["potential"] = -fall
+    ledger["kinetic"] = 0.7 * fall
+    ledger["friction_loss"] = 0.3 * fall[:, 1]
+    assert energy_growth(ledger, SCENE, CELL) < 1e-12
+    ledger["kinetic"] = 0.8 * fall
+    assert energy_growth(ledger, SCENE, CELL) == pytest.approx(0.1)
+
+
+@pytest.mark.parametrize(
+    ("key", "value", "word"),
+    [
+        ("nan_count", 3, "not numbers"),
+        ("particles_out_of_domain", 7, "7 particles"),
+        ("momentum_residual", 0.05, "5.0%"),
+        ("energy_growth", 0.2, "Energy"),
+        ("max_penetration_dx", 2.5, "2.5 grid cells"),
+        ("mass_error", 0.3, "30%"),
+    ],
+)
+def test_every_breach_is_said_in_plain_words(story, key, value, word):
+    found = audit(*story) | {key: value}
+    (sentence,) = breaches(found)
+    assert word in sentence
+    assert sentence.endswith(".")
