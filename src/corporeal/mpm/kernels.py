@@ -15,21 +15,25 @@ wp.set_module_options(
     {"enable_backward": False, "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast"}
 )
 
+_POINTERS = "part node material table block where near point rigid surface"
+_COUNTS = "blocks pool rigids points surfaces pushed"
 FIELD = np.dtype(
-    [
-        (name, "u8")
-        for name in "part node material table block where near point rigid surface".split()
-    ]
+    [(name, "u8") for name in _POINTERS.split()]
     + [("mass", "f8"), ("origin", "i4", 3), ("dim", "i4", 3)]
-    + [(name, "i4") for name in "blocks pool rigids points surfaces pushed".split()],
+    + [(name, "i4") for name in _COUNTS.split()],
     align=True,
 )
+_POINTERS = (
+    "field task contact_memory list order report plane friction restitution ledger pair_memory "
+    "near_memory plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
+)
+_COUNTS = (
+    "fields planes tasks contacts pairs nears most_contacts most_pairs most_nears full names again"
+)
 WORLD = np.dtype(
-    [(name, "u8") for name in "field task contact_memory list report plane friction".split()]
-    + [(name, "u8") for name in "restitution ledger pair_memory near_memory".split()]
+    [(name, "u8") for name in _POINTERS.split()]
     + [("dx", "f8"), ("dt", "f8"), ("time", "f8"), ("kick", "f8", 3)]
-    + [(name, "i4") for name in "fields planes tasks contacts pairs nears most_contacts".split()]
-    + [(name, "i4") for name in "most_pairs most_nears full most_list multi".split()],
+    + [(name, "i4") for name in _COUNTS.split()],
     align=True,
 )
 
@@ -72,6 +76,10 @@ def forces_native(memory: Memory, index: int): ...
 def gather_native(memory: Memory, index: int): ...
 
 
+@wp.func_native(_native("contact"))
+def contact_native(memory: Memory, index: int): ...
+
+
 @wp.kernel
 def clear(memory: Memory, first: int):
     clear_native(memory, first + wp.tid())
@@ -92,6 +100,15 @@ def gather(memory: Memory, first: int):
     gather_native(memory, first + wp.tid())
 
 
+@wp.kernel
+def contact(memory: Memory, first: int):
+    contact_native(memory, first + wp.tid())
+
+
+MEET, TOUCH, CLOSE = 704, 448, 96
+"""Bytes of a node where fields meet, of a possible contact, and of a particle near it."""
+
+
 class Program:
     """The launches of one step, recorded once."""
 
@@ -100,24 +117,21 @@ class Program:
             ptr=world.ctypes.data, dtype=wp.uint64, shape=world.nbytes // 8, device="cpu"
         )
         self.world = world
-        self.commands: list = []
+        self.divide(0, 0, 0)
 
     def divide(self, even: int, odd: int, nodes: int) -> None:
         """Record one step with so many tasks on particles of even and odd planes and on nodes."""
-        plan = [
-            (clear, 0, nodes),
-            (scatter, 0, even),
-            (scatter, even, odd),
-            (forces, 0, nodes),
-            (gather, 0, even + odd),
-        ]
-        self.commands = [
-            wp.launch(kernel, dim=count, inputs=[self.memory, first], device="cpu", record_cmd=True)
+        self.before = self._record(
+            [(clear, 0, nodes), (scatter, 0, even), (scatter, even, odd), (forces, 0, nodes)]
+        )
+        self.contact = self._record([(contact, 0, 1)])[0]
+        self.after = self._record([(gather, 0, even + odd)])
+
+    def _record(self, plan: list) -> list:
+        return [
+            wp.launch(
+                kernel, dim=count, inputs=[self.memory, first], device="cpu", record_cmd=True
+            )
             for kernel, first, count in plan
             if count
         ]
-
-    def step(self) -> None:
-        """Run one step."""
-        for command in self.commands:
-            command.launch()

@@ -10,10 +10,13 @@ from corporeal.errors import SimulationError
 from corporeal.mpm import tables
 from corporeal.mpm.kernels import (
     ASTRAY,
+    CLOSE,
     FIELD,
+    MEET,
     PLASTIC,
     REPORT,
     SPEED2,
+    TOUCH,
     VISCOUS,
     WAVE2,
     WORK,
@@ -82,10 +85,62 @@ class WarpEngine:
             self.window[f] = Window(place, rows)
             if not self.window[f].fits:
                 raise SimulationError(_too_wide(problem, bodies, 0.0))
+        self._lay_out_rigid()
+        self._lay_out_contact()
         self.program = Program(self.world)
         self.speed = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
         self.wave = max([self._rest_speed(f) for f in self.window] + [0.0])
         self._connect()
+
+    def _lay_out_rigid(self) -> None:
+        """Give every rigid body a grid of its own, large enough for any turn; used where touched."""
+        self.keep: list[np.ndarray] = []
+        for b, state in self.rigid.items():
+            if not self._is_rigid(b):
+                continue
+            across = int(np.ceil((2.0 * state[tables.RADIUS] / self.problem.cell + 4.0) / 4.0)) + 3
+            surface = self.problem.bodies[b].surface - state[tables.CENTRE : tables.CENTRE + 3]
+            arrays = {
+                "node": np.zeros((across**3, 64, 8), np.float32),
+                "table": np.full(across**3, -1, np.int32),
+                "where": np.zeros((across**3, 4), np.int32),
+                "near": np.zeros(across**3, np.uint64),
+                "block": np.zeros(len(self.points[b]), np.int32),
+                "point": np.ascontiguousarray(self.points[b]),
+                "surface": np.ascontiguousarray(surface),
+                "rigid": state,
+            }
+            self.keep += arrays.values()
+            record = self.field[b : b + 1]
+            for name, array in arrays.items():
+                record[name] = array.ctypes.data
+            record["dim"], record["rigids"] = across, 1
+            record["points"], record["surfaces"] = len(self.points[b]), len(surface)
+
+    def _lay_out_contact(self) -> None:
+        problem, fields = self.problem, len(self.members)
+        walls = [[*plane.normal, plane.offset] for plane in problem.planes]
+        self.plane = np.array(walls, float).reshape(-1, 4)
+        bodies, friction = len(problem.bodies), np.array(problem.friction, float)
+        restitution = np.array(problem.restitution, float)
+        if problem.contact == "single":
+            wall = friction[:bodies, bodies:].mean(axis=0)
+            friction = np.zeros((1 + len(walls), 1 + len(walls)))
+            friction[0, 1:] = friction[1:, 0] = wall
+            restitution = np.zeros_like(friction)
+        self.friction, self.restitution = friction, restitution
+        self.scratch = np.zeros((fields + len(walls)) ** 2 * 8)
+        self._point(
+            plane=self.plane, friction=friction, restitution=restitution, ledger=self.scratch
+        )
+        book = self.ledger
+        for name in (
+            "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
+        ).split():
+            self._point(**{name: getattr(book, name)})
+        self.world["planes"], self.world["names"] = len(walls), bodies + len(walls)
+        self.room = 1024
+        self._lengthen()
 
     def _refuse_far(self, place: np.ndarray, bodies: list[int]) -> None:
         if not np.isfinite(place).all():
@@ -118,13 +173,7 @@ class WarpEngine:
         self.slower = np.array([self.slowing[f] for f in self.task[:, 0]])
         for f, window in self.window.items():
             self._connect_field(f, window)
-        for name, value in (
-            ("field", self.field),
-            ("task", self.task),
-            ("list", self.node_task),
-            ("report", self.report),
-        ):
-            self.world[name] = value.ctypes.data
+        self._point(field=self.field, task=self.task, list=self.node_task, report=self.report)
         self.world["fields"], self.world["dx"] = len(self.field), self.problem.cell
         self.world["tasks"] = len(self.task)
         self.program.divide(len(even), len(odd), len(nodes))
@@ -182,13 +231,46 @@ class WarpEngine:
         world = self.world
         world["dt"], world["time"] = dt, self.time_now
         world["kick"] = self._kick(dt)
-        self.program.step()
+        for command in self.program.before:
+            command.launch()
+        self._touch()
+        for command in self.program.after:
+            command.launch()
         self.time_now += dt
         self.steps.count += 1
         self.steps.smallest = min(self.steps.smallest, dt)
         self.steps.largest = max(self.steps.largest, dt)
         if len(self.task):
             self._hear()
+
+    def _touch(self) -> None:
+        """Solve contact; where a list was too short, lengthen it and begin again."""
+        self.world["again"] = 0
+        self.program.contact.launch()
+        while self.world["full"][0]:
+            self._lengthen()
+            self.world["again"] = 1
+            self.program.contact.launch()
+
+    def _lengthen(self) -> None:
+        self.room *= 2
+        room = self.room
+        self.meets = np.zeros(room * MEET, np.uint8)
+        self.touches = np.zeros(2 * room * TOUCH, np.uint8)
+        self.closes = np.zeros(4 * room * CLOSE, np.uint8)
+        self.order = np.zeros(2 * room, np.int32)
+        self._point(
+            contact_memory=self.meets,
+            pair_memory=self.touches,
+            near_memory=self.closes,
+            order=self.order,
+        )
+        world = self.world
+        world["most_contacts"], world["most_pairs"], world["most_nears"] = room, 2 * room, 4 * room
+
+    def _point(self, **arrays: np.ndarray) -> None:
+        for name, array in arrays.items():
+            self.world[name] = array.ctypes.data
 
     def _kick(self, dt: float) -> np.ndarray:
         """Velocity [m/s] that gravity gives in this step; enters it and the pushes."""
@@ -201,6 +283,11 @@ class WarpEngine:
                 span = max(0.0, min(end, body.push.end) - max(start, body.push.start))
                 push = np.array(body.push.acceleration) * span
                 self._push(b, push)
+            if b in self.rigid:
+                state = self.rigid[b]
+                state[tables.KICK : tables.KICK + 3] = gravity + push
+                mean = state[tables.SPEED : tables.SPEED + 3] + 0.5 * (gravity + push)
+                self.ledger.push_work += self.mass[b] * float(push @ mean)
             self.ledger.external_impulse[b] += self.mass[b] * (gravity + push)
         return gravity
 
@@ -293,7 +380,7 @@ class WarpEngine:
     def restore(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from what ``save`` returned, on an engine built from the same problem."""
         for name in self.ledger.as_arrays():
-            setattr(self.ledger, name, np.array(saved[f"ledger.{name}"]))
+            getattr(self.ledger, name)[...] = saved[f"ledger.{name}"]
         for f, window in self.window.items():
             head = f"field{f}."
             window.restore(

@@ -35,10 +35,13 @@ struct Field {
 struct World {
   Field *field;
   int *task, *contact_memory, *list;
+  int *order;
   double *report, *plane, *friction, *restitution, *ledger, *pair_memory, *near_memory;
+  double *plane_impulse, *pair_impulse, *friction_loss, *first_contact, *last_contact;
+  double *contact_point;
   double dx, dt, time, kick[3];
   int fields, planes, tasks, contacts, pairs, nears, most_contacts, most_pairs, most_nears, full;
-  int most_list, multi;
+  int names, again;   // bodies and planes in the books; a repeated call after more memory
 };
 
 struct Simd {

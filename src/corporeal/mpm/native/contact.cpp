@@ -1,0 +1,874 @@
+// One step's contact, from first to last: rigid bodies put mass on their grids, nodes where fields
+// meet are listed, surfaces looked at, normals chosen, gaps measured, impulses solved, rigid bodies
+// moved. Same formulas as contact.py and encounter.py; design: physics, section 2 C to G.
+const int CENTRE = 1, TURN = 4, REST = 13, SPEED = 22, MOMENT = 25, INERTIA = 28, SPIN = 37,
+          RADIUS = 40, KICK = 41;
+constexpr double WALL_REACH = 0.51, LATTICE_GAP = 0.05, LATTICE_SLOPE = 0.25, LATTICE_START = 0.7,
+             DEEPEST = 1.25, PATCH = 0.1, SLOWEST = 0.05, POINT_REACH = 0.3;
+
+struct Meet {             // a node where fields meet
+  int at[3], count, first, last, stiff, several;
+  int field[MOST], slot[MOST];
+  double m[MOST], mean[MOST][3], out[MOST][3], v[MOST][3];
+  double spare[7];
+};
+struct Touch {            // a possible contact of a with c, or with plane -1 - c
+  int meet, a, c, fa, fc, active, stiff, bounce;
+  double x[3], n[3], chosen[3], candidate[3][3], far_a[3], far_c[3];
+  double gap, target, mu, inverse, J[3], before[3], approach;
+};
+struct Close {            // a particle near a node where two fields meet
+  double x[3];
+  float F[9];
+  float reach;
+  int field, base[3];
+};
+static_assert(sizeof(Meet) <= 704 && sizeof(Touch) <= 448 && sizeof(Close) <= 96, "memory");
+
+struct Face {             // a half space u < s through the quadratic spline
+  static inline double mean(double s) {
+    s = s < -1.5 ? -1.5 : s > 1.5 ? 1.5 : s;
+    double n = s > 0 ? -s : s, w = n + 1.5, weight, moment;
+    if (n < -0.5) {
+      weight = w * w * w / 6.0;
+      moment = w * w * w * w / 8.0 - w * w * w / 4.0;
+    } else {
+      weight = 0.5 + 0.75 * n - n * n * n / 3.0;
+      moment = -13.0 / 64.0 + 0.375 * n * n - 0.25 * n * n * n * n;
+    }
+    if (s > 0) weight = 1.0 - weight;
+    return weight > 1e-12 ? moment / weight : n;
+  }
+  static inline double face(double p) {   // inverse of mean by bisection and secant on [-1.5, 1.5]
+    if (p >= 0.0) return 1.5;
+    if (p <= -1.5) return -1.5;
+    double low = -1.5, high = 1.5;
+    for (int i = 0; i < 30; i++) {
+      double mid = 0.5 * (low + high);
+      if (mean(mid) < p) low = mid; else high = mid;
+    }
+    return 0.5 * (low + high);
+  }
+  static inline double touching(double s) {
+    s = fabs(s);
+    if (s > DEEPEST) s = DEEPEST;
+    double over = s - LATTICE_START;
+    return -mean(s) - mean(-s) + LATTICE_GAP + LATTICE_SLOPE * (over > 0 ? over : 0.0);
+  }
+};
+struct Vec {
+  static inline double dot(const double *a, const double *b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  }
+  static inline void cross(const double *a, const double *b, double *c) {
+    double x = a[1] * b[2] - a[2] * b[1], y = a[2] * b[0] - a[0] * b[2];
+    c[2] = a[0] * b[1] - a[1] * b[0];
+    c[0] = x;
+    c[1] = y;
+  }
+  static inline void apply(const double *A, const double *b, double *c) {
+    double x = dot(A, b), y = dot(A + 3, b), z = dot(A + 6, b);
+    c[0] = x;
+    c[1] = y;
+    c[2] = z;
+  }
+  static inline double unit(double *a) {
+    double l = sqrt(dot(a, a));
+    for (int i = 0; i < 3; i++) a[i] = l > 1e-30 ? a[i] / l : 0.0;
+    return l;
+  }
+  // C = A B, or A Bt
+  static inline void times(const double *A, const double *B, double *C) {
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++)
+        C[3 * i + j] = A[3 * i] * B[j] + A[3 * i + 1] * B[3 + j] + A[3 * i + 2] * B[6 + j];
+  }
+  static inline void times_transposed(const double *A, const double *B, double *C) {
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++)
+        C[3 * i + j] = dot(A + 3 * i, B + 3 * j);
+  }
+  static inline int floor_int(double a) {
+    int i = (int)a;
+    return i - (a < i);
+  }
+};
+struct Body6 {            // a rigid body's state
+  static inline void turn(double *s, const double *w, double dt, double *Q) {
+    double a[3] = {w[0] * dt, w[1] * dt, w[2] * dt}, t = sqrt(Vec::dot(a, a));
+    double K[9] = {0, -a[2], a[1], a[2], 0, -a[0], -a[1], a[0], 0}, K2[9], R[9];
+    Vec::times(K, K, K2);
+    double f = t < 1e-6 ? 1.0 - t * t / 6.0 : sin(t) / t;
+    double g = t < 1e-6 ? 0.5 - t * t / 24.0 : (1.0 - cos(t)) / (t * t);
+    for (int i = 0; i < 9; i++) R[i] = f * K[i] + g * K2[i] + (i % 4 == 0);
+    Vec::times(R, s + TURN, Q);
+  }
+  static inline void spin_up(double *s, const double *Q, double *w) {
+    double A[9], B[9];
+    Vec::times(Q, s + REST, A);
+    Vec::times_transposed(A, Q, B);
+    for (int i = 0; i < 9; i++) s[INERTIA + i] = B[i];
+    Vec::apply(B, s + MOMENT, w);
+  }
+  static inline void velocity(const double *s, const double *x, double *v) {
+    double r[3] = {x[0] - s[CENTRE], x[1] - s[CENTRE + 1], x[2] - s[CENTRE + 2]};
+    Vec::cross(s + SPIN, r, v);
+    for (int i = 0; i < 3; i++) v[i] += s[SPEED + i];
+  }
+  static inline double softness(const double *s, const double *x, const double *n) {
+    double r[3] = {x[0] - s[CENTRE], x[1] - s[CENTRE + 1], x[2] - s[CENTRE + 2]}, t[3], u[3];
+    Vec::cross(r, n, t);
+    Vec::apply(s + INERTIA, t, u);
+    return 1.0 / s[0] + Vec::dot(t, u);
+  }
+  static inline void hit(double *s, const double *x, const double *J) {
+    double r[3] = {x[0] - s[CENTRE], x[1] - s[CENTRE + 1], x[2] - s[CENTRE + 2]}, t[3], u[3];
+    Vec::cross(r, J, t);
+    Vec::apply(s + INERTIA, t, u);
+    for (int i = 0; i < 3; i++) {
+      s[SPEED + i] += J[i] / s[0];
+      s[MOMENT + i] += t[i];
+      s[SPIN + i] += u[i];
+    }
+  }
+};
+struct Grid {
+  static inline int block(const Field &f, int x, int y, int z) {   // window coordinates
+    if (x < 0 || y < 0 || z < 0 || x >= f.dim[0] || y >= f.dim[1] || z >= f.dim[2]) return -1;
+    return f.table[(x * f.dim[1] + y) * f.dim[2] + z];
+  }
+  static inline int slot(const Field &f, const int *node) {        // world node to node slot
+    int x = node[0] - 4 * f.origin[0], y = node[1] - 4 * f.origin[1],
+        z = node[2] - 4 * f.origin[2];
+    if (x < 0 || y < 0 || z < 0) return -1;
+    int b = block(f, x >> 2, y >> 2, z >> 2);
+    return b < 0 ? -1 : b * 64 + (x & 3) * 16 + (y & 3) * 4 + (z & 3);
+  }
+};
+
+const double dx = world->dx, dt = world->dt, inv = 1.0 / dx;
+const int fields = world->fields, planes = world->planes, all = fields + planes,
+          books = world->names - planes;
+Meet *meets = (Meet *)world->contact_memory;
+Touch *touches = (Touch *)world->pair_memory;
+Close *closes = (Close *)world->near_memory;
+int nm = 0, nt = 0, nc = 0, stiff_any = 0;
+world->full = 0;
+
+// ---- rigid bodies: forces, then mass on the nodes where somebody else is
+for (int f = 0; f < fields; f++) {
+  Field &F = world->field[f];
+  if (!F.rigids) continue;
+  double *s = F.rigid;
+  if (!world->again) {
+    for (int i = 0; i < 3; i++) s[SPEED + i] += s[KICK + i];
+    double Q[9];
+    for (int i = 0; i < 9; i++) Q[i] = s[TURN + i];
+    Body6::spin_up(s, Q, s + SPIN);
+  }
+  // Forget last step's blocks, move the window, mark the blocks that others reach.
+  for (int b = 0; b < F.pool; b++) {
+    int *w = F.where + 4 * b;
+    F.table[(w[0] * F.dim[1] + w[1]) * F.dim[2] + w[2]] = -1;
+    for (int i = 0; i < 512; i++) F.node[(size_t)b * 512 + i] = 0;
+  }
+  F.pool = 0;
+  F.blocks = 0;
+  for (int i = 0; i < 3; i++)
+    F.origin[i] = (Vec::floor_int((s[CENTRE + i] - s[RADIUS]) * inv - 1.0) >> 2) - 1;
+}
+for (int f = 0; f < fields; f++) {
+  Field &F = world->field[f];
+  if (!F.rigids) continue;
+  double *s = F.rigid;
+  int low[3] = {1 << 28, 1 << 28, 1 << 28}, high[3] = {-1, -1, -1}, marked = 0;
+  for (int g = 0; g < fields; g++) {
+    Field &G = world->field[g];
+    if (g == f) continue;
+    int from[3], to[3], none = 0;   // common blocks, in F's window
+    for (int i = 0; i < 3; i++) {
+      int shift = G.origin[i] - F.origin[i];
+      from[i] = shift > 0 ? shift : 0;
+      to[i] = shift + G.dim[i] < F.dim[i] ? shift + G.dim[i] : F.dim[i];
+      none |= from[i] >= to[i];
+    }
+    if (none) continue;
+    for (int x = from[0]; x < to[0]; x++)
+      for (int y = from[1]; y < to[1]; y++)
+        for (int z = from[2]; z < to[2]; z++) {
+          if (!G.rigids) {
+            int b = Grid::block(G, x + F.origin[0] - G.origin[0], y + F.origin[1] - G.origin[1],
+                                z + F.origin[2] - G.origin[2]);
+            if (b < 0) continue;
+          } else {
+            // Both spheres must reach the block.
+            double far = 0, mine = 0;
+            for (int i = 0; i < 3; i++) {
+              int c = i == 0 ? x : i == 1 ? y : z;
+              double mid = (4.0 * (c + F.origin[i]) + 1.5) * dx;
+              double q = fabs(mid - G.rigid[CENTRE + i]) - 3.6 * dx;
+              double p = fabs(mid - s[CENTRE + i]) - 3.6 * dx;
+              far += q > 0 ? q * q : 0;
+              mine += p > 0 ? p * p : 0;
+            }
+            double R = G.rigid[RADIUS], S = s[RADIUS];
+            if (far > R * R || mine > S * S) continue;
+          }
+          F.table[(x * F.dim[1] + y) * F.dim[2] + z] = -2;
+          int c[3] = {x, y, z};
+          for (int i = 0; i < 3; i++) {
+            if (c[i] < low[i]) low[i] = c[i];
+            if (c[i] > high[i]) high[i] = c[i];
+          }
+          marked++;
+        }
+  }
+  if (F.surfaces == 0)
+    for (int w = 0; w < planes; w++) {
+      const double *P = world->plane + 4 * w;
+      if (Vec::dot(P, s + CENTRE) - P[3] > s[RADIUS] + 3 * dx) continue;
+      for (int x = 0; x < F.dim[0]; x++)
+        for (int y = 0; y < F.dim[1]; y++)
+          for (int z = 0; z < F.dim[2]; z++) {
+            double c[3] = {(4.0 * (x + F.origin[0]) + 1.5) * dx, (4.0 * (y + F.origin[1]) + 1.5) * dx,
+                           (4.0 * (z + F.origin[2]) + 1.5) * dx};
+            if (Vec::dot(P, c) - P[3] > 3.5 * dx) continue;
+            F.table[(x * F.dim[1] + y) * F.dim[2] + z] = -2;
+            int k[3] = {x, y, z};
+            for (int i = 0; i < 3; i++) {
+              if (k[i] < low[i]) low[i] = k[i];
+              if (k[i] > high[i]) high[i] = k[i];
+            }
+            marked++;
+          }
+    }
+  if (!marked) continue;
+  const double *Q = s + TURN;
+  double edge_low[3], edge_high[3];
+  for (int i = 0; i < 3; i++) {
+    edge_low[i] = (4.0 * (low[i] + F.origin[i]) - 1.5) * dx;
+    edge_high[i] = (4.0 * (high[i] + F.origin[i]) + 4.5) * dx;
+  }
+  for (int p = 0; p < F.points; p++) {
+    const double *q = F.point + 5 * p;
+    double x[3];
+    int out = 0;
+    for (int i = 0; i < 3; i++) {
+      x[i] = s[CENTRE + i] + Vec::dot(Q + 3 * i, q);
+      out |= (x[i] < edge_low[i]) | (x[i] > edge_high[i]);
+    }
+    if (out) continue;
+    int base[3];
+    double w[3][3];
+    for (int i = 0; i < 3; i++) {
+      double c = x[i] * inv;
+      base[i] = Vec::floor_int(c - 0.5);
+      double fr = c - base[i];
+      w[i][0] = 0.5 * (1.5 - fr) * (1.5 - fr);
+      w[i][1] = 0.75 - (fr - 1) * (fr - 1);
+      w[i][2] = 0.5 * (fr - 0.5) * (fr - 0.5);
+      base[i] -= 4 * F.origin[i];
+    }
+    int used = 0;
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++)
+        for (int k = 0; k < 3; k++) {
+          int X = base[0] + i, Y = base[1] + j, Z = base[2] + k;
+          if (X < 0 || Y < 0 || Z < 0 || X >> 2 >= F.dim[0] || Y >> 2 >= F.dim[1] ||
+              Z >> 2 >= F.dim[2])
+            continue;
+          int *t = F.table + ((X >> 2) * F.dim[1] + (Y >> 2)) * F.dim[2] + (Z >> 2);
+          if (*t == -1) continue;
+          if (*t == -2) {
+            *t = F.pool;
+            int *wh = F.where + 4 * F.pool++;
+            wh[0] = X >> 2;
+            wh[1] = Y >> 2;
+            wh[2] = Z >> 2;
+          }
+          float *node = F.node + ((size_t)*t * 64 + (X & 3) * 16 + (Y & 3) * 4 + (Z & 3)) * 8;
+          node[0] += (float)(q[3] * w[0][i] * w[1][j] * w[2][k]);
+          used = 1;
+        }
+    if (used) F.block[F.blocks++] = p;
+  }
+  // Marks that no particle reached.
+  for (int x = low[0]; x <= high[0]; x++)
+    for (int y = low[1]; y <= high[1]; y++)
+      for (int z = low[2]; z <= high[2]; z++) {
+        int *t = F.table + (x * F.dim[1] + y) * F.dim[2] + z;
+        if (*t == -2) *t = -1;
+      }
+}
+
+// ---- the list of nodes where fields meet each other or a plane
+for (int f = 0; f < fields; f++) {
+  Field &F = world->field[f];
+  if (world->again)
+    for (size_t i = 0; i < (size_t)F.pool * 64; i++) F.node[8 * i + 7] = 0;
+}
+for (int f = 0; f < fields && !world->full; f++) {
+  Field &F = world->field[f];
+  for (int b = 0; b < F.pool && !world->full; b++) {
+    const int *w = F.where + 4 * b;
+    int at[3] = {w[0] + F.origin[0], w[1] + F.origin[1], w[2] + F.origin[2]};
+    double mid[3] = {(4 * at[0] + 1.5) * dx, (4 * at[1] + 1.5) * dx, (4 * at[2] + 1.5) * dx};
+    for (int g = f + 1; g < all; g++) {
+      int other = -1;
+      const double *P = 0;
+      if (g < fields) {
+        Field &G = world->field[g];
+        if (!G.pool) continue;
+        other = Grid::block(G, at[0] - G.origin[0], at[1] - G.origin[1], at[2] - G.origin[2]);
+        if (other < 0) continue;
+      } else {
+        if (F.rigids && F.surfaces) continue;
+        P = world->plane + 4 * (g - fields);
+        if (Vec::dot(P, mid) - P[3] > 3.2 * dx) continue;
+      }
+      for (int i = 0; i < 64; i++) {
+        float *a = F.node + ((size_t)b * 64 + i) * 8, *c = 0;
+        if (!(a[0] > 0)) continue;
+        int node[3] = {4 * at[0] + (i >> 4), 4 * at[1] + ((i >> 2) & 3), 4 * at[2] + (i & 3)};
+        if (P) {
+          double h = (P[0] * node[0] + P[1] * node[1] + P[2] * node[2]) * dx - P[3];
+          if (h > WALL_REACH * dx) continue;
+        } else {
+          c = world->field[g].node + ((size_t)other * 64 + i) * 8;
+          if (!(c[0] > 0)) continue;
+        }
+        int k = (int)a[7] - 1;
+        if (k < 0 && c) k = (int)c[7] - 1;
+        if (k < 0) {
+          if (nm >= world->most_contacts) {
+            world->full = 1;
+            break;
+          }
+          k = nm++;
+          Meet &M = meets[k];
+          for (int d = 0; d < 3; d++) M.at[d] = node[d];
+          M.count = M.stiff = M.several = 0;
+        }
+        Meet &M = meets[k];
+        for (int side = 0; side < 2; side++) {
+          float *n = side ? c : a;
+          if (!n || n[7] != 0.0f || M.count == MOST) continue;
+          n[7] = (float)(k + 1);
+          int q = M.count++;
+          M.field[q] = side ? g : f;
+          M.slot[q] = (side ? other : b) * 64 + i;
+          M.m[q] = 0;
+          for (int d = 0; d < 3; d++) M.mean[q][d] = M.out[q][d] = 0, M.v[q][d] = n[1 + d];
+          if (world->field[M.field[q]].rigids) M.stiff = 1;
+        }
+        if (M.count > 1) M.several = 1;
+      }
+      if (world->full) break;
+    }
+  }
+}
+for (int k = 0; k < nm && !world->full; k++) {
+  Meet &M = meets[k];
+  M.first = nt;
+  if (nt + 15 + MOST * planes > world->most_pairs) {
+    world->full = 1;
+    break;
+  }
+  for (int a = 0; a < M.count; a++)
+    for (int c = a + 1; c < M.count + planes; c++) {
+      int w = c - M.count;
+      Touch &T = touches[nt];
+      T.fa = M.field[a];
+      Field &A = world->field[T.fa];
+      for (int d = 0; d < 3; d++) T.x[d] = M.at[d] * dx;
+      if (w >= 0) {
+        const double *P = world->plane + 4 * w;
+        if (A.rigids && A.surfaces) continue;
+        if (Vec::dot(P, T.x) - P[3] > WALL_REACH * dx) continue;
+        for (int d = 0; d < 3; d++) T.n[d] = T.chosen[d] = -P[d];
+      }
+      T.meet = k;
+      T.a = a;
+      T.c = w >= 0 ? -1 - w : c;
+      T.fc = w >= 0 ? fields + w : M.field[c];
+      for (int q = 0; q < 3; q++) T.far_a[q] = -1e30, T.far_c[q] = 1e30;
+      nt++;
+    }
+  M.last = nt;
+}
+
+// ---- second look at the particles around those nodes, and only them
+for (int k = 0; k < nm && !world->full; k++) {
+  Meet &M = meets[k];
+  for (int q = 0; q < M.count; q++) {
+    Field &F = world->field[M.field[q]];
+    int x = M.at[0] - 4 * F.origin[0], y = M.at[1] - 4 * F.origin[1], z = M.at[2] - 4 * F.origin[2];
+    for (int i = x - 2; i <= x; i++)
+      for (int j = y - 2; j <= y; j++)
+        for (int l = z - 2; l <= z; l++) {
+          if (i < 0 || j < 0 || l < 0) continue;
+          int b = Grid::block(F, i >> 2, j >> 2, l >> 2);
+          if (b >= 0) F.near[b] |= 1ull << ((i & 3) * 16 + (j & 3) * 4 + (l & 3));
+        }
+  }
+}
+for (int f = 0; f < fields && nm && !world->full; f++) {
+  Field &F = world->field[f];
+  const int runs = F.rigids ? (F.blocks ? 1 : 0) : F.blocks;
+  for (int b = 0; b < runs; b++) {
+    const int *record = F.block + NB * b;
+    int first = F.rigids ? 0 : record[0], last = F.rigids ? F.blocks : record[1];
+    if (!F.rigids) {
+      int any = 0;
+      for (int i = 0; i < 27; i++) any |= F.near[record[5 + i]] != 0;
+      if (!any) continue;
+    }
+    for (int e = first; e < last; e++) {
+      double c[3], m, V, Fp[9];
+      int base[3];
+      if (F.rigids) {
+        const double *p = F.point + 5 * F.block[e];
+        for (int i = 0; i < 3; i++) {
+          c[i] = (F.rigid[CENTRE + i] + Vec::dot(F.rigid + TURN + 3 * i, p)) * inv -
+                 4.0 * F.origin[i];
+          base[i] = Vec::floor_int(c[i] - 0.5);
+        }
+        m = p[3];
+        V = p[4];
+      } else {
+        const float *q = F.part + (size_t)(e >> 3) * 8 * NC + (e & 7);
+        for (int i = 0; i < 3; i++) {
+          int x = ((const int *)q)[8 * (XI + i)];
+          base[i] = (x - HALF) >> PLACE;
+          c[i] = x * (1.0 / UNIT);
+        }
+        m = q[8 * MA];
+        V = q[8 * VO];
+      }
+      if (base[0] < 0 || base[1] < 0 || base[2] < 0) continue;
+      int home = Grid::block(F, base[0] >> 2, base[1] >> 2, base[2] >> 2);
+      if (home < 0) {
+        // A rigid particle's own block may be empty of others; its nodes may not be.
+        if (!F.rigids) continue;
+      } else if (!(F.near[home] >> ((base[0] & 3) * 16 + (base[1] & 3) * 4 + (base[2] & 3)) & 1)) {
+        continue;
+      }
+      double w[3][3], g[3][3];
+      for (int i = 0; i < 3; i++) {
+        double fr = c[i] - base[i];
+        w[i][0] = 0.5 * (1.5 - fr) * (1.5 - fr);
+        w[i][1] = 0.75 - (fr - 1) * (fr - 1);
+        w[i][2] = 0.5 * (fr - 0.5) * (fr - 0.5);
+        g[i][0] = (fr - 1.5) * inv;
+        g[i][1] = -2 * (fr - 1) * inv;
+        g[i][2] = (fr - 0.5) * inv;
+      }
+      if (F.rigids) {
+        for (int i = 0; i < 9; i++) Fp[i] = F.rigid[TURN + i];
+      } else {
+        const float *q = F.part + (size_t)(e >> 3) * 8 * NC + (e & 7);
+        for (int i = 0; i < 9; i++) Fp[i] = q[8 * (DE + i)] + (i % 4 == 0);
+        V *= Fp[0] * (Fp[4] * Fp[8] - Fp[5] * Fp[7]) - Fp[1] * (Fp[3] * Fp[8] - Fp[5] * Fp[6]) +
+             Fp[2] * (Fp[3] * Fp[7] - Fp[4] * Fp[6]);
+      }
+      int several = 0;
+      for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++)
+          for (int k = 0; k < 3; k++) {
+            int X = base[0] + i, Y = base[1] + j, Z = base[2] + k;
+            int pool = Grid::block(F, X >> 2, Y >> 2, Z >> 2);
+            if (pool < 0) continue;
+            int id = (int)F.node[((size_t)pool * 64 + (X & 3) * 16 + (Y & 3) * 4 + (Z & 3)) * 8 + 7];
+            if (!id) continue;
+            Meet &M = meets[id - 1];
+            int q = 0;
+            while (q < M.count && M.field[q] != f) q++;
+            if (q == M.count) continue;
+            double mw = m * w[0][i] * w[1][j] * w[2][k];
+            M.m[q] += mw;
+            M.mean[q][0] += mw * (c[0] - X) * dx;
+            M.mean[q][1] += mw * (c[1] - Y) * dx;
+            M.mean[q][2] += mw * (c[2] - Z) * dx;
+            if (!M.several) continue;
+            several = 1;
+            M.out[q][0] += V * g[0][i] * w[1][j] * w[2][k];
+            M.out[q][1] += V * w[0][i] * g[1][j] * w[2][k];
+            M.out[q][2] += V * w[0][i] * w[1][j] * g[2][k];
+          }
+      if (several) {
+        if (nc >= world->most_nears) {
+          world->full = 1;
+          break;
+        }
+        Close &C = closes[nc++];
+        for (int i = 0; i < 3; i++) {
+          C.x[i] = c[i];
+          C.base[i] = base[i];
+        }
+        for (int i = 0; i < 9; i++) C.F[i] = (float)Fp[i];
+        C.reach = (float)(0.5 * cbrt(F.rigids ? F.point[5 * F.block[e] + 4]
+                                              : F.part[(size_t)(e >> 3) * 8 * NC + (e & 7) + 8 * VO]));
+        C.field = f;
+      }
+    }
+    if (world->full) break;
+  }
+}
+for (int k = 0; k < nm; k++) {     // wipe the marks, whatever happened
+  Meet &M = meets[k];
+  for (int q = 0; q < M.count; q++) {
+    Field &F = world->field[M.field[q]];
+    int x = M.at[0] - 4 * F.origin[0], y = M.at[1] - 4 * F.origin[1], z = M.at[2] - 4 * F.origin[2];
+    for (int i = (x - 2) >> 2; i <= x >> 2; i++)
+      for (int j = (y - 2) >> 2; j <= y >> 2; j++)
+        for (int l = (z - 2) >> 2; l <= z >> 2; l++) {
+          int b = Grid::block(F, i, j, l);
+          if (b >= 0) F.near[b] = 0;
+        }
+  }
+}
+world->contacts = nm;
+world->pairs = nt;
+world->nears = nc;
+if (world->full) return;
+
+// ---- normals: the separating axis among three, smoothed over neighbours
+for (int k = 0; k < nm; k++)
+  for (int q = 0; q < meets[k].count; q++)
+    for (int d = 0; d < 3; d++)
+      if (meets[k].m[q] > 0) meets[k].mean[q][d] /= meets[k].m[q];
+for (int t = 0; t < nt; t++) {
+  Touch &T = touches[t];
+  if (T.c < 0) continue;
+  Meet &M = meets[T.meet];
+  for (int d = 0; d < 3; d++) {
+    T.candidate[0][d] = M.out[T.a][d] - M.out[T.c][d];
+    T.candidate[1][d] = M.out[T.a][d];
+    T.candidate[2][d] = -M.out[T.c][d];
+  }
+  for (int q = 0; q < 3; q++) Vec::unit(T.candidate[q]);
+}
+for (int p = 0; p < nc; p++) {
+  Close &C = closes[p];
+  Field &F = world->field[C.field];
+  for (int i = 0; i < 27; i++) {
+    int X = C.base[0] + i / 9, Y = C.base[1] + i / 3 % 3, Z = C.base[2] + i % 3;
+    int pool = Grid::block(F, X >> 2, Y >> 2, Z >> 2);
+    if (pool < 0) continue;
+    int id = (int)F.node[((size_t)pool * 64 + (X & 3) * 16 + (Y & 3) * 4 + (Z & 3)) * 8 + 7];
+    if (!id || !meets[id - 1].several) continue;
+    Meet &M = meets[id - 1];
+    double r[3] = {(C.x[0] - X) * dx, (C.x[1] - Y) * dx, (C.x[2] - Z) * dx};
+    for (int t = M.first; t < M.last; t++) {
+      Touch &T = touches[t];
+      if (T.c < 0 || (T.fa != C.field && T.fc != C.field)) continue;
+      for (int q = 0; q < 3; q++) {
+        const double *n = T.candidate[q];
+        double a0 = C.F[0] * n[0] + C.F[3] * n[1] + C.F[6] * n[2];
+        double a1 = C.F[1] * n[0] + C.F[4] * n[1] + C.F[7] * n[2];
+        double a2 = C.F[2] * n[0] + C.F[5] * n[1] + C.F[8] * n[2];
+        double R = C.reach * sqrt(a0 * a0 + a1 * a1 + a2 * a2), h = Vec::dot(r, n);
+        if (T.fa == C.field) {
+          if (h + R > T.far_a[q]) T.far_a[q] = h + R;
+        } else if (h - R < T.far_c[q]) {
+          T.far_c[q] = h - R;
+        }
+      }
+    }
+  }
+}
+for (int t = 0; t < nt; t++) {
+  Touch &T = touches[t];
+  if (T.c < 0) continue;
+  double best = -1e300;
+  int pick = 0;
+  for (int q = 0; q < 3; q++) {
+    const double *n = T.candidate[q];
+    if (n[0] == 0 && n[1] == 0 && n[2] == 0) continue;
+    double wide = T.far_c[q] - T.far_a[q] + (q == 0 ? 0.1 : 0.05) * dx;
+    if (wide > best) best = wide, pick = q;
+  }
+  for (int d = 0; d < 3; d++) T.chosen[d] = T.candidate[pick][d];
+}
+for (int t = 0; t < nt; t++) {
+  Touch &T = touches[t];
+  if (T.c < 0) continue;
+  Meet &M = meets[T.meet];
+  Field &F = world->field[T.fa];
+  double sum[3] = {0, 0, 0};
+  for (int i = 0; i < 27; i++) {
+    int node[3] = {M.at[0] + i / 9 - 1, M.at[1] + i / 3 % 3 - 1, M.at[2] + i % 3 - 1};
+    int slot = Grid::slot(F, node);
+    if (slot < 0) continue;
+    int id = (int)F.node[(size_t)slot * 8 + 7];
+    if (!id) continue;
+    Meet &O = meets[id - 1];
+    for (int o = O.first; o < O.last; o++) {
+      Touch &U = touches[o];
+      if (U.fa != T.fa || U.fc != T.fc) continue;
+      double a = O.m[U.a], c = O.m[U.c], weight = a < c ? a : c;
+      for (int d = 0; d < 3; d++) sum[d] += weight * U.chosen[d];
+    }
+  }
+  Vec::unit(sum);
+  for (int d = 0; d < 3; d++) T.n[d] = sum[d];
+}
+
+// ---- gaps
+for (int t = 0; t < nt; t++) {
+  Touch &T = touches[t];
+  Meet &M = meets[T.meet];
+  T.gap = 1e30;
+  if (!(M.m[T.a] > 0) || (T.n[0] == 0 && T.n[1] == 0 && T.n[2] == 0)) continue;
+  double pa = Vec::dot(M.mean[T.a], T.n) * inv;
+  if (T.c < 0) {
+    const double *P = world->plane + 4 * (-1 - T.c);
+    double h = (Vec::dot(P, T.x) - P[3]) * inv;
+    T.gap = (-Face::mean(-h) - pa - Face::touching(h)) * dx;
+  } else if (M.m[T.c] > 0) {
+    double pc = Vec::dot(M.mean[T.c], T.n) * inv;
+    double s = 0.5 * (Face::face(pa) - Face::face(-pc));
+    T.gap = (pc - pa - Face::touching(s)) * dx;
+  }
+}
+
+// ---- rigid bodies against planes: their surface points
+for (int f = 0; f < fields; f++) {
+  Field &F = world->field[f];
+  if (!F.rigids || !F.surfaces) continue;
+  const double *s = F.rigid;
+  for (int w = 0; w < planes; w++) {
+    const double *P = world->plane + 4 * w;
+    if (Vec::dot(P, s + CENTRE) - P[3] > s[RADIUS] + POINT_REACH * dx) continue;
+    for (int p = 0; p < F.surfaces; p++) {
+      double x[3];
+      for (int i = 0; i < 3; i++) x[i] = s[CENTRE + i] + Vec::dot(s + TURN + 3 * i, F.surface + 3 * p);
+      double gap = Vec::dot(P, x) - P[3];
+      if (gap >= POINT_REACH * dx) continue;
+      if (nt >= world->most_pairs) {
+        world->full = 1;
+        world->pairs = nt;
+        return;
+      }
+      Touch &T = touches[nt++];
+      T.meet = -1;
+      T.a = 0;
+      T.c = -1 - w;
+      T.fa = f;
+      T.fc = fields + w;
+      T.gap = gap;
+      for (int d = 0; d < 3; d++) {
+        T.x[d] = x[d];
+        T.n[d] = -P[d];
+      }
+    }
+  }
+}
+world->pairs = nt;
+
+// ---- impulses
+struct Solver {
+  static inline void velocity(World *w, Meet *meets, const Touch &T, int side, double *v) {
+    int f = side ? T.fc : T.fa, q = side ? T.c : T.a;
+    if (f >= w->fields) {
+      v[0] = v[1] = v[2] = 0;
+    } else if (w->field[f].rigids) {
+      Body6::velocity(w->field[f].rigid, T.x, v);
+    } else {
+      for (int i = 0; i < 3; i++) v[i] = meets[T.meet].v[q][i];
+    }
+  }
+  static inline void slip(World *w, Meet *meets, const Touch &T, double *u) {
+    double c[3];
+    velocity(w, meets, T, 0, u);
+    velocity(w, meets, T, 1, c);
+    for (int i = 0; i < 3; i++) u[i] -= c[i];
+  }
+  static inline double softness(World *w, Meet *meets, const Touch &T, const double *n) {
+    double sum = 0;
+    for (int side = 0; side < 2; side++) {
+      int f = side ? T.fc : T.fa, q = side ? T.c : T.a;
+      if (f >= w->fields) continue;
+      if (w->field[f].rigids)
+        sum += Body6::softness(w->field[f].rigid, T.x, n);
+      else
+        sum += 1.0 / w->field[f].node[(size_t)meets[T.meet].slot[q] * 8];
+    }
+    return sum;
+  }
+  // One projection of one contact onto its Coulomb cone; true when it changed something.
+  static inline bool relax(World *w, Meet *meets, Touch &T) {
+    double u[3], d[3], t[3];
+    slip(w, meets, T, u);
+    double un = Vec::dot(u, T.n), old = Vec::dot(T.J, T.n);
+    double jn = old + (un - T.target) / T.inverse;
+    if (jn <= 0) {
+      if (old == 0) return false;
+      jn = 0;
+    }
+    for (int i = 0; i < 3; i++) {
+      d[i] = u[i] - un * T.n[i];
+      t[i] = T.J[i] - old * T.n[i];
+    }
+    double size = sqrt(Vec::dot(d, d));
+    if (size > 1e-14) {
+      double soft = T.inverse;
+      if (T.stiff) {
+        double e[3] = {d[0] / size, d[1] / size, d[2] / size};
+        soft = softness(w, meets, T, e);
+      }
+      for (int i = 0; i < 3; i++) t[i] += d[i] / soft;
+    }
+    double length = sqrt(Vec::dot(t, t));
+    if (length > T.mu * jn) {
+      double scale = T.mu * jn / length;
+      for (int i = 0; i < 3; i++) t[i] *= scale;
+    }
+    for (int i = 0; i < 3; i++) {
+      double next = jn * T.n[i] + t[i];
+      d[i] = next - T.J[i];
+      T.J[i] = next;
+    }
+    for (int side = 0; side < 2; side++) {
+      int f = side ? T.fc : T.fa, q = side ? T.c : T.a;
+      if (f >= w->fields) continue;
+      double sign = side ? 1.0 : -1.0, J[3] = {sign * d[0], sign * d[1], sign * d[2]};
+      if (w->field[f].rigids) {
+        Body6::hit(w->field[f].rigid, T.x, J);
+      } else {
+        double im = 1.0 / w->field[f].node[(size_t)meets[T.meet].slot[q] * 8];
+        for (int i = 0; i < 3; i++) meets[T.meet].v[q][i] += im * J[i];
+      }
+    }
+    return true;
+  }
+};
+double *scratch = world->ledger;      // [all][all][8]: hit, normal sum, weighted place 3
+for (int i = 0; i < all * all * 8; i++) scratch[i] = 0;
+int hits = 0;
+for (int t = 0; t < nt; t++) {
+  Touch &T = touches[t];
+  T.active = T.gap < 1e29;
+  if (!T.active) continue;
+  double u[3];
+  Solver::slip(world, meets, T, u);
+  for (int i = 0; i < 3; i++) {
+    T.before[i] = u[i];
+    T.J[i] = 0;
+  }
+  int ra = world->field[T.fa].rigids, rc = T.fc < fields ? world->field[T.fc].rigids : 1;
+  T.stiff = ra || (T.fc < fields && rc);
+  T.mu = world->friction[T.fa * all + T.fc];
+  T.inverse = Solver::softness(world, meets, T, T.n);
+  T.target = (T.gap > 0 ? T.gap : 0.0) / dt;
+  T.bounce = 0;
+  double un = Vec::dot(u, T.n), e = world->restitution[T.fa * all + T.fc];
+  if (T.stiff) stiff_any = 1;
+  // What neither closes now nor shares a body with others that may push it: leave it out.
+  if (!T.stiff && T.meet >= 0 && meets[T.meet].last - meets[T.meet].first == 1 && un <= T.target)
+    T.active = 0;
+  if (!(ra && rc) || e <= 0) continue;
+  double kick[3] = {0, 0, 0};
+  for (int i = 0; i < 3; i++) {
+    kick[i] = world->field[T.fa].rigid[KICK + i];
+    if (T.fc < fields) kick[i] -= world->field[T.fc].rigid[KICK + i];
+  }
+  double before = un - Vec::dot(kick, T.n);
+  if (before <= SLOWEST) continue;
+  bool closing = un * dt > T.gap;
+  T.approach = before;
+  T.bounce = closing || T.gap < PATCH * dx;
+  if (closing) {
+    scratch[(T.fa * all + T.fc) * 8] = 1;
+    hits = 1;
+  }
+}
+if (hits)
+  for (int t = 0; t < nt; t++) {
+    Touch &T = touches[t];
+    if (T.active && T.bounce && scratch[(T.fa * all + T.fc) * 8] > 0)
+      T.target = -world->restitution[T.fa * all + T.fc] * T.approach;
+  }
+int sweeps = hits ? 100 : 10;
+for (int k = 0; k < nm; k++) {
+  if (meets[k].stiff) continue;
+  for (int s = 0; s < 10; s++) {
+    bool moved = false;
+    for (int t = meets[k].first; t < meets[k].last; t++)
+      if (touches[t].active && Solver::relax(world, meets, touches[t])) moved = true;
+    if (!moved || meets[k].last - meets[k].first == 1) break;
+  }
+}
+if (stiff_any) {
+  // The rest in one list; contacts keep their order.
+  int *order = world->order, n = 0;
+  for (int t = 0; t < nt; t++)
+    if (touches[t].active && (touches[t].meet < 0 || meets[touches[t].meet].stiff)) order[n++] = t;
+  for (int s = 0; s < sweeps; s++) {
+    bool moved = false;
+    for (int i = 0; i < n; i++)
+      if (Solver::relax(world, meets, touches[order[i]])) moved = true;
+    if (!moved) break;
+  }
+}
+
+// ---- write back, and enter the books
+for (int k = 0; k < nm; k++)
+  for (int q = 0; q < meets[k].count; q++) {
+    Field &F = world->field[meets[k].field[q]];
+    if (F.rigids) continue;
+    float *node = F.node + (size_t)meets[k].slot[q] * 8;
+    for (int i = 0; i < 3; i++) node[1 + i] = (float)meets[k].v[q][i];
+  }
+double loss = 0;
+for (int t = 0; t < nt; t++) {
+  Touch &T = touches[t];
+  if (!T.active) continue;
+  double jn = Vec::dot(T.J, T.n);
+  if (jn <= 0) continue;
+  double u[3];
+  Solver::slip(world, meets, T, u);
+  for (int i = 0; i < 3; i++) loss += (T.J[i] - jn * T.n[i]) * 0.5 * (T.before[i] + u[i]);
+  double *row = scratch + (T.fa * all + T.fc) * 8;
+  row[1] += jn;
+  for (int i = 0; i < 3; i++) row[2 + i] += jn * T.x[i];
+  if (T.fc >= fields)
+    for (int i = 0; i < 3; i++) world->plane_impulse[((T.fc - fields) * books + T.fa) * 3 + i] -= T.J[i];
+}
+*world->friction_loss += loss;
+for (int a = 0; a < fields; a++)
+  for (int c = a + 1; c < all; c++) {
+    double *row = scratch + (a * all + c) * 8;
+    if (row[1] <= 0) continue;
+    if (c < fields) {
+      world->pair_impulse[a * books + c] += row[1];
+      world->pair_impulse[c * books + a] = world->pair_impulse[a * books + c];
+    }
+    for (int side = 0; side < 2; side++) {
+      int i = side ? c * world->names + a : a * world->names + c;
+      if (!(world->first_contact[i] >= 0)) {
+        world->first_contact[i] = world->time + dt;
+        for (int d = 0; d < 3; d++) world->contact_point[3 * i + d] = row[2 + d] / row[1];
+      }
+      world->last_contact[i] = world->time + dt;
+    }
+  }
+
+// ---- rigid bodies move; the angular momentum is exact, the turn follows it at mid-step
+for (int f = 0; f < fields; f++) {
+  Field &F = world->field[f];
+  if (!F.rigids) continue;
+  double *s = F.rigid, half[9], w[3], Q[9];
+  Body6::turn(s, s + SPIN, 0.5 * dt, half);
+  Body6::spin_up(s, half, w);
+  Body6::turn(s, w, dt, Q);
+  // One step of Gram-Schmidt keeps it a rotation.
+  Vec::unit(Q);
+  double d = Vec::dot(Q, Q + 3);
+  for (int i = 0; i < 3; i++) Q[3 + i] -= d * Q[i];
+  Vec::unit(Q + 3);
+  Vec::cross(Q, Q + 3, Q + 6);
+  for (int i = 0; i < 9; i++) s[TURN + i] = Q[i];
+  Body6::spin_up(s, Q, s + SPIN);
+  for (int i = 0; i < 3; i++) s[CENTRE + i] += dt * s[SPEED + i];
+}
