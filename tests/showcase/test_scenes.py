@@ -1,0 +1,98 @@
+"""The seven scenes: real things, apart at the start, of substances that the library knows."""
+
+import tomllib
+from importlib import resources
+
+import numpy as np
+import pytest
+import trimesh
+
+from corporeal.errors import UnknownChoiceError
+from corporeal.showcase import check, scenes
+
+NAMES = list(scenes.SCENES)
+
+
+@pytest.fixture(scope="module")
+def built():
+    return {name: scenes.build(name) for name in NAMES}
+
+
+@pytest.fixture(scope="module")
+def library():
+    text = resources.files("corporeal.materials").joinpath("library.toml").read_text("utf-8")
+    return set(tomllib.loads(text))
+
+
+def test_there_are_seven_scenes_and_the_duck_on_mud_comes_first():
+    assert len(NAMES) == 7
+    assert NAMES[:3] == ["duck-on-mud", "duck-on-can", "vase-ball-armchair"]
+
+
+def test_an_unknown_scene_is_refused_with_the_menu():
+    with pytest.raises(UnknownChoiceError, match="duck-on-can"):
+        scenes.build("duck-on-custard")
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_overlaps_at_the_start(name):
+    composition = scenes.SCENES[name]()
+    models = scenes.place(composition)
+    assert check.overlap([p for m in models for p in m.parts]) < 1e-5 + max(
+        check.overlap(m.parts) for m in models
+    )
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_nothing_starts_below_the_floor(built, name):
+    lowest = min(s.vertices[:, 2].min() for s in built[name].surfaces)
+    assert lowest == pytest.approx(0, abs=1.5e-4) or lowest > 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_every_substance_is_in_the_library(built, library, name):
+    for surface in built[name].surfaces:
+        assert surface.extras["substance"] in library
+        assert surface.extras["shell_thickness_m"] >= 0
+
+
+@pytest.mark.parametrize("name", NAMES)
+def test_a_scene_is_whole_and_short(built, name):
+    scene = built[name]
+    assert scene.name == name
+    assert 80 <= scene.duration * scene.fps <= 120
+    assert {s.object for s in scene.surfaces} == set(range(len(scene.objects)))
+    assert {s.finish for s in scene.surfaces} == set(range(len(scene.finishes)))
+    assert len({o.name for o in scene.objects}) == len(scene.objects)
+    assert np.linalg.norm(scenes.view(name)) > 0
+
+
+def test_the_same_code_builds_the_same_scene(built):
+    again = scenes.build("duck-on-mud")
+    for a, b in zip(built["duck-on-mud"].surfaces, again.surfaces, strict=True):
+        assert np.array_equal(a.vertices, b.vertices)
+        assert np.array_equal(a.triangles, b.triangles)
+
+
+def test_the_duck_starts_above_the_mud_at_the_speed_of_its_fall(built):
+    scene = built["duck-on-mud"]
+    mud = next(s for s in scene.surfaces if s.name == "mud").vertices
+    duck = next(s for s in scene.surfaces if s.name == "body").vertices
+    near = np.hypot(*(mud[:, :2] - duck[:, :2].mean(0)).T) < 0.03
+    gap = duck[:, 2].min() - mud[near, 2].max()
+    speed = -scene.objects[1].velocity[2]
+    assert gap + speed**2 / (2 * 9.81) == pytest.approx(0.8, abs=0.01)
+
+
+def test_vase_ball_and_armchair_stand_in_a_row_with_gaps(built):
+    scene = built["vase-ball-armchair"]
+    parts = [[s for s in scene.surfaces if s.object == k] for k in range(3)]
+    vase, ball, chair = (np.concatenate([s.vertices for s in p]) for p in parts)
+    front = trimesh.Trimesh(parts[2][0].vertices, parts[2][0].triangles, process=False)
+    places, *_ = front.ray.intersects_location(
+        [[-1.5, y, 0.11] for y in (-0.1, 0.0, 0.1)], [[1.0, 0, 0]] * 3, multiple_hits=False
+    )
+    assert vase[:, 0].max() + 0.05 < ball[:, 0].min()
+    assert len(places) == 3, "the stretcher stands in the ball's way"
+    assert ball[:, 0].max() + 0.1 < places[:, 0].min()
+    assert all(points[:, 2].min() == pytest.approx(0, abs=1e-4) for points in (vase, ball, chair))
