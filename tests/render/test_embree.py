@@ -130,8 +130,8 @@ def test_no_triangle_breaks_the_picture():
 def test_moved_vertices_move_the_picture():
     stage = Stage(scene([ball()]))
     before, _ = identify(stage, front())
-    stage.pose(stage.vertices + np.array([0.3, 0, 0]), stage.normals)
-    after, _ = identify(stage, front())
+    there = stage.posed(stage.vertices + stage.origin + np.array([0.3, 0, 0]), stage.normals)
+    after, _ = identify(there, front())
     shift = np.nonzero(after >= 0)[1].mean() - np.nonzero(before >= 0)[1].mean()
     assert 10 < shift < 25
 

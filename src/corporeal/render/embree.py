@@ -7,6 +7,7 @@ throughout; a filmic curve and sRGB at the end.
 
 import os
 from concurrent.futures import ThreadPoolExecutor
+from copy import copy
 from dataclasses import dataclass
 from typing import Literal
 
@@ -62,32 +63,38 @@ class Light:
 
 
 class Stage:
-    """A scene's surfaces, ready to be hit; ``pose`` moves them."""
+    """A scene's surfaces in one pose, ready to be hit."""
 
     def __init__(self, scene: Scene, light: Light | None = None) -> None:
         self.look: Look = pack(scene)
         self.light = light or Light()
         rest = positions(scene)
-        rest = np.where(np.isfinite(rest), rest, 0.0)
         low, high = (f(rest, axis=0) if len(rest) else np.zeros(3) for f in (np.min, np.max))
         self.size = max(float(np.linalg.norm(high - low)), 1e-9)
         self.origin = np.array([*(low + high)[:2] / 2, 0.0])
         self.centre = ((low + high) / 2 - self.origin).astype(np.float32)
         self.see_through = sees_through(self.look)
-        self.pose(rest, vertex_normals(scene))
+        self.vertices = (rest - self.origin).astype(np.float32)
+        self.normals = vertex_normals(scene).astype(np.float32)
+        self.scene = self._built()
 
-    def pose(self, vertices: np.ndarray, normals: np.ndarray) -> None:
-        """Stand like this from now on: vertices (V, 3) [m] and unit normals (V, 3)."""
+    def posed(self, vertices: np.ndarray, normals: np.ndarray) -> "Stage":
+        """Return the stage with vertices (V, 3) [m] and unit normals (V, 3) elsewhere."""
+        there = copy(self)
         local = np.nan_to_num(vertices - self.origin, nan=0.0, posinf=0.0, neginf=0.0)
-        self.normals = np.ascontiguousarray(normals, dtype=np.float32)
-        local = np.ascontiguousarray(local, dtype=np.float32)
-        if hasattr(self, "vertices") and np.array_equal(local, self.vertices):
-            return
-        self.vertices = local
-        self.scene = EmbreeScene()
+        there.vertices = np.ascontiguousarray(local, dtype=np.float32)
+        there.normals = np.ascontiguousarray(normals, dtype=np.float32)
+        if not np.array_equal(there.vertices, self.vertices):
+            there.scene = there._built()
+        return there
+
+    def _built(self) -> EmbreeScene:
+        scene = EmbreeScene()
         if len(self.look.triangles):
-            TriangleMesh(self.scene, self.vertices, self.look.triangles)
-        self.hit(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+            TriangleMesh(scene, self.vertices, self.look.triangles)
+            # Embree builds at the first ray; several threads must not be the first at once.
+            scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
+        return scene
 
     def hit(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, ...]:
         """Nearest triangle (-1: none), barycentric u, v and distance of each ray."""

@@ -72,7 +72,8 @@ def vertex_normals(scene: Scene) -> np.ndarray:
 
 def positions(scene: Scene) -> np.ndarray:
     """(V, 3) of all surfaces in order [m]."""
-    return _join([s.vertices for s in scene.surfaces], (0, 3), np.float64)
+    places = _join([s.vertices for s in scene.surfaces], (0, 3), np.float64)
+    return np.where(np.all(np.isfinite(places), axis=1)[:, None], places, 0.0)
 
 
 def linear(colour: np.ndarray) -> np.ndarray:

@@ -1,0 +1,131 @@
+"""The mesh follows the matter: each vertex is bound at the start to the particles around it.
+
+Weights depend on position and part only, so vertices doubled along a texture seam stay together,
+and a rigid object, whose particles all share one rotation, moves exactly.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.spatial import KDTree
+
+from corporeal.render import kernels_skin
+from corporeal.render.look import positions, vertex_normals
+from corporeal.types import Frame, Particles, Parts, Scene
+
+NEIGHBOURS = 12
+STRETCH = (0.3, 3.0)
+"""A picture shows no more than this principal stretch of a particle's surroundings [-]."""
+LOOSE = (0.7, 1.4)
+"""The same for granular matter, whose neighbours part and whose F says little of a surface."""
+
+
+@dataclass(frozen=True)
+class Skin:
+    """Vertices of all surfaces in order, bound to particles."""
+
+    rest: Float[np.ndarray, "V 3"]
+    """[m]"""
+    normals: Float[np.ndarray, "V 3"]
+    near: Int[np.ndarray, "V k"]
+    """Particles of each vertex."""
+    weight: Float[np.ndarray, "V k"]
+    start: Float[np.ndarray, "P 3"]
+    """Particles' first positions [m]."""
+    loose: Bool[np.ndarray, " P"]
+
+    def pose(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+        """Vertices (V, 3) [m] and unit normals (V, 3) at one instant."""
+        place, turned = np.empty_like(self.rest), np.empty_like(self.normals)
+        F = np.ascontiguousarray(frame.deformation, dtype=np.float64)
+        F = bounded(bounded(F, STRETCH), LOOSE, self.loose)
+        now = np.ascontiguousarray(frame.position, dtype=np.float64)
+        lost = ~np.all(np.isfinite(now), axis=1)
+        if lost.any():
+            now = np.where(lost[:, None], self.start, now)
+        kernels_skin.carry(
+            self.rest, self.normals, self.near, self.weight, self.start, now, F, place, turned
+        )
+        return place, turned
+
+
+def bind(scene: Scene, parts: Parts, particles: Particles, loose: Bool[np.ndarray, " K"]) -> Skin:
+    """Bind every vertex to the nearest particles of its own part, or else of its own object.
+
+    loose: which parts are granular.
+    """
+    rest = positions(scene)
+    part, thing = _owners(scene, parts)
+    near = np.zeros((len(rest), NEIGHBOURS), dtype=np.int64)
+    weight = np.zeros((len(rest), NEIGHBOURS))
+    for vertices, own in _families(part, thing, particles):
+        near[vertices], weight[vertices] = _nearest(rest[vertices], own, particles.position)
+    return Skin(
+        rest=rest,
+        normals=vertex_normals(scene),
+        near=near,
+        weight=weight,
+        start=np.ascontiguousarray(particles.position, dtype=np.float64),
+        loose=np.asarray(loose, dtype=bool)[particles.part] if len(loose) else particles.part < 0,
+    )
+
+
+def bounded(
+    F: Float[np.ndarray, "P 3 3"],
+    limits: tuple[float, float],
+    of: Bool[np.ndarray, " P"] | None = None,
+) -> Float[np.ndarray, "P 3 3"]:
+    """F with its principal stretches within limits; a mirrored or broken F becomes a rotation."""
+    low, high = limits
+    finite = np.all(np.isfinite(F), axis=(1, 2))
+    F = np.where(finite[:, None, None], F, np.eye(3))
+    # σ1² ≤ tr FᵀF, and σ3 = det F / (σ1 σ2) ≥ 2 det F / tr FᵀF: most need no decomposition.
+    trace = np.einsum("pij,pij->p", F, F)
+    outside = (trace > high**2) | (2 * np.linalg.det(F) < low * trace) | (trace < low**2)
+    if of is not None:
+        outside &= of
+    if outside.any():
+        U, s, Vt = np.linalg.svd(F[outside])
+        flip = np.linalg.det(U) * np.linalg.det(Vt) < 0
+        U[flip, :, 2] *= -1
+        F = F.copy()
+        F[outside] = U * np.clip(s, low, high)[:, None, :] @ Vt
+    return F
+
+
+def _owners(scene: Scene, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
+    """Part (-1: none) and object of every vertex."""
+    counts = [len(s.vertices) for s in scene.surfaces]
+    thing = np.repeat([s.object for s in scene.surfaces], counts).astype(np.int64)
+    part = np.full(sum(counts), -1, dtype=np.int64)
+    first, triangle = 0, 0
+    for s in scene.surfaces:
+        mine = parts.part_of_point[triangle : triangle + len(s.triangles)]
+        for corner in range(3):
+            part[first + s.triangles[:, corner]] = mine
+        first, triangle = first + len(s.vertices), triangle + len(s.triangles)
+    return part, thing
+
+
+def _families(part: np.ndarray, thing: np.ndarray, particles: Particles):
+    """Vertices with the particles that may carry them."""
+    for k in np.unique(part):
+        of_part = np.flatnonzero(particles.part == k)
+        for j in np.unique(thing[part == k]):
+            vertices = np.flatnonzero((part == k) & (thing == j))
+            own = of_part[particles.object[of_part] == j]
+            if len(own) == 0:
+                own = np.flatnonzero(particles.object == j)
+            if len(own):
+                yield vertices, own
+
+
+def _nearest(
+    points: np.ndarray, own: np.ndarray, position: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    found = KDTree(position[own]).query(points, k=NEIGHBOURS + 1)
+    distance, index = (np.asarray(x) for x in found)
+    weight = np.empty((len(points), NEIGHBOURS))
+    kernels_skin.weights(distance, weight)
+    return own[np.minimum(index[:, :NEIGHBOURS], len(own) - 1)], weight

@@ -1,0 +1,143 @@
+"""A film file: pictures go to a separate ffmpeg program one by one; memory stays flat."""
+
+import subprocess
+import tempfile
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import IO, Any
+
+import imageio_ffmpeg
+import numpy as np
+
+from corporeal.errors import UserError
+from corporeal.store import DiskError, writing
+
+COMPRESSION = 17
+"""x264's constant rate factor: 0 is lossless, 23 its default."""
+
+
+class Reel:
+    """A film being written; ``add`` takes the next picture."""
+
+    def __init__(self, program: "subprocess.Popen[bytes]", log: IO[Any], path: Path) -> None:
+        self.program, self.log, self.path = program, log, path
+
+    def add(self, picture: np.ndarray) -> None:
+        """Append one picture (height, width, 3) uint8."""
+        assert self.program.stdin is not None
+        try:
+            self.program.stdin.write(np.ascontiguousarray(picture).tobytes())
+        except (BrokenPipeError, OSError) as error:
+            raise self.failure() from error
+
+    def close(self) -> None:
+        """Wait until the encoder has finished."""
+        try:
+            if self.program.stdin is not None:
+                self.program.stdin.close()
+        except OSError as error:
+            raise self.failure() from error
+        if self.program.wait() != 0:
+            raise self.failure()
+
+    def failure(self) -> UserError:
+        """Say what went wrong, in the encoder's words."""
+        self.program.kill()
+        self.program.wait()
+        self.log.seek(0)
+        words = self.log.read().decode(errors="replace").strip().splitlines()
+        if any("No space left" in line for line in words):
+            return DiskError(
+                f"Cannot write {self.path}: the disk is full. Free some space, then run the same "
+                "command again: finished stages are kept."
+            )
+        last = words[-1] if words else "it stopped without a word"
+        return UserError(
+            f"Cannot write {self.path}: ffmpeg failed ({last}). Check that "
+            f"{self.program.args[0]} -encoders lists libx264, or point IMAGEIO_FFMPEG_EXE to "  # type: ignore[index]
+            "another ffmpeg."
+        )
+
+
+@contextmanager
+def reel(path: Path, fps: int, size: tuple[int, int]) -> Iterator[Reel]:
+    """Write H.264 that any browser plays to ``path``, which appears only when it is finished.
+
+    Raises:
+        UserError: The size is odd, the disk is full, or the encoder is missing or fails.
+
+    """
+    width, height = size
+    if width % 2 or height % 2 or min(size) < 16:
+        raise UserError(
+            f"A film cannot be {width} × {height} pixels. Both must be even and at least 16."
+        )
+    partial = path.with_name(f".{path.stem}.part{path.suffix}")
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        log = tempfile.TemporaryFile()
+    try:
+        film = Reel(_encoder(partial, fps, size, log), log, path)
+        try:
+            yield film
+            film.close()
+        except BaseException:
+            film.program.kill()
+            film.program.wait()
+            raise
+        with writing(path):
+            partial.replace(path)
+    finally:
+        log.close()
+        partial.unlink(missing_ok=True)
+
+
+def _encoder(path: Path, fps: int, size: tuple[int, int], log: IO[Any]) -> Any:
+    try:
+        program = imageio_ffmpeg.get_ffmpeg_exe()
+        command = [program, "-y", "-loglevel", "error", *_picture_options(fps, size), str(path)]
+        return subprocess.Popen(
+            command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log
+        )
+    except (RuntimeError, OSError) as error:
+        raise UserError(
+            f"Cannot write {path}: no ffmpeg program can be started ({error}). "
+            "Install it, or point IMAGEIO_FFMPEG_EXE to one."
+        ) from error
+
+
+def _picture_options(fps: int, size: tuple[int, int]) -> list[str]:
+    colour = ["-colorspace", "bt709", "-color_primaries", "bt709", "-color_trc", "bt709"]
+    source = ["-f", "rawvideo", "-pix_fmt", "rgb24", "-s", f"{size[0]}x{size[1]}"]
+    return [
+        *(*source, "-r", str(fps), "-i", "-", "-an"),
+        *("-vf", "scale=out_color_matrix=bt709:out_range=tv", "-pix_fmt", "yuv420p"),
+        *("-c:v", "libx264", "-preset", "medium", "-crf", str(COMPRESSION), "-threads", "2"),
+        *(*colour, "-color_range", "tv", "-movflags", "+faststart"),
+    ]
+
+
+def pictures(path: Path, wanted: list[int]) -> list[np.ndarray]:
+    """Read some frames (height, width, 3) uint8 of a film, by number, in order.
+
+    Raises:
+        UserError: The film cannot be read.
+
+    """
+    try:
+        reader = imageio_ffmpeg.read_frames(str(path))
+        meta: dict[str, Any] = next(reader)  # type: ignore[assignment]
+    except (OSError, RuntimeError, StopIteration) as error:
+        raise UserError(f"{path}: cannot be read as a film ({error}). Make it again.") from error
+    width, height = meta["source_size"]
+    found: dict[int, np.ndarray] = {}
+    try:
+        for number, data in enumerate(reader):
+            if number in wanted:
+                found[number] = np.frombuffer(data, np.uint8).reshape(height, width, 3)
+            if number >= max(wanted):
+                break
+    finally:
+        reader.close()
+    return [found[min(k, max(found))] for k in wanted] if found else []
