@@ -33,11 +33,6 @@ def picture_bytes(part):
     return b"" if part.finish.texture is None else part.finish.texture.tobytes()
 
 
-@pytest.fixture(scope="module")
-def models():
-    return {name: make() for name, make in MODELS.items()}
-
-
 def test_the_menu_has_the_eighteen_props():
     assert set(MODELS) == set(TABLE)
 
@@ -68,7 +63,8 @@ def test_parts_touch_and_do_not_overlap(models, name):
     assert check.overlap(models[name].parts) < 1.5e-3
 
 
-@pytest.mark.parametrize("name", TABLE)
+# One for each way of making a surface: marching, booleans, lathes, mounds, growth, drawing.
+@pytest.mark.parametrize("name", ["mug", "armchair", "vase", "mud_pile", "potted_ficus", "book"])
 def test_the_same_code_makes_the_same_prop(models, name):
     for first, again in zip(models[name].parts, MODELS[name]().parts, strict=True):
         assert np.array_equal(first.mesh.vertices, again.mesh.vertices)

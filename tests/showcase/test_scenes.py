@@ -1,6 +1,7 @@
 """The seven scenes: real things, apart at the start, of substances that the library knows."""
 
 import tomllib
+from functools import partial
 from importlib import resources
 
 import numpy as np
@@ -9,13 +10,19 @@ import trimesh
 
 from corporeal.errors import UnknownChoiceError
 from corporeal.showcase import check, scenes
+from corporeal.showcase.models import MODELS
 
 NAMES = list(scenes.SCENES)
 
 
-@pytest.fixture(scope="module")
-def built():
-    return {name: scenes.build(name) for name in NAMES}
+@pytest.fixture(autouse=True)
+def props_made_once(models, monkeypatch):
+    monkeypatch.setattr(scenes, "MODELS", {name: partial(models.get, name) for name in models})
+
+
+@pytest.fixture
+def scene(name):
+    return scenes.build(name)
 
 
 @pytest.fixture(scope="module")
@@ -44,21 +51,20 @@ def test_nothing_overlaps_at_the_start(name):
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_nothing_starts_below_the_floor(built, name):
-    lowest = min(s.vertices[:, 2].min() for s in built[name].surfaces)
+def test_nothing_starts_below_the_floor(scene, name):
+    lowest = min(s.vertices[:, 2].min() for s in scene.surfaces)
     assert lowest == pytest.approx(0, abs=1.5e-4) or lowest > 0
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_every_substance_is_in_the_library(built, library, name):
-    for surface in built[name].surfaces:
+def test_every_substance_is_in_the_library(scene, library, name):
+    for surface in scene.surfaces:
         assert surface.extras["substance"] in library
         assert surface.extras["shell_thickness_m"] >= 0
 
 
 @pytest.mark.parametrize("name", NAMES)
-def test_a_scene_is_whole_and_short(built, name):
-    scene = built[name]
+def test_a_scene_is_whole_and_short(scene, name):
     assert scene.name == name
     assert 80 <= scene.duration * scene.fps <= 120
     assert {s.object for s in scene.surfaces} == set(range(len(scene.objects)))
@@ -67,15 +73,16 @@ def test_a_scene_is_whole_and_short(built, name):
     assert np.linalg.norm(scenes.view(name)) > 0
 
 
-def test_the_same_code_builds_the_same_scene(built):
-    again = scenes.build("duck-on-mud")
-    for a, b in zip(built["duck-on-mud"].surfaces, again.surfaces, strict=True):
+def test_the_same_code_builds_the_same_scene(monkeypatch):
+    first = scenes.build("duck-on-mud")
+    monkeypatch.setattr(scenes, "MODELS", MODELS)
+    for a, b in zip(first.surfaces, scenes.build("duck-on-mud").surfaces, strict=True):
         assert np.array_equal(a.vertices, b.vertices)
         assert np.array_equal(a.triangles, b.triangles)
 
 
-def test_the_duck_starts_above_the_mud_at_the_speed_of_its_fall(built):
-    scene = built["duck-on-mud"]
+def test_the_duck_starts_above_the_mud_at_the_speed_of_its_fall():
+    scene = scenes.build("duck-on-mud")
     mud = next(s for s in scene.surfaces if s.name == "mud").vertices
     duck = next(s for s in scene.surfaces if s.name == "body").vertices
     near = np.hypot(*(mud[:, :2] - duck[:, :2].mean(0)).T) < 0.03
@@ -84,8 +91,8 @@ def test_the_duck_starts_above_the_mud_at_the_speed_of_its_fall(built):
     assert gap + speed**2 / (2 * 9.81) == pytest.approx(0.8, abs=0.01)
 
 
-def test_vase_ball_and_armchair_stand_in_a_row_with_gaps(built):
-    scene = built["vase-ball-armchair"]
+def test_vase_ball_and_armchair_stand_in_a_row_with_gaps():
+    scene = scenes.build("vase-ball-armchair")
     parts = [[s for s in scene.surfaces if s.object == k] for k in range(3)]
     vase, ball, chair = (np.concatenate([s.vertices for s in p]) for p in parts)
     front = trimesh.Trimesh(parts[2][0].vertices, parts[2][0].triangles, process=False)
