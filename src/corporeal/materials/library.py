@@ -12,7 +12,7 @@ from corporeal.materials.quantities import QUANTITIES, si
 from corporeal.types import Ground, Law, Material, Range
 
 MENU = {"default": "library.toml", "reference": "reference.toml"}
-ABOUT = {"law", "group", "family", "aliases", "note", "id"}
+ABOUT = {"law", "group", "family", "published", "aliases", "note", "id"}
 
 
 @dataclass(frozen=True)
@@ -27,6 +27,8 @@ class Entry:
     """Metal, mineral, granular, fibrous, polymer, elastomer, foam, food."""
     family: str = ""
     """The material whose measured friction it shares."""
+    published: str = ""
+    """The nearest name of the 22-material vocabulary, where its own is not one."""
     aliases: tuple[str, ...] = ()
     note: str = ""
     number: int = field(default=0, compare=False)
@@ -74,6 +76,17 @@ def library(name: str = "default") -> dict[str, Entry]:
     raise UnknownChoiceError("material library", name, [*MENU, "a .toml file"])
 
 
+def counterpart(entry: Entry, library_name: str) -> Entry:
+    """Return what stands for ``entry`` in another library: its own name, or the published one."""
+    entries = library(library_name)
+    for name in (entry.name, entry.published):
+        if name in entries:
+            return entries[name]
+    raise UserError(
+        f"Library {library_name!r} has nothing for {entry.name!r}. Use --library default."
+    )
+
+
 def find(name: str, library_name: str = "default") -> Entry:
     """Return the entry called ``name``; spaces, hyphens, case and aliases don't matter.
 
@@ -91,12 +104,18 @@ def find(name: str, library_name: str = "default") -> Entry:
 
 def citation(key: str) -> str:
     """Resolve a source key ("a", or "a+b" for two) to what a reader can look up."""
-    known = sources()
+    known = source_table()
     return " / ".join(known[k]["cite"] if k in known else k for k in key.split("+"))
 
 
+def sources() -> dict[str, str]:
+    """Every source key that a value of the shipped libraries carries, with what it stands for."""
+    ranges = [r for name in MENU for e in library(name).values() for r in e.ranges.values()]
+    return {key: citation(key) for key in sorted({r.source for r in ranges} | set(source_table()))}
+
+
 @cache
-def sources() -> dict[str, dict[str, str]]:
+def source_table() -> dict[str, dict[str, str]]:
     """Every source: how to cite it, and whether it was read or recalled."""
     return tomllib.loads(_text("sources.toml"))
 
@@ -137,6 +156,7 @@ def _entry(name: str, row: dict) -> Entry:
         ranges=ranges,
         group=row.get("group", ""),
         family=row.get("family", ""),
+        published=row.get("published", ""),
         aliases=tuple(row.get("aliases", ())),
         note=row.get("note", ""),
         number=row.get("id", 0),

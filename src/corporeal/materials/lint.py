@@ -3,7 +3,7 @@
 from collections import Counter
 from collections.abc import Iterator, Mapping
 
-from corporeal.materials.library import Entry, sources
+from corporeal.materials.library import Entry, source_table
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.types import Law, Range
 
@@ -49,5 +49,5 @@ def _range_problems(field: str, r: Range) -> Iterator[str]:
     if not quantity.low <= r.low <= r.high <= quantity.high:
         yield f"{field} of {r.low:g} to {r.high:g} {quantity.unit} is not of this world"
     for key in r.source.split("+"):
-        if key not in sources():
+        if key not in source_table():
             yield f"{field} cites {key!r}, which sources.toml does not list"

@@ -2,15 +2,16 @@
 
 from math import degrees
 
-from corporeal.materials.library import Entry, citation, find, library, sources
+from corporeal.materials.library import Entry, citation, find, library, source_table
 from corporeal.materials.quantities import QUANTITIES
+from corporeal.types import Ground, Material, MaterialField, Part, Parts, PartWords, Structure
 
 SCALES = {"Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))}
 COLUMNS = ("young", "poisson", "density", "yield_stress", "friction_angle", "cohesion")
 HEADS = ("material", "law", "E", "ν", "ρ", "σ_y", "φ", "c")
 
 
-def table(library_name: str = "default") -> str:
+def menu(library_name: str = "default") -> str:
     """Every material of a library, one line each: range, and the typical value in brackets."""
     rows = [HEADS, *(_row(e) for e in library(library_name).values())]
     widths = [max(len(row[i]) for row in rows) for i in range(len(HEADS))]
@@ -29,7 +30,7 @@ def show(name: str, library_name: str = "default") -> str:
     lines.append("")
     for field, r in entry.ranges.items():
         words = QUANTITIES[field].words
-        lines.append(f"  {words:<18} {span(field, r.low, r.typical, r.high):<28} {r.source}")
+        lines.append(f"  {words:<18} {span(field, r.low, r.typical, r.high):<26} {r.source}")
     keys = sorted({key for r in entry.ranges.values() for key in r.source.split("+")})
     lines += ["", "Sources", *(f"  {key}: {citation(key)}" for key in keys)]
     return "\n".join(lines)
@@ -58,28 +59,74 @@ def markdown() -> str:
             "*read*: the value was seen in the source while the library was compiled; *recalled*: "
             "cited from knowledge of the handbook; *ours*: derived, chosen or estimated by us.",
             "",
-            *(f"- **{key}** ({row['check']}): {row['cite']}" for key, row in sources().items()),
+            *(
+                f"- **{key}** ({row['check']}): {row['cite']}"
+                for key, row in source_table().items()
+            ),
             "",
         ]
     )
 
 
+def materials_json(field: MaterialField, parts: Parts) -> dict:
+    """Return what every part is made of as plain data, with the grounds of every value [SI]."""
+    rows = zip(parts.catalogue, field.materials, field.structures, field.words, strict=True)
+    return {
+        "units": {q.field: q.unit for q in QUANTITIES.values()},
+        "parts": [_part_json(*row) for row in rows],
+        "friction": field.friction.round(4).tolist(),
+        "restitution": field.restitution.round(4).tolist(),
+        "order": "rows and columns are the parts in order, then the floor and the walls",
+    }
+
+
+def _part_json(part: Part, material: Material, made: Structure, words: PartWords) -> dict:
+    return {
+        "name": part.name,
+        "object": part.object,
+        "found_by": part.found_by,
+        "material": material.name,
+        "recognised": words.material,
+        "answered_by": words.answered_by,
+        "margin": words.margin,
+        "reason": words.reason,
+        "law": material.law.name.lower(),
+        "structure": {"kind": made.kind, "thickness": made.thickness, "reason": made.reason},
+        "values": {name: _ground_json(name, g) for name, g in material.grounds.items()},
+    }
+
+
+def _ground_json(name: str, ground: Ground) -> dict:
+    return {
+        "value": ground.value,
+        "range": [ground.range.low, ground.range.high],
+        "unit": QUANTITIES[name].unit,
+        "chosen_by": ground.chosen_by,
+        "reason": ground.reason,
+        "source": citation(ground.range.source),
+    }
+
+
 def span(field: str, low: float, typical: float, high: float) -> str:
     """Write a range in a readable unit, with the typical value in brackets."""
-    factor, unit = _scale(field, high)
-    bounds = f"{low * factor:.3g}–{high * factor:.3g}" if low < high else f"{low * factor:.3g}"
-    middle = f" ({typical * factor:.3g})" if low < high else ""
-    return f"{bounds}{middle}{' ' + unit if unit != '-' else ''}"
+    factor, unit = _scale(field, typical)
+    words = [_number(value * factor) for value in (low, high, typical)]
+    bounds = f"{words[0]}–{words[1]} ({words[2]})" if low < high else words[0]
+    return bounds if unit == "-" else f"{bounds} {unit}"
 
 
-def _scale(field: str, largest: float) -> tuple[float, str]:
+def _number(value: float) -> str:
+    return f"{value:.0f}" if abs(value) >= 1000 else f"{value:.3g}"
+
+
+def _scale(field: str, value: float) -> tuple[float, str]:
     unit = QUANTITIES[field].unit
     if unit == "rad":
         return degrees(1.0), "°"
     if unit == "m":
         return 1e3, "mm"
     for size, name in SCALES.get(unit, ()):
-        if largest >= size:
+        if value >= size:
             return 1.0 / (size or 1.0), name
     return 1.0, unit
 

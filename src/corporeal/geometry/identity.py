@@ -1,0 +1,119 @@
+"""Which surfaces make one part: what the file itself says, by node, mesh and material."""
+
+import re
+import zlib
+from collections.abc import Callable, Hashable
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Int
+
+from corporeal.types import Finish, Part, Scene, Surface
+
+NOISE = frozenset(
+    "a aws blinn camera circle collada common cone001 cube curve cylinder default defaultmaterial "
+    "diffuse export fbx finish fx geom geometry glb gltf grp group high id imported instance "
+    "lambert lib lod low lp mat material materials matte mesh meshes model models nd node none "
+    "nurbspath obj object objects part phong piece plain plane poly prim primitive residential "
+    "root rootnode scene shader shape sketchfab sp sphere standard surface textured texture "
+    "textures untitled uv vert visual collision wire x y z".split()
+)
+"""Words that exporters write whatever the thing is."""
+SPLIT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+")
+
+Hint = Callable[[Surface, Finish], str]
+
+
+@dataclass(frozen=True)
+class Identity:
+    """The parts of a scene, told apart by identity."""
+
+    catalogue: tuple[Part, ...]
+    """Object by object, in the scene's order."""
+    part_of_surface: Int[np.ndarray, " S"]
+
+    def surfaces(self, part: int) -> list[int]:
+        """Numbers of the surfaces that make up one part."""
+        return np.flatnonzero(self.part_of_surface == part).tolist()
+
+
+def words(name: str) -> list[str]:
+    """Split a name into lower-case words, without what exporters write.
+
+    ``"M_LeatherParts.001"`` gives ``["leather", "parts"]``.
+    """
+    found = [w.lower() for w in SPLIT.findall(name)]
+    return [w for w in found if len(w) > 1 and w not in NOISE]
+
+
+def identify(scene: Scene, hint: Hint = lambda surface, finish: "") -> Identity:
+    """Tell the parts of every object apart.
+
+    A node whose extras state a substance is a part. Other surfaces of an object form one part when
+    they wear the same finish, unless ``hint`` (what the names say of the matter) differs.
+    """
+    catalogue: list[Part] = []
+    part_of_surface = np.zeros(len(scene.surfaces), dtype=np.int64)
+    for number in range(len(scene.objects)):
+        groups = _groups(scene, number, hint)
+        names = _names(scene, number, groups)
+        for (key, surfaces), name in zip(groups.items(), names, strict=True):
+            found_by = "whole object" if len(groups) == 1 else str(key[0])
+            part_of_surface[surfaces] = len(catalogue)
+            catalogue.append(Part(name, number, found_by))
+    return Identity(tuple(catalogue), part_of_surface)
+
+
+def _groups(scene: Scene, number: int, hint: Hint) -> dict[tuple[Hashable, ...], list[int]]:
+    groups: dict[tuple[Hashable, ...], list[int]] = {}
+    for k, surface in enumerate(scene.surfaces):
+        if surface.object == number:
+            finish = scene.finishes[surface.finish]
+            stated = surface.extras.get("substance")
+            key = (
+                ("node", surface.name, stated)
+                if stated
+                else ("material", _look(finish), hint(surface, finish))
+            )
+            groups.setdefault(key, []).append(k)
+    return groups
+
+
+def _look(finish: Finish) -> Hashable:
+    """Two finishes that differ in a running number only are one."""
+    picture = None if finish.texture is None else zlib.crc32(finish.texture[::8, ::8].tobytes())
+    numbers = (*finish.colour, finish.metallic, finish.roughness, finish.transmission, finish.glow)
+    plain = re.sub(r"[\W\d_]+", "", finish.name).lower()
+    return (plain, tuple(round(x, 3) for x in numbers), finish.alpha_mode, picture)
+
+
+def _names(scene: Scene, number: int, groups: dict) -> list[str]:
+    """Name each part as its file does, where that says anything; otherwise after the object."""
+    thing, names = scene.objects[number], []
+    for surfaces in groups.values():
+        first = scene.surfaces[surfaces[0]]
+        finish = scene.finishes[first.finish].name
+        own = (first.name,) if first.extras.get("substance") else _order(first, finish, surfaces)
+        told = next((n for n in own if words(n)), "")
+        whole = thing.class_name or thing.name
+        if len(groups) == 1:
+            told = told if first.extras.get("substance") and told else whole
+        names.append(told or f"{whole} part")
+    return _distinct(names)
+
+
+def _order(first: Surface, finish: str, surfaces: list[int]) -> tuple[str, ...]:
+    """One surface goes by its own name, several by the finish they share."""
+    return (
+        (first.name, finish) if len(surfaces) == 1 and words(first.name) else (finish, first.name)
+    )
+
+
+def _distinct(names: list[str]) -> list[str]:
+    told: dict[str, int] = {}
+    numbered = []
+    for name in names:
+        told[name] = told.get(name, 0) + 1
+        again = names.count(name) > 1
+        numbered.append(f"{name} {told[name]}" if again else name)
+    return numbered

@@ -1,0 +1,116 @@
+"""What a person says about a scene's parts, in a YAML file. It is believed before anybody else."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from corporeal.errors import BadFileError
+
+KEYS = ("material", "structure", "thickness_mm", "values")
+EXAMPLE = "For example: 'duck_0: soft_PVC', or 'duck_0: { material: soft_PVC, thickness_mm: 2 }'."
+
+
+@dataclass(frozen=True)
+class Annotation:
+    """What is said of one part."""
+
+    material: str | None = None
+    structure: str | None = None
+    """"solid" or "shell"."""
+    thickness: float | None = None
+    """[m]"""
+    values: dict[str, float] = field(default_factory=dict)
+    """Spelt as in the library, unit in the key: ``{"young_MPa": 5}``."""
+
+
+def read_annotations(
+    path: Path, scene: Mapping[str, Sequence[str]]
+) -> dict[tuple[str, str], Annotation]:
+    """Read the file and check it against the scene.
+
+    Args:
+        path: The YAML file.
+        scene: Every object's name with its parts' names.
+
+    Returns:
+        (object, part) → what is said of it. What is said of an object holds for all its parts that
+        are not named themselves.
+
+    Raises:
+        BadFileError: The file is not such a file, or names an object or part that does not exist.
+
+    """
+    told: dict[tuple[str, str], Annotation] = {}
+    for name, said in _mapping(path).items():
+        if name not in scene:
+            raise _nobody(path, "object", name, scene)
+        parts = said.pop("parts", {}) if isinstance(said, dict) else {}
+        if not isinstance(parts, dict):
+            raise BadFileError(path, f"'parts' of {name!r} must map part names.", EXAMPLE)
+        for part in parts:
+            if part not in scene[name]:
+                raise _nobody(path, f"part of {name!r}", part, scene[name])
+        if said:
+            told |= {(name, part): _annotation(path, name, said) for part in scene[name]}
+        told |= {(name, p): _annotation(path, f"{name}: {p}", a) for p, a in parts.items()}
+    return told
+
+
+def _mapping(path: Path) -> dict:
+    try:
+        said = yaml.safe_load(path.read_text(encoding="utf-8"))
+    except (OSError, UnicodeDecodeError) as error:
+        raise BadFileError(path, f"cannot be read ({error}).") from error
+    except yaml.YAMLError as error:
+        first = str(error).splitlines()[0]
+        raise BadFileError(path, f"is not YAML ({first}).", EXAMPLE) from error
+    if not isinstance(said, dict):
+        raise BadFileError(path, "must map object names to what they are made of.", EXAMPLE)
+    return {str(name): value for name, value in said.items()}
+
+
+def _annotation(path: Path, where: str, said: Any) -> Annotation:
+    if isinstance(said, str):
+        return Annotation(material=said)
+    if not isinstance(said, dict):
+        raise BadFileError(path, f"{where}: must be a material's name or a mapping.", EXAMPLE)
+    strange = [k for k in said if k not in KEYS]
+    if strange:
+        raise BadFileError(path, f"{where}: unknown key {strange[0]!r}.", f"Keys: {_list(KEYS)}.")
+    structure = said.get("structure")
+    if structure not in (None, "solid", "shell"):
+        raise BadFileError(path, f"{where}: structure is {structure!r}.", "Say solid or shell.")
+    material = said.get("material")
+    if material is not None and not isinstance(material, str):
+        raise BadFileError(path, f"{where}: material must be a name, not {material!r}.", EXAMPLE)
+    thickness = said.get("thickness_mm")
+    if thickness is not None:
+        thickness = _number(path, f"{where}: thickness_mm", thickness) * 1e-3
+        if thickness <= 0:
+            raise BadFileError(path, f"{where}: thickness_mm must be above 0.", "")
+    return Annotation(material, structure, thickness, _values(path, where, said.get("values")))
+
+
+def _values(path: Path, where: str, said: Any) -> dict[str, float]:
+    if said is None:
+        return {}
+    if not isinstance(said, dict):
+        raise BadFileError(path, f"{where}: 'values' must map, such as {{ young_MPa: 5 }}.", "")
+    return {str(k): _number(path, f"{where}: {k}", v) for k, v in said.items()}
+
+
+def _number(path: Path, where: str, said: Any) -> float:
+    if isinstance(said, bool) or not isinstance(said, int | float):
+        raise BadFileError(path, f"{where} must be a number, not {said!r}.", "")
+    return float(said)
+
+
+def _nobody(path: Path, kind: str, name: object, real: object) -> BadFileError:
+    return BadFileError(path, f"there is no {kind} called {name!r}.", f"There are: {_list(real)}.")
+
+
+def _list(names: Any) -> str:
+    return ", ".join(str(n) for n in names)

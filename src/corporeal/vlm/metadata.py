@@ -1,0 +1,245 @@
+"""Recognition without a model: what the file's own names and surface values tell."""
+
+import tomllib
+from collections.abc import Iterable, Sequence
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+
+from corporeal.geometry.identity import words
+from corporeal.types import Finish, PartWords, SceneObject, Surface
+
+KINDS = ("substance", "piece", "thing")
+WEAKER = 0.6
+"""Factor on the margin of what is said of the whole when the part is only one of several."""
+UNKNOWN = PartWords("", None, reason="No name in the file says what this is made of.")
+
+
+@dataclass(frozen=True)
+class Saying:
+    """One entry of the lexicon: what a phrase tells."""
+
+    phrase: tuple[str, ...]
+    kind: str
+    material: str
+    margin: float
+    structure: str | None = None
+    thickness: float | None = None
+    """[m]"""
+    gives_way: tuple[str, ...] = ()
+    of: tuple[str, ...] = ()
+    colour: bool = False
+    every: bool = False
+    plant: bool = False
+    alpha: str = ""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """All that the file says about one part."""
+
+    surfaces: Sequence[Surface]
+    finishes: Sequence[Finish]
+    """Of the part."""
+    thing: SceneObject
+    alone: bool
+    """The part is the whole object."""
+    metallic_means_something: bool
+    """Some surface of the object is not fully metallic: 1 is more than the exporter's default."""
+
+    @property
+    def own(self) -> tuple[str, ...]:
+        """Names that are the part's own."""
+        return tuple(
+            dict.fromkeys([*(f.name for f in self.finishes), *(s.name for s in self.surfaces)])
+        )
+
+    @property
+    def general(self) -> tuple[str, ...]:
+        """Names of the whole object."""
+        stem = self.thing.source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+        return tuple(dict.fromkeys([self.thing.class_name, self.thing.name, stem]))
+
+
+def stated_substance(surfaces: Iterable[Surface]) -> str | None:
+    """Return what the nodes state outright in their extras, or None."""
+    said = {str(s.extras["substance"]) for s in surfaces if s.extras.get("substance")}
+    return said.pop() if len(said) == 1 else None
+
+
+def stated_thickness(surfaces: Iterable[Surface]) -> float | None:
+    """Return the wall thickness [m] that the nodes state; 0: stated solid; None: not said."""
+    said = {
+        float(s.extras["shell_thickness_m"])
+        for s in surfaces
+        if isinstance(s.extras.get("shell_thickness_m"), int | float)
+    }
+    return said.pop() if len(said) == 1 else None
+
+
+def matter_hint(surface: Surface, finish: Finish) -> str:
+    """Return the material that a surface's own names state, "" for none: tells parts apart."""
+    sayings, _ = _told((finish.name, surface.name), (finish,), ("substance", "piece"), ())
+    return sayings[0].material if len({s.material for s in sayings}) == 1 else ""
+
+
+def recognise(evidence: Evidence) -> PartWords:
+    """Say what a part is made of, how sure, and why; unknown is a normal answer."""
+    for look in (_own_names, _general_names, _surface_values):
+        answer = look(evidence)
+        if answer is not None:
+            return _weighed(answer, evidence)
+    return UNKNOWN
+
+
+def _own_names(evidence: Evidence) -> PartWords | None:
+    sayings, name = _told(evidence.own, evidence.finishes, KINDS, evidence.general)
+    if not sayings or (sayings[0].plant and not evidence.alone):
+        return None  # "plant" names the pot's node as often as the leaves
+    whole = sayings[0].kind != "thing" or evidence.alone or sayings[0].every
+    return _answer(sayings, name, 1.0 if whole else WEAKER)
+
+
+def _general_names(evidence: Evidence) -> PartWords | None:
+    sayings, name = _told(evidence.general, evidence.finishes, ("substance", "thing"), ())
+    if not sayings or evidence.alone or sayings[0].every:
+        return _answer(sayings, name, 1.0) if sayings else None
+    if sayings[0].plant:
+        green = all(f.texture is None and _green(f) for f in evidence.finishes)
+        reason = f"{name!r} is a plant, and this part of it is green."
+        return PartWords("", "leaves-flowers", margin=0.4, reason=reason) if green else None
+    return _answer(sayings, name, WEAKER) if sayings[0].kind == "substance" else None
+
+
+def _surface_values(evidence: Evidence) -> PartWords | None:
+    if all(f.transmission > 0.5 for f in evidence.finishes):
+        return PartWords("", "glass", margin=0.5, reason="The surface lets light through.")
+    if evidence.metallic_means_something and all(f.metallic >= 0.9 for f in evidence.finishes):
+        return PartWords(
+            "", "steel", margin=0.3, reason="The surface is metallic; steel is the likeliest metal."
+        )
+    return None
+
+
+def _weighed(answer: PartWords, evidence: Evidence) -> PartWords:
+    """Lower the margin where the surface contradicts the name."""
+    metal = evidence.metallic_means_something and all(f.metallic > 0.9 for f in evidence.finishes)
+    if answer.material and metal and answer.material not in metals():
+        reason = f"{answer.reason} But the surface is metallic."
+        return replace(answer, margin=answer.margin * 0.5, reason=reason)
+    return answer
+
+
+def _answer(sayings: list[Saying], name: str, factor: float) -> PartWords:
+    materials = sorted({s.material for s in sayings})
+    if len(materials) > 1:
+        reason = f"{name!r} speaks of {' and '.join(materials)}; which one is not said."
+        return PartWords("", None, reason=reason)
+    said = sayings[0]
+    kinds = {"substance": "names the material", "piece": "is usually", "thing": "is usually"}
+    reason = f"{' '.join(said.phrase)!r} in {name!r} {kinds[said.kind]} {said.material}."
+    structure = "shell" if said.structure == "shell" else None
+    return PartWords(
+        "",
+        said.material,
+        structure=structure,
+        thickness=said.thickness,
+        margin=round(said.margin * factor, 3),
+        reason=reason,
+    )
+
+
+def _told(
+    names: Sequence[str], finishes: Sequence[Finish], kinds: Sequence[str], thing: Sequence[str]
+) -> tuple[list[Saying], str]:
+    """Find the strongest sayings in any of the names, and the name they stand in.
+
+    Longest phrase first, then substance before piece before thing. Several are returned when
+    equally strong ones stand in the names.
+    """
+    found: list[tuple[tuple[int, int], Saying, str]] = []
+    around = {w for n in thing for w in _tokens(n)}
+    for name in names:
+        tokens = _tokens(name)
+        for saying in lexicon():
+            if saying.kind in kinds and _stands_in(saying.phrase, tokens):
+                if _fits(saying, finishes, around | set(tokens)):
+                    rank = (len(saying.phrase), -KINDS.index(saying.kind))
+                    found.append((rank, saying, name))
+    if not found:
+        return [], ""
+    best = max(rank for rank, _, _ in found)
+    strongest = [(s, n) for rank, s, n in found if rank == best]
+    materials = {s.material for s, _ in strongest}
+    kept = [(s, n) for s, n in strongest if not materials & set(s.gives_way)]
+    kept.sort(key=lambda told: -told[0].margin)
+    return _particular([s for s, _ in kept]), kept[0][1]
+
+
+def _particular(sayings: list[Saying]) -> list[Saying]:
+    """Among entries of one phrase, the one with a condition speaks; it was met."""
+    return sayings if not any(s.alpha for s in sayings) else [s for s in sayings if s.alpha]
+
+
+def _fits(saying: Saying, finishes: Sequence[Finish], around: set[str]) -> bool:
+    if saying.colour and not any(f.metallic > 0.5 for f in finishes):
+        return False
+    if saying.alpha and not all(f.alpha_mode == saying.alpha for f in finishes):
+        return False
+    return not saying.of or bool(around & {_singular(w) for w in saying.of})
+
+
+def _stands_in(phrase: tuple[str, ...], tokens: list[str]) -> bool:
+    n = len(phrase)
+    return any(tuple(tokens[i : i + n]) == phrase for i in range(len(tokens) - n + 1))
+
+
+def _tokens(name: str) -> list[str]:
+    return [_singular(w) for w in words(name)]
+
+
+def _singular(word: str) -> str:
+    return word[:-1] if len(word) > 3 and word.endswith("s") and not word.endswith("ss") else word
+
+
+def _green(finish: Finish) -> bool:
+    red, green, blue, _ = finish.colour
+    return green > 1.2 * red and green > 1.5 * blue
+
+
+@cache
+def metals() -> frozenset[str]:
+    """Materials whose surface is metallic."""
+    general = next(s for s in lexicon() if s.phrase == ("metal",))
+    return frozenset((general.material, "aluminium_can_sheet", "zinc", "lead", *general.gives_way))
+
+
+@cache
+def lexicon() -> tuple[Saying, ...]:
+    """Every phrase of the lexicon with what it tells."""
+    text = files("corporeal.vlm").joinpath("lexicon.toml").read_text(encoding="utf-8")
+    table = tomllib.loads(text)
+    return tuple(
+        _saying(kind, phrase, row)
+        for kind in KINDS
+        for row in table[kind]
+        for phrase in row["words"]
+    )
+
+
+def _saying(kind: str, phrase: str, row: dict) -> Saying:
+    thickness = row.get("thickness_mm")
+    return Saying(
+        phrase=tuple(_singular(w) for w in phrase.split()),
+        kind=kind,
+        material=row["material"],
+        margin=row["margin"],
+        structure=row.get("structure"),
+        thickness=None if thickness is None else thickness * 1e-3,
+        gives_way=tuple(row.get("gives_way", ())),
+        of=tuple(row.get("of", ())),
+        colour=row.get("colour", False),
+        every=row.get("every", False),
+        plant=row.get("plant", False),
+        alpha=row.get("alpha", ""),
+    )

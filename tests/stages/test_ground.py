@@ -1,0 +1,127 @@
+import json
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from corporeal import materials
+from corporeal.errors import OutOfRangeError, UserError
+from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.ground import GroundConfig, doubts, ground
+from corporeal.stages.segment import segment
+from handmade import plain, scene
+
+
+def stated(name, substance, **extras):
+    return (f"{name}_0", [(name, plain(), {"substance": substance, **extras})])
+
+
+DUCK = stated("duck", "soft_PVC", shell_thickness_m=0.002)
+BLOCK = stated("block", "steel")
+PLANK = stated("plank", "hardwood")
+RIDDLE = ("riddle_0", [("mesh", plain(), {})])
+
+
+def grounded(*objects, config=None, annotations=None):
+    made = scene(*objects)
+    words = describe(made, DescribeConfig(annotations=annotations))
+    parts = segment(made, words)
+    return ground(made, parts, words, config or GroundConfig()), parts, made
+
+
+def test_every_value_carries_its_range_its_source_and_a_reason():
+    field, _, _ = grounded(DUCK, BLOCK, PLANK)
+    for material in field.materials:
+        assert set(material.grounds) >= {"young", "poisson", "density", "friction", "loss"}
+        for name, why in material.grounds.items():
+            assert getattr(material, name) == why.value
+            assert why.value in why.range
+            assert materials.citation(why.range.source) != why.range.source
+            assert (why.chosen_by, bool(why.reason)) == ("typical", True)
+
+
+def test_the_structure_follows_what_is_said():
+    field, _, _ = grounded(DUCK, BLOCK)
+    assert (field.structures[0].kind, field.structures[0].thickness) == ("shell", 0.002)
+    assert field.structures[1].kind == "solid"
+    assert "the shape decides" in field.structures[1].reason
+
+
+def test_a_shell_of_unsaid_thickness_is_as_thin_as_such_things_are(tmp_path):
+    (tmp_path / "a.yaml").write_text("block_0: { structure: shell }")
+    field, _, _ = grounded(BLOCK, annotations=tmp_path / "a.yaml")
+    assert field.structures[0].thickness == pytest.approx(0.0007)
+    (tmp_path / "a.yaml").write_text("block_0: { material: sand, structure: shell }")
+    with pytest.raises(UserError, match="Give thickness_mm"):
+        grounded(BLOCK, annotations=tmp_path / "a.yaml")
+
+
+def test_an_unknown_part_gets_a_stated_stand_in_and_a_warning():
+    field, parts, made = grounded(RIDDLE, BLOCK)
+    assert field.materials[0].name == "plastics-PP"
+    assert field.words[0].material is None
+    assert {g.chosen_by for g in field.materials[0].grounds.values()} == {"fallback"}
+    assert "Nobody knows" in field.materials[0].grounds["young"].reason
+    (warning,) = doubts(field, parts, made)
+    assert warning.startswith("riddle_0: riddle is of unknown material")
+
+
+def test_a_person_may_choose_a_value_inside_the_range_and_never_outside(tmp_path):
+    path = tmp_path / "a.yaml"
+    path.write_text("block_0: { values: { yield_MPa: 500, density_g_cm3: 7.9 } }")
+    field, _, _ = grounded(BLOCK, annotations=path)
+    steel = field.materials[0]
+    assert steel.yield_stress == pytest.approx(500e6)
+    assert steel.density == pytest.approx(7900)
+    assert steel.grounds["yield_stress"].chosen_by == "annotation"
+    assert steel.grounds["young"].chosen_by == "typical"
+    path.write_text("block_0: { values: { young_GPa: 20 } }")
+    with pytest.raises(OutOfRangeError, match="Young's modulus of steel is 2e\\+10 Pa"):
+        grounded(BLOCK, annotations=path)
+    path.write_text("block_0: { values: { cohesion_kPa: 2 } }")
+    with pytest.raises(UserError, match="steel has no cohesion"):
+        grounded(BLOCK, annotations=path)
+
+
+def test_friction_and_restitution_are_between_two_and_the_floor_is_one_of_them():
+    field, _, _ = grounded(BLOCK, PLANK)
+    assert field.friction.shape == field.restitution.shape == (3, 3)
+    assert np.allclose(field.friction, field.friction.T)
+    assert np.allclose(field.restitution, field.restitution.T)
+    assert field.friction[0, 0] == pytest.approx(0.42)  # steel on steel, measured
+    assert field.friction[0, 1] == pytest.approx(0.3)  # metal on wood, measured
+    assert field.friction[0, 2] == pytest.approx(0.5)  # steel on the concrete floor, measured
+    icy, _, _ = grounded(BLOCK, PLANK, config=GroundConfig(floor="ice"))
+    assert icy.friction[0, 2] < 0.05
+
+
+def test_stated_friction_outranks_a_measured_pair(tmp_path):
+    (tmp_path / "a.yaml").write_text("block_0: { values: { friction: 0.32 } }")
+    field, _, _ = grounded(BLOCK, annotations=tmp_path / "a.yaml")
+    floor = materials.find("concrete").ranges["friction"].typical
+    assert field.friction[0, 1] == pytest.approx((0.32 * floor) ** 0.5)
+
+
+def test_the_published_vocabulary_grounds_the_same_scene():
+    field, _, _ = grounded(DUCK, BLOCK, PLANK, RIDDLE, config=GroundConfig(library="reference"))
+    assert [m.name for m in field.materials] == ["rubber", "steel", "wood", "plastics-PP"]
+    assert field.materials[0].poisson == pytest.approx(0.4999)
+
+
+def test_the_record_is_plain_data_with_resolved_citations():
+    field, parts, _ = grounded(DUCK, RIDDLE)
+    said = json.loads(json.dumps(materials.materials_json(field, parts), allow_nan=False))
+    duck = said["parts"][0]
+    assert duck["structure"]["thickness"] == 0.002
+    assert duck["values"]["young"]["range"] == [3.6e6, 21e6]
+    assert "Gent" in duck["values"]["young"]["source"]
+    assert said["parts"][1]["answered_by"] == "unknown"
+
+
+def test_a_description_without_the_part_is_refused():
+    made = scene(BLOCK)
+    words = describe(made)
+    parts = segment(made, words)
+    other = replace(words, objects=(replace(words.objects[0], parts=()),))
+    with pytest.raises(UserError, match="has no part 'block'"):
+        ground(made, parts, other)

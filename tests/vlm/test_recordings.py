@@ -1,0 +1,80 @@
+import json
+from dataclasses import replace
+
+import pytest
+from pydantic import BaseModel
+
+from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.vlm import Question, Vlm, connect
+from corporeal.vlm.recordings import record
+
+ASKED = Question("materials", "What is it made of?", "scene/duck_0", "4 views, 512 px")
+
+
+class Colour(BaseModel):
+    name: str
+
+
+class Wider(BaseModel):
+    name: str
+    sure: bool = True
+
+
+def test_a_recorded_answer_comes_back(tmp_path):
+    record(tmp_path, ASKED, Colour(name="red"), "some-model")
+    model = connect(f"replay:{tmp_path}")
+    assert isinstance(model, Vlm)
+    assert model.ask(ASKED, Colour).name == "red"
+
+
+def test_a_recording_does_not_go_stale_with_the_pictures(tmp_path):
+    record(tmp_path, ASKED, Colour(name="red"), "some-model")
+    import numpy as np
+
+    seen = replace(ASKED, pictures=(np.zeros((2, 2, 3), np.uint8),))
+    assert connect(f"replay:{tmp_path}").ask(seen, Colour).name == "red"
+
+
+@pytest.mark.parametrize("field", ["task", "prompt", "scene", "views"])
+def test_a_mismatch_names_the_field_that_differs(tmp_path, field):
+    record(tmp_path, ASKED, Colour(name="red"), "some-model")
+    other = replace(ASKED, **{field: "something else"})
+    with pytest.raises(UserError, match=f"differs in '{field}'.*something else"):
+        connect(f"replay:{tmp_path}").ask(other, Colour)
+
+
+def test_a_new_shape_of_answer_never_replays_an_old_one(tmp_path):
+    record(tmp_path, ASKED, Colour(name="red"), "some-model")
+    with pytest.raises(UserError, match="differs in 'schema'"):
+        connect(f"replay:{tmp_path}").ask(ASKED, Wider)
+
+
+def test_what_is_not_a_recording_is_named(tmp_path):
+    (tmp_path / "notes.json").write_text(json.dumps({"task": "materials"}))
+    with pytest.raises(UserError, match=r"notes.json: is not a recording"):
+        connect(f"replay:{tmp_path}")
+    (tmp_path / "notes.json").write_text("{")
+    with pytest.raises(UserError, match=r"notes.json: is not a recording"):
+        connect(f"replay:{tmp_path}")
+
+
+def test_an_answer_that_does_not_fit_is_refused(tmp_path):
+    path = record(tmp_path, ASKED, Colour(name="red"), "some-model")
+    row = json.loads(path.read_text())
+    path.write_text(json.dumps(row | {"answer": {"name": 7}}))
+    with pytest.raises(UserError, match="its answer does not fit: name"):
+        connect(f"replay:{tmp_path}").ask(ASKED, Colour)
+
+
+@pytest.mark.parametrize("spec", ["openai:gpt-5.4", "ollama:llava", "anthropic:x"])
+def test_a_live_model_says_that_it_is_not_connected_and_what_to_use(spec):
+    with pytest.raises(UserError, match=r"not connected in this version.*replay:FOLDER"):
+        connect(spec)
+
+
+def test_nobody_is_a_choice_and_an_unknown_name_shows_the_menu(tmp_path):
+    assert connect("metadata") is None
+    with pytest.raises(UnknownChoiceError, match="Choose one of: metadata, replay"):
+        connect("oracle")
+    with pytest.raises(UserError, match="No folder of recordings"):
+        connect(f"replay:{tmp_path}/nowhere")
