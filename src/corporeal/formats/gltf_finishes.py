@@ -178,7 +178,12 @@ class _Base:
 
 
 def _uv_of(texture: Entry) -> tuple[int, np.ndarray | None]:
-    """Return which coordinates a texture takes, and the matrix of KHR_texture_transform."""
+    """Return which coordinates a texture takes, and the matrix of KHR_texture_transform.
+
+    The rotation is anticlockwise to the eye, and v runs down: (u, v) becomes (v, -u) at 90°. So
+    says the extension's text and so do three.js and the Khronos viewer; the GLSL in its README
+    is the transpose.
+    """
     transform = texture.extension("KHR_texture_transform")
     uv_set = texture.whole("texCoord", 0)
     if transform is None:

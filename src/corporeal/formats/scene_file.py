@@ -186,7 +186,7 @@ class _Table:
         return float(x)
 
     def whole(self, key: str, low: int, high: int) -> int | None:
-        x = self.number(key, low, high)
+        x = self.number(key, float(low), float(high))
         if x is None:
             return None
         if not x.is_integer():

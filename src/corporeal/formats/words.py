@@ -17,7 +17,7 @@ FILLERS = frozenset(
 def everyday(name: str) -> str:
     """Return the words of a name that say what a thing is: "soda can coke"; may be empty."""
     name = re.sub(r"\.[A-Za-z0-9]{2,4}$", "", name)
-    name = re.sub(r"(?<=[a-z])(?=[A-Z][a-z])", " ", name)
+    name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     words = [w.lower() for w in re.split(r"[^A-Za-zÀ-ÿ]+", name)]
     kept = [w for w in words if len(w) > 1 and w not in VENDORS and w not in FILLERS]
     return " ".join(kept)[:60].strip()

@@ -1,0 +1,84 @@
+import math
+
+import pytest
+
+from corporeal.errors import BadFileError
+from corporeal.formats.scene_file import read_scene_file
+from corporeal.types import Push
+
+WHOLE = """
+duration = 2
+fps = 30
+gravity = [0, 0, -1.62]
+[[object]]
+name = "duck_0"
+file = "duck.glb"
+class = "rubber duck"
+extent = 0.1
+position = [0, 0, 0.4]
+velocity = [0, 0, -2]
+push = { acceleration = [3, 0, 0], from = 0.1, to = 0.5 }
+[[object]]
+file = "can.glb"
+push = { acceleration = [1, 0, 0] }
+"""
+
+
+def read(tmp_path, text):
+    path = tmp_path / "scene.toml"
+    path.write_text(text)
+    return read_scene_file(path)
+
+
+def test_a_scene_file_says_what_is_where_and_how_it_starts(tmp_path):
+    scene = read(tmp_path, WHOLE)
+    duck, can = scene.objects
+    assert (scene.duration, scene.fps, scene.gravity) == (2.0, 30, (0.0, 0.0, -1.62))
+    assert duck.file == tmp_path / "duck.glb"
+    assert (duck.name, duck.class_name, duck.extent) == ("duck_0", "rubber duck", 0.1)
+    assert (duck.position, duck.velocity) == ((0, 0, 0.4), (0, 0, -2))
+    assert duck.push == Push((3, 0, 0), 0.1, 0.5)
+    assert can.push == Push((1, 0, 0), 0.0, math.inf)
+    assert can.position is can.velocity is can.name is None
+
+
+@pytest.mark.parametrize(
+    ("text", "said"),
+    [
+        ('file = "a.glb"\ndt = 1e-4', "unknown key 'dt'. Allowed here: file, duration"),
+        ('[[object]]\nfile = "a.glb"\nyoung = 1e6', "object 1: unknown key 'young'"),
+        ('[[object]]\nfile = "a.glb"\ndamping = 0.1', "unknown key 'damping'"),
+        ('[[object]]\nfile = "a.glb"\nwind = { velocity = [8, 0, 0] }', "later version"),
+        ('file = "a.glb"\nwind = [1, 0, 0]', "later version"),
+        ('[[object]]\nfile = "a.glb"\nposition = [0, 0]', "three numbers"),
+        ('[[object]]\nfile = "a.glb"\nposition = [0, 0, nan]', "three numbers"),
+        ('[[object]]\nfile = "a.glb"\nvelocity = [0, 0, 1e9]', "at most 1000"),
+        ('[[object]]\nfile = "a.glb"\nvelocity = "fast"', "three numbers"),
+        ('[[object]]\nfile = "a.glb"\npush = [1, 0, 0]', "not a table"),
+        ('[[object]]\nfile = "a.glb"\npush = { to = 1 }', "'acceleration' is missing"),
+        (
+            '[[object]]\nfile = "a.glb"\npush = { acceleration = [1, 0, 0], from = 1, to = 0.5 }',
+            "before it begins",
+        ),
+        ("[[object]]\nfile = 3", "not a text"),
+        ('[[object]]\nfile = "a.glb"\nextent = -1', "from 0.0001 to 1000"),
+        ('[[object]]\nname = "a"', "names no model"),
+        ('[object]\nfile = "a.glb"', "Write [[object]] before each"),
+        ('file = "a.glb"\n[[object]]\nposition = [0, 0, 0]', "object 1 names no file"),
+        ('file = "a.glb"\nduration = 0', "from 0.01 to 60"),
+        ('file = "a.glb"\nduration = true', "from 0.01 to 60"),
+        ('file = "a.glb"\nfps = 29.97', "whole number"),
+        ("file = ", "not valid TOML"),
+        ("", "names no model"),
+    ],
+)
+def test_a_slip_in_a_scene_file_is_named(tmp_path, text, said):
+    with pytest.raises(BadFileError) as error:
+        read(tmp_path, text)
+    assert said in str(error.value)
+    assert "scene.toml" in str(error.value)
+
+
+def test_a_missing_scene_file_is_named(tmp_path):
+    with pytest.raises(BadFileError, match="no such file"):
+        read_scene_file(tmp_path / "none.toml")
