@@ -31,7 +31,8 @@ def bomb(width, height):
     ("mode", "channels"), [("RGB", 3), ("RGBA", 4), ("L", 3), ("LA", 4), ("P", 3), ("1", 3)]
 )
 def test_every_kind_of_picture_ends_as_eight_bit_rgb(mode, channels):
-    picture = Image.new("RGBA", (3, 2), (255, 255, 255, 128)).convert(mode)
+    start = Image.new("RGBA", (3, 2), (255, 255, 255, 128))
+    picture = (start.convert("RGB") if mode == "P" else start).convert(mode)
     array = decode_image(png(picture))
     assert array.shape == (2, 3, channels) and array.dtype == np.uint8
     assert (array[..., :3] == 255).all()

@@ -37,8 +37,8 @@ def test_a_scene_file_says_what_is_where_and_how_it_starts(tmp_path):
     assert duck.file == tmp_path / "duck.glb"
     assert (duck.name, duck.class_name, duck.extent) == ("duck_0", "rubber duck", 0.1)
     assert (duck.position, duck.velocity) == ((0, 0, 0.4), (0, 0, -2))
-    assert duck.push == Push((3, 0, 0), 0.1, 0.5)
-    assert can.push == Push((1, 0, 0), 0.0, math.inf)
+    assert duck.push == Push((3.0, 0.0, 0.0), 0.1, 0.5)
+    assert can.push == Push((1.0, 0.0, 0.0), 0.0, math.inf)
     assert can.position is can.velocity is can.name is None
 
 

@@ -1,0 +1,238 @@
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corporeal.errors import BadFileError, UserError
+from corporeal.formats.glb_writer import write_glb
+from corporeal.geometry.arrangement import boxes_of, moved
+from corporeal.geometry.placing import overlapping
+from corporeal.stages.assemble import AssembleConfig, assemble
+from glb_maker import Maker, cube
+
+
+@pytest.fixture
+def models(tmp_path):
+    """A duck of 10 cm, a can of 12 cm, a ball of 20 cm; all are cubes that hang somewhere."""
+    sizes = {"duck": 0.1, "soda_can": 0.12, "ball": 0.2}
+    return [
+        cube(scale=[x] * 3, translation=[7, 3, -2]).save(tmp_path / f"{name}.glb")
+        for name, x in sizes.items()
+    ]
+
+
+def toml(folder, text):
+    path = folder / "scene.toml"
+    path.write_text(text)
+    return path
+
+
+def test_a_single_object_is_put_on_the_floor(models):
+    scene = assemble(models[:1])
+    assert np.allclose(boxes_of(scene), [[[-0.05, -0.05, 0], [0.05, 0.05, 0.1]]])
+    assert scene.objects[0].real_extent == pytest.approx(0.1)
+    assert scene.warnings == ()
+
+
+def test_several_files_stand_side_by_side_apart(models):
+    scene = assemble(models)
+    boxes = boxes_of(scene)
+    assert [o.name for o in scene.objects] == ["duck_0", "soda_can_0", "ball_0"]
+    assert np.allclose(boxes[:, 0, 2], 0)
+    assert overlapping(boxes) == []
+    assert (boxes[1:, 0, 0] - boxes[:-1, 1, 0] < 0.1).all()
+
+
+def test_files_are_stacked_in_the_order_given(models):
+    boxes = boxes_of(assemble(models, AssembleConfig(stack=True)))
+    assert boxes[0, 0, 2] == 0
+    gaps = boxes[1:, 0, 2] - boxes[:-1, 1, 2]
+    assert (gaps > 0).all() and (gaps < 0.01).all()
+    assert np.allclose(boxes.mean(axis=1)[:, :2], 0)
+
+
+def test_drop_lifts_by_a_part_of_the_size(models):
+    scene = assemble(models, AssembleConfig(drop=0.2))
+    assert boxes_of(scene)[:, 0, 2] == pytest.approx([0.02, 0.024, 0.04])
+
+
+def test_the_same_file_twice_is_two_objects(models):
+    scene = assemble([models[0], models[0]])
+    assert [o.name for o in scene.objects] == ["duck_0", "duck_1"]
+    assert [s.object for s in scene.surfaces] == [0, 1]
+    assert [s.finish for s in scene.surfaces] == [0, 1]
+
+
+def test_a_folder_means_the_models_in_it(models):
+    scene = assemble([models[0].parent])
+    assert sorted(o.class_name for o in scene.objects) == ["ball", "duck", "soda can"]
+
+
+@pytest.mark.parametrize("name", ["duck=0.5", "duck_0=0.5"])
+def test_an_extent_gives_an_object_its_real_size(models, name):
+    scene = assemble(models, AssembleConfig(extent=(name,)))
+    sizes = np.diff(boxes_of(scene), axis=1).max(axis=(1, 2))
+    assert sizes == pytest.approx([0.5, 0.12, 0.2])
+    assert (scene.objects[0].real_extent, scene.objects[0].scale) == (0.5, 1.0)
+
+
+def test_a_bare_extent_means_the_only_object(models):
+    assert assemble(models[:1], AssembleConfig(extent=("0.3",))).objects[0].real_extent == 0.3
+    with pytest.raises(UserError, match="NAME=METRES"):
+        assemble(models, AssembleConfig(extent=("0.3",)))
+
+
+@pytest.mark.parametrize("text", ["duck", "duck=", "duck=big", "duck=-1", "duck=nan", "=1", ""])
+def test_an_extent_that_makes_no_sense_is_refused(models, text):
+    with pytest.raises(UserError, match="NAME=METRES"):
+        assemble(models, AssembleConfig(extent=(text,)))
+
+
+def test_an_extent_for_nobody_lists_the_objects(models):
+    with pytest.raises(UserError, match=r"no object 'cat'\. Choose one of: duck_0, soda_can_0"):
+        assemble(models, AssembleConfig(extent=("cat=1",)))
+
+
+def test_artist_units_are_doubted_and_a_size_proposed(tmp_path):
+    path = cube(scale=[1.6] * 3).save(tmp_path / "duck.glb")
+    (said,) = assemble([path]).warnings
+    assert "--extent duck_0=0.1" in said
+    assert assemble([path], AssembleConfig(extent=("duck=0.1",))).warnings == ()
+
+
+def test_a_working_extent_scales_the_scene_but_not_the_real_things(models):
+    scene = assemble(models, AssembleConfig(working_extent=1.0))
+    boxes = boxes_of(scene)
+    assert (boxes[:, 1].max(axis=0) - boxes[:, 0].min(axis=0)).max() == pytest.approx(1)
+    for thing, box in zip(scene.objects, boxes, strict=True):
+        assert np.ptp(box, axis=0).max() == pytest.approx(thing.real_extent * thing.scale)
+    assert scene.objects[0].real_extent == pytest.approx(0.1)
+
+
+def test_a_scene_file_places_and_pushes_objects(models):
+    text = """
+    gravity = [0, 0, -1.62]
+    duration = 1.25
+    fps = 24
+    [[object]]
+    file = "duck.glb"
+    name = "quack"
+    position = [1, 2, 0.4]
+    velocity = [0, 0, -2]
+    extent = 0.3
+    [[object]]
+    file = "ball.glb"
+    push = { acceleration = [3, 0, 0], to = 0.5 }
+    """
+    scene = assemble([toml(models[0].parent, text)])
+    quack, ball = scene.objects
+    assert (scene.gravity, scene.duration, scene.fps) == ((0, 0, -1.62), 1.25, 24)
+    assert (quack.name, quack.velocity, quack.real_extent) == ("quack", (0, 0, -2), 0.3)
+    assert ball.push is not None and ball.push.acceleration == (3, 0, 0)
+    assert np.allclose(boxes_of(scene)[0], [[0.85, 1.85, 0.4], [1.15, 2.15, 0.7]])
+    assert boxes_of(scene)[1, 0, 2] == 0
+    assert overlapping(boxes_of(scene)) == []
+
+
+def test_a_scene_file_can_speak_of_objects_within_its_file(tmp_path):
+    room(tmp_path)
+    text = """
+    file = "room.glb"
+    [[object]]
+    name = "lamp_0"
+    position = [0, 0, 2]
+    velocity = [1, 0, 0]
+    """
+    chair, lamp = assemble([toml(tmp_path, text)]).objects
+    assert (chair.velocity, lamp.velocity) == ((0, 0, 0), (1, 0, 0))
+    boxes = boxes_of(assemble([tmp_path / "scene.toml"]))
+    assert boxes[:, 0, 2] == pytest.approx([0, 2])
+    with pytest.raises(BadFileError, match=r"no object 'sofa'\. Choose one of: chair_0, lamp_0"):
+        assemble([toml(tmp_path, 'file = "room.glb"\n[[object]]\nname = "sofa"')])
+
+
+def room(folder):
+    made = Maker()
+    mesh = made.mesh()
+    made.node(name="chair_0", mesh=mesh, extras={"class": "chair"})
+    made.node(name="lamp_0", mesh=mesh, translation=[0, 2, 0], extras={"class": "lamp"})
+    return made.save(folder / "room.glb")
+
+
+def test_several_objects_of_one_file_keep_their_places(tmp_path):
+    scene = assemble([room(tmp_path)])
+    assert boxes_of(scene)[:, 0, 2] == pytest.approx([0, 2])
+    assert len(assemble([tmp_path / "room.glb"], AssembleConfig(objects="one")).objects) == 1
+
+
+def test_our_own_file_keeps_its_gravity_duration_and_height(models, tmp_path):
+    scene = moved(assemble(models, AssembleConfig(duration=2.5, fps=25)), (0.0, 0.0, 1.0))
+    (tmp_path / "ours").mkdir()
+    write_glb(tmp_path / "ours" / "own.glb", scene)
+    again = assemble([tmp_path / "ours" / "own.glb"])
+    assert (again.duration, again.fps, again.gravity) == (2.5, 25, scene.gravity)
+    assert np.allclose(boxes_of(again), boxes_of(scene), atol=1e-6)
+    assert assemble([tmp_path / "ours" / "own.glb"], AssembleConfig(duration=1.5)).duration == 1.5
+
+
+@pytest.mark.parametrize(("drop", "seconds"), [(0.0, 1.0), (10.0, 2.4), (100.0, 3.0)])
+def test_the_time_watched_follows_from_the_fall(models, drop, seconds):
+    assert assemble(models[:1], AssembleConfig(drop=drop)).duration == pytest.approx(seconds)
+
+
+def test_objects_that_stand_in_each_other_are_told(models):
+    text = """
+    [[object]]
+    file = "duck.glb"
+    position = [0, 0, 0]
+    [[object]]
+    file = "ball.glb"
+    position = [0, 0, 0.05]
+    """
+    scene = assemble([toml(models[0].parent, text)])
+    assert scene.warnings == ("duck_0 and ball_0 overlap at the start.",)
+
+
+def test_inputs_that_are_no_models_are_refused(tmp_path, models):
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "mesh.obj").write_text("v 0 0 0")
+    (tmp_path / "zero.glb").write_bytes(b"")
+    for inputs, said in (
+        ([], "No input"),
+        ([tmp_path / "none.glb"], "no such file"),
+        ([tmp_path / "none"], "no such file"),
+        ([tmp_path / "empty"], "holds no .glb"),
+        ([tmp_path / "mesh.obj"], "is not a .glb"),
+        ([tmp_path / "zero.glb"], "0 bytes"),
+        ([tmp_path / "none.toml"], "no such file"),
+        ([models[0], toml(tmp_path, 'file = "duck.glb"')], "stands alone"),
+    ):
+        with pytest.raises(UserError, match=said):
+            assemble([Path(p) for p in inputs])
+
+
+@pytest.mark.parametrize(
+    "config",
+    [
+        AssembleConfig(drop=-1.0),
+        AssembleConfig(drop=float("nan")),
+        AssembleConfig(working_extent=0.0),
+        AssembleConfig(duration=1e9),
+        AssembleConfig(fps=0),
+    ],
+)
+def test_options_out_of_reason_are_refused(models, config):
+    with pytest.raises(UserError, match="Give a number from"):
+        assemble(models, config)
+
+
+def test_real_objects_collide_with_nothing_at_the_start(shared_assets):
+    files = [
+        shared_assets / "objects" / f"{n}.glb"
+        for n in ("vase_smallhouse", "ball_smallhouse", "soda_can_coke")
+    ]
+    for stack in (False, True):
+        scene = assemble(files, AssembleConfig(stack=stack, drop=0.2))
+        assert overlapping(boxes_of(scene)) == []
+        assert scene.warnings == ()
+        assert [o.class_name for o in scene.objects] == ["vase", "ball", "soda can coke"]
