@@ -205,3 +205,18 @@ def test_a_scene_of_stones_still_gets_a_grid():
     found = plan([sphere(STEEL, 0.1)], [FALL], "draft")
     assert found.cell == pytest.approx(0.1 / 8)
     assert found.treatments[0].step == float("inf")
+
+
+def test_a_tab_too_small_to_see_does_not_set_the_step_of_the_scene():
+    tab = block(ALUMINIUM, 0.001, 0.019, 0.033)
+    can, small = plan([CAN, tab], [FALL], "draft").treatments
+    assert small.wave_speed == pytest.approx(can.wave_speed)
+    assert small.yield_stress / (small.density * small.wave_speed) == pytest.approx(2.4, abs=0.1)
+    assert "too small" in small.why.lower()
+
+
+def test_a_slender_leg_is_no_trinket():
+    leg = cylinder(WOOD, 0.03, 0.7)
+    cushion = block(FOAM, 0.3, 0.5, 0.5)
+    wood, foam = plan([leg, cushion], [FALL], "draft").treatments
+    assert wood.wave_speed > 3 * foam.wave_speed

@@ -57,7 +57,7 @@ def audit(
         "pair_penetration_m": pair,
         "parts": part_rows(scene, particles, field),
     }
-    return found | {"warnings": breaches(found)}
+    return found | {"warnings": [*particles.warnings, *breaches(found)]}
 
 
 # ------------------------------------------------------------------ laws

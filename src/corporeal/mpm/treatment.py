@@ -30,6 +30,10 @@ INVISIBLE_STRAIN = 5e-3
 
 PARTICLES_PER_CELL = 8
 
+TRINKET_CELLS, TRINKET_LENGTH = 8.0, 5.0
+"""A part of fewer cells than the first, and nowhere longer than the second [cells], is a trinket:
+its own stiffness cannot be seen."""
+
 
 @dataclass(frozen=True)
 class PartGeometry:
@@ -131,6 +135,7 @@ def plan(
         treatments = [cap(p, t, cell) for p, t in zip(parts, treatments, strict=True)]
         warnings.append("Stiffness is capped by the published rule: a control, not a prediction.")
     else:
+        treatments = calm_trinkets(parts, treatments, cell)
         treatments, compressed = fit_budget(treatments, cell, quality)
         warnings.extend(compressed)
     return Plan(cell=cell, treatments=tuple(treatments), warnings=tuple(warnings))
@@ -305,6 +310,27 @@ def reason(verdict: Verdict, soft: bool, shell: bool, ratio: float) -> str:
     return text
 
 
+def calm_trinkets(
+    parts: Sequence[PartGeometry], treatments: Sequence[Treatment], cell: float
+) -> list[Treatment]:
+    """Give parts that the grid cannot show the stiffness of the fastest part that they sit on.
+
+    A can's tab or a duck's eye would otherwise set the time step of the whole scene.
+    """
+    small = [
+        p.volume < TRINKET_CELLS * cell**3 and p.size[2] < TRINKET_LENGTH * cell for p in parts
+    ]
+    fastest = dict.fromkeys((p.object for p in parts), 0.0)
+    for part, treatment, trinket in zip(parts, treatments, small, strict=True):
+        if not trinket:
+            fastest[part.object] = max(fastest[part.object], treatment.wave_speed)
+    because = "Too small for the grid to show its own stiffness, it is slowed to what it sits on"
+    return [
+        compress(t, fastest[p.object], cell, because) if trinket and fastest[p.object] > 0 else t
+        for p, t, trinket in zip(parts, treatments, small, strict=True)
+    ]
+
+
 def fit_budget(
     treatments: Sequence[Treatment], cell: float, quality: Quality
 ) -> tuple[list[Treatment], list[str]]:
@@ -318,7 +344,10 @@ def fit_budget(
     limit = max(COURANT * cell * quality.steps_per_second - motion, 10 * motion)
     if fastest <= limit:
         return list(treatments), []
-    fitted = [compress(t, compress_speed(t.wave_speed, fastest, limit), cell) for t in treatments]
+    because = "The step budget slows its waves"
+    fitted = [
+        compress(t, compress_speed(t.wave_speed, fastest, limit), cell, because) for t in treatments
+    ]
     changed = sum(a.young != b.young for a, b in zip(treatments, fitted, strict=True))
     return fitted, [
         f"{changed} of {len(fitted)} parts are simulated softer than they are, to stay within "
@@ -327,8 +356,8 @@ def fit_budget(
     ]
 
 
-def compress(treatment: Treatment, speed: float, cell: float) -> Treatment:
-    """Slow a deformable part's waves down to ``speed`` [m/s]."""
+def compress(treatment: Treatment, speed: float, cell: float, because: str) -> Treatment:
+    """Slow a deformable part's waves down to ``speed`` [m/s], and say why."""
     if treatment.kind == "rigid" or speed >= treatment.wave_speed:
         return treatment
     factor = speed / treatment.wave_speed
@@ -339,7 +368,7 @@ def compress(treatment: Treatment, speed: float, cell: float) -> Treatment:
         yield_stress=None if strong is None else strong * factor,
         wave_speed=speed,
         step=stable_step(speed, treatment.impact_speed, cell),
-        why=f"{treatment.why} Its waves are slowed {1 / factor:.3g} times by the step budget.",
+        why=f"{treatment.why} {because}: {1 / factor:.3g} times.",
     )
 
 
