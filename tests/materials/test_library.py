@@ -199,5 +199,5 @@ def test_the_tables_are_readable_and_complete():
     shown = materials.show("HDPE")
     assert "plastics-HDPE" in shown
     assert "Cambridge" in shown
-    assert "620–900 (800) MPa" in shown
+    assert "620–1080 (900) MPa" in shown
     assert "940–970 (955) kg/m³" in shown
