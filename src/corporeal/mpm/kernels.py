@@ -5,6 +5,8 @@ extensions, so they build on any processor. ``WORLD`` and ``FIELD`` mirror the s
 ``native/shared.cpp`` byte for byte.
 """
 
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
 from pathlib import Path
 
 import numpy as np
@@ -39,14 +41,18 @@ WORLD = np.dtype(
 
 PLACE = 22
 """Places are fixed point: 2**PLACE units per cell."""
-XI, VE, AF, DE, ST, MA, VO, EP, VC, MT, ID, TM, NC = 0, 3, 6, 15, 24, 30, 31, 32, 33, 34, 35, 36, 45
-"""Channels of a particle: place, velocity, affine part, F - 1, stress, mass, volume, plastic strain,
-volume correction, material, number, whole motion - 1; and how many channels there are."""
+XI, VE, AF, DE, ST, MA, VO, EP, VC, MT, ID, TM = 0, 3, 6, 15, 24, 30, 31, 32, 33, 34, 35, 36
+"""First channels of a particle's place (3), velocity (3), affine part (9), F - 1 (9), stress (6),
+mass, volume, plastic strain, volume correction, material, number, and whole motion - 1 (9)."""
+NC = 45
+"""Channels of a particle."""
 MATERIAL = 16
 """Columns of the table of materials."""
 BLOCK = 32
 """Integers of a block's record."""
 REPORT = 8
+SMALLEST_SHARE = 2000
+"""Particles or nodes below which a thread is not worth waking."""
 SPEED2, WAVE2, PLASTIC, VISCOUS, ASTRAY, WORK = range(6)
 """Columns of a task's report."""
 
@@ -105,33 +111,68 @@ def contact(memory: Memory, first: int):
     contact_native(memory, first + wp.tid())
 
 
-MEET, TOUCH, CLOSE = 704, 448, 96
+MEET, TOUCH, CLOSE = 704, 448, 304
 """Bytes of a node where fields meet, of a possible contact, and of a particle near it."""
 
 
 class Program:
-    """The launches of one step, recorded once."""
+    """The launches of one step, recorded once; phases with many tasks are shared among threads.
 
-    def __init__(self, world: np.ndarray) -> None:
+    Warp runs a kernel on one thread and lets go of Python's lock meanwhile. Tasks of one phase
+    never write to the same place, so the result does not depend on the number of threads.
+    """
+
+    def __init__(self, world: np.ndarray, threads: int) -> None:
         self.memory = wp.array(
             ptr=world.ctypes.data, dtype=wp.uint64, shape=world.nbytes // 8, device="cpu"
         )
-        self.world = world
-        self.divide(0, 0, 0)
+        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self.threads = threads
+        self.contact = self._record(contact, 0, 1)
 
-    def divide(self, even: int, odd: int, nodes: int) -> None:
-        """Record one step with so many tasks on particles of even and odd planes and on nodes."""
-        self.before = self._record(
-            [(clear, 0, nodes), (scatter, 0, even), (scatter, even, odd), (forces, 0, nodes)]
-        )
-        self.contact = self._record([(contact, 0, 1)])[0]
-        self.after = self._record([(gather, 0, even + odd)])
+    def divide(self, even: np.ndarray, odd: np.ndarray, nodes: np.ndarray) -> None:
+        """Record one step.
 
-    def _record(self, plan: list) -> list:
-        return [
-            wp.launch(
-                kernel, dim=count, inputs=[self.memory, first], device="cpu", record_cmd=True
-            )
-            for kernel, first, count in plan
-            if count
+        Args:
+            even: How much work each task on particles of even planes is.
+            odd: The same of odd planes.
+            nodes: The same of the tasks on nodes.
+
+        """
+        both = np.concatenate([even, odd])
+        self.before = [
+            self._phase(clear, 0, nodes),
+            self._phase(scatter, 0, even),
+            self._phase(scatter, len(even), odd),
+            self._phase(forces, 0, nodes),
         ]
+        self.after = [self._phase(gather, 0, both)]
+
+    def _phase(self, kernel: wp.Kernel, first: int, work: np.ndarray) -> list[wp.Launch]:
+        """Cut a run of tasks into one part per thread, of nearly equal work."""
+        if len(work) == 0:
+            return []
+        total = np.cumsum(work)
+        threads = self.threads if total[-1] > SMALLEST_SHARE * self.threads else 1
+        cuts = np.searchsorted(total, total[-1] * np.arange(1, threads) / threads)
+        cuts = np.unique([0, *cuts.tolist(), len(work)])
+        return [
+            self._record(kernel, first + int(low), int(high - low)) for low, high in pairwise(cuts)
+        ]
+
+    def _record(self, kernel: wp.Kernel, first: int, count: int) -> wp.Launch:
+        return wp.launch(
+            kernel, dim=count, inputs=[self.memory, first], device="cpu", record_cmd=True
+        )
+
+    def run(self, phases: list[list[wp.Launch]]) -> None:
+        """Run phases one after the other, the parts of each at once."""
+        for parts in phases:
+            if self.pool is None or len(parts) < 2:
+                for part in parts:
+                    part.launch()
+            else:
+                others = [self.pool.submit(part.launch) for part in parts[1:]]
+                parts[0].launch()
+                for other in others:
+                    other.result()

@@ -48,7 +48,6 @@ def measured(engine: "WarpEngine") -> Measure:
     mass, centre, momentum, angular, kinetic, elastic = (
         np.array(column) for column in zip(*rows, strict=True)
     )
-    ledger = {k: (float(v) if v.ndim == 0 else v) for k, v in book.as_arrays().items()}
     return Measure(
         time=engine.time,
         mass=mass,
@@ -60,7 +59,16 @@ def measured(engine: "WarpEngine") -> Measure:
         potential=-mass * (centre @ np.array(problem.gravity)),
         speed=float(np.linalg.norm(state.velocity, axis=1).max()),
         lost=engine.lost.copy(),
-        **ledger,
+        external_impulse=book.external_impulse.copy(),
+        plane_impulse=book.plane_impulse.copy(),
+        pair_impulse=book.pair_impulse.copy(),
+        push_work=float(book.push_work),
+        friction_loss=float(book.friction_loss),
+        plastic_loss=float(book.plastic_loss),
+        viscous_loss=float(book.viscous_loss),
+        first_contact=book.first_contact.copy(),
+        last_contact=book.last_contact.copy(),
+        contact_point=book.contact_point.copy(),
     )
 
 

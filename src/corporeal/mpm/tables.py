@@ -40,7 +40,7 @@ def _rows(problem: Problem, body: Body, number: int) -> np.ndarray:
     if body.rigid:
         rows[:, 1], rows[:, 9] = STRESSLESS, 1e30
         return rows
-    mu, lam = elasticity.lame(body.young, body.poisson)
+    mu, lam = (np.asarray(value) for value in elasticity.lame(body.young, body.poisson))
     fastest = np.sqrt(np.max((lam + 2.0 * mu) / body.density))
     angle = np.maximum(body.friction_angle, SMALLEST_ANGLE)
     sand = body.law == Law.DRUCKER_PRAGER.value

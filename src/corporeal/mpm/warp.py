@@ -4,6 +4,8 @@ Moving-least-squares MPM (Hu et al. 2018) with quadratic B-splines and affine FL
 particles, nodes and contacts are the native pieces of ``kernels``, launched by Warp.
 """
 
+import os
+
 import numpy as np
 
 from corporeal.errors import SimulationError
@@ -36,15 +38,25 @@ SUNK = 8.0
 """A particle deeper than this in a wall [cells] has left the domain."""
 FARTHEST = 1e5
 """A particle farther than this from the origin [cells] has left the domain."""
-CHUNK = 128
+MOST_THREADS = 4
+CHUNK = 32
 """Node blocks of one task."""
 
 
 class WarpEngine:
     """Steps one problem on the CPU."""
 
-    def __init__(self, problem: Problem) -> None:
+    def __init__(self, problem: Problem, threads: int | None = None) -> None:
+        """Lay out memory.
+
+        Args:
+            problem: What to simulate.
+            threads: How many threads share the loops; None: as many as there are cores, up to 4.
+                The result does not depend on it.
+
+        """
         self.problem = problem
+        self.threads = threads or min(MOST_THREADS, os.cpu_count() or 1)
         self.steps = Steps()
         self.time_now = 0.0
         self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
@@ -87,13 +99,13 @@ class WarpEngine:
                 raise SimulationError(_too_wide(problem, bodies, 0.0))
         self._lay_out_rigid()
         self._lay_out_contact()
-        self.program = Program(self.world)
+        self.program = Program(self.world, self.threads)
         self.speed = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
         self.wave = max([self._rest_speed(f) for f in self.window] + [0.0])
         self._connect()
 
     def _lay_out_rigid(self) -> None:
-        """Give every rigid body a grid of its own, large enough for any turn; used where touched."""
+        """Give every rigid body a grid that holds it however it turns; used where touched."""
         self.keep: list[np.ndarray] = []
         for b, state in self.rigid.items():
             if not self._is_rigid(b):
@@ -104,7 +116,7 @@ class WarpEngine:
                 "node": np.zeros((across**3, 64, 8), np.float32),
                 "table": np.full(across**3, -1, np.int32),
                 "where": np.zeros((across**3, 4), np.int32),
-                "near": np.zeros(across**3, np.uint64),
+                "near": np.zeros(2 * across**3, np.uint64),
                 "block": np.zeros(len(self.points[b]), np.int32),
                 "point": np.ascontiguousarray(self.points[b]),
                 "surface": np.ascontiguousarray(surface),
@@ -176,7 +188,14 @@ class WarpEngine:
         self._point(field=self.field, task=self.task, list=self.node_task, report=self.report)
         self.world["fields"], self.world["dx"] = len(self.field), self.problem.cell
         self.world["tasks"] = len(self.task)
-        self.program.divide(len(even), len(odd), len(nodes))
+        work = np.array([self._particles(*task) for task in self.task])
+        self.program.divide(
+            work[: len(even)], work[len(even) :], 64 * (self.node_task[:, 2] - self.node_task[:, 1])
+        )
+
+    def _particles(self, field: int, low: int, high: int, _: int) -> int:
+        block = self.window[field].block
+        return int(block[high - 1, 1] - block[low, 0])
 
     def _connect_field(self, f: int, window: Window) -> None:
         record = self.field[f : f + 1]
@@ -231,11 +250,9 @@ class WarpEngine:
         world = self.world
         world["dt"], world["time"] = dt, self.time_now
         world["kick"] = self._kick(dt)
-        for command in self.program.before:
-            command.launch()
+        self.program.run(self.program.before)
         self._touch()
-        for command in self.program.after:
-            command.launch()
+        self.program.run(self.program.after)
         self.time_now += dt
         self.steps.count += 1
         self.steps.smallest = min(self.steps.smallest, dt)

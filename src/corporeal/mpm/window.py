@@ -78,13 +78,14 @@ class Window:
         spread = rows[source]
         idle = np.ones(len(source), bool)
         idle[self.slot] = False
-        spread[np.ix_(idle, [MA, ID])] = np.array([0, -1], np.int32).view(np.float32)
+        spread[idle, MA] = 0.0
+        spread[idle, ID] = np.array(-1, np.int32).view(np.float32)
         spread[idle, VE : AF + 9] = 0.0
         self.start, self.end = start, start + counts
         self.part = np.ascontiguousarray(spread.reshape(-1, 8, NC).transpose(0, 2, 1))
 
     def _tabulate(self, block: np.ndarray, counts: np.ndarray) -> None:
-        """Number the node blocks that particle blocks reach, and point to them."""
+        """Give the node blocks that particle blocks reach numbers, and point to them."""
         around = block[:, None, :] + NEIGHBOURS
         table = np.full(tuple(self.dim), -1, np.int32)
         table[tuple(around.reshape(-1, 3).T)] = 0
@@ -100,7 +101,7 @@ class Window:
         if len(self.node) < len(reached):
             room = len(reached) * 3 // 2
             self.node = np.zeros((room, 64, 8), np.float32)
-            self.near = np.zeros(room, np.uint64)
+            self.near = np.zeros(2 * room, np.uint64)
 
     # ------------------------------------------------------------ reading
 
@@ -127,7 +128,7 @@ class Window:
         return fixed / float(1 << PLACE) + 4.0 * self.origin
 
     def planes(self) -> np.ndarray:
-        """Runs of blocks with the same first coordinate: (R, 3) coordinate, first, last."""
+        """List runs of blocks with the same first coordinate: (R, 3) coordinate, first, last."""
         x = self.block[:, 2]
         first = np.flatnonzero(np.r_[True, x[1:] != x[:-1]])
         last = np.r_[first[1:], len(x)]
@@ -145,4 +146,4 @@ class Window:
         self.fits = True
         if len(self.node) < len(self.where):
             self.node = np.zeros((len(self.where) * 3 // 2, 64, 8), np.float32)
-            self.near = np.zeros(len(self.node), np.uint64)
+            self.near = np.zeros(2 * len(self.node), np.uint64)

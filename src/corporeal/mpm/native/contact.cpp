@@ -20,10 +20,10 @@ struct Touch {            // a possible contact of a with c, or with plane -1 - 
 struct Close {            // a particle near a node where two fields meet
   double x[3];
   float F[9];
-  float reach;
-  int field, base[3];
+  float reach, stretch;
+  int field, count, id[27], at[27];
 };
-static_assert(sizeof(Meet) <= 704 && sizeof(Touch) <= 448 && sizeof(Close) <= 96, "memory");
+static_assert(sizeof(Meet) <= 704 && sizeof(Touch) <= 448 && sizeof(Close) <= 304, "memory");
 
 struct Face {             // a half space u < s through the quadratic spline
   static inline double mean(double s) {
@@ -408,53 +408,63 @@ for (int k = 0; k < nm && !world->full; k++) {
         for (int l = z - 2; l <= z; l++) {
           if (i < 0 || j < 0 || l < 0) continue;
           int b = Grid::block(F, i >> 2, j >> 2, l >> 2);
-          if (b >= 0) F.near[b] |= 1ull << ((i & 3) * 16 + (j & 3) * 4 + (l & 3));
+          if (b < 0) continue;
+          u64 bit = 1ull << ((i & 3) * 16 + (j & 3) * 4 + (l & 3));
+          F.near[2 * b] |= bit;
+          if (M.several) F.near[2 * b + 1] |= bit;
         }
   }
 }
+struct Look {
+  // Remember a particle near nodes where fields meet, with the nodes it reaches.
+  static inline void close(Close &C, const Field &F, int f, const Meet *meets, const double *c,
+                           const int *base, const double *Fp, double volume) {
+    double rows = 0, columns = 0;
+    for (int i = 0; i < 3; i++) {
+      double r = fabs(Fp[3 * i]) + fabs(Fp[3 * i + 1]) + fabs(Fp[3 * i + 2]);
+      double q = fabs(Fp[i]) + fabs(Fp[3 + i]) + fabs(Fp[6 + i]);
+      rows = r > rows ? r : rows;
+      columns = q > columns ? q : columns;
+      C.x[i] = c[i];
+    }
+    for (int i = 0; i < 9; i++) C.F[i] = (float)Fp[i];
+    C.reach = (float)(0.5 * cbrt(volume));
+    C.stretch = (float)(sqrt(rows * columns) * 1.000001);   // no direction stretches more
+    C.field = f;
+    C.count = 0;
+    for (int i = 0; i < 27; i++) {
+      int X = base[0] + i / 9, Y = base[1] + i / 3 % 3, Z = base[2] + i % 3;
+      int pool = Grid::block(F, X >> 2, Y >> 2, Z >> 2);
+      if (pool < 0) continue;
+      int id = (int)F.node[((size_t)pool * 64 + (X & 3) * 16 + (Y & 3) * 4 + (Z & 3)) * 8 + 7];
+      if (!id || !meets[id - 1].several) continue;
+      C.at[C.count] = i;
+      C.id[C.count++] = id - 1;
+    }
+    for (int i = 0; i < 3; i++) C.x[i] -= base[i];
+  }
+  static inline void add(Meet &M, int f, const float *v, double dx) {
+    int q = 0;
+    while (q < M.count && M.field[q] != f) q++;
+    if (q == M.count) return;
+    M.m[q] += v[0];
+    for (int d = 0; d < 3; d++) {
+      M.mean[q][d] += v[1 + d] * dx;
+      M.out[q][d] += v[4 + d];
+    }
+  }
+};
+alignas(64) f8 arena[512];
 for (int f = 0; f < fields && nm && !world->full; f++) {
   Field &F = world->field[f];
-  const int runs = F.rigids ? (F.blocks ? 1 : 0) : F.blocks;
-  for (int b = 0; b < runs; b++) {
-    const int *record = F.block + NB * b;
-    int first = F.rigids ? 0 : record[0], last = F.rigids ? F.blocks : record[1];
-    if (!F.rigids) {
-      int any = 0;
-      for (int i = 0; i < 27; i++) any |= F.near[record[5 + i]] != 0;
-      if (!any) continue;
-    }
-    for (int e = first; e < last; e++) {
-      double c[3], m, V, Fp[9];
-      int base[3];
-      if (F.rigids) {
-        const double *p = F.point + 5 * F.block[e];
-        for (int i = 0; i < 3; i++) {
-          c[i] = (F.rigid[CENTRE + i] + Vec::dot(F.rigid + TURN + 3 * i, p)) * inv -
-                 4.0 * F.origin[i];
-          base[i] = Vec::floor_int(c[i] - 0.5);
-        }
-        m = p[3];
-        V = p[4];
-      } else {
-        const float *q = F.part + (size_t)(e >> 3) * 8 * NC + (e & 7);
-        for (int i = 0; i < 3; i++) {
-          int x = ((const int *)q)[8 * (XI + i)];
-          base[i] = (x - HALF) >> PLACE;
-          c[i] = x * (1.0 / UNIT);
-        }
-        m = q[8 * MA];
-        V = q[8 * VO];
-      }
-      if (base[0] < 0 || base[1] < 0 || base[2] < 0) continue;
-      int home = Grid::block(F, base[0] >> 2, base[1] >> 2, base[2] >> 2);
-      if (home < 0) {
-        // A rigid particle's own block may be empty of others; its nodes may not be.
-        if (!F.rigids) continue;
-      } else if (!(F.near[home] >> ((base[0] & 3) * 16 + (base[1] & 3) * 4 + (base[2] & 3)) & 1)) {
-        continue;
-      }
-      double w[3][3], g[3][3];
+  if (F.rigids) {
+    for (int e = 0; e < F.blocks; e++) {
+      const double *p = F.point + 5 * F.block[e];
+      double c[3], w[3][3], g[3][3];
+      int base[3], several = 0;
       for (int i = 0; i < 3; i++) {
+        c[i] = (F.rigid[CENTRE + i] + Vec::dot(F.rigid + TURN + 3 * i, p)) * inv - 4.0 * F.origin[i];
+        base[i] = Vec::floor_int(c[i] - 0.5);
         double fr = c[i] - base[i];
         w[i][0] = 0.5 * (1.5 - fr) * (1.5 - fr);
         w[i][1] = 0.75 - (fr - 1) * (fr - 1);
@@ -463,55 +473,132 @@ for (int f = 0; f < fields && nm && !world->full; f++) {
         g[i][1] = -2 * (fr - 1) * inv;
         g[i][2] = (fr - 0.5) * inv;
       }
-      if (F.rigids) {
-        for (int i = 0; i < 9; i++) Fp[i] = F.rigid[TURN + i];
-      } else {
-        const float *q = F.part + (size_t)(e >> 3) * 8 * NC + (e & 7);
-        for (int i = 0; i < 9; i++) Fp[i] = q[8 * (DE + i)] + (i % 4 == 0);
-        V *= Fp[0] * (Fp[4] * Fp[8] - Fp[5] * Fp[7]) - Fp[1] * (Fp[3] * Fp[8] - Fp[5] * Fp[6]) +
-             Fp[2] * (Fp[3] * Fp[7] - Fp[4] * Fp[6]);
-      }
-      int several = 0;
       for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
           for (int k = 0; k < 3; k++) {
             int X = base[0] + i, Y = base[1] + j, Z = base[2] + k;
             int pool = Grid::block(F, X >> 2, Y >> 2, Z >> 2);
-            if (pool < 0) continue;
+            if (X < 0 || Y < 0 || Z < 0 || pool < 0) continue;
             int id = (int)F.node[((size_t)pool * 64 + (X & 3) * 16 + (Y & 3) * 4 + (Z & 3)) * 8 + 7];
             if (!id) continue;
-            Meet &M = meets[id - 1];
-            int q = 0;
-            while (q < M.count && M.field[q] != f) q++;
-            if (q == M.count) continue;
-            double mw = m * w[0][i] * w[1][j] * w[2][k];
-            M.m[q] += mw;
-            M.mean[q][0] += mw * (c[0] - X) * dx;
-            M.mean[q][1] += mw * (c[1] - Y) * dx;
-            M.mean[q][2] += mw * (c[2] - Z) * dx;
-            if (!M.several) continue;
-            several = 1;
-            M.out[q][0] += V * g[0][i] * w[1][j] * w[2][k];
-            M.out[q][1] += V * w[0][i] * g[1][j] * w[2][k];
-            M.out[q][2] += V * w[0][i] * w[1][j] * g[2][k];
+            several |= meets[id - 1].several;
+            double mw = p[3] * w[0][i] * w[1][j] * w[2][k];
+            float v[7] = {(float)mw, (float)(mw * (c[0] - X)), (float)(mw * (c[1] - Y)),
+                          (float)(mw * (c[2] - Z)), (float)(p[4] * g[0][i] * w[1][j] * w[2][k]),
+                          (float)(p[4] * w[0][i] * g[1][j] * w[2][k]),
+                          (float)(p[4] * w[0][i] * w[1][j] * g[2][k])};
+            Look::add(meets[id - 1], f, v, dx);
           }
-      if (several) {
+      if (!several) continue;
+      if (nc >= world->most_nears) {
+        world->full = 1;
+        break;
+      }
+      Look::close(closes[nc++], F, f, meets, c, base, F.rigid + TURN, p[4]);
+    }
+    continue;
+  }
+  const float slope = (float)inv;
+  for (int b = 0; b < F.blocks && !world->full; b++) {
+    const int *record = F.block + NB * b;
+    u64 any = 0;
+    for (int i = 0; i < 27; i++) any |= F.near[2 * record[5 + i]];
+    if (!any) continue;
+    for (int i = 0; i < 512; i++) arena[i] = Simd::all(0.0f);
+    int used = 0;
+    for (int s = record[0]; s < record[1]; s += 8) {
+      const float *q = F.part + (size_t)s * NC;
+      int live = record[1] - s < 8 ? record[1] - s : 8, lanes = 0, several = 0;
+      i8 cell[3];
+      alignas(32) int low[3][8], home[8];
+      i8 place = i8{0, 0, 0, 0, 0, 0, 0, 0};
+      for (int d = 0; d < 3; d++) {
+        cell[d] = (*(i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE;
+        *(i8 *)low[d] = cell[d];
+        place = place * 8 + (cell[d] - (4 * record[2 + d] - 1));
+      }
+      *(i8 *)home = place;
+      for (int l = 0; l < live; l++) {
+        int x = low[0][l], y = low[1][l], z = low[2][l];
+        const int *near = record + 5 + (((x >> 2) - record[2] + 1) * 3 + (y >> 2) - record[3] + 1) * 3 +
+                          (z >> 2) - record[4] + 1;
+        int bit = (x & 3) * 16 + (y & 3) * 4 + (z & 3);
+        lanes |= (int)(F.near[2 * *near] >> bit & 1) << l;
+        several |= (int)(F.near[2 * *near + 1] >> bit & 1) << l;
+      }
+      if (!lanes) continue;
+      used = 1;
+      // Lanes of a node: mass, mass times offset 3, outward gradient of volume 3.
+      f8 H[9], w[3][3], g[3][3], fr[3], r[8], W[3][3][8];
+      for (int k = 0; k < 9; k++) H[k] = *(f8u *)(q + 8 * (DE + k));
+      H[0] += 1.0f;
+      H[4] += 1.0f;
+      H[8] += 1.0f;
+      f8 V = *(f8u *)(q + 8 * VO) * (H[0] * (H[4] * H[8] - H[5] * H[7]) -
+                                     H[1] * (H[3] * H[8] - H[5] * H[6]) +
+                                     H[2] * (H[3] * H[7] - H[4] * H[6]));
+      f8 m = *(f8u *)(q + 8 * MA), zero = Simd::all(0.0f);
+      r[0] = m;
+      r[7] = zero;
+      for (int d = 0; d < 3; d++) {
+        fr[d] = Simd::flo(*(i8u *)(q + 8 * (XI + d)) - (cell[d] << PLACE)) * PER_UNIT;
+        Simd::spline(fr[d], w[d]);
+        g[d][0] = (fr[d] - 1.5f) * slope;
+        g[d][1] = (1.0f - fr[d]) * (2.0f * slope);
+        g[d][2] = (fr[d] - 0.5f) * slope;
+        r[1 + d] = m * fr[d];
+        r[4 + d] = V;
+      }
+      for (int d = 0; d < 3; d++)
+        for (int i = 0; i < 3; i++) {
+          for (int k = 0; k < 7; k++) W[d][i][k] = k == 4 + d ? g[d][i] : w[d][i];
+          W[d][i][7] = zero;
+          Simd::turn(W[d][i]);
+        }
+      Simd::turn(r);
+      for (int l = 0; l < live; l++) {
+        if (!(lanes >> l & 1)) continue;
+        f8 *a = arena + home[l];
+        float mass = r[l][0];
+        f8 x1 = f8{0, mass, 0, 0, 0, 0, 0, 0}, y1 = f8{0, 0, mass, 0, 0, 0, 0, 0},
+           z1 = f8{0, 0, 0, mass, 0, 0, 0, 0}, ri = r[l];
+        for (int i = 0; i < 3; i++, ri -= x1) {
+          f8 rj = ri;
+          for (int j = 0; j < 3; j++, rj -= y1) {
+            f8 wij = W[0][i][l] * W[1][j][l];
+            f8 *h = a + i * 64 + j * 8;
+            h[0] += wij * W[2][0][l] * rj;
+            h[1] += wij * W[2][1][l] * (rj - z1);
+            h[2] += wij * W[2][2][l] * (rj - z1 - z1);
+          }
+        }
+        if (!(several >> l & 1)) continue;
         if (nc >= world->most_nears) {
           world->full = 1;
           break;
         }
-        Close &C = closes[nc++];
-        for (int i = 0; i < 3; i++) {
-          C.x[i] = c[i];
-          C.base[i] = base[i];
+        double c[3], Fp[9];
+        int base[3];
+        for (int d = 0; d < 3; d++) {
+          c[d] = ((const int *)q)[8 * (XI + d) + l] * (1.0 / UNIT);
+          base[d] = low[d][l];
         }
-        for (int i = 0; i < 9; i++) C.F[i] = (float)Fp[i];
-        C.reach = (float)(0.5 * cbrt(F.rigids ? F.point[5 * F.block[e] + 4]
-                                              : F.part[(size_t)(e >> 3) * 8 * NC + (e & 7) + 8 * VO]));
-        C.field = f;
+        for (int k = 0; k < 9; k++) Fp[k] = H[k][l];
+        Look::close(closes[nc++], F, f, meets, c, base, Fp, q[8 * VO + l]);
       }
     }
-    if (world->full) break;
+    if (!used) continue;
+    for (int i = 0; i < 8; i++)
+      for (int j = 0; j < 8; j++) {
+        const int *near = record + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
+        size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
+        for (int k = 0; k < 8; k++) {
+          const f8 &h = arena[i * 64 + j * 8 + k];
+          if (!(h[0] > 0)) continue;
+          float id = F.node[((size_t)near[(k + 3) >> 2] * 64 + row + ((k + 3) & 3)) * 8 + 7];
+          if (id != 0.0f) Look::add(meets[(int)id - 1], f, (const float *)&h, dx);
+        }
+      }
   }
 }
 for (int k = 0; k < nm; k++) {     // wipe the marks, whatever happened
@@ -523,7 +610,7 @@ for (int k = 0; k < nm; k++) {     // wipe the marks, whatever happened
       for (int j = (y - 2) >> 2; j <= y >> 2; j++)
         for (int l = (z - 2) >> 2; l <= z >> 2; l++) {
           int b = Grid::block(F, i, j, l);
-          if (b >= 0) F.near[b] = 0;
+          if (b >= 0) F.near[2 * b] = F.near[2 * b + 1] = 0;
         }
   }
 }
@@ -550,25 +637,23 @@ for (int t = 0; t < nt; t++) {
 }
 for (int p = 0; p < nc; p++) {
   Close &C = closes[p];
-  Field &F = world->field[C.field];
-  for (int i = 0; i < 27; i++) {
-    int X = C.base[0] + i / 9, Y = C.base[1] + i / 3 % 3, Z = C.base[2] + i % 3;
-    int pool = Grid::block(F, X >> 2, Y >> 2, Z >> 2);
-    if (pool < 0) continue;
-    int id = (int)F.node[((size_t)pool * 64 + (X & 3) * 16 + (Y & 3) * 4 + (Z & 3)) * 8 + 7];
-    if (!id || !meets[id - 1].several) continue;
-    Meet &M = meets[id - 1];
-    double r[3] = {(C.x[0] - X) * dx, (C.x[1] - Y) * dx, (C.x[2] - Z) * dx};
+  for (int e = 0; e < C.count; e++) {
+    int i = C.at[e];
+    Meet &M = meets[C.id[e]];
+    double r[3] = {(C.x[0] - i / 9) * dx, (C.x[1] - i / 3 % 3) * dx, (C.x[2] - i % 3) * dx};
     for (int t = M.first; t < M.last; t++) {
       Touch &T = touches[t];
       if (T.c < 0 || (T.fa != C.field && T.fc != C.field)) continue;
+      bool first = T.fa == C.field;
       for (int q = 0; q < 3; q++) {
         const double *n = T.candidate[q];
+        double h = Vec::dot(r, n), most = C.reach * C.stretch;
+        if (first ? h + most <= T.far_a[q] : h - most >= T.far_c[q]) continue;
         double a0 = C.F[0] * n[0] + C.F[3] * n[1] + C.F[6] * n[2];
         double a1 = C.F[1] * n[0] + C.F[4] * n[1] + C.F[7] * n[2];
         double a2 = C.F[2] * n[0] + C.F[5] * n[1] + C.F[8] * n[2];
-        double R = C.reach * sqrt(a0 * a0 + a1 * a1 + a2 * a2), h = Vec::dot(r, n);
-        if (T.fa == C.field) {
+        double R = C.reach * sqrt(a0 * a0 + a1 * a1 + a2 * a2);
+        if (first) {
           if (h + R > T.far_a[q]) T.far_a[q] = h + R;
         } else if (h - R < T.far_c[q]) {
           T.far_c[q] = h - R;

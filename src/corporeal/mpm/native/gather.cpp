@@ -217,7 +217,7 @@ for (int b = task[1]; b < task[2]; b++) {
     f8 on = Simd::pick(alive, Simd::all(1.0f), Simd::all(0.0f));
 
     // Velocity, affine part and place; L is the grid's gradient times dx.
-    f8 L[9], C[9], v2 = Simd::all(0.0f);
+    f8 L[9], C[9], B[9], v2 = Simd::all(0.0f);
     i8 off = i8{0, 0, 0, 0, 0, 0, 0, 0};
     for (int k = 0; k < 3; k++) {
       f8u *v = (f8u *)(q + 8 * (VE + k));
@@ -229,6 +229,7 @@ for (int b = task[1]; b < task[2]; b++) {
       for (int j = 0; j < 3; j++) {
         f8u *c = (f8u *)(q + 8 * (AF + 3 * k + j));
         f8 grad = 4.0f * col_new[j];
+        B[3 * k + j] = *c;
         C[3 * k + j] = grad + keep * (*c - 4.0f * col_old[j]);
         *c = C[3 * k + j];
         L[3 * k + j] = grad;
@@ -353,7 +354,7 @@ for (int b = task[1]; b < task[2]; b++) {
           for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++)
               *(f8u *)(q + 8 * (TM + 3 * i + j)) =
-                  G[3 * i + j] + A[3 * i] * G[j] + A[3 * i + 1] * G[3 + j] + A[3 * i + 2] * G[6 + j];
+                  G[3 * i + j] + A[3 * i + j] + A[3 * i] * G[j] + A[3 * i + 1] * G[3 + j] + A[3 * i + 2] * G[6 + j];
         }
         f8 tr = eps[0] + eps[1] + eps[2];
         for (int i = 0; i < 3; i++)
@@ -370,7 +371,9 @@ for (int b = task[1]; b < task[2]; b++) {
         for (int j = i; j < 3; j++) {
           f8 d = C[3 * i + j] + C[3 * j + i];
           stress[k++] += eta * d;
-          w += (i == j ? 0.5f : 1.0f) * d * (L[3 * i + j] + L[3 * j + i]);
+          // Work of the stress that acted in this step, which the old affine part made.
+          w += (i == j ? 0.5f : 1.0f) * (B[3 * i + j] + B[3 * j + i]) *
+               (L[3 * i + j] + L[3 * j + i]);
         }
       w *= eta * volume * on * (dt / dx);
       for (int l = 0; l < 8; l++) viscous += w[l];
