@@ -20,13 +20,14 @@ from corporeal.types import (
     Treatment,
 )
 
-CELL, FPS, STEPS = 0.01, 100, 81
+CELL, FPS, STEPS = 0.01, 50, 41
 SCENE = Scene(
     "made up",
     "",
     (SceneObject("clay_0", "clay", 0.1), SceneObject("stone_0", "stone", 0.04)),
     (),
     (),
+    gravity=(0.0, 0.0, -5.0),
     fps=FPS,
     duration=(STEPS - 1) / FPS,
 )
@@ -63,6 +64,7 @@ def positions(t):
 def row(t):
     clay, stone = positions(t)
     mass = np.array([1.7, 0.1])
+    momentum = np.array([[0, 0, 0], [0, 0, -0.1 * 5 * t if t < HIT else 0.0]])
     first, point = np.full((3, 3), np.nan), np.full((3, 3, 3), np.nan)
     first[0, 2] = first[2, 0] = 0.001
     point[0, 2] = point[2, 0] = 0.0
@@ -73,11 +75,11 @@ def row(t):
         "time": np.float64(t),
         "mass": mass,
         "centre": np.stack([clay.mean(0), stone.mean(0)]),
-        "momentum": np.zeros((2, 3)),
+        "momentum": momentum,
         "kinetic": np.zeros(2),
         "elastic": np.zeros(2),
         "potential": np.zeros(2),
-        "external_impulse": np.zeros((2, 3)),
+        "external_impulse": momentum,
         "plane_impulse": np.zeros((1, 2, 3)),
         "pair_impulse": np.zeros((2, 2)),
         "push_work": np.float64(0),
@@ -134,8 +136,13 @@ def story(tmp_path_factory):
     return SCENE, particles, field, gather(folder, STEPS)
 
 
-def test_the_imprint_is_where_the_stone_struck(story):
-    clay = outcome(story[0], story[1], story[3])["objects"]["clay_0"]
+@pytest.fixture(scope="module")
+def seen(story):
+    return outcome(story[0], story[1], story[3])
+
+
+def test_the_imprint_is_where_the_stone_struck(seen):
+    clay = seen["objects"]["clay_0"]
     assert clay["dent_depth_m"] == pytest.approx(0.02, rel=0.05)
     np.testing.assert_allclose(clay["dent_place"][:2], [0.02, 0.02], atol=0.003)
     assert clay["dent_from_contact_m"]["stone_0"] < 0.02
@@ -143,8 +150,7 @@ def test_the_imprint_is_where_the_stone_struck(story):
     assert clay["at_rest"]
 
 
-def test_the_stone_bounced_and_kept_its_shape(story):
-    seen = outcome(story[0], story[1], story[3])
+def test_the_stone_bounced_and_kept_its_shape(seen):
     stone, pair = seen["objects"]["stone_0"], seen["pairs"]["clay_0|stone_0"]
     assert stone["shape_error_end"] < 1e-6
     assert stone["dent_place"] is None
@@ -167,7 +173,7 @@ def test_a_sound_run_has_no_warnings(story):
 def test_momentum_from_nowhere_is_found(story):
     ledger = dict(story[3].ledger)
     ledger["momentum"] = ledger["momentum"].copy()
-    ledger["momentum"][40:, 1, 0] += 0.02
+    ledger["momentum"][20:, 1, 0] += 0.02
     assert momentum_residual(ledger, SCENE, CELL) == pytest.approx(0.02 / 2)
 
 

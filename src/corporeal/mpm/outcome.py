@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.mpm.shape import Dent, dent, rigid_fit, shape_error, where_it_was
+from corporeal.mpm.shape import Dent, dent, diagonal, largest, rigid_fit, where_it_was
 from corporeal.types import Particles, Scene, Trajectory
 
 REST = 0.3
@@ -38,7 +38,7 @@ def outcome(scene: Scene, particles: Particles, trajectory: Trajectory) -> dict[
     first frame on left out. ``cell_m``, ``duration_s``.
     """
     names = [o.name for o in scene.objects]
-    bodies = Bodies(particles, trajectory)
+    bodies = Bodies(scene, particles, trajectory)
     pairs = pair_rows(names, particles.cell, trajectory)
     return {
         "objects": {name: object_row(b, names, bodies) for b, name in enumerate(names)},
@@ -52,7 +52,8 @@ def outcome(scene: Scene, particles: Particles, trajectory: Trajectory) -> dict[
 class Bodies:
     """Particle positions of every object over time; one pass over the frames on disk."""
 
-    def __init__(self, particles: Particles, trajectory: Trajectory) -> None:
+    def __init__(self, scene: Scene, particles: Particles, trajectory: Trajectory) -> None:
+        self.gravity = -scene.gravity[2]
         self.cell, self.time, self.ledger = particles.cell, trajectory.time, trajectory.ledger
         self.trajectory = trajectory
         count = len(trajectory.ledger["mass"][0])
@@ -70,10 +71,10 @@ class Bodies:
         position = self.trajectory.frames[k].position.astype(float)
         for b, mine in enumerate(self.members):
             now, start = position[mine], self.start[b]
-            self.error[k, b] = shape_error(start, now)
             fit = rigid_fit(start, now, np.ones(len(start)))
             shift = np.linalg.norm(fit.undo(now) - start, axis=1)
-            self.squeeze[b] = max(self.squeeze[b], float(np.sort(shift)[-8:].mean()))
+            self.error[k, b] = np.sqrt(np.mean(shift**2)) / diagonal(start)
+            self.squeeze[b] = max(self.squeeze[b], largest(shift))
             if keep:
                 self.last[b].append(now)
 
@@ -113,7 +114,7 @@ def object_row(body: int, names: list[str], bodies: Bodies) -> dict[str, Any]:
         "turned_deg": degrees(fit.angle),
         "rest_drift_m": drift,
         "length_m": float(np.ptp(start, axis=0).max()),
-        **bounce(centre[:, 2], ledger["first_contact"][-1, body], bodies.time, cell),
+        **bounce(body, bodies, bodies.gravity),
     }
 
 
@@ -133,31 +134,33 @@ def dent_distances(
     return found
 
 
-def bounce(
-    height: Float[np.ndarray, " F"],
-    first_contact: Float[np.ndarray, " N"],
-    time: Float[np.ndarray, " F"],
-    cell: float,
-) -> dict[str, float | None]:
-    """How far a body fell before it first touched anything, and how high it came back.
+def bounce(body: int, bodies: Bodies, gravity: float) -> dict[str, float | None]:
+    """How far a body fell until it first touched anything, and how high it came back.
 
-    The rebound is measured from the lowest point of the centre of mass that follows the contact; a
-    fall of less than half a cell has no ratio.
+    Both are measured from where its centre of mass was at that instant, found by free flight from
+    the last frame before it. A fall of less than half a cell has no ratio.
+
+    Args:
+        body: Which.
+        bodies: All of them over time.
+        gravity: Downward acceleration [m/s²].
+
     """
-    none: dict[str, float | None] = {"fall_m": None, "rebound_m": None, "rebound_ratio": None}
-    if np.isnan(first_contact).all():
-        return none
-    k = max(0, min(int(np.searchsorted(time, np.nanmin(first_contact))), len(time) - 1) - 1)
-    rising = np.flatnonzero(np.diff(height[k:]) > 0)
-    if len(rising) == 0:
-        return none | {"fall_m": float(height[0] - height[k])}
-    low = k + int(rising[0])
-    fall, rebound = float(height[0] - height[low]), float(height[low:].max() - height[low])
-    return {
-        "fall_m": fall,
-        "rebound_m": rebound,
-        "rebound_ratio": rebound / fall if fall > cell / 2 else None,
-    }
+    ledger, time = bodies.ledger, bodies.time
+    first = ledger["first_contact"][-1, body]
+    if np.isnan(first).all():
+        return {"fall_m": None, "rebound_m": None, "rebound_ratio": None}
+    touch = float(np.nanmin(first))
+    k = max(0, int(np.searchsorted(time, touch)) - 1)
+    height = ledger["centre"][:, body, 2]
+    speed = ledger["momentum"][k, body, 2] / ledger["mass"][k, body]
+    flight = touch - time[k]
+    met = height[k] + speed * flight - 0.5 * gravity * flight**2
+    rising = np.flatnonzero(np.diff(height[k + 1 :]) > 0)
+    peak = height[k + 1 + rising[0] :].max() if len(rising) else met
+    fall, rebound = float(height[0] - met), max(0.0, float(peak - met))
+    ratio = rebound / fall if fall > bodies.cell / 2 else None
+    return {"fall_m": fall, "rebound_m": rebound, "rebound_ratio": ratio}
 
 
 def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str, dict[str, Any]]:

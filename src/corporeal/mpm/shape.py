@@ -64,6 +64,12 @@ def shape_error(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) 
     return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / diagonal(start)
 
 
+def largest(size: Float[np.ndarray, " N"]) -> float:
+    """Mean of the eight largest values: one cell's worth of particles."""
+    few = min(8, len(size))
+    return float(np.partition(size, len(size) - few)[-few:].mean())
+
+
 @dataclass(frozen=True)
 class Dent:
     """A residual change of shape."""
@@ -90,7 +96,7 @@ def dent(
     shift = np.mean([trusted_fit(start, x).undo(x) - start for x in now], axis=0)
     size = np.linalg.norm(shift, axis=1)
     dented = size > threshold
-    depth = float(np.sort(size)[-8:].mean())
+    depth = largest(size)
     if not dented.any():
         return Dent(depth, np.full(3, np.nan), 0.0)
     place = np.average(start[dented], axis=0, weights=size[dented] ** 2)
