@@ -205,7 +205,7 @@ TRUTH = {
     "050_medium_clamp": {"": HARD_PLASTIC | STEELS},
     "006_mustard_bottle": {"": HARD_PLASTIC | {"PET"}},
     "038_padlock": {"": STEELS | {"brass"}},
-    "043_phillips_screwdriver": {"": STEELS},
+    "043_phillips_screwdriver": {"": STEELS | HARD_PLASTIC},
     "037_scissors": {"": STEELS},
     "054_softball": {"": {"leather", "cork", "TPU"}},
     "026_sponge": {"": {"seat_foam"}},
