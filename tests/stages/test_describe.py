@@ -45,6 +45,26 @@ def test_a_foreign_substance_is_no_obstacle():
     assert words(describe(scene(odd)))[("vase_0", "vase")].material == "ceramic"
 
 
+@pytest.mark.parametrize(
+    "said",
+    [
+        {"substance": ["a", "list"], "shell_thickness_m": "thin"},
+        {"substance": {"a": 1}, "shell_thickness_m": float("nan")},
+        {"substance": 7, "shell_thickness_m": -1.0},
+        {"substance": True, "shell_thickness_m": True},
+    ],
+)
+def test_nonsense_in_a_foreign_file_is_no_obstacle(said):
+    made = words(describe(scene(("vase_0", [("mesh", plain(), said)]))))[("vase_0", "vase")]
+    assert (made.material, made.structure, made.thickness) == ("ceramic", None, None)
+
+
+def test_a_scene_of_a_thousand_surfaces_is_described_in_a_moment():
+    pieces = [(f"piece_{k}", plain(f"Metal.{k:03d}"), {}) for k in range(1000)]
+    (thing,) = describe(scene(("heap_0", pieces))).objects
+    assert [p.material for p in thing.parts] == ["steel"]
+
+
 def test_unknown_is_a_normal_answer():
     said = words(describe(scene(THING)))[("thing_0", "thing")]
     assert (said.material, said.margin, said.answered_by) == (None, 0.0, "unknown")

@@ -52,10 +52,12 @@ def identify(scene: Scene, hint: Hint = lambda surface, finish: "") -> Identity:
     A node whose extras state a substance is a part. Other surfaces of an object form one part when
     they wear the same finish, unless ``hint`` (what the names say of the matter) differs.
     """
+    looks = [_look(finish) for finish in scene.finishes]
+    members = _members(scene)
     catalogue: list[Part] = []
     part_of_surface = np.zeros(len(scene.surfaces), dtype=np.int64)
     for number in range(len(scene.objects)):
-        groups = _groups(scene, number, hint)
+        groups = _groups(scene, members[number], looks, hint)
         names = _names(scene, number, groups)
         for (key, surfaces), name in zip(groups.items(), names, strict=True):
             found_by = "whole object" if len(groups) == 1 else str(key[0])
@@ -64,18 +66,30 @@ def identify(scene: Scene, hint: Hint = lambda surface, finish: "") -> Identity:
     return Identity(tuple(catalogue), part_of_surface)
 
 
-def _groups(scene: Scene, number: int, hint: Hint) -> dict[tuple[Hashable, ...], list[int]]:
-    groups: dict[tuple[Hashable, ...], list[int]] = {}
+def _members(scene: Scene) -> list[list[int]]:
+    members: list[list[int]] = [[] for _ in scene.objects]
     for k, surface in enumerate(scene.surfaces):
-        if surface.object == number:
-            finish = scene.finishes[surface.finish]
-            stated = surface.extras.get("substance")
-            key = (
-                ("node", surface.name, stated)
-                if stated
-                else ("material", _look(finish), hint(surface, finish))
+        members[surface.object].append(k)
+    return members
+
+
+def _groups(
+    scene: Scene, members: list[int], looks: list[Hashable], hint: Hint
+) -> dict[tuple[Hashable, ...], list[int]]:
+    groups: dict[tuple[Hashable, ...], list[int]] = {}
+    for k in members:
+        surface = scene.surfaces[k]
+        stated = surface.extras.get("substance")
+        key = (
+            ("node", surface.name, str(stated))
+            if stated
+            else (
+                "material",
+                looks[surface.finish],
+                hint(surface, scene.finishes[surface.finish]),
             )
-            groups.setdefault(key, []).append(k)
+        )
+        groups.setdefault(key, []).append(k)
     return groups
 
 

@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel
+from pydantic import BaseModel, Field
 
 from corporeal import materials
 from corporeal.errors import UnknownChoiceError, UserError
@@ -52,7 +52,7 @@ class PartAnswer(BaseModel):
     part: str
     material: str | None
     structure: Literal["solid", "shell"] | None = None
-    thickness_mm: float | None = None
+    thickness_mm: float | None = Field(default=None, gt=0, lt=1e4, allow_inf_nan=False)
     reason: str = ""
 
 

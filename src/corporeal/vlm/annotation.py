@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from math import isfinite
 from pathlib import Path
 from typing import Any
 
@@ -50,6 +51,7 @@ def read_annotations(
         parts = said.pop("parts", {}) if isinstance(said, dict) else {}
         if not isinstance(parts, dict):
             raise BadFileError(path, f"'parts' of {name!r} must map part names.", EXAMPLE)
+        parts = {str(part): answer for part, answer in parts.items()}
         for part in parts:
             if part not in scene[name]:
                 raise _nobody(path, f"part of {name!r}", part, scene[name])
@@ -64,8 +66,8 @@ def _mapping(path: Path) -> dict:
         said = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
         raise BadFileError(path, f"cannot be read ({error}).") from error
-    except yaml.YAMLError as error:
-        first = str(error).splitlines()[0]
+    except (yaml.YAMLError, RecursionError, ValueError) as error:
+        first = (str(error) or "nested too deep").splitlines()[0]
         raise BadFileError(path, f"is not YAML ({first}).", EXAMPLE) from error
     if not isinstance(said, dict):
         raise BadFileError(path, "must map object names to what they are made of.", EXAMPLE)
@@ -90,7 +92,7 @@ def _annotation(path: Path, where: str, said: Any) -> Annotation:
     if thickness is not None:
         thickness = _number(path, f"{where}: thickness_mm", thickness) * 1e-3
         if thickness <= 0:
-            raise BadFileError(path, f"{where}: thickness_mm must be above 0.", "")
+            raise BadFileError(path, f"{where}: thickness_mm must be above 0.")
     return Annotation(material, structure, thickness, _values(path, where, said.get("values")))
 
 
@@ -98,13 +100,13 @@ def _values(path: Path, where: str, said: Any) -> dict[str, float]:
     if said is None:
         return {}
     if not isinstance(said, dict):
-        raise BadFileError(path, f"{where}: 'values' must map, such as {{ young_MPa: 5 }}.", "")
+        raise BadFileError(path, f"{where}: 'values' must map, such as {{ young_MPa: 5 }}.")
     return {str(k): _number(path, f"{where}: {k}", v) for k, v in said.items()}
 
 
 def _number(path: Path, where: str, said: Any) -> float:
-    if isinstance(said, bool) or not isinstance(said, int | float):
-        raise BadFileError(path, f"{where} must be a number, not {said!r}.", "")
+    if isinstance(said, bool) or not isinstance(said, int | float) or not isfinite(said):
+        raise BadFileError(path, f"{where} must be a number, not {said!r}.")
     return float(said)
 
 

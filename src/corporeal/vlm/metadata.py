@@ -1,10 +1,11 @@
 """Recognition without a model: what the file's own names and surface values tell."""
 
 import tomllib
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
+from math import isfinite
 
 from corporeal.geometry.identity import words
 from corporeal.types import Finish, PartWords, SceneObject, Surface
@@ -12,6 +13,8 @@ from corporeal.types import Finish, PartWords, SceneObject, Surface
 KINDS = ("substance", "piece", "thing")
 WEAKER = 0.6
 """Factor on the margin of what is said of the whole when the part is only one of several."""
+LONGEST_WALL = 10.0
+"""No wall of a thing is thicker [m]."""
 UNKNOWN = PartWords("", None, reason="No name in the file says what this is made of.")
 
 
@@ -69,12 +72,15 @@ def stated_substance(surfaces: Iterable[Surface]) -> str | None:
 
 def stated_thickness(surfaces: Iterable[Surface]) -> float | None:
     """Return the wall thickness [m] that the nodes state; 0: stated solid; None: not said."""
-    said = {
-        float(s.extras["shell_thickness_m"])
-        for s in surfaces
-        if isinstance(s.extras.get("shell_thickness_m"), int | float)
-    }
+    said = {_length(s.extras.get("shell_thickness_m")) for s in surfaces}
     return said.pop() if len(said) == 1 else None
+
+
+def _length(said: object) -> float | None:
+    """Return a foreign file's number where it can be a length [m]."""
+    if isinstance(said, bool) or not isinstance(said, int | float):
+        return None
+    return float(said) if isfinite(said) and 0 <= said < LONGEST_WALL else None
 
 
 def matter_hint(surface: Surface, finish: Finish) -> str:
@@ -161,11 +167,10 @@ def _told(
     around = {w for n in thing for w in _tokens(n)}
     for name in names:
         tokens = _tokens(name)
-        for saying in lexicon():
-            if saying.kind in kinds and _stands_in(saying.phrase, tokens):
-                if _fits(saying, finishes, around | set(tokens)):
-                    rank = (len(saying.phrase), -KINDS.index(saying.kind))
-                    found.append((rank, saying, name))
+        for saying in _standing_in(tokens):
+            if saying.kind in kinds and _fits(saying, finishes, around | set(tokens)):
+                rank = (len(saying.phrase), -KINDS.index(saying.kind))
+                found.append((rank, saying, name))
     if not found:
         return [], ""
     best = max(rank for rank, _, _ in found)
@@ -189,9 +194,19 @@ def _fits(saying: Saying, finishes: Sequence[Finish], around: set[str]) -> bool:
     return not saying.of or bool(around & {_singular(w) for w in saying.of})
 
 
-def _stands_in(phrase: tuple[str, ...], tokens: list[str]) -> bool:
-    n = len(phrase)
-    return any(tuple(tokens[i : i + n]) == phrase for i in range(len(tokens) - n + 1))
+def _standing_in(tokens: list[str]) -> Iterator[Saying]:
+    for k, token in enumerate(tokens):
+        for saying in _by_first_word().get(token, ()):
+            if tuple(tokens[k : k + len(saying.phrase)]) == saying.phrase:
+                yield saying
+
+
+@cache
+def _by_first_word() -> dict[str, list[Saying]]:
+    index: dict[str, list[Saying]] = {}
+    for saying in lexicon():
+        index.setdefault(saying.phrase[0], []).append(saying)
+    return index
 
 
 def _tokens(name: str) -> list[str]:
