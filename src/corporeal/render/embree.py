@@ -19,7 +19,15 @@ from corporeal.render import kernels, kernels_light
 from corporeal.render.camera import Camera, axes
 from corporeal.render.kernels import NOTHING, Samples
 from corporeal.render.kernels_light import CHANNELS, GLOSSY, SHARP, Lamps
-from corporeal.render.look import Look, linear, pack, positions, sees_through, vertex_normals
+from corporeal.render.look import (
+    Look,
+    linear,
+    pack,
+    painted,
+    positions,
+    sees_through,
+    vertex_normals,
+)
 from corporeal.types import Scene
 
 Quality = Literal["draft", "normal", "fine"]
@@ -86,6 +94,14 @@ class Stage:
         there.normals = np.ascontiguousarray(normals, dtype=np.float32)
         if not np.array_equal(there.vertices, self.vertices):
             there.scene = there._built()
+        return there
+
+    def painted(self, colours: np.ndarray, light: Light) -> "Stage":
+        """Return the stage in matt plain colours, (T, 3) linear, one per triangle."""
+        there = copy(self)
+        shades, number = np.unique(colours, axis=0, return_inverse=True)
+        there.look = painted(self.look, shades, number.reshape(-1))
+        there.light, there.see_through = light, False
         return there
 
     def _built(self) -> EmbreeScene:

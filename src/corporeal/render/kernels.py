@@ -213,10 +213,11 @@ def _lift(vertices, normals, tri, bary, flat, p):
     """
     x, y, z = p[0], p[1], p[2]
     for c in range(3):
+        if abs(dot(normals[tri[c]], flat)) < CREASE:
+            return
+    for c in range(3):
         n, q = normals[tri[c]], vertices[tri[c]]
         side = -1.0 if dot(n, flat) < 0 else 1.0
-        if dot(n, flat) * side < 0.5:
-            continue
         away = ((x - q[0]) * n[0] + (y - q[1]) * n[1] + (z - q[2]) * n[2]) * side
         if away < 0:
             for a in range(3):
@@ -245,8 +246,7 @@ def meet(look, vertices, normals, floor, pixel, o, d, prim, u, v, t, index, out)
         _facet(vertices, corners, d[k], out.flat[g])
         keep = look.smooth[tri]
         _shading_normal(normals, corners, bary, out.flat[g], d[k], keep, out.normal[g])
-        if dot(out.normal[g], out.flat[g]) > CREASE:
-            _lift(vertices, normals, corners, bary, out.flat[g], out.point[g])
+        _lift(vertices, normals, corners, bary, out.flat[g], out.point[g])
         grazing = max(-dot(out.flat[g], d[k]), 0.2)
         colour(look, tri, u[k], v[k], t[k] * pixel / np.sqrt(grazing), rgba)
         for a in range(3):

@@ -59,6 +59,20 @@ def pack(scene: Scene) -> Look:
     )
 
 
+def painted(look: Look, shades: np.ndarray, shade_of_triangle: np.ndarray) -> Look:
+    """Return the same triangles without textures, each in one of the ``shades`` (S, 3) linear."""
+    finish = np.zeros((len(shades), 12), dtype=np.float32)
+    finish[:, :3] = shades
+    finish[:, ALPHA] = 1
+    finish[:, ROUGH] = 0.8
+    finish[:, TEXTURE] = -1
+    return look._replace(
+        colours=np.ones_like(look.colours),
+        finish=finish,
+        finish_of_triangle=shade_of_triangle.astype(np.int32),
+    )
+
+
 def sees_through(look: Look) -> bool:
     """Whether any ray may pass a surface that it meets."""
     f = look.finish

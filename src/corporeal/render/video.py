@@ -118,6 +118,20 @@ def _picture_options(fps: int, size: tuple[int, int]) -> list[str]:
     ]
 
 
+def length(path: Path) -> int:
+    """Count the frames of a film.
+
+    Raises:
+        UserError: The film cannot be read.
+
+    """
+    try:
+        count, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
+    except (OSError, RuntimeError) as error:
+        raise UserError(f"{path}: cannot be read as a film ({error}). Make it again.") from error
+    return int(count or 0)
+
+
 def pictures(path: Path, wanted: list[int]) -> list[np.ndarray]:
     """Read some frames (height, width, 3) uint8 of a film, by number, in order.
 

@@ -1,0 +1,81 @@
+"""Colours that mean the same in every scene: of materials, laws and objects; turbo for numbers."""
+
+import hashlib
+from collections.abc import Sequence
+
+import matplotlib
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.types import Law
+
+SALT = "s41605"
+"""Chosen so that materials which meet in the showcase lie far apart."""
+HUES = 30
+TIERS = ((0.52, 0.115), (0.66, 0.125), (0.79, 0.105), (0.40, 0.085))
+"""Lightness and chroma of OKLCH."""
+LAWS = {
+    Law.COROTATED: ("fixed corotated", "#4477aa"),
+    Law.NEO_HOOKEAN: ("Neo-Hookean", "#228833"),
+    Law.HENCKY: ("Hencky", "#66ccee"),
+    Law.DRUCKER_PRAGER: ("Drucker–Prager", "#ccbb44"),
+    Law.VON_MISES: ("von Mises", "#aa3377"),
+}
+"""What each law is called in figures, and its colour (Tol's bright scheme)."""
+OBJECTS = (
+    "#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee8866", "#77aadd",
+    "#44bb99", "#ffaabb", "#999933", "#882255",
+)  # fmt: skip
+"""By place in the scene, then again from the start."""
+
+Colour = tuple[float, float, float]
+
+
+def of_hex(text: str) -> Colour:
+    """Read ``#rrggbb`` as sRGB in [0, 1]."""
+    r, g, b = (int(text[k : k + 2], 16) / 255 for k in (1, 3, 5))
+    return r, g, b
+
+
+def of_material(name: str) -> Colour:
+    """Give a library name its colour, the same in every scene, on every machine."""
+    number = int.from_bytes(hashlib.sha256(f"{SALT} {name}".encode()).digest()[:6], "big")
+    lightness, chroma = TIERS[number % len(TIERS)]
+    hue = 2 * np.pi * ((number // len(TIERS)) % HUES) / HUES
+    return of_oklch(lightness, chroma, hue)
+
+
+def of_oklch(lightness: float, chroma: float, hue: float) -> Colour:
+    """OKLCH to sRGB in [0, 1] (Ottosson 2020, "A perceptual color space for image processing")."""
+    a, b = chroma * np.cos(hue), chroma * np.sin(hue)
+    lms = np.array(
+        [
+            lightness + 0.3963377774 * a + 0.2158037573 * b,
+            lightness - 0.1055613458 * a - 0.0638541728 * b,
+            lightness - 0.0894841775 * a - 1.2914855480 * b,
+        ]
+    )
+    rgb = (
+        np.array(
+            [
+                [4.0767416621, -3.3077115913, 0.2309699292],
+                [-1.2684380046, 2.6097574011, -0.3413193965],
+                [-0.0041960863, -0.7034186147, 1.7076147010],
+            ]
+        )
+        @ lms**3
+    )
+    rgb = np.clip(rgb, 0, 1)
+    r, g, b = np.where(rgb <= 0.0031308, 12.92 * rgb, 1.055 * rgb ** (1 / 2.4) - 0.055)
+    return float(r), float(g), float(b)
+
+
+def turbo(values: Sequence[float], log: bool) -> tuple[Float[np.ndarray, "N 3"], float, float]:
+    """Colours from lowest to highest (Mikhailov 2019), and those two; equal values: the middle."""
+    x = np.asarray(values, dtype=float)
+    low, high = float(x.min()), float(x.max())
+    if log:
+        x = np.log(np.maximum(x, 1e-300))
+    span = x.max() - x.min()
+    share = (x - x.min()) / span if span > 1e-9 * max(abs(x.max()), 1e-30) else x * 0 + 0.5
+    return matplotlib.colormaps["turbo"](0.04 + 0.92 * share)[:, :3], low, high
