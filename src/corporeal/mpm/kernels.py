@@ -5,6 +5,7 @@ extensions, so they build on any processor. ``WORLD`` and ``FIELD`` mirror the s
 ``native/shared.cpp`` byte for byte.
 """
 
+import os
 from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from pathlib import Path
@@ -12,7 +13,21 @@ from pathlib import Path
 import numpy as np
 import warp as wp
 
-wp.config.log_level = wp.LOG_ERROR
+
+def _start_quietly() -> None:
+    """Start Warp without its word on stderr that there is no graphics card."""
+    wp.config.log_level = wp.LOG_ERROR
+    kept, nowhere = os.dup(2), os.open(os.devnull, os.O_WRONLY)
+    os.dup2(nowhere, 2)
+    try:
+        wp.init()
+    finally:
+        os.dup2(kept, 2)
+        os.close(kept)
+        os.close(nowhere)
+
+
+_start_quietly()
 wp.set_module_options(
     {"enable_backward": False, "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast"}
 )
@@ -128,6 +143,7 @@ class Program:
         )
         self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
         self.threads = threads
+        self.smallest_share = SMALLEST_SHARE
         self.contact = self._record(contact, 0, 1)
 
     def divide(self, even: np.ndarray, odd: np.ndarray, nodes: np.ndarray) -> None:
@@ -153,7 +169,7 @@ class Program:
         if len(work) == 0:
             return []
         total = np.cumsum(work)
-        threads = self.threads if total[-1] > SMALLEST_SHARE * self.threads else 1
+        threads = self.threads if total[-1] > self.smallest_share * self.threads else 1
         cuts = np.searchsorted(total, total[-1] * np.arange(1, threads) / threads)
         cuts = np.unique([0, *cuts.tolist(), len(work)])
         return [

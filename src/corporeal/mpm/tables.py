@@ -46,7 +46,7 @@ def _rows(problem: Problem, body: Body, number: int) -> np.ndarray:
     sand = body.law == Law.DRUCKER_PRAGER.value
     rows[:, 1], rows[:, 2], rows[:, 3] = body.law, mu, lam
     rows[:, 4], rows[:, 5] = body.yield_stress, body.hardening
-    rows[sand, 6] = cone_slope(angle)[sand]
+    rows[sand, 6] = np.asarray(cone_slope(angle))[sand]
     rows[sand, 7] = (body.cohesion / np.tan(angle) / (lam + 2.0 * mu / 3.0))[sand]
     rows[:, 8] = body.viscosity
     affine = np.isin(body.law, APIC_LAWS) | (problem.transfer == "apic")

@@ -10,6 +10,7 @@ import numpy as np
 
 from corporeal.errors import SimulationError
 from corporeal.mpm import tables
+from corporeal.mpm.carried import Carried
 from corporeal.mpm.kernels import (
     ASTRAY,
     CLOSE,
@@ -98,11 +99,16 @@ class WarpEngine:
             if not self.window[f].fits:
                 raise SimulationError(_too_wide(problem, bodies, 0.0))
         self._lay_out_rigid()
+        single = problem.contact == "single"
+        self.carried = [
+            Carried(problem.bodies[b], state, self.first[b], problem.cell)
+            for b, state in (self.rigid.items() if single else ())
+        ]
         self._lay_out_contact()
         self.program = Program(self.world, self.threads)
         self.speed = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
         self.wave = max([self._rest_speed(f) for f in self.window] + [0.0])
-        self._connect()
+        self.connect()
 
     def _lay_out_rigid(self) -> None:
         """Give every rigid body a grid that holds it however it turns; used where touched."""
@@ -171,7 +177,7 @@ class WarpEngine:
         self.slowing[field] = float((np.sqrt(1.0 + damping**2) + damping).max())
         return float(wave.max()) * self.slowing[field]
 
-    def _connect(self) -> None:
+    def connect(self) -> None:
         """List the tasks and point the native structs to where everything is."""
         even, odd, nodes = [], [], []
         for f, window in self.window.items():
@@ -185,6 +191,8 @@ class WarpEngine:
         self.slower = np.array([self.slowing[f] for f in self.task[:, 0]])
         for f, window in self.window.items():
             self._connect_field(f, window)
+        for body in self.carried:
+            body.find(self.window[0])
         self._point(field=self.field, task=self.task, list=self.node_task, report=self.report)
         self.world["fields"], self.world["dx"] = len(self.field), self.problem.cell
         self.world["tasks"] = len(self.task)
@@ -217,13 +225,15 @@ class WarpEngine:
         good = self.save()
         try:
             while self.time_now < until:
+                if not self.speed < np.inf:
+                    self._find_lost()
                 left = until - self.time_now
                 count = max(1, int(np.ceil(left / self.stable_step() - 1e-9)))
                 self.step(left / count)
                 if count == 1:
                     self.time_now = until
         except SimulationError:
-            lost = self.lost
+            lost = self.lost.copy()
             self.restore(good)
             self.lost = lost
             raise
@@ -253,12 +263,13 @@ class WarpEngine:
         self.program.run(self.program.before)
         self._touch()
         self.program.run(self.program.after)
+        strayed = [body.carry(self.window[0], dt) for body in self.carried]
         self.time_now += dt
         self.steps.count += 1
         self.steps.smallest = min(self.steps.smallest, dt)
         self.steps.largest = max(self.steps.largest, dt)
         if len(self.task):
-            self._hear()
+            self._hear(any(strayed))
 
     def _touch(self) -> None:
         """Solve contact; where a list was too short, lengthen it and begin again."""
@@ -321,16 +332,14 @@ class WarpEngine:
             self._mass = [float(b.volume @ b.density) for b in self.problem.bodies]
         return self._mass
 
-    def _hear(self) -> None:
+    def _hear(self, strayed: bool) -> None:
         """Read what the tasks report; sort where somebody strayed."""
         report = self.report
         speed = np.sqrt(report[:, SPEED2])
         self.speed = float(speed.max())
         self.wave = float((np.sqrt(report[:, WAVE2]) * self.slower).max())
-        if not self.speed < np.inf:
-            self._find_lost()
-        if report[:, ASTRAY].any():
-            self._sort({int(f) for f in self.task[report[:, ASTRAY] > 0, 0]})
+        if strayed or report[:, ASTRAY].any():
+            self._sort({int(f) for f in self.task[strayed | (report[:, ASTRAY] > 0), 0]})
 
     def _book(self) -> None:
         """Move what the tasks added up into the ledger."""
@@ -346,7 +355,7 @@ class WarpEngine:
         for f in sorted(fields):
             if not self.window[f].sort():
                 raise SimulationError(_too_wide(self.problem, self.members[f], self.time_now))
-        self._connect()
+        self.connect()
 
     def _find_lost(self) -> None:
         """Raise when a particle is not finite or left the domain."""
@@ -409,7 +418,7 @@ class WarpEngine:
         self.time_now = time
         self.steps = Steps(int(count), smallest, largest)
         self.lost[:] = False
-        self._connect()
+        self.connect()
 
 
 def _ramped(time: float, ramp: float) -> float:

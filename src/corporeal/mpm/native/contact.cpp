@@ -932,10 +932,10 @@ for (int a = 0; a < fields; a++)
     for (int side = 0; side < 2; side++) {
       int i = side ? c * world->names + a : a * world->names + c;
       if (!(world->first_contact[i] >= 0)) {
-        world->first_contact[i] = world->time + dt;
+        world->first_contact[i] = world->time;
         for (int d = 0; d < 3; d++) world->contact_point[3 * i + d] = row[2 + d] / row[1];
       }
-      world->last_contact[i] = world->time + dt;
+      world->last_contact[i] = world->time;
     }
   }
 

@@ -39,7 +39,7 @@ for (int b = task[1]; b < task[2]; b++) {
       }
       for (int k = 0; k < 3; k++) {
         f8 g = *(f8 *)push[k];  // velocity that the push gives in this step
-        f8 e = g * (r[1 + k] + 0.5f * m * g);
+        f8 e = g * (r[1 + k] + 0.5f * m * (g + (float)world->kick[k]));
         for (int l = 0; l < 8; l++) work += e[l];
         r[1 + k] += m * g;
       }
