@@ -1,0 +1,288 @@
+"""The front door: every verb a person can type."""
+
+import sys
+import traceback
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Annotated, Any
+
+import tyro
+from rich.console import Console
+from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
+from rich.table import Table
+
+from corporeal import __version__
+from corporeal.errors import UserError
+
+Inputs = Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE ...")]
+Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+MATERIAL_WORDS = ("corporeal materials show NAME", "corporeal materials check FILE")
+console = Console(stderr=True)
+
+
+@dataclass(frozen=True)
+class Where:
+    """Where a run's folder goes."""
+
+    out: Path = Path("runs")
+    """Folder that holds the runs."""
+    name: str = ""
+    """The run's own folder inside; by default the scene's name."""
+    resume: bool = True
+    """Go on with what an interrupted run left, instead of starting its simulation again."""
+
+
+def verb_run() -> None:
+    """Do everything, from a scene to a film and a report.
+
+    SCENE is a GLB or glTF file, several of them (each one object), or a scene.toml.
+    Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
+    What is already done with the same settings is not done again.
+    """
+    from corporeal.pipeline import Settings
+
+    @dataclass(frozen=True)
+    class Run:
+        inputs: Inputs
+        where: Where = Where()
+        settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
+
+    asked = _parse(Run, "run", verb_run.__doc__)
+    _go(list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where)
+
+
+def verb_demo() -> None:
+    """Run one of the showcase's own scenes, end to end; needs no files, no key, no GPU.
+
+    The first scene drops a rubber duck on mud. The scene is written to runs/<scene>/input/ as a
+    GLB, and then run like any other.
+    """
+    from corporeal.pipeline import Settings, write_showcase
+    from corporeal.showcase.scenes import SCENES
+
+    first = next(iter(SCENES))
+
+    @dataclass(frozen=True)
+    class Demo:
+        scene: tyro.conf.Positional[str] = first
+        where: Where = Where()
+        settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
+
+    asked = _parse(Demo, "demo", f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}.")
+    where = replace(asked.where, name=asked.where.name or asked.scene)
+    folder = where.out / where.name
+    with console.status("building the scene"):
+        path = write_showcase(asked.scene, folder / "input")
+    _go([path], folder, asked.settings, where)
+
+
+def verb_status() -> None:
+    """Tell how far a run came, and how long each verb took."""
+    from corporeal.pipeline import status
+
+    @dataclass(frozen=True)
+    class Status:
+        run: Folder
+
+    table = Table("verb", "state", "seconds", box=None)
+    for verb, state, seconds in status(_parse(Status, "status", verb_status.__doc__).run):
+        table.add_row(verb, state, "" if seconds is None else f"{seconds:.1f}")
+    Console().print(table)
+
+
+def verb_materials() -> None:
+    """Show the measured library: `materials`, `materials show NAME`, `materials check FILE`."""
+    from corporeal import materials
+
+    @dataclass(frozen=True)
+    class Menu:
+        words: tyro.conf.Positional[tuple[str, ...]] = ()
+        library: str = "default"
+        """"default", or "reference": the 22 materials as first published."""
+
+    asked = _parse(Menu, "materials", verb_materials.__doc__)
+    if not asked.words:
+        print(materials.menu(asked.library))
+    elif asked.words[0] == "show" and len(asked.words) == 2:
+        print(materials.show(asked.words[1], asked.library))
+    elif asked.words[0] == "check" and len(asked.words) == 2:
+        problems = materials.lint(materials.read(Path(asked.words[1])))
+        if problems:
+            raise UserError("\n  ".join([f"{asked.words[1]} has problems:", *problems]))
+        print(f"{asked.words[1]}: nothing to complain about.")
+    else:
+        raise UserError(f"Say `corporeal materials`, or one of: {'; '.join(MATERIAL_WORDS)}.")
+
+
+def verb_doctor() -> None:
+    """Tell what works on this machine, and what would be gained by what."""
+    from corporeal.doctor import examine
+
+    _parse(dataclass(frozen=True)(type("Doctor", (), {})), "doctor", verb_doctor.__doc__)
+    table = Table("", "", "found", "advice", box=None)
+    for finding in examine():
+        mark = "[green]✓[/]" if finding.works else "[yellow]–[/]"
+        table.add_row(mark, finding.what, finding.found, finding.advice)
+    Console().print(table)
+
+
+def _again(verb: str) -> Callable[[], None]:
+    def redo() -> None:
+        from corporeal.pipeline import Settings, reopen
+
+        known = verb in Settings.__dataclass_fields__
+        kept = reopen(Path(sys.argv[2])) if _names_a_run() else ([], Settings())
+        config: Any = getattr(kept[1], verb, None)
+
+        @dataclass(frozen=True)
+        class Redo:
+            run: Folder
+
+        shape = Redo
+        if known:
+            shape = dataclass(frozen=True)(
+                type(
+                    "Redo",
+                    (),
+                    {"__annotations__": {"run": Folder, "config": type(config)}, "config": config},
+                )
+            )
+        asked = _parse(shape, verb, f"Redo `{verb}` of a run; what comes after goes stale.")
+        inputs, settings = reopen(asked.run)
+        if known:
+            settings = replace(settings, **{verb: asked.config})
+        _go(inputs, asked.run, settings, Where(), until=verb)
+
+    redo.__doc__ = f"Redo `{verb}` of a run with other settings."
+    return redo
+
+
+def _names_a_run() -> bool:
+    return len(sys.argv) > 2 and (Path(sys.argv[2]) / "run.json").exists()
+
+
+VERBS: dict[str, Callable[[], None]] = {
+    "demo": verb_demo,
+    "run": verb_run,
+    "status": verb_status,
+    "materials": verb_materials,
+    "doctor": verb_doctor,
+}
+REDO = ("assemble", "describe", "segment", "ground", "fill", "simulate", "film", "report")
+VERBS |= {verb: _again(verb) for verb in REDO}
+
+
+# ---------------------------------------------------------------- how a verb is done
+
+
+def _parse(kind: Any, verb: str, description: str | None) -> Any:
+    """Read the rest of the command line into ``kind``; its nested settings become plain flags."""
+    return tyro.cli(
+        tyro.conf.OmitArgPrefixes[kind],
+        prog=f"corporeal {verb}",
+        description=description,
+        args=sys.argv[2:],
+    )
+
+
+def _folder(where: Where, inputs: list[Path]) -> Path:
+    return where.out / (where.name or "-".join(p.stem for p in inputs[:3]) or "scene")
+
+
+def _go(
+    inputs: list[Path], folder: Path, settings: Any, where: Where, until: str = "report"
+) -> None:
+    from corporeal.pipeline import forget_simulation, run
+
+    if not where.resume:
+        forget_simulation(folder)
+    with _told() as tell:
+        run(inputs, folder, settings, tell, until)
+    if until == "report":
+        print(folder / "report.html")
+        print(folder / "film.mp4")
+    else:
+        print(f"{until} done. Go on with: corporeal report {folder}")
+
+
+@contextmanager
+def _told() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
+    """Draw one bar per verb, with the time left; in a log, one line per verb."""
+    columns = (
+        TextColumn("[bold]{task.fields[verb]:>9}"),
+        BarColumn(30),
+        TaskProgressColumn(),
+        TimeRemainingColumn(),
+        TextColumn("[dim]{task.description}"),
+    )
+    with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
+
+        def tell(verb: str) -> Callable[[float, str], None]:
+            for task in bars.task_ids:
+                bars.update(task, completed=1.0, description="")
+            task = bars.add_task("", total=1.0, verb=verb)
+            if not console.is_terminal:
+                console.print(verb)
+
+            def progress(fraction: float, words: str) -> None:
+                bars.update(task, completed=fraction, description=words)
+
+            return progress
+
+        yield tell
+        for task in bars.task_ids:
+            bars.update(task, completed=1.0, description="")
+
+
+def _usage() -> str:
+    lines = [f"corporeal {__version__}: gives reconstructed scenes a body.", ""]
+    for name, verb in VERBS.items():
+        first = (verb.__doc__ or "").strip().splitlines()[0]
+        lines.append(f"  corporeal {name:10} {first}")
+    return "\n".join([*lines, "", "corporeal VERB --help tells more."])
+
+
+def main() -> None:
+    """Do the verb a person typed; their mistake prints one line and exits with code 2."""
+    verb = sys.argv[1] if len(sys.argv) > 1 else "--help"
+    if verb in ("--help", "-h", "help"):
+        print(_usage())
+        return
+    if verb == "--version":
+        print(__version__)
+        return
+    if verb not in VERBS:
+        sys.exit(_complain(f"Unknown verb {verb!r}. Choose one of: {', '.join(VERBS)}."))
+    try:
+        VERBS[verb]()
+    except UserError as error:
+        sys.exit(_complain(str(error)))
+    except KeyboardInterrupt:
+        _complain("Stopped. What was finished is kept: the same command goes on from there.")
+        sys.exit(130)
+    except MemoryError:
+        sys.exit(_complain("Out of memory. Use --detail draft, or a smaller scene."))
+    except Exception as error:  # our own mistake: the details go to a file, not to the person
+        sys.exit(_confess(error))
+
+
+def _complain(message: str) -> int:
+    print(f"corporeal: {message}", file=sys.stderr)
+    return 2
+
+
+def _confess(error: Exception) -> int:
+    path = Path("corporeal-crash.txt")
+    path.write_text("".join(traceback.format_exception(error)), encoding="utf-8")
+    print(
+        f"corporeal: a mistake of ours ({type(error).__name__}: {error}). The details are in "
+        f"{path}; please report them.",
+        file=sys.stderr,
+    )
+    return 1
+
+
+if __name__ == "__main__":
+    main()

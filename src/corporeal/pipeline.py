@@ -1,0 +1,331 @@
+"""The order of the verbs: the only file that knows it.
+
+A run is a folder. Each verb leaves its result in a numbered folder inside, named by a key that
+covers everything it depends on: what is fresh is read back, what is stale is done again, what was
+interrupted goes on. ``run.json`` says how far the run came.
+"""
+
+import resource
+import shutil
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, field, fields, replace
+from pathlib import Path
+from typing import Any
+
+from corporeal import materials, store
+from corporeal.errors import UserError
+from corporeal.formats.glb_writer import write_glb
+from corporeal.mpm.frames import read_trajectory
+from corporeal.mpm.outcome import outcome
+from corporeal.render.figures import fields_figure, strip
+from corporeal.showcase.expectations import expect
+from corporeal.showcase.scenes import build
+from corporeal.stages.assemble import AssembleConfig, assemble
+from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.fill import FillConfig, fill
+from corporeal.stages.film import FilmConfig, film
+from corporeal.stages.ground import GroundConfig, doubts, ground
+from corporeal.stages.report import Story, report
+from corporeal.stages.segment import SegmentConfig, segment
+from corporeal.stages.simulate import SimulateConfig, simulate
+from corporeal.types import Film, MaterialField, Particles, Parts, Scene, Trajectory
+
+Progress = Callable[[float, str], None]
+"""Told the fraction done and what is being done."""
+Tell = Callable[[str], Progress]
+"""Given a verb, returns whom to tell about its progress."""
+
+FOLDERS = {
+    "assemble": "1-assemble",
+    "describe": "4-describe",
+    "segment": "5-segment",
+    "ground": "6-ground",
+    "fill": "7-fill",
+    "simulate": "8-simulate",
+    "film": "9-film",
+    "report": "10-report",
+}
+VERBS = tuple(FOLDERS)
+RUN = "run.json"
+RESULTS = ("film.mp4", "report.html", "materials.json", "audit.json", "fields.png", "strip.png")
+
+
+@dataclass(frozen=True)
+class Settings:
+    """One configuration per verb."""
+
+    assemble: AssembleConfig = field(default_factory=AssembleConfig)
+    describe: DescribeConfig = field(default_factory=DescribeConfig)
+    segment: SegmentConfig = field(default_factory=SegmentConfig)
+    ground: GroundConfig = field(default_factory=GroundConfig)
+    fill: FillConfig = field(default_factory=FillConfig)
+    simulate: SimulateConfig = field(default_factory=SimulateConfig)
+    film: FilmConfig = field(default_factory=FilmConfig)
+
+
+def run(
+    inputs: list[Path],
+    folder: Path,
+    settings: Settings,
+    tell: Tell,
+    until: str = "report",
+) -> Path:
+    """Do every verb up to ``until``; return the run's folder.
+
+    Args:
+        inputs: What a person typed: scene files.
+        folder: The run's folder; made when absent.
+        settings: Configuration of every verb.
+        tell: Whom to tell about progress.
+        until: The last verb to do.
+
+    Raises:
+        UserError: An input cannot be used, the disk is full, or the simulation cannot go on.
+
+    """
+    with store.writing(folder):
+        _Run(inputs, folder, settings, tell).through(until)
+    return folder
+
+
+def reopen(folder: Path) -> tuple[list[Path], Settings]:
+    """Read back what a run was asked to do.
+
+    Raises:
+        UserError: The folder is not a run.
+
+    """
+    if not (folder / RUN).exists():
+        raise UserError(f"{folder} is not a run: it has no {RUN}. Start one with: corporeal run.")
+    said = store.read_json(folder / RUN)
+    configs = {f.name: f.default_factory for f in fields(Settings)}  # type: ignore[misc]
+    known = {
+        name: _config(make(), said["settings"].get(name, {}))  # type: ignore[operator]
+        for name, make in configs.items()
+    }
+    return [Path(p) for p in said["inputs"]], Settings(**known)
+
+
+def _config(default: Any, said: dict) -> Any:
+    given = {}
+    for known in fields(default):
+        value = said.get(known.name, getattr(default, known.name))
+        if isinstance(value, list):
+            value = tuple(value)
+        if isinstance(value, str) and "Path" in str(known.type):
+            value = Path(value)
+        given[known.name] = value
+    return replace(default, **given)
+
+
+def _read_files(config: Any) -> list[str]:
+    """Name the content of every file that a configuration points to."""
+    values = [str(getattr(config, f.name)) for f in fields(config)] if config else []
+    paths = [Path(value.removeprefix("replay:")) for value in values if value]
+    return [store.digest(path) for path in paths if path.exists()]
+
+
+def status(folder: Path) -> list[tuple[str, str, float | None]]:
+    """For each verb: its name, "finished", "unfinished" or "not yet", and its seconds."""
+    reopen(folder)
+    rows = []
+    for verb, name in FOLDERS.items():
+        meta = folder / name / store.META
+        if meta.exists():
+            rows.append((verb, "finished", store.read_json(meta)["seconds"]))
+        else:
+            rows.append((verb, "unfinished" if (folder / name).exists() else "not yet", None))
+    return rows
+
+
+def forget_simulation(folder: Path) -> None:
+    """Drop a simulation, finished or not, so that the next run starts it again."""
+    shutil.rmtree(folder / FOLDERS["simulate"], ignore_errors=True)
+
+
+def write_showcase(name: str, folder: Path) -> Path:
+    """Write one of our own scenes as a GLB; return its path.
+
+    Raises:
+        UnknownChoiceError: There is no such scene.
+
+    """
+    path = folder / f"{name}.glb"
+    with store.writing(path):
+        folder.mkdir(parents=True, exist_ok=True)
+        write_glb(path, build(name))
+    return path
+
+
+class _Run:
+    """One pass over the verbs; holds what earlier verbs made for later ones."""
+
+    def __init__(self, inputs: list[Path], folder: Path, settings: Settings, tell: Tell) -> None:
+        self.inputs, self.folder, self.settings, self.tell = inputs, folder, settings, tell
+        self.key = ""
+        self.seconds: dict[str, float] = {}
+        self.made: dict[str, Any] = {}
+
+    def through(self, until: str) -> None:
+        """Do all verbs up to ``until`` and say in ``run.json`` how it went."""
+        self.folder.mkdir(parents=True, exist_ok=True)
+        self._declare("running")
+        try:
+            for verb in VERBS[: VERBS.index(until) + 1]:
+                self._do(verb)
+        except KeyboardInterrupt:
+            self._declare("interrupted")
+            raise
+        except Exception as error:
+            self._declare("failed", str(error))
+            raise
+        self._declare("finished" if until == "report" else f"done up to {until}")
+
+    def _declare(self, state: str, error: str = "") -> None:
+        settings = {f.name: asdict(getattr(self.settings, f.name)) for f in fields(Settings)}
+        said = {
+            "state": state,
+            "inputs": [str(path.resolve()) for path in self.inputs],
+            "settings": settings,
+            "error": error,
+        }
+        store.write_json(self.folder / RUN, said)
+
+    def _do(self, verb: str) -> None:
+        config = getattr(self.settings, verb, None)
+        before = [self.key] if self.key else [store.digest(p) for p in self._files()]
+        self.key = store.key(verb, config, before + _read_files(config))
+        folder = self.folder / FOLDERS[verb]
+        step = getattr(self, f"_{verb}")
+        if store.fresh(folder, self.key):
+            self.made[verb] = self._read(verb, folder)
+            self.seconds[verb] = store.read_json(folder / store.META)["seconds"]
+            return
+        self._clear(verb, folder)
+        store.begin(folder)
+        start = time.perf_counter()
+        self.made[verb] = step(folder, self.tell(verb))
+        self.seconds[verb] = time.perf_counter() - start
+        store.finish(folder, self.key, config, self.seconds[verb])
+
+    def _files(self) -> list[Path]:
+        missing = [str(p) for p in self.inputs if not p.exists()]
+        if missing:
+            raise UserError(f"No such file: {', '.join(missing)}. Check the path.")
+        return self.inputs
+
+    def _clear(self, verb: str, folder: Path) -> None:
+        """Remove results that no longer follow from the settings; keep an unfinished simulation."""
+        for name in RESULTS:
+            (self.folder / name).unlink(missing_ok=True)
+        for later in VERBS[VERBS.index(verb) + 1 :]:
+            (self.folder / FOLDERS[later] / store.META).unlink(missing_ok=True)
+        started = folder / "started.json"
+        unfinished = started.exists() and store.read_json(started).get("key") == self.key
+        if not (verb == "simulate" and unfinished) and folder.exists():
+            shutil.rmtree(folder)
+        store.write_json(started, {"key": self.key})
+
+    def _read(self, verb: str, folder: Path) -> Any:
+        if verb == "simulate":
+            return read_trajectory(folder)
+        return None if verb == "report" else store.load(folder / store.DATA)
+
+    def _keep(self, folder: Path, value: Any) -> Any:
+        store.save(folder / store.DATA, value)
+        return value
+
+    # ------------------------------------------------------------ the verbs
+
+    def _assemble(self, folder: Path, progress: Progress) -> Scene:
+        progress(0.0, "reading the scene")
+        return self._keep(folder, assemble(self.inputs, self.settings.assemble))
+
+    def _describe(self, folder: Path, progress: Progress) -> Any:
+        progress(0.0, "recognising")
+        return self._keep(folder, describe(self.made["assemble"], self.settings.describe))
+
+    def _segment(self, folder: Path, progress: Progress) -> Parts:
+        progress(0.0, "finding parts")
+        scene, inventory = self.made["assemble"], self.made["describe"]
+        return self._keep(folder, segment(scene, inventory, self.settings.segment))
+
+    def _ground(self, folder: Path, progress: Progress) -> MaterialField:
+        progress(0.0, "looking numbers up")
+        scene, inventory, parts = (self.made[v] for v in ("assemble", "describe", "segment"))
+        made = ground(scene, parts, inventory, self.settings.ground)
+        store.write_json(self.folder / "materials.json", materials.materials_json(made, parts))
+        return self._keep(folder, made)
+
+    def _fill(self, folder: Path, progress: Progress) -> Particles:
+        progress(0.0, "filling with particles")
+        scene, parts, made = (self.made[v] for v in ("assemble", "segment", "ground"))
+        return self._keep(folder, fill(scene, parts, made, self.settings.fill))
+
+    def _simulate(self, folder: Path, progress: Progress) -> Trajectory:
+        scene, particles, made = (self.made[v] for v in ("assemble", "fill", "ground"))
+        return simulate(scene, particles, made, self.settings.simulate, folder, progress)
+
+    def _film(self, folder: Path, progress: Progress) -> Film:
+        names = ("assemble", "segment", "fill", "ground", "simulate")
+        scene, parts, particles, made, trajectory = (self.made[v] for v in names)
+        config = self.settings.film
+        done = film(scene, parts, particles, made, trajectory, config, folder, progress)
+        return self._keep(folder, done)
+
+    def _report(self, folder: Path, progress: Progress) -> None:
+        progress(0.0, "writing the report")
+        started = time.perf_counter()
+        names = ("assemble", "segment", "fill", "ground", "simulate", "film")
+        scene, parts, particles, made, trajectory, movie = (self.made[v] for v in names)
+        fields_figure(scene, parts, made, self.folder / "fields.png")
+        progress(0.5, "drawing the figures")
+        strip(movie, self.folder / "strip.png")
+        audit = store.read_json(self.folder / FOLDERS["simulate"] / "audit.json")
+        happened = outcome(scene, particles, trajectory)
+        seen = expect(scene.name, happened)
+        self.seconds["report"] = time.perf_counter() - started
+        audit |= {
+            "outcome": happened,
+            "expectations": [asdict(e) for e in seen],
+            "seconds": self.seconds | {"total": sum(self.seconds.values())},
+            "peak_memory_mb": peak_memory_mb(),
+            "settings": _spoken(self.settings),
+        }
+        said = (scene.warnings, doubts(made, parts, scene), particles.warnings, audit["warnings"])
+        audit["warnings"] = list(dict.fromkeys(w for group in said for w in group))
+        shutil.copyfile(movie.path, self.folder / "film.mp4")
+        store.write_json(self.folder / "audit.json", audit)
+        story = Story(
+            scene=scene,
+            parts=parts,
+            field=made,
+            particles=particles,
+            film=movie,
+            audit=audit,
+            figures={
+                "The film as a row of frames": self.folder / "strip.png",
+                "Materials, laws and values of every part": self.folder / "fields.png",
+            },
+            sources=materials.sources(),
+            expectations=tuple((e.sentence, e.value, e.met) for e in seen),
+        )
+        report(story, self.folder / "report.html")
+
+
+def peak_memory_mb() -> float:
+    """Largest resident memory of this process so far [MB]."""
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
+    return round(peak / (1e6 if sys.platform == "darwin" else 1e3), 1)
+
+
+def _spoken(settings: Settings) -> dict[str, str]:
+    fill_, simulate_ = settings.fill, settings.simulate
+    return {
+        "detail": fill_.detail,
+        "stiffness": fill_.stiffness,
+        "contact": simulate_.contact,
+        "engine": simulate_.engine,
+    }

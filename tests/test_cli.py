@@ -1,0 +1,163 @@
+import json
+import resource
+import sys
+
+import numpy as np
+import pytest
+
+from corporeal import cli, store
+from corporeal.formats.glb_writer import write_glb
+from corporeal.types import Finish, Scene, SceneObject, Surface
+
+CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
+QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+FACES = np.array([t for a, b, c, d in QUADS for t in ([a, b, c], [a, c, d])])
+
+
+def a_box(size=0.1, substance="rubber", height=0.05, **said):
+    vertices = CORNERS * size + [0, 0, height]
+    surface = Surface("box", 0, 0, vertices, FACES, extras={"substance": substance})
+    thing = SceneObject("box_0", "box", size)
+    return Scene("box", "", (thing,), (surface,), (Finish("red"),), duration=0.2, fps=30, **said)
+
+
+def corporeal(monkeypatch, *words):
+    """Type a command; return its exit code."""
+    monkeypatch.setattr(sys, "argv", ["corporeal", *map(str, words)])
+    try:
+        cli.main()
+    except SystemExit as stop:
+        return stop.code or 0
+    return 0
+
+
+@pytest.fixture
+def typed(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+
+    def type_(*words):
+        code = corporeal(monkeypatch, *words)
+        return code, capsys.readouterr()
+
+    return type_
+
+
+def refused(said, *words):
+    """One line that contains the words, exit code 2, no traceback."""
+    code, text = said
+    assert code == 2, text.err
+    complaint = [line for line in text.err.splitlines() if line.startswith("corporeal: ")]
+    assert len(complaint) == 1, text.err
+    assert "Traceback" not in text.err
+    for word in words:
+        assert word in complaint[0]
+
+
+def test_a_box_falls_and_the_run_tells_everything(typed, tmp_path):
+    write_glb(tmp_path / "box.glb", a_box())
+    code, text = typed("run", "box.glb", "--size", "160x120")
+    assert code == 0, text.err
+    folder = tmp_path / "runs" / "box"
+    for name in ("film.mp4", "report.html", "materials.json", "audit.json", "strip.png"):
+        assert (folder / name).stat().st_size > 500, name
+    audit = json.loads((folder / "audit.json").read_text())
+    assert audit["nan_count"] == 0
+    assert audit["particles_out_of_domain"] == 0
+    assert audit["max_penetration_dx"] < 1
+    assert abs(audit["momentum_residual"]) < 1e-3
+    page = (folder / "report.html").read_text()
+    assert "data:video/mp4" in page
+    assert "Young" in page
+    assert json.loads((folder / "run.json").read_text())["state"] == "finished"
+
+    before = (folder / "8-simulate" / store.META).stat().st_mtime_ns
+    assert typed("run", "box.glb", "--size", "160x120")[0] == 0
+    assert (folder / "8-simulate" / store.META).stat().st_mtime_ns == before, "done twice"
+
+    assert typed("film", "runs/box", "--size", "200x150")[0] == 0
+    assert not (folder / "report.html").exists(), "a stale report was left"
+    code, text = typed("status", "runs/box")
+    assert "not yet" in text.out or "unfinished" in text.out
+    assert typed("report", "runs/box")[0] == 0
+    assert (folder / "report.html").exists()
+
+
+def test_an_unknown_verb_shows_the_menu(typed):
+    refused(typed("simulat"), "Unknown verb", "simulate")
+
+
+def test_a_missing_file_is_named(typed):
+    refused(typed("run", "nowhere.glb"), "nowhere.glb")
+
+
+def test_a_run_needs_a_scene(typed):
+    refused(typed("run"), "scene")
+
+
+def test_a_folder_that_is_no_run_is_refused(typed, tmp_path):
+    (tmp_path / "x").mkdir()
+    refused(typed("film", "x"), "not a run")
+
+
+@pytest.mark.parametrize("content", [b"", b"glTF", b"\0" * 100, b"{}", b"not a model at all"])
+def test_a_file_that_is_no_scene_is_refused(typed, tmp_path, content):
+    (tmp_path / "bad.glb").write_bytes(content)
+    refused(typed("run", "bad.glb"), "bad.glb")
+    assert not (tmp_path / "runs" / "bad" / "film.mp4").exists()
+    assert json.loads((tmp_path / "runs" / "bad" / "run.json").read_text())["state"] == "failed"
+
+
+def test_an_empty_directory_is_refused(typed, tmp_path):
+    (tmp_path / "empty").mkdir()
+    refused(typed("run", "empty"), "empty")
+
+
+def test_a_mesh_without_volume_is_run_or_refused_in_one_line(typed, tmp_path):
+    scene = a_box()
+    point = Surface("dot", 0, 0, np.full((3, 3), 0.1), np.array([[0, 1, 2]]))
+    write_glb(tmp_path / "dot.glb", Scene("dot", "", scene.objects, (point,), scene.finishes))
+    refused(typed("run", "dot.glb"), "dot")
+
+
+def test_an_annotation_for_a_part_that_is_not_there_names_those_that_are(typed, tmp_path):
+    write_glb(tmp_path / "box.glb", a_box())
+    (tmp_path / "a.yaml").write_text("box_0:\n  parts:\n    wheel: steel\n")
+    refused(typed("run", "box.glb", "--annotations", "a.yaml"), "wheel", "box")
+
+
+def test_an_unknown_material_in_an_annotation_shows_the_menu(typed, tmp_path):
+    write_glb(tmp_path / "box.glb", a_box())
+    (tmp_path / "a.yaml").write_text("box_0: unobtainium\n")
+    refused(typed("run", "box.glb", "--annotations", "a.yaml"), "unobtainium", "steel")
+
+
+def test_a_full_disk_is_said_and_the_run_is_not_taken_for_finished(typed, tmp_path):
+    write_glb(tmp_path / "box.glb", a_box())
+    soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
+    resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
+    try:
+        said = typed("run", "box.glb", "--size", "160x120")
+    finally:
+        resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
+    refused(said, "Cannot write")
+    assert json.loads((tmp_path / "runs" / "box" / "run.json").read_text())["state"] != "finished"
+    assert typed("run", "box.glb", "--size", "160x120")[0] == 0, "it goes on once there is room"
+
+
+def test_the_doctor_examines_without_failing(typed):
+    code, text = typed("doctor")
+    assert code == 0
+    assert "warp engine" in text.out
+
+
+def test_materials_can_be_listed_and_shown(typed):
+    assert "steel" in typed("materials")[1].out
+    assert "GPa" in typed("materials", "show", "steel")[1].out
+    refused(typed("materials", "show", "unobtainium"), "unobtainium")
+
+
+def test_help_is_there_for_every_verb(typed):
+    for verb in cli.VERBS:
+        code, text = typed(verb, "--help")
+        assert code == 0
+        assert verb in text.out
