@@ -139,6 +139,8 @@ class Skin:
 def outer_skin(shape: Shape, rng: np.random.Generator) -> Skin:
     """Leave out surface that is buried where pieces overlap: nothing can touch it."""
     mesh = shape.mesh
+    if pieces(mesh).max() == 0 and not len(boundary(mesh)[0]):
+        return Skin(shape, np.arange(len(mesh.triangles)))
     step = 1e-5 * mesh.extent
     crossing = np.zeros(len(mesh.triangles))
     for weights in rng.dirichlet((2, 2, 2), 2):

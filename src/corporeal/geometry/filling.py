@@ -11,6 +11,8 @@ from corporeal.geometry.settle import settle
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import sample_surface, scatter, thin_out
 
+SLIVER = 0.02
+"""Volumes below this share of spacing³ are left out where there is more."""
 PACKING = 0.83
 """Least distance, in spacings, at which dart throwing reaches one point per spacing²."""
 
@@ -23,14 +25,6 @@ class Filling:
     """[m]"""
     volumes: Float[np.ndarray, " N"]
     """[m³]"""
-
-
-def joined(fillings: list[Filling]) -> Filling:
-    """Put several fillings together."""
-    return Filling(
-        np.concatenate([np.zeros((0, 3)), *(f.points for f in fillings)]),
-        np.concatenate([np.zeros(0), *(f.volumes for f in fillings)]),
-    )
 
 
 def fill_body(
@@ -56,8 +50,12 @@ def fill_body(
     """
     points = scatter(shape, spacing, rng)
     limit = deepest(points)
-    depth, _, foot = skin.closest(points)
-    points, limit, depth, foot = _pick(depth < limit, points, limit, depth, foot)
+    depth, foot = np.full(len(points), np.inf), np.zeros_like(points)
+    ask = np.isfinite(limit) | skin.may_be_within(2 * spacing, points)
+    depth[ask], _, foot[ask] = skin.closest(points[ask])
+    points, limit, depth, foot = _pick(
+        (depth < limit) | (limit == np.inf), points, limit, depth, foot
+    )
     narrow = depth < spacing
     inward = (points - foot)[narrow] / np.maximum(depth[narrow], 1e-300)[:, None]
     narrow[narrow] = depth[narrow] + skin.reach(points[narrow] + 1e-9 * inward, inward) < spacing
@@ -66,6 +64,9 @@ def fill_body(
     lost = float(narrow.sum()) * spacing**3
     points, limit = points[~narrow], limit[~narrow]
     middle = middle[thin_out(middle, 0.6 * spacing, points)]
+    each = lost / max(len(middle), 1)
+    if each < SLIVER * spacing**3 and len(points):  # only sharp edges: nothing to speak of
+        middle = middle[:0]
     if not len(middle):
         return Filling(
             settle(points, shape, skin, spacing, limit), np.full(len(points), spacing**3)
@@ -73,7 +74,7 @@ def fill_body(
     everything = np.concatenate([points, middle])
     held = np.arange(len(everything)) >= len(points)
     limit = np.concatenate([limit, np.full(len(middle), np.inf)])
-    volumes = np.where(held, max(lost / len(middle), 1e-3 * spacing**3), spacing**3)
+    volumes = np.where(held, max(each, SLIVER * spacing**3), spacing**3)
     return Filling(settle(everything, shape, skin, spacing, limit, held), volumes)
 
 
@@ -117,6 +118,8 @@ def fill_wall(face: Mesh, spacing: float, thickness: float, rng: np.random.Gener
         points = points[rng.permutation(len(points))]
         found.append(points[thin_out(points, PACKING * spacing)])
     points = np.concatenate(found)
+    if not len(points):  # crumpled more tightly than it is thick
+        return fill_wall(face, spacing, 0.0, rng)
     return Filling(points, np.full(len(points), area * thickness / max(len(points), 1)))
 
 

@@ -74,7 +74,7 @@ def pack(
             lumps.append(_lump(fill_wall(outer, spacing, recipe.wall, rng), member, sheet=False))
         elif len(face.triangles) and not (lumps[0].part == member.part).any():
             lumps.append(_lump(fill_wall(face, spacing, 0.0, rng), member, sheet=False))
-        if len(member.sheet.triangles):
+        if member.sheet_area > 1e-3 * member.body_area:
             filling = fill_wall(member.sheet, spacing, recipe.sheet, rng)
             lumps.append(_lump(filling, member, sheet=True))
     return Packing(

@@ -61,7 +61,8 @@ def settle(
     limit = np.maximum(limit - 0.5 * spacing, 0.5 * spacing)
     if not free.any():
         return points
-    near = np.flatnonzero(free)
+    near = free & (np.isfinite(limit) | outer.may_be_within(5 * spacing, points))
+    near = np.flatnonzero(near)
     for turn in range(ROUNDS):
         distance, skin = _feel(points, near, shape, outer, spacing)
         near = near[(distance < 4 * spacing) | np.isfinite(limit[near])]
@@ -72,7 +73,7 @@ def settle(
             _press(points, skin, spacing, limit, draw=turn >= 2)
     for _ in range(4):
         _press(points, _feel(points, near, shape, outer, spacing)[1], spacing, limit, draw=False)
-    return _stay_inside(points, start, shape, free)
+    return _stay_inside(points, start, shape, near)
 
 
 def _feel(
@@ -101,10 +102,9 @@ def _press(
 
 
 def _stay_inside(
-    points: np.ndarray, start: np.ndarray, shape: Shape, free: np.ndarray
+    points: np.ndarray, start: np.ndarray, shape: Shape, lost: np.ndarray
 ) -> np.ndarray:
     """Take back, by halves and then wholly, what ended outside: gaps narrower than a spacing."""
-    lost = np.flatnonzero(free)
     for share in (0.5, 0.25, 0.0):
         lost = lost[~shape.inside(points[lost])]
         if not len(lost):

@@ -59,6 +59,20 @@ class Shape:
         )
         return np.sqrt(np.asarray(squared)), np.asarray(triangle), np.asarray(point)
 
+    def may_be_within(
+        self, reach: float, points: Float[np.ndarray, "N 3"]
+    ) -> Bool[np.ndarray, " N"]:
+        """Find the points that could be nearer to the surface than ``reach`` [m].
+
+        Asked once per cube of side ``reach``: much faster than the distance of every point.
+        """
+        if not len(points):
+            return np.zeros(0, dtype=bool)
+        cubes = np.floor(points / reach).astype(np.int64)
+        unique, cube = np.unique(cubes, axis=0, return_inverse=True)
+        distance, _, _ = self.closest((unique + 0.5) * reach)
+        return (distance < (1 + np.sqrt(3) / 2) * reach)[cube.reshape(-1)]
+
     def sightings(self, points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
         """How many of 26 evenly spread directions hit the surface."""
         hits = np.zeros(len(points), dtype=np.int64)

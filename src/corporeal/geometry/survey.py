@@ -1,6 +1,7 @@
 """One object taken apart: which triangles enclose which part, how large everything is."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -33,6 +34,11 @@ class Member:
     """Enclosed by the object and belonging to this part [m³]."""
     size: tuple[float, float, float]
     """Extents of its smallest box, shortest first [m]."""
+
+    @cached_property
+    def shape(self) -> Shape:
+        """``body``, ready to be asked."""
+        return Shape(self.body)
 
     @property
     def body_area(self) -> float:
@@ -176,7 +182,7 @@ def label(
         used = member.body.vertices[np.unique(member.body.triangles)]
         low, high = used.min(axis=0), used.max(axis=0)
         near = np.flatnonzero(((points >= low) & (points <= high)).all(axis=1))
-        result[near[Shape(member.body).inside(points[near])]] = member.part
+        result[near[member.shape.inside(points[near])]] = member.part
     left = np.flatnonzero(result < 0)
     faces = rest if len(rest) else np.arange(len(part_of_triangle))
     result[left] = part_of_triangle[faces[Shape(shape.mesh.only(faces)).closest(points[left])[1]]]
@@ -191,6 +197,4 @@ def _with_volume(member: Member, members: list[Member], owner: np.ndarray, each:
     whole = len(members) == 1 and member.closed
     if exact > 0 and (abs(exact - volume) < 0.03 * exact or (few and not whole)):
         volume = exact
-    return Member(
-        member.part, member.body, member.sheet, member.closed, member.build, volume, member.size
-    )
+    return replace(member, volume=volume)

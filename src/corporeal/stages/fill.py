@@ -369,11 +369,7 @@ def weigh(
         thickened = treatment.kind == "shell" and not (
             made.thickness > 0 and not made.modelled and is_porous(member, chosen.cell)
         )
-        mass = np.zeros(len(own))
-        for sheet, total in ((False, made.body_mass), (True, made.sheet_mass)):
-            these = packing.sheet[own] == sheet
-            share = packing.volumes[own[these]]
-            mass[these] = total * share / max(share.sum(), 1e-300)
+        mass = _shared(packing.volumes[own], packing.sheet[own], made)
         if treatment.kind == "rigid":
             one_face = made.thickness if not made.modelled else 0.0
             body, sheets = reference(anatomy, member, one_face, rng)
@@ -389,6 +385,15 @@ def weigh(
         density[own] = mass.sum() / whole
         volume[own] = mass / density[own]
     return volume, density
+
+
+def _shared(volumes: np.ndarray, sheet: np.ndarray, made: Make) -> np.ndarray:
+    """Spread a part's mass over its points; what has no points of its own goes to the others."""
+    mass = np.zeros(len(volumes))
+    for these, total in ((~sheet, made.body_mass), (sheet, made.sheet_mass)):
+        if these.any():
+            mass[these] = total * volumes[these] / volumes[these].sum()
+    return mass * (made.body_mass + made.sheet_mass) / mass.sum()
 
 
 def describe(

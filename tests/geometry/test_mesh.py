@@ -1,0 +1,62 @@
+import numpy as np
+import pytest
+import trimesh
+
+from corporeal.geometry.extent import oriented_size
+from corporeal.geometry.mesh import Mesh, openness, orient, signed_volume, weld
+
+
+def welded(mesh):
+    return weld(np.asarray(mesh.vertices), np.asarray(mesh.faces))[0]
+
+
+def test_split_vertices_and_two_sided_faces_do_not_matter():
+    box = trimesh.creation.box((1, 2, 3))
+    soup = np.asarray(box.triangles).reshape(-1, 3)
+    faces = np.arange(len(soup)).reshape(-1, 3)
+    twice = np.concatenate([faces, faces[:, ::-1]])
+    mesh, kept = weld(soup, twice)
+    assert len(mesh.vertices) == 8
+    assert len(kept) == 12
+    assert openness(mesh) == 0
+    assert abs(signed_volume(mesh)) == pytest.approx(6)
+
+
+def test_welding_is_the_same_anywhere_in_the_world():
+    ball = trimesh.creation.icosphere(2)
+    soup = np.asarray(ball.triangles).reshape(-1, 3)
+    faces = np.arange(len(soup)).reshape(-1, 3)
+    here, there = weld(soup, faces)[0], weld(soup + 1000.0, faces)[0]
+    assert len(here.vertices) == len(there.vertices) == len(ball.vertices)
+
+
+def test_triangles_without_area_are_dropped():
+    vertices = np.array([[0, 0, 0], [1, 0, 0], [0, 1, 0], [2, 0, 0]], float)
+    mesh, kept = weld(vertices, np.array([[0, 1, 2], [0, 1, 1], [0, 1, 3]]))
+    assert len(mesh.triangles) == 1
+    assert list(kept) == [0]
+
+
+@pytest.mark.parametrize("share", [0.15, 1.0])
+def test_flipped_triangles_are_turned_back(share, rng):
+    ball = welded(trimesh.creation.icosphere(3))
+    turn = rng.uniform(size=len(ball.triangles)) < share
+    faces = np.where(turn[:, None], ball.triangles[:, ::-1], ball.triangles)
+    assert signed_volume(orient(Mesh(ball.vertices, faces))) == pytest.approx(signed_volume(ball))
+
+
+def test_a_cavity_stays_and_a_mirrored_leg_is_turned():
+    outer, inner = trimesh.creation.icosphere(3), trimesh.creation.icosphere(3, 0.5)
+    inner.invert()
+    leg = trimesh.creation.box((0.2, 0.2, 1))
+    leg.apply_translation((3, 0, 0))
+    whole = outer.volume + inner.volume + leg.volume
+    leg.invert()
+    mesh = orient(welded(trimesh.util.concatenate([outer, inner, leg])))
+    assert signed_volume(mesh) == pytest.approx(whole)
+
+
+def test_the_smallest_box_of_a_tilted_plate_is_the_plate():
+    plate = trimesh.creation.box((0.1, 1.0, 3.0))
+    plate.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3)))
+    assert oriented_size(np.asarray(plate.vertices)) == pytest.approx((0.1, 1.0, 3.0))

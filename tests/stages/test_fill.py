@@ -1,0 +1,243 @@
+"""Parts become particles: masses, walls, labels, contact points, and what is refused."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import KDTree
+
+from corporeal.errors import UserError
+from corporeal.stages.fill import FillConfig, examine, fill, motions
+from corporeal.types import (
+    Finish,
+    Law,
+    Material,
+    MaterialField,
+    Part,
+    Parts,
+    PartWords,
+    Push,
+    Scene,
+    SceneObject,
+    Structure,
+    Surface,
+)
+
+RUBBER = Material("rubber", Law.NEO_HOOKEAN, 2e6, 0.48, 1100.0)
+STEEL = Material("steel", Law.VON_MISES, 2e11, 0.3, 7850.0, yield_stress=2.5e8)
+ALUMINIUM = Material("aluminium", Law.VON_MISES, 6.9e10, 0.33, 2700.0, yield_stress=1.5e8)
+SOLID = Structure("solid")
+
+
+def thing(*parts, name="thing", **how):
+    """One object: parts are (mesh, material) or (mesh, material, structure)."""
+    return name, parts, how
+
+
+def inputs(*things):
+    objects, surfaces, catalogue, object_of, part_of = [], [], [], [], []
+    materials, structures = [], []
+    for number, (name, made_of, how) in enumerate(things):
+        objects.append(SceneObject(f"{name}_{number}", name, 1.0, **how))
+        for mesh, material, *structure in made_of:
+            vertices = np.asarray(mesh.vertices, dtype=np.float64)
+            triangles = np.asarray(mesh.faces, dtype=np.int64)
+            surfaces.append(Surface(material.name, number, 0, vertices, triangles))
+            object_of += [number] * len(triangles)
+            part_of += [len(catalogue)] * len(triangles)
+            catalogue.append(Part(material.name, number, "node"))
+            materials.append(material)
+            structures.append(structure[0] if structure else SOLID)
+    k = len(catalogue) + 1
+    points = len(part_of)
+    return (
+        Scene("test", "test.glb", tuple(objects), tuple(surfaces), (Finish("plain"),)),
+        Parts(np.array(object_of), np.array(part_of), np.ones(points), tuple(catalogue)),
+        MaterialField(
+            tuple(materials),
+            tuple(structures),
+            tuple(PartWords(m.name, m.name) for m in materials),
+            np.full((k, k), 0.5),
+            np.full((k, k), 0.5),
+        ),
+    )
+
+
+def put(mesh, bottom, x=0.0):
+    mesh = mesh.copy()
+    mesh.apply_translation((x, 0, bottom - mesh.bounds[0, 2]))
+    return mesh
+
+
+def ball(radius=0.1, bottom=0.5, x=0.0):
+    return put(trimesh.creation.icosphere(4, radius), bottom, x)
+
+
+def inertia(points, masses):
+    centre = np.average(points, axis=0, weights=masses)
+    arm = points - centre
+    return centre, (masses[:, None] * arm).T @ arm
+
+
+def test_a_ball_has_the_mass_and_inertia_of_a_ball():
+    particles = fill(*inputs(thing((ball(0.1), RUBBER))))
+    mass = 1100 * ball(0.1).volume
+    assert particles.treatments[0].kind == "deformable"
+    assert particles.mass.sum() == pytest.approx(mass, rel=1e-6)
+    assert particles.mass_real[0] == pytest.approx(mass, rel=1e-6)
+    centre, second = inertia(particles.position, particles.mass)
+    assert np.allclose(centre, [0, 0, 0.6], atol=0.001)
+    # Half a spacing of skin holds no particle centres, so a coarse deformable ball's is smaller.
+    assert np.allclose(np.diag(second), mass * 0.1**2 / 5, rtol=0.05)
+
+
+def test_a_rigid_body_has_its_exact_mass_centre_and_inertia():
+    hammer = [put(trimesh.creation.box((0.1, 0.04, 0.04)), 0.26)]
+    hammer.append(put(trimesh.creation.cylinder(0.015, 0.26), 0.0))
+    particles = fill(*inputs(thing((hammer[0], STEEL), (hammer[1], replace(STEEL, density=700.0)))))
+    assert {t.kind for t in particles.treatments} == {"rigid"}
+    masses = [7850 * hammer[0].volume, 700 * hammer[1].volume]
+    assert particles.mass_real == pytest.approx(masses, rel=0.005)
+    assert particles.mass.sum() == pytest.approx(sum(masses), rel=0.005)
+    centre, second = inertia(particles.position, particles.mass)
+    height = (masses[0] * 0.28 + masses[1] * 0.13) / sum(masses)
+    assert np.allclose(centre, [0, 0, height], atol=0.01 * 0.3)
+    along = masses[0] * (0.04**2 / 12 + (0.28 - height) ** 2)
+    along += masses[1] * (0.26**2 / 12 + (0.13 - height) ** 2)
+    assert second[2, 2] == pytest.approx(along, rel=0.01)
+
+
+def test_a_rigid_body_has_contact_points_on_its_skin_and_rests_on_its_lowest():
+    particles = fill(*inputs(thing((ball(0.1, bottom=0.0), STEEL))))
+    assert particles.treatments[0].kind == "rigid"
+    radius = np.linalg.norm(particles.surface - [0, 0, 0.1], axis=1)
+    assert 500 < len(particles.surface) <= 5000
+    assert 0.099 < radius.min()
+    assert radius.max() < 0.1 + 1e-9
+    assert particles.surface[:, 2].min() == pytest.approx(0, abs=1e-12)
+    gap, _ = KDTree(particles.surface).query(ball(0.1, bottom=0.0).vertices)
+    assert gap.max() < particles.cell
+
+
+def can():
+    return put(trimesh.creation.cylinder(0.033, 0.122, sections=64), 1.0)
+
+
+def test_a_can_keeps_its_areal_mass_and_has_layers():
+    wall = Structure("shell", 1e-4)
+    particles = fill(*inputs(thing((can(), ALUMINIUM, wall))))
+    assert particles.treatments[0].kind == "shell"
+    mass = 2700 * can().area * 1e-4
+    assert particles.mass.sum() == pytest.approx(mass, rel=1e-6)
+    assert particles.mass_real[0] == pytest.approx(mass, rel=1e-6)
+    radius = np.linalg.norm(particles.position[:, :2], axis=1)
+    middle = np.abs(particles.position[:, 2] - 1.061) < 0.02
+    thick = particles.treatments[0].thickness
+    assert thick is not None
+    assert radius[middle].min() > 0.033 - thick  # hollow
+    depths = (0.033 - radius[middle]) / (particles.cell / 2)
+    assert (depths < 1).sum() > 0.15 * middle.sum()
+    assert (depths > 1).sum() > 0.15 * middle.sum()
+
+
+def test_a_shell_too_narrow_to_be_hollow_is_filled_with_its_walls_mass():
+    wall, rod = Structure("shell", 1e-3), put(trimesh.creation.box((0.02, 0.02, 0.4)), 1.0)
+    wide = put(trimesh.creation.box((0.3, 0.3, 0.3)), 1.0, x=1.0)
+    scene = inputs(thing((wide, RUBBER), (rod, RUBBER, wall)))
+    particles = fill(*scene)
+    mass = particles.mass[particles.part == 1].sum()
+    assert mass == pytest.approx(1100 * rod.area * 1e-3, rel=1e-6)
+    assert "filled through" in particles.fills[1]
+
+
+def test_a_shell_is_never_heavier_than_the_same_thing_solid():
+    particles = fill(*inputs(thing((ball(0.1), RUBBER, Structure("shell", 0.5)))))
+    assert particles.mass_real[0] == pytest.approx(1100 * ball(0.1).volume, rel=1e-6)
+
+
+def test_a_solid_whose_mesh_is_a_vessel_weighs_its_wall_not_its_contents():
+    outline = [(0, 0), (0.05, 0), (0.05, 0.1), (0.046, 0.1), (0.046, 0.004), (0, 0.004)]
+    cup = put(trimesh.creation.revolve(np.array(outline), sections=48), 0.5)
+    particles = fill(*inputs(thing((cup, STEEL))))
+    assert particles.mass.sum() == pytest.approx(7850 * abs(cup.volume), rel=0.01)
+    inside = np.linalg.norm(particles.position[:, :2], axis=1) < 0.03
+    assert particles.position[inside, 2].max() < 0.5 + 0.05
+
+
+def test_every_particle_bears_the_name_of_the_part_it_lies_in():
+    seat = put(trimesh.creation.box((0.4, 0.4, 0.1)), 0.1)
+    foot = put(trimesh.creation.box((0.1, 0.1, 0.1)), 0.0)
+    particles = fill(*inputs(thing((seat, RUBBER), (foot, STEEL))))
+    assert np.array_equal(particles.part == 0, particles.position[:, 2] > 0.1)
+    assert particles.mass_real == pytest.approx([1100 * 0.016, 7850 * 0.001], rel=0.01)
+
+
+def test_a_leaf_without_volume_still_has_particles_and_a_mass():
+    leaf = trimesh.Trimesh([[0, 0, 0.5], [0.1, 0, 0.5], [0.1, 0.1, 0.52]], [[0, 1, 2]])
+    stem = put(trimesh.creation.cylinder(0.002, 0.5), 0.0)
+    thick = Structure("shell", 2e-4)
+    particles = fill(*inputs(thing((stem, RUBBER), (leaf, RUBBER, thick)), thing((ball(), RUBBER))))
+    counts = np.bincount(particles.part)
+    assert counts.min() >= 1
+    assert particles.mass[particles.part == 1].sum() == pytest.approx(1100 * leaf.area * 2e-4)
+    assert particles.mass[particles.part == 0].sum() == pytest.approx(1100 * stem.volume, rel=0.01)
+
+
+def test_the_same_seed_gives_the_same_particles():
+    scene = inputs(thing((ball(0.1), RUBBER)))
+    first, again, other = (fill(*scene, FillConfig(seed=s)) for s in (0, 0, 1))
+    assert np.array_equal(first.position, again.position)
+    assert np.array_equal(first.volume, again.volume)
+    assert not np.array_equal(first.position[:9], other.position[:9])
+
+
+def test_particles_of_touching_objects_keep_apart():
+    lower = put(trimesh.creation.box((0.2, 0.2, 0.2)), 0.0)
+    upper = put(trimesh.creation.box((0.2, 0.2, 0.2)), 0.19)
+    particles = fill(*inputs(thing((lower, RUBBER)), thing((upper, RUBBER))))
+    first = particles.position[particles.object == 0]
+    gap, _ = KDTree(first).query(particles.position[particles.object == 1])
+    assert gap.min() >= particles.cell / 4
+    assert particles.mass.sum() == pytest.approx(2 * 1100 * 0.008, rel=1e-6)
+
+
+def test_a_fall_gives_its_speed_and_a_standing_thing_expects_what_falls_on_it():
+    scene, parts, _ = inputs(
+        thing((put(trimesh.creation.box((1, 1, 0.2)), 0.0), RUBBER)),
+        thing((ball(0.1, bottom=1.2), RUBBER)),
+        thing((ball(0.1, bottom=0.0, x=3.0), RUBBER), push=Push((3.0, 0.0, 0.0), 0.0, 0.5)),
+    )
+
+    found = motions(scene, examine(scene, parts, 0), 0)
+    falling = np.sqrt(2 * 9.81 * 1.0)
+    assert found[1].impact_speed == pytest.approx(np.hypot(falling, 1.5), rel=1e-3)
+    assert found[0].impact_speed == pytest.approx(falling, rel=1e-3)
+    assert found[2].impact_speed == pytest.approx(np.hypot(falling, 1.5), rel=1e-3)
+    assert found[2].acceleration == pytest.approx(12.81)
+
+
+def test_what_cannot_be_filled_is_named():
+    flat = trimesh.Trimesh([[0, 0, 1], [1, 0, 1], [0, 1, 1]], [[0, 1, 2]])
+    with pytest.raises(UserError, match="no object encloses a volume"):
+        fill(*inputs(thing((flat, RUBBER))))
+    point = trimesh.Trimesh(np.zeros((3, 3)), [[0, 1, 2]], process=False)
+    with pytest.raises(UserError, match=r"Part 'steel' of object 'thing_0' has no surface"):
+        fill(*inputs(thing((ball(), RUBBER), (point, STEEL))))
+    with pytest.raises(UserError, match=r"'thing_0' reaches .* below the floor"):
+        fill(*inputs(thing((ball(0.1, bottom=-0.1), RUBBER))))
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("folder", ["objects", "ycb"])
+def test_every_real_object_can_be_filled(folder, shared_assets):
+    files = sorted((shared_assets / folder).glob("*.glb"))
+    assert files
+    for file in files:
+        mesh = trimesh.load_scene(file).to_geometry()
+        mesh.vertices *= 0.3 / mesh.extents.max()
+        particles = fill(*inputs(thing((put(mesh, 0.05), RUBBER), name=file.stem)))
+        assert 1 <= particles.count <= 40_000, file
+        assert particles.mass.sum() == pytest.approx(sum(particles.mass_real), rel=1e-6)
+        assert np.isfinite(particles.position).all()
+        assert particles.volume.min() > 0
