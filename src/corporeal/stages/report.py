@@ -28,7 +28,7 @@ UNITS = {
     "loss": ("loss factor η", ""),
     "shell_thickness": ("wall thickness", "m"),
 }
-PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"))
+PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
 LAWS = {
     "COROTATED": "fixed corotated",
     "NEO_HOOKEAN": "Neo-Hookean",

@@ -1,0 +1,44 @@
+from pathlib import Path
+
+import pytest
+
+from corporeal import pipeline, store
+from corporeal.errors import UserError
+from corporeal.pipeline import Settings, reopen, run
+from corporeal.stages.describe import DescribeConfig
+from corporeal.stages.fill import FillConfig
+
+
+def silent(verb):
+    return lambda fraction, words: None
+
+
+def test_a_run_remembers_what_it_was_asked(tmp_path):
+    wanted = Settings(
+        describe=DescribeConfig(annotations=Path("said.yaml")), fill=FillConfig(detail="fine")
+    )
+    with pytest.raises(UserError):
+        run([tmp_path / "nowhere.glb"], tmp_path / "run", wanted, silent)
+    inputs, settings = reopen(tmp_path / "run")
+    assert inputs == [(tmp_path / "nowhere.glb").resolve()]
+    assert settings == wanted
+
+
+def test_a_failed_run_says_why(tmp_path):
+    with pytest.raises(UserError):
+        run([tmp_path / "nowhere.glb"], tmp_path / "run", Settings(), silent)
+    said = store.read_json(tmp_path / "run" / "run.json")
+    assert said["state"] == "failed"
+    assert "nowhere.glb" in said["error"]
+
+
+def test_an_edited_annotation_makes_its_answers_stale(tmp_path):
+    path = tmp_path / "said.yaml"
+    path.write_text("a: steel")
+    before = pipeline._read_files(DescribeConfig(annotations=path))
+    path.write_text("a: glass")
+    assert pipeline._read_files(DescribeConfig(annotations=path)) != before
+
+
+def test_memory_is_counted_in_megabytes():
+    assert 10 < pipeline.peak_memory_mb() < 100_000
