@@ -1,6 +1,6 @@
 """Read a glTF 2.0 scene (.glb, .gltf) as a Scene: Z up, metres as in the file.
 
-Triangles, looks, names and extras are kept. Skins, animations and morphs are left at rest. Any
+Triangles, looks, names and extras are kept. Skins and morphs are left at rest, animations out. Any
 file gives a scene or one ``BadFileError`` that names the place in the file.
 """
 
@@ -15,7 +15,8 @@ from corporeal.formats.glb_extras import object_of_extras, scene_of_extras, writ
 from corporeal.formats.gltf_document import Document, Entry
 from corporeal.formats.gltf_finishes import Wardrobe
 from corporeal.formats.gltf_nodes import Placed, walk
-from corporeal.formats.gltf_primitives import LARGEST_COORDINATE, Piece, read_primitive
+from corporeal.formats.gltf_pose import Skeletons, posed
+from corporeal.formats.gltf_primitives import Piece, read_primitive
 from corporeal.formats.words import everyday, numbered, safe, unique
 from corporeal.types import Scene, Surface
 
@@ -30,6 +31,7 @@ READABLE = (
     "KHR_xmp",
 )
 """Beginnings of extensions that are understood, or that can be left out without changing shapes."""
+MAX_SURFACES = 10_000
 
 
 @dataclass(frozen=True)
@@ -77,7 +79,8 @@ def read_model(path: Path, objects: Objects = "auto") -> Model:
     shapes = _shapes(document, tree, wardrobe)
     if not shapes:
         document.root.fail(
-            "the scene holds no triangles.", "Export a mesh; points, lines and splats are not used."
+            "the scene holds no triangles of any size.",
+            "Export a mesh; points, lines and splats are not used.",
         )
     owner = _owners(tree, {s.node for s in shapes}, objects)
     scene = _scene(document, tree, shapes, owner)
@@ -95,26 +98,36 @@ def _check_extensions(document: Document) -> None:
 
 
 def _shapes(document: Document, tree: list[Placed], wardrobe: Wardrobe) -> list[_Shape]:
-    meshes: dict[str, list[tuple[int, Piece]]] = {}
-    shapes = []
+    """Return every primitive at every place where the scene shows it."""
     if document.root.has("animations"):
         document.warn("is animated; its rest pose is used.")
-    for placed in tree:
-        mesh = placed.node.refer("mesh", "meshes")
-        if mesh is None:
-            continue
-        if placed.node.has("skin"):
-            document.warn("is skinned; its skeleton is ignored and the mesh stands as modelled.")
-        if mesh.pointer not in meshes:
-            meshes[mesh.pointer] = _pieces(mesh, wardrobe)
-        name = _name(placed.node, mesh)
+    shown = [(p, m) for p in tree if (m := p.node.refer("mesh", "meshes")) is not None]
+    meshes = {m.pointer: m for _, m in shown}
+    pieces = {pointer: _pieces(m, wardrobe) for pointer, m in meshes.items()}
+    _check_total(document, [pieces[m.pointer] for _, m in shown])
+    skeletons = Skeletons(document, tree)
+    shapes = []
+    for placed, mesh in shown:
+        name, bones = _name(placed.node, mesh), skeletons.bones(placed)
         extras = placed.node.value.get("extras")
-        for finish, piece in meshes[mesh.pointer]:
-            document.spend(placed.node, len(piece.vertices) + len(piece.triangles))
-            posed = _posed(piece, placed)
+        for finish, piece in pieces[mesh.pointer]:
+            there = posed(piece, placed, bones)
+            if not np.ptp(there.vertices, axis=0).any():
+                document.warn(f"surface {name!r} has no size; it is left out.")
+                continue
             kept = dict(extras) if isinstance(extras, dict) else {}
-            shapes.append(_Shape(placed.number, name, finish, posed, kept))
+            shapes.append(_Shape(placed.number, name, finish, there, kept))
     return shapes
+
+
+def _check_total(document: Document, shown: list[list[tuple[int, Piece]]]) -> None:
+    """Refuse a small file that shows its meshes at a million places, before any is placed."""
+    if sum(map(len, shown)) > MAX_SURFACES:
+        what = f"the scene has more than {MAX_SURFACES} pieces."
+        document.root.fail(what, "Join its meshes first.")
+    for pieces in shown:
+        for _, piece in pieces:
+            document.spend(document.root, len(piece.vertices) + len(piece.triangles))
 
 
 def _pieces(mesh: Entry, wardrobe: Wardrobe) -> list[tuple[int, Piece]]:
@@ -134,37 +147,6 @@ def _name(node: Entry, mesh: Entry) -> str:
     if everyday(own) or not everyday(other):
         return safe(own) or safe(other) or "surface"
     return safe(other)
-
-
-def _posed(piece: Piece, placed: Placed) -> Piece:
-    """Return the piece in the world; a mirrored one keeps its outside out."""
-    with np.errstate(all="ignore"):
-        linear, shift = placed.world_from_node[:3, :3], placed.world_from_node[:3, 3]
-        vertices = piece.vertices @ linear.T + shift
-        mirrored = np.linalg.det(linear) < 0
-        if not np.all(np.abs(vertices) < LARGEST_COORDINATE):
-            placed.node.fail("its transform moves the mesh out of any reasonable place.")
-    return Piece(
-        vertices,
-        piece.triangles[:, ::-1] if mirrored else piece.triangles,
-        _turned(piece.normals, linear),
-        piece.uv,
-        piece.colours,
-    )
-
-
-def _turned(normals: np.ndarray | None, linear: np.ndarray) -> np.ndarray | None:
-    """Return unit normals under a linear map (its cofactors); None where they are not unit."""
-    if normals is None:
-        return None
-    a, b, c = linear.T
-    cofactors = np.stack([np.cross(b, c), np.cross(c, a), np.cross(a, b)], axis=1)
-    turned = normals @ (cofactors * np.sign(np.linalg.det(linear) or 1.0)).T
-    length = np.linalg.norm(turned, axis=1, keepdims=True)
-    if not (length > 1e-12).all():
-        return None
-    # Normals that are unit already pass unrounded, so that reading what we wrote changes nothing.
-    return turned if np.allclose(length, 1, atol=1e-4) else turned / length
 
 
 def _owners(tree: list[Placed], shaped: set[int], objects: Objects) -> dict[int, int]:

@@ -30,7 +30,8 @@ def rows_of(accessor: Entry) -> np.ndarray:
 
 def as_real(rows: np.ndarray, normalized: bool) -> np.ndarray:
     """Return float64; normalised integers become [0, 1] or [-1, 1] (glTF 2.0, 3.6.2.2)."""
-    values = rows.astype(np.float64)
+    with np.errstate(invalid="ignore"):  # signalling NaNs; whoever uses the values looks for NaN
+        values = rows.astype(np.float64)
     if normalized and rows.dtype.kind in "iu":
         values = np.maximum(values / np.iinfo(rows.dtype).max, -1.0)
     return values

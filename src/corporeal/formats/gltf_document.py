@@ -21,8 +21,8 @@ from corporeal.formats.gltf_container import (
 )
 from corporeal.formats.resources import decode_data_uri, read_beside
 
-MAX_ROWS = 200_000_000
-"""Rows of all arrays together that are unpacked from one file."""
+MAX_ROWS = 60_000_000
+"""Vertices and triangles together that are unpacked from one file, copies included."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +164,7 @@ class Document:
         self.rows_left -= rows
         if self.rows_left < 0:
             entry.fail(
-                f"the file asks for more than {MAX_ROWS // 10**6} million rows of numbers.",
+                f"the file asks for more than {MAX_ROWS // 10**6} million vertices and triangles.",
                 "Simplify the model first.",
             )
 

@@ -11,6 +11,8 @@ Z_UP_OF_Y_UP = np.array(
     [[1.0, 0, 0, 0], [0, 0, -1.0, 0], [0, 1.0, 0, 0], [0, 0, 0, 1.0]],
 )
 """(x, y, z) → (x, -z, y): the one place where the file's Y-up becomes the house's Z-up."""
+MAX_NODES = 100_000
+TRANSFORM = {"matrix", "translation", "rotation", "scale"}
 IDENTITY = tuple(np.eye(4).ravel().tolist())
 
 
@@ -33,7 +35,9 @@ def walk(document: Document) -> Iterator[Placed]:
         BadFileError: A node has two parents or is its own ancestor.
 
     """
-    nodes = document.entries("nodes")
+    nodes = document.entries("nodes") or _implied_nodes(document)
+    if len(nodes) > MAX_NODES:
+        document.root.fail(f"has more than {MAX_NODES} nodes.", "Join its meshes first.")
     seen: set[int] = set()
     stack: list[tuple[int, np.ndarray, int | None]]
     stack = [(k, Z_UP_OF_Y_UP, None) for k in reversed(_roots(document, len(nodes)))]
@@ -42,7 +46,8 @@ def walk(document: Document) -> Iterator[Placed]:
         if k in seen:
             nodes[k].fail("the node hangs in the tree twice, or below itself.")
         seen.add(k)
-        placed = Placed(k, nodes[k], above @ local_matrix(nodes[k]), parent)
+        with np.errstate(all="ignore"):  # what grows beyond bounds is refused where it is used
+            placed = Placed(k, nodes[k], above @ local_matrix(nodes[k]), parent)
         yield placed
         children = node_numbers(nodes[k], "children", len(nodes))
         stack += [(c, placed.world_from_node, k) for c in reversed(children)]
@@ -59,6 +64,8 @@ def node_numbers(entry: Entry, key: str, count: int) -> list[int]:
 
 def local_matrix(node: Entry) -> np.ndarray:
     """Return (4, 4) of a node's own matrix, or of its translation · rotation · scale."""
+    if not TRANSFORM & node.value.keys():
+        return np.eye(4)
     if node.has("matrix"):
         matrix = np.array(node.numbers("matrix", IDENTITY)).reshape(4, 4).T
         return _affine(matrix, node)
@@ -81,13 +88,21 @@ def local_matrix(node: Entry) -> np.ndarray:
 
 
 def _affine(matrix: np.ndarray, node: Entry) -> np.ndarray:
-    if np.abs(matrix).max() > 1e12 or not np.allclose(matrix[3], (0, 0, 0, 1), atol=1e-6):
+    if np.abs(matrix).max() > 1e12 or np.abs(matrix[3] - (0, 0, 0, 1)).max() > 1e-6:
         node.fail("the node's transform is not an affine one of sensible size.")
     return matrix
 
 
+def _implied_nodes(document: Document) -> list[Entry]:
+    """Return a node for every mesh of a file without any nodes, which is a library of meshes."""
+    meshes = document.entries("meshes")
+    return [Entry(document, {"mesh": k}, m.pointer) for k, m in enumerate(meshes)]
+
+
 def _roots(document: Document, count: int) -> list[int]:
     """Return the root nodes of the default scene; without scenes, all nodes nobody contains."""
+    if not document.entries("nodes"):
+        return list(range(count))
     scene = document.root.refer("scene", "scenes")
     if scene is None and document.entries("scenes"):
         scene = document.entries("scenes")[0]

@@ -30,6 +30,10 @@ class Piece:
     """(V, 2), the finish's texture transform applied."""
     colours: np.ndarray | None
     """(V, 3 or 4) linear."""
+    joints: np.ndarray | None = None
+    """(V, 4) numbers within the node's skin."""
+    weights: np.ndarray | None = None
+    """(V, 4) of these joints."""
 
 
 def read_primitive(primitive: Entry, mesh: str, dress: Dress) -> Piece | None:
@@ -44,6 +48,9 @@ def read_primitive(primitive: Entry, mesh: str, dress: Dress) -> Piece | None:
     if "targets" in primitive.value:
         document.warn(f"mesh {mesh!r} can morph; its rest shape is used.")
     source = _Source(primitive, mesh)
+    if source.count == 0:
+        document.warn(f"mesh {mesh!r} has a primitive without vertices; it is left out.")
+        return None
     triangles = _without_degenerate(source.triangles(mode))
     if not len(triangles):
         document.warn(f"mesh {mesh!r} has a primitive without triangles; it is left out.")
@@ -56,6 +63,8 @@ def read_primitive(primitive: Entry, mesh: str, dress: Dress) -> Piece | None:
         normals=source.optional("NORMAL", (3,), used),
         uv=_transformed(source.optional(f"TEXCOORD_{dress.uv_set}", (2,), used), dress),
         colours=_in_unit(source.optional("COLOR_0", (3, 4), used)),
+        joints=source.optional("JOINTS_0", (4,), used),
+        weights=source.optional("WEIGHTS_0", (4,), used),
     )
 
 
@@ -69,9 +78,7 @@ class _Source:
         packed = primitive.extension("KHR_draco_mesh_compression")
         self.faces, self.decoded = decode_draco(primitive, packed) if packed else (None, {})
         self._position = self._stored("POSITION", (3,))
-        if self._position is None:
-            self.attributes.fail(f"mesh {mesh!r} has no POSITION.")
-        self.count = len(self._position.rows)
+        self.count = len(self._position.rows) if self._position else 0
 
     def positions(self, used: np.ndarray) -> np.ndarray:
         """Return the places of some vertices."""
@@ -136,7 +143,7 @@ def _whole_numbers(accessor: Entry) -> np.ndarray:
     rows = rows_of(accessor)
     if rows.dtype.kind != "u" or rows.shape[1] != 1:
         accessor.fail("indices must be single unsigned integers.")
-    accessor.document.spend(accessor, len(rows))
+    accessor.document.spend(accessor, len(rows) // 3)
     return rows[:, 0].astype(np.int64)
 
 
