@@ -45,6 +45,16 @@ def test_a_dent_has_its_depth_and_place_however_the_body_lies():
     assert mark.share < 0.3
 
 
+def test_what_gives_on_the_other_side_is_another_dent():
+    squashed = pressed(CUBE)
+    below = np.clip((-0.02 - squashed[:, 2]) / 0.03, 0, 1)
+    squashed = squashed + np.outer(0.006 * below, [0, 0, 1])
+    mark = dent(CUBE, [squashed @ TURN.T], 0.002)
+    assert mark.depth == pytest.approx(0.01, rel=0.25)
+    np.testing.assert_allclose(mark.place[:2], [0.02, 0.01], atol=0.006)
+    assert mark.place[2] > 0.01
+
+
 def test_a_vibration_is_no_dent():
     swing = [CUBE * (1 + 0.05 * np.sin(t) * np.array([1, -1, 0])) for t in np.arange(8) / 8 * 6.28]
     assert dent(CUBE, swing, 0.001).share == 0

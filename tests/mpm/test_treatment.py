@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 from itertools import pairwise
-from math import pi
+from math import pi, sqrt
 
 import pytest
 from hypothesis import given
@@ -58,7 +58,9 @@ BALL = sphere(RUBBER, 0.1)
 # name: part, wave speed [m/s] and substeps per second at 8 cells across; None: rigid.
 TABLE = {
     "duck shell": (DUCK, 27, 6e3),
-    "drinks can": (CAN, 38, 12e3),
+    # The page says 38 m/s and 12k for bending alone; folds that yield at their true angle need
+    # three times as much (stability.fold_factor).
+    "drinks can": (CAN, 38 * 9.1**0.5, 12e3 * 118 / 41),
     "mud": (block(MUD, 0.085, 0.4, 0.4), 69, 17e3),
     "rubber ball, hollow": (sphere(RUBBER, 0.084, shell(0.003)), 40, 9e3),
     "rubber ball, solid": (BALL, 279, 56e3),
@@ -129,14 +131,19 @@ def test_one_soft_part_makes_its_whole_object_deformable():
     assert "by itself it would be rigid" in frame.why
 
 
-def test_a_thickened_wall_keeps_its_bending_stiffness_and_areal_mass():
-    (can,) = plan([CAN], [FALL], "draft").treatments
+def test_a_thickened_wall_keeps_its_mass_its_folding_moment_and_the_stiffness_of_a_fold():
+    (can,) = plan([CAN], [FALL], "fine").treatments
     t, t_num = 1e-4, can.thickness
     assert can.kind == "shell"
-    assert t_num == pytest.approx(2 * 0.066 / 8)
+    assert t_num == pytest.approx(2 * 0.066 / 20)
     assert can.density * t_num == pytest.approx(2700 * t)
-    assert can.young * t_num**3 == pytest.approx(68e9 * t**3)
+    assert can.young * t_num**3 == pytest.approx(68e9 * t**3 * t_num / sqrt(0.033 * t))
     assert can.yield_stress * t_num**2 == pytest.approx(40e6 * t**2)
+
+
+def test_a_wall_that_cannot_yield_keeps_its_bending_stiffness():
+    (duck,) = plan([DUCK], [FALL], "draft").treatments
+    assert duck.young * duck.thickness**3 == pytest.approx(RUBBER.young * 0.002**3)
 
 
 def test_a_rigid_shell_keeps_its_mass():

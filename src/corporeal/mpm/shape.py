@@ -72,20 +72,23 @@ def largest(size: Float[np.ndarray, " N"]) -> float:
 
 @dataclass(frozen=True)
 class Dent:
-    """A residual change of shape."""
+    """A residual change of shape: the patch that moved the way its deepest place did."""
 
     depth: float
     """Largest residual displacement, averaged over one cell's worth of particles [m]."""
     place: Float[np.ndarray, " 3"]
     """Centroid, weighted by displacement squared, on the body as it started [m]; nan: no dent."""
     share: float
-    """Share of the particles that moved more than the threshold [-]."""
+    """Share of the particles that belong to it [-]."""
 
 
 def dent(
     start: Float[np.ndarray, "N 3"], now: list[Float[np.ndarray, "N 3"]], threshold: float
 ) -> Dent:
     """Residual displacement of a body, averaged over its last frames so that vibration cancels.
+
+    A can that is struck on top also gives where it stands: only what moved within 60° of the
+    deepest place's direction counts as the same dent.
 
     Args:
         start: Where the particles started [m].
@@ -95,12 +98,15 @@ def dent(
     """
     shift = np.mean([trusted_fit(start, x).undo(x) - start for x in now], axis=0)
     size = np.linalg.norm(shift, axis=1)
-    dented = size > threshold
-    depth = largest(size)
-    if not dented.any():
-        return Dent(depth, np.full(3, np.nan), 0.0)
+    if not (size > threshold).any():
+        return Dent(largest(size), np.full(3, np.nan), 0.0)
+    nearest = KDTree(start).query(start, k=min(8, len(start)))[1].reshape(len(start), -1)
+    smooth = shift[nearest].mean(axis=1)
+    way = smooth[np.argmax(np.linalg.norm(smooth, axis=1))]
+    along = shift @ way / np.linalg.norm(way)
+    dented = (size > threshold) & (along > 0.5 * size)
     place = np.average(start[dented], axis=0, weights=size[dented] ** 2)
-    return Dent(depth, place, float(dented.mean()))
+    return Dent(largest(size[dented]), place, float(dented.mean()))
 
 
 def where_it_was(

@@ -15,6 +15,7 @@ from corporeal.mpm.stability import (
     bounded_poisson,
     capped_young,
     compress_speed,
+    fold_factor,
     p_wave_speed,
     stable_step,
     thin_wall,
@@ -273,6 +274,8 @@ def treat(
     material, structure = part.material, part.structure
     ratio = wall_ratio(part, 2 * cell)
     stiffer, stronger, denser = thin_wall(ratio)
+    if material.law is Law.VON_MISES and structure.thickness and ratio < 1:
+        stiffer *= fold_factor(structure.thickness, 2 * cell, part.size[1] / 2)
     young, poisson = bounded_poisson(material.young, material.poisson)
     density = material.density * denser
     strong = material.yield_stress
@@ -305,7 +308,7 @@ def reason(verdict: Verdict, soft: bool, shell: bool, ratio: float) -> str:
     if shell and ratio < 1:
         text += (
             f" Its wall is simulated {1 / ratio:.3g} times as thick, with its bending stiffness "
-            "and mass kept; in-plane it is softer than in life."
+            "and mass kept; in its plane it is softer than in life."
         )
     return text
 
