@@ -42,8 +42,7 @@ class Carried:
         whole = rigid.mass_of(position, self.mass, self.volume)
         speed, moment = rigid.fit_motion(whole, position, self.mass, velocity)
         turn = state[tables.TURN : tables.TURN + 9].reshape(3, 3)
-        spin = rigid.world_inverse_inertia(turn, self.inertia) @ moment
-        turn = rigid.turned(turn, spin, dt)
+        turn = rigid.turned(turn, self.inertia, moment, dt)
         state[tables.CENTRE : tables.CENTRE + 3] += dt * speed
         state[tables.TURN : tables.TURN + 9] = turn.ravel()
         state[tables.SPEED : tables.SPEED + 3] = speed

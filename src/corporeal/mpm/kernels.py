@@ -42,7 +42,8 @@ FIELD = np.dtype(
 )
 _POINTERS = (
     "field task contact_memory list order report plane friction restitution ledger pair_memory "
-    "near_memory plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
+    "near_memory plane_impulse pair_impulse friction_loss first_contact last_contact contact_point "
+    "face"
 )
 _COUNTS = (
     "fields planes tasks contacts pairs nears most_contacts most_pairs most_nears full names again"

@@ -11,6 +11,7 @@ import numpy as np
 from corporeal.errors import SimulationError
 from corporeal.mpm import tables
 from corporeal.mpm.carried import Carried
+from corporeal.mpm.contact import half_space_face
 from corporeal.mpm.kernels import (
     ASTRAY,
     CLOSE,
@@ -156,6 +157,8 @@ class WarpEngine:
             "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
         ).split():
             self._point(**{name: getattr(book, name)})
+        self.face = half_space_face(np.linspace(-1.5, 0.0, 4097))
+        self._point(face=self.face)
         self.world["planes"], self.world["names"] = len(walls), bodies + len(walls)
         self.room = 1024
         self._lengthen()

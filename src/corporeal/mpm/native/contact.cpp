@@ -39,15 +39,11 @@ struct Face {             // a half space u < s through the quadratic spline
     if (s > 0) weight = 1.0 - weight;
     return weight > 1e-12 ? moment / weight : n;
   }
-  static inline double face(double p) {   // inverse of mean by bisection and secant on [-1.5, 1.5]
-    if (p >= 0.0) return 1.5;
-    if (p <= -1.5) return -1.5;
-    double low = -1.5, high = 1.5;
-    for (int i = 0; i < 30; i++) {
-      double mid = 0.5 * (low + high);
-      if (mean(mid) < p) low = mid; else high = mid;
-    }
-    return 0.5 * (low + high);
+  // Inverse of mean, from a table of 4097 values over [-1.5, 0].
+  static inline double face(const double *table, double p) {
+    double f = ((p < -1.5 ? -1.5 : p > 0.0 ? 0.0 : p) + 1.5) * (4096.0 / 1.5);
+    int i = f < 4095.0 ? (int)f : 4095;
+    return table[i] + (table[i + 1] - table[i]) * (f - i);
   }
   static inline double touching(double s) {
     s = fabs(s);
@@ -417,8 +413,8 @@ for (int k = 0; k < nm && !world->full; k++) {
 }
 struct Look {
   // Remember a particle near nodes where fields meet, with the nodes it reaches.
-  static inline void close(Close &C, const Field &F, int f, const Meet *meets, const double *c,
-                           const int *base, const double *Fp, double volume) {
+  static inline void close(Close &C, int f, const double *c, const int *base, const double *Fp,
+                           double volume) {
     double rows = 0, columns = 0;
     for (int i = 0; i < 3; i++) {
       double r = fabs(Fp[3 * i]) + fabs(Fp[3 * i + 1]) + fabs(Fp[3 * i + 2]);
@@ -431,16 +427,6 @@ struct Look {
     C.reach = (float)(0.5 * cbrt(volume));
     C.stretch = (float)(sqrt(rows * columns) * 1.000001);   // no direction stretches more
     C.field = f;
-    C.count = 0;
-    for (int i = 0; i < 27; i++) {
-      int X = base[0] + i / 9, Y = base[1] + i / 3 % 3, Z = base[2] + i % 3;
-      int pool = Grid::block(F, X >> 2, Y >> 2, Z >> 2);
-      if (pool < 0) continue;
-      int id = (int)F.node[((size_t)pool * 64 + (X & 3) * 16 + (Y & 3) * 4 + (Z & 3)) * 8 + 7];
-      if (!id || !meets[id - 1].several) continue;
-      C.at[C.count] = i;
-      C.id[C.count++] = id - 1;
-    }
     for (int i = 0; i < 3; i++) C.x[i] -= base[i];
   }
   static inline void add(Meet &M, int f, const float *v, double dx) {
@@ -473,6 +459,12 @@ for (int f = 0; f < fields && nm && !world->full; f++) {
         g[i][1] = -2 * (fr - 1) * inv;
         g[i][2] = (fr - 0.5) * inv;
       }
+      if (nc >= world->most_nears) {
+        world->full = 1;
+        break;
+      }
+      Close &C = closes[nc];
+      C.count = 0;
       for (int i = 0; i < 3; i++)
         for (int j = 0; j < 3; j++)
           for (int k = 0; k < 3; k++) {
@@ -481,7 +473,11 @@ for (int f = 0; f < fields && nm && !world->full; f++) {
             if (X < 0 || Y < 0 || Z < 0 || pool < 0) continue;
             int id = (int)F.node[((size_t)pool * 64 + (X & 3) * 16 + (Y & 3) * 4 + (Z & 3)) * 8 + 7];
             if (!id) continue;
-            several |= meets[id - 1].several;
+            if (meets[id - 1].several) {
+              several = 1;
+              C.at[C.count] = 9 * i + 3 * j + k;
+              C.id[C.count++] = id - 1;
+            }
             double mw = p[3] * w[0][i] * w[1][j] * w[2][k];
             float v[7] = {(float)mw, (float)(mw * (c[0] - X)), (float)(mw * (c[1] - Y)),
                           (float)(mw * (c[2] - Z)), (float)(p[4] * g[0][i] * w[1][j] * w[2][k]),
@@ -490,11 +486,8 @@ for (int f = 0; f < fields && nm && !world->full; f++) {
             Look::add(meets[id - 1], f, v, dx);
           }
       if (!several) continue;
-      if (nc >= world->most_nears) {
-        world->full = 1;
-        break;
-      }
-      Look::close(closes[nc++], F, f, meets, c, base, F.rigid + TURN, p[4]);
+      Look::close(C, f, c, base, F.rigid + TURN, p[4]);
+      nc++;
     }
     continue;
   }
@@ -549,8 +542,13 @@ for (int f = 0; f < fields && nm && !world->full; f++) {
         r[1 + d] = m * fr[d];
         r[4 + d] = V;
       }
+      alignas(32) float plain[9][8];
       for (int d = 0; d < 3; d++)
         for (int i = 0; i < 3; i++) {
+          if (!several) {
+            *(f8 *)plain[3 * d + i] = w[d][i];
+            continue;
+          }
           for (int k = 0; k < 7; k++) W[d][i][k] = k == 4 + d ? g[d][i] : w[d][i];
           W[d][i][7] = zero;
           Simd::turn(W[d][i]);
@@ -562,6 +560,20 @@ for (int f = 0; f < fields && nm && !world->full; f++) {
         float mass = r[l][0];
         f8 x1 = f8{0, mass, 0, 0, 0, 0, 0, 0}, y1 = f8{0, 0, mass, 0, 0, 0, 0, 0},
            z1 = f8{0, 0, 0, mass, 0, 0, 0, 0}, ri = r[l];
+        if (!several) {            // planes need no gradient
+          float w0 = plain[6][l], w1 = plain[7][l], w2 = plain[8][l];
+          for (int i = 0; i < 3; i++, ri -= x1) {
+            f8 rj = ri;
+            for (int j = 0; j < 3; j++, rj -= y1) {
+              float wij = plain[i][l] * plain[3 + j][l];
+              f8 *h = a + i * 64 + j * 8;
+              h[0] += (wij * w0) * rj;
+              h[1] += (wij * w1) * (rj - z1);
+              h[2] += (wij * w2) * (rj - z1 - z1);
+            }
+          }
+          continue;
+        }
         for (int i = 0; i < 3; i++, ri -= x1) {
           f8 rj = ri;
           for (int j = 0; j < 3; j++, rj -= y1) {
@@ -579,12 +591,28 @@ for (int f = 0; f < fields && nm && !world->full; f++) {
         }
         double c[3], Fp[9];
         int base[3];
+        Close &C = closes[nc++];
+        C.count = 0;
+        for (int i = 0; i < 3; i++)
+          for (int j = 0; j < 3; j++) {
+            int x = low[0][l] + i - 4 * record[2] + 4, y = low[1][l] + j - 4 * record[3] + 4,
+                z = low[2][l] - 4 * record[4] + 4;
+            const int *near = record + 5 + ((x >> 2) * 3 + (y >> 2)) * 3;
+            size_t row = (x & 3) * 16 + (y & 3) * 4;
+            for (int k = 0; k < 3; k++) {
+              size_t slot = (size_t)near[(z + k) >> 2] * 64 + row + ((z + k) & 3);
+              int id = (int)F.node[slot * 8 + 7];
+              if (!id || !meets[id - 1].several) continue;
+              C.at[C.count] = 9 * i + 3 * j + k;
+              C.id[C.count++] = id - 1;
+            }
+          }
         for (int d = 0; d < 3; d++) {
           c[d] = ((const int *)q)[8 * (XI + d) + l] * (1.0 / UNIT);
           base[d] = low[d][l];
         }
         for (int k = 0; k < 9; k++) Fp[k] = H[k][l];
-        Look::close(closes[nc++], F, f, meets, c, base, Fp, q[8 * VO + l]);
+        Look::close(C, f, c, base, Fp, q[8 * VO + l]);
       }
     }
     if (!used) continue;
@@ -712,7 +740,7 @@ for (int t = 0; t < nt; t++) {
     T.gap = (-Face::mean(-h) - pa - Face::touching(h)) * dx;
   } else if (M.m[T.c] > 0) {
     double pc = Vec::dot(M.mean[T.c], T.n) * inv;
-    double s = 0.5 * (Face::face(pa) - Face::face(-pc));
+    double s = 0.5 * (Face::face(world->face, pa) - Face::face(world->face, -pc));
     T.gap = (pc - pa - Face::touching(s)) * dx;
   }
 }

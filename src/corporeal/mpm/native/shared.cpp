@@ -38,7 +38,7 @@ struct World {
   int *order;
   double *report, *plane, *friction, *restitution, *ledger, *pair_memory, *near_memory;
   double *plane_impulse, *pair_impulse, *friction_loss, *first_contact, *last_contact;
-  double *contact_point;
+  double *contact_point, *face;
   double dx, dt, time, kick[3];
   int fields, planes, tasks, contacts, pairs, nears, most_contacts, most_pairs, most_nears, full;
   int names, again;   // bodies and planes in the books; a repeated call after more memory
