@@ -105,12 +105,12 @@ def cylinder_sdf(centre, radius, height):
     return distance
 
 
-def lattice(sdf, centre, reach, spacing, turn=None):
-    """Points of a lattice centred on a body, in the body's own axes, inside its surface."""
+def lattice(sdf, centre, reach, spacing):
+    """Points of a lattice centred on a body, inside its surface."""
     half = int(np.ceil(reach / spacing)) + 1
     axis = (np.arange(-half, half) + 0.5) * spacing
     grid = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), axis=-1).reshape(-1, 3)
-    points = np.array(centre) + grid @ (np.eye(3) if turn is None else turn).T
+    points = np.array(centre) + grid
     return points[sdf(points) < -1e-9]
 
 
@@ -142,13 +142,24 @@ def _below_surface(points, sdf, spacing):
 
 
 def box(centre, size, spacing, fill="lattice", turn=None, **more):
-    sdf, reach = box_sdf(centre, size, turn), float(np.linalg.norm(size)) / 2
-    points = _filled(fill, sdf, centre, reach, spacing, turn)
+    if fill == "lattice":
+        points = bricks(centre, size, spacing, turn)
+    else:
+        sdf = box_sdf(centre, size, turn)
+        points = blue_noise(sdf, centre, float(np.linalg.norm(size)) / 2, spacing)
     return body(points, float(np.prod(size)), **more)
 
 
+def bricks(centre, size, spacing, turn=None):
+    """Points in the middles of equal bricks that fill a box exactly."""
+    counts = [max(1, round(s / spacing)) for s in size]
+    axes = [((np.arange(n) + 0.5) / n - 0.5) * s for n, s in zip(counts, size, strict=True)]
+    grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    return np.array(centre) + grid @ (np.eye(3) if turn is None else turn).T
+
+
 def ball(centre, radius, spacing, fill="lattice", **more):
-    points = _filled(fill, ball_sdf(centre, radius), centre, radius, spacing, None)
+    points = _filled(fill, ball_sdf(centre, radius), centre, radius, spacing)
     return body(points, 4 / 3 * np.pi * radius**3, **more)
 
 
@@ -158,9 +169,9 @@ def cylinder(centre, radius, height, spacing, fill="lattice", **more):
     return body(points, np.pi * radius**2 * height, **more)
 
 
-def _filled(fill, sdf, centre, reach, spacing, turn):
+def _filled(fill, sdf, centre, reach, spacing):
     if fill == "lattice":
-        return lattice(sdf, centre, reach, spacing, turn)
+        return lattice(sdf, centre, reach, spacing)
     return blue_noise(sdf, centre, reach, spacing)
 
 

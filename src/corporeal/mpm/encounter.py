@@ -119,8 +119,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     speed = np.sum(before * contacts.normal, axis=1)
     rebound = _rebound(scene, pair, contacts)
     target, hit = contact.target_speeds(contacts, speed, rebound, problem.cell, dt)
-    sweeps = contact.SWEEPS_OF_A_HIT if hit else contact.SWEEPS
-    impulse = contact.solve(contacts, movers, target, sweeps)
+    impulse = contact.solve(contacts, movers, target, _sweeps(scene, contacts, hit))
     after = contacts.approach(movers)
     bodies = len(problem.bodies)
     return Meeting(
@@ -132,6 +131,15 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         impulse=impulse,
         friction_loss=contact.friction_loss(impulse, contacts.normal, before, after),
     )
+
+
+def _sweeps(scene: Scene, contacts: contact.Contacts, hit: bool) -> int:
+    """One sweep is exact where nothing that can move has more than one contact."""
+    movers = np.concatenate([contacts.a, contacts.c])
+    shared = np.bincount(movers[movers != scene.wall_mover], minlength=1).max() > 1
+    if hit:
+        return contact.SWEEPS_OF_A_HIT
+    return contact.SWEEPS if shared else 1
 
 
 def _possible(touch: Touch) -> Touch:

@@ -198,12 +198,11 @@ class ReferenceEngine:
             R = state.rotation[b]
             if self.problem.contact == "single":
                 speed[b], momentum[b] = matter.fit(b, self.state.position, state.velocity)
-                spin = rigid.world_inverse_inertia(R, matter.inertia[b]) @ momentum[b]
             else:
-                speed[b], spin = meeting.speed[b], meeting.spin[b]
-                momentum[b] = R @ matter.inertia[b] @ R.T @ spin
+                speed[b] = meeting.speed[b]
+                momentum[b] = R @ matter.inertia[b] @ R.T @ meeting.spin[b]
             centre[b] = centre[b] + dt * speed[b]
-            turned[b] = rigid.turned(R, spin, dt)
+            turned[b] = rigid.turned(R, matter.inertia[b], momentum[b], dt)
         moved = replace(state, centre=centre, speed=speed, spin_momentum=momentum, rotation=turned)
         return moved.follow_rigid(matter)
 

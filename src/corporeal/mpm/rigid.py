@@ -62,9 +62,15 @@ def rotation(turn: Vector3) -> Matrix3:
     return np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * K @ K
 
 
-def turned(R: Matrix3, spin: Vector3, dt: float) -> Matrix3:
-    """Give R after turning with constant ω [rad/s] for dt [s], kept orthonormal to round-off."""
-    U, _, Vt = np.linalg.svd(rotation(spin * dt) @ R)
+def turned(R: Matrix3, inertia: Matrix3, momentum: Vector3, dt: float) -> Matrix3:
+    """Give R after a free turn of dt [s] with constant angular momentum L, in the middle's ω.
+
+    R ← exp(ω_½ dt) R with ω_½ = I⁻¹ L half a step ahead: second order, and the energy of a spin
+    about any axis stays; with the ω of the step's start it would grow or fade.
+    """
+    now = world_inverse_inertia(R, inertia) @ momentum
+    middle = world_inverse_inertia(rotation(0.5 * dt * now) @ R, inertia) @ momentum
+    U, _, Vt = np.linalg.svd(rotation(middle * dt) @ R)
     return U @ Vt
 
 

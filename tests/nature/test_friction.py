@@ -1,0 +1,80 @@
+"""Bodies that slide or stick. The slope is made by tilting gravity over a level floor."""
+
+import numpy as np
+import pytest
+from bodies import Stuff, box, box_surface, floor, problem
+
+G, ANGLE = 9.81, np.radians(30)
+CELL, SIZE = 0.025, (0.2, 0.1, 0.1)
+SLOPE = (G * np.sin(ANGLE), 0.0, -G * np.cos(ANGLE))
+CENTRE = (0.1, 0.05, 0.05)
+
+
+def block_on_slope(friction, gravity=SLOPE, rigid=False, **more):
+    stuff = Stuff(young=1e5)
+    surface = box_surface(CENTRE, SIZE) if rigid else None
+    block = box(CENTRE, SIZE, CELL / 2, stuff=stuff, rigid=rigid, surface=surface)
+    return problem(block, cell=CELL, friction=friction, planes=[floor()], gravity=gravity, **more)
+
+
+def slide(friction, time):
+    """s = ½ g (sin θ - μ cos θ) t²."""
+    return 0.5 * G * (np.sin(ANGLE) - friction * np.cos(ANGLE)) * time**2
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_a_block_slides_down_a_slope_as_coulomb_says(patient_engine, rigid):
+    run = patient_engine(block_on_slope(0.3, rigid=rigid))
+    run.advance(0.3)
+    m = run.measure()
+    assert m.centre[0, 0] - CENTRE[0] == pytest.approx(slide(0.3, 0.3), rel=0.05)
+    assert abs(m.centre[0, 1] - CENTRE[1]) < 0.01 * CELL
+
+
+def test_friction_takes_exactly_the_energy_that_is_missing(engine):
+    """Work of gravity = kinetic energy + friction loss, for a block that only slides."""
+    run = engine(block_on_slope(0.3, rigid=True))
+    before = run.measure()
+    run.advance(0.2)
+    after = run.measure()
+    released = before.potential[0] - after.potential[0]
+    assert after.friction_loss == pytest.approx(released - after.kinetic[0], rel=0.05)
+    normal = after.mass[0] * G * np.cos(ANGLE)
+    path = after.centre[0, 0] - CENTRE[0]
+    assert after.friction_loss == pytest.approx(0.3 * normal * path, rel=0.05)
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_a_block_sticks_when_friction_exceeds_the_slope(patient_engine, rigid):
+    run = patient_engine(block_on_slope(0.8, rigid=rigid, gravity_ramp=0.1))
+    run.advance(0.25)
+    moved = run.measure().centre[0] - CENTRE
+    assert abs(moved[0]) < 0.04 * CELL
+    assert abs(moved[1]) < 0.01 * CELL
+
+
+def test_a_block_without_friction_slides_freely(patient_engine):
+    run = patient_engine(block_on_slope(0.0))
+    run.advance(0.2)
+    m = run.measure()
+    assert m.centre[0, 0] - CENTRE[0] == pytest.approx(slide(0.0, 0.2), rel=0.01)
+    assert m.friction_loss == pytest.approx(0.0, abs=1e-9)
+
+
+def test_a_long_slide_stays_on_coulombs_parabola(fast_engine):
+    run = fast_engine(block_on_slope(0.3))
+    for time in (0.2, 0.35, 0.5):
+        run.advance(time)
+        assert run.measure().centre[0, 0] - CENTRE[0] == pytest.approx(slide(0.3, time), rel=0.05)
+
+
+def test_a_thrown_block_stops_after_its_braking_distance(fast_engine):
+    """v₀² / 2 μ g."""
+    block = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young=1e5), velocity=(1.0, 0.0, 0.0))
+    run = fast_engine(
+        problem(block, cell=CELL, friction=0.5, planes=[floor()], gravity=(0.0, 0.0, -G))
+    )
+    run.advance(1.0 / (0.5 * G) + 0.1)
+    m = run.measure()
+    assert m.centre[0, 0] - CENTRE[0] == pytest.approx(1.0 / (2 * 0.5 * G), rel=0.05)
+    assert np.abs(m.momentum[0] / m.mass[0]).max() < 0.02
