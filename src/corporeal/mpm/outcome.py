@@ -83,9 +83,20 @@ class Bodies:
         late = np.flatnonzero(self.time >= self.time[-1] - REST - 1e-9)
         return np.unique(np.linspace(late[0], late[-1], SAMPLES).astype(int))
 
-    def at(self, k: int, body: int) -> Float[np.ndarray, "N 3"]:
-        """One object's particles in frame k [m]."""
-        return self.trajectory.frames[k].position[self.members[body]].astype(float)
+    def before(self, instant: float) -> int:
+        """Return the number of the last frame before an instant [s]."""
+        return max(0, int(np.searchsorted(self.time, instant)) - 1)
+
+    def when(self, instant: float, body: int) -> Float[np.ndarray, "N 3"]:
+        """One object's particles [m] at an instant of impact [s]: from the frame before, in flight.
+
+        The frame after would show what the impact has done already.
+        """
+        k = self.before(instant)
+        flight = instant - self.time[k]
+        velocity = self.ledger["momentum"][k, body] / self.ledger["mass"][k, body]
+        position = self.trajectory.frames[k].position[self.members[body]].astype(float)
+        return position + flight * velocity
 
 
 def object_row(body: int, names: list[str], bodies: Bodies) -> dict[str, Any]:
@@ -128,8 +139,7 @@ def dent_distances(
         if other == body or not np.isfinite(instant):
             continue
         point = bodies.ledger["contact_point"][-1, body, other]
-        frame = min(int(np.searchsorted(bodies.time, instant)), len(bodies.time) - 1)
-        struck = where_it_was(point, bodies.at(frame, body), bodies.start[body])
+        struck = where_it_was(point, bodies.when(instant, body), bodies.start[body])
         found[name] = None if mark.share == 0 else float(np.linalg.norm(mark.place - struck))
     return found
 
@@ -151,7 +161,7 @@ def bounce(body: int, bodies: Bodies, gravity: float) -> dict[str, float | None]
     if np.isnan(first).all():
         return {"fall_m": None, "rebound_m": None, "rebound_ratio": None}
     touch = float(np.nanmin(first))
-    k = max(0, int(np.searchsorted(time, touch)) - 1)
+    k = bodies.before(touch)
     height = ledger["centre"][:, body, 2]
     speed = ledger["momentum"][k, body, 2] / ledger["mass"][k, body]
     flight = touch - time[k]
