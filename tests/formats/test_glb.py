@@ -83,7 +83,7 @@ def test_what_was_written_is_read_back(scene, tmp_path):
     assert (duck.name, duck.class_name, duck.real_extent, duck.velocity) == (
         "rubber_duck_0", "rubber duck", 0.1, (0.0, 0.0, -2.0),
     )  # fmt: skip
-    assert duck.scale == pytest.approx(20.0)
+    assert duck.scale == 20.0
     assert stone == scene.objects[1]
     for was, now in zip(scene.finishes, back.finishes, strict=True):
         if was.texture is not None:

@@ -182,7 +182,7 @@ def test_a_mesh_shown_a_million_times_is_refused(tmp_path):
     mesh = made.mesh(np.random.default_rng(0).random((60000, 3)), strip, mode=5)
     made.json["nodes"] = [{"mesh": mesh}] * 9_000
     made.json["scenes"][0]["nodes"] = list(range(9_000))
-    refused(made.save(tmp_path / "a.glb"), "million vertices and triangles")
+    refused(made.save(tmp_path / "a.glb"), "million vertices and indices")
 
 
 def test_too_many_small_pieces_are_refused(tmp_path):

@@ -17,7 +17,7 @@ def decode_draco(primitive: Entry, packed: Entry) -> tuple[np.ndarray, dict[str,
     _check_claims(primitive, packed, len(data))
     faces = _claimed_faces(data)
     if faces is not None:
-        packed.document.spend(packed, faces)
+        packed.document.spend(packed, 3 * faces)
     try:
         mesh = DracoPy.decode(data)
         triangles = np.asarray(mesh.faces, np.int64).reshape(-1, 3)

@@ -37,12 +37,13 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
     asset = document.root.child("asset")
     copyright = asset.text("copyright") if asset else ""
     real = _real_extent(extras) or extent
+    measured = extent / real if real > 0 else 1.0
     ours = written_by_us(document)
     return SceneObject(
         name=safe(head.text("name")) if head and extras.text("class") else "",
         class_name=_class(document, head, extras),
         real_extent=real,
-        scale=extent / real if real > 0 else 1.0,
+        scale=extras.number("scale", measured) if ours else measured,
         velocity=_vector(extras.numbers("velocity_m_s", NO_MOTION)) if ours else NO_MOTION,
         push=_push(extras) if ours else None,
         source=extras.text("source") or str(document.path),

@@ -22,7 +22,8 @@ from corporeal.formats.gltf_container import (
 from corporeal.formats.resources import decode_data_uri, read_beside
 
 MAX_ROWS = 60_000_000
-"""Vertices and triangles together that are unpacked from one file, copies included."""
+"""Indices, vertices and triangles together that are unpacked from one file, copies included;
+about 10 million triangles, or 4 GB while it is read."""
 
 
 @dataclass(frozen=True)
@@ -164,7 +165,7 @@ class Document:
         self.rows_left -= rows
         if self.rows_left < 0:
             entry.fail(
-                f"the file asks for more than {MAX_ROWS // 10**6} million vertices and triangles.",
+                f"the file asks for more than {MAX_ROWS // 10**6} million vertices and indices.",
                 "Simplify the model first.",
             )
 

@@ -56,7 +56,7 @@ def read_primitive(primitive: Entry, mesh: str, dress: Dress) -> Piece | None:
         document.warn(f"mesh {mesh!r} has a primitive without triangles; it is left out.")
         return None
     used, triangles = _compact(triangles, source.count, primitive)
-    document.spend(primitive, len(used) + len(triangles))
+    document.spend(primitive, len(used))
     return Piece(
         vertices=_finite(source.positions(used), primitive, mesh),
         triangles=triangles,
@@ -143,7 +143,7 @@ def _whole_numbers(accessor: Entry) -> np.ndarray:
     rows = rows_of(accessor)
     if rows.dtype.kind != "u" or rows.shape[1] != 1:
         accessor.fail("indices must be single unsigned integers.")
-    accessor.document.spend(accessor, len(rows) // 3)
+    accessor.document.spend(accessor, len(rows))
     return rows[:, 0].astype(np.int64)
 
 
