@@ -130,7 +130,7 @@ def verb_doctor() -> None:
 
 def _again(verb: str) -> Callable[[], None]:
     def redo() -> None:
-        from corporeal.pipeline import Settings, reopen
+        from corporeal.pipeline import Settings, outdate, reopen
 
         known = verb in Settings.__dataclass_fields__
         kept = reopen(Path(sys.argv[2])) if _names_a_run() else ([], Settings())
@@ -153,6 +153,7 @@ def _again(verb: str) -> Callable[[], None]:
         inputs, settings = reopen(asked.run)
         if known:
             settings = replace(settings, **{verb: asked.config})
+        outdate(asked.run, verb)
         _go(inputs, asked.run, settings, Where(), until=verb)
 
     redo.__doc__ = f"Redo `{verb}` of a run with other settings."

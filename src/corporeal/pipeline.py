@@ -140,6 +140,11 @@ def status(folder: Path) -> list[tuple[str, str, float | None]]:
     return rows
 
 
+def outdate(folder: Path, verb: str) -> None:
+    """Declare one verb's result stale, so that it is done again even with the same settings."""
+    (folder / FOLDERS[verb] / store.META).unlink(missing_ok=True)
+
+
 def forget_simulation(folder: Path) -> None:
     """Drop a simulation, finished or not, so that the next run starts it again."""
     shutil.rmtree(folder / FOLDERS["simulate"], ignore_errors=True)
@@ -256,7 +261,6 @@ class _Run:
         progress(0.0, "looking numbers up")
         scene, inventory, parts = (self.made[v] for v in ("assemble", "describe", "segment"))
         made = ground(scene, parts, inventory, self.settings.ground)
-        store.write_json(self.folder / "materials.json", materials.materials_json(made, parts))
         return self._keep(folder, made)
 
     def _fill(self, folder: Path, progress: Progress) -> Particles:
@@ -298,6 +302,7 @@ class _Run:
         audit["warnings"] = list(dict.fromkeys(w for group in said for w in group))
         shutil.copyfile(movie.path, self.folder / "film.mp4")
         store.write_json(self.folder / "audit.json", audit)
+        store.write_json(self.folder / "materials.json", materials.materials_json(made, parts))
         story = Story(
             scene=scene,
             parts=parts,
@@ -310,7 +315,7 @@ class _Run:
                 "Materials, laws and values of every part": self.folder / "fields.png",
             },
             sources=materials.sources(),
-            expectations=tuple((e.sentence, e.value, e.met) for e in seen),
+            expectations=tuple((e.sentence, e.value, e.target, e.met) for e in seen),
         )
         report(story, self.folder / "report.html")
 

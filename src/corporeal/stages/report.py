@@ -59,8 +59,8 @@ class Story:
     """Caption → picture, in order."""
     sources: Mapping[str, str]
     """Citation key → where it was read."""
-    expectations: tuple[tuple[str, str, bool], ...] = ()
-    """What should be seen: sentence, measured value in words, whether it was."""
+    expectations: tuple[tuple[str, str, str, bool], ...] = ()
+    """What should be seen: sentence, measured value and target in words, whether it was."""
 
 
 def report(story: Story, path: Path) -> None:
@@ -123,10 +123,11 @@ def _expectations(story: Story) -> str:
         return ""
     rows = "".join(
         f'<tr><td class="{"yes" if met else "no"}">{"✓" if met else "✗"}</td>'
-        f"<td>{_safe(sentence)}</td><td>{_safe(value)}</td></tr>"
-        for sentence, value, met in story.expectations
+        f"<td>{_safe(sentence)}</td><td>{_safe(value)}</td><td>{_safe(target)}</td></tr>"
+        for sentence, value, target, met in story.expectations
     )
-    return f"<h2>What must be seen in this scene</h2><table>{rows}</table>"
+    head = "<tr><th></th><th></th><th>measured</th><th>wanted</th></tr>"
+    return f'<h2>What must be seen in this scene</h2><table class="short">{head}{rows}</table>'
 
 
 # ---------------------------------------------------------------- tables
@@ -151,7 +152,7 @@ def _part_row(story: Story, k: int) -> str:
         _safe(treatment.kind),
         simulated(treatment),
     )
-    return "<tr>" + "".join(f"<td>{c}</td>" for c in cells) + "</tr>"
+    return "<tr>" + "".join(f'<td class="n">{c}</td>' for c in cells) + "</tr>"
 
 
 def simulated(treatment: Treatment) -> str:
