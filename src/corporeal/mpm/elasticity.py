@@ -130,13 +130,13 @@ def psi_hencky(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
 def tau_hencky(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """τ = U (2μ ε + λ tr ε 1) Uᵀ."""
     U, stretch, _ = signed_svd(F)
-    return from_stretches(U, _principal_tau(log_strain(stretch), mu, lam), U)
+    return from_stretches(U, principal_tau(log_strain(stretch), mu, lam), U)
 
 
 def pk1_hencky(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """P = U (2μ Σ⁻¹ ε + λ tr ε Σ⁻¹) Vᵀ."""
     U, stretch, V = signed_svd(F)
-    return from_stretches(U, _principal_tau(log_strain(stretch), mu, lam) / stretch, V)
+    return from_stretches(U, principal_tau(log_strain(stretch), mu, lam) / stretch, V)
 
 
 # ---------------------------------------------------------------- all laws
@@ -184,7 +184,8 @@ def _by_law(law: Int[np.ndarray, " P"]) -> list[tuple[Law, np.ndarray]]:
     return [(Law(value), np.flatnonzero(law == value)) for value in np.unique(law).tolist()]
 
 
-def _principal_tau(strain: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
+def principal_tau(strain: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
+    """Give the principal Kirchhoff stresses 2μ ε + λ tr ε [Pa] of principal logarithmic strains."""
     return 2.0 * mu[:, None] * strain + (lam * np.sum(strain, axis=1))[:, None]
 
 

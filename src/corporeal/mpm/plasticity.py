@@ -16,7 +16,7 @@ from corporeal.mpm.elasticity import (
     Vectors,
     from_stretches,
     log_strain,
-    psi_log_strain,
+    principal_tau,
     signed_svd,
 )
 
@@ -29,6 +29,8 @@ class Returned(NamedTuple):
 
     strain: Vectors
     """Admissible principal logarithmic strains."""
+    slip: Vectors
+    """Plastic part of the step: what the trial strains had too much, less its free expansion."""
     plastic_strain: Scalars
     """Increment of the equivalent plastic strain √(2/3) ‖Δε‖ [-]."""
     volume: Scalars
@@ -66,7 +68,8 @@ def return_von_mises(
     radius = np.sqrt(2.0 / 3.0) * (yield_stress + hardening * plastic) / (2.0 * mu)
     slip = np.maximum(size - radius, 0.0) / (1.0 + hardening / (3.0 * mu))
     returned = strain - _scaled(deviator, slip, size)
-    return Returned(returned, np.sqrt(2.0 / 3.0) * slip, np.zeros(len(strain)))
+    equivalent = np.sqrt(2.0 / 3.0) * slip
+    return Returned(returned, strain - returned, equivalent, np.zeros(len(strain)))
 
 
 def return_drucker_prager(
@@ -103,8 +106,9 @@ def return_drucker_prager(
     slip = size + cone_slope(angle) * (3.0 * lam + 2.0 * mu) / (2.0 * mu) * (trace - apex)
     on_cone = strain - _scaled(deviator, np.clip(slip, 0.0, size), size)
     returned = np.where((trace > apex)[:, None], apex[:, None] / 3.0, on_cone)
-    moved = np.linalg.norm(strain - returned, axis=1)
-    return Returned(returned, np.sqrt(2.0 / 3.0) * moved, trace - np.sum(returned, axis=1))
+    excess = strain - returned
+    equivalent = np.sqrt(2.0 / 3.0) * np.linalg.norm(excess, axis=1)
+    return Returned(returned, excess, equivalent, trace - np.sum(returned, axis=1))
 
 
 class Flow(NamedTuple):
@@ -117,7 +121,12 @@ class Flow(NamedTuple):
     volume: Scalars
     """New volume correction [-]."""
     loss: Scalars
-    """Elastic energy per rest volume given up [J/m³]."""
+    """Plastic work per rest volume τ : Δε_p [J/m³], with the stress after the return.
+
+    This is what the grid really pays. The elastic energy given up would also count the overshoot of
+    the trial, for which no force did work: several times too much where a step passes the yield
+    strain.
+    """
 
 
 def flow_von_mises(
@@ -167,7 +176,7 @@ def _flown(
     U, strain, V = trial
     moved = np.any(new.strain != strain, axis=1)
     rebuilt = from_stretches(U, np.exp(new.strain), V)
-    loss = psi_log_strain(strain, *elastic) - psi_log_strain(new.strain, *elastic)
+    loss = np.sum(principal_tau(new.strain, *elastic) * new.slip, axis=1)
     return Flow(np.where(moved[:, None, None], rebuilt, F), new.plastic_strain, new.volume, loss)
 
 
