@@ -80,9 +80,11 @@ def bounded(
     low, high = limits
     finite = np.all(np.isfinite(F), axis=(1, 2))
     F = np.where(finite[:, None, None], F, np.eye(3))
-    # σ1² ≤ tr FᵀF, and σ3 = det F / (σ1 σ2) ≥ 2 det F / tr FᵀF: most need no decomposition.
-    trace = np.einsum("pij,pij->p", F, F)
-    outside = (trace > high**2) | (2 * np.linalg.det(F) < low * trace) | (trace < low**2)
+    # |σ² - 1| ≤ ‖FᵀF - 1‖, so that small strains need no decomposition.
+    strain = np.einsum("pki,pkj->pij", F, F) - np.eye(3)
+    mirrored = np.einsum("pi,pi->p", np.cross(F[:, 0], F[:, 1]), F[:, 2]) <= 0
+    outside = np.einsum("pij,pij->p", strain, strain) > min(1 - low**2, high**2 - 1) ** 2
+    outside |= mirrored
     if of is not None:
         outside &= of
     if outside.any():
