@@ -27,6 +27,18 @@ def decode_data_uri(uri: str) -> bytes:
         raise ValueError("the data URI is not valid base64") from None
 
 
+def beside(folder: Path, uri: str) -> Path | None:
+    """Return the file that a URI names, if it is one in ``folder`` or below it."""
+    if ABSOLUTE.match(uri):
+        return None
+    try:
+        root = folder.resolve()
+        path = (root / unquote(uri).replace("\\", "/")).resolve()
+        return path if path.is_relative_to(root) and path.is_file() else None
+    except (OSError, ValueError):
+        return None
+
+
 def read_beside(folder: Path, uri: str, most: int) -> bytes:
     """Return the content of a file that lies in ``folder`` or below it.
 
@@ -34,15 +46,10 @@ def read_beside(folder: Path, uri: str, most: int) -> bytes:
         ValueError: It leads elsewhere, is missing, or is larger than ``most`` bytes.
 
     """
-    if ABSOLUTE.match(uri):
-        raise ValueError(f"{_shown(uri)} leads outside the file's folder")
+    path = beside(folder, uri)
+    if path is None:
+        raise ValueError(f"{_shown(uri)} is not there, or leads outside the file's folder")
     try:
-        root = folder.resolve()
-        path = (root / unquote(uri).replace("\\", "/")).resolve()
-        if not path.is_relative_to(root):
-            raise ValueError(f"{_shown(uri)} leads outside the file's folder")
-        if not path.is_file():
-            raise ValueError(f"{_shown(uri)} is not there")
         if path.stat().st_size > most:
             raise ValueError(f"{_shown(uri)} is larger than {most >> 20} MiB")
         return path.read_bytes()

@@ -11,6 +11,7 @@ import numpy as np
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.glb import read_model
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
+from corporeal.formats.sources import MODELS, models_in
 from corporeal.formats.typical_extents import doubt
 from corporeal.formats.words import safe, unique
 from corporeal.geometry import placing
@@ -24,7 +25,6 @@ from corporeal.geometry.arrangement import (
 )
 from corporeal.types import Scene, SceneObject
 
-MODELS = (".glb", ".gltf")
 SHORTEST, LONGEST = 1.0, 3.0
 """Bounds of the time that is watched when nobody says how long [s]."""
 
@@ -109,7 +109,7 @@ def _plan(inputs: list[Path]) -> SceneFile:
 
 
 def _models_in(folder: Path) -> list[Path]:
-    found = sorted(p for p in folder.iterdir() if p.suffix.lower() in MODELS)
+    found = models_in(folder)
     if not found:
         step = "Name a .glb file, or a folder that holds some."
         raise BadFileError(folder, "the folder holds no .glb or .gltf file.", step)

@@ -1,0 +1,50 @@
+"""Which files a scene is made of: a result is stale when any of them changes."""
+
+from collections.abc import Iterable
+from pathlib import Path
+
+from corporeal.errors import UserError
+from corporeal.formats.gltf_document import Document
+from corporeal.formats.resources import beside
+from corporeal.formats.scene_file import read_scene_file
+
+MODELS = (".glb", ".gltf")
+
+
+def sources(inputs: Iterable[Path]) -> list[Path]:
+    """Return all files that the inputs name, directly or within; broken ones name nothing more."""
+    found: dict[Path, None] = {}
+    for path in inputs:
+        for file in _named_by(Path(path)):
+            found.setdefault(file)
+    return list(found)
+
+
+def models_in(folder: Path) -> list[Path]:
+    """Return the models that lie in a folder, by name."""
+    return sorted(p for p in folder.iterdir() if p.suffix.lower() in MODELS)
+
+
+def _named_by(path: Path) -> list[Path]:
+    if path.is_dir():
+        return [f for model in models_in(path) for f in _named_by(model)]
+    if not path.is_file():
+        return []
+    try:
+        if path.suffix.lower() == ".toml":
+            scene = read_scene_file(path)
+            files = [scene.file, *(o.file for o in scene.objects)]
+            return [path, *(f for model in files if model for f in _named_by(model))]
+        return [path, *_companions(path)]
+    except UserError:
+        return [path]
+
+
+def _companions(path: Path) -> list[Path]:
+    if path.suffix.lower() != ".gltf":
+        return []
+    document = Document(path)
+    entries = document.entries("buffers") + document.entries("images")
+    uris = [e.text("uri") for e in entries]
+    files = [beside(path.parent, u) for u in uris if u and u[:5].lower() != "data:"]
+    return [f for f in files if f is not None]

@@ -1,0 +1,28 @@
+import json
+
+from corporeal.formats.sources import sources
+from glb_maker import cube
+
+
+def test_a_scene_is_made_of_every_file_that_it_names(tmp_path):
+    made = cube()
+    (tmp_path / "cube.bin").write_bytes(made.binary)
+    (tmp_path / "skin.png").write_bytes(b"")
+    made.json["buffers"] = [{"byteLength": len(made.binary), "uri": "cube.bin"}]
+    made.json["images"] = [{"uri": "skin.png"}, {"uri": "data:,"}, {"uri": "../../etc/passwd"}]
+    (tmp_path / "cube.gltf").write_text(json.dumps(made.json))
+    cube().save(tmp_path / "ball.glb")
+    text = (
+        '[[object]]\nfile = "cube.gltf"\n[[object]]\nfile = "ball.glb"\n[[object]]\nfile = "x.glb"'
+    )
+    (tmp_path / "scene.toml").write_text(text)
+    names = {"scene.toml", "cube.gltf", "cube.bin", "skin.png", "ball.glb"}
+    assert {p.name for p in sources([tmp_path / "scene.toml"])} == names
+    assert {p.name for p in sources([tmp_path])} == names - {"scene.toml"}
+
+
+def test_a_broken_file_still_counts_as_itself(tmp_path):
+    for name in ("a.gltf", "a.toml"):
+        (tmp_path / name).write_text("{ broken")
+        assert sources([tmp_path / name]) == [tmp_path / name]
+    assert sources([tmp_path / "none.glb"]) == []
