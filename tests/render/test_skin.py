@@ -151,7 +151,17 @@ def test_the_picture_of_a_stretch_is_bounded_and_never_mirrored():
     assert stretch.min() > 0.4 - 1e-9 and stretch.max() < 2.5 + 1e-9
     assert (np.linalg.det(shown) > 0).all()
     mild = np.eye(3) + 0.1 * rng.normal(size=(50, 3, 3))
-    assert np.array_equal(bounded(mild, (0.4, 2.5)), mild)
+    assert np.abs(bounded(mild, (0.4, 2.5)) - mild).max() < 1e-12, "mild stretch is shown as it is"
+
+
+@pytest.mark.parametrize("limits", [(0.3, 3.0), (0.7, 1.4)])
+def test_the_shortcut_lets_nothing_past_the_limits(limits):
+    rng = np.random.default_rng(9)
+    F = np.eye(3) + rng.normal(size=(20_000, 3, 3)) * rng.uniform(0, 1, (20_000, 1, 1))
+    shown = bounded(F, limits)
+    stretch = np.linalg.svd(shown, compute_uv=False)
+    assert limits[0] - 1e-9 < stretch.min() and stretch.max() < limits[1] + 1e-9
+    assert (np.linalg.det(shown) > 0).all()
 
 
 def test_one_lost_particle_leaves_no_hole_in_the_picture(block):
