@@ -134,10 +134,15 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
 
 
 def _sweeps(scene: Scene, contacts: contact.Contacts, hit: bool) -> int:
-    """One sweep is exact where nothing that can move has more than one contact."""
+    """One sweep is exact where nothing that can move has more than one contact.
+
+    Rigid bodies on one another have only each other to yield: with few sweeps stacks creep.
+    """
     movers = np.concatenate([contacts.a, contacts.c])
     shared = np.bincount(movers[movers != scene.wall_mover], minlength=1).max() > 1
-    if hit:
+    bodies = len(scene.problem.bodies)
+    stacked = bool(np.any((contacts.a < bodies) & (contacts.c < bodies)))
+    if hit or stacked:
         return contact.SWEEPS_OF_A_HIT
     return contact.SWEEPS if shared else 1
 

@@ -858,7 +858,7 @@ struct Solver {
 };
 double *scratch = world->ledger;      // [all][all][8]: hit, normal sum, weighted place 3
 for (int i = 0; i < all * all * 8; i++) scratch[i] = 0;
-int hits = 0;
+int hits = 0, stacked = 0;
 for (int t = 0; t < nt; t++) {
   Touch &T = touches[t];
   T.active = T.gap < 1e29;
@@ -880,6 +880,7 @@ for (int t = 0; t < nt; t++) {
   // What neither closes now nor shares a body with others that may push it: leave it out.
   if (!T.stiff && T.meet >= 0 && meets[T.meet].last - meets[T.meet].first == 1 && un <= T.target)
     T.active = 0;
+  if (ra && rc && T.fc < fields) stacked = 1;
   if (!(ra && rc) || e <= 0) continue;
   double kick[3] = {0, 0, 0};
   for (int i = 0; i < 3; i++) {
@@ -902,7 +903,8 @@ if (hits)
     if (T.active && T.bounce && scratch[(T.fa * all + T.fc) * 8] > 0)
       T.target = -world->restitution[T.fa * all + T.fc] * T.approach;
   }
-int sweeps = hits ? 100 : 10;
+// Rigid bodies on one another have only each other to yield: with few sweeps stacks creep.
+int sweeps = hits || stacked ? 100 : 10;
 for (int k = 0; k < nm; k++) {
   if (meets[k].stiff) continue;
   for (int s = 0; s < 10; s++) {

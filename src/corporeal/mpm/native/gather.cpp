@@ -83,13 +83,10 @@ struct Stuff {
 };
 // Laws in principal form (design: physics, section 3). H = F - 1 keeps small strains exact.
 struct Laws {
-  // Principal strain eps to the cone or cylinder; returns what was lost per rest volume.
-  static inline f8 energy(const Stuff &t, const f8 *e) {
-    f8 tr = e[0] + e[1] + e[2];
-    return t.mu * (e[0] * e[0] + e[1] * e[1] + e[2] * e[2]) + 0.5f * t.lambda * tr * tr;
-  }
+  // Principal strain eps to the cone or cylinder; returns the plastic work per rest volume, with
+  // the stress after the return.
   static inline f8 sand(const Stuff &t, f8 *eps, f8 &change, f8 &vc) {
-    f8 zero = Simd::all(0.0f), before = energy(t, eps), h[3];
+    f8 zero = Simd::all(0.0f), h[3], work = zero;
     for (int i = 0; i < 3; i++) eps[i] += vc * (1.0f / 3.0f);
     f8 tr = eps[0] + eps[1] + eps[2], mean = tr * (1.0f / 3.0f);
     for (int i = 0; i < 3; i++) h[i] = eps[i] - mean;
@@ -101,10 +98,15 @@ struct Laws {
     f8 scale = 1.0f - slip / Simd::high(n, Simd::all(1e-30f));
     scale = Simd::pick(apex, zero, scale);
     mean = Simd::pick(apex, t.apex * (1.0f / 3.0f), mean);
-    for (int i = 0; i < 3; i++) eps[i] = scale * h[i] + mean;
+    f8 after = 3.0f * mean;
+    for (int i = 0; i < 3; i++) {
+      f8 next = scale * h[i] + mean;
+      work += (2.0f * t.mu * next + t.lambda * after) * (eps[i] - next);
+      eps[i] = next;
+    }
     change = Simd::pick(apex, Simd::root(n * n + out * out * (1.0f / 3.0f)), slip);
-    vc = tr - (eps[0] + eps[1] + eps[2]);
-    return before - energy(t, eps);
+    vc = tr - after;
+    return work;
   }
   static inline f8 metal(const Stuff &t, f8 *eps, f8 &change, f8 ep) {
     const float R = 0.81649658f;
@@ -118,7 +120,7 @@ struct Laws {
     f8 scale = 1.0f - dg / Simd::high(n, Simd::all(1e-30f));
     for (int i = 0; i < 3; i++) eps[i] = scale * h[i] + mean;
     change = dg;
-    return t.mu * n * n * (1.0f - scale * scale);
+    return 2.0f * t.mu * n * scale * dg;
   }
 };
 
