@@ -60,4 +60,7 @@ def test_only_implausible_sizes_are_doubted():
     )
     assert "an armchair" in (doubt("a", "armchair", 112.0) or "")
     assert doubt("thing", "widget", 1.0) is None
+    assert doubt("a", "statue", 1.9) is None
+    assert "usually about 40 cm" in (doubt("a", "statue", 2.0) or ""), "fitted into a box"
+    assert doubt("a", "bed", 2.0) is None
     assert "metres?" in (doubt("thing", "widget", 250.0) or "")

@@ -36,7 +36,7 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
     """Return a sentence for the user where a thing is implausibly large or small [m]."""
     known = typical_extent(class_name)
     low, high = (known.low / MARGIN, known.high * MARGIN) if known else (SMALLEST, LARGEST)
-    if low <= extent <= high:
+    if low <= extent <= high and not _normalised(extent, known):
         return None
     size = f"{name} is {_length(extent)} large"
     if known is None:
@@ -44,6 +44,12 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
     article = "an" if known.words[0] in "aeiou" else "a"
     usual = f"{article} {known.words} is usually about {_length(known.usual)}"
     return f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}."
+
+
+def _normalised(extent: float, known: TypicalExtent | None) -> bool:
+    """Tell whether a program seems to have fitted the model into a box of 1 or 2 units."""
+    exact = min(abs(extent - 1), abs(extent - 2)) < 1e-5
+    return exact and known is not None and not known.usual / MARGIN < extent < known.usual * MARGIN
 
 
 @cache
