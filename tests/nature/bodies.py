@@ -165,7 +165,7 @@ def ball(centre, radius, spacing, fill="lattice", **more):
 
 def cylinder(centre, radius, height, spacing, fill="lattice", **more):
     reach = float(np.hypot(radius, height / 2))
-    points = _filled(fill, cylinder_sdf(centre, radius, height), centre, reach, spacing, None)
+    points = _filled(fill, cylinder_sdf(centre, radius, height), centre, reach, spacing)
     return body(points, np.pi * radius**2 * height, **more)
 
 

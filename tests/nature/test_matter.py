@@ -1,0 +1,146 @@
+"""How different kinds of matter take a blow."""
+
+import numpy as np
+import pytest
+from bodies import Stuff, ball, box, cylinder, floor, problem
+
+from corporeal.types import Law
+
+G = 9.81
+DOWN = (0.0, 0.0, -G)
+CELL = 0.02
+SIDE = 0.04
+
+
+def thrown_down(engine, stuff, speed, until, friction=0.3):
+    """A cube that hits the floor: first and last measure, and the largest booked energy."""
+    cube = box((0.003, 0.0, 0.021), (SIDE,) * 3, CELL / 2, stuff=stuff, velocity=(0, 0, -speed))
+    run = engine(problem(cube, cell=CELL, friction=friction, planes=[floor()], gravity=DOWN))
+    before, booked = run.measure(), []
+    for time in np.linspace(until / 8, until, 8):
+        run.advance(time)
+        m = run.measure()
+        losses = m.friction_loss + m.plastic_loss + m.viscous_loss
+        booked.append(m.kinetic.sum() + m.elastic.sum() + m.potential.sum() + losses)
+    return run, before, run.measure(), max(booked)
+
+
+@pytest.mark.parametrize("law", [Law.DRUCKER_PRAGER, Law.VON_MISES])
+def test_what_yields_pays_for_it_and_no_more(engine, law):
+    """Energy left plus energy lost never exceeds what there was, however coarse the steps."""
+    stuff = Stuff(law=law, yield_stress=500.0)
+    _, before, after, booked = thrown_down(engine, stuff, 2.0, 0.03)
+    start = before.kinetic.sum() + before.potential.sum()
+    assert after.plastic_loss > 0.1 * start
+    assert booked <= 1.01 * start
+
+
+def test_metal_hit_softly_springs_back_and_hit_hard_keeps_a_dent(engine):
+    """It yields first where the speed passes σ_y / (ρ c)."""
+    metal = Stuff(law=Law.VON_MISES, young=1e6, density=1000.0, yield_stress=1.5e4)
+    soft, _, _, _ = thrown_down(engine, metal, 0.1, 0.03)
+    hard, _, _, _ = thrown_down(engine, metal, 3.0, 0.03)
+    assert soft.snapshot().plastic_strain.max() == 0.0
+    assert hard.snapshot().plastic_strain.max() > 0.02
+
+
+def test_hardening_metal_deforms_less(engine):
+    plain = Stuff(law=Law.VON_MISES, yield_stress=1e3)
+    tough = Stuff(law=Law.VON_MISES, yield_stress=1e3, hardening=1e5)
+    strain = [
+        thrown_down(engine, stuff, 2.0, 0.02)[0].snapshot().plastic_strain.mean()
+        for stuff in (plain, tough)
+    ]
+    assert strain[1] < 0.7 * strain[0]
+
+
+def test_viscous_matter_bounces_less(engine):
+    rebound = []
+    for viscosity in (0.0, 10.0):
+        stuff = Stuff(viscosity=viscosity)
+        _, _, after, _ = thrown_down(engine, stuff, 1.0, 0.02)
+        rebound.append(after.momentum[0, 2] / after.mass[0])
+        assert (after.viscous_loss > 0) == (viscosity > 0)
+    assert 0 < rebound[1] < 0.9 * rebound[0]
+
+
+def test_plastic_flow_keeps_the_volume_of_metal(engine):
+    metal = Stuff(law=Law.VON_MISES, yield_stress=500.0)
+    run, _, _, _ = thrown_down(engine, metal, 2.0, 0.03)
+    s = run.snapshot()
+    assert s.plastic_strain.mean() > 0.05
+    J_all, J_elastic = np.linalg.det(s.motion), np.linalg.det(s.deformation)
+    assert np.abs(J_all - J_elastic).max() < 1e-3
+
+
+def test_a_column_of_dry_sand_slumps_into_a_heap_and_stops(fast_engine):
+    """It comes to rest with a slope below its friction angle.
+
+    Lube et al. 2004 measured a spread ΔR/R = 1.24 for this column; we reach half of it on these
+    grids, as the cone through triaxial compression is too strong for matter that spreads sideways.
+    """
+    cell, radius = 0.02, 0.1
+    sand = Stuff(
+        law=Law.DRUCKER_PRAGER,
+        young=2e5,
+        poisson=0.3,
+        density=1500.0,
+        friction_angle=np.radians(32.0),
+    )
+    heap = cylinder((0.003, 0.002, radius / 2), radius, radius, cell / 2, stuff=sand)
+    run = fast_engine(problem(heap, cell=cell, friction=0.6, planes=[floor()], gravity=DOWN))
+    run.advance(0.6)
+    middle = run.snapshot().position
+    run.advance(0.8)
+    end = run.snapshot().position
+    out = np.hypot(end[:, 0], end[:, 1])
+    spread = (np.percentile(out, 99) - radius) / radius
+    height = np.percentile(end[:, 2], 99.9)
+    assert 0.4 < spread < 1.24 * 1.15
+    assert 15.0 < np.degrees(np.arctan(height / (radius * (1 + spread)))) < 32.0
+    assert np.percentile(np.linalg.norm(end - middle, axis=1), 95) < 0.25 * cell
+    assert end[:, 2].min() > -0.5 * cell
+
+
+def test_cohesion_keeps_a_column_standing_that_sand_would_let_slump(fast_engine):
+    cell, radius = 0.02, 0.06
+    heights = []
+    for cohesion in (0.0, 2000.0):
+        soil = Stuff(
+            law=Law.DRUCKER_PRAGER,
+            young=2e5,
+            density=1500.0,
+            friction_angle=np.radians(25.0),
+            cohesion=cohesion,
+        )
+        column = cylinder((0.003, 0.002, 0.06), radius, 0.12, cell / 2, stuff=soil)
+        run = fast_engine(problem(column, cell=cell, friction=0.6, planes=[floor()], gravity=DOWN))
+        run.advance(0.4)
+        heights.append(np.percentile(run.snapshot().position[:, 2], 99))
+    assert heights[0] < 0.085
+    assert heights[1] > 0.105
+
+
+def test_a_ball_dents_mud_and_the_dent_stays(fast_engine):
+    cell = 0.02
+    mud = Stuff(law=Law.VON_MISES, young=2e5, poisson=0.4, density=1600.0, yield_stress=2e3)
+    bed = box((0.003, 0.002, 0.04), (0.24, 0.24, 0.08), cell / 2, stuff=mud)
+    stone = ball(
+        (0.003, 0.002, 0.145),
+        0.04,
+        cell / 2,
+        stuff=Stuff(density=2500.0),
+        rigid=True,
+        velocity=(0.0, 0.0, -2.0),
+    )
+    run = fast_engine(problem(bed, stone, cell=cell, friction=0.5, planes=[floor()], gravity=DOWN))
+    count = len(bed.position)
+    top = run.snapshot().position[:count, 2] > 0.08 - cell / 2
+    near = np.hypot(*(run.snapshot().position[:count, :2] - (0.003, 0.002)).T) < 0.02
+    run.advance(0.25)
+    first = run.snapshot().position[:count][top & near, 2].mean()
+    run.advance(0.4)
+    last = run.snapshot().position[:count][top & near, 2].mean()
+    assert last < 0.075 - 0.3 * cell
+    assert last == pytest.approx(first, abs=0.1 * cell)
+    assert run.snapshot().plastic_strain[:count].max() > 0.1
