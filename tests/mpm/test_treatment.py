@@ -85,7 +85,7 @@ def test_the_rule_gives_what_the_physics_page_says_at_three_metres_per_second(na
 @pytest.mark.parametrize("name", [n for n, row in TABLE.items() if row[1]])
 def test_true_stiffness_costs_the_steps_that_the_physics_page_says(name, monkeypatch):
     part, wave, steps = TABLE[name]
-    generous = replace(QUALITIES["draft"], steps_per_second=1e9, particles=10**9)
+    generous = replace(QUALITIES["draft"], steps_per_second=1e9, particles=10**9, work=1e18)
     monkeypatch.setitem(QUALITIES, "draft", generous)
     (treatment,) = plan([part], [FALL], "draft").treatments
     assert treatment.wave_speed == pytest.approx(wave, rel=0.25)
@@ -174,6 +174,13 @@ def test_a_step_budget_keeps_the_order_of_stiffness_and_the_yield_speed():
     assert copper_part.yield_stress / (8940 * copper_part.wave_speed) == pytest.approx(real)
     steps = 1 / min(t.step for t in (foam, rubber, wood, copper_part))
     assert steps == pytest.approx(QUALITIES["draft"].steps_per_second, rel=1e-6)
+
+
+def test_a_crowded_scene_takes_fewer_steps_than_a_small_one():
+    draft = QUALITIES["draft"]
+    assert draft.steps(2_000) == 20e3
+    assert draft.steps(40_000) == 8e3
+    assert draft.steps(20_000) * 20_000 == pytest.approx(draft.work)
 
 
 @given(

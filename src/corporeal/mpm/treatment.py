@@ -84,13 +84,19 @@ class Quality:
     particles: int
     """At most so many particles in the scene."""
     steps_per_second: float
-    """At most so many steps per simulated second."""
+    """At most so many steps per simulated second …"""
+    work: float
+    """… and so many particles times steps, but never below two fifths of those steps."""
+
+    def steps(self, particles: float) -> float:
+        """Say how many steps per simulated second a scene of so many particles may take."""
+        return min(self.steps_per_second, max(self.work / particles, 0.4 * self.steps_per_second))
 
 
 QUALITIES: dict[str, Quality] = {
-    "draft": Quality(8, 48, 40_000, 20e3),
-    "normal": Quality(12, 96, 200_000, 60e3),
-    "fine": Quality(20, 192, 1_000_000, 200e3),
+    "draft": Quality(8, 48, 40_000, 20e3, 3e8),
+    "normal": Quality(12, 96, 200_000, 60e3, 5e9),
+    "fine": Quality(20, 192, 1_000_000, 200e3, 1e11),
 }
 
 
@@ -137,7 +143,8 @@ def plan(
         warnings.append("Stiffness is capped by the published rule: a control, not a prediction.")
     else:
         treatments = calm_trinkets(parts, treatments, cell)
-        treatments, compressed = fit_budget(treatments, cell, quality)
+        steps = quality.steps(particles_needed(parts, cell))
+        treatments, compressed = fit_budget(treatments, cell, steps)
         warnings.extend(compressed)
     return Plan(cell=cell, treatments=tuple(treatments), warnings=tuple(warnings))
 
@@ -257,8 +264,8 @@ def unresolved(parts: Sequence[PartGeometry], soft: set[int], cell: float) -> li
     """Warn of deformable objects that are too thin for the grid."""
     thinnest = [(object_size(parts, k)[0] / cell, k) for k in sorted(soft)]
     return [
-        f"Object {k} is only {cells:.1f} cells across: its deformation is a rough estimate. "
-        "A finer detail resolves it better."
+        f"Object {k + 1} of the scene is only {cells:.1f} cells across: its deformation is a rough "
+        "estimate. A finer detail resolves it better."
         for cells, k in thinnest
         if cells < 4
     ]
@@ -335,7 +342,7 @@ def calm_trinkets(
 
 
 def fit_budget(
-    treatments: Sequence[Treatment], cell: float, quality: Quality
+    treatments: Sequence[Treatment], cell: float, steps: float
 ) -> tuple[list[Treatment], list[str]]:
     """Compress wave speeds where the step budget would be exceeded; their order is kept.
 
@@ -344,7 +351,7 @@ def fit_budget(
     fastest = max((t.wave_speed for t in treatments), default=0.0)
     motion = max((t.impact_speed for t in treatments), default=0.0)
     # A wave must outrun what moves by far, whatever the budget.
-    limit = max(COURANT * cell * quality.steps_per_second - motion, 10 * motion)
+    limit = max(COURANT * cell * steps - motion, 10 * motion)
     if fastest <= limit:
         return list(treatments), []
     because = "The step budget slows its waves"
@@ -354,7 +361,7 @@ def fit_budget(
     changed = sum(a.young != b.young for a, b in zip(treatments, fitted, strict=True))
     return fitted, [
         f"{changed} of {len(fitted)} parts are simulated softer than they are, to stay within "
-        f"{quality.steps_per_second:,.0f} steps per second; the order of stiffness is kept. "
+        f"{steps:,.0f} steps per second; the order of stiffness is kept. "
         "A finer detail has a larger budget."
     ]
 

@@ -17,6 +17,7 @@ from corporeal import backends, store
 from corporeal.errors import BadFileError, SimulationError
 from corporeal.mpm import audit as audits
 from corporeal.mpm.frames import (
+    FOLDER,
     Layout,
     frame_path,
     gather,
@@ -123,6 +124,8 @@ class Run:
 
     def through(self, progress: Progress) -> None:
         """Step to the end, writing every frame as it comes."""
+        for half in (self.folder / FOLDER).glob(".*.part"):
+            half.unlink()  # left by a process that was killed while writing
         done = self.restore()
         if done == 0:
             write_layout(self.folder, self.layout)
