@@ -241,3 +241,12 @@ def test_every_real_object_can_be_filled(folder, shared_assets):
         assert particles.mass.sum() == pytest.approx(sum(particles.mass_real), rel=1e-6)
         assert np.isfinite(particles.position).all()
         assert particles.volume.min() > 0
+
+
+def test_a_rigid_object_touches_with_its_own_surface_only():
+    """Another object's corners once held a ball up in the air."""
+    floor = put(trimesh.creation.box((0.4, 0.4, 0.1)), 0.0)
+    particles = fill(*inputs(thing((floor, RUBBER)), thing((ball(0.05, bottom=0.2), STEEL))))
+    assert set(particles.object_of_surface) == {1}
+    assert np.abs(particles.surface[:, :2]).max() < 0.051
+    assert particles.surface[:, 2].min() > 0.19

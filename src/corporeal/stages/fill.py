@@ -113,7 +113,8 @@ def examine(scene: Scene, parts: Parts, seed: int) -> list[Anatomy]:
         own = np.flatnonzero(parts.object_of_point == number)
         label = _whole(parts.part_of_point[own])
         rng = np.random.default_rng([seed, number, 0])
-        anatomies.append(survey(corners, triangles[own], label, rng))
+        used, joined = np.unique(triangles[own], return_inverse=True)
+        anatomies.append(survey(corners[used], joined.reshape(-1, 3), label, rng))
     found = {m.part for a in anatomies for m in a.members}
     for k, part in enumerate(parts.catalogue):
         if k not in found:
