@@ -69,9 +69,13 @@ def _eye(side: int) -> Mesh:
 
 
 def ball() -> Model:
-    """Model a playground ball, 0.22 m across, of rubber 3 mm thick."""
-    look = pictured("ball rubber", labels.ball_stripes(), 0.38)
-    return Model("ball", (Part("ball", _ball(0.11), look, "rubber", 0.003),))
+    """Model a play ball, 0.22 m across, of EVA foam.
+
+    Not an inflated one: it is the air in it that makes that stiff, and a wall of 3 mm of rubber
+    alone would sag under its own weight.
+    """
+    look = pictured("ball foam skin", labels.ball_stripes(), 0.38)
+    return Model("ball", (Part("ball", _ball(0.11), look, "EVA_foam"),))
 
 
 def rubber_ball() -> Model:
