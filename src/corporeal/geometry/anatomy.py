@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.mesh import Mesh, boundary
 from corporeal.geometry.shape import Shape, sphere_directions
 from corporeal.geometry.spread import sample_surface
 
@@ -52,17 +52,6 @@ def sheets(mesh: Mesh, piece: Int[np.ndarray, " T"]) -> np.ndarray:
     rim = np.bincount(piece[owner], length, minlength=len(area))
     is_sheet = (rim > 0.05 * np.sqrt(area)) & (2 * volume / area < 0.03 * np.sqrt(area))
     return (is_sheet | (np.bincount(piece) < 4))[piece]
-
-
-def boundary(mesh: Mesh) -> tuple[Int[np.ndarray, "B 2"], Int[np.ndarray, " B"]]:
-    """Edges that an odd number of triangles share, and a triangle of each."""
-    f = mesh.triangles
-    edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
-    _, edge, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
-    odd = np.flatnonzero(count[edge.reshape(-1)] % 2 == 1)
-    return edges[odd], odd % len(f)
 
 
 def longest_rim(mesh: Mesh) -> float:
@@ -139,7 +128,7 @@ class Skin:
 def outer_skin(shape: Shape, rng: np.random.Generator) -> Skin:
     """Leave out surface that is buried where pieces overlap: nothing can touch it."""
     mesh = shape.mesh
-    if pieces(mesh).max() == 0 and not len(boundary(mesh)[0]):
+    if shape.closed and pieces(mesh).max() == 0:
         return Skin(shape, np.arange(len(mesh.triangles)))
     step = 1e-5 * mesh.extent
     crossing = np.zeros(len(mesh.triangles))

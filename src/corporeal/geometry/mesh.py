@@ -53,6 +53,7 @@ class Mesh:
 def weld(
     vertices: Float[np.ndarray, "V 3"],
     triangles: Int[np.ndarray, "T 3"],
+    part: Int[np.ndarray, " T"] | None = None,
     tolerance: float = 1e-6,
 ) -> tuple[Mesh, Int[np.ndarray, " kept"]]:
     """Join vertices that coincide and drop triangles without area and repeated ones.
@@ -63,6 +64,8 @@ def weld(
     Args:
         vertices: [m]
         triangles: Vertex numbers.
+        part: Triangles of different parts are never repeats: where two parts meet, both have a
+            face.
         tolerance: Of the diagonal of the box.
 
     Returns:
@@ -79,7 +82,8 @@ def weld(
     keys = np.round((vertices - origin) / max(tolerance * size, 1e-300)).astype(np.int64)
     _, first, joined = np.unique(keys, axis=0, return_index=True, return_inverse=True)
     welded = joined.reshape(-1)[triangles]
-    ordered = np.sort(welded, axis=1)
+    owner = np.zeros(len(triangles), dtype=np.int64) if part is None else part
+    ordered = np.column_stack([owner, np.sort(welded, axis=1)])
     _, kept = np.unique(ordered, axis=0, return_index=True)
     kept = np.sort(kept)
     mesh = Mesh(vertices[first], np.ascontiguousarray(welded[kept]))
@@ -94,18 +98,21 @@ def signed_volume(mesh: Mesh) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
-def openness(mesh: Mesh) -> float:
-    """Length of the boundary edges over the root of the area [-]; 0 when closed.
-
-    An edge is on the boundary when the triangles beside it do not pass it once each way.
-    """
+def boundary(mesh: Mesh) -> tuple[Int[np.ndarray, "B 2"], Int[np.ndarray, " B"]]:
+    """Edges that an odd number of triangles share, and a triangle of each."""
     f = mesh.triangles
     edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
     _, edge, count = np.unique(
         np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
     )
-    odd = count[edge.reshape(-1)] % 2 == 1
-    length = np.linalg.norm(mesh.vertices[edges[odd, 0]] - mesh.vertices[edges[odd, 1]], axis=1)
+    odd = np.flatnonzero(count[edge.reshape(-1)] % 2 == 1)
+    return edges[odd], odd % len(f)
+
+
+def openness(mesh: Mesh) -> float:
+    """Length of the boundary edges over the root of the area [-]; 0 when closed."""
+    edges, _ = boundary(mesh)
+    length = np.linalg.norm(mesh.vertices[edges[:, 0]] - mesh.vertices[edges[:, 1]], axis=1)
     return float(length.sum() / np.sqrt(mesh.areas.sum()))
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import repel
 
-ROUNDS, STEPS = 8, 5
+ROUNDS, STEPS = 7, 5
 REACH = 1.2
 """Of the repulsion, in spacings."""
 
@@ -61,29 +61,33 @@ def settle(
     limit = np.maximum(limit - 0.5 * spacing, 0.5 * spacing)
     if not free.any():
         return points
-    near = free & (np.isfinite(limit) | outer.may_be_within(5 * spacing, points))
-    near = np.flatnonzero(near)
+    candidates = np.flatnonzero(
+        free & (np.isfinite(limit) | outer.may_be_within(4 * spacing, points))
+    )
+    near = candidates
     for turn in range(ROUNDS):
-        distance, skin = _feel(points, near, shape, outer, spacing)
-        near = near[(distance < 4 * spacing) | np.isfinite(limit[near])]
+        asked = candidates if turn % 3 == 0 else near
+        distance, skin = _feel(points, asked, outer, spacing)
+        near = asked[(distance < 2 * spacing) | (distance > limit[asked] - spacing)]
         for _ in range(STEPS):
             move = repel(points, REACH * spacing)
             move *= np.minimum(1, 0.3 * spacing / (np.linalg.norm(move, axis=1) + 1e-300))[:, None]
             points[free] += move[free]
             _press(points, skin, spacing, limit, draw=turn >= 2)
-    for _ in range(4):
-        _press(points, _feel(points, near, shape, outer, spacing)[1], spacing, limit, draw=False)
+    for _ in range(3):
+        distance, skin = _feel(points, near, outer, spacing)
+        _press(points, skin, spacing, limit, draw=False)
+        near = near[(distance < spacing) | (distance > limit[near] - spacing)]
     return _stay_inside(points, start, shape, near)
 
 
 def _feel(
-    points: np.ndarray, which: np.ndarray, shape: Shape, outer: Shape, spacing: float
+    points: np.ndarray, which: np.ndarray, outer: Shape, spacing: float
 ) -> tuple[np.ndarray, Skin]:
     distance, triangle, foot = outer.closest(points[which])
     inward = (points[which] - foot) / np.maximum(distance, 1e-300)[:, None]
     inward[distance < 1e-6 * spacing] = -outer.mesh.normals[triangle[distance < 1e-6 * spacing]]
-    doubtful = np.flatnonzero(distance < 0.45 * spacing)
-    out = doubtful[~shape.inside(points[which[doubtful]])]
+    out = np.einsum("md,md->m", inward, outer.mesh.normals[triangle]) > 0
     inward[out] = -inward[out]
     return distance, Skin(which, foot, inward)
 

@@ -9,7 +9,7 @@ import trimesh
 from jaxtyping import Bool, Float, Int
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
-from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.mesh import Mesh, boundary
 
 
 @dataclass(frozen=True)
@@ -17,6 +17,11 @@ class Shape:
     """A welded, consistently wound mesh, ready to be asked."""
 
     mesh: Mesh
+
+    @cached_property
+    def closed(self) -> bool:
+        """Whether no edge is open."""
+        return not len(boundary(self.mesh)[0])
 
     @cached_property
     def _winding(self) -> igl.FastWindingNumberBVH:
@@ -89,6 +94,15 @@ class Shape:
             where, ray, _ = self._rays.intersects_location(origins, directions, multiple_hits=False)
             length[ray] = np.einsum("ij,ij->i", where - origins[ray], directions[ray])
         return length
+
+    def crossings(
+        self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]
+    ) -> tuple[Int[np.ndarray, " H"], Float[np.ndarray, " H"], Int[np.ndarray, " H"]]:
+        """Every hit along each ray: its ray, its distance [m], and 1 into the shape, -1 out."""
+        where, ray, triangle = self._rays.intersects_location(origins, directions)
+        length = np.einsum("ij,ij->i", where - origins[ray], directions[ray])
+        facing = np.einsum("ij,ij->i", self.mesh.area_vectors[triangle], directions[ray])
+        return ray, length, -np.sign(facing).astype(np.int64)
 
     def hit(
         self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]

@@ -1,5 +1,7 @@
 """Points spread evenly and without a lattice: jittered starts, dart throwing, repulsion."""
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
@@ -12,26 +14,73 @@ def scatter(shape: Shape, spacing: float, rng: np.random.Generator) -> Float[np.
     """One jittered point per cube of ``spacing``, where it falls inside the shape.
 
     The cubes stand in a random frame, so that no row of them follows a face. Each point stands
-    for spacing³. Blocks of 4³ cubes that the surface does not reach are asked only once.
+    for spacing³.
     """
     used = shape.mesh.vertices[np.unique(shape.mesh.triangles)]
     frame, centre = random_rotation(rng), used.mean(axis=0)
     turned = (used - centre) @ frame
-    low, block = turned.min(axis=0), 4 * spacing
-    counts = np.ceil(np.ptp(turned, axis=0) / block).astype(int) + 1
     # A random shift, so that a thin plate is not hit or missed as a whole.
-    low = low - rng.uniform(0, 1, 3) * spacing
-    centres = low + (np.indices(counts).reshape(3, -1).T + 0.5) * block
-    world = centres @ frame.T + centre
-    distance = shape.closest(world)[0]
-    mixed = distance < np.sqrt(3) / 2 * block
-    whole = ~mixed & shape.inside(world)
-    offsets = (np.indices((4, 4, 4)).reshape(3, -1).T - 1.5) * spacing
+    low = turned.min(axis=0) - rng.uniform(0, 1, 3) * spacing
+    counts = np.ceil((turned.max(axis=0) - low) / spacing).astype(int) + 1
+    way = _by_columns if shape.closed else _by_blocks
+    return way(shape, Lattice(frame, centre, low, counts, spacing), rng)
+
+
+@dataclass(frozen=True)
+class Lattice:
+    """Cubes in a turned frame."""
+
+    frame: np.ndarray
+    """Its axes, as columns."""
+    centre: np.ndarray
+    """World position of its origin [m]."""
+    low: np.ndarray
+    """Corner of the first cube, in the frame [m]."""
+    counts: np.ndarray
+    spacing: float
+
+    def world(self, inner: np.ndarray) -> np.ndarray:
+        """World position of points that are given in cubes from the first corner."""
+        return (self.low + inner * self.spacing) @ self.frame.T + self.centre
+
+
+def _by_columns(shape: Shape, lattice: Lattice, rng: np.random.Generator) -> np.ndarray:
+    """Count surfaces along one ray per column of cubes: exact for closed meshes, and fast.
+
+    A column that does not leave the shape as often as it enters has slipped through an edge; its
+    points are asked one by one.
+    """
+    nx, ny, nz = lattice.counts
+    column = np.indices((nx, ny)).reshape(2, -1).T + rng.uniform(0, 1, (nx * ny, 2))
+    origins = lattice.world(np.column_stack([column, np.full(len(column), -1.0)]))
+    directions = np.tile(lattice.frame[:, 2], (len(column), 1))
+    ray, length, step = shape.crossings(origins, directions)
+    slipped = np.bincount(ray, step, minlength=len(column)) != 0
+    ray, length, step = (a[~slipped[ray]] for a in (ray, length, step))
+    tall = (nz + 2.0) * lattice.spacing
+    order = np.argsort(ray * tall + length)
+    winding = np.concatenate([[0], np.cumsum(step[order])])
+    height = np.arange(nz) + rng.uniform(0, 1, (len(column), nz))
+    key = np.arange(len(column))[:, None] * tall + (height + 1) * lattice.spacing
+    around = winding[np.searchsorted((ray * tall + length)[order], key)]
+    across = np.broadcast_to(column[:, None], (*height.shape, 2))
+    inner = np.concatenate([across, height[..., None]], axis=-1)
+    points = lattice.world(inner[around != 0])
+    doubtful = lattice.world(inner[slipped].reshape(-1, 3))
+    return np.concatenate([points, doubtful[shape.inside(doubtful)]])
+
+
+def _by_blocks(shape: Shape, lattice: Lattice, rng: np.random.Generator) -> np.ndarray:
+    """Ask the winding number at every point, but only once in blocks the surface stays out of."""
+    blocks = np.indices(tuple(-(-lattice.counts // 4))).reshape(3, -1).T * 4
+    middles = lattice.world(blocks + 2.0)
+    mixed = shape.closest(middles)[0] < 2 * np.sqrt(3) * lattice.spacing
+    whole = ~mixed & shape.inside(middles)
+    offsets = np.indices((4, 4, 4)).reshape(3, -1).T
     found = []
     for chosen, ask in ((whole, False), (mixed, True)):
-        points = (centres[chosen][:, None] + offsets).reshape(-1, 3)
-        points = points + rng.uniform(-0.5, 0.5, points.shape) * spacing
-        points = points @ frame.T + centre
+        inner = (blocks[chosen][:, None] + offsets).reshape(-1, 3).astype(np.float64)
+        points = lattice.world(inner + rng.uniform(0, 1, inner.shape))
         found.append(points[shape.inside(points)] if ask else points)
     return np.concatenate(found)
 

@@ -14,8 +14,8 @@ from corporeal.geometry.mesh import Mesh, openness, orient, signed_volume, weld
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import scatter
 
-PROBES = 30_000
-"""Points that measure an object's volume; the error of a ball's is about 0.1 %."""
+PROBES = 20_000
+"""Points that measure an object's volume; the error of a ball's is about 0.2 %."""
 
 
 @dataclass(frozen=True)
@@ -97,7 +97,7 @@ def survey(
         rng: Source of the probes.
 
     """
-    mesh, kept = weld(vertices, triangles)
+    mesh, kept = weld(vertices, triangles, part_of_triangle)
     part = part_of_triangle[kept]
     mesh = orient(mesh)
     piece = pieces(mesh) if len(kept) else kept
@@ -157,7 +157,8 @@ def probe(shape: Shape | None, rng: np.random.Generator) -> tuple[np.ndarray, fl
     used = shape.mesh.vertices[np.unique(shape.mesh.triangles)]
     low, high = used.min(axis=0), used.max(axis=0)
     span = np.maximum(high - low, 1e-3 * (high - low).max())
-    spacing = float(np.prod(span) / 4000) ** (1 / 3)
+    guess = max(abs(signed_volume(shape.mesh)), 1e-4 * float(np.prod(span)))
+    spacing = (min(guess, float(np.prod(span))) / PROBES) ** (1 / 3)
     points = scatter(shape, spacing, rng)
     for _ in range(2):
         if len(points) > 0.7 * PROBES:
