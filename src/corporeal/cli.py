@@ -60,7 +60,7 @@ def verb_demo() -> None:
     GLB, and then run like any other.
     """
     from corporeal.pipeline import Settings, write_showcase
-    from corporeal.showcase.scenes import SCENES
+    from corporeal.showcase.scenes import SCENES, view
 
     first = next(iter(SCENES))
 
@@ -75,7 +75,10 @@ def verb_demo() -> None:
     folder = where.out / where.name
     with console.status("building the scene"):
         path = write_showcase(asked.scene, folder / "input")
-    _go([path], folder, asked.settings, where)
+    settings = asked.settings
+    if settings.film.view is None:
+        settings = replace(settings, film=replace(settings.film, view=view(asked.scene)))
+    _go([path], folder, settings, where)
 
 
 def verb_status() -> None:
