@@ -17,6 +17,7 @@ from typing import Any
 from corporeal import materials, store
 from corporeal.errors import UserError
 from corporeal.formats.glb_writer import write_glb
+from corporeal.formats.sources import sources
 from corporeal.mpm.frames import read_trajectory
 from corporeal.mpm.outcome import outcome
 from corporeal.render.figures import fields_figure, strip
@@ -219,7 +220,7 @@ class _Run:
         missing = [str(p) for p in self.inputs if not p.exists()]
         if missing:
             raise UserError(f"No such file: {', '.join(missing)}. Check the path.")
-        return self.inputs
+        return sources(self.inputs)
 
     def _clear(self, verb: str, folder: Path) -> None:
         """Remove results that no longer follow from the settings; keep an unfinished simulation."""
