@@ -128,7 +128,6 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
             0.02,
             "%",
         ),
-        Fact("The duck comes to rest", of("rubber_duck", "at_rest")),
     ),
     "duck-on-can": (
         Demand("The can keeps a dent", of("soda_can", "dent_depth_dx"), "above", 1, "grid cells"),

@@ -62,15 +62,15 @@ def fallen(height: float, gap: float) -> Point:
 
 
 def duck_on_mud() -> Composition:
-    """Drop the duck from a metre onto the fresh clods of a heap of mud.
+    """Let the duck fall from a second-floor window, 5 m, onto the fresh clods of a heap of mud.
 
     Six clods of 20 mm radius and cohesion c = 1.7 kPa carry 2 c (unconfined compression) over
-    7e-3 m²: 25 N. What the duck brings from a metre, 0.75 J, flattens them by some 25 mm. The
-    little force also squeezes the duck little, so that it hardly bounces.
+    7e-3 m², 25 N; flat mud would carry over 5 c. The duck brings 3.8 J. From a metre (0.75 J) it
+    would bounce off and leave no more than a few millimetres.
     """
-    duck = Placed("rubber_duck", (0.0, 0.0, 0.30), (2, -3, 10), fallen(1.0, 0.21))
+    duck = Placed("rubber_duck", (0.0, 0.0, 0.30), (2, -3, 10), fallen(5.0, 0.21))
     return Composition(
-        "The mud yields under the duck and keeps its imprint; the duck rests on it undeformed.",
+        "The mud yields under the duck and keeps its imprint; the duck ends undeformed.",
         (Placed("mud_pile"), duck),
         view=(0.80, -0.62, 0.36),
         duration=1.5,
@@ -84,12 +84,13 @@ def duck_on_can() -> Composition:
     dent of depth δ in a tube takes P = 16 √(2π/3) m_p √(2 δ / t), m_p = σ_y t²/4 (Wierzbicki and
     Suh 1988). With 285 MPa and t = 0.1 mm that is 73 N at 1 mm and 230 N at 10 mm, which costs
     (2/3) P δ = 1.5 J. The duck, a vinyl sphere of R = 35 mm and wall h = 2 mm, pushes back with
-    k ≈ 2.3 E h²/R = 2 N/mm (Reissner 1946): it takes 3.8 J until its walls meet at 60 mm. Dropped
-    from a table (0.6 J) it only bounces. Thrown down at 12 m/s, as a child can, it has 5.6 J:
-    enough for both.
+    k ≈ 2.3 E h²/R = 2 N/mm (Reissner 1946) until its walls meet. Dropped from a table (0.6 J,
+    50 N) it only bounces; thrown down at 8 m/s, as a child can, it has 2.5 J and pushes with
+    100 N, which leaves a dent of some millimetres in life. A wall that the grid must thicken is
+    softer in its plane, and dents deeper.
     """
     can = Placed("soda_can", (-0.0575, 0, 0.0331), (0, 90, 0))
-    duck = Placed("rubber_duck", (0.0, 0.0, 0.20), (0, 6, -15), (0.0, 0.0, -12.0))
+    duck = Placed("rubber_duck", (0.0, 0.0, 0.20), (0, 6, -15), (0.0, 0.0, -8.0))
     return Composition(
         "The duck deforms and recovers; the can keeps a dent where it was hit.",
         (can, duck),
