@@ -234,3 +234,18 @@ def test_a_slender_leg_is_no_trinket():
     cushion = block(FOAM, 0.3, 0.5, 0.5)
     wood, foam = plan([leg, cushion], [FALL], "draft").treatments
     assert wood.wave_speed > 3 * foam.wave_speed
+
+
+def test_a_closed_elastic_wall_keeps_its_indentation_stiffness():
+    """k ~ E t² / R of a spherical shell (Reissner 1946)."""
+    (duck,) = plan([replace(DUCK, closed=True)], [FALL], "fine").treatments
+    assert duck.young * duck.thickness**2 == pytest.approx(RUBBER.young * 0.002**2)
+    assert duck.density * duck.thickness == pytest.approx(RUBBER.density * 0.002)
+
+
+def test_a_closed_wall_that_flows_keeps_its_hinges():
+    """A can dents by folding: its map is the same whether its lid is on or not."""
+    (shut,), (open_,) = (
+        plan([replace(CAN, closed=closed)], [FALL], "draft").treatments for closed in (True, False)
+    )
+    assert shut == open_

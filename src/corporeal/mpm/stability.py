@@ -71,6 +71,16 @@ def thin_wall(ratio: float) -> tuple[float, float, float]:
     return ratio**3, ratio**2, ratio
 
 
+def closed_wall(ratio: float) -> tuple[float, float, float]:
+    """Factors on (E, σ_y, ρ) for a thickened wall that goes all around and does not flow.
+
+    A closed convex surface cannot bend without stretching (Cohn-Vossen's theorem), so what a blow
+    feels is the indentation stiffness k = 4 E t² / (R √(3(1 - ν²))) of a spherical shell (Reissner
+    1946): E r² keeps it. E r³ would make a rubber duck t_num/t times too soft.
+    """
+    return ratio**2, ratio**2, ratio
+
+
 def fold_factor(thickness: float, simulated: float, radius: float) -> float:
     """Factor on E r³ that lets a fold in a thickened wall yield at the same angle as in life.
 

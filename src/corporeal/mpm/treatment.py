@@ -1,19 +1,20 @@
 """How each part enters the simulation: rigid, deformable or shell, and with which numbers.
 
 One policy for all scenes (no scene can tune it): a part that would neither yield nor visibly flex
-is rigid; everything else keeps its true stiffness; thin walls are thickened with their bending
-stiffness and areal mass kept; only a step budget may compress wave speeds, and keeps their order.
+is rigid; everything else keeps its true stiffness; thin walls are thickened with the stiffness
+that counts and the areal mass kept; only a step budget may compress wave speeds, in their order.
 """
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import inf
+from math import inf, sqrt
 from typing import Literal
 
 from corporeal.mpm.stability import (
     COURANT,
     bounded_poisson,
     capped_young,
+    closed_wall,
     compress_speed,
     fold_factor,
     p_wave_speed,
@@ -50,6 +51,8 @@ class PartGeometry:
     """Enclosed volume [m³]."""
     area: float
     """Surface area, one side [m²]."""
+    closed: bool = False
+    """Whether its wall goes all around something, as a duck's does and a vase's does not."""
 
 
 @dataclass(frozen=True)
@@ -162,15 +165,16 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
     """
     material, speed = part.material, motion.impact_speed
     young, poisson = bounded_poisson(material.young, material.poisson)
-    density, ratio = material.density, wall_ratio(part, width(part) / 10)
-    wave = p_wave_speed(young, poisson, density) * ratio
-    length = part.size[2]
+    density = material.density
+    stiffer, _, denser = wall_factors(part, wall_ratio(part, width(part) / 10))
+    real = p_wave_speed(young, poisson, density)
+    mapped = stiffer / denser
     strain = max(
-        speed / wave,
-        density * motion.acceleration * length / (young * ratio**2),
+        speed / (real * sqrt(mapped)),
+        density * motion.acceleration * part.size[2] / (young * mapped),
         sag(part, motion.acceleration),
     )
-    yields_at = yield_speed(resistance(material), wave / ratio, density)
+    yields_at = yield_speed(resistance(material), real, density)
     rigid = strain < INVISIBLE_STRAIN and speed < yields_at
     return Verdict(strain, yields_at, rigid, explain(strain, speed, yields_at))
 
@@ -209,6 +213,16 @@ def wall_ratio(part: PartGeometry, simulated: float) -> float:
     if part.structure.kind != "shell" or thickness is None:
         return 1.0
     return min(1.0, thickness / simulated)
+
+
+def wall_factors(part: PartGeometry, ratio: float) -> tuple[float, float, float]:
+    """Factors on (E, σ_y, ρ) of a part's wall, by how it gives way.
+
+    A closed wall that does not flow answers by its indentation stiffness; an open one bends; and
+    what flows (a can) folds along plastic hinges.
+    """
+    elastic = part.material.law not in (Law.VON_MISES, Law.DRUCKER_PRAGER)
+    return closed_wall(ratio) if part.closed and elastic else thin_wall(ratio)
 
 
 def sag(part: PartGeometry, acceleration: float) -> float:
@@ -280,7 +294,7 @@ def treat(
     """Give a part its simulated numbers: true ones, but for a thin wall and a capped bulk."""
     material, structure = part.material, part.structure
     ratio = wall_ratio(part, 2 * cell)
-    stiffer, stronger, denser = thin_wall(ratio)
+    stiffer, stronger, denser = wall_factors(part, ratio)
     if material.law is Law.VON_MISES and structure.thickness and ratio < 1:
         stiffer *= fold_factor(structure.thickness, 2 * cell, part.size[1] / 2)
     young, poisson = bounded_poisson(material.young, material.poisson)
@@ -300,11 +314,11 @@ def treat(
         impact_speed=motion.impact_speed,
         wave_speed=wave,
         step=stable_step(wave, motion.impact_speed, cell) if soft else inf,
-        why=reason(verdict, soft, shell, ratio),
+        why=reason(verdict, soft) + (wall_reason(part, ratio) if soft else ""),
     )
 
 
-def reason(verdict: Verdict, soft: bool, shell: bool, ratio: float) -> str:
+def reason(verdict: Verdict, soft: bool) -> str:
     """Say in one or two sentences why a part is treated as it is."""
     if not soft:
         return f"Rigid, because {verdict.reason}."
@@ -312,12 +326,19 @@ def reason(verdict: Verdict, soft: bool, shell: bool, ratio: float) -> str:
         text = "Deformable with the rest of its object; by itself it would be rigid."
     else:
         text = f"Deformable, because {verdict.reason}."
-    if shell and ratio < 1:
-        text += (
-            f" Its wall is simulated {1 / ratio:.3g} times as thick, with its bending stiffness "
-            "and mass kept; in its plane it is softer than in life."
-        )
     return text
+
+
+def wall_reason(part: PartGeometry, ratio: float) -> str:
+    """Say what a thickened wall keeps."""
+    if ratio >= 1:
+        return ""
+    dents = wall_factors(part, ratio) == closed_wall(ratio)
+    kept = "the stiffness with which it dents" if dents else "its bending stiffness"
+    return (
+        f" Its wall is simulated {1 / ratio:.3g} times as thick, with {kept} and its mass kept; "
+        "in its plane it is softer than in life."
+    )
 
 
 def calm_trinkets(

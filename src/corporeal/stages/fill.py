@@ -223,6 +223,7 @@ def resolve(
             size=(max(m.size[0], makes[m.part].sheet), m.size[1], m.size[2]),
             volume=makes[m.part].volume,
             area=makes[m.part].area,
+            closed=m.closed and not makes[m.part].modelled,
         )
         for number, anatomy in enumerate(anatomies)
         for m in anatomy.members
