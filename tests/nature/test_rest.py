@@ -100,3 +100,16 @@ def test_a_wall_holds_whichever_way_it_faces(patient_engine):
     m = run.measure()
     assert m.plane_impulse[0, 0, 0] == pytest.approx(m.mass[0] * G * 0.175, rel=0.03)
     assert np.abs((m.centre[0] - centre) / CELL).max() < 0.05
+
+
+def test_a_tall_rigid_stack_does_not_creep(fast_engine):
+    """Five cubes for one second; sweeps in one direction only would walk the top sideways."""
+    tops = [np.add((0.005, 0.01, 0.05), (0, 0, 0.1 * k)) for k in range(5)]
+    cubes = [box(c, SIZE, CELL / 2, rigid=True, surface=box_surface(c, SIZE)) for c in tops]
+    run = fast_engine(
+        problem(*cubes, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.1)
+    )
+    run.advance(1.0)
+    moved = (run.measure().centre - tops) / CELL
+    assert np.abs(moved[:, :2]).max() < 0.1
+    assert np.abs(moved[:, 2]).max() < 0.1

@@ -253,9 +253,23 @@ def solve(contacts: Contacts, movers: Movers, target: Scalars, sweeps: int) -> V
         (movers.inverse_mass, movers.inverse_inertia, movers.centre),
         (movers.velocity, movers.spin),
         impulse,
-        sweeps,
+        _orders(contacts, sweeps),
     )
     return impulse
+
+
+def _orders(contacts: Contacts, sweeps: int) -> Int[np.ndarray, "S E"]:
+    """Give the order of every sweep: the contacts of two rigid bodies forwards, then backwards.
+
+    With one order for all sweeps the first contacts carry more, and stacks creep to one side.
+    """
+    forward = np.arange(len(contacts.a))
+    changed = (np.diff(contacts.a) != 0) | (np.diff(contacts.c) != 0)
+    starts = np.flatnonzero(np.concatenate([[True], changed]))
+    block = np.cumsum(np.concatenate([[True], changed])) - 1
+    ends = np.append(starts[1:], len(forward))
+    backward = (starts + ends - 1)[block] - forward if len(forward) else forward
+    return np.stack([forward, backward] * ((sweeps + 1) // 2))[:sweeps]
 
 
 @njit(cache=True)
@@ -282,13 +296,13 @@ def _tangential(impulse, slip, softness, limit):
 
 
 @njit(cache=True)
-def _sweep(contacts, masses, motion, impulse, sweeps):
-    """Gauss–Seidel sweeps over all contacts, in their order; changes motion and impulse."""
+def _sweep(contacts, masses, motion, impulse, orders):
+    """Gauss–Seidel sweeps over all contacts, in given orders; changes motion and impulse."""
     first, second, point, normals, friction, target = contacts
     inverse_mass, inverse_inertia, centre = masses
     velocity, spin = motion
-    for _ in range(sweeps):
-        for e in range(len(first)):
+    for order in orders:
+        for e in order:
             a, c, n, old = first[e], second[e], normals[e], impulse[e].copy()
             arm_a, arm_c = point[e] - centre[a], point[e] - centre[c]
             slip = velocity[a] + _cross(spin[a], arm_a) - velocity[c] - _cross(spin[c], arm_c)

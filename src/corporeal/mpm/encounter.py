@@ -43,7 +43,7 @@ class Scene:
 
     @property
     def wall_mover(self) -> int:
-        """Movers are the bodies, then the slots, then the one immovable thing."""
+        """Movers are the bodies, then the slots, then the planes, of which this is the first."""
         return len(self.problem.bodies) + self.grid.count
 
     def mover_of_slot(self, slot: Int[np.ndarray, " E"]) -> Int[np.ndarray, " E"]:
@@ -55,17 +55,18 @@ class Scene:
 
     def movers(self, velocity: Float[np.ndarray, "A 3"]) -> contact.Movers:
         """Everything that an impulse can move, with its velocity after forces."""
-        bodies, still = len(self.problem.bodies), np.zeros((1, 3))
+        bodies = len(self.problem.bodies)
+        still = np.zeros((len(self.problem.planes), 3))
         stiff = np.array([self.is_rigid(b) for b in range(bodies)])
-        inertia = np.zeros((self.wall_mover + 1, 3, 3))
+        inertia = np.zeros((self.wall_mover + len(still), 3, 3))
         inertia[:bodies] = np.where(
             stiff[:, None, None], self.state.inverse_inertia(self.matter), 0.0
         )
-        spin = np.zeros((self.wall_mover + 1, 3))
+        spin = np.zeros((self.wall_mover + len(still), 3))
         spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
         light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, 1e-300), 0.0)
         return contact.Movers(
-            np.concatenate([np.where(stiff, 1.0 / self.matter.total, 0.0), light, [0.0]]),
+            np.concatenate([np.where(stiff, 1.0 / self.matter.total, 0.0), light, still[:, 0]]),
             inertia,
             np.concatenate([self.state.centre, self.grid.index * self.problem.cell, still]),
             np.concatenate([self.state.speed, velocity, still]),
@@ -123,7 +124,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     after = contacts.approach(movers)
     bodies = len(problem.bodies)
     return Meeting(
-        velocity=movers.velocity[bodies:-1],
+        velocity=movers.velocity[bodies : scene.wall_mover],
         speed=movers.velocity[:bodies],
         spin=movers.spin[:bodies],
         pair=pair,
@@ -139,7 +140,7 @@ def _sweeps(scene: Scene, contacts: contact.Contacts, hit: bool) -> int:
     Rigid bodies on one another have only each other to yield: with few sweeps stacks creep.
     """
     movers = np.concatenate([contacts.a, contacts.c])
-    shared = np.bincount(movers[movers != scene.wall_mover], minlength=1).max() > 1
+    shared = np.bincount(movers[movers < scene.wall_mover], minlength=1).max() > 1
     bodies = len(scene.problem.bodies)
     stacked = bool(np.any((contacts.a < bodies) & (contacts.c < bodies)))
     if hit or stacked:
@@ -304,7 +305,7 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     normal = np.tile(-np.array(scene.problem.planes[wall].normal), (len(slot), 1))
     gap = contact.gap_to_wall(look.mean[slot], _height(scene, slot, wall), normal, cell)
     point = scene.grid.index[slot] * cell
-    there = np.full(len(slot), scene.wall_mover)
+    there = np.full(len(slot), scene.wall_mover + wall)
     return Touch((field, bodies + wall), scene.mover_of_slot(slot), there, point, normal, gap)
 
 
@@ -320,6 +321,6 @@ def _points_on_walls(scene: Scene) -> list[Touch]:
             if len(near) == 0:
                 continue
             normal = np.tile(-np.array(plane.normal), (len(near), 1))
-            mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover)
+            mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover + w)
             touches.append(Touch((b, bodies + w), mover, wall, point[near], normal, height[near]))
     return touches
