@@ -60,3 +60,16 @@ def test_the_smallest_box_of_a_tilted_plate_is_the_plate():
     plate = trimesh.creation.box((0.1, 1.0, 3.0))
     plate.apply_transform(trimesh.transformations.rotation_matrix(0.7, (1, 2, 3)))
     assert oriented_size(np.asarray(plate.vertices)) == pytest.approx((0.1, 1.0, 3.0))
+
+
+def test_parts_welded_to_one_another_keep_their_own_winding():
+    """A stem stands on a foot: their common ring of edges once turned the stem inside out."""
+    foot, stem = trimesh.creation.cylinder(0.1, 0.1), trimesh.creation.cylinder(0.1, 1.0)
+    stem.apply_translation((0, 0, 0.55))
+    part = np.repeat([0, 1], [len(foot.faces), len(stem.faces)])
+    both = trimesh.util.concatenate([foot, stem])
+    mesh, kept = weld(np.asarray(both.vertices), np.asarray(both.faces), part)
+    assert len(kept) == len(both.faces)
+    turned = orient(mesh)
+    for k, own in enumerate((foot, stem)):
+        assert signed_volume(turned.only(part[kept] == k)) == pytest.approx(own.volume)

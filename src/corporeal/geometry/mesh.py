@@ -98,13 +98,16 @@ def signed_volume(mesh: Mesh) -> float:
     return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
 
 
-def boundary(mesh: Mesh) -> tuple[Int[np.ndarray, "B 2"], Int[np.ndarray, " B"]]:
-    """Edges that an odd number of triangles share, and a triangle of each."""
+def boundary(
+    mesh: Mesh, patch: Int[np.ndarray, " T"] | None = None
+) -> tuple[Int[np.ndarray, "B 2"], Int[np.ndarray, " B"]]:
+    """Edges that an odd number of triangles (of one patch) share, and a triangle of each."""
     f = mesh.triangles
     edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
-    _, edge, count = np.unique(
-        np.sort(edges, axis=1), axis=0, return_inverse=True, return_counts=True
-    )
+    key = np.sort(edges, axis=1)
+    if patch is not None:
+        key = np.column_stack([key, np.tile(patch, 3)])
+    _, edge, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
     odd = np.flatnonzero(count[edge.reshape(-1)] % 2 == 1)
     return edges[odd], odd % len(f)
 
@@ -137,11 +140,13 @@ def orient(mesh: Mesh) -> Mesh:
     wrong = closed & (volume < 0)
     right = closed & (volume > 0)
     if wrong.any() and right.any():
-        _, example = np.unique(patch, return_index=True)
+        asked = np.flatnonzero(wrong[patch])
         around = igl.fast_winding_number(
-            mesh.vertices, mesh.only(right[patch]).triangles, mesh.corners[example].mean(axis=1)
+            mesh.vertices, mesh.only(right[patch]).triangles, mesh.corners[asked].mean(axis=1)
         )
-        wrong &= np.abs(around) < 0.5
+        within = mesh.areas[asked] * (np.abs(np.asarray(around)).reshape(-1) > 0.5)
+        share = np.bincount(patch[asked], within, len(wrong)) / np.bincount(patch, mesh.areas)
+        wrong &= share < 0.95
     return Mesh(mesh.vertices, _flip(mesh.triangles, wrong[patch]))
 
 
@@ -152,15 +157,17 @@ def _flip(triangles: np.ndarray, which: np.ndarray) -> np.ndarray:
 def _patch_volumes(mesh: Mesh, patch: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Signed volume of each patch about its own middle [m³], and whether it is nearly closed.
 
-    The area vectors of a closed surface add up to nothing.
+    Where parts were welded together a tube can be a patch of its own: open, whatever its ends.
     """
-    corners, vectors, areas = mesh.corners, mesh.area_vectors, mesh.areas
+    corners, areas = mesh.corners, mesh.areas
     total = np.bincount(patch, areas)
     middle = np.stack(
         [np.bincount(patch, areas * corners.mean(axis=1)[:, k]) / total for k in range(3)], axis=1
     )
     a, b, c = np.swapaxes(corners - middle[patch][:, None], 0, 1)
     volume = np.bincount(patch, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6)
-    left = np.stack([np.bincount(patch, vectors[:, k]) for k in range(3)], axis=1)
-    closed = (np.linalg.norm(left, axis=1) < 0.05 * total) & (np.bincount(patch) >= 4)
+    edges, owner = boundary(mesh, patch)
+    length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
+    rim = np.bincount(patch[owner], length, minlength=len(total))
+    closed = (rim < 0.1 * np.sqrt(total)) & (np.bincount(patch) >= 4)
     return volume, closed

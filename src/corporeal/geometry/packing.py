@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.geometry.anatomy import convex_side
+from corporeal.geometry.anatomy import convex_side, pieces
 from corporeal.geometry.filling import Filling, fill_body, fill_wall
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.shape import Shape
@@ -71,11 +71,17 @@ def pack(
         face = member.body
         if recipe.depth == 0 and len(face.triangles):
             outer = outer_face(anatomy, member)
-            lumps.append(_lump(fill_wall(outer, spacing, recipe.wall, rng), member, sheet=False))
+            lumps.append(
+                _lump(
+                    fill_wall(outer, spacing, _fitting(outer, recipe.wall), rng),
+                    member,
+                    sheet=False,
+                )
+            )
         elif len(face.triangles) and not (lumps[0].part == member.part).any():
             lumps.append(_lump(fill_wall(face, spacing, 0.0, rng), member, sheet=False))
         if member.sheet_area > 1e-3 * member.body_area:
-            filling = fill_wall(member.sheet, spacing, recipe.sheet, rng)
+            filling = fill_wall(member.sheet, spacing, _fitting(member.sheet, recipe.sheet), rng)
             lumps.append(_lump(filling, member, sheet=True))
     return Packing(
         np.concatenate([p.points for p in lumps]),
@@ -83,6 +89,12 @@ def pack(
         np.concatenate([p.part for p in lumps]),
         np.concatenate([p.sheet for p in lumps]),
     )
+
+
+def _fitting(face: Mesh, thickness: float) -> float:
+    """Give leaves one layer: a thickness is for pieces that are wider than it is twice."""
+    count = int(pieces(face).max()) + 1
+    return thickness if face.areas.sum() / count > (2 * thickness) ** 2 else 0.0
 
 
 def _lump(filling: Filling, member: Member, *, sheet: bool) -> Packing:
