@@ -53,7 +53,8 @@ def problem(law: Law, count: int, contact: bool) -> Problem:
     """Build the block, with or without the floor and the ball."""
     spacing = float(np.cbrt(np.prod(SIZE) / count))
     half = np.array([SIZE[0] / 2, SIZE[1] / 2, 0.0])
-    bodies = [matter("block", lattice(-half, half + [0, 0, SIZE[2]], spacing), spacing, law)]
+    block = lattice(-half, half + np.array([0, 0, SIZE[2]]), spacing)
+    bodies = [matter("block", block, spacing, law)]
     if contact:
         radius, centre = 0.05, np.array([0.0, 0.0, SIZE[2] + 0.05])
         points = lattice(centre - radius, centre + radius, spacing)

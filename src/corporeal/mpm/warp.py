@@ -11,16 +11,12 @@ import numpy as np
 from corporeal.errors import SimulationError
 from corporeal.mpm import tables
 from corporeal.mpm.carried import Carried
-from corporeal.mpm.contact import half_space_face
 from corporeal.mpm.kernels import (
     ASTRAY,
-    CLOSE,
     FIELD,
-    MEET,
     PLASTIC,
     REPORT,
     SPEED2,
-    TOUCH,
     VISCOUS,
     WAVE2,
     WORK,
@@ -29,6 +25,7 @@ from corporeal.mpm.kernels import (
 )
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measuring import measured, shown
+from corporeal.mpm.memory import ContactMemory, point, rigid_grid
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.mpm.window import Window
 
@@ -99,69 +96,27 @@ class WarpEngine:
             self.window[f] = Window(place, rows)
             if not self.window[f].fits:
                 raise SimulationError(_too_wide(problem, bodies, 0.0))
-        self._lay_out_rigid()
-        single = problem.contact == "single"
+        separate = [b for b in self.rigid if self._is_rigid(b)]
+        self.grids = [
+            rigid_grid(
+                self.field[b : b + 1],
+                problem.bodies[b],
+                self.rigid[b],
+                self.points[b],
+                problem.cell,
+            )
+            for b in separate
+        ]
         self.carried = [
             Carried(problem.bodies[b], state, self.first[b], problem.cell)
-            for b, state in (self.rigid.items() if single else ())
+            for b, state in self.rigid.items()
+            if b not in separate
         ]
-        self._lay_out_contact()
+        self.contact = ContactMemory(self.world, problem, self.ledger)
         self.program = Program(self.world, self.threads)
         self.speed = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
         self.wave = max([self._rest_speed(f) for f in self.window] + [0.0])
         self.connect()
-
-    def _lay_out_rigid(self) -> None:
-        """Give every rigid body a grid that holds it however it turns; used where touched."""
-        self.keep: list[np.ndarray] = []
-        for b, state in self.rigid.items():
-            if not self._is_rigid(b):
-                continue
-            across = int(np.ceil((2.0 * state[tables.RADIUS] / self.problem.cell + 4.0) / 4.0)) + 3
-            surface = self.problem.bodies[b].surface - state[tables.CENTRE : tables.CENTRE + 3]
-            arrays = {
-                "node": np.zeros((across**3, 64, 8), np.float32),
-                "table": np.full(across**3, -1, np.int32),
-                "where": np.zeros((across**3, 4), np.int32),
-                "near": np.zeros(2 * across**3, np.uint64),
-                "block": np.zeros(len(self.points[b]), np.int32),
-                "point": np.ascontiguousarray(self.points[b]),
-                "surface": np.ascontiguousarray(surface),
-                "rigid": state,
-            }
-            self.keep += arrays.values()
-            record = self.field[b : b + 1]
-            for name, array in arrays.items():
-                record[name] = array.ctypes.data
-            record["dim"], record["rigids"] = across, 1
-            record["points"], record["surfaces"] = len(self.points[b]), len(surface)
-
-    def _lay_out_contact(self) -> None:
-        problem, fields = self.problem, len(self.members)
-        walls = [[*plane.normal, plane.offset] for plane in problem.planes]
-        self.plane = np.array(walls, float).reshape(-1, 4)
-        bodies, friction = len(problem.bodies), np.array(problem.friction, float)
-        restitution = np.array(problem.restitution, float)
-        if problem.contact == "single":
-            wall = friction[:bodies, bodies:].mean(axis=0)
-            friction = np.zeros((1 + len(walls), 1 + len(walls)))
-            friction[0, 1:] = friction[1:, 0] = wall
-            restitution = np.zeros_like(friction)
-        self.friction, self.restitution = friction, restitution
-        self.scratch = np.zeros((fields + len(walls)) ** 2 * 8)
-        self._point(
-            plane=self.plane, friction=friction, restitution=restitution, ledger=self.scratch
-        )
-        book = self.ledger
-        for name in (
-            "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
-        ).split():
-            self._point(**{name: getattr(book, name)})
-        self.face = half_space_face(np.linspace(-1.5, 0.0, 4097))
-        self._point(face=self.face)
-        self.world["planes"], self.world["names"] = len(walls), bodies + len(walls)
-        self.room = 1024
-        self._lengthen()
 
     def _refuse_far(self, place: np.ndarray, bodies: list[int]) -> None:
         if not np.isfinite(place).all():
@@ -196,7 +151,13 @@ class WarpEngine:
             self._connect_field(f, window)
         for body in self.carried:
             body.find(self.window[0])
-        self._point(field=self.field, task=self.task, list=self.node_task, report=self.report)
+        point(
+            self.world,
+            field=self.field,
+            task=self.task,
+            list=self.node_task,
+            report=self.report,
+        )
         self.world["fields"], self.world["dx"] = len(self.field), self.problem.cell
         self.world["tasks"] = len(self.task)
         work = np.array([self._particles(*task) for task in self.task])
@@ -279,29 +240,9 @@ class WarpEngine:
         self.world["again"] = 0
         self.program.contact.launch()
         while self.world["full"][0]:
-            self._lengthen()
+            self.contact.lengthen()
             self.world["again"] = 1
             self.program.contact.launch()
-
-    def _lengthen(self) -> None:
-        self.room *= 2
-        room = self.room
-        self.meets = np.zeros(room * MEET, np.uint8)
-        self.touches = np.zeros(2 * room * TOUCH, np.uint8)
-        self.closes = np.zeros(4 * room * CLOSE, np.uint8)
-        self.order = np.zeros(2 * room, np.int32)
-        self._point(
-            contact_memory=self.meets,
-            pair_memory=self.touches,
-            near_memory=self.closes,
-            order=self.order,
-        )
-        world = self.world
-        world["most_contacts"], world["most_pairs"], world["most_nears"] = room, 2 * room, 4 * room
-
-    def _point(self, **arrays: np.ndarray) -> None:
-        for name, array in arrays.items():
-            self.world[name] = array.ctypes.data
 
     def _kick(self, dt: float) -> np.ndarray:
         """Velocity [m/s] that gravity gives in this step; enters it and the pushes."""
