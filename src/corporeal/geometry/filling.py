@@ -120,7 +120,9 @@ def fill_wall(face: Mesh, spacing: float, thickness: float, rng: np.random.Gener
     points = np.concatenate(found)
     if not len(points):  # crumpled more tightly than it is thick
         return fill_wall(face, spacing, 0.0, rng)
-    return Filling(points, np.full(len(points), area * thickness / max(len(points), 1)))
+    return Filling(
+        points, np.full(len(points), area * (thickness or spacing) / max(len(points), 1))
+    )
 
 
 def _vertex_normals(mesh: Mesh) -> np.ndarray:
