@@ -253,22 +253,27 @@ def solve(contacts: Contacts, movers: Movers, target: Scalars, sweeps: int) -> V
         (movers.inverse_mass, movers.inverse_inertia, movers.centre),
         (movers.velocity, movers.spin),
         impulse,
-        _orders(contacts, sweeps),
+        _orders(contacts, movers, sweeps),
     )
     return impulse
 
 
-def _orders(contacts: Contacts, sweeps: int) -> Int[np.ndarray, "S E"]:
-    """Give the order of every sweep: the contacts of two rigid bodies forwards, then backwards.
+def _orders(contacts: Contacts, movers: Movers, sweeps: int) -> Int[np.ndarray, "S E"]:
+    """Give the order of every sweep: forwards, or to and fro where rigid bodies are stacked.
 
-    With one order for all sweeps the first contacts carry more, and stacks creep to one side.
+    With one order for all sweeps the first contacts carry more, and stacks creep to one side. To
+    and fro, each run of contacts between the same two things is turned about in every second
+    sweep; that needs the many sweeps of a stack, and a lone block stands better without.
     """
     forward = np.arange(len(contacts.a))
     changed = (np.diff(contacts.a) != 0) | (np.diff(contacts.c) != 0)
     starts = np.flatnonzero(np.concatenate([[True], changed]))
     block = np.cumsum(np.concatenate([[True], changed])) - 1
     ends = np.append(starts[1:], len(forward))
-    backward = (starts + ends - 1)[block] - forward if len(forward) else forward
+    turned = (starts + ends - 1)[block] - forward if len(forward) else forward
+    rigid = np.any(movers.inverse_inertia != 0.0, axis=(1, 2))
+    stacked = bool(np.any(rigid[contacts.a] & rigid[contacts.c]))
+    backward = turned if stacked else forward
     return np.stack([forward, backward] * ((sweeps + 1) // 2))[:sweeps]
 
 
