@@ -941,12 +941,13 @@ if (stiff_any) {
   double fine = 2e-3 * dx;
   for (int s = 0; s < sweeps; s++) {
     double most = 0;
-    // Contacts of two rigid things go forwards, then backwards: with one order for all sweeps the
-    // first would carry more, and stacks creep to one side.
+    // Contacts of two rigid bodies go forwards, then backwards: with one order for all sweeps the
+    // first would carry more, and stacks creep to one side. So do the planes below a stack; a lone
+    // block on a plane, which has few sweeps, would creep if they turned about.
     for (int first = 0, last; first < n; first = last) {
       Touch &F = touches[order[first]];
       bool turned = s & 1 && world->field[F.fa].rigids &&
-                    (F.fc >= fields || world->field[F.fc].rigids);
+                    (F.fc < fields ? world->field[F.fc].rigids : stacked);
       for (last = first; last < n; last++) {
         Touch &T = touches[order[last]];
         if (T.fa != F.fa || T.fc != F.fc || (T.meet < 0) != (F.meet < 0)) break;
