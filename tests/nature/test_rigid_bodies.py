@@ -38,14 +38,14 @@ def test_a_rigid_ball_bounces_to_the_height_its_restitution_says(patient_engine,
     assert peak == pytest.approx(restitution**2 * drop, rel=0.03, abs=0.03 * CELL)
 
 
-def test_two_rigid_balls_rebound_as_newton_says(engine):
+def test_two_rigid_balls_rebound_as_newton_says(patient_engine):
     restitution, v, ratio, cell = 0.9, 1.0, 0.3, RADIUS / 5
     shift = np.array([0.13, 0.31, 0.22]) * cell
     far = shift + np.array([2 * RADIUS + 0.9 * cell, 0.0, 0.0])
     one = ball(shift, RADIUS, cell / 2, stuff=STEEL, rigid=True, velocity=(v, 0.0, 0.0))
     light = Stuff(density=7850.0 * ratio)
     two = ball(far, RADIUS, cell / 2, stuff=light, rigid=True, velocity=(-v / 2, 0.0, 0.0))
-    run = engine(problem(one, two, cell=cell, restitution=restitution))
+    run = patient_engine(problem(one, two, cell=cell, restitution=restitution))
     before = run.measure()
     run.advance(0.03)
     after = run.measure()
@@ -84,7 +84,7 @@ def test_a_rigid_ball_rolls_down_a_slope_without_slipping(patient_engine):
     assert spin[1] / inertia * RADIUS == pytest.approx(m.momentum[0, 0] / m.mass[0], rel=0.05)
 
 
-def test_a_heavy_rigid_block_sinks_into_foam_until_the_foam_carries_it(patient_engine):
+def test_a_heavy_rigid_block_sinks_into_foam_until_the_foam_carries_it(fast_engine):
     """Between two states of rest: the floor has taken the weight of both."""
     cell = 0.025
     foam = Stuff(young=1e5, poisson=0.3, density=100.0, viscosity=150.0)
@@ -92,7 +92,7 @@ def test_a_heavy_rigid_block_sinks_into_foam_until_the_foam_carries_it(patient_e
     block = box(
         (0.103, 0.052, 0.125), (0.1, 0.1, 0.05), cell / 2, stuff=Stuff(density=2000.0), rigid=True
     )
-    run = patient_engine(
+    run = fast_engine(
         problem(
             below, block, cell=cell, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.1
         )
