@@ -152,3 +152,12 @@ def test_flow_of_sand_carries_the_friction_limit_back_to_f():
     limit = -3 * plasticity.cone_slope(0.6) * pressure
     assert np.all(shear <= limit * (1 + 1e-9) + 1e-9)
     assert np.any(flow.plastic_strain > 0)
+
+
+def test_what_lies_open_at_rest_pays_nothing_more():
+    """A soil torn open books its opening once, however many steps it then lies still."""
+    torn = drucker_prager(np.full((1, 3), 0.05), 30, cohesion=1.0)
+    again = drucker_prager(torn.strain, 30, cohesion=1.0, volume=torn.volume[0])
+    assert torn.plastic_strain[0] > 1e-3
+    assert again.plastic_strain[0] < 1e-12
+    np.testing.assert_allclose(again.volume, torn.volume)

@@ -106,7 +106,9 @@ def return_drucker_prager(
     slip = size + cone_slope(angle) * (3.0 * lam + 2.0 * mu) / (2.0 * mu) * (trace - apex)
     on_cone = strain - _scaled(deviator, np.clip(slip, 0.0, size), size)
     returned = np.where((trace > apex)[:, None], apex[:, None] / 3.0, on_cone)
-    excess = strain - returned
+    # Beyond the apex what was open before is no new slip: only the change is.
+    opened = np.where(trace > apex, volume, 0.0)[:, None] / 3.0
+    excess = strain - returned - opened
     equivalent = np.sqrt(2.0 / 3.0) * np.linalg.norm(excess, axis=1)
     return Returned(returned, excess, equivalent, trace - np.sum(returned, axis=1))
 

@@ -99,11 +99,14 @@ struct Laws {
     scale = Simd::pick(apex, zero, scale);
     mean = Simd::pick(apex, t.apex * (1.0f / 3.0f), mean);
     f8 after = 3.0f * mean;
+    // Beyond the apex what was open before is no new slip: only the change is.
+    f8 opened = Simd::pick(apex, vc, zero);
     for (int i = 0; i < 3; i++) {
       f8 next = scale * h[i] + mean;
-      work += (2.0f * t.mu * next + t.lambda * after) * (eps[i] - next);
+      work += (2.0f * t.mu * next + t.lambda * after) * (eps[i] - next - opened * (1.0f / 3.0f));
       eps[i] = next;
     }
+    out -= opened;
     change = Simd::pick(apex, Simd::root(n * n + out * out * (1.0f / 3.0f)), slip);
     vc = tr - after;
     return work;
