@@ -7,36 +7,21 @@ from corporeal.showcase.mesh import Model, Part, pictured, plain
 
 
 def mud_pile() -> Model:
-    """Model wet mud, 0.42 m across and 9 cm high: glossy, slumped at the rim, fresh clods on top.
-
-    The clods are what something light can flatten: their strength is 2 c, flat mud's over 5 c.
-    """
+    """Model wet mud, 0.26 m across and 9 cm high: lumpy, glossy, slumped at the rim."""
     rng = np.random.default_rng(5)
-    rim = _outline(0.205, 3, 0.06)
+    rim = _outline(0.125, 3, 0.06)
     fine = sdf.noise3(2, 2.0)
-    angle, place = rng.random(16) * 2 * np.pi, 0.15 * np.sqrt(rng.random(16))
-    wide, tall = 0.034 + 0.03 * rng.random(16), 0.010 + 0.020 * rng.random(16)
+    angle, place = rng.random(16) * 2 * np.pi, 0.085 * np.sqrt(rng.random(16))
+    wide, tall = 0.024 + 0.020 * rng.random(16), 0.008 + 0.014 * rng.random(16)
     lumps = np.stack([place * np.cos(angle), place * np.sin(angle), wide, tall], 1)
-    clods = [
-        (r * np.cos(a), r * np.sin(a), w, h)
-        for a, r, w, h in zip(
-            np.arange(6) * 1.047 + 0.3 * rng.random(6),
-            0.034 + 0.008 * rng.random(6),
-            0.018 + 0.003 * rng.random(6),
-            0.024 + 0.010 * rng.random(6),
-            strict=True,
-        )
-    ]
 
     def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         s = _share(x, y, rim)
-        z = bed = 0.042 * (1 - 0.62 * s**2)
+        z = bed = 0.068 * (1 - 0.55 * s**2)
         for cx, cy, w, h in lumps:
             # Soft maximum: clods melt into each other.
             clod = h * np.exp(-(((x - cx) ** 2 + (y - cy) ** 2) / w**2)) + bed
             z = 0.5 * (z + clod + np.sqrt((z - clod) ** 2 + 3e-5))
-        for cx, cy, w, h in clods:
-            z = z + h * np.exp(-((((x - cx) ** 2 + (y - cy) ** 2) / w**2) ** 1.5))
         return (1 - s**5) ** 0.6 * (z - 0.004 + 0.0012 * _relief(fine, x, y, 0.07))
 
     colours = ("#2a2018", "#453527", "#5f4b38")
