@@ -27,6 +27,8 @@ from corporeal.types import Scene, SceneObject
 
 SHORTEST, LONGEST = 1.0, 3.0
 """Bounds of the time that is watched when nobody says how long [s]."""
+FPS = 30
+"""Frames per second of the film when nobody says."""
 
 
 @dataclass(frozen=True)
@@ -47,7 +49,7 @@ class AssembleConfig:
     duration: float | None = None
     """How long to watch [s]; by default as the scene file says, else as the falls need."""
     fps: int | None = None
-    """Frames per second of the film."""
+    """Frames per second of the film; by default as the scene file says, else 30."""
 
 
 DEFAULT = AssembleConfig()
@@ -323,7 +325,7 @@ def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: Assemble
     scene = replace(
         scene,
         gravity=plan.gravity or (own or scene).gravity,
-        fps=config.fps or plan.fps or (own or scene).fps,
+        fps=config.fps or plan.fps or (own.fps if own else FPS),
     )
     stated = config.duration or plan.duration or (own.duration if own else None)
     return replace(scene, duration=stated or _watched(scene))
