@@ -10,7 +10,7 @@ from corporeal.showcase.models import MODELS
 TABLE = {
     "rubber_duck": (63.9, (126, 84, 110)),
     "soda_can": (5.18, (66, 66, 115)),
-    "mud_pile": (5020, (389, 439, 99)),
+    "mud_pile": (2587, (237, 268, 91)),
     "vase": (792.3, (188, 188, 281)),
     "ball": (5565, (220, 220, 220)),
     "armchair": (97480, (788, 712, 923)),

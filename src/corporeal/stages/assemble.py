@@ -223,7 +223,8 @@ def _extent_of(text: str, blocks: int, scene: Scene) -> tuple[str, float]:
 def _means(words: str, thing: SceneObject) -> bool:
     """Tell whether somebody who types these words means this object."""
     said = set(words.lower().replace("_", " ").split())
-    return words == thing.name or said <= set(thing.class_name.lower().split())
+    exactly = words in (thing.name, Path(thing.source).stem)
+    return exactly or said <= set(thing.class_name.lower().split())
 
 
 def _at_working_extent(scene: Scene, extent: float | None) -> Scene:
