@@ -186,6 +186,9 @@ def test_energy_from_nowhere_is_found_and_dissipation_is_not_mistaken_for_it(sto
     assert energy_growth(ledger, SCENE, CELL) < 1e-12
     ledger["kinetic"] = 0.8 * fall
     assert energy_growth(ledger, SCENE, CELL) == pytest.approx(0.1)
+    assert energy_growth(ledger, SCENE, CELL, with_losses=False) == 0
+    ledger["kinetic"] = 1.2 * fall
+    assert energy_growth(ledger, SCENE, CELL, with_losses=False) == pytest.approx(0.2)
 
 
 @pytest.mark.parametrize(
@@ -194,7 +197,8 @@ def test_energy_from_nowhere_is_found_and_dissipation_is_not_mistaken_for_it(sto
         ("nan_count", 3, "not numbers"),
         ("particles_out_of_domain", 7, "7 particles"),
         ("momentum_residual", 0.05, "5.0%"),
-        ("energy_growth", 0.2, "Energy"),
+        ("energy_growth", 0.2, "books of energy"),
+        ("mechanical_growth", 0.2, "Energy grew by 20.0%"),
         ("max_penetration_dx", 2.5, "2.5 grid cells"),
         ("mass_error", 0.3, "30%"),
     ],

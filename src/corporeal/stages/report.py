@@ -195,7 +195,8 @@ def _ground_row(name: str, ground: Ground) -> str:
 
 AUDIT_ROWS = (
     ("momentum_residual", "momentum not accounted for, relative", ".2g"),
-    ("energy_growth", "energy created, relative", ".2g"),
+    ("mechanical_growth", "energy of motion and strain created, relative", ".2g"),
+    ("energy_growth", "the same with booked losses, relative", ".2g"),
     ("max_penetration_dx", "deepest penetration, in grid cells", ".2f"),
     ("max_penetration_m", "deepest penetration [m]", ".2g"),
     ("particles", "particles", ",d"),
