@@ -1,10 +1,12 @@
 """The front door: every verb a person can type."""
 
+import os
 import sys
 import traceback
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
+from inspect import cleandoc
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -186,7 +188,7 @@ def _parse(kind: Any, verb: str, description: str | None) -> Any:
     return tyro.cli(
         tyro.conf.OmitArgPrefixes[kind],
         prog=f"corporeal {verb}",
-        description=description,
+        description=cleandoc(description or ""),
         args=sys.argv[2:],
     )
 
@@ -253,23 +255,31 @@ def main() -> None:
     verb = sys.argv[1] if len(sys.argv) > 1 else "--help"
     if verb in ("--help", "-h", "help"):
         print(_usage())
-        return
-    if verb == "--version":
+    elif verb == "--version":
         print(__version__)
-        return
-    if verb not in VERBS:
+    elif verb not in VERBS:
         sys.exit(_complain(f"Unknown verb {verb!r}. Choose one of: {', '.join(VERBS)}."))
+    else:
+        sys.exit(_do(VERBS[verb]))
+
+
+def _do(verb: Callable[[], None]) -> int:
+    """Return the exit code: 0, 1 a mistake of ours, 2 the person's, 130 stopped."""
     try:
-        VERBS[verb]()
+        verb()
+        return 0
     except UserError as error:
-        sys.exit(_complain(str(error)))
+        return _complain(str(error))
     except KeyboardInterrupt:
         _complain("Stopped. What was finished is kept: the same command goes on from there.")
-        sys.exit(130)
+        return 130
+    except BrokenPipeError:  # `corporeal materials | head`: nobody listens any more
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return 0
     except MemoryError:
-        sys.exit(_complain("Out of memory. Use --detail draft, or a smaller scene."))
+        return _complain("Out of memory. Use --detail draft, or a smaller scene.")
     except Exception as error:  # our own mistake: the details go to a file, not to the person
-        sys.exit(_confess(error))
+        return _confess(error)
 
 
 def _complain(message: str) -> int:
