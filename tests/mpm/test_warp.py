@@ -204,3 +204,13 @@ def test_two_processes_may_compile_at_once(tmp_path):
     for process in running:
         _, words = process.communicate(timeout=200)
         assert process.returncode == 0, words
+
+
+def test_the_control_books_its_floor_as_the_floor():
+    """With one field for all, a touch of the floor once went down as a touch of the bodies."""
+    balls = [body(ball((x, 0, 0.059), 0.06), velocity=(0, 0, -1)) for x in (0.0, 0.3)]
+    engine = WarpEngine(problem(*balls, contact="single"))
+    engine.advance(0.02)
+    first = engine.measure().first_contact
+    assert np.isnan(first[0, 1])
+    assert np.isfinite(first[0, 2])

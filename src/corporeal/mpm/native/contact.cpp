@@ -994,8 +994,10 @@ for (int a = 0; a < fields; a++)
       world->pair_impulse[a * books + c] += row[1];
       world->pair_impulse[c * books + a] = world->pair_impulse[a * books + c];
     }
+    // In the books planes come after the bodies, which share one field in the control.
+    int name = c < fields ? c : books + c - fields;
     for (int side = 0; side < 2; side++) {
-      int i = side ? c * world->names + a : a * world->names + c;
+      int i = side ? name * world->names + a : a * world->names + name;
       if (!(world->first_contact[i] >= 0)) {
         world->first_contact[i] = world->time;
         for (int d = 0; d < 3; d++) world->contact_point[3 * i + d] = row[2 + d] / row[1];
