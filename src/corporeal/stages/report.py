@@ -9,6 +9,7 @@ import html
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
+from math import degrees
 from pathlib import Path
 from string import Template
 from typing import Any
@@ -240,7 +241,11 @@ def _settings(audit: Mapping[str, Any]) -> str:
 
 
 def si(value: float, unit: str) -> str:
-    """Write a number with three digits and an SI prefix where the unit takes one."""
+    """Write a number with three digits, an SI prefix where the unit takes one, angles in degrees."""
+    if unit == "rad":
+        return f"{degrees(value):.3g}°"
+    if unit == "kg/m³":
+        return f"{value:.4g} {unit}"
     if unit not in ("Pa", "m") or value == 0:
         return f"{value:.3g} {unit}".strip()
     for size, prefix in PREFIXES:
