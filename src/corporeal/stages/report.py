@@ -241,7 +241,7 @@ def _settings(audit: Mapping[str, Any]) -> str:
 
 
 def si(value: float, unit: str) -> str:
-    """Write a number with three digits, an SI prefix where the unit takes one, angles in degrees."""
+    """Write a number with three digits, a prefix where the unit takes one, angles in degrees."""
     if unit == "rad":
         return f"{degrees(value):.3g}°"
     if unit == "kg/m³":
