@@ -11,6 +11,7 @@ from corporeal.types import Finish, Scene, SceneObject, Surface
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+SMALL = ("--width", "160", "--height", "120")
 FACES = np.array([t for a, b, c, d in QUADS for t in ([a, b, c], [a, c, d])])
 
 
@@ -55,7 +56,7 @@ def refused(said, *words):
 
 def test_a_box_falls_and_the_run_tells_everything(typed, tmp_path):
     write_glb(tmp_path / "box.glb", a_box())
-    code, text = typed("run", "box.glb", "--width", "160", "--height", "120")
+    code, text = typed("run", "box.glb", *SMALL)
     assert code == 0, text.err
     folder = tmp_path / "runs" / "box"
     for name in ("film.mp4", "report.html", "materials.json", "audit.json", "strip.png"):
@@ -71,7 +72,7 @@ def test_a_box_falls_and_the_run_tells_everything(typed, tmp_path):
     assert json.loads((folder / "run.json").read_text())["state"] == "finished"
 
     before = (folder / "8-simulate" / store.META).stat().st_mtime_ns
-    assert typed("run", "box.glb", "--width", "160", "--height", "120")[0] == 0
+    assert typed("run", "box.glb", *SMALL)[0] == 0
     assert (folder / "8-simulate" / store.META).stat().st_mtime_ns == before, "done twice"
 
     assert typed("film", "runs/box", "--width", "200", "--height", "150")[0] == 0
@@ -136,12 +137,12 @@ def test_a_full_disk_is_said_and_the_run_is_not_taken_for_finished(typed, tmp_pa
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)
     resource.setrlimit(resource.RLIMIT_FSIZE, (20_000, hard))
     try:
-        said = typed("run", "box.glb", "--width", "160", "--height", "120")
+        said = typed("run", "box.glb", *SMALL)
     finally:
         resource.setrlimit(resource.RLIMIT_FSIZE, (soft, hard))
     refused(said, "Cannot write")
     assert json.loads((tmp_path / "runs" / "box" / "run.json").read_text())["state"] != "finished"
-    assert typed("run", "box.glb", "--width", "160", "--height", "120")[0] == 0, "it goes on once there is room"
+    assert typed("run", "box.glb", *SMALL)[0] == 0, "it goes on once there is room"
 
 
 def test_the_doctor_examines_without_failing(typed):
