@@ -56,6 +56,11 @@ def test_a_body_on_the_floor_is_not_in_it():
     )
 
 
+def test_a_grain_that_has_flowed_does_not_reach_through_the_floor():
+    grain = np.array([[0.0, 0.0, CELL]])
+    assert plane_depth(grain, FLOOR, 100 * np.eye(3)[None], CELL) == 0
+
+
 def test_a_flattened_particle_reaches_less_far():
     body = np.array([[0.0, 0.0, 0.1 * CELL]])
     flat = np.diag([1.0, 1.0, 0.4])[None]

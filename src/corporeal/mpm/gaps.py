@@ -100,12 +100,14 @@ def plane_depth(
         points: Surface points, or particle centres when ``motion`` is given [m].
         plane: The floor or a wall.
         motion: Deformation gradients: a particle's ball becomes an ellipsoid of half width
-            r ‖Fᵀ n‖ along n.
+            r ‖Fᵀ n‖ along n; grains that have flowed far are no ellipsoid any more, so it is
+            at most 2 r.
         cell: Grid spacing dx [m].
 
     """
     normal = np.array(plane.normal)
     height = points @ normal - plane.offset
     if motion is not None:
-        height = height - RADIUS * cell * np.linalg.norm(normal @ motion, axis=1)
+        stretch = np.minimum(np.linalg.norm(normal @ motion, axis=1), 2.0)
+        height = height - RADIUS * cell * stretch
     return max(0.0, -float(height.min(initial=np.inf)))
