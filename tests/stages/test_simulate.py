@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 from corporeal.errors import SimulationError
+from corporeal.mpm import checkpoint
 from corporeal.mpm import frames as disk
 from corporeal.mpm import problem as contract
 from corporeal.mpm.frames import read_trajectory
@@ -168,7 +169,7 @@ def test_frames_come_back_in_the_order_of_the_particles(tmp_path):
     fallen = particles.position - [0, 0, 0.5 * 9.81 * 0.2**2]
     np.testing.assert_allclose(trajectory.frames[-1].position, fallen, atol=1e-6)
     assert len(read_trajectory(tmp_path).frames) == 11
-    assert not (tmp_path / stage.CHECKPOINT).exists()
+    assert not (tmp_path / checkpoint.LAST).exists()
 
 
 def test_the_audit_names_every_field_and_finds_the_hole_in_the_floor(tmp_path):
@@ -211,7 +212,8 @@ def test_an_interrupted_simulation_goes_on_as_if_nothing_had_happened(tmp_path, 
 
 def test_a_killed_simulation_goes_on_from_its_last_checkpoint(tmp_path, monkeypatch):
     asked = scene_of()
-    monkeypatch.setattr(stage, "SAVE_EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "LARGEST_SHARE", np.inf)
 
     class KilledError(BaseException):
         pass
@@ -222,7 +224,7 @@ def test_a_killed_simulation_goes_on_from_its_last_checkpoint(tmp_path, monkeypa
 
     with pytest.raises(KilledError):
         simulate(*asked, SimulateConfig(), tmp_path, kill)
-    assert (tmp_path / stage.CHECKPOINT).exists()
+    assert (tmp_path / checkpoint.LAST).exists()
     told = []
     trajectory = simulate(*asked, SimulateConfig(), tmp_path, lambda f, w: told.append(f))
     assert told[0] > 0.6

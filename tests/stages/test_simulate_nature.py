@@ -6,10 +6,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from corporeal.mpm import checkpoint
 from corporeal.mpm.audit import outcome
 from corporeal.mpm.frames import read_trajectory
 from corporeal.mpm.treatment import Motion, PartGeometry, plan
-from corporeal.stages import simulate as stage
 from corporeal.stages.simulate import SimulateConfig, simulate
 from corporeal.types import (
     Law,
@@ -139,7 +139,8 @@ def test_two_balls_that_meet_part_again_and_one_field_glues_them(tmp_path):
 
 def test_a_run_that_was_cut_off_ends_exactly_like_one_that_was_not(bounce, tmp_path, monkeypatch):
     asked, whole, _ = bounce
-    monkeypatch.setattr(stage, "SAVE_EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "EVERY", 0.0)
+    monkeypatch.setattr(checkpoint, "LARGEST_SHARE", np.inf)
 
     def cut(fraction, words):
         if fraction > 0.4:

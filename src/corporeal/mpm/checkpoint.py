@@ -1,0 +1,118 @@
+"""Checkpoints: what a simulation that was cut off goes on from, exactly as if nothing had happened.
+
+``checkpoint.npz`` holds the engine's whole state after a finished frame, and the name of the
+problem it belongs to; ``checkpoint-before.npz`` is the one before it, for when the last cannot be
+read. Each is written whole, forced to the disk and then renamed, so that a process or a machine
+that stops in the middle leaves the old ones.
+"""
+
+import hashlib
+import logging
+import time
+from dataclasses import fields, is_dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from corporeal.errors import BadFileError
+from corporeal.mpm.frames import frame_path, read_arrays, write_arrays
+
+LAST, BEFORE = "checkpoint.npz", "checkpoint-before.npz"
+EVERY = 10.0
+"""Least seconds of computing between two checkpoints."""
+LARGEST_SHARE = 0.05
+"""Largest share of the time that may be spent on writing them."""
+STATE = "engine."
+
+log = logging.getLogger(__name__)
+
+
+class Checkpoints:
+    """The last two states of one simulation in one folder."""
+
+    def __init__(self, folder: Path, name: str) -> None:
+        """Look after the checkpoints in a folder.
+
+        Args:
+            folder: Where they are, beside the frames.
+            name: What is simulated; a checkpoint with another name is never used.
+
+        """
+        self.folder, self.name = folder, name
+        self.written, self.seconds = time.monotonic(), 0.0
+
+    @property
+    def due(self) -> bool:
+        """Whether enough was computed since the last one to write another."""
+        pause = max(EVERY, self.seconds / LARGEST_SHARE)
+        return time.monotonic() - self.written >= pause
+
+    def keep(self, saved: dict[str, np.ndarray], done: int) -> None:
+        """Write a state after ``done`` frames; the last one becomes the one before."""
+        start = time.monotonic()
+        last = self.folder / LAST
+        if last.exists():
+            last.replace(self.folder / BEFORE)
+        state = {f"{STATE}{name}": value for name, value in saved.items()}
+        write_arrays(last, state | {"done": np.int64(done), "name": np.array(self.name)})
+        self.written = time.monotonic()
+        self.seconds = self.written - start
+
+    def newest(self) -> tuple[int, dict[str, np.ndarray]]:
+        """How many frames the newest usable checkpoint has behind it, and its state; 0 without."""
+        for path in (self.folder / LAST, self.folder / BEFORE):
+            if not path.exists():
+                continue
+            try:
+                return self._read(path)
+            except BadFileError as error:
+                log.warning("%s Looking for an earlier one, or starting again.", error)
+                path.unlink()
+        return 0, {}
+
+    def _read(self, path: Path) -> tuple[int, dict[str, np.ndarray]]:
+        found = read_arrays(path)
+        try:
+            done, name = int(found.pop("done")), str(found.pop("name"))
+        except KeyError as error:
+            raise BadFileError(path, f"is no checkpoint ({error} is missing).") from error
+        if name != self.name:
+            raise BadFileError(path, "is of another scene or other settings.")
+        missing = [k for k in range(done) if not frame_path(self.folder, k).exists()]
+        if missing:
+            raise BadFileError(path, f"does not fit: frame {missing[0]} is missing.")
+        return done, {k.removeprefix(STATE): v for k, v in found.items()}
+
+    def forget(self) -> None:
+        """Remove them: the simulation is finished."""
+        for name in (LAST, BEFORE):
+            (self.folder / name).unlink(missing_ok=True)
+
+
+def fingerprint(*things: Any) -> str:
+    """Name anything made of dataclasses, containers, arrays and numbers by its content."""
+    total = hashlib.sha256()
+    for thing in things:
+        _feed(total, thing)
+    return total.hexdigest()[:20]
+
+
+def _feed(total: Any, thing: Any) -> None:
+    """Add one thing to the digest, its kind and length first, so that no two things look alike."""
+    total.update(type(thing).__name__.encode())
+    if isinstance(thing, np.ndarray):
+        total.update(f"{thing.dtype.str}{thing.shape}".encode())
+        total.update(np.ascontiguousarray(thing).tobytes())
+    elif is_dataclass(thing) and not isinstance(thing, type):
+        for f in fields(thing):
+            total.update(f.name.encode())
+            _feed(total, getattr(thing, f.name))
+    elif isinstance(thing, dict):
+        _feed(total, list(thing.items()))
+    elif isinstance(thing, list | tuple):
+        total.update(str(len(thing)).encode())
+        for item in thing:
+            _feed(total, item)
+    else:
+        total.update(repr(thing).encode())
