@@ -149,7 +149,7 @@ def load(path: Path) -> Any:
         with np.load(path, allow_pickle=False) as file:
             tree = json.loads(bytes(file[TREE]).decode())
             return _decode(tree, file)
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile) as error:
         raise BadFileError(
             path, f"cannot be read ({error}).", "Delete the folder it is in and run again."
         ) from error

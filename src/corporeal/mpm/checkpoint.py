@@ -2,8 +2,8 @@
 
 ``checkpoint.npz`` holds the engine's whole state after a finished frame, and the name of the
 problem it belongs to; ``checkpoint-before.npz`` is the one before it, for when the last cannot be
-read. Each is written whole, forced to the disk and then renamed, so that a process or a machine
-that stops in the middle leaves the old ones.
+read. Each is sealed with a digest, written whole, forced to the disk and then renamed, so that a
+process or a machine that stops in the middle leaves the old ones.
 """
 
 import hashlib
@@ -54,8 +54,10 @@ class Checkpoints:
         last = self.folder / LAST
         if last.exists():
             last.replace(self.folder / BEFORE)
+        saved = {name: np.asarray(value) for name, value in saved.items()}
         state = {f"{STATE}{name}": value for name, value in saved.items()}
-        write_arrays(last, state | {"done": np.int64(done), "name": np.array(self.name)})
+        about = {"done": done, "name": self.name, "seal": fingerprint(done, self.name, saved)}
+        write_arrays(last, state | {name: np.array(value) for name, value in about.items()})
         self.written = time.monotonic()
         self.seconds = self.written - start
 
@@ -73,16 +75,19 @@ class Checkpoints:
 
     def _read(self, path: Path) -> tuple[int, dict[str, np.ndarray]]:
         found = read_arrays(path)
+        state = {k.removeprefix(STATE): v for k, v in found.items() if k.startswith(STATE)}
         try:
-            done, name = int(found.pop("done")), str(found.pop("name"))
+            done, name, seal = int(found["done"]), str(found["name"]), str(found["seal"])
         except KeyError as error:
             raise BadFileError(path, f"is no checkpoint ({error} is missing).") from error
+        if seal != fingerprint(done, name, state):
+            raise BadFileError(path, "cannot be read (not what was written).")
         if name != self.name:
             raise BadFileError(path, "is of another scene or other settings.")
         missing = [k for k in range(done) if not frame_path(self.folder, k).exists()]
         if missing:
             raise BadFileError(path, f"does not fit: frame {missing[0]} is missing.")
-        return done, {k.removeprefix(STATE): v for k, v in found.items()}
+        return done, state
 
     def forget(self) -> None:
         """Remove them: the simulation is finished."""
@@ -109,7 +114,7 @@ def _feed(total: Any, thing: Any) -> None:
             total.update(f.name.encode())
             _feed(total, getattr(thing, f.name))
     elif isinstance(thing, dict):
-        _feed(total, list(thing.items()))
+        _feed(total, sorted(thing.items()))
     elif isinstance(thing, list | tuple):
         total.update(str(len(thing)).encode())
         for item in thing:

@@ -24,6 +24,8 @@ FOLDER = "frames"
 LAYOUT = "layout.npz"
 LEDGER = "ledger.npz"
 PREFIX = "ledger."
+DAMAGE = (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile)
+"""What reading a damaged npz raises."""
 HALF = 6e4
 """Largest stretch that float16 can hold [-]."""
 
@@ -70,7 +72,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     try:
         with np.load(path, allow_pickle=False) as file:
             return {name: file[name] for name in file.files}
-    except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
+    except DAMAGE as error:
         raise BadFileError(
             path, f"cannot be read ({error}).", "Run corporeal simulate again."
         ) from error
