@@ -6,6 +6,7 @@ impulses together, rigid bodies and walls included.
 
 from dataclasses import dataclass
 from itertools import combinations
+from typing import Protocol
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -17,6 +18,14 @@ from corporeal.mpm.stencil import Stencil
 
 POINT_REACH = 0.3
 """Surface points of rigid bodies are watched this far above a wall [dx]."""
+
+
+class Stand(Protocol):
+    """Something that moves in a rigid body's stead."""
+
+    def act(self, movers: contact.Movers) -> None:
+        """Take the body's place among what contact can move."""
+        ...
 
 
 @dataclass(frozen=True)
@@ -31,6 +40,8 @@ class Scene:
     """Of every slot [kg]."""
     kick: Float[np.ndarray, "B 3"]
     """Velocity that gravity and push gave each body in this step [m/s]."""
+    composites: tuple["Stand", ...] = ()
+    """Rigid bodies that move as one with what they hold."""
 
     @property
     def single(self) -> bool:
@@ -65,13 +76,16 @@ class Scene:
         spin = np.zeros((self.wall_mover + len(still), 3))
         spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
         light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, 1e-300), 0.0)
-        return contact.Movers(
+        movers = contact.Movers(
             np.concatenate([np.where(stiff, 1.0 / self.matter.total, 0.0), light, still[:, 0]]),
             inertia,
             np.concatenate([self.state.centre, self.grid.index * self.problem.cell, still]),
             np.concatenate([self.state.speed, velocity, still]),
             spin,
         )
+        for composite in self.composites:
+            composite.act(movers)
+        return movers
 
 
 @dataclass(frozen=True)
@@ -196,7 +210,9 @@ def find(scene: Scene) -> list[Touch]:
     """List everything that touches or may touch in this step."""
     fields = np.unique(scene.grid.field).tolist()
     rows = {f: np.flatnonzero((scene.grid.field == f) & (scene.mass > 0.0)) for f in fields}
-    pairs = {p: _common(scene.grid, rows, p) for p in combinations(fields, 2)}
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.bonds}
+    apart = [p for p in combinations(fields, 2) if p not in bonded]
+    pairs = {p: _common(scene.grid, rows, p) for p in apart}
     walls = {(f, w): _near(scene, rows[f], w) for f in fields for w in _walls(scene, f)}
     shown = [slot for both in pairs.values() for slot in both] + list(walls.values())
     look = Look.at(scene, np.concatenate([np.zeros(0, np.int64), *shown]))

@@ -6,7 +6,20 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.types import Push
+from corporeal.types import Push, Wind
+
+
+@dataclass(frozen=True)
+class Faces:
+    """Where a body meets the air; A faces."""
+
+    area: Float[np.ndarray, "A 3"]
+    """Outward area vectors at rest [m²]; a sheet has one for each side."""
+    particle: Int[np.ndarray, " A"]
+    """Which of the body's particles each face moves with."""
+
+
+NO_FACES = Faces(np.zeros((0, 3)), np.zeros(0, np.int64))
 
 
 @dataclass(frozen=True)
@@ -42,6 +55,9 @@ class Body:
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
     push: Push | None = None
+    wind: Wind | None = None
+    faces: Faces = NO_FACES
+    """What the wind blows on."""
 
 
 @dataclass(frozen=True)
@@ -83,6 +99,9 @@ class Problem:
     stay with APIC)."""
     courant: float = 0.4
     """Largest fraction of a cell that a wave may cross in one step."""
+    bonds: tuple[tuple[int, int], ...] = ()
+    """Rigid inclusions: (frame, soft), a rigid and a deformable body of one object. The frame holds
+    what of the soft body lies inside it, and the two are never in contact."""
 
 
 @dataclass(frozen=True)
@@ -126,13 +145,13 @@ class Measure:
     speed: float
     """Largest particle speed [m/s]."""
     external_impulse: Float[np.ndarray, "B 3"]
-    """Of gravity and push [N s]."""
+    """Of gravity, pushes and wind [N s]."""
     plane_impulse: Float[np.ndarray, "W B 3"]
     """Of plane w on body b [N s]."""
     pair_impulse: Float[np.ndarray, "B B"]
     """Sum of normal impulse magnitudes between two bodies [N s]. Symmetric."""
     push_work: float
-    """[J]; gravity's work is in ``potential``."""
+    """Of pushes and wind [J]; gravity's work is in ``potential``."""
     friction_loss: float
     """[J]"""
     plastic_loss: float

@@ -11,6 +11,7 @@ from jaxtyping import Float, Int
 
 from corporeal.errors import SimulationError
 from corporeal.mpm import elasticity, plasticity, rigid
+from corporeal.mpm.bond import Bonds, without
 from corporeal.mpm.encounter import Meeting, Scene, resolve
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.matter import Matter, State
@@ -38,6 +39,7 @@ class ReferenceEngine:
         self.steps = Steps()
         self.matter = Matter.of(problem)
         self.state = State.start(problem, self.matter)
+        self.bonds = Bonds(problem)
         self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
         self.lost = np.zeros(len(self.matter.mass), dtype=bool)
 
@@ -62,7 +64,11 @@ class ReferenceEngine:
         kick, push = self._kicks(dt)
         mass, old, new = self._to_grid(grid, kick, dt)
         state = replace(self.state, speed=self.state.speed + kick)
-        meeting = resolve(Scene(self.problem, matter, state, grid, mass, kick), new, dt)
+        held = tuple(self.bonds.compose(matter, state, grid, mass, new))
+        stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, held)
+        meeting = resolve(stage, new, dt)
+        for composite in held:
+            meeting = composite.split(meeting)
         moved, viscous_loss = self._from_grid(grid, old, meeting.velocity, dt)
         flowed, plastic_loss = _flow(matter, moved)
         turned = self._move_rigid(flowed, meeting, dt)

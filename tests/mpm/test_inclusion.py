@@ -1,0 +1,135 @@
+"""A frame with a cushion on it: rigid where it is stiff, soft where it is soft, one object."""
+
+import sys
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+sys.path.insert(0, str(Path(__file__).parents[1] / "nature"))
+
+from bodies import Stuff, box, box_surface, floor, problem
+
+from corporeal.backends import load
+from corporeal.mpm.bond import join
+from corporeal.mpm.problem import MENU
+from corporeal.mpm.rigid import mass_of
+
+CELL = 0.05
+FOAM = Stuff(young=2.5e5, poisson=0.35, density=30.0)
+WOOD = Stuff(density=700.0)
+STEEL = Stuff(density=7850.0)
+SIDE, HEIGHT = 0.2, 0.1
+
+
+def chair(cell=CELL, offset=0.3, spin=0.0, **more):
+    """Give a frame and the cushion on it: .2 x .2 m, .1 and .2 m high."""
+    z, xy = offset * cell, 0.1 + 0.3 * cell
+    low = (xy, xy, z + 0.05)
+    surface = box_surface(low, (SIDE, SIDE, HEIGHT))
+    frame = box(low, (SIDE, SIDE, HEIGHT), cell / 2, stuff=WOOD, rigid=True, surface=surface,
+                spin=(0.0, spin, 0.0), name="frame", **more)  # fmt: skip
+    cushion = box((xy, xy, z + 0.2), (SIDE,) * 3, cell / 2, stuff=FOAM, name="cushion", **more)
+    return frame, cushion
+
+
+def block(cell=CELL, offset=0.3, velocity=(0.0, 0.0, -1.0), gap=0.5):
+    centre = (0.1 + 0.3 * cell, 0.1 + 0.3 * cell, 0.35 + (offset + gap) * cell)
+    return box(centre, (SIDE, SIDE, HEIGHT), cell / 2, stuff=STEEL, rigid=True, velocity=velocity,
+               name="block")  # fmt: skip
+
+
+@pytest.fixture(params=["reference"])
+def engine(request):
+    chosen = load("engine", request.param, MENU)
+    chosen.round_off = {"reference": 1e-12, "warp": 1e-5}[request.param]
+    return chosen
+
+
+def shape_error(before, after):
+    """Largest distance after the best rigid motion [m]."""
+    a, b = before - before.mean(axis=0), after - after.mean(axis=0)
+    U, _, Vt = np.linalg.svd(a.T @ b)
+    return np.abs(a @ U @ Vt - b).max()
+
+
+def test_a_frame_joined_to_points_keeps_momentum_and_inertia_to_round_off():
+    rng = np.random.default_rng(0)
+    x, m = rng.normal(size=(40, 3)), rng.uniform(1.0, 2.0, 40)
+    v, spin = np.array([1.0, -2.0, 0.5]), np.array([0.3, 1.0, -2.0])
+    none = np.zeros(40)
+    own = mass_of(x[:25], m[:25], none[:25])
+    u = v + np.cross(spin, x)
+    speed, moment = m[:25] @ u[:25] / own.total, own.inertia @ spin
+    whole, common, total = join(own, (speed, moment), m[25:], x[25:], u[25:])
+    everything = mass_of(x, m, none)
+    assert whole.centre == pytest.approx(everything.centre, rel=1e-12)
+    assert whole.inertia == pytest.approx(everything.inertia, rel=1e-12)
+    assert common == pytest.approx(m @ u / m.sum(), rel=1e-12)
+    assert np.linalg.solve(whole.inertia, total) == pytest.approx(spin, rel=1e-12)
+
+
+def test_a_blow_on_a_cushion_reaches_its_frame_with_all_momentum_and_no_change_of_shape(engine):
+    frame, cushion = chair(spin=3.0)
+    run = engine(problem(frame, cushion, block(), cell=CELL, bonds=((0, 1),), transfer="apic"))
+    start, before = run.measure(), run.snapshot().position
+    run.advance(0.012)
+    end, after = run.measure(), run.snapshot().position
+    scale = np.abs(start.momentum).max()
+    gained = end.momentum.sum(axis=0) - start.momentum.sum(axis=0)
+    turned = end.angular_momentum.sum(axis=0) - start.angular_momentum.sum(axis=0)
+    assert np.abs(gained).max() < engine.round_off * scale
+    assert np.abs(turned).max() < engine.round_off * scale
+    assert end.momentum[0, 2] < -1e-3 * scale
+    n = len(frame.position)
+    assert shape_error(before[:n], after[:n]) < engine.round_off * CELL
+    energy = [m.kinetic.sum() + m.elastic.sum() for m in (start, end)]
+    assert 0.95 * energy[0] < energy[1] < 1.001 * energy[0]
+
+
+def test_a_chair_in_free_flight_turns_as_one_body(engine):
+    frame, cushion = chair(spin=0.0)
+    both = np.concatenate([frame.position, cushion.position])
+    turning = [replace(b, velocity=np.cross([0.0, 4.0, 0.0], b.position - both.mean(axis=0)))
+               for b in (frame, cushion)]  # fmt: skip
+    run = engine(problem(*turning, cell=CELL, bonds=((0, 1),), transfer="apic"))
+    before = run.snapshot().position
+    run.advance(0.02)
+    assert shape_error(before, run.snapshot().position) < 0.05 * CELL
+    measured = run.measure()
+    assert measured.pair_impulse[0, 1] == 0.0
+
+
+def test_a_ball_on_the_arm_of_a_chair_bounces_off_wood():
+    """The frame's own surface meets others with its restitution, bond or not."""
+    frame, cushion = chair()
+    top = 0.1 + 0.3 * CELL
+    beside = replace(cushion, position=np.add(cushion.position, (SIDE, 0.0, -0.1)))
+    centre = (0.1 + 0.3 * CELL, 0.1 + 0.3 * CELL, top + 0.05 + 0.2 * CELL)
+    stone = box(centre, (0.1,) * 3, CELL / 2, stuff=WOOD, rigid=True, velocity=(0.0, 0.0, -1.0))
+    given = problem(frame, beside, stone, cell=CELL, bonds=((0, 1),), restitution=0.5)
+    run = load("engine", "reference", MENU)(given)
+    run.advance(0.03)
+    speed = run.measure().momentum[:, 2] / run.measure().mass
+    assert speed[2] - speed[0] == pytest.approx(0.5, abs=0.1)
+
+
+def test_a_chair_stands(engine):
+    frame, cushion = chair()
+    run = engine(
+        problem(
+            frame,
+            cushion,
+            cell=CELL,
+            bonds=((0, 1),),
+            friction=0.5,
+            planes=[floor(0.3 * CELL)],
+            gravity=(0.0, 0.0, -9.81),
+        )
+    )
+    run.advance(0.05)
+    m = run.measure()
+    moved = m.centre[0] - frame.position.mean(axis=0)
+    assert np.abs(moved).max() < 1e-3 * CELL
+    assert m.plane_impulse[0, :, 2].sum() == pytest.approx(m.mass.sum() * 9.81 * 0.05, rel=0.05)
