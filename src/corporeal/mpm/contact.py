@@ -334,7 +334,9 @@ def _sweep(contacts, masses, motion, impulse, orders):
 def friction_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> float:
     """Kinetic energy [J] that the tangential impulses took: Σ J_t · ½ (u_before + u_after).
 
-    Exact for simultaneous impulses, as the velocities are linear in them.
+    ``before`` is the relative velocity as the step began, before its forces: then the works of
+    stress, gravity and contact, each at the mean velocity of the step, add up to what the kinetic
+    energy gained. After the forces, a contact that only holds against them would seem to slip.
     """
     tangential = impulse - np.sum(impulse * normal, axis=1, keepdims=True) * normal
     return float(np.sum(tangential * 0.5 * (before + after)))

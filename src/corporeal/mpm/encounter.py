@@ -40,6 +40,8 @@ class Scene:
     """Of every slot [kg]."""
     kick: Float[np.ndarray, "B 3"]
     """Velocity that gravity and push gave each body in this step [m/s]."""
+    old: Float[np.ndarray, "A 3"]
+    """Velocity of every slot before this step's forces [m/s]."""
     composites: tuple["Stand", ...] = ()
     """Rigid bodies that move as one with what they hold."""
 
@@ -87,6 +89,13 @@ class Scene:
             composite.act(movers)
         return movers
 
+    def movers_before_forces(self) -> contact.Movers:
+        """Everything that an impulse can move, with the velocity it had as the step began."""
+        movers = self.movers(self.old)
+        for b in filter(self.is_rigid, range(len(self.problem.bodies))):
+            movers.velocity[b] -= self.kick[b]
+        return movers
+
 
 @dataclass(frozen=True)
 class Touch:
@@ -130,12 +139,11 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         friction=_friction(problem)[pair[:, 0], pair[:, 1]],
     )
     movers = scene.movers(velocity)
-    before = contacts.approach(movers)
-    speed = np.sum(before * contacts.normal, axis=1)
+    speed = np.sum(contacts.approach(movers) * contacts.normal, axis=1)
     rebound = _rebound(scene, pair, contacts)
     target, hit = contact.target_speeds(contacts, speed, rebound, problem.cell, dt)
     impulse = contact.solve(contacts, movers, target, _sweeps(scene, contacts, hit))
-    after = contacts.approach(movers)
+    before, after = contacts.approach(scene.movers_before_forces()), contacts.approach(movers)
     bodies = len(problem.bodies)
     return Meeting(
         velocity=movers.velocity[bodies : scene.wall_mover],

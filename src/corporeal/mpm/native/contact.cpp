@@ -797,6 +797,23 @@ struct Solver {
     velocity(w, meets, T, 1, c);
     for (int i = 0; i < 3; i++) u[i] -= c[i];
   }
+  // Relative velocity as the step began, before its forces: what friction's work is booked with.
+  static inline void before(World *w, Meet *meets, const Touch &T, double *u) {
+    for (int i = 0; i < 3; i++) u[i] = 0;
+    for (int side = 0; side < 2; side++) {
+      int f = side ? T.fc : T.fa, q = side ? T.c : T.a;
+      if (f >= w->fields) continue;
+      const Field &F = w->field[f];
+      double v[3], sign = side ? -1.0 : 1.0;
+      if (F.rigids) {
+        Body6::velocity(F.rigid, T.x, v);
+        for (int i = 0; i < 3; i++) v[i] -= F.rigid[KICK + i];
+      } else {
+        for (int i = 0; i < 3; i++) v[i] = F.node[(size_t)meets[T.meet].slot[q] * 8 + 4 + i];
+      }
+      for (int i = 0; i < 3; i++) u[i] += sign * v[i];
+    }
+  }
   static inline double softness(World *w, Meet *meets, const Touch &T, const double *n) {
     double sum = 0;
     for (int side = 0; side < 2; side++) {
@@ -866,9 +883,9 @@ for (int t = 0; t < nt; t++) {
   double u[3];
   Solver::slip(world, meets, T, u);
   for (int i = 0; i < 3; i++) {
-    T.before[i] = u[i];
     T.J[i] = 0;
   }
+  Solver::before(world, meets, T, T.before);
   int ra = world->field[T.fa].rigids, rc = T.fc < fields ? world->field[T.fc].rigids : 1;
   T.stiff = ra || (T.fc < fields && rc);
   T.mu = world->friction[T.fa * all + T.fc];
