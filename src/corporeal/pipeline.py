@@ -83,10 +83,11 @@ def run(
         until: The last verb to do.
 
     Raises:
-        UserError: An input cannot be used, the disk is full, or the simulation cannot go on.
+        UserError: An input cannot be used, the disk is full, another process works in the folder,
+            or the simulation cannot go on.
 
     """
-    with store.writing(folder):
+    with store.alone(folder), store.writing(folder):
         _Run(inputs, folder, settings, tell).through(until)
     return folder
 
@@ -143,12 +144,14 @@ def status(folder: Path) -> list[tuple[str, str, float | None]]:
 
 def outdate(folder: Path, verb: str) -> None:
     """Declare one verb's result stale, so that it is done again even with the same settings."""
-    (folder / FOLDERS[verb] / store.META).unlink(missing_ok=True)
+    with store.alone(folder):
+        (folder / FOLDERS[verb] / store.META).unlink(missing_ok=True)
 
 
 def forget_simulation(folder: Path) -> None:
     """Drop a simulation, finished or not, so that the next run starts it again."""
-    shutil.rmtree(folder / FOLDERS["simulate"], ignore_errors=True)
+    with store.alone(folder):
+        shutil.rmtree(folder / FOLDERS["simulate"], ignore_errors=True)
 
 
 def write_showcase(name: str, folder: Path) -> Path:

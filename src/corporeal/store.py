@@ -6,6 +6,7 @@ it is unfinished, whatever else lies in it.
 """
 
 import errno
+import fcntl
 import hashlib
 import json
 import os
@@ -25,6 +26,7 @@ from corporeal.errors import BadFileError, UserError
 META = "meta.json"
 DATA = "data.npz"
 TREE = "tree"
+LOCK = ".lock"
 KNOWN: dict[str, Any] = {
     name: kind
     for name, kind in vars(types).items()
@@ -60,6 +62,33 @@ def writing(path: Path) -> Iterator[None]:
             f"Cannot write {path}: {reasons[error.errno]}, then run the same command again: "
             "finished stages are kept."
         ) from error
+
+
+@contextmanager
+def alone(folder: Path) -> Iterator[None]:
+    """Keep other processes out of a run's folder; a process that dies lets go of it.
+
+    Raises:
+        UserError: Another process works in it.
+
+    """
+    with writing(folder):
+        folder.mkdir(parents=True, exist_ok=True)
+        lock = (folder / LOCK).open("a+", encoding="utf-8")
+    with lock:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        except BlockingIOError:
+            lock.seek(0)
+            raise UserError(
+                f"Another corporeal (process {lock.read().strip() or 'unknown'}) works in {folder}."
+                " Wait until it is done, or choose another folder with --name or --out."
+            ) from None
+        with writing(folder):
+            lock.truncate(0)
+            lock.write(str(os.getpid()))
+            lock.flush()
+        yield
 
 
 def write_bytes(path: Path, data: bytes) -> None:
