@@ -33,7 +33,7 @@ class Matter:
     wave_speed: Float[np.ndarray, " P"]
     """Longitudinal wave speed at rest [m/s]; 0 where rigid."""
     memory_speed: Float[np.ndarray, " P"]
-    """Wave speed of the particle's whole body [m/s]; inf where APIC is kept."""
+    """Fastest wave among all that share the particle's field [m/s]; inf where APIC is kept."""
     total: Float[np.ndarray, " B"]
     """Mass of each body [kg]."""
     centre: Float[np.ndarray, "B 3"]
@@ -58,8 +58,11 @@ class Matter:
         body = np.repeat(np.arange(len(bodies)), [len(b.position) for b in bodies])
         stiff = np.array([b.rigid for b in bodies])[body]
         wave = np.where(stiff, 0.0, np.sqrt((lam + 2.0 * mu) / density))
-        fastest = np.array([wave[body == b].max() for b in range(len(bodies))])[body]
         affine = stiff | np.isin(law, APIC_LAWS) | (problem.transfer == "apic")
+        remembered = np.where(affine, np.inf, wave)
+        field = np.zeros_like(body) if problem.contact == "single" else body
+        # Momentum is kept only if all that share a field forget at one rate.
+        fastest = np.array([remembered[field == f].max() for f in range(field.max() + 1)])
         masses = [rigid.mass_of(b.position, b.volume * b.density, b.volume) for b in bodies]
         centre = np.stack([m.centre for m in masses])
         return cls(
@@ -76,7 +79,7 @@ class Matter:
             viscosity=gathered("viscosity"),
             rigid=stiff,
             wave_speed=wave,
-            memory_speed=np.where(affine, np.inf, fastest),
+            memory_speed=fastest[field],
             total=np.array([m.total for m in masses]),
             centre=centre,
             inertia=np.stack([m.inertia for m in masses]),

@@ -27,6 +27,8 @@ def materials(problem: Problem, bodies: list[int]) -> tuple[np.ndarray, np.ndarr
     forgetting rate κ c_b/dx [1/s], ρ [kg/m³], this step's push [m/s] (3).
     """
     rows = np.concatenate([_rows(problem, problem.bodies[b], b) for b in bodies])
+    # Momentum is kept only if all that share a field forget at one rate.
+    rows[:, 9] = rows[:, 9].max()
     unique, index = np.unique(rows, axis=0, return_inverse=True)
     table = np.zeros((len(unique), MATERIAL), np.float32)
     table[:, :PUSH] = unique[:, 1:]
