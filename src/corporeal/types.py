@@ -77,6 +77,20 @@ class Push:
 
 
 @dataclass(frozen=True)
+class Wind:
+    """Air that blows on one whole object within a time window; at rest it only slows down."""
+
+    velocity: Vector
+    """Of the air [m/s]."""
+    gust: float = 0.0
+    """By how much of itself the velocity swells and falls, 0 to 1 [-]."""
+    start: float = 0.0
+    """[s]"""
+    end: float = float("inf")
+    """[s]"""
+
+
+@dataclass(frozen=True)
 class SceneObject:
     """One separable thing, and how it starts."""
 
@@ -90,6 +104,7 @@ class SceneObject:
     velocity: Vector = (0.0, 0.0, 0.0)
     """[m/s]"""
     push: Push | None = None
+    wind: Wind | None = None
     source: str = ""
     """The file it came from."""
     credit: str = ""
@@ -343,6 +358,12 @@ class Particles:
     object_of_surface: Int[np.ndarray, " S"]
     mass_real: tuple[float, ...]
     """Estimated mass of every part [kg]: what the particles' masses must add up to."""
+    face: Float[np.ndarray, "A 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    """Outward area vectors of the surface that objects in the wind show to the air [m²]."""
+    particle_of_face: Int[np.ndarray, " A"] = field(
+        default_factory=lambda: np.zeros(0, dtype=np.int64)
+    )
+    """Which particle bears each of those faces."""
     fills: tuple[str, ...] = ()
     """How each part was filled, in words, for the report."""
     warnings: tuple[str, ...] = ()

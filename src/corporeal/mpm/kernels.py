@@ -43,15 +43,25 @@ FIELD = np.dtype(
 _POINTERS = (
     "field task contact_memory list order report plane friction restitution ledger pair_memory "
     "near_memory plane_impulse pair_impulse friction_loss first_contact last_contact contact_point "
-    "face"
+    "face blow"
 )
 _COUNTS = (
-    "fields planes tasks contacts pairs nears most_contacts most_pairs most_nears full names again"
+    "fields planes tasks contacts pairs nears most_contacts most_pairs most_nears full names again "
+    "blows"
 )
 WORLD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("dx", "f8"), ("dt", "f8"), ("time", "f8"), ("kick", "f8", 3)]
     + [(name, "i4") for name in _COUNTS.split()],
+    align=True,
+)
+_POINTERS = "area point rigid impulse signal face"
+_NUMBERS = "gust start end half_rho_c work"
+BLOW = np.dtype(
+    [(name, "u8") for name in _POINTERS.split()]
+    + [("wind", "f8", 3)]
+    + [(name, "f8") for name in _NUMBERS.split()]
+    + [(name, "i4") for name in "field first count free".split()],
     align=True,
 )
 
@@ -90,6 +100,10 @@ def clear_native(memory: Memory, index: int): ...
 def scatter_native(memory: Memory, index: int): ...
 
 
+@wp.func_native(_native("blow"))
+def blow_native(memory: Memory, index: int): ...
+
+
 @wp.func_native(_native("forces"))
 def forces_native(memory: Memory, index: int): ...
 
@@ -110,6 +124,11 @@ def clear(memory: Memory, first: int):
 @wp.kernel
 def scatter(memory: Memory, first: int):
     scatter_native(memory, first + wp.tid())
+
+
+@wp.kernel
+def blow(memory: Memory, first: int):
+    blow_native(memory, first + wp.tid())
 
 
 @wp.kernel
@@ -147,13 +166,16 @@ class Program:
         self.smallest_share = SMALLEST_SHARE
         self.contact = self._record(contact, 0, 1)
 
-    def divide(self, even: np.ndarray, odd: np.ndarray, nodes: np.ndarray) -> None:
+    def divide(
+        self, even: np.ndarray, odd: np.ndarray, nodes: np.ndarray, blown: np.ndarray
+    ) -> None:
         """Record one step.
 
         Args:
             even: How much work each task on particles of even planes is.
             odd: The same of odd planes.
             nodes: The same of the tasks on nodes.
+            blown: The same of loads on the particles of each field; empty: there are none.
 
         """
         both = np.concatenate([even, odd])
@@ -161,6 +183,7 @@ class Program:
             self._phase(clear, 0, nodes),
             self._phase(scatter, 0, even),
             self._phase(scatter, len(even), odd),
+            self._phase(blow, 0, blown),
             self._phase(forces, 0, nodes),
         ]
         self.after = [self._phase(gather, 0, both)]

@@ -14,6 +14,7 @@ from corporeal.mpm import elasticity, plasticity, rigid
 from corporeal.mpm.bond import Bonds, without
 from corporeal.mpm.encounter import Meeting, Scene, resolve
 from corporeal.mpm.ledger import Ledger
+from corporeal.mpm.loads import blow, carry
 from corporeal.mpm.matter import Matter, State
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.mpm.stencil import Stencil, stencil
@@ -64,6 +65,9 @@ class ReferenceEngine:
         kick, push = self._kicks(dt)
         mass, old, new = self._to_grid(grid, kick, dt)
         state = replace(self.state, speed=self.state.speed + kick)
+        blown = blow(self.problem, matter, self.state, dt)
+        loaded = carry(blown, matter, state, grid, (mass, new))
+        state, new = loaded.state, loaded.velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))
         stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, held)
         meeting = resolve(stage, new, dt)
@@ -76,6 +80,8 @@ class ReferenceEngine:
         self.ledger.plastic_loss += plastic_loss
         self.ledger.viscous_loss += viscous_loss
         self._enter(meeting, grid, kick, push)
+        self.ledger.external_impulse += loaded.impulse
+        self.ledger.push_work += loaded.work
         self.state = replace(turned, time=np.array(self.time + dt))
         self.steps.count += 1
         self.steps.smallest = min(self.steps.smallest, dt)

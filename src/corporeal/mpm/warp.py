@@ -10,6 +10,7 @@ import numpy as np
 
 from corporeal.errors import SimulationError
 from corporeal.mpm import tables
+from corporeal.mpm.blow import Blows
 from corporeal.mpm.carried import Carried
 from corporeal.mpm.kernels import (
     ASTRAY,
@@ -113,6 +114,9 @@ class WarpEngine:
             if b not in separate
         ]
         self.contact = ContactMemory(self.world, problem, self.ledger)
+        self.blows = Blows(
+            problem, self.first, self.ledger.external_impulse, self.rigid, self.points
+        )
         self.program = Program(self.world, self.threads)
         self.speed = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
         self.wave = max([self._rest_speed(f) for f in self.window] + [0.0])
@@ -157,12 +161,19 @@ class WarpEngine:
             task=self.task,
             list=self.node_task,
             report=self.report,
+            blow=self.blows.record,
         )
+        self.world["blows"] = len(self.blows.record)
         self.world["fields"], self.world["dx"] = len(self.field), self.problem.cell
         self.world["tasks"] = len(self.task)
         work = np.array([self._particles(*task) for task in self.task])
         self.program.divide(
-            work[: len(even)], work[len(even) :], 64 * (self.node_task[:, 2] - self.node_task[:, 1])
+            work[: len(even)],
+            work[len(even) :],
+            64 * (self.node_task[:, 2] - self.node_task[:, 1]),
+            self.blows.load(
+                len(self.field), [len(self.problem.bodies[m[0]].position) for m in self.members]
+            ),
         )
 
     def _particles(self, field: int, low: int, high: int, _: int) -> int:
@@ -290,7 +301,7 @@ class WarpEngine:
         total = self.report[:, [PLASTIC, VISCOUS, WORK]].sum(axis=0)
         self.ledger.plastic_loss += total[0]
         self.ledger.viscous_loss += total[1]
-        self.ledger.push_work += total[2]
+        self.ledger.push_work += total[2] + self.blows.take_work()
         self.report[:, [PLASTIC, VISCOUS, WORK]] = 0.0
 
     def _sort(self, fields: set[int]) -> None:

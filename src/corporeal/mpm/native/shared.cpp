@@ -32,6 +32,12 @@ struct Field {
   int origin[3], dim[3];    // in blocks; the window's corner and size
   int blocks, pool, rigids, points, surfaces, pushed;
 };
+struct Blow {               // a body in the wind: see blow.py
+  double *area, *point, *rigid, *impulse, *signal;
+  int *face;
+  double wind[3], gust, start, end, half_rho_c, work;
+  int field, first, count, free;
+};
 struct World {
   Field *field;
   int *task, *contact_memory, *list;
@@ -39,9 +45,10 @@ struct World {
   double *report, *plane, *friction, *restitution, *ledger, *pair_memory, *near_memory;
   double *plane_impulse, *pair_impulse, *friction_loss, *first_contact, *last_contact;
   double *contact_point, *face;
+  Blow *blow;
   double dx, dt, time, kick[3];
   int fields, planes, tasks, contacts, pairs, nears, most_contacts, most_pairs, most_nears, full;
-  int names, again;   // bodies and planes in the books; a repeated call after more memory
+  int names, again, blows;   // bodies and planes in the books; a repeated call after more memory
 };
 
 struct Simd {
