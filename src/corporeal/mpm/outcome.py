@@ -145,10 +145,12 @@ def dent_distances(
 
 
 def bounce(body: int, bodies: Bodies, gravity: float) -> dict[str, float | None]:
-    """How far a body fell until it first touched anything, and how high it came back.
+    """From how high a body came when it first touched anything, and how high it came back.
 
-    Both are measured from where its centre of mass was at that instant, found by free flight from
-    the last frame before it. A fall of less than half a cell has no ratio.
+    The fall is the free fall from rest that ends at its speed, so that a thing thrown down has
+    fallen from far; the rebound is measured from where its centre of mass was. Both at that
+    instant, found by free flight from the last frame before it. A fall of less than half a cell
+    has no ratio.
 
     Args:
         body: Which.
@@ -166,9 +168,11 @@ def bounce(body: int, bodies: Bodies, gravity: float) -> dict[str, float | None]
     speed = ledger["momentum"][k, body, 2] / ledger["mass"][k, body]
     flight = touch - time[k]
     met = height[k] + speed * flight - 0.5 * gravity * flight**2
+    struck = min(0.0, speed - gravity * flight)
     rising = np.flatnonzero(np.diff(height[k + 1 :]) > 0)
     peak = height[k + 1 + rising[0] :].max() if len(rising) else met
-    fall, rebound = float(height[0] - met), max(0.0, float(peak - met))
+    fall = float(0.5 * struck**2 / gravity) if gravity > 0.0 else 0.0
+    rebound = max(0.0, float(peak - met))
     ratio = rebound / fall if fall > bodies.cell / 2 else None
     return {"fall_m": fall, "rebound_m": rebound, "rebound_ratio": ratio}
 
