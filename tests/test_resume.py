@@ -139,3 +139,20 @@ def test_a_run_is_let_go_of_when_it_ends(tmp_path):
         with store.alone(tmp_path), pytest.raises(UserError, match="works in"):
             with store.alone(tmp_path):
                 pass
+
+
+@pytest.mark.slow
+def test_runs_that_start_at_once_on_an_empty_kernel_cache_leave_each_other_alone(tmp_path):
+    scene = a_scene(tmp_path / "two.glb", duration=0.05)
+    kernels = tmp_path / "kernels"
+    caches = {"WARP_CACHE_PATH": str(kernels), "NUMBA_CACHE_DIR": str(tmp_path / "numba")}
+    compiling = start(scene, tmp_path / "killed", **caches)
+    while not list(kernels.rglob("*.cpp")):
+        assert compiling.poll() is None, compiling.communicate()[1]
+        time.sleep(0.002)
+    kill(compiling)
+    together = [start(scene, tmp_path / name, **caches) for name in ("one", "two", "three")]
+    for process in together:
+        ended(process)
+    assert_same(tmp_path / "one", tmp_path / "two")
+    assert_same(tmp_path / "one", tmp_path / "three")
