@@ -40,7 +40,7 @@ def block(cell=CELL, offset=0.3, velocity=(0.0, 0.0, -1.0), gap=0.5):
                name="block")  # fmt: skip
 
 
-@pytest.fixture(params=["reference"])
+@pytest.fixture(params=["reference", "warp"])
 def engine(request):
     chosen = load("engine", request.param, MENU)
     chosen.round_off = {"reference": 1e-12, "warp": 1e-5}[request.param]

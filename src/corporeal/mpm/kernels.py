@@ -43,11 +43,11 @@ FIELD = np.dtype(
 _POINTERS = (
     "field task contact_memory list order report plane friction restitution ledger pair_memory "
     "near_memory plane_impulse pair_impulse friction_loss first_contact last_contact contact_point "
-    "face blow"
+    "face blow bond"
 )
 _COUNTS = (
     "fields planes tasks contacts pairs nears most_contacts most_pairs most_nears full names again "
-    "blows"
+    "blows bonds"
 )
 WORLD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
@@ -62,6 +62,12 @@ BLOW = np.dtype(
     + [("wind", "f8", 3)]
     + [(name, "f8") for name in _NUMBERS.split()]
     + [(name, "i4") for name in "field first count free".split()],
+    align=True,
+)
+BOND = np.dtype(
+    [(name, "u8") for name in ("slot", "mass")]
+    + [(name, "f8") for name in ("per_stiff", "per_soft")]
+    + [(name, "i4") for name in ("frame", "soft", "count")],
     align=True,
 )
 
@@ -85,8 +91,8 @@ SPEED2, WAVE2, PLASTIC, VISCOUS, ASTRAY, WORK = range(6)
 _NATIVE = Path(__file__).parent / "native"
 
 
-def _native(name: str) -> str:
-    return "\n".join((_NATIVE / f"{part}.cpp").read_text() for part in ("shared", name))
+def _native(*names: str) -> str:
+    return "\n".join((_NATIVE / f"{part}.cpp").read_text() for part in ("shared", *names))
 
 
 Memory = wp.array(dtype=wp.uint64)
@@ -112,7 +118,7 @@ def forces_native(memory: Memory, index: int): ...
 def gather_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("contact"))
+@wp.func_native(_native("bond", "contact"))
 def contact_native(memory: Memory, index: int): ...
 
 

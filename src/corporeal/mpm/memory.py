@@ -8,6 +8,8 @@ from corporeal.mpm.kernels import CLOSE, MEET, TOUCH
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.problem import Body, Problem
 
+BONDED = -1.0
+"""Friction of a pair that is never in contact, to the native piece."""
 BOOKS = "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
 
 
@@ -94,6 +96,8 @@ def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     friction = np.array(problem.friction, float)
     restitution = np.array(problem.restitution, float)
     if problem.contact == "multi":
+        for frame, soft in problem.bonds:
+            friction[frame, soft] = friction[soft, frame] = BONDED
         return friction, restitution
     bodies, walls = len(problem.bodies), len(problem.planes)
     shared = np.zeros((1 + walls, 1 + walls))

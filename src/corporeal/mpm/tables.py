@@ -3,7 +3,8 @@
 import numpy as np
 
 from corporeal.mpm import elasticity, rigid
-from corporeal.mpm.kernels import ID, MA, MATERIAL, MT, NC, VE, VO
+from corporeal.mpm.bond import densities
+from corporeal.mpm.kernels import BOND, ID, MA, MATERIAL, MT, NC, VE, VO
 from corporeal.mpm.plasticity import SMALLEST_ANGLE, cone_slope
 from corporeal.mpm.problem import Body, Problem
 from corporeal.types import Law
@@ -16,7 +17,8 @@ STRESSLESS = 5.0
 PUSH = 10
 RIGID = 64
 """Doubles of a rigid state: mass, centre 3, rotation 9, inverse inertia at rest 9, velocity 3,
-angular momentum 3, inverse inertia now 9, spin 3, radius, kick 3."""
+angular momentum 3, inverse inertia now 9, spin 3, radius, kick 3, and
+while a frame holds soft nodes its own mass and centre 3."""
 CENTRE, TURN, REST, SPEED, MOMENT, INERTIA, SPIN, RADIUS, KICK = 1, 4, 13, 22, 25, 28, 37, 40, 41
 
 
@@ -89,6 +91,17 @@ def rigid_state(body: Body) -> np.ndarray:
     points = np.concatenate([body.position, body.surface.reshape(-1, 3)])
     state[RADIUS] = np.linalg.norm(points - mass.centre, axis=1).max()
     return state
+
+
+def bonds(problem: Problem) -> np.ndarray:
+    """Native records of the bonds; where held nodes are kept is filled in later."""
+    pairs = problem.bonds if problem.contact == "multi" else ()
+    rows = np.zeros(len(pairs), BOND)
+    for row, (frame, soft) in zip(rows, pairs, strict=True):
+        stiff, held = densities(problem.bodies[frame], problem.bodies[soft], problem.cell)
+        row["per_stiff"], row["per_soft"] = 1.0 / stiff, 1.0 / held
+        row["frame"], row["soft"] = frame, soft
+    return rows
 
 
 def rigid_points(body: Body, state: np.ndarray) -> np.ndarray:

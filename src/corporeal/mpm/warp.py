@@ -117,6 +117,7 @@ class WarpEngine:
         self.blows = Blows(
             problem, self.first, self.ledger.external_impulse, self.rigid, self.points
         )
+        self.bond = tables.bonds(problem)
         self.program = Program(self.world, self.threads)
         self.speed = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
         self.wave = max([self._rest_speed(f) for f in self.window] + [0.0])
@@ -162,7 +163,9 @@ class WarpEngine:
             list=self.node_task,
             report=self.report,
             blow=self.blows.record,
+            bond=self.bond,
         )
+        self._connect_bonds()
         self.world["blows"] = len(self.blows.record)
         self.world["fields"], self.world["dx"] = len(self.field), self.problem.cell
         self.world["tasks"] = len(self.task)
@@ -179,6 +182,16 @@ class WarpEngine:
     def _particles(self, field: int, low: int, high: int, _: int) -> int:
         block = self.window[field].block
         return int(block[high - 1, 1] - block[low, 0])
+
+    def _connect_bonds(self) -> None:
+        """Make room for every node that a frame could hold."""
+        self.held = []
+        for row in self.bond:
+            room = 64 * len(self.window[int(row["soft"])].where)
+            slot, mass = np.zeros(room, np.int32), np.zeros(room, np.float32)
+            self.held += [slot, mass]
+            row["slot"], row["mass"] = slot.ctypes.data, mass.ctypes.data
+        self.world["bonds"] = len(self.bond)
 
     def _connect_field(self, f: int, window: Window) -> None:
         record = self.field[f : f + 1]

@@ -297,6 +297,8 @@ for (int f = 0; f < fields; f++) {
       }
 }
 
+Bonds::hold(world);
+
 // ---- the list of nodes where fields meet each other or a plane
 for (int f = 0; f < fields; f++) {
   Field &F = world->field[f];
@@ -314,7 +316,7 @@ for (int f = 0; f < fields && !world->full; f++) {
       const double *P = 0;
       if (g < fields) {
         Field &G = world->field[g];
-        if (!G.pool) continue;
+        if (!G.pool || world->friction[f * all + g] < 0) continue;   // bonded
         other = Grid::block(G, at[0] - G.origin[0], at[1] - G.origin[1], at[2] - G.origin[2]);
         if (other < 0) continue;
       } else {
@@ -383,6 +385,7 @@ for (int k = 0; k < nm && !world->full; k++) {
         if (Vec::dot(P, T.x) - P[3] > WALL_REACH * dx) continue;
         for (int d = 0; d < 3; d++) T.n[d] = T.chosen[d] = -P[d];
       }
+      if (w < 0 && world->friction[T.fa * all + M.field[c]] < 0) continue;   // bonded
       T.meet = k;
       T.a = a;
       T.c = w >= 0 ? -1 - w : c;
@@ -780,6 +783,7 @@ for (int f = 0; f < fields; f++) {
 world->pairs = nt;
 
 // ---- impulses
+Bonds::join(world);
 struct Solver {
   static inline void velocity(World *w, Meet *meets, const Touch &T, int side, double *v) {
     int f = side ? T.fc : T.fa, q = side ? T.c : T.a;
@@ -1022,6 +1026,8 @@ for (int a = 0; a < fields; a++)
       world->last_contact[i] = world->time;
     }
   }
+
+Bonds::part(world);
 
 // ---- rigid bodies move; the angular momentum is exact, the turn follows it at mid-step
 for (int f = 0; f < fields; f++) {

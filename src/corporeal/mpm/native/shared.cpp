@@ -38,6 +38,12 @@ struct Blow {               // a body in the wind: see blow.py
   double wind[3], gust, start, end, half_rho_c, work;
   int field, first, count, free;
 };
+struct Bond {               // a frame and the soft nodes it holds in this step
+  int *slot;
+  float *mass;
+  double per_stiff, per_soft;   // volume per mass [m^3/kg]
+  int frame, soft, count;
+};
 struct World {
   Field *field;
   int *task, *contact_memory, *list;
@@ -46,9 +52,10 @@ struct World {
   double *plane_impulse, *pair_impulse, *friction_loss, *first_contact, *last_contact;
   double *contact_point, *face;
   Blow *blow;
+  Bond *bond;
   double dx, dt, time, kick[3];
   int fields, planes, tasks, contacts, pairs, nears, most_contacts, most_pairs, most_nears, full;
-  int names, again, blows;   // bodies and planes in the books; a repeated call after more memory
+  int names, again, blows, bonds;   // bodies and planes in the books; a repeated call after more memory
 };
 
 struct Simd {

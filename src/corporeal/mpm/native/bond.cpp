@@ -1,0 +1,133 @@
+// Rigid inclusions: a frame and the soft nodes inside it are one rigid body while contact acts on it.
+// Same formulas as bond.py; design: physics, section 5.1.
+constexpr double HELD_SHARE = 0.15;
+struct Bonds {
+  enum { CENTRE = 1, TURN = 4, REST = 13, SPEED = 22, MOMENT = 25, INERTIA = 28, SPIN = 37, OWN = 44 };
+  static inline void cross(const double *a, const double *b, double *c) {
+    for (int i = 0; i < 3; i++) c[i] = a[(i + 1) % 3] * b[(i + 2) % 3] - a[(i + 2) % 3] * b[(i + 1) % 3];
+  }
+  static inline void apply(const double *A, const double *b, double *c) {
+    for (int i = 0; i < 3; i++) c[i] = A[3 * i] * b[0] + A[3 * i + 1] * b[1] + A[3 * i + 2] * b[2];
+  }
+  static inline void invert(const double *A, double *B) {
+    double r[3][3];
+    for (int i = 0; i < 3; i++) cross(A + 3 * ((i + 1) % 3), A + 3 * ((i + 2) % 3), r[i]);
+    double det = A[0] * r[0][0] + A[1] * r[0][1] + A[2] * r[0][2];
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) B[3 * i + j] = r[j][i] / det;
+  }
+  // I += m (|r|^2 1 - r rt)
+  static inline void add(double *I, double m, const double *r) {
+    double q = r[0] * r[0] + r[1] * r[1] + r[2] * r[2];
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) I[3 * i + j] += m * ((i == j ? q : 0.0) - r[i] * r[j]);
+  }
+  static inline void place(const World *world, const Field &S, int slot, double *x) {
+    const int *w = S.where + 4 * (slot >> 6);
+    const int in[3] = {slot >> 4 & 3, slot >> 2 & 3, slot & 3};
+    for (int i = 0; i < 3; i++) x[i] = (4 * (w[i] + S.origin[i]) + in[i]) * world->dx;
+  }
+  // Soft nodes where the frame has its share of the volume; contact takes them for empty.
+  static inline void hold(World *world) {
+    if (world->again) return;
+    for (int k = 0; k < world->bonds; k++) {
+      Bond &B = world->bond[k];
+      Field &F = world->field[B.frame], &S = world->field[B.soft];
+      B.count = 0;
+      for (int b = 0; b < F.pool; b++) {
+        const int *w = F.where + 4 * b;
+        int c[3], out = 0;
+        for (int i = 0; i < 3; i++) {
+          c[i] = w[i] + F.origin[i] - S.origin[i];
+          out |= c[i] < 0 || c[i] >= S.dim[i];
+        }
+        int other = out ? -1 : S.table[(c[0] * S.dim[1] + c[1]) * S.dim[2] + c[2]];
+        if (other < 0) continue;
+        for (int i = 0; i < 64; i++) {
+          float *node = S.node + ((size_t)other * 64 + i) * 8;
+          double stiff = F.node[((size_t)b * 64 + i) * 8] * B.per_stiff, soft = node[0] * B.per_soft;
+          if (!(stiff > 0) || !(soft > 0) || stiff < HELD_SHARE * (stiff + soft)) continue;
+          B.slot[B.count] = other * 64 + i;
+          B.mass[B.count++] = node[0];
+          node[0] = 0;
+        }
+      }
+    }
+  }
+  // Common centre, velocity from summed momentum, spin from summed angular momentum.
+  static inline void join(World *world) {
+    for (int k = 0; k < world->bonds; k++) {
+      const Bond &B = world->bond[k];
+      const Field &S = world->field[B.soft];
+      double *s = world->field[B.frame].rigid, M = s[0], P[3], X[3], I[9], r[3], p[3], l[3];
+      for (int i = 0; i < 4; i++) s[OWN + i] = s[i];
+      for (int i = 0; i < 3; i++) {
+        X[i] = M * s[CENTRE + i];
+        P[i] = M * s[SPEED + i];
+      }
+      for (int e = 0; e < B.count; e++) {
+        place(world, S, B.slot[e], r);
+        M += B.mass[e];
+        for (int i = 0; i < 3; i++) {
+          X[i] += B.mass[e] * r[i];
+          P[i] += B.mass[e] * S.node[(size_t)B.slot[e] * 8 + 1 + i];
+        }
+      }
+      invert(s + INERTIA, I);
+      for (int i = 0; i < 3; i++) {
+        X[i] /= M;
+        r[i] = s[CENTRE + i] - X[i];
+        p[i] = s[0] * s[SPEED + i];
+      }
+      cross(r, p, l);
+      add(I, s[0], r);
+      for (int i = 0; i < 3; i++) s[MOMENT + i] += l[i];
+      for (int e = 0; e < B.count; e++) {
+        place(world, S, B.slot[e], r);
+        for (int i = 0; i < 3; i++) {
+          r[i] -= X[i];
+          p[i] = B.mass[e] * S.node[(size_t)B.slot[e] * 8 + 1 + i];
+        }
+        cross(r, p, l);
+        add(I, B.mass[e], r);
+        for (int i = 0; i < 3; i++) s[MOMENT + i] += l[i];
+      }
+      s[0] = M;
+      for (int i = 0; i < 3; i++) {
+        s[CENTRE + i] = X[i];
+        s[SPEED + i] = P[i] / M;
+      }
+      invert(I, s + INERTIA);
+      apply(s + INERTIA, s + MOMENT, s + SPIN);
+    }
+  }
+  // v = V + omega x r for the nodes and for the frame, which gets its own mass and inertia back.
+  static inline void part(World *world) {
+    for (int k = 0; k < world->bonds; k++) {
+      const Bond &B = world->bond[k];
+      const Field &S = world->field[B.soft];
+      double *s = world->field[B.frame].rigid, r[3], u[3], A[9], Q[9];
+      for (int e = 0; e < B.count; e++) {
+        place(world, S, B.slot[e], r);
+        for (int i = 0; i < 3; i++) r[i] -= s[CENTRE + i];
+        cross(s + SPIN, r, u);
+        float *node = S.node + (size_t)B.slot[e] * 8;
+        node[0] = B.mass[e];
+        for (int i = 0; i < 3; i++) node[1 + i] = (float)(s[SPEED + i] + u[i]);
+      }
+      for (int i = 0; i < 3; i++) r[i] = s[OWN + 1 + i] - s[CENTRE + i];
+      cross(s + SPIN, r, u);
+      for (int i = 0; i < 3; i++) s[SPEED + i] += u[i];
+      for (int i = 0; i < 4; i++) s[i] = s[OWN + i];
+      // I^-1 = Q I0^-1 Qt
+      for (int i = 0; i < 3; i++)
+        for (int j = 0; j < 3; j++) {
+          A[3 * i + j] = 0;
+          for (int q = 0; q < 3; q++) A[3 * i + j] += s[TURN + 3 * i + q] * s[REST + 3 * q + j];
+        }
+      for (int i = 0; i < 3; i++) apply(s + TURN, A + 3 * i, s + INERTIA + 3 * i);
+      invert(s + INERTIA, Q);
+      apply(Q, s + SPIN, s + MOMENT);
+    }
+  }
+};
