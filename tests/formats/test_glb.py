@@ -12,7 +12,7 @@ from PIL import Image
 
 from corporeal.formats.glb import read_glb
 from corporeal.formats.glb_writer import encode_glb, write_glb
-from corporeal.types import Finish, Push, Scene, SceneObject, Surface
+from corporeal.types import Finish, Push, Scene, SceneObject, Surface, Wind
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube
 
 
@@ -58,7 +58,8 @@ def scene():
             SceneObject("rubber_duck_0", "rubber duck", 0.1, 20.0, velocity=(0.0, 0.0, -2.0)),
             SceneObject(
                 "stone_0", "stone", 0.25,
-                push=Push((3.0, 0.0, 0.0), 0.25), source="stone.blend", credit="CC0, somebody",
+                push=Push((3.0, 0.0, 0.0), 0.25), wind=Wind((0.0, 8.0, 0.0), 0.3, 0.5, 1.5),
+                source="stone.blend", credit="CC0, somebody",
             ),
         ),
         surfaces=(skin, lid, stone),

@@ -4,7 +4,7 @@ import pytest
 
 from corporeal.errors import BadFileError
 from corporeal.formats.scene_file import read_scene_file
-from corporeal.types import Push
+from corporeal.types import Push, Wind
 
 WHOLE = """
 duration = 2
@@ -21,7 +21,11 @@ push = { acceleration = [3, 0, 0], from = 0.1, to = 0.5 }
 [[object]]
 file = "can.glb"
 push = { acceleration = [1, 0, 0] }
+wind = { velocity = [8, 0, 0], gust = 0.3, from = 0.5, to = 1.5 }
 """
+
+
+WIND = '[[object]]\nfile = "a.glb"\nwind = '
 
 
 def read(tmp_path, text):
@@ -39,6 +43,8 @@ def test_a_scene_file_says_what_is_where_and_how_it_starts(tmp_path):
     assert (duck.position, duck.velocity) == ((0, 0, 0.4), (0, 0, -2))
     assert duck.push == Push((3.0, 0.0, 0.0), 0.1, 0.5)
     assert can.push == Push((1.0, 0.0, 0.0), 0.0, math.inf)
+    assert can.wind == Wind((8.0, 0.0, 0.0), 0.3, 0.5, 1.5)
+    assert duck.wind is None
     assert can.position is can.velocity is can.name is None
 
 
@@ -48,8 +54,18 @@ def test_a_scene_file_says_what_is_where_and_how_it_starts(tmp_path):
         ('file = "a.glb"\ndt = 1e-4', "unknown key 'dt'. Allowed here: file, duration"),
         ('[[object]]\nfile = "a.glb"\nyoung = 1e6', "object 1: unknown key 'young'"),
         ('[[object]]\nfile = "a.glb"\ndamping = 0.1', "unknown key 'damping'"),
-        ('[[object]]\nfile = "a.glb"\nwind = { velocity = [8, 0, 0] }', "later version"),
-        ('file = "a.glb"\nwind = [1, 0, 0]', "later version"),
+        ('file = "a.glb"\nwind = { velocity = [1, 0, 0] }', "unknown key 'wind'"),
+        (WIND + '"strong"', "'wind' is not a table. Allowed in it: velocity, gust, from, to"),
+        (WIND + "{ gust = 0.3 }", "wind: 'velocity' is missing"),
+        (WIND + "{ velocity = [8, 0] }", "three numbers"),
+        (WIND + "{ velocity = [8, 0, 0], gust = -0.1 }", "from 0 to 1"),
+        (WIND + "{ velocity = [8, 0, 0], gust = 1.1 }", "from 0 to 1"),
+        (WIND + "{ velocity = [8, 0, 0], gust = nan }", "from 0 to 1"),
+        (WIND + "{ velocity = [8, 0, 0], from = 2, to = 1 }", "before it begins"),
+        (WIND + "{ velocity = [8, 0, 0], from = -1 }", "from 0 to 60"),
+        (WIND + "{ velocity = [340, 0, 0] }", "at up to 340 m/s. Give at most 100 m/s"),
+        (WIND + "{ velocity = [60, 0, 60], gust = 0.5 }", "at up to 127.3 m/s"),
+        (WIND + "{ velocity = [8, 0, 0], drag = 1.2 }", "unknown key 'drag'"),
         ('[[object]]\nfile = "a.glb"\nposition = [0, 0]', "three numbers"),
         ('[[object]]\nfile = "a.glb"\nposition = [0, 0, nan]', "three numbers"),
         ('[[object]]\nfile = "a.glb"\nvelocity = [0, 0, 1e9]', "at most 1000"),

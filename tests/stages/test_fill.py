@@ -22,6 +22,7 @@ from corporeal.types import (
     SceneObject,
     Structure,
     Surface,
+    Wind,
 )
 
 RUBBER = Material("rubber", Law.NEO_HOOKEAN, 2e6, 0.48, 1100.0)
@@ -209,7 +210,7 @@ def test_a_fall_gives_its_speed_and_a_standing_thing_expects_what_falls_on_it():
         thing((ball(0.1, bottom=0.0, x=3.0), RUBBER), push=Push((3.0, 0.0, 0.0), 0.0, 0.5)),
     )
 
-    found = motions(scene, examine(scene, parts, 0), 0)
+    found = motions(scene, examine(scene, parts, 0), [1.0, 1.0, 1.0], 0)
     falling = np.sqrt(2 * 9.81 * 1.0)
     assert found[1].impact_speed == pytest.approx(np.hypot(falling, 1.5), rel=1e-3)
     assert found[0].impact_speed == pytest.approx(falling, rel=1e-3)
@@ -250,3 +251,34 @@ def test_a_rigid_object_touches_with_its_own_surface_only():
     assert set(particles.object_of_surface) == {1}
     assert np.abs(particles.surface[:, :2]).max() < 0.051
     assert particles.surface[:, 2].min() > 0.19
+
+
+def test_what_stands_in_the_wind_shows_its_whole_surface_to_it():
+    brick = put(trimesh.creation.box((0.1, 0.2, 0.3)), 0.0)
+    leaf = trimesh.Trimesh([[1, 0, 1], [2, 0, 1], [1, 0, 2.0]], [[0, 1, 2]])
+    given = inputs(
+        thing((brick, RUBBER)),
+        thing((leaf, RUBBER), (ball(0.1, bottom=3.0), RUBBER), wind=Wind((5.0, 0.0, 0.0))),
+        thing((put(brick, 1.0), RUBBER), wind=Wind((5.0, 0.0, 0.0))),
+    )
+    particles = fill(*given)
+    owner = particles.object[particles.particle_of_face]
+    assert set(owner) == {1, 2}
+    for direction, size in zip(np.eye(3), (0.06, 0.03, 0.02), strict=True):
+        for side in (direction, -direction):
+            shown = np.maximum(particles.face[owner == 2] @ side, 0.0).sum()
+            assert shown == pytest.approx(size, rel=1e-6)
+    shown = np.maximum(particles.face[owner == 1] @ np.array([0.0, 1.0, 0.0]), 0.0).sum()
+    assert shown == pytest.approx(0.5 + np.pi * 0.01, rel=0.01)
+    outward = particles.position[particles.particle_of_face] - np.array([0.0, 0.0, 1.15])
+    assert np.einsum("ij,ij->i", outward, particles.face)[owner == 2].min() > 0
+
+
+def test_a_wind_counts_as_an_acceleration_and_carries_nothing_faster_than_itself():
+    scene, parts, _ = inputs(thing((ball(0.1, bottom=0.0), RUBBER), wind=Wind((5.0, 0.0, 0.0))))
+    anatomies = examine(scene, parts, 0)
+    heavy, light = (motions(scene, anatomies, [mass], 0)[0] for mass in (10.0, 1e-3))
+    force = 0.5 * 1.2 * 1.17 * np.pi * 0.01 * 25
+    assert heavy.acceleration == pytest.approx(9.81 + force / 10.0, rel=0.01)
+    assert heavy.impact_speed == pytest.approx(2.0 * force / 10.0, rel=0.01)
+    assert light.impact_speed == pytest.approx(5.0, rel=1e-3)

@@ -5,7 +5,7 @@ import math
 from corporeal.formats.glb_writer import GENERATOR
 from corporeal.formats.gltf_document import Document, Entry
 from corporeal.formats.words import everyday, safe
-from corporeal.types import Push, SceneObject
+from corporeal.types import Push, SceneObject, Wind
 
 NO_MOTION = (0.0, 0.0, 0.0)
 
@@ -46,6 +46,7 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
         scale=extras.number("scale", measured) if ours else measured,
         velocity=_vector(extras.numbers("velocity_m_s", NO_MOTION)) if ours else NO_MOTION,
         push=_push(extras) if ours else None,
+        wind=_wind(extras) if ours else None,
         source=extras.text("source") or str(document.path),
         credit=(extras.text("credit") or copyright)[:500],
     )
@@ -94,9 +95,21 @@ def _push(extras: Entry) -> Push | None:
     push = extras.child("push")
     if push is None:
         return None
-    end = math.inf if push.value.get("end_s") is None else push.number("end_s", 0.0)
     acceleration = _vector(push.numbers("acceleration_m_s2", NO_MOTION))
-    return Push(acceleration, push.number("start_s", 0.0), end)
+    return Push(acceleration, *_window(push))
+
+
+def _wind(extras: Entry) -> Wind | None:
+    wind = extras.child("wind")
+    if wind is None:
+        return None
+    velocity = _vector(wind.numbers("velocity_m_s", NO_MOTION))
+    return Wind(velocity, wind.number("gust", 0.0), *_window(wind))
+
+
+def _window(force: Entry) -> tuple[float, float]:
+    endless = force.value.get("end_s") is None
+    return force.number("start_s", 0.0), math.inf if endless else force.number("end_s", 0.0)
 
 
 def _vector(numbers: tuple[float, ...]) -> tuple[float, float, float]:

@@ -2,7 +2,7 @@
 
 One node per object, named like the object, with a child node per surface. The file is Y-up, as
 glTF asks: the root node turns our Z-up into it, so that numbers pass through unrounded. What glTF
-has no word for (class, real extent, gravity, pushes) stands in ``extras``; ``read_glb`` reads it.
+has no word for (class, real extent, gravity, forces) stands in ``extras``; ``read_glb`` reads it.
 """
 
 import io
@@ -14,7 +14,7 @@ from pathlib import Path
 import numpy as np
 from PIL import Image
 
-from corporeal.types import Finish, Push, Scene, SceneObject, Surface
+from corporeal.types import Finish, Push, Scene, SceneObject, Surface, Wind
 
 GENERATOR = "corporeal"
 FLOAT, UNSIGNED_SHORT, UNSIGNED_INT = 5126, 5123, 5125
@@ -25,7 +25,7 @@ Y_UP_OF_Z_UP = [1, 0, 0, 0, 0, 0, -1, 0, 0, 1, 0, 0, 0, 0, 0, 1]
 
 
 def write_glb(path: Path, scene: Scene) -> None:
-    """Save the scene; lengths in metres, velocities and pushes in the extras of their nodes.
+    """Save the scene; lengths in metres, velocities, pushes and winds in the extras of their nodes.
 
     Raises:
         ValueError: A number in the scene is NaN or infinite, which JSON cannot say.
@@ -210,16 +210,19 @@ def _object_extras(thing: SceneObject) -> dict:
     if any(thing.velocity):
         extras["velocity_m_s"] = list(thing.velocity)
     if thing.push is not None:
-        extras["push"] = _push_extras(thing.push)
+        acceleration = list(thing.push.acceleration)
+        extras["push"] = {"acceleration_m_s2": acceleration} | _window(thing.push)
+    if thing.wind is not None:
+        blown = {"velocity_m_s": list(thing.wind.velocity), "gust": thing.wind.gust}
+        extras["wind"] = blown | _window(thing.wind)
     for key, words in (("source", thing.source), ("credit", thing.credit)):
         if words:
             extras[key] = words
     return extras
 
 
-def _push_extras(push: Push) -> dict:
+def _window(force: Push | Wind) -> dict:
     return {
-        "acceleration_m_s2": list(push.acceleration),
-        "start_s": push.start,
-        "end_s": push.end if math.isfinite(push.end) else None,
+        "start_s": force.start,
+        "end_s": force.end if math.isfinite(force.end) else None,
     }

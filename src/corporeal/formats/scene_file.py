@@ -1,4 +1,4 @@
-"""Read ``scene.toml``: what is where, how it starts, what pushes it. Lengths [m], times [s].
+"""Read ``scene.toml``: what is where, how it starts, what pushes it or blows on it. [m], [s].
 
 There is nothing numerical to tune in it: quality is one word on the command line (``--detail``).
 
@@ -16,6 +16,7 @@ There is nothing numerical to tune in it: quality is one word on the command lin
     extent = 0.1                  # its largest extent
     class = "rubber duck"
     push = { acceleration = [3, 0, 0], from = 0.0, to = 0.5 }
+    wind = { velocity = [8, 0, 0], gust = 0.3, from = 0.0, to = 1.5 }
 """
 
 import math
@@ -25,15 +26,18 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from corporeal.errors import BadFileError
-from corporeal.types import Push, Vector
+from corporeal.types import Push, Vector, Wind
 
 SCENE_KEYS = ("file", "duration", "fps", "gravity", "object")
-OBJECT_KEYS = ("name", "file", "class", "extent", "position", "velocity", "push")
+OBJECT_KEYS = ("name", "file", "class", "extent", "position", "velocity", "push", "wind")
 PUSH_KEYS = ("acceleration", "from", "to")
+WIND_KEYS = ("velocity", "gust", "from", "to")
 LONGEST = 60.0
 """[s]"""
 FASTEST = 1000.0
 """Speed [m/s] and acceleration [m/s²] beyond which an entry is taken for a slip."""
+STORM = 100.0
+"""Fastest wind [m/s]: air resists otherwise from a third of the speed of sound."""
 FARTHEST = 1000.0
 """[m]"""
 
@@ -52,6 +56,7 @@ class ObjectEntry:
     velocity: Vector | None = None
     """[m/s]"""
     push: Push | None = None
+    wind: Wind | None = None
 
 
 @dataclass(frozen=True)
@@ -104,23 +109,32 @@ def _object(table: "_Table") -> ObjectEntry:
         position=table.vector("position", FARTHEST),
         velocity=table.vector("velocity", FASTEST),
         push=_push(table),
+        wind=_wind(table),
     )
 
 
 def _push(table: "_Table") -> Push | None:
-    push = table.table("push")
+    push = table.table("push", PUSH_KEYS)
     if push is None:
         return None
-    push.only(PUSH_KEYS)
     acceleration = push.vector("acceleration", FASTEST)
     if acceleration is None:
         push.fail("'acceleration' is missing.", "Give it as [x, y, z] in m/s².")
-    start = push.number("from", 0.0, LONGEST)
-    end = push.number("to", 0.0, LONGEST)
-    start, end = 0.0 if start is None else start, math.inf if end is None else end
-    if end <= start:
-        push.fail(f"it ends at {end} s, before it begins at {start} s.", "Swap from and to.")
-    return Push(acceleration, start, end)
+    return Push(acceleration, *push.window())
+
+
+def _wind(table: "_Table") -> Wind | None:
+    wind = table.table("wind", WIND_KEYS)
+    if wind is None:
+        return None
+    velocity = wind.vector("velocity", FASTEST)
+    if velocity is None:
+        wind.fail("'velocity' is missing.", "Give it as [x, y, z] in m/s.")
+    gust = wind.number("gust", 0.0, 1.0) or 0.0
+    if math.hypot(*velocity) * (1.0 + gust) > STORM:
+        what = f"it blows at up to {math.hypot(*velocity) * (1.0 + gust):.4g} m/s."
+        wind.fail(what, f"Give at most {STORM:g} m/s, gusts included.")
+    return Wind(velocity, gust, *wind.window())
 
 
 def _load(path: Path) -> dict[str, Any]:
@@ -148,8 +162,6 @@ class _Table:
 
     def only(self, allowed: tuple[str, ...]) -> None:
         for key in self.value:
-            if key == "wind":
-                self.fail("wind comes in a later version.", "Use push, or leave wind out.")
             if key not in allowed:
                 self.fail(f"unknown key {key[:40]!r}.", f"Allowed here: {', '.join(allowed)}.")
 
@@ -159,13 +171,23 @@ class _Table:
             self.fail(f"{key!r} is not a list of tables.", f"Write [[{key}]] before each.")
         return [_Table(self.path, f"{key} {k + 1}: ", x) for k, x in enumerate(items)]
 
-    def table(self, key: str) -> "_Table | None":
+    def table(self, key: str, allowed: tuple[str, ...]) -> "_Table | None":
         item = self.value.get(key)
         if item is None:
             return None
         if not isinstance(item, dict):
-            self.fail(f"{key!r} is not a table.", f"Allowed in it: {', '.join(PUSH_KEYS)}.")
-        return _Table(self.path, f"{self.where}{key}: ", item)
+            self.fail(f"{key!r} is not a table.", f"Allowed in it: {', '.join(allowed)}.")
+        inner = _Table(self.path, f"{self.where}{key}: ", item)
+        inner.only(allowed)
+        return inner
+
+    def window(self) -> tuple[float, float]:
+        start = self.number("from", 0.0, LONGEST) or 0.0
+        end = self.number("to", 0.0, LONGEST)
+        end = math.inf if end is None else end
+        if end <= start:
+            self.fail(f"it ends at {end} s, before it begins at {start} s.", "Swap from and to.")
+        return start, end
 
     def text(self, key: str) -> str | None:
         x = self.value.get(key)

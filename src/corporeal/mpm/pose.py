@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.gaps import pair_gaps
-from corporeal.mpm.problem import FLOOR, Body, Problem
+from corporeal.mpm.problem import FLOOR, NO_FACES, Body, Faces, Problem
 from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment
 
 RAMP = 0.1
@@ -74,8 +74,17 @@ def body_of(
         rigid=all(particles.treatments[k].kind == "rigid" for k in np.unique(part)),
         surface=particles.surface[particles.object_of_surface == number].astype(float),
         push=thing.push,
+        wind=thing.wind,
+        faces=faces_of(particles, mine) if thing.wind is not None else NO_FACES,
         **column,
     )
+
+
+def faces_of(particles: Particles, mine: Int[np.ndarray, " N"]) -> Faces:
+    """Faces that some particles show to the air, numbered among them; ``mine`` rises."""
+    own = np.isin(particles.particle_of_face, mine)
+    bearer = np.searchsorted(mine, particles.particle_of_face[own])
+    return Faces(area=particles.face[own].astype(float), particle=bearer)
 
 
 def numbers(
@@ -156,13 +165,13 @@ def pair_values(
 
 
 def starts_settled(scene: Scene, particles: Particles) -> bool:
-    """Whether nothing moves, nothing is pushed, and every object stands on something.
+    """Whether nothing moves, is pushed or blown, and every object stands on something.
 
     Then gravity grows over a tenth of a second: switched on at once it would set off vibrations
     in which bodies hop by less than a grid cell.
     """
     moving = np.abs(particles.velocity).max(initial=0.0) > 0.0
-    if moving or any(o.push is not None for o in scene.objects):
+    if moving or any(o.push or o.wind for o in scene.objects):
         return False
     near = 0.5 * particles.cell
     bodies = [particles.position[particles.object == b] for b in range(len(scene.objects))]

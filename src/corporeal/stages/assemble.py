@@ -161,6 +161,7 @@ def _with_object(scene: Scene, k: int, entry: ObjectEntry) -> Scene:
         class_name=entry.class_name or thing.class_name,
         velocity=entry.velocity or thing.velocity,
         push=entry.push or thing.push,
+        wind=entry.wind or thing.wind,
     )
     objects = (*scene.objects[:k], thing, *scene.objects[k + 1 :])
     scene = replace(scene, objects=objects)
@@ -333,13 +334,14 @@ def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: Assemble
 
 
 def _watched(scene: Scene) -> float:
-    """Return three times the longest fall and a second more [s], and never less than the pushes."""
+    """Return three times the longest fall and a second more [s], and never less than the forces."""
     fall = 0.0
     g = -scene.gravity[2]
     for thing, height in zip(scene.objects, boxes_of(scene)[:, 0, 2], strict=True):
         v = thing.velocity[2]
         if g > 0:
             fall = max(fall, (v + math.sqrt(v * v + 2 * g * max(height, 0.0))) / g)
-    ends = [o.push.end for o in scene.objects if o.push and math.isfinite(o.push.end)]
-    pushed = max(ends, default=0.0) + 0.5
-    return round(max(min(max(3 * fall + 1, SHORTEST), LONGEST), pushed), 1)
+    forces = [f for o in scene.objects for f in (o.push, o.wind) if f is not None]
+    ends = [f.end for f in forces if math.isfinite(f.end)]
+    forced = max(ends, default=0.0) + 0.5
+    return round(max(min(max(3 * fall + 1, SHORTEST), LONGEST), forced), 1)

@@ -4,31 +4,18 @@ from dataclasses import dataclass
 from typing import Literal
 
 import numpy as np
-from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
-from corporeal.geometry.anatomy import Build
 from corporeal.geometry.contact_points import contact_points
+from corporeal.geometry.exposure import cross_section, faces
 from corporeal.geometry.falls import drop_heights
-from corporeal.geometry.filling import match_moments
-from corporeal.geometry.packing import Packing, Recipe, pack, reference
-from corporeal.geometry.survey import Anatomy, Member, survey
+from corporeal.geometry.make import Make, decide, how_filled, recipe
+from corporeal.geometry.packing import Packing, pack
+from corporeal.geometry.survey import Anatomy, survey
+from corporeal.geometry.weights import keep_apart, weigh
 from corporeal.mpm.treatment import Motion, PartGeometry, Plan, plan
-from corporeal.types import (
-    Material,
-    MaterialField,
-    Particles,
-    Parts,
-    PartWords,
-    Scene,
-    Structure,
-    Treatment,
-)
-
-SHEET_SHARE = 0.01
-"""Thickness of an open sheet, of its middle extent, where nobody states it."""
-POROUS_CELLS = 6
-"""A shell narrower than this many cells is filled through, with the shell's mass."""
+from corporeal.mpm.wind import greatest_acceleration
+from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject
 
 
 @dataclass(frozen=True)
@@ -43,28 +30,6 @@ class FillConfig:
 
 
 DEFAULT = FillConfig()
-
-
-@dataclass(frozen=True)
-class Make:
-    """How one part is made: what was said about it and what its mesh shows, put together."""
-
-    structure: Structure
-    """As simulated: a solid whose mesh turns out to be a wall is a shell here."""
-    modelled: bool
-    """Whether the mesh shows both faces of the wall."""
-    thickness: float
-    """Of the wall [m]; 0: solid."""
-    sheet: float
-    """Thickness of open sheets [m]."""
-    body_mass: float
-    """Of what its surface encloses [kg]."""
-    sheet_mass: float
-    """Of its open sheets [kg]."""
-    area: float
-    """One side [m²]."""
-    volume: float
-    """Enclosed by the surface, and of the sheets [m³]."""
 
 
 def fill(
@@ -168,45 +133,6 @@ def refuse_buried(scene: Scene, anatomies: list[Anatomy], cell: float) -> None:
 # ------------------------------------------------------------------ how it is made
 
 
-def decide(member: Member, structure: Structure, material: Material, words: PartWords) -> Make:
-    """Say how thick a part's walls are and what it weighs.
-
-    Solid: m = ρ V. Shell: m = ρ min(A t, V) with the area A of one face. A wall whose mesh shows
-    both faces is 2 V / A thick unless somebody stated otherwise. Open sheets weigh ρ A t.
-    """
-    wall = member.build is Build.WALL
-    shown = 2 * member.volume / member.body_area if wall else 0.0
-    stated = structure.thickness or material.shell_thickness
-    guess = SHEET_SHARE * (member.size[1] or member.size[2])
-    only_sheet = member.volume == 0
-    sheet = (words.thickness or stated or guess) if member.sheet_area or only_sheet else 0.0
-    thickness = 0.0
-    if structure.kind == "shell":
-        thickness = words.thickness or shown or stated or guess
-    elif wall:
-        thickness = shown
-    face = member.body_area * (0.5 if wall else 1.0)
-    volume = member.volume if not only_sheet else face * sheet
-    if structure.kind == "shell" and not only_sheet:
-        matter = min(face * thickness, volume)
-    else:
-        matter = volume
-    if thickness > 0 or only_sheet:
-        simulated = Structure("shell", thickness or sheet, structure.reason)
-    else:
-        simulated = Structure("solid")
-    return Make(
-        structure=simulated,
-        modelled=wall,
-        thickness=thickness,
-        sheet=sheet,
-        body_mass=material.density * matter,
-        sheet_mass=material.density * member.sheet_area * sheet,
-        area=face + member.sheet_area,
-        volume=volume + member.sheet_area * sheet,
-    )
-
-
 def resolve(
     scene: Scene,
     field: MaterialField,
@@ -229,29 +155,28 @@ def resolve(
         for m in anatomy.members
     }
     ordered = [geometries[k] for k in sorted(geometries)]
-    return plan(ordered, motions(scene, anatomies, config.seed), config.detail, config.stiffness)
+    masses = [sum(makes[m.part].mass for m in a.members) for a in anatomies]
+    moved = motions(scene, anatomies, masses, config.seed)
+    return plan(ordered, moved, config.detail, config.stiffness)
 
 
-def motions(scene: Scene, anatomies: list[Anatomy], seed: int) -> list[Motion]:
+def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: int) -> list[Motion]:
     """Estimate every object's speed at impact.
 
-    Falling gives √(v_z² + 2 g h) with the free height h below; pushes and own velocity add across.
-    What may be hit by another object is hit at the difference of their speeds across, and at the
-    larger of their falls.
+    Falling gives √(v_z² + 2 g h) with the free height h below; pushes, wind and own velocity add
+    across. What may be hit by another object is hit at the difference of their speeds across, and
+    at the larger of their falls.
     """
     gravity = float(np.linalg.norm(scene.gravity))
     meshes = [a.everything for a in anatomies]
     heights = drop_heights(meshes, np.random.default_rng([seed, 2]))
     across, fall, acceleration = [], [], []
-    for thing, height in zip(scene.objects, heights, strict=True):
-        velocity, push = np.array(thing.velocity), np.zeros(3)
-        if thing.push is not None:
-            push = np.array(thing.push.acceleration)
-            lasts = max(0.0, min(thing.push.end, scene.duration) - thing.push.start)
-            velocity = velocity + push * lasts
+    for k, (thing, height) in enumerate(zip(scene.objects, heights, strict=True)):
+        gained, strongest = driven(thing, anatomies[k], masses[k], scene.duration)
+        velocity = np.array(thing.velocity) + gained
         across.append(velocity[:2])
         fall.append(np.sqrt(velocity[2] ** 2 + 2 * gravity * height))
-        acceleration.append(gravity + float(np.linalg.norm(push)))
+        acceleration.append(gravity + strongest)
     result = []
     for i in range(len(scene.objects)):
         speeds = [float(np.hypot(fall[i], np.linalg.norm(across[i])))]
@@ -263,55 +188,34 @@ def motions(scene: Scene, anatomies: list[Anatomy], seed: int) -> list[Motion]:
     return result
 
 
+def driven(
+    thing: SceneObject, anatomy: Anatomy, mass: float, duration: float
+) -> tuple[np.ndarray, float]:
+    """Velocity [m/s] that push and wind give a thing, and their largest acceleration [m/s²].
+
+    The wind carries a thing no faster than itself.
+    """
+    gained, strongest = np.zeros(3), 0.0
+    if thing.push is not None:
+        push = np.array(thing.push.acceleration)
+        gained += push * max(0.0, min(thing.push.end, duration) - thing.push.start)
+        strongest += float(np.linalg.norm(push))
+    if thing.wind is not None:
+        air = np.array(thing.wind.velocity) * (1.0 + thing.wind.gust)
+        shown = cross_section(anatomy, thing.wind.velocity)
+        blown = greatest_acceleration(thing.wind, shown, mass)
+        lasts = max(0.0, min(thing.wind.end, duration) - thing.wind.start)
+        gained += air * min(1.0, blown * lasts / max(float(np.linalg.norm(air)), 1e-30))
+        strongest += blown
+    return gained, strongest
+
+
 def is_rigid(anatomy: Anatomy, chosen: Plan) -> bool:
     """Whether the object moves as one rigid body."""
     return all(chosen.treatments[m.part].kind == "rigid" for m in anatomy.members)
 
 
-def recipe(member: Member, made: Make, treatment: Treatment, cell: float) -> Recipe:
-    """Say where a part's matter lies on this grid."""
-    simulated = treatment.thickness or max(made.thickness, 2 * cell)
-    sheet = made.sheet
-    if made.structure.kind == "shell" and treatment.kind == "shell":
-        sheet = simulated
-    if made.thickness == 0:
-        return Recipe(np.inf, 0.0, sheet)
-    if made.modelled:
-        thin = made.thickness < 0.99 * simulated and treatment.kind == "shell"
-        return Recipe(0.0 if thin else np.inf, simulated, sheet)
-    return Recipe(np.inf if is_porous(member, cell) else simulated, simulated, sheet)
-
-
-def is_porous(member: Member, cell: float) -> bool:
-    """Whether a shell is too narrow for two walls with a hollow between them."""
-    return member.size[0] < POROUS_CELLS * cell
-
-
 # ------------------------------------------------------------------ points
-
-
-def keep_apart(packings: list[Packing], cell: float) -> list[Packing]:
-    """Remove points of one object that lie among another's; masses are set afterwards."""
-    result = list(packings)
-    for i in range(len(result)):
-        for j in range(i):
-            more, less = (i, j) if len(result[i].points) >= len(result[j].points) else (j, i)
-            tree = KDTree(result[less].points)
-            gap = tree.query(result[more].points, distance_upper_bound=cell / 4)[0]
-            mixed = np.isfinite(gap)
-            if mixed.any():
-                result[more] = result[more].only(~_spare(mixed, result[more].part))
-    return result
-
-
-def _spare(mixed: np.ndarray, part: np.ndarray) -> np.ndarray:
-    """Leave every part at least one point."""
-    mixed = mixed.copy()
-    for k in np.unique(part):
-        own = np.flatnonzero(part == k)
-        if mixed[own].all():
-            mixed[own[0]] = False
-    return mixed
 
 
 def gather(
@@ -323,9 +227,11 @@ def gather(
     packings: list[Packing],
 ) -> Particles:
     """Give every point its volume and density, and rigid objects their contact points."""
-    columns: dict[str, list[np.ndarray]] = {k: [] for k in ("volume", "density", "skin", "owner")}
+    names = ("volume", "density", "skin", "owner", "face", "bearer")
+    columns: dict[str, list[np.ndarray]] = {k: [] for k in names}
+    first = 0
     for number, (anatomy, packing) in enumerate(zip(anatomies, packings, strict=True)):
-        volume, density = weigh(anatomy, packing, makes, chosen)
+        volume, density = weigh(anatomy, packing, makes, chosen.treatments, chosen.cell)
         columns["volume"].append(volume)
         columns["density"].append(density)
         skin = np.zeros((0, 3))
@@ -333,6 +239,11 @@ def gather(
             skin = contact_points(anatomy, chosen.cell / 3, np.random.default_rng([number, 3]))
         columns["skin"].append(skin)
         columns["owner"].append(np.full(len(skin), number))
+        if scene.objects[number].wind is not None:
+            face, bearer = faces(anatomy, packing.points, chosen.cell / 4)
+            columns["face"].append(face)
+            columns["bearer"].append(first + bearer)
+        first += len(packing.points)
     counts = [len(p.points) for p in packings]
     velocity = np.array([o.velocity for o in scene.objects], dtype=np.float64).reshape(-1, 3)
     part = np.concatenate([p.part for p in packings])
@@ -347,55 +258,12 @@ def gather(
         treatments=chosen.treatments,
         surface=np.concatenate(columns["skin"]),
         object_of_surface=np.concatenate(columns["owner"]),
-        mass_real=tuple(
-            makes[k].body_mass + makes[k].sheet_mass for k in range(len(parts.catalogue))
-        ),
+        face=np.concatenate([np.zeros((0, 3)), *columns["face"]]),
+        particle_of_face=np.concatenate([np.zeros(0, np.int64), *columns["bearer"]]),
+        mass_real=tuple(makes[k].mass for k in range(len(parts.catalogue))),
         fills=describe(parts, anatomies, makes, chosen, part),
         warnings=chosen.warnings,
     )
-
-
-def weigh(
-    anatomy: Anatomy, packing: Packing, makes: dict[int, Make], chosen: Plan
-) -> tuple[np.ndarray, np.ndarray]:
-    """Volume [m³] and simulated density [kg/m³] of every point of an object.
-
-    A thickened wall keeps the treatment's density, so its volume follows from its mass; a solid
-    keeps its true volume. A rigid part's masses are adjusted to its true centre and inertia.
-    """
-    volume, density = np.zeros(len(packing.points)), np.ones(len(packing.points))
-    rng = np.random.default_rng(4)
-    for member in anatomy.members:
-        made, treatment = makes[member.part], chosen.treatments[member.part]
-        own = np.flatnonzero(packing.part == member.part)
-        thickened = treatment.kind == "shell" and not (
-            made.thickness > 0 and not made.modelled and is_porous(member, chosen.cell)
-        )
-        mass = _shared(packing.volumes[own], packing.sheet[own], made)
-        if treatment.kind == "rigid":
-            one_face = made.thickness if not made.modelled else 0.0
-            body, sheets = reference(anatomy, member, one_face, rng)
-            wanted = np.concatenate([body, sheets])
-            weights = np.concatenate(
-                [
-                    np.full(len(body), made.body_mass / max(len(body), 1)),
-                    np.full(len(sheets), made.sheet_mass / max(len(sheets), 1)),
-                ]
-            )
-            mass = match_moments(packing.points[own], mass, wanted, weights)
-        whole = mass.sum() / treatment.density if thickened else made.volume
-        density[own] = mass.sum() / whole
-        volume[own] = mass / density[own]
-    return volume, density
-
-
-def _shared(volumes: np.ndarray, sheet: np.ndarray, made: Make) -> np.ndarray:
-    """Spread a part's mass over its points; what has no points of its own goes to the others."""
-    mass = np.zeros(len(volumes))
-    for these, total in ((~sheet, made.body_mass), (sheet, made.sheet_mass)):
-        if these.any():
-            mass[these] = total * volumes[these] / volumes[these].sum()
-    return mass * (made.body_mass + made.sheet_mass) / mass.sum()
 
 
 def describe(
@@ -410,24 +278,7 @@ def describe(
     sentences = []
     for k, entry in enumerate(parts.catalogue):
         made, count = makes[k], int((part == k).sum())
-        what = how_filled(members[k], made, chosen, k)
+        what = how_filled(members[k], made, chosen.treatments[k], chosen.cell)
         mass = made.body_mass + made.sheet_mass
         sentences.append(f"{entry.name}: {what}; {count:,} particles, {mass:.3g} kg.")
     return tuple(sentences)
-
-
-def how_filled(member: Member, made: Make, chosen: Plan, k: int) -> str:
-    """Say in words what the fill is."""
-    treatment = chosen.treatments[k]
-    if member.volume == 0:
-        return f"an open sheet, taken as {made.sheet * 1e3:.3g} mm thick"
-    open_too = f", with open sheets {made.sheet * 1e3:.3g} mm thick" if member.sheet_area else ""
-    if made.thickness == 0:
-        return f"solid, {member.volume * 1e6:.4g} cm³ by winding number{open_too}"
-    shown = " as its mesh shows" if made.modelled else ""
-    wall = f"a wall {made.thickness * 1e3:.3g} mm thick{shown}"
-    if not made.modelled and is_porous(member, chosen.cell):
-        return f"{wall}, filled through because it is narrow, with the wall's mass{open_too}"
-    if treatment.kind == "shell" and treatment.thickness and treatment.thickness > made.thickness:
-        return f"{wall}, simulated {treatment.thickness * 1e3:.3g} mm thick{open_too}"
-    return f"{wall}{open_too}"

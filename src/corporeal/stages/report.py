@@ -6,15 +6,26 @@ range it was chosen from and where that range was read.
 
 import base64
 import html
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from importlib.resources import files
-from math import degrees
 from pathlib import Path
 from string import Template
 from typing import Any
 
-from corporeal.types import Film, Ground, MaterialField, Particles, Parts, Scene, Treatment
+from corporeal.types import (
+    Film,
+    Ground,
+    MaterialField,
+    Particles,
+    Parts,
+    Push,
+    Scene,
+    SceneObject,
+    Treatment,
+    Wind,
+)
 
 UNITS = {
     "young": ("Young's modulus E", "Pa"),
@@ -103,12 +114,31 @@ def _summary(story: Story) -> str:
         else "No vision-language model looked at pictures of this scene: materials come from "
         "annotations and from the words in the file.",
     ]
+    sentences += [_forced(o) for o in scene.objects if o.push or o.wind]
     if unknown:
         sentences.append(
             f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got a "
             "neutral stand-in material: name it with --annotations."
         )
     return " ".join(sentences)
+
+
+def _forced(thing: SceneObject) -> str:
+    """Say in one sentence what pushes a thing and what blows on it."""
+    said = []
+    if thing.push is not None:
+        size = math.hypot(*thing.push.acceleration)
+        said.append(f"is pushed with {size:.3g} m/s² {_window(thing.push)}")
+    if thing.wind is not None:
+        gusts = f" in gusts of ± {thing.wind.gust:.0%}" if thing.wind.gust else ""
+        size = math.hypot(*thing.wind.velocity)
+        said.append(f"stands in a wind of {size:.3g} m/s{gusts} {_window(thing.wind)}")
+    return f"{_safe(thing.name.replace('_', ' '))} {' and '.join(said)}."
+
+
+def _window(force: Push | Wind) -> str:
+    until = f"to {force.end:g} s" if math.isfinite(force.end) else "to the end"
+    return f"from {force.start:g} s {until}"
 
 
 def _verdict(audit: Mapping[str, Any]) -> str:
@@ -243,7 +273,7 @@ def _settings(audit: Mapping[str, Any]) -> str:
 def si(value: float, unit: str) -> str:
     """Write a number with three digits, a prefix where the unit takes one, angles in degrees."""
     if unit == "rad":
-        return f"{degrees(value):.3g}°"
+        return f"{math.degrees(value):.3g}°"
     if unit == "kg/m³":
         return f"{value:.4g} {unit}"
     if unit not in ("Pa", "m") or value == 0:
