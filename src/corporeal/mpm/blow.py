@@ -60,13 +60,6 @@ class Blows:
         record["start"], record["end"] = body.wind.start, body.wind.end
         record["half_rho_c"] = 0.5 * wind.AIR_DENSITY * wind.PLATE
 
-    def load(self, fields: int, particles: list[int]) -> np.ndarray:
-        """How much work each field's loads are; empty without any."""
-        if not len(self.record):
-            return np.zeros(0, np.int64)
-        loaded = np.isin(np.arange(fields), self.record["field"])
-        return np.where(loaded, particles, 1)
-
     def take_work(self) -> float:
         """Work done since it was last taken [J]."""
         total = float(self.record["work"].sum())

@@ -1,14 +1,27 @@
 """The native pieces of the engine, compiled by Warp, and the memory layout they share.
 
 Warp compiles C++ for the machine it runs on and keeps it in a cache; the pieces use vector
-extensions, so they build on any processor. ``WORLD`` and ``FIELD`` mirror the structs in
+extensions, so they build on any processor. ``WORLD``, ``FIELD`` and the like mirror the structs in
 ``native/shared.cpp`` byte for byte.
+
+A step is a list of phases, ``SCHEDULE``; a phase is a number of tasks of one piece, which any
+thread may take in any order. A new one needs four things: ``native/NAME.cpp``, which does task
+``index`` and returns; a stub ``NAME_native``; a number and a branch in ``work``; a ``Phase``. How
+many tasks it has may be known only at run time: then it is an int in ``WORLD``, which an earlier
+phase wrote. Tasks of one phase must not write to the same place, or what is written must not depend
+on their order. A piece ends the steps through ``World.full`` (a list was too short: Python
+lengthens it and goes on at the phase marked ``resume``, with ``World.again`` set) or
+``World.stop``.
+
+Before ``FORCES`` nodes hold mass, momentum and force: loads add to the force, so that affine FLIP
+sees them. After it they hold mass, velocity and the velocity as it was.
 """
 
+import ctypes
 import os
 from concurrent.futures import ThreadPoolExecutor
-from itertools import pairwise
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import warp as wp
@@ -32,27 +45,30 @@ wp.set_module_options(
     {"enable_backward": False, "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast"}
 )
 
-_POINTERS = "part node material table block where near point rigid surface"
+_POINTERS = "part node next history material table block where near point rigid surface"
 _COUNTS = "blocks pool rigids points surfaces pushed"
 FIELD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
-    + [("mass", "f8"), ("origin", "i4", 3), ("dim", "i4", 3)]
+    + [("mass", "f8"), ("slowing", "f8"), ("origin", "i4", 3), ("dim", "i4", 3)]
     + [(name, "i4") for name in _COUNTS.split()],
     align=True,
 )
 _POINTERS = (
-    "field task contact_memory list order report plane friction restitution ledger pair_memory "
-    "near_memory plane_impulse pair_impulse friction_loss first_contact last_contact contact_point "
-    "face blow bond"
+    "crew clock field task contact_memory list order report plane friction restitution ledger "
+    "pair_memory near_memory plane_impulse pair_impulse friction_loss first_contact last_contact "
+    "contact_point face blow bond"
 )
 _COUNTS = (
     "fields planes tasks contacts pairs nears most_contacts most_pairs most_nears full names again "
-    "blows bonds"
+    "blows blown bonds stop nodes"
 )
+COLOURS = 4
+"""Columns of blocks of one colour, the parities of their x and y, never overlap."""
 WORLD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("dx", "f8"), ("dt", "f8"), ("time", "f8"), ("kick", "f8", 3)]
-    + [(name, "i4") for name in _COUNTS.split()],
+    + [(name, "i4") for name in _COUNTS.split()]
+    + [("colour", "i4", COLOURS), ("bare_nodes", "i4"), ("bare", "i4", COLOURS)],
     align=True,
 )
 _POINTERS = "area point rigid impulse signal face"
@@ -70,23 +86,77 @@ BOND = np.dtype(
     + [(name, "i4") for name in ("frame", "soft", "count")],
     align=True,
 )
+THING = np.dtype(
+    [("mass", "f8"), ("push", "f8", 3), ("start", "f8"), ("end", "f8"), ("rigid", "u8")]
+    + [(name, "i4") for name in ("field", "first", "last", "spare")]
+)
+CLOCK = np.dtype(
+    [(name, "u8") for name in ("thing", "external_impulse", "push_work")]
+    + [(name, "f8") for name in "until given stable speed wave smallest largest".split()]
+    + [("gravity", "f8", 3)]
+    + [(name, "f8") for name in "ramp courant rigid_courant fall".split()]
+    + [("count", "i8"), ("budget", "i8")]
+    + [(n, "i4") for n in "things started last laid fuse fused pushed spare".split()]
+)
+CREW = np.dtype(
+    [("nap", "u8"), ("phase", "u8")]
+    + [(n, "i4") for n in "phases threads now piece first count started spare".split()]
+    + [("fill0", "u8", 2), ("epoch", "i4"), ("stopped", "i4"), ("fill1", "u8", 7)]
+    + [("done", "i4"), ("spare2", "i4"), ("fill2", "u8", 7), ("post", "u8", (64, 8))]
+)
+REACHED, STRAYED, PAUSED, INFINITE = 1, 2, 3, 4
+"""Why steps ended: time is up; a particle left its block; enough for now; something overflowed."""
 
 PLACE = 22
 """Places are fixed point: 2**PLACE units per cell."""
-XI, VE, AF, DE, ST, MA, VO, EP, VC, MT, ID, TM = 0, 3, 6, 15, 24, 30, 31, 32, 33, 34, 35, 36
+XI, VE, AF, DE, ST, MA, VO, MT, ID = 0, 3, 6, 15, 24, 30, 31, 32, 33
 """First channels of a particle's place (3), velocity (3), affine part (9), F - 1 (9), stress (6),
-mass, volume, plastic strain, volume correction, material, number, and whole motion - 1 (9)."""
-NC = 45
+mass, volume, material and number."""
+NC = 34
 """Channels of a particle."""
+EP, VC, TM = 0, 1, 2
+"""First channels of what matter that flows remembers besides: plastic strain, volume correction,
+whole motion - 1 (9)."""
+NH = 11
+"""Channels of that."""
 MATERIAL = 16
 """Columns of the table of materials."""
 BLOCK = 32
 """Integers of a block's record."""
 REPORT = 8
-SMALLEST_SHARE = 2000
-"""Particles or nodes below which a thread is not worth waking."""
+SMALLEST_SHARE = 500
+"""Particles below which a thread is not worth waking."""
+MOST_THREADS = 64
 SPEED2, WAVE2, PLASTIC, VISCOUS, ASTRAY, WORK = range(6)
 """Columns of a task's report."""
+
+LAY, MOVE, PACE, CLEAR, BLOW_ON, FORCES, CONTACT = range(7)
+"""Numbers of the pieces."""
+
+
+class Phase(NamedTuple):
+    """One phase of a step."""
+
+    piece: int
+    count: str | int = 1
+    """How many tasks; or where in ``WORLD`` that stands when the phase begins; 0 skips it."""
+    which: int = 0
+    """Place in it, where it is an array."""
+    resume: bool = False
+    """Steps go on here after a list was too short and has been lengthened (``World.full``)."""
+
+
+SCHEDULE = (
+    Phase(PACE),
+    Phase(CLEAR, "bare_nodes"),
+    *(Phase(LAY, "bare", colour) for colour in range(COLOURS)),
+    Phase(BLOW_ON, "blown"),
+    Phase(FORCES, "nodes"),
+    Phase(CONTACT, resume=True),
+    *(Phase(MOVE, "colour", colour) for colour in range(COLOURS)),
+)
+"""A step. Particles lay the nodes of the next step when they move, so laying is skipped unless the
+nodes are bare: at the start, after a sort, and while a push acts."""
 
 _NATIVE = Path(__file__).parent / "native"
 
@@ -98,12 +168,16 @@ def _native(*names: str) -> str:
 Memory = wp.array(dtype=wp.uint64)
 
 
+@wp.func_native(_native("conduct"))
+def conduct_native(memory: Memory, thread: int) -> int: ...
+
+
+@wp.func_native(_native("pace"))
+def pace_native(memory: Memory, index: int): ...
+
+
 @wp.func_native(_native("clear"))
 def clear_native(memory: Memory, index: int): ...
-
-
-@wp.func_native(_native("scatter"))
-def scatter_native(memory: Memory, index: int): ...
 
 
 @wp.func_native(_native("blow"))
@@ -114,8 +188,8 @@ def blow_native(memory: Memory, index: int): ...
 def forces_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("gather"))
-def gather_native(memory: Memory, index: int): ...
+@wp.func_native(_native("laws", "gather", "scatter", "transfer"))
+def transfer_native(memory: Memory, index: int): ...
 
 
 @wp.func_native(_native("bond", "contact"))
@@ -123,33 +197,24 @@ def contact_native(memory: Memory, index: int): ...
 
 
 @wp.kernel
-def clear(memory: Memory, first: int):
-    clear_native(memory, first + wp.tid())
-
-
-@wp.kernel
-def scatter(memory: Memory, first: int):
-    scatter_native(memory, first + wp.tid())
-
-
-@wp.kernel
-def blow(memory: Memory, first: int):
-    blow_native(memory, first + wp.tid())
-
-
-@wp.kernel
-def forces(memory: Memory, first: int):
-    forces_native(memory, first + wp.tid())
-
-
-@wp.kernel
-def gather(memory: Memory, first: int):
-    gather_native(memory, first + wp.tid())
-
-
-@wp.kernel
-def contact(memory: Memory, first: int):
-    contact_native(memory, first + wp.tid())
+def work(memory: Memory, thread: int):
+    order = conduct_native(memory, thread)
+    while order >= 0:
+        piece = order >> 24
+        task = order & 0xFFFFFF
+        if piece <= MOVE:
+            transfer_native(memory, 2 * task + 1 - piece)
+        elif piece == PACE:
+            pace_native(memory, task)
+        elif piece == CLEAR:
+            clear_native(memory, task)
+        elif piece == BLOW_ON:
+            blow_native(memory, task)
+        elif piece == FORCES:
+            forces_native(memory, task)
+        elif piece == CONTACT:
+            contact_native(memory, task)
+        order = conduct_native(memory, thread)
 
 
 MEET, TOUCH, CLOSE = 704, 448, 304
@@ -157,68 +222,67 @@ MEET, TOUCH, CLOSE = 704, 448, 304
 
 
 class Program:
-    """The launches of one step, recorded once; phases with many tasks are shared among threads.
+    """Runs steps on several threads without coming back to Python in between.
 
-    Warp runs a kernel on one thread and lets go of Python's lock meanwhile. Tasks of one phase
-    never write to the same place, so the result does not depend on the number of threads.
+    Each thread runs one Warp kernel, which lets go of Python's lock, and takes tasks until the
+    steps end. Tasks of one phase never write to the same place and phases follow one another in a
+    fixed order, so the result does not depend on the number of threads.
     """
 
     def __init__(self, world: np.ndarray, threads: int) -> None:
-        self.memory = wp.array(
+        self.world = world
+        memory = wp.array(
             ptr=world.ctypes.data, dtype=wp.uint64, shape=world.nbytes // 8, device="cpu"
         )
-        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
-        self.threads = threads
+        self.threads = min(threads, MOST_THREADS)
+        self.crew = aligned((1,), CREW)
+        self.phase = np.zeros((len(SCHEDULE), 4), np.int32)
+        for row, phase in zip(self.phase, SCHEDULE, strict=True):
+            named = isinstance(phase.count, str)
+            row[0], row[2] = phase.piece, -1 if named else phase.count
+            row[3] = WORLD.fields[phase.count][1] + 4 * phase.which if named else 0
+        self.resume = next(i for i, phase in enumerate(SCHEDULE) if phase.resume)
+        self.crew["phase"], self.crew["phases"] = self.phase.ctypes.data, len(SCHEDULE)
+        self.crew["nap"] = _yield_address()
+        world["crew"] = self.crew.ctypes.data
+        self.pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
+        self.launches = [
+            wp.launch(work, dim=1, inputs=[memory, thread], device="cpu", record_cmd=True)
+            for thread in range(self.threads)
+        ]
         self.smallest_share = SMALLEST_SHARE
-        self.contact = self._record(contact, 0, 1)
 
-    def divide(
-        self, even: np.ndarray, odd: np.ndarray, nodes: np.ndarray, blown: np.ndarray
-    ) -> None:
-        """Record one step.
+    def divide(self, first: list[int], particles: int) -> None:
+        """Say where each colour's tasks begin, and how many particles there are."""
+        for row, phase in zip(self.phase, SCHEDULE, strict=True):
+            if phase.piece in (LAY, MOVE):
+                row[1] = first[phase.which]
+        self.hands = max(1, min(self.threads, particles // self.smallest_share))
 
-        Args:
-            even: How much work each task on particles of even planes is.
-            odd: The same of odd planes.
-            nodes: The same of the tasks on nodes.
-            blown: The same of loads on the particles of each field; empty: there are none.
+    def run(self, resume: bool = False) -> None:
+        """Step until a piece says stop, or that a list is full."""
+        crew = self.crew
+        crew["now"] = self.resume - 1 if resume else len(SCHEDULE) - 1
+        crew["threads"], crew["started"], crew["stopped"] = self.hands, 0, 0
+        crew["post"] = 0
+        self.world["stop"] = self.world["full"] = 0
+        mates = [self.pool.submit(other.launch) for other in self.launches[1 : self.hands]]
+        self.launches[0].launch()
+        for mate in mates:
+            mate.result()
 
-        """
-        both = np.concatenate([even, odd])
-        self.before = [
-            self._phase(clear, 0, nodes),
-            self._phase(scatter, 0, even),
-            self._phase(scatter, len(even), odd),
-            self._phase(blow, 0, blown),
-            self._phase(forces, 0, nodes),
-        ]
-        self.after = [self._phase(gather, 0, both)]
 
-    def _phase(self, kernel: wp.Kernel, first: int, work: np.ndarray) -> list[wp.Launch]:
-        """Cut a run of tasks into one part per thread, of nearly equal work."""
-        if len(work) == 0:
-            return []
-        total = np.cumsum(work)
-        threads = self.threads if total[-1] > self.smallest_share * self.threads else 1
-        cuts = np.searchsorted(total, total[-1] * np.arange(1, threads) / threads)
-        cuts = np.unique([0, *cuts.tolist(), len(work)])
-        return [
-            self._record(kernel, first + int(low), int(high - low)) for low, high in pairwise(cuts)
-        ]
+def aligned(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
+    """Zeros that begin on a cache line."""
+    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
+    raw = np.zeros(size + 64, np.uint8)
+    start = -raw.ctypes.data % 64
+    return raw[start : start + size].view(dtype).reshape(shape)
 
-    def _record(self, kernel: wp.Kernel, first: int, count: int) -> wp.Launch:
-        return wp.launch(
-            kernel, dim=count, inputs=[self.memory, first], device="cpu", record_cmd=True
-        )
 
-    def run(self, phases: list[list[wp.Launch]]) -> None:
-        """Run phases one after the other, the parts of each at once."""
-        for parts in phases:
-            if self.pool is None or len(parts) < 2:
-                for part in parts:
-                    part.launch()
-            else:
-                others = [self.pool.submit(part.launch) for part in parts[1:]]
-                parts[0].launch()
-                for other in others:
-                    other.result()
+def _yield_address() -> int:
+    """Address of the system's call that offers a core to others; 0 where there is none."""
+    try:
+        return ctypes.cast(ctypes.CDLL(None).sched_yield, ctypes.c_void_p).value or 0
+    except (AttributeError, OSError, TypeError):
+        return 0

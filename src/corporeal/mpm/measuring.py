@@ -23,8 +23,8 @@ def shown(engine: "WarpEngine") -> Snapshot:
         position[at] = window.position() * engine.problem.cell
         velocity[at] = window.channel(VE, 3)
         F[at] = window.channel(DE, 9).reshape(-1, 3, 3) + np.eye(3)
-        motion[at] = window.channel(TM, 9).reshape(-1, 3, 3) + np.eye(3)
-        plastic[at] = window.channel(EP, 1)[:, 0]
+        motion[at] = window.past(TM, 9).reshape(-1, 3, 3) + np.eye(3)
+        plastic[at] = window.past(EP, 1)[:, 0]
     law = np.concatenate([body.law for body in engine.problem.bodies])
     flows = np.isin(law, tables.APIC_LAWS)
     motion = np.where(flows[:, None, None], motion, F)

@@ -9,17 +9,19 @@ import os
 import numpy as np
 
 from corporeal.errors import SimulationError
-from corporeal.mpm import tables
+from corporeal.mpm import pacing, tables
 from corporeal.mpm.blow import Blows
 from corporeal.mpm.carried import Carried
 from corporeal.mpm.kernels import (
     ASTRAY,
+    CLOCK,
+    COLOURS,
     FIELD,
+    INFINITE,
     PLASTIC,
     REPORT,
-    SPEED2,
+    STRAYED,
     VISCOUS,
-    WAVE2,
     WORK,
     WORLD,
     Program,
@@ -41,6 +43,10 @@ FARTHEST = 1e5
 MOST_THREADS = 4
 CHUNK = 32
 """Node blocks of one task."""
+BREATH = 0.2
+"""Seconds of computing after which Python looks whether somebody wants to stop."""
+KEPT = ("count", "smallest", "largest", "speed", "wave")
+"""What the clock remembers from step to step."""
 
 
 class WarpEngine:
@@ -58,7 +64,6 @@ class WarpEngine:
         self.problem = problem
         self.threads = threads or min(MOST_THREADS, os.cpu_count() or 1)
         self.steps = Steps()
-        self.time_now = 0.0
         self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
         counts = [len(b.position) for b in problem.bodies]
         self.first = [0, *np.cumsum(counts).tolist()]
@@ -94,7 +99,8 @@ class WarpEngine:
             rows = tables.particle_rows(problem, bodies, self.first, kind)
             place = np.concatenate([problem.bodies[b].position for b in bodies]) / problem.cell
             self._refuse_far(place, bodies)
-            self.window[f] = Window(place, rows)
+            flows = any(np.isin(problem.bodies[b].law, tables.APIC_LAWS).any() for b in bodies)
+            self.window[f] = Window(place, rows, flows)
             if not self.window[f].fits:
                 raise SimulationError(_too_wide(problem, bodies, 0.0))
         separate = [b for b in self.rigid if self._is_rigid(b)]
@@ -119,9 +125,32 @@ class WarpEngine:
         )
         self.bond = tables.bonds(problem)
         self.program = Program(self.world, self.threads)
-        self.speed = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
-        self.wave = max([self._rest_speed(f) for f in self.window] + [0.0])
+        self._wind_clock()
         self.connect()
+
+    def _wind_clock(self) -> None:
+        problem, clock = self.problem, np.zeros(1, CLOCK)
+        self.clock = clock
+        self.things = pacing.things(problem, self.rigid, self.body_of_material)
+        clock["gravity"], clock["ramp"] = problem.gravity, problem.gravity_ramp
+        clock["courant"], clock["rigid_courant"] = problem.courant, RIGID_COURANT
+        pull = max(
+            float(np.linalg.norm(a)) for a in (problem.gravity, *self.things["push"].tolist())
+        )
+        clock["fall"] = FALL * np.sqrt(problem.cell / max(pull, 1e-30))
+        clock["speed"] = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
+        clock["wave"] = max([self._rest_speed(f) for f in self.window] + [0.0])
+        clock["smallest"] = np.inf
+        clock["things"] = len(self.things)
+        # Carried bodies are moved between steps.
+        clock["fuse"] = not self.carried
+        point(
+            clock,
+            thing=self.things,
+            external_impulse=self.ledger.external_impulse,
+            push_work=self.ledger.push_work,
+        )
+        point(self.world, clock=clock)
 
     def _refuse_far(self, place: np.ndarray, bodies: list[int]) -> None:
         if not np.isfinite(place).all():
@@ -136,28 +165,31 @@ class WarpEngine:
         wave = np.sqrt((table[:, 2] + 2.0 * table[:, 1]) / table[:, 9])
         damping = table[:, 7] / np.maximum(table[:, 2] + 2.0 * table[:, 1], 1e-30)
         damping = damping * wave / self.problem.cell
-        self.slowing = getattr(self, "slowing", {})
-        self.slowing[field] = float((np.sqrt(1.0 + damping**2) + damping).max())
-        return float(wave.max()) * self.slowing[field]
+        slowing = float((np.sqrt(1.0 + damping**2) + damping).max())
+        self.field["slowing"][field] = slowing
+        return float(wave.max()) * slowing
 
     def connect(self) -> None:
         """List the tasks and point the native structs to where everything is."""
-        even, odd, nodes = [], [], []
+        columns, nodes = [], []
         for f, window in self.window.items():
-            for x, low, high in window.planes():
-                (odd if x % 2 else even).append((f, low, high, 0))
+            columns.append(np.insert(window.columns(), 0, f, axis=1))
             pool = len(window.where)
             nodes += [(f, low, min(low + CHUNK, pool), 0) for low in range(0, pool, CHUNK)]
-        self.task = np.array(even + odd, np.int32).reshape(-1, 4)
+        column = np.concatenate([np.zeros((0, 5), np.int64), *columns])
+        colour = 2 * (column[:, 1] % 2) + column[:, 2] % 2
+        counts = np.bincount(colour, minlength=COLOURS)
+        self.task = np.zeros((len(column), 4), np.int32)
+        self.task[:, :3] = column[np.argsort(colour, kind="stable")][:, [0, 3, 4]]
         self.node_task = np.array(nodes, np.int32).reshape(-1, 4)
         self.report = np.zeros((len(self.task), REPORT))
-        self.slower = np.array([self.slowing[f] for f in self.task[:, 0]])
         for f, window in self.window.items():
             self._connect_field(f, window)
         for body in self.carried:
             body.find(self.window[0])
+        world = self.world
         point(
-            self.world,
+            world,
             field=self.field,
             task=self.task,
             list=self.node_task,
@@ -166,22 +198,13 @@ class WarpEngine:
             bond=self.bond,
         )
         self._connect_bonds()
-        self.world["blows"] = len(self.blows.record)
-        self.world["fields"], self.world["dx"] = len(self.field), self.problem.cell
-        self.world["tasks"] = len(self.task)
-        work = np.array([self._particles(*task) for task in self.task])
-        self.program.divide(
-            work[: len(even)],
-            work[len(even) :],
-            64 * (self.node_task[:, 2] - self.node_task[:, 1]),
-            self.blows.load(
-                len(self.field), [len(self.problem.bodies[m[0]].position) for m in self.members]
-            ),
-        )
-
-    def _particles(self, field: int, low: int, high: int, _: int) -> int:
-        block = self.window[field].block
-        return int(block[high - 1, 1] - block[low, 0])
+        world["blows"] = len(self.blows.record)
+        world["blown"] = len(self.field) if len(self.blows.record) else 0
+        world["fields"], world["dx"] = len(self.field), self.problem.cell
+        world["tasks"], world["nodes"], world["colour"] = len(self.task), len(nodes), counts
+        self.clock["laid"] = 0
+        particles = sum(window.count for window in self.window.values())
+        self.program.divide((np.cumsum(counts) - counts).tolist(), particles)
 
     def _connect_bonds(self) -> None:
         """Make room for every node that a frame could hold."""
@@ -195,7 +218,7 @@ class WarpEngine:
 
     def _connect_field(self, f: int, window: Window) -> None:
         record = self.field[f : f + 1]
-        for name in ("part", "node", "table", "block", "where", "near"):
+        for name in ("part", "node", "next", "history", "table", "block", "where", "near"):
             record[name] = getattr(window, name).ctypes.data
         record["material"] = self.material[f].ctypes.data
         record["origin"], record["dim"] = window.origin, window.dim
@@ -206,20 +229,18 @@ class WarpEngine:
     @property
     def time(self) -> float:
         """Simulated time so far [s]."""
-        return self.time_now
+        return float(self.world["time"][0])
 
     def advance(self, until: float) -> None:
         """Step until exactly ``until`` [s], choosing steps by stability."""
         good = self.save()
         try:
-            while self.time_now < until:
-                if not self.speed < np.inf:
-                    self._find_lost()
-                left = until - self.time_now
-                count = max(1, int(np.ceil(left / self.stable_step() - 1e-9)))
-                self.step(left / count)
-                if count == 1:
-                    self.time_now = until
+            self.clock["until"], self.clock["given"] = until, 0.0
+            breath = pacing.Breath(BREATH)
+            while self.time < until:
+                with breath:
+                    self.clock["budget"] = 1 if self.carried else breath.steps
+                    self._run()
         except SimulationError:
             lost = self.lost.copy()
             self.restore(good)
@@ -228,86 +249,39 @@ class WarpEngine:
 
     def stable_step(self) -> float:
         """Largest stable step now [s]: dt = s dx/(c + |v|), and the falls of what is rigid."""
-        cell = self.problem.cell
-        limits = [1.0]
-        if self.window:
-            limits.append(self.problem.courant * cell / max(self.wave + self.speed, 1e-30))
-        for state in self.rigid.values():
-            turning = np.linalg.norm(state[37:40]) * state[tables.RADIUS]
-            fastest = np.linalg.norm(state[22:25]) + turning
-            limits.append(RIGID_COURANT * cell / max(float(fastest), 1e-30))
-        pulls = [self.problem.gravity] + [
-            b.push.acceleration for b in self.problem.bodies if b.push is not None
-        ]
-        pull = max(float(np.linalg.norm(p)) for p in pulls)
-        limits.append(FALL * np.sqrt(cell / max(pull, 1e-30)))
-        return min(limits)
+        self.clock["budget"] = 0
+        self.program.run()
+        return float(self.clock["stable"][0])
 
     def step(self, dt: float) -> None:
         """Take one step of dt [s]."""
+        self.clock["given"], self.clock["budget"] = dt, 1
+        self._run()
+
+    def _run(self) -> None:
+        """Step until something is up; where a list was too short, lengthen it and go on."""
         world = self.world
-        world["dt"], world["time"] = dt, self.time_now
-        world["kick"] = self._kick(dt)
-        self.program.run(self.program.before)
-        self._touch()
-        self.program.run(self.program.after)
-        strayed = [body.carry(self.window[0], dt) for body in self.carried]
-        self.time_now += dt
-        self.steps.count += 1
-        self.steps.smallest = min(self.steps.smallest, dt)
-        self.steps.largest = max(self.steps.largest, dt)
-        if len(self.task):
-            self._hear(any(strayed))
-
-    def _touch(self) -> None:
-        """Solve contact; where a list was too short, lengthen it and begin again."""
-        self.world["again"] = 0
-        self.program.contact.launch()
-        while self.world["full"][0]:
+        self.program.run()
+        while world["full"][0]:
             self.contact.lengthen()
-            self.world["again"] = 1
-            self.program.contact.launch()
+            world["again"] = 1
+            self.program.run(resume=True)
+        self._note_steps()
+        strayed = [body.carry(self.window[0], float(world["dt"][0])) for body in self.carried]
+        if world["stop"][0] == INFINITE:
+            self._find_lost()
+        if world["stop"][0] == STRAYED or any(strayed):
+            astray = (self.report[:, ASTRAY] > 0) | any(strayed)
+            self._sort({int(f) for f in self.task[astray, 0]})
 
-    def _kick(self, dt: float) -> np.ndarray:
-        """Velocity [m/s] that gravity gives in this step; enters it and the pushes."""
-        problem, start, end = self.problem, self.time_now, self.time_now + dt
-        ramp = problem.gravity_ramp
-        gravity = np.array(problem.gravity) * (_ramped(end, ramp) - _ramped(start, ramp))
-        for b, body in enumerate(problem.bodies):
-            push = np.zeros(3)
-            if body.push is not None:
-                span = max(0.0, min(end, body.push.end) - max(start, body.push.start))
-                push = np.array(body.push.acceleration) * span
-                self._push(b, push)
-            if b in self.rigid:
-                state = self.rigid[b]
-                state[tables.KICK : tables.KICK + 3] = gravity + push
-                mean = state[tables.SPEED : tables.SPEED + 3] + 0.5 * (gravity + push)
-                self.ledger.push_work += self.mass[b] * float(push @ mean)
-            self.ledger.external_impulse[b] += self.mass[b] * (gravity + push)
-        return gravity
-
-    def _push(self, b: int, push: np.ndarray) -> None:
-        field = 0 if self.problem.contact == "single" else b
-        if field in self.material:
-            self.material[field][self.body_of_material[field] == b, 10:13] = push
-            self.field["pushed"][field] = 1
+    def _note_steps(self) -> None:
+        clock = self.clock[0]
+        self.steps = Steps(int(clock["count"]), float(clock["smallest"]), float(clock["largest"]))
 
     @property
     def mass(self) -> list[float]:
         """Mass of every body [kg]."""
-        if not hasattr(self, "_mass"):
-            self._mass = [float(b.volume @ b.density) for b in self.problem.bodies]
-        return self._mass
-
-    def _hear(self, strayed: bool) -> None:
-        """Read what the tasks report; sort where somebody strayed."""
-        report = self.report
-        speed = np.sqrt(report[:, SPEED2])
-        self.speed = float(speed.max())
-        self.wave = float((np.sqrt(report[:, WAVE2]) * self.slower).max())
-        if strayed or report[:, ASTRAY].any():
-            self._sort({int(f) for f in self.task[strayed | (report[:, ASTRAY] > 0), 0]})
+        return self.things["mass"].tolist()
 
     def _book(self) -> None:
         """Move what the tasks added up into the ledger."""
@@ -322,7 +296,7 @@ class WarpEngine:
         self._find_lost()
         for f in sorted(fields):
             if not self.window[f].sort():
-                raise SimulationError(_too_wide(self.problem, self.members[f], self.time_now))
+                raise SimulationError(_too_wide(self.problem, self.members[f], self.time))
         self.connect()
 
     def _find_lost(self) -> None:
@@ -341,7 +315,7 @@ class WarpEngine:
             first = int(np.argmax(self.lost))
             body = int(np.searchsorted(self.first, first, side="right")) - 1
             raise SimulationError(
-                f"At t = {self.time_now:.4g} s {int(self.lost.sum())} particles of "
+                f"At t = {self.time:.4g} s {int(self.lost.sum())} particles of "
                 f"{self.problem.bodies[body].name!r} were lost: they are not finite or left the "
                 "domain. What was computed before is kept. Use more detail, or look for parts "
                 "that overlap at the start."
@@ -365,10 +339,7 @@ class WarpEngine:
         for f, window in self.window.items():
             saved |= {f"field{f}.{k}": v for k, v in window.saved().items()}
         saved |= {f"rigid{b}": state.copy() for b, state in self.rigid.items()}
-        steps = self.steps
-        saved["clock"] = np.array(
-            [self.time_now, steps.count, steps.smallest, steps.largest, self.speed, self.wave]
-        )
+        saved["clock"] = np.array([self.time, *(float(self.clock[k][0]) for k in KEPT)])
         return saved
 
     def restore(self, saved: dict[str, np.ndarray]) -> None:
@@ -382,18 +353,13 @@ class WarpEngine:
             )
         for b, state in self.rigid.items():
             state[:] = saved[f"rigid{b}"]
-        time, count, smallest, largest, self.speed, self.wave = saved["clock"].tolist()
-        self.time_now = time
-        self.steps = Steps(int(count), smallest, largest)
+        time, *kept = saved["clock"].tolist()
+        self.world["time"] = time
+        for name, value in zip(KEPT, kept, strict=True):
+            self.clock[name] = value
+        self._note_steps()
         self.lost[:] = False
         self.connect()
-
-
-def _ramped(time: float, ramp: float) -> float:
-    """∫ of gravity's share from 0 to time [s]."""
-    if ramp <= 0.0:
-        return time
-    return 0.5 * time**2 / ramp if time < ramp else time - 0.5 * ramp
 
 
 def _too_wide(problem: Problem, bodies: list[int], time: float) -> str:

@@ -6,44 +6,49 @@ of its own. Blocks that no particle reaches take no memory.
 
 import numpy as np
 
-from corporeal.mpm.kernels import AF, BLOCK, ID, MA, MT, NC, PLACE, VE, XI
+from corporeal.mpm.kernels import AF, BLOCK, ID, MA, MT, NC, NH, PLACE, VE, XI, aligned
 
 HALF = 1 << (PLACE - 1)
 LONGEST = (1 << (31 - PLACE)) // 4 - 4
 """Blocks that a window may span before places overflow."""
+KEPT = ("part", "history", "slot", "start", "end", "origin", "dim", "table", "where", "block")
+"""What the next step depends on."""
 NEIGHBOURS = np.array(list(np.ndindex(3, 3, 3))) - 1
 
 
 class Window:
     """Particles of one velocity field, in batches of eight, and the table of its node blocks."""
 
-    def __init__(self, place: np.ndarray, rows: np.ndarray) -> None:
+    def __init__(self, place: np.ndarray, rows: np.ndarray, flows: bool) -> None:
         """Sort particles into a first window.
 
         Args:
             place: Positions in cells, (P, 3).
             rows: All other channels, (P, NC); places are filled in here.
+            flows: Whether any of them remembers what matter that flows does.
 
         """
         self.count = len(rows)
         corner = np.floor(place.min(axis=0) / 4).astype(np.int64) - 1
         self.origin = corner.astype(np.int32)
-        self.node = np.zeros((0, 64, 8), np.float32)
+        self.node = self.next = aligned((0, 64, 8), np.float32)
         self.near = np.zeros(0, np.uint64)
         rows = rows.astype(np.float32)
+        past = np.zeros((len(rows) if flows else 0, NH), np.float32)
         fixed = np.rint((place - 4 * corner) * (1 << PLACE)).astype(np.int64)
         self.fits = bool((np.abs(fixed) < 2**31).all())
         if self.fits:
             rows[:, XI : XI + 3] = fixed.astype(np.int32).view(np.float32)
-            self._arrange(rows)
+            self._arrange(rows, past)
 
     def sort(self) -> bool:
         """Sort again and move the window; False when its particles no longer fit into one."""
         rows = self.part.transpose(0, 2, 1).reshape(-1, NC)
-        self._arrange(rows[self.slot])
+        past = self.history.transpose(0, 2, 1).reshape(-1, NH)
+        self._arrange(rows[self.slot], past[self.slot] if len(past) else past)
         return self.fits
 
-    def _arrange(self, rows: np.ndarray) -> None:
+    def _arrange(self, rows: np.ndarray, past: np.ndarray) -> None:
         x = np.ascontiguousarray(rows[:, XI : XI + 3]).view(np.int32)
         base = (x - HALF) >> PLACE
         block = base >> 2
@@ -63,11 +68,16 @@ class Window:
         kind = np.ascontiguousarray(rows[:, MT]).view(np.int32)
         order = np.argsort((line.astype(np.int64) * (1 << 20) + kind) * 64 + inner, kind="stable")
         _, first, counts = np.unique(line[order], return_index=True, return_counts=True)
-        self._fill(rows, order, first, counts)
+        self._fill(rows, past, order, first, counts)
         self._tabulate(block[order[first]], counts)
 
     def _fill(
-        self, rows: np.ndarray, order: np.ndarray, first: np.ndarray, counts: np.ndarray
+        self,
+        rows: np.ndarray,
+        past: np.ndarray,
+        order: np.ndarray,
+        first: np.ndarray,
+        counts: np.ndarray,
     ) -> None:
         """Copy rows into batches; what pads a batch stands where its block's first one does."""
         padded = (counts + 7) // 8 * 8
@@ -82,7 +92,8 @@ class Window:
         spread[idle, ID] = np.array(-1, np.int32).view(np.float32)
         spread[idle, VE : AF + 9] = 0.0
         self.start, self.end = start, start + counts
-        self.part = np.ascontiguousarray(spread.reshape(-1, 8, NC).transpose(0, 2, 1))
+        self.part = _batches(spread)
+        self.history = _batches(past[source] if len(past) else past)
 
     def _tabulate(self, block: np.ndarray, counts: np.ndarray) -> None:
         """Give the node blocks that particle blocks reach numbers, and point to them."""
@@ -99,9 +110,12 @@ class Window:
         record[:, 5:] = table[tuple(around.reshape(-1, 3).T)].reshape(-1, 27)
         self.block = record
         if len(self.node) < len(reached):
-            room = len(reached) * 3 // 2
-            self.node = np.zeros((room, 64, 8), np.float32)
-            self.near = np.zeros(2 * room, np.uint64)
+            self._make_room(len(reached) * 3 // 2)
+
+    def _make_room(self, blocks: int) -> None:
+        self.node = aligned((blocks, 64, 8), np.float32)
+        self.next = aligned((blocks, 64, 8), np.float32)
+        self.near = np.zeros(2 * blocks, np.uint64)
 
     # ------------------------------------------------------------ reading
 
@@ -112,9 +126,16 @@ class Window:
 
     def channel(self, first: int, width: int) -> np.ndarray:
         """Copy some channels of every particle, in slot order, (P, width)."""
-        part = self.part[:, first : first + width]
-        flat = np.ascontiguousarray(part.transpose(0, 2, 1)).reshape(-1, width)
-        return flat[self.slot]
+        return self._rows(self.part[:, first : first + width])
+
+    def past(self, first: int, width: int) -> np.ndarray:
+        """Copy some channels of what matter that flows remembers; 0 where nothing flows."""
+        if not len(self.history):
+            return np.zeros((self.count, width), np.float32)
+        return self._rows(self.history[:, first : first + width])
+
+    def _rows(self, part: np.ndarray) -> np.ndarray:
+        return part.transpose(0, 2, 1).reshape(-1, part.shape[1])[self.slot]
 
     def write(self, first: int, values: np.ndarray) -> None:
         """Put values, in slot order, into some channels."""
@@ -127,23 +148,41 @@ class Window:
         fixed = self.channel(XI, 3).view(np.int32)
         return fixed / float(1 << PLACE) + 4.0 * self.origin
 
-    def planes(self) -> np.ndarray:
-        """List runs of blocks with the same first coordinate: (R, 3) coordinate, first, last."""
-        x = self.block[:, 2]
-        first = np.flatnonzero(np.r_[True, x[1:] != x[:-1]])
-        last = np.r_[first[1:], len(x)]
-        return np.stack([x[first], first, last], axis=1)
+    def columns(self) -> np.ndarray:
+        """List runs of blocks with the same first two coordinates: (R, 4) x, y, first, last."""
+        at = self.block[:, 2:4]
+        first = np.flatnonzero(np.r_[True, (at[1:] != at[:-1]).any(axis=1)])
+        return np.column_stack([at[first], first, np.r_[first[1:], len(at)]])
 
     def saved(self) -> dict[str, np.ndarray]:
         """Everything that the next step depends on."""
-        names = ("part", "slot", "start", "end", "origin", "dim", "table", "where", "block")
+        names = (
+            "part",
+            "history",
+            "slot",
+            "start",
+            "end",
+            "origin",
+            "dim",
+            "table",
+            "where",
+            "block",
+        )
         return {name: getattr(self, name).copy() for name in names}
 
     def restore(self, saved: dict[str, np.ndarray]) -> None:
         """Take back what ``saved`` gave."""
         for name, value in saved.items():
-            setattr(self, name, value.copy())
+            copy = aligned(value.shape, value.dtype)
+            copy[...] = value
+            setattr(self, name, copy)
         self.fits = True
         if len(self.node) < len(self.where):
-            self.node = np.zeros((len(self.where) * 3 // 2, 64, 8), np.float32)
-            self.near = np.zeros(2 * len(self.node), np.uint64)
+            self._make_room(len(self.where) * 3 // 2)
+
+
+def _batches(rows: np.ndarray) -> np.ndarray:
+    """Rows (8 B, C) as batches of eight lanes, (B, C, 8)."""
+    out = aligned((len(rows) // 8, rows.shape[1], 8), np.float32)
+    out[...] = rows.reshape(-1, 8, rows.shape[1]).transpose(0, 2, 1)
+    return out

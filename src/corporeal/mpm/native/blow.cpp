@@ -46,8 +46,9 @@ struct Load {
           double weight = W[0][i] * W[1][j] * W[2][k], lighter = 1.0 / node[0];
           for (int d = 0; d < 3; d++) {
             double part = weight * J[d];
-            work += part * (lighter * (node[1 + d] + 0.5 * part) + w->kick[d]);
-            node[1 + d] += (float)part;
+            double momentum = node[1 + d] + w->dt * node[4 + d];
+            work += part * (lighter * (momentum + 0.5 * part) + w->kick[d]);
+            node[4 + d] += (float)(part / w->dt);
           }
         }
     return work;
@@ -104,13 +105,15 @@ for (int n = 0; n < world->blows; n++) {
       const int *block = field.block + NB * b;
       for (int slot = block[0]; slot < block[1]; slot++) {
         const float *q = field.part + (size_t)(slot & ~7) * NC;
+        const float *past = field.history + (size_t)(slot & ~7) * NH;
         const int lane = slot & 7, p = ((const int *)(q + 8 * ID))[lane] - B.first;
         if (p < 0 || p >= B.count || B.face[p] == B.face[p + 1]) continue;
         const int law = (int)field.material[NM * ((const int *)(q + 8 * MT))[lane] + LAW];
         double F[9], seen[3], J[3] = {0, 0, 0};
         for (int i = 0; i < 9; i++)
           F[i] = B.rigid ? B.rigid[RIGID_TURN + i]
-                         : q[8 * ((law == 3 || law == 4 ? TM : DE) + i) + lane] + (i % 4 == 0);
+                         : (law == 3 || law == 4 ? past + 8 * TM : q + 8 * DE)[8 * i + lane] +
+                               (i % 4 == 0);
         for (int d = 0; d < 3; d++) seen[d] = air[d] - q[8 * (VE + d) + lane];
         for (int a = B.face[p]; a < B.face[p + 1]; a++) {
           double area[3];

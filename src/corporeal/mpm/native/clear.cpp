@@ -1,5 +1,4 @@
 // Empty a range of one field's node blocks.
 int *task = world->list + 4 * index;
-Field &field = world->field[task[0]];
-for (size_t i = (size_t)task[1] * 64; i < (size_t)task[2] * 64; i++)
-  ((f8u *)field.node)[i] = Simd::all(0.0f);
+f8 *node = (f8 *)world->field[task[0]].node;
+for (size_t i = (size_t)task[1] * 64; i < (size_t)task[2] * 64; i++) node[i] = Simd::all(0.0f);

@@ -1,18 +1,24 @@
-// Momentum to velocity on a range of one field's node blocks, with gravity's kick; clears the free lane.
-// Tasks share the blocks of a field by number.
+// Momentum and force to velocity on a range of one field's node blocks, with gravity's kick; empties
+// the same range of the next step's nodes.
 int *task = world->list + 4 * index;
 Field &field = world->field[task[0]];
+const float dt = (float)world->dt;
 const f8 g = f8{0, (float)world->kick[0], (float)world->kick[1], (float)world->kick[2], 0, 0, 0, 0};
+const f8 h = f8{0, dt, dt, dt, 0, 0, 0, 0};
+f8 *node = (f8 *)field.node, *next = (f8 *)field.next;
+const bool empty = world->clock->fused;
 for (size_t i = (size_t)task[1] * 64; i < (size_t)task[2] * 64; i++) {
-  f8u *node = (f8u *)field.node + i;
-  f8 a = *node;
+  f8 a = node[i];
   float m = a[0];
   if (m > 1e-30f) {
-    a = a * (1.0f / m) + g;
+    f8 p = __builtin_shufflevector(a, a, 0, 1, 2, 3, 1, 2, 3, 7);
+    f8 f = __builtin_shufflevector(a, a, 0, 4, 5, 6, 0, 0, 0, 0);
+    a = (p + h * f) * (1.0f / m) + g;
     a[0] = m;
     a[7] = 0.0f;
-    *node = a;
+    node[i] = a;
   } else {
-    *node = Simd::all(0.0f);
+    node[i] = Simd::all(0.0f);
   }
+  if (empty) next[i] = Simd::all(0.0f);
 }

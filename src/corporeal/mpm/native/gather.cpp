@@ -1,224 +1,68 @@
-// Grid to particles, one task: velocities, affine parts, places, strain, return map and stress.
-struct Math {
-  // ln(1 + x), exact for small x.
-  static inline f8 log1p(f8 x) {
-    f8 y = 1.0f + x;
-    i8 k = ((i8)y - 0x3f3504f3) >> 23;
-    f8 scaled = (f8)((i8)y - (k << 23)) - 1.0f;
-    f8 f = Simd::pick(k == 0, x, scaled);
-    f8 z = f / (2.0f + f), s = z * z;
-    f8 p = 2.0f / 9.0f + s * (2.0f / 11.0f);
-    p = 2.0f / 7.0f + s * p;
-    p = 2.0f / 5.0f + s * p;
-    p = 2.0f / 3.0f + s * p;
-    return z * (2.0f + s * p) + Simd::flo(k) * 0.69314718f;
-  }
-  // exp(x) - 1, exact for small x.
-  static inline f8 expm1(f8 x) {
-    x = Simd::low(Simd::high(x, Simd::all(-60.0f)), Simd::all(60.0f));
-    f8 t = x * 1.44269504f;
-    i8 k = Simd::whole(t + Simd::pick(t < 0.0f, Simd::all(-0.5f), Simd::all(0.5f)));
-    f8 n = Simd::flo(k);
-    f8 r = (x - n * 0.693359375f) + n * 2.12194440e-4f;
-    f8 p = 1.0f / 720.0f + r * (1.0f / 5040.0f);
-    p = 1.0f / 120.0f + r * p;
-    p = 1.0f / 24.0f + r * p;
-    p = 1.0f / 6.0f + r * p;
-    p = 0.5f + r * p;
-    p = r + r * r * p;
-    f8 two = (f8)((k + 127) << 23);
-    return Simd::pick(k == 0, p, two * p + (two - 1.0f));
-  }
-  static inline void rotate(f8 &app, f8 &aqq, f8 &apq, f8 &arp, f8 &arq, f8 *V, int p, int q) {
-    f8 zero = Simd::all(0.0f), one = Simd::all(1.0f);
-    i8 small = Simd::size(apq) < (Simd::size(app) + Simd::size(aqq)) * 1e-9f + 1e-30f;
-    f8 tau = (aqq - app) * 0.5f / Simd::pick(small, one, apq);
-    f8 h = Simd::root(1.0f + tau * tau);
-    f8 t = 1.0f / (Simd::size(tau) + h);
-    t = Simd::pick(tau < 0.0f, -t, t);
-    t = Simd::pick(small, zero, t);
-    f8 c = 1.0f / Simd::root(1.0f + t * t), s = t * c, tp = t * apq;
-    app = app - tp;
-    aqq = aqq + tp;
-    apq = zero;
-    f8 a = arp, b = arq;
-    arp = c * a - s * b;
-    arq = s * a + c * b;
-    for (int i = 0; i < 3; i++) {
-      f8 x = V[3 * i + p], y = V[3 * i + q];
-      V[3 * i + p] = c * x - s * y;
-      V[3 * i + q] = s * x + c * y;
-    }
-  }
-  // E = V diag(l) Vt of a symmetric matrix (00 01 02 11 12 22) by four sweeps of Jacobi.
-  static inline void eigen(const f8 *E, f8 *l, f8 *V) {
-    f8 z = Simd::all(0.0f), o = Simd::all(1.0f);
-    f8 a00 = E[0], a01 = E[1], a02 = E[2], a11 = E[3], a12 = E[4], a22 = E[5];
-    for (int i = 0; i < 9; i++) V[i] = z;
-    V[0] = V[4] = V[8] = o;
-    for (int sweep = 0; sweep < 4; sweep++) {
-      rotate(a00, a11, a01, a02, a12, V, 0, 1);
-      rotate(a00, a22, a02, a01, a12, V, 0, 2);
-      rotate(a11, a22, a12, a01, a02, V, 1, 2);
-      f8 off = Simd::size(a01) + Simd::size(a02) + Simd::size(a12);
-      f8 on = Simd::size(a00) + Simd::size(a11) + Simd::size(a22);
-      if (sweep > 0 && !Simd::any(off > on * 1e-8f)) break;
-    }
-    l[0] = a00;
-    l[1] = a11;
-    l[2] = a22;
-  }
-  // S = U diag(t) Ut as 00 01 02 11 12 22.
-  static inline void compose(const f8 *U, const f8 *t, f8 *S) {
-    int n = 0;
-    for (int i = 0; i < 3; i++)
-      for (int j = i; j < 3; j++)
-        S[n++] = t[0] * U[3 * i] * U[3 * j] + t[1] * U[3 * i + 1] * U[3 * j + 1] +
-                 t[2] * U[3 * i + 2] * U[3 * j + 2];
-  }
-};
-// Material of each lane.
-struct Stuff {
-  f8 law, mu, lambda, yield, hard, cone, apex, visc, keep, rho;
-};
-// Laws in principal form (design: physics, section 3). H = F - 1 keeps small strains exact.
-struct Laws {
-  // Principal strain eps to the cone or cylinder; returns the plastic work per rest volume, with
-  // the stress after the return.
-  static inline f8 sand(const Stuff &t, f8 *eps, f8 &change, f8 &vc) {
-    f8 zero = Simd::all(0.0f), h[3], work = zero;
-    for (int i = 0; i < 3; i++) eps[i] += vc * (1.0f / 3.0f);
-    f8 tr = eps[0] + eps[1] + eps[2], mean = tr * (1.0f / 3.0f);
-    for (int i = 0; i < 3; i++) h[i] = eps[i] - mean;
-    f8 n = Simd::root(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
-    f8 out = tr - t.apex;
-    f8 slip = n + t.cone * (3.0f * t.lambda + 2.0f * t.mu) / (2.0f * t.mu) * out;
-    slip = Simd::low(Simd::high(slip, zero), n);
-    i8 apex = out > 0.0f;
-    f8 scale = 1.0f - slip / Simd::high(n, Simd::all(1e-30f));
-    scale = Simd::pick(apex, zero, scale);
-    mean = Simd::pick(apex, t.apex * (1.0f / 3.0f), mean);
-    f8 after = 3.0f * mean;
-    // Beyond the apex what was open before is no new slip: only the change is.
-    f8 opened = Simd::pick(apex, vc, zero);
-    for (int i = 0; i < 3; i++) {
-      f8 next = scale * h[i] + mean;
-      work += (2.0f * t.mu * next + t.lambda * after) * (eps[i] - next - opened * (1.0f / 3.0f));
-      eps[i] = next;
-    }
-    out -= opened;
-    change = Simd::pick(apex, Simd::root(n * n + out * out * (1.0f / 3.0f)), slip);
-    vc = tr - after;
-    return work;
-  }
-  static inline f8 metal(const Stuff &t, f8 *eps, f8 &change, f8 ep) {
-    const float R = 0.81649658f;
-    f8 zero = Simd::all(0.0f);
-    f8 mean = (eps[0] + eps[1] + eps[2]) * (1.0f / 3.0f), h[3];
-    for (int i = 0; i < 3; i++) h[i] = eps[i] - mean;
-    f8 n = Simd::root(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
-    f8 dg = (2.0f * t.mu * n - R * (t.yield + t.hard * ep)) /
-            (2.0f * t.mu + (2.0f / 3.0f) * t.hard);
-    dg = Simd::high(dg, zero);
-    f8 scale = 1.0f - dg / Simd::high(n, Simd::all(1e-30f));
-    for (int i = 0; i < 3; i++) eps[i] = scale * h[i] + mean;
-    change = dg;
-    return 2.0f * t.mu * n * scale * dg;
-  }
-};
+// Nodes to one block's particles: velocities, affine parts, places, strain, return map and stress.
+struct Gather {
+  f8 speed2 = Simd::all(0.0f), wave2 = speed2;
+  double plastic = 0, viscous = 0;
+  int astray = 0;
 
-int *task = world->task + 4 * index;
-Field &field = world->field[task[0]];
-const float dt = (float)world->dt, step = (float)(world->dt / world->dx);
-const float dx = (float)world->dx;
-f8 speed2 = Simd::all(0.0f), wave2 = Simd::all(0.0f);
-double plastic = 0, viscous = 0;
-int astray = 0;
-alignas(64) f8 arena[512];
-for (int b = task[1]; b < task[2]; b++) {
-  const int *block = field.block + NB * b;
-  for (int i = 0; i < 8; i++)
-    for (int j = 0; j < 8; j++) {
-      int ib = (i + 3) >> 2, jb = (j + 3) >> 2;
-      const int *near = block + 5 + (ib * 3 + jb) * 3;
-      f8 *h = arena + i * 64 + j * 8;
-      size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
-      const f8u *g0 = (f8u *)field.node + (size_t)near[0] * 64 + row;
-      const f8u *g1 = (f8u *)field.node + (size_t)near[1] * 64 + row;
-      const f8u *g2 = (f8u *)field.node + (size_t)near[2] * 64 + row;
-      h[0] = g0[3];
-      for (int k = 0; k < 4; k++) h[1 + k] = g1[k];
-      for (int k = 0; k < 3; k++) h[5 + k] = g2[k];
-    }
-  for (int s = block[0]; s < block[1]; s += 8) {
-    float *q = field.part + (size_t)s * NC;
-    int live = block[1] - s < 8 ? block[1] - s : 8;
-    alignas(32) float W[9][8], D[3][8];
-    alignas(32) int base[8];
-    i8 at = i8{0, 0, 0, 0, 0, 0, 0, 0};
-    for (int d = 0; d < 3; d++) {
-      i8 x = *(i8u *)(q + 8 * (XI + d));
-      i8 cell = (x - HALF) >> PLACE;
-      f8 f = Simd::flo(x - (cell << PLACE)) * PER_UNIT;
-      f8 w[3];
-      Simd::spline(f, w);
-      *(f8 *)D[d] = f;
-      for (int k = 0; k < 3; k++) *(f8 *)W[3 * d + k] = w[k];
-      at = at * 8 + (cell - (4 * block[2 + d] - 1));
-    }
-    *(i8 *)base = at;
-    f8 u[8], c0[8], c1[8], c2[8];
-    for (int l = 0; l < 8; l++) {
-      const f8 *g = arena + base[l];
-      float w0 = W[6][l], w1 = W[7][l], w2 = W[8][l];
-      f8 v = Simd::all(0.0f), x = v, y = v, z = v;
+  // Moments of 27 nodes for one lane: of velocity u, and of velocity times the node's number along
+  // each axis.
+  static inline void lane(const f8 *g, const Row *W, int l, f8 &u, f8 &x, f8 &y, f8 &z) {
+    f8 c[3];
 #pragma unroll
-      for (int i = 0; i < 3; i++) {
-        float wi = W[i][l];
-        f8 ci = Simd::all(0.0f);
+    for (int i = 0; i < 3; i++) {
+      f8 s[3];
 #pragma unroll
-        for (int j = 0; j < 3; j++) {
-          float w = wi * W[3 + j][l];
-          const f8 *h = g + i * 64 + j * 8;
-          f8 h1 = w1 * h[1], h2 = w2 * h[2];
-          f8 s0 = (w0 * h[0] + h1 + h2) * w, s1 = (h1 + 2.0f * h2) * w;
-          ci += s0;
-          z += s1;
-          if (j == 1) y += s0;
-          if (j == 2) y += 2.0f * s0;
-        }
-        v += ci;
-        if (i == 1) x += ci;
-        if (i == 2) x += 2.0f * ci;
+      for (int j = 0; j < 3; j++) {
+        const f8 *h = g + i * 64 + j * 8;
+        const Row *w = W + (i * 3 + j) * 3;
+        f8 b = w[2][l] * h[2], t = w[1][l] * h[1] + b;
+        s[j] = w[0][l] * h[0] + t;
+        z = (i || j) ? z + (t + b) : t + b;
       }
-      u[l] = v;
-      c0[l] = x - D[0][l] * v;
-      c1[l] = y - D[1][l] * v;
-      c2[l] = z - D[2][l] * v;
+      f8 t = s[1] + s[2];
+      y = i ? y + (t + s[2]) : t + s[2];
+      c[i] = s[0] + t;
     }
+    x = c[1] + c[2];
+    u = c[0] + x;
+    x += c[2];
+  }
+  static inline void fill(const Field &field, const int *block, f8 *arena) {
+    for (int i = 0; i < 8; i++)
+      for (int j = 0; j < 8; j++) {
+        const int *near = block + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
+        f8 *h = arena + i * 64 + j * 8;
+        size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
+        const f8 *g0 = (f8 *)field.node + (size_t)near[0] * 64 + row;
+        const f8 *g1 = (f8 *)field.node + (size_t)near[1] * 64 + row;
+        const f8 *g2 = (f8 *)field.node + (size_t)near[2] * 64 + row;
+        h[0] = g0[3];
+        for (int k = 0; k < 4; k++) h[1 + k] = g1[k];
+        for (int k = 0; k < 3; k++) h[5 + k] = g2[k];
+      }
+  }
+  inline void batch(const World *world, const Field &field, const int *block, int s, const f8 *arena) {
+    const float dt = (float)world->dt, step = (float)(world->dt / world->dx), dx = (float)world->dx;
+    float *q = field.part + (size_t)s * NC, *past = field.history + (size_t)s * NH;
+    int live = block[1] - s < 8 ? block[1] - s : 8;
+    alignas(64) float W[27][8];
+    alignas(32) int base[8];
+    f8 D[3], u[8], c0[8], c1[8], c2[8];
+    Simd::weights(q, block, D, W, base);
+    for (int l = live; l < 8; l++) u[l] = c0[l] = c1[l] = c2[l] = Simd::all(0.0f);
+    for (int l = 0; l < live; l++) lane(arena + base[l], W, l, u[l], c0[l], c1[l], c2[l]);
     Simd::turn(u);
     Simd::turn(c0);
     Simd::turn(c1);
     Simd::turn(c2);
-
-    Stuff t;
-    alignas(32) float prop[10][8];
-    for (int l = 0; l < 8; l++) {
-      const float *row = field.material + NM * ((int *)(q + 8 * MT))[l];
-      for (int k = 0; k < 10; k++) prop[k][l] = row[k];
+    for (int k = 1; k < 7; k++) {
+      c0[k] -= D[0] * u[k];
+      c1[k] -= D[1] * u[k];
+      c2[k] -= D[2] * u[k];
     }
-    t.law = *(f8 *)prop[LAW];
-    t.mu = *(f8 *)prop[MU];
-    t.lambda = *(f8 *)prop[LAMBDA];
-    t.yield = *(f8 *)prop[YIELD];
-    t.hard = *(f8 *)prop[HARD];
-    t.cone = *(f8 *)prop[CONE];
-    t.apex = *(f8 *)prop[APEX];
-    t.visc = *(f8 *)prop[VISC];
-    t.rho = *(f8 *)prop[RHO];
-    f8 keep = 1.0f - Simd::low(Simd::all(1.0f), dt * *(f8 *)prop[KEEP]);
-    const i8 count = i8{0, 1, 2, 3, 4, 5, 6, 7};
-    i8 alive = count < live;
+    Stuff t = Stuff::of(field, (const int *)(q + 8 * MT));
+    f8 keep = 1.0f - Simd::low(Simd::all(1.0f), dt * t.keep);
+    i8 alive = i8{0, 1, 2, 3, 4, 5, 6, 7} < live;
     f8 on = Simd::pick(alive, Simd::all(1.0f), Simd::all(0.0f));
 
     // Velocity, affine part and place; L is the grid's gradient times dx.
@@ -321,7 +165,7 @@ for (int b = task[1]; b < task[2]; b++) {
         for (int i = 0; i < 3; i++) old[i] = eps[i] = 0.5f * Math::log1p(l[i]);
         i8 flow = t.law >= 3.0f;
         if (Simd::any(flow)) {
-          f8 ep = *(f8u *)(q + 8 * EP), vc = *(f8u *)(q + 8 * VC);
+          f8 ep = *(f8u *)(past + 8 * EP), vc = *(f8u *)(past + 8 * VC);
           i8 grain = t.law == 3.0f;
           if (Simd::any(grain)) {
             f8 e[3] = {eps[0], eps[1], eps[2]}, d, v = vc;
@@ -329,7 +173,7 @@ for (int b = task[1]; b < task[2]; b++) {
             for (int i = 0; i < 3; i++) eps[i] = Simd::pick(grain, e[i], eps[i]);
             change = Simd::pick(grain, d, change);
             lost = Simd::pick(grain, w, lost);
-            *(f8u *)(q + 8 * VC) = Simd::pick(grain & alive, v, vc);
+            *(f8u *)(past + 8 * VC) = Simd::pick(grain & alive, v, vc);
           }
           i8 ductile = t.law == 4.0f;
           if (Simd::any(ductile)) {
@@ -339,7 +183,7 @@ for (int b = task[1]; b < task[2]; b++) {
             change = Simd::pick(ductile, d, change);
             lost = Simd::pick(ductile, w, lost);
           }
-          *(f8u *)(q + 8 * EP) = ep + 0.81649658f * change * on;
+          *(f8u *)(past + 8 * EP) = ep + 0.81649658f * change * on;
           lost *= volume * on;
           for (int k = 0; k < 8; k++) plastic += lost[k];
           // H = U diag(exp(new - old)) Ut (1 + H) - 1
@@ -355,10 +199,10 @@ for (int b = task[1]; b < task[2]; b++) {
             }
           for (int k = 0; k < 9; k++) H[k] = G[k];
           // The whole motion, plastic part included.
-          for (int k = 0; k < 9; k++) G[k] = *(f8u *)(q + 8 * (TM + k));
+          for (int k = 0; k < 9; k++) G[k] = *(f8u *)(past + 8 * (TM + k));
           for (int i = 0; i < 3; i++)
             for (int j = 0; j < 3; j++)
-              *(f8u *)(q + 8 * (TM + 3 * i + j)) =
+              *(f8u *)(past + 8 * (TM + 3 * i + j)) =
                   G[3 * i + j] + A[3 * i + j] + A[3 * i] * G[j] + A[3 * i + 1] * G[3 + j] + A[3 * i + 2] * G[6 + j];
         }
         f8 tr = eps[0] + eps[1] + eps[2];
@@ -388,16 +232,22 @@ for (int b = task[1]; b < task[2]; b++) {
     f8 scale = volume * (-4.0f / dx) * on;
     for (int k = 0; k < 6; k++) *(f8u *)(q + 8 * (ST + k)) = scale * stress[k];
   }
-}
-double *report = world->report + NR * index;
-float top = 0, fast = 0;
-for (int l = 0; l < 8; l++) {
-  // NaN fails every comparison: keep it visible.
-  if (!(speed2[l] <= top)) top = speed2[l];
-  if (!(wave2[l] <= fast)) fast = wave2[l];
-}
-report[SPEED2] = top;
-report[WAVE2] = fast;
-report[PLASTIC] += plastic;
-report[VISCOUS] += viscous;
-report[ASTRAY] = astray;
+  void block(const World *world, const Field &field, const int *block) {
+    alignas(64) f8 arena[512];
+    fill(field, block, arena);
+    for (int s = block[0]; s < block[1]; s += 8) batch(world, field, block, s, arena);
+  }
+  void report(double *row) const {
+    float top = 0, fast = 0;
+    for (int l = 0; l < 8; l++) {
+      // NaN fails every comparison: it counts as infinite.
+      if (!(speed2[l] <= top)) top = speed2[l] < INFINITY ? speed2[l] : INFINITY;
+      if (!(wave2[l] <= fast)) fast = wave2[l] < INFINITY ? wave2[l] : INFINITY;
+    }
+    row[SPEED2] = top;
+    row[WAVE2] = fast;
+    row[PLASTIC] += plastic;
+    row[VISCOUS] += viscous;
+    row[ASTRAY] = astray;
+  }
+};

@@ -5,14 +5,17 @@ typedef int i8 __attribute__((vector_size(32)));
 typedef float f8u __attribute__((vector_size(32), aligned(4)));
 typedef int i8u __attribute__((vector_size(32), aligned(4)));
 typedef unsigned long long u64;
+typedef float Row[8];
+typedef int Call(void);
 
 // A particle's place is fixed point: 2^22 units per cell, relative to its field's window.
 const int PLACE = 22, UNIT = 1 << 22, HALF = 1 << 21;
-const float PER_UNIT = 1.0f / 4194304.0f;
+constexpr float PER_UNIT = 1.0f / 4194304.0f;
 
 // Channels of a particle batch [channel][8]. Velocity gradients are per cell: dx times the usual.
-const int XI = 0, VE = 3, AF = 6, DE = 15, ST = 24, MA = 30, VO = 31, EP = 32, VC = 33, MT = 34,
-          ID = 35, TM = 36, NC = 45;
+const int XI = 0, VE = 3, AF = 6, DE = 15, ST = 24, MA = 30, VO = 31, MT = 32, ID = 33, NC = 34;
+// Channels of what batches of matter that flows remember besides.
+const int EP = 0, VC = 1, TM = 2, NH = 11;
 // Columns of the table of materials.
 const int LAW = 0, MU = 1, LAMBDA = 2, YIELD = 3, HARD = 4, CONE = 5, APEX = 6, VISC = 7, KEEP = 8,
           RHO = 9, PUSH = 10, NM = 16;
@@ -21,14 +24,50 @@ const int SPEED2 = 0, WAVE2 = 1, PLASTIC = 2, VISCOUS = 3, ASTRAY = 4, WORK = 5,
 const int NB = 32;      // ints of a block's record: start, end, coordinates 3, neighbours 27
 const int MOST = 6;     // fields that may meet at one node
 
+struct Post {             // one thread's, on a cache line of its own
+  u64 share;              // its tasks of this phase: epoch 24 bits, next 20, end 20
+  u64 busy, spare[6];
+};
+struct Crew {
+  Call *nap;              // the system's sched_yield, or null
+  int *phase;             // [phases][4]: piece, first task, how many, or where in World that stands
+  int phases, threads, now, piece, first, count, started, spare;
+  u64 fill0[2];
+  int epoch, stopped;     // a line of their own
+  u64 fill1[7];
+  int done, spare2;
+  u64 fill2[7];
+  Post post[64];
+};
+struct Bond {               // a frame and the soft nodes it holds in this step
+  int *slot;
+  float *mass;
+  double per_stiff, per_soft;   // volume per mass [m^3/kg]
+  int frame, soft, count;
+};
+struct Thing {            // a body, as far as uniform accelerations go
+  double mass, push[3], from, to;
+  double *rigid;
+  int field, first, last, spare;    // rows of the field's materials
+};
+struct Clock {
+  Thing *thing;
+  double *external_impulse, *push_work;
+  double until, given, stable, speed, wave, smallest, largest, gravity[3], ramp;
+  double courant, rigid_courant, fall;
+  long long count, budget;
+  int things, started, last, laid, fuse, fused, pushed, spare;
+};
+// Nodes: mass, momentum 3, force of stress 3, free; after the forces mass, velocity 3, velocity as
+// it was 3, and a lane for contact's use. While a step reads its nodes, the next one's are laid.
 struct Field {
-  float *part, *node, *material;
+  float *part, *node, *next, *history, *material;
   int *table, *block, *where;
   u64 *near;
   double *point;            // rigid: [P][5] place in the body's frame, mass, volume
   double *rigid;            // rigid: its state, see rigid.cpp
   double *surface;          // rigid: [S][3] in the body's frame
-  double mass;
+  double mass, slowing;     // slowing: how much viscosity shortens steps
   int origin[3], dim[3];    // in blocks; the window's corner and size
   int blocks, pool, rigids, points, surfaces, pushed;
 };
@@ -38,13 +77,9 @@ struct Blow {               // a body in the wind: see blow.py
   double wind[3], gust, start, end, half_rho_c, work;
   int field, first, count, free;
 };
-struct Bond {               // a frame and the soft nodes it holds in this step
-  int *slot;
-  float *mass;
-  double per_stiff, per_soft;   // volume per mass [m^3/kg]
-  int frame, soft, count;
-};
 struct World {
+  Crew *crew;
+  Clock *clock;
   Field *field;
   int *task, *contact_memory, *list;
   int *order;
@@ -55,7 +90,11 @@ struct World {
   Bond *bond;
   double dx, dt, time, kick[3];
   int fields, planes, tasks, contacts, pairs, nears, most_contacts, most_pairs, most_nears, full;
-  int names, again, blows, bonds;   // bodies and planes in the books; a repeated call after more memory
+  int names, again;   // bodies and planes in the books; a repeated call after more memory
+  int blows, blown, bonds;   // bodies in the wind; tasks on them
+  int stop;           // why the steps end after this phase; 0: they go on
+  int nodes, colour[4];             // tasks on nodes, and on particles of each colour
+  int bare_nodes, bare[4];          // the same where this step's nodes are still to be laid
 };
 
 struct Simd {
@@ -95,6 +134,26 @@ struct Simd {
     w[0] = 0.5f * a * a;
     w[1] = 0.75f - b * b;
     w[2] = 0.5f * c * c;
+  }
+  // Of a batch in a block: distances from the first node, weights of 27 nodes, and the first node's
+  // place in the block's arena of 8 x 8 x 8. Who strayed is kept inside: its step counts no more.
+  static inline void weights(const float *q, const int *block, f8 *D, Row *W, int *base) {
+    f8 w[3][3];
+    i8 at = i8{0, 0, 0, 0, 0, 0, 0, 0};
+    for (int d = 0; d < 3; d++) {
+      i8 x = *(const i8u *)(q + 8 * (XI + d)), cell = (x - HALF) >> PLACE;
+      D[d] = flo(x - (cell << PLACE)) * PER_UNIT;
+      spline(D[d], w[d]);
+      cell -= 4 * block[2 + d] - 1;
+      cell = cell < 0 ? at * 0 : cell > 5 ? at * 0 + 5 : cell;
+      at = at * 8 + cell;
+    }
+    *(i8 *)base = at;
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) {
+        f8 wij = w[0][i] * w[1][j];
+        for (int k = 0; k < 3; k++) *(f8 *)W[(i * 3 + j) * 3 + k] = wij * w[2][k];
+      }
   }
 };
 // Numbers too small for float32's full precision cost a hundred times as much as zero, and come in

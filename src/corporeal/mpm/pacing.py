@@ -1,0 +1,51 @@
+"""What the native clock reads of bodies, and how long it runs before Python looks around."""
+
+import time
+
+import numpy as np
+
+from corporeal.mpm.kernels import THING
+from corporeal.mpm.problem import Problem
+
+
+def things(
+    problem: Problem, rigid: dict[int, np.ndarray], rows: dict[int, np.ndarray]
+) -> np.ndarray:
+    """Record of every body its mass, push, rigid state, and where their materials stand.
+
+    Args:
+        problem: What to simulate.
+        rigid: States of rigid bodies.
+        rows: Body of every row of each field's table of materials, in order.
+
+    """
+    records = np.zeros(len(problem.bodies), THING)
+    for b, body in enumerate(problem.bodies):
+        record, field = records[b], 0 if problem.contact == "single" else b
+        record["mass"] = body.volume @ body.density
+        if body.push is not None:
+            record["push"] = body.push.acceleration
+            record["start"], record["end"] = body.push.start, body.push.end
+        if b in rigid:
+            record["rigid"] = rigid[b].ctypes.data
+        if field in rows:
+            record["field"] = field
+            record["first"], record["last"] = np.searchsorted(rows[field], [b, b + 1])
+    return records
+
+
+class Breath:
+    """Chooses how many steps to take at once, so that they last about as long as asked."""
+
+    def __init__(self, seconds: float) -> None:
+        self.seconds = seconds
+        self.steps = 16
+
+    def __enter__(self) -> None:
+        """Look at the clock."""
+        self.start = time.monotonic()
+
+    def __exit__(self, *_: object) -> None:
+        """Look again."""
+        took = max(time.monotonic() - self.start, 1e-9)
+        self.steps = int(np.clip(self.steps * min(4.0, self.seconds / took), 1, 1e6))
