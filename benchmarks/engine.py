@@ -1,117 +1,124 @@
-"""Speed of the production engine: nanoseconds per particle and substep.
+"""What a substep costs: nanoseconds and bytes per particle, ours and genesis-world's side by side.
 
-    python benchmarks/engine.py [--quick] [--json FILE]
+    python benchmarks/engine.py [--quick] [--json FILE] [--docs] [--peer DIR] [--peer-install DIR]
 
-A block falls freely (loops alone), and lies on the floor with a heavy rigid ball on it (with
-contact). Each is stepped on one thread and on all; a row is the least of several runs.
+Cubes of one material drop on the floor and slide. All contestants take turns, batch by batch, and
+the best of five batches counts, so that all of them meet the same machine.
+
+The peer lives in a virtual environment of its own, because it needs other versions of things:
+
+    python benchmarks/engine.py --peer-install ~/genesis     (pip install torch genesis-world)
+    python benchmarks/engine.py --peer ~/genesis
 """
 
 import argparse
 import json
 import os
-import time
+import sys
+from dataclasses import dataclass, replace
 from pathlib import Path
 
-import numpy as np
+import warp as wp
+from cost import page
+from cost.blocks import Drop, drop_of
+from cost.contest import Contestant, Ours, contest
+from cost.peer import Peer, install
 
-from corporeal.mpm.problem import FLOOR, Body, Problem
-from corporeal.mpm.warp import WarpEngine
 from corporeal.types import Law
 
-SIZE = (0.4, 0.4, 0.1)
-"""Of the block [m]."""
+
+@dataclass(frozen=True)
+class Size:
+    """How much is measured."""
+
+    particles: int
+    """Of everything but the series of sizes."""
+    series: tuple[int, ...]
+    objects: tuple[int, ...]
+    extents: tuple[int, ...]
+    """Cells across which eight objects are spread."""
+    substeps: int
+    """Of one batch."""
 
 
-def lattice(low: np.ndarray, high: np.ndarray, spacing: float) -> np.ndarray:
-    """Points of a cubic lattice within a box, (N, 3)."""
-    axes = [np.arange(a + spacing / 2, b, spacing) for a, b in zip(low, high, strict=True)]
-    return np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
+FULL = Size(
+    100_000, (10_000, 30_000, 100_000, 300_000, 1_000_000), (2, 4, 8, 16), (64, 128, 256), 60
+)
+QUICK = Size(20_000, (10_000, 100_000), (16,), (64, 256), 24)
+DOCS = Path(__file__).parent.parent / "docs"
+WIDTHS = (16, 6, 2, 16, 10, 3, 24, 8, 5)
+"""Of the columns on the screen."""
 
 
-def matter(name: str, points: np.ndarray, spacing: float, law: Law, **given) -> Body:
-    """Fill a body with one material."""
-    one = np.ones(len(points))
-    return Body(
-        name=name,
-        position=points,
-        velocity=np.zeros_like(points),
-        volume=one * spacing**3,
-        density=one * given.pop("density", 1600.0),
-        law=np.full(len(points), law.value),
-        young=one * 1e6,
-        poisson=one * 0.3,
-        yield_stress=one * 2e4,
-        hardening=one * 0.0,
-        friction_angle=one * np.radians(32.0),
-        cohesion=one * 0.0,
-        viscosity=one * 0.0,
-        **given,
-    )
+def rivals(size: Size) -> list[Drop]:
+    """List all drops that meet in the first contest."""
+    cores = os.cpu_count() or 1
+    plain = drop_of(size.particles)
+    laws = [replace(plain, law=law, threads=t) for law in Law for t in (1, 2, 4) if t <= cores]
+    heaps = [
+        drop_of(size.particles, objects=count, heap=heap)
+        for count in size.objects
+        for heap in (False, True)
+    ]
+    spread = [drop_of(size.particles, objects=8, extent=cells) for cells in size.extents]
+    cards = [replace(plain, law=law, device=card) for law in Law for card in cuda_devices()]
+    return [*laws, *heaps, *spread, *cards, replace(plain, floor=False)]
 
 
-def problem(law: Law, count: int, contact: bool) -> Problem:
-    """Build the block, with or without the floor and the ball."""
-    spacing = float(np.cbrt(np.prod(SIZE) / count))
-    half = np.array([SIZE[0] / 2, SIZE[1] / 2, 0.0])
-    block = lattice(-half, half + np.array([0, 0, SIZE[2]]), spacing)
-    bodies = [matter("block", block, spacing, law)]
-    if contact:
-        radius, centre = 0.05, np.array([0.0, 0.0, SIZE[2] + 0.05])
-        points = lattice(centre - radius, centre + radius, spacing)
-        points = points[np.linalg.norm(points - centre, axis=1) < radius]
-        bodies.append(matter("ball", points, spacing, law, density=7800.0, rigid=True))
-    planes = (FLOOR,) if contact else ()
-    n = len(bodies) + len(planes)
-    return Problem(
-        tuple(bodies),
-        2 * spacing,
-        friction=np.full((n, n), 0.5),
-        restitution=np.zeros((n, n)),
-        planes=planes,
-    )
+def cuda_devices() -> list[str]:
+    """Name the graphics cards of this machine."""
+    return [device.alias for device in wp.get_cuda_devices()]
 
 
-def measure(given: Problem, threads: int, steps: int) -> float:
-    """Least time per particle and substep over five runs of ``steps`` [ns]."""
-    engine = WarpEngine(given, threads=threads)
-    for _ in range(steps):
-        engine.step(engine.stable_step())
-    least = np.inf
-    for _ in range(5):
-        start = time.perf_counter()
-        for _ in range(steps):
-            engine.step(engine.stable_step())
-        least = min(least, time.perf_counter() - start)
-    return 1e9 * least / steps / len(given.bodies[0].position)
+def measure(size: Size, peer: Path | None) -> list[page.Result]:
+    """Hold the contest among all drops of one size, and then the one among sizes."""
+    threads = [t for t in (1, 2, 4) if t <= (os.cpu_count() or 1)]
+    plain = drop_of(size.particles)
+    peers = [Peer(peer, replace(plain, threads=t)) for t in threads] if peer else []
+    ours = [Ours(drop) for drop in rivals(size)]
+    for other in peers:
+        other.ready()
+    found = held_contest([*ours, *peers], size.substeps)
+    return found + held_contest([Ours(drop_of(count)) for count in size.series], size.substeps)
+
+
+def held_contest(contestants: list[Contestant], substeps: int) -> list[page.Result]:
+    """Let contestants take turns; print and return what each needed."""
+    found = []
+    for one, cost in zip(contestants, contest(contestants, substeps), strict=True):
+        version = one.version if isinstance(one, Peer) else ""
+        found.append(
+            page.Result(one.engine, one.drop, one.particles, cost, one.bytes, one.grown, version)
+        )
+        one.close()
+        print(" ".join(f"{c:{w}s}" for c, w in zip(found[-1].cells(), WIDTHS, strict=True)))
+    return found
 
 
 def main() -> None:
-    """Print a table, and write the rows where asked."""
-    parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("--quick", action="store_true", help="fewer particles and steps")
+    """Measure, print, and write what was asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--quick", action="store_true", help="fewer particles and substeps")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
+    parser.add_argument("--docs", action="store_true", help="write docs/benchmarks.md")
+    parser.add_argument("--peer", type=Path, help="virtual environment with genesis-world")
+    parser.add_argument("--peer-install", type=Path, help="make that environment here, and stop")
     chosen = parser.parse_args()
-    count, steps = (20_000, 10) if chosen.quick else (100_000, 20)
-    rows = []
-    for law in (Law.COROTATED, Law.NEO_HOOKEAN, Law.DRUCKER_PRAGER, Law.VON_MISES):
-        for contact in (False, True):
-            for threads in sorted({1, os.cpu_count() or 1}):
-                cost = measure(problem(law, count, contact), threads, steps)
-                rows.append(
-                    {
-                        "law": law.name.lower(),
-                        "contact": contact,
-                        "threads": threads,
-                        "particles": count,
-                        "ns_per_particle_step": round(cost, 1),
-                    }
-                )
-                print(
-                    f"{law.name.lower():16s} {'with' if contact else 'no':4s} contact "
-                    f"{threads:2d} threads {cost:7.1f} ns per particle and substep"
-                )
+    if chosen.peer_install:
+        install(chosen.peer_install)
+        return
+    machine = page.machine()
+    results = measure(QUICK if chosen.quick else FULL, chosen.peer)
     if chosen.json:
-        chosen.json.write_text(json.dumps(rows, indent=1) + "\n")
+        rows = [result.row() for result in results if result.drop.floor and not result.drop.heap]
+        chosen.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    if chosen.docs:
+        command = f"python benchmarks/engine.py {' '.join(sys.argv[1:])}".replace(
+            str(chosen.peer), "DIR"
+        )
+        page.write(results, machine, command, DOCS)
 
 
 if __name__ == "__main__":

@@ -1,0 +1,1 @@
+"""What a substep costs: the blocks that are dropped, the contest, the peer, and the page."""

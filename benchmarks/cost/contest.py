@@ -1,0 +1,117 @@
+"""Contestants take turns, a batch of substeps each, so that all of them meet the same machine."""
+
+import os
+import time
+from collections.abc import Iterator
+from typing import Any, Protocol
+
+import numpy as np
+import warp as wp
+
+from corporeal.mpm.warp import WarpEngine
+from cost.blocks import Drop, problem_of
+
+ROUNDS = 5
+"""Batches of each contestant; the best counts."""
+
+
+class Contestant(Protocol):
+    """One engine with one drop."""
+
+    engine: str
+    drop: Drop
+    particles: int
+    bytes: float
+    """Of all arrays that the engine holds; nan: not known."""
+    grown: float
+    """What the process grew by while it was made; nan: not known."""
+
+    def batch(self, substeps: int) -> float:
+        """Take some substeps; return the nanoseconds per particle and substep."""
+        ...
+
+    def close(self) -> None:
+        """Give back what it holds."""
+        ...
+
+
+class Ours:
+    """The production engine, or the one on a graphics card."""
+
+    engine = "corporeal"
+
+    def __init__(self, drop: Drop) -> None:
+        """Build the problem and lay out the engine."""
+        problem = problem_of(drop)
+        before = resident()
+        if drop.device == "cpu":
+            self.solver: Any = WarpEngine(problem, threads=drop.threads)
+        else:
+            from corporeal.mpm.device import DeviceEngine
+
+            self.solver = DeviceEngine(problem, drop.device)
+        self.drop, self.particles = drop, drop.particles
+        self.step = self.solver.stable_step()
+        self.batch(4)
+        self.grown = float(resident() - before)
+        self.bytes = float(held(self.solver))
+
+    def batch(self, substeps: int) -> float:
+        """Advance by so many of the first stable steps, and count those that were taken."""
+        taken = self.solver.steps.count
+        start = time.perf_counter()
+        self.solver.advance(self.solver.time + substeps * self.step)
+        seconds = time.perf_counter() - start
+        return 1e9 * seconds / (self.solver.steps.count - taken) / self.particles
+
+    def close(self) -> None:
+        """Let go of the engine."""
+        del self.solver
+
+
+def contest(contestants: list[Contestant], substeps: int) -> list[float]:
+    """Return the best batch of each [ns per particle and substep]."""
+    best = [np.inf] * len(contestants)
+    for contestant in contestants:
+        contestant.batch(substeps)  # what is compiled or settles at first counts for nobody
+    for _ in range(ROUNDS):
+        for k, contestant in enumerate(contestants):
+            best[k] = min(best[k], contestant.batch(substeps))
+    return best
+
+
+def resident() -> int:
+    """Memory of this process now [bytes]."""
+    with open("/proc/self/statm", encoding="ascii") as file:
+        return int(file.read().split()[1]) * os.sysconf("SC_PAGE_SIZE")
+
+
+def held(engine: Any) -> int:
+    """Bytes of all arrays that an engine holds beside its problem, each memory counted once."""
+    blocks: dict[int, int] = {}
+    seen: set[int] = set()
+    todo = [engine]
+    while todo:
+        thing = todo.pop()
+        if id(thing) in seen or thing is engine.problem:
+            continue
+        seen.add(id(thing))
+        if isinstance(thing, np.ndarray):
+            while isinstance(thing.base, np.ndarray):
+                thing = thing.base
+            blocks[thing.ctypes.data] = thing.nbytes
+        elif isinstance(thing, wp.array):
+            if thing.deleter is not None:
+                blocks[int(thing.ptr or 0)] = thing.capacity
+        else:
+            todo.extend(_inside(thing))
+    return sum(blocks.values())
+
+
+def _inside(thing: Any) -> Iterator[Any]:
+    if isinstance(thing, dict):
+        yield from thing.values()
+    elif isinstance(thing, list | tuple | set):
+        yield from thing
+    elif type(thing).__module__.startswith("corporeal.mpm"):
+        yield from vars(thing).values() if hasattr(thing, "__dict__") else ()

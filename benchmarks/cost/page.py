@@ -1,0 +1,286 @@
+"""docs/benchmarks.md and its figures, made from what was measured."""
+
+import os
+import platform
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import matplotlib
+import numpy as np
+import warp as wp
+
+from corporeal.types import Law
+from cost.blocks import Drop
+
+matplotlib.use("Agg")
+from matplotlib import pyplot as plt
+
+NAMES = {
+    Law.COROTATED: "fixed corotated",
+    Law.NEO_HOOKEAN: "Neo-Hookean",
+    Law.HENCKY: "Hencky",
+    Law.DRUCKER_PRAGER: "Drucker–Prager",
+    Law.VON_MISES: "von Mises",
+}
+BLUE, GREY, RED = "#2b6cb0", "#718096", "#c53030"
+
+
+@dataclass(frozen=True)
+class Result:
+    """What one contestant needed."""
+
+    engine: str
+    drop: Drop
+    particles: int
+    cost: float
+    """Least of five batches [ns per particle and substep]."""
+    bytes: float
+    """Of all arrays of the engine; nan: not known."""
+    grown: float
+    """What the process grew by while the engine was made [bytes]; nan: not known."""
+    version: str = ""
+
+    def row(self) -> dict[str, Any]:
+        """Return what --json writes."""
+        return {
+            "engine": self.engine,
+            "device": self.device,
+            "threads": self.drop.threads,
+            "law": self.drop.law.name.lower(),
+            "particles": self.particles,
+            "objects": self.drop.objects,
+            "ns_per_particle_substep": round(self.cost, 2),
+            "bytes_per_particle": _number(self.bytes / self.particles),
+        }
+
+    @property
+    def device(self) -> str:
+        """The processor, or the name of the card."""
+        if self.drop.device == "cpu":
+            return "cpu"
+        return f"cuda:{wp.get_device(self.drop.device).name}"
+
+    @property
+    def setting(self) -> str:
+        """How the objects lie."""
+        if not self.drop.floor:
+            return "in free flight"
+        if self.drop.extent:
+            return f"spread over {self.drop.extent}³ cells"
+        if self.drop.objects > 1:
+            return "a heap" if self.drop.heap else "side by side"
+        return "on the floor"
+
+    def cells(self) -> tuple[str, ...]:
+        """Return a row of the page's table."""
+        return (
+            " ".join((self.engine, self.version)).strip(),
+            self.device,
+            str(self.drop.threads),
+            NAMES[self.drop.law],
+            f"{self.particles:,}",
+            f"{self.drop.objects}",
+            self.setting,
+            f"{self.cost:.1f}",
+            "–" if np.isnan(self.bytes) else f"{self.bytes / self.particles:.0f}",
+        )
+
+
+HEAD = ("engine", "device", "threads", "law", "particles", "objects", "which", "ns", "bytes")
+
+
+def _number(value: float) -> float | None:
+    return None if np.isnan(value) else round(value, 1)
+
+
+def machine() -> str:
+    """Say on what is measured."""
+    with open("/proc/cpuinfo", encoding="utf-8") as file:
+        names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
+    return (
+        f"{names[0] if names else platform.processor()}, {os.cpu_count()} cores, load "
+        f"{os.getloadavg()[0]:.1f} at the start, {platform.system()}, "
+        f"Python {platform.python_version()}, Warp {wp.__version__}, {time.strftime('%Y-%m-%d')}"
+    )
+
+
+def write(results: list[Result], where: str, command: str, docs: Path) -> None:
+    """Write docs/benchmarks.md and its figures."""
+    images = docs / "images"
+    images.mkdir(parents=True, exist_ok=True)
+    figures = {
+        "particles": (_particles, "Cost against the number of particles; one thread."),
+        "threads": (_threads, "Cost against the number of threads."),
+        "laws": (_laws, "The five laws; one thread."),
+    }
+    shown = []
+    for name, (draw, words) in figures.items():
+        figure, axes = plt.subplots(figsize=(6.4, 4.0), layout="constrained")
+        draw(axes, results)
+        figure.savefig(images / f"benchmarks-{name}.png", dpi=110)
+        plt.close(figure)
+        shown.append(f"![{words}](images/benchmarks-{name}.png)\n")
+    text = PAGE.format(
+        machine=where,
+        command=command,
+        targets=_table(("what", "measured", "target", ""), _targets(results)),
+        figures="\n".join(shown),
+        rows=_table(HEAD, [result.cells() for result in results]),
+    )
+    (docs / "benchmarks.md").write_text(text, encoding="utf-8")
+
+
+PAGE = """# What a substep costs
+
+Made by `{command}`; don't edit.
+
+Measured on: {machine}.
+
+Cubes of one material (E = 0.1 MPa, ν = 0.3, 1000 kg/m³, eight particles to the cell) drop on the
+floor and slide along it at 1 m/s, so that contact works and particles are sorted again and again
+throughout. A batch is a run of substeps as a simulation takes them, stability, sorting and books
+included. All contestants take turns, one batch each, and the best of five batches counts: whatever
+else the machine does hits them alike, and ratios within one run mean more than numbers of two.
+`ns` are nanoseconds per particle and substep, `bytes` are those of all arrays that the engine
+holds, per particle. genesis-world takes its own substeps of the same length with its corotated
+elastic material, on a dense grid of 64³ cells, in single precision, in a process of its own.
+
+{targets}
+
+{figures}
+{rows}
+
+How to measure again (the peer is optional, and needs 3 GB of disk):
+
+```
+python benchmarks/engine.py --peer-install ~/genesis
+python benchmarks/engine.py --docs --peer ~/genesis
+```
+
+Where the machine has a CUDA card, the engine for it takes part as well.
+"""
+
+
+def _table(head: tuple[str, ...], rows: list[tuple[str, ...]]) -> str:
+    lines = ["| " + " | ".join(row) + " |" for row in (head, ("---",) * len(head), *rows)]
+    return "\n".join(lines)
+
+
+# ---------------------------------------------------------------- targets
+
+
+def _find(results: list[Result], **wanted: Any) -> list[Result]:
+    """All results of ours on the CPU that are as wanted; one cube on the floor unless told."""
+    usual = {"objects": 1, "extent": 0, "floor": True, "device": "cpu", "heap": False}
+    wanted = usual | {"engine": "corporeal"} | wanted
+    return [
+        r
+        for r in results
+        if all(getattr(r if k == "engine" else r.drop, k) == v for k, v in wanted.items())
+    ]
+
+
+def _targets(results: list[Result]) -> list[tuple[str, ...]]:
+    """Compare with what the engine is held to, as far as it was measured."""
+    usual = _find(results, law=Law.COROTATED, threads=1)[0]
+    across = usual.drop.across
+    cost = {t: _find(results, law=Law.COROTATED, threads=t, across=across) for t in (1, 2, 4)}
+    peer = {t: _find(results, engine="genesis", threads=t) for t in (1, 2, 4)}
+    laws = [r.cost for r in _find(results, threads=1, across=across)]
+    rows = [
+        _judged("fixed corotated, one thread", usual.cost, "ns", 80.0, at_most=True),
+        _judged("slowest of the five laws", max(laws), "ns", 150.0, at_most=True),
+        _judged("memory", usual.bytes / usual.particles, "bytes", 400.0, at_most=True),
+    ]
+    for threads, target in ((2, 1.7), (4, 2.8)):
+        if cost[threads]:
+            gain = usual.cost / cost[threads][0].cost
+            rows.append(_judged(f"{threads} threads against one", gain, "×", target))
+    for threads in (1, 2, 4):
+        if peer[threads]:
+            gain = peer[threads][0].cost / cost[threads][0].cost
+            words = f"genesis-world against ours, {threads} thread{'s'[: threads > 1]} each"
+            rows.append(_judged(words, gain, "×", 12.0))
+    for heap, words in ((False, "side by side"), (True, "in a heap, touching")):
+        many = _find(results, objects=16, heap=heap)
+        if many:
+            ratio = many[0].cost / usual.cost
+            rows.append(_judged(f"16 objects {words}, against one", ratio, "×", 1.5, at_most=True))
+    return rows + _linear(results)
+
+
+def _linear(results: list[Result]) -> list[tuple[str, ...]]:
+    sizes = _series(results)
+    large = [r for r in sizes if r.particles >= 90_000]
+    if len(large) < 2:
+        return []
+    ratio = large[-1].cost / large[0].cost
+    words = f"{large[-1].particles:,} particles against {large[0].particles:,}, each"
+    return [_judged(words, ratio, "×", 1.2, at_most=True)]
+
+
+def _judged(
+    what: str, value: float, unit: str, target: float, at_most: bool = False
+) -> tuple[str, ...]:
+    met = value <= target if at_most else value >= target
+    sign = "≤" if at_most else "≥"
+    figure = f"{value:.0f} {unit}" if unit != "×" else f"{value:.2f} ×"
+    return what, figure, f"{sign} {target:g} {unit}", "✓" if met else "missed"
+
+
+# ---------------------------------------------------------------- figures
+
+
+def _series(results: list[Result]) -> list[Result]:
+    """One cube on one thread, by size; the last measured of each size."""
+    found = _find(results, law=Law.COROTATED, threads=1)
+    return [r for _, r in sorted({r.particles: r for r in found}.items())]
+
+
+def _particles(axes: Any, results: list[Result]) -> None:
+    sizes = _series(results)
+    axes.loglog([r.particles for r in sizes], [r.cost for r in sizes], "o-", color=BLUE)
+    for r in sizes:
+        axes.annotate(
+            f"{r.cost:.0f}", (r.particles, r.cost), (0, 8), textcoords="offset points", ha="center"
+        )
+    for r in _find(results, engine="genesis", threads=1):
+        axes.loglog([r.particles], [r.cost], "s", color=RED)
+        axes.annotate("genesis-world", (r.particles, r.cost), (8, -4), textcoords="offset points")
+    axes.set(xlabel="particles", ylabel="ns per particle and substep", ylim=(10, 5000))
+    axes.grid(which="both", alpha=0.2)
+
+
+def _threads(axes: Any, results: list[Result]) -> None:
+    across = _find(results, law=Law.COROTATED, threads=1)[0].drop.across
+
+    def line(keep: Callable[[Result], bool], words: str, **style: Any) -> None:
+        kept = sorted((r for r in results if keep(r)), key=lambda r: r.drop.threads)
+        if kept:
+            count, cost = [r.drop.threads for r in kept], [r.cost for r in kept]
+            axes.loglog(count, cost, label=words, **style)
+            axes.loglog(count, cost[0] / np.array(count), ":", color=GREY)
+
+    for law, shade in zip(Law, plt.get_cmap("viridis")(np.linspace(0.1, 0.85, 5)), strict=True):
+        mine = _find(results, law=law, across=across)
+        line(lambda r, mine=mine: r in mine, NAMES[law], marker="o", color=shade)
+    line(lambda r: r.engine == "genesis", "genesis-world, corotated", marker="s", color=RED)
+    axes.set(xlabel="threads (dotted: in proportion)", ylabel="ns per particle and substep")
+    axes.set_xticks([1, 2, 4], ["1", "2", "4"])
+    axes.minorticks_off()
+    axes.legend(fontsize=8)
+    axes.grid(which="both", alpha=0.2)
+
+
+def _laws(axes: Any, results: list[Result]) -> None:
+    across = _find(results, law=Law.COROTATED, threads=1)[0].drop.across
+    one = {r.drop.law: r.cost for r in _find(results, threads=1, across=across)}
+    bars = axes.bar([NAMES[law] for law in Law], [one[law] for law in Law], color=BLUE)
+    axes.bar_label(bars, fmt="%.0f")
+    axes.axhline(150.0, color=GREY, linestyle=":")
+    axes.annotate("target", (4.4, 150.0), (0, 3), textcoords="offset points", ha="right")
+    axes.set(ylabel="ns per particle and substep")
+    axes.tick_params(axis="x", labelsize=8)

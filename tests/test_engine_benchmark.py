@@ -1,0 +1,80 @@
+"""The benchmark of the engine: rows as promised, nothing forgotten when memory is counted."""
+
+import json
+import sys
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+BENCHMARKS = Path(__file__).parent.parent / "benchmarks"
+KEYS = {
+    "engine", "device", "threads", "law", "particles", "objects", "ns_per_particle_substep",
+    "bytes_per_particle",
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def engine():
+    sys.path.insert(0, str(BENCHMARKS))
+    try:
+        import engine
+
+        yield engine
+    finally:
+        sys.path.remove(str(BENCHMARKS))
+
+
+def test_rows_and_page_are_made_from_one_run(engine, tmp_path, monkeypatch):
+    tiny = engine.Size(1000, (500, 2000), (2,), (32,), 2)
+    monkeypatch.setattr(engine, "QUICK", tiny)
+    monkeypatch.setattr(engine, "DOCS", tmp_path)
+    words = ["engine.py", "--quick", "--docs", "--json", str(tmp_path / "rows.json")]
+    monkeypatch.setattr(sys, "argv", words)
+    engine.main()
+    rows = json.loads((tmp_path / "rows.json").read_text())
+    assert all(set(row) == KEYS for row in rows)
+    assert {row["law"] for row in rows} == {
+        "corotated", "neo_hookean", "hencky", "drucker_prager", "von_mises",
+    }  # fmt: skip
+    assert {row["objects"] for row in rows} >= {1, 2}
+    assert all(row["ns_per_particle_substep"] > 0 for row in rows)
+    page = (tmp_path / "benchmarks.md").read_text()
+    assert page.count("| corporeal |") == len(rows) + 2, "a heap and a free flight are shown too"
+    assert len(list((tmp_path / "images").glob("benchmarks-*.png"))) == 3
+
+
+def test_memory_is_counted_once(engine):
+    from cost.contest import held
+
+    class Window:
+        __module__ = "corporeal.mpm.window"
+
+        def __init__(self):
+            self.part = np.zeros(1000)
+            self.view = self.part[10:].reshape(99, 10).T
+            self.lists = {"a": [np.zeros(10, np.int32)]}
+
+    class Engine:
+        __module__ = "corporeal.mpm.warp"
+
+        def __init__(self):
+            self.problem = np.zeros(5000)
+            self.window = {0: Window()}
+            self.same = self.window[0]
+
+    assert held(Engine()) == 8 * 1000 + 40
+
+
+def test_blocks_have_the_particles_they_say_and_do_not_overlap(engine):
+    from cost.blocks import CELL, drop_of, problem_of
+
+    for given in ({}, {"objects": 16}, {"objects": 16, "heap": True}, {"objects": 8, "extent": 64}):
+        drop = drop_of(20_000, **given)
+        bodies = problem_of(drop).bodies
+        assert sum(len(b.position) for b in bodies) == drop.particles
+        assert drop.particles == pytest.approx(20_000, rel=0.25)
+        places = np.concatenate([b.position for b in bodies])
+        assert len(np.unique(np.floor(places / (0.4 * CELL)), axis=0)) == drop.particles
+        if drop.extent:
+            np.testing.assert_allclose(np.ptp(places, axis=0), drop.extent * CELL, rtol=0.02)
