@@ -109,6 +109,36 @@ def test_the_decomposition_is_accurate_for_flat_and_mirrored_matter():
         assert np.abs(S - elasticity.transpose(S)).max() < 1e-13
 
 
+@pytest.mark.parametrize(
+    "stretch",
+    [[2.0, 1.0, 0.5], [1.0, 1.0, 0.5], [0.7, 0.7, 0.7], [1.0, 1.0, 1e-6], [1.0, 0.8, -0.3]],
+    ids=["all differ", "two alike", "all alike", "flat", "mirrored"],
+)
+def test_stretches_without_a_decomposition_store_the_same_energy(stretch):
+    rng = np.random.default_rng(5)
+    F = elasticity.from_stretches(
+        some_rotations(200, rng), np.tile(np.array(stretch), (200, 1)), some_rotations(200, rng)
+    )
+    found, exact = elasticity.stretches(F), elasticity.signed_svd(F)[1]
+    np.testing.assert_allclose(found, exact, atol=1e-7)
+    for energy in (np.square, lambda x: (x - 1.0) ** 2, lambda x: np.log(np.abs(x)) ** 2):
+        a, b = energy(found).sum(axis=1), energy(exact).sum(axis=1)
+        np.testing.assert_allclose(a, b, rtol=1e-9)
+
+
+def test_small_strains_store_the_energy_of_linear_elasticity():
+    rng = np.random.default_rng(6)
+    mu, lam = constants(200)
+    for size in (1e-3, 1e-5):
+        E = size * rng.normal(size=(200, 3, 3))
+        E = 0.5 * (E + elasticity.transpose(E))
+        trace = np.trace(E, axis1=1, axis2=2)
+        linear = mu * np.sum(E * E, axis=(1, 2)) + 0.5 * lam * trace**2
+        for law in Law:
+            psi = elasticity.PSI[law](np.eye(3) + E, mu, lam)
+            np.testing.assert_allclose(psi, linear, rtol=30 * size)
+
+
 def test_a_confined_bar_shortens_by_the_p_wave_modulus():
     strain = 1e-7
     F = np.diag([1.0, 1.0, 1.0 - strain])[None]

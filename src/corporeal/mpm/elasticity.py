@@ -15,6 +15,9 @@ Vectors = Float[np.ndarray, "P 3"]
 Scalars = Float[np.ndarray, " P"]
 Number = Float[np.ndarray, " P"] | float
 
+FLAT = 1e-4
+"""Square of the ratio of two stretches below which the closed form loses too many digits."""
+
 
 def lame(young: Number, poisson: Number) -> tuple[Number, Number]:
     """Lamé's constants (μ, λ) [Pa].
@@ -51,6 +54,34 @@ def polar(F: Matrices) -> tuple[Matrices, Matrices]:
     return U @ transpose(V), (V * stretch[:, None, :]) @ transpose(V)
 
 
+def stretches(F: Matrices) -> Vectors:
+    """Return Σ as ``signed_svd`` does, without U and V and in a tenth of the time.
+
+    In closed form from E = FᵀF - 1 (Smith 1961), formed from F - 1 so that small strains stay
+    exact; what is pressed nearly flat is decomposed. Two that are nearly equal come 1e-5 apart, but
+    their sums and products, and so energies, are exact.
+    """
+    H = F - np.eye(3)
+    xx, yy, zz = (2.0 * H[:, i, i] + np.sum(H[:, :, i] ** 2, axis=1) for i in range(3))
+    xy, xz, yz = (
+        H[:, i, j] + H[:, j, i] + np.sum(H[:, :, i] * H[:, :, j], axis=1)
+        for i, j in ((0, 1), (0, 2), (1, 2))
+    )
+    mean = (xx + yy + zz) / 3.0
+    a, b, c = xx - mean, yy - mean, zz - mean
+    spread = np.sqrt((a * a + b * b + c * c + 2.0 * (xy * xy + xz * xz + yz * yz)) / 6.0)
+    cubic = a * (b * c - yz * yz) - xy * (xy * c - yz * xz) + xz * (xy * yz - b * xz)
+    angle = np.arccos(np.clip(0.5 * cubic / np.maximum(spread**3, 1e-300), -1.0, 1.0)) / 3.0
+    largest = mean + 2.0 * spread * np.cos(angle)
+    least = mean + 2.0 * spread * np.cos(angle + 2.0 * np.pi / 3.0)
+    squares = 1.0 + np.stack([largest, 3.0 * mean - largest - least, least], axis=1)
+    out = np.sqrt(np.maximum(squares, 0.0))
+    out[:, 2] *= np.sign(determinant(F))
+    flat = ~(squares[:, 2] > FLAT * squares[:, 0])
+    out[flat] = signed_svd(F[flat])[1]
+    return out
+
+
 def determinant(F: Matrices) -> Scalars:
     """Triple product of the rows; a tenth of the time of a factorisation."""
     return np.sum(F[:, 0] * np.cross(F[:, 1], F[:, 2]), axis=1)
@@ -71,7 +102,7 @@ def from_stretches(U: Matrices, stretch: Vectors, V: Matrices) -> Matrices:
 
 def psi_corotated(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     """Ψ = μ Σ (σ_i - 1)² + λ/2 (J - 1)²  (Stomakhin et al. 2012)."""
-    stretch = signed_svd(F)[1]
+    stretch = stretches(F)
     J = determinant(F)
     return mu * np.sum((stretch - 1.0) ** 2, axis=1) + 0.5 * lam * (J - 1.0) ** 2
 
@@ -124,7 +155,7 @@ def psi_log_strain(strain: Vectors, mu: Scalars, lam: Scalars) -> Scalars:
 
 def psi_hencky(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     """Ψ = μ ‖ε‖² + λ/2 (tr ε)²  ("StVK" in the graphics literature, but on logarithmic strain)."""
-    return psi_log_strain(log_strain(signed_svd(F)[1]), mu, lam)
+    return psi_log_strain(log_strain(stretches(F)), mu, lam)
 
 
 def tau_hencky(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:

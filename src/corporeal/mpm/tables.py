@@ -31,10 +31,17 @@ def materials(problem: Problem, bodies: list[int]) -> tuple[np.ndarray, np.ndarr
     rows = np.concatenate([_rows(problem, problem.bodies[b], b) for b in bodies])
     # Momentum is kept only if all that share a field forget at one rate.
     rows[:, 9] = rows[:, 9].max()
-    unique, index = np.unique(rows, axis=0, return_inverse=True)
+    unique, index = _different(rows)
     table = np.zeros((len(unique), MATERIAL), np.float32)
     table[:, :PUSH] = unique[:, 1:]
-    return table, index.reshape(-1).astype(np.int32), unique[:, 0].astype(np.int64)
+    return table, index.astype(np.int32), unique[:, 0].astype(np.int64)
+
+
+def _different(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Different rows, and which of them each row is; neighbours are mostly equal."""
+    new = np.r_[True, (rows[1:] != rows[:-1]).any(axis=1)]
+    unique, index = np.unique(rows[new], axis=0, return_inverse=True)
+    return unique, index.reshape(-1)[np.cumsum(new) - 1]
 
 
 def _rows(problem: Problem, body: Body, number: int) -> np.ndarray:
