@@ -1,5 +1,6 @@
 """One object taken apart: which triangles enclose which part, how large everything is."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -74,12 +75,26 @@ class Anatomy:
         meshes = [m for member in self.members for m in (member.body, member.sheet)]
         return Mesh(self.vertices, np.concatenate([m.triangles for m in meshes]))
 
+    def only(self, parts: Collection[int]) -> "Anatomy":
+        """Leave out the outside of all other parts; probes and enclosing shape stay whole."""
+        members = tuple(m for m in self.members if m.part in parts)
+        skin = self.skin
+        if skin is not None:
+            own = np.isin(self.part_of_triangle[skin.numbers], list(parts))
+            skin = Skin(Shape(skin.shape.mesh.only(own)), skin.numbers[own])
+        used = np.unique(np.concatenate([t for m in members for t in _triangles(m)]))
+        return replace(self, members=members, skin=skin, vertices=self.vertices[used])
+
     def label(self, points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
         """Part of each point inside: the smallest around it, else that of the nearest face."""
         if self.shape is None or not len(points):
             return np.zeros(len(points), dtype=np.int64)
         closed = [m for m in self.members if m.closed]
         return label(points, self.shape, self.part_of_triangle, closed)
+
+
+def _triangles(member: Member) -> list[np.ndarray]:
+    return [member.body.triangles.ravel(), member.sheet.triangles.ravel()]
 
 
 def survey(

@@ -11,7 +11,9 @@ from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 def ledger_row(
     problem: Problem, now: Snapshot, measure: Measure, steps: Steps
 ) -> dict[str, np.ndarray]:
-    """Everything the audit needs of one instant; B bodies, W planes.
+    """Everything the audit needs of one instant; B objects, W planes.
+
+    The bodies of one object, its soft matter and the frames bonded to it, are added up.
 
     All of ``Measure`` under its own names (``lost`` as a number of particles), and ``flow`` Σ m|v|
     per body [kg m/s], ``rms_speed`` per body [m/s], ``gap`` and ``overlap`` (B, B) [m],
@@ -29,8 +31,13 @@ def ledger_row(
     row["rms_speed"] = np.array(
         [np.sqrt(m @ v**2 / m.sum()) for m, v in zip(mass, speed, strict=True)]
     )
-    row["gap"], row["overlap"] = pair_gaps(position, problem.cell)
     row["plane_depth"] = plane_depths(problem, now)
+    group = object_of_body(problem)
+    if problem.bonds:
+        row |= merged(row, group)
+        one = [np.flatnonzero(group == k) for k in range(group.max() + 1)]
+        position = [np.concatenate([position[b] for b in bodies]) for bodies in one]
+    row["gap"], row["overlap"] = pair_gaps(position, problem.cell)
     row["steps"] = np.array(steps.count)
     row["dt_min"], row["dt_max"] = np.array(steps.smallest), np.array(steps.largest)
     finite = np.isfinite(now.position).all(axis=1) & np.isfinite(now.motion).all(axis=(1, 2))
@@ -59,3 +66,51 @@ def carried(
 ) -> np.ndarray:
     """Points that turn with a rigid body whose particles went from ``start`` to ``now`` [m]."""
     return (points - start.mean(axis=0)) @ rotation.T + now.mean(axis=0)
+
+
+# ------------------------------------------------------------------ objects of several bodies
+
+
+def object_of_body(problem: Problem) -> np.ndarray:
+    """Say which object each body is of (B,): a frame is of that of the body it holds."""
+    soft_of_frame = dict(problem.bonds)
+    group: list[int] = []
+    for b in range(len(problem.bodies)):
+        alone = b not in soft_of_frame
+        group.append(max(group, default=-1) + 1 if alone else group[soft_of_frame[b]])
+    return np.array(group)
+
+
+def merged(row: dict[str, np.ndarray], group: np.ndarray) -> dict[str, np.ndarray]:
+    """Give the same row with one entry per object."""
+    share = (group == np.arange(group.max() + 1)[:, None]).astype(float)
+    mass = share @ row["mass"]
+    found = {name: share @ row[name] for name in ADDED}
+    found["centre"] = (share * row["mass"]) @ row["centre"] / mass[:, None]
+    found["rms_speed"] = np.sqrt((share * row["mass"]) @ row["rms_speed"] ** 2 / mass)
+    found["plane_impulse"] = np.einsum("ob,wbk->wok", share, row["plane_impulse"])
+    deepest = [row["plane_depth"][:, group == k].max(axis=1) for k in range(len(share))]
+    found["plane_depth"] = np.stack(deepest, axis=1)
+    between = share @ row["pair_impulse"] @ share.T
+    found["pair_impulse"] = between - np.diag(np.diag(between))
+    planes = len(row["first_contact"]) - len(group)
+    names = np.concatenate([group, group.max() + 1 + np.arange(planes)])
+    return found | meetings(row, names)
+
+
+ADDED = "mass momentum angular_momentum kinetic elastic potential external_impulse flow".split()
+
+
+def meetings(row: dict[str, np.ndarray], name: np.ndarray) -> dict[str, np.ndarray]:
+    """First and last contact of every two things, when several bodies go by one name."""
+    count = name.max() + 1
+    first, last = np.full((2, count, count), np.nan)
+    point = np.full((count, count, 3), np.nan)
+    for i, j in np.argwhere(np.isfinite(row["first_contact"])):
+        a, c = name[i], name[j]
+        if a == c:
+            continue
+        if not row["first_contact"][i, j] >= first[a, c]:
+            first[a, c], point[a, c] = row["first_contact"][i, j], row["contact_point"][i, j]
+        last[a, c] = np.fmax(last[a, c], row["last_contact"][i, j])
+    return {"first_contact": first, "last_contact": last, "contact_point": point}

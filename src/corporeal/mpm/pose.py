@@ -6,6 +6,9 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+from scipy.spatial import KDTree
 
 from corporeal.mpm.gaps import pair_gaps
 from corporeal.mpm.problem import FLOOR, NO_FACES, Body, Faces, Problem
@@ -15,6 +18,8 @@ RAMP = 0.1
 """Time over which gravity grows where everything starts at rest in contact [s]."""
 DAMPING_LIMIT = 0.25
 """Largest viscosity as a fraction of ρ c dx: more would shorten the step noticeably."""
+TOUCHING = 1.5
+"""Rigid particles of one object nearer than this [cells] belong to one frame."""
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,7 @@ class Posed:
     order: Int[np.ndarray, " P"]
     """Number in ``Particles`` of each particle of the problem: body after body."""
     rigid: Bool[np.ndarray, " B"]
+    object_of_body: Int[np.ndarray, " B"]
 
 
 def pose(
@@ -33,12 +39,15 @@ def pose(
     field: MaterialField,
     contact: Literal["multi", "single"] = "multi",
 ) -> Posed:
-    """Build the problem that an engine solves; one body per object, in the scene's order."""
-    count = len(scene.objects)
-    members = [np.flatnonzero(particles.object == b) for b in range(count)]
-    bodies = tuple(body_of(scene, particles, field, b, members[b]) for b in range(count))
-    weights = part_weights(particles, len(field.materials), count)
-    footing = footing_weights(particles, weights)
+    """Build the problem that an engine solves.
+
+    One body per object, in the scene's order; an object with rigid frames gives its soft body and
+    then each frame.
+    """
+    pieces = divide(particles, len(scene.objects))
+    bodies = tuple(body_of(scene, particles, field, piece) for piece in pieces)
+    weights = part_weights(particles, pieces)
+    footing = footing_weights(particles, pieces, weights)
     problem = Problem(
         bodies=bodies,
         cell=particles.cell,
@@ -48,22 +57,80 @@ def pose(
         gravity=scene.gravity,
         gravity_ramp=RAMP if starts_settled(scene, particles) else 0.0,
         contact=contact,
+        bonds=tuple((k, p.soft) for k, p in enumerate(pieces) if p.soft >= 0),
     )
-    return Posed(problem, np.concatenate(members), np.array([b.rigid for b in bodies]))
+    return Posed(
+        problem,
+        np.concatenate([p.members for p in pieces]),
+        np.array([p.rigid for p in pieces]),
+        np.array([p.object for p in pieces]),
+    )
 
 
-def body_of(
-    scene: Scene, particles: Particles, field: MaterialField, number: int, mine: np.ndarray
-) -> Body:
-    """One object with the simulated numbers of its parts."""
+# ------------------------------------------------------------------ bodies
+
+
+@dataclass(frozen=True)
+class Piece:
+    """What becomes one body: an object, or of a mixed object what is soft or one rigid frame."""
+
+    object: int
+    rigid: bool
+    members: Int[np.ndarray, " N"]
+    """Numbers of its particles."""
+    surface: Int[np.ndarray, " S"]
+    """Numbers of its surface points."""
+    soft: int = -1
+    """Piece that a frame holds; -1: no frame."""
+
+
+def divide(particles: Particles, objects: int) -> list[Piece]:
+    """Take mixed objects apart into what is soft and its rigid frames."""
+    stiff = np.array([t.kind == "rigid" for t in particles.treatments])[particles.part]
+    pieces: list[Piece] = []
+    for k in range(objects):
+        mine = np.flatnonzero(particles.object == k)
+        points = np.flatnonzero(particles.object_of_surface == k)
+        if stiff[mine].all() or not stiff[mine].any():
+            pieces.append(Piece(k, bool(stiff[mine[0]]), mine, points))
+            continue
+        soft, frame = len(pieces), mine[stiff[mine]]
+        pieces.append(Piece(k, False, mine[~stiff[mine]], points[:0]))
+        joined = clusters(particles.position[frame], TOUCHING * particles.cell)
+        owner = nearest(particles.position[frame], particles.surface[points], joined)
+        pieces += [
+            Piece(k, True, frame[joined == c], points[owner == c], soft)
+            for c in range(joined.max() + 1)
+        ]
+    return pieces
+
+
+def clusters(points: Float[np.ndarray, "N 3"], reach: float) -> Int[np.ndarray, " N"]:
+    """Label the groups of points that hang together over distances below ``reach`` [m]."""
+    pairs = KDTree(points).query_pairs(reach, output_type="ndarray")
+    links = coo_matrix((np.ones(len(pairs)), pairs.T), shape=(len(points),) * 2)
+    return connected_components(links, directed=False)[1]
+
+
+def nearest(
+    points: Float[np.ndarray, "N 3"], asked: Float[np.ndarray, "S 3"], label: np.ndarray
+) -> Int[np.ndarray, " S"]:
+    """Label of the point nearest to each asked one."""
+    return label[KDTree(points).query(asked)[1]]
+
+
+def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Piece) -> Body:
+    """One body with the simulated numbers of its parts."""
+    mine = piece.members
     part = particles.part[mine]
-    extent = float(np.ptp(particles.position[mine], axis=0).max())
+    whole = particles.position[particles.object == piece.object]
+    extent = float(np.ptp(whole, axis=0).max())
     rows = [
         numbers(m, t, extent, particles.cell)
         for m, t in zip(field.materials, particles.treatments, strict=True)
     ]
     column = {name: np.array([row[name] for row in rows])[part] for name in rows[0]}
-    thing = scene.objects[number]
+    thing = scene.objects[piece.object]
     return Body(
         name=thing.name,
         position=particles.position[mine].astype(float),
@@ -71,8 +138,8 @@ def body_of(
         volume=particles.volume[mine].astype(float),
         density=particles.density[mine].astype(float),
         law=column.pop("law").astype(np.int64),
-        rigid=all(particles.treatments[k].kind == "rigid" for k in np.unique(part)),
-        surface=particles.surface[particles.object_of_surface == number].astype(float),
+        rigid=piece.rigid,
+        surface=particles.surface[piece.surface].astype(float),
         push=thing.push,
         wind=thing.wind,
         faces=faces_of(particles, mine) if thing.wind is not None else NO_FACES,
@@ -127,21 +194,23 @@ def viscosity(material: Material, treatment: Treatment, extent: float, cell: flo
 # ------------------------------------------------------------------ pairs
 
 
-def part_weights(particles: Particles, parts: int, objects: int) -> Float[np.ndarray, "B K"]:
-    """Share of each part in its object's surface [-], taken as volume^(2/3)."""
-    volume = np.zeros((objects, parts))
-    np.add.at(volume, (particles.object, particles.part), particles.volume)
+def part_weights(particles: Particles, pieces: list[Piece]) -> Float[np.ndarray, "B K"]:
+    """Share of each part in its body's surface [-], taken as volume^(2/3)."""
+    parts = len(particles.treatments)
+    volume = np.stack(
+        [np.bincount(particles.part[p.members], particles.volume[p.members], parts) for p in pieces]
+    )
     area = volume ** (2 / 3)
     return area / area.sum(axis=1, keepdims=True)
 
 
 def footing_weights(
-    particles: Particles, weights: Float[np.ndarray, "B K"]
+    particles: Particles, pieces: list[Piece], weights: Float[np.ndarray, "B K"]
 ) -> Float[np.ndarray, "B K"]:
-    """Share of each part in the lowest cell of its object [-]: what meets the floor."""
+    """Share of each part in the lowest cell of its body [-]: what meets the floor."""
     share = np.zeros_like(weights)
-    for b in range(len(weights)):
-        mine = np.flatnonzero(particles.object == b)
+    for b, piece in enumerate(pieces):
+        mine = piece.members
         height = particles.position[mine, 2]
         low = mine[height <= height.min() + particles.cell]
         np.add.at(share[b], particles.part[low], particles.volume[low])
@@ -153,7 +222,7 @@ def pair_values(
     weights: Float[np.ndarray, "B K"],
     footing: Float[np.ndarray, "B K"],
 ) -> Float[np.ndarray, "B+1 B+1"]:
-    """Average a table over parts into one over objects and the floor."""
+    """Average a table over parts into one over bodies and the floor."""
     between = weights @ table[:-1, :-1] @ weights.T
     floor = footing @ table[:-1, -1]
     corner = np.array([[table[-1, -1]]])

@@ -13,7 +13,8 @@ from corporeal.geometry.make import Make, decide, how_filled, recipe
 from corporeal.geometry.packing import Packing, pack
 from corporeal.geometry.survey import Anatomy, survey
 from corporeal.geometry.weights import keep_apart, weigh
-from corporeal.mpm.treatment import Motion, PartGeometry, Plan, plan
+from corporeal.mpm.part import Motion, PartGeometry
+from corporeal.mpm.treatment import Plan, plan
 from corporeal.mpm.wind import greatest_acceleration
 from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject
 
@@ -226,7 +227,7 @@ def gather(
     chosen: Plan,
     packings: list[Packing],
 ) -> Particles:
-    """Give every point its volume and density, and rigid objects their contact points."""
+    """Give every point its volume and density, and what is rigid its contact points."""
     names = ("volume", "density", "skin", "owner", "face", "bearer")
     columns: dict[str, list[np.ndarray]] = {k: [] for k in names}
     first = 0
@@ -235,8 +236,10 @@ def gather(
         columns["volume"].append(volume)
         columns["density"].append(density)
         skin = np.zeros((0, 3))
-        if is_rigid(anatomy, chosen):
-            skin = contact_points(anatomy, chosen.cell / 3, np.random.default_rng([number, 3]))
+        stiff = [m.part for m in anatomy.members if chosen.treatments[m.part].kind == "rigid"]
+        if stiff:
+            outside = anatomy if is_rigid(anatomy, chosen) else anatomy.only(stiff)
+            skin = contact_points(outside, chosen.cell / 3, np.random.default_rng([number, 3]))
         columns["skin"].append(skin)
         columns["owner"].append(np.full(len(skin), number))
         if scene.objects[number].wind is not None:

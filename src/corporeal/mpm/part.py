@@ -1,0 +1,76 @@
+"""What the treatment policy needs to know of a part: its shape, its matter, what will happen to it.
+
+A part's wall may be simulated thicker than it is; here is what that does to its numbers.
+"""
+
+from dataclasses import dataclass
+
+from corporeal.mpm.stability import closed_wall, thin_wall
+from corporeal.types import Law, Material, Structure
+
+TRINKET_CELLS, TRINKET_LENGTH = 8.0, 5.0
+"""A part of fewer cells than the first, and nowhere longer than the second [cells], is a trinket:
+its own stiffness cannot be seen."""
+
+
+@dataclass(frozen=True)
+class PartGeometry:
+    """What the policy needs to know of one part."""
+
+    object: int
+    """Which object it belongs to."""
+    material: Material
+    structure: Structure
+    size: tuple[float, float, float]
+    """Extents of its bounding box, shortest first [m]."""
+    volume: float
+    """Enclosed volume [m³]."""
+    area: float
+    """Surface area, one side [m²]."""
+    closed: bool = False
+    """Whether its wall goes all around something, as a duck's does and a vase's does not."""
+
+
+@dataclass(frozen=True)
+class Motion:
+    """What is about to happen to one object."""
+
+    impact_speed: float
+    """Estimated speed at impact: fall, own velocity, push, and others' speed [m/s]."""
+    acceleration: float
+    """Largest acceleration: gravity and push [m/s²]."""
+
+
+def is_trinket(part: PartGeometry, cell: float) -> bool:
+    """Whether the grid cannot show the part's own stiffness."""
+    return part.volume < TRINKET_CELLS * cell**3 and part.size[2] < TRINKET_LENGTH * cell
+
+
+def width(part: PartGeometry) -> float:
+    """How wide the part is across [m]: its shortest side, or less where it is bent or branched.
+
+    6 V/A is the side of the cube (the diameter of the sphere) with the part's volume per area; it
+    says nothing when the mesh models the wall itself, inside and outside.
+    """
+    spread = 6 * part.volume / part.area if part.area > 0 else 0.0
+    thickness = part.structure.thickness or 0.0
+    wall_only = part.structure.kind == "shell" and spread < 4 * thickness
+    return part.size[0] if wall_only or spread <= 0 else min(part.size[0], spread)
+
+
+def wall_ratio(part: PartGeometry, simulated: float) -> float:
+    """Give r = t / t_num of a wall that is simulated at least ``simulated`` thick [m]; else 1."""
+    thickness = part.structure.thickness
+    if part.structure.kind != "shell" or thickness is None:
+        return 1.0
+    return min(1.0, thickness / simulated)
+
+
+def wall_factors(part: PartGeometry, ratio: float) -> tuple[float, float, float]:
+    """Factors on (E, σ_y, ρ) of a part's wall, by how it gives way.
+
+    A closed wall that does not flow answers by its indentation stiffness; an open one bends; and
+    what flows (a can) folds along plastic hinges.
+    """
+    elastic = part.material.law not in (Law.VON_MISES, Law.DRUCKER_PRAGER)
+    return closed_wall(ratio) if part.closed and elastic else thin_wall(ratio)
