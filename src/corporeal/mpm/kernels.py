@@ -42,7 +42,10 @@ def _start_quietly() -> None:
 
 _start_quietly()
 wp.set_module_options(
-    {"enable_backward": False, "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast"}
+    {
+        "enable_backward": False,
+        "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast",
+    }
 )
 
 _POINTERS = "part node next history material table block where near point rigid surface"
@@ -54,21 +57,18 @@ FIELD = np.dtype(
     align=True,
 )
 _POINTERS = (
-    "crew clock field task contact_memory list order report plane friction restitution ledger "
-    "pair_memory near_memory plane_impulse pair_impulse friction_loss first_contact last_contact "
-    "contact_point face blow bond"
+    "crew clock field task list contact_memory report plane friction restitution plane_impulse "
+    "pair_impulse friction_loss first_contact last_contact contact_point face blow bond"
 )
-_COUNTS = (
-    "fields planes tasks contacts pairs nears most_contacts most_pairs most_nears full names again "
-    "blows blown bonds stop nodes"
-)
+_COUNTS = "fields planes tasks full names again blows blown bonds stop nodes"
 COLOURS = 4
 """Columns of blocks of one colour, the parities of their x and y, never overlap."""
 WORLD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("dx", "f8"), ("dt", "f8"), ("time", "f8"), ("kick", "f8", 3)]
     + [(name, "i4") for name in _COUNTS.split()]
-    + [("colour", "i4", COLOURS), ("bare_nodes", "i4"), ("bare", "i4", COLOURS)],
+    + [("colour", "i4", COLOURS), ("bare_nodes", "i4"), ("bare", "i4", COLOURS)]
+    + [("parts", "i4"), ("looks", "i4", COLOURS), ("rigids", "i4"), ("turns", "i4")],
     align=True,
 )
 _POINTERS = "area point rigid impulse signal face"
@@ -92,7 +92,10 @@ THING = np.dtype(
 )
 CLOCK = np.dtype(
     [(name, "u8") for name in ("thing", "external_impulse", "push_work")]
-    + [(name, "f8") for name in "until given stable speed wave smallest largest".split()]
+    + [
+        (name, "f8")
+        for name in "until given stable speed wave smallest largest".split()
+    ]
     + [("gravity", "f8", 3)]
     + [(name, "f8") for name in "ramp courant rigid_courant fall".split()]
     + [("count", "i8"), ("budget", "i8")]
@@ -131,7 +134,12 @@ SPEED2, WAVE2, PLASTIC, VISCOUS, ASTRAY, WORK = range(6)
 """Columns of a task's report."""
 
 LAY, MOVE, PACE, CLEAR, BLOW_ON, FORCES, CONTACT = range(7)
-"""Numbers of the pieces."""
+"""Numbers of the pieces; those of contact follow from the last."""
+START, MARK, FIND, LIST, LOOK, FACE, REACH, CHOOSE, SOLVE, SETTLE = range(
+    CONTACT, CONTACT + 10
+)
+TOUCHING = "start mark find list look face reach choose solve settle"
+"""Pieces of contact: ``native/contact_NAME.cpp``."""
 
 
 class Phase(NamedTuple):
@@ -152,7 +160,17 @@ SCHEDULE = (
     *(Phase(LAY, "bare", colour) for colour in range(COLOURS)),
     Phase(BLOW_ON, "blown"),
     Phase(FORCES, "nodes"),
-    Phase(CONTACT, resume=True),
+    Phase(START, "rigids"),
+    Phase(MARK, "rigids"),
+    Phase(FIND, resume=True),
+    Phase(LIST, "parts"),
+    *(Phase(LOOK, "looks", colour) for colour in range(COLOURS)),
+    Phase(FACE, "parts"),
+    *(Phase(REACH, "looks", colour) for colour in range(COLOURS)),
+    Phase(REACH, "turns"),
+    Phase(CHOOSE, "parts"),
+    Phase(SOLVE, "parts"),
+    Phase(SETTLE),
     *(Phase(MOVE, "colour", colour) for colour in range(COLOURS)),
 )
 """A step. Particles lay the nodes of the next step when they move, so laying is skipped unless the
@@ -162,7 +180,9 @@ _NATIVE = Path(__file__).parent / "native"
 
 
 def _native(*names: str) -> str:
-    return "\n".join((_NATIVE / f"{part}.cpp").read_text() for part in ("shared", *names))
+    return "\n".join(
+        (_NATIVE / f"{part}.cpp").read_text() for part in ("shared", *names)
+    )
 
 
 Memory = wp.array(dtype=wp.uint64)
@@ -192,8 +212,17 @@ def forces_native(memory: Memory, index: int): ...
 def transfer_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("bond", "contact"))
-def contact_native(memory: Memory, index: int): ...
+def _contact() -> str:
+    """Text of all pieces of contact: what they share, then one branch for each."""
+    text = [_native("bond", "contact_shared")]
+    for number, name in enumerate(TOUCHING.split()):
+        piece = (_NATIVE / f"contact_{name}.cpp").read_text()
+        text.append(f"if (piece == {number}) {{\n{piece}}}")
+    return "\n".join(text)
+
+
+@wp.func_native(_contact())
+def contact_native(memory: Memory, piece: int, index: int): ...
 
 
 @wp.kernel
@@ -212,13 +241,9 @@ def work(memory: Memory, thread: int):
             blow_native(memory, task)
         elif piece == FORCES:
             forces_native(memory, task)
-        elif piece == CONTACT:
-            contact_native(memory, task)
+        elif piece >= CONTACT:
+            contact_native(memory, piece - CONTACT, task)
         order = conduct_native(memory, thread)
-
-
-MEET, TOUCH, CLOSE = 704, 448, 304
-"""Bytes of a node where fields meet, of a possible contact, and of a particle near it."""
 
 
 class Program:
@@ -232,7 +257,10 @@ class Program:
     def __init__(self, world: np.ndarray, threads: int) -> None:
         self.world = world
         memory = wp.array(
-            ptr=world.ctypes.data, dtype=wp.uint64, shape=world.nbytes // 8, device="cpu"
+            ptr=world.ctypes.data,
+            dtype=wp.uint64,
+            shape=world.nbytes // 8,
+            device="cpu",
         )
         self.threads = min(threads, MOST_THREADS)
         self.crew = aligned((1,), CREW)
@@ -247,16 +275,20 @@ class Program:
         world["crew"] = self.crew.ctypes.data
         self.pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
         self.launches = [
-            wp.launch(work, dim=1, inputs=[memory, thread], device="cpu", record_cmd=True)
+            wp.launch(
+                work, dim=1, inputs=[memory, thread], device="cpu", record_cmd=True
+            )
             for thread in range(self.threads)
         ]
         self.smallest_share = SMALLEST_SHARE
 
-    def divide(self, first: list[int], particles: int) -> None:
-        """Say where each colour's tasks begin, and how many particles there are."""
+    def divide(self, first: list[int], tasks: int, particles: int) -> None:
+        """Say where each colour's tasks begin, and how many tasks and particles there are."""
         for row, phase in zip(self.phase, SCHEDULE, strict=True):
-            if phase.piece in (LAY, MOVE):
+            if phase.count in ("bare", "colour", "looks"):
                 row[1] = first[phase.which]
+            elif phase.count == "turns":
+                row[1] = tasks
         self.hands = max(1, min(self.threads, particles // self.smallest_share))
 
     def run(self, resume: bool = False) -> None:
@@ -266,7 +298,9 @@ class Program:
         crew["threads"], crew["started"], crew["stopped"] = self.hands, 0, 0
         crew["post"] = 0
         self.world["stop"] = self.world["full"] = 0
-        mates = [self.pool.submit(other.launch) for other in self.launches[1 : self.hands]]
+        mates = [
+            self.pool.submit(other.launch) for other in self.launches[1 : self.hands]
+        ]
         self.launches[0].launch()
         for mate in mates:
             mate.result()

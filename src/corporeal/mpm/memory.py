@@ -4,13 +4,33 @@ import numpy as np
 
 from corporeal.mpm import tables
 from corporeal.mpm.contact import half_space_face
-from corporeal.mpm.kernels import CLOSE, MEET, TOUCH
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.problem import Body, Problem
 
+PARTS = 16
+"""Parts that a list of nodes or contacts is cut into."""
+BYTES = {
+    "junction": 256,
+    "meet": 32,
+    "side": 72,
+    "touch": 328,
+    "entry": 72,
+    "line": 240,
+}
+"""Of the structs in ``native/contact_shared.cpp``."""
+_POINTERS = "junction meet side touch entry line pair order"
+_COUNTS = "most_junctions most_meets most_sides most_touches junctions meets sides touches points"
+STAGE = np.dtype(
+    [(name, "u8") for name in _POINTERS.split()]
+    + [(name, "i4") for name in _COUNTS.split()]
+    + [("entries", "i4", PARTS)],
+    align=True,
+)
 BONDED = -1.0
 """Friction of a pair that is never in contact, to the native piece."""
-BOOKS = "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
+BOOKS = (
+    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
+)
 
 
 def point(record: np.ndarray, **arrays: np.ndarray) -> None:
@@ -58,37 +78,47 @@ class ContactMemory:
         walls = [[*plane.normal, plane.offset] for plane in problem.planes]
         self.plane = np.array(walls, float).reshape(-1, 4)
         self.friction, self.restitution = _pair_tables(problem)
-        self.scratch = np.zeros(self.friction.size * 8)
         self.face = half_space_face(np.linspace(-1.5, 0.0, 4097))
+        self.stage = np.zeros(1, STAGE)
+        self.pair = np.zeros(self.friction.size * 8)
+        point(self.stage, pair=self.pair)
         point(
             world,
             plane=self.plane,
             friction=self.friction,
             restitution=self.restitution,
-            ledger=self.scratch,
+            contact_memory=self.stage,
             face=self.face,
         )
         point(world, **{name: getattr(ledger, name) for name in BOOKS.split()})
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
-        self.room = 1024
+        self.room = 256
         self.lengthen()
 
     def lengthen(self) -> None:
         """Make every list twice as long."""
         self.room *= 2
-        room, world = self.room, self.world
-        self.meets = np.zeros(room * MEET, np.uint8)
-        self.touches = np.zeros(2 * room * TOUCH, np.uint8)
-        self.closes = np.zeros(4 * room * CLOSE, np.uint8)
-        self.order = np.zeros(2 * room, np.int32)
-        point(
-            world,
-            contact_memory=self.meets,
-            pair_memory=self.touches,
-            near_memory=self.closes,
-            order=self.order,
+        room = {
+            "junction": self.room,
+            "meet": 4 * self.room,
+            "side": 8 * self.room,
+            "touch": 8 * self.room,
+            "entry": 8 * self.room,
+            "line": 8 * self.room,
+        }
+        self.lists = {
+            name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()
+        }
+        self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
+        point(self.stage, order=self.order, **self.lists)
+        self.stage["most_junctions"], self.stage["most_meets"] = (
+            room["junction"],
+            room["meet"],
         )
-        world["most_contacts"], world["most_pairs"], world["most_nears"] = room, 2 * room, 4 * room
+        self.stage["most_sides"], self.stage["most_touches"] = (
+            room["side"],
+            room["touch"],
+        )
 
 
 def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:

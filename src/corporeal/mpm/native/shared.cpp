@@ -81,20 +81,21 @@ struct World {
   Crew *crew;
   Clock *clock;
   Field *field;
-  int *task, *contact_memory, *list;
-  int *order;
-  double *report, *plane, *friction, *restitution, *ledger, *pair_memory, *near_memory;
+  int *task, *list, *contact_memory;
+  double *report, *plane, *friction, *restitution;
   double *plane_impulse, *pair_impulse, *friction_loss, *first_contact, *last_contact;
   double *contact_point, *face;
   Blow *blow;
   Bond *bond;
   double dx, dt, time, kick[3];
-  int fields, planes, tasks, contacts, pairs, nears, most_contacts, most_pairs, most_nears, full;
+  int fields, planes, tasks, full;
   int names, again;   // bodies and planes in the books; a repeated call after more memory
   int blows, blown, bonds;   // bodies in the wind; tasks on them
   int stop;           // why the steps end after this phase; 0: they go on
   int nodes, colour[4];             // tasks on nodes, and on particles of each colour
   int bare_nodes, bare[4];          // the same where this step's nodes are still to be laid
+  int parts, looks[4];              // tasks on contacts, and on particles for contact; 0 without any
+  int rigids, turns;                // fields, where some are rigid; tasks to look at those
 };
 
 struct Simd {

@@ -1,0 +1,25 @@
+// Candidate normals where two fields meet: g_a - g_c, g_a and -g_c.
+int from = (int)((long long)stage->sides * index / PARTS),
+    to = (int)((long long)stage->sides * (index + 1) / PARTS);
+for (int s = from; s < to; s++)
+  for (int d = 0; d < 3; d++) sides[s].mean[d] /= sides[s].m;
+from = (int)((long long)stage->touches * index / PARTS);
+to = (int)((long long)stage->touches * (index + 1) / PARTS);
+for (int t = from; t < to; t++) {
+  Touch &T = touches[t];
+  if (T.c < 0) continue;
+  const Side &A = sides[T.a], &C = sides[T.c];
+  float n[3][3];
+  for (int d = 0; d < 3; d++) {
+    n[0][d] = A.out[d] - C.out[d];
+    n[1][d] = A.out[d];
+    n[2][d] = -C.out[d];
+  }
+  for (int q = 0; q < 4; q++) {
+    double v[3] = {0, 0, 0};
+    for (int d = 0; d < 3 && q < 3; d++) v[d] = n[q][d];
+    Vec::unit(v);
+    for (int d = 0; d < 3; d++) T.n[d][q] = (float)v[d];
+    T.far[0][q] = T.far[1][q] = -1e30f;
+  }
+}

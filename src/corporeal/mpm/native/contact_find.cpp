@@ -1,0 +1,117 @@
+// List the blocks where fields meet each other or a plane, and number what is in them. One task:
+// it looks at blocks, not at nodes, unless something is there.
+struct Find {
+  static inline bool apart(const Field &A, const Field &B) {
+    for (int i = 0; i < 3; i++)
+      if (A.origin[i] + A.dim[i] <= B.origin[i] || B.origin[i] + B.dim[i] <= A.origin[i]) return true;
+    return false;
+  }
+  // Height of the lowest and highest corner of a box of blocks over a plane.
+  static inline double lowest(const double *P, const Field &F, double dx) {
+    double h = -P[3];
+    for (int i = 0; i < 3; i++) {
+      double a = 4.0 * F.origin[i] * dx, b = 4.0 * (F.origin[i] + F.dim[i]) * dx;
+      h += P[i] * (P[i] > 0 ? a : b);
+    }
+    return h;
+  }
+  static inline u64 have(const Field &F, int block) {
+    const float *node = F.node + (size_t)block * 512;
+    u64 m = 0;
+    for (int i = 0; i < 64; i++) m |= (u64)(node[8 * i] > 0.0f) << i;
+    return m;
+  }
+};
+Bonds::hold(world);
+int count = 0, meet = 0, side = 0, touch = 0, points = 0;
+for (int f = 0; f < fields; f++) {
+  Field &F = world->field[f];
+  int near[64], nears = 0, wall[16], walls = 0;
+  for (int g = f + 1; g < fields && nears < 64; g++)
+    if (world->field[g].pool && !Find::apart(F, world->field[g])) near[nears++] = g;
+  const bool pointed = F.rigids && F.surfaces;
+  for (int w = 0; w < planes && walls < 16; w++) {
+    const double *P = world->plane + 4 * w;
+    if (pointed)
+      points += Vec::dot(P, F.rigid + CENTRE) - P[3] > F.rigid[RADIUS] + POINT_REACH * dx ? 0 : F.surfaces;
+    else if (Find::lowest(P, F, dx) <= WALL_REACH * dx)
+      wall[walls++] = w;
+  }
+  if (!nears && !walls) continue;
+  for (int b = 0; b < F.pool; b++) {
+    int *w = F.where + 4 * b;
+    if (w[3]) continue;
+    Junction J;
+    J.fields = 0;
+    for (int i = 0; i < 3; i++) J.at[i] = w[i] + F.origin[i];
+    J.field[J.fields] = f;
+    J.block[J.fields++] = b;
+    for (int i = 0; i < nears && J.fields < HERE; i++) {
+      int other = Grid::block(world->field[near[i]], J.at);
+      if (other < 0) continue;
+      J.field[J.fields] = near[i];
+      J.block[J.fields++] = other;
+    }
+    int low = 0;
+    for (int i = 0; i < walls; i++) {
+      const double *P = world->plane + 4 * wall[i];
+      double h = -P[3];
+      for (int d = 0; d < 3; d++) h += P[d] * (4.0 * J.at[d] + (P[d] > 0 ? 0 : 3)) * dx;
+      low |= (h <= WALL_REACH * dx) << i;
+    }
+    if (J.fields < 2 && !low) continue;
+    J.mask = J.several = 0;
+    int found = 0;
+    for (int q = 0; q < J.fields; q++) J.have[q] = Find::have(world->field[J.field[q]], J.block[q]);
+    for (int a = 0; a < J.fields; a++)
+      for (int c = a + 1; c < J.fields; c++) {
+        if (world->friction[J.field[a] * all + J.field[c]] < 0) continue;   // bonded
+        u64 both = J.have[a] & J.have[c];
+        J.several |= both;
+        found += Grid::count(both);
+      }
+    J.mask = J.several;
+    // Planes near any of the fields here: the first one's list may be too short for the others.
+    for (int v = 0; v < planes; v++) {
+      const double *P = world->plane + 4 * v;
+      double h = -P[3];
+      for (int d = 0; d < 3; d++) h += P[d] * (4.0 * J.at[d] + (P[d] > 0 ? 0 : 3)) * dx;
+      if (h > WALL_REACH * dx) continue;
+      u64 there = Grid::wall(P, J.at, dx);
+      for (int q = 0; q < J.fields; q++) {
+        const Field &G = world->field[J.field[q]];
+        if (G.rigids && G.surfaces) continue;
+        J.mask |= there & J.have[q];
+        found += Grid::count(there & J.have[q]);
+      }
+    }
+    if (!J.mask) continue;
+    J.meet = meet;
+    J.side = side;
+    J.touch = touch;
+    meet += Grid::count(J.mask);
+    for (int q = 0; q < J.fields; q++) side += Grid::count(J.mask & J.have[q]);
+    touch += found;
+    J.last = touch;
+    if (count < stage->most_junctions) {
+      junctions[count] = J;
+      for (int q = 0; q < J.fields; q++)
+        world->field[J.field[q]].where[4 * J.block[q] + 3] = count + 1;
+    }
+    count++;
+  }
+}
+world->full = count > stage->most_junctions || meet > stage->most_meets ||
+              side > stage->most_sides || touch + points > stage->most_touches;
+int kept = count < stage->most_junctions ? count : stage->most_junctions;
+if (world->full)       // begin again with more memory
+  for (int j = 0; j < kept; j++)
+    for (int q = 0; q < junctions[j].fields; q++)
+      world->field[junctions[j].field[q]].where[4 * junctions[j].block[q] + 3] = 0;
+stage->junctions = world->full ? 0 : count;
+stage->meets = world->full ? 0 : meet;
+stage->sides = world->full ? 0 : side;
+stage->touches = world->full ? 0 : touch;
+world->parts = stage->junctions ? PARTS : 0;
+world->turns = stage->junctions ? world->rigids : 0;
+for (int k = 0; k < 4; k++) world->looks[k] = stage->junctions ? world->colour[k] : 0;
