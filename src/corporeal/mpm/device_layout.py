@@ -1,0 +1,263 @@
+"""Structs that the kernels of the device engine share: particles, grid, rigid bodies, contacts.
+
+Plain Warp, so that the same kernels run on a CUDA card and on the processor. Every kernel loops
+over its items with a stride: it is launched with as many threads as the device keeps busy, and
+the number of items may change on the device without a word to the host.
+"""
+
+from corporeal.mpm.kernels import wp
+
+wp.set_module_options({"enable_backward": False})
+
+EMPTY = wp.constant(wp.int64(-1))
+MOST = wp.constant(6)
+"""Bodies that may meet at one node."""
+
+# What ``Sheet.flag`` holds.
+GOING = wp.constant(0)
+"""1: take another step."""
+BLOCKS = wp.constant(1)
+"""Blocks in use."""
+FULL = wp.constant(2)
+"""1: too few blocks; 2: too little room for contacts. The step was not taken."""
+LOST = wp.constant(3)
+"""1: a particle is not finite or left the domain."""
+FRESH = wp.constant(4)
+"""1: blocks were added since they were linked."""
+MEETS = wp.constant(5)
+TOUCHES = wp.constant(6)
+STIFF = wp.constant(7)
+"""Contacts that rigid bodies take part in."""
+HITS = wp.constant(8)
+"""1: something rigid bounces in this step; 2: rigid bodies lie on one another."""
+SWEEPING = wp.constant(9)
+SWEEPS = wp.constant(10)
+FLAGS = 11
+
+# What ``Sheet.clock`` holds.
+TIME = wp.constant(0)
+UNTIL = wp.constant(1)
+DT = wp.constant(2)
+COUNT = wp.constant(3)
+SMALLEST = wp.constant(4)
+LARGEST = wp.constant(5)
+STABLE = wp.constant(6)
+"""Largest stable step as of now [s]."""
+LAST = wp.constant(7)
+"""1: this step ends exactly at UNTIL."""
+FORCED = wp.constant(8)
+"""1: one step to UNTIL, stable or not."""
+CLOCK = 9
+
+# Columns of the table of materials.
+LAW = wp.constant(0)
+MU = wp.constant(1)
+LAMBDA = wp.constant(2)
+YIELD = wp.constant(3)
+HARD = wp.constant(4)
+CONE = wp.constant(5)
+APEX = wp.constant(6)
+VISCOSITY = wp.constant(7)
+FORGET = wp.constant(8)
+DENSITY = wp.constant(9)
+SLOWING = wp.constant(10)
+BODY = wp.constant(11)
+COLUMNS = 12
+
+# Rows of ``Sheet.loss``; each is spread over LANES places, so that threads rarely collide.
+PLASTIC = wp.constant(0)
+VISCOUS = wp.constant(1)
+PUSHING = wp.constant(2)
+RUBBING = wp.constant(3)
+LANES = wp.constant(256)
+
+vec6 = wp.types.vector(length=6, dtype=wp.float32)
+D = wp.float64
+
+
+@wp.struct
+class Sheet:
+    """What one step shares: clock, flags, forces, and the books."""
+
+    clock: wp.array(dtype=wp.float64)
+    flag: wp.array(dtype=wp.int32)
+    fast: wp.array(dtype=wp.float32)
+    """Largest speed and largest wave speed of what can deform [m/s]: in this step, in the last."""
+    change: wp.array(dtype=wp.float32)
+    """Largest change of a contact's velocity in this sweep [m/s]."""
+    loss: wp.array2d(dtype=wp.float64)
+    gravity: wp.vec3d
+    ramp: wp.float64
+    pull: wp.float64
+    """Largest acceleration [m/s²]."""
+    courant: wp.float64
+    dx: wp.float64
+    cell: wp.float32
+    push: wp.array(dtype=wp.vec3d)
+    """Acceleration of each body [m/s²] …"""
+    start: wp.array(dtype=wp.float64)
+    end: wp.array(dtype=wp.float64)
+    kick: wp.array(dtype=wp.vec3d)
+    """Velocity that each body is given in this step [m/s], and …"""
+    pushed: wp.array(dtype=wp.vec3d)
+    """… the push's part of it."""
+    mass: wp.array(dtype=wp.float64)
+    bodies: int
+    planes: int
+    plane: wp.array(dtype=wp.vec3d)
+    offset: wp.array(dtype=wp.float64)
+    external: wp.array(dtype=wp.vec3d)
+    plane_impulse: wp.array2d(dtype=wp.vec3d)
+    pair_impulse: wp.array2d(dtype=wp.float64)
+    first_contact: wp.array2d(dtype=wp.float64)
+    last_contact: wp.array2d(dtype=wp.float64)
+    contact_point: wp.array2d(dtype=wp.vec3d)
+    step_impulse: wp.array2d(dtype=wp.float64)
+    """Normal impulse of each pair in this step [N s] …"""
+    step_place: wp.array2d(dtype=wp.vec3d)
+    """… times where [N s m]."""
+
+
+@wp.struct
+class Particles:
+    """Everything that can deform, sorted by block now and then."""
+
+    count: int
+    cell: wp.array(dtype=wp.vec3i)
+    """Lowest of the particle's 27 nodes …"""
+    place: wp.array(dtype=wp.vec3)
+    """… and how far it is from it [cells], in [½, 1½)."""
+    velocity: wp.array(dtype=wp.vec3)
+    affine: wp.array(dtype=wp.mat33)
+    """dx C [m/s]."""
+    strain: wp.array(dtype=wp.mat33)
+    """F - 1."""
+    motion: wp.array(dtype=wp.mat33)
+    """Total deformation gradient - 1, of plastic and granular matter."""
+    stress: wp.array(dtype=vec6)
+    """-(4/dx) V₀ τ: 00 01 02 11 12 22."""
+    mass: wp.array(dtype=wp.float32)
+    volume: wp.array(dtype=wp.float32)
+    plastic: wp.array(dtype=wp.float32)
+    opened: wp.array(dtype=wp.float32)
+    kind: wp.array(dtype=wp.int32)
+    field: wp.array(dtype=wp.int32)
+    number: wp.array(dtype=wp.int32)
+    home: wp.array(dtype=wp.int32)
+    """Block of ``cell``; -1: not looked up since it changed."""
+    lost: wp.array(dtype=wp.int32)
+    table: wp.array2d(dtype=wp.float32)
+
+
+@wp.struct
+class Grid:
+    """Node blocks of 4³ of all fields, found by hashing (field, block)."""
+
+    keys: wp.array(dtype=wp.int64)
+    slots: wp.array(dtype=wp.int32)
+    mask: int
+    room: int
+    """Blocks there is memory for."""
+    fields: int
+    where: wp.array(dtype=wp.vec3i)
+    field: wp.array(dtype=wp.int32)
+    near: wp.array(dtype=wp.int32)
+    """Eight per block: itself and its neighbours at +1; -1: absent."""
+    partner: wp.array(dtype=wp.int32)
+    """MOST per block: blocks of other fields at the same place, by field; -1: no more."""
+    seen: wp.array(dtype=wp.int32)
+    """1: fields meet in this block; 2: more than one does."""
+    aware: wp.array(dtype=wp.int32)
+    """The same of any block that particles of this one reach."""
+    node: wp.array(dtype=wp.vec4)
+    """Mass [kg] and momentum [kg m/s], then velocity [m/s]."""
+    old: wp.array(dtype=wp.vec3)
+    """The same without forces."""
+    meet: wp.array(dtype=wp.int32)
+    """1 + the field's entry where it meets others; 0: nobody."""
+
+
+@wp.struct
+class Rigid:
+    """Rigid bodies, their particles and surface points; arrays of states go by body."""
+
+    stiff: wp.array(dtype=wp.int32)
+    """1: the field moves with six degrees of freedom."""
+    pointed: wp.array(dtype=wp.int32)
+    """1: it meets planes with surface points, not on nodes."""
+    light: wp.array(dtype=wp.float64)
+    """1/M [1/kg]."""
+    centre: wp.array(dtype=wp.vec3d)
+    turn: wp.array(dtype=wp.mat33d)
+    rest: wp.array(dtype=wp.mat33d)
+    """I⁻¹ of the body as it started [1/(kg m²)]."""
+    speed: wp.array(dtype=wp.vec3d)
+    moment: wp.array(dtype=wp.vec3d)
+    inertia: wp.array(dtype=wp.mat33d)
+    """I⁻¹ now."""
+    spin: wp.array(dtype=wp.vec3d)
+    radius: wp.array(dtype=wp.float64)
+    speed_change: wp.array(dtype=wp.vec3d)
+    moment_change: wp.array(dtype=wp.vec3d)
+    busy: wp.array(dtype=wp.int32)
+    """Contacts that share the body in this sweep."""
+    lost: wp.array(dtype=wp.int32)
+    count: int
+    body: wp.array(dtype=wp.int32)
+    arm: wp.array(dtype=wp.vec3d)
+    mass: wp.array(dtype=wp.float32)
+    volume: wp.array(dtype=wp.float32)
+    cell: wp.array(dtype=wp.vec3i)
+    place: wp.array(dtype=wp.vec3)
+    home: wp.array(dtype=wp.int32)
+    surfaces: int
+    surface_body: wp.array(dtype=wp.int32)
+    surface: wp.array(dtype=wp.vec3d)
+
+
+@wp.struct
+class Contacts:
+    """Nodes where fields meet, their entries (MOST per node), and the touches of pairs there."""
+
+    room: int
+    """Meets there is memory for; touches: twice as many."""
+    at: wp.array(dtype=wp.vec3i)
+    number: wp.array(dtype=wp.int32)
+    first: wp.array(dtype=wp.int32)
+    last: wp.array(dtype=wp.int32)
+    stiff: wp.array(dtype=wp.int32)
+    field: wp.array(dtype=wp.int32)
+    slot: wp.array(dtype=wp.int32)
+    mean: wp.array(dtype=wp.vec3)
+    """X: mass times offset from the node [kg m]."""
+    outward: wp.array(dtype=wp.vec3)
+    velocity: wp.array(dtype=wp.vec3d)
+    light: wp.array(dtype=wp.float64)
+    """1/m [1/kg]."""
+    meet: wp.array(dtype=wp.int32)
+    """Of a touch; -1: a surface point."""
+    a: wp.array(dtype=wp.int32)
+    """Entry the normal points away from …"""
+    c: wp.array(dtype=wp.int32)
+    """… and to; -1 - plane: a plane."""
+    candidate: wp.array(dtype=wp.mat33)
+    far_a: wp.array(dtype=wp.float32)
+    far_c: wp.array(dtype=wp.float32)
+    chosen: wp.array(dtype=wp.vec3)
+    normal: wp.array(dtype=wp.vec3)
+    gap: wp.array(dtype=wp.float32)
+    fa: wp.array(dtype=wp.int32)
+    fc: wp.array(dtype=wp.int32)
+    """Fields; B + plane for a plane."""
+    point: wp.array(dtype=wp.vec3d)
+    active: wp.array(dtype=wp.int32)
+    """0: not in this step; 1: yes; 2: bounces when its pair is hit."""
+    target: wp.array(dtype=wp.float64)
+    approach: wp.array(dtype=wp.float64)
+    before: wp.array(dtype=wp.vec3d)
+    impulse: wp.array(dtype=wp.vec3d)
+    hit: wp.array2d(dtype=wp.int32)
+    friction: wp.array2d(dtype=wp.float64)
+    restitution: wp.array2d(dtype=wp.float64)
+    face: wp.array(dtype=wp.float32)
+    """Where the face of a half space lies whose mean offset is i/4096 · 1½ - 1½ [dx]."""
