@@ -219,5 +219,6 @@ class Engine(Protocol):
 
 MENU = {
     "warp": "corporeal.mpm.warp:WarpEngine",
+    "cuda": "corporeal.mpm.device:DeviceEngine",
     "reference": "corporeal.mpm.reference:ReferenceEngine",
 }
