@@ -218,7 +218,7 @@ def find(scene: Scene) -> list[Touch]:
     """List everything that touches or may touch in this step."""
     fields = np.unique(scene.grid.field).tolist()
     rows = {f: np.flatnonzero((scene.grid.field == f) & (scene.mass > 0.0)) for f in fields}
-    bonded = {tuple(sorted(bond)) for bond in scene.problem.bonds}
+    bonded = {tuple(sorted(bond)) for bond in (*scene.problem.bonds, *scene.problem.apart)}
     apart = [p for p in combinations(fields, 2) if p not in bonded]
     pairs = {p: _common(scene.grid, rows, p) for p in apart}
     walls = {(f, w): _near(scene, rows[f], w) for f in fields for w in _walls(scene, f)}

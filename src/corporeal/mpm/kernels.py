@@ -42,10 +42,7 @@ def _start_quietly() -> None:
 
 _start_quietly()
 wp.set_module_options(
-    {
-        "enable_backward": False,
-        "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast",
-    }
+    {"enable_backward": False, "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast"}
 )
 
 _POINTERS = "part node next history material table block where near point rigid surface"
@@ -58,9 +55,12 @@ FIELD = np.dtype(
 )
 _POINTERS = (
     "crew clock field task list contact_memory report plane friction restitution plane_impulse "
-    "pair_impulse friction_loss first_contact last_contact contact_point face blow bond"
+    "pair_impulse friction_loss first_contact last_contact contact_point face blow bond tether "
+    "joint grip"
 )
-_COUNTS = "fields planes tasks full names again blows blown bonds stop nodes"
+_COUNTS = (
+    "fields planes tasks full names again blows blown bonds tethers joints grips sprung stop nodes"
+)
 COLOURS = 4
 """Columns of blocks of one colour, the parities of their x and y, never overlap."""
 WORLD = np.dtype(
@@ -86,16 +86,32 @@ BOND = np.dtype(
     + [(name, "i4") for name in ("frame", "soft", "count")],
     align=True,
 )
+TETHER = np.dtype(
+    [(name, "u8") for name in ("anchor", "rate", "holder")]
+    + [(name, "f8") for name in ("damping", "lost")]
+    + [(name, "i4") for name in ("field", "first", "count")],
+    align=True,
+)
+JOINT = np.dtype(
+    [(name, "u8") for name in ("first", "second")]
+    + [(name, "f8", 3) for name in ("arm_first", "arm_second")]
+    + [(name, "f8") for name in ("stiffness", "damping", "lost")],
+    align=True,
+)
+GRIP = np.dtype(
+    [(name, "u8") for name in ("share", "rigid", "impulse")]
+    + [(name, "f8", 3) for name in ("arm", "target")]
+    + [(name, "f8") for name in ("stiffness", "damping", "mass", "work")]
+    + [(name, "i4") for name in ("field", "first", "count")],
+    align=True,
+)
 THING = np.dtype(
     [("mass", "f8"), ("push", "f8", 3), ("start", "f8"), ("end", "f8"), ("rigid", "u8")]
     + [(name, "i4") for name in ("field", "first", "last", "spare")]
 )
 CLOCK = np.dtype(
     [(name, "u8") for name in ("thing", "external_impulse", "push_work")]
-    + [
-        (name, "f8")
-        for name in "until given stable speed wave smallest largest".split()
-    ]
+    + [(name, "f8") for name in "until given stable speed wave smallest largest".split()]
     + [("gravity", "f8", 3)]
     + [(name, "f8") for name in "ramp courant rigid_courant fall".split()]
     + [("count", "i8"), ("budget", "i8")]
@@ -133,11 +149,9 @@ MOST_THREADS = 64
 SPEED2, WAVE2, PLASTIC, VISCOUS, ASTRAY, WORK = range(6)
 """Columns of a task's report."""
 
-LAY, MOVE, PACE, CLEAR, BLOW_ON, FORCES, CONTACT = range(7)
+LAY, MOVE, PACE, CLEAR, BLOW_ON, SPRING, FORCES, CONTACT = range(8)
 """Numbers of the pieces; those of contact follow from the last."""
-START, MARK, FIND, LIST, LOOK, FACE, REACH, CHOOSE, SOLVE, SETTLE = range(
-    CONTACT, CONTACT + 10
-)
+START, MARK, FIND, LIST, LOOK, FACE, REACH, CHOOSE, SOLVE, SETTLE = range(CONTACT, CONTACT + 10)
 TOUCHING = "start mark find list look face reach choose solve settle"
 """Pieces of contact: ``native/contact_NAME.cpp``."""
 
@@ -159,6 +173,7 @@ SCHEDULE = (
     Phase(CLEAR, "bare_nodes"),
     *(Phase(LAY, "bare", colour) for colour in range(COLOURS)),
     Phase(BLOW_ON, "blown"),
+    Phase(SPRING, "sprung"),
     Phase(FORCES, "nodes"),
     Phase(START, "rigids"),
     Phase(MARK, "rigids"),
@@ -180,9 +195,7 @@ _NATIVE = Path(__file__).parent / "native"
 
 
 def _native(*names: str) -> str:
-    return "\n".join(
-        (_NATIVE / f"{part}.cpp").read_text() for part in ("shared", *names)
-    )
+    return "\n".join((_NATIVE / f"{part}.cpp").read_text() for part in ("shared", *names))
 
 
 Memory = wp.array(dtype=wp.uint64)
@@ -200,8 +213,12 @@ def pace_native(memory: Memory, index: int): ...
 def clear_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("blow"))
+@wp.func_native(_native("hand", "blow"))
 def blow_native(memory: Memory, index: int): ...
+
+
+@wp.func_native(_native("hand", "springs"))
+def springs_native(memory: Memory, index: int): ...
 
 
 @wp.func_native(_native("forces"))
@@ -239,6 +256,8 @@ def work(memory: Memory, thread: int):
             clear_native(memory, task)
         elif piece == BLOW_ON:
             blow_native(memory, task)
+        elif piece == SPRING:
+            springs_native(memory, task)
         elif piece == FORCES:
             forces_native(memory, task)
         elif piece >= CONTACT:
@@ -257,10 +276,7 @@ class Program:
     def __init__(self, world: np.ndarray, threads: int) -> None:
         self.world = world
         memory = wp.array(
-            ptr=world.ctypes.data,
-            dtype=wp.uint64,
-            shape=world.nbytes // 8,
-            device="cpu",
+            ptr=world.ctypes.data, dtype=wp.uint64, shape=world.nbytes // 8, device="cpu"
         )
         self.threads = min(threads, MOST_THREADS)
         self.crew = aligned((1,), CREW)
@@ -275,9 +291,7 @@ class Program:
         world["crew"] = self.crew.ctypes.data
         self.pool = ThreadPoolExecutor(self.threads) if self.threads > 1 else None
         self.launches = [
-            wp.launch(
-                work, dim=1, inputs=[memory, thread], device="cpu", record_cmd=True
-            )
+            wp.launch(work, dim=1, inputs=[memory, thread], device="cpu", record_cmd=True)
             for thread in range(self.threads)
         ]
         self.smallest_share = SMALLEST_SHARE
@@ -298,9 +312,7 @@ class Program:
         crew["threads"], crew["started"], crew["stopped"] = self.hands, 0, 0
         crew["post"] = 0
         self.world["stop"] = self.world["full"] = 0
-        mates = [
-            self.pool.submit(other.launch) for other in self.launches[1 : self.hands]
-        ]
+        mates = [self.pool.submit(other.launch) for other in self.launches[1 : self.hands]]
         self.launches[0].launch()
         for mate in mates:
             mate.result()

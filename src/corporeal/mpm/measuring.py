@@ -7,6 +7,7 @@ import numpy as np
 from corporeal.mpm import elasticity, tables
 from corporeal.mpm.kernels import AF, DE, EP, TM, VE
 from corporeal.mpm.problem import Measure, Snapshot
+from corporeal.mpm.springs import stored
 
 if TYPE_CHECKING:
     from corporeal.mpm.warp import WarpEngine
@@ -55,7 +56,7 @@ def measured(engine: "WarpEngine") -> Measure:
         momentum=momentum,
         angular_momentum=angular,
         kinetic=kinetic,
-        elastic=elastic,
+        elastic=elastic + _sprung(engine, state),
         potential=-mass * (centre @ np.array(problem.gravity)),
         speed=float(np.linalg.norm(state.velocity, axis=1).max()),
         lost=engine.lost.copy(),
@@ -70,6 +71,17 @@ def measured(engine: "WarpEngine") -> Measure:
         last_contact=book.last_contact.copy(),
         contact_point=book.contact_point.copy(),
     )
+
+
+def _sprung(engine: "WarpEngine", state: Snapshot) -> np.ndarray:
+    """Energy in springs, per body [J]."""
+    count = len(engine.problem.bodies)
+    now, first = (np.zeros((count, tables.RIGID)) for _ in range(2))
+    for b, rigid_state in engine.rigid.items():
+        now[b], first[b] = rigid_state, engine.springs.start[b]
+    centre = slice(tables.CENTRE, tables.CENTRE + 3)
+    turn = now[:, tables.TURN : tables.TURN + 9].reshape(-1, 3, 3)
+    return stored(engine.problem, state.position, now[:, centre], turn, first[:, centre])
 
 
 def _affine(engine: "WarpEngine") -> np.ndarray:

@@ -9,14 +9,7 @@ from corporeal.mpm.problem import Body, Problem
 
 PARTS = 16
 """Parts that a list of nodes or contacts is cut into."""
-BYTES = {
-    "junction": 256,
-    "meet": 32,
-    "side": 72,
-    "touch": 328,
-    "entry": 72,
-    "line": 240,
-}
+BYTES = {"junction": 256, "meet": 32, "side": 72, "touch": 328, "entry": 72, "line": 240}
 """Of the structs in ``native/contact_shared.cpp``."""
 _POINTERS = "junction meet side touch entry line pair order"
 _COUNTS = "most_junctions most_meets most_sides most_touches junctions meets sides touches points"
@@ -28,9 +21,7 @@ STAGE = np.dtype(
 )
 BONDED = -1.0
 """Friction of a pair that is never in contact, to the native piece."""
-BOOKS = (
-    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
-)
+BOOKS = "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
 
 
 def point(record: np.ndarray, **arrays: np.ndarray) -> None:
@@ -106,19 +97,11 @@ class ContactMemory:
             "entry": 8 * self.room,
             "line": 8 * self.room,
         }
-        self.lists = {
-            name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()
-        }
+        self.lists = {name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()}
         self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
         point(self.stage, order=self.order, **self.lists)
-        self.stage["most_junctions"], self.stage["most_meets"] = (
-            room["junction"],
-            room["meet"],
-        )
-        self.stage["most_sides"], self.stage["most_touches"] = (
-            room["side"],
-            room["touch"],
-        )
+        self.stage["most_junctions"], self.stage["most_meets"] = room["junction"], room["meet"]
+        self.stage["most_sides"], self.stage["most_touches"] = room["side"], room["touch"]
 
 
 def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
@@ -126,7 +109,7 @@ def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
     friction = np.array(problem.friction, float)
     restitution = np.array(problem.restitution, float)
     if problem.contact == "multi":
-        for frame, soft in problem.bonds:
+        for frame, soft in (*problem.bonds, *problem.apart):
             friction[frame, soft] = friction[soft, frame] = BONDED
         return friction, restitution
     bodies, walls = len(problem.bodies), len(problem.planes)

@@ -23,6 +23,32 @@ NO_FACES = Faces(np.zeros((0, 3)), np.zeros(0, np.int64))
 
 
 @dataclass(frozen=True)
+class Tether:
+    """Damped springs from a body's particles to where they started on a rigid body."""
+
+    holder: int
+    """Which body, a rigid one."""
+    rate: Float[np.ndarray, " P"]
+    """Natural angular frequency of each particle on its spring [rad/s]; 0: it is free."""
+    damping: float
+    """Damping ratio ζ [-]."""
+
+
+@dataclass(frozen=True)
+class Joint:
+    """Two rigid bodies that share a point and turn about it against a damped spring."""
+
+    first: int
+    second: int
+    point: tuple[float, float, float]
+    """Where, at the start [m]."""
+    stiffness: float
+    """[N m/rad]"""
+    damping: float
+    """[N m s/rad]"""
+
+
+@dataclass(frozen=True)
 class Body:
     """One object: particles that share a velocity field; P particles, S surface points."""
 
@@ -58,6 +84,7 @@ class Body:
     wind: Wind | None = None
     faces: Faces = NO_FACES
     """What the wind blows on."""
+    tether: Tether | None = None
 
 
 @dataclass(frozen=True)
@@ -102,6 +129,10 @@ class Problem:
     bonds: tuple[tuple[int, int], ...] = ()
     """Rigid inclusions: (frame, soft), a rigid and a deformable body of one object. The frame holds
     what of the soft body lies inside it, and the two are never in contact."""
+    joints: tuple[Joint, ...] = ()
+    """Between rigid bodies."""
+    apart: tuple[tuple[int, int], ...] = ()
+    """Bodies of one object that are never in contact with each other."""
 
 
 @dataclass(frozen=True)

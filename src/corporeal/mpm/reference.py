@@ -17,6 +17,7 @@ from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.loads import blow, carry
 from corporeal.mpm.matter import Matter, State
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
+from corporeal.mpm.springs import longest_step, pull, stored
 from corporeal.mpm.stencil import Stencil, stencil
 from corporeal.types import Law
 
@@ -67,7 +68,10 @@ class ReferenceEngine:
         state = replace(self.state, speed=self.state.speed + kick)
         blown = blow(self.problem, matter, self.state, dt)
         loaded = carry(blown, matter, state, grid, (mass, new))
-        state, new = loaded.state, loaded.velocity
+        before = replace(loaded.state, speed=loaded.state.speed - kick)
+        pulled = pull(self.problem, matter, before, dt)
+        state = replace(pulled.state, speed=pulled.state.speed + kick)
+        new = carry(pulled.load, matter, state, grid, (mass, loaded.velocity)).velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))
         stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, held)
         meeting = resolve(stage, new, dt)
@@ -78,7 +82,7 @@ class ReferenceEngine:
         turned = self._move_rigid(flowed, meeting, dt)
         self._check(turned)
         self.ledger.plastic_loss += plastic_loss
-        self.ledger.viscous_loss += viscous_loss
+        self.ledger.viscous_loss += viscous_loss + pulled.loss
         self._enter(meeting, grid, kick, push)
         self.ledger.external_impulse += loaded.impulse
         self.ledger.push_work += loaded.work
@@ -110,8 +114,8 @@ class ReferenceEngine:
         if m.rigid.any():
             limits.append(RIGID_COURANT * cell / max(speed[m.rigid].max(), 1e-30))
         pulls = [body.push.acceleration for body in self.problem.bodies if body.push is not None]
-        pull = max(float(np.linalg.norm(p)) for p in [self.problem.gravity, *pulls])
-        limits.append(FALL * np.sqrt(cell / max(pull, 1e-30)))
+        strongest = max(float(np.linalg.norm(p)) for p in [self.problem.gravity, *pulls])
+        limits += [FALL * np.sqrt(cell / max(strongest, 1e-30)), longest_step(self.problem)]
         return float(min(min(limits), 1.0))
 
     # ------------------------------------------------------------ forces
@@ -296,8 +300,9 @@ class ReferenceEngine:
         swirl = np.stack([s.affine[:, i, j] - s.affine[:, j, i] for i, j in _AXIAL], axis=1)
         moment = m.mass[:, None] * (np.cross(s.position, s.velocity) + apic * swirl)
         soft = np.flatnonzero(~m.rigid)
-        stored = np.zeros(len(m.mass))
-        stored[soft] = elasticity.psi(m.law[soft], s.F[soft], m.mu[soft], m.lam[soft])
+        strained = np.zeros(len(m.mass))
+        sprung = stored(self.problem, s.position, s.centre, s.rotation, m.centre)
+        strained[soft] = elasticity.psi(m.law[soft], s.F[soft], m.mu[soft], m.lam[soft])
         momentum = self._per_body(m.mass[:, None] * s.velocity)
         centre = self._per_body(m.mass[:, None] * s.position) / m.total[:, None]
         angular, kinetic = self._per_body(moment), self._per_body(energy)
@@ -313,7 +318,7 @@ class ReferenceEngine:
             momentum=momentum,
             angular_momentum=angular,
             kinetic=kinetic,
-            elastic=self._per_body(m.volume * stored),
+            elastic=self._per_body(m.volume * strained) + sprung,
             potential=-m.total * (centre @ np.array(self.problem.gravity)),
             speed=float(np.sqrt(_square(s.velocity).max())),
             lost=self.lost.copy(),

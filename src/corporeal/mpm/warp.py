@@ -30,6 +30,8 @@ from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measuring import measured, shown
 from corporeal.mpm.memory import ContactMemory, point, rigid_grid
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
+from corporeal.mpm.spring_records import Springs
+from corporeal.mpm.springs import longest_step
 from corporeal.mpm.window import Window
 
 RIGID_COURANT = 0.05
@@ -71,12 +73,9 @@ class WarpEngine:
         everything = list(range(len(problem.bodies)))
         single = problem.contact == "single"
         self.members = [everything] if single else [[b] for b in everything]
-        self.rigid = {
-            b: tables.rigid_state(problem.bodies[b]) for b in self._rigid_bodies()
-        }
+        self.rigid = {b: tables.rigid_state(problem.bodies[b]) for b in self._rigid_bodies()}
         self.points = {
-            b: tables.rigid_points(problem.bodies[b], state)
-            for b, state in self.rigid.items()
+            b: tables.rigid_points(problem.bodies[b], state) for b, state in self.rigid.items()
         }
         self._lay_out()
 
@@ -98,18 +97,11 @@ class WarpEngine:
         for f, bodies in enumerate(self.members):
             if self._is_rigid(f):
                 continue
-            self.material[f], kind, self.body_of_material[f] = tables.materials(
-                problem, bodies
-            )
+            self.material[f], kind, self.body_of_material[f] = tables.materials(problem, bodies)
             rows = tables.particle_rows(problem, bodies, self.first, kind)
-            place = (
-                np.concatenate([problem.bodies[b].position for b in bodies])
-                / problem.cell
-            )
+            place = np.concatenate([problem.bodies[b].position for b in bodies]) / problem.cell
             self._refuse_far(place, bodies)
-            flows = any(
-                np.isin(problem.bodies[b].law, tables.APIC_LAWS).any() for b in bodies
-            )
+            flows = any(np.isin(problem.bodies[b].law, tables.APIC_LAWS).any() for b in bodies)
             self.window[f] = Window(place, rows, flows)
             if not self.window[f].fits:
                 raise SimulationError(_too_wide(problem, bodies, 0.0))
@@ -133,6 +125,7 @@ class WarpEngine:
         self.blows = Blows(
             problem, self.first, self.ledger.external_impulse, self.rigid, self.points
         )
+        self.springs = Springs(problem, self.first, self.ledger.external_impulse, self.rigid)
         self.bond = tables.bonds(problem)
         self.program = Program(self.world, self.threads)
         self._wind_clock()
@@ -145,13 +138,11 @@ class WarpEngine:
         clock["gravity"], clock["ramp"] = problem.gravity, problem.gravity_ramp
         clock["courant"], clock["rigid_courant"] = problem.courant, RIGID_COURANT
         pull = max(
-            float(np.linalg.norm(a))
-            for a in (problem.gravity, *self.things["push"].tolist())
+            float(np.linalg.norm(a)) for a in (problem.gravity, *self.things["push"].tolist())
         )
-        clock["fall"] = FALL * np.sqrt(problem.cell / max(pull, 1e-30))
-        clock["speed"] = max(
-            np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies
-        )
+        fall = FALL * np.sqrt(problem.cell / max(pull, 1e-30))
+        clock["fall"] = min(fall, longest_step(problem))
+        clock["speed"] = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
         clock["wave"] = max([self._rest_speed(f) for f in self.window] + [0.0])
         clock["smallest"] = np.inf
         clock["things"] = len(self.things)
@@ -188,9 +179,7 @@ class WarpEngine:
         for f, window in self.window.items():
             columns.append(np.insert(window.columns(), 0, f, axis=1))
             pool = len(window.where)
-            nodes += [
-                (f, low, min(low + CHUNK, pool), 0) for low in range(0, pool, CHUNK)
-            ]
+            nodes += [(f, low, min(low + CHUNK, pool), 0) for low in range(0, pool, CHUNK)]
         column = np.concatenate([np.zeros((0, 5), np.int64), *columns])
         colour = 2 * (column[:, 1] % 2) + column[:, 2] % 2
         counts = np.bincount(colour, minlength=COLOURS)
@@ -213,20 +202,15 @@ class WarpEngine:
             bond=self.bond,
         )
         self._connect_bonds()
+        self.springs.connect(world)
         world["blows"] = len(self.blows.record)
         world["blown"] = len(self.field) if len(self.blows.record) else 0
         world["fields"], world["dx"] = len(self.field), self.problem.cell
-        world["tasks"], world["nodes"], world["colour"] = (
-            len(self.task),
-            len(nodes),
-            counts,
-        )
+        world["tasks"], world["nodes"], world["colour"] = len(self.task), len(nodes), counts
         world["rigids"] = len(self.field) if self.field["rigids"].any() else 0
         self.clock["laid"] = 0
         particles = sum(window.count for window in self.window.values())
-        self.program.divide(
-            (np.cumsum(counts) - counts).tolist(), len(self.task), particles
-        )
+        self.program.divide((np.cumsum(counts) - counts).tolist(), len(self.task), particles)
 
     def _connect_bonds(self) -> None:
         """Make room for every node that a frame could hold."""
@@ -240,16 +224,7 @@ class WarpEngine:
 
     def _connect_field(self, f: int, window: Window) -> None:
         record = self.field[f : f + 1]
-        for name in (
-            "part",
-            "node",
-            "next",
-            "history",
-            "table",
-            "block",
-            "where",
-            "near",
-        ):
+        for name in ("part", "node", "next", "history", "table", "block", "where", "near"):
             record[name] = getattr(window, name).ctypes.data
         record["material"] = self.material[f].ctypes.data
         record["origin"], record["dim"] = window.origin, window.dim
@@ -298,9 +273,7 @@ class WarpEngine:
             world["again"] = 1
             self.program.run(resume=True)
         self._note_steps()
-        strayed = [
-            body.carry(self.window[0], float(world["dt"][0])) for body in self.carried
-        ]
+        strayed = [body.carry(self.window[0], float(world["dt"][0])) for body in self.carried]
         if world["stop"][0] == INFINITE:
             self._find_lost()
         if world["stop"][0] == STRAYED or any(strayed):
@@ -309,9 +282,7 @@ class WarpEngine:
 
     def _note_steps(self) -> None:
         clock = self.clock[0]
-        self.steps = Steps(
-            int(clock["count"]), float(clock["smallest"]), float(clock["largest"])
-        )
+        self.steps = Steps(int(clock["count"]), float(clock["smallest"]), float(clock["largest"]))
 
     @property
     def mass(self) -> list[float]:
@@ -322,8 +293,8 @@ class WarpEngine:
         """Move what the tasks added up into the ledger."""
         total = self.report[:, [PLASTIC, VISCOUS, WORK]].sum(axis=0)
         self.ledger.plastic_loss += total[0]
-        self.ledger.viscous_loss += total[1]
-        self.ledger.push_work += total[2] + self.blows.take_work()
+        self.ledger.viscous_loss += total[1] + self.springs.take_loss()
+        self.ledger.push_work += total[2] + self.blows.take_work() + self.springs.take_work()
         self.report[:, [PLASTIC, VISCOUS, WORK]] = 0.0
 
     def _sort(self, fields: set[int]) -> None:
@@ -331,9 +302,7 @@ class WarpEngine:
         self._find_lost()
         for f in sorted(fields):
             if not self.window[f].sort():
-                raise SimulationError(
-                    _too_wide(self.problem, self.members[f], self.time)
-                )
+                raise SimulationError(_too_wide(self.problem, self.members[f], self.time))
         self.connect()
 
     def _find_lost(self) -> None:
@@ -343,9 +312,7 @@ class WarpEngine:
         for window in self.window.values():
             place = window.position()
             rows = window.channel(3, 21)
-            good = np.isfinite(rows).all(axis=1) & (np.abs(place) < FARTHEST).all(
-                axis=1
-            )
+            good = np.isfinite(rows).all(axis=1) & (np.abs(place) < FARTHEST).all(axis=1)
             for plane in self.problem.planes:
                 height = place @ np.array(plane.normal) - plane.offset / cell
                 good &= height > -SUNK
@@ -388,11 +355,7 @@ class WarpEngine:
         for f, window in self.window.items():
             head = f"field{f}."
             window.restore(
-                {
-                    k.removeprefix(head): v
-                    for k, v in saved.items()
-                    if k.startswith(head)
-                }
+                {k.removeprefix(head): v for k, v in saved.items() if k.startswith(head)}
             )
         for b, state in self.rigid.items():
             state[:] = saved[f"rigid{b}"]

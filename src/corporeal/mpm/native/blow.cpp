@@ -21,41 +21,7 @@ struct Load {
     double given = force * dt / (1.0 + force * dt / (mass * against));
     for (int i = 0; i < 3; i++) J[i] -= given * a[i] / size;
   }
-  // Hand an impulse to the nodes around a particle; the work that it does on them.
-  static inline double hand(const World *w, const Field &field, const float *q, int lane,
-                            const double *J) {
-    int base[3];
-    float W[3][3];
-    for (int d = 0; d < 3; d++) {
-      int x = ((const int *)(q + 8 * (XI + d)))[lane];
-      base[d] = (x - HALF) >> PLACE;
-      float f = (float)(x - (base[d] << PLACE)) / UNIT;
-      float a = 1.5f - f, b = f - 1.0f, c = f - 0.5f;
-      W[d][0] = 0.5f * a * a;
-      W[d][1] = 0.75f - b * b;
-      W[d][2] = 0.5f * c * c;
-    }
-    double work = 0;
-    for (int i = 0; i < 3; i++)
-      for (int j = 0; j < 3; j++)
-        for (int k = 0; k < 3; k++) {
-          int x = base[0] + i, y = base[1] + j, z = base[2] + k;
-          int block = field.table[((x >> 2) * field.dim[1] + (y >> 2)) * field.dim[2] + (z >> 2)];
-          size_t at = (size_t)block * 64 + (x & 3) * 16 + (y & 3) * 4 + (z & 3);
-          float *node = field.node + 8 * at;
-          double weight = W[0][i] * W[1][j] * W[2][k], lighter = 1.0 / node[0];
-          for (int d = 0; d < 3; d++) {
-            double part = weight * J[d];
-            double momentum = node[1 + d] + w->dt * node[4 + d];
-            work += part * (lighter * (momentum + 0.5 * part) + w->kick[d]);
-            node[4 + d] += (float)(part / w->dt);
-          }
-        }
-    return work;
-  }
 };
-const int RIGID_CENTRE = 1, RIGID_TURN = 4, RIGID_SPEED = 22, RIGID_MOMENT = 25, RIGID_INERTIA = 28,
-          RIGID_SPIN = 37, RIGID_KICK = 41;
 const double dt = world->dt, middle = world->time + 0.5 * dt;
 for (int n = 0; n < world->blows; n++) {
   Blow &B = world->blow[n];
@@ -120,7 +86,7 @@ for (int n = 0; n < world->blows; n++) {
           Load::turned(F, B.area + 3 * a, area);
           Load::press(B.half_rho_c, area, seen, q[8 * MA + lane], dt, J);
         }
-        B.work += Load::hand(world, field, q, lane, J);
+        B.work += Hand::over(world, field, q, lane, J);
         for (int d = 0; d < 3; d++) total[d] += J[d];
       }
     }

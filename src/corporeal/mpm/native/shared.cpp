@@ -77,6 +77,20 @@ struct Blow {               // a body in the wind: see blow.py
   double wind[3], gust, start, end, half_rho_c, work;
   int field, first, count, free;
 };
+struct Tether {             // particles of a field on springs to a rigid body: see springs.py
+  double *anchor, *rate, *holder;
+  double damping, lost;
+  int field, first, count;
+};
+struct Joint {              // two rigid bodies: arms in their own frames
+  double *first, *second;
+  double arm_first[3], arm_second[3], stiffness, damping, lost;
+};
+struct Grip {               // a spring from a body to a point outside: see grip.py
+  double *share, *rigid, *impulse;
+  double arm[3], target[3], stiffness, damping, mass, work;
+  int field, first, count;
+};
 struct World {
   Crew *crew;
   Clock *clock;
@@ -87,10 +101,14 @@ struct World {
   double *contact_point, *face;
   Blow *blow;
   Bond *bond;
+  Tether *tether;
+  Joint *joint;
+  Grip *grip;
   double dx, dt, time, kick[3];
   int fields, planes, tasks, full;
   int names, again;   // bodies and planes in the books; a repeated call after more memory
   int blows, blown, bonds;   // bodies in the wind; tasks on them
+  int tethers, joints, grips, sprung;   // sprung: whether there is any of them
   int stop;           // why the steps end after this phase; 0: they go on
   int nodes, colour[4];             // tasks on nodes, and on particles of each colour
   int bare_nodes, bare[4];          // the same where this step's nodes are still to be laid

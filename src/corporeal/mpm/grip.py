@@ -1,0 +1,102 @@
+"""Taking hold of a body from outside: a blow at a point, and a spring that drags it along.
+
+Both reach the particles within ``REACH`` cells of the point, weighted by (1 - d²/r²)² and mass; a
+point that lies farther out takes hold of the nearest particle's surroundings. A rigid body is
+taken exactly at the point.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from corporeal.errors import UserError
+from corporeal.mpm.problem import Body
+from corporeal.types import Vector
+
+REACH = 2.0
+"""Radius of the hold [cells]."""
+
+
+@dataclass(frozen=True)
+class Hold:
+    """Which part of a body is held; H particles, one for a rigid body."""
+
+    particle: Int[np.ndarray, " H"]
+    """Of the body's particles; those of a rigid body are not looked at."""
+    share: Float[np.ndarray, " H"]
+    """Of the impulse, in sum 1 [-]."""
+    mass: float
+    """What moves at once [kg]; all of a rigid body."""
+    arm: Float[np.ndarray, "3"]
+    """Rigid: where it is held, from its centre, in its own frame [m]."""
+
+
+@dataclass(frozen=True)
+class Grip:
+    """A damped spring between a part of a body and a point in space."""
+
+    hold: Hold
+    target: Float[np.ndarray, "3"]
+    """[m]"""
+    stiffness: float
+    """k [N/m]"""
+    damping: float
+    """c [N s/m], critical for the whole body."""
+
+    def impulse(
+        self, place: Float[np.ndarray, "3"], velocity: Float[np.ndarray, "3"], dt: float
+    ) -> Float[np.ndarray, "3"]:
+        """Give the spring's impulse in a step [N s], never more than brings what it holds to rest.
+
+        J = dt (k (x_target - x) - c v) / (1 + (c dt + k dt²)/m)
+        """
+        stiff = self.damping * dt + self.stiffness * dt**2
+        force = self.stiffness * (self.target - place) - self.damping * velocity
+        return dt * force / (1.0 + stiff / self.hold.mass)
+
+
+def take_hold(body: Body, position: Float[np.ndarray, "P 3"], point: Vector, cell: float) -> Hold:
+    """Hold a body that bends at a point [m] of space; its particles are where they are now."""
+    away = np.linalg.norm(position - np.array(point), axis=1)
+    if away.min() > REACH * cell:
+        away = np.linalg.norm(position - position[np.argmin(away)], axis=1)
+    near = np.flatnonzero(away < REACH * cell)
+    weight = (1.0 - (away[near] / (REACH * cell)) ** 2) ** 2
+    weight = weight * (body.volume * body.density)[near]
+    held = float((body.volume * body.density)[near].sum())
+    return Hold(near, weight / weight.sum(), held, np.zeros(3))
+
+
+def take_hold_of_rigid(
+    mass: float, centre: Float[np.ndarray, "3"], turn: Float[np.ndarray, "3 3"], point: Vector
+) -> Hold:
+    """Hold a rigid body at a point [m] of space."""
+    arm = turn.T @ (np.array(point, np.float64) - centre)
+    return Hold(np.zeros(1, np.int64), np.ones(1), mass, arm)
+
+
+def gripped(hold: Hold, target: Vector, stiffness: float, total: float) -> Grip | None:
+    """Pull on what is held; None with stiffness 0: let go.
+
+    Args:
+        hold: What is held.
+        target: Where to [m].
+        stiffness: Of the spring [N/m].
+        total: Mass of the whole body [kg].
+
+    Raises:
+        UserError: The stiffness is negative or no number.
+
+    """
+    if not 0.0 <= stiffness < np.inf:
+        raise UserError(f"A drag's stiffness is {stiffness} N/m. Give 0 (let go) or more.")
+    if stiffness == 0.0:
+        return None
+    damping = 2.0 * float(np.sqrt(stiffness * total))
+    return Grip(hold, np.array(target, np.float64), stiffness, damping)
+
+
+def moved(grip: Grip, target: Vector) -> Grip:
+    """Pull somewhere else [m]."""
+    return replace(grip, target=np.array(target, np.float64))

@@ -1,0 +1,42 @@
+// Impulses from single particles to the nodes around them, between the scatter and the forces.
+struct Hand {
+  // Hand an impulse to the nodes around a particle; the work that it does on them.
+  static inline double over(const World *w, const Field &field, const float *q, int lane,
+                            const double *J) {
+    int base[3];
+    float W[3][3];
+    for (int d = 0; d < 3; d++) {
+      int x = ((const int *)(q + 8 * (XI + d)))[lane];
+      base[d] = (x - HALF) >> PLACE;
+      float f = (float)(x - (base[d] << PLACE)) / UNIT;
+      float a = 1.5f - f, b = f - 1.0f, c = f - 0.5f;
+      W[d][0] = 0.5f * a * a;
+      W[d][1] = 0.75f - b * b;
+      W[d][2] = 0.5f * c * c;
+    }
+    double work = 0;
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++)
+        for (int k = 0; k < 3; k++) {
+          int x = base[0] + i, y = base[1] + j, z = base[2] + k;
+          int block = field.table[((x >> 2) * field.dim[1] + (y >> 2)) * field.dim[2] + (z >> 2)];
+          size_t at = (size_t)block * 64 + (x & 3) * 16 + (y & 3) * 4 + (z & 3);
+          float *node = field.node + 8 * at;
+          double weight = W[0][i] * W[1][j] * W[2][k], lighter = 1.0 / node[0];
+          for (int d = 0; d < 3; d++) {
+            double part = weight * J[d];
+            double momentum = node[1 + d] + w->dt * node[4 + d];
+            work += part * (lighter * (momentum + 0.5 * part) + w->kick[d]);
+            node[4 + d] += (float)(part / w->dt);
+          }
+        }
+    return work;
+  }
+  // Where a particle is [m].
+  static inline void place(const World *w, const Field &field, const float *q, int lane, double *x) {
+    for (int d = 0; d < 3; d++)
+      x[d] = (((const int *)(q + 8 * (XI + d)))[lane] / (double)UNIT + 4.0 * field.origin[d]) * w->dx;
+  }
+};
+const int RIGID_CENTRE = 1, RIGID_TURN = 4, RIGID_SPEED = 22, RIGID_MOMENT = 25, RIGID_INERTIA = 28,
+          RIGID_SPIN = 37, RIGID_KICK = 41;

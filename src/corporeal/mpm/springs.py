@@ -1,0 +1,166 @@
+"""Springs: tethers of particles, joints of rigid bodies, and grips from outside.
+
+All are damped springs whose impulse in a step never overshoots: a mass m on a spring k with a
+damper c gets J = dt (-k u - c v) / (1 + (c dt + k dt²)/m), which is stable for every step and
+exact to its first order. A joint's point is kept together, its turn sprung (soft constraints:
+Catto 2011, "Soft Constraints", GDC).
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.mpm import rigid
+from corporeal.mpm.loads import Load
+from corporeal.mpm.matter import Matter, State
+from corporeal.mpm.problem import Joint, Problem, Tether
+
+CLOSING = 0.2
+"""Share of a joint's gap that is closed in a step."""
+LONGEST = 0.2
+"""Longest step as a fraction of 1/ω of any spring."""
+
+
+@dataclass(frozen=True)
+class Pulled:
+    """What the springs gave in one step."""
+
+    state: State
+    """With the impulses on rigid bodies in their velocities."""
+    load: Load
+    """What other bodies' particles get."""
+    loss: float
+    """What dampers took [J]."""
+
+
+def pull(problem: Problem, matter: Matter, state: State, dt: float) -> Pulled:
+    """Let tethers and joints act; they do nothing in a field that all share.
+
+    ``state`` is without this step's gravity and pushes, which move all that a spring joins alike.
+    """
+    pulled = Pulled(state, Load.none(), 0.0)
+    if problem.contact == "single":
+        return pulled
+    first = 0
+    for body in problem.bodies:
+        if body.tether is not None:
+            pulled = tethered(pulled, body.tether, first, matter, dt)
+        first += len(body.position)
+    for joint in problem.joints:
+        pulled = joined(pulled, joint, matter, dt)
+    return pulled
+
+
+def tethered(pulled: Pulled, tether: Tether, first: int, matter: Matter, dt: float) -> Pulled:
+    """Pull every tethered particle back; the holder gets the reaction where the particle is."""
+    state, h = pulled.state, tether.holder
+    own = first + np.flatnonzero(tether.rate)
+    rate = tether.rate[tether.rate > 0]
+    start = matter.arm[own] + matter.centre[matter.body[own]] - matter.centre[h]
+    arm = start @ state.rotation[h].T
+    u = state.position[own] - state.centre[h] - arm
+    v = state.velocity[own] - state.speed[h] - np.cross(state.spin(matter)[h], arm)
+    brake = 2.0 * tether.damping * rate
+    whole = 1.0 / (1.0 + brake * dt + (rate * dt) ** 2)
+    mass = matter.mass[own]
+    impulse = -(mass * dt * whole)[:, None] * (rate[:, None] ** 2 * u + brake[:, None] * v)
+    loss = float(np.sum(mass * dt * whole * brake * np.sum(v * v, axis=1)))
+    place = state.position[own] - state.centre[h]
+    after = struck(state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0))
+    return Pulled(after, pulled.load.joined(Load(own, impulse)), pulled.loss + loss)
+
+
+def struck(
+    state: State,
+    matter: Matter,
+    body: int,
+    impulse: Float[np.ndarray, "3"],
+    moment: Float[np.ndarray, "3"],
+) -> State:
+    """Give a rigid body an impulse [N s] and an angular one about its centre [N m s]."""
+    speed, spin = state.speed.copy(), state.spin_momentum.copy()
+    speed[body] += impulse / matter.total[body]
+    spin[body] += moment
+    return replace(state, speed=speed, spin_momentum=spin)
+
+
+def joined(pulled: Pulled, joint: Joint, matter: Matter, dt: float) -> Pulled:
+    """Keep a joint's point together and spring its turn, both at once and implicitly.
+
+    [A  B     ] [J]   [-v - .2 e/dt      ]
+    [Bᵀ D + γ1] [T] = [-ω - k θ/(c + k dt)],  γ = 1/(dt (c + k dt)), with v, ω and e the relative
+    velocity, spin and gap of the second body from the first at the point, and θ its turn.
+    """
+    state, a, c = pulled.state, joint.first, joint.second
+    point = np.array(joint.point)
+    arms = [state.rotation[b] @ (point - matter.centre[b]) for b in (a, c)]
+    inverse = [state.inverse_inertia(matter)[b] for b in (a, c)]
+    spin = state.spin(matter)
+    crossed = [rigid.cross_matrix(arm) for arm in arms]
+    gap = state.centre[c] + arms[1] - state.centre[a] - arms[0]
+    v = state.speed[c] + np.cross(spin[c], arms[1]) - state.speed[a] - np.cross(spin[a], arms[0])
+    turn = turn_of(state.rotation[c] @ state.rotation[a].T)
+    lever = [R @ W for R, W in zip(crossed, inverse, strict=True)]
+    stiff = joint.damping + joint.stiffness * dt
+    light = 1 / matter.total[a] + 1 / matter.total[c]
+    A = light * np.eye(3) - lever[0] @ crossed[0] - lever[1] @ crossed[1]
+    B = -lever[0] - lever[1]
+    D = inverse[0] + inverse[1] + np.eye(3) / (dt * stiff)
+    wanted = [-v - CLOSING / dt * gap, spin[a] - spin[c] - joint.stiffness / stiff * turn]
+    given = np.linalg.solve(np.block([[A, B], [B.T, D]]), np.concatenate(wanted))
+    J, T = given[:3], given[3:]
+    after = struck(state, matter, a, -J, -np.cross(arms[0], J) - T)
+    after = struck(after, matter, c, J, np.cross(arms[1], J) + T)
+    relative = after.spin(matter)[c] - after.spin(matter)[a]
+    loss = joint.damping * dt * float(relative @ relative)
+    return replace(pulled, state=after, loss=pulled.loss + loss)
+
+
+def turn_of(R: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "3"]:
+    """Rotation vector of a rotation by less than half a turn [rad]."""
+    axis = 0.5 * np.array([R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]])
+    sine, cosine = float(np.linalg.norm(axis)), 0.5 * (float(np.trace(R)) - 1.0)
+    return axis * (np.arctan2(sine, cosine) / sine if sine > 1e-12 else 1.0)
+
+
+def stored(
+    problem: Problem,
+    position: Float[np.ndarray, "P 3"],
+    centre: Float[np.ndarray, "B 3"],
+    rotation: Float[np.ndarray, "B 3 3"],
+    start: Float[np.ndarray, "B 3"],
+) -> Float[np.ndarray, " B"]:
+    """Energy in the springs [J]: of a tether with its body, of a joint with its second one.
+
+    Args:
+        problem: Where the springs are.
+        position: Of all particles [m].
+        centre: Of the rigid bodies [m].
+        rotation: Of the rigid bodies.
+        start: Where their centres were at first [m].
+
+    """
+    energy, first = np.zeros(len(problem.bodies)), 0
+    for b, body in enumerate(problem.bodies):
+        mine = slice(first, first := first + len(body.position))
+        if body.tether is not None and problem.contact == "multi":
+            h, mass = body.tether.holder, body.volume * body.density
+            anchor = (body.position - start[h]) @ rotation[h].T + centre[h]
+            away = np.sum((position[mine] - anchor) ** 2, axis=1)
+            energy[b] += 0.5 * float(np.sum(mass * body.tether.rate**2 * away))
+    for joint in problem.joints if problem.contact == "multi" else ():
+        turn = turn_of(rotation[joint.second] @ rotation[joint.first].T)
+        energy[joint.second] += 0.5 * joint.stiffness * float(turn @ turn)
+    return energy
+
+
+def longest_step(problem: Problem) -> float:
+    """Longest step [s] that follows every spring's oscillation."""
+    rates = [float(b.tether.rate.max()) for b in problem.bodies if b.tether is not None]
+    for joint in problem.joints:
+        pair = [problem.bodies[b] for b in (joint.first, joint.second)]
+        inertia = [rigid.mass_of(b.position, b.volume * b.density, b.volume).inertia for b in pair]
+        lightest = min(float(np.linalg.eigvalsh(i)[0]) for i in inertia)
+        rates.append(float(np.sqrt(joint.stiffness / lightest)))
+    return LONGEST / max([*rates, 1e-30])
