@@ -7,6 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
+from typing import Any
 
 from corporeal import __version__
 
@@ -49,15 +50,20 @@ def _engines() -> list[Finding]:
 
         wp.config.log_level = wp.LOG_ERROR
         wp.init()
-        cards = [device.name for device in wp.get_cuda_devices()]
+        cards = [_card(device) for device in wp.get_cuda_devices()]
     except Exception as error:  # whatever is broken in a native library belongs in the table
         return [Finding("warp engine", False, str(error), "Reinstall: pip install warp-lang.")]
-    gpu = ", ".join(cards) or "no CUDA GPU: simulations run on the processor"
+    gpu = ", ".join(cards) or "no CUDA card: simulations run on the processor"
+    use = "Simulate on it with --engine cuda." if cards else "Not needed."
     return [
         Finding("warp engine", True, f"Warp {version('warp-lang')}, on the processor"),
-        Finding("GPU", bool(cards), gpu, "" if cards else "Not needed."),
+        Finding("GPU", bool(cards), gpu, use),
         Finding("reference engine", True, "NumPy, slow: for checking"),
     ]
+
+
+def _card(device: Any) -> str:
+    return f"{device.name} (sm_{device.arch}, {device.total_memory / 2**30:.0f} GB)"
 
 
 def _libraries() -> list[Finding]:

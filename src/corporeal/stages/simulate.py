@@ -30,8 +30,9 @@ Progress = Callable[[float, str], None]
 class SimulateConfig:
     """How the scene is stepped; nothing here tunes the physics."""
 
-    engine: Literal["warp", "reference"] = "warp"
-    """The fast engine, or the slow one in double precision that it is checked against."""
+    engine: Literal["warp", "cuda", "reference"] = "warp"
+    """The fast engine on the processor, the one for a CUDA card, or the slow one in double
+    precision that both are checked against."""
     contact: Literal["multi", "single"] = "multi"
     """One velocity field per object, or the control: one for all, which glues what touches."""
 
