@@ -47,13 +47,13 @@ class Grip:
     def impulse(
         self, place: Float[np.ndarray, "3"], velocity: Float[np.ndarray, "3"], dt: float
     ) -> Float[np.ndarray, "3"]:
-        """Give the spring's impulse in a step [N s], never more than brings what it holds to rest.
+        """Give the spring's impulse in a step [N s]: J = dt (k (x_target - x) - c v).
 
-        J = dt (k (x_target - x) - c v) / (1 + (c dt + k dt²)/m)
+        k and c are at most what the step can follow with the mass that moves at once.
         """
-        stiff = self.damping * dt + self.stiffness * dt**2
-        force = self.stiffness * (self.target - place) - self.damping * velocity
-        return dt * force / (1.0 + stiff / self.hold.mass)
+        stiffness = min(self.stiffness, 0.25 * self.hold.mass / dt**2)
+        damping = min(self.damping, 0.5 * self.hold.mass / dt)
+        return dt * (stiffness * (self.target - place) - damping * velocity)
 
 
 def take_hold(body: Body, position: Float[np.ndarray, "P 3"], point: Vector, cell: float) -> Hold:

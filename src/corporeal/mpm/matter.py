@@ -10,8 +10,8 @@ from corporeal.mpm import elasticity, rigid
 from corporeal.mpm.problem import Problem
 from corporeal.types import Law
 
-APIC_LAWS = (Law.DRUCKER_PRAGER.value, Law.VON_MISES.value)
-"""Granular and plastic matter keeps APIC."""
+PLASTIC_LAWS = (Law.DRUCKER_PRAGER.value, Law.VON_MISES.value)
+"""What flows: its shape is not only its elastic deformation."""
 
 
 @dataclass(frozen=True)
@@ -58,7 +58,7 @@ class Matter:
         body = np.repeat(np.arange(len(bodies)), [len(b.position) for b in bodies])
         stiff = np.array([b.rigid for b in bodies])[body]
         wave = np.where(stiff, 0.0, np.sqrt((lam + 2.0 * mu) / density))
-        affine = stiff | np.isin(law, APIC_LAWS) | (problem.transfer == "apic")
+        affine = stiff | (problem.transfer == "apic") | (mu == 0.0)
         remembered = np.where(affine, np.inf, wave)
         field = np.zeros_like(body) if problem.contact == "single" else body
         # Momentum is kept only if all that share a field forget at one rate.

@@ -69,8 +69,8 @@ class ReferenceEngine:
         blown = blow(self.problem, matter, self.state, dt)
         loaded = carry(blown, matter, state, grid, (mass, new))
         before = replace(loaded.state, speed=loaded.state.speed - kick)
-        pulled = pull(self.problem, matter, before, dt)
-        state = replace(pulled.state, speed=pulled.state.speed + kick)
+        pulled = pull(self.problem, matter, before, kick, dt)
+        state = pulled.state
         new = carry(pulled.load, matter, state, grid, (mass, loaded.velocity)).velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))
         stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, held)
@@ -107,9 +107,10 @@ class ReferenceEngine:
         if soft.any():
             stretch = np.linalg.norm(self.state.F[soft], axis=(1, 2)) / np.sqrt(3.0)
             wave = m.wave_speed[soft] * np.maximum(1.0, stretch)
-            damping = m.viscosity[soft] / (m.lam + 2.0 * m.mu)[soft] * wave / cell
+            modulus = np.maximum((m.lam + 2.0 * m.mu)[soft], 1e-30)
+            damping = m.viscosity[soft] / modulus * wave / cell
             slower = np.sqrt(1.0 + damping**2) - damping
-            crossing = self.problem.courant * cell / (wave.max() + speed[soft].max())
+            crossing = self.problem.courant * cell / max(wave.max() + speed[soft].max(), 1e-30)
             limits.append(crossing * slower.min())
         if m.rigid.any():
             limits.append(RIGID_COURANT * cell / max(speed[m.rigid].max(), 1e-30))

@@ -1,9 +1,8 @@
 """Springs: tethers of particles, joints of rigid bodies, and grips from outside.
 
-All are damped springs whose impulse in a step never overshoots: a mass m on a spring k with a
-damper c gets J = dt (-k u - c v) / (1 + (c dt + k dt²)/m), which is stable for every step and
-exact to its first order. A joint's point is kept together, its turn sprung (soft constraints:
-Catto 2011, "Soft Constraints", GDC).
+Tethers and grips are explicit, J = -dt (k u + c v): ``longest_step`` keeps them stable. A joint is
+implicit in both its point, which is kept together, and its turn, which is sprung at mid-step (soft
+constraints: Catto 2011, "Soft Constraints", Game Developers Conference).
 """
 
 from dataclasses import dataclass, replace
@@ -34,19 +33,27 @@ class Pulled:
     """What dampers took [J]."""
 
 
-def pull(problem: Problem, matter: Matter, state: State, dt: float) -> Pulled:
+def pull(
+    problem: Problem, matter: Matter, state: State, kick: Float[np.ndarray, "B 3"], dt: float
+) -> Pulled:
     """Let tethers and joints act; they do nothing in a field that all share.
 
-    ``state`` is without this step's gravity and pushes, which move all that a spring joins alike.
+    Args:
+        problem: Where the springs are.
+        matter: All particles.
+        state: Before gravity and pushes.
+        kick: What these add to the bodies' velocities in this step [m/s]; the result has them.
+        dt: [s]
+
     """
-    pulled = Pulled(state, Load.none(), 0.0)
     if problem.contact == "single":
-        return pulled
-    first = 0
+        return Pulled(replace(state, speed=state.speed + kick), Load.none(), 0.0)
+    pulled, first = Pulled(state, Load.none(), 0.0), 0
     for body in problem.bodies:
         if body.tether is not None:
             pulled = tethered(pulled, body.tether, first, matter, dt)
         first += len(body.position)
+    pulled = replace(pulled, state=replace(pulled.state, speed=pulled.state.speed + kick))
     for joint in problem.joints:
         pulled = joined(pulled, joint, matter, dt)
     return pulled
@@ -62,10 +69,10 @@ def tethered(pulled: Pulled, tether: Tether, first: int, matter: Matter, dt: flo
     u = state.position[own] - state.centre[h] - arm
     v = state.velocity[own] - state.speed[h] - np.cross(state.spin(matter)[h], arm)
     brake = 2.0 * tether.damping * rate
-    whole = 1.0 / (1.0 + brake * dt + (rate * dt) ** 2)
     mass = matter.mass[own]
-    impulse = -(mass * dt * whole)[:, None] * (rate[:, None] ** 2 * u + brake[:, None] * v)
-    loss = float(np.sum(mass * dt * whole * brake * np.sum(v * v, axis=1)))
+    impulse = -(mass * dt)[:, None] * (rate[:, None] ** 2 * u + brake[:, None] * v)
+    middle = v + 0.5 * impulse / mass[:, None]
+    loss = float(np.sum(mass * dt * brake * np.sum(v * middle, axis=1)))
     place = state.position[own] - state.centre[h]
     after = struck(state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0))
     return Pulled(after, pulled.load.joined(Load(own, impulse)), pulled.loss + loss)
@@ -89,8 +96,8 @@ def joined(pulled: Pulled, joint: Joint, matter: Matter, dt: float) -> Pulled:
     """Keep a joint's point together and spring its turn, both at once and implicitly.
 
     [A  B     ] [J]   [-v - .2 e/dt      ]
-    [Bᵀ D + γ1] [T] = [-ω - k θ/(c + k dt)],  γ = 1/(dt (c + k dt)), with v, ω and e the relative
-    velocity, spin and gap of the second body from the first at the point, and θ its turn.
+    [Bᵀ D + γ1] [T] = [-ω - k θ/s       ],  s = c + k dt/2, γ = 1/(dt s), with v, ω and e the
+    relative velocity, spin and gap of the second body from the first at the point, θ its turn.
     """
     state, a, c = pulled.state, joint.first, joint.second
     point = np.array(joint.point)
@@ -102,7 +109,7 @@ def joined(pulled: Pulled, joint: Joint, matter: Matter, dt: float) -> Pulled:
     v = state.speed[c] + np.cross(spin[c], arms[1]) - state.speed[a] - np.cross(spin[a], arms[0])
     turn = turn_of(state.rotation[c] @ state.rotation[a].T)
     lever = [R @ W for R, W in zip(crossed, inverse, strict=True)]
-    stiff = joint.damping + joint.stiffness * dt
+    stiff = joint.damping + 0.5 * joint.stiffness * dt
     light = 1 / matter.total[a] + 1 / matter.total[c]
     A = light * np.eye(3) - lever[0] @ crossed[0] - lever[1] @ crossed[1]
     B = -lever[0] - lever[1]

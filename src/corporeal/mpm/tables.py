@@ -11,7 +11,7 @@ from corporeal.types import Law
 
 FORGETTING = 0.1
 """κ: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
-APIC_LAWS = (Law.DRUCKER_PRAGER.value, Law.VON_MISES.value)
+PLASTIC_LAWS = (Law.DRUCKER_PRAGER.value, Law.VON_MISES.value)
 STRESSLESS = 5.0
 """Law of a rigid body's particles in a shared field."""
 PUSH = 10
@@ -58,9 +58,9 @@ def _rows(problem: Problem, body: Body, number: int) -> np.ndarray:
     rows[:, 1], rows[:, 2], rows[:, 3] = body.law, mu, lam
     rows[:, 4], rows[:, 5] = body.yield_stress, body.hardening
     rows[sand, 6] = np.asarray(cone_slope(angle))[sand]
-    rows[sand, 7] = (body.cohesion / np.tan(angle) / (lam + 2.0 * mu / 3.0))[sand]
+    rows[sand, 7] = (body.cohesion / np.tan(angle))[sand] / (lam + 2.0 * mu / 3.0)[sand]
     rows[:, 8] = body.viscosity
-    affine = np.isin(body.law, APIC_LAWS) | (problem.transfer == "apic")
+    affine = (problem.transfer == "apic") | (body.young == 0.0)
     rows[:, 9] = np.where(affine, 1e30, FORGETTING * fastest / problem.cell)
     return rows
 

@@ -66,19 +66,19 @@ for (int n = 0; n < world->tethers; n++) {
       const float *q = field.part + (size_t)(slot & ~7) * NC;
       const int lane = slot & 7, p = ((const int *)(q + 8 * ID))[lane] - T.first;
       if (p < 0 || p >= T.count || T.rate[p] == 0) continue;
-      double x[3], arm[3], va[3], J[3], about[3], speed2 = 0;
+      double x[3], arm[3], va[3], J[3], about[3], lost = 0;
       Hand::place(world, field, q, lane, x);
       Spring::turned(s, T.anchor + 3 * p, arm);
       Spring::velocity(s, arm, va);
       double rate = T.rate[p], brake = 2.0 * T.damping * rate, mass = q[8 * MA + lane];
-      double given = mass * dt / (1.0 + brake * dt + rate * dt * rate * dt);
+      double given = mass * dt;
       for (int d = 0; d < 3; d++) {
         double u = x[d] - s[RIGID_CENTRE + d] - arm[d], v = q[8 * (VE + d) + lane] - va[d];
         J[d] = -given * (rate * rate * u + brake * v);
         x[d] -= s[RIGID_CENTRE + d];
-        speed2 += v * v;
+        lost += v * (v + 0.5 * J[d] / mass);
       }
-      T.lost += given * brake * speed2;
+      T.lost += given * brake * lost;
       Hand::over(world, field, q, lane, J);
       Spring::cross(x, J, about);
       for (int d = 0; d < 3; d++) {
@@ -106,7 +106,7 @@ for (int n = 0; n < world->joints; n++) {
   turn[2] = 0.5 * (Q[3] - Q[1]);
   double sine = sqrt(turn[0] * turn[0] + turn[1] * turn[1] + turn[2] * turn[2]);
   double angle = sine > 1e-12 ? atan2(sine, 0.5 * (Q[0] + Q[4] + Q[8] - 1.0)) / sine : 1.0;
-  double stiff = N.damping + N.stiffness * dt, M[6][7], La[3][3], Lc[3][3];
+  double stiff = N.damping + 0.5 * N.stiffness * dt, M[6][7], La[3][3], Lc[3][3];
   Spring::lever(ra, a + RIGID_INERTIA, La);
   Spring::lever(rc, c + RIGID_INERTIA, Lc);
   for (int i = 0; i < 3; i++)
@@ -120,7 +120,7 @@ for (int n = 0; n < world->joints; n++) {
     }
   for (int i = 0; i < 3; i++) {
     double gap = c[RIGID_CENTRE + i] + rc[i] - a[RIGID_CENTRE + i] - ra[i];
-    M[i][6] = va[i] - vc[i] - 0.2 / dt * gap;
+    M[i][6] = va[i] + a[RIGID_KICK + i] - vc[i] - c[RIGID_KICK + i] - 0.2 / dt * gap;
     M[3 + i][6] = a[RIGID_SPIN + i] - c[RIGID_SPIN + i] - N.stiffness / stiff * angle * turn[i];
   }
   Spring::solve(M);
@@ -146,7 +146,9 @@ for (int n = 0; n < world->grips; n++) {
   Grip &G = world->grip[n];
   Field &field = world->field[G.field];
   double x[3] = {0, 0, 0}, v[3] = {0, 0, 0}, J[3], arm[3], about[3];
-  double whole = dt / (1.0 + (G.damping * dt + G.stiffness * dt * dt) / G.mass);
+  double k = 0.25 * G.mass / (dt * dt), c = 0.5 * G.mass / dt;
+  if (G.stiffness < k) k = G.stiffness;
+  if (G.damping < c) c = G.damping;
   for (int turn = 0; turn < (G.rigid ? 1 : 2); turn++) {   // look at what is held, then pull
     if (turn == 0 && G.rigid) {
       Spring::turned(G.rigid, G.arm, arm);
@@ -175,7 +177,7 @@ for (int n = 0; n < world->grips; n++) {
     }
     if (turn == 0)
       for (int d = 0; d < 3; d++)
-        J[d] = whole * (G.stiffness * (G.target[d] - x[d]) - G.damping * v[d]);
+        J[d] = dt * (k * (G.target[d] - x[d]) - c * v[d]);
   }
   if (G.rigid) {
     double before[3], after[3];
