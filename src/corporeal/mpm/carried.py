@@ -30,7 +30,7 @@ class Carried:
         at[window.number] = window.slot
         slot = at[self.first : self.first + count]
         self.batch, self.lane = slot // 8, slot % 8
-        run = np.searchsorted(window.start, slot, side="right") - 1
+        run = np.searchsorted(window.block[:, 0], slot, side="right") - 1
         self.home = window.block[run, 2:5]
 
     def carry(self, window: Window, dt: float) -> bool:

@@ -41,9 +41,11 @@ def _start_quietly() -> None:
 
 
 _start_quietly()
-wp.set_module_options(
-    {"enable_backward": False, "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast"}
-)
+OPTIONS = {
+    "enable_backward": False,
+    "cpu_compiler_flags": "-march=native -O3 -ffp-contract=fast",
+}
+wp.set_module_options(OPTIONS)
 
 _POINTERS = "part node next history material table block where near point rigid surface"
 _COUNTS = "blocks pool rigids points surfaces pushed"
@@ -194,44 +196,45 @@ nodes are bare: at the start, after a sort, and while a push acts."""
 _NATIVE = Path(__file__).parent / "native"
 
 
-def _native(*names: str) -> str:
+def native(*names: str) -> str:
+    """Source of a piece: what all share, then its own files."""
     return "\n".join((_NATIVE / f"{part}.cpp").read_text() for part in ("shared", *names))
 
 
 Memory = wp.array(dtype=wp.uint64)
 
 
-@wp.func_native(_native("conduct"))
+@wp.func_native(native("conduct"))
 def conduct_native(memory: Memory, thread: int) -> int: ...
 
 
-@wp.func_native(_native("pace"))
+@wp.func_native(native("pace"))
 def pace_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("clear"))
+@wp.func_native(native("clear"))
 def clear_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("hand", "blow"))
+@wp.func_native(native("hand", "blow"))
 def blow_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("hand", "springs"))
+@wp.func_native(native("hand", "springs"))
 def springs_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("forces"))
+@wp.func_native(native("forces"))
 def forces_native(memory: Memory, index: int): ...
 
 
-@wp.func_native(_native("laws", "gather", "scatter", "transfer"))
+@wp.func_native(native("laws", "gather", "scatter", "transfer"))
 def transfer_native(memory: Memory, index: int): ...
 
 
 def _contact() -> str:
     """Text of all pieces of contact: what they share, then one branch for each."""
-    text = [_native("bond", "contact_shared")]
+    text = [native("bond", "contact_shared")]
     for number, name in enumerate(TOUCHING.split()):
         piece = (_NATIVE / f"contact_{name}.cpp").read_text()
         text.append(f"if (piece == {number}) {{\n{piece}}}")

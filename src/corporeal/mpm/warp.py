@@ -26,6 +26,7 @@ from corporeal.mpm.kernels import (
     WORLD,
     Program,
 )
+from corporeal.mpm.kernels_sort import Sorter
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measuring import measured, shown
 from corporeal.mpm.memory import ContactMemory, point, rigid_grid
@@ -92,6 +93,8 @@ class WarpEngine:
         self.world = np.zeros(1, WORLD)
         self.field = np.zeros(len(self.members), FIELD)
         self.window: dict[int, Window] = {}
+        walls = [[*plane.normal, plane.offset / problem.cell] for plane in problem.planes]
+        sorter = Sorter(np.reshape(walls, (-1, 4)), (SUNK, FARTHEST), self.threads)
         self.material: dict[int, np.ndarray] = {}
         self.body_of_material: dict[int, np.ndarray] = {}
         for f, bodies in enumerate(self.members):
@@ -102,7 +105,7 @@ class WarpEngine:
             place = np.concatenate([problem.bodies[b].position for b in bodies]) / problem.cell
             self._refuse_far(place, bodies)
             flows = any(np.isin(problem.bodies[b].law, tables.APIC_LAWS).any() for b in bodies)
-            self.window[f] = Window(place, rows, flows)
+            self.window[f] = Window(place, rows, flows, sorter)
             if not self.window[f].fits:
                 raise SimulationError(_too_wide(problem, bodies, 0.0))
         separate = [b for b in self.rigid if self._is_rigid(b)]
@@ -299,9 +302,11 @@ class WarpEngine:
 
     def _sort(self, fields: set[int]) -> None:
         self._book()
-        self._find_lost()
         for f in sorted(fields):
-            if not self.window[f].sort():
+            fits = self.window[f].sort()
+            if self.window[f].lost:
+                self._find_lost()
+            if not fits:
                 raise SimulationError(_too_wide(self.problem, self.members[f], self.time))
         self.connect()
 

@@ -4,113 +4,61 @@ The window follows its particles: every sort places it anew around them, so the 
 of its own. Blocks that no particle reaches take no memory.
 """
 
+from functools import cached_property
+
 import numpy as np
 
-from corporeal.mpm.kernels import AF, BLOCK, ID, MA, MT, NC, NH, PLACE, VE, XI, aligned
+from corporeal.mpm.kernels import BLOCK, ID, MT, NC, NH, PLACE, XI, aligned
+from corporeal.mpm.kernels_sort import Sorter
 
 HALF = 1 << (PLACE - 1)
 LONGEST = (1 << (31 - PLACE)) // 4 - 4
 """Blocks that a window may span before places overflow."""
-KEPT = ("part", "history", "slot", "start", "end", "origin", "dim", "table", "where", "block")
+KEPT = ("part", "history", "origin", "dim", "table", "where", "block")
 """What the next step depends on."""
-NEIGHBOURS = np.array(list(np.ndindex(3, 3, 3))) - 1
 
 
 class Window:
     """Particles of one velocity field, in batches of eight, and the table of its node blocks."""
 
-    def __init__(self, place: np.ndarray, rows: np.ndarray, flows: bool) -> None:
+    def __init__(self, place: np.ndarray, rows: np.ndarray, flows: bool, sorter: Sorter) -> None:
         """Sort particles into a first window.
 
         Args:
             place: Positions in cells, (P, 3).
             rows: All other channels, (P, NC); places are filled in here.
             flows: Whether any of them remembers what matter that flows does.
+            sorter: Who sorts.
 
         """
-        self.count = len(rows)
+        self.count, self.sorter = len(rows), sorter
         corner = np.floor(place.min(axis=0) / 4).astype(np.int64) - 1
         self.origin = corner.astype(np.int32)
         self.node = self.next = aligned((0, 64, 8), np.float32)
         self.near = np.zeros(0, np.uint64)
-        rows = rows.astype(np.float32)
-        past = np.zeros((len(rows) if flows else 0, NH), np.float32)
         fixed = np.rint((place - 4 * corner) * (1 << PLACE)).astype(np.int64)
         self.fits = bool((np.abs(fixed) < 2**31).all())
-        if self.fits:
-            rows[:, XI : XI + 3] = fixed.astype(np.int32).view(np.float32)
-            self._arrange(rows, past)
+        if not self.fits:
+            return
+        rows = rows.astype(np.float32)
+        rows[:, XI : XI + 3] = fixed.astype(np.int32).view(np.float32)
+        batches = -(-len(rows) // 8)
+        self.part = aligned((batches, NC, 8), np.float32)
+        self.part.transpose(0, 2, 1)[np.arange(len(rows)) // 8, np.arange(len(rows)) % 8] = rows
+        self.history = aligned((batches if flows else 0, NH, 8), np.float32)
+        self.block = np.zeros((1, BLOCK), np.int32)
+        self.block[0, 1] = len(rows)
+        self.kinds = int(rows[:, MT].view(np.int32).max()) + 1
+        self.sort()
 
     def sort(self) -> bool:
         """Sort again and move the window; False when its particles no longer fit into one."""
-        rows = self.part.transpose(0, 2, 1).reshape(-1, NC)
-        past = self.history.transpose(0, 2, 1).reshape(-1, NH)
-        self._arrange(rows[self.slot], past[self.slot] if len(past) else past)
+        self.lost = self.sorter.survey(self)
+        self.fits = self.sorter.arrange(self, LONGEST)
+        self.__dict__.pop("slot", None)
+        if self.fits and len(self.node) < len(self.where):
+            self._make_room(len(self.where) * 3 // 2)
         return self.fits
-
-    def _arrange(self, rows: np.ndarray, past: np.ndarray) -> None:
-        x = np.ascontiguousarray(rows[:, XI : XI + 3]).view(np.int32)
-        base = (x - HALF) >> PLACE
-        block = base >> 2
-        shift = block.min(axis=0) - 1
-        dim = block.max(axis=0) - shift + 2
-        self.fits = bool((dim < LONGEST).all())
-        if not self.fits:
-            return
-        x = x - ((4 * shift) << PLACE).astype(np.int32)
-        rows[:, XI : XI + 3] = x.view(np.float32)
-        self.origin = (self.origin + shift).astype(np.int32)
-        self.dim = dim.astype(np.int32)
-        block = block - shift
-        line = (block[:, 0] * dim[1] + block[:, 1]) * dim[2] + block[:, 2]
-        cell = base & 3
-        inner = (cell[:, 0] * 4 + cell[:, 1]) * 4 + cell[:, 2]
-        kind = np.ascontiguousarray(rows[:, MT]).view(np.int32)
-        order = np.argsort((line.astype(np.int64) * (1 << 20) + kind) * 64 + inner, kind="stable")
-        _, first, counts = np.unique(line[order], return_index=True, return_counts=True)
-        self._fill(rows, past, order, first, counts)
-        self._tabulate(block[order[first]], counts)
-
-    def _fill(
-        self,
-        rows: np.ndarray,
-        past: np.ndarray,
-        order: np.ndarray,
-        first: np.ndarray,
-        counts: np.ndarray,
-    ) -> None:
-        """Copy rows into batches; what pads a batch stands where its block's first one does."""
-        padded = (counts + 7) // 8 * 8
-        start = np.cumsum(padded) - padded
-        source = np.repeat(order[first], padded)
-        self.slot = np.arange(self.count) + np.repeat(start - first, counts)
-        source[self.slot] = order
-        spread = rows[source]
-        idle = np.ones(len(source), bool)
-        idle[self.slot] = False
-        spread[idle, MA] = 0.0
-        spread[idle, ID] = np.array(-1, np.int32).view(np.float32)
-        spread[idle, VE : AF + 9] = 0.0
-        self.start, self.end = start, start + counts
-        self.part = _batches(spread)
-        self.history = _batches(past[source] if len(past) else past)
-
-    def _tabulate(self, block: np.ndarray, counts: np.ndarray) -> None:
-        """Give the node blocks that particle blocks reach numbers, and point to them."""
-        around = block[:, None, :] + NEIGHBOURS
-        table = np.full(tuple(self.dim), -1, np.int32)
-        table[tuple(around.reshape(-1, 3).T)] = 0
-        reached = np.argwhere(table == 0)
-        table[tuple(reached.T)] = np.arange(len(reached))
-        self.table = table
-        self.where = np.zeros((len(reached), 4), np.int32)
-        self.where[:, :3] = reached
-        record = np.zeros((len(block), BLOCK), np.int32)
-        record[:, 0], record[:, 1], record[:, 2:5] = self.start, self.end, block
-        record[:, 5:] = table[tuple(around.reshape(-1, 3).T)].reshape(-1, 27)
-        self.block = record
-        if len(self.node) < len(reached):
-            self._make_room(len(reached) * 3 // 2)
 
     def _make_room(self, blocks: int) -> None:
         self.node = aligned((blocks, 64, 8), np.float32)
@@ -118,6 +66,12 @@ class Window:
         self.near = np.zeros(2 * blocks, np.uint64)
 
     # ------------------------------------------------------------ reading
+
+    @cached_property
+    def slot(self) -> np.ndarray:
+        """Slots in use, in order."""
+        runs = [np.arange(low, high) for low, high in self.block[:, :2].tolist()]
+        return np.concatenate(runs)
 
     @property
     def number(self) -> np.ndarray:
@@ -137,12 +91,6 @@ class Window:
     def _rows(self, part: np.ndarray) -> np.ndarray:
         return part.transpose(0, 2, 1).reshape(-1, part.shape[1])[self.slot]
 
-    def write(self, first: int, values: np.ndarray) -> None:
-        """Put values, in slot order, into some channels."""
-        batch, lane = self.slot // 8, self.slot % 8
-        for k in range(values.shape[1]):
-            self.part[batch, first + k, lane] = values[:, k]
-
     def position(self) -> np.ndarray:
         """Positions in cells, (P, 3)."""
         fixed = self.channel(XI, 3).view(np.int32)
@@ -156,19 +104,7 @@ class Window:
 
     def saved(self) -> dict[str, np.ndarray]:
         """Everything that the next step depends on."""
-        names = (
-            "part",
-            "history",
-            "slot",
-            "start",
-            "end",
-            "origin",
-            "dim",
-            "table",
-            "where",
-            "block",
-        )
-        return {name: getattr(self, name).copy() for name in names}
+        return {name: getattr(self, name).copy() for name in KEPT}
 
     def restore(self, saved: dict[str, np.ndarray]) -> None:
         """Take back what ``saved`` gave."""
@@ -177,12 +113,6 @@ class Window:
             copy[...] = value
             setattr(self, name, copy)
         self.fits = True
+        self.__dict__.pop("slot", None)
         if len(self.node) < len(self.where):
             self._make_room(len(self.where) * 3 // 2)
-
-
-def _batches(rows: np.ndarray) -> np.ndarray:
-    """Rows (8 B, C) as batches of eight lanes, (B, C, 8)."""
-    out = aligned((len(rows) // 8, rows.shape[1], 8), np.float32)
-    out[...] = rows.reshape(-1, 8, rows.shape[1]).transpose(0, 2, 1)
-    return out

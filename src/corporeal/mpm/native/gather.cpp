@@ -13,7 +13,7 @@ struct Gather {
       f8 s[3];
 #pragma unroll
       for (int j = 0; j < 3; j++) {
-        const f8 *h = g + i * 64 + j * 8;
+        const f8 *h = g + i * LAYER + j * 8;
         const Row *w = W + (i * 3 + j) * 3;
         f8 b = w[2][l] * h[2], t = w[1][l] * h[1] + b;
         s[j] = w[0][l] * h[0] + t;
@@ -31,7 +31,7 @@ struct Gather {
     for (int i = 0; i < 8; i++)
       for (int j = 0; j < 8; j++) {
         const int *near = block + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
-        f8 *h = arena + i * 64 + j * 8;
+        f8 *h = arena + i * LAYER + j * 8;
         size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
         const f8 *g0 = (f8 *)field.node + (size_t)near[0] * 64 + row;
         const f8 *g1 = (f8 *)field.node + (size_t)near[1] * 64 + row;
@@ -44,6 +44,7 @@ struct Gather {
   inline void batch(const World *world, const Field &field, const int *block, int s, const f8 *arena) {
     const float dt = (float)world->dt, step = (float)(world->dt / world->dx), dx = (float)world->dx;
     float *q = field.part + (size_t)s * NC, *past = field.history + (size_t)s * NH;
+    for (int k = 0; k < NC * 8; k += 16) __builtin_prefetch(q + 2 * NC * 8 + k, 1, 3);
     int live = block[1] - s < 8 ? block[1] - s : 8;
     alignas(64) float W[27][8];
     alignas(32) int base[8];
@@ -233,7 +234,7 @@ struct Gather {
     for (int k = 0; k < 6; k++) *(f8u *)(q + 8 * (ST + k)) = scale * stress[k];
   }
   void block(const World *world, const Field &field, const int *block) {
-    alignas(64) f8 arena[512];
+    alignas(64) f8 arena[ARENA];
     fill(field, block, arena);
     for (int s = block[0]; s < block[1]; s += 8) batch(world, field, block, s, arena);
   }

@@ -23,7 +23,7 @@ struct Scatter {
       f8 r = r0;
 #pragma unroll
       for (int j = 0; j < 3; j++) {
-        f8 *h = g + i * 64 + j * 8;
+        f8 *h = g + i * LAYER + j * 8;
         const Row *w = W + (i * 3 + j) * 3;
         f8 s = r + a2, t = s + a2;
         h[0] += w[0][l] * r;
@@ -62,14 +62,14 @@ struct Scatter {
     for (int l = 0; l < n; l++) lane(arena + base[l], W, l, r[l], a[0][l], a[1][l], a[2][l]);
   }
   static double block(const World *world, const Field &field, const int *block, float *node) {
-    alignas(64) f8 arena[512];
+    alignas(64) f8 arena[ARENA];
     double work = 0;
-    for (int i = 0; i < 512; i++) arena[i] = Simd::all(0.0f);
+    for (int i = 0; i < ARENA; i++) arena[i] = Simd::all(0.0f);
     for (int s = block[0]; s < block[1]; s += 8) batch(world, field, block, s, arena, work);
     for (int i = 0; i < 8; i++)
       for (int j = 0; j < 8; j++) {
         const int *near = block + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
-        const f8 *h = arena + i * 64 + j * 8;
+        const f8 *h = arena + i * LAYER + j * 8;
         size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
         f8 *g0 = (f8 *)node + (size_t)near[0] * 64 + row;
         f8 *g1 = (f8 *)node + (size_t)near[1] * 64 + row;

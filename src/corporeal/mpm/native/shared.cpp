@@ -21,6 +21,9 @@ const int LAW = 0, MU = 1, LAMBDA = 2, YIELD = 3, HARD = 4, CONE = 5, APEX = 6, 
           RHO = 9, PUSH = 10, NM = 16;
 // Columns of a task's report.
 const int SPEED2 = 0, WAVE2 = 1, PLASTIC = 2, VISCOUS = 3, ASTRAY = 4, WORK = 5, NR = 8;
+// Nodes from one layer of an arena of 8 x 8 x 8 to the next: with 64, what is read in the third layer
+// would wait for what was just written in the first, 4096 bytes before.
+const int LAYER = 66, ARENA = 8 * LAYER;
 const int NB = 32;      // ints of a block's record: start, end, coordinates 3, neighbours 27
 const int MOST = 6;     // fields that may meet at one node
 
@@ -154,18 +157,30 @@ struct Simd {
     w[1] = 0.75f - b * b;
     w[2] = 0.5f * c * c;
   }
+  // Ask for the nodes around a block, some time before they are needed.
+  static inline void fetch(const float *node, const int *block) {
+    for (int i = 0; i < 8; i++)
+      for (int j = 0; j < 8; j++) {
+        const int *near = block + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
+        const float *row = node + (((i + 3) & 3) * 16 + ((j + 3) & 3) * 4) * 8;
+        __builtin_prefetch(row + (size_t)near[0] * 512 + 24, 0, 2);
+        __builtin_prefetch(row + (size_t)near[1] * 512, 0, 2);
+        __builtin_prefetch(row + (size_t)near[2] * 512, 0, 2);
+      }
+  }
   // Of a batch in a block: distances from the first node, weights of 27 nodes, and the first node's
   // place in the block's arena of 8 x 8 x 8. Who strayed is kept inside: its step counts no more.
   static inline void weights(const float *q, const int *block, f8 *D, Row *W, int *base) {
     f8 w[3][3];
-    i8 at = i8{0, 0, 0, 0, 0, 0, 0, 0};
+    const i8 zero = i8{0, 0, 0, 0, 0, 0, 0, 0};
+    i8 at = zero;
     for (int d = 0; d < 3; d++) {
       i8 x = *(const i8u *)(q + 8 * (XI + d)), cell = (x - HALF) >> PLACE;
       D[d] = flo(x - (cell << PLACE)) * PER_UNIT;
       spline(D[d], w[d]);
       cell -= 4 * block[2 + d] - 1;
-      cell = cell < 0 ? at * 0 : cell > 5 ? at * 0 + 5 : cell;
-      at = at * 8 + cell;
+      cell = cell < 0 ? zero : cell > 5 ? zero + 5 : cell;
+      at += cell * (d == 0 ? LAYER : d == 1 ? 8 : 1);
     }
     *(i8 *)base = at;
     for (int i = 0; i < 3; i++)

@@ -1,0 +1,130 @@
+"""The native sort of one field's particles, and the memory it works in."""
+
+from concurrent.futures import ThreadPoolExecutor
+from itertools import pairwise
+from typing import TYPE_CHECKING
+
+import numpy as np
+import warp as wp
+
+from corporeal.mpm.kernels import BLOCK, NC, NH, OPTIONS, Memory, aligned, native
+
+if TYPE_CHECKING:
+    from corporeal.mpm.window import Window
+
+wp.set_module_options(OPTIONS)
+
+_POINTERS = "part history to past_to old line inner count bin middle order block table where plane"
+_COUNTS = "olds bins planes lost blocks slots pool flows"
+SORTING = np.dtype(
+    [(name, "u8") for name in _POINTERS.split()]
+    + [("deepest", "f8"), ("farthest", "f8")]
+    + [(name, "i4", 3) for name in ("low", "high", "dim", "origin")]
+    + [(name, "i4") for name in _COUNTS.split()],
+    align=True,
+)
+SURVEY, COUNT, RANK, COPY = range(4)
+"""Stages of a sort."""
+SHARE = 4096
+"""Slots below which a thread is not worth waking."""
+
+
+@wp.func_native(native("sort"))
+def sort_native(memory: Memory, stage: int, low: int, high: int): ...
+
+
+@wp.kernel
+def sort(memory: Memory, stage: int, low: int, high: int):
+    sort_native(memory, stage, low, high)
+
+
+class Sorter:
+    """Sorts windows one after the other, in memory of its own."""
+
+    def __init__(self, planes: np.ndarray, domain: tuple[float, float], threads: int) -> None:
+        """Prepare.
+
+        Args:
+            planes: Normals and offsets [cells], (W, 4).
+            domain: How deep in a plane and how far from the origin [cells] a particle is lost.
+            threads: How many share the copying.
+
+        """
+        self.record = np.zeros(1, SORTING)
+        self.plane = np.ascontiguousarray(planes, float)
+        self.record["plane"], self.record["planes"] = self.plane.ctypes.data, len(planes)
+        self.record["deepest"], self.record["farthest"] = domain
+        memory = wp.array(
+            ptr=self.record.ctypes.data,
+            dtype=wp.uint64,
+            shape=self.record.nbytes // 8,
+            device="cpu",
+        )
+        self.launches = [
+            wp.launch(
+                sort, dim=1, inputs=[memory, min(k, COPY), 0, 0], device="cpu", record_cmd=True
+            )
+            for k in range(COPY + threads)
+        ]
+        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+
+    def survey(self, window: "Window") -> bool:
+        """See where a window's particles are; True when one is lost."""
+        self.old = np.ascontiguousarray(window.block[:, :2])
+        self._point(part=window.part, history=window.history, old=self.old)
+        record = self.record[0]
+        record["olds"], record["flows"] = len(self.old), len(window.history) > 0
+        record["origin"] = window.origin
+        self.launches[SURVEY].launch()
+        return bool(record["lost"])
+
+    def arrange(self, window: "Window", longest: int) -> bool:
+        """Sort what was surveyed; False, and nothing done, where it spans too many blocks."""
+        record = self.record[0]
+        shift = record["low"] - 1
+        dim = (record["high"] - shift + 2).astype(np.int32)
+        if (dim >= longest).any():
+            return False
+        record["dim"], record["bins"] = dim, 64 * window.kinds
+        lines, slots = int(np.prod(dim, dtype=np.int64)), 8 * len(window.part)
+        scratch = {
+            "line": np.empty(slots, np.int32),
+            "inner": np.empty(slots, np.int32),
+            "middle": np.empty(window.count, np.int32),
+            "count": np.zeros(lines, np.int32),
+            "bin": np.zeros(64 * window.kinds, np.int32),
+        }
+        self._point(**scratch)
+        self.launches[COUNT].launch()
+        blocks = int(record["blocks"])
+        scratch["order"] = np.empty(record["slots"], np.int32)
+        window.block = np.zeros((blocks, BLOCK), np.int32)
+        window.table = np.full(tuple(dim), -1, np.int32)
+        where = np.empty((min(lines, 27 * blocks), 4), np.int32)
+        self._point(order=scratch["order"], block=window.block, table=window.table, where=where)
+        self.launches[RANK].launch()
+        window.where = where[: record["pool"]].copy()
+        window.dim, window.origin = dim, (window.origin + shift).astype(np.int32)
+        self._copy(window)
+        return True
+
+    def _copy(self, window: "Window") -> None:
+        batches = int(self.record["slots"][0]) // 8
+        part = aligned((batches, NC, 8), np.float32)
+        history = aligned((batches if len(window.history) else 0, NH, 8), np.float32)
+        self._point(to=part, past_to=history)
+        copies = self.launches[COPY:][: max(1, 8 * batches // SHARE)]
+        end = window.block[:, 1]
+        cuts = np.searchsorted(end, np.linspace(0, end[-1], len(copies) + 1)[1:-1])
+        for launch, (low, high) in zip(copies, pairwise([0, *cuts, len(end)]), strict=True):
+            launch.set_param_at_index(2, int(low))
+            launch.set_param_at_index(3, int(high))
+        mates = [self.pool.submit(copy.launch) for copy in copies[1:]] if self.pool else []
+        copies[0].launch()
+        for mate in mates:
+            mate.result()
+        window.part, window.history = part, history
+
+    def _point(self, **arrays: np.ndarray) -> None:
+        for name, array in arrays.items():
+            self.record[name] = array.ctypes.data

@@ -1,0 +1,156 @@
+// Sorts one field's particles by block, material and cell, in four stages with Python's memory between.
+struct Sorting {
+  float *from, *past_from, *to, *past_to;
+  int *old;                 // [olds][2]: runs of slots in use before
+  int *line, *inner;        // [slots before]: a particle's block, its material and cell
+  int *count, *bin;         // [lines], [bins]: how many there are
+  int *middle, *order;      // particles sorted by material and cell; source of every slot, -1: none
+  int *block, *table, *where;
+  double *plane;            // [planes][4]
+  double deepest, farthest;
+  int low[3], high[3];      // of blocks, in the old window
+  int dim[3], origin[3];    // of the new one
+  int olds, bins, planes, lost, blocks, slots, pool, flows;
+};
+Sorting &S = *(Sorting *)memory.data;
+struct Stage {
+  static inline i8 block(const float *q, int d) {
+    return (*(const i8u *)(q + 8 * (XI + d)) - HALF) >> (PLACE + 2);
+  }
+  // Where blocks are, and whether somebody is lost.
+  static void survey(Sorting &S) {
+    i8 low[3], high[3];
+    for (int d = 0; d < 3; d++) low[d] = i8{} + (1 << 30), high[d] = -low[d];
+    i8 lost = i8{};
+    for (int r = 0; r < S.olds; r++)
+      for (int s = S.old[2 * r]; s < S.old[2 * r + 1]; s += 8) {
+        const float *q = S.from + (size_t)s * NC;
+        i8 alive = i8{0, 1, 2, 3, 4, 5, 6, 7} < S.old[2 * r + 1] - s;
+        f8 x[3], v = Simd::all(0.0f);
+        for (int d = 0; d < 3; d++) {
+          i8 b = block(q, d), first = i8{} + b[0];
+          b = alive ? b : first;
+          low[d] = b < low[d] ? b : low[d];
+          high[d] = b > high[d] ? b : high[d];
+          x[d] = Simd::flo(*(const i8u *)(q + 8 * (XI + d))) * PER_UNIT + 4.0f * S.origin[d];
+          lost |= alive & ~(Simd::size(x[d]) < (float)S.farthest);
+          v += Simd::size(*(const f8u *)(q + 8 * (VE + d)));
+        }
+        lost |= alive & ~(v < 1e30f);
+        for (int w = 0; w < S.planes; w++) {
+          const double *P = S.plane + 4 * w;
+          f8 h = x[0] * (float)P[0] + x[1] * (float)P[1] + x[2] * (float)P[2] - (float)P[3];
+          lost |= alive & ~(h > (float)-S.deepest);
+        }
+      }
+    S.lost = Simd::any(lost);
+    for (int d = 0; d < 3; d++) {
+      S.low[d] = 1 << 30;
+      S.high[d] = -(1 << 30);
+      for (int l = 0; l < 8; l++) {
+        if (low[d][l] < S.low[d]) S.low[d] = low[d][l];
+        if (high[d][l] > S.high[d]) S.high[d] = high[d][l];
+      }
+    }
+  }
+  // Keys, how many share one, blocks and slots needed.
+  static void count(Sorting &S) {
+    for (int r = 0; r < S.olds; r++)
+      for (int s = S.old[2 * r]; s < S.old[2 * r + 1]; s += 8) {
+        const float *q = S.from + (size_t)s * NC;
+        i8 line = i8{}, inner = *(const i8u *)(q + 8 * MT);
+        for (int d = 0; d < 3; d++) {
+          line = line * S.dim[d] + (block(q, d) - S.low[d] + 1);
+          inner = inner * 4 + (((*(const i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE) & 3);
+        }
+        *(i8u *)(S.line + s) = line;
+        *(i8u *)(S.inner + s) = inner;
+        int live = S.old[2 * r + 1] - s < 8 ? S.old[2 * r + 1] - s : 8;
+        for (int l = 0; l < live; l++) {
+          S.count[S.line[s + l]]++;
+          S.bin[S.inner[s + l]]++;
+        }
+      }
+    S.blocks = S.slots = 0;
+    for (int i = 0; i < S.dim[0] * S.dim[1] * S.dim[2]; i++) {
+      S.blocks += S.count[i] > 0;
+      S.slots += (S.count[i] + 7) & ~7;
+    }
+  }
+  // Two stable counting sorts, records of blocks, and the table of node blocks that they reach.
+  static void rank(Sorting &S) {
+    int sum = 0;
+    for (int i = 0; i < S.bins; i++) {
+      int n = S.bin[i];
+      S.bin[i] = sum;
+      sum += n;
+    }
+    for (int r = 0; r < S.olds; r++)
+      for (int s = S.old[2 * r]; s < S.old[2 * r + 1]; s++) S.middle[S.bin[S.inner[s]]++] = s;
+    int line = 0, slot = 0, b = 0;
+    for (int x = 0; x < S.dim[0]; x++)
+      for (int y = 0; y < S.dim[1]; y++)
+        for (int z = 0; z < S.dim[2]; z++, line++) {
+          int n = S.count[line];
+          if (!n) continue;
+          int *record = S.block + NB * b++;
+          record[0] = slot;
+          record[1] = slot + n;
+          record[2] = x;
+          record[3] = y;
+          record[4] = z;
+          S.count[line] = slot;
+          slot += (n + 7) & ~7;
+          for (int k = 0; k < 27; k++) S.table[reached(S, line, k)] = 0;
+        }
+    for (int i = 0; i < S.slots; i++) S.order[i] = -1;
+    for (int i = 0; i < sum; i++) S.order[S.count[S.line[S.middle[i]]]++] = S.middle[i];
+    line = S.pool = 0;
+    for (int x = 0; x < S.dim[0]; x++)
+      for (int y = 0; y < S.dim[1]; y++)
+        for (int z = 0; z < S.dim[2]; z++, line++) {
+          if (S.table[line] < 0) continue;
+          int *w = S.where + 4 * S.pool;
+          w[0] = x;
+          w[1] = y;
+          w[2] = z;
+          w[3] = 0;
+          S.table[line] = S.pool++;
+        }
+    for (b = 0; b < S.blocks; b++) {
+      int *record = S.block + NB * b;
+      line = (record[2] * S.dim[1] + record[3]) * S.dim[2] + record[4];
+      for (int k = 0; k < 27; k++) record[5 + k] = S.table[reached(S, line, k)];
+    }
+  }
+  static inline int reached(const Sorting &S, int line, int k) {
+    return line + ((k / 9 - 1) * S.dim[1] + k / 3 % 3 - 1) * S.dim[2] + k % 3 - 1;
+  }
+  // Copy some blocks' particles; what pads a batch stands where its block's first one does.
+  static void copy(const Sorting &S, int low, int high) {
+    for (int b = low; b < high; b++) {
+      const int *record = S.block + NB * b;
+      for (int s = record[0]; s < record[1]; s += 8) {
+        float *q = S.to + (size_t)s * NC, *past = S.past_to + (size_t)s * NH;
+        for (int l = 0; l < 8; l++) {
+          int source = S.order[s + l], there = source < 0 ? S.order[record[0]] : source;
+          const float *p = S.from + (size_t)(there & ~7) * NC + (there & 7);
+          for (int k = 0; k < NC; k++) q[8 * k + l] = p[8 * k];
+          if (S.flows) {
+            const float *h = S.past_from + (size_t)(there & ~7) * NH + (there & 7);
+            for (int k = 0; k < NH; k++) past[8 * k + l] = h[8 * k];
+          }
+          if (source >= 0) continue;
+          q[8 * MA + l] = 0;
+          ((int *)q)[8 * ID + l] = -1;
+          for (int k = VE; k < AF + 9; k++) q[8 * k + l] = 0;
+        }
+        for (int d = 0; d < 3; d++) *(i8u *)(q + 8 * (XI + d)) -= (S.low[d] - 1) * (4 << PLACE);
+      }
+    }
+  }
+};
+if (stage == 0) Stage::survey(S);
+if (stage == 1) Stage::count(S);
+if (stage == 2) Stage::rank(S);
+if (stage == 3) Stage::copy(S, low, high);
