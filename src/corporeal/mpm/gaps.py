@@ -58,8 +58,11 @@ def pair_gap(a: np.ndarray, c: np.ndarray, cell: float) -> tuple[float, float]:
     if len(near_a) == 0 or len(near_c) == 0:
         return reach, 0.0
     tree_a, tree_c = KDTree(near_a), KDTree(near_c)
-    to_c, to_a = tree_c.query(near_a)[0], tree_a.query(near_c)[0]
     close = REACH * cell
+    to_c = tree_c.query(near_a, distance_upper_bound=close)[0]  # bounded: far ones cost most
+    to_a = tree_a.query(near_c, distance_upper_bound=close)[0]
+    if np.isinf(to_c).all():
+        to_c = tree_c.query(near_a)[0]
     depth = max(
         overlap(near_a[to_c < close], tree_c, cell), overlap(near_c[to_a < close], tree_a, cell)
     )
