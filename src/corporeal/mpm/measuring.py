@@ -27,7 +27,7 @@ def shown(engine: "WarpEngine") -> Snapshot:
         motion[at] = window.past(TM, 9).reshape(-1, 3, 3) + np.eye(3)
         plastic[at] = window.past(EP, 1)[:, 0]
     law = np.concatenate([body.law for body in engine.problem.bodies])
-    flows = np.isin(law, tables.APIC_LAWS)
+    flows = np.isin(law, tables.PLASTIC_LAWS)
     motion = np.where(flows[:, None, None], motion, F)
     for b, state in engine.rigid.items():
         mine = slice(engine.first[b], engine.first[b + 1])

@@ -38,12 +38,13 @@ class Returned(NamedTuple):
 
 
 def cone_slope(friction_angle: Number) -> Number:
-    """α = √(2/3) · 2 sin φ / (3 - sin φ): the cone through Mohr–Coulomb's triaxial compression.
+    """α = (√2/3) sin φ: Mohr–Coulomb's strength in plane strain, flowing without dilation.
 
-    Klar et al. 2016, "Drucker–Prager elastoplasticity for sand animation".
+    There √J₂ = p sin φ (Davis 1968), and ‖s‖ = √(2 J₂) ≤ 3 α p. Through triaxial compression
+    instead, as in Klar et al. 2016, a slope of φ = 30° would be as strong as one of 44°, and sand
+    pushed aside, in extension, stronger still (decision 6).
     """
-    s = np.sin(friction_angle)
-    return np.sqrt(2.0 / 3.0) * 2.0 * s / (3.0 - s)
+    return np.sqrt(2.0) / 3.0 * np.sin(friction_angle)
 
 
 def return_von_mises(

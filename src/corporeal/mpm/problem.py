@@ -122,8 +122,7 @@ class Problem:
     contact: Literal["multi", "single"] = "multi"
     """One velocity field per body, or the control: one for all, which glues what touches."""
     transfer: Literal["apic", "flip"] = "flip"
-    """APIC, or affine FLIP that forgets at each body's own wave speed (granular and plastic laws
-    stay with APIC)."""
+    """APIC, or affine FLIP that forgets at each body's own wave speed."""
     courant: float = 0.4
     """Largest fraction of a cell that a wave may cross in one step."""
     bonds: tuple[tuple[int, int], ...] = ()

@@ -104,7 +104,7 @@ class WarpEngine:
             rows = tables.particle_rows(problem, bodies, self.first, kind)
             place = np.concatenate([problem.bodies[b].position for b in bodies]) / problem.cell
             self._refuse_far(place, bodies)
-            flows = any(np.isin(problem.bodies[b].law, tables.APIC_LAWS).any() for b in bodies)
+            flows = any(np.isin(problem.bodies[b].law, tables.PLASTIC_LAWS).any() for b in bodies)
             self.window[f] = Window(place, rows, flows, sorter)
             if not self.window[f].fits:
                 raise SimulationError(_too_wide(problem, bodies, 0.0))
