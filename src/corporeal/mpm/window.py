@@ -21,6 +21,22 @@ KEPT = ("part", "history", "origin", "dim", "table", "where", "block")
 class Window:
     """Particles of one velocity field, in batches of eight, and the table of its node blocks."""
 
+    part: np.ndarray
+    """Channels of all particles, (batches, NC, 8)."""
+    history: np.ndarray
+    """What matter that flows remembers besides, (batches, NH, 8); empty without any."""
+    block: np.ndarray
+    """Records of particle blocks, (blocks, BLOCK)."""
+    table: np.ndarray
+    """Number of each node block, -1: none."""
+    where: np.ndarray
+    """Coordinates of node blocks, (blocks, 4)."""
+    dim: np.ndarray
+    """Size of the table."""
+    fits: bool
+    lost: bool
+    """Whether the last sort saw a particle that is not finite or left the domain."""
+
     def __init__(self, place: np.ndarray, rows: np.ndarray, flows: bool, sorter: Sorter) -> None:
         """Sort particles into a first window.
 
