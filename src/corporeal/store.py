@@ -10,6 +10,7 @@ import fcntl
 import hashlib
 import json
 import os
+import shutil
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
@@ -62,6 +63,25 @@ def writing(path: Path) -> Iterator[None]:
             f"Cannot write {path}: {reasons[error.errno]}, then run the same command again: "
             "finished stages are kept."
         ) from error
+
+
+def require_room(folder: Path, needed: int) -> None:
+    """Refuse to begin what the disk cannot hold.
+
+    Args:
+        folder: Where it would be written.
+        needed: [bytes]
+
+    Raises:
+        DiskError: Less than that is free.
+
+    """
+    free = shutil.disk_usage(folder).free
+    if needed > free:
+        raise DiskError(
+            f"Cannot write {folder}: {needed / 1e9:.1f} GB are needed, and {free / 1e9:.1f} GB are "
+            "free. Free some space, choose another folder with --out, or ask for less detail."
+        )
 
 
 @contextmanager

@@ -4,10 +4,12 @@ import errno
 import json
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
+from corporeal import store
 from corporeal.errors import SimulationError
 from corporeal.mpm import checkpoint
 from corporeal.mpm import frames as disk
@@ -262,6 +264,16 @@ def test_a_full_disk_is_one_clear_sentence(tmp_path, monkeypatch):
         simulate(*scene_of(), SimulateConfig(), tmp_path)
     assert not list(tmp_path.rglob("*.part"))
     assert not (tmp_path / "ledger.npz").exists()
+
+
+def test_what_the_disk_cannot_hold_is_not_begun(tmp_path, monkeypatch):
+    usage = SimpleNamespace(free=50_000)
+    monkeypatch.setattr(store.shutil, "disk_usage", lambda folder: usage)
+    with pytest.raises(DiskError, match=r"GB are needed, and 0\.0 GB are free"):
+        simulate(*scene_of(), SimulateConfig(), tmp_path)
+    assert len(final(tmp_path)) == 1
+    usage.free = 50_000_000
+    assert len(simulate(*scene_of(), SimulateConfig(), tmp_path).frames) == 11
 
 
 def problem_of(monkeypatch, tmp_path, asked):

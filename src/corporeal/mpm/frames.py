@@ -62,8 +62,8 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
         partial.unlink(missing_ok=True)
 
 
-def read_arrays(path: Path) -> dict[str, np.ndarray]:
-    """Read all arrays of an npz.
+def read_arrays(path: Path, start: str = "") -> dict[str, np.ndarray]:
+    """Read the arrays of an npz whose names begin with ``start``.
 
     Raises:
         BadFileError: The file is absent or damaged.
@@ -71,7 +71,7 @@ def read_arrays(path: Path) -> dict[str, np.ndarray]:
     """
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files}
+            return {name: file[name] for name in file.files if name.startswith(start)}
     except DAMAGE as error:
         raise BadFileError(
             path, f"cannot be read ({error}).", "Run corporeal simulate again."
@@ -124,8 +124,8 @@ def read_frame(folder: Path, number: int, layout: Layout) -> Frame:
 
 def read_ledger(folder: Path, number: int) -> dict[str, np.ndarray]:
     """Read one frame's ledger."""
-    found = read_arrays(frame_path(folder, number))
-    return {k.removeprefix(PREFIX): v for k, v in found.items() if k.startswith(PREFIX)}
+    found = read_arrays(frame_path(folder, number), PREFIX)
+    return {k.removeprefix(PREFIX): v for k, v in found.items()}
 
 
 class Frames(Sequence[Frame]):

@@ -15,7 +15,7 @@ from corporeal import __version__, backends, store
 from corporeal.errors import SimulationError
 from corporeal.mpm import audit as audits
 from corporeal.mpm.checkpoint import Checkpoints, fingerprint
-from corporeal.mpm.frames import FOLDER, Layout, gather, write_frame, write_layout
+from corporeal.mpm.frames import FOLDER, Layout, frame_path, gather, write_frame, write_layout
 from corporeal.mpm.ledger_row import ledger_row
 from corporeal.mpm.pose import Posed, pose
 from corporeal.mpm.problem import MENU, Engine
@@ -135,6 +135,8 @@ class Run:
         if not done:
             write_layout(self.folder, self.layout)
             self.keep_frame(0)
+        frame = frame_path(self.folder, 0).stat().st_size
+        store.require_room(self.folder, frame * (len(self.times) - max(done, 1)))
         return max(done, 1)
 
     def words(self) -> str:
