@@ -91,7 +91,10 @@ def held_contest(contestants: list[Contestant], substeps: int) -> list[page.Resu
             page.Result(one.engine, one.drop, one.particles, cost, one.bytes, one.grown, version)
         )
         one.close()
-        print(" ".join(f"{c:{w}s}" for c, w in zip(found[-1].cells(), WIDTHS, strict=True)))
+        print(
+            " ".join(f"{c:{w}s}" for c, w in zip(found[-1].cells(), WIDTHS, strict=True)),
+            flush=True,
+        )
     return found
 
 

@@ -65,9 +65,9 @@ class Peer:
         return json.loads(line)
 
     def batch(self, substeps: int) -> float:
-        """Take some substeps; return the nanoseconds per particle and substep."""
+        """Take a third of the substeps: each costs as much as the other, and ten times ours."""
         assert self.process.stdin is not None
-        self.process.stdin.write(f"{substeps}\n")
+        self.process.stdin.write(f"{substeps // 3}\n")
         self.process.stdin.flush()
         said = self._answer()
         return 1e9 * said["seconds"] / said["substeps"] / self.particles
