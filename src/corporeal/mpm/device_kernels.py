@@ -34,6 +34,7 @@ from corporeal.mpm.device_layout import (
     VISCOUS,
     D,
     Grid,
+    Loads,
     Particles,
     Rigid,
     Sheet,
@@ -68,7 +69,7 @@ def ramped(time: wp.float64, ramp: wp.float64):
 @wp.func
 def stable(s: Sheet, r: Rigid):
     """Largest stable step now [s]: dt = s dx/(c + |v|), and the falls of what is rigid."""
-    limit = wp.min(D(1.0), FALL * wp.sqrt(s.dx / wp.max(s.pull, TINY)))
+    limit = wp.min(s.longest, FALL * wp.sqrt(s.dx / wp.max(s.pull, TINY)))
     quick = D(s.fast[2]) + D(s.fast[3])
     limit = wp.min(limit, s.courant * s.dx / wp.max(quick, TINY))
     for b in range(s.bodies):
@@ -116,7 +117,7 @@ def begin(s: Sheet, r: Rigid):
 
 
 @wp.kernel
-def tick(s: Sheet, r: Rigid):
+def tick(s: Sheet, r: Rigid, l: Loads):
     """Book a step that was taken, and plan the next one."""
     if s.flag[FULL] != 2:
         dt = s.clock[DT]
@@ -127,10 +128,11 @@ def tick(s: Sheet, r: Rigid):
         s.clock[SMALLEST] = wp.min(s.clock[SMALLEST], dt)
         s.clock[LARGEST] = wp.max(s.clock[LARGEST], dt)
         for b in range(s.bodies):
-            s.external[b] = s.external[b] + s.mass[b] * s.kick[b]
+            s.external[b] = s.external[b] + s.mass[b] * s.kick[b] + l.external[b]
         for i in range(2):
             s.fast[2 + i] = s.fast[i]
             s.fast[i] = 0.0
+        s.loss[VISCOUS, 0] = s.loss[VISCOUS, 0] + l.loss[0]
     plan(s, r)
 
 
@@ -138,7 +140,7 @@ def tick(s: Sheet, r: Rigid):
 
 
 @wp.kernel
-def scatter(p: Particles, g: Grid, s: Sheet, stride: int):
+def scatter(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
     """Sum mass, momentum, and momentum as it was."""
     dt = wp.float32(s.clock[DT])
     for i in range(wp.tid(), p.count, stride):
@@ -154,7 +156,7 @@ def scatter(p: Particles, g: Grid, s: Sheet, stride: int):
         B = m * p.affine[i]
         A = B + dt * wp.mat33(t[0], t[1], t[2], t[1], t[3], t[4], t[2], t[4], t[5])
         old = m * p.velocity[i]
-        new = old + m * wp.vec3(s.kick[int(p.table[row, BODY])])
+        new = old + m * wp.vec3(s.kick[int(p.table[row, BODY])]) + l.given[i]
         w = splines(f)
         for x in range(3):
             for y in range(3):
@@ -222,7 +224,7 @@ def work_of(eta: wp.float32, B: wp.mat33, L: wp.mat33):
 
 
 @wp.kernel
-def gather(p: Particles, g: Grid, s: Sheet, stride: int):
+def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
     """Velocities, affine parts, places, strain, return map and stress."""
     if s.flag[FULL] == 2:
         return
@@ -235,6 +237,8 @@ def gather(p: Particles, g: Grid, s: Sheet, stride: int):
         row = p.kind[i]
         w = splines(f)
         keep = 1.0 - wp.min(1.0, p.table[row, FORGET] * dt)
+        given = l.given[i]
+        blown = wp.length_sq(given) > 0.0 and l.faces > 0
         v = wp.vec3(0.0)
         u = wp.vec3(0.0)
         L = wp.mat33(0.0)
@@ -249,7 +253,7 @@ def gather(p: Particles, g: Grid, s: Sheet, stride: int):
                     now = n * wp.vec3(q[1], q[2], q[3])
                     v += now
                     L += wp.outer(now, arm)
-                    if keep > 0.0:
+                    if keep > 0.0 or blown:
                         was = n * g.old[node]
                         u += was
                         K += wp.outer(was, arm)
@@ -260,6 +264,8 @@ def gather(p: Particles, g: Grid, s: Sheet, stride: int):
         if wp.length_sq(push) > 0.0:
             mean = before + 0.5 * wp.vec3(s.kick[body])
             book(s, PUSHING, i, p.mass[i] * wp.dot(push, mean))
+        if blown:
+            book(s, PUSHING, i, 0.5 * wp.dot(given, u + v))
         C = L
         if keep > 0.0:
             C = L + keep * (B - K)
