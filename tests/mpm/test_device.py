@@ -1,10 +1,12 @@
 """The engine for CUDA cards, run on the processor: it follows the reference and keeps its word."""
 
+from dataclasses import dataclass, fields
+
 import numpy as np
 import pytest
 
 from corporeal.errors import SimulationError, UserError
-from corporeal.mpm import device
+from corporeal.mpm import device_program as program
 from corporeal.mpm.device import DeviceEngine
 from corporeal.mpm.problem import FLOOR, MENU, Body, Problem
 from corporeal.mpm.reference import ReferenceEngine
@@ -182,11 +184,11 @@ def test_going_on_from_a_saved_state_changes_nothing():
 def test_too_little_room_is_enlarged_and_nothing_is_lost_or_done_twice():
     given = fall(Law.NEO_HOOKEAN)
     ample, cramped = on_processor(given), on_processor(given)
-    cramped.contacts = cramped.memory.contacts(given, 2)
-    cramped.grid = cramped.memory.grid(given, 4)
+    cramped.arrays.contacts = cramped.memory.contacts(given, 2)
+    cramped.arrays.grid = cramped.memory.grid(given, 4)
     for engine in (ample, cramped):
         engine.advance(0.04)
-    assert cramped.contacts.room > 2 and cramped.grid.room > 4
+    assert cramped.arrays.contacts.room > 2 and cramped.arrays.grid.room > 4
     assert ample.steps == cramped.steps
     assert ample.measure().pair_impulse[0, 1] > 0
     apart = np.abs(ample.snapshot().position - cramped.snapshot().position).max()
@@ -224,7 +226,7 @@ def test_a_body_that_flies_apart_is_an_error_a_person_can_read(rigid):
 
 
 def test_without_a_card_it_says_what_to_do():
-    if device.wp.get_cuda_devices():
+    if program.wp.get_cuda_devices():
         pytest.skip("there is a card")
     with pytest.raises(UserError, match="--engine warp"):
         DeviceEngine(problem(body(ball((0, 0, 0.1)))))
@@ -235,34 +237,43 @@ def test_what_it_cannot_do_it_names():
     rigid = problem(body(ball((0, 0, 0.1)), rigid=True), contact="single")
     with pytest.raises(UserError, match="shared field"):
         on_processor(rigid)
-    soft = body(ball((0, 0, 0.1), 0.03))
-    bonded = problem(body(ball((0, 0, 0.1), 0.02), rigid=True), soft, bonds=((0, 1),))
-    with pytest.raises(UserError, match="bonds"):
-        on_processor(bonded)
+
+
+def test_what_a_later_contract_asks_for_is_refused_and_not_left_out():
+    @dataclass(frozen=True)
+    class Charged(Problem):
+        charge: tuple[float, ...] = ()
+
+    told = {
+        f.name: getattr(problem(body(ball((0, 0, 0.1), 0.02))), f.name) for f in fields(Problem)
+    }
+    on_processor(Charged(**told))
+    with pytest.raises(UserError, match="charge"):
+        on_processor(Charged(**told, charge=(1.0,)))
 
 
 # ---------------------------------------------------------------- cards
 
 
 def compiled(module, folder):
-    made = device.wp.compile_aot_module(module, arch=ARCHITECTURES, module_dir=folder)
+    made = program.wp.compile_aot_module(module, arch=ARCHITECTURES, module_dir=folder)
     return [path.suffixes[-2:] for path in made if path.stat().st_size > 10_000]
 
 
 def test_rigid_bodies_compile_for_cards_without_one(tmp_path):
     expected = [[f".sm{arch}", ".cubin"] for arch in ARCHITECTURES]
-    assert compiled(device.rigid, tmp_path) == expected
+    assert compiled(program.rigid, tmp_path) == expected
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("module", device.MODULES, ids=lambda m: m.__name__.split(".")[-1])
+@pytest.mark.parametrize("module", program.MODULES, ids=lambda m: m.__name__.split(".")[-1])
 def test_every_kernel_compiles_for_cards_without_one(module, tmp_path):
     expected = [[f".sm{arch}", ".cubin"] for arch in ARCHITECTURES]
     assert compiled(module, tmp_path) == expected
 
 
 @pytest.mark.gpu
-@pytest.mark.skipif(not device.wp.get_cuda_devices(), reason="needs a CUDA device")
+@pytest.mark.skipif(not program.wp.get_cuda_devices(), reason="needs a CUDA device")
 @pytest.mark.parametrize("law", list(Law))
 def test_a_card_moves_things_as_the_processor_does(law):
     card, here = DeviceEngine(fall(law)), on_processor(fall(law))

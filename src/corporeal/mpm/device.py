@@ -15,7 +15,7 @@ from corporeal.mpm import device_extras as extras
 from corporeal.mpm import device_layout as layout
 from corporeal.mpm.device_layout import wp
 from corporeal.mpm.device_measure import measured, shown
-from corporeal.mpm.device_memory import Memory, split
+from corporeal.mpm.device_memory import Memory, slowing, split
 from corporeal.mpm.device_program import MODULES, PARTICLE_STATE, Arrays, Program
 from corporeal.mpm.matter import Matter
 from corporeal.mpm.problem import Body, Measure, Problem, Snapshot, Steps
@@ -108,8 +108,7 @@ class DeviceEngine:
         if len(soft):
             velocity = np.concatenate([b.velocity for b in self.problem.bodies])[soft]
             speed = float(np.linalg.norm(velocity, axis=1).max())
-            damping = (m.viscosity / (m.lam + 2.0 * m.mu) * m.wave_speed / self.problem.cell)[soft]
-            wave = float((m.wave_speed[soft] * (np.sqrt(1.0 + damping**2) + damping)).max())
+            wave = float((m.wave_speed * slowing(m, self.problem.cell))[soft].max())
         self.arrays.sheet.fast.assign(np.array([0, 0, speed, wave], np.float32))
         self._arrange()
 

@@ -91,6 +91,8 @@ class Sheet:
     pull: wp.float64
     """Largest acceleration [m/s²]."""
     courant: wp.float64
+    longest: wp.float64
+    """Longest step that follows every spring [s]."""
     dx: wp.float64
     cell: wp.float32
     push: wp.array(dtype=wp.vec3d)
@@ -175,6 +177,8 @@ class Grid:
     """The same without forces."""
     meet: wp.array(dtype=wp.int32)
     """1 + the field's entry where it meets others; 0: nobody."""
+    held: wp.array(dtype=wp.int32)
+    """1 + the frame that holds the node; 0: none."""
 
 
 @wp.struct
@@ -213,6 +217,83 @@ class Rigid:
     surfaces: int
     surface_body: wp.array(dtype=wp.int32)
     surface: wp.array(dtype=wp.vec3d)
+
+
+@wp.struct
+class Loads:
+    """What acts on single particles, wind and tethers; and joints of rigid bodies."""
+
+    given: wp.array(dtype=wp.vec3)
+    """To each particle in this step [N s], in the order of ``Particles``."""
+    force: wp.array(dtype=wp.vec3d)
+    """To each rigid body [N s] …"""
+    moment: wp.array(dtype=wp.vec3d)
+    """… about its centre [N m s]."""
+    external: wp.array(dtype=wp.vec3d)
+    """Of the wind on each body [N s]."""
+    loss: wp.array(dtype=wp.float64)
+    """What tethers' dampers took in this step [J]."""
+    at: wp.array(dtype=wp.int32)
+    """Where the particle of a number is now."""
+    air: wp.array(dtype=wp.vec3d)
+    """Velocity of each body's wind [m/s], and …"""
+    gust: wp.array(dtype=wp.float64)
+    start: wp.array(dtype=wp.float64)
+    end: wp.array(dtype=wp.float64)
+    """… its swell and window; end before start: none."""
+    octave: wp.array(dtype=wp.vec3d)
+    """Share, frequency [Hz] and phase [rad] of a gust's parts."""
+    faces: int
+    face: wp.array(dtype=wp.int32)
+    """Number of the particle that each face moves with."""
+    face_body: wp.array(dtype=wp.int32)
+    area: wp.array(dtype=wp.vec3)
+    """Outward, at rest [m²]."""
+    arm: wp.array(dtype=wp.vec3d)
+    """Of a rigid body's face, from its centre [m]."""
+    weight: wp.array(dtype=wp.float32)
+    """Mass of the face's particle [kg]."""
+    tethers: int
+    tied: wp.array(dtype=wp.int32)
+    """Number of a tethered particle."""
+    holder: wp.array(dtype=wp.int32)
+    anchor: wp.array(dtype=wp.vec3d)
+    """Where it started, from the holder's centre [m]."""
+    rate: wp.array(dtype=wp.float64)
+    damping: wp.array(dtype=wp.float64)
+    """2 ζ ω [1/s]."""
+    joints: int
+    first: wp.array(dtype=wp.int32)
+    second: wp.array(dtype=wp.int32)
+    first_arm: wp.array(dtype=wp.vec3d)
+    second_arm: wp.array(dtype=wp.vec3d)
+    stiffness: wp.array(dtype=wp.float64)
+    friction: wp.array(dtype=wp.float64)
+    """Damping [N m s/rad]."""
+
+
+@wp.struct
+class Bonds:
+    """Rigid frames and the soft bodies' nodes that they hold; sums go by body."""
+
+    count: int
+    frame: wp.array(dtype=wp.int32)
+    soft: wp.array(dtype=wp.int32)
+    stiff_density: wp.array(dtype=wp.float64)
+    soft_density: wp.array(dtype=wp.float64)
+    framing: wp.array(dtype=wp.int32)
+    """1: the body is a frame."""
+    mass: wp.array(dtype=wp.float64)
+    lever: wp.array(dtype=wp.vec3d)
+    """Σ m r from the frame's centre [kg m]."""
+    momentum: wp.array(dtype=wp.vec3d)
+    moment: wp.array(dtype=wp.vec3d)
+    spread: wp.array(dtype=wp.mat33d)
+    """Σ m r rᵀ [kg m²]."""
+    centre: wp.array(dtype=wp.vec3d)
+    """The frame's own centre, and …"""
+    inertia: wp.array(dtype=wp.mat33d)
+    """… inverse inertia, while it stands for the whole."""
 
 
 @wp.struct
@@ -256,6 +337,8 @@ class Contacts:
     approach: wp.array(dtype=wp.float64)
     before: wp.array(dtype=wp.vec3d)
     impulse: wp.array(dtype=wp.vec3d)
+    apart: wp.array2d(dtype=wp.int32)
+    """1: two bodies that are never in contact."""
     hit: wp.array2d(dtype=wp.int32)
     friction: wp.array2d(dtype=wp.float64)
     restitution: wp.array2d(dtype=wp.float64)

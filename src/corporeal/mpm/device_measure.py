@@ -6,8 +6,9 @@ import numpy as np
 
 from corporeal.mpm import elasticity, rigid
 from corporeal.mpm.device_layout import PLASTIC, PUSHING, RUBBING, VISCOUS
-from corporeal.mpm.matter import APIC_LAWS
+from corporeal.mpm.matter import PLASTIC_LAWS
 from corporeal.mpm.problem import Measure, Snapshot
+from corporeal.mpm.springs import stored
 
 if TYPE_CHECKING:
     from corporeal.mpm.device import DeviceEngine
@@ -16,7 +17,7 @@ if TYPE_CHECKING:
 def shown(engine: "DeviceEngine") -> Snapshot:
     """Every particle now, in the problem's order."""
     m, cell = engine.matter, engine.problem.cell
-    count, p = len(m.mass), engine.particles
+    count, p = len(m.mass), engine.arrays.particles
     at = p.number.numpy()[: p.count]
 
     def placed(values: np.ndarray) -> np.ndarray:
@@ -28,8 +29,8 @@ def shown(engine: "DeviceEngine") -> Snapshot:
     velocity = placed(p.velocity.numpy())
     F = placed(p.strain.numpy()) + np.eye(3)
     motion = placed(p.motion.numpy()) + np.eye(3)
-    motion = np.where(np.isin(m.law, APIC_LAWS)[:, None, None], motion, F)
-    r = engine.rigid
+    motion = np.where(np.isin(m.law, PLASTIC_LAWS)[:, None, None], motion, F)
+    r = engine.arrays.rigid
     centre, turn = r.centre.numpy(), r.turn.numpy()
     speed, spin = r.speed.numpy(), r.spin.numpy()
     for b in np.flatnonzero(r.stiff.numpy()):
@@ -43,14 +44,14 @@ def shown(engine: "DeviceEngine") -> Snapshot:
 
 def measured(engine: "DeviceEngine") -> Measure:
     """Mass, momentum and energy of every body, and the ledger."""
-    m, s, state = engine.matter, engine.sheet, shown(engine)
+    m, s, state = engine.matter, engine.arrays.sheet, shown(engine)
     gradient = _affine(engine)
     spread = 0.25 * engine.problem.cell**2
     turn = np.stack([gradient[:, i, j] - gradient[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], 1)
     square = np.sum(state.velocity**2, axis=1)
     soft = np.flatnonzero(~m.rigid)
-    stored = np.zeros(len(m.mass))
-    stored[soft] = elasticity.psi(m.law[soft], state.deformation[soft], m.mu[soft], m.lam[soft])
+    strained = np.zeros(len(m.mass))
+    strained[soft] = elasticity.psi(m.law[soft], state.deformation[soft], m.mu[soft], m.lam[soft])
 
     def per_body(values: np.ndarray) -> np.ndarray:
         out = np.zeros((len(engine.problem.bodies), *values.shape[1:]))
@@ -62,6 +63,8 @@ def measured(engine: "DeviceEngine") -> Measure:
     momentum = per_body(p * state.velocity)
     angular = per_body(p * (np.cross(state.position, state.velocity) + spread * turn))
     kinetic = per_body(0.5 * m.mass * (square + spread * np.sum(gradient**2, axis=(1, 2))))
+    r = engine.arrays.rigid
+    sprung = stored(engine.problem, state.position, r.centre.numpy(), r.turn.numpy(), m.centre)
     _enter_rigid(engine, centre, momentum, angular, kinetic)
     loss = s.loss.numpy().sum(axis=1)
     return Measure(
@@ -71,7 +74,7 @@ def measured(engine: "DeviceEngine") -> Measure:
         momentum=momentum,
         angular_momentum=angular,
         kinetic=kinetic,
-        elastic=per_body(m.volume * stored),
+        elastic=per_body(m.volume * strained) + sprung,
         potential=-m.total * (centre @ np.array(engine.problem.gravity)),
         speed=float(np.sqrt(square.max())),
         lost=engine.lost.copy(),
@@ -90,7 +93,7 @@ def measured(engine: "DeviceEngine") -> Measure:
 
 def _affine(engine: "DeviceEngine") -> np.ndarray:
     """C of every particle [1/s]; 0 where rigid."""
-    p = engine.particles
+    p = engine.arrays.particles
     out = np.zeros((len(engine.matter.mass), 3, 3))
     out[p.number.numpy()[: p.count]] = p.affine.numpy()[: p.count] / engine.problem.cell
     return out
@@ -104,7 +107,7 @@ def _enter_rigid(
     kinetic: np.ndarray,
 ) -> None:
     """Rigid bodies know themselves better than their particles do."""
-    r, mass = engine.rigid, engine.matter.total
+    r, mass = engine.arrays.rigid, engine.matter.total
     place, speed = r.centre.numpy(), r.speed.numpy()
     moment, turn = r.moment.numpy(), r.turn.numpy()
     for b in np.flatnonzero(r.stiff.numpy()):

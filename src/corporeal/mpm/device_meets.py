@@ -56,6 +56,12 @@ def enter(c: Contacts, g: Grid, r: Rigid, k: int, node: int):
 
 
 @wp.func
+def there(g: Grid, node: int):
+    """Whether a field is felt at a node: a held one is its frame's."""
+    return g.node[node][0] > 0.0 and g.held[node] == 0
+
+
+@wp.func
 def walls_near(s: Sheet, r: Rigid, field: int, at: wp.vec3i):
     """How many planes a field meets at a node."""
     n = int(0)
@@ -99,6 +105,8 @@ def add_touches(c: Contacts, s: Sheet, r: Rigid, k: int, room: int):
     for a in range(n):
         f = c.field[k * MOST + a]
         for b in range(a + 1, n):
+            if c.apart[f, c.field[k * MOST + b]] == 1:
+                continue
             add_touch(c, t, k, k * MOST + a, k * MOST + b)
             c.point[t] = x
             c.fa[t] = f
@@ -122,7 +130,7 @@ def add_touches(c: Contacts, s: Sheet, r: Rigid, k: int, room: int):
 def list_meets(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
     """List nodes where fields meet each other or a plane; the lowest field enters them."""
     for i in range(wp.tid(), 64 * s.flag[BLOCKS], stride):
-        if g.node[i][0] <= 0.0:
+        if not there(g, i):
             continue
         b = i // 64
         o = i % 64
@@ -132,7 +140,7 @@ def list_meets(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             other = g.partner[MOST * b + q]
             if other < 0:
                 break
-            if g.node[64 * other + o][0] > 0.0:
+            if there(g, 64 * other + o):
                 several = 1
                 if g.field[other] < g.field[b]:
                     several = -1
@@ -152,7 +160,7 @@ def list_meets(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             other = g.partner[MOST * b + q]
             if other < 0 or c.number[k] == MOST:
                 break
-            if g.node[64 * other + o][0] > 0.0:
+            if there(g, 64 * other + o):
                 enter(c, g, r, k, 64 * other + o)
                 wp.atomic_max(g.seen, other, 2)
         add_touches(c, s, r, k, 2 * c.room)

@@ -10,6 +10,7 @@ from corporeal.mpm.device_layout import Contacts, Grid, Particles, Rigid, Sheet,
 from corporeal.mpm.matter import Matter, State
 from corporeal.mpm.plasticity import SMALLEST_ANGLE, cone_slope
 from corporeal.mpm.problem import Problem
+from corporeal.mpm.springs import longest_step
 from corporeal.types import Law
 
 FORGETTING = 0.1
@@ -80,7 +81,7 @@ class Memory:
         g.near, g.partner = self.zeros(8 * room, wp.int32), self.zeros(MOST * room, wp.int32)
         g.seen, g.aware = self.zeros(room, wp.int32), self.zeros(room, wp.int32)
         g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec3)
-        g.meet = self.zeros(64 * room, wp.int32)
+        g.meet, g.held = self.zeros(64 * room, wp.int32), self.zeros(64 * room, wp.int32)
         return g
 
     # ------------------------------------------------------------ rigid bodies
@@ -159,6 +160,10 @@ class Memory:
             self.put(restitution, wp.float64),
         )
         c.hit = self.zeros(friction.shape, wp.int32)
+        apart = np.zeros((len(problem.bodies), len(problem.bodies)), int)
+        for a, b in (*problem.bonds, *problem.apart):
+            apart[a, b] = apart[b, a] = 1
+        c.apart = self.put(apart, wp.int32)
         c.face = self.put(half_space_face(np.linspace(-1.5, 0.0, 4097)), wp.float32)
         return c
 
@@ -175,6 +180,7 @@ class Memory:
         s.loss = self.zeros((4, int(layout.LANES)), wp.float64)
         s.gravity, s.ramp = wp.vec3d(*problem.gravity), problem.gravity_ramp
         s.courant, s.dx, s.cell = problem.courant, problem.cell, problem.cell
+        s.longest = min(1.0, longest_step(problem))
         self._forces(s, problem)
         s.mass = self.put(matter.total, wp.float64)
         s.bodies, s.planes = bodies, planes
@@ -222,8 +228,7 @@ def _materials(
     mu, lam = m.mu[chosen], m.lam[chosen]
     angle = np.maximum(m.friction_angle[chosen], SMALLEST_ANGLE)
     sand = m.law[chosen] == Law.DRUCKER_PRAGER.value
-    apex = m.cohesion[chosen] / np.tan(angle) / (lam + 2.0 * mu / 3.0)
-    damping = m.viscosity[chosen] / (lam + 2.0 * mu) * m.wave_speed[chosen] / problem.cell
+    apex = m.cohesion[chosen] / np.tan(angle) / np.maximum(lam + 2.0 * mu / 3.0, 1e-30)
     rows[:, layout.LAW] = np.where(stiff, STRESSLESS, m.law[chosen])
     rows[:, layout.MU], rows[:, layout.LAMBDA] = mu, lam
     rows[:, layout.YIELD], rows[:, layout.HARD] = m.yield_stress[chosen], m.hardening[chosen]
@@ -233,11 +238,18 @@ def _materials(
     rate = FORGETTING * m.memory_speed[chosen] / problem.cell
     rows[:, layout.FORGET] = np.minimum(rate, 1e30)
     rows[:, layout.DENSITY] = m.mass[chosen] / m.volume[chosen]
-    rows[:, layout.SLOWING] = np.sqrt(1.0 + damping**2) + damping
+    rows[:, layout.SLOWING] = slowing(m, problem.cell)[chosen]
     rows[:, layout.BODY] = m.body[chosen]
     rows[stiff, 1:8] = 0.0
     table, kind = np.unique(rows.astype(np.float32), axis=0, return_inverse=True)
     return table, kind.reshape(-1)
+
+
+def slowing(m: Matter, cell: float) -> np.ndarray:
+    """How much faster a particle's waves seem to run, as viscosity asks for shorter steps [-]."""
+    stiffness = np.maximum(m.lam + 2.0 * m.mu, 1e-30)
+    damping = m.viscosity / stiffness * m.wave_speed / cell
+    return np.sqrt(1.0 + damping**2) + damping
 
 
 def _radii(matter: Matter) -> np.ndarray:

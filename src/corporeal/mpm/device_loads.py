@@ -1,0 +1,204 @@
+"""Wind, tethers and joints on the device; twins of ``loads``, ``wind`` and ``springs``."""
+
+from corporeal.mpm.device_layout import (
+    DT,
+    FULL,
+    PUSHING,
+    TIME,
+    D,
+    Loads,
+    Particles,
+    Rigid,
+    Sheet,
+    wp,
+)
+from corporeal.mpm.device_rigid import speed_at
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 0})
+
+AIR = wp.constant(0.5 * 1.2 * 1.17)
+"""½ ρ C of a plate that faces the wind [kg/m³]."""
+CLOSING = wp.constant(D(0.2))
+"""Share of a joint's gap that is closed in a step."""
+TURN = wp.constant(D(6.283185307179586))
+
+
+@wp.kernel
+def calm(p: Particles, l: Loads, s: Sheet, stride: int):
+    """Take all loads away, and say where particles are."""
+    for i in range(wp.tid(), p.count, stride):
+        l.given[i] = wp.vec3(0.0)
+        l.at[p.number[i]] = i
+    for b in range(wp.tid(), s.bodies, stride):
+        l.force[b] = wp.vec3d(D(0.0))
+        l.moment[b] = wp.vec3d(D(0.0))
+        l.external[b] = wp.vec3d(D(0.0))
+    if wp.tid() == 0:
+        l.loss[0] = D(0.0)
+
+
+@wp.func
+def push_rigid(l: Loads, b: int, arm: wp.vec3d, impulse: wp.vec3d):
+    """Give an impulse to a rigid body at an arm from its centre."""
+    wp.atomic_add(l.force, b, impulse)
+    wp.atomic_add(l.moment, b, wp.cross(arm, impulse))
+    return 0
+
+
+# ---------------------------------------------------------------- wind
+
+
+@wp.func
+def swell(l: Loads, time: wp.float64):
+    """Σ a_k sin(2π f_k t + φ_k)."""
+    total = D(0.0)
+    for k in range(l.octave.shape[0]):
+        part = l.octave[k]
+        total += part[0] * wp.sin(TURN * part[1] * time + part[2])
+    return total
+
+
+@wp.func
+def pressed(area: wp.vec3, seen: wp.vec3, mass: wp.float32, dt: wp.float32):
+    """Impulse of the air on a face [N s]; a face is never blown faster than the air."""
+    size = wp.max(wp.length(area), 1.0e-30)
+    n = area / size
+    against = wp.max(-wp.dot(seen, n), 0.0)
+    if against == 0.0:
+        return wp.vec3(0.0)
+    force = AIR * size * against * against * against / wp.length(seen)
+    return n * (-force * dt / (1.0 + force / (mass * against) * dt))
+
+
+@wp.func
+def cofactor(F: wp.mat33, area: wp.vec3):
+    """Area vector after a deformation: cof(F) N dA (Nanson's formula)."""
+    a = wp.vec3(F[0, 0], F[1, 0], F[2, 0])
+    b = wp.vec3(F[0, 1], F[1, 1], F[2, 1])
+    c = wp.vec3(F[0, 2], F[1, 2], F[2, 2])
+    return wp.cross(b, c) * area[0] + wp.cross(c, a) * area[1] + wp.cross(a, b) * area[2]
+
+
+@wp.kernel
+def blow(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
+    """Let the wind press on faces."""
+    dt = wp.float32(s.clock[DT])
+    time = s.clock[TIME] + D(0.5) * s.clock[DT]
+    for k in range(wp.tid(), l.faces, stride):
+        b = l.face_body[k]
+        if time < l.start[b] or time >= l.end[b]:
+            continue
+        air = l.air[b] * (D(1.0) + l.gust[b] * swell(l, time))
+        if r.stiff[b] == 1:
+            arm = r.turn[b] * l.arm[k]
+            seen = air - speed_at(r, b, r.centre[b] + arm)
+            area = r.turn[b] * wp.vec3d(l.area[k])
+            J = wp.vec3d(pressed(wp.vec3(area), wp.vec3(seen), l.weight[k], dt))
+            push_rigid(l, b, arm, J)
+            wp.atomic_add(l.external, b, J)
+        else:
+            i = l.at[l.face[k]]
+            F = wp.identity(n=3, dtype=wp.float32) + p.strain[i]
+            if p.table[p.kind[i], 0] > 2.5:
+                F = wp.identity(n=3, dtype=wp.float32) + p.motion[i]
+            seen_here = wp.vec3(air) - p.velocity[i]
+            given = pressed(cofactor(F, l.area[k]), seen_here, l.weight[k], dt)
+            wp.atomic_add(l.given, i, given)
+            wp.atomic_add(l.external, b, wp.vec3d(given))
+
+
+# ---------------------------------------------------------------- tethers
+
+
+@wp.kernel
+def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
+    """Pull tethered particles back; the holder gets the reaction where the particle is."""
+    dt = s.clock[DT]
+    for k in range(wp.tid(), l.tethers, stride):
+        i = l.at[l.tied[k]]
+        h = l.holder[k]
+        cell = p.cell[i]
+        low = wp.vec3d(D(cell[0]), D(cell[1]), D(cell[2]))
+        place = (low + wp.vec3d(p.place[i])) * s.dx - r.centre[h]
+        arm = r.turn[h] * l.anchor[k]
+        v = wp.vec3d(p.velocity[i]) - r.speed[h] - wp.cross(r.spin[h], arm)
+        rate = l.rate[k]
+        brake = l.damping[k]
+        mass = D(p.mass[i])
+        whole = D(1.0) / (D(1.0) + brake * dt + rate * rate * dt * dt)
+        J = (rate * rate * (place - arm) + brake * v) * (-mass * dt * whole)
+        wp.atomic_add(l.given, i, wp.vec3(J))
+        push_rigid(l, h, place, -J)
+        wp.atomic_add(l.loss, 0, mass * dt * whole * brake * wp.length_sq(v))
+
+
+# ---------------------------------------------------------------- rigid bodies
+
+
+@wp.kernel
+def load_rigid(r: Rigid, l: Loads, s: Sheet):
+    """Give rigid bodies their loads; the wind's work is booked, that of tethers is stored."""
+    b = wp.tid()
+    if r.stiff[b] == 1 and s.flag[FULL] != 2:
+        speed = r.speed[b]
+        spin = r.inertia[b] * r.moment[b]
+        r.speed[b] = speed + l.force[b] * r.light[b]
+        r.moment[b] = r.moment[b] + l.moment[b]
+        r.spin[b] = r.inertia[b] * r.moment[b]
+        if l.tethers == 0:
+            mean = D(0.5) * (speed + r.speed[b]) + s.kick[b]
+            work = wp.dot(l.force[b], mean)
+            work += wp.dot(l.moment[b], D(0.5) * (spin + r.spin[b]))
+            wp.atomic_add(s.loss, PUSHING, b % 256, work)
+
+
+@wp.func
+def turn_of(R: wp.mat33d):
+    """Rotation vector of a rotation by less than half a turn [rad]."""
+    axis = D(0.5) * wp.vec3d(R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1])
+    sine = wp.length(axis)
+    if sine > D(1e-12):
+        return axis * (wp.atan2(sine, D(0.5) * (wp.trace(R) - D(1.0))) / sine)
+    return axis
+
+
+@wp.func
+def strike(r: Rigid, b: int, impulse: wp.vec3d, moment: wp.vec3d):
+    """Give a rigid body an impulse, and an angular one about its centre."""
+    r.speed[b] = r.speed[b] + impulse * r.light[b]
+    r.moment[b] = r.moment[b] + moment
+    r.spin[b] = r.inertia[b] * r.moment[b]
+    return 0
+
+
+@wp.kernel
+def join(r: Rigid, l: Loads, s: Sheet):
+    """Keep joints together and spring their turns, one joint after the other."""
+    if s.flag[FULL] == 2:
+        return
+    dt = s.clock[DT]
+    one = wp.identity(n=3, dtype=wp.float64)
+    for k in range(l.joints):
+        a = l.first[k]
+        c = l.second[k]
+        arm_a = r.turn[a] * l.first_arm[k]
+        arm_c = r.turn[c] * l.second_arm[k]
+        gap = r.centre[c] + arm_c - r.centre[a] - arm_a
+        v = r.speed[c] + wp.cross(r.spin[c], arm_c) - r.speed[a] - wp.cross(r.spin[a], arm_a)
+        turn = turn_of(r.turn[c] * wp.transpose(r.turn[a]))
+        X = wp.skew(arm_a)
+        Y = wp.skew(arm_c)
+        stiff = l.friction[k] + l.stiffness[k] * dt
+        A = (r.light[a] + r.light[c]) * one - X * r.inertia[a] * X - Y * r.inertia[c] * Y
+        B = -(X * r.inertia[a]) - Y * r.inertia[c]
+        G = r.inertia[a] + r.inertia[c] + one * (D(1.0) / (dt * stiff))
+        pulled = -v - gap * (CLOSING / dt)
+        twisted = r.spin[a] - r.spin[c] - turn * (l.stiffness[k] / stiff)
+        # Two blocks at once: T from the second row, J from what is left of the first.
+        inverse = wp.inverse(G)
+        J = wp.inverse(A - B * inverse * wp.transpose(B)) * (pulled - B * inverse * twisted)
+        T = inverse * (twisted - wp.transpose(B) * J)
+        strike(r, a, -J, -wp.cross(arm_a, J) - T)
+        strike(r, c, J, wp.cross(arm_c, J) + T)
+        relative = r.spin[c] - r.spin[a]
+        l.loss[0] = l.loss[0] + l.friction[k] * dt * wp.length_sq(relative)
