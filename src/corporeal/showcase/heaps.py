@@ -30,17 +30,17 @@ def mud_pile() -> Model:
 
 
 def sand_pile() -> Model:
-    """Dry sand, 2 m across, poured at 25 degrees, with wind ripples."""
-    rim = _outline(1.0, 8, 0.025)
+    """Dry sand, 1.2 m across, poured at 25 degrees, with wind ripples."""
+    rim = _outline(0.6, 8, 0.025)
     dune, fine = sdf.noise3(4, 2.2), sdf.noise3(9, 1.0)
 
     def height(x: np.ndarray, y: np.ndarray) -> np.ndarray:
         s = _share(x, y, rim)
-        cone = np.tan(np.radians(25)) * (1 - s - 0.28 * np.exp(-((s / 0.33) ** 2)))
+        cone = 0.6 * np.tan(np.radians(25)) * (1 - s - 0.28 * np.exp(-((s / 0.33) ** 2)))
         phase = (x * 0.8 + 0.5 * y + 0.035 * _relief(dune, x, y, 0.3)) / 0.10
         strength = 0.5 + 0.5 * np.clip(_relief(dune, y, x, 0.5), -1, 1)
         ripple = np.sin(2 * np.pi * phase) * np.clip((1 - s) * 4, 0, 1) * strength
-        grain = 0.012 * _relief(dune, x, y, 0.35) + 0.0008 * _relief(fine, x, y, 0.08)
+        grain = 0.009 * _relief(dune, x, y, 0.35) + 0.0008 * _relief(fine, x, y, 0.08)
         return cone + 0.0055 * ripple + np.clip((1 - s) * 5, 0, 1) * grain
 
     colours = ("#b28a54", "#dcb77e", "#f1d9aa")

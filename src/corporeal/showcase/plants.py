@@ -134,7 +134,7 @@ def _pot_and_soil() -> tuple[Mesh, Mesh]:
 
 
 def small_tree(seed: int = 9) -> Model:
-    """Model a young broadleaf tree, 1.79 m, its roots flaring into the ground."""
+    """Model a broadleaf sapling, 1.08 m, its roots flaring into the ground."""
     rng = np.random.default_rng(seed)
     t = np.linspace(0, 1, 14)
     bend = np.stack([0.05 * np.sin(2.5 * t), 0.04 * np.sin(3.4 * t + 0.5) - 0.019], 1)
@@ -158,10 +158,15 @@ def small_tree(seed: int = 9) -> Model:
     return Model(
         "small_tree",
         (
-            Part("trunk", trunk, pictured("tree bark", bark, 0.9), "hardwood"),
-            Part("leaves", leaves, green, "leaves-flowers"),
+            Part("trunk", _sized(trunk), pictured("tree bark", bark, 0.9), "hardwood"),
+            Part("leaves", _sized(leaves), green, "leaves-flowers"),
         ),
     )
+
+
+def _sized(mesh: Mesh) -> Mesh:
+    """Bring the tree, which was drawn at 1.8 m, to a sapling's size."""
+    return replace(mesh, vertices=0.6 * mesh.vertices)
 
 
 def _grow(rng: np.random.Generator, bud: Bud, habit: Habit) -> list[Twig]:

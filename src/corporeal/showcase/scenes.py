@@ -146,13 +146,17 @@ def ficus_pushed() -> Composition:
 
 
 def tree_and_ball_in_sand() -> Composition:
-    """Drop a ball on a heap of sand that a young tree stands in, 0.2 m deep."""
+    """Drop a ball from 1.2 m on a heap of sand that a sapling stands in, 0.1 m deep.
+
+    A ball of 230 kg/m³ and D = 0.19 m leaves a crater of about .14/tan φ √(ρ_b/ρ_g) D^⅔ H^⅓
+    (Uehara et al. 2003), 3 cm at φ = 33°.
+    """
     return Composition(
         "Sand flows: the ball digs in, the heap slumps about the trunk.",
         (
             Placed("sand_pile"),
-            Placed("small_tree", (-0.12, -0.10, 0.11)),
-            Placed("ball", (0.42, 0.30, 0.62), velocity=fallen(1.2, 0.4)),
+            Placed("small_tree", (-0.12, -0.09, 0.06)),
+            Placed("ball", (0.19, 0.14, 0.29), velocity=fallen(1.2, 0.12)),
         ),
         view=(0.80, -0.62, 0.36),
         duration=1.5,
