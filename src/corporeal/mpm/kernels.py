@@ -315,8 +315,12 @@ class Program:
         crew["threads"], crew["started"], crew["stopped"] = self.hands, 0, 0
         crew["post"] = 0
         self.world["stop"] = self.world["full"] = 0
-        mates = [self.pool.submit(other.launch) for other in self.launches[1 : self.hands]]
-        self.launches[0].launch()
+        self.share(self.launches[: self.hands])
+
+    def share(self, launches: list[wp.Launch]) -> None:
+        """Run launches at once, one on each thread."""
+        mates = [self.pool.submit(other.launch) for other in launches[1:]] if self.pool else []
+        launches[0].launch()
         for mate in mates:
             mate.result()
 

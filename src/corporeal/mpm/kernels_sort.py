@@ -1,13 +1,12 @@
 """The native sort of one field's particles, and the memory it works in."""
 
-from concurrent.futures import ThreadPoolExecutor
 from itertools import pairwise
 from typing import TYPE_CHECKING
 
 import numpy as np
 import warp as wp
 
-from corporeal.mpm.kernels import BLOCK, NC, NH, OPTIONS, Memory, aligned, native
+from corporeal.mpm.kernels import BLOCK, NC, NH, OPTIONS, Memory, Program, aligned, native
 
 if TYPE_CHECKING:
     from corporeal.mpm.window import Window
@@ -41,13 +40,13 @@ def sort(memory: Memory, stage: int, low: int, high: int):
 class Sorter:
     """Sorts windows one after the other, in memory of its own."""
 
-    def __init__(self, planes: np.ndarray, domain: tuple[float, float], threads: int) -> None:
+    def __init__(self, planes: np.ndarray, domain: tuple[float, float], program: Program) -> None:
         """Prepare.
 
         Args:
             planes: Normals and offsets [cells], (W, 4).
             domain: How deep in a plane and how far from the origin [cells] a particle is lost.
-            threads: How many share the copying.
+            program: Whose threads share the copying.
 
         """
         self.record = np.zeros(1, SORTING)
@@ -64,9 +63,9 @@ class Sorter:
             wp.launch(
                 sort, dim=1, inputs=[memory, min(k, COPY), 0, 0], device="cpu", record_cmd=True
             )
-            for k in range(COPY + threads)
+            for k in range(COPY + program.threads)
         ]
-        self.pool = ThreadPoolExecutor(threads) if threads > 1 else None
+        self.share = program.share
 
     def survey(self, window: "Window") -> bool:
         """See where a window's particles are; True when one is lost."""
@@ -119,10 +118,7 @@ class Sorter:
         for launch, (low, high) in zip(copies, pairwise([0, *cuts, len(end)]), strict=True):
             launch.set_param_at_index(2, int(low))
             launch.set_param_at_index(3, int(high))
-        mates = [self.pool.submit(copy.launch) for copy in copies[1:]] if self.pool else []
-        copies[0].launch()
-        for mate in mates:
-            mate.result()
+        self.share(copies)
         window.part, window.history = part, history
 
     def _point(self, **arrays: np.ndarray) -> None:

@@ -26,6 +26,7 @@ from corporeal.mpm.kernels import (
     WORLD,
     Program,
 )
+from corporeal.mpm.kernels_read import Reader
 from corporeal.mpm.kernels_sort import Sorter
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measuring import measured, shown
@@ -91,10 +92,12 @@ class WarpEngine:
     def _lay_out(self) -> None:
         problem = self.problem
         self.world = np.zeros(1, WORLD)
+        self.program = Program(self.world, self.threads)
         self.field = np.zeros(len(self.members), FIELD)
         self.window: dict[int, Window] = {}
         walls = [[*plane.normal, plane.offset / problem.cell] for plane in problem.planes]
-        sorter = Sorter(np.reshape(walls, (-1, 4)), (SUNK, FARTHEST), self.threads)
+        sorter = Sorter(np.reshape(walls, (-1, 4)), (SUNK, FARTHEST), self.program)
+        self.reader = Reader(problem.cell, self.program)
         self.material: dict[int, np.ndarray] = {}
         self.body_of_material: dict[int, np.ndarray] = {}
         for f, bodies in enumerate(self.members):
@@ -130,7 +133,6 @@ class WarpEngine:
         )
         self.springs = Springs(problem, self.first, self.ledger.external_impulse, self.rigid)
         self.bond = tables.bonds(problem)
-        self.program = Program(self.world, self.threads)
         self._wind_clock()
         self.connect()
 

@@ -100,12 +100,7 @@ struct Gather {
     float rate = step;
     for (int k = 0; k < 9; k++) H[k] = *(f8u *)(q + 8 * (DE + k));
     for (int k = 0; k < 9; k++) A[k] = L[k] * (on * rate);
-    f8 G[9];
-    for (int i = 0; i < 3; i++)
-      for (int j = 0; j < 3; j++)
-        G[3 * i + j] = H[3 * i + j] + A[3 * i + j] + A[3 * i] * H[j] + A[3 * i + 1] * H[3 + j] +
-                       A[3 * i + 2] * H[6 + j];
-    for (int k = 0; k < 9; k++) H[k] = G[k];
+    follow(A, H);
     // b - 1 = H + Ht + H Ht
     f8 E[6];
     int n = 0;
@@ -120,99 +115,27 @@ struct Gather {
     f8 volume = *(f8u *)(q + 8 * VO);
     f8 stress[6], wave = t.lambda + 2.0f * t.mu;
     for (int k = 0; k < 6; k++) stress[k] = Simd::all(0.0f);
-
-    i8 neo = t.law == 1.0f;
-    if (Simd::any(neo)) {
-      f8 l = t.lambda * Math::log1p(Simd::high(j1, Simd::all(-0.999f)));
-      for (int k = 0; k < 6; k++)
-        stress[k] = Simd::pick(neo, t.mu * E[k] + (k == 0 || k == 3 || k == 5 ? l : 0.0f * l),
-                               stress[k]);
-      f8 bound = Simd::high(Simd::high(E[0] + Simd::size(E[1]) + Simd::size(E[2]),
-                                       E[3] + Simd::size(E[1]) + Simd::size(E[4])),
-                            E[5] + Simd::size(E[2]) + Simd::size(E[4]));
-      f8 w = t.lambda + 2.0f * t.mu * (1.0f + Simd::high(bound, Simd::all(0.0f)));
-      wave = Simd::pick(neo, w, wave);
+    i8 fixed = t.law == 0.0f, neo = t.law == 1.0f, logarithmic = (t.law >= 2.0f) & (t.law < 5.0f);
+    if (Simd::any(fixed)) {
+      f8 tau[6], c;
+      Laws::corotated(t, E, j1, tau, c);
+      take(fixed, tau, stress);
+      wave = Simd::pick(fixed, c, wave);
     }
-    if (Simd::any((t.law != 1.0f) & (t.law < 5.0f))) {
-      f8 l[3], U[9], sigma[3], s1[3], p[3];
-      Math::eigen(E, l, U);
-      for (int i = 0; i < 3; i++) {
-        l[i] = Simd::high(l[i], Simd::all(-0.9999f));
-        sigma[i] = Simd::root(1.0f + l[i]);
-        s1[i] = l[i] / (1.0f + sigma[i]);
-        p[i] = Simd::all(0.0f);
-      }
-      i8 fixed = t.law == 0.0f;
-      if (Simd::any(fixed)) {
-        // An inverted particle has its smallest stretch negative.
-        i8 turned = j1 < -1.0f;
-        f8 least = Simd::low(sigma[0], Simd::low(sigma[1], sigma[2]));
-        f8 most = Simd::high(sigma[0], Simd::high(sigma[1], sigma[2]));
-        f8 lj = t.lambda * (1.0f + j1) * j1;
-        for (int i = 0; i < 3; i++) {
-          i8 flip = turned & (sigma[i] == least);
-          f8 g = Simd::pick(flip, -sigma[i], sigma[i]);
-          f8 g1 = Simd::pick(flip, g - 1.0f, s1[i]);
-          p[i] = Simd::pick(fixed, 2.0f * t.mu * g * g1 + lj, p[i]);
-        }
-        f8 J = Simd::high(1.0f + j1, Simd::all(1.0f));
-        most = Simd::high(most, Simd::all(1.0f));
-        f8 w = 2.0f * t.mu * most * (2.0f * most - 1.0f) + t.lambda * J * (2.0f * J - 1.0f);
-        wave = Simd::pick(fixed, w, wave);
-      }
-      i8 log_law = t.law >= 2.0f;
-      if (Simd::any(log_law)) {
-        f8 eps[3], old[3], lost = Simd::all(0.0f), change = lost;
-        for (int i = 0; i < 3; i++) old[i] = eps[i] = 0.5f * Math::log1p(l[i]);
-        i8 flow = t.law >= 3.0f;
-        if (Simd::any(flow)) {
-          f8 ep = *(f8u *)(past + 8 * EP), vc = *(f8u *)(past + 8 * VC);
-          i8 grain = t.law == 3.0f;
-          if (Simd::any(grain)) {
-            f8 e[3] = {eps[0], eps[1], eps[2]}, d, v = vc;
-            f8 w = Laws::sand(t, e, d, v);
-            for (int i = 0; i < 3; i++) eps[i] = Simd::pick(grain, e[i], eps[i]);
-            change = Simd::pick(grain, d, change);
-            lost = Simd::pick(grain, w, lost);
-            *(f8u *)(past + 8 * VC) = Simd::pick(grain & alive, v, vc);
-          }
-          i8 ductile = t.law == 4.0f;
-          if (Simd::any(ductile)) {
-            f8 e[3] = {eps[0], eps[1], eps[2]}, d;
-            f8 w = Laws::metal(t, e, d, ep);
-            for (int i = 0; i < 3; i++) eps[i] = Simd::pick(ductile, e[i], eps[i]);
-            change = Simd::pick(ductile, d, change);
-            lost = Simd::pick(ductile, w, lost);
-          }
-          *(f8u *)(past + 8 * EP) = ep + 0.81649658f * change * on;
-          lost *= volume * on;
-          for (int k = 0; k < 8; k++) plastic += lost[k];
-          // H = U diag(exp(new - old)) Ut (1 + H) - 1
-          f8 g[3], S[6];
-          for (int i = 0; i < 3; i++) g[i] = Math::expm1(eps[i] - old[i]);
-          Math::compose(U, g, S);
-          f8 M[9] = {S[0], S[1], S[2], S[1], S[3], S[4], S[2], S[4], S[5]};
-          for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++) {
-              f8 h = H[3 * i + j] + M[3 * i + j] + M[3 * i] * H[j] + M[3 * i + 1] * H[3 + j] +
-                     M[3 * i + 2] * H[6 + j];
-              G[3 * i + j] = Simd::pick(flow, h, H[3 * i + j]);
-            }
-          for (int k = 0; k < 9; k++) H[k] = G[k];
-          // The whole motion, plastic part included.
-          for (int k = 0; k < 9; k++) G[k] = *(f8u *)(past + 8 * (TM + k));
-          for (int i = 0; i < 3; i++)
-            for (int j = 0; j < 3; j++)
-              *(f8u *)(past + 8 * (TM + 3 * i + j)) =
-                  G[3 * i + j] + A[3 * i + j] + A[3 * i] * G[j] + A[3 * i + 1] * G[3 + j] + A[3 * i + 2] * G[6 + j];
-        }
-        f8 tr = eps[0] + eps[1] + eps[2];
-        for (int i = 0; i < 3; i++)
-          p[i] = Simd::pick(log_law, 2.0f * t.mu * eps[i] + t.lambda * tr, p[i]);
-      }
-      f8 S[6];
-      Math::compose(U, p, S);
-      for (int k = 0; k < 6; k++) stress[k] = Simd::pick(neo, stress[k], S[k]);
+    if (Simd::any(neo)) {
+      f8 tau[6], c;
+      Laws::neo_hookean(t, E, j1, tau, c);
+      take(neo, tau, stress);
+      wave = Simd::pick(neo, c, wave);
+    }
+    if (Simd::any(logarithmic)) {
+      f8 e[6];
+      Function::half_log(E, e);
+      if (Simd::any((t.law >= 3.0f) & logarithmic)) plastic += flow(t, on, volume, A, past, e, H);
+      f8 tr = t.lambda * (e[0] + e[3] + e[5]);
+      for (int k = 0; k < 6; k++) e[k] = 2.0f * t.mu * e[k];
+      for (int k = 0; k < 6; k += k == 3 ? 2 : 3) e[k] += tr;
+      take(logarithmic, e, stress);
     }
     if (Simd::any(t.visc > 0.0f)) {
       f8 eta = t.visc * Simd::high(1.0f + j1, Simd::all(0.0f)) * (1.0f / dx), w = Simd::all(0.0f);
@@ -232,6 +155,58 @@ struct Gather {
     for (int k = 0; k < 9; k++) *(f8u *)(q + 8 * (DE + k)) = H[k];
     f8 scale = volume * (-4.0f / dx) * on;
     for (int k = 0; k < 6; k++) *(f8u *)(q + 8 * (ST + k)) = scale * stress[k];
+  }
+  static inline void take(i8 where, const f8 *from, f8 *to) {
+    for (int k = 0; k < 6; k++) to[k] = Simd::pick(where, from[k], to[k]);
+  }
+  // (1 + H) <- (1 + M) (1 + H)
+  static inline void follow(const f8 *M, f8 *H) {
+    f8 G[9];
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++)
+        G[3 * i + j] = H[3 * i + j] + M[3 * i + j] + M[3 * i] * H[j] + M[3 * i + 1] * H[3 + j] +
+                       M[3 * i + 2] * H[6 + j];
+    for (int k = 0; k < 9; k++) H[k] = G[k];
+  }
+  // Strain e and F = 1 + H after plastic flow; the whole motion goes on by A. Returns the work.
+  static inline double flow(const Stuff &t, f8 on, f8 volume, const f8 *A, float *past, f8 *e, f8 *H) {
+    i8 grain = t.law == 3.0f, ductile = t.law == 4.0f;
+    f8 ep = *(f8u *)(past + 8 * EP), vc = *(f8u *)(past + 8 * VC), zero = Simd::all(0.0f);
+    f8 change = zero, lost = zero, moved[6], X[6];
+    for (int k = 0; k < 6; k++) moved[k] = zero;
+    if (Simd::any(grain)) {
+      f8 s[6], m[6], d, v = vc;
+      for (int k = 0; k < 6; k++) s[k] = e[k];
+      f8 w = Laws::sand(t, s, m, d, v);
+      take(grain, s, e);
+      take(grain, m, moved);
+      change = Simd::pick(grain, d, change);
+      lost = Simd::pick(grain, w, lost);
+      *(f8u *)(past + 8 * VC) = Simd::pick(grain & (on > 0.0f), v, vc);
+    }
+    if (Simd::any(ductile)) {
+      f8 s[6], m[6], d;
+      for (int k = 0; k < 6; k++) s[k] = e[k];
+      f8 w = Laws::metal(t, s, m, d, ep);
+      take(ductile, s, e);
+      take(ductile, m, moved);
+      change = Simd::pick(ductile, d, change);
+      lost = Simd::pick(ductile, w, lost);
+    }
+    *(f8u *)(past + 8 * EP) = ep + 0.81649658f * change * on;
+    if (Simd::any(Sym::bound(moved) > 0.0f)) {
+      Function::expm1(moved, X);
+      f8 M[9] = {X[0], X[1], X[2], X[1], X[3], X[4], X[2], X[4], X[5]};
+      follow(M, H);
+    }
+    f8 G[9];
+    for (int k = 0; k < 9; k++) G[k] = *(f8u *)(past + 8 * (TM + k));
+    follow(A, G);
+    for (int k = 0; k < 9; k++) *(f8u *)(past + 8 * (TM + k)) = G[k];
+    lost *= volume * on;
+    double work = 0;
+    for (int k = 0; k < 8; k++) work += lost[k];
+    return work;
   }
   void block(const World *world, const Field &field, const int *block) {
     alignas(64) f8 arena[ARENA];

@@ -98,17 +98,155 @@ struct Stuff {
     return t;
   }
 };
-// Laws in principal form (design: physics, section 3). H = F - 1 keeps small strains exact.
+// Symmetric matrices as 00 01 02 11 12 22.
+struct Sym {
+  // C = A B of matrices that commute.
+  static inline void times(const f8 *A, const f8 *B, f8 *C) {
+    f8 c[6] = {A[0] * B[0] + A[1] * B[1] + A[2] * B[2], A[0] * B[1] + A[1] * B[3] + A[2] * B[4],
+               A[0] * B[2] + A[1] * B[4] + A[2] * B[5], A[1] * B[1] + A[3] * B[3] + A[4] * B[4],
+               A[1] * B[2] + A[3] * B[4] + A[4] * B[5], A[2] * B[2] + A[4] * B[4] + A[5] * B[5]};
+    for (int k = 0; k < 6; k++) C[k] = c[k];
+  }
+  static inline void invert(const f8 *A, f8 *B) {
+    f8 c[6] = {A[3] * A[5] - A[4] * A[4], A[2] * A[4] - A[1] * A[5], A[1] * A[4] - A[2] * A[3],
+               A[0] * A[5] - A[2] * A[2], A[1] * A[2] - A[0] * A[4], A[0] * A[3] - A[1] * A[1]};
+    f8 per = 1.0f / (A[0] * c[0] + A[1] * c[1] + A[2] * c[2]);
+    for (int k = 0; k < 6; k++) B[k] = c[k] * per;
+  }
+  // A = a A + b 1
+  static inline void scale(f8 *A, float a, float b) {
+    for (int k = 0; k < 6; k++) A[k] *= a;
+    for (int k = 0; k < 6; k += k == 3 ? 2 : 3) A[k] += b;
+  }
+  // Largest sum of sizes in a row: no eigenvalue is larger (Gershgorin).
+  static inline f8 bound(const f8 *A) {
+    f8 a = Simd::size(A[1]), b = Simd::size(A[2]), c = Simd::size(A[4]);
+    return Simd::high(Simd::high(Simd::size(A[0]) + a + b, Simd::size(A[3]) + a + c),
+                      Simd::size(A[5]) + b + c);
+  }
+};
+// Functions of symmetric matrices: by series where the argument is small in all lanes, else by
+// eigenvalues.
+struct Function {
+  // Y = ln(1 + X)/2 = Z + Z^3/3 + Z^5/5 + ... with Z = X/(2 + X), to 1e-7 of itself.
+  static inline void half_log(const f8 *X, f8 *Y) {
+    f8 Z[6], W[6], P[6];
+    if (Simd::any(Sym::bound(X) > 0.3f)) return by_values(X, 0, Y);
+    for (int k = 0; k < 6; k++) Z[k] = X[k];
+    Sym::scale(Z, 1.0f, 2.0f);
+    Sym::invert(Z, Z);
+    Sym::times(X, Z, Z);
+    Sym::times(Z, Z, W);
+    for (int k = 0; k < 6; k++) P[k] = W[k];
+    Sym::scale(P, 1.0f / 7.0f, 1.0f / 5.0f);
+    Sym::times(W, P, P);
+    Sym::scale(P, 1.0f, 1.0f / 3.0f);
+    Sym::times(W, P, P);
+    Sym::times(Z, P, P);
+    for (int k = 0; k < 6; k++) Y[k] = Z[k] + P[k];
+  }
+  // Y = (1 + X)^1/2 - 1: Pade's approximant (8 X + 4 X^2)/(16 + 12 X + X^2), and one step of Newton.
+  static inline void root(const f8 *X, f8 *Y) {
+    f8 A[6], B[6];
+    if (Simd::any(Sym::bound(X) > 0.6f)) return by_values(X, 1, Y);
+    Sym::times(X, X, A);
+    for (int k = 0; k < 6; k++) {
+      B[k] = 12.0f * X[k] + A[k];
+      A[k] = 8.0f * X[k] + 4.0f * A[k];
+    }
+    Sym::scale(B, 1.0f, 16.0f);
+    Sym::invert(B, B);
+    Sym::times(A, B, Y);
+    Sym::times(Y, Y, A);
+    for (int k = 0; k < 6; k++) {
+      A[k] = X[k] - 2.0f * Y[k] - A[k];
+      B[k] = 2.0f * Y[k];
+    }
+    Sym::scale(B, 1.0f, 2.0f);
+    Sym::invert(B, B);
+    Sym::times(A, B, A);
+    for (int k = 0; k < 6; k++) Y[k] += A[k];
+  }
+  // Y = exp(X) - 1
+  static inline void expm1(const f8 *X, f8 *Y) {
+    f8 A[6];
+    if (Simd::any(Sym::bound(X) > 0.3f)) return by_values(X, 2, Y);
+    for (int k = 0; k < 6; k++) A[k] = X[k];
+    Sym::scale(A, 1.0f / 6.0f, 1.0f);
+    for (int n = 5; n > 1; n--) {
+      Sym::times(X, A, A);
+      Sym::scale(A, 1.0f / n, 1.0f);
+    }
+    Sym::times(X, A, Y);
+  }
+  __attribute__((noinline)) static void by_values(const f8 *X, int which, f8 *Y) {
+    f8 l[3], U[9];
+    Math::eigen(X, l, U);
+    for (int i = 0; i < 3; i++) {
+      f8 low = Simd::high(l[i], Simd::all(-0.9999f));
+      if (which == 0) l[i] = 0.5f * Math::log1p(low);
+      if (which == 1) l[i] = low / (1.0f + Simd::root(1.0f + low));
+      if (which == 2) l[i] = Math::expm1(l[i]);
+    }
+    Math::compose(U, l, Y);
+  }
+};
+// Constitutive laws (design: physics, section 3) on E = b - 1, exact for small strains.
 struct Laws {
-  // Principal strain eps to the cone or cylinder; returns the plastic work per rest volume, with
-  // the stress after the return.
-  static inline f8 sand(const Stuff &t, f8 *eps, f8 &change, f8 &vc) {
-    f8 zero = Simd::all(0.0f), h[3], work = zero;
-    for (int i = 0; i < 3; i++) eps[i] += vc * (1.0f / 3.0f);
-    f8 tr = eps[0] + eps[1] + eps[2], mean = tr * (1.0f / 3.0f);
-    for (int i = 0; i < 3; i++) h[i] = eps[i] - mean;
-    f8 n = Simd::root(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
-    f8 out = tr - t.apex;
+  // tau = 2 mu V (V - 1) + lambda J (J - 1), V the left stretch; c its wave modulus.
+  static inline void corotated(const Stuff &t, const f8 *E, f8 j1, f8 *tau, f8 &c) {
+    i8 turned = j1 < -1.0f;
+    f8 J = 1.0f + j1, l = t.lambda * J * j1;
+    if (Simd::any(turned)) {
+      inverted(t, E, turned, tau);
+    } else {
+      f8 V1[6], V2[6];
+      Function::root(E, V1);
+      Sym::times(V1, V1, V2);
+      for (int k = 0; k < 6; k++) tau[k] = 2.0f * t.mu * (V1[k] + V2[k]);
+    }
+    for (int k = 0; k < 6; k += k == 3 ? 2 : 3) tau[k] += l;
+    f8 most = Simd::root(1.0f + Sym::bound(E));
+    J = Simd::high(J, Simd::all(1.0f));
+    c = 2.0f * t.mu * most * (2.0f * most - 1.0f) + t.lambda * J * (2.0f * J - 1.0f);
+  }
+  // The same where det F < 0: the smallest stretch is negative there.
+  __attribute__((noinline)) static void inverted(const Stuff &t, const f8 *E, i8 turned, f8 *tau) {
+    f8 l[3], U[9], g[3];
+    Math::eigen(E, l, U);
+    for (int i = 0; i < 3; i++) {
+      l[i] = Simd::high(l[i], Simd::all(-0.9999f));
+      g[i] = Simd::root(1.0f + l[i]);
+    }
+    f8 least = Simd::low(g[0], Simd::low(g[1], g[2]));
+    for (int i = 0; i < 3; i++) {
+      i8 flip = turned & (g[i] == least);
+      f8 s = Simd::pick(flip, -g[i], g[i]);
+      l[i] = 2.0f * t.mu * s * Simd::pick(flip, s - 1.0f, l[i] / (1.0f + g[i]));
+    }
+    Math::compose(U, l, tau);
+  }
+  static inline void neo_hookean(const Stuff &t, const f8 *E, f8 j1, f8 *tau, f8 &c) {
+    f8 l = t.lambda * Math::log1p(Simd::high(j1, Simd::all(-0.999f)));
+    for (int k = 0; k < 6; k++) tau[k] = t.mu * E[k];
+    for (int k = 0; k < 6; k += k == 3 ? 2 : 3) tau[k] += l;
+    f8 bound = Simd::high(Simd::high(E[0] + Simd::size(E[1]) + Simd::size(E[2]),
+                                     E[3] + Simd::size(E[1]) + Simd::size(E[4])),
+                          E[5] + Simd::size(E[2]) + Simd::size(E[4]));
+    c = t.lambda + 2.0f * t.mu * (1.0f + Simd::high(bound, Simd::all(0.0f)));
+  }
+  // Deviator of a strain; returns its size.
+  static inline f8 deviator(const f8 *e, f8 mean, f8 *h) {
+    for (int k = 0; k < 6; k++) h[k] = e[k];
+    for (int k = 0; k < 6; k += k == 3 ? 2 : 3) h[k] -= mean;
+    return Simd::root(h[0] * h[0] + h[3] * h[3] + h[5] * h[5] +
+                      2.0f * (h[1] * h[1] + h[2] * h[2] + h[4] * h[4]));
+  }
+  // Strain to the cone; gives what it changed by, the slip, the volume correction, and the plastic
+  // work per rest volume with the stress after the return.
+  static inline f8 sand(const Stuff &t, f8 *e, f8 *moved, f8 &change, f8 &vc) {
+    f8 zero = Simd::all(0.0f), h[6], tr = e[0] + e[3] + e[5] + vc, start = tr * (1.0f / 3.0f);
+    f8 mean = start, n = deviator(e, mean - vc * (1.0f / 3.0f), h), out = tr - t.apex;
     f8 slip = n + t.cone * (3.0f * t.lambda + 2.0f * t.mu) / (2.0f * t.mu) * out;
     slip = Simd::low(Simd::high(slip, zero), n);
     i8 apex = out > 0.0f;
@@ -117,30 +255,31 @@ struct Laws {
     mean = Simd::pick(apex, t.apex * (1.0f / 3.0f), mean);
     f8 after = 3.0f * mean;
     // Beyond the apex what was open before is no new slip: only the change is.
-    f8 opened = Simd::pick(apex, vc, zero);
-    for (int i = 0; i < 3; i++) {
-      f8 next = scale * h[i] + mean;
-      work += (2.0f * t.mu * next + t.lambda * after) * (eps[i] - next - opened * (1.0f / 3.0f));
-      eps[i] = next;
-    }
+    f8 opened = Simd::pick(apex, vc, zero), gone = start - mean - opened * (1.0f / 3.0f);
+    f8 work = 2.0f * t.mu * (scale * (1.0f - scale) * n * n + after * gone) +
+              3.0f * t.lambda * after * gone;
+    f8 shift = mean - start + vc * (1.0f / 3.0f);
+    for (int k = 0; k < 6; k++) moved[k] = (scale - 1.0f) * h[k];
+    for (int k = 0; k < 6; k += k == 3 ? 2 : 3) moved[k] += shift;
+    for (int k = 0; k < 6; k++) e[k] = scale * h[k];
+    for (int k = 0; k < 6; k += k == 3 ? 2 : 3) e[k] += mean;
     out -= opened;
     change = Simd::pick(apex, Simd::root(n * n + out * out * (1.0f / 3.0f)), slip);
     vc = tr - after;
     return work;
   }
-  static inline f8 metal(const Stuff &t, f8 *eps, f8 &change, f8 ep) {
+  static inline f8 metal(const Stuff &t, f8 *e, f8 *moved, f8 &change, f8 ep) {
     const float R = 0.81649658f;
-    f8 zero = Simd::all(0.0f);
-    f8 mean = (eps[0] + eps[1] + eps[2]) * (1.0f / 3.0f), h[3];
-    for (int i = 0; i < 3; i++) h[i] = eps[i] - mean;
-    f8 n = Simd::root(h[0] * h[0] + h[1] * h[1] + h[2] * h[2]);
+    f8 h[6], n = deviator(e, (e[0] + e[3] + e[5]) * (1.0f / 3.0f), h);
     f8 dg = (2.0f * t.mu * n - R * (t.yield + t.hard * ep)) /
             (2.0f * t.mu + (2.0f / 3.0f) * t.hard);
-    dg = Simd::high(dg, zero);
-    f8 scale = 1.0f - dg / Simd::high(n, Simd::all(1e-30f));
-    for (int i = 0; i < 3; i++) eps[i] = scale * h[i] + mean;
+    dg = Simd::high(dg, Simd::all(0.0f));
+    f8 less = dg / Simd::high(n, Simd::all(1e-30f));
+    for (int k = 0; k < 6; k++) {
+      moved[k] = -less * h[k];
+      e[k] += moved[k];
+    }
     change = dg;
-    return 2.0f * t.mu * n * scale * dg;
+    return 2.0f * t.mu * n * (1.0f - less) * dg;
   }
 };
-
