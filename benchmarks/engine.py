@@ -87,14 +87,15 @@ def held_contest(contestants: list[Contestant], substeps: int) -> list[page.Resu
     found = []
     for one, cost in zip(contestants, contest(contestants, substeps), strict=True):
         version = one.version if isinstance(one, Peer) else ""
+        upkeep = one.upkeep() if isinstance(one, Ours) else {}
         found.append(
-            page.Result(one.engine, one.drop, one.particles, cost, one.bytes, one.grown, version)
+            page.Result(
+                one.engine, one.drop, one.particles, cost, one.bytes, one.grown, version, upkeep
+            )
         )
         one.close()
-        print(
-            " ".join(f"{c:{w}s}" for c, w in zip(found[-1].cells(), WIDTHS, strict=True)),
-            flush=True,
-        )
+        cells = zip(found[-1].cells(), WIDTHS, strict=True)
+        print(" ".join(f"{cell:{width}s}" for cell, width in cells), flush=True)
     return found
 
 

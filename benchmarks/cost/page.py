@@ -4,7 +4,7 @@ import os
 import platform
 import time
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -42,6 +42,8 @@ class Result:
     grown: float
     """What the process grew by while the engine was made [bytes]; nan: not known."""
     version: str = ""
+    upkeep: dict[str, float] = field(default_factory=dict)
+    """What is done once a frame beside the substeps [s]."""
 
     def row(self) -> dict[str, Any]:
         """Return what --json writes."""
@@ -128,6 +130,7 @@ def write(results: list[Result], where: str, command: str, docs: Path) -> None:
         command=command,
         targets=_table(("what", "measured", "target", ""), _targets(results)),
         figures="\n".join(shown),
+        upkeep=_upkeep(results),
         rows=_table(HEAD, [result.cells() for result in results]),
     )
     (docs / "benchmarks.md").write_text(text, encoding="utf-8")
@@ -151,6 +154,8 @@ elastic material, on a dense grid of 64³ cells, in single precision, in a proce
 {targets}
 
 {figures}
+{upkeep}
+
 {rows}
 
 How to measure again (the peer is optional, and needs 3 GB of disk):
@@ -229,6 +234,17 @@ def _judged(
     sign = "≤" if at_most else "≥"
     figure = f"{value:.0f} {unit}" if unit != "×" else f"{value:.2f} ×"
     return what, figure, f"{sign} {target:g} {unit}", "✓" if met else "missed"
+
+
+def _upkeep(results: list[Result]) -> str:
+    """Say what the largest problem needs beside its substeps."""
+    largest = max((r for r in results if r.upkeep), key=lambda r: (r.particles, r.grown))
+    seconds = "; ".join(f"{words} {value:.2f} s" for words, value in largest.upkeep.items())
+    return (
+        f"With {largest.particles:,} particles the engine holds {largest.bytes / 1e6:.0f} MB, and "
+        f"the process grows by {largest.grown / 1e6:.0f} MB when it is made. A substep takes "
+        f"{largest.cost * largest.particles / 1e9:.3f} s. Once a frame: {seconds}."
+    )
 
 
 # ---------------------------------------------------------------- figures
