@@ -310,7 +310,7 @@ class MaterialField:
 class Treatment:
     """How one part enters the simulation: real numbers, simulated numbers, and why they differ."""
 
-    kind: Literal["rigid", "deformable", "shell"]
+    kind: Literal["rigid", "deformable", "shell", "foliage"]
     young_real: float
     """[Pa]"""
     young: float
@@ -331,6 +331,21 @@ class Treatment:
     step: float
     """Largest stable time step of this part [s]; inf when rigid."""
     why: str
+
+
+@dataclass(frozen=True)
+class Root:
+    """How a plant stands in its soil: a sprung joint between its wood and the rest."""
+
+    object: int
+    part: int
+    """The wood: index into the catalogue of parts."""
+    point: Vector
+    """About which it rocks [m]."""
+    stiffness: float
+    """[N m/rad]"""
+    damping: float
+    """[N m s/rad]"""
 
 
 @dataclass(frozen=True)
@@ -364,6 +379,11 @@ class Particles:
         default_factory=lambda: np.zeros(0, dtype=np.int64)
     )
     """Which particle bears each of those faces."""
+    rate: Float[np.ndarray, " R"] = field(default_factory=lambda: np.zeros(0))
+    """Natural angular frequency of every particle of foliage on its stalk, 0 for all others
+    [rad/s]; empty where there is no foliage."""
+    roots: tuple[Root, ...] = ()
+    """Of plants that stand in soil."""
     fills: tuple[str, ...] = ()
     """How each part was filled, in words, for the report."""
     warnings: tuple[str, ...] = ()

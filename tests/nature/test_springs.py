@@ -51,8 +51,8 @@ def test_a_damped_tether_books_what_its_damper_takes(engine):
     after = run.measure()
     energy = (after.kinetic + after.elastic).sum()
     assert after.viscous_loss > 0.1 * before.kinetic.sum()
-    # Within a swing the energy of symplectic Euler goes up and down by ω dt/2, here 10 %.
-    assert energy + after.viscous_loss == pytest.approx(before.kinetic.sum(), rel=0.06)
+    # Within a swing the energy of symplectic Euler goes up and down by ω dt/2, here 2.5 %.
+    assert energy + after.viscous_loss == pytest.approx(before.kinetic.sum(), rel=0.02)
     assert after.momentum.sum(axis=0) == pytest.approx(
         before.momentum.sum(axis=0), abs=1e-5 * before.momentum.max()
     )
@@ -61,20 +61,16 @@ def test_a_damped_tether_books_what_its_damper_takes(engine):
     )
 
 
-def test_gravity_lets_a_tethered_crown_sag_by_g_over_its_rate_squared(fast_engine):
-    held = post(surface=box_surface((0, 0, 0.1), (0.02, 0.02, 0.2)))
-    run = fast_engine(
-        problem(
-            held,
-            crown(20.0, damping=1.0),
-            cell=CELL,
-            planes=(floor(),),
-            gravity=FALL,
-            apart=((0, 1),),
-        )
-    )
-    run.advance(1.0)
-    assert run.measure().centre[1, 2] == pytest.approx(0.3 - 9.81 / 400, abs=3e-4)
+def test_a_tethered_crown_hangs_where_it_hung(fast_engine):
+    """Its springs bear its weight from the start, and what holds them feels it."""
+    held = post(1e3, surface=box_surface((0, 0, 0.1), (0.02, 0.02, 0.2)))
+    given = problem(held, crown(20.0), cell=CELL, planes=(floor(),), gravity=FALL, apart=((0, 1),))
+    run = fast_engine(given)
+    run.advance(0.5)
+    measure = run.measure()
+    assert np.abs(measure.centre[1] - [0, 0, 0.3]).max() < 2e-4
+    impulse = measure.plane_impulse[0].sum(axis=0)
+    assert impulse[2] == pytest.approx(measure.mass.sum() * 9.81 * 0.5, rel=0.02)
 
 
 def hinged(stiffness, damping=0.0, push=None):

@@ -82,7 +82,9 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
 
 
 def recipe(member: Member, made: Make, treatment: Treatment, cell: float) -> Recipe:
-    """Say where a part's matter lies on this grid."""
+    """Say where a part's matter lies on this grid; leaves are one layer."""
+    if treatment.kind == "foliage":
+        return Recipe(0.0, 0.0, 0.0)
     simulated = treatment.thickness or max(made.thickness, 2 * cell)
     sheet = made.sheet
     if made.structure.kind == "shell" and treatment.kind == "shell":
@@ -102,6 +104,8 @@ def is_porous(member: Member, cell: float) -> bool:
 
 def how_filled(member: Member, made: Make, treatment: Treatment, cell: float) -> str:
     """Say in words what the fill is."""
+    if treatment.kind == "foliage":
+        return "leaves on springs"
     if member.volume == 0:
         return f"an open sheet, taken as {made.sheet * 1e3:.3g} mm thick"
     open_too = f", with open sheets {made.sheet * 1e3:.3g} mm thick" if member.sheet_area else ""

@@ -7,6 +7,7 @@ from jaxtyping import Float
 from scipy.spatial import KDTree
 
 from corporeal.geometry.filling import match_moments
+from corporeal.geometry.foliage import crown_volume
 from corporeal.geometry.make import Make, is_porous
 from corporeal.geometry.packing import Packing, reference
 from corporeal.geometry.survey import Anatomy
@@ -47,7 +48,8 @@ def weigh(
     """Volume [m³] and simulated density [kg/m³] of every point of an object.
 
     A thickened wall keeps the treatment's density, so its volume follows from its mass; a solid
-    keeps its true volume. A rigid part's masses are adjusted to its true centre and inertia.
+    keeps its true volume; foliage fills its crown's. A rigid part's masses are adjusted to its true
+    centre and inertia.
     """
     volume, density = np.zeros(len(packing.points)), np.ones(len(packing.points))
     rng = np.random.default_rng(4)
@@ -70,6 +72,8 @@ def weigh(
             )
             mass = match_moments(packing.points[own], mass, wanted, weights)
         whole = mass.sum() / treatment.density if thickened else made.volume
+        if treatment.kind == "foliage":
+            whole = crown_volume(packing.points[own], cell)
         density[own] = mass.sum() / whole
         volume[own] = mass / density[own]
     return volume, density

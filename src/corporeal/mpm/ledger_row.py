@@ -33,7 +33,7 @@ def ledger_row(
     )
     row["plane_depth"] = plane_depths(problem, now)
     group = object_of_body(problem)
-    if problem.bonds:
+    if problem.bonds or problem.apart:
         row |= merged(row, group)
         one = [np.flatnonzero(group == k) for k in range(group.max() + 1)]
         position = [np.concatenate([position[b] for b in bodies]) for bodies in one]
@@ -72,12 +72,11 @@ def carried(
 
 
 def object_of_body(problem: Problem) -> np.ndarray:
-    """Say which object each body is of (B,): a frame is of that of the body it holds."""
-    soft_of_frame = dict(problem.bonds)
+    """Say which object each body is of (B,): bodies held together or kept apart are of one."""
+    first = {max(pair): min(pair) for pair in (*problem.bonds, *problem.apart)}
     group: list[int] = []
     for b in range(len(problem.bodies)):
-        alone = b not in soft_of_frame
-        group.append(max(group, default=-1) + 1 if alone else group[soft_of_frame[b]])
+        group.append(group[first[b]] if b in first else max(group, default=-1) + 1)
     return np.array(group)
 
 

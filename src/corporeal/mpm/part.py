@@ -29,6 +29,10 @@ class PartGeometry:
     """Surface area, one side [m²]."""
     closed: bool = False
     """Whether its wall goes all around something, as a duck's does and a vase's does not."""
+    leaves: int = 0
+    """Separate leaves; 0: it is not foliage."""
+    burden: float = 0.0
+    """What it carries at its far end, over its own mass [-]."""
 
 
 @dataclass(frozen=True)
@@ -38,7 +42,21 @@ class Motion:
     impact_speed: float
     """Estimated speed at impact: fall, own velocity, push, and others' speed [m/s]."""
     acceleration: float
-    """Largest acceleration: gravity and push [m/s²]."""
+    """Largest acceleration: gravity, push and wind [m/s²]."""
+    driven: float = 0.0
+    """Without gravity [m/s²]."""
+
+
+@dataclass(frozen=True)
+class Verdict:
+    """Whether one part, by itself, would be seen to change its shape."""
+
+    strain: float
+    """Largest strain expected [-]."""
+    yield_speed: float
+    """[m/s]"""
+    rigid: bool
+    reason: str
 
 
 def is_trinket(part: PartGeometry, cell: float) -> bool:

@@ -1,6 +1,7 @@
 """Pose the problem: turn a scene filled with particles into what an engine is given."""
 
 from dataclasses import dataclass
+from itertools import combinations
 from math import pi, sqrt
 from typing import Literal
 
@@ -11,7 +12,7 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from corporeal.mpm.gaps import pair_gaps
-from corporeal.mpm.problem import FLOOR, NO_FACES, Body, Faces, Problem
+from corporeal.mpm.problem import FLOOR, NO_FACES, Body, Faces, Joint, Problem, Tether
 from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment
 
 RAMP = 0.1
@@ -58,6 +59,8 @@ def pose(
         gravity_ramp=RAMP if starts_settled(scene, particles) else 0.0,
         contact=contact,
         bonds=tuple((k, p.soft) for k, p in enumerate(pieces) if p.soft >= 0),
+        joints=joints_of(particles, pieces),
+        apart=parted(pieces),
     )
     return Posed(
         problem,
@@ -82,15 +85,21 @@ class Piece:
     """Numbers of its surface points."""
     soft: int = -1
     """Piece that a frame holds; -1: no frame."""
+    holder: int = -1
+    """Piece that foliage hangs on; -1: no foliage."""
 
 
 def divide(particles: Particles, objects: int) -> list[Piece]:
     """Take mixed objects apart into what is soft and its rigid frames."""
     stiff = np.array([t.kind == "rigid" for t in particles.treatments])[particles.part]
     pieces: list[Piece] = []
+    leafy = np.array([t.kind == "foliage" for t in particles.treatments])[particles.part]
     for k in range(objects):
         mine = np.flatnonzero(particles.object == k)
         points = np.flatnonzero(particles.object_of_surface == k)
+        if leafy[mine].any():
+            pieces += plant(particles, k, mine[leafy[mine]], len(pieces))
+            continue
         if stiff[mine].all() or not stiff[mine].any():
             pieces.append(Piece(k, bool(stiff[mine[0]]), mine, points))
             continue
@@ -105,6 +114,29 @@ def divide(particles: Particles, objects: int) -> list[Piece]:
     return pieces
 
 
+def plant(
+    particles: Particles, number: int, crown: Int[np.ndarray, " N"], first: int
+) -> list[Piece]:
+    """Take a plant apart: pot and soil, the wood that stands in it where it does, leaves.
+
+    Args:
+        particles: All of the scene's.
+        number: Which object.
+        crown: Numbers of its leaves' particles.
+        first: How many pieces there are already.
+
+    """
+    mine = np.flatnonzero(particles.object == number)
+    points = np.flatnonzero(particles.object_of_surface == number)
+    rest = np.setdiff1d(mine, crown)
+    wood = [r.part for r in particles.roots if r.object == number]
+    swings = np.isin(particles.part[rest], wood).astype(np.int64)
+    owner = nearest(particles.position[rest], particles.surface[points], swings)
+    found = [Piece(number, True, rest[swings == c], points[owner == c]) for c in np.unique(swings)]
+    holder = first + len(found) - 1
+    return [*found, Piece(number, False, crown, points[:0], holder=holder)]
+
+
 def clusters(points: Float[np.ndarray, "N 3"], reach: float) -> Int[np.ndarray, " N"]:
     """Label the groups of points that hang together over distances below ``reach`` [m]."""
     pairs = KDTree(points).query_pairs(reach, output_type="ndarray")
@@ -117,6 +149,22 @@ def nearest(
 ) -> Int[np.ndarray, " S"]:
     """Label of the point nearest to each asked one."""
     return label[KDTree(points).query(asked)[1]]
+
+
+def joints_of(particles: Particles, pieces: list[Piece]) -> tuple[Joint, ...]:
+    """Let the wood of plants rock in its soil."""
+    found = []
+    for root in particles.roots:
+        second = next(k for k, p in enumerate(pieces) if particles.part[p.members[0]] == root.part)
+        found.append(Joint(second - 1, second, root.point, root.stiffness, root.damping))
+    return tuple(found)
+
+
+def parted(pieces: list[Piece]) -> tuple[tuple[int, int], ...]:
+    """Pieces of one plant, which never touch one another."""
+    plants = {p.object for p in pieces if p.holder >= 0}
+    pairs = combinations([k for k, p in enumerate(pieces) if p.object in plants], 2)
+    return tuple((a, c) for a, c in pairs if pieces[a].object == pieces[c].object)
 
 
 def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Piece) -> Body:
@@ -143,8 +191,17 @@ def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Pie
         push=thing.push,
         wind=thing.wind,
         faces=faces_of(particles, mine) if thing.wind is not None else NO_FACES,
+        tether=tether_of(particles, field, piece),
         **column,
     )
+
+
+def tether_of(particles: Particles, field: MaterialField, piece: Piece) -> Tether | None:
+    """Put leaves on their stalks; ζ is half the loss factor."""
+    if piece.holder < 0:
+        return None
+    loss = field.materials[particles.part[piece.members[0]]].loss
+    return Tether(piece.holder, particles.rate[piece.members].astype(float), 0.5 * loss)
 
 
 def faces_of(particles: Particles, mine: Int[np.ndarray, " N"]) -> Faces:
@@ -162,9 +219,9 @@ def numbers(
     The hardening modulus is a stiffness and follows E; cohesion is a strength and follows
     √(E_sim/E), as the yield stress does.
     """
-    softer = treatment.young / treatment.young_real
+    softer, leafy = treatment.young / treatment.young_real, treatment.kind == "foliage"
     return {
-        "law": float(material.law.value),
+        "law": float(Law.COROTATED.value if leafy else material.law.value),
         "young": treatment.young,
         "poisson": treatment.poisson,
         "yield_stress": treatment.yield_stress or 0.0,
@@ -172,7 +229,7 @@ def numbers(
         "friction_angle": material.friction_angle or 0.0,
         "cohesion": (material.cohesion or 0.0) * sqrt(softer),
         "viscosity": 0.0
-        if treatment.kind == "rigid"
+        if treatment.kind == "rigid" or leafy
         else viscosity(material, treatment, extent, cell),
     }
 

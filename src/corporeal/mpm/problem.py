@@ -24,7 +24,10 @@ NO_FACES = Faces(np.zeros((0, 3)), np.zeros(0, np.int64))
 
 @dataclass(frozen=True)
 class Tether:
-    """Damped springs from a body's particles to where they started on a rigid body."""
+    """Damped springs from a body's particles to where they started on a rigid body.
+
+    At the start they bear their particles' weight, so that nothing sags.
+    """
 
     holder: int
     """Which body, a rigid one."""

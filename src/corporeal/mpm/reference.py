@@ -69,7 +69,7 @@ class ReferenceEngine:
         blown = blow(self.problem, matter, self.state, dt)
         loaded = carry(blown, matter, state, grid, (mass, new))
         before = replace(loaded.state, speed=loaded.state.speed - kick)
-        pulled = pull(self.problem, matter, before, kick, dt)
+        pulled = pull(self.problem, matter, before, (kick, push), dt)
         state = pulled.state
         new = carry(pulled.load, matter, state, grid, (mass, loaded.velocity)).velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))

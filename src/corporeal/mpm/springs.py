@@ -17,8 +17,8 @@ from corporeal.mpm.problem import Joint, Problem, Tether
 
 CLOSING = 0.2
 """Share of a joint's gap that is closed in a step."""
-LONGEST = 0.2
-"""Longest step as a fraction of 1/ω of any spring."""
+LONGEST, LONGEST_TURN = 0.05, 0.2
+"""Longest step as a fraction of 1/ω of a tether, whose energy swings by ω dt/2, and of a joint."""
 
 
 @dataclass(frozen=True)
@@ -34,7 +34,11 @@ class Pulled:
 
 
 def pull(
-    problem: Problem, matter: Matter, state: State, kick: Float[np.ndarray, "B 3"], dt: float
+    problem: Problem,
+    matter: Matter,
+    state: State,
+    kicks: tuple[Float[np.ndarray, "B 3"], Float[np.ndarray, "B 3"]],
+    dt: float,
 ) -> Pulled:
     """Let tethers and joints act; they do nothing in a field that all share.
 
@@ -42,16 +46,19 @@ def pull(
         problem: Where the springs are.
         matter: All particles.
         state: Before gravity and pushes.
-        kick: What these add to the bodies' velocities in this step [m/s]; the result has them.
+        kicks: What both add to the bodies' velocities in this step, and the pushes alone [m/s]; the
+            result has them.
         dt: [s]
 
     """
+    kick, push = kicks
     if problem.contact == "single":
         return Pulled(replace(state, speed=state.speed + kick), Load.none(), 0.0)
     pulled, first = Pulled(state, Load.none(), 0.0), 0
     for body in problem.bodies:
         if body.tether is not None:
             pulled = tethered(pulled, body.tether, first, matter, dt)
+            pulled = borne(pulled, body.tether, first, matter, (kick - push)[0])
         first += len(body.position)
     pulled = replace(pulled, state=replace(pulled.state, speed=pulled.state.speed + kick))
     for joint in problem.joints:
@@ -76,6 +83,27 @@ def tethered(pulled: Pulled, tether: Tether, first: int, matter: Matter, dt: flo
     place = state.position[own] - state.centre[h]
     after = struck(state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0))
     return Pulled(after, pulled.load.joined(Load(own, impulse)), pulled.loss + loss)
+
+
+def borne(
+    pulled: Pulled, tether: Tether, first: int, matter: Matter, gained: Float[np.ndarray, "3"]
+) -> Pulled:
+    """Let the holder bear the weight of what is tethered to it.
+
+    Args:
+        pulled: So far.
+        tether: Which.
+        first: Number of the body's first particle.
+        matter: All particles.
+        gained: Velocity that gravity gives in this step [m/s].
+
+    """
+    state, h = pulled.state, tether.holder
+    own = first + np.flatnonzero(tether.rate)
+    impulse = -matter.mass[own][:, None] * gained
+    place = state.position[own] - state.centre[h]
+    after = struck(state, matter, h, -impulse.sum(axis=0), -np.cross(place, impulse).sum(axis=0))
+    return replace(pulled, state=after, load=pulled.load.joined(Load(own, impulse)))
 
 
 def struck(
@@ -156,6 +184,8 @@ def stored(
             anchor = (body.position - start[h]) @ rotation[h].T + centre[h]
             away = np.sum((position[mine] - anchor) ** 2, axis=1)
             energy[b] += 0.5 * float(np.sum(mass * body.tether.rate**2 * away))
+            held = mass * (body.tether.rate > 0)
+            energy[b] += float(held @ (position[mine] - anchor) @ np.array(problem.gravity))
     for joint in problem.joints if problem.contact == "multi" else ():
         turn = turn_of(rotation[joint.second] @ rotation[joint.first].T)
         energy[joint.second] += 0.5 * joint.stiffness * float(turn @ turn)
@@ -164,10 +194,10 @@ def stored(
 
 def longest_step(problem: Problem) -> float:
     """Longest step [s] that follows every spring's oscillation."""
-    rates = [float(b.tether.rate.max()) for b in problem.bodies if b.tether is not None]
+    rates = [float(b.tether.rate.max()) / LONGEST for b in problem.bodies if b.tether is not None]
     for joint in problem.joints:
         pair = [problem.bodies[b] for b in (joint.first, joint.second)]
         inertia = [rigid.mass_of(b.position, b.volume * b.density, b.volume).inertia for b in pair]
         lightest = min(float(np.linalg.eigvalsh(i)[0]) for i in inertia)
-        rates.append(float(np.sqrt(joint.stiffness / lightest)))
-    return LONGEST / max([*rates, 1e-30])
+        rates.append(float(np.sqrt(joint.stiffness / lightest)) / LONGEST_TURN)
+    return 1.0 / max([*rates, 1e-30])

@@ -11,10 +11,12 @@ from dataclasses import dataclass
 from math import inf, sqrt
 from typing import Literal
 
+from corporeal.mpm import plants
 from corporeal.mpm.budget import calm_trinkets, cap, fit_budget
 from corporeal.mpm.part import (
     Motion,
     PartGeometry,
+    Verdict,
     is_trinket,
     wall_factors,
     wall_ratio,
@@ -32,9 +34,9 @@ from corporeal.types import Law, Material, Treatment
 
 Detail = Literal["draft", "normal", "fine"]
 Stiffness = Literal["true", "capped"]
-Role = Literal["soft", "rigid", "frame", "trinket"]
+Role = Literal["soft", "rigid", "frame", "trinket", "crown"]
 """A frame is a rigid inclusion: it holds the softer parts of its object. A trinket is too small to
-be one and goes with them."""
+be one and goes with them. A crown is leaves on springs."""
 
 INVISIBLE_STRAIN = 5e-3
 """Half a percent of strain is not seen."""
@@ -83,18 +85,6 @@ QUALITIES: dict[str, Quality] = {
 }
 
 
-@dataclass(frozen=True)
-class Verdict:
-    """Whether one part, by itself, would be seen to change its shape."""
-
-    strain: float
-    """Largest strain expected [-]."""
-    yield_speed: float
-    """[m/s]"""
-    rigid: bool
-    reason: str
-
-
 def plan(
     parts: Sequence[PartGeometry],
     motions: Sequence[Motion],
@@ -112,13 +102,21 @@ def plan(
     """
     quality = QUALITIES[detail]
     verdicts = [judge(part, motions[part.object]) for part in parts]
+    crowns: set[int] = set()
+    if stiffness == "true":
+        verdicts, crowns = plants.settle(parts, verdicts)
     yields = [not v.rigid or stiffness == "capped" for v in verdicts]
     soft = [p for p, deforms in zip(parts, yields, strict=True) if deforms]
     cell = choose_cell(parts, soft, quality)
-    mixed = {p.object for p in soft}
+    leafy = {parts[k].object for k in crowns}
+    mixed = {p.object for p in soft} - leafy
+    roles: list[Role] = [
+        "crown" if k in crowns else role(p, deforms, mixed, cell)
+        for k, (p, deforms) in enumerate(zip(parts, yields, strict=True))
+    ]
     treatments = [
-        treat(p, v, motions[p.object], cell, role(p, deforms, mixed, cell))
-        for p, v, deforms in zip(parts, verdicts, yields, strict=True)
+        treat(p, v, motions[p.object], cell, r)
+        for p, v, r in zip(parts, verdicts, roles, strict=True)
     ]
     warnings = [*unresolved(soft, cell)]
     if stiffness == "capped":
@@ -169,7 +167,8 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
     strain = max(
         speed / (real * sqrt(mapped)),
         density * motion.acceleration * part.size[2] / (young * mapped),
-        sag(part, motion.acceleration),
+        # The shape of a plant has its own weight and its leaves' in it already.
+        sag(part, motion.driven if part.burden else motion.acceleration),
     )
     yields_at = yield_speed(resistance(material), real, density)
     rigid = strain < INVISIBLE_STRAIN and speed < yields_at
@@ -202,7 +201,9 @@ def sag(part: PartGeometry, acceleration: float) -> float:
     if depth <= 0 or length < 4 * depth:
         return 0.0
     density, young = part.material.density, part.material.young
-    return 1.5 * density * acceleration * length**3 / (young * depth**2)
+    # A load at the tip bends 8/3 as much as one spread along.
+    loaded = 1.0 + 8 / 3 * part.burden
+    return 1.5 * loaded * density * acceleration * length**3 / (young * depth**2)
 
 
 # ------------------------------------------------------------------ resolution
@@ -262,6 +263,8 @@ def treat(
     part: PartGeometry, verdict: Verdict, motion: Motion, cell: float, role: Role
 ) -> Treatment:
     """Give a part its simulated numbers: true ones, but for a thin wall and a capped bulk."""
+    if role == "crown":
+        return crown(part, verdict, motion)
     material, structure, soft = (
         part.material,
         part.structure,
@@ -289,6 +292,24 @@ def treat(
         wave_speed=wave,
         step=stable_step(wave, motion.impact_speed, cell) if soft else inf,
         why=reason(verdict, role) + (wall_reason(part, ratio) if soft else ""),
+    )
+
+
+def crown(part: PartGeometry, verdict: Verdict, motion: Motion) -> Treatment:
+    """Give foliage no stress of its own."""
+    return Treatment(
+        kind="foliage",
+        young_real=part.material.young,
+        young=0.0,
+        poisson=0.0,
+        density=part.material.density,
+        yield_stress=None,
+        thickness=None,
+        strain=verdict.strain,
+        impact_speed=motion.impact_speed,
+        wave_speed=0.0,
+        step=inf,
+        why=f"{plants.SWAYS}, because {verdict.reason} and the wood stays rigid.",
     )
 
 

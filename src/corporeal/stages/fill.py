@@ -1,6 +1,6 @@
 """Fill every part with material points: solids, walls and sheets, with their true masses."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
@@ -9,14 +9,16 @@ from corporeal.errors import UserError
 from corporeal.geometry.contact_points import contact_points
 from corporeal.geometry.exposure import cross_section, faces
 from corporeal.geometry.falls import drop_heights
+from corporeal.geometry.foliage import leaves_of, root_of, swinging
 from corporeal.geometry.make import Make, decide, how_filled, recipe
 from corporeal.geometry.packing import Packing, pack
-from corporeal.geometry.survey import Anatomy, survey
+from corporeal.geometry.survey import Anatomy, Member, survey
 from corporeal.geometry.weights import keep_apart, weigh
+from corporeal.materials import find
 from corporeal.mpm.part import Motion, PartGeometry
 from corporeal.mpm.treatment import Plan, plan
 from corporeal.mpm.wind import greatest_acceleration
-from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject
+from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject, Vector
 
 
 @dataclass(frozen=True)
@@ -56,7 +58,8 @@ def fill(
         coarse = is_rigid(anatomy, chosen)
         packings.append(pack(anatomy, recipes, chosen.cell / 2, rng, coarse=coarse))
     packings = keep_apart(packings, chosen.cell)
-    return gather(scene, parts, anatomies, makes, chosen, packings)
+    particles = gather(scene, parts, anatomies, makes, chosen, packings)
+    return with_plants(particles, anatomies, field)
 
 
 # ------------------------------------------------------------------ what is there
@@ -151,6 +154,8 @@ def resolve(
             volume=makes[m.part].volume,
             area=makes[m.part].area,
             closed=m.closed and not makes[m.part].modelled,
+            leaves=leaves_of(m, field.materials[m.part]),
+            burden=burden(m, anatomy, makes, field),
         )
         for number, anatomy in enumerate(anatomies)
         for m in anatomy.members
@@ -159,6 +164,14 @@ def resolve(
     masses = [sum(makes[m.part].mass for m in a.members) for a in anatomies]
     moved = motions(scene, anatomies, masses, config.seed)
     return plan(ordered, moved, config.detail, config.stiffness)
+
+
+def burden(member: Member, anatomy: Anatomy, makes: dict[int, Make], field: MaterialField) -> float:
+    """Mass of the foliage of an object over that of one of its other parts [-]."""
+    leafy = [m.part for m in anatomy.members if leaves_of(m, field.materials[m.part])]
+    if member.part in leafy:
+        return 0.0
+    return sum(makes[k].mass for k in leafy) / max(makes[member.part].mass, 1e-30)
 
 
 def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: int) -> list[Motion]:
@@ -171,13 +184,13 @@ def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: i
     gravity = float(np.linalg.norm(scene.gravity))
     meshes = [a.everything for a in anatomies]
     heights = drop_heights(meshes, np.random.default_rng([seed, 2]))
-    across, fall, acceleration = [], [], []
+    across, fall, forced = [], [], []
     for k, (thing, height) in enumerate(zip(scene.objects, heights, strict=True)):
         gained, strongest = driven(thing, anatomies[k], masses[k], scene.duration)
         velocity = np.array(thing.velocity) + gained
         across.append(velocity[:2])
         fall.append(np.sqrt(velocity[2] ** 2 + 2 * gravity * height))
-        acceleration.append(gravity + strongest)
+        forced.append(strongest)
     result = []
     for i in range(len(scene.objects)):
         speeds = [float(np.hypot(fall[i], np.linalg.norm(across[i])))]
@@ -185,7 +198,7 @@ def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: i
             if j != i:
                 closing = np.linalg.norm(across[i] - across[j])
                 speeds.append(float(np.hypot(max(fall[i], fall[j]), closing)))
-        result.append(Motion(impact_speed=max(speeds), acceleration=acceleration[i]))
+        result.append(Motion(max(speeds), gravity + forced[i], forced[i]))
     return result
 
 
@@ -267,6 +280,41 @@ def gather(
         fills=describe(parts, anatomies, makes, chosen, part),
         warnings=chosen.warnings,
     )
+
+
+def with_plants(particles: Particles, anatomies: list[Anatomy], field: MaterialField) -> Particles:
+    """Put leaves on springs, and what bears them into its soil."""
+    leafy = [k for k, t in enumerate(particles.treatments) if t.kind == "foliage"]
+    if not leafy:
+        return particles
+    leaf = find("leaf_tissue")
+    tissue = leaf.pick(leaf.typical())
+    rate, roots = np.zeros(particles.count), []
+    for number, anatomy in enumerate(anatomies):
+        crowns = [m for m in anatomy.members if m.part in leafy]
+        for member in crowns:
+            own = particles.part == member.part
+            rate[own] = swinging(member, particles.position[own], tissue)
+        if crowns:
+            swing = Swing(particles, [m.part for m in crowns])
+            root = root_of(anatomy, number, field.materials, swing)
+            roots += [] if root is None else [root]
+    return replace(particles, rate=rate, roots=tuple(roots))
+
+
+@dataclass(frozen=True)
+class Swing:
+    """What rocks on a root: the wood and the leaves."""
+
+    particles: Particles
+    crowns: list[int]
+
+    def __call__(self, wood: int, point: Vector) -> float:
+        """Moment of inertia about a level axis through a point [kg m²]."""
+        mine = np.isin(self.particles.part, [wood, *self.crowns])
+        arm = self.particles.position[mine] - np.array(point)
+        level = 0.5 * (arm[:, 0] ** 2 + arm[:, 1] ** 2) + arm[:, 2] ** 2
+        return float(self.particles.mass[mine] @ level)
 
 
 def describe(

@@ -75,8 +75,9 @@ for (int n = 0; n < world->tethers; n++) {
       for (int d = 0; d < 3; d++) {
         double u = x[d] - s[RIGID_CENTRE + d] - arm[d], v = q[8 * (VE + d) + lane] - va[d];
         J[d] = -given * (rate * rate * u + brake * v);
-        x[d] -= s[RIGID_CENTRE + d];
         lost += v * (v + 0.5 * J[d] / mass);
+        J[d] -= mass * world->kick[d];   // its weight
+        x[d] -= s[RIGID_CENTRE + d];
       }
       T.lost += given * brake * lost;
       Hand::over(world, field, q, lane, J);
