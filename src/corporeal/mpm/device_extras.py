@@ -16,9 +16,10 @@ NEVER = (0.0, -1.0)
 def loads(memory: Memory, problem: Problem, matter: Matter) -> Any:
     """Lay out wind, tethers and joints."""
     bodies, out = len(problem.bodies), Loads()
-    out.given = memory.zeros(len(matter.mass), wp.vec3)
+    out.blown = memory.zeros(len(matter.mass), wp.vec3)
+    out.pulled = memory.zeros(len(matter.mass), wp.vec3)
     out.at = memory.zeros(len(matter.mass), wp.int32)
-    for name in ("force", "moment", "external"):
+    for name in ("wind_force", "wind_moment", "force", "moment", "external"):
         setattr(out, name, memory.zeros(bodies, wp.vec3d))
     out.loss = memory.zeros(1, wp.float64)
     _wind(out, memory, problem)

@@ -156,7 +156,8 @@ def scatter(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
         B = m * p.affine[i]
         A = B + dt * wp.mat33(t[0], t[1], t[2], t[1], t[3], t[4], t[2], t[4], t[5])
         old = m * p.velocity[i]
-        new = old + m * wp.vec3(s.kick[int(p.table[row, BODY])]) + l.given[i]
+        new = old + m * wp.vec3(s.kick[int(p.table[row, BODY])])
+        new += l.blown[i] + l.pulled[i]
         w = splines(f)
         for x in range(3):
             for y in range(3):
@@ -237,8 +238,7 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
         row = p.kind[i]
         w = splines(f)
         keep = 1.0 - wp.min(1.0, p.table[row, FORGET] * dt)
-        given = l.given[i]
-        blown = wp.length_sq(given) > 0.0 and l.faces > 0
+        blown = wp.length_sq(l.blown[i]) > 0.0
         v = wp.vec3(0.0)
         u = wp.vec3(0.0)
         L = wp.mat33(0.0)
@@ -265,7 +265,7 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
             mean = before + 0.5 * wp.vec3(s.kick[body])
             book(s, PUSHING, i, p.mass[i] * wp.dot(push, mean))
         if blown:
-            book(s, PUSHING, i, 0.5 * wp.dot(given, u + v))
+            book(s, PUSHING, i, 0.5 * wp.dot(l.blown[i], u + v))
         C = L
         if keep > 0.0:
             C = L + keep * (B - K)

@@ -223,16 +223,22 @@ class Rigid:
 class Loads:
     """What acts on single particles, wind and tethers; and joints of rigid bodies."""
 
-    given: wp.array(dtype=wp.vec3)
-    """To each particle in this step [N s], in the order of ``Particles``."""
+    blown: wp.array(dtype=wp.vec3)
+    """What the wind gives each particle in this step [N s], in the order of ``Particles`` …"""
+    pulled: wp.array(dtype=wp.vec3)
+    """… and what its tether does."""
+    wind_force: wp.array(dtype=wp.vec3d)
+    """What the wind gives each rigid body [N s] …"""
+    wind_moment: wp.array(dtype=wp.vec3d)
+    """… about its centre [N m s] …"""
     force: wp.array(dtype=wp.vec3d)
-    """To each rigid body [N s] …"""
+    """… and what tethers do [N s] …"""
     moment: wp.array(dtype=wp.vec3d)
-    """… about its centre [N m s]."""
+    """[N m s]"""
     external: wp.array(dtype=wp.vec3d)
     """Of the wind on each body [N s]."""
     loss: wp.array(dtype=wp.float64)
-    """What tethers' dampers took in this step [J]."""
+    """What dampers of tethers and joints took in this step [J]."""
     at: wp.array(dtype=wp.int32)
     """Where the particle of a number is now."""
     air: wp.array(dtype=wp.vec3d)

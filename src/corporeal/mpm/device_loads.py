@@ -27,22 +27,17 @@ TURN = wp.constant(D(6.283185307179586))
 def calm(p: Particles, l: Loads, s: Sheet, stride: int):
     """Take all loads away, and say where particles are."""
     for i in range(wp.tid(), p.count, stride):
-        l.given[i] = wp.vec3(0.0)
+        l.blown[i] = wp.vec3(0.0)
+        l.pulled[i] = wp.vec3(0.0)
         l.at[p.number[i]] = i
     for b in range(wp.tid(), s.bodies, stride):
+        l.wind_force[b] = wp.vec3d(D(0.0))
+        l.wind_moment[b] = wp.vec3d(D(0.0))
         l.force[b] = wp.vec3d(D(0.0))
         l.moment[b] = wp.vec3d(D(0.0))
         l.external[b] = wp.vec3d(D(0.0))
     if wp.tid() == 0:
         l.loss[0] = D(0.0)
-
-
-@wp.func
-def push_rigid(l: Loads, b: int, arm: wp.vec3d, impulse: wp.vec3d):
-    """Give an impulse to a rigid body at an arm from its centre."""
-    wp.atomic_add(l.force, b, impulse)
-    wp.atomic_add(l.moment, b, wp.cross(arm, impulse))
-    return 0
 
 
 # ---------------------------------------------------------------- wind
@@ -94,7 +89,8 @@ def blow(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
             seen = air - speed_at(r, b, r.centre[b] + arm)
             area = r.turn[b] * wp.vec3d(l.area[k])
             J = wp.vec3d(pressed(wp.vec3(area), wp.vec3(seen), l.weight[k], dt))
-            push_rigid(l, b, arm, J)
+            wp.atomic_add(l.wind_force, b, J)
+            wp.atomic_add(l.wind_moment, b, wp.cross(arm, J))
             wp.atomic_add(l.external, b, J)
         else:
             i = l.at[l.face[k]]
@@ -103,7 +99,7 @@ def blow(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
                 F = wp.identity(n=3, dtype=wp.float32) + p.motion[i]
             seen_here = wp.vec3(air) - p.velocity[i]
             given = pressed(cofactor(F, l.area[k]), seen_here, l.weight[k], dt)
-            wp.atomic_add(l.given, i, given)
+            wp.atomic_add(l.blown, i, given)
             wp.atomic_add(l.external, b, wp.vec3d(given))
 
 
@@ -123,13 +119,14 @@ def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
         arm = r.turn[h] * l.anchor[k]
         v = wp.vec3d(p.velocity[i]) - r.speed[h] - wp.cross(r.spin[h], arm)
         rate = l.rate[k]
-        brake = l.damping[k]
         mass = D(p.mass[i])
-        whole = D(1.0) / (D(1.0) + brake * dt + rate * rate * dt * dt)
-        J = (rate * rate * (place - arm) + brake * v) * (-mass * dt * whole)
-        wp.atomic_add(l.given, i, wp.vec3(J))
-        push_rigid(l, h, place, -J)
-        wp.atomic_add(l.loss, 0, mass * dt * whole * brake * wp.length_sq(v))
+        pull = (rate * rate * (place - arm) + l.damping[k] * v) * (-dt)
+        wp.atomic_add(l.loss, 0, mass * dt * l.damping[k] * wp.dot(v, v + D(0.5) * pull))
+        # Springs bear the weight from the start, so that nothing sags.
+        J = mass * (pull - (s.kick[h] - s.pushed[h]))
+        l.pulled[i] = wp.vec3(J)
+        wp.atomic_sub(l.force, h, J)
+        wp.atomic_sub(l.moment, h, wp.cross(place, J))
 
 
 # ---------------------------------------------------------------- rigid bodies
@@ -137,19 +134,16 @@ def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
 
 @wp.kernel
 def load_rigid(r: Rigid, l: Loads, s: Sheet):
-    """Give rigid bodies their loads; the wind's work is booked, that of tethers is stored."""
+    """Give rigid bodies their loads, and book the wind's work at their mean velocity."""
     b = wp.tid()
     if r.stiff[b] == 1 and s.flag[FULL] != 2:
-        speed = r.speed[b]
-        spin = r.inertia[b] * r.moment[b]
-        r.speed[b] = speed + l.force[b] * r.light[b]
-        r.moment[b] = r.moment[b] + l.moment[b]
+        speed = r.speed[b] + D(0.5) * l.wind_force[b] * r.light[b]
+        spin = r.inertia[b] * (r.moment[b] + D(0.5) * l.wind_moment[b])
+        work = wp.dot(l.wind_force[b], speed + s.kick[b]) + wp.dot(l.wind_moment[b], spin)
+        wp.atomic_add(s.loss, PUSHING, b % 256, work)
+        r.speed[b] = r.speed[b] + (l.wind_force[b] + l.force[b]) * r.light[b]
+        r.moment[b] = r.moment[b] + l.wind_moment[b] + l.moment[b]
         r.spin[b] = r.inertia[b] * r.moment[b]
-        if l.tethers == 0:
-            mean = D(0.5) * (speed + r.speed[b]) + s.kick[b]
-            work = wp.dot(l.force[b], mean)
-            work += wp.dot(l.moment[b], D(0.5) * (spin + r.spin[b]))
-            wp.atomic_add(s.loss, PUSHING, b % 256, work)
 
 
 @wp.func
@@ -188,7 +182,7 @@ def join(r: Rigid, l: Loads, s: Sheet):
         turn = turn_of(r.turn[c] * wp.transpose(r.turn[a]))
         X = wp.skew(arm_a)
         Y = wp.skew(arm_c)
-        stiff = l.friction[k] + l.stiffness[k] * dt
+        stiff = l.friction[k] + D(0.5) * l.stiffness[k] * dt
         A = (r.light[a] + r.light[c]) * one - X * r.inertia[a] * X - Y * r.inertia[c] * Y
         B = -(X * r.inertia[a]) - Y * r.inertia[c]
         G = r.inertia[a] + r.inertia[c] + one * (D(1.0) / (dt * stiff))

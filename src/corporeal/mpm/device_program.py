@@ -144,9 +144,9 @@ class Program:
         a = self.arrays
         if a.loads.faces or a.loads.tethers:
             self._per_body(loads.load_rigid, a.rigid, a.loads, a.sheet)
+        self._per_body(rigid.force, a.rigid, a.sheet)
         if a.loads.joints:
             self._run(loads.join, 1, a.rigid, a.loads, a.sheet, stride=False)
-        self._per_body(rigid.force, a.rigid, a.sheet)
         if a.bonds.count:
             self._per_body(bonds.compose, a.rigid, a.bonds, a.sheet)
 
