@@ -52,7 +52,8 @@ _COUNTS = "blocks pool rigids points surfaces pushed"
 FIELD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("mass", "f8"), ("slowing", "f8"), ("origin", "i4", 3), ("dim", "i4", 3)]
-    + [(name, "i4") for name in _COUNTS.split()],
+    + [(name, "i4") for name in _COUNTS.split()]
+    + [("floor", "i4"), ("level", "f4", 3)],
     align=True,
 )
 _POINTERS = (
@@ -70,7 +71,13 @@ WORLD = np.dtype(
     + [("dx", "f8"), ("dt", "f8"), ("time", "f8"), ("kick", "f8", 3)]
     + [(name, "i4") for name in _COUNTS.split()]
     + [("colour", "i4", COLOURS), ("bare_nodes", "i4"), ("bare", "i4", COLOURS)]
-    + [("parts", "i4"), ("looks", "i4", COLOURS), ("rigids", "i4"), ("turns", "i4")],
+    + [
+        ("stands", "i4"),
+        ("parts", "i4"),
+        ("looks", "i4", COLOURS),
+        ("rigids", "i4"),
+        ("turns", "i4"),
+    ],
     align=True,
 )
 _POINTERS = "area point rigid impulse signal face"
@@ -153,8 +160,10 @@ SPEED2, WAVE2, PLASTIC, VISCOUS, ASTRAY, WORK = range(6)
 
 LAY, MOVE, PACE, CLEAR, BLOW_ON, SPRING, FORCES, CONTACT = range(8)
 """Numbers of the pieces; those of contact follow from the last."""
-START, MARK, FIND, LIST, LOOK, FACE, REACH, CHOOSE, SOLVE, SETTLE = range(CONTACT, CONTACT + 10)
-TOUCHING = "start mark find list look face reach choose solve settle"
+START, MARK, FIND, STAND, LIST, LOOK, FACE, REACH, CHOOSE, SOLVE, SETTLE = range(
+    CONTACT, CONTACT + 11
+)
+TOUCHING = "start mark find stand list look face reach choose solve settle"
 """Pieces of contact: ``native/contact_NAME.cpp``."""
 
 
@@ -180,6 +189,7 @@ SCHEDULE = (
     Phase(START, "rigids"),
     Phase(MARK, "rigids"),
     Phase(FIND, resume=True),
+    Phase(STAND, "stands"),
     Phase(LIST, "parts"),
     *(Phase(LOOK, "looks", colour) for colour in range(COLOURS)),
     Phase(FACE, "parts"),

@@ -3,15 +3,23 @@
 import numpy as np
 
 from corporeal.mpm import tables
-from corporeal.mpm.contact import half_space_face
+from corporeal.mpm.contact import WALL_REACH, half_space_face
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.problem import Body, Problem
 
 PARTS = 16
 """Parts that a list of nodes or contacts is cut into."""
-BYTES = {"junction": 256, "meet": 32, "side": 72, "touch": 328, "entry": 72, "line": 240}
+BYTES = {
+    "junction": 256,
+    "meet": 32,
+    "side": 72,
+    "touch": 184,
+    "aim": 104,
+    "entry": 72,
+    "line": 240,
+}
 """Of the structs in ``native/contact_shared.cpp``."""
-_POINTERS = "junction meet side touch entry line pair order"
+_POINTERS = "junction meet side touch aim entry stand line pair order"
 _COUNTS = "most_junctions most_meets most_sides most_touches junctions meets sides touches points"
 STAGE = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
@@ -56,7 +64,7 @@ def rigid_grid(
         "rigid": state,
     }
     point(record, **arrays)
-    record["dim"], record["rigids"] = across, 1
+    record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
     return arrays
 
@@ -65,7 +73,7 @@ class ContactMemory:
     """Lists of nodes, contacts and particles near them, and tables that never change."""
 
     def __init__(self, world: np.ndarray, problem: Problem, ledger: Ledger) -> None:
-        self.world = world
+        self.world, self.cell = world, problem.cell
         walls = [[*plane.normal, plane.offset] for plane in problem.planes]
         self.plane = np.array(walls, float).reshape(-1, 4)
         self.friction, self.restitution = _pair_tables(problem)
@@ -86,6 +94,28 @@ class ContactMemory:
         self.room = 256
         self.lengthen()
 
+    def watched(self, origin: np.ndarray, dim: np.ndarray) -> tuple[int, np.ndarray]:
+        """Give the plane that a window reaches, and its normal; -1 and 0 if none or several.
+
+        Args:
+            origin: The window's first block.
+            dim: How many blocks it has along each axis.
+
+        """
+        ends = 4.0 * self.cell * np.stack([origin, origin + dim])
+        normal = self.plane[:, :3]
+        lowest = np.where(normal > 0.0, normal * ends[0], normal * ends[1]).sum(axis=1)
+        near = np.flatnonzero(lowest - self.plane[:, 3] < WALL_REACH * self.cell + 1e-9)
+        if len(near) != 1:
+            return -1, np.zeros(3)
+        return int(near[0]), normal[near[0]]
+
+    def stand(self, floor: np.ndarray, tasks: int) -> int:
+        """Make room for the books of tasks on nodes; how many of them there are, if any stands."""
+        self.stands = np.zeros(tasks * BYTES["entry"], np.uint8)
+        point(self.stage, stand=self.stands)
+        return tasks if (floor >= 0).any() else 0
+
     def lengthen(self) -> None:
         """Make every list twice as long."""
         self.room *= 2
@@ -94,6 +124,7 @@ class ContactMemory:
             "meet": 4 * self.room,
             "side": 8 * self.room,
             "touch": 8 * self.room,
+            "aim": 8 * self.room,
             "entry": 8 * self.room,
             "line": 8 * self.room,
         }

@@ -212,6 +212,7 @@ class WarpEngine:
         world["blown"] = len(self.field) if len(self.blows.record) else 0
         world["fields"], world["dx"] = len(self.field), self.problem.cell
         world["tasks"], world["nodes"], world["colour"] = len(self.task), len(nodes), counts
+        world["stands"] = self.contact.stand(self.field["floor"], len(nodes))
         world["rigids"] = len(self.field) if self.field["rigids"].any() else 0
         self.clock["laid"] = 0
         particles = sum(window.count for window in self.window.values())
@@ -234,6 +235,7 @@ class WarpEngine:
         record["material"] = self.material[f].ctypes.data
         record["origin"], record["dim"] = window.origin, window.dim
         record["blocks"], record["pool"] = len(window.block), len(window.where)
+        record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
 
     # ------------------------------------------------------------ time
 

@@ -6,7 +6,10 @@ for (int s = from; s < to; s++)
 from = (int)((long long)stage->touches * index / PARTS);
 to = (int)((long long)stage->touches * (index + 1) / PARTS);
 for (int t = from; t < to; t++) {
-  Touch &T = touches[t];
+  const Touch &T = touches[t];
+  Aim &aim = aims[t];
+  aim.fa = T.c < 0 ? -1 : T.fa;
+  aim.fc = T.c < 0 ? -1 : T.fc;
   if (T.c < 0) continue;
   const Side &A = sides[T.a], &C = sides[T.c];
   float n[3][3];
@@ -19,7 +22,8 @@ for (int t = from; t < to; t++) {
     double v[3] = {0, 0, 0};
     for (int d = 0; d < 3 && q < 3; d++) v[d] = n[q][d];
     Vec::unit(v);
-    for (int d = 0; d < 3; d++) T.n[d][q] = (float)v[d];
-    T.far[0][q] = T.far[1][q] = -1e30f;
+    for (int d = 0; d < 3; d++) aim.n[d][q] = (float)v[d];
+    aim.far[0][q] = aim.far[1][q] = q < 3 ? -1e30f : 1e30f;
   }
+  aim.weight = A.m < C.m ? A.m : C.m;
 }

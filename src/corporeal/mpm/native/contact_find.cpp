@@ -26,16 +26,16 @@ Bonds::hold(world);
 int count = 0, meet = 0, side = 0, touch = 0, points = 0;
 for (int f = 0; f < fields; f++) {
   Field &F = world->field[f];
-  int near[64], nears = 0, wall[16], walls = 0;
+  int near[64], nears = 0, wall_of[WALLS], walls = 0;
   for (int g = f + 1; g < fields && nears < 64; g++)
     if (world->field[g].pool && !Find::apart(F, world->field[g])) near[nears++] = g;
   const bool pointed = F.rigids && F.surfaces;
-  for (int w = 0; w < planes && walls < 16; w++) {
+  for (int w = 0; w < planes && walls < WALLS; w++) {
     const double *P = world->plane + 4 * w;
     if (pointed)
       points += Vec::dot(P, F.rigid + CENTRE) - P[3] > F.rigid[RADIUS] + POINT_REACH * dx ? 0 : F.surfaces;
-    else if (Find::lowest(P, F, dx) <= WALL_REACH * dx)
-      wall[walls++] = w;
+    else if (F.floor < 0 && Find::lowest(P, F, dx) <= WALL_REACH * dx)
+      wall_of[walls++] = w;
   }
   if (!nears && !walls) continue;
   for (int b = 0; b < F.pool; b++) {
@@ -52,13 +52,8 @@ for (int f = 0; f < fields; f++) {
       J.field[J.fields] = near[i];
       J.block[J.fields++] = other;
     }
-    int low = 0;
-    for (int i = 0; i < walls; i++) {
-      const double *P = world->plane + 4 * wall[i];
-      double h = -P[3];
-      for (int d = 0; d < 3; d++) h += P[d] * (4.0 * J.at[d] + (P[d] > 0 ? 0 : 3)) * dx;
-      low |= (h <= WALL_REACH * dx) << i;
-    }
+    bool low = false;
+    for (int i = 0; i < walls; i++) low |= !Grid::over(world->plane + 4 * wall_of[i], J.at, dx);
     if (J.fields < 2 && !low) continue;
     J.mask = J.several = 0;
     int found = 0;
@@ -71,19 +66,22 @@ for (int f = 0; f < fields; f++) {
         found += Grid::count(both);
       }
     J.mask = J.several;
-    // Planes near any of the fields here: the first one's list may be too short for the others.
-    for (int v = 0; v < planes; v++) {
+    // Planes, where a field may touch more than one; else they cost nothing but here: contact_stand.
+    u64 wall[WALLS];
+    int floors = 0;
+    for (int v = 0; v < planes && floors < WALLS; v++) {
       const double *P = world->plane + 4 * v;
-      double h = -P[3];
-      for (int d = 0; d < 3; d++) h += P[d] * (4.0 * J.at[d] + (P[d] > 0 ? 0 : 3)) * dx;
-      if (h > WALL_REACH * dx) continue;
-      u64 there = Grid::wall(P, J.at, dx);
-      for (int q = 0; q < J.fields; q++) {
-        const Field &G = world->field[J.field[q]];
-        if (G.rigids && G.surfaces) continue;
-        J.mask |= there & J.have[q];
-        found += Grid::count(there & J.have[q]);
-      }
+      if (!Grid::over(P, J.at, dx)) wall[floors++] = Grid::wall(P, J.at, dx);
+    }
+    for (int q = 0; q < J.fields; q++) {
+      const Field &G = world->field[J.field[q]];
+      if (G.floor >= 0 || (G.rigids && G.surfaces)) continue;
+      for (int v = 0; v < floors; v++) J.mask |= wall[v] & J.have[q];
+    }
+    for (int q = 0; q < J.fields; q++) {
+      const Field &G = world->field[J.field[q]];
+      if (G.rigids && G.surfaces) continue;
+      for (int v = 0; v < floors; v++) found += Grid::count(wall[v] & J.have[q] & J.mask);
     }
     if (!J.mask) continue;
     J.meet = meet;

@@ -35,13 +35,11 @@ int from = (int)((long long)stage->junctions * index / PARTS),
 for (int j = from; j < to; j++) {
   const Junction &J = junctions[j];
   int k = J.meet, s = J.side, t = J.touch;
-  u64 wall[64];
-  int walls[64], near = 0;
-  for (int w = 0; w < planes && near < 64; w++) {
+  u64 wall[WALLS];
+  int walls[WALLS], near = 0;
+  for (int w = 0; w < planes && near < WALLS; w++) {
     const double *P = world->plane + 4 * w;
-    double h = -P[3];
-    for (int d = 0; d < 3; d++) h += P[d] * (4.0 * J.at[d] + (P[d] > 0 ? 0 : 3)) * dx;
-    if (h > WALL_REACH * dx) continue;
+    if (Grid::over(P, J.at, dx)) continue;
     walls[near] = w;
     wall[near++] = Grid::wall(P, J.at, dx);
   }

@@ -110,10 +110,9 @@ for (int b = task[1]; b < task[2]; b++) {
     while (q < J.fields && J.field[q] != task[0]) q++;
     if (q == J.fields) continue;
     int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
-    for (u64 left = J.mask & J.have[q]; left; left &= left - 1) {
-      int i = __builtin_ctzll(left), ax = x + (i >> 4), ay = y + (i >> 2 & 3), az = z + (i & 3);
-      if ((ax | ay | az) & ~7) continue;
-      const f8 &h = arena[ax * 64 + ay * 8 + az];
+    for (u64 left = J.mask & J.have[q] & Grid::arena(n); left; left &= left - 1) {
+      int i = __builtin_ctzll(left);
+      const f8 &h = arena[(x + (i >> 4)) * 64 + (y + (i >> 2 & 3)) * 8 + z + (i & 3)];
       if (!(h[0] > 0)) continue;
       const Meet &M = meets[Grid::meet(J, i)];
       int s = M.side;

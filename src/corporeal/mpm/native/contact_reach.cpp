@@ -1,21 +1,21 @@
 // How far fields reach along the candidate normals: s(n) = max (x·n + R), R = r0 ‖Fᵀn‖, over the
 // particles around each node. Tasks: those of the particles, then one per field for rigid bodies.
 struct Support {
-  // One particle at one node, seen from either side.
-  static inline void see(Touch &T, bool first, float x, float y, float z, const float *F,
-                         float reach, float most) {
-    const f4 nx = *(f4 *)T.n[0], ny = *(f4 *)T.n[1], nz = *(f4 *)T.n[2];
-    f4 &far = *(f4 *)T.far[first ? 0 : 1];
+  // One particle at one node, seen from either side. What cannot reach farther is most of them.
+  static inline void see(Aim &A, int f, f4 x, f4 y, f4 z, const float *F, float reach, float most) {
+    if (A.fa != f && A.fc != f) return;
+    const bool first = A.fa == f;
+    const f4 nx = *(f4 *)A.n[0], ny = *(f4 *)A.n[1], nz = *(f4 *)A.n[2];
+    f4 &far = *(f4 *)A.far[first ? 0 : 1];
     f4 h = x * nx + y * ny + z * nz;
     if (!first) h = -h;
-    f4 open = h + most;
-    auto closer = open > far;
-    if (!(closer[0] | closer[1] | closer[2])) return;
+    if (!__builtin_reduce_or(h + most > far)) return;
     f4 a = F[0] * nx + F[3] * ny + F[6] * nz, b = F[1] * nx + F[4] * ny + F[7] * nz,
        c = F[2] * nx + F[5] * ny + F[8] * nz;
     h += reach * __builtin_elementwise_sqrt(a * a + b * b + c * c);
-    far = h > far ? h : far;
+    far = __builtin_elementwise_max(far, h);
   }
+  static inline f4 all(float a) { return f4{a, a, a, a}; }
   // No direction stretches more than this.
   static inline float most(const float *F) {
     float rows = 0, columns = 0;
@@ -43,10 +43,11 @@ if (index >= world->tasks) {
       base[i] = Vec::floor_int(c - 0.5);
       x[i] = (float)(c - base[i]);
     }
+    int at[3];
     float reach = 0;
     for (int i = 0; i < 27; i++) {
       int node[3] = {base[0] + i / 9, base[1] + i / 3 % 3, base[2] + i % 3};
-      int at[3] = {node[0] >> 2, node[1] >> 2, node[2] >> 2};
+      for (int d = 0; d < 3; d++) at[d] = node[d] >> 2;
       int b = Grid::block(F, at);
       if (b < 0 || !F.where[4 * b + 3]) continue;
       const Junction &J = junctions[F.where[4 * b + 3] - 1];
@@ -54,63 +55,71 @@ if (index >= world->tasks) {
       if (!(J.several >> bit & 1)) continue;
       const Meet &M = meets[Grid::meet(J, bit)];
       if (reach == 0) reach = (float)(0.5 * cbrt(p[4]) * inv);
-      for (int t = M.touch; t < M.touch + M.touches; t++) {
-        Touch &T = touches[t];
-        if (T.c >= 0 && (T.fa == f || T.fc == f))
-          Support::see(T, T.fa == f, x[0] - i / 9, x[1] - i / 3 % 3, x[2] - i % 3, Q, reach, reach);
-      }
+      for (int t = M.touch; t < M.touch + M.touches; t++)
+        Support::see(aims[t], f, Support::all(x[0] - i / 9), Support::all(x[1] - i / 3 % 3),
+                     Support::all(x[2] - i % 3), Q, reach, reach);
     }
   }
   return;
 }
 int *task = world->task + 4 * index;
 Field &field = world->field[task[0]];
-alignas(64) int map[512];   // node of the arena to one more than its meet
+alignas(64) int map[512];   // node of the arena to its first contact + 1, and how many << 24
+float volume = 0, radius = 0;
 for (int b = task[1]; b < task[2]; b++) {
   const int *record = field.block + NB * b;
   u64 any = 0;
   for (int i = 0; i < 27; i++) any |= field.near[2 * record[5 + i] + 1];
   if (!any) continue;
-  for (int i = 0; i < 512; i++) map[i] = 0;
+  for (int i = 0; i < 512; i += 8) *(i8u *)(map + i) = i8{0, 0, 0, 0, 0, 0, 0, 0};
   for (int n = 0; n < 27; n++) {
     int j = field.where[4 * record[5 + n] + 3];
     if (!j) continue;
     const Junction &J = junctions[j - 1];
     int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
-    for (u64 left = J.several; left; left &= left - 1) {
-      int i = __builtin_ctzll(left), ax = x + (i >> 4), ay = y + (i >> 2 & 3), az = z + (i & 3);
-      if (!((ax | ay | az) & ~7)) map[ax * 64 + ay * 8 + az] = Grid::meet(J, i) + 1;
+    for (u64 left = J.several & Grid::arena(n); left; left &= left - 1) {
+      int i = __builtin_ctzll(left);
+      const Meet &M = meets[Grid::meet(J, i)];
+      map[(x + (i >> 4)) * 64 + (y + (i >> 2 & 3)) * 8 + z + (i & 3)] = (M.touch + 1) | M.touches << 24;
     }
   }
   for (int s = record[0]; s < record[1]; s += 8) {
     const float *q = field.part + (size_t)s * NC;
     int live = record[1] - s < 8 ? record[1] - s : 8;
     alignas(32) int low[3][8];
-    for (int d = 0; d < 3; d++) *(i8 *)low[d] = (*(i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE;
+    alignas(32) float at[3][8];
+    for (int d = 0; d < 3; d++) {
+      i8 x = *(i8u *)(q + 8 * (XI + d)), cell = (x - HALF) >> PLACE;
+      *(i8 *)low[d] = cell;
+      *(f8 *)at[d] = Simd::flo(x - (cell << PLACE)) * PER_UNIT;
+    }
     for (int l = 0; l < live; l++) {
       int x = low[0][l], y = low[1][l], z = low[2][l];
       int near = record[5 + (((x >> 2) - record[2] + 1) * 3 + (y >> 2) - record[3] + 1) * 3 +
                         (z >> 2) - record[4] + 1];
       if (!(field.near[2 * near + 1] >> ((x & 3) * 16 + (y & 3) * 4 + (z & 3)) & 1)) continue;
-      float F[9], at[3];
+      float F[9];
       for (int k = 0; k < 9; k++) F[k] = q[8 * (DE + k) + l] + (k % 4 == 0);
-      for (int d = 0; d < 3; d++)
-        at[d] = (float)(((const int *)q)[8 * (XI + d) + l] - (low[d][l] << PLACE)) * PER_UNIT;
-      float reach = (float)(0.5 * cbrt((double)q[8 * VO + l]) * inv), most = reach * Support::most(F);
+      if (q[8 * VO + l] != volume) {
+        volume = q[8 * VO + l];
+        radius = (float)(0.5 * cbrt((double)volume) * inv);
+      }
+      const float most = radius * Support::most(F);
       const int *home = map + ((x - 4 * record[2] + 1) * 8 + y - 4 * record[3] + 1) * 8 + z -
                         4 * record[4] + 1;
-      for (int i = 0; i < 3; i++)
-        for (int j = 0; j < 3; j++)
-          for (int k = 0; k < 3; k++) {
+      f4 X = Support::all(at[0][l]);
+      for (int i = 0; i < 3; i++, X -= 1.0f) {
+        f4 Y = Support::all(at[1][l]);
+        for (int j = 0; j < 3; j++, Y -= 1.0f) {
+          f4 Z = Support::all(at[2][l]);
+          for (int k = 0; k < 3; k++, Z -= 1.0f) {
             int id = home[i * 64 + j * 8 + k];
             if (!id) continue;
-            const Meet &M = meets[id - 1];
-            for (int t = M.touch; t < M.touch + M.touches; t++) {
-              Touch &T = touches[t];
-              if (T.c < 0 || (T.fa != task[0] && T.fc != task[0])) continue;
-              Support::see(T, T.fa == task[0], at[0] - i, at[1] - j, at[2] - k, F, reach, most);
-            }
+            for (int t = (id & 0xffffff) - 1, end = t + (id >> 24); t < end; t++)
+              Support::see(aims[t], task[0], X, Y, Z, F, radius, most);
           }
+        }
+      }
     }
   }
 }

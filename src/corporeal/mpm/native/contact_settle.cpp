@@ -238,6 +238,8 @@ struct Books {
 };
 for (int i = 0; i < all * all; i++)
   for (int d = 1; d < 5; d++) pair[8 * i + d] = 0;
+for (int i = 0; i < world->stands; i++)
+  if (stage->stand[i].normal > 0) Books::enter(world, pair, all, stage->stand[i]);
 for (int p = 0; p < world->parts; p++) {
   int from = (int)((long long)stage->junctions * p / PARTS);
   for (int e = 0; e < stage->entries[p]; e++)

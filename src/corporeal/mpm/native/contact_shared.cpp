@@ -1,4 +1,4 @@
-// What the contact pieces share. Their order: start, mark, find, list, look, face, reach, choose,
+// What the contact pieces share. Their order: start, mark, find, stand, list, look, face, reach, choose,
 // solve, settle. Same formulas as contact.py and encounter.py; design: physics, section 2 C to G.
 // Offsets, gaps and normals' supports are in cells; velocities, masses and impulses SI.
 const int CENTRE = 1, TURN = 4, REST = 13, SPEED = 22, MOMENT = 25, INERTIA = 28, SPIN = 37,
@@ -7,6 +7,7 @@ constexpr double WALL_REACH = 0.51, LATTICE_GAP = 0.05, LATTICE_SLOPE = 0.25, LA
              DEEPEST = 1.25, POINT_REACH = 0.3;
 const int HERE = 12;      // fields in one block of nodes
 const int PARTS = 16;     // parts that a list is cut into, whoever works on them
+const int WALLS = 32;     // planes that a block of nodes may reach
 const int ENTRIES = 8;    // entries looked back at
 
 typedef float f4 __attribute__((vector_size(16), aligned(4)));
@@ -24,10 +25,13 @@ struct Side {             // one field there
   float m, mean[3], out[3];
   double v[3], inverse;
 };
-struct Touch {            // a possible contact of side a with side c, or with plane -1 - c
-  float n[3][4];          // candidates, component by component
-  float far[2][4];        // how far a reaches along them, and c against them
+struct Aim {              // candidate normals of a possible contact of two fields
+  float n[3][4];          // component by component
+  float far[2][4];        // how far the first reaches along them, and the second against them
+  int fa, fc;             // the fields; -1 for a plane
   float chosen[3], weight;
+};
+struct Touch {            // a possible contact of side a with side c, or with plane -1 - c
   int meet, a, c, fa, fc, active, bounce, spare;
   double x[3], normal[3], gap, target, inverse, mu, approach, J[3], before[3];
 };
@@ -46,7 +50,8 @@ struct Stage {
   Meet *meet;
   Side *side;
   Touch *touch;
-  Entry *entry;
+  Aim *aim;
+  Entry *entry, *stand;
   Line *line;
   double *pair;           // [all][all][8]
   int *order;
@@ -56,7 +61,7 @@ struct Stage {
 };
 
 static_assert(sizeof(Junction) <= 256 && sizeof(Meet) <= 32 && sizeof(Side) <= 72 &&
-                  sizeof(Touch) <= 328 && sizeof(Entry) <= 72 && sizeof(Line) <= 240,
+                  sizeof(Touch) <= 184 && sizeof(Aim) <= 104 && sizeof(Entry) <= 72 && sizeof(Line) <= 240,
               "as memory.py says");
 
 struct Face {             // a half space u < s through the quadratic spline
@@ -153,14 +158,40 @@ struct Grid {
   static inline u64 below(int i) { return (1ull << i) - 1; }
   static inline int count(u64 m) { return __builtin_popcountll(m); }
   static inline int meet(const Junction &J, int i) { return J.meet + count(J.mask & below(i)); }
+  // Nodes of neighbour n of 27 that lie in a block's arena, which has one node before it and three
+  // after it; or, with a margin, in the block and one layer around it.
+  static inline u64 arena(int n) {
+    const u64 x[3] = {0xffff000000000000ull, ~0ull, 0x0000ffffffffffffull},
+              y[3] = {0xf000f000f000f000ull, ~0ull, 0x0fff0fff0fff0fffull},
+              z[3] = {0x8888888888888888ull, ~0ull, 0x7777777777777777ull};
+    return x[n / 9] & y[n / 3 % 3] & z[n % 3];
+  }
+  static inline u64 margin(int n) {
+    const u64 x[3] = {0xffff000000000000ull, ~0ull, 0x000000000000ffffull},
+              y[3] = {0xf000f000f000f000ull, ~0ull, 0x000f000f000f000full},
+              z[3] = {0x8888888888888888ull, ~0ull, 0x1111111111111111ull};
+    return x[n / 9] & y[n / 3 % 3] & z[n % 3];
+  }
+  // Whether a block lies so high over a plane that none of its nodes can touch it.
+  static inline bool over(const double *P, const int *at, double dx) {
+    double h = -P[3];
+    for (int d = 0; d < 3; d++) h += P[d] * (4.0 * at[d] + (P[d] > 0 ? 0 : 3)) * dx;
+    return h > WALL_REACH * dx;
+  }
   // Nodes of a block that a plane may touch.
   static inline u64 wall(const double *P, const int *at, double dx) {
+    double h[3][4];
+    for (int d = 0; d < 3; d++)
+      for (int k = 0; k < 4; k++) h[d][k] = P[d] * (4 * at[d] + k) * dx;
+    const double top = P[3] + WALL_REACH * dx;
     u64 mask = 0;
-    double first = (P[0] * at[0] + P[1] * at[1] + P[2] * at[2]) * 4.0 * dx - P[3] - WALL_REACH * dx;
-    for (int i = 0; i < 64; i++) {
-      double h = first + (P[0] * (i >> 4) + P[1] * (i >> 2 & 3) + P[2] * (i & 3)) * dx;
-      mask |= (u64)(h <= 0.0) << i;
-    }
+    for (int i = 0; i < 4; i++)
+      for (int j = 0; j < 4; j++) {
+        double left = top - h[0][i] - h[1][j];
+        u64 row = (h[2][0] <= left) | (h[2][1] <= left) << 1 | (h[2][2] <= left) << 2 |
+                  (h[2][3] <= left) << 3;
+        mask |= row << (16 * i + 4 * j);
+      }
     return mask;
   }
 };
@@ -172,3 +203,4 @@ Junction *junctions = stage->junction;
 Meet *meets = stage->meet;
 Side *sides = stage->side;
 Touch *touches = stage->touch;
+Aim *aims = stage->aim;

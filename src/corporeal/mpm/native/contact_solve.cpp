@@ -82,10 +82,9 @@ if (from < to) {
         if (!other) continue;
         const Junction &O = junctions[other - 1];
         int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
-        for (u64 left = O.several; left; left &= left - 1) {
-          int i = __builtin_ctzll(left), ax = x + (i >> 4), ay = y + (i >> 2 & 3), az = z + (i & 3);
-          if (ax < 0 || ay < 0 || az < 0 || ax > 5 || ay > 5 || az > 5) continue;
-          map[(ax * 6 + ay) * 6 + az] = Grid::meet(O, i) + 1;
+        for (u64 left = O.several & Grid::margin(n); left; left &= left - 1) {
+          int i = __builtin_ctzll(left);
+          map[((x + (i >> 4)) * 6 + y + (i >> 2 & 3)) * 6 + z + (i & 3)] = Grid::meet(O, i) + 1;
         }
       }
     }
@@ -109,7 +108,7 @@ if (from < to) {
             if (!id) continue;
             const Meet &O = meets[id - 1];
             for (int o = O.touch; o < O.touch + O.touches; o++) {
-              const Touch &U = touches[o];
+              const Aim &U = aims[o];
               if (U.fa != T.fa || U.fc != T.fc) continue;
               for (int d = 0; d < 3; d++) T.normal[d] += (double)U.weight * U.chosen[d];
             }

@@ -15,7 +15,6 @@ for (size_t i = (size_t)task[1] * 64; i < (size_t)task[2] * 64; i++) {
     f8 f = __builtin_shufflevector(a, a, 0, 4, 5, 6, 0, 0, 0, 0);
     a = (p + h * f) * (1.0f / m) + g;
     a[0] = m;
-    a[7] = 0.0f;
     node[i] = a;
   } else {
     node[i] = Simd::all(0.0f);

@@ -49,12 +49,13 @@ struct Scatter {
     if (field.pushed) work += push(world, field, q, m, r);
     const int row[3][3] = {{0, 1, 2}, {1, 3, 4}, {2, 4, 5}};
     for (int j = 0; j < 3; j++) {
-      a[j][0] = a[j][7] = zero;
+      a[j][0] = zero;
+      a[j][7] = -m * field.level[j];
       for (int k = 0; k < 3; k++) {
         a[j][1 + k] = m * *(f8u *)(q + 8 * (AF + 3 * k + j));
         a[j][4 + k] = *(f8u *)(q + 8 * (ST + row[k][j]));
       }
-      for (int k = 1; k < 7; k++) r[k] -= a[j][k] * D[j];
+      for (int k = 1; k < 8; k++) r[k] -= a[j][k] * D[j];
     }
     Simd::turn(r);
     for (int j = 0; j < 3; j++) Simd::turn(a[j]);

@@ -61,8 +61,9 @@ struct Clock {
   long long count, budget;
   int things, started, last, laid, fuse, fused, pushed, spare;
 };
-// Nodes: mass, momentum 3, force of stress 3, free; after the forces mass, velocity 3, velocity as
-// it was 3, and a lane for contact's use. While a step reads its nodes, the next one's are laid.
+// Nodes: mass, momentum 3, force of stress 3, mass times height over the node [cells] along "level";
+// after the forces mass, velocity 3, velocity as it was 3, mean height. While a step reads its nodes,
+// the next one's are laid.
 struct Field {
   float *part, *node, *next, *history, *material;
   int *table, *block, *where;
@@ -73,6 +74,8 @@ struct Field {
   double mass, slowing;     // slowing: how much viscosity shortens steps
   int origin[3], dim[3];    // in blocks; the window's corner and size
   int blocks, pool, rigids, points, surfaces, pushed;
+  int floor;                // the only plane that the window reaches, or -1
+  float level[3];           // its normal, or 0
 };
 struct Blow {               // a body in the wind: see blow.py
   double *area, *point, *rigid, *impulse, *signal;
@@ -115,6 +118,7 @@ struct World {
   int stop;           // why the steps end after this phase; 0: they go on
   int nodes, colour[4];             // tasks on nodes, and on particles of each colour
   int bare_nodes, bare[4];          // the same where this step's nodes are still to be laid
+  int stands;                       // tasks on nodes that may stand on a plane
   int parts, looks[4];              // tasks on contacts, and on particles for contact; 0 without any
   int rigids, turns;                // fields, where some are rigid; tasks to look at those
 };
