@@ -5,13 +5,13 @@ point that lies farther out takes hold of the nearest particle's surroundings. A
 taken exactly at the point.
 """
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.errors import UserError
-from corporeal.mpm.problem import Body
+from corporeal.mpm.problem import Body, Problem
 from corporeal.types import Vector
 
 REACH = 2.0
@@ -76,27 +76,40 @@ def take_hold_of_rigid(
     return Hold(np.zeros(1, np.int64), np.ones(1), mass, arm)
 
 
-def gripped(hold: Hold, target: Vector, stiffness: float, total: float) -> Grip | None:
-    """Pull on what is held; None with stiffness 0: let go.
+def regripped(
+    grips: dict[int, Grip], body: int, hold: Hold | None, pull: tuple[Vector, float], total: float
+) -> dict[int, Grip]:
+    """Grip a body anew, or pull what is gripped elsewhere.
 
     Args:
-        hold: What is held.
-        target: Where to [m].
-        stiffness: Of the spring [N/m].
+        grips: The present ones, by body.
+        body: Which.
+        hold: Where it is held; None: where it is held already.
+        pull: Where to [m], and the spring's stiffness [N/m]; 0 lets go.
         total: Mass of the whole body [kg].
 
-    Raises:
-        UserError: The stiffness is negative or no number.
-
     """
+    target, stiffness = pull
     if not 0.0 <= stiffness < np.inf:
         raise UserError(f"A drag's stiffness is {stiffness} N/m. Give 0 (let go) or more.")
+    kept = {b: grip for b, grip in grips.items() if b != body}
     if stiffness == 0.0:
-        return None
+        return kept
+    if hold is None and body not in grips:
+        raise UserError(f"Body {body} is not held yet. Say at which point to take hold of it.")
+    hold = hold or grips[body].hold
     damping = 2.0 * float(np.sqrt(stiffness * total))
-    return Grip(hold, np.array(target, np.float64), stiffness, damping)
+    return kept | {body: Grip(hold, np.array(target, np.float64), stiffness, damping)}
 
 
-def moved(grip: Grip, target: Vector) -> Grip:
-    """Pull somewhere else [m]."""
-    return replace(grip, target=np.array(target, np.float64))
+def check(problem: Problem, body: int, *vectors: Vector | None) -> None:
+    """Refuse bodies that are not there, and points and impulses that are no numbers.
+
+    Raises:
+        UserError: It says what to give.
+
+    """
+    if not 0 <= body < len(problem.bodies):
+        raise UserError(f"There is no body {body}. Choose 0 to {len(problem.bodies) - 1}.")
+    if not all(np.isfinite(v).all() for v in vectors if v is not None):
+        raise UserError("A point or an impulse is not finite. Give three numbers.")

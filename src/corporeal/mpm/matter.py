@@ -6,7 +6,7 @@ from functools import cached_property
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.mpm import elasticity, rigid
+from corporeal.mpm import elasticity, plasticity, rigid
 from corporeal.mpm.problem import Problem
 from corporeal.types import Law
 
@@ -185,3 +185,22 @@ class State:
     def as_arrays(self) -> dict[str, np.ndarray]:
         """Copy everything into a dict."""
         return {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
+
+
+def flowed(matter: Matter, state: State) -> tuple[State, float]:
+    """Bring granular and plastic matter back to what it can bear; give the energy lost [J]."""
+    F, plastic, volume, loss = state.F.copy(), state.plastic.copy(), state.volume.copy(), 0.0
+    mu, lam = matter.mu, matter.lam
+    for law in (Law.DRUCKER_PRAGER, Law.VON_MISES):
+        k = np.flatnonzero((matter.law == law.value) & ~matter.rigid)
+        if law is Law.DRUCKER_PRAGER:
+            soil = matter.friction_angle[k], matter.cohesion[k]
+            flow = plasticity.flow_drucker_prager(F[k], (mu[k], lam[k]), soil, volume[k])
+            volume[k] = flow.volume
+        else:
+            metal = matter.yield_stress[k], matter.hardening[k]
+            flow = plasticity.flow_von_mises(F[k], (mu[k], lam[k]), metal, plastic[k])
+        F[k] = flow.F
+        plastic[k] += flow.plastic_strain
+        loss += float(np.sum(matter.volume[k] * flow.loss))
+    return replace(state, F=F, plastic=plastic, volume=volume), loss

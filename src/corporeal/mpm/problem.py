@@ -6,7 +6,7 @@ from typing import Literal, Protocol, runtime_checkable
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.types import Push, Wind
+from corporeal.types import Push, Vector, Wind
 
 
 @dataclass(frozen=True)
@@ -247,6 +247,40 @@ class Engine(Protocol):
 
     def restore(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from what ``save`` returned, on an engine built from the same problem."""
+        ...
+
+
+@runtime_checkable
+class Interactive(Engine, Protocol):
+    """An engine whose bodies can be touched from outside between two advances.
+
+    A touch reaches the particles within two cells of a point, less with the distance; of a rigid
+    body it is exact. It is in the ledger as external impulse and work, but not in what ``save``
+    keeps.
+    """
+
+    def poke(self, body: int, point: Vector, impulse: Vector) -> None:
+        """Give a body an impulse [N s] at a point [m] at once.
+
+        Raises:
+            UserError: There is no such body, or something is not finite.
+
+        """
+        ...
+
+    def drag(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
+        """Pull on a body by a damped spring until told otherwise.
+
+        Args:
+            body: Which.
+            point: Where to take hold of it [m]; None: where it is held already.
+            target: Where to [m].
+            stiffness: Of the spring [N/m]; 0 lets go.
+
+        Raises:
+            UserError: There is no such body, it is not held, or something is not finite.
+
+        """
         ...
 
 

@@ -10,16 +10,17 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.errors import SimulationError
-from corporeal.mpm import elasticity, plasticity, rigid
+from corporeal.mpm import elasticity, rigid
 from corporeal.mpm.bond import Bonds, without
+from corporeal.mpm.driving import Drive
 from corporeal.mpm.encounter import Meeting, Scene, resolve
+from corporeal.mpm.grip import Grip, Hold, check, regripped, take_hold, take_hold_of_rigid
 from corporeal.mpm.ledger import Ledger
-from corporeal.mpm.loads import blow, carry
-from corporeal.mpm.matter import Matter, State
+from corporeal.mpm.matter import Matter, State, flowed
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
-from corporeal.mpm.springs import longest_step, pull, stored
+from corporeal.mpm.springs import longest_step, stored, struck
 from corporeal.mpm.stencil import Stencil, stencil
-from corporeal.types import Law
+from corporeal.types import Vector
 
 FORGETTING = 0.1
 """κ: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
@@ -42,6 +43,7 @@ class ReferenceEngine:
         self.matter = Matter.of(problem)
         self.state = State.start(problem, self.matter)
         self.bonds = Bonds(problem)
+        self.grips: dict[int, Grip] = {}
         self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
         self.lost = np.zeros(len(self.matter.mass), dtype=bool)
 
@@ -65,24 +67,20 @@ class ReferenceEngine:
         grid = stencil(self.state.position, self._field, cell)
         kick, push = self._kicks(dt)
         mass, old, new = self._to_grid(grid, kick, dt)
-        state = replace(self.state, speed=self.state.speed + kick)
-        blown = blow(self.problem, matter, self.state, dt)
-        loaded = carry(blown, matter, state, grid, (mass, new))
-        before = replace(loaded.state, speed=loaded.state.speed - kick)
-        pulled = pull(self.problem, matter, before, (kick, push), dt)
-        state = pulled.state
-        new = carry(pulled.load, matter, state, grid, (mass, loaded.velocity)).velocity
+        drive = Drive(self.problem, matter, self.state, grid, self.grips)
+        loaded, damped = drive.act((mass, new), (kick, push), dt)
+        state, new = loaded.state, loaded.velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))
         stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, held)
         meeting = resolve(stage, new, dt)
         for composite in held:
             meeting = composite.split(meeting)
         moved, viscous_loss = self._from_grid(grid, old, meeting.velocity, dt)
-        flowed, plastic_loss = _flow(matter, moved)
-        turned = self._move_rigid(flowed, meeting, dt)
+        settled, plastic_loss = flowed(matter, moved)
+        turned = self._move_rigid(settled, meeting, dt)
         self._check(turned)
         self.ledger.plastic_loss += plastic_loss
-        self.ledger.viscous_loss += viscous_loss + pulled.loss
+        self.ledger.viscous_loss += viscous_loss + damped
         self._enter(meeting, grid, kick, push)
         self.ledger.external_impulse += loaded.impulse
         self.ledger.push_work += loaded.work
@@ -278,6 +276,38 @@ class ReferenceEngine:
             impulse=(share[:, :, None] * meeting.impulse).reshape(-1, 3),
         )
 
+    # ------------------------------------------------------------ from outside
+
+    def poke(self, body: int, point: Vector, impulse: Vector) -> None:
+        """Give a body an impulse [N s] at a point [m] at once: see ``problem.Interactive``."""
+        check(self.problem, body, point, impulse)
+        hold, given, m, s = self._hold(body, point), np.array(impulse), self.matter, self.state
+        before = self.measure().kinetic[body]
+        if self.problem.bodies[body].rigid:
+            arm = s.rotation[body] @ hold.arm
+            self.state = struck(s, m, body, given, np.cross(arm, given)).follow_rigid(m)
+        else:
+            own = np.flatnonzero(m.body == body)[hold.particle]
+            velocity = s.velocity.copy()
+            velocity[own] += hold.share[:, None] * given / m.mass[own][:, None]
+            self.state = replace(s, velocity=velocity)
+        self.ledger.external_impulse[body] += given
+        self.ledger.push_work += self.measure().kinetic[body] - before
+
+    def drag(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
+        """Pull on a body by a spring until told otherwise: see ``problem.Interactive``."""
+        check(self.problem, body, point, target)
+        hold = None if point is None else self._hold(body, point)
+        pull, total = (target, stiffness), float(self.matter.total[body])
+        self.grips = regripped(self.grips, body, hold, pull, total)
+
+    def _hold(self, body: int, point: Vector) -> Hold:
+        s, m = self.state, self.matter
+        if self.problem.bodies[body].rigid:
+            return take_hold_of_rigid(m.total[body], s.centre[body], s.rotation[body], point)
+        place = s.position[m.body == body]
+        return take_hold(self.problem.bodies[body], place, point, self.problem.cell)
+
     # ------------------------------------------------------------ reading and keeping
 
     def snapshot(self) -> Snapshot:
@@ -366,22 +396,3 @@ def _ramped(time: float, ramp: float) -> float:
     if time >= ramp:
         return time - 0.5 * ramp
     return 0.5 * time**2 / ramp
-
-
-def _flow(matter: Matter, state: State) -> tuple[State, float]:
-    """Bring granular and plastic matter back to what it can bear; give the energy lost [J]."""
-    F, plastic, volume, loss = state.F.copy(), state.plastic.copy(), state.volume.copy(), 0.0
-    mu, lam = matter.mu, matter.lam
-    for law in (Law.DRUCKER_PRAGER, Law.VON_MISES):
-        k = np.flatnonzero((matter.law == law.value) & ~matter.rigid)
-        if law is Law.DRUCKER_PRAGER:
-            soil = matter.friction_angle[k], matter.cohesion[k]
-            flow = plasticity.flow_drucker_prager(F[k], (mu[k], lam[k]), soil, volume[k])
-            volume[k] = flow.volume
-        else:
-            metal = matter.yield_stress[k], matter.hardening[k]
-            flow = plasticity.flow_von_mises(F[k], (mu[k], lam[k]), metal, plastic[k])
-        F[k] = flow.F
-        plastic[k] += flow.plastic_strain
-        loss += float(np.sum(matter.volume[k] * flow.loss))
-    return replace(state, F=F, plastic=plastic, volume=volume), loss

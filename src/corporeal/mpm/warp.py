@@ -9,9 +9,10 @@ import os
 import numpy as np
 
 from corporeal.errors import SimulationError
-from corporeal.mpm import pacing, tables
+from corporeal.mpm import pacing, tables, touching
 from corporeal.mpm.blow import Blows
 from corporeal.mpm.carried import Carried
+from corporeal.mpm.grip import Grip
 from corporeal.mpm.kernels import (
     ASTRAY,
     CLOCK,
@@ -35,6 +36,7 @@ from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.mpm.spring_records import Springs
 from corporeal.mpm.springs import longest_step
 from corporeal.mpm.window import Window
+from corporeal.types import Vector
 
 RIGID_COURANT = 0.05
 """Largest fraction of a cell that a rigid body may cross in one step."""
@@ -132,6 +134,7 @@ class WarpEngine:
             problem, self.first, self.ledger.external_impulse, self.rigid, self.points
         )
         self.springs = Springs(problem, self.first, self.ledger.external_impulse, self.rigid)
+        self.grips: dict[int, Grip] = {}
         self.bond = tables.bonds(problem)
         self._wind_clock()
         self.connect()
@@ -296,7 +299,7 @@ class WarpEngine:
         """Mass of every body [kg]."""
         return self.things["mass"].tolist()
 
-    def _book(self) -> None:
+    def book(self) -> None:
         """Move what the tasks added up into the ledger."""
         total = self.report[:, [PLASTIC, VISCOUS, WORK]].sum(axis=0)
         self.ledger.plastic_loss += total[0]
@@ -305,7 +308,7 @@ class WarpEngine:
         self.report[:, [PLASTIC, VISCOUS, WORK]] = 0.0
 
     def _sort(self, fields: set[int]) -> None:
-        self._book()
+        self.book()
         for f in sorted(fields):
             fits = self.window[f].sort()
             if self.window[f].lost:
@@ -336,6 +339,16 @@ class WarpEngine:
                 "that overlap at the start."
             )
 
+    # ------------------------------------------------------------ from outside
+
+    def poke(self, body: int, point: Vector, impulse: Vector) -> None:
+        """Give a body an impulse [N s] at a point [m] at once: see ``problem.Interactive``."""
+        touching.poke(self, body, point, impulse)
+
+    def drag(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
+        """Pull on a body by a spring until told otherwise: see ``problem.Interactive``."""
+        touching.drag(self, body, point, (target, stiffness))
+
     # ------------------------------------------------------------ reading and keeping
 
     def snapshot(self) -> Snapshot:
@@ -344,12 +357,12 @@ class WarpEngine:
 
     def measure(self) -> Measure:
         """Add up the ledger."""
-        self._book()
+        self.book()
         return measured(self)
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything needed to go on later exactly as if nothing had happened."""
-        self._book()
+        self.book()
         saved = {f"ledger.{k}": v for k, v in self.ledger.as_arrays().items()}
         for f, window in self.window.items():
             saved |= {f"field{f}.{k}": v for k, v in window.saved().items()}
