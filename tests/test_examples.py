@@ -12,3 +12,7 @@ def example(name):
 
 def test_a_rubber_ball_comes_back_but_not_all_the_way():
     assert 0.3 < example("01_drop_a_ball.py") < 0.98
+
+
+def test_a_dragged_ball_trails_behind_the_hand():
+    assert 0.05 < example("02_drag_an_object.py") < 0.4

@@ -8,6 +8,8 @@ import trimesh
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
+from corporeal.mpm.ledger_row import object_of_body
+from corporeal.mpm.pose import pose
 from corporeal.stages.fill import FillConfig, examine, fill, motions
 from corporeal.types import (
     Finish,
@@ -282,3 +284,73 @@ def test_a_wind_counts_as_an_acceleration_and_carries_nothing_faster_than_itself
     assert heavy.acceleration == pytest.approx(9.81 + force / 10.0, rel=0.01)
     assert heavy.impact_speed == pytest.approx(2.0 * force / 10.0, rel=0.01)
     assert light.impact_speed == pytest.approx(5.0, rel=1e-3)
+
+
+# ---------------------------------------------------------------- plants
+
+
+LEAVES = Material("leaves-flowers", Law.NEO_HOOKEAN, 3e8, 0.4, 150.0, loss=0.1)
+WOOD = Material("hardwood", Law.HENCKY, 1.2e10, 0.3, 700.0)
+CLAY = Material("terracotta", Law.HENCKY, 1.2e10, 0.2, 1900.0)
+SOIL = Material("potting_soil", Law.DRUCKER_PRAGER, 3e5, 0.25, 600.0, friction_angle=0.6,
+                cohesion=2e3, loss=0.2)  # fmt: skip
+
+
+def leaf_blades(count, bottom):
+    """Small triangles on a spiral."""
+    corner = np.array([[0.015, 0, 0], [0.095, 0.02, 0], [0.095, -0.02, 0.01]])
+    meshes = []
+    for k in range(count):
+        turn = trimesh.transformations.rotation_matrix(2.4 * k, [0, 0, 1])
+        blade = trimesh.Trimesh(corner, [[0, 1, 2]], process=False)
+        blade.apply_transform(turn)
+        blade.apply_translation((0, 0, bottom + 0.3 * k / count))
+        meshes.append(blade)
+    return trimesh.util.concatenate(meshes)
+
+
+def a_potted_plant(wood=WOOD, **how):
+    outside = trimesh.creation.cylinder(0.12, 0.2, sections=24)
+    pot = put(outside, 0.0)
+    soil = put(trimesh.creation.cylinder(0.1, 0.18, sections=24), 0.01)
+    stem = put(trimesh.creation.cylinder(0.012, 0.5, sections=12), 0.11)
+    made = [(pot, CLAY), (soil, SOIL), (stem, wood), (leaf_blades(40, 0.4), LEAVES)]
+    return inputs(thing(*made, **how))
+
+
+def test_a_plant_is_a_rigid_stem_on_a_spring_with_leaves_on_stalks():
+    scene, parts, field = a_potted_plant(push=Push((3.0, 0.0, 0.0), 0.0, 0.2))
+    particles = fill(scene, parts, field)
+    assert [t.kind for t in particles.treatments] == ["rigid", "rigid", "rigid", "foliage"]
+    assert "pot" in particles.treatments[1].why
+    (root,) = particles.roots
+    assert (root.object, root.part) == (0, 2)
+    assert root.stiffness == pytest.approx(0.34 * 3e5 * 0.08**3, rel=1e-6)
+    assert root.point == pytest.approx((0, 0, 0.11 + 0.4 * 0.08), abs=2e-3)
+    leafy = particles.part == 3
+    assert np.all(particles.rate[~leafy] == 0.0)
+    length = np.linalg.norm([0.08, 0.02, 0.01])
+    rate = np.sqrt(2e8 * 0.25e-3**2 / (0.6 * 800)) / length**2
+    assert np.median(particles.rate[leafy]) == pytest.approx(rate, rel=0.05)
+    assert particles.mass[leafy].sum() == pytest.approx(particles.mass_real[3])
+
+
+def test_a_plant_becomes_bodies_that_hold_together_and_never_touch():
+    scene, parts, field = a_potted_plant()
+    posed = pose(scene, fill(scene, parts, field), field)
+    problem = posed.problem
+    assert [b.rigid for b in problem.bodies] == [True, True, False]
+    assert problem.joints[0].first == 0 and problem.joints[0].second == 1
+    assert problem.bodies[2].tether is not None and problem.bodies[2].tether.holder == 1
+    assert set(problem.apart) == {(0, 1), (0, 2), (1, 2)}
+    assert list(posed.object_of_body) == [0, 0, 0]
+    assert list(object_of_body(problem)) == [0, 0, 0]
+
+
+def test_a_plant_whose_stem_bends_is_no_rigid_one():
+    rubbery = replace(WOOD, young=1e7)
+    scene, parts, field = a_potted_plant(rubbery, push=Push((3.0, 0.0, 0.0), 0.0, 0.2))
+    particles = fill(scene, parts, field)
+    assert particles.treatments[2].kind == "deformable"
+    assert "foliage" not in [t.kind for t in particles.treatments]
+    assert len(particles.rate) == 0

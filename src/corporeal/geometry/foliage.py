@@ -53,14 +53,17 @@ def swinging(
 
 
 def lengths_of_pieces(mesh: Mesh) -> Float[np.ndarray, " T"]:
-    """Length of the piece that each triangle belongs to [m]: its box's diagonal."""
+    """Length of the piece that each triangle belongs to [m], from end to end."""
     label = np.repeat(pieces(mesh), 3)
     corner = mesh.corners.reshape(-1, 3)
-    low, high = np.full((2, label.max() + 1, 3), np.inf)
-    high = -high
-    np.minimum.at(low, label, corner)
-    np.maximum.at(high, label, corner)
-    return np.linalg.norm(high - low, axis=1)[label[::3]]
+    count = np.bincount(label)
+    middle = np.stack([np.bincount(label, x) / count for x in corner.T], axis=1)
+    out = np.linalg.norm(corner - middle[label], axis=1)
+    order = np.lexsort((out, label))
+    end = corner[order[np.cumsum(count) - 1]]  # of each piece, what is farthest out
+    length = np.zeros(len(count))
+    np.maximum.at(length, label, np.linalg.norm(corner - end[label], axis=1))
+    return length[label[::3]]
 
 
 def crown_volume(points: Float[np.ndarray, "N 3"], cell: float) -> float:
