@@ -39,12 +39,18 @@ class Size:
     """Cells across which eight objects are spread."""
     substeps: int
     """Of one batch."""
+    peer_threads: tuple[int, ...]
 
 
 FULL = Size(
-    100_000, (10_000, 30_000, 100_000, 300_000, 1_000_000), (2, 4, 8, 16), (64, 128, 256), 60
+    100_000,
+    (10_000, 30_000, 100_000, 300_000, 1_000_000),
+    (2, 4, 8, 16),
+    (64, 128, 256),
+    60,
+    (1, 2, 4),
 )
-QUICK = Size(20_000, (10_000, 100_000), (16,), (64, 256), 24)
+QUICK = Size(20_000, (10_000, 100_000), (16,), (64, 256), 24, (1,))
 DOCS = Path(__file__).parent.parent / "docs"
 WIDTHS = (16, 6, 2, 16, 10, 3, 24, 8, 5)
 """Of the columns on the screen."""
@@ -72,7 +78,7 @@ def cuda_devices() -> list[str]:
 
 def measure(size: Size, peer: Path | None) -> list[page.Result]:
     """Hold the contest among all drops of one size, and then the one among sizes."""
-    threads = [t for t in (1, 2, 4) if t <= (os.cpu_count() or 1)]
+    threads = [t for t in size.peer_threads if t <= (os.cpu_count() or 1)]
     plain = drop_of(size.particles)
     peers = [Peer(peer, replace(plain, threads=t)) for t in threads] if peer else []
     ours = [Ours(drop) for drop in rivals(size)]

@@ -26,7 +26,7 @@ def engine():
 
 
 def test_rows_and_page_are_made_from_one_run(engine, tmp_path, monkeypatch):
-    tiny = engine.Size(1000, (500, 2000), (2,), (32,), 2)
+    tiny = engine.Size(1000, (500, 2000), (2,), (32,), 2, (1,))
     monkeypatch.setattr(engine, "QUICK", tiny)
     monkeypatch.setattr(engine, "DOCS", tmp_path)
     words = ["engine.py", "--quick", "--docs", "--json", str(tmp_path / "rows.json")]
