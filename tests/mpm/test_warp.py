@@ -88,6 +88,29 @@ def test_every_law_moves_as_in_the_reference_through_impact_and_friction(law):
     assert ours.contact_point == pytest.approx(theirs.contact_point, abs=1e-5, nan_ok=True)
 
 
+@pytest.mark.parametrize("law", list(Law))
+@pytest.mark.parametrize("stretch", [(40.0, -15.0, 25.0), (-25.0, -25.0, 5.0)])
+def test_every_law_holds_far_beyond_where_its_series_do(law, stretch):
+    """Small strains are taken by series, others by eigenvalues; a body here sees both."""
+    points = ball((0, 0, 0), 0.05)
+    given = problem(
+        body(points, law, young=1e4, yield_stress=5e2, viscosity=0.0),
+        body(points + np.array([0.5, 0, 0]), law, young=1e4, yield_stress=5e2, viscosity=0.0),
+        planes=(),
+        gravity=(0.0, 0.0, 0.0),
+    )
+    shear = np.array([[0, 9.0, 0], [0, 0, -6.0], [4.0, 0, 0]])
+    given.bodies[0].velocity[:] = points @ (np.diag(stretch) + shear).T
+    fast, sure = side_by_side(given, 40)
+    here, there = fast.snapshot(), sure.snapshot()
+    size = np.linalg.norm(there.motion - np.eye(3), axis=(1, 2))
+    assert size.max() > 0.5
+    assert np.abs(here.position - there.position).max() < 2e-4 * CELL
+    assert np.abs(here.deformation - there.deformation).max() < 1e-3
+    assert np.abs(here.plastic_strain - there.plastic_strain).max() < 1e-3
+    assert fast.measure().elastic == pytest.approx(sure.measure().elastic, rel=1e-3, abs=1e-9)
+
+
 @pytest.mark.parametrize("stiff", [(False, True), (True, True)])
 def test_rigid_bodies_move_as_in_the_reference(stiff):
     low, high = ball((0, 0, 0.055), 0.05), ball((0.02, 0.01, 0.155), 0.05)

@@ -47,13 +47,13 @@ OPTIONS = {
 }
 wp.set_module_options(OPTIONS)
 
-_POINTERS = "part node next history material table block where near point rigid surface"
+_POINTERS = "part node next history material table block where used near point rigid surface"
 _COUNTS = "blocks pool rigids points surfaces pushed"
 FIELD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("mass", "f8"), ("slowing", "f8"), ("origin", "i4", 3), ("dim", "i4", 3)]
     + [(name, "i4") for name in _COUNTS.split()]
-    + [("floor", "i4"), ("level", "f4", 3)],
+    + [("floor", "i4"), ("level", "f4", 3), ("side", "i4"), ("spare", "i4")],
     align=True,
 )
 _POINTERS = (

@@ -46,6 +46,8 @@ SUNK = 8.0
 """A particle deeper than this in a wall [cells] has left the domain."""
 FARTHEST = 1e5
 """A particle farther than this from the origin [cells] has left the domain."""
+LARGEST = 1e9
+"""A particle with a larger velocity [m/s], velocity gradient or strain is as good as infinite."""
 MOST_THREADS = 4
 CHUNK = 32
 """Node blocks of one task."""
@@ -233,7 +235,7 @@ class WarpEngine:
 
     def _connect_field(self, f: int, window: Window) -> None:
         record = self.field[f : f + 1]
-        for name in ("part", "node", "next", "history", "table", "block", "where", "near"):
+        for name in ("part", "node", "next", "history", "table", "block", "where", "used", "near"):
             record[name] = getattr(window, name).ctypes.data
         record["material"] = self.material[f].ctypes.data
         record["origin"], record["dim"] = window.origin, window.dim
@@ -309,13 +311,12 @@ class WarpEngine:
 
     def _sort(self, fields: set[int]) -> None:
         self.book()
-        for f in sorted(fields):
-            fits = self.window[f].sort()
-            if self.window[f].lost:
-                self._find_lost()
-            if not fits:
-                raise SimulationError(_too_wide(self.problem, self.members[f], self.time))
+        if any(self.window[f].survey() for f in fields):
+            self._find_lost()
+        wide = [f for f in sorted(fields) if not self.window[f].sort()]
         self.connect()
+        if wide:
+            raise SimulationError(_too_wide(self.problem, self.members[wide[0]], self.time))
 
     def _find_lost(self) -> None:
         """Raise when a particle is not finite or left the domain."""
@@ -324,7 +325,7 @@ class WarpEngine:
         for window in self.window.values():
             place = window.position()
             rows = window.channel(3, 21)
-            good = np.isfinite(rows).all(axis=1) & (np.abs(place) < FARTHEST).all(axis=1)
+            good = (np.abs(rows) < LARGEST).all(axis=1) & (np.abs(place) < FARTHEST).all(axis=1)
             for plane in self.problem.planes:
                 height = place @ np.array(plane.normal) - plane.offset / cell
                 good &= height > -SUNK

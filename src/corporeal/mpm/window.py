@@ -31,11 +31,11 @@ class Window:
     """Number of each node block, -1: none."""
     where: np.ndarray
     """Coordinates of node blocks, (blocks, 4)."""
+    used: np.ndarray
+    """Which of the two sets of nodes hold anything in each node block: bits."""
     dim: np.ndarray
     """Size of the table."""
     fits: bool
-    lost: bool
-    """Whether the last sort saw a particle that is not finite or left the domain."""
 
     def __init__(self, place: np.ndarray, rows: np.ndarray, flows: bool, sorter: Sorter) -> None:
         """Sort particles into a first window.
@@ -67,16 +67,25 @@ class Window:
         self.kinds = int(rows[:, MT].view(np.int32).max()) + 1
         self.sort()
 
+    def survey(self) -> bool:
+        """Whether a particle is not finite or left the domain."""
+        return self.sorter.survey(self)
+
     def sort(self) -> bool:
         """Sort again and move the window; False when its particles no longer fit into one."""
-        self.lost = self.sorter.survey(self)
+        self.survey()
         self.fits = self.sorter.arrange(self, LONGEST)
         self.__dict__.pop("slot", None)
-        if self.fits and len(self.node) < len(self.where):
-            self._make_room(len(self.where) * 3 // 2)
+        if self.fits:
+            self._make_room()
         return self.fits
 
-    def _make_room(self, blocks: int) -> None:
+    def _make_room(self) -> None:
+        """Have nodes enough, in which whatever was there before still stands."""
+        self.used = np.full(len(self.where), 3, np.int32)
+        if len(self.node) >= len(self.where):
+            return
+        blocks = len(self.where) * 3 // 2
         self.node = aligned((blocks, 64, 8), np.float32)
         self.next = aligned((blocks, 64, 8), np.float32)
         self.near = np.zeros(2 * blocks, np.uint64)
@@ -130,5 +139,4 @@ class Window:
             setattr(self, name, copy)
         self.fits = True
         self.__dict__.pop("slot", None)
-        if len(self.node) < len(self.where):
-            self._make_room(len(self.where) * 3 // 2)
+        self._make_room()

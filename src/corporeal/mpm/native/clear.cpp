@@ -1,4 +1,10 @@
 // Empty a range of one field's node blocks.
 int *task = world->list + 4 * index;
-f8 *node = (f8 *)world->field[task[0]].node;
-for (size_t i = (size_t)task[1] * 64; i < (size_t)task[2] * 64; i++) node[i] = Simd::all(0.0f);
+const Field &field = world->field[task[0]];
+for (int b = task[1]; b < task[2]; b++) {
+  int *used = field.used + b;
+  if (!(*used & 1 << field.side)) continue;
+  *used &= ~(1 << field.side);
+  f8 *node = (f8 *)field.node + (size_t)b * 64;
+  for (int i = 0; i < 64; i++) node[i] = Simd::all(0.0f);
+}

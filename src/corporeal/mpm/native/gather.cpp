@@ -28,17 +28,20 @@ struct Gather {
     x += c[2];
   }
   static inline void fill(const Field &field, const int *block, f8 *arena) {
-    for (int i = 0; i < 8; i++)
-      for (int j = 0; j < 8; j++) {
+    int low[3], high[3];
+    Simd::range(field, block, low, high);
+    for (int i = low[0]; i <= high[0]; i++)
+      for (int j = low[1]; j <= high[1]; j++) {
         const int *near = block + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
         f8 *h = arena + i * LAYER + j * 8;
         size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
         const f8 *g0 = (f8 *)field.node + (size_t)near[0] * 64 + row;
         const f8 *g1 = (f8 *)field.node + (size_t)near[1] * 64 + row;
         const f8 *g2 = (f8 *)field.node + (size_t)near[2] * 64 + row;
-        h[0] = g0[3];
+        if (low[2] == 0) h[0] = g0[3];
         for (int k = 0; k < 4; k++) h[1 + k] = g1[k];
-        for (int k = 0; k < 3; k++) h[5 + k] = g2[k];
+        if (high[2] > 4)
+          for (int k = 0; k < 3; k++) h[5 + k] = g2[k];
       }
   }
   inline void batch(const World *world, const Field &field, const int *block, int s, const f8 *arena) {

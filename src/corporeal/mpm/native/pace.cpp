@@ -51,6 +51,7 @@ struct Pace {
         float *now = F.node;
         F.node = F.next;
         F.next = now;
+        F.side = !F.side;
       }
     }
     c->laid = c->fused;

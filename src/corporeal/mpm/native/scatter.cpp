@@ -62,22 +62,40 @@ struct Scatter {
     int n = block[1] - s < 8 ? block[1] - s : 8;
     for (int l = 0; l < n; l++) lane(arena + base[l], W, l, r[l], a[0][l], a[1][l], a[2][l]);
   }
+  // Node blocks that are no longer empty.
+  static inline void mark(const Field &field, const int *block, const int *low, const int *high,
+                          const float *node) {
+    int bit = 1 << (node == field.node ? field.side : !field.side);
+    for (int i = (low[0] + 3) >> 2; i <= (high[0] + 3) >> 2; i++)
+      for (int j = (low[1] + 3) >> 2; j <= (high[1] + 3) >> 2; j++)
+        for (int k = (low[2] + 3) >> 2; k <= (high[2] + 3) >> 2; k++) {
+          int *used = field.used + block[5 + (i * 3 + j) * 3 + k];
+          if (!(__atomic_load_n(used, __ATOMIC_RELAXED) & bit))
+            __atomic_fetch_or(used, bit, __ATOMIC_RELAXED);
+        }
+  }
   static double block(const World *world, const Field &field, const int *block, float *node) {
     alignas(64) f8 arena[ARENA];
     double work = 0;
-    for (int i = 0; i < ARENA; i++) arena[i] = Simd::all(0.0f);
+    int low[3], high[3];
+    Simd::range(field, block, low, high);
+    for (int i = low[0]; i <= high[0]; i++)
+      for (int j = low[1]; j <= high[1]; j++)
+        for (int k = 0; k < 8; k++) arena[i * LAYER + j * 8 + k] = Simd::all(0.0f);
     for (int s = block[0]; s < block[1]; s += 8) batch(world, field, block, s, arena, work);
-    for (int i = 0; i < 8; i++)
-      for (int j = 0; j < 8; j++) {
+    mark(field, block, low, high, node);
+    for (int i = low[0]; i <= high[0]; i++)
+      for (int j = low[1]; j <= high[1]; j++) {
         const int *near = block + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
         const f8 *h = arena + i * LAYER + j * 8;
         size_t row = ((i + 3) & 3) * 16 + ((j + 3) & 3) * 4;
         f8 *g0 = (f8 *)node + (size_t)near[0] * 64 + row;
         f8 *g1 = (f8 *)node + (size_t)near[1] * 64 + row;
         f8 *g2 = (f8 *)node + (size_t)near[2] * 64 + row;
-        g0[3] += h[0];
+        if (low[2] == 0) g0[3] += h[0];
         for (int k = 0; k < 4; k++) g1[k] += h[1 + k];
-        for (int k = 0; k < 3; k++) g2[k] += h[5 + k];
+        if (high[2] > 4)
+          for (int k = 0; k < 3; k++) g2[k] += h[5 + k];
       }
     return work;
   }

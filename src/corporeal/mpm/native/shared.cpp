@@ -67,6 +67,7 @@ struct Clock {
 struct Field {
   float *part, *node, *next, *history, *material;
   int *table, *block, *where;
+  int *used;                // which of the two sets of nodes hold anything in a node block: bits
   u64 *near;
   double *point;            // rigid: [P][5] place in the body's frame, mass, volume
   double *rigid;            // rigid: its state, see rigid.cpp
@@ -76,6 +77,7 @@ struct Field {
   int blocks, pool, rigids, points, surfaces, pushed;
   int floor;                // the only plane that the window reaches, or -1
   float level[3];           // its normal, or 0
+  int side, spare;          // of the two sets of nodes, which this step reads
 };
 struct Blow {               // a body in the wind: see blow.py
   double *area, *point, *rigid, *impulse, *signal;
@@ -160,6 +162,29 @@ struct Simd {
     w[0] = 0.5f * a * a;
     w[1] = 0.75f - b * b;
     w[2] = 0.5f * c * c;
+  }
+  // Nodes of a block's arena that its particles reach, first and last along each axis.
+  static inline void range(const Field &field, const int *block, int *low, int *high) {
+    for (int d = 0; d < 3; d++) {
+      const i8 zero = i8{0, 0, 0, 0, 0, 0, 0, 0};
+      i8 least = zero + 5, most = zero;
+      for (int s = block[0]; s < block[1]; s += 8) {
+        i8 cell = *(const i8u *)(field.part + (size_t)s * NC + 8 * (XI + d));
+        cell = ((cell - HALF) >> PLACE) - (4 * block[2 + d] - 1);
+        if (block[1] - s < 8)
+          cell = i8{0, 1, 2, 3, 4, 5, 6, 7} < block[1] - s ? cell : zero + cell[0];
+        least = cell < least ? cell : least;
+        most = cell > most ? cell : most;
+      }
+      low[d] = 5;
+      high[d] = 0;
+      for (int l = 0; l < 8; l++) {
+        if (least[l] < low[d]) low[d] = least[l];
+        if (most[l] > high[d]) high[d] = most[l];
+      }
+      if (low[d] < 0) low[d] = 0;
+      high[d] = (high[d] > 5 ? 5 : high[d]) + 2;
+    }
   }
   // Ask for the nodes around a block, some time before they are needed.
   static inline void fetch(const float *node, const int *block) {
