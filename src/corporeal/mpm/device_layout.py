@@ -85,6 +85,8 @@ class Sheet:
     """Largest speed and largest wave speed of what can deform [m/s]: in this step, in the last."""
     change: wp.array(dtype=wp.float32)
     """Largest change of a contact's velocity in this sweep [m/s]."""
+    pace: wp.array(dtype=wp.float64)
+    """Nesterov's t and momentum, and whether the last sweep went back on its way."""
     loss: wp.array2d(dtype=wp.float64)
     gravity: wp.vec3d
     ramp: wp.float64
@@ -203,6 +205,8 @@ class Rigid:
     radius: wp.array(dtype=wp.float64)
     speed_change: wp.array(dtype=wp.vec3d)
     moment_change: wp.array(dtype=wp.vec3d)
+    last_speed: wp.array(dtype=wp.vec3d)
+    last_moment: wp.array(dtype=wp.vec3d)
     busy: wp.array(dtype=wp.int32)
     """Contacts that share the body in this sweep."""
     lost: wp.array(dtype=wp.int32)
@@ -319,6 +323,7 @@ class Contacts:
     """X: mass times offset from the node [kg m]."""
     outward: wp.array(dtype=wp.vec3)
     velocity: wp.array(dtype=wp.vec3d)
+    last_velocity: wp.array(dtype=wp.vec3d)
     light: wp.array(dtype=wp.float64)
     """1/m [1/kg]."""
     meet: wp.array(dtype=wp.int32)
@@ -343,6 +348,8 @@ class Contacts:
     approach: wp.array(dtype=wp.float64)
     before: wp.array(dtype=wp.vec3d)
     impulse: wp.array(dtype=wp.vec3d)
+    last_impulse: wp.array(dtype=wp.vec3d)
+    turn: wp.array(dtype=wp.float64)
     apart: wp.array2d(dtype=wp.int32)
     """1: two bodies that are never in contact."""
     hit: wp.array2d(dtype=wp.int32)

@@ -81,6 +81,7 @@ def add_touch(c: Contacts, t: int, k: int, a: int, other: int):
     c.active[t] = 0
     c.gap[t] = FAR
     c.impulse[t] = wp.vec3d(D(0.0))
+    c.last_impulse[t] = wp.vec3d(D(0.0))
     for q in range(3):
         c.far_a[3 * t + q] = -FAR
         c.far_c[3 * t + q] = FAR

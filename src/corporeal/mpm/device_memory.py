@@ -105,6 +105,8 @@ class Memory:
         r.radius = self.put(_radii(matter), wp.float64)
         r.speed_change = self.zeros(len(stiff), wp.vec3d)
         r.moment_change = self.zeros(len(stiff), wp.vec3d)
+        r.last_speed = self.zeros(len(stiff), wp.vec3d)
+        r.last_moment = self.zeros(len(stiff), wp.vec3d)
         r.busy, r.lost = self.zeros(len(stiff), wp.int32), self.zeros(len(stiff), wp.int32)
         self._rigid_particles(r, problem, matter, np.flatnonzero(stiff[matter.body]))
         self._surfaces(r, matter, np.flatnonzero(stiff))
@@ -152,7 +154,8 @@ class Memory:
         c.chosen, c.normal = self.zeros(touches, wp.vec3), self.zeros(touches, wp.vec3)
         c.gap = self.zeros(touches, wp.float32)
         c.target, c.approach = self.zeros(touches, wp.float64), self.zeros(touches, wp.float64)
-        for name in ("point", "before", "impulse"):
+        c.last_velocity, c.turn = self.zeros(entries, wp.vec3d), self.zeros(touches, wp.float64)
+        for name in ("point", "before", "impulse", "last_impulse"):
             setattr(c, name, self.zeros(touches, wp.vec3d))
         friction, restitution = _pair_tables(problem)
         c.friction, c.restitution = (
@@ -177,6 +180,7 @@ class Memory:
         s.clock, s.flag = self.zeros(layout.CLOCK, wp.float64), self.zeros(layout.FLAGS, wp.int32)
         s.clock[int(layout.SMALLEST) : int(layout.SMALLEST) + 1].fill_(np.inf)
         s.fast, s.change = self.zeros(4, wp.float32), self.zeros(1, wp.float32)
+        s.pace = self.zeros(3, wp.float64)
         s.loss = self.zeros((4, int(layout.LANES)), wp.float64)
         s.gravity, s.ramp = wp.vec3d(*problem.gravity), problem.gravity_ramp
         s.courant, s.dx, s.cell = problem.courant, problem.cell, problem.cell
