@@ -15,12 +15,15 @@ from concurrent.futures import ProcessPoolExecutor, as_completed
 from dataclasses import replace
 from pathlib import Path
 
+from laws import convergence, page
 from laws.outcome import Outcome
 from laws.suite import CASES
 from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+DOCS = Path(__file__).parents[1] / "docs"
 
 
 def timed(number: str, quick: bool) -> Outcome:
@@ -92,6 +95,36 @@ def tally(found: list[Outcome]) -> tuple[int, int]:
     return sum(targets.values()), len(targets)
 
 
+def converge(workers: int) -> list[tuple[convergence.Plot, list[list[float]]]]:
+    """Run the resolutions of all plots, the finest first; their errors [%]."""
+    errors = [[[0.0] * len(s.cells) for s in plot.series] for plot in convergence.PLOTS]
+    points = [
+        (p, s, k)
+        for p, plot in enumerate(convergence.PLOTS)
+        for s, series in enumerate(plot.series)
+        for k in range(len(series.cells))
+    ]
+    points.sort(key=lambda point: -point[2])
+    with (
+        ProcessPoolExecutor(workers) as pool,
+        Progress(console=Console(stderr=True)) as bar,
+    ):
+        task = bar.add_task("convergence", total=len(points))
+        waiting = {
+            pool.submit(convergence.measured, p, s, convergence.PLOTS[p].series[s].cells[k]): (
+                p,
+                s,
+                k,
+            )
+            for p, s, k in points
+        }
+        for done in as_completed(waiting):
+            p, s, k = waiting[done]
+            errors[p][s][k] = done.result()
+            bar.advance(task)
+    return list(zip(convergence.PLOTS, errors, strict=True))
+
+
 def main() -> None:
     """Run what was asked."""
     parser = argparse.ArgumentParser(
@@ -108,11 +141,15 @@ def main() -> None:
         help="cases that run side by side",
     )
     asked = parser.parse_args()
+    if asked.docs and (asked.quick or asked.case):
+        parser.error("--docs needs the whole suite in full: leave out --quick and --case")
     found = run(asked.case or list(CASES), asked.quick, asked.workers)
     show(found)
     if asked.json:
         rows = [o.row() | {"quick": asked.quick} for o in found]
         asked.json.write_text(json.dumps(rows, indent=1, allow_nan=False) + "\n")
+    if asked.docs:
+        page.write(DOCS, found, converge(asked.workers), tally(found))
 
 
 if __name__ == "__main__":

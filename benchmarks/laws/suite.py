@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from laws import collisions, friction, rest, rotation, statics, waves
+from laws import bending, collisions, friction, grains, plastic, rest, rotation, statics, waves
 from laws.outcome import Outcome
 
 
@@ -35,6 +35,9 @@ CASES = {
         Case("12a", statics.heavy_in_plane_strain, (5, 20)),
         Case("12b", statics.heavy_in_space, (8, 30)),
         Case("13", statics.self_weight, (3, 4)),
+        Case("14", bending.cantilever, (8, 25)),
+        Case("15", plastic.copper_bar, (5, 15)),
+        Case("16", grains.sand, (10, 30)),
         Case("17", rotation.rotating_body, (3, 20)),
     )
 }

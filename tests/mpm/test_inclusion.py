@@ -1,15 +1,10 @@
 """A frame with a cushion on it: rigid where it is stiff, soft where it is soft, one object."""
 
-import sys
 from dataclasses import replace
-from pathlib import Path
 
 import numpy as np
 import pytest
-
-sys.path.insert(0, str(Path(__file__).parents[1] / "nature"))
-
-from bodies import Stuff, box, box_surface, floor, problem
+from laws.bodies import Stuff, box, box_surface, floor, problem
 
 from corporeal.backends import load
 from corporeal.mpm.bond import join

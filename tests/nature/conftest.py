@@ -1,14 +1,10 @@
 """Every law of nature is asked of every engine."""
 
-import sys
-from pathlib import Path
-
 import pytest
+from laws.suite import CASES
 
 from corporeal.backends import load
 from corporeal.mpm.problem import MENU
-
-sys.path.insert(0, str(Path(__file__).parent))
 
 ROUND_OFF = {"reference": 1e-12, "warp": 1e-5}
 
@@ -33,3 +29,18 @@ def patient_engine(request):
 def fast_engine():
     """Only the production engine: for experiments of many steps."""
     return load("engine", "warp", MENU)
+
+
+@pytest.fixture
+def holds():
+    """Run a case of the validation suite and show every check that misses its target."""
+
+    def check(number, quick):
+        found = CASES[number].run(quick)
+        missed = [c for c in found.checks if not c.met]
+        assert not missed, "\n".join(
+            f"{c.quantity}: {c.value:.5g}, error {c.error:.3g} {c.unit}" for c in missed
+        )
+        return found
+
+    return check

@@ -4,7 +4,7 @@ from functools import cache
 
 import numpy as np
 import pytest
-from bodies import Stuff, ball, box, problem
+from laws.bodies import Stuff, ball, box, problem
 
 RADIUS, CELL, SPEED = 0.1, 0.1 / 3, 0.3
 CONTACT_TIME = 0.113

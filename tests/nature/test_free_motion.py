@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import RUBBER, Stuff, ball, box, problem
+from laws.bodies import RUBBER, Stuff, ball, box, problem
 
 from corporeal.types import Law, Push
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import Stuff, ball, box, box_surface, floor, problem
+from laws.bodies import Stuff, ball, box, box_surface, floor, problem
 
 G, ANGLE = 9.81, np.radians(30)
 CELL, SIZE = 0.025, (0.2, 0.1, 0.1)

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import Stuff, ball, box, cylinder, floor, problem
+from laws.bodies import Stuff, ball, box, cylinder, floor, problem
 
 from corporeal.types import Law
 

@@ -3,7 +3,7 @@
 from dataclasses import replace
 
 import numpy as np
-from bodies import box, problem
+from laws.bodies import box, problem
 
 from corporeal.types import Law
 

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import Stuff, box, box_surface, floor, problem
+from laws.bodies import Stuff, box, box_surface, floor, problem
 
 from corporeal.mpm.problem import Plane
 from corporeal.types import Law

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import Stuff, ball, ball_surface, box, floor, problem
+from laws.bodies import Stuff, ball, ball_surface, box, floor, problem
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)

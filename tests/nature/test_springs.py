@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import Stuff, ball, box, box_surface, floor, problem
+from laws.bodies import Stuff, ball, box, box_surface, floor, problem
 
 from corporeal.errors import UserError
 from corporeal.mpm.problem import Joint, Tether

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from bodies import Stuff, box, problem
+from laws.bodies import Stuff, box, problem
 
 LENGTH, YOUNG, DENSITY = 1.0, 1e6, 1000.0
 PERIOD = 2 * LENGTH * np.sqrt(DENSITY / YOUNG)

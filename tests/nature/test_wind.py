@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from bodies import Stuff, ball, ball_surface, box, problem
+from laws.bodies import Stuff, ball, ball_surface, box, problem
 from scipy.spatial import cKDTree
 
 from corporeal.mpm import wind
