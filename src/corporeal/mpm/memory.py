@@ -16,17 +16,24 @@ BYTES = {
     "touch": 184,
     "aim": 104,
     "entry": 72,
-    "line": 240,
+    "line": 248,
+    "past": 32,
 }
 """Of the structs in ``native/contact_shared.cpp``."""
-_POINTERS = "junction meet side touch aim entry stand line pair order"
-_COUNTS = "most_junctions most_meets most_sides most_touches junctions meets sides touches points"
+_POINTERS = "junction meet side touch aim entry stand line past slot pair order"
+_COUNTS = (
+    "most_junctions most_meets most_sides most_touches slots pasts sweeps junctions meets sides "
+    "touches points"
+)
 STAGE = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [(name, "i4") for name in _COUNTS.split()]
     + [("entries", "i4", PARTS)],
     align=True,
 )
+BOX = 48
+"""First column of the box around a body's particles, in a rigid state: lowest and highest corner
+in the body's frame [m]."""
 BONDED = -1.0
 """Friction of a pair that is never in contact, to the native piece."""
 BOOKS = "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point"
@@ -53,20 +60,44 @@ def rigid_grid(
     """
     across = int(np.ceil((2.0 * state[tables.RADIUS] / cell + 4.0) / 4.0)) + 3
     surface = body.surface - state[tables.CENTRE : tables.CENTRE + 3]
+    points, clumps = _clumped(points, cell)
+    state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
     arrays = {
         "node": np.zeros((across**3, 64, 8), np.float32),
         "table": np.full(across**3, -1, np.int32),
         "where": np.zeros((across**3, 4), np.int32),
         "near": np.zeros(2 * across**3, np.uint64),
         "block": np.zeros(len(points), np.int32),
-        "point": np.ascontiguousarray(points),
+        "point": points,
+        "clump": clumps,
         "surface": np.ascontiguousarray(surface),
         "rigid": state,
     }
     point(record, **arrays)
     record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
+    record["clumps"] = len(clumps)
     return arrays
+
+
+def _clumped(points: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """Sort a rigid body's particles into cubes of 4 cells: what is far from all others is passed over.
+
+    Returns:
+        The particles, and for each cube the first and last of them, its middle and its radius [m].
+
+    """
+    cube = np.floor(points[:, :3] / (4.0 * cell)).astype(np.int64)
+    order = np.lexsort(cube.T)
+    points, cube = np.ascontiguousarray(points[order]), cube[order]
+    starts = np.flatnonzero(np.any(np.diff(cube, axis=0, prepend=cube[:1] - 1) != 0, axis=1))
+    clumps = np.zeros((len(starts), 6))
+    clumps[:, 0], clumps[:, 1] = starts, np.append(starts[1:], len(points))
+    for clump in clumps:
+        mine = points[int(clump[0]) : int(clump[1]), :3]
+        clump[2:5] = 0.5 * (mine.min(axis=0) + mine.max(axis=0))
+        clump[5] = np.linalg.norm(mine - clump[2:5], axis=1).max()
+    return points, clumps
 
 
 class ContactMemory:
@@ -116,6 +147,18 @@ class ContactMemory:
         point(self.stage, stand=self.stands)
         return tasks if (floor >= 0).any() else 0
 
+    @property
+    def past(self) -> np.ndarray:
+        """Forces of the contacts in the last step, as bytes: where the next one begins to look."""
+        return self.lists["past"][: int(self.stage["pasts"][0]) * BYTES["past"]].copy()
+
+    @past.setter
+    def past(self, bytes_: np.ndarray) -> None:
+        while len(bytes_) > len(self.lists["past"]):
+            self.lengthen()
+        self.lists["past"][: len(bytes_)] = bytes_
+        self.stage["pasts"] = len(bytes_) // BYTES["past"]
+
     def lengthen(self) -> None:
         """Make every list twice as long."""
         self.room *= 2
@@ -127,10 +170,15 @@ class ContactMemory:
             "aim": 8 * self.room,
             "entry": 8 * self.room,
             "line": 8 * self.room,
+            "past": 8 * self.room,
         }
+        past = self.past if hasattr(self, "lists") else np.zeros(0, np.uint8)
         self.lists = {name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()}
         self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
-        point(self.stage, order=self.order, **self.lists)
+        self.slot = np.zeros(32 * self.room, np.int32)
+        self.stage["slots"] = len(self.slot)
+        point(self.stage, order=self.order, slot=self.slot, **self.lists)
+        self.past = past
         self.stage["most_junctions"], self.stage["most_meets"] = room["junction"], room["meet"]
         self.stage["most_sides"], self.stage["most_touches"] = room["side"], room["touch"]
 

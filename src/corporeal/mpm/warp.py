@@ -368,6 +368,7 @@ class WarpEngine:
         for f, window in self.window.items():
             saved |= {f"field{f}.{k}": v for k, v in window.saved().items()}
         saved |= {f"rigid{b}": state.copy() for b, state in self.rigid.items()}
+        saved["contact"] = self.contact.past
         saved["clock"] = np.array([self.time, *(float(self.clock[k][0]) for k in KEPT)])
         return saved
 
@@ -382,6 +383,7 @@ class WarpEngine:
             )
         for b, state in self.rigid.items():
             state[:] = saved[f"rigid{b}"]
+        self.contact.past = saved["contact"]
         time, *kept = saved["clock"].tolist()
         self.world["time"] = time
         for name, value in zip(KEPT, kept, strict=True):

@@ -91,6 +91,11 @@ for (int j = from; j < to; j++) {
       }
     }
     M.touches = t - M.touch;
+    // A rigid body's nodes know their contacts: its particles are in no order that others share.
+    for (int q = M.side; q < s && M.sides > 1; q++)
+      if (world->field[sides[q].field].rigids)
+        ((int *)world->field[sides[q].field].node)[(size_t)sides[q].slot * 8 + 7] =
+            (M.touch + 1) | M.touches << 24;
     k++;
   }
   for (int q = 0; q < J.fields; q++) {

@@ -43,22 +43,25 @@ if (index >= world->tasks) {
       base[i] = Vec::floor_int(c - 0.5);
       x[i] = (float)(c - base[i]);
     }
-    int at[3];
     float reach = 0;
-    for (int i = 0; i < 27; i++) {
-      int node[3] = {base[0] + i / 9, base[1] + i / 3 % 3, base[2] + i % 3};
-      for (int d = 0; d < 3; d++) at[d] = node[d] >> 2;
-      int b = Grid::block(F, at);
-      if (b < 0 || !F.where[4 * b + 3]) continue;
-      const Junction &J = junctions[F.where[4 * b + 3] - 1];
-      int bit = (node[0] & 3) * 16 + (node[1] & 3) * 4 + (node[2] & 3);
-      if (!(J.several >> bit & 1)) continue;
-      const Meet &M = meets[Grid::meet(J, bit)];
-      if (reach == 0) reach = (float)(0.5 * cbrt(p[4]) * inv);
-      for (int t = M.touch; t < M.touch + M.touches; t++)
-        Support::see(aims[t], f, Support::all(x[0] - i / 9), Support::all(x[1] - i / 3 % 3),
-                     Support::all(x[2] - i % 3), Q, reach, reach);
-    }
+    for (int i = 0; i < 3; i++)
+      for (int j = 0; j < 3; j++) {
+        const int *row = 0;
+        int last = 1 << 30;
+        for (int k = 0; k < 3; k++) {
+          const int X = base[0] + i, Y = base[1] + j, Z = base[2] + k;
+          if (Z >> 2 != last) {
+            int at[3] = {X >> 2, Y >> 2, last = Z >> 2}, b = Grid::block(F, at);
+            row = b < 0 ? 0 : (const int *)F.node + ((size_t)b * 64 + (X & 3) * 16 + (Y & 3) * 4) * 8;
+          }
+          const int id = row ? row[8 * (Z & 3) + 7] : 0;
+          if (!id) continue;
+          if (reach == 0) reach = (float)(0.5 * cbrt(p[4]) * inv);
+          for (int t = (id & 0xffffff) - 1, end = t + (id >> 24); t < end; t++)
+            Support::see(aims[t], f, Support::all(x[0] - i), Support::all(x[1] - j),
+                         Support::all(x[2] - k), Q, reach, reach);
+        }
+      }
   }
   return;
 }

@@ -1,7 +1,7 @@
 // What moves rigid bodies, in one list: contacts on nodes and, against planes, on their surface
 // points. Then the books, and rigid bodies move.
 constexpr double PATCH = 0.1, SLOWEST = 0.05;
-const int SWEEPS = 10, SWEEPS_OF_A_HIT = 100;
+const int SWEEPS = 10, SWEEPS_OF_A_HIT = 100, LEAST = 2;
 struct List {
   // K gains 1/M + [r]ᵀ I⁻¹ [r] of a rigid body: K e·e is its inverse mass along e.
   static inline void soften(double *K, const double *s, const double *r) {
@@ -76,6 +76,19 @@ struct List {
     hit(R.c, R.mc, R.rc, d, 1.0);
     return sqrt(Vec::dot(d, d)) * R.inverse;
   }
+  // Begin with the force of the last step, as far as it still pushes.
+  static inline void remember(Line &R, const double *force, double dt) {
+    double jn = Vec::dot(force, R.n) * dt, t[3];
+    if (jn <= 0) return;
+    for (int i = 0; i < 3; i++) t[i] = force[i] * dt - jn * R.n[i];
+    double length = sqrt(Vec::dot(t, t)), scale = length > R.mu * jn ? R.mu * jn / length : 1.0;
+    for (int i = 0; i < 3; i++) R.J[i] = jn * R.n[i] + scale * t[i];
+    hit(R.a, R.ma, R.ra, R.J, -1.0);
+    hit(R.c, R.mc, R.rc, R.J, 1.0);
+  }
+  static inline int first_slot(u64 key, int slots) {
+    return (int)((key * 0x9e3779b97f4a7c15ull) >> 32) & (slots - 1);
+  }
   static inline void side(const World *w, Side *sides, int f, int s, const double *x, double *&at,
                           double &m, double *r, double *K) {
     at = 0;
@@ -115,7 +128,7 @@ for (int f = 0; f < fields; f++) {
       if (gap >= POINT_REACH * dx) continue;
       Touch &T = touches[nt++];
       T.meet = -1;
-      T.a = 0;
+      T.a = p;
       T.c = -1 - w;
       T.fa = f;
       T.fc = fields + w;
@@ -140,6 +153,11 @@ for (int t = 0; t < nt; t++) {
   Line &R = lines[n++];
   R.touch = t;
   R.group = (kind * all + T.fa) * all + T.fc;
+  R.key = (u64)R.group << 48;
+  if (T.meet < 0)
+    R.key |= (u64)T.a;
+  else
+    for (int i = 0; i < 3; i++) R.key |= (u64)(meets[T.meet].at[i] & 0xffff) << (16 * i);
   R.mu = T.mu;
   for (int i = 0; i < 6; i++) R.K[i] = 0;
   for (int i = 0; i < 3; i++) {
@@ -184,6 +202,7 @@ if (hits)
     if (T.bounce && pair[8 * (T.fa * all + T.fc)] > 0)
       lines[i].target = -world->restitution[T.fa * all + T.fc] * T.approach;
   }
+if (!n) stage->pasts = 0;
 if (n) {
   // Pairs of bodies, then bodies on planes, then their surface points.
   int *order = stage->order, *place = order + n;
@@ -196,6 +215,21 @@ if (n) {
   // ten sweeps, what is left may creep by a few thousandths of a cell per second.
   const int sweeps = hits || stacked ? SWEEPS_OF_A_HIT : SWEEPS;
   const double fine = 2e-3 * dx;
+  const bool known = stage->pasts && !hits;
+  if (known) {
+    int *slot = stage->slot, last = stage->slots - 1;
+    for (int i = 0; i <= last; i++) slot[i] = 0;
+    for (int p = 0; p < stage->pasts; p++) {
+      int at = List::first_slot(stage->past[p].key, stage->slots);
+      while (slot[at]) at = (at + 1) & last;
+      slot[at] = p + 1;
+    }
+    for (int i = 0; i < n; i++) {
+      int at = List::first_slot(lines[i].key, stage->slots);
+      while (slot[at] && stage->past[slot[at] - 1].key != lines[i].key) at = (at + 1) & last;
+      if (slot[at]) List::remember(lines[i], stage->past[slot[at] - 1].force, dt);
+    }
+  }
   double u[3];
   for (int s = 0; s < sweeps; s++) {
     double most = 0;
@@ -211,11 +245,18 @@ if (n) {
         if (change > most) most = change;
       }
     }
-    if (most == 0 || (s >= 10 && most < fine)) break;
+    stage->sweeps = s + 1;
+    if (most == 0 || (s >= (known ? LEAST : 10) && most < fine)) break;
   }
+  stage->pasts = 0;
   for (int i = 0; i < n; i++) {
     Touch &T = touches[lines[i].touch];
     for (int d = 0; d < 3; d++) T.J[d] = lines[i].J[d];
+    if (lines[i].J[0] != 0 || lines[i].J[1] != 0 || lines[i].J[2] != 0) {
+      Past &past = stage->past[stage->pasts++];
+      past.key = lines[i].key;
+      for (int d = 0; d < 3; d++) past.force[d] = lines[i].J[d] / dt;
+    }
     for (int side = 0; side < 2; side++) {
       if ((side ? lines[i].mc : lines[i].ma) <= 0) continue;
       const Side &S = sides[side ? T.c : T.a];

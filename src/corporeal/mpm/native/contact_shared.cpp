@@ -2,7 +2,7 @@
 // solve, settle. Same formulas as contact.py and encounter.py; design: physics, section 2 C to G.
 // Offsets, gaps and normals' supports are in cells; velocities, masses and impulses SI.
 const int CENTRE = 1, TURN = 4, REST = 13, SPEED = 22, MOMENT = 25, INERTIA = 28, SPIN = 37,
-          RADIUS = 40, KICK = 41;
+          RADIUS = 40, KICK = 41, BOX = 48;
 constexpr double WALL_REACH = 0.51, LATTICE_GAP = 0.05, LATTICE_SLOPE = 0.25, LATTICE_START = 0.7,
              DEEPEST = 1.25, POINT_REACH = 0.3;
 const int HERE = 12;      // fields in one block of nodes
@@ -39,10 +39,15 @@ struct Entry {            // what some contacts of one pair add to the books
   int a, c;
   double normal, place[3], J[3], loss;
 };
+struct Past {             // force of a contact in the last step
+  u64 key;
+  double force[3];
+};
 struct Line {              // a contact in the list of those that move rigid bodies
   double *a, *c;          // velocity of a node or state of a rigid body; 0: a plane
   double ma, mc;          // inverse masses of nodes; negative: a rigid body
   double n[3], ra[3], rc[3], K[6], inverse, target, mu, J[3];
+  u64 key;
   int touch, group;
 };
 struct Stage {
@@ -53,15 +58,18 @@ struct Stage {
   Aim *aim;
   Entry *entry, *stand;
   Line *line;
+  Past *past;
+  int *slot;              // where each past contact stands, by its key; slots: a power of two
   double *pair;           // [all][all][8]
   int *order;
   int most_junctions, most_meets, most_sides, most_touches;
+  int slots, pasts, sweeps;
   int junctions, meets, sides, touches, points;
   int entries[PARTS];
 };
 
 static_assert(sizeof(Junction) <= 256 && sizeof(Meet) <= 32 && sizeof(Side) <= 72 &&
-                  sizeof(Touch) <= 184 && sizeof(Aim) <= 104 && sizeof(Entry) <= 72 && sizeof(Line) <= 240,
+                  sizeof(Touch) <= 184 && sizeof(Aim) <= 104 && sizeof(Entry) <= 72 && sizeof(Past) <= 32 && sizeof(Line) <= 248,
               "as memory.py says");
 
 struct Face {             // a half space u < s through the quadratic spline

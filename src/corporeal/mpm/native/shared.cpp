@@ -72,12 +72,17 @@ struct Field {
   double *point;            // rigid: [P][5] place in the body's frame, mass, volume
   double *rigid;            // rigid: its state, see rigid.cpp
   double *surface;          // rigid: [S][3] in the body's frame
+  double *clump;            // rigid: [clumps][6] first and last point, middle, radius
   double mass, slowing;     // slowing: how much viscosity shortens steps
   int origin[3], dim[3];    // in blocks; the window's corner and size
   int blocks, pool, rigids, points, surfaces, pushed;
   int floor;                // the only plane that the window reaches, or -1
   float level[3];           // its normal, or 0
+<<<<<<< src/corporeal/mpm/native/shared.cpp
+  int clumps;
+=======
   int side, spare;          // of the two sets of nodes, which this step reads
+>>>>>>> hf
 };
 struct Blow {               // a body in the wind: see blow.py
   double *area, *point, *rigid, *impulse, *signal;
