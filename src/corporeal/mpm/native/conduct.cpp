@@ -52,7 +52,8 @@ Crew *crew = world->crew;
 Post *post = crew->post + thread;
 if (post->busy) {
   post->busy = 0;
-  if (__atomic_add_fetch(&crew->done, 1, __ATOMIC_ACQ_REL) == crew->count)
+  const int count = crew->count;   // read before: once all are done another thread may change it
+  if (__atomic_add_fetch(&crew->done, 1, __ATOMIC_ACQ_REL) == count)
     Conduct::next_phase(world, crew);
 } else if (thread == 0 && !crew->started) {
   crew->started = 1;
