@@ -47,21 +47,13 @@ OPTIONS = {
 }
 wp.set_module_options(OPTIONS)
 
-<<<<<<< src/corporeal/mpm/kernels.py
-_POINTERS = "part node next history material table block where near point rigid surface clump"
-=======
-_POINTERS = "part node next history material table block where used near point rigid surface"
->>>>>>> hf
+_POINTERS = "part node next history material table block where used near point rigid surface clump"
 _COUNTS = "blocks pool rigids points surfaces pushed"
 FIELD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("mass", "f8"), ("slowing", "f8"), ("origin", "i4", 3), ("dim", "i4", 3)]
     + [(name, "i4") for name in _COUNTS.split()]
-<<<<<<< src/corporeal/mpm/kernels.py
-    + [("floor", "i4"), ("level", "f4", 3), ("clumps", "i4")],
-=======
-    + [("floor", "i4"), ("level", "f4", 3), ("side", "i4"), ("spare", "i4")],
->>>>>>> hf
+    + [("floor", "i4"), ("level", "f4", 3), ("side", "i4"), ("clumps", "i4")],
     align=True,
 )
 _POINTERS = (

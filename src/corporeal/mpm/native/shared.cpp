@@ -78,11 +78,7 @@ struct Field {
   int blocks, pool, rigids, points, surfaces, pushed;
   int floor;                // the only plane that the window reaches, or -1
   float level[3];           // its normal, or 0
-<<<<<<< src/corporeal/mpm/native/shared.cpp
-  int clumps;
-=======
-  int side, spare;          // of the two sets of nodes, which this step reads
->>>>>>> hf
+  int side, clumps;         // side: of the two sets of nodes, which this step reads
 };
 struct Blow {               // a body in the wind: see blow.py
   double *area, *point, *rigid, *impulse, *signal;
