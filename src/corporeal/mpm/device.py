@@ -224,20 +224,24 @@ def _present(device: str) -> str:
     """Name of a device that is there.
 
     Raises:
-        UserError: It is not.
+        UserError: It is not, or its driver is too old for a whole frame in one graph.
 
     """
     known = [found.alias for found in wp.get_devices()]
     cards = [found.alias for found in wp.get_cuda_devices()]
-    if device == "cuda" and cards:
-        return cards[0]
-    if device in known:
-        return device
-    raise UserError(
-        f"The engine 'cuda' needs a CUDA card, and Warp finds no {device!r} here "
-        f"(found: {', '.join(known)}). Install NVIDIA's driver (CUDA 12.4 or later), or simulate "
-        "on the processor: --engine warp."
-    )
+    chosen = cards[0] if device == "cuda" and cards else device
+    if chosen not in known:
+        raise UserError(
+            f"The engine 'cuda' needs a CUDA card, and Warp finds no {device!r} here "
+            f"(found: {', '.join(known)}). Install NVIDIA's driver (CUDA 12.4 or later), or "
+            "simulate on the processor: --engine warp."
+        )
+    if chosen in cards and not wp.is_conditional_graph_supported():
+        raise UserError(
+            f"The driver of {chosen!r} is too old for the engine 'cuda'. Install one for CUDA 12.4 "
+            "or later, or simulate on the processor: --engine warp."
+        )
+    return chosen
 
 
 def _refuse_unknown(problem: Problem) -> None:
