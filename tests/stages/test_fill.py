@@ -354,3 +354,20 @@ def test_a_plant_whose_stem_bends_is_no_rigid_one():
     assert particles.treatments[2].kind == "deformable"
     assert "foliage" not in [t.kind for t in particles.treatments]
     assert len(particles.rate) == 0
+
+
+def test_a_rod_thinner_than_the_grid_stands_on_rings_with_its_bending_stiffness():
+    soft = replace(RUBBER, young=2e7)
+    rod = trimesh.creation.cylinder(0.004, 0.8, sections=16)
+    rod.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+    scene, parts, field = inputs(thing((put(rod, 0.3), soft)))
+    particles = fill(scene, parts, field)
+    (treatment,) = particles.treatments
+    r = 0.008 / (2 * particles.cell)
+    assert r < 1
+    assert treatment.kind == "deformable"
+    assert treatment.young == pytest.approx(2e7 * r**4, rel=0.1)
+    assert treatment.density == pytest.approx(1100 * r**2, rel=0.05)
+    assert "times as thick" in treatment.why
+    assert particles.mass.sum() == pytest.approx(1100 * np.pi * 0.004**2 * 0.8, rel=0.04)
+    assert particles.count == pytest.approx(6 * 0.8 / (particles.cell / 2), abs=7)

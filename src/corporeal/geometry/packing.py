@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 from corporeal.geometry.anatomy import convex_side, pieces
 from corporeal.geometry.filling import Filling, fill_body, fill_wall
 from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.rods import Rod, rings
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import sample_surface, scatter
 from corporeal.geometry.survey import Anatomy, Member
@@ -26,6 +27,10 @@ class Recipe:
     """Thickness of layers below the outer face of a wall that is modelled thinner [m]."""
     sheet: float
     """Thickness of open sheets [m]."""
+    rod: Rod | None = None
+    """Centreline of a part that stands on rings of points."""
+    thick: float = 0.0
+    """Diameter that these stand for [m]."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +74,10 @@ def pack(
     for member in anatomy.members:
         recipe = recipes[member.part]
         face = member.body
-        if recipe.depth == 0 and len(face.triangles):
+        if recipe.rod is not None:
+            points = rings(recipe.rod, recipe.thick, spacing)
+            lumps.append(_lump(Filling(points, np.ones(len(points))), member, sheet=False))
+        elif recipe.depth == 0 and len(face.triangles):
             outer = outer_face(anatomy, member)
             lumps.append(
                 _lump(

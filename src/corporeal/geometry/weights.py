@@ -72,6 +72,8 @@ def weigh(
             )
             mass = match_moments(packing.points[own], mass, wanted, weights)
         whole = mass.sum() / treatment.density if thickened else made.volume
+        if treatment.kind == "deformable" and treatment.density < 0.999 * mass.sum() / whole:
+            whole = mass.sum() / treatment.density  # a rod thicker than in life
         if treatment.kind == "foliage":
             whole = crown_volume(packing.points[own], cell)
         density[own] = mass.sum() / whole

@@ -31,6 +31,8 @@ class PartGeometry:
     """Whether its wall goes all around something, as a duck's does and a vase's does not."""
     leaves: int = 0
     """Separate leaves; 0: it is not foliage."""
+    diameter: float = 0.0
+    """Of a solid rod with a known centreline [m]; 0: it is none."""
     burden: float = 0.0
     """What it carries at its far end, over its own mass [-]."""
 
@@ -74,6 +76,11 @@ def width(part: PartGeometry) -> float:
     thickness = part.structure.thickness or 0.0
     wall_only = part.structure.kind == "shell" and spread < 4 * thickness
     return part.size[0] if wall_only or spread <= 0 else min(part.size[0], spread)
+
+
+def rod_ratio(part: PartGeometry, simulated: float) -> float:
+    """Real over simulated diameter of a rod; 1 where nothing is thickened."""
+    return min(1.0, part.diameter / simulated) if part.diameter > 0 else 1.0
 
 
 def wall_ratio(part: PartGeometry, simulated: float) -> float:

@@ -18,6 +18,7 @@ from corporeal.mpm.part import (
     PartGeometry,
     Verdict,
     is_trinket,
+    rod_ratio,
     wall_factors,
     wall_ratio,
     width,
@@ -274,6 +275,9 @@ def treat(
     stiffer, stronger, denser = wall_factors(part, ratio)
     if material.law is Law.VON_MISES and structure.thickness and ratio < 1:
         stiffer *= fold_factor(structure.thickness, 2 * cell, part.size[1] / 2)
+    thin = rod_ratio(part, 2 * cell) if role == "soft" else 1.0
+    if thin < 1:
+        stiffer, stronger, denser = thin**4, thin**3, thin**2
     young, poisson = bounded_poisson(material.young, material.poisson)
     density = material.density * denser
     strong = material.yield_stress
@@ -291,7 +295,7 @@ def treat(
         impact_speed=motion.impact_speed,
         wave_speed=wave,
         step=stable_step(wave, motion.impact_speed, cell) if soft else inf,
-        why=reason(verdict, role) + (wall_reason(part, ratio) if soft else ""),
+        why=reason(verdict, role) + (wall_reason(part, ratio) if soft else "") + rod_reason(thin),
     )
 
 
@@ -321,6 +325,17 @@ def reason(verdict: Verdict, role: Role) -> str:
         "trinket": "Deformable with the rest of its object; by itself it would be rigid.",
         "soft": f"Deformable, because {verdict.reason}.",
     }[role]
+
+
+def rod_reason(ratio: float) -> str:
+    """Say what a thickened rod keeps."""
+    if ratio >= 1:
+        return ""
+    return (
+        f" It is simulated {1 / ratio:.3g} times as thick, with its bending stiffness (up to 10 % "
+        "less where it runs askew to the grid), its strength in bending and its mass kept; "
+        "stretched it is softer than in life."
+    )
 
 
 def wall_reason(part: PartGeometry, ratio: float) -> str:

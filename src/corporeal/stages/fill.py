@@ -11,14 +11,15 @@ from corporeal.geometry.exposure import cross_section, faces
 from corporeal.geometry.falls import drop_heights
 from corporeal.geometry.foliage import leaves_of, root_of, swinging
 from corporeal.geometry.make import Make, decide, how_filled, recipe
-from corporeal.geometry.packing import Packing, pack
+from corporeal.geometry.packing import Packing, Recipe, pack
+from corporeal.geometry.rods import Rod, rod_of
 from corporeal.geometry.survey import Anatomy, Member, survey
 from corporeal.geometry.weights import keep_apart, weigh
 from corporeal.materials import find
 from corporeal.mpm.part import Motion, PartGeometry
 from corporeal.mpm.treatment import Plan, plan
 from corporeal.mpm.wind import greatest_acceleration
-from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject, Vector
+from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject, Treatment, Vector
 
 
 @dataclass(frozen=True)
@@ -46,12 +47,23 @@ def fill(
         for m in a.members
     }
     refuse_flat(scene, anatomies)
-    chosen = resolve(scene, field, anatomies, makes, config)
+    rods = {
+        m.part: rod
+        for a in anatomies
+        for m in a.members
+        if makes[m.part].thickness == 0 and (rod := rod_of(m, np.random.default_rng(config.seed)))
+    }
+    chosen = resolve(scene, field, anatomies, (makes, rods), config)
     refuse_buried(scene, anatomies, chosen.cell)
     packings = []
     for number, anatomy in enumerate(anatomies):
         recipes = {
-            m.part: recipe(m, makes[m.part], chosen.treatments[m.part], chosen.cell)
+            m.part: on_rings(
+                recipe(m, makes[m.part], chosen.treatments[m.part], chosen.cell),
+                rods.get(m.part),
+                chosen.treatments[m.part],
+                chosen.cell,
+            )
             for m in anatomy.members
         }
         rng = np.random.default_rng([config.seed, number, 1])
@@ -141,10 +153,11 @@ def resolve(
     scene: Scene,
     field: MaterialField,
     anatomies: list[Anatomy],
-    makes: dict[int, Make],
+    found: tuple[dict[int, Make], dict[int, Rod]],
     config: FillConfig,
 ) -> Plan:
     """Ask for grid spacing and treatments."""
+    makes, rods = found
     geometries = {
         m.part: PartGeometry(
             object=number,
@@ -155,6 +168,7 @@ def resolve(
             area=makes[m.part].area,
             closed=m.closed and not makes[m.part].modelled,
             leaves=leaves_of(m, field.materials[m.part]),
+            diameter=rods[m.part].diameter if m.part in rods else 0.0,
             burden=burden(m, anatomy, makes, field),
         )
         for number, anatomy in enumerate(anatomies)
@@ -222,6 +236,13 @@ def driven(
         gained += air * min(1.0, blown * lasts / max(float(np.linalg.norm(air)), 1e-30))
         strongest += blown
     return gained, strongest
+
+
+def on_rings(recipe: Recipe, rod: Rod | None, treatment: Treatment, cell: float) -> Recipe:
+    """Let rings of points stand for a rod that is thinner than two cells and bends."""
+    if rod is None or treatment.kind != "deformable" or rod.diameter >= 2 * cell:
+        return recipe
+    return replace(recipe, depth=0.0, rod=rod, thick=2 * cell)
 
 
 def is_rigid(anatomy: Anatomy, chosen: Plan) -> bool:
