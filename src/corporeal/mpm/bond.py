@@ -25,6 +25,9 @@ half: a face on a grid plane would be a tie."""
 NEAR = 2.0
 """Soft matter this near to the frame [cells] says how dense what it holds is."""
 
+REACH = 6.0
+"""Particles of a frame farther than this from what it holds [cells] never share a node with it."""
+
 
 @dataclass(frozen=True)
 class Composite:
@@ -71,6 +74,12 @@ def densities(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
     near = near if near.any() else np.ones(len(near), bool)
     held = float(soft.volume[near] @ soft.density[near] / soft.volume[near].sum())
     return float(frame.volume @ frame.density / frame.volume.sum()), held
+
+
+def around(frame: Body, soft: Body, cell: float) -> Int[np.ndarray, " K"]:
+    """Particles of a frame that what it holds could ever meet; those far inside don't matter."""
+    far = KDTree(soft.position).query(frame.position, distance_upper_bound=REACH * cell)[0]
+    return np.flatnonzero(np.isfinite(far))
 
 
 def join(

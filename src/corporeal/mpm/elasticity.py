@@ -195,6 +195,9 @@ PK1 = {
 }
 
 
+RELIEVED = (Law.COROTATED, Law.NEO_HOOKEAN, Law.HENCKY)
+
+
 def psi(law: Int[np.ndarray, " P"], F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     """Give the stored energy per rest volume Ψ [J/m³] of particles with different laws."""
     out = np.empty(len(F))
@@ -209,6 +212,24 @@ def tau(law: Int[np.ndarray, " P"], F: Matrices, mu: Scalars, lam: Scalars) -> M
     for rule, chosen in _by_law(law):
         out[chosen] = TAU[rule](F[chosen], mu[chosen], lam[chosen])
     return out
+
+
+def is_stiff_in_bulk(law: np.ndarray, mu: np.ndarray, lam: np.ndarray) -> np.ndarray:
+    """Whether matter is elastic and its ν above 0.4: splines lock unless pressure is a mean."""
+    return np.isin(law, [rule.value for rule in RELIEVED]) & (lam > 4.0 * mu)
+
+
+def tau_relief(law: Int[np.ndarray, " P"], F: Matrices, lam: Scalars, relief: Scalars) -> Matrices:
+    """Give what a swelling of J + ``relief`` instead of J adds to the Kirchhoff stress [Pa].
+
+    Only the pressure sees it: λ J (J - 1) of fixed corotated, λ ln J of the others.
+    """
+    J = determinant(F)
+    mean = np.maximum(J + relief, 1e-3)
+    corotated = lam * (mean * (mean - 1.0) - J * (J - 1.0))
+    with np.errstate(invalid="ignore", divide="ignore"):
+        other = lam * np.log(mean / J)
+    return _isotropic(np.where(law == Law.COROTATED.value, corotated, other))
 
 
 def _by_law(law: Int[np.ndarray, " P"]) -> list[tuple[Law, np.ndarray]]:

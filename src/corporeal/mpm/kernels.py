@@ -48,7 +48,7 @@ OPTIONS = {
 wp.set_module_options(OPTIONS)
 
 _POINTERS = "part node next history material table block where used near point rigid surface clump"
-_COUNTS = "blocks pool rigids points surfaces pushed"
+_COUNTS = "blocks pool rigids points surfaces pushed swells"
 FIELD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("mass", "f8"), ("slowing", "f8"), ("origin", "i4", 3), ("dim", "i4", 3)]
@@ -90,9 +90,9 @@ BLOW = np.dtype(
     align=True,
 )
 BOND = np.dtype(
-    [(name, "u8") for name in ("slot", "mass")]
-    + [(name, "f8") for name in ("per_stiff", "per_soft")]
-    + [(name, "i4") for name in ("frame", "soft", "count")],
+    [(name, "u8") for name in ("slot", "mass", "volume", "point")]
+    + [("per_soft", "f8")]
+    + [(name, "i4") for name in ("frame", "soft", "points", "count")],
     align=True,
 )
 TETHER = np.dtype(

@@ -34,6 +34,8 @@ class Matter:
     """Longitudinal wave speed at rest [m/s]; 0 where rigid."""
     memory_speed: Float[np.ndarray, " P"]
     """Fastest wave among all that share the particle's field [m/s]; inf where APIC is kept."""
+    swells: Bool[np.ndarray, " P"]
+    """Whether pressure comes from the mean swelling around: in fields all stiff in bulk."""
     total: Float[np.ndarray, " B"]
     """Mass of each body [kg]."""
     centre: Float[np.ndarray, "B 3"]
@@ -63,6 +65,8 @@ class Matter:
         field = np.zeros_like(body) if problem.contact == "single" else body
         # Momentum is kept only if all that share a field forget at one rate.
         fastest = np.array([remembered[field == f].max() for f in range(field.max() + 1)])
+        bulky = elasticity.is_stiff_in_bulk(law, np.asarray(mu), np.asarray(lam)) & ~stiff
+        bulky = np.array([bulky[field == f].all() for f in range(field.max() + 1)])
         masses = [rigid.mass_of(b.position, b.volume * b.density, b.volume) for b in bodies]
         centre = np.stack([m.centre for m in masses])
         return cls(
@@ -80,6 +84,7 @@ class Matter:
             rigid=stiff,
             wave_speed=wave,
             memory_speed=fastest[field],
+            swells=bulky[field],
             total=np.array([m.total for m in masses]),
             centre=centre,
             inertia=np.stack([m.inertia for m in masses]),
@@ -118,6 +123,8 @@ class State:
     plastic: Float[np.ndarray, " P"]
     volume: Float[np.ndarray, " P"]
     """v_c of granular matter."""
+    relief: Float[np.ndarray, " P"]
+    """Mean J around a particle less its own; see ``Matter.swells``."""
     centre: Float[np.ndarray, "B 3"]
     """The rest is used for rigid bodies: centre of mass [m] …"""
     speed: Float[np.ndarray, "B 3"]
@@ -144,6 +151,7 @@ class State:
             motion=identity,
             plastic=np.zeros(count),
             volume=np.zeros(count),
+            relief=np.zeros(count),
             centre=matter.centre,
             speed=np.stack([linear for linear, _ in fits]),
             spin_momentum=np.stack([angular for _, angular in fits]),

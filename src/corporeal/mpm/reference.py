@@ -20,6 +20,7 @@ from corporeal.mpm.matter import Matter, State, flowed
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.mpm.springs import longest_step, stored, struck
 from corporeal.mpm.stencil import Stencil, stencil
+from corporeal.mpm.swelling import relief
 from corporeal.types import Vector
 
 FORGETTING = 0.1
@@ -160,6 +161,8 @@ class ReferenceEngine:
         out = np.zeros_like(s.F)
         soft = ~m.rigid
         out[soft] = elasticity.tau(m.law[soft], s.F[soft], m.mu[soft], m.lam[soft])
+        k = m.swells
+        out[k] += elasticity.tau_relief(m.law[k], s.F[k], m.lam[k], s.relief[k])
         return out + self._viscous_stress()
 
     def _viscous_stress(self) -> Float[np.ndarray, "P 3 3"]:
@@ -198,6 +201,7 @@ class ReferenceEngine:
             affine=gradient + keep[:, None, None] * lost_c,
             F=step @ state.F,
             motion=step @ state.motion,
+            relief=relief(m, state.F, grid),
         )
         return after, dt * float(np.sum(m.volume * viscous))
 

@@ -3,7 +3,7 @@
 import numpy as np
 
 from corporeal.mpm import elasticity, rigid
-from corporeal.mpm.bond import densities
+from corporeal.mpm.bond import around, densities
 from corporeal.mpm.kernels import BOND, ID, MA, MATERIAL, MT, NC, VE, VO
 from corporeal.mpm.plasticity import SMALLEST_ANGLE, cone_slope
 from corporeal.mpm.problem import Body, Problem
@@ -35,6 +35,11 @@ def materials(problem: Problem, bodies: list[int]) -> tuple[np.ndarray, np.ndarr
     table = np.zeros((len(unique), MATERIAL), np.float32)
     table[:, :PUSH] = unique[:, 1:]
     return table, index.astype(np.int32), unique[:, 0].astype(np.int64)
+
+
+def swells(table: np.ndarray) -> bool:
+    """Whether a field's pressure comes from the mean swelling around each particle."""
+    return bool(elasticity.is_stiff_in_bulk(table[:, 0], table[:, 1], table[:, 2]).all())
 
 
 def _different(rows: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -100,15 +105,22 @@ def rigid_state(body: Body) -> np.ndarray:
     return state
 
 
-def bonds(problem: Problem) -> np.ndarray:
-    """Native records of the bonds; where held nodes are kept is filled in later."""
+def bonds(problem: Problem) -> tuple[np.ndarray, list[np.ndarray]]:
+    """Native records of the bonds, and each frame's points near what it holds, in its own frame.
+
+    A point is place [m] and volume [m³]. Where held nodes are kept is filled in later.
+    """
     pairs = problem.bonds if problem.contact == "multi" else ()
-    rows = np.zeros(len(pairs), BOND)
-    for row, (frame, soft) in zip(rows, pairs, strict=True):
-        stiff, held = densities(problem.bodies[frame], problem.bodies[soft], problem.cell)
-        row["per_stiff"], row["per_soft"] = 1.0 / stiff, 1.0 / held
-        row["frame"], row["soft"] = frame, soft
-    return rows
+    rows, points = np.zeros(len(pairs), BOND), []
+    for row, (f, s) in zip(rows, pairs, strict=True):
+        frame, soft = problem.bodies[f], problem.bodies[s]
+        stiff, held = densities(frame, soft, problem.cell)
+        mass, chosen = frame.volume * frame.density, around(frame, soft, problem.cell)
+        place = frame.position - mass @ frame.position / mass.sum()
+        points.append(np.column_stack([place, mass / stiff])[chosen])
+        row["point"], row["points"] = points[-1].ctypes.data, len(points[-1])
+        row["per_soft"], row["frame"], row["soft"] = 1.0 / held, f, s
+    return rows, points
 
 
 def rigid_points(body: Body, state: np.ndarray) -> np.ndarray:

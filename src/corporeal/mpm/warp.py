@@ -137,7 +137,7 @@ class WarpEngine:
         )
         self.springs = Springs(problem, self.first, self.ledger.external_impulse, self.rigid)
         self.grips: dict[int, Grip] = {}
-        self.bond = tables.bonds(problem)
+        self.bond, self.bonded = tables.bonds(problem)
         self._wind_clock()
         self.connect()
 
@@ -228,9 +228,9 @@ class WarpEngine:
         self.held = []
         for row in self.bond:
             room = 64 * len(self.window[int(row["soft"])].where)
-            slot, mass = np.zeros(room, np.int32), np.zeros(room, np.float32)
-            self.held += [slot, mass]
-            row["slot"], row["mass"] = slot.ctypes.data, mass.ctypes.data
+            held = np.zeros(room, np.int32), np.zeros(room, np.float32), np.zeros(room, np.float32)
+            self.held += held
+            row["slot"], row["mass"], row["volume"] = (array.ctypes.data for array in held)
         self.world["bonds"] = len(self.bond)
 
     def _connect_field(self, f: int, window: Window) -> None:
@@ -240,7 +240,10 @@ class WarpEngine:
         record["material"] = self.material[f].ctypes.data
         record["origin"], record["dim"] = window.origin, window.dim
         record["blocks"], record["pool"] = len(window.block), len(window.where)
-        record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
+        record["swells"] = tables.swells(self.material[f])
+        # One lane of a node says how high mass lies over a floor, or how it swells.
+        watched = self.contact.watched(window.origin, window.dim)
+        record["floor"], record["level"] = (-1, 0.0) if record["swells"] else watched
 
     # ------------------------------------------------------------ time
 

@@ -27,30 +27,57 @@ struct Bonds {
     const int in[3] = {slot >> 4 & 3, slot >> 2 & 3, slot & 3};
     for (int i = 0; i < 3; i++) x[i] = (4 * (w[i] + S.origin[i]) + in[i]) * world->dx;
   }
+  // Slot of a node of the world in a field; -1: none.
+  static inline int slot(const Field &S, int x, int y, int z) {
+    int c[3] = {x - 4 * S.origin[0], y - 4 * S.origin[1], z - 4 * S.origin[2]}, out = 0;
+    for (int i = 0; i < 3; i++) out |= c[i] < 0 || c[i] >> 2 >= S.dim[i];
+    int b = out ? -1 : S.table[((c[0] >> 2) * S.dim[1] + (c[1] >> 2)) * S.dim[2] + (c[2] >> 2)];
+    return b < 0 ? -1 : b * 64 + (c[0] & 3) * 16 + (c[1] & 3) * 4 + (c[2] & 3);
+  }
+  // The frame's volume on the soft field's nodes, by slot; lists those that it reaches.
+  static inline void spread(const World *world, Bond &B) {
+    const Field &S = world->field[B.soft];
+    const double *s = world->field[B.frame].rigid;
+    B.count = 0;
+    for (int p = 0; p < B.points; p++) {
+      const double *q = B.point + 4 * p;
+      int base[3];
+      float w[3][3];
+      for (int i = 0; i < 3; i++) {
+        double r = s[TURN + 3 * i] * q[0] + s[TURN + 3 * i + 1] * q[1] + s[TURN + 3 * i + 2] * q[2];
+        double c = (s[CENTRE + i] + r) / world->dx;
+        base[i] = (int)floor(c - 0.5);
+        float f = (float)(c - base[i]);
+        w[i][0] = 0.5f * (1.5f - f) * (1.5f - f);
+        w[i][1] = 0.75f - (f - 1) * (f - 1);
+        w[i][2] = 0.5f * (f - 0.5f) * (f - 0.5f);
+      }
+      for (int i = 0; i < 27; i++) {
+        int e = slot(S, base[0] + i / 9, base[1] + i / 3 % 3, base[2] + i % 3);
+        if (e < 0) continue;
+        float *node = S.node + (size_t)e * 8;
+        if (!(node[0] > 0)) continue;
+        if (B.volume[e] == 0) B.slot[B.count++] = e;
+        B.volume[e] += (float)q[3] * w[0][i / 9] * w[1][i / 3 % 3] * w[2][i % 3] + 1e-30f;
+      }
+    }
+  }
   // Soft nodes where the frame has its share of the volume; contact takes them for empty.
   static inline void hold(World *world) {
     if (world->again) return;
     for (int k = 0; k < world->bonds; k++) {
       Bond &B = world->bond[k];
-      Field &F = world->field[B.frame], &S = world->field[B.soft];
+      spread(world, B);
+      int reached = B.count;
       B.count = 0;
-      for (int b = 0; b < F.pool; b++) {
-        const int *w = F.where + 4 * b;
-        int c[3], out = 0;
-        for (int i = 0; i < 3; i++) {
-          c[i] = w[i] + F.origin[i] - S.origin[i];
-          out |= c[i] < 0 || c[i] >= S.dim[i];
-        }
-        int other = out ? -1 : S.table[(c[0] * S.dim[1] + c[1]) * S.dim[2] + c[2]];
-        if (other < 0) continue;
-        for (int i = 0; i < 64; i++) {
-          float *node = S.node + ((size_t)other * 64 + i) * 8;
-          double stiff = F.node[((size_t)b * 64 + i) * 8] * B.per_stiff, soft = node[0] * B.per_soft;
-          if (!(stiff > 0) || !(soft > 0) || stiff < HELD_SHARE * (stiff + soft)) continue;
-          B.slot[B.count] = other * 64 + i;
-          B.mass[B.count++] = node[0];
-          node[0] = 0;
-        }
+      for (int e = 0; e < reached; e++) {
+        float *node = world->field[B.soft].node + (size_t)B.slot[e] * 8;
+        float stiff = B.volume[B.slot[e]], soft = node[0] * (float)B.per_soft;
+        B.volume[B.slot[e]] = 0;
+        if (stiff < (float)HELD_SHARE * (stiff + soft)) continue;
+        B.slot[B.count] = B.slot[e];
+        B.mass[B.count++] = node[0];
+        node[0] = 0;
       }
     }
   }

@@ -94,7 +94,7 @@ int mates = 0;
 bool soft = false;
 for (int g = 0; g < fields; g++) {
   const Field &G = world->field[g];
-  if (g == index) continue;
+  if (g == index || world->friction[index * all + g] < 0) continue;   // bonded
   int from[3], to[3], none = 0;   // common blocks, in F's window
   for (int i = 0; i < 3; i++) {
     int shift = G.origin[i] - F.origin[i];

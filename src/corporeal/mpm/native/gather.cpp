@@ -103,6 +103,7 @@ struct Gather {
     float rate = step;
     for (int k = 0; k < 9; k++) H[k] = *(f8u *)(q + 8 * (DE + k));
     for (int k = 0; k < 9; k++) A[k] = L[k] * (on * rate);
+    const f8 relief = field.swells ? u[7] - Simd::swelling(q) : Simd::all(0.0f);
     follow(A, H);
     // b - 1 = H + Ht + H Ht
     f8 E[6];
@@ -139,6 +140,12 @@ struct Gather {
       for (int k = 0; k < 6; k++) e[k] = 2.0f * t.mu * e[k];
       for (int k = 0; k < 6; k += k == 3 ? 2 : 3) e[k] += tr;
       take(logarithmic, e, stress);
+    }
+    if (field.swells) {   // pressure from the mean swelling around, not from one's own
+      f8 jm = Simd::high(j1 + relief, Simd::all(-0.999f));
+      f8 p = Simd::pick(fixed, (1.0f + jm) * jm - (1.0f + j1) * j1,
+                        Math::log1p((jm - j1) / (1.0f + j1)));
+      for (int k = 0; k < 6; k += k == 3 ? 2 : 3) stress[k] += t.lambda * p;
     }
     if (Simd::any(t.visc > 0.0f)) {
       f8 eta = t.visc * Simd::high(1.0f + j1, Simd::all(0.0f)) * (1.0f / dx), w = Simd::all(0.0f);

@@ -43,7 +43,7 @@ struct Scatter {
     Simd::weights(q, block, D, W, base);
     f8 m = *(f8u *)(q + 8 * MA), zero = Simd::all(0.0f), r[8], a[3][8];
     r[0] = m;
-    r[7] = zero;
+    r[7] = field.swells ? m * Simd::swelling(q) : zero;
     for (int k = 0; k < 3; k++) r[1 + k] = m * *(f8u *)(q + 8 * (VE + k));
     r[4] = r[5] = r[6] = zero;
     if (field.pushed) work += push(world, field, q, m, r);

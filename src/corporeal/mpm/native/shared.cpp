@@ -42,11 +42,12 @@ struct Crew {
   u64 fill2[7];
   Post post[64];
 };
-struct Bond {               // a frame and the soft nodes it holds in this step
+struct Bond {               // a frame and the soft nodes it holds in this step: see bond.py
   int *slot;
-  float *mass;
-  double per_stiff, per_soft;   // volume per mass [m^3/kg]
-  int frame, soft, count;
+  float *mass, *volume;
+  double *point;            // [points][4] near the soft body: place in the frame's frame, volume
+  double per_soft;          // volume per mass [m^3/kg]
+  int frame, soft, points, count;
 };
 struct Thing {            // a body, as far as uniform accelerations go
   double mass, push[3], from, to;
@@ -61,9 +62,9 @@ struct Clock {
   long long count, budget;
   int things, started, last, laid, fuse, fused, pushed, spare;
 };
-// Nodes: mass, momentum 3, force of stress 3, mass times height over the node [cells] along "level";
-// after the forces mass, velocity 3, velocity as it was 3, mean height. While a step reads its nodes,
-// the next one's are laid.
+// Nodes: mass, momentum 3, force of stress 3, mass times height over the node [cells] along "level",
+// or times J - 1 where the field swells; after the forces mass, velocity 3, velocity as it was 3, mean
+// height or swelling. While a step reads its nodes, the next one's are laid.
 struct Field {
   float *part, *node, *next, *history, *material;
   int *table, *block, *where;
@@ -75,7 +76,7 @@ struct Field {
   double *clump;            // rigid: [clumps][6] first and last point, middle, radius
   double mass, slowing;     // slowing: how much viscosity shortens steps
   int origin[3], dim[3];    // in blocks; the window's corner and size
-  int blocks, pool, rigids, points, surfaces, pushed;
+  int blocks, pool, rigids, points, surfaces, pushed, swells;
   int floor;                // the only plane that the window reaches, or -1
   float level[3];           // its normal, or 0
   int side, clumps;         // side: of the two sets of nodes, which this step reads
@@ -138,6 +139,15 @@ struct Simd {
   }
   static inline f8 flo(i8 a) { return __builtin_convertvector(a, f8); }
   static inline i8 whole(f8 a) { return __builtin_convertvector(a, i8); }
+  // J - 1 of a batch, of H = F - 1.
+  static inline f8 swelling(const float *q) {
+    f8 H[9];
+    for (int k = 0; k < 9; k++) H[k] = *(f8u *)(q + 8 * (DE + k));
+    f8 minors = H[0] * H[4] - H[1] * H[3] + H[0] * H[8] - H[2] * H[6] + H[4] * H[8] - H[5] * H[7];
+    f8 det = H[0] * (H[4] * H[8] - H[5] * H[7]) - H[1] * (H[3] * H[8] - H[5] * H[6]) +
+             H[2] * (H[3] * H[7] - H[4] * H[6]);
+    return H[0] + H[4] + H[8] + minors + det;
+  }
   // Rows of eight lanes to lanes of eight rows.
   static inline void turn(f8 *r) {
     f8 a[8], b[8];
