@@ -68,7 +68,7 @@ def two_cantilevers(cells: int, transfer: str = "flip") -> Cantilever:
         np.flatnonzero(middle & (np.abs(x) < 0.6 * cell)),
     ]
     ideal = Cantilever.of(BEAM, LENGTH, HEIGHT)
-    path = follow(run, 1.7 / ideal.frequency, 120, groups)
+    path = follow(run, 1.4 / ideal.frequency, 100, groups)
     sunk = path.moved[:, 1, 2] - path.moved[:, 0, 2]
     falls = crossing(path.time, 0.5 * sunk.max() - sunk)
     inside = (path.time >= falls[0]) & (path.time <= falls[-1])

@@ -7,7 +7,7 @@ import numpy as np
 from corporeal.mpm import contact
 from corporeal.mpm.problem import Problem
 from corporeal.mpm.reference import ReferenceEngine
-from laws.bodies import Stuff, ball, disc, problem, walls
+from laws.bodies import Stuff, ball, body, disc, problem, walls
 from laws.outcome import Outcome, absolute, at_least, relative
 from laws.watching import bodies_of, follow, half_width, rise, started, watch
 
@@ -191,7 +191,7 @@ def discs(
 
 
 def collision(
-    given: Problem, until: float, touching: float, speed: float, looks: int = 150
+    given: Problem, until: float, touching: float, speed: float, looks: int = 100
 ) -> Collision:
     """Watch two bodies meet whose centres are ``touching`` [m] apart when they touch."""
     run = started(given)
@@ -316,11 +316,13 @@ def spheres(cells: int, fill: str = "blue", transfer: str = "flip") -> Collision
 
     """
     cell = RADIUS / cells
-    shift = OFF_GRID * cell
-    far = shift + np.array([2 * RADIUS + cell, 0.0, 0.0])
+    one = ball((0.0, 0.0, 0.0), RADIUS, cell / 2, fill)
+    near = OFF_GRID * cell
+    far = near + np.array([2 * RADIUS + cell, 0.0, 0.0])
+    volume = float(one.volume.sum())
     pair = [
-        ball(tuple(c), RADIUS, cell / 2, fill, stuff=SPHERE, velocity=(v, 0.0, 0.0))
-        for c, v in ((shift, SPEED / 2), (far, -SPEED / 2))
+        body(one.position + place, volume, SPHERE, (v, 0.0, 0.0))
+        for place, v in ((near, SPEED / 2), (far, -SPEED / 2))
     ]
     hertz = Hertz.of(RADIUS, SPHERE, SPEED)
     given = problem(*pair, cell=cell, transfer=transfer)

@@ -12,7 +12,7 @@ FINE = 24
 
 @cache
 def _fine_sink() -> float:
-    return statics.heavy_on_foam(FINE, True, contact="single", rigid=False).mean
+    return statics.heavy_on_foam(FINE, True, contact="single").mean
 
 
 @dataclass(frozen=True)
@@ -70,8 +70,7 @@ def _slip(tilt: float, fill: str) -> Callable[[int], float]:
 
 def _sink(face: float, contact: str) -> Callable[[int], float]:
     def error(cells: int) -> float:
-        rigid = contact == "multi"
-        found = statics.heavy_on_foam(cells, True, face, contact, rigid)
+        found = statics.heavy_on_foam(cells, True, face, contact)
         return 100 * abs(found.mean / _fine_sink() - 1)
 
     return error

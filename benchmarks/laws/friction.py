@@ -114,21 +114,20 @@ def sliding_block(quick: bool = False) -> Outcome:
             glued.distance,
         ),
     ]
-    stiff = block_on_slab(Slope(rigid=True), time)
-    checks.append(
-        relative("slip of a rigid block on a slab [m]", stiff.distance, slide(0.3, time), 2.0)
-    )
+    if not quick:
+        stiff = block_on_slab(Slope(rigid=True), time).distance
+        checks.append(relative("slip of a rigid block on a slab [m]", stiff, slide(0.3, time), 2.0))
     return Outcome(
         "7",
         "A block slides down a slope as Coulomb says",
-        "30°, μ = .3, 4 cells across the block",
+        f"30°, μ = .3, 4 cells across the block; {time} s",
         tuple(checks),
     )
 
 
 def sticking_block(quick: bool = False) -> Outcome:
     """Case 8: with μ > tan θ the block stays."""
-    time = 0.5
+    time = 0.3 if quick else 0.5
     found = block_on_slab(Slope(friction=0.8, ramp=0.1), time)
     cell = 0.1 / 4
     checks = (
@@ -138,7 +137,7 @@ def sticking_block(quick: bool = False) -> Outcome:
     return Outcome(
         "8",
         "A block sticks where friction exceeds the slope",
-        "30°, μ = .8, gravity grows in 0.1 s; ½ s",
+        f"30°, μ = .8, gravity grows in 0.1 s; {time} s",
         checks,
     )
 
@@ -148,21 +147,21 @@ def tilted_block(quick: bool = False) -> Outcome:
     time = 0.5
     aligned = block_on_slab(Slope(tilt=20.0), time)
     blue = block_on_slab(Slope(tilt=20.0, fill="blue"), time)
-    glued = block_on_slab(Slope(tilt=20.0, contact="single"), time)
+    glued = None if quick else block_on_slab(Slope(tilt=20.0, contact="single"), time).distance
     checks = [
         relative(
             "slip, particles aligned with the block [m]",
             aligned.distance,
             slide(0.3, time),
             2.0,
-            glued.distance,
+            glued,
         ),
         relative("slip, blue-noise fill [m]", blue.distance, slide(0.3, time), 2.0),
     ]
     return Outcome(
         "9",
         "A tilted grid does not change friction",
-        "case 7 with everything turned 20° on the grid",
+        f"case 7 with everything turned 20° on the grid; {time} s",
         tuple(checks),
     )
 
@@ -188,13 +187,15 @@ def rolled(shape: str, friction: float, time: float) -> float:
     return 0.5 * G * np.sin(SLOPE) * time**2 / (1 + k)
 
 
-def round_body(shape: str, friction: float, cells: int = 5, rigid: bool = False) -> float:
+def round_body(
+    shape: str, friction: float, cells: int = 5, rigid: bool = False, time: float = 0.4
+) -> float:
     """Release a ball or cylinder on a slope; how far it came, relative to the reference [-].
 
     A cylinder lies between smooth walls. What is soft lies on a soft slab that the floor holds; a
     rigid ball lies on the floor itself.
     """
-    time, cell = 0.4, RADIUS / cells
+    cell = RADIUS / cells
     given = _rigid_ball(friction, cell) if rigid else _on_slab(shape, friction, cell)
     moved = follow(started(given), time, 1).moved[-1, 0, 0]
     return float(moved) / rolled(shape, friction, time)
@@ -236,6 +237,7 @@ def _rigid_ball(friction: float, cell: float) -> Problem:
 
 def rolling_bodies(quick: bool = False) -> Outcome:
     """Case 10: balls and cylinders roll where friction suffices, and slip where it doesn't."""
+    time = 0.25 if quick else 0.4
     plans = [
         ("ball rolls", "ball", ROLLS, 5, False, 5.0),
         ("cylinder rolls", "cylinder", ROLLS, 5, False, 10.0),
@@ -247,12 +249,12 @@ def rolling_bodies(quick: bool = False) -> Outcome:
         plans.append(("ball rolls, R/dx 10", "ball", ROLLS, 10, False, 5.0))
     checks: list[Check] = []
     for name, shape, friction, cells, rigid, percent in plans:
-        share = round_body(shape, friction, cells, rigid)
-        ideal = rolled(shape, friction, 0.4)
+        share = round_body(shape, friction, cells, rigid, time)
+        ideal = rolled(shape, friction, time)
         checks.append(relative(f"{name} [m]", share * ideal, ideal, percent))
     return Outcome(
         "10",
         "Balls and cylinders roll and slip down a slope",
-        "30°, 0.4 s, R/dx 5; soft on a soft slab, the rigid ball on the floor",
+        f"30°, {time} s, R/dx 5; soft on a soft slab, the rigid ball on the floor",
         tuple(checks),
     )

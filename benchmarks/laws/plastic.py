@@ -66,7 +66,7 @@ def taylor_bar(cells: int, fill: str = "lattice") -> Mushroom:
 
 def copper_bar(quick: bool = False) -> Outcome:
     """Case 15: length, foot and strain that several codes agree on."""
-    cells = 4 if quick else 6
+    cells = 5 if quick else 6
     found = taylor_bar(cells)
     checks = (
         relative("final length [m]", found.length, 21.46e-3, 2.0),

@@ -83,18 +83,19 @@ def braked(rigid: bool) -> float:
 def bodies_at_rest(quick: bool = False) -> Outcome:
     """Case 11: nothing moves, and the floor carries the weight."""
     checks: list[Check] = []
-    block = standing(1, rigid=False)
+    time = 0.5 if quick else 1.0
+    block = standing(1, False, time)
     checks += [
         absolute("block: move up or down [dx]", block.normal, 0.0, 0.006, "dx"),
         absolute("block: move sideways [% dx]", 100 * block.lateral, 0.0, 0.2, "% dx"),
         absolute("block: impulse of the floor / m g T", block.impulse, 1.0, 0.015),
     ]
-    soft, stiff = standing(5, rigid=False), standing(5, rigid=True)
+    soft, stiff = standing(5, False, time), standing(5, True, time)
     checks += [
         absolute("five soft cubes: move sideways [dx]", soft.lateral, 0.0, 0.02, "dx"),
         absolute("five rigid cubes: move sideways [dx]", stiff.lateral, 0.0, 0.1, "dx"),
     ]
     if not quick:
         checks.append(relative("thrown block: way to rest / (v²/2μg)", braked(False), 1.0, 0.2))
-    words = "1 s, gravity grows in 0.1 s, 4 cells across a cube"
+    words = f"{time} s, gravity grows in 0.1 s, 4 cells across a cube"
     return Outcome("11", "What lies stays, and the floor carries it", words, tuple(checks))

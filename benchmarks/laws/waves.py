@@ -98,7 +98,7 @@ def meeting_bars(cells: int, shift: float, contact: str = "multi") -> Rebound:
         for x, v in ((length / 2, 0.1), (1.5 * length + cell, -0.1))
     ]
     run = started(problem(*bars, cell=cell, contact=contact))
-    path = follow(run, cell / 0.2 + 2.0 * 2 * length / SOUND, 120)
+    path = follow(run, cell / 0.2 + 2.0 * 2 * length / SOUND, 100)
     v = path.velocity[:, 1, 0] - path.velocity[:, 0, 0]
     return Rebound(float(v[-1] / 0.2), half_width(path.time, v))
 

@@ -1,28 +1,35 @@
 """Every law of nature is asked of every engine."""
 
+from functools import cache, partial
+
 import pytest
 from laws.suite import CASES
 
 from corporeal.backends import load
 from corporeal.mpm.problem import MENU
 
-ROUND_OFF = {"reference": 1e-12, "warp": 1e-5}
+ROUND_OFF = {"reference": 1e-12, "warp": 1e-5, "cuda": 1e-5}
+SLOWLY = {name: pytest.param(name, marks=pytest.mark.slow) for name in ROUND_OFF}
 
 
-@pytest.fixture(params=["reference", "warp"])
+@cache
+def built(name):
+    """Give a function that builds an engine; the one for cards runs on the processor."""
+    chosen = load("engine", name, MENU)
+    chosen.round_off = ROUND_OFF[name]
+    return partial(chosen, device="cpu") if name == "cuda" else chosen
+
+
+@pytest.fixture(params=["reference", "warp", SLOWLY["cuda"]])
 def engine(request):
     """Give a function that builds an engine from a problem."""
-    chosen = load("engine", request.param, MENU)
-    chosen.round_off = ROUND_OFF[request.param]
-    return chosen
+    return built(request.param)
 
 
-@pytest.fixture(params=["warp", pytest.param("reference", marks=pytest.mark.slow)])
+@pytest.fixture(params=["warp", SLOWLY["reference"], SLOWLY["cuda"]])
 def patient_engine(request):
-    """Give either engine, the reference only in slow runs: for experiments of many steps."""
-    chosen = load("engine", request.param, MENU)
-    chosen.round_off = ROUND_OFF[request.param]
-    return chosen
+    """Give any engine, most only in slow runs: for experiments of many steps."""
+    return built(request.param)
 
 
 @pytest.fixture

@@ -61,7 +61,7 @@ def test_a_rigid_stack_stands(patient_engine):
 
 
 @pytest.mark.parametrize("law", [Law.COROTATED, Law.NEO_HOOKEAN, Law.HENCKY])
-def test_a_confined_column_settles_under_its_weight_as_hooke_says(patient_engine, law):
+def test_every_elastic_law_is_hookes_where_strains_are_small(patient_engine, law):
     """The top sinks by ρ g L² / 2 (λ + 2μ); smooth walls keep the sides."""
     length, width, cell = 0.2, 0.04, 0.02
     stuff = Stuff(law=law, young=2e5, poisson=0.3, viscosity=300.0)
@@ -102,14 +102,6 @@ def test_a_wall_holds_whichever_way_it_faces(patient_engine):
     assert np.abs((m.centre[0] - centre) / CELL).max() < 0.05
 
 
-def test_a_tall_rigid_stack_does_not_creep(fast_engine):
-    """Five cubes for one second; sweeps in one direction only would walk the top sideways."""
-    tops = [np.add((0.005, 0.01, 0.05), (0, 0, 0.1 * k)) for k in range(5)]
-    cubes = [box(c, SIZE, CELL / 2, rigid=True, surface=box_surface(c, SIZE)) for c in tops]
-    run = fast_engine(
-        problem(*cubes, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.1)
-    )
-    run.advance(1.0)
-    moved = (run.measure().centre - tops) / CELL
-    assert np.abs(moved[:, :2]).max() < 0.1
-    assert np.abs(moved[:, 2]).max() < 0.1
+@pytest.mark.slow
+def test_blocks_and_stacks_of_five_stay_and_the_floor_carries_them(holds):
+    holds("11", quick=False)
