@@ -91,6 +91,16 @@ class Wind:
 
 
 @dataclass(frozen=True)
+class Wall:
+    """A plane that nothing passes, beside the floor; as rough as the floor."""
+
+    normal: Vector
+    """Unit, out of the wall into the room."""
+    point: Vector
+    """Any point of it [m]."""
+
+
+@dataclass(frozen=True)
 class SceneObject:
     """One separable thing, and how it starts."""
 
@@ -124,6 +134,8 @@ class Scene:
     """What one unit of the file was taken to be [m]."""
     gravity: Vector = (0.0, 0.0, -9.81)
     """[m/s²]"""
+    walls: tuple[Wall, ...] = ()
+    """Beside the floor, which is always there."""
     duration: float = 2.0
     """[s]"""
     fps: int = 60

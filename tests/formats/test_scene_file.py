@@ -4,7 +4,7 @@ import pytest
 
 from corporeal.errors import BadFileError
 from corporeal.formats.scene_file import read_scene_file
-from corporeal.types import Push, Wind
+from corporeal.types import Push, Wall, Wind
 
 WHOLE = """
 duration = 2
@@ -25,6 +25,7 @@ wind = { velocity = [8, 0, 0], gust = 0.3, from = 0.5, to = 1.5 }
 """
 
 
+WALL = 'file = "a.glb"\n[[wall]]\n'
 WIND = '[[object]]\nfile = "a.glb"\nwind = '
 
 
@@ -84,6 +85,10 @@ def test_a_scene_file_says_what_is_where_and_how_it_starts(tmp_path):
         ('file = "a.glb"\nduration = 0', "from 0.01 to 60"),
         ('file = "a.glb"\nduration = true', "from 0.01 to 60"),
         ('file = "a.glb"\nfps = 29.97', "whole number"),
+        (WALL + "point = [1, 0, 0]", "wall 1: it needs a point and a normal"),
+        (WALL + "point = [1, 0, 0]\nnormal = [0, 0, 0]", "wall 1: 'normal' is zero"),
+        (WALL + "point = [1, 0, 0]\nnormal = [1, 0, inf]", "three numbers"),
+        (WALL + "friction = 2", "wall 1: unknown key 'friction'"),
         ("file = ", "not valid TOML"),
         ("", "names no model"),
     ],
@@ -93,6 +98,11 @@ def test_a_slip_in_a_scene_file_is_named(tmp_path, text, said):
         read(tmp_path, text)
     assert said in str(error.value)
     assert "scene.toml" in str(error.value)
+
+
+def test_a_scene_file_may_have_walls(tmp_path):
+    scene = read(tmp_path, 'file = "a.glb"\n[[wall]]\npoint = [1, 0, 0]\nnormal = [-3, 0, 4]\n')
+    assert scene.walls == (Wall((-0.6, 0.0, 0.8), (1.0, 0.0, 0.0)),)
 
 
 def test_a_missing_scene_file_is_named(tmp_path):

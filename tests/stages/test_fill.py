@@ -10,7 +10,9 @@ from scipy.spatial import KDTree
 from corporeal.errors import UserError
 from corporeal.mpm.ledger_row import object_of_body
 from corporeal.mpm.pose import pose
+from corporeal.mpm.problem import Plane
 from corporeal.stages.fill import FillConfig, examine, fill, motions
+from corporeal.stages.simulate import SimulateConfig, simulate
 from corporeal.types import (
     Finish,
     Law,
@@ -24,6 +26,7 @@ from corporeal.types import (
     SceneObject,
     Structure,
     Surface,
+    Wall,
     Wind,
 )
 
@@ -371,3 +374,27 @@ def test_a_rod_thinner_than_the_grid_stands_on_rings_with_its_bending_stiffness(
     assert "times as thick" in treatment.why
     assert particles.mass.sum() == pytest.approx(1100 * np.pi * 0.004**2 * 0.8, rel=0.04)
     assert particles.count == pytest.approx(6 * 0.8 / (particles.cell / 2), abs=7)
+
+
+def test_what_stands_in_a_wall_is_named_and_walls_are_planes():
+    scene, parts, field = inputs(thing((ball(0.1, bottom=0.0), RUBBER)))
+    inside = replace(scene, walls=(Wall((1.0, 0.0, 0.0), (0.05, 0.0, 0.0)),))
+    with pytest.raises(UserError, match=r"'thing_0' reaches 0\.15 m into wall 1"):
+        fill(inside, parts, field)
+    beside = replace(scene, walls=(Wall((1.0, 0.0, 0.0), (-0.2, 0.0, 0.0)),))
+    problem = pose(beside, fill(beside, parts, field), field).problem
+    assert problem.planes[1] == Plane((1.0, 0.0, 0.0), -0.2)
+    assert problem.friction.shape == (3, 3)
+    assert problem.friction[0, 1] == problem.friction[0, 2] == problem.friction[2, 0]
+
+
+def test_a_ball_comes_back_from_a_wall(tmp_path):
+    scene, parts, field = inputs(thing((ball(0.1, bottom=0.3), RUBBER), velocity=(2.0, 0.0, 0.0)))
+    scene = replace(scene, walls=(Wall((-1.0, 0.0, 0.0), (0.15, 0.0, 0.0)),), duration=0.2, fps=20)
+    particles = fill(scene, parts, field)
+    moved = simulate(scene, particles, field, SimulateConfig(), tmp_path)
+    velocity = moved.ledger["momentum"][-1, 0, 0] / moved.ledger["mass"][-1, 0]
+    assert -2.0 < velocity < -1.2
+    assert moved.ledger["plane_impulse"][-1, 1, 0, 0] == pytest.approx(
+        moved.ledger["momentum"][-1, 0, 0] - moved.ledger["momentum"][0, 0, 0], rel=1e-3
+    )

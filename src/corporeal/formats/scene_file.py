@@ -17,6 +17,9 @@ There is nothing numerical to tune in it: quality is one word on the command lin
     class = "rubber duck"
     push = { acceleration = [3, 0, 0], from = 0.0, to = 0.5 }
     wind = { velocity = [8, 0, 0], gust = 0.3, from = 0.0, to = 1.5 }
+    [[wall]]
+    point = [1, 0, 0]             # any point of it
+    normal = [-1, 0, 0]           # out of the wall into the room
 """
 
 import math
@@ -26,9 +29,10 @@ from pathlib import Path
 from typing import Any, NoReturn
 
 from corporeal.errors import BadFileError
-from corporeal.types import Push, Vector, Wind
+from corporeal.types import Push, Vector, Wall, Wind
 
-SCENE_KEYS = ("file", "duration", "fps", "gravity", "object")
+SCENE_KEYS = ("file", "duration", "fps", "gravity", "object", "wall")
+WALL_KEYS = ("point", "normal")
 OBJECT_KEYS = ("name", "file", "class", "extent", "position", "velocity", "push", "wind")
 PUSH_KEYS = ("acceleration", "from", "to")
 WIND_KEYS = ("velocity", "gust", "from", "to")
@@ -71,6 +75,7 @@ class SceneFile:
     gravity: Vector | None = None
     """[m/s²]"""
     objects: tuple[ObjectEntry, ...] = ()
+    walls: tuple[Wall, ...] = ()
 
 
 def read_scene_file(path: Path) -> SceneFile:
@@ -96,6 +101,7 @@ def read_scene_file(path: Path) -> SceneFile:
         fps=table.whole("fps", 1, 1000),
         gravity=table.vector("gravity", FASTEST),
         objects=objects,
+        walls=tuple(_wall(t) for t in table.tables("wall")),
     )
 
 
@@ -111,6 +117,17 @@ def _object(table: "_Table") -> ObjectEntry:
         push=_push(table),
         wind=_wind(table),
     )
+
+
+def _wall(table: "_Table") -> Wall:
+    table.only(WALL_KEYS)
+    point, normal = table.vector("point", FARTHEST), table.vector("normal", FARTHEST)
+    if point is None or normal is None:
+        table.fail("it needs a point and a normal.", "Give both as [x, y, z].")
+    size = math.hypot(*normal)
+    if size < 1e-6:
+        table.fail("'normal' is zero.", "Give the direction out of the wall into the room.")
+    return Wall((normal[0] / size, normal[1] / size, normal[2] / size), point)
 
 
 def _push(table: "_Table") -> Push | None:

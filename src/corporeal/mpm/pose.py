@@ -12,8 +12,8 @@ from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from corporeal.mpm.gaps import pair_gaps
-from corporeal.mpm.problem import FLOOR, NO_FACES, Body, Faces, Joint, Problem, Tether
-from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment
+from corporeal.mpm.problem import FLOOR, NO_FACES, Body, Faces, Joint, Plane, Problem, Tether
+from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment, Wall
 
 RAMP = 0.1
 """Time over which gravity grows where everything starts at rest in contact [s]."""
@@ -52,9 +52,9 @@ def pose(
     problem = Problem(
         bodies=bodies,
         cell=particles.cell,
-        friction=pair_values(field.friction, weights, footing),
-        restitution=pair_values(field.restitution, weights, footing),
-        planes=(FLOOR,),
+        friction=with_walls(pair_values(field.friction, weights, footing), len(scene.walls)),
+        restitution=with_walls(pair_values(field.restitution, weights, footing), len(scene.walls)),
+        planes=(FLOOR, *(plane_of(w) for w in scene.walls)),
         gravity=scene.gravity,
         gravity_ramp=RAMP if starts_settled(scene, particles) else 0.0,
         contact=contact,
@@ -285,6 +285,17 @@ def pair_values(
     corner = np.array([[table[-1, -1]]])
     value = np.block([[between, floor[:, None]], [floor[None, :], corner]])
     return 0.5 * (value + value.T)
+
+
+def with_walls(table: Float[np.ndarray, "B1 B1"], walls: int) -> Float[np.ndarray, "BW BW"]:
+    """Give every wall the floor's row and column, which come last."""
+    planes = np.minimum(np.arange(len(table) + walls), len(table) - 1)
+    return table[np.ix_(planes, planes)]
+
+
+def plane_of(wall: Wall) -> Plane:
+    """Return a wall as engines know it."""
+    return Plane(wall.normal, float(np.dot(wall.normal, wall.point)))
 
 
 # ------------------------------------------------------------------ at rest or not

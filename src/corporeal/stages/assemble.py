@@ -309,6 +309,7 @@ def _merged(plan: SceneFile, blocks: list[_Block]) -> Scene:
         objects=tuple(objects),
         surfaces=tuple(surfaces),
         finishes=tuple(finishes),
+        walls=plan.walls,
         warnings=tuple(dict.fromkeys(warnings)),
     )
 

@@ -131,7 +131,7 @@ def refuse_flat(scene: Scene, anatomies: list[Anatomy]) -> None:
 
 
 def refuse_buried(scene: Scene, anatomies: list[Anatomy], cell: float) -> None:
-    """Stop when an object reaches more than one cell into the floor.
+    """Stop when an object reaches more than one cell into the floor or a wall.
 
     Raises:
         UserError: It names the object.
@@ -144,6 +144,13 @@ def refuse_buried(scene: Scene, anatomies: list[Anatomy], cell: float) -> None:
                 f"Object {thing.name!r} reaches {-lowest:.3g} m below the floor. "
                 "Raise its position by as much."
             )
+        for k, wall in enumerate(scene.walls):
+            depth = float(((np.array(wall.point) - anatomy.vertices) @ np.array(wall.normal)).max())
+            if depth > cell:
+                raise UserError(
+                    f"Object {thing.name!r} reaches {depth:.3g} m into wall {k + 1}. "
+                    "Move one of them, or turn the wall's normal round."
+                )
 
 
 # ------------------------------------------------------------------ how it is made
