@@ -175,12 +175,15 @@ def test_going_on_from_a_saved_state_changes_nothing():
 
 
 def crowd():
-    """A pile of everything: all laws, a rigid body, contacts, a push."""
+    """A pile of everything: all laws, a rigid body, contacts, a push, a tall pole."""
+    axes = [np.arange(0, size, CELL / 2) for size in (0.03, 0.03, 0.5)]
+    pole = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3) + (-0.2, 0, 0.01)
     laws = [body(ball((0.11 * k, 0, 0.055), 0.05), law) for k, law in enumerate(Law)]
     stone = ball((0.1, 0.02, 0.16), 0.05)
     duck = ball((0.3, 0.01, 0.16), 0.05)
     return problem(
         *laws,
+        body(pole, velocity=(0.5, 0, -2.0)),
         body(stone, velocity=(0, 0, -2.0), rigid=True, surface=stone, name="stone"),
         body(duck, velocity=(0, 0, -2.0), push=Push((5.0, 0.0, 0.0), 0.004, 0.006)),
     )
@@ -192,6 +195,7 @@ def test_the_number_of_threads_changes_nothing(threads):
     many.program.smallest_share = 10
     many.connect()
     assert many.program.hands == threads
+    assert many.world["colour"][0, 4:].any()
     for engine in (one, many):
         engine.advance(0.012)
     assert one.measure().pair_impulse.max() > 0

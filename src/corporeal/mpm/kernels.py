@@ -64,8 +64,9 @@ _POINTERS = (
 _COUNTS = (
     "fields planes tasks full names again blows blown bonds tethers joints grips sprung stop nodes"
 )
-COLOURS = 4
-"""Columns of blocks of one colour, the parities of their x and y, never overlap."""
+COLOURS = 8
+"""Tasks on particles are pieces of columns of blocks. Those of one colour, the parities of their x,
+y and number in the column, never overlap."""
 WORLD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("dx", "f8"), ("dt", "f8"), ("time", "f8"), ("kick", "f8", 3)]

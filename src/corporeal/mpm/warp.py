@@ -51,6 +51,8 @@ LARGEST = 1e9
 MOST_THREADS = 4
 CHUNK = 32
 """Node blocks of one task."""
+HEIGHT = 4
+"""Particle blocks, one above the other, of one task."""
 BREATH = 0.2
 """Seconds of computing after which Python looks whether somebody wants to stop."""
 KEPT = ("count", "smallest", "largest", "speed", "wave")
@@ -187,14 +189,15 @@ class WarpEngine:
         """List the tasks and point the native structs to where everything is."""
         columns, nodes = [], []
         for f, window in self.window.items():
-            columns.append(np.insert(window.columns(), 0, f, axis=1))
+            pieces = window.columns(HEIGHT)
+            columns.append(np.column_stack([np.full(len(pieces), f), pieces]))
             pool = len(window.where)
             nodes += [(f, low, min(low + CHUNK, pool), 0) for low in range(0, pool, CHUNK)]
-        column = np.concatenate([np.zeros((0, 5), np.int64), *columns])
-        colour = 2 * (column[:, 1] % 2) + column[:, 2] % 2
+        column = np.concatenate([np.zeros((0, 6), np.int64), *columns])
+        colour = column[:, 1:4] % 2 @ (2, 1, 4)
         counts = np.bincount(colour, minlength=COLOURS)
         self.task = np.zeros((len(column), 4), np.int32)
-        self.task[:, :3] = column[np.argsort(colour, kind="stable")][:, [0, 3, 4]]
+        self.task[:, :3] = column[np.argsort(colour, kind="stable")][:, [0, 4, 5]]
         self.node_task = np.array(nodes, np.int32).reshape(-1, 4)
         self.report = np.zeros((len(self.task), REPORT))
         for f, window in self.window.items():

@@ -121,9 +121,10 @@ class Window:
         fixed = self.channel(XI, 3).view(np.int32)
         return fixed / float(1 << PLACE) + 4.0 * self.origin
 
-    def columns(self) -> np.ndarray:
-        """List runs of blocks with the same first two coordinates: (R, 4) x, y, first, last."""
-        at = self.block[:, 2:4]
+    def columns(self, height: int) -> np.ndarray:
+        """List pieces of columns of blocks: (R, 5) x, y, number in the column, first, last."""
+        at = self.block[:, 2:5].copy()
+        at[:, 2] = (at[:, 2] - 1) // height
         first = np.flatnonzero(np.r_[True, (at[1:] != at[:-1]).any(axis=1)])
         return np.column_stack([at[first], first, np.r_[first[1:], len(at)]])
 

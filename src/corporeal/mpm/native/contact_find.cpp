@@ -112,4 +112,4 @@ stage->sides = world->full ? 0 : side;
 stage->touches = world->full ? 0 : touch;
 world->parts = stage->junctions ? PARTS : 0;
 world->turns = stage->junctions ? world->rigids : 0;
-for (int k = 0; k < 4; k++) world->looks[k] = stage->junctions ? world->colour[k] : 0;
+for (int k = 0; k < COLOURS; k++) world->looks[k] = stage->junctions ? world->colour[k] : 0;

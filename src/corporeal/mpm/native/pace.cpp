@@ -77,7 +77,7 @@ struct Pace {
     // Pushes need to know the step: while there is one, particles lie down when the step begins.
     c->fused = c->fuse && !c->pushed;
     w->bare_nodes = c->laid ? 0 : w->nodes;
-    for (int k = 0; k < 4; k++) w->bare[k] = c->laid ? 0 : w->colour[k];
+    for (int k = 0; k < COLOURS; k++) w->bare[k] = c->laid ? 0 : w->colour[k];
   }
   // Velocity that gravity and pushes give in this step; enters it in the books.
   static inline void kick(World *w, Clock *c) {

@@ -24,6 +24,7 @@ const int SPEED2 = 0, WAVE2 = 1, PLASTIC = 2, VISCOUS = 3, ASTRAY = 4, WORK = 5,
 // Nodes from one layer of an arena of 8 x 8 x 8 to the next: with 64, what is read in the third layer
 // would wait for what was just written in the first, 4096 bytes before.
 const int LAYER = 66, ARENA = 8 * LAYER;
+const int COLOURS = 8;  // of tasks on particles: those of one colour never overlap
 const int NB = 32;      // ints of a block's record: start, end, coordinates 3, neighbours 27
 const int MOST = 6;     // fields that may meet at one node
 
@@ -120,10 +121,10 @@ struct World {
   int blows, blown, bonds;   // bodies in the wind; tasks on them
   int tethers, joints, grips, sprung;   // sprung: whether there is any of them
   int stop;           // why the steps end after this phase; 0: they go on
-  int nodes, colour[4];             // tasks on nodes, and on particles of each colour
-  int bare_nodes, bare[4];          // the same where this step's nodes are still to be laid
+  int nodes, colour[COLOURS];            // tasks on nodes, and on particles of each colour
+  int bare_nodes, bare[COLOURS];          // the same where this step's nodes are still to be laid
   int stands;                       // tasks on nodes that may stand on a plane
-  int parts, looks[4];              // tasks on contacts, and on particles for contact; 0 without any
+  int parts, looks[COLOURS];              // tasks on contacts, and on particles for contact; 0 without any
   int rigids, turns;                // fields, where some are rigid; tasks to look at those
 };
 

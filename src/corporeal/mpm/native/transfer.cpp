@@ -1,6 +1,6 @@
-// One task on particles: a run of blocks in one column of one field. Nodes give particles their motion,
-// or particles lay the nodes of a step, or both, the second for the step after. Columns of one colour,
-// the parities of their two coordinates, never overlap.
+// One task on particles: some blocks of one column of one field. Nodes give particles their motion, or
+// particles lay the nodes of a step, or both, the second for the step after. Tasks of one colour never
+// overlap.
 int *task = world->task + 4 * (index >> 1);
 const Field &field = world->field[task[0]];
 const bool fused = world->clock->fused, bare = index & 1;
