@@ -52,7 +52,7 @@ FULL = Size(
 )
 QUICK = Size(20_000, (10_000, 100_000), (16,), (64, 256), 24, (1,))
 DOCS = Path(__file__).parent.parent / "docs"
-WIDTHS = (16, 6, 2, 16, 10, 3, 24, 8, 5)
+WIDTHS = (16, 6, 2, 16, 10, 3, 24, 8, 8, 5)
 """Of the columns on the screen."""
 
 
@@ -96,7 +96,7 @@ def held_contest(contestants: list[Contestant], substeps: int) -> list[page.Resu
         upkeep = one.upkeep() if isinstance(one, Ours) else {}
         found.append(
             page.Result(
-                one.engine, one.drop, one.particles, cost, one.bytes, one.grown, version, upkeep
+                one.engine, one.drop, one.particles, *cost, one.bytes, one.grown, version, upkeep
             )
         )
         one.close()

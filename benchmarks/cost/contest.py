@@ -3,7 +3,7 @@
 import os
 import time
 from collections.abc import Iterator
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import warp as wp
@@ -13,6 +13,15 @@ from cost.blocks import Drop, problem_of
 
 ROUNDS = 5
 """Batches of each contestant; the best counts."""
+
+
+class Cost(NamedTuple):
+    """What a batch took, per particle and substep."""
+
+    wall: float
+    """[ns]"""
+    cpu: float
+    """Of all threads together [ns]: what hardly depends on what else the machine does."""
 
 
 class Contestant(Protocol):
@@ -26,8 +35,8 @@ class Contestant(Protocol):
     grown: float
     """What the process grew by while it was made; nan: not known."""
 
-    def batch(self, substeps: int) -> float:
-        """Take some substeps; return the nanoseconds per particle and substep."""
+    def batch(self, substeps: int) -> Cost:
+        """Take some substeps."""
         ...
 
     def close(self) -> None:
@@ -56,13 +65,14 @@ class Ours:
         self.grown = float(resident() - before)
         self.bytes = float(held(self.solver))
 
-    def batch(self, substeps: int) -> float:
+    def batch(self, substeps: int) -> Cost:
         """Advance by so many of the first stable steps, and count those that were taken."""
         taken = self.solver.steps.count
-        start = time.perf_counter()
+        start, busy = time.perf_counter(), time.process_time()
         self.solver.advance(self.solver.time + substeps * self.step)
-        seconds = time.perf_counter() - start
-        return 1e9 * seconds / (self.solver.steps.count - taken) / self.particles
+        wall, cpu = time.perf_counter() - start, time.process_time() - busy
+        unit = 1e9 / (self.solver.steps.count - taken) / self.particles
+        return Cost(unit * wall, unit * cpu)
 
     def upkeep(self) -> dict[str, float]:
         """Return what is done once a frame beside the substeps, and how long it takes [s]."""
@@ -82,14 +92,15 @@ class Ours:
         del self.solver
 
 
-def contest(contestants: list[Contestant], substeps: int) -> list[float]:
-    """Return the best batch of each [ns per particle and substep]."""
-    best = [np.inf] * len(contestants)
+def contest(contestants: list[Contestant], substeps: int) -> list[Cost]:
+    """Return the least that a batch of each took."""
+    best = [Cost(np.inf, np.inf)] * len(contestants)
     for contestant in contestants:
         contestant.batch(substeps)  # what is compiled or settles at first counts for nobody
     for _ in range(ROUNDS):
         for k, contestant in enumerate(contestants):
-            best[k] = min(best[k], contestant.batch(substeps))
+            now = contestant.batch(substeps)
+            best[k] = Cost(min(best[k].wall, now.wall), min(best[k].cpu, now.cpu))
     return best
 
 

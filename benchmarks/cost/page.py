@@ -37,6 +37,8 @@ class Result:
     particles: int
     cost: float
     """Least of five batches [ns per particle and substep]."""
+    cpu: float
+    """The same, but the time of all threads on the processor [ns]."""
     bytes: float
     """Of all arrays of the engine; nan: not known."""
     grown: float
@@ -87,11 +89,12 @@ class Result:
             f"{self.drop.objects}",
             self.setting,
             f"{self.cost:.1f}",
+            f"{self.cpu:.1f}",
             "–" if np.isnan(self.bytes) else f"{self.bytes / self.particles:.0f}",
         )
 
 
-HEAD = ("engine", "device", "threads", "law", "particles", "objects", "which", "ns", "bytes")
+HEAD = tuple("engine device threads law particles objects which ns CPU-ns bytes".split())
 
 
 def _number(value: float) -> float | None:
@@ -103,9 +106,9 @@ def machine() -> str:
     with open("/proc/cpuinfo", encoding="utf-8") as file:
         names = [line.split(":", 1)[1].strip() for line in file if line.startswith("model name")]
     return (
-        f"{names[0] if names else platform.processor()}, {os.cpu_count()} cores, load "
-        f"{os.getloadavg()[0]:.1f} at the start, {platform.system()}, "
-        f"Python {platform.python_version()}, Warp {wp.__version__}, {time.strftime('%Y-%m-%d')}"
+        f"{names[0] if names else platform.processor()}, {os.cpu_count()} cores, "
+        f"{platform.system()}, Python {platform.python_version()}, Warp {wp.__version__}, "
+        f"{time.strftime('%Y-%m-%d')}; load {os.getloadavg()[0]:.1f}"
     )
 
 
@@ -127,6 +130,7 @@ def write(results: list[Result], where: str, command: str, docs: Path) -> None:
         shown.append(f"![{words}](images/benchmarks-{name}.png)\n")
     text = PAGE.format(
         machine=where,
+        load=os.getloadavg()[0],
         command=command,
         targets=_table(("what", "measured", "target", ""), _targets(results)),
         figures="\n".join(shown),
@@ -140,15 +144,17 @@ PAGE = """# What a substep costs
 
 Made by `{command}`; don't edit.
 
-Measured on: {machine}.
+Measured on: {machine} when it began, {load:.1f} when it ended. Where the load is above the number of
+threads, others were at work on the same cores, and more threads than one cannot show what they can.
 
 Cubes of one material (E = 0.1 MPa, ν = 0.3, 1000 kg/m³, eight particles to the cell) drop on the
 floor and slide along it at 1 m/s, so that contact works and particles are sorted again and again
 throughout. A batch is a run of substeps as a simulation takes them, stability, sorting and books
 included. All contestants take turns, one batch each, and the best of five batches counts: whatever
 else the machine does hits them alike, and ratios within one run mean more than numbers of two.
-`ns` are nanoseconds per particle and substep, `bytes` are those of all arrays that the engine
-holds, per particle. genesis-world takes its own substeps of the same length with its corotated
+`ns` are nanoseconds per particle and substep, `CPU-ns` those that all threads together spent on
+the processor (which depends less on what else the machine does), `bytes` are those of all arrays
+that the engine holds, per particle. genesis-world takes its own substeps of the same length with its corotated
 elastic material, on a dense grid of 64³ cells, in single precision, in a process of its own.
 
 {targets}
@@ -209,6 +215,9 @@ def _targets(results: list[Result]) -> list[tuple[str, ...]]:
             gain = peer[threads][0].cost / cost[threads][0].cost
             words = f"genesis-world against ours, {threads} thread{'s'[: threads > 1]} each"
             rows.append(_judged(words, gain, "×", 12.0))
+    if peer[1]:
+        gain = peer[1][0].cpu / cost[1][0].cpu
+        rows.append(_judged("the same on one thread, in time of the processor", gain, "×", 12.0))
     for heap, words in ((False, "side by side"), (True, "in a heap, touching")):
         many = _find(results, objects=16, heap=heap)
         if many:

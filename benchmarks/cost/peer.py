@@ -8,6 +8,7 @@ import venv
 from pathlib import Path
 
 from cost.blocks import CELL, DENSITY, HEIGHT, POISSON, SPEED, STEP, YOUNG, Drop
+from cost.contest import Cost
 
 SCRIPT = Path(__file__).parent.parent / "peers" / "genesis_block.py"
 PACKAGES = ("torch==2.13.0", "genesis-world")
@@ -64,13 +65,14 @@ class Peer:
             sys.exit(f"genesis-world did not run:\n{self.complaints.read()[-2000:]}")
         return json.loads(line)
 
-    def batch(self, substeps: int) -> float:
+    def batch(self, substeps: int) -> Cost:
         """Take a third of the substeps: each costs as much as the other, and ten times ours."""
         assert self.process.stdin is not None
         self.process.stdin.write(f"{substeps // 3}\n")
         self.process.stdin.flush()
         said = self._answer()
-        return 1e9 * said["seconds"] / said["substeps"] / self.particles
+        unit = 1e9 / said["substeps"] / self.particles
+        return Cost(unit * said["seconds"], unit * said["cpu"])
 
     def close(self) -> None:
         """End the process."""
