@@ -1,0 +1,33 @@
+"""The validation suite as a program."""
+
+import json
+
+import validation
+from laws.outcome import Check, Outcome, absolute, at_least, relative
+from laws.suite import CASES
+
+ROW = {"case", "title", "reference", "value", "error", "target", "met", "control"}
+
+
+def test_every_case_is_there_and_twelve_counts_once():
+    numbers = [str(n) for n in range(1, 18) if n != 12]
+    assert sorted(CASES) == sorted([*numbers, "12a", "12b"])
+    check = Check("q", 1.0, 1.0, 0.0, 1.0)
+    found = [Outcome(n, "t", "s", (check,)) for n in CASES]
+    assert validation.tally(found) == (17, 17)
+    missed = Outcome("12b", "t", "s", (absolute("q", 3.0, 1.0, 1.0),))
+    assert validation.tally([*found, missed]) == (16, 17)
+
+
+def test_a_check_is_met_within_its_target_and_not_by_a_nan():
+    assert relative("q", 1.02, 1.0, 2.1).met and not relative("q", 1.03, 1.0, 2.1).met
+    assert at_least("q", 0.96, 1.0, 0.95).met and not at_least("q", 0.94, 1.0, 0.95).met
+    assert not absolute("q", float("nan"), 1.0, 5.0).met
+
+
+def test_a_row_leads_with_the_first_check_that_misses():
+    good, bad = relative("good", 1.0, 1.0, 1.0), relative("bad", 2.0, 1.0, 1.0)
+    row = Outcome("1", "t", "s", (good, bad)).row()
+    assert set(row) >= ROW and not row["met"]
+    assert row["quantity"] == "bad" and row["error"] > row["target"]
+    assert json.loads(json.dumps(row)) == row
