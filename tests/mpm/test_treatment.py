@@ -8,7 +8,8 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from corporeal.mpm.stability import compress_speed, p_wave_speed
+from corporeal.materials import library
+from corporeal.mpm.stability import compress_young, compression, p_wave_speed
 from corporeal.mpm.treatment import QUALITIES, Motion, PartGeometry, judge, plan
 from corporeal.types import Law, Material, Structure
 
@@ -173,8 +174,6 @@ def test_a_step_budget_keeps_the_order_of_stiffness_and_the_yield_speed():
     plaster = replace(copper, name="plaster", young=5e9, yield_stress=2e6)
     parts = [sphere(m, 0.1, number=k) for k, m in enumerate((FOAM, RUBBER, plaster, copper))]
     foam, rubber, soft_metal, hard_metal = plan(parts, [FALL] * 4, "draft").treatments
-    speeds = [t.wave_speed for t in (foam, rubber, soft_metal, hard_metal)]
-    assert speeds == sorted(speeds)
     assert foam.young < rubber.young < soft_metal.young < hard_metal.young
     assert foam.young == 50e3
     assert hard_metal.young < hard_metal.young_real == 110e9
@@ -192,15 +191,52 @@ def test_a_crowded_scene_takes_fewer_steps_than_a_small_one():
 
 
 @given(
-    st.lists(st.floats(0.1, 1e4), min_size=2, max_size=8, unique=True),
-    st.floats(0.2, 1e4),
+    st.lists(st.tuples(st.floats(1e3, 1e12), st.floats(1.0, 1e4)), min_size=2, max_size=8),
+    st.floats(0.2, 9e3),
 )
-def test_compression_is_monotone_and_never_stiffens(speeds, limit):
-    speeds = sorted(speeds)
-    squeezed = [compress_speed(c, speeds[-1], limit) for c in speeds]
+def test_compression_keeps_the_order_never_stiffens_and_slows_all_waves(parts, limit):
+    if max(speed for _, speed in parts) <= limit:
+        return
+    knee, power = compression(parts, limit)
+    squeezed = [compress_young(young, knee, power) for young, _ in sorted(parts)]
+    assert 0 < power < 1
     assert all(a <= b for a, b in pairwise(squeezed))
-    assert all(s <= c * (1 + 1e-12) for s, c in zip(squeezed, speeds, strict=True))
-    assert squeezed[-1] <= limit * (1 + 1e-9)
+    for young, speed in parts:
+        small = compress_young(young, knee, power)
+        assert small <= young * (1 + 1e-12)
+        assert speed * sqrt(small / young) <= limit * (1 + 1e-9)
+
+
+MATERIALS = [entry.pick(entry.typical()) for entry in library().values()]
+
+
+@pytest.mark.parametrize("detail", QUALITIES)
+@pytest.mark.parametrize("speed", [0.5, 3.0, 30.0])
+def test_every_two_materials_of_the_library_are_simulated_in_their_order_of_stiffness(
+    detail, speed
+):
+    parts = [sphere(m, 0.1, number=k) for k, m in enumerate(MATERIALS)]
+    treatments = plan(parts, [Motion(speed, 9.81)] * len(parts), detail).treatments
+    bulk = [t for t in treatments if t.kind == "deformable"]
+    assert len(bulk) > 10
+    order = sorted(bulk, key=lambda t: t.young_real)
+    assert all(a.young < b.young for a, b in pairwise(order) if b.young_real > 1.01 * a.young_real)
+
+
+def test_shells_are_simulated_in_their_order_of_bending_stiffness():
+    made = [
+        (m, t) for m in MATERIALS if m.law not in (Law.VON_MISES, Law.DRUCKER_PRAGER)
+        for t in (2e-4, 1e-3)
+    ]  # fmt: skip
+    parts = [sphere(m, 0.2, shell(t), number=k) for k, (m, t) in enumerate(made)]
+    treatments = plan(parts, [Motion(30.0, 9.81)] * len(parts), "draft").treatments
+    rows = sorted(
+        (m.young * t**3, s.young * (s.thickness or 0.0) ** 3)
+        for (m, t), s in zip(made, treatments, strict=True)
+        if s.kind == "shell"
+    )
+    assert len(rows) > 40
+    assert all(a[1] < b[1] for a, b in pairwise(rows) if b[0] > 1.05 * a[0])
 
 
 def test_the_published_cap_loses_the_order_of_stiffness():
@@ -232,7 +268,7 @@ def test_a_scene_of_stones_still_gets_a_grid():
 def test_a_tab_too_small_to_see_does_not_set_the_step_of_the_scene():
     tab = block(ALUMINIUM, 0.001, 0.019, 0.033)
     can, small = plan([CAN, tab], [FALL], "draft").treatments
-    assert small.wave_speed == pytest.approx(can.wave_speed)
+    assert small.wave_speed <= can.wave_speed
     assert small.yield_stress / (small.density * small.wave_speed) == pytest.approx(2.4, abs=0.1)
     assert "too small" in small.why.lower()
 

@@ -5,12 +5,14 @@ Also the published rule, a cap that does not keep the order: a control only.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from math import sqrt
 
 from corporeal.mpm.part import PartGeometry, is_trinket
 from corporeal.mpm.stability import (
     COURANT,
     capped_young,
-    compress_speed,
+    compress_young,
+    compression,
     p_wave_speed,
     stable_step,
 )
@@ -39,7 +41,7 @@ def calm_trinkets(
 def fit_budget(
     treatments: Sequence[Treatment], cell: float, steps: float
 ) -> tuple[list[Treatment], list[str]]:
-    """Compress wave speeds where the step budget would be exceeded; their order is kept.
+    """Compress stiffness where the step budget would be exceeded; its order is kept.
 
     σ_y falls with √(E_sim/E), which keeps the impact speed at which a part yields.
     """
@@ -50,8 +52,15 @@ def fit_budget(
     if fastest <= limit:
         return list(treatments), []
     because = "The step budget slows its waves"
+    bends = [(t.young, t.wave_speed) for t in treatments if t.wave_speed > 0]
+    knee, power = compression(bends, limit)
     fitted = [
-        compress(t, compress_speed(t.wave_speed, fastest, limit), cell, because) for t in treatments
+        compress(
+            t, t.wave_speed * sqrt(compress_young(t.young, knee, power) / t.young), cell, because
+        )
+        if t.wave_speed > 0
+        else t
+        for t in treatments
     ]
     changed = sum(a.young != b.young for a, b in zip(treatments, fitted, strict=True))
     return fitted, [

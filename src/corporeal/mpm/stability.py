@@ -1,5 +1,6 @@
 """How fast waves run, how large a step that allows, and how far the step budget reaches."""
 
+from collections.abc import Sequence
 from math import inf, log, sqrt
 
 COURANT = 0.4
@@ -92,16 +93,29 @@ def fold_factor(thickness: float, simulated: float, radius: float) -> float:
     return max(1.0, simulated / sqrt(radius * thickness)) if simulated > thickness else 1.0
 
 
-def compress_speed(speed: float, fastest: float, limit: float) -> float:
-    """Order-preserving compression of wave speeds [m/s] so that ``fastest`` becomes ``limit``.
+def compression(parts: Sequence[tuple[float, float]], limit: float) -> tuple[float, float]:
+    """Knee K [Pa] and power q of the compression that keeps every wave below ``limit`` [m/s].
 
-    Speeds up to the knee k = limit/2 stay; above it f(c) = k (c/k)^p with p chosen so that
-    f(fastest) = limit. f is continuous, strictly increasing and never above c.
+    E ↦ K (E/K)^q above K, E below. The knee lies at half the limit's wave speed in the part that
+    exceeds it most for its stiffness, and q is the largest that slows all enough; 0 < q < 1.
+
+    Args:
+        parts: Young's modulus [Pa] and wave speed [m/s] of each.
+        limit: Largest wave speed.
+
     """
-    knee = limit / 2
-    if fastest <= limit or speed <= knee:
-        return speed
-    return knee * (speed / knee) ** (log(2) / log(fastest / knee))
+    fast = [(young, speed / limit) for young, speed in parts if speed > limit]
+    knee = min(young / over**2 for young, over in fast) / 4
+    return knee, 1 - max(2 * log(over) / log(young / knee) for young, over in fast)
+
+
+def compress_young(young: float, knee: float, power: float) -> float:
+    """Compress Young's modulus [Pa]: K (E/K)^q above the knee.
+
+    Monotone in E, so the order of stiffness is kept, whatever the densities; a compression of wave
+    speeds would make heavy soft matter stiffer than light stiff matter. Never above E.
+    """
+    return young if young <= knee else knee * (young / knee) ** power
 
 
 def capped_young(young: float, poisson: float, density: float, cell: float) -> float:
