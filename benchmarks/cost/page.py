@@ -144,8 +144,8 @@ PAGE = """# What a substep costs
 
 Made by `{command}`; don't edit.
 
-Measured on: {machine} when it began, {load:.1f} when it ended. Where the load is above the number of
-threads, others were at work on the same cores, and more threads than one cannot show what they can.
+Measured on: {machine} when it began, {load:.1f} when it ended. A load above the number of cores
+says that others were at work on them, and that more than one thread cannot show what it can do.
 
 Cubes of one material (E = 0.1 MPa, ν = 0.3, 1000 kg/m³, eight particles to the cell) drop on the
 floor and slide along it at 1 m/s, so that contact works and particles are sorted again and again
@@ -154,8 +154,9 @@ included. All contestants take turns, one batch each, and the best of five batch
 else the machine does hits them alike, and ratios within one run mean more than numbers of two.
 `ns` are nanoseconds per particle and substep, `CPU-ns` those that all threads together spent on
 the processor (which depends less on what else the machine does), `bytes` are those of all arrays
-that the engine holds, per particle. genesis-world takes its own substeps of the same length with its corotated
-elastic material, on a dense grid of 64³ cells, in single precision, in a process of its own.
+that the engine holds, per particle. genesis-world takes its own substeps of nearly the same length
+with its corotated elastic material, on a dense grid of 64³ cells, in single precision, in a process
+of its own.
 
 {targets}
 
