@@ -17,7 +17,11 @@ def built(name):
     """Give a function that builds an engine; the one for cards runs on the processor."""
     chosen = load("engine", name, MENU)
     chosen.round_off = ROUND_OFF[name]
-    return partial(chosen, device="cpu") if name == "cuda" else chosen
+    if name != "cuda":
+        return chosen
+    here = partial(chosen, device="cpu")
+    here.round_off = ROUND_OFF[name]
+    return here
 
 
 @pytest.fixture(params=["reference", "warp", SLOWLY["cuda"]])

@@ -12,13 +12,16 @@ import numpy as np
 
 from corporeal.errors import SimulationError, UserError
 from corporeal.mpm import device_extras as extras
+from corporeal.mpm import device_hands as hands
 from corporeal.mpm import device_layout as layout
 from corporeal.mpm.device_layout import wp
 from corporeal.mpm.device_measure import measured, shown
 from corporeal.mpm.device_memory import Memory, slowing, split
 from corporeal.mpm.device_program import MODULES, PARTICLE_STATE, Arrays, Program
+from corporeal.mpm.grip import Grip
 from corporeal.mpm.matter import Matter
 from corporeal.mpm.problem import Body, Measure, Problem, Snapshot, Steps
+from corporeal.types import Vector
 
 KNOWN = {
     Body: "name position velocity volume density law young poisson yield_stress hardening "
@@ -69,6 +72,7 @@ class DeviceEngine:
         self.kept = self._kept()
         self.spare = {name: wp.empty_like(array) for name, array in self.kept.items()}
         self.lost = np.zeros(len(self.matter.mass), bool)
+        self.grips: dict[int, Grip] = {}
         for module in MODULES:
             wp.load_module(module, device=self.device)
         self._start()
@@ -195,6 +199,16 @@ class DeviceEngine:
             "are not finite or left the domain. What was computed before is kept. Use more "
             "detail, or look for parts that overlap at the start."
         )
+
+    # ------------------------------------------------------------ from outside
+
+    def poke(self, body: int, point: Vector, impulse: Vector) -> None:
+        """Give a body an impulse [N s] at a point [m] at once: see ``problem.Interactive``."""
+        hands.poke(self, body, point, impulse)
+
+    def drag(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
+        """Pull on a body by a spring until told otherwise: see ``problem.Interactive``."""
+        hands.drag(self, body, point, target, stiffness)
 
     # ------------------------------------------------------------ reading and keeping
 

@@ -15,10 +15,9 @@ NEVER = (0.0, -1.0)
 
 def loads(memory: Memory, problem: Problem, matter: Matter) -> Any:
     """Lay out wind, tethers and joints."""
-    bodies, out = len(problem.bodies), Loads()
-    out.blown = memory.zeros(len(matter.mass), wp.vec3)
-    out.pulled = memory.zeros(len(matter.mass), wp.vec3)
-    out.at = memory.zeros(len(matter.mass), wp.int32)
+    bodies, count, out = len(problem.bodies), len(matter.mass), Loads()
+    out.blown, out.pulled = memory.zeros(count, wp.vec3), memory.zeros(count, wp.vec3)
+    out.at = memory.zeros(count, wp.int32)
     for name in ("wind_force", "wind_moment", "force", "moment", "external"):
         setattr(out, name, memory.zeros(bodies, wp.vec3d))
     out.loss = memory.zeros(1, wp.float64)
@@ -26,6 +25,11 @@ def loads(memory: Memory, problem: Problem, matter: Matter) -> Any:
     _faces(out, memory, problem, matter)
     _tethers(out, memory, problem, matter)
     _joints(out, memory, problem, matter)
+    out.gripped, out.share = memory.zeros(bodies, wp.int32), memory.zeros(count, wp.float32)
+    for name in ("spring", "brake", "grip_mass"):
+        setattr(out, name, memory.zeros(bodies, wp.float64))
+    for name in ("target", "grip_arm", "hand", "hand_speed"):
+        setattr(out, name, memory.zeros(bodies, wp.vec3d))
     return out
 
 

@@ -209,7 +209,7 @@ def clear(g: Grid, s: Sheet, stride: int):
     blocks = s.flag[BLOCKS]
     for i in range(wp.tid(), 64 * blocks, stride):
         g.node[i] = wp.vec4(0.0)
-        g.old[i] = wp.vec3(0.0)
+        g.old[i] = wp.vec4(0.0)
         g.meet[i] = 0
         g.held[i] = 0
     for b in range(wp.tid(), blocks, stride):
@@ -228,4 +228,4 @@ def divide(g: Grid, s: Sheet, stride: int):
             g.old[i] = g.old[i] / a[0]
         else:
             g.node[i] = wp.vec4(0.0)
-            g.old[i] = wp.vec3(0.0)
+            g.old[i] = wp.vec4(0.0)

@@ -68,7 +68,8 @@ def side_before(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int, entry: int, fi
         return wp.vec3d(D(0.0))
     if r.stiff[field] == 1:
         return speed_at(r, field, c.point[t]) - s.kick[field]
-    return wp.vec3d(g.old[c.slot[entry]])
+    v = g.old[c.slot[entry]]
+    return wp.vec3d(D(v[0]), D(v[1]), D(v[2]))
 
 
 @wp.func

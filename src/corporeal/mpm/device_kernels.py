@@ -4,7 +4,7 @@ Same step as ``reference.ReferenceEngine.step``; see there for the formulas.
 """
 
 from corporeal.mpm.device_grid import block_of, claim_around, find, node_of, splines
-from corporeal.mpm.device_laws import answer
+from corporeal.mpm.device_laws import answer, relieved, swelling
 from corporeal.mpm.device_layout import (
     BODY,
     COUNT,
@@ -27,6 +27,7 @@ from corporeal.mpm.device_layout import (
     STABLE,
     STIFF,
     SWEEPS,
+    SWELLS,
     TIME,
     TOUCHES,
     UNTIL,
@@ -159,6 +160,7 @@ def scatter(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
         new = old + m * wp.vec3(s.kick[int(p.table[row, BODY])])
         new += l.blown[i] + l.pulled[i]
         w = splines(f)
+        bulk = m * p.table[row, SWELLS] * swelling(p.strain[i])
         for x in range(3):
             for y in range(3):
                 for z in range(3):
@@ -167,7 +169,8 @@ def scatter(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
                     q = n * (new + A * r)
                     node = node_of(g, home, cell, x, y, z)
                     wp.atomic_add(g.node, node, wp.vec4(n * m, q[0], q[1], q[2]))
-                    wp.atomic_add(g.old, node, n * (old + B * r))
+                    o = n * (old + B * r)
+                    wp.atomic_add(g.old, node, wp.vec4(o[0], o[1], o[2], n * bulk))
 
 
 @wp.kernel
@@ -239,6 +242,8 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
         w = splines(f)
         keep = 1.0 - wp.min(1.0, p.table[row, FORGET] * dt)
         blown = wp.length_sq(l.blown[i]) > 0.0
+        swells = p.table[row, SWELLS] > 0.0
+        bulk = float(0.0)
         v = wp.vec3(0.0)
         u = wp.vec3(0.0)
         L = wp.mat33(0.0)
@@ -253,8 +258,10 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
                     now = n * wp.vec3(q[1], q[2], q[3])
                     v += now
                     L += wp.outer(now, arm)
-                    if keep > 0.0 or blown:
-                        was = n * g.old[node]
+                    if keep > 0.0 or blown or swells:
+                        o = g.old[node]
+                        was = n * wp.vec3(o[0], o[1], o[2])
+                        bulk += n * o[3]
                         u += was
                         K += wp.outer(was, arm)
         B = p.affine[i]
@@ -283,6 +290,9 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
             p.opened[i] = a.opened
             book(s, PLASTIC, i, p.volume[i] * a.work)
         tau = a.tau
+        if swells:
+            more = relieved(p, row, a.strain, bulk - swelling(H))
+            tau += wp.diag(wp.vec3(more))
         eta = p.table[row, VISCOSITY] / s.cell
         if eta > 0.0:
             J = wp.max(wp.determinant(wp.identity(n=3, dtype=wp.float32) + H), 0.0)

@@ -155,15 +155,31 @@ def flow_metal(p: Particles, k: int, trial: wp.vec3, plastic: wp.float32):
 
 
 @wp.func
+def swelling(H: wp.mat33):
+    """J - 1 of F = 1 + H, exact for small H."""
+    minors = H[0, 0] * H[1, 1] - H[0, 1] * H[1, 0] + H[0, 0] * H[2, 2] - H[0, 2] * H[2, 0]
+    minors += H[1, 1] * H[2, 2] - H[1, 2] * H[2, 1]
+    return wp.trace(H) + minors + wp.determinant(H)
+
+
+@wp.func
+def relieved(p: Particles, k: int, H: wp.mat33, relief: wp.float32):
+    """Pressure that a swelling of J + relief instead of J adds [Pa]: ``elasticity.tau_relief``."""
+    own = swelling(H)
+    mean = wp.max(own + relief, -0.999)
+    if p.table[k, LAW] == 0.0:
+        return p.table[k, LAMBDA] * ((1.0 + mean) * mean - (1.0 + own) * own)
+    return p.table[k, LAMBDA] * (log1p(mean) - log1p(wp.max(own, -0.999)))
+
+
+@wp.func
 def answer(p: Particles, k: int, H: wp.mat33, plastic: wp.float32, opened: wp.float32):
     """Stress of material k at F = 1 + H, after its return map."""
     law = int(p.table[k, LAW])
     mu = p.table[k, MU]
     lam = p.table[k, LAMBDA]
     E = H + wp.transpose(H) + H * wp.transpose(H)
-    minors = H[0, 0] * H[1, 1] - H[0, 1] * H[1, 0] + H[0, 0] * H[2, 2] - H[0, 2] * H[2, 0]
-    minors += H[1, 1] * H[2, 2] - H[1, 2] * H[2, 1]
-    j1 = wp.trace(H) + minors + wp.determinant(H)
+    j1 = swelling(H)
     r = Answer()
     r.strain = H
     r.opened = opened

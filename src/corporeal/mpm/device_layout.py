@@ -62,7 +62,9 @@ FORGET = wp.constant(8)
 DENSITY = wp.constant(9)
 SLOWING = wp.constant(10)
 BODY = wp.constant(11)
-COLUMNS = 12
+SWELLS = wp.constant(12)
+"""1: pressure comes from the mean swelling around."""
+COLUMNS = 13
 
 # Rows of ``Sheet.loss``; each is spread over LANES places, so that threads rarely collide.
 PLASTIC = wp.constant(0)
@@ -175,8 +177,8 @@ class Grid:
     """The same of any block that particles of this one reach."""
     node: wp.array(dtype=wp.vec4)
     """Mass [kg] and momentum [kg m/s], then velocity [m/s]."""
-    old: wp.array(dtype=wp.vec3)
-    """The same without forces."""
+    old: wp.array(dtype=wp.vec4)
+    """Momentum, then velocity, without forces; mass times swelling J - 1, then its mean."""
     meet: wp.array(dtype=wp.int32)
     """1 + the field's entry where it meets others; 0: nobody."""
     held: wp.array(dtype=wp.int32)
@@ -228,7 +230,7 @@ class Loads:
     """What acts on single particles, wind and tethers; and joints of rigid bodies."""
 
     blown: wp.array(dtype=wp.vec3)
-    """What the wind gives each particle in this step [N s], in the order of ``Particles`` …"""
+    """What wind and grips give each particle in this step [N s], in the order of ``Particles`` …"""
     pulled: wp.array(dtype=wp.vec3)
     """… and what its tether does."""
     wind_force: wp.array(dtype=wp.vec3d)
@@ -240,7 +242,7 @@ class Loads:
     moment: wp.array(dtype=wp.vec3d)
     """[N m s]"""
     external: wp.array(dtype=wp.vec3d)
-    """Of the wind on each body [N s]."""
+    """Of wind and grips on each body [N s]."""
     loss: wp.array(dtype=wp.float64)
     """What dampers of tethers and joints took in this step [J]."""
     at: wp.array(dtype=wp.int32)
@@ -280,6 +282,24 @@ class Loads:
     stiffness: wp.array(dtype=wp.float64)
     friction: wp.array(dtype=wp.float64)
     """Damping [N m s/rad]."""
+    gripped: wp.array(dtype=wp.int32)
+    """1: the body is pulled by a spring …"""
+    target: wp.array(dtype=wp.vec3d)
+    """… to here [m] …"""
+    spring: wp.array(dtype=wp.float64)
+    """… with k [N/m] …"""
+    brake: wp.array(dtype=wp.float64)
+    """… and c [N s/m] …"""
+    grip_mass: wp.array(dtype=wp.float64)
+    """… that move so much at once [kg] …"""
+    grip_arm: wp.array(dtype=wp.vec3d)
+    """… at this place of a rigid body, in its own frame [m] …"""
+    share: wp.array(dtype=wp.float32)
+    """… or by this share at each particle, by its number."""
+    hand: wp.array(dtype=wp.vec3d)
+    """Where each body that bends is held now [m], and …"""
+    hand_speed: wp.array(dtype=wp.vec3d)
+    """… how fast that moves [m/s]."""
 
 
 @wp.struct

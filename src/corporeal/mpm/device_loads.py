@@ -1,6 +1,7 @@
-"""Wind, tethers and joints on the device; twins of ``loads``, ``wind`` and ``springs``."""
+"""Wind, springs and grips on the device: ``loads``, ``wind``, ``springs`` and ``driving``."""
 
 from corporeal.mpm.device_layout import (
+    BODY,
     DT,
     FULL,
     PUSHING,
@@ -36,6 +37,8 @@ def calm(p: Particles, l: Loads, s: Sheet, stride: int):
         l.force[b] = wp.vec3d(D(0.0))
         l.moment[b] = wp.vec3d(D(0.0))
         l.external[b] = wp.vec3d(D(0.0))
+        l.hand[b] = wp.vec3d(D(0.0))
+        l.hand_speed[b] = wp.vec3d(D(0.0))
     if wp.tid() == 0:
         l.loss[0] = D(0.0)
 
@@ -106,6 +109,13 @@ def blow(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
 # ---------------------------------------------------------------- tethers
 
 
+@wp.func
+def position_of(p: Particles, s: Sheet, i: int):
+    """Where a particle is [m]."""
+    cell = p.cell[i]
+    return (wp.vec3d(D(cell[0]), D(cell[1]), D(cell[2])) + wp.vec3d(p.place[i])) * s.dx
+
+
 @wp.kernel
 def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
     """Pull tethered particles back; the holder gets the reaction where the particle is."""
@@ -113,9 +123,7 @@ def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
     for k in range(wp.tid(), l.tethers, stride):
         i = l.at[l.tied[k]]
         h = l.holder[k]
-        cell = p.cell[i]
-        low = wp.vec3d(D(cell[0]), D(cell[1]), D(cell[2]))
-        place = (low + wp.vec3d(p.place[i])) * s.dx - r.centre[h]
+        place = position_of(p, s, i) - r.centre[h]
         arm = r.turn[h] * l.anchor[k]
         v = wp.vec3d(p.velocity[i]) - r.speed[h] - wp.cross(r.spin[h], arm)
         rate = l.rate[k]
@@ -196,3 +204,51 @@ def join(r: Rigid, l: Loads, s: Sheet):
         strike(r, c, J, wp.cross(arm_c, J) + T)
         relative = r.spin[c] - r.spin[a]
         l.loss[0] = l.loss[0] + l.friction[k] * dt * wp.length_sq(relative)
+
+
+# ---------------------------------------------------------------- grips
+
+
+@wp.func
+def pull_of(l: Loads, b: int, place: wp.vec3d, velocity: wp.vec3d, dt: wp.float64):
+    """Impulse of a grip's spring in a step [N s], as much as the step can follow."""
+    k = wp.min(l.spring[b], D(0.25) * l.grip_mass[b] / (dt * dt))
+    c = wp.min(l.brake[b], D(0.5) * l.grip_mass[b] / dt)
+    return (k * (l.target[b] - place) - c * velocity) * dt
+
+
+@wp.kernel
+def feel(p: Particles, l: Loads, s: Sheet, stride: int):
+    """Work out where bodies that bend are held, and how fast that moves."""
+    for i in range(wp.tid(), p.count, stride):
+        share = D(l.share[p.number[i]])
+        if share > D(0.0):
+            b = int(p.table[p.kind[i], BODY])
+            wp.atomic_add(l.hand, b, share * position_of(p, s, i))
+            wp.atomic_add(l.hand_speed, b, share * wp.vec3d(p.velocity[i]))
+
+
+@wp.kernel
+def grasp(p: Particles, l: Loads, s: Sheet, stride: int):
+    """Let grips pull on bodies that bend."""
+    for i in range(wp.tid(), p.count, stride):
+        share = D(l.share[p.number[i]])
+        if share > D(0.0):
+            b = int(p.table[p.kind[i], BODY])
+            J = share * pull_of(l, b, l.hand[b], l.hand_speed[b], s.clock[DT])
+            l.blown[i] = l.blown[i] + wp.vec3(J)
+            wp.atomic_add(l.external, b, J)
+
+
+@wp.kernel
+def grasp_rigid(r: Rigid, l: Loads, s: Sheet):
+    """Let grips pull on rigid bodies, and book their work at the mean velocity."""
+    b = wp.tid()
+    if l.gripped[b] == 1 and r.stiff[b] == 1 and s.flag[FULL] != 2:
+        arm = r.turn[b] * l.grip_arm[b]
+        before = speed_at(r, b, r.centre[b] + arm) - s.kick[b]
+        J = pull_of(l, b, r.centre[b] + arm, before, s.clock[DT])
+        strike(r, b, J, wp.cross(arm, J))
+        moving = speed_at(r, b, r.centre[b] + arm) - s.kick[b]
+        wp.atomic_add(s.loss, PUSHING, b % 256, wp.dot(J, D(0.5) * (before + moving) + s.kick[b]))
+        l.external[b] = l.external[b] + J

@@ -80,7 +80,7 @@ class Memory:
         g.where, g.field = self.zeros(room, wp.vec3i), self.zeros(room, wp.int32)
         g.near, g.partner = self.zeros(8 * room, wp.int32), self.zeros(MOST * room, wp.int32)
         g.seen, g.aware = self.zeros(room, wp.int32), self.zeros(room, wp.int32)
-        g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec3)
+        g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec4)
         g.meet, g.held = self.zeros(64 * room, wp.int32), self.zeros(64 * room, wp.int32)
         return g
 
@@ -243,7 +243,7 @@ def _materials(
     rows[:, layout.FORGET] = np.minimum(rate, 1e30)
     rows[:, layout.DENSITY] = m.mass[chosen] / m.volume[chosen]
     rows[:, layout.SLOWING] = slowing(m, problem.cell)[chosen]
-    rows[:, layout.BODY] = m.body[chosen]
+    rows[:, layout.BODY], rows[:, layout.SWELLS] = m.body[chosen], m.swells[chosen]
     rows[stiff, 1:8] = 0.0
     table, kind = np.unique(rows.astype(np.float32), axis=0, return_inverse=True)
     return table, kind.reshape(-1)

@@ -43,6 +43,7 @@ class Program:
         self.bodies, self.planes = len(problem.bodies), len(problem.planes)
         self.arrays, self.device = arrays, device
         self.graph = None
+        self.held = False
         self.stride = self._threads()
 
     def _threads(self) -> int:
@@ -55,6 +56,12 @@ class Program:
         if self.graph is None:
             self.graph = self._record()
         wp.capture_launch(self.graph)
+
+    def hold(self, held: bool) -> None:
+        """Say whether anything is held from outside."""
+        if held != self.held:
+            self.held = held
+            self.forget()
 
     def forget(self) -> None:
         """Record anew before the next run: arrays were replaced."""
@@ -131,6 +138,9 @@ class Program:
             self._each(loads.blow, a.particles, a.rigid, a.loads, a.sheet)
         if a.loads.tethers:
             self._each(loads.tether, a.particles, a.rigid, a.loads, a.sheet)
+        if self.held:
+            self._each(loads.feel, a.particles, a.loads, a.sheet)
+            self._each(loads.grasp, a.particles, a.loads, a.sheet)
 
     def _hold(self) -> None:
         """Find what rigid frames hold."""
@@ -147,6 +157,8 @@ class Program:
         self._per_body(rigid.force, a.rigid, a.sheet)
         if a.loads.joints:
             self._run(loads.join, 1, a.rigid, a.loads, a.sheet, stride=False)
+        if self.held:
+            self._per_body(loads.grasp_rigid, a.rigid, a.loads, a.sheet)
         if a.bonds.count:
             self._per_body(bonds.compose, a.rigid, a.bonds, a.sheet)
 
