@@ -81,7 +81,7 @@ def rigid_grid(
 
 
 def _clumped(points: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Sort a rigid body's particles into cubes of 4 cells: what is far from all others is passed over.
+    """Sort a rigid body's particles into cubes of 4 cells, which are passed over where all is far.
 
     Returns:
         The particles, and for each cube the first and last of them, its middle and its radius [m].
@@ -122,7 +122,7 @@ class ContactMemory:
         )
         point(world, **{name: getattr(ledger, name) for name in BOOKS.split()})
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
-        self.room = 256
+        self.room, self.lists = 256, {"past": np.zeros(0, np.uint8)}
         self.lengthen()
 
     def watched(self, origin: np.ndarray, dim: np.ndarray) -> tuple[int, np.ndarray]:
@@ -172,7 +172,7 @@ class ContactMemory:
             "line": 8 * self.room,
             "past": 8 * self.room,
         }
-        past = self.past if hasattr(self, "lists") else np.zeros(0, np.uint8)
+        past = self.past
         self.lists = {name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()}
         self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
         self.slot = np.zeros(32 * self.room, np.int32)

@@ -211,8 +211,9 @@ if (n) {
   for (int i = 0; i < n; i++) place[lines[i].group + 1]++;
   for (int i = 0; i < groups; i++) place[i + 1] += place[i];
   for (int i = 0; i < n; i++) order[place[lines[i].group]++] = i;
-  // Rigid bodies on one another have only each other to yield: with few sweeps stacks creep. After
-  // ten sweeps, what is left may creep by a few thousandths of a cell per second.
+  // Rigid bodies on one another have only each other to yield: with few sweeps stacks creep. So
+  // contacts begin with the forces of the last step, unless there is a hit; and sweeps end when what
+  // they change would creep by less than a few thousandths of a cell per second.
   const int sweeps = hits || stacked ? SWEEPS_OF_A_HIT : SWEEPS;
   const double fine = 2e-3 * dx;
   const bool known = stage->pasts && !hits;
