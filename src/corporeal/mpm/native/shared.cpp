@@ -198,17 +198,6 @@ struct Simd {
       high[d] = (high[d] > 5 ? 5 : high[d]) + 2;
     }
   }
-  // Ask for the nodes around a block, some time before they are needed.
-  static inline void fetch(const float *node, const int *block) {
-    for (int i = 0; i < 8; i++)
-      for (int j = 0; j < 8; j++) {
-        const int *near = block + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
-        const float *row = node + (((i + 3) & 3) * 16 + ((j + 3) & 3) * 4) * 8;
-        __builtin_prefetch(row + (size_t)near[0] * 512 + 24, 0, 2);
-        __builtin_prefetch(row + (size_t)near[1] * 512, 0, 2);
-        __builtin_prefetch(row + (size_t)near[2] * 512, 0, 2);
-      }
-  }
   // Of a batch in a block: distances from the first node, weights of 27 nodes, and the first node's
   // place in the block's arena of 8 x 8 x 8. Who strayed is kept inside: its step counts no more.
   static inline void weights(const float *q, const int *block, f8 *D, Row *W, int *base) {

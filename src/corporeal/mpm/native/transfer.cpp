@@ -8,11 +8,7 @@ Gather gather;
 double work = 0;
 for (int b = task[1]; b < task[2]; b++) {
   const int *block = field.block + NB * b;
-  if (!bare) {
-    if (fused) Simd::fetch(field.next, block);
-    gather.block(world, field, block);
-    if (b + 1 < task[2]) Simd::fetch(field.node, block + NB);
-  }
+  if (!bare) gather.block(world, field, block);
   if (bare || fused) work += Scatter::block(world, field, block, bare ? field.node : field.next);
 }
 double *report = world->report + NR * (index >> 1);
