@@ -77,6 +77,8 @@ def _tell(engine: "DeviceEngine") -> None:
     acting.target.assign(target)
     acting.grip_arm.assign(arm)
     acting.share.assign(share.astype(np.float32))
+    acting.blown.zero_()
+    acting.external.zero_()
     engine.program.hold(bool(engine.grips))
 
 

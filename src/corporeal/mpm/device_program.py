@@ -44,6 +44,7 @@ class Program:
         self.arrays, self.device = arrays, device
         self.graph = None
         self.held = False
+        self.touching = self.planes > 0 or (self.bodies > 1 and problem.contact == "multi")
         self.stride = self._threads()
 
     def _threads(self) -> int:
@@ -118,21 +119,27 @@ class Program:
         self._each(grids.clear, a.grid, a.sheet)
         self._load()
         self._each(kernels.scatter, a.particles, a.grid, a.loads, a.sheet)
-        self._each(kernels.scatter_rigid, a.rigid, a.grid, a.sheet)
+        if a.rigid.count:
+            self._each(kernels.scatter_rigid, a.rigid, a.grid, a.sheet)
         self._each(grids.divide, a.grid, a.sheet)
         self._hold()
-        self._look()
+        if self.touching:
+            self._look()
         self._force()
-        self._touch()
+        if self.touching:
+            self._touch()
         self._release()
         self._each(kernels.gather, a.particles, a.grid, a.loads, a.sheet)
-        self._per_body(rigid.advance, a.rigid, a.sheet)
-        self._each(rigid.follow, a.rigid, a.grid, a.sheet)
+        if a.rigid.count:
+            self._per_body(rigid.advance, a.rigid, a.sheet)
+            self._each(rigid.follow, a.rigid, a.grid, a.sheet)
         self._run(kernels.tick, 1, a.sheet, a.rigid, a.loads, stride=False)
 
     def _load(self) -> None:
         """Let wind and tethers act on particles."""
         a = self.arrays
+        if not (a.loads.faces or a.loads.tethers or a.loads.joints or self.held):
+            return
         self._each(loads.calm, a.particles, a.loads, a.sheet)
         if a.loads.faces:
             self._each(loads.blow, a.particles, a.rigid, a.loads, a.sheet)
@@ -152,6 +159,8 @@ class Program:
     def _force(self) -> None:
         """Let forces act on rigid bodies; frames then stand for all that they hold."""
         a = self.arrays
+        if not a.rigid.count:
+            return
         if a.loads.faces or a.loads.tethers:
             self._per_body(loads.load_rigid, a.rigid, a.loads, a.sheet)
         self._per_body(rigid.force, a.rigid, a.sheet)
@@ -175,13 +184,16 @@ class Program:
         self._each(meets.list_meets, a.grid, a.contacts, a.rigid, a.sheet)
         self._each(meets.look_around, a.grid, a.sheet)
         self._each(contact.show_particles, a.particles, a.grid, a.contacts, a.sheet)
-        self._each(contact.show_rigid, a.rigid, a.grid, a.contacts, a.sheet)
+        if a.rigid.count:
+            self._each(contact.show_rigid, a.rigid, a.grid, a.contacts, a.sheet)
         self._each(contact.propose, a.contacts, a.sheet)
         self._each(contact.reach_particles, a.particles, a.grid, a.contacts, a.sheet)
-        self._each(contact.reach_rigid, a.rigid, a.grid, a.contacts, a.sheet)
+        if a.rigid.count:
+            self._each(contact.reach_rigid, a.rigid, a.grid, a.contacts, a.sheet)
         self._each(contact.choose, a.contacts, a.sheet)
         self._each(contact.measure_gaps, a.grid, a.contacts, a.sheet)
-        self._each(meets.list_points, a.rigid, a.contacts, a.sheet)
+        if a.rigid.surfaces:
+            self._each(meets.list_points, a.rigid, a.contacts, a.sheet)
 
     def _touch(self) -> None:
         """Solve all impulses, and enter them."""
@@ -189,8 +201,9 @@ class Program:
         self._each(impulses.prepare, a.contacts, a.rigid, a.grid, a.sheet)
         self._each(impulses.rebound, a.contacts, a.sheet)
         self._each(impulses.solve_nodes, a.contacts, a.rigid, a.sheet)
-        sweeping = a.sheet.flag[int(layout.SWEEPING) : int(layout.SWEEPING) + 1]
-        wp.capture_while(sweeping, self._sweep)
+        if a.rigid.count:
+            sweeping = a.sheet.flag[int(layout.SWEEPING) : int(layout.SWEEPING) + 1]
+            wp.capture_while(sweeping, self._sweep)
         self._each(impulses.hand_back, a.grid, a.contacts, a.rigid, a.sheet)
         self._each(impulses.note, a.contacts, a.rigid, a.sheet)
         everything = self.bodies + self.planes
