@@ -269,9 +269,9 @@ def compiled(module, folder):
     return [path.suffixes[-2:] for path in made if path.stat().st_size > 10_000]
 
 
-def test_rigid_bodies_compile_for_cards_without_one(tmp_path):
+def test_rigid_inclusions_compile_for_cards_without_one(tmp_path):
     expected = [[f".sm{arch}", ".cubin"] for arch in ARCHITECTURES]
-    assert compiled(program.rigid, tmp_path) == expected
+    assert compiled(program.bonds, tmp_path) == expected
 
 
 @pytest.mark.slow
