@@ -8,6 +8,8 @@ from laws.bodies import Stuff, box, box_surface, floor, problem
 
 from corporeal.backends import load
 from corporeal.mpm.bond import join
+from corporeal.mpm.ledger_row import ledger_row
+from corporeal.mpm.pose import clusters
 from corporeal.mpm.problem import MENU
 from corporeal.mpm.rigid import mass_of
 
@@ -128,3 +130,46 @@ def test_a_chair_stands(engine):
     moved = m.centre[0] - frame.position.mean(axis=0)
     assert np.abs(moved).max() < 1e-3 * CELL
     assert m.plane_impulse[0, :, 2].sum() == pytest.approx(m.mass.sum() * 9.81 * 0.05, rel=0.05)
+
+
+def test_the_ledger_adds_up_what_belongs_to_one_object():
+    frame, cushion = chair()
+    given = problem(cushion, frame, block(), cell=CELL, bonds=((1, 0),), planes=[floor()])
+    run = load("engine", "warp", MENU)(given)
+    run.advance(0.03)
+    row = ledger_row(given, run.snapshot(), run.measure(), run.steps)
+    whole = run.measure()
+    assert row["mass"] == pytest.approx([whole.mass[:2].sum(), whole.mass[2]])
+    assert row["momentum"].sum(axis=0) == pytest.approx(whole.momentum.sum(axis=0))
+    assert row["plane_impulse"].sum(axis=1) == pytest.approx(whole.plane_impulse.sum(axis=1))
+    assert row["pair_impulse"][0, 1] == pytest.approx(whole.pair_impulse[:2, 2].sum())
+    assert row["first_contact"][0, 1] == np.nanmin(whole.first_contact[:2, 2])
+    assert row["gap"].shape == row["overlap"].shape == (2, 2)
+
+
+def test_particles_that_hang_together_make_one_frame():
+    rng = np.random.default_rng(3)
+    legs = [np.add(rng.uniform(0.0, 0.05, (200, 3)), (x, 0.0, 0.0)) for x in (0.0, 0.5)]
+    label = clusters(np.concatenate(legs), 0.03)
+    assert len(np.unique(label)) == 2
+    assert np.unique(label[:200]).size == np.unique(label[200:]).size == 1
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("offset", [0.0, 0.3, 0.7])
+def test_a_block_sinks_into_a_cushion_on_a_frame_as_into_one_on_a_fine_grid(offset):
+    """The fine grid, one field and a stiff frame in it, says 10.26 mm."""
+    cell = 0.025
+    frame, cushion = chair(cell, offset)
+    load_ = block(cell, offset, velocity=(0.0, 0.0, 0.0), gap=0.0)
+    given = problem(
+        frame, cushion, load_, cell=cell, bonds=((0, 1),), friction=0.5,
+        planes=[floor(offset * cell)], gravity=(0.0, 0.0, -9.81),
+    )  # fmt: skip
+    run = load("engine", "warp", MENU)(given)
+    start, deepest = run.measure().centre, 0.0
+    for k in range(40):
+        run.advance(0.06 + 0.0005 * k)
+        deepest = max(deepest, start[2, 2] - run.measure().centre[2, 2])
+    assert 0.94 < deepest / 0.01026 < 1.10
+    assert np.abs(run.measure().centre[0] - start[0]).max() < 1e-4 * cell
