@@ -187,7 +187,7 @@ def discs(
     given = problem(
         *sides, cell=cell, planes=walls(1, 0.0, 2 * cell), contact=contact, transfer=transfer
     )
-    return collision(given, 2.2, 2 * radius, 2 * 0.1 * np.sqrt(2))
+    return collision(given, 2.2, 2 * radius, 2 * 0.1 * np.sqrt(2), looks=240)
 
 
 def collision(
