@@ -39,7 +39,10 @@ def pieces(mesh: Mesh) -> Int[np.ndarray, " T"]:
 
 
 def sheets(mesh: Mesh, piece: Int[np.ndarray, " T"]) -> np.ndarray:
-    """Which triangles belong to open pieces that enclose next to nothing."""
+    """Which triangles belong to open pieces that enclose next to nothing.
+
+    The rim of a sheet is longer than the root of its area; a shorter one is a flaw of the mesh.
+    """
     corners, areas = mesh.corners, mesh.areas
     area = np.bincount(piece, areas)
     middle = np.stack(
@@ -50,7 +53,7 @@ def sheets(mesh: Mesh, piece: Int[np.ndarray, " T"]) -> np.ndarray:
     edges, owner = boundary(mesh)
     length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
     rim = np.bincount(piece[owner], length, minlength=len(area))
-    is_sheet = (rim > 0.05 * np.sqrt(area)) & (2 * volume / area < 0.03 * np.sqrt(area))
+    is_sheet = (rim > 0.5 * np.sqrt(area)) & (2 * volume / area < 0.03 * np.sqrt(area))
     return (is_sheet | (np.bincount(piece) < 4))[piece]
 
 
