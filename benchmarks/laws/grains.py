@@ -125,9 +125,7 @@ def sand(quick: bool = False) -> Outcome:
     column = sand_column(cells)
     checks = (
         relative("run-out ΔR/R", column.spread, LUBE, 15.0),
-        absolute(
-            "angle of repose [°]", steepest(8 if quick else 12, 3 if quick else 4), REPOSE, 3.0, "°"
-        ),
+        absolute("angle of repose [°]", steepest(cells), REPOSE, 3.0, "°"),
     )
     words = f"R/dx {cells}, a = 1, φ = 30°, rough floor; a quarter between smooth walls"
     return Outcome("16", "A column of sand runs out and heaps up", words, checks)
