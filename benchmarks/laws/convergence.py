@@ -35,6 +35,8 @@ class Plot:
     """What the cells are counted along."""
     error: str
     """What the error is of."""
+    words: str
+    """What the plot shows."""
     series: tuple[Series, ...]
     target: float | None = None
     """Of the case [%]."""
@@ -60,10 +62,11 @@ def _energy(transfer: str) -> Callable[[int], float]:
     return error
 
 
-def _slip(tilt: float, fill: str) -> Callable[[int], float]:
+def _slip(tilt: float, fill: str, ramp: float) -> Callable[[int], float]:
     def error(cells: int) -> float:
-        given = friction.Slope(cells=cells, tilt=tilt, fill=fill)
-        return 100 * abs(friction.block_on_slab(given, 0.4).distance / friction.slide(0.3, 0.4) - 1)
+        given = friction.Slope(cells=cells, tilt=tilt, fill=fill, ramp=ramp)
+        found = friction.block_on_slab(given, 0.5).distance
+        return 100 * abs(found / friction.slide(0.3, 0.5, ramp) - 1)
 
     return error
 
@@ -86,6 +89,7 @@ PLOTS = (
         "A free bar in its first mode",
         "cells along the bar",
         "error after five periods [%]",
+        "Period and energy are right to second order or better.",
         tuple(
             Series(f"{name}, {transfer.upper()}", make(transfer), (10, 20, 40, 80))
             for name, make in (("period", _period), ("energy lost", _energy))
@@ -96,11 +100,13 @@ PLOTS = (
         "7",
         "A block slides down a slope",
         "cells across the block's height",
-        "error of the way after 0.4 s [%]",
+        "error of the way after 0.5 s [%]",
+        "Gravity that sets in at once makes the block hop unseen, which spares it 1 to 2 % of its "
+        "friction on any grid. Where gravity grows in 0.1 s the error falls with the grid.",
         (
-            Series("along the grid", _slip(0.0, "bricks"), (3, 4, 6)),
-            Series("turned 20°, aligned fill", _slip(20.0, "bricks"), (3, 4, 6)),
-            Series("turned 20°, blue-noise fill", _slip(20.0, "blue"), (3, 4, 6)),
+            Series("along the grid, gravity at once", _slip(0.0, "bricks", 0.0), (3, 4, 6)),
+            Series("gravity grows in 0.1 s", _slip(0.0, "bricks", 0.1), (3, 4, 6)),
+            Series("the same, turned 20°, blue noise", _slip(20.0, "blue", 0.1), (3, 4, 6)),
         ),
         2.0,
     ),
@@ -109,6 +115,7 @@ PLOTS = (
         "A heavy block on foam, plane strain",
         "cells across the foam",
         f"difference from one field on {FINE} cells [%]",
+        "Separate fields and one field tend to the same sink, wherever the face lies.",
         (
             Series("separate fields, rigid block", _sink(0.0, "multi"), (4, 6, 8, 12)),
             Series("the same, face at .3 dx", _sink(0.3, "multi"), (4, 6, 8, 12)),
@@ -121,7 +128,9 @@ PLOTS = (
         "A column of sand, as high as its radius",
         "cells across the radius",
         "error of the run-out [%]",
-        (Series("run-out", _spread, (6, 8, 10, 12)),),
+        "The run-out grows slowly with the grid and passes the measured value at 12 cells, so the "
+        "error there is small by chance: 6 to 10 % is what to expect.",
+        (Series("run-out", _spread, (6, 8, 10, 12, 16)),),
         15.0,
     ),
 )

@@ -23,9 +23,13 @@ def down_slope(turn: np.ndarray | None = None) -> tuple[float, float, float]:
     return tuple(g if turn is None else turn @ g)
 
 
-def slide(friction: float, time: float) -> float:
-    """S = ½ g (sin θ - μ cos θ) t² [m]."""
-    return 0.5 * G * (np.sin(SLOPE) - friction * np.cos(SLOPE)) * time**2
+def slide(friction: float, time: float, ramp: float = 0.0) -> float:
+    """Way down the slope [m]: a t²/2 with a = g (sin θ - μ cos θ).
+
+    Where gravity grows in a time τ: a (t²/2 - τ t/2 + τ²/6).
+    """
+    pull = G * (np.sin(SLOPE) - friction * np.cos(SLOPE))
+    return float(pull * (time**2 / 2 - ramp * time / 2 + ramp**2 / 6))
 
 
 @dataclass(frozen=True)
@@ -115,6 +119,10 @@ def sliding_block(quick: bool = False) -> Outcome:
         ),
     ]
     if not quick:
+        gentle = block_on_slab(Slope(ramp=0.1), time).distance
+        checks.append(
+            relative("the same, gravity grows in 0.1 s [m]", gentle, slide(0.3, time, 0.1), 2.0)
+        )
         stiff = block_on_slab(Slope(rigid=True), time).distance
         checks.append(relative("slip of a rigid block on a slab [m]", stiff, slide(0.3, time), 2.0))
     return Outcome(

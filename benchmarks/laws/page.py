@@ -114,7 +114,7 @@ def write(
     for plot, errors in plots:
         name = f"validation-{plot.case}.png"
         draw(plot, errors, images / name)
-        pictures.append(f"![Error over cells: {plot.title}](images/{name})")
+        pictures += [f"![Error over cells: {plot.title}](images/{name})", "", plot.words, ""]
     met, total = tally
     text = [
         "# Validation",
@@ -139,7 +139,6 @@ def write(
         "## Convergence",
         "",
         *pictures,
-        "",
         "## Settings",
         "",
         *settings(found),
