@@ -14,7 +14,6 @@ The peer lives in a virtual environment of its own, because it needs other versi
 import argparse
 import json
 import os
-import sys
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -125,9 +124,8 @@ def main() -> None:
         rows = [result.row() for result in results if result.drop.floor and not result.drop.heap]
         chosen.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
     if chosen.docs:
-        command = f"python benchmarks/engine.py {' '.join(sys.argv[1:])}".replace(
-            str(chosen.peer), "DIR"
-        )
+        flags = {"--quick": chosen.quick, "--docs": True, "--peer DIR": chosen.peer}
+        command = " ".join(["python benchmarks/engine.py", *(f for f, on in flags.items() if on)])
         page.write(results, machine, command, DOCS)
 
 
