@@ -115,6 +115,13 @@ def test_a_thin_twig_is_not_called_rigid_by_its_wave_speed_alone():
     assert judge(cylinder(WOOD, 0.04, 1.0), Motion(0.1, 9.81)).rigid
 
 
+def test_a_steel_tube_is_judged_as_the_bar_that_it_is_and_a_bowl_of_its_wall_as_a_wall():
+    tube = cylinder(STEEL, 0.03, 1.2, shell(1.2e-3))
+    bowl = cylinder(STEEL, 0.3, 0.3, shell(1.2e-3))
+    assert judge(tube, FALL).rigid
+    assert judge(tube, FALL).strain < 0.2 * judge(bowl, FALL).strain
+
+
 def test_the_verdict_depends_neither_on_detail_nor_on_company():
     company = sphere(RUBBER, 0.3, number=1)
     kinds = {

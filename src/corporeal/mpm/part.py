@@ -12,6 +12,9 @@ TRINKET_CELLS, TRINKET_LENGTH = 8.0, 5.0
 """A part of fewer cells than the first, and nowhere longer than the second [cells], is a trinket:
 its own stiffness cannot be seen."""
 
+TUBE = 8.0
+"""Least length over width of a tube."""
+
 
 @dataclass(frozen=True)
 class PartGeometry:
@@ -89,6 +92,12 @@ def wall_ratio(part: PartGeometry, simulated: float) -> float:
     if part.structure.kind != "shell" or thickness is None:
         return 1.0
     return min(1.0, thickness / simulated)
+
+
+def is_tube(part: PartGeometry) -> bool:
+    """Whether a wall is rolled into a long tube, which bends as a bar does and not as its wall."""
+    thin, broad, long = part.size
+    return part.structure.kind == "shell" and long > TUBE * broad and thin > 0.5 * broad
 
 
 def wall_factors(part: PartGeometry, ratio: float) -> tuple[float, float, float]:

@@ -18,6 +18,7 @@ from corporeal.mpm.part import (
     PartGeometry,
     Verdict,
     is_trinket,
+    is_tube,
     rod_ratio,
     wall_factors,
     wall_ratio,
@@ -157,12 +158,13 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
     ε = max(v/c, ρ a L/E, tip shift of a cantilever / L) and v_y = σ_y/(ρ c); rigid when ε is below
     half a percent and v below v_y. A thin wall is judged by its mapped values at a tenth of the
     part's width, which is the wall the finest detail would simulate: so the verdict depends neither
-    on the detail nor on what else is in the scene.
+    on the detail nor on what else is in the scene. A tube is judged as the bar that it is.
     """
     material, speed = part.material, motion.impact_speed
     young, poisson = bounded_poisson(material.young, material.poisson)
     density = material.density
-    stiffer, _, denser = wall_factors(part, wall_ratio(part, width(part) / 10))
+    ratio = 1.0 if is_tube(part) else wall_ratio(part, width(part) / 10)
+    stiffer, _, denser = wall_factors(part, ratio)
     real = p_wave_speed(young, poisson, density)
     mapped = stiffer / denser
     strain = max(
