@@ -197,10 +197,10 @@ def resistance(material: Material) -> float | None:
 def sag(part: PartGeometry, acceleration: float) -> float:
     """Tip shift over length of the part as a cantilever in a uniform acceleration [-].
 
-    δ/L = (3 ρ a L² / 2 E h) (L / h) for a solid bar of depth h (Euler–Bernoulli). A tube bends
-    less, so the estimate is on the safe side for it.
+    δ/L = (3 ρ a L² / 2 E h) (L / h) for a solid bar of depth h (Euler–Bernoulli). The second moment
+    of a thin tube, A d²/8, is that of a bar with h = √1.5 d.
     """
-    length, depth = part.size[2], 2 / 3 * width(part)
+    length, depth = part.size[2], (sqrt(1.5) if is_tube(part) else 2 / 3) * width(part)
     if depth <= 0 or length < 4 * depth:
         return 0.0
     density, young = part.material.density, part.material.young
