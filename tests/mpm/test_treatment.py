@@ -120,6 +120,8 @@ def test_a_steel_tube_is_judged_as_the_bar_that_it_is_and_a_bowl_of_its_wall_as_
     bowl = cylinder(STEEL, 0.3, 0.3, shell(1.2e-3))
     assert judge(tube, FALL).rigid
     assert judge(tube, FALL).strain < 0.2 * judge(bowl, FALL).strain
+    box = PartGeometry(0, STEEL, shell(1e-3), (0.03, 1.0, 1.0), 0.03, 2.12)
+    assert judge(box, FALL).strain > 5 * judge(tube, FALL).strain
 
 
 def test_the_verdict_depends_neither_on_detail_nor_on_company():

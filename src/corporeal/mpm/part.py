@@ -4,6 +4,7 @@ A part's wall may be simulated thicker than it is; here is what that does to its
 """
 
 from dataclasses import dataclass
+from math import inf, pi
 
 from corporeal.mpm.stability import closed_wall, thin_wall
 from corporeal.types import Law, Material, Structure
@@ -13,7 +14,7 @@ TRINKET_CELLS, TRINKET_LENGTH = 8.0, 5.0
 its own stiffness cannot be seen."""
 
 TUBE = 8.0
-"""Least length over width of a tube."""
+"""Least length over diameter of a tube."""
 
 
 @dataclass(frozen=True)
@@ -94,10 +95,19 @@ def wall_ratio(part: PartGeometry, simulated: float) -> float:
     return min(1.0, thickness / simulated)
 
 
-def is_tube(part: PartGeometry) -> bool:
-    """Whether a wall is rolled into a long tube, which bends as a bar does and not as its wall."""
-    thin, broad, long = part.size
-    return part.structure.kind == "shell" and long > TUBE * broad and thin > 0.5 * broad
+def tube(part: PartGeometry) -> float:
+    """Diameter of a wall rolled into a long tube [m], which bends as a bar does; 0: it is none.
+
+    d = 4 V/A, and the tube is A/(π d) long: of a plate, rolled up in thought, that is many times
+    its own length, and of a tube with a few branches or bends little more.
+    """
+    thickness = part.structure.thickness or 0.0
+    if part.structure.kind != "shell" or part.area <= 0:
+        return 0.0
+    diameter = 4 * part.volume / part.area
+    long, rolled = part.size[2], part.area / (pi * diameter) if diameter > 0 else inf
+    hollow = diameter > 4 * thickness
+    return diameter if hollow and TUBE * diameter < long and rolled < 3 * long else 0.0
 
 
 def wall_factors(part: PartGeometry, ratio: float) -> tuple[float, float, float]:

@@ -18,8 +18,8 @@ from corporeal.mpm.part import (
     PartGeometry,
     Verdict,
     is_trinket,
-    is_tube,
     rod_ratio,
+    tube,
     wall_factors,
     wall_ratio,
     width,
@@ -163,7 +163,7 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
     material, speed = part.material, motion.impact_speed
     young, poisson = bounded_poisson(material.young, material.poisson)
     density = material.density
-    ratio = 1.0 if is_tube(part) else wall_ratio(part, width(part) / 10)
+    ratio = 1.0 if tube(part) else wall_ratio(part, width(part) / 10)
     stiffer, _, denser = wall_factors(part, ratio)
     real = p_wave_speed(young, poisson, density)
     mapped = stiffer / denser
@@ -200,7 +200,7 @@ def sag(part: PartGeometry, acceleration: float) -> float:
     δ/L = (3 ρ a L² / 2 E h) (L / h) for a solid bar of depth h (Euler–Bernoulli). The second moment
     of a thin tube, A d²/8, is that of a bar with h = √1.5 d.
     """
-    length, depth = part.size[2], (sqrt(1.5) if is_tube(part) else 2 / 3) * width(part)
+    length, depth = part.size[2], sqrt(1.5) * tube(part) or 2 / 3 * width(part)
     if depth <= 0 or length < 4 * depth:
         return 0.0
     density, young = part.material.density, part.material.young
