@@ -13,7 +13,6 @@ The peer lives in a virtual environment of its own, because it needs other versi
 
 import argparse
 import json
-import os
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -23,6 +22,7 @@ from cost.blocks import Drop, drop_of
 from cost.contest import Contestant, Ours, contest
 from cost.peer import Peer, install
 
+from corporeal.machine import cores
 from corporeal.types import Law
 
 
@@ -57,9 +57,9 @@ WIDTHS = (16, 6, 2, 16, 10, 3, 24, 8, 8, 5)
 
 def rivals(size: Size) -> list[Drop]:
     """List all drops that meet in the first contest."""
-    cores = os.cpu_count() or 1
+    free = cores()
     plain = drop_of(size.particles)
-    laws = [replace(plain, law=law, threads=t) for law in Law for t in (1, 2, 4) if t <= cores]
+    laws = [replace(plain, law=law, threads=t) for law in Law for t in (1, 2, 4) if t <= free]
     heaps = [
         drop_of(size.particles, objects=count, heap=heap)
         for count in size.objects
@@ -77,7 +77,7 @@ def cuda_devices() -> list[str]:
 
 def measure(size: Size, peer: Path | None) -> list[page.Result]:
     """Hold the contest among all drops of one size, and then the one among sizes."""
-    threads = [t for t in size.peer_threads if t <= (os.cpu_count() or 1)]
+    threads = [t for t in size.peer_threads if t <= cores()]
     plain = drop_of(size.particles)
     peers = [Peer(peer, replace(plain, threads=t)) for t in threads] if peer else []
     ours = [Ours(drop) for drop in rivals(size)]

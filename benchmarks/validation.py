@@ -8,7 +8,6 @@ resolutions of the plots and writes docs/validation.md and docs/images/validatio
 
 import argparse
 import json
-import os
 import time
 from collections.abc import Iterator
 from concurrent.futures import ProcessPoolExecutor, as_completed
@@ -22,6 +21,8 @@ from rich.console import Console
 from rich.markup import escape
 from rich.progress import BarColumn, Progress, TextColumn, TimeElapsedColumn
 from rich.table import Table
+
+from corporeal.machine import cores
 
 DOCS = Path(__file__).parents[1] / "docs"
 
@@ -137,7 +138,7 @@ def main() -> None:
     parser.add_argument(
         "--workers",
         type=int,
-        default=min(4, os.cpu_count() or 1),
+        default=min(4, cores()),
         help="cases that run side by side",
     )
     asked = parser.parse_args()

@@ -10,6 +10,7 @@ from importlib.util import find_spec
 from typing import Any
 
 from corporeal import __version__
+from corporeal.machine import cores
 
 KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
 LIBRARIES = {"embreex": "films and pictures", "igl": "filling of meshes", "DracoPy": "Draco files"}
@@ -35,11 +36,10 @@ def examine() -> list[Finding]:
 
 def _machine() -> list[Finding]:
     system = f"corporeal {__version__}, Python {platform.python_version()}, {platform.platform()}"
-    cores = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     free = shutil.disk_usage(".").free / 1e9
     return [
         Finding("system", True, system),
-        Finding("processor", True, f"{cores} cores"),
+        Finding("processor", True, f"{cores()} cores"),
         Finding("disk", free > 1, f"{free:.0f} GB free", "" if free > 1 else "Free some space."),
     ]
 

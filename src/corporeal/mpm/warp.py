@@ -4,11 +4,10 @@ Moving-least-squares MPM (Hu et al. 2018) with quadratic B-splines and affine FL
 particles, nodes and contacts are the native pieces of ``kernels``, launched by Warp.
 """
 
-import os
-
 import numpy as np
 
 from corporeal.errors import SimulationError
+from corporeal.machine import cores
 from corporeal.mpm import pacing, tables, touching
 from corporeal.mpm.blow import Blows
 from corporeal.mpm.carried import Carried
@@ -72,7 +71,7 @@ class WarpEngine:
 
         """
         self.problem = problem
-        self.threads = threads or min(MOST_THREADS, os.cpu_count() or 1)
+        self.threads = threads or min(MOST_THREADS, cores())
         self.steps = Steps()
         self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
         counts = [len(b.position) for b in problem.bodies]

@@ -5,7 +5,6 @@ nothing and run in threads (Embree and the compiled loops release Python's lock)
 throughout; a filmic curve and sRGB at the end.
 """
 
-import os
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
@@ -15,6 +14,7 @@ import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
 
+from corporeal.machine import cores
 from corporeal.render import kernels, kernels_light
 from corporeal.render.camera import Camera, axes
 from corporeal.render.kernels import NOTHING, Samples
@@ -145,7 +145,7 @@ def render(
     """One picture (height, width, 3) uint8. Equal input gives equal bytes."""
     job = _Job(stage, camera, SAMPLING[quality])
     out = np.empty((camera.height, camera.width, 3), np.uint8)
-    threads = threads or os.cpu_count() or 1
+    threads = threads or cores()
     band = max(BAND, -(-camera.height // (2 * threads)))
     rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
     with ThreadPoolExecutor(threads) as pool:
