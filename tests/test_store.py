@@ -5,7 +5,17 @@ import numpy as np
 import pytest
 
 from corporeal import store
-from corporeal.types import Finish, Law, Material, Range, Scene, SceneObject, Surface
+from corporeal.types import (
+    Finish,
+    Law,
+    Material,
+    PartWords,
+    Range,
+    Scene,
+    SceneObject,
+    Structure,
+    Surface,
+)
 
 
 def a_scene():
@@ -29,6 +39,29 @@ def test_enums_nothing_and_infinity_come_back(tmp_path):
     store.save(tmp_path / "m.npz", {"m": material, "limit": float("inf")})
     again = store.load(tmp_path / "m.npz")
     assert again == {"m": material, "limit": float("inf")}
+
+
+def test_what_is_filled_comes_back_with_its_contents(tmp_path):
+    syrup = Material("syrup", Law.NEO_HOOKEAN, 1e4, 0.49, 1330.0)
+    made = Structure("filled", 4e-4, "said", contents=syrup, fill=0.9)
+    words = PartWords("jar", "glass", "filled", contents="syrup", alternatives=(("PET", 0.25),))
+    store.save(tmp_path / "x.npz", {"made": made, "words": words})
+    assert store.load(tmp_path / "x.npz") == {"made": made, "words": words}
+
+
+def test_what_was_kept_before_a_type_grew_is_still_read(tmp_path, monkeypatch):
+    encode = store._encode
+
+    def older(value, arrays):
+        tree = encode(value, arrays)
+        for name in ("contents", "fill", "alternatives"):
+            tree.get("fields", {}).pop(name, None)
+        return tree
+
+    monkeypatch.setattr(store, "_encode", older)
+    store.save(tmp_path / "x.npz", {"made": Structure("shell", 1e-3), "words": PartWords("a", "b")})
+    again = store.load(tmp_path / "x.npz")
+    assert again == {"made": Structure("shell", 1e-3), "words": PartWords("a", "b")}
 
 
 def test_json_never_contains_nan(tmp_path):

@@ -161,10 +161,10 @@ class PartWords:
     name: str
     material: str | None
     """A name from the library; None: unknown, which is a normal answer."""
-    structure: Literal["solid", "shell"] | None = None
+    structure: Literal["solid", "shell", "filled"] | None = None
     """How the part is made; None: not said, the shape decides."""
     thickness: float | None = None
-    """Wall thickness of a shell, where it is known [m]."""
+    """Thickness of the wall of what is a shell or filled, where it is known [m]."""
     answered_by: Literal["annotation", "recording", "model", "metadata", "unknown"] = "unknown"
     margin: float = 0.0
     """How sure: 0 (a guess) to 1 (stated outright)."""
@@ -172,6 +172,13 @@ class PartWords:
     """Why this answer, in one sentence."""
     values: dict[str, float] = field(default_factory=dict)
     """Numbers that a person stated: field of ``Material`` → value, SI."""
+    contents: str | None = None
+    """A name from the library: what is behind the wall of what is filled."""
+    fill: float | None = None
+    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    alternatives: tuple[tuple[str, float], ...] = ()
+    """Other materials it may be, each with its stated probability; what is left is ``material``'s.
+    """
 
 
 @dataclass(frozen=True)
@@ -292,10 +299,14 @@ class Material:
 class Structure:
     """How one part is built."""
 
-    kind: Literal["solid", "shell"]
+    kind: Literal["solid", "shell", "filled"]
     thickness: float | None = None
-    """Wall thickness of a shell [m]."""
+    """Of the wall of a shell, or of what is filled [m]."""
     reason: str = ""
+    contents: Material | None = None
+    """What is behind the wall of what is filled; None: air."""
+    fill: float = 0.0
+    """Share of the room behind the wall that the contents take up, in [0, 1]."""
 
 
 @dataclass(frozen=True)
