@@ -1,0 +1,78 @@
+"""A chair gives where its cushion is, and nowhere else.
+
+A steel ball of 4 kg is thrown onto the armchair of the showcase, through all stages.
+"""
+
+from dataclasses import replace
+from functools import cache
+
+import numpy as np
+import pytest
+
+from corporeal import pipeline
+from corporeal.mpm import treatment
+from corporeal.mpm.frames import read_trajectory
+from corporeal.mpm.shape import diagonal, largest, rigid_fit
+from corporeal.pipeline import FOLDERS, Settings
+from corporeal.showcase import scenes
+from corporeal.stages.fill import FillConfig
+from corporeal.store import DATA, load
+
+SCENE = "ball-on-armchair"
+FEW = 5_000
+"""Particles of a grid so coarse that the experiment takes seconds."""
+
+
+@pytest.fixture(scope="module")
+def thrown(tmp_path_factory):
+    """Throw the ball once for each rule; give how every part changed its shape."""
+    patch = pytest.MonkeyPatch()
+    ball = scenes.Placed("steel_ball", (0.06, 0.0, 0.55), velocity=(0.0, 0.0, -2.5))
+    chair = scenes.Placed("armchair", without=("back_cushion",))
+    told = scenes.Composition("", (chair, ball), view=(1.0, -1.0, 0.4), duration=0.2)
+    patch.setitem(scenes.SCENES, SCENE, lambda: told)
+
+    @cache
+    def shapes(stiffness, particles=FEW):
+        coarse = replace(treatment.QUALITIES["draft"], particles=particles)
+        patch.setitem(treatment.QUALITIES, "draft", coarse)
+        folder = tmp_path_factory.mktemp(stiffness)
+        file = pipeline.write_showcase(SCENE, folder / "input")
+        settings = Settings(fill=FillConfig(stiffness=stiffness))
+        silent = lambda verb: lambda fraction, words: None  # noqa: E731
+        pipeline.run([file], folder, settings, silent, until="simulate")
+        parts, particles = (load(folder / FOLDERS[v] / DATA) for v in ("segment", "fill"))
+        film = read_trajectory(folder / FOLDERS["simulate"])
+        names = [entry.name for entry in parts.catalogue]
+        return {name: changes(film, particles.part == k) for k, name in enumerate(names)}
+
+    yield shapes
+    patch.undo()
+
+
+def changes(film, mine):
+    """Largest shape error [-] and squeeze [m] of some particles, at any time."""
+    start = film.frames[0].position[mine].astype(float)
+    error, squeeze = [], []
+    for frame in film.frames:
+        now = frame.position[mine].astype(float)
+        shift = np.linalg.norm(rigid_fit(start, now, np.ones(len(now))).undo(now) - start, axis=1)
+        error.append(np.sqrt(np.mean(shift**2)) / diagonal(start))
+        squeeze.append(largest(shift))
+    return max(error), max(squeeze)
+
+
+def test_a_chair_with_a_stiff_frame_and_a_soft_cushion_deforms_only_in_the_cushion(thrown):
+    shape = thrown("true")
+    frame_error, frame_squeeze = shape["frame"]
+    cushion_error, cushion_squeeze = shape["seat_cushion"]
+    assert frame_error < 1e-6 and frame_squeeze < 1e-6
+    assert cushion_error > 5e-3 and 0.03 < cushion_squeeze < 0.1
+
+
+@pytest.mark.slow
+def test_under_the_published_cap_the_wood_of_the_same_chair_gives_too(thrown):
+    """The control: with E capped the frame bends more than the cushion does."""
+    shape = thrown("capped")
+    assert shape["frame"][0] > 5e-3
+    assert shape["frame"][1] > shape["seat_cushion"][1]
