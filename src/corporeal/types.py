@@ -155,6 +155,17 @@ class Scene:
 
 
 @dataclass(frozen=True)
+class Placement:
+    """Where inside a measured range somebody put a value. It cannot leave the range."""
+
+    fraction: float
+    """0: the low end, 1: the high end; on a logarithmic scale where the range is wide."""
+    chosen_by: Literal["model", "recording", "fallback"]
+    reason: str
+    """Why there, in one sentence."""
+
+
+@dataclass(frozen=True)
 class PartWords:
     """What somebody or something said about one part."""
 
@@ -179,6 +190,21 @@ class PartWords:
     alternatives: tuple[tuple[str, float], ...] = ()
     """Other materials it may be, each with its stated probability; what is left is ``material``'s.
     """
+    placements: dict[str, Placement] = field(default_factory=dict)
+    """Field of ``Material`` → where in its range a model put it; fields not named are typical."""
+    pieces: tuple["PartWords", ...] = ()
+    """What a model told apart in what the file holds as one part; the largest one speaks for it."""
+    volume_share: float | None = None
+    """Of a piece: its share of the volume inside the whole's outline, in [0, 1]."""
+    surface_share: float | None = None
+    """Of a piece: its share of the whole's outer surface, in [0, 1]."""
+    volume_share: float = 1.0
+    """Of a piece: its share of the volume inside the part's surface, in [0, 1]."""
+    surface_share: float = 1.0
+    """Of a piece: its share of the part's surface, in [0, 1]."""
+    pieces: "tuple[PartWords, ...]" = ()
+    """What the part consists of where its mesh does not tell them apart: the shaft and the handle
+    of a scanned screwdriver. The words above are then those of the piece that matters most."""
 
 
 @dataclass(frozen=True)
@@ -188,6 +214,8 @@ class ObjectWords:
     name: str
     class_name: str
     parts: tuple[PartWords, ...]
+    usual_extent: float | None = None
+    """How large such a thing usually is, as a model says [m]."""
 
 
 @dataclass(frozen=True)
@@ -197,6 +225,10 @@ class Inventory:
     objects: tuple[ObjectWords, ...]
     transcript: tuple[dict, ...] = ()
     """Every question put to a model with its answer, as data."""
+    usage: dict = field(default_factory=dict)
+    """What the questions took: calls, tokens, US dollars where the price is known, seconds."""
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know about the answers, in sentences."""
 
 
 @dataclass(frozen=True)
@@ -259,8 +291,10 @@ class Ground:
     range: Range
     """The measured interval the value was chosen from, SI."""
     chosen_by: str
-    """"typical", "model", "annotation", "fallback" …"""
+    """"typical", "model", "recording", "annotation", "fallback" …"""
     reason: str
+    margin: float = 0.0
+    """How sure the material is, and so its range: 0 (a guess) to 1 (stated outright)."""
 
 
 @dataclass(frozen=True)
@@ -310,6 +344,15 @@ class Structure:
 
 
 @dataclass(frozen=True)
+class Piece:
+    """One of several things that share a part's mesh."""
+
+    words: PartWords
+    material: Material
+    structure: Structure
+
+
+@dataclass(frozen=True)
 class MaterialField:
     """What every part is made of; K parts in the catalogue's order."""
 
@@ -324,6 +367,8 @@ class MaterialField:
     walls."""
     restitution: Float[np.ndarray, "K1 K1"]
     """Newton's coefficient between rigid parts [-]; last row and column as above."""
+    pieces: tuple[tuple[Piece, ...], ...] = ()
+    """Per part, of what it consists where its mesh does not tell; empty: nowhere more than one."""
 
 
 # ---------------------------------------------------------------- what is simulated
