@@ -192,12 +192,6 @@ class PartWords:
     """
     placements: dict[str, Placement] = field(default_factory=dict)
     """Field of ``Material`` → where in its range a model put it; fields not named are typical."""
-    pieces: tuple["PartWords", ...] = ()
-    """What a model told apart in what the file holds as one part; the largest one speaks for it."""
-    volume_share: float | None = None
-    """Of a piece: its share of the volume inside the whole's outline, in [0, 1]."""
-    surface_share: float | None = None
-    """Of a piece: its share of the whole's outer surface, in [0, 1]."""
     volume_share: float = 1.0
     """Of a piece: its share of the volume inside the part's surface, in [0, 1]."""
     surface_share: float = 1.0
