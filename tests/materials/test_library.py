@@ -201,3 +201,13 @@ def test_the_tables_are_readable_and_complete():
     assert "Cambridge" in shown
     assert "620–1080 (900) MPa" in shown
     assert "940–970 (955) kg/m³" in shown
+
+
+def test_containers_hold_what_kitchens_and_workshops_hold():
+    held = materials.contents()
+    for word in ("drink", "cooking oil", "soup", "flour", "sugar", "rice", "sand", "stuffing"):
+        assert materials.find(word).name in held
+    assert not {"steel", "glass", "cardboard"} & set(held)
+    order = "flakes biscuits powder granules water sauce"
+    density = [materials.find(n).ranges["density"].typical for n in order.split()]
+    assert density == sorted(density)

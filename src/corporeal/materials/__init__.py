@@ -4,6 +4,7 @@ from corporeal.materials.contact import Friction, combine, friction_between, res
 from corporeal.materials.library import (
     Entry,
     citation,
+    contents,
     counterpart,
     find,
     library,
@@ -21,6 +22,7 @@ __all__ = [
     "Quantity",
     "citation",
     "combine",
+    "contents",
     "counterpart",
     "find",
     "friction_between",

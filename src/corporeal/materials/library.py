@@ -14,6 +14,9 @@ from corporeal.types import Ground, Law, Material, Range
 MENU = {"default": "library.toml", "reference": "reference.toml"}
 ABOUT = {"law", "group", "family", "published", "aliases", "note", "id"}
 
+HELD = ("liquid", "bulk", "granular", "foam", "food")
+"""Groups of what is found inside things."""
+
 
 @dataclass(frozen=True)
 class Entry:
@@ -24,7 +27,8 @@ class Entry:
     ranges: Mapping[str, Range]
     """Field name of ``types.Material`` → measured range."""
     group: str = ""
-    """Metal, mineral, granular, fibrous, polymer, elastomer, foam, food."""
+    """Metal, mineral, granular, fibrous, polymer, elastomer, foam, food, liquid, bulk (what lies in
+    containers)."""
     family: str = ""
     """The material whose measured friction it shares."""
     published: str = ""
@@ -100,6 +104,11 @@ def find(name: str, library_name: str = "default") -> Entry:
         if wanted in map(_plain, (entry.name, *entry.aliases)):
             return entry
     raise UnknownChoiceError("material", name, list(entries))
+
+
+def contents(library_name: str = "default") -> list[str]:
+    """Names of what a thing may be filled with: liquids, loose matter and soft stuffing."""
+    return [e.name for e in library(library_name).values() if e.group in HELD]
 
 
 def citation(key: str) -> str:
