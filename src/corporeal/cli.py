@@ -113,9 +113,10 @@ def verb_materials() -> None:
     elif asked.words[0] == "show" and len(asked.words) == 2:
         print(materials.show(asked.words[1], asked.library))
     elif asked.words[0] == "check" and len(asked.words) == 2:
-        problems = materials.lint(materials.read(Path(asked.words[1])))
+        problems = materials.check(Path(asked.words[1]))
         if problems:
-            raise UserError("\n  ".join([f"{asked.words[1]} has problems:", *problems]))
+            told = [f"{asked.words[1]} has {len(problems)} mistakes:", *map(str, problems)]
+            raise UserError("\n  ".join(told))
         print(f"{asked.words[1]}: nothing to complain about.")
     else:
         raise UserError(f"Say `corporeal materials`, or one of: {'; '.join(MATERIAL_WORDS)}.")

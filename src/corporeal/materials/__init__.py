@@ -1,25 +1,28 @@
 """The measured library: what a material is like, in which range, and who measured it."""
 
 from corporeal.materials.contact import Friction, combine, friction_between, restitution_between
+from corporeal.materials.entry import Entry
 from corporeal.materials.library import (
-    Entry,
-    citation,
+    check,
     contents,
     counterpart,
     find,
     library,
     read,
-    sources,
+    substances,
 )
-from corporeal.materials.lint import lint
+from corporeal.materials.lint import Problem
 from corporeal.materials.quantities import QUANTITIES, Quantity, si
+from corporeal.materials.shipped import citation, sources
 from corporeal.materials.tables import markdown, materials_json, menu, show
 
 __all__ = [
     "QUANTITIES",
     "Entry",
     "Friction",
+    "Problem",
     "Quantity",
+    "check",
     "citation",
     "combine",
     "contents",
@@ -27,7 +30,6 @@ __all__ = [
     "find",
     "friction_between",
     "library",
-    "lint",
     "markdown",
     "materials_json",
     "menu",
@@ -36,4 +38,5 @@ __all__ = [
     "show",
     "si",
     "sources",
+    "substances",
 ]

@@ -6,7 +6,7 @@ from functools import cache
 from importlib.resources import files
 from math import sqrt
 
-from corporeal.materials.library import Entry
+from corporeal.materials.entry import Entry
 from corporeal.types import Material, Range
 
 

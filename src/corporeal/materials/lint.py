@@ -1,11 +1,21 @@
-"""Is a library sound? Every number has a range in order, a plausible size and a known source."""
+"""Is a library sound? What is wrong in its file, where, and what to do about it.
 
-from collections import Counter
+Works on the text of the file, so that every mistake is found at once and has a line.
+"""
+
+import difflib
+import re
+import tomllib
 from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from math import isfinite
+from typing import Any
 
-from corporeal.materials.library import Entry, source_table
-from corporeal.materials.quantities import QUANTITIES
-from corporeal.types import Law, Range
+from corporeal.errors import UserError
+from corporeal.materials.entry import ABOUT
+from corporeal.materials.plausible import POISSON_LIMIT, doubt, namesake, strain_doubt
+from corporeal.materials.quantities import QUANTITIES, UNITS, examples, si
+from corporeal.types import Law
 
 ALWAYS = ("young", "poisson", "density")
 NEEDED = {
@@ -19,35 +29,252 @@ MEANINGLESS = {
     "cohesion": {Law.DRUCKER_PRAGER},
 }
 """Fields that only these laws read."""
+GROUPS = ("metal", "mineral", "granular", "soft", "fibrous", "polymer", "elastomer", "foam")
+GROUPS += ("food", "liquid", "bulk")
+RESERVED = ("extends", "sources")
+"""Keys at the top of a user's library that are no materials."""
+CELL = ("low", "typical", "high", "source", "unusual")
+HEADER = re.compile(r"^\s*\[\s*([^\]]+?)\s*\]")
+KEY = re.compile(r"""^\s*["']?([\w-]+)["']?\s*=""")
 
 
-def lint(entries: Mapping[str, Entry]) -> list[str]:
-    """Return what is wrong, one sentence each; empty when nothing is."""
-    names = Counter(n.lower() for e in entries.values() for n in (e.name, *e.aliases))
-    found = [f"{name}: means two materials" for name, count in names.items() if count > 1]
-    for entry in entries.values():
-        found += [f"{entry.name}: {problem}" for problem in _problems(entry)]
-    return found
+@dataclass(frozen=True)
+class Problem:
+    """One mistake in a library."""
+
+    line: int
+    """In the file, from 1; 0: not in one line."""
+    table: str
+    key: str
+    what: str
+    advice: str
+
+    def __str__(self) -> str:
+        where = f"line {self.line}, " if self.line else ""
+        table = f"[{self.table}] " if self.table else ""
+        key = f"{self.key}: " if self.key else ""
+        return f"{where}{table}{key}{self.what} {self.advice}".strip()
 
 
-def _problems(entry: Entry) -> Iterator[str]:
-    law = entry.law.name.lower()
-    yield from (f"{law} needs {f}" for f in NEEDED.get(entry.law, ALWAYS) if f not in entry.ranges)
+def inspect(text: str, sources: Mapping[str, Any], bases: tuple[str, ...]) -> list[Problem]:
+    """Return every mistake in the text of a library; empty when there is none.
+
+    Args:
+        text: The TOML file.
+        sources: Source keys that are known without the file saying so.
+        bases: Names that ``extends`` may have.
+
+    """
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as error:
+        return [Problem(0, "", "", f"This is not TOML: {error}.", "Mend the syntax there first.")]
+    found = _Finder(_lines(text))
+    _look_at_top(found, tables, bases)
+    own = tables.get("sources", {})
+    known = set(sources) | (set(own) if isinstance(own, dict) else set())
+    rows = {name: row for name, row in tables.items() if name not in RESERVED}
+    for name, row in rows.items():
+        if isinstance(row, dict):
+            _look_at_material(found, name, row, known)
+        else:
+            found.tell(name, "", "is not a table.", f"Write a material as [{name}] with its keys.")
+    _look_at_names(found, {n: r for n, r in rows.items() if isinstance(r, dict)})
+    return sorted(found.problems, key=lambda p: p.line)
+
+
+class _Finder:
+    """Collects problems and knows in which line each key stands."""
+
+    def __init__(self, lines: dict[tuple[str, str], int]) -> None:
+        self.lines = lines
+        self.problems: list[Problem] = []
+
+    def tell(self, table: str, key: str, what: str, advice: str) -> None:
+        line = self.lines.get((table, key)) or self.lines.get((table, ""), 0)
+        self.problems.append(Problem(line, table, key, what, advice))
+
+
+def _lines(text: str) -> dict[tuple[str, str], int]:
+    table, lines = "", {}
+    for number, line in enumerate(text.splitlines(), 1):
+        if head := HEADER.match(line):
+            table = head[1].strip("\"'")
+            lines.setdefault((table, ""), number)
+        elif key := KEY.match(line):
+            lines.setdefault((table, key[1]), number)
+    return lines
+
+
+# ---------------------------------------------------------------- the file
+
+
+def _look_at_top(found: _Finder, tables: dict, bases: tuple[str, ...]) -> None:
+    base = tables.get("extends")
+    if base is not None and base not in bases:
+        found.tell("", "extends", f"{base!r} is no library.", f"Write one of: {_list(bases)}.")
+    own = tables.get("sources", {})
+    if not isinstance(own, dict):
+        found.tell("", "sources", "must be a table.", "Write [sources.mine] with cite = '...'.")
+        return
+    for name, row in own.items():
+        if not (isinstance(row, dict) and isinstance(row.get("cite"), str) and row["cite"]):
+            what = "says nothing that could be looked up."
+            found.tell(f"sources.{name}", "", what, "Give it cite = 'author, title, table'.")
+    if not set(tables) - set(RESERVED):
+        found.tell("", "", "There is no material in the file.", "Write one as [name].")
+
+
+def _look_at_names(found: _Finder, rows: dict[str, dict]) -> None:
+    owner: dict[str, str] = {}
+    for name, row in rows.items():
+        aliases = row.get("aliases", [])
+        for word in (name, *(aliases if isinstance(aliases, list) else ())):
+            first = owner.setdefault(str(word).lower(), name)
+            if first != name:
+                what = f"{word!r} also names {first}."
+                found.tell(name, "aliases", what, "Let it name one of the two only.")
+
+
+# ---------------------------------------------------------------- one material
+
+
+def _look_at_material(found: _Finder, name: str, row: dict, known: set[str]) -> None:
+    law = _law(found, name, row)
+    _look_at_words(found, name, row)
+    fields: dict[str, tuple[str, dict]] = {}
+    for key, cell in row.items():
+        if key in ABOUT:
+            continue
+        field = _field(found, name, key)
+        if field is None:
+            continue
+        if field in fields:
+            what = f"says {QUANTITIES[field].words.lower()} a second time."
+            found.tell(name, key, what, f"Keep {fields[field][0]} or {key}.")
+        elif _look_at_cell(found, (name, key), cell, known):
+            fields[field] = (key, cell)
+    _look_at_needs(found, name, law, {f for f in map(_quietly, row) if f})
+    _look_at_sizes(found, name, (law, row), fields)
+
+
+def _law(found: _Finder, name: str, row: dict) -> Law | None:
+    laws = [law.name.lower() for law in Law]
+    if "law" not in row:
+        found.tell(name, "", "has no law.", f"Add law = one of: {_list(laws)}.")
+    elif row["law"] not in laws:
+        found.tell(name, "law", f"{row['law']!r} is no law.", f"Write one of: {_list(laws)}.")
+    else:
+        return Law[row["law"].upper()]
+    return None
+
+
+def _look_at_words(found: _Finder, name: str, row: dict) -> None:
+    for key, kind in ABOUT.items():
+        if key in row and not isinstance(row[key], kind):
+            found.tell(name, key, f"is {row[key]!r}.", f"It must be of type {kind.__name__}.")
+    group = row.get("group", "")
+    if group == "" and namesake(name) is None:
+        what = "has no group, so its numbers cannot be compared with those of its like."
+        found.tell(name, "", what, f"Add group = one of: {_list(GROUPS)}.")
+    elif isinstance(group, str) and group and group not in GROUPS:
+        found.tell(name, "group", f"{group!r} is no group.", f"Write one of: {_list(GROUPS)}.")
+
+
+def _field(found: _Finder, name: str, key: str) -> str | None:
+    try:
+        return si(key)[0]
+    except UserError:
+        keys = [*_spellings(), *ABOUT]
+        close = difflib.get_close_matches(key, keys, n=1, cutoff=0.75)
+        advice = f"Did you mean {close[0]}?" if close else f"Keys: {_list(examples())}."
+        found.tell(name, key, "Unknown key; the unit is in the key.", advice)
+        return None
+
+
+def _quietly(key: str) -> str | None:
+    try:
+        return si(key)[0]
+    except UserError:
+        return None
+
+
+def _spellings() -> Iterator[str]:
+    """Every key that a number may have, all units."""
+    for field, quantity in QUANTITIES.items():
+        units = [name for name, (unit, _) in UNITS.items() if unit == quantity.unit]
+        yield from (f"{field}_{unit}" for unit in units) if units else (field,)
+
+
+def _look_at_needs(found: _Finder, name: str, law: Law | None, fields: set[str]) -> None:
+    needs = ALWAYS if law is None else NEEDED.get(law, ALWAYS)
+    spelt = {si(key)[0]: key for key in examples()}
+    for field in needs:
+        if field not in fields:
+            because = f" ({law.name.lower()} reads it)" if law and field not in ALWAYS else ""
+            what = f"has no {QUANTITIES[field].words.lower()}{because}."
+            found.tell(name, "", what, f"Add {spelt[field]}.")
     for field, laws in MEANINGLESS.items():
-        if field in entry.ranges and entry.law not in laws:
-            yield f"{law} never reads {field}"
-    for field, r in entry.ranges.items():
-        yield from _range_problems(field, r)
-    if "poisson" in entry.ranges and entry.ranges["poisson"].typical >= 0.5:
-        yield "a Poisson's ratio of 0.5 has no finite Lamé constant"
+        if law and field in fields and law not in laws:
+            right = _list(sorted(one.name.lower() for one in laws))
+            what = f"{law.name.lower()} never reads {QUANTITIES[field].words.lower()}."
+            found.tell(name, "", what, f"Take it out, or use law = {right}.")
 
 
-def _range_problems(field: str, r: Range) -> Iterator[str]:
-    quantity = QUANTITIES[field]
-    if not r.low <= r.typical <= r.high:
-        yield f"{field} is out of order: {r.low:g}, {r.typical:g}, {r.high:g}"
-    if not quantity.low <= r.low <= r.high <= quantity.high:
-        yield f"{field} of {r.low:g} to {r.high:g} {quantity.unit} is not of this world"
-    for key in r.source.split("+"):
-        if key not in source_table():
-            yield f"{field} cites {key!r}, which sources.toml does not list"
+# ---------------------------------------------------------------- one number
+
+
+def _look_at_cell(found: _Finder, at: tuple[str, str], cell: Any, known: set[str]) -> bool:
+    """Tell what is wrong with the form of a cell; return whether its numbers can be read."""
+    form = "Write { low = 1, typical = 2, high = 3, source = 'key' }."
+    if not isinstance(cell, dict):
+        found.tell(*at, f"is {cell!r}, not a range.", form)
+        return False
+    for key in set(cell) - set(CELL):
+        found.tell(*at, f"has an unknown entry {key!r}.", f"A range has: {_list(CELL)}.")
+    _look_at_source(found, at, cell.get("source"), known)
+    missing = [k for k in CELL[:3] if not _is_number(cell.get(k))]
+    if missing:
+        found.tell(*at, f"{missing[0]!r} is missing or no number.", form)
+    return not missing
+
+
+def _look_at_source(found: _Finder, at: tuple[str, str], source: Any, known: set[str]) -> None:
+    if not isinstance(source, str) or not source.strip():
+        advice = "Say who measured it: source = 'key', and [sources.key] with cite = '...'."
+        found.tell(*at, "has no source.", advice)
+        return
+    for key in source.split("+"):
+        if key not in known:
+            advice = f"Add [sources.{key}] with cite = '...', or use a key of ours."
+            found.tell(*at, f"cites {key!r}, which nothing explains.", advice)
+
+
+def _look_at_sizes(
+    found: _Finder, name: str, about: tuple[Law | None, dict], fields: dict[str, tuple[str, dict]]
+) -> None:
+    law, row = about
+    for field, (key, cell) in fields.items():
+        low, typical, high = (cell[k] for k in CELL[:3])
+        if not low <= typical <= high:
+            advice = "Swap low and high." if low > high else "Put typical between low and high."
+            found.tell(name, key, f"is out of order: {low:g}, {typical:g}, {high:g}.", advice)
+        elif field == "poisson" and high >= POISSON_LIMIT:
+            advice = "For what hardly changes its volume write 0.49 to 0.499."
+            found.tell(name, key, f"reaches {high:g}: at 0.5 no volume can change at all.", advice)
+        elif not cell.get("unusual"):
+            said = doubt(key, (low, high), name, row.get("group", ""), law)
+            if said:
+                found.tell(name, key, *said)
+    said = strain_doubt({f: c["typical"] * si(k)[1] for f, (k, c) in fields.items()})
+    unusual = any(c.get("unusual") for f, (_, c) in fields.items() if f in said[0]) if said else 0
+    if said and not unusual and not any(p.table == name for p in found.problems):
+        found.tell(name, fields[said[0][0]][0], *said[1])
+
+
+def _is_number(said: Any) -> bool:
+    return isinstance(said, int | float) and not isinstance(said, bool) and isfinite(said)
+
+
+def _list(words: Any) -> str:
+    return ", ".join(map(str, words))

@@ -2,8 +2,10 @@
 
 from math import degrees
 
-from corporeal.materials.library import Entry, citation, find, library, source_table
+from corporeal.materials.entry import Entry
+from corporeal.materials.library import find, library
 from corporeal.materials.quantities import QUANTITIES
+from corporeal.materials.shipped import citation, source_table
 from corporeal.types import Ground, Material, MaterialField, Part, Parts, PartWords, Structure
 
 SCALES = {"Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))}

@@ -1,0 +1,95 @@
+"""One material of a library: its law, and for every number the measured range."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+
+from corporeal.errors import OutOfRangeError, UserError
+from corporeal.materials.quantities import QUANTITIES, si
+from corporeal.types import Ground, Law, Material, Range
+
+ABOUT = {"law": str, "group": str, "family": str, "published": str, "note": str}
+ABOUT |= {"aliases": list, "id": int}
+"""Keys of a material in a file that are no numbers, with their types."""
+
+
+@dataclass(frozen=True)
+class Entry:
+    """One material: its law and, for every number, the measured range. All SI."""
+
+    name: str
+    law: Law
+    ranges: Mapping[str, Range]
+    """Field name of ``types.Material`` → measured range."""
+    group: str = ""
+    """Metal, mineral, granular, fibrous, polymer, elastomer, foam, food, liquid, bulk (what lies in
+    containers)."""
+    family: str = ""
+    """The material whose measured friction it shares."""
+    published: str = ""
+    """The nearest name of the 22-material vocabulary, where its own is not one."""
+    aliases: tuple[str, ...] = ()
+    note: str = ""
+    number: int = field(default=0, compare=False)
+    """Its number in the published vocabulary; 0: not in it."""
+
+    @property
+    def kin(self) -> tuple[str, ...]:
+        """Names under which a measured pair may list it, most particular first."""
+        return tuple(n for n in (self.name, self.family, self.group) if n)
+
+    def typical(self, reason: str = "the usual value in the measured range") -> dict[str, Ground]:
+        """Ground every number at its typical value."""
+        return {
+            name: Ground(r.typical, r, "typical", reason if r.low < r.high else "a single value")
+            for name, r in self.ranges.items()
+        }
+
+    def pick(self, grounds: Mapping[str, Ground]) -> Material:
+        """Make the material from chosen values.
+
+        Raises:
+            OutOfRangeError: A value lies outside the measured range.
+
+        """
+        for name, ground in grounds.items():
+            quantity, allowed = QUANTITIES[name], self.ranges.get(name)
+            if allowed is None:
+                raise UserError(
+                    f"{self.name} has no {quantity.words.lower()} in the library, so none can be "
+                    f"chosen. It has: {', '.join(self.ranges)}."
+                )
+            if ground.value not in allowed:
+                what = f"{quantity.words} of {self.name}"
+                raise OutOfRangeError(what, ground.value, allowed.low, allowed.high, quantity.unit)
+        values = {name: ground.value for name, ground in grounds.items()}
+        return Material(name=self.name, law=self.law, grounds=dict(grounds), **values)
+
+
+def entries(tables: Mapping[str, dict]) -> dict[str, Entry]:
+    """Read the tables of a sound library."""
+    return {name: _entry(name, row) for name, row in tables.items()}
+
+
+def plain(name: str) -> str:
+    """Write a name as it is compared: case, hyphens, underscores and spaces don't matter."""
+    return " ".join(name.lower().replace("-", " ").replace("_", " ").split())
+
+
+def _entry(name: str, row: dict) -> Entry:
+    ranges = {}
+    for key, cell in row.items():
+        if key not in ABOUT:
+            quantity, factor = si(key)
+            low, typical, high = (cell[k] * factor for k in ("low", "typical", "high"))
+            ranges[quantity] = Range(low, typical, high, cell["source"])
+    return Entry(
+        name=name,
+        law=Law[row["law"].upper()],
+        ranges=ranges,
+        group=row.get("group", ""),
+        family=row.get("family", ""),
+        published=row.get("published", ""),
+        aliases=tuple(row.get("aliases", ())),
+        note=row.get("note", ""),
+        number=row.get("id", 0),
+    )

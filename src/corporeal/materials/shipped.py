@@ -1,0 +1,41 @@
+"""What comes with the package: two libraries, and the sources of their numbers."""
+
+import tomllib
+from functools import cache
+from importlib.resources import files
+
+from corporeal.materials.entry import Entry, entries
+
+SHIPPED = {"default": "library.toml", "reference": "reference.toml"}
+
+
+@cache
+def shipped(name: str) -> dict[str, Entry]:
+    """Return every entry of "default" or "reference"."""
+    return entries(tomllib.loads(text(SHIPPED[name])))
+
+
+@cache
+def source_table() -> dict[str, dict[str, str]]:
+    """Every source: how to cite it, and whether it was read or recalled."""
+    return tomllib.loads(text("sources.toml"))
+
+
+def citation(key: str) -> str:
+    """Resolve a source key ("a", or "a+b" for two) to what a reader can look up.
+
+    A source that a user's library explains itself is already written out, and stays as it is.
+    """
+    known, keys = source_table(), key.split("+")
+    return " / ".join(known[k]["cite"] for k in keys) if set(keys) <= set(known) else key
+
+
+def sources() -> dict[str, str]:
+    """Every source key that a value of the shipped libraries carries, with what it stands for."""
+    ranges = [r for name in SHIPPED for e in shipped(name).values() for r in e.ranges.values()]
+    return {key: citation(key) for key in sorted({r.source for r in ranges} | set(source_table()))}
+
+
+def text(name: str) -> str:
+    """Return a data file of this package."""
+    return files("corporeal.materials").joinpath(name).read_text(encoding="utf-8")
