@@ -105,7 +105,8 @@ def verb_materials() -> None:
     class Menu:
         words: tyro.conf.Positional[tuple[str, ...]] = ()
         library: str = "default"
-        """"default", or "reference": the 22 materials as first published."""
+        """"default", "reference" (the 22 materials as first published), or the path of a TOML
+        file."""
 
     asked = _parse(Menu, "materials", verb_materials.__doc__)
     if not asked.words:

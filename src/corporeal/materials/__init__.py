@@ -12,9 +12,10 @@ from corporeal.materials.library import (
     substances,
 )
 from corporeal.materials.lint import Problem
+from corporeal.materials.page import markdown
 from corporeal.materials.quantities import QUANTITIES, Quantity, si
 from corporeal.materials.shipped import citation, sources
-from corporeal.materials.tables import markdown, materials_json, menu, show
+from corporeal.materials.tables import materials_json, menu, show
 
 __all__ = [
     "QUANTITIES",

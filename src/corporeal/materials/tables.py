@@ -1,7 +1,8 @@
-"""The library as text: for the terminal, and for the documentation page."""
+"""The library as text for the terminal, and what a scene is made of as data."""
 
 from math import degrees
 
+from corporeal.materials.contact import pairs
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import find, library
 from corporeal.materials.quantities import QUANTITIES
@@ -24,7 +25,7 @@ def menu(library_name: str = "default") -> str:
 def show(name: str, library_name: str = "default") -> str:
     """Everything the library says of one material, with its sources."""
     entry = find(name, library_name)
-    lines = [f"{entry.name}  ({entry.law.name.lower()})"]
+    lines = [f"{entry.name}  ({', '.join(w for w in (entry.group, entry.law.name.lower()) if w)})"]
     if entry.aliases:
         lines.append(f"also: {', '.join(entry.aliases)}")
     if entry.note:
@@ -33,41 +34,33 @@ def show(name: str, library_name: str = "default") -> str:
     for field, r in entry.ranges.items():
         words = QUANTITIES[field].words
         lines.append(f"  {words:<18} {span(field, r.low, r.typical, r.high):<26} {r.source}")
-    keys = sorted({key for r in entry.ranges.values() for key in r.source.split("+")})
-    lines += ["", "Sources", *(f"  {key}: {citation(key)}" for key in keys)]
+    lines += _measured_friction(entry)
+    keys = sorted({key for r in entry.ranges.values() for key in _keys(r.source)})
+    lines += ["", "Sources", *(f"  {key}{_seen(key)}" for key in keys)]
     return "\n".join(lines)
 
 
-def markdown() -> str:
-    """Write the documentation page: both libraries and their sources."""
-    return "\n".join(
-        [
-            "# Materials",
-            "",
-            "Generated from the tables in `src/corporeal/materials` by `corporeal.materials."
-            "markdown()`; a test holds this page equal to them. Each cell is the measured range "
-            "with the usual value in brackets.",
-            "",
-            "## Library `default`",
-            "",
-            *_markdown_table("default"),
-            "",
-            "## Library `reference`: the vocabulary as first published",
-            "",
-            *_markdown_table("reference"),
-            "",
-            "## Sources",
-            "",
-            "*read*: the value was seen in the source while the library was compiled; *recalled*: "
-            "cited from knowledge of the handbook; *ours*: derived, chosen or estimated by us.",
-            "",
-            *(
-                f"- **{key}** ({row['check']}): {row['cite']}"
-                for key, row in source_table().items()
-            ),
-            "",
-        ]
-    )
+def _measured_friction(entry: Entry) -> list[str]:
+    """Tell the measured pairs that this material is named in, itself or as one of its kind."""
+    rows = []
+    for names, row in pairs().items():
+        own = [n for n in entry.kin if n in names]
+        if own:
+            other = next(iter(names - {own[0]}), own[0])
+            low, typical, high = row["sliding"]
+            rows.append(f"  as {own[0]} on {other}: {span('friction', low, typical, high)}")
+    return ["", "Measured sliding friction, clean and dry", *rows] if rows else []
+
+
+def _keys(source: str) -> list[str]:
+    """Return the keys of a source; a source that a user's file explains is one text."""
+    keys = source.split("+")
+    return keys if set(keys) <= set(source_table()) else [source]
+
+
+def _seen(key: str) -> str:
+    row = source_table().get(key)
+    return f" ({row['check']}): {row['cite']}" if row else ""
 
 
 def materials_json(field: MaterialField, parts: Parts) -> dict:
@@ -139,8 +132,3 @@ def _row(entry: Entry) -> tuple[str, ...]:
         span(f, r.low, r.typical, r.high) if r else "" for f, r in zip(COLUMNS, cells, strict=True)
     )
     return (entry.name, entry.law.name.lower(), *written)
-
-
-def _markdown_table(library_name: str) -> list[str]:
-    rows = [HEADS, ("---",) * len(HEADS), *(_row(e) for e in library(library_name).values())]
-    return [f"| {' | '.join(row)} |" for row in rows]

@@ -1,0 +1,138 @@
+"""The library as a page of the documentation."""
+
+from collections.abc import Sequence
+
+from corporeal.materials.contact import pairs
+from corporeal.materials.entry import Entry
+from corporeal.materials.library import library
+from corporeal.materials.shipped import source_table
+from corporeal.materials.tables import COLUMNS, HEADS, span
+
+OTHER = ("friction", "restitution", "loss", "hardening", "shell_thickness")
+OTHER_HEADS = ("material", "group", "μ", "e", "η", "H", "wall")
+INTRODUCTION = """# Materials
+
+Generated from the tables in `src/corporeal/materials` by `corporeal.materials.markdown()`; a test
+holds this page equal to them. Each cell is the measured range with the usual value in brackets: E
+Young's modulus, ν Poisson's ratio, ρ density, σ_y yield stress, φ friction angle and c cohesion of
+what is granular; μ the surface's own sliding friction, e restitution, η loss factor, H hardening
+modulus, wall the usual thickness of things made as shells.
+
+`corporeal materials` lists them, `corporeal materials show NAME` tells all of one with its sources.
+"""
+OWN = """## A library of your own
+
+```toml
+extends = "default"              # leave it out, and the file stands alone
+
+[sources.my-bench]
+cite = "Our tensile test of 2026-03-14, five specimens"
+
+[lamp_steel]
+law = "von_mises"                # corotated, neo_hookean, hencky, drucker_prager, von_mises
+group = "metal"
+young_GPa = { low = 195, typical = 205, high = 210, source = "my-bench" }
+poisson = { low = 0.28, typical = 0.29, high = 0.30, source = "kaye-laby" }
+density_kg_m3 = { low = 7800, typical = 7850, high = 7900, source = "my-bench" }
+yield_MPa = { low = 240, typical = 260, high = 300, source = "my-bench" }
+```
+
+`corporeal run scene.glb --library my.toml` uses it everywhere. **One rule**: a file that starts
+with `extends = "default"` (or `"reference"`) is merged, material by material: its table replaces
+the namesake whole. Any other file replaces the library, and must then hold every material that the
+scene is found to be made of, the floor (`--floor`) and what stands for the unknown (`--neutral`).
+
+`corporeal materials check my.toml` tells every mistake with its line and what to do: ends swapped,
+a Poisson's ratio of 0.5, a number without a source, a source that nothing explains, a key or law
+that does not exist, a law without the numbers that it reads, and numbers that lie three times
+beyond those of the material's namesake or of all that share its group and law, which is how a
+wrong unit shows. What is true all the same is said to be: `{ low = …, unusual = true }`. A library
+with a mistake is not used. Every law needs E, ν and ρ; `von_mises` also yield stress,
+`drucker_prager` friction angle and cohesion. Without friction or restitution of its own a material
+gets 0.5.
+"""
+RULE = """## Friction between two surfaces
+
+Measured pairs come first, the most particular one: a material's own name before its family's
+("wood" for plywood), that before its group's ("metal"). Published tables disagree; the range holds
+them all. What is simulated is sliding friction. For a pair that nobody measured the rule is
+μ = √(μ_a μ_b) of the surfaces' own values, which were chosen so that the rule comes near the
+measured pairs. Restitution of a pair: e² = (E_b e_a² + E_a e_b²)/(E_a + E_b) with the plane-strain
+moduli, so the softer body decides (Cross, Am. J. Phys. 68 (2000) 1025).
+"""
+SOURCES = """## Sources
+
+*read*: the value was seen in the source while the library was compiled; *recalled*: cited from
+knowledge of the handbook; *ours*: derived, chosen or estimated by us.
+"""
+
+
+def markdown() -> str:
+    """Write the page: both libraries, friction, how to make one's own, and the sources."""
+    default = list(library().values())
+    reference = list(library("reference").values())
+    counts = f"{len(default)} materials. {_counts()}"
+    return "\n".join(
+        [
+            INTRODUCTION,
+            OWN,
+            *("## Library `default`", "", counts, "", *_table(HEADS, default, _core), ""),
+            *("### Surface, damping, hardening, walls", "", *_table(OTHER_HEADS, default, _other)),
+            "",
+            *("## Library `reference`: the vocabulary as first published", ""),
+            *("`--library reference`: 22 materials, errors included; a baseline only.", ""),
+            *(*_table(HEADS, reference, _core), ""),
+            RULE,
+            *(*_friction(), ""),
+            SOURCES,
+            *(f"- **{k}** ({row['check']}): {row['cite']}" for k, row in source_table().items()),
+            "",
+        ]
+    )
+
+
+def _counts() -> str:
+    """Say how well founded the numbers are."""
+    told = {"read": 0, "recalled": 0, "ours": 0}
+    for entry in library().values():
+        for field in ("young", "poisson", "density", "yield_stress"):
+            if field in entry.ranges:
+                keys = entry.ranges[field].source.split("+")
+                checks = [source_table()[k]["check"] for k in keys]
+                told[max(checks, key=list(told).index)] += 1
+    total = sum(told.values())
+    return (
+        f"Of their {total} values of E, ν, ρ and σ_y, {told['read']} rest on sources that were "
+        f"read, {told['recalled']} on handbooks that were recalled, and {told['ours']} at least in "
+        "part on an estimate of ours."
+    )
+
+
+def _table(heads: Sequence[str], entries: Sequence[Entry], row) -> list[str]:
+    rows = [heads, ("---",) * len(heads), *(row(entry) for entry in entries)]
+    return [f"| {' | '.join(cells)} |" for cells in rows]
+
+
+def _core(entry: Entry) -> tuple[str, ...]:
+    return (entry.name, entry.law.name.lower(), *_cells(entry, COLUMNS))
+
+
+def _other(entry: Entry) -> tuple[str, ...]:
+    return (entry.name, entry.group, *_cells(entry, OTHER))
+
+
+def _cells(entry: Entry, fields: Sequence[str]) -> list[str]:
+    ranges = [(f, entry.ranges.get(f)) for f in fields]
+    return [span(f, r.low, r.typical, r.high) if r else "" for f, r in ranges]
+
+
+def _friction() -> list[str]:
+    lines = ["| pair | static | sliding | source |", "| --- | --- | --- | --- |"]
+    for row in pairs().values():
+        low, high = row["static"]
+        static = f"{low:g}–{high:g}" if low < high else f"{low:g}"
+        note = f" ({row['note']})" if "note" in row else ""
+        sliding = span("friction", *row["sliding"])
+        pair = " on ".join(row["of"])
+        lines.append(f"| {pair}{note} | {static} | {sliding} | {row['source']} |")
+    return lines

@@ -1,0 +1,63 @@
+"""`corporeal materials` as a person types it."""
+
+import sys
+
+import pytest
+from test_lint import PLANTED, SOUND  # type: ignore[import-not-found]
+
+from corporeal import cli
+
+
+@pytest.fixture
+def typed(monkeypatch, capsys, tmp_path):
+    monkeypatch.chdir(tmp_path)
+
+    def run(*words):
+        monkeypatch.setattr(sys, "argv", ["corporeal", "materials", *words])
+        with pytest.raises(SystemExit) as ended:
+            cli.main()
+        said = capsys.readouterr()
+        return ended.value.code, said.out, said.err
+
+    return run
+
+
+def test_a_sound_library_passes_and_is_shown(typed, tmp_path):
+    (tmp_path / "mine.toml").write_text(SOUND)
+    assert typed("check", "mine.toml")[:2] == (0, "mine.toml: nothing to complain about.\n")
+    code, out, _ = typed("--library", "mine.toml")
+    assert code == 0
+    assert "lamp_steel" in out
+    assert "brass" not in out
+    assert "Our tensile test" in typed("show", "lamp-steel", "--library", "mine.toml")[1]
+
+
+def test_a_merged_library_holds_ours_too(typed, tmp_path):
+    (tmp_path / "mine.toml").write_text('extends = "default"\n' + SOUND)
+    out = typed("--library", "mine.toml")[1]
+    assert "lamp_steel" in out
+    assert "brass" in out
+
+
+@pytest.mark.parametrize("mistake", ["swapped", "incompressible", "no source", "MPa for GPa"])
+def test_a_mistake_ends_with_code_2_and_says_where_and_what_to_do(typed, tmp_path, mistake):
+    (before, after), told = PLANTED[mistake]
+    (tmp_path / "mine.toml").write_text(SOUND.replace(before, after, 1))
+    code, _, err = typed("check", "mine.toml")
+    assert code == 2
+    assert told in err
+    assert "line " in err
+    assert typed("--library", "mine.toml")[0] == 2, "and it is not used"
+
+
+def test_what_cannot_be_read_is_said(typed, tmp_path):
+    assert "cannot be read" in typed("check", "absent.toml")[2]
+    (tmp_path / "a.toml").write_bytes(b"\xff\xfe")
+    assert typed("check", "a.toml")[0] == 2
+    assert "corporeal materials check FILE" in typed("chekc", "a.toml")[2]
+
+
+def test_a_material_is_shown_with_its_sources_and_measured_pairs(typed):
+    out = typed("show", "plywood")[1]
+    assert "wood-handbook (read): USDA" in out
+    assert "as wood on metal: 0.2–0.5 (0.3)" in out
