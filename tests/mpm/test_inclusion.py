@@ -9,7 +9,7 @@ from laws.bodies import Stuff, box, box_surface, floor, problem
 from corporeal.backends import load
 from corporeal.mpm.bond import join
 from corporeal.mpm.ledger_row import ledger_row
-from corporeal.mpm.pose import clusters
+from corporeal.mpm.pose import clusters, frames_of
 from corporeal.mpm.problem import MENU
 from corporeal.mpm.rigid import mass_of
 
@@ -153,6 +153,15 @@ def test_particles_that_hang_together_make_one_frame():
     label = clusters(np.concatenate(legs), 0.03)
     assert len(np.unique(label)) == 2
     assert np.unique(label[:200]).size == np.unique(label[200:]).size == 1
+
+
+def test_a_wire_with_few_particles_is_still_one_frame():
+    particles = np.array([[0.0, 0, 0], [1.0, 0, 0], [5.0, 0, 0]])
+    wire = np.stack([np.linspace(0, 1, 21), np.zeros(21), np.zeros(21)], 1)
+    bare = np.array([[9.0, 0, 0]])
+    joined, owner = frames_of(particles, np.concatenate([wire, bare]), 0.1)
+    assert joined.tolist() == [0, 0, 1]
+    assert owner.tolist() == [0] * 21 + [1], "a surface without matter goes with the nearest"
 
 
 @pytest.mark.slow

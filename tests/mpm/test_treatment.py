@@ -294,6 +294,13 @@ def test_a_slender_leg_is_no_trinket_but_a_tack_is():
     assert "by itself it would be rigid" in steel.why
 
 
+def test_a_heavy_foot_of_a_few_cells_holds_what_is_around_it():
+    foot, shade = block(STEEL, 0.02, 0.25, 0.25), block(FOAM, 0.3, 0.4, 0.4)
+    found = plan([foot, shade], [FALL], "draft")
+    assert 1 < foot.volume / found.cell**3 and foot.size[2] < 8 * found.cell
+    assert found.treatments[0].kind == "rigid"
+
+
 def test_a_closed_elastic_wall_keeps_its_indentation_stiffness():
     """k ~ E t² / R of a spherical shell (Reissner 1946)."""
     (duck,) = plan([replace(DUCK, closed=True)], [FALL], "fine").treatments

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from corporeal.mpm.filled import acting
 from corporeal.mpm.outcome import outcome
 from corporeal.types import MaterialField, Particles, Scene, Trajectory
 
@@ -112,10 +113,10 @@ def part_rows(scene: Scene, particles: Particles, field: MaterialField) -> list[
             "name": words.name,
             "object": scene.objects[particles.object[first[k]]].name if k in first else None,
             "material": material.name,
-            "law": material.law.name.lower(),
+            "law": acting(material, structure, treatment).law.name.lower(),
             "treatment": treatment.kind,
             "structure": structure.kind,
-            "E": material.young,
+            "E": treatment.young_real,
             "E_sim": treatment.young,
             "nu": material.poisson,
             "density": material.density,
@@ -123,6 +124,8 @@ def part_rows(scene: Scene, particles: Particles, field: MaterialField) -> list[
             "yield_stress": material.yield_stress,
             "yield_stress_sim": treatment.yield_stress,
             "thickness_m": structure.thickness,
+            "contents": structure.contents.name if structure.contents else None,
+            "fill": structure.fill if structure.contents else None,
             "thickness_sim_m": treatment.thickness,
             "mass_kg": mass,
             "why": treatment.why,

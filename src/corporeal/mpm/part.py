@@ -65,6 +65,11 @@ class Verdict:
     reason: str
 
 
+def is_grain(part: PartGeometry, cell: float) -> bool:
+    """Whether the part has too little matter on the grid to hold what is around it."""
+    return part.volume < cell**3 and part.size[2] < TRINKET_LENGTH * cell
+
+
 def is_trinket(part: PartGeometry, cell: float) -> bool:
     """Whether the grid cannot show the part's own stiffness."""
     return part.volume < TRINKET_CELLS * cell**3 and part.size[2] < TRINKET_LENGTH * cell

@@ -11,6 +11,7 @@ from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
+from corporeal.mpm.filled import acting
 from corporeal.mpm.gaps import pair_gaps
 from corporeal.mpm.problem import FLOOR, NO_FACES, Body, Faces, Joint, Plane, Problem, Tether
 from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment, Wall
@@ -20,7 +21,7 @@ RAMP = 0.1
 DAMPING_LIMIT = 0.25
 """Largest viscosity as a fraction of ρ c dx: more would shorten the step noticeably."""
 TOUCHING = 1.5
-"""Rigid particles of one object nearer than this [cells] belong to one frame."""
+"""Rigid matter of one object nearer than this [cells] belongs to one frame."""
 
 
 @dataclass(frozen=True)
@@ -105,13 +106,35 @@ def divide(particles: Particles, objects: int) -> list[Piece]:
             continue
         soft, frame = len(pieces), mine[stiff[mine]]
         pieces.append(Piece(k, False, mine[~stiff[mine]], points[:0]))
-        joined = clusters(particles.position[frame], TOUCHING * particles.cell)
-        owner = nearest(particles.position[frame], particles.surface[points], joined)
+        joined, owner = frames_of(
+            particles.position[frame], particles.surface[points], TOUCHING * particles.cell
+        )
         pieces += [
             Piece(k, True, frame[joined == c], points[owner == c], soft)
             for c in range(joined.max() + 1)
         ]
     return pieces
+
+
+def frames_of(
+    position: Float[np.ndarray, "N 3"], surface: Float[np.ndarray, "S 3"], reach: float
+) -> tuple[Int[np.ndarray, " N"], Int[np.ndarray, " S"]]:
+    """Say which frame each rigid particle and each surface point belongs to.
+
+    Surfaces join too: a wire has few particles, far apart, on a coarse grid.
+
+    Args:
+        position: Of the particles [m].
+        surface: Of the points [m].
+        reach: What is nearer hangs together [m].
+
+    """
+    label = clusters(np.concatenate([position, surface]), reach)
+    filled, joined = np.unique(label[: len(position)], return_inverse=True)
+    owner = nearest(position, surface, joined) if len(surface) else np.zeros(0, dtype=np.int64)
+    known = np.isin(label[len(position) :], filled)
+    owner[known] = np.searchsorted(filled, label[len(position) :][known])
+    return joined, owner
 
 
 def plant(
@@ -173,10 +196,8 @@ def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Pie
     part = particles.part[mine]
     whole = particles.position[particles.object == piece.object]
     extent = float(np.ptp(whole, axis=0).max())
-    rows = [
-        numbers(m, t, extent, particles.cell)
-        for m, t in zip(field.materials, particles.treatments, strict=True)
-    ]
+    acted = zip(field.materials, field.structures, particles.treatments, strict=True)
+    rows = [numbers(acting(m, s, t), t, extent, particles.cell) for m, s, t in acted]
     column = {name: np.array([row[name] for row in rows])[part] for name in rows[0]}
     thing = scene.objects[piece.object]
     return Body(

@@ -13,11 +13,12 @@ from typing import Literal
 
 from corporeal.mpm import plants
 from corporeal.mpm.budget import calm_trinkets, cap, fit_budget
+from corporeal.mpm.filled import as_contents, judge_filled, mean_density
 from corporeal.mpm.part import (
     Motion,
     PartGeometry,
     Verdict,
-    is_trinket,
+    is_grain,
     rod_ratio,
     tube,
     wall_factors,
@@ -122,7 +123,7 @@ def plan(
     ]
     warnings = [*unresolved(soft, cell)]
     if stiffness == "capped":
-        treatments = [cap(p, t, cell) for p, t in zip(parts, treatments, strict=True)]
+        treatments = [cap(as_contents(p), t, cell) for p, t in zip(parts, treatments, strict=True)]
         warnings.append("Stiffness is capped by the published rule: a control, not a prediction.")
     else:
         treatments = calm_trinkets(parts, treatments, cell)
@@ -149,7 +150,7 @@ def role(part: PartGeometry, deforms: bool, mixed: set[int], cell: float) -> Rol
         return "soft"
     if part.object not in mixed:
         return "rigid"
-    return "trinket" if is_trinket(part, cell) else "frame"
+    return "trinket" if is_grain(part, cell) else "frame"
 
 
 def judge(part: PartGeometry, motion: Motion) -> Verdict:
@@ -160,6 +161,8 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
     part's width, which is the wall the finest detail would simulate: so the verdict depends neither
     on the detail nor on what else is in the scene. A tube is judged as the bar that it is.
     """
+    if part.structure.contents is not None:
+        return judge_filled(part, motion, judge)
     material, speed = part.material, motion.impact_speed
     young, poisson = bounded_poisson(material.young, material.poisson)
     density = material.density
@@ -268,11 +271,9 @@ def treat(
     """Give a part its simulated numbers: true ones, but for a thin wall and a capped bulk."""
     if role == "crown":
         return crown(part, verdict, motion)
-    material, structure, soft = (
-        part.material,
-        part.structure,
-        role in ("soft", "trinket"),
-    )
+    soft = role in ("soft", "trinket")
+    part = as_contents(part) if soft else part
+    material, structure = part.material, part.structure
     ratio = wall_ratio(part, 2 * cell)
     stiffer, stronger, denser = wall_factors(part, ratio)
     if material.law is Law.VON_MISES and structure.thickness and ratio < 1:
@@ -281,7 +282,7 @@ def treat(
     if thin < 1:
         stiffer, stronger, denser = thin**4, thin**3, thin**2
     young, poisson = bounded_poisson(material.young, material.poisson)
-    density = material.density * denser
+    density = mean_density(part) * denser
     strong = material.yield_stress
     shell = structure.kind == "shell" and structure.thickness is not None
     wave = p_wave_speed(young * stiffer, poisson, density) if soft else 0.0
