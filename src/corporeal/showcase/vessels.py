@@ -88,11 +88,12 @@ def mug() -> Model:
 
 
 def floor_lamp() -> Model:
-    """Model a reading lamp, 1.55 m: brass-plated steel, linen shade on a wire spider, lit bulb."""
+    """Model a reading lamp, 1.55 m: brass-plated steel tube, opal glass shade on a spider, bulb."""
     foot = [(0, 0), (0.138, 0), (0.14, 0), (0.14, 0.010), (0.135, 0.014), (0.05, 0.018)]
     foot += [(0.020, 0.028), (0.014, 0.05), (0.0, 0.05)]
     base = shape.lathe(shape.soften(foot), 72)
-    metal = union([_lamp_stem(), *_lamp_spider()])
+    stem, spider = _lamp_stem(), union(_lamp_spider())
+    metal = union([stem, spider])
     pear = [(0, 1.266), (0.012, 1.266), (0.014, 1.275), (0.017, 1.290), (0.031, 1.325)]
     pear += [(0.030, 1.350), (0.017, 1.368), (0.0, 1.370)]
     bulb = shape.lathe(shape.soften(pear), 40)
@@ -101,7 +102,8 @@ def floor_lamp() -> Model:
         "floor_lamp",
         (
             Part("base", base, brass, "steel"),
-            Part("stem", cut(metal, base), brass, "steel", 0.0012),
+            Part("stem", cut(stem, base), brass, "steel", 0.0012),
+            Part("spider", cut(spider, stem), brass, "steel"),
             Part(
                 "bulb",
                 cut(bulb, metal),
@@ -109,13 +111,17 @@ def floor_lamp() -> Model:
                 "glass",
                 1e-3,
             ),
-            Part("shade", cut(_lamp_shade(), metal), _linen(), "cotton"),
+            Part("shade", cut(_lamp_shade(), metal), _opal(), "glass"),
         ),
     )
 
 
 LAMP_LOW, LAMP_HIGH, LAMP_WIDE, LAMP_NARROW = 1.20, 1.55, 0.215, 0.155
 """The shade: heights of its rims and their radii [m]."""
+SHADE_WALL = 0.004
+"""How thick its glass is [m]."""
+WIRE = LAMP_WIDE - SHADE_WALL - 0.0018
+"""Radius of the lowest wires, which press against it [m]."""
 
 
 def _shade_radius(share: float | np.ndarray) -> float | np.ndarray:
@@ -125,12 +131,11 @@ def _shade_radius(share: float | np.ndarray) -> float | np.ndarray:
 def _lamp_shade() -> Mesh:
     s = np.linspace(0, 1, 13)
     outside = np.stack([_shade_radius(s), LAMP_LOW + (LAMP_HIGH - LAMP_LOW) * s], 1)
-    return shape.lathe(np.concatenate([outside, outside[::-1] - [0.0018, 0]]), 96, loop=True)
+    return shape.lathe(np.concatenate([outside, outside[::-1] - [SHADE_WALL, 0]]), 96, loop=True)
 
 
-def _linen() -> Finish:
-    cloth = paint.weave(256, 8, "#cdbb98", "#f3e6c8", "#fffaf0", threads=32)
-    return Finish("linen shade", texture=cloth, roughness=0.95, glow=0.28, translucency=0.5)
+def _opal() -> Finish:
+    return replace(plain("opal glass", "#f6efe0", 0.25, glow=0.28), translucency=0.5)
 
 
 def _lamp_stem() -> Mesh:
@@ -144,12 +149,12 @@ def _lamp_spider() -> list[Mesh]:
     rise = LAMP_HIGH - LAMP_LOW
     hoops = []
     for z in (LAMP_LOW + 0.047, LAMP_HIGH - 0.012, LAMP_LOW + 0.012):
-        r = float(_shade_radius((z - LAMP_LOW) / rise)) - 0.0036
+        r = float(_shade_radius((z - LAMP_LOW) / rise)) - (LAMP_WIDE - WIRE)
         hoops.append(shape.ring(_ellipse(72, (0, 0, z), r, r), 0.0028))
     bars = []
     s = np.linspace(0.03, 0.97, 6)
-    strut = np.stack([LAMP_WIDE - 0.0036 - 0.0602 * s, LAMP_LOW + s * rise], 1)
-    spoke = np.array([(0.010, 1.235), (0.07, 1.237), (0.150, 1.243), (0.2039, 1.2466)])
+    strut = np.stack([WIRE - 0.0602 * s, LAMP_LOW + s * rise], 1)
+    spoke = np.array([(0.010, 1.235), (0.07, 1.237), (0.150, 1.243), (WIRE - 0.0075, 1.2466)])
     for angle in 2 * np.pi * np.arange(3) / 3 + 0.4:
         for (r, z), radius in ((spoke.T, 0.003), (strut.T, 0.0024)):
             path = np.stack([r * np.cos(angle), r * np.sin(angle), z], 1)
