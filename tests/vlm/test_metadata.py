@@ -1,3 +1,4 @@
+import numpy as np
 import pytest
 
 from corporeal import materials
@@ -26,6 +27,7 @@ def seen(surface, thing, finish=None, alone=True, metallic=False):
 def test_every_material_of_the_lexicon_is_in_the_library():
     assert {s.material for s in lexicon()} <= set(materials.library())
     assert metals() <= set(materials.library())
+    assert {s.metallic for s in lexicon() if s.metallic} <= metals()
     assert all(0 < s.margin <= 1 for s in lexicon())
 
 
@@ -88,10 +90,28 @@ def test_light_through_a_nameless_surface_is_glass():
     assert seen("mesh", "thing", Finish("x", transmission=1.0)).material == "glass"
 
 
-def test_of_a_plants_parts_only_the_green_ones_are_leaves():
-    green, brown = Finish("m", (0.2, 0.5, 0.1, 1.0)), Finish("m", (0.4, 0.1, 0.03, 1.0))
-    assert seen("mesh", "potted plant", green, alone=False).material == "leaves-flowers"
-    assert seen("mesh", "potted plant", brown, alone=False).material is None
+def test_a_plants_parts_are_told_by_their_colour():
+    colours = {
+        "leaves-flowers": (0.2, 0.5, 0.1, 1.0),
+        "terracotta": (0.4, 0.1, 0.03, 1.0),
+        "potting_soil": (0.07, 0.03, 0.01, 1.0),
+        None: (0.1, 0.1, 0.5, 1.0),
+    }
+    for material, colour in colours.items():
+        said = seen("mesh", "potted plant", Finish("m", colour), alone=False)
+        assert said.material == material
+        assert said.margin <= 0.4
+    picture = np.zeros((2, 2, 3), dtype=np.uint8)
+    textured = Finish("m", colours["leaves-flowers"], texture=picture)
+    assert seen("mesh", "potted plant", textured, alone=False).material is None
+    assert seen("mesh", "car", Finish("m", colours["terracotta"]), alone=False).material is None
+
+
+def test_a_metallic_statue_is_cast():
+    grey, gilt = Finish("m", metallic=0.0), Finish("m", metallic=0.8)
+    assert seen("mesh", "statue", grey, metallic=True).material == "granite"
+    assert seen("mesh", "statue", gilt, metallic=True).material == "bronze"
+    assert seen("mesh", "statue", gilt, metallic=False).material == "granite"
 
 
 def test_a_thing_of_several_parts_does_not_say_what_each_is():

@@ -1,5 +1,6 @@
 """Recognition without a model: what the file's own names and surface values tell."""
 
+import colorsys
 import tomllib
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -7,12 +8,14 @@ from functools import cache
 from importlib.resources import files
 from math import isfinite
 
-from corporeal.geometry.identity import words
-from corporeal.types import Finish, PartWords, SceneObject, Surface
+from corporeal.geometry.identity import Identity, words
+from corporeal.types import Finish, PartWords, Scene, SceneObject, Surface
 
 KINDS = ("substance", "piece", "thing")
 WEAKER = 0.6
 """Factor on the margin of what is said of the whole when the part is only one of several."""
+METALLIC = 0.5
+"""Metallic value from which most of a surface is metal: a picture's value is its mean."""
 LONGEST_WALL = 10.0
 """No wall of a thing is thicker [m]."""
 UNKNOWN = PartWords("", None, reason="No name in the file says what this is made of.")
@@ -35,6 +38,21 @@ class Saying:
     every: bool = False
     plant: bool = False
     alpha: str = ""
+    metallic: str = ""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a part's colour tells in certain things."""
+
+    hue: tuple[float, float]
+    """[degrees]"""
+    saturation: tuple[float, float]
+    value: tuple[float, float]
+    of: frozenset[str]
+    says: str
+    material: str
+    margin: float
 
 
 @dataclass(frozen=True)
@@ -64,6 +82,20 @@ class Evidence:
         return tuple(dict.fromkeys([self.thing.class_name, self.thing.name, stem]))
 
 
+def evidence(scene: Scene, identity: Identity, part: int) -> Evidence:
+    """Gather what a scene's file says about one of its parts."""
+    number = identity.catalogue[part].object
+    surfaces = [scene.surfaces[k] for k in identity.surfaces(part)]
+    worn = [scene.finishes[s.finish] for s in scene.surfaces if s.object == number]
+    return Evidence(
+        surfaces=surfaces,
+        finishes=[scene.finishes[f] for f in dict.fromkeys(s.finish for s in surfaces)],
+        thing=scene.objects[number],
+        alone=sum(p.object == number for p in identity.catalogue) == 1,
+        metallic_means_something=any(f.metallic < 1.0 for f in worn),
+    )
+
+
 def stated_substance(surfaces: Iterable[Surface]) -> str | None:
     """Return what the nodes state outright in their extras, or None."""
     said = {str(s.extras["substance"]) for s in surfaces if s.extras.get("substance")}
@@ -91,8 +123,8 @@ def matter_hint(surface: Surface, finish: Finish) -> str:
 
 def recognise(evidence: Evidence) -> PartWords:
     """Say what a part is made of, how sure, and why; unknown is a normal answer."""
-    for look in (_own_names, _general_names, _surface_values):
-        answer = look(evidence)
+    for ask in (_own_names, _general_names, _looks, _surface_values):
+        answer = ask(evidence)
         if answer is not None:
             return _weighed(answer, evidence)
     return UNKNOWN
@@ -103,37 +135,63 @@ def _own_names(evidence: Evidence) -> PartWords | None:
     if not sayings or (sayings[0].plant and not evidence.alone):
         return None  # "plant" names the pot's node as often as the leaves
     whole = sayings[0].kind != "thing" or evidence.alone or sayings[0].every
-    return _answer(sayings, name, 1.0 if whole else WEAKER)
+    return _answer(_of_metal(sayings, evidence), name, 1.0 if whole else WEAKER)
 
 
 def _general_names(evidence: Evidence) -> PartWords | None:
     sayings, name = _told(evidence.general, evidence.finishes, ("substance", "thing"), ())
-    if not sayings or evidence.alone or sayings[0].every:
-        return _answer(sayings, name, 1.0) if sayings else None
+    if not sayings:
+        return None
+    if evidence.alone or sayings[0].every:
+        return _answer(_of_metal(sayings, evidence), name, 1.0)
     if sayings[0].plant:
-        green = all(f.texture is None and _green(f) for f in evidence.finishes)
-        reason = f"{name!r} is a plant, and this part of it is green."
-        return PartWords("", "leaves-flowers", margin=0.4, reason=reason) if green else None
+        return None  # which of its parts this is, only the colour tells
     return _answer(sayings, name, WEAKER) if sayings[0].kind == "substance" else None
+
+
+def _looks(evidence: Evidence) -> PartWords | None:
+    """Tell a part by its plain colour where the thing has a part that looks so."""
+    if evidence.alone or any(f.texture is not None for f in evidence.finishes):
+        return None
+    around = {w for name in evidence.general for w in _tokens(name)}
+    for look in _lookbook():
+        if look.of & around and all(_seen_as(look, f) for f in evidence.finishes):
+            reason = f"In {evidence.thing.class_name!r} what is {look.says} is usually "
+            return PartWords(
+                "", look.material, margin=look.margin, reason=f"{reason}{look.material}."
+            )
+    return None
 
 
 def _surface_values(evidence: Evidence) -> PartWords | None:
     if all(f.transmission > 0.5 for f in evidence.finishes):
         return PartWords("", "glass", margin=0.5, reason="The surface lets light through.")
-    if evidence.metallic_means_something and all(f.metallic >= 0.9 for f in evidence.finishes):
-        return PartWords(
-            "", "steel", margin=0.3, reason="The surface is metallic; steel is the likeliest metal."
-        )
+    if _metallic(evidence):
+        reason = "The surface is metallic; steel is the likeliest metal."
+        return PartWords("", "steel", margin=0.3, reason=reason)
     return None
+
+
+def _metallic(evidence: Evidence) -> bool:
+    """Tell whether most of the surface is metal, and says so on purpose."""
+    return evidence.metallic_means_something and all(
+        f.metallic >= METALLIC for f in evidence.finishes
+    )
 
 
 def _weighed(answer: PartWords, evidence: Evidence) -> PartWords:
     """Lower the margin where the surface contradicts the name."""
-    metal = evidence.metallic_means_something and all(f.metallic > 0.9 for f in evidence.finishes)
-    if answer.material and metal and answer.material not in metals():
+    if answer.material and _metallic(evidence) and answer.material not in metals():
         reason = f"{answer.reason} But the surface is metallic."
         return replace(answer, margin=answer.margin * 0.5, reason=reason)
     return answer
+
+
+def _of_metal(sayings: list[Saying], evidence: Evidence) -> list[Saying]:
+    """Let a thing that looks metallic be of the metal that such things are made of."""
+    if not _metallic(evidence):
+        return sayings
+    return [replace(s, material=s.metallic or s.material) for s in sayings]
 
 
 def _answer(sayings: list[Saying], name: str, factor: float) -> PartWords:
@@ -160,16 +218,19 @@ def _told(
 ) -> tuple[list[Saying], str]:
     """Find the strongest sayings in any of the names, and the name they stand in.
 
-    Longest phrase first, then substance before piece before thing. Several are returned when
-    equally strong ones stand in the names.
+    Longest phrase first, then substance before piece before thing; a piece's phrase is never more
+    telling than a substance ("oak table top"). Several are returned when equally strong ones
+    stand in the names.
     """
-    found: list[tuple[tuple[int, int], Saying, str]] = []
+    found: list[tuple[tuple[int, int, int], Saying, str]] = []
     around = {w for n in thing for w in _tokens(n)}
     for name in names:
         tokens = _tokens(name)
         for saying in _standing_in(tokens):
             if saying.kind in kinds and _fits(saying, finishes, around | set(tokens)):
-                rank = (len(saying.phrase), -KINDS.index(saying.kind))
+                length = len(saying.phrase)
+                said = 1 if saying.kind == "piece" else length
+                rank = (said, -KINDS.index(saying.kind), length)
                 found.append((rank, saying, name))
     if not found:
         return [], ""
@@ -217,28 +278,67 @@ def _singular(word: str) -> str:
     return word[:-1] if len(word) > 3 and word.endswith("s") and not word.endswith("ss") else word
 
 
-def _green(finish: Finish) -> bool:
-    red, green, blue, _ = finish.colour
-    return green > 1.2 * red and green > 1.5 * blue
+def _seen_as(look: Look, finish: Finish) -> bool:
+    red, green, blue = (_as_seen(c) for c in finish.colour[:3])
+    hue, saturation, value = colorsys.rgb_to_hsv(red, green, blue)
+    seen = (360.0 * hue, saturation, value)
+    bounds = (look.hue, look.saturation, look.value)
+    return all(low <= x <= high for x, (low, high) in zip(seen, bounds, strict=True))
+
+
+def _as_seen(light: float) -> float:
+    """Linear light to sRGB (IEC 61966-2-1)."""
+    c = min(max(light, 0.0), 1.0)
+    return 12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055
 
 
 @cache
 def metals() -> frozenset[str]:
     """Materials whose surface is metallic."""
     general = next(s for s in lexicon() if s.phrase == ("metal",))
-    return frozenset((general.material, "aluminium_can_sheet", "zinc", "lead", *general.gives_way))
+    return frozenset(
+        (
+            general.material,
+            "aluminium_can_sheet",
+            "hardened_steel",
+            "zinc",
+            "lead",
+            *general.gives_way,
+        )
+    )
 
 
 @cache
 def lexicon() -> tuple[Saying, ...]:
     """Every phrase of the lexicon with what it tells."""
-    text = files("corporeal.vlm").joinpath("lexicon.toml").read_text(encoding="utf-8")
-    table = tomllib.loads(text)
     return tuple(
         _saying(kind, phrase, row)
         for kind in KINDS
-        for row in table[kind]
+        for row in _table()[kind]
         for phrase in row["words"]
+    )
+
+
+@cache
+def _lookbook() -> tuple[Look, ...]:
+    return tuple(
+        Look(
+            hue=tuple(row["hue"]),
+            saturation=tuple(row["saturation"]),
+            value=tuple(row["value"]),
+            of=frozenset(_singular(w) for w in row["of"]),
+            says=row["says"],
+            material=row["material"],
+            margin=row["margin"],
+        )
+        for row in _table()["look"]
+    )
+
+
+@cache
+def _table() -> dict[str, list[dict]]:
+    return tomllib.loads(
+        files("corporeal.vlm").joinpath("lexicon.toml").read_text(encoding="utf-8")
     )
 
 
@@ -257,4 +357,5 @@ def _saying(kind: str, phrase: str, row: dict) -> Saying:
         every=row.get("every", False),
         plant=row.get("plant", False),
         alpha=row.get("alpha", ""),
+        metallic=row.get("metallic", ""),
     )
