@@ -335,6 +335,8 @@ class Structure:
     """What is behind the wall of what is filled; None: air."""
     fill: float = 0.0
     """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    loose: bool = False
+    """Whether the contents lie at the bottom, as liquids and grains do; else they are all over."""
 
 
 @dataclass(frozen=True)

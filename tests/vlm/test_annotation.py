@@ -34,7 +34,7 @@ def test_what_is_said_of_a_part_comes_before_what_is_said_of_its_object(tmp_path
             "there is no part of 'duck_0' called 'sole'. There are: body, beak.",
         ),
         ("duck_0: {stuff: ABS}", "unknown key 'stuff'"),
-        ("duck_0: {structure: hollow}", "Say solid or shell"),
+        ("duck_0: {structure: hollow}", "Say solid, shell or filled"),
         ("duck_0: {thickness_mm: thin}", "thickness_mm must be a number"),
         ("duck_0: {thickness_mm: -1}", "above 0"),
         ("duck_0: {thickness_mm: .nan}", "must be a number"),

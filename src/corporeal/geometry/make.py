@@ -1,18 +1,37 @@
 """How a part is made: solid, wall or sheet, how thick, how heavy, and where its matter lies."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from corporeal.geometry.anatomy import Build
 from corporeal.geometry.packing import Recipe
-from corporeal.geometry.survey import Member
-from corporeal.types import Material, PartWords, Structure, Treatment
+from corporeal.geometry.room import is_vessel, room_of
+from corporeal.geometry.survey import Anatomy, Member
+from corporeal.types import Material, MaterialField, PartWords, Structure, Treatment
 
 SHEET_SHARE = 0.01
 """Thickness of an open sheet, of its middle extent, where nobody states it."""
+Said = tuple[Structure, Material, PartWords]
+"""How one piece is built, of what, and in whose words."""
 POROUS_CELLS = 6
 """A shell narrower than this many cells is filled through, with the shell's mass."""
+
+
+@dataclass(frozen=True)
+class Held:
+    """What is behind the wall of a filled part."""
+
+    mass: float
+    """[kg]"""
+    room: float
+    """Volume that it could take up [m³]."""
+    lies: Float[np.ndarray, "N 3"]
+    """Points evenly in it [m]."""
+    level: float
+    """Nothing of it is above this height [m]."""
 
 
 @dataclass(frozen=True)
@@ -34,19 +53,81 @@ class Make:
     area: float
     """One side [m²]."""
     volume: float
-    """Enclosed by the surface, and of the sheets [m³]."""
+    """Enclosed by the surface, of the sheets, and of what a vessel holds [m³]."""
+    density: float
+    """Mean density of its wall, or of all of it when it is solid [kg/m³]."""
+    held: Held | None = None
+    """None: nothing but air behind the wall, or no wall."""
 
     @property
     def mass(self) -> float:
         """All of it [kg]."""
-        return self.body_mass + self.sheet_mass
+        return self.body_mass + self.sheet_mass + (self.held.mass if self.held else 0.0)
+
+
+def compose(
+    anatomy: Anatomy, member: Member, field: MaterialField, rng: np.random.Generator
+) -> Make:
+    """Say how a part is made, with what is behind its wall and all that shares its mesh.
+
+    Pieces share the mesh by their stated shares of its volume and surface; the part then weighs
+    what they weigh together, and is otherwise as the piece that matters most.
+    """
+    k = member.part
+    structure, material = field.structures[k], field.materials[k]
+    made = decide(member, structure, material, field.words[k])
+    pieces = field.pieces[k] if field.pieces else ()
+    single = [(structure, material, field.words[k])]
+    every = [(p.structure, p.material, p.words) for p in pieces] or single
+    makes = [decide(member, *row) for row in every]
+    holds = [contain(anatomy, member, m, row, rng) for m, row in zip(makes, every, strict=True)]
+    body, sheet = sum(m.body_mass for m in makes), sum(m.sheet_mass for m in makes)
+    alone = made.body_mass + made.sheet_mass
+    mean = material.density * (body + sheet) / alone if alone > 0 else material.density
+    made = replace(made, body_mass=body, sheet_mass=sheet, density=mean)
+    return with_contents(made, member, [h for h in holds if h])
+
+
+def with_contents(made: Make, member: Member, holds: Sequence[Held]) -> Make:
+    """Put what was found behind the walls of a part's pieces into one."""
+    if not holds:
+        return made
+    held = Held(
+        mass=sum(h.mass for h in holds),
+        room=sum(h.room for h in holds),
+        lies=np.concatenate([h.lies for h in holds]),
+        level=max(h.level for h in holds),
+    )
+    beside = held.room if is_vessel(member) else 0.0
+    return replace(made, held=held, volume=made.volume + beside)
+
+
+def contain(
+    anatomy: Anatomy, member: Member, made: Make, said: Said, rng: np.random.Generator
+) -> Held | None:
+    """Say what is behind a wall; None: nothing but air.
+
+    m = ρ f (V - A t), with the share f of the room that the contents take up.
+    """
+    structure, material, words = said
+    if structure.contents is None:
+        return None
+    room = room_of(anatomy, member, made.thickness or made.sheet, rng)
+    wall = made.body_mass / material.density
+    behind = room.volume if is_vessel(member) else member.volume
+    inner = behind * words.volume_share - (0.0 if is_vessel(member) else wall)
+    inner = max(inner, 0.0)
+    level = room.level(structure.fill) if structure.loose else np.inf
+    lies = room.points[room.points[:, 2] <= level]
+    return Held(structure.contents.density * structure.fill * inner, inner, lies, level)
 
 
 def decide(member: Member, structure: Structure, material: Material, words: PartWords) -> Make:
-    """Say how thick a part's walls are and what it weighs.
+    """Say how thick a part's walls are and what they weigh.
 
-    Solid: m = ρ V. Shell: m = ρ min(A t, V) with the area A of one face. A wall whose mesh shows
-    both faces is 2 V / A thick unless somebody stated otherwise. Open sheets weigh ρ A t.
+    Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ min(A t, V) with the area A of one
+    face. A wall whose mesh shows both faces is 2 V / A thick unless somebody stated otherwise.
+    Open sheets weigh ρ A t. Of a piece, its shares of V and A count.
     """
     wall = member.build is Build.WALL
     shown = 2 * member.volume / member.body_area if wall else 0.0
@@ -54,19 +135,21 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
     guess = SHEET_SHARE * (member.size[1] or member.size[2])
     only_sheet = member.volume == 0
     sheet = (words.thickness or stated or guess) if member.sheet_area or only_sheet else 0.0
-    thickness = 0.0
-    if structure.kind == "shell":
+    thickness, walled = 0.0, structure.kind != "solid"
+    if walled:
         thickness = words.thickness or shown or stated or guess
     elif wall:
         thickness = shown
-    face = member.body_area * (0.5 if wall else 1.0)
-    volume = member.volume if not only_sheet else face * sheet
-    if structure.kind == "shell" and not only_sheet:
+    face = member.body_area * (0.5 if wall else 1.0) * words.surface_share
+    volume = member.volume * words.volume_share if not only_sheet else face * sheet
+    sheets = member.sheet_area * words.surface_share
+    if walled and not only_sheet:
         matter = min(face * thickness, volume)
     else:
         matter = volume
     if thickness > 0 or only_sheet:
-        simulated = Structure("shell", thickness or sheet, structure.reason)
+        kind = "filled" if structure.kind == "filled" else "shell"
+        simulated = replace(structure, kind=kind, thickness=thickness or sheet)
     else:
         simulated = Structure("solid")
     return Make(
@@ -75,9 +158,10 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
         thickness=thickness,
         sheet=sheet,
         body_mass=material.density * matter,
-        sheet_mass=material.density * member.sheet_area * sheet,
-        area=face + member.sheet_area,
-        volume=volume + member.sheet_area * sheet,
+        sheet_mass=material.density * sheets * sheet,
+        area=face + sheets,
+        volume=volume + sheets * sheet,
+        density=material.density,
     )
 
 
@@ -91,6 +175,9 @@ def recipe(member: Member, made: Make, treatment: Treatment, cell: float) -> Rec
         sheet = simulated
     if made.thickness == 0:
         return Recipe(np.inf, 0.0, sheet)
+    if made.held:
+        wall = max(made.thickness, 0.5 * cell)
+        return Recipe(np.inf, wall, sheet, level=made.held.level, vessel=is_vessel(member))
     if made.modelled:
         thin = made.thickness < 0.99 * simulated and treatment.kind == "shell"
         return Recipe(0.0 if thin else np.inf, simulated, sheet)
@@ -102,10 +189,24 @@ def is_porous(member: Member, cell: float) -> bool:
     return member.size[0] < POROUS_CELLS * cell
 
 
+def how_held(made: Make) -> str:
+    """Say in words what is behind the wall."""
+    structure = made.structure
+    if made.held is None or structure.contents is None:
+        return ""
+    litres = f"{made.held.room * 1e3:.3g} l"
+    return (
+        f", around {made.held.mass:.3g} kg of {structure.contents.name} that take up "
+        f"{structure.fill:.0%} of {litres}"
+    )
+
+
 def how_filled(member: Member, made: Make, treatment: Treatment, cell: float) -> str:
     """Say in words what the fill is."""
     if treatment.kind == "foliage":
         return "leaves on springs"
+    if made.held:
+        return f"a wall {(made.thickness or made.sheet) * 1e3:.3g} mm thick{how_held(made)}"
     if member.volume == 0:
         return f"an open sheet, taken as {made.sheet * 1e3:.3g} mm thick"
     open_too = f", with open sheets {made.sheet * 1e3:.3g} mm thick" if member.sheet_area else ""

@@ -9,6 +9,7 @@ from corporeal.geometry.anatomy import convex_side, pieces
 from corporeal.geometry.filling import Filling, fill_body, fill_wall
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.rods import Rod, rings
+from corporeal.geometry.room import vessel_points
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import sample_surface, scatter
 from corporeal.geometry.survey import Anatomy, Member
@@ -31,6 +32,10 @@ class Recipe:
     """Centreline of a part that stands on rings of points."""
     thick: float = 0.0
     """Diameter that these stand for [m]."""
+    level: float = np.inf
+    """Above this height [m] there is matter in the wall only."""
+    vessel: bool = False
+    """Whether there is matter between the faces of the mesh too, up to its rim."""
 
 
 @dataclass(frozen=True)
@@ -88,6 +93,8 @@ def pack(
             )
         elif len(face.triangles) and not (lumps[0].part == member.part).any():
             lumps.append(_lump(fill_wall(face, spacing, 0.0, rng), member, sheet=False))
+        if recipe.vessel:
+            lumps.append(_poured(anatomy, member, recipe, spacing * (1 + coarse), rng))
         if member.sheet_area > 1e-3 * member.body_area:
             filling = fill_wall(member.sheet, spacing, _fitting(member.sheet, recipe.sheet), rng)
             lumps.append(_lump(filling, member, sheet=True))
@@ -111,6 +118,14 @@ def _lump(filling: Filling, member: Member, *, sheet: bool) -> Packing:
     return Packing(filling.points, volumes, np.full(n, member.part), np.full(n, sheet))
 
 
+def _poured(
+    anatomy: Anatomy, member: Member, recipe: Recipe, spacing: float, rng: np.random.Generator
+) -> Packing:
+    points = vessel_points(anatomy, member, spacing, rng)
+    points = points[points[:, 2] <= recipe.level]
+    return _lump(Filling(points, np.full(len(points), spacing**3)), member, sheet=False)
+
+
 def _bodies(
     anatomy: Anatomy,
     recipes: dict[int, Recipe],
@@ -125,9 +140,16 @@ def _bodies(
     shape, skin = anatomy.shape, anatomy.skin.shape
     full = FULL_DEPTH * spacing
     depth_of = {m.part: recipes[m.part].depth for m in anatomy.members}
+    wall_of = {m.part: recipes[m.part].wall for m in anatomy.members}
+    level_of = {m.part: recipes[m.part].level for m in anatomy.members}
+
+    def allowed(points: np.ndarray) -> np.ndarray:
+        part = anatomy.label(points)
+        limit, void = _look_up(part, depth_of), points[:, 2] > _look_up(part, level_of)
+        return np.where(void, _look_up(part, wall_of), limit)
 
     def deepest(points: np.ndarray) -> np.ndarray:
-        limit = _look_up(anatomy.label(points), depth_of)
+        limit = allowed(points)
         return np.minimum(limit, full) if coarse else limit
 
     near = fill_body(shape, skin, spacing, deepest, rng)
@@ -135,8 +157,7 @@ def _bodies(
     if coarse:
         deep = scatter(shape, 2 * spacing, rng)
         distance = skin.closest(deep)[0]
-        limit = _look_up(anatomy.label(deep), depth_of)
-        deep = deep[(distance > full) & (distance < limit)]
+        deep = deep[(distance > full) & (distance < allowed(deep))]
         points = np.concatenate([points, deep])
         volumes = np.concatenate([volumes, np.full(len(deep), 8 * spacing**3)])
     return Packing(points, volumes, anatomy.label(points), np.zeros(len(points), dtype=bool))

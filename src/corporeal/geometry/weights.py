@@ -10,7 +10,8 @@ from corporeal.geometry.filling import match_moments
 from corporeal.geometry.foliage import crown_volume
 from corporeal.geometry.make import Make, is_porous
 from corporeal.geometry.packing import Packing, reference
-from corporeal.geometry.survey import Anatomy
+from corporeal.geometry.shape import Shape
+from corporeal.geometry.survey import Anatomy, Member
 from corporeal.types import Treatment
 
 
@@ -48,37 +49,71 @@ def weigh(
     """Volume [m³] and simulated density [kg/m³] of every point of an object.
 
     A thickened wall keeps the treatment's density, so its volume follows from its mass; a solid
-    keeps its true volume; foliage fills its crown's. A rigid part's masses are adjusted to its true
-    centre and inertia.
+    keeps its true volume; foliage fills its crown's; what is filled is as dense in the middle as
+    its contents. A rigid part's masses are adjusted to its true centre and inertia.
     """
     volume, density = np.zeros(len(packing.points)), np.ones(len(packing.points))
     rng = np.random.default_rng(4)
     for member in anatomy.members:
         made, treatment = makes[member.part], treatments[member.part]
         own = np.flatnonzero(packing.part == member.part)
-        thickened = treatment.kind == "shell" and not (
-            made.thickness > 0 and not made.modelled and is_porous(member, cell)
-        )
-        mass = _shared(packing.volumes[own], packing.sheet[own], made)
+        points, volumes = packing.points[own], packing.volumes[own]
+        mass = _shared(volumes, packing.sheet[own], made)
+        if made.held:
+            mass = _around(member, points, volumes, made, cell)
         if treatment.kind == "rigid":
-            one_face = made.thickness if not made.modelled else 0.0
-            body, sheets = reference(anatomy, member, one_face, rng)
-            wanted = np.concatenate([body, sheets])
-            weights = np.concatenate(
-                [
-                    np.full(len(body), made.body_mass / max(len(body), 1)),
-                    np.full(len(sheets), made.sheet_mass / max(len(sheets), 1)),
-                ]
-            )
-            mass = match_moments(packing.points[own], mass, wanted, weights)
-        whole = mass.sum() / treatment.density if thickened else made.volume
-        if treatment.kind == "deformable" and treatment.density < 0.999 * mass.sum() / whole:
-            whole = mass.sum() / treatment.density  # a rod thicker than in life
-        if treatment.kind == "foliage":
-            whole = crown_volume(packing.points[own], cell)
-        density[own] = mass.sum() / whole
+            mass = match_moments(points, mass, *_truth(anatomy, member, made, rng))
+        if made.held:
+            density[own] = mass / (made.volume * volumes / volumes.sum())
+        elif treatment.kind == "foliage":
+            density[own] = mass.sum() / crown_volume(points, cell)
+        else:
+            density[own] = mass.sum() / _takes_up(member, made, treatment, mass.sum(), cell)
         volume[own] = mass / density[own]
     return volume, density
+
+
+def _takes_up(member: Member, made: Make, treatment: Treatment, mass: float, cell: float) -> float:
+    """Volume of a part as simulated [m³]: what is thickened takes up more than in life."""
+    thickened = treatment.kind == "shell" and not (
+        made.thickness > 0 and not made.modelled and is_porous(member, cell)
+    )
+    thin = treatment.kind == "deformable" and treatment.density < 0.999 * mass / made.volume
+    return mass / treatment.density if thickened or thin else made.volume
+
+
+def _truth(
+    anatomy: Anatomy, member: Member, made: Make, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "M 3"], Float[np.ndarray, " M"]]:
+    """Points spread as a part's matter truly is, and their masses [kg]."""
+    one_face = made.thickness if not made.modelled else 0.0
+    body, sheets = reference(anatomy, member, one_face, rng)
+    groups = [(body, made.body_mass), (sheets, made.sheet_mass)]
+    groups += [(made.held.lies, made.held.mass)] if made.held else []
+    weights = [np.full(len(p), mass / max(len(p), 1)) for p, mass in groups]
+    return np.concatenate([p for p, _ in groups]), np.concatenate(weights)
+
+
+def _around(
+    member: Member,
+    points: Float[np.ndarray, "N 3"],
+    volumes: Float[np.ndarray, " N"],
+    made: Make,
+    cell: float,
+) -> Float[np.ndarray, " N"]:
+    """Give points next to the surface the wall's mass, and those below the level what lies there.
+
+    A solid's own points make up the wall's layer; it is at least half a cell deep.
+    """
+    assert made.held is not None
+    faces = [m for m in (member.body, member.sheet) if len(m.triangles)]
+    depth = np.min([Shape(m).closest(points)[0] for m in faces], axis=0)
+    wall = depth <= max(made.thickness, made.sheet, 0.5 * cell, depth.min())
+    low = points[:, 2] <= max(made.held.level, points[:, 2].min())
+    mass = np.zeros(len(points))
+    for these, total in ((wall, made.body_mass + made.sheet_mass), (low, made.held.mass)):
+        mass[these] += total * volumes[these] / volumes[these].sum()
+    return np.maximum(mass, 1e-6 * made.mass / len(mass))
 
 
 def _shared(volumes: np.ndarray, sheet: np.ndarray, made: Make) -> np.ndarray:

@@ -10,7 +10,7 @@ from corporeal.geometry.contact_points import contact_points
 from corporeal.geometry.exposure import cross_section, faces
 from corporeal.geometry.falls import drop_heights
 from corporeal.geometry.foliage import leaves_of, root_of, swinging
-from corporeal.geometry.make import Make, decide, how_filled, recipe
+from corporeal.geometry.make import Make, compose, how_filled, recipe
 from corporeal.geometry.packing import Packing, Recipe, pack
 from corporeal.geometry.rods import Rod, rod_of
 from corporeal.geometry.survey import Anatomy, Member, survey
@@ -42,7 +42,7 @@ def fill(
     """Turn meshes into material points, choosing resolution and treatment on the way."""
     anatomies = examine(scene, parts, config.seed)
     makes = {
-        m.part: decide(m, field.structures[m.part], field.materials[m.part], field.words[m.part])
+        m.part: compose(a, m, field, np.random.default_rng([config.seed, m.part, 5]))
         for a in anatomies
         for m in a.members
     }
@@ -168,7 +168,7 @@ def resolve(
     geometries = {
         m.part: PartGeometry(
             object=number,
-            material=field.materials[m.part],
+            material=replace(field.materials[m.part], density=makes[m.part].density),
             structure=makes[m.part].structure,
             size=(max(m.size[0], makes[m.part].sheet), m.size[1], m.size[2]),
             volume=makes[m.part].volume,
@@ -358,6 +358,5 @@ def describe(
     for k, entry in enumerate(parts.catalogue):
         made, count = makes[k], int((part == k).sum())
         what = how_filled(members[k], made, chosen.treatments[k], chosen.cell)
-        mass = made.body_mass + made.sheet_mass
-        sentences.append(f"{entry.name}: {what}; {count:,} particles, {mass:.3g} kg.")
+        sentences.append(f"{entry.name}: {what}; {count:,} particles, {made.mass:.3g} kg.")
     return tuple(sentences)

@@ -10,7 +10,7 @@ import yaml
 
 from corporeal.errors import BadFileError
 
-KEYS = ("material", "structure", "thickness_mm", "values")
+KEYS = ("material", "structure", "thickness_mm", "contents", "fill", "values")
 EXAMPLE = "For example: 'duck_0: soft_PVC', or 'duck_0: { material: soft_PVC, thickness_mm: 2 }'."
 
 
@@ -20,9 +20,13 @@ class Annotation:
 
     material: str | None = None
     structure: str | None = None
-    """"solid" or "shell"."""
+    """"solid", "shell" or "filled"."""
     thickness: float | None = None
     """[m]"""
+    contents: str | None = None
+    """What is behind the wall."""
+    fill: float | None = None
+    """Share of the room there that it takes up, above 0 and up to 1."""
     values: dict[str, float] = field(default_factory=dict)
     """Spelt as in the library, unit in the key: ``{"young_MPa": 5}``."""
 
@@ -83,17 +87,39 @@ def _annotation(path: Path, where: str, said: Any) -> Annotation:
     if strange:
         raise BadFileError(path, f"{where}: unknown key {strange[0]!r}.", f"Keys: {_list(KEYS)}.")
     structure = said.get("structure")
-    if structure not in (None, "solid", "shell"):
-        raise BadFileError(path, f"{where}: structure is {structure!r}.", "Say solid or shell.")
-    material = said.get("material")
-    if material is not None and not isinstance(material, str):
-        raise BadFileError(path, f"{where}: material must be a name, not {material!r}.", EXAMPLE)
-    thickness = said.get("thickness_mm")
-    if thickness is not None:
-        thickness = _number(path, f"{where}: thickness_mm", thickness) * 1e-3
-        if thickness <= 0:
-            raise BadFileError(path, f"{where}: thickness_mm must be above 0.")
-    return Annotation(material, structure, thickness, _values(path, where, said.get("values")))
+    if structure not in (None, "solid", "shell", "filled"):
+        options = "Say solid, shell or filled."
+        raise BadFileError(path, f"{where}: structure is {structure!r}.", options)
+    for key in ("material", "contents"):
+        if said.get(key) is not None and not isinstance(said[key], str):
+            raise BadFileError(path, f"{where}: {key} must be a name, not {said[key]!r}.", EXAMPLE)
+    thickness = _thickness(path, where, said.get("thickness_mm"))
+    return Annotation(
+        material=said.get("material"),
+        structure=structure,
+        thickness=thickness,
+        contents=said.get("contents"),
+        fill=_fill(path, where, said.get("fill")),
+        values=_values(path, where, said.get("values")),
+    )
+
+
+def _thickness(path: Path, where: str, said: Any) -> float | None:
+    if said is None:
+        return None
+    thickness = _number(path, f"{where}: thickness_mm", said) * 1e-3
+    if thickness <= 0:
+        raise BadFileError(path, f"{where}: thickness_mm must be above 0.")
+    return thickness
+
+
+def _fill(path: Path, where: str, said: Any) -> float | None:
+    if said is None:
+        return None
+    fill = _number(path, f"{where}: fill", said)
+    if not 0 < fill <= 1:
+        raise BadFileError(path, f"{where}: fill is a share: above 0 and up to 1, not {said!r}.")
+    return fill
 
 
 def _values(path: Path, where: str, said: Any) -> dict[str, float]:

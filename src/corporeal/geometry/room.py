@@ -1,0 +1,112 @@
+"""The room behind a wall: how much goes in, and where contents lie that do not fill it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from corporeal.geometry.anatomy import Build
+from corporeal.geometry.shape import Shape
+from corporeal.geometry.survey import Anatomy, Member
+
+COUNT = 20_000
+"""Points thrown into a vessel's box to measure how much goes in."""
+ROUND = 12
+"""Level directions that are looked into."""
+
+
+@dataclass(frozen=True)
+class Room:
+    """What is behind one part's wall."""
+
+    points: Float[np.ndarray, "N 3"]
+    """Evenly in it [m]."""
+    volume: float
+    """[m³]"""
+
+    def level(self, fill: float) -> float:
+        """Height [m] below which the share ``fill`` of the room lies; inf: all of it."""
+        if fill >= 1 or not len(self.points):
+            return np.inf
+        return float(np.quantile(self.points[:, 2], fill))
+
+
+def is_vessel(member: Member) -> bool:
+    """Whether the room lies between the faces of the mesh instead of behind all of them."""
+    return member.build is not Build.BODY or member.volume == 0
+
+
+def room_of(anatomy: Anatomy, member: Member, thickness: float, rng: np.random.Generator) -> Room:
+    """Measure the room behind a wall.
+
+    Behind a closed outer surface it is all that lies deeper than the wall; a vessel's reaches up to
+    its rim.
+
+    Args:
+        anatomy: The object.
+        member: The part with the wall.
+        thickness: Of the wall [m].
+        rng: Source of the probes.
+
+    """
+    if is_vessel(member):
+        box = np.prod(np.ptp(corners_of(member), axis=0))
+        points = within(anatomy, member, box_points(member, COUNT, rng))
+        wall = member.sheet_area * thickness
+        return Room(points, max(float(box) * len(points) / COUNT - wall, 0.0))
+    probes = anatomy.probes[anatomy.part_of_probe == member.part]
+    deep = member.shape.closest(probes)[0] > thickness
+    wall = min(member.body_area * thickness, member.volume)
+    return Room(probes[deep] if deep.any() else probes, member.volume - wall)
+
+
+def vessel_points(
+    anatomy: Anatomy, member: Member, spacing: float, rng: np.random.Generator
+) -> Float[np.ndarray, "N 3"]:
+    """Fill a vessel up to its rim: one point per spacing³ [m]."""
+    box = float(np.prod(np.ptp(corners_of(member), axis=0)))
+    count = int(np.clip(box / spacing**3, 1, 5_000_000))
+    return within(anatomy, member, box_points(member, count, rng))
+
+
+def corners_of(member: Member) -> Float[np.ndarray, "N 3"]:
+    """Every corner of a part [m]."""
+    return np.concatenate([m.corners.reshape(-1, 3) for m in (member.body, member.sheet)])
+
+
+def box_points(
+    member: Member, count: int, rng: np.random.Generator
+) -> Float[np.ndarray, "count 3"]:
+    """Points at random in a part's upright box [m]."""
+    corners = corners_of(member)
+    low, high = corners.min(axis=0), corners.max(axis=0)
+    return low + rng.uniform(0, 1, (count, 3)) * (high - low)
+
+
+def within(
+    anatomy: Anatomy, member: Member, points: Float[np.ndarray, "N 3"]
+) -> Float[np.ndarray, "N 3"]:
+    """Keep the points that a level liquid could reach without running over the rim.
+
+    Those outside the matter with the part's faces below and, but for one crack, all around.
+    """
+    if anatomy.shape is not None:
+        points = points[~anatomy.shape.inside(points)]
+    faces = [m for m in (member.body, member.sheet) if len(m.triangles)]
+    shapes = [Shape(m) for m in faces]
+    points = points[blocked(shapes, points, np.array([0.0, 0.0, -1.0]))]
+    turns = 2 * np.pi * np.arange(ROUND) / ROUND
+    around = np.zeros(len(points), dtype=np.int64)
+    for turn in turns:
+        around += blocked(shapes, points, np.array([np.cos(turn), np.sin(turn), 0.0]))
+    return points[around >= ROUND - 1]
+
+
+def blocked(
+    shapes: list[Shape], points: Float[np.ndarray, "N 3"], direction: Float[np.ndarray, "3"]
+) -> Bool[np.ndarray, " N"]:
+    """Whether something lies that way."""
+    found = np.zeros(len(points), dtype=bool)
+    for shape in shapes:
+        found |= shape.hit(points, np.tile(direction, (len(points), 1))) >= 0
+    return found
