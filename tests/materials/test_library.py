@@ -1,13 +1,14 @@
 import re
 from math import sqrt
 
+import numpy as np
 import pytest
 
 from corporeal import materials
 from corporeal.errors import OutOfRangeError, UnknownChoiceError, UserError
 from corporeal.materials.contact import pairs
 from corporeal.materials.shipped import source_table
-from corporeal.types import Ground, Law
+from corporeal.types import Ground, Law, MaterialField, Part, Parts, PartWords, Structure
 
 LIBRARIES = ["default", "reference"]
 
@@ -162,3 +163,14 @@ def test_containers_hold_what_kitchens_and_workshops_hold():
     order = "flakes biscuits powder granules water sauce"
     density = [materials.find(n).ranges["density"].typical for n in order.split()]
     assert density == sorted(density)
+
+
+def test_what_is_inside_is_in_materials_json_with_its_grounds():
+    tin, soup = (materials.find(n).pick(materials.find(n).typical()) for n in ("steel", "sauce"))
+    made = Structure("filled", 2e-4, "said", contents=soup, fill=0.9)
+    words, one = PartWords("can", "steel", "filled"), np.ones((2, 2))
+    field = MaterialField((tin,), (made,), (words,), one, one)
+    parts = Parts(np.zeros(1, int), np.zeros(1, int), np.ones(1), (Part("can", 0, "node"),))
+    said = materials.materials_json(field, parts)["parts"][0]["structure"]
+    assert (said["contents"], said["fill"]) == ("sauce", 0.9)
+    assert said["contents_values"]["density"]["range"] == [1000, 1250]

@@ -1,7 +1,7 @@
 import pytest
 
-from corporeal.stages.report import si, simulated
-from corporeal.types import Treatment
+from corporeal.stages.report import built, si, simulated
+from corporeal.types import Law, Material, Structure, Treatment
 
 
 @pytest.mark.parametrize(
@@ -31,3 +31,9 @@ def test_the_real_stiffness_stands_beside_the_simulated_one():
     assert simulated(treated("rigid", 1e9)) == "rigid"
     assert simulated(treated("deformable", 1e9)) == "1 GPa (as real)"
     assert simulated(treated("shell", 1e6)) == "1 MPa (0.001 × real)"
+
+
+def test_what_is_inside_is_told_with_how_it_is_built():
+    soup = Material("soup", Law.NEO_HOOKEAN, 300.0, 0.49, 1050.0)
+    assert built(Structure("filled", 2e-4, contents=soup, fill=0.9)) == "filled with soup"
+    assert built(Structure("shell", 2e-4)) == "shell"

@@ -86,9 +86,18 @@ def _part_json(part: Part, material: Material, made: Structure, words: PartWords
         "margin": words.margin,
         "reason": words.reason,
         "law": material.law.name.lower(),
-        "structure": {"kind": made.kind, "thickness": made.thickness, "reason": made.reason},
+        "structure": _structure_json(made),
         "values": {name: _ground_json(name, g) for name, g in material.grounds.items()},
     }
+
+
+def _structure_json(made: Structure) -> dict:
+    said: dict = {"kind": made.kind, "thickness": made.thickness, "reason": made.reason}
+    if made.contents is not None:
+        inner = made.contents
+        said |= {"contents": inner.name, "fill": made.fill}
+        said["contents_values"] = {name: _ground_json(name, g) for name, g in inner.grounds.items()}
+    return said
 
 
 def _ground_json(name: str, ground: Ground) -> dict:

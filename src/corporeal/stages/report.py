@@ -23,6 +23,7 @@ from corporeal.types import (
     Push,
     Scene,
     SceneObject,
+    Structure,
     Treatment,
     Wind,
 )
@@ -179,11 +180,18 @@ def _part_row(story: Story, k: int) -> str:
         f"{material.density:.4g}",
         yields,
         f"{story.particles.mass_real[k]:.3g}",
-        _safe(story.field.structures[k].kind),
+        _safe(built(story.field.structures[k])),
         _safe(treatment.kind),
         simulated(treatment),
     )
     return "<tr>" + "".join(f'<td class="n">{c}</td>' for c in cells) + "</tr>"
+
+
+def built(structure: Structure) -> str:
+    """Say how a part is built, and what is in it."""
+    if structure.contents is None:
+        return structure.kind
+    return f"{structure.kind} with {structure.contents.name}"
 
 
 def simulated(treatment: Treatment) -> str:
@@ -201,6 +209,9 @@ def _grounds(story: Story, k: int) -> str:
     rows = "".join(
         _ground_row(name, ground) for name, ground in material.grounds.items() if name in UNITS
     )
+    inner = story.field.structures[k].contents
+    if inner is not None and "density" in inner.grounds:
+        rows += _ground_row("density", inner.grounds["density"], f" of the {inner.name} in it")
     fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
     return (
         f"<details><summary><b>{_safe(part.name)}</b> of "
@@ -212,8 +223,9 @@ def _grounds(story: Story, k: int) -> str:
     )
 
 
-def _ground_row(name: str, ground: Ground) -> str:
+def _ground_row(name: str, ground: Ground, of: str = "") -> str:
     label, unit = UNITS[name]
+    label += _safe(of)
     low, high = ground.range.low, ground.range.high
     place = 0.5 if high <= low else min(max((ground.value - low) / (high - low), 0), 1)
     bar = f'<div class="bar"><i style="left:{place:.1%}"></i></div>'
@@ -248,7 +260,9 @@ def _audit_table(audit: Mapping[str, Any]) -> str:
 
 
 def _sources(story: Story) -> str:
-    used = sorted({g.range.source for m in story.field.materials for g in m.grounds.values()})
+    held = [s.contents for s in story.field.structures if s.contents is not None]
+    known = [*story.field.materials, *held]
+    used = sorted({g.range.source for m in known for g in m.grounds.values()})
     items = (f"<dt>{_safe(k)}</dt><dd>{_safe(story.sources.get(k, k))}</dd>" for k in used)
     return "".join(items)
 
