@@ -10,6 +10,7 @@ from corporeal.mpm.frames import read_trajectory
 from corporeal.mpm.outcome import outcome
 from corporeal.pipeline import FOLDERS, Settings
 from corporeal.showcase.expectations import dent_from_impact, expect
+from corporeal.stages.assemble import AssembleConfig
 from corporeal.stages.simulate import SimulateConfig
 from corporeal.store import DATA, load, read_json
 
@@ -18,6 +19,8 @@ CELL_APART = 1.0
 """Bodies whose surfaces are farther apart than this have parted [cells]."""
 GLUED = 1.5
 """A quadratic spline reaches so far: what is nearer moves with the same nodes [cells]."""
+LONG_ENOUGH = 0.7
+"""The control is slow: until then it has long shown what it must [s]."""
 
 
 @pytest.fixture(scope="module")
@@ -25,10 +28,12 @@ def story(tmp_path_factory):
     """Simulate a scene of the showcase, once; return its outcome, audit and gaps [cells]."""
 
     @cache
-    def told(name, contact):
+    def told(name, contact, duration=None):
         folder = tmp_path_factory.mktemp(f"{name}-{contact}")
         scene = pipeline.write_showcase(name, folder / "input")
-        settings = Settings(simulate=SimulateConfig(contact=contact))
+        settings = Settings(
+            assemble=AssembleConfig(duration=duration), simulate=SimulateConfig(contact=contact)
+        )
         silent = lambda verb: lambda fraction, words: None  # noqa: E731
         pipeline.run([scene], folder, settings, silent, until="simulate")
         simulated = folder / FOLDERS["simulate"]
@@ -76,11 +81,11 @@ def test_on_a_single_grid_the_vase_sticks_to_the_ball(story):
 
     A single field knows no pairs, so its booked contacts say nothing: the gaps over time do.
     """
-    happened, audit, gap = story("vase-ball-armchair", "single")
+    _, audit, gap = story("vase-ball-armchair", "single", LONG_ENOUGH)
     assert audit["nan_count"] == audit["particles_out_of_domain"] == 0
-    vase_to_ball, ball_to_chair = gap[:, 0, 1], gap[:, 1, 2]
+    vase_to_ball = gap[:, 0, 1]
     met = int(np.argmax(vase_to_ball < CELL_APART))
     assert met > 0, "the vase comes within a cell of the ball"
     assert np.all(vase_to_ball[met:] < GLUED), "and never leaves it again"
-    assert np.all(ball_to_chair > GLUED), "so that the ball does not reach the armchair"
-    assert not all(seen("vase-ball-armchair", happened).values())
+    apart = story("vase-ball-armchair", "multi")[2][len(vase_to_ball) - 1, 0, 1]
+    assert apart > 2 * GLUED, "while with separate fields they have parted by then"
