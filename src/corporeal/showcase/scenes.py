@@ -67,8 +67,7 @@ def duck_on_mud() -> Composition:
     The duck brings 0.9 J. Its foot, some 28 cm² once it has flattened a little, is carried by mud
     of cohesion c = 0.7 kPa with about 6.5 c (Prandtl's bearing capacity at φ = 5°), 13 N, and by
     the mud's inertia, ρ v², which at first is more. The mud flows and keeps an imprint of a
-    centimetre or two. What the duck's wall has stored throws it off again, by a few centimetres:
-    this mud does not stick.
+    few centimetres, in which the duck tips over and comes to rest on its beak.
     """
     duck = Placed("rubber_duck", (0.0, 0.0, 0.245), (2, -3, 10), fallen(1.2, 0.155))
     return Composition(
