@@ -13,8 +13,6 @@ from corporeal.mpm.problem import Problem
 from corporeal.mpm.springs import longest_step
 from corporeal.types import Law
 
-FORGETTING = 0.1
-"""κ: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
 STRESSLESS = 5.0
 """Law of a rigid body's particles in a shared field."""
 MOST = int(layout.MOST)
@@ -239,8 +237,7 @@ def _materials(
     rows[:, layout.CONE] = np.where(sand, cone_slope(angle), 0.0)
     rows[:, layout.APEX] = np.where(sand, apex, 0.0)
     rows[:, layout.VISCOSITY] = m.viscosity[chosen]
-    rate = FORGETTING * m.memory_speed[chosen] / problem.cell
-    rows[:, layout.FORGET] = np.minimum(rate, 1e30)
+    rows[:, layout.FORGET] = np.minimum(m.forgetting[chosen], 1e30)
     rows[:, layout.DENSITY] = m.mass[chosen] / m.volume[chosen]
     rows[:, layout.SLOWING] = slowing(m, problem.cell)[chosen]
     rows[:, layout.BODY], rows[:, layout.SWELLS] = m.body[chosen], m.swells[chosen]

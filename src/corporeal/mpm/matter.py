@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm import elasticity, plasticity, rigid
 from corporeal.mpm.problem import Problem
+from corporeal.mpm.stability import forgetting_rate
 from corporeal.types import Law
 
 PLASTIC_LAWS = (Law.DRUCKER_PRAGER.value, Law.VON_MISES.value)
@@ -32,8 +33,9 @@ class Matter:
     rigid: Bool[np.ndarray, " P"]
     wave_speed: Float[np.ndarray, " P"]
     """Longitudinal wave speed at rest [m/s]; 0 where rigid."""
-    memory_speed: Float[np.ndarray, " P"]
-    """Fastest wave among all that share the particle's field [m/s]; inf where APIC is kept."""
+    forgetting: Float[np.ndarray, " P"]
+    """Rate at which what the grid cannot see is forgotten [1/s]: one for all that share the
+    particle's field, or momentum would not be kept; inf where APIC is kept."""
     swells: Bool[np.ndarray, " P"]
     """Whether pressure comes from the mean swelling around: in fields all stiff in bulk."""
     total: Float[np.ndarray, " B"]
@@ -61,10 +63,11 @@ class Matter:
         stiff = np.array([b.rigid for b in bodies])[body]
         wave = np.where(stiff, 0.0, np.sqrt((lam + 2.0 * mu) / density))
         affine = stiff | (problem.transfer == "apic") | (mu == 0.0)
-        remembered = np.where(affine, np.inf, wave)
+        dry = (law == Law.DRUCKER_PRAGER.value) & (gathered("cohesion") == 0.0)
+        pull = float(np.linalg.norm(problem.gravity))
+        forgets = np.where(affine, np.inf, forgetting_rate(wave, dry, pull, problem.cell))
         field = np.zeros_like(body) if problem.contact == "single" else body
-        # Momentum is kept only if all that share a field forget at one rate.
-        fastest = np.array([remembered[field == f].max() for f in range(field.max() + 1)])
+        fastest = np.array([forgets[field == f].max() for f in range(field.max() + 1)])
         bulky = elasticity.is_stiff_in_bulk(law, np.asarray(mu), np.asarray(lam)) & ~stiff
         bulky = np.array([bulky[field == f].all() for f in range(field.max() + 1)])
         masses = [rigid.mass_of(b.position, b.volume * b.density, b.volume) for b in bodies]
@@ -83,7 +86,7 @@ class Matter:
             viscosity=gathered("viscosity"),
             rigid=stiff,
             wave_speed=wave,
-            memory_speed=fastest[field],
+            forgetting=fastest[field],
             swells=bulky[field],
             total=np.array([m.total for m in masses]),
             centre=centre,

@@ -23,8 +23,6 @@ from corporeal.mpm.stencil import Stencil, stencil
 from corporeal.mpm.swelling import relief
 from corporeal.types import Vector
 
-FORGETTING = 0.1
-"""κ: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
 RIGID_COURANT = 0.05
 """Largest fraction of a cell that a rigid body may cross in one step."""
 FALL = 0.1
@@ -179,14 +177,14 @@ class ReferenceEngine:
         """Gather what the particle's own field says, and remember what the grid cannot see.
 
         v_p = S v_new + a (v_p - S v_old);  C_p = ∇v_new + a (C_p - ∇v_old);
-        x_p += dt S v_new;  F ← (1 + dt ∇v_new) F;  a = 1 - min(1, κ c_b dt/dx), 0 for APIC.
+        x_p += dt S v_new;  F ← (1 + dt ∇v_new) F;  a = 1 - min(1, rate dt), 0 for APIC.
 
         Returns:
             The state after it, and the energy that viscosity took [J].
 
         """
-        m, state, cell = self.matter, self.state, self.problem.cell
-        forget = np.minimum(1.0, FORGETTING * m.memory_speed * dt / cell)
+        m, state = self.matter, self.state
+        forget = np.minimum(1.0, m.forgetting * dt)
         keep = 1.0 - forget
         both = np.hstack([new, old])
         v, v_old = np.split(grid.gather(both), 2, axis=1)

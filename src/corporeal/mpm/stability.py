@@ -3,11 +3,20 @@
 from collections.abc import Sequence
 from math import inf, log, sqrt
 
+import numpy as np
+from jaxtyping import Bool, Float
+
 COURANT = 0.4
 """Fraction of a cell that a wave may cross in one step; the default of ``Problem.courant``."""
 
 POISSON_LIMIT = 0.49
 """Nearly incompressible bodies are simulated at this Poisson's ratio, with their true μ."""
+
+FORGETTING = 0.1
+"""κ: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
+
+SETTLING = 0.5
+"""Dry grains forget so often in the time √(dx/g) in which they fall half a cell."""
 
 
 def p_wave_speed(young: float, poisson: float, density: float) -> float:
@@ -53,6 +62,26 @@ def stable_step(wave: float, motion: float, cell: float, courant: float = COURAN
     """
     speed = wave + motion
     return courant * cell / speed if speed > 0 else inf
+
+
+def forgetting_rate(
+    wave: Float[np.ndarray, " P"], dry: Bool[np.ndarray, " P"], pull: float, cell: float
+) -> Float[np.ndarray, " P"]:
+    """Rate at which matter forgets the velocities that its grid cannot see [1/s].
+
+    κ c/dx: what rings, rings away within some passages of its waves. Dry grains do not ring, and
+    the stiffness of a grain must not tell how far a heap flows: ½ √(g/dx) for them (decision 6).
+
+    Args:
+        wave: Wave speed c [m/s].
+        dry: Which is granular matter without cohesion.
+        pull: Strength g of gravity [m/s²]; without any, grains forget as the others do.
+        cell: dx [m].
+
+    """
+    rings = FORGETTING * wave / cell
+    settles = SETTLING * sqrt(pull / cell) if pull > 0 else inf
+    return np.where(dry, np.minimum(rings, settles), rings)
 
 
 def yield_speed(yield_stress: float | None, wave: float, density: float) -> float:

@@ -7,10 +7,9 @@ from corporeal.mpm.bond import around, densities
 from corporeal.mpm.kernels import BOND, ID, MA, MATERIAL, MT, NC, VE, VO
 from corporeal.mpm.plasticity import SMALLEST_ANGLE, cone_slope
 from corporeal.mpm.problem import Body, Problem
+from corporeal.mpm.stability import forgetting_rate
 from corporeal.types import Law
 
-FORGETTING = 0.1
-"""κ: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
 PLASTIC_LAWS = (Law.DRUCKER_PRAGER.value, Law.VON_MISES.value)
 STRESSLESS = 5.0
 """Law of a rigid body's particles in a shared field."""
@@ -26,7 +25,7 @@ def materials(problem: Problem, bodies: list[int]) -> tuple[np.ndarray, np.ndarr
     """Different materials of some bodies: table, each particle's row in it, the row's body.
 
     Columns: law, μ, λ [Pa], σ_y [Pa], H [Pa], cone slope α, apex strain p₀/K, η [Pa s],
-    forgetting rate κ c_b/dx [1/s], ρ [kg/m³], this step's push [m/s] (3).
+    forgetting rate [1/s], ρ [kg/m³], this step's push [m/s] (3).
     """
     rows = np.concatenate([_rows(problem, problem.bodies[b], b) for b in bodies])
     # Momentum is kept only if all that share a field forget at one rate.
@@ -57,7 +56,7 @@ def _rows(problem: Problem, body: Body, number: int) -> np.ndarray:
         rows[:, 1], rows[:, 9] = STRESSLESS, 1e30
         return rows
     mu, lam = (np.asarray(value) for value in elasticity.lame(body.young, body.poisson))
-    fastest = np.sqrt(np.max((lam + 2.0 * mu) / body.density))
+    wave = np.sqrt((lam + 2.0 * mu) / body.density)
     angle = np.maximum(body.friction_angle, SMALLEST_ANGLE)
     sand = body.law == Law.DRUCKER_PRAGER.value
     rows[:, 1], rows[:, 2], rows[:, 3] = body.law, mu, lam
@@ -66,7 +65,9 @@ def _rows(problem: Problem, body: Body, number: int) -> np.ndarray:
     rows[sand, 7] = (body.cohesion / np.tan(angle))[sand] / (lam + 2.0 * mu / 3.0)[sand]
     rows[:, 8] = body.viscosity
     affine = (problem.transfer == "apic") | (body.young == 0.0)
-    rows[:, 9] = np.where(affine, 1e30, FORGETTING * fastest / problem.cell)
+    pull = float(np.linalg.norm(problem.gravity))
+    rate = forgetting_rate(wave, sand & (body.cohesion == 0.0), pull, problem.cell)
+    rows[:, 9] = np.where(affine, 1e30, rate)
     return rows
 
 
