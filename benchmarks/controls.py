@@ -8,9 +8,7 @@ capped``). The pictures of the three stand side by side; ``--docs`` keeps them f
 """
 
 import argparse
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import matplotlib
 import numpy as np
@@ -18,54 +16,25 @@ import numpy as np
 matplotlib.use("Agg")
 from matplotlib import pyplot
 from matplotlib.axes import Axes
+from stories import Told, tell
 
-from corporeal import pipeline
-from corporeal.mpm.frames import read_trajectory
-from corporeal.mpm.outcome import outcome
 from corporeal.mpm.shape import rigid_fit
-from corporeal.pipeline import FOLDERS, Settings
+from corporeal.pipeline import Settings
 from corporeal.stages.fill import FillConfig
 from corporeal.stages.simulate import SimulateConfig
-from corporeal.store import DATA, load
-from corporeal.types import Particles, Scene, Trajectory
 
 PICTURE = Path(__file__).parents[1] / "docs" / "images" / "controls.png"
 COLOURS = {"corporeal": "#1f6f8b", "single field": "#c8553d", "capped stiffness": "#8a8a3c"}
 
 
-@dataclass(frozen=True)
-class Told:
-    """One run of a scene."""
-
-    scene: Scene
-    particles: Particles
-    film: Trajectory
-
-
-def tell(
-    name: str,
-    folder: Path,
-    contact: Literal["multi", "single"] = "multi",
-    stiffness: Literal["true", "capped"] = "true",
-) -> Told:
-    """Simulate a scene of the showcase; what lies there already is used again."""
-    scene = pipeline.write_showcase(name, folder / "input")
-    settings = Settings(
-        fill=FillConfig(stiffness=stiffness), simulate=SimulateConfig(contact=contact)
-    )
-    silent = lambda verb: lambda fraction, words: None  # noqa: E731
-    pipeline.run([scene], folder, settings, silent, until="simulate")
-    made = [load(folder / FOLDERS[verb] / DATA) for verb in ("assemble", "fill")]
-    scene_made, particles = made
-    return Told(scene_made, particles, read_trajectory(folder / FOLDERS["simulate"]))
-
-
 def variants(name: str, folder: Path) -> dict[str, Told]:
     """Run a scene as it should be, and both controls."""
+    single = Settings(simulate=SimulateConfig(contact="single"))
+    capped = Settings(fill=FillConfig(stiffness="capped"))
     return {
-        "corporeal": tell(name, folder / name),
-        "single field": tell(name, folder / f"{name}-single", contact="single"),
-        "capped stiffness": tell(name, folder / f"{name}-capped", stiffness="capped"),
+        "corporeal": tell(name, folder / name, Settings()),
+        "single field": tell(name, folder / f"{name}-single", single),
+        "capped stiffness": tell(name, folder / f"{name}-capped", capped),
     }
 
 
@@ -104,8 +73,7 @@ def draw_dents(axes: Axes, told: dict[str, Told]) -> None:
 def draw_gaps(axes: Axes, told: dict[str, Told], pair: tuple[int, int], title: str) -> None:
     """Draw the distance between two objects over time."""
     for name, run in told.items():
-        gap = run.film.ledger["gap"][:, pair[0], pair[1]] / run.particles.cell
-        axes.plot(run.film.time, gap, color=COLOURS[name], label=name, lw=2)
+        axes.plot(run.film.time, run.gap(*pair), color=COLOURS[name], label=name, lw=2)
     axes.axhline(1.0, color="black", lw=0.8, ls=":")
     axes.annotate("parted: more than one cell", (0.0, 1.0), fontsize=8, va="bottom")
     axes.set(title=title, xlabel="time [s]", ylabel="gap [cells]")
@@ -114,7 +82,7 @@ def draw_gaps(axes: Axes, told: dict[str, Told], pair: tuple[int, int], title: s
 def say(name: str, told: dict[str, Told]) -> None:
     """Print the numbers behind the figure."""
     for variant, run in told.items():
-        seen = outcome(run.scene, run.particles, run.film)
+        seen = run.outcome
         if name == "duck-on-can":
             can = seen["objects"]["soda_can_0"]
             place = can["dent_from_contact_m"].get("rubber_duck_0")

@@ -4,15 +4,12 @@ from functools import cache
 
 import numpy as np
 import pytest
+from stories import tell
 
-from corporeal import pipeline
-from corporeal.mpm.frames import read_trajectory
-from corporeal.mpm.outcome import outcome
-from corporeal.pipeline import FOLDERS, Settings
-from corporeal.showcase.expectations import dent_from_impact, expect
+from corporeal.pipeline import Settings
+from corporeal.showcase.expectations import dent_from_impact
 from corporeal.stages.assemble import AssembleConfig
 from corporeal.stages.simulate import SimulateConfig
-from corporeal.store import DATA, load, read_json
 
 pytestmark = pytest.mark.slow
 CELL_APART = 1.0
@@ -25,41 +22,30 @@ LONG_ENOUGH = 0.7
 
 @pytest.fixture(scope="module")
 def story(tmp_path_factory):
-    """Simulate a scene of the showcase, once; return its outcome, audit and gaps [cells]."""
+    """Simulate a scene of the showcase, once."""
 
     @cache
     def told(name, contact, duration=None):
-        folder = tmp_path_factory.mktemp(f"{name}-{contact}")
-        scene = pipeline.write_showcase(name, folder / "input")
         settings = Settings(
             assemble=AssembleConfig(duration=duration), simulate=SimulateConfig(contact=contact)
         )
-        silent = lambda verb: lambda fraction, words: None  # noqa: E731
-        pipeline.run([scene], folder, settings, silent, until="simulate")
-        simulated = folder / FOLDERS["simulate"]
-        made = (load(folder / FOLDERS[verb] / DATA) for verb in ("assemble", "fill"))
-        film = read_trajectory(simulated)
-        audit = read_json(simulated / "audit.json")
-        return outcome(*made, film), audit, film.ledger["gap"] / audit["cell_m"]
+        return tell(name, tmp_path_factory.mktemp(f"{name}-{contact}"), settings)
 
     return told
 
 
-def seen(name, happened):
-    return {e.sentence: e.met for e in expect(name, happened)}
-
-
 @pytest.mark.parametrize("name", ["duck-on-can", "vase-ball-armchair"])
 def test_everything_that_must_be_seen_is_seen(story, name):
-    happened, audit, _ = story(name, "multi")
-    met = seen(name, happened)
-    assert all(met.values()), met
+    told = story(name, "multi")
+    met = {e.sentence: e.met for e in told.expectations()}
+    assert met and all(met.values()), met
+    audit = told.audit
     assert audit["nan_count"] == audit["particles_out_of_domain"] == 0
     assert audit["momentum_residual"] < 1e-4
 
 
 def test_the_can_keeps_a_dent_where_the_duck_struck_and_the_duck_recovers(story):
-    happened, *_ = story("duck-on-can", "multi")
+    happened = story("duck-on-can", "multi").outcome
     can, duck = (happened["objects"][f"{thing}_0"] for thing in ("soda_can", "rubber_duck"))
     assert can["dent_depth_dx"] > 1
     assert can["dent_from_contact_m"]["rubber_duck_0"] < duck["length_m"] / 3
@@ -69,7 +55,7 @@ def test_the_can_keeps_a_dent_where_the_duck_struck_and_the_duck_recovers(story)
 
 
 def test_vase_ball_and_armchair_touch_in_order_and_end_apart(story):
-    happened, *_ = story("vase-ball-armchair", "multi")
+    happened = story("vase-ball-armchair", "multi").outcome
     assert happened["order"] == [["vase_0", "ball_0"], ["ball_0", "armchair_0"]]
     for pair in ("vase_0|ball_0", "ball_0|armchair_0"):
         assert happened["pairs"][pair]["separated"]
@@ -81,11 +67,11 @@ def test_on_a_single_grid_the_vase_sticks_to_the_ball(story):
 
     A single field knows no pairs, so its booked contacts say nothing: the gaps over time do.
     """
-    _, audit, gap = story("vase-ball-armchair", "single", LONG_ENOUGH)
-    assert audit["nan_count"] == audit["particles_out_of_domain"] == 0
-    vase_to_ball = gap[:, 0, 1]
+    glued = story("vase-ball-armchair", "single", LONG_ENOUGH)
+    assert glued.audit["nan_count"] == glued.audit["particles_out_of_domain"] == 0
+    vase_to_ball = glued.gap(0, 1)
     met = int(np.argmax(vase_to_ball < CELL_APART))
     assert met > 0, "the vase comes within a cell of the ball"
     assert np.all(vase_to_ball[met:] < GLUED), "and never leaves it again"
-    apart = story("vase-ball-armchair", "multi")[2][len(vase_to_ball) - 1, 0, 1]
+    apart = story("vase-ball-armchair", "multi").gap(0, 1)[len(vase_to_ball) - 1]
     assert apart > 2 * GLUED, "while with separate fields they have parted by then"

@@ -1,0 +1,59 @@
+"""Simulate a scene of the showcase and give back what happened; shared by programs and tests."""
+
+from dataclasses import dataclass
+from functools import cached_property
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal import pipeline
+from corporeal.mpm.frames import read_trajectory
+from corporeal.mpm.outcome import outcome
+from corporeal.pipeline import FOLDERS, Settings
+from corporeal.showcase.expectations import Expectation, expect
+from corporeal.store import DATA, META, load, read_json
+from corporeal.types import Particles, Scene, Trajectory
+
+
+@dataclass(frozen=True)
+class Told:
+    """One run of a scene, up to and with its simulation."""
+
+    name: str
+    scene: Scene
+    particles: Particles
+    film: Trajectory
+    audit: dict[str, Any]
+    seconds: float
+    """Of simulating alone."""
+
+    @cached_property
+    def outcome(self) -> dict[str, Any]:
+        """Who met whom, who was dented where, who bounced how high."""
+        return outcome(self.scene, self.particles, self.film)
+
+    def expectations(self) -> list[Expectation]:
+        """Compare what happened with what must be seen."""
+        return expect(self.name, self.outcome)
+
+    def gap(self, first: int, second: int) -> Float[np.ndarray, " F"]:
+        """Distance between two objects at every frame [cells]."""
+        return self.film.ledger["gap"][:, first, second] / self.particles.cell
+
+
+def tell(name: str, folder: Path, settings: Settings) -> Told:
+    """Simulate a scene of the showcase; what lies in ``folder`` already is used again."""
+    scene = pipeline.write_showcase(name, folder / "input")
+    silent = lambda verb: lambda fraction, words: None  # noqa: E731
+    pipeline.run([scene], folder, settings, silent, until="simulate")
+    simulated = folder / FOLDERS["simulate"]
+    return Told(
+        name,
+        load(folder / FOLDERS["assemble"] / DATA),
+        load(folder / FOLDERS["fill"] / DATA),
+        read_trajectory(simulated),
+        read_json(simulated / "audit.json"),
+        read_json(simulated / META)["seconds"],
+    )
