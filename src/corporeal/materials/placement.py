@@ -1,0 +1,96 @@
+"""Which values of a part can be placed in their ranges, and what a placement comes to."""
+
+from collections.abc import Mapping
+from typing import Literal
+
+from corporeal.errors import UnknownChoiceError
+from corporeal.materials.consistency import contradictions
+from corporeal.materials.entry import Entry
+from corporeal.materials.library import counterpart, find, library
+from corporeal.materials.offer import Choice, choice
+from corporeal.materials.scale import fraction_of, place
+from corporeal.types import PartWords, Placement
+
+PLACED = (
+    "young",
+    "poisson",
+    "density",
+    "yield_stress",
+    "friction_angle",
+    "cohesion",
+    "shell_thickness",
+)
+"""Fields of ``Material`` that use and treatment decide; the others keep their usual value."""
+By = Literal["model", "recording"]
+CONTENTS = "contents_density"
+"""The density of what is inside: of the contents' material, placed with the wall's values."""
+
+
+def entry_of(name: str, library_name: str = "default") -> Entry:
+    """Look a material up; a smaller library gives what stands for it there."""
+    entries = library(library_name)
+    return entries[name] if name in entries else counterpart(find(name), library_name)
+
+
+def spelling(name: str, library_name: str, offered: list[str]) -> str | None:
+    """Return how a library spells a name that somebody gave, None where it is not offered."""
+    try:
+        found = find(name, library_name).name
+    except UnknownChoiceError:
+        return None
+    return found if found in offered else None
+
+
+def choices(words: PartWords, library_name: str = "default") -> dict[str, Choice]:
+    """Offer the quantities of a part that somebody may place; nothing where none is open."""
+    if words.material is None:
+        return {}
+    entry = entry_of(words.material, library_name)
+    walled = words.structure in ("shell", "filled") and words.thickness is None
+    fields = [f for f in PLACED if f in entry.ranges and (walled or f != "shell_thickness")]
+    offered = {f: choice(entry.name, f, entry.ranges[f]) for f in fields if f not in words.values}
+    if words.contents is not None:
+        inside = entry_of(words.contents, library_name)
+        offered[CONTENTS] = choice(inside.name, "density", inside.ranges["density"])
+    return {f: c for f, c in offered.items() if c.range.low < c.range.high}
+
+
+def from_fractions(
+    said: Mapping[str, tuple[float, str]], by: By, offered: Mapping[str, Choice]
+) -> dict[str, Placement]:
+    """Take fractions, each with its reason, as they are."""
+    return {f: Placement(x, by, why) for f, (x, why) in said.items() if f in offered}
+
+
+def from_values(
+    said: Mapping[str, tuple[float, str]], by: By, offered: Mapping[str, Choice]
+) -> dict[str, Placement]:
+    """Find the place of values, each in the unit that was offered and with its reason."""
+    placed = {}
+    for field, (value, why) in said.items():
+        r = offered[field].range
+        inside = min(max(value * offered[field].factor, r.low), r.high)  # a bound's last digit
+        placed[field] = Placement(fraction_of(r, inside), by, why)
+    return placed
+
+
+def usual(offered: Mapping[str, Choice], why: str) -> dict[str, Placement]:
+    """Place everything where it usually lies, because nobody could be asked."""
+    return {
+        f: Placement(fraction_of(c.range, c.range.typical), "fallback", why)
+        for f, c in offered.items()
+    }
+
+
+def odd(
+    words: PartWords, placements: Mapping[str, Placement], library_name: str = "default"
+) -> dict[str, str]:
+    """Say which of a part's values do not fit each other: field → why, in a clause."""
+    if words.material is None:
+        return {}
+    entry = entry_of(words.material, library_name)
+    values = {f: r.typical for f, r in entry.ranges.items()}
+    values |= {
+        f: place(r, placements[f].fraction) for f, r in entry.ranges.items() if f in placements
+    }
+    return contradictions(entry.group, entry.ranges, values | words.values)
