@@ -1,0 +1,112 @@
+"""Pictures of one object for somebody who is to recognise it and say what it is made of."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from corporeal.geometry.arrangement import box_of, moved
+from corporeal.render.camera import Camera, place
+from corporeal.render.embree import Light, Stage, identify, render
+from corporeal.types import Scene, Vector
+
+DIRECTIONS = 8
+"""Even set of views about the vertical, alternately low and high."""
+HEIGHTS = (0.25, 0.85)
+"""Tangent of the two angles above the horizon."""
+FILL = 0.9
+COLOURS: dict[str, Vector] = {
+    # name → linear RGB: far apart, and words that everybody has
+    "red": (0.80, 0.03, 0.03),
+    "blue": (0.03, 0.10, 0.80),
+    "yellow": (0.85, 0.65, 0.02),
+    "green": (0.03, 0.45, 0.06),
+    "magenta": (0.70, 0.04, 0.55),
+    "cyan": (0.03, 0.60, 0.65),
+    "orange": (0.85, 0.25, 0.02),
+    "white": (0.85, 0.85, 0.85),
+    "black": (0.02, 0.02, 0.02),
+    "brown": (0.20, 0.09, 0.03),
+    "pink": (0.90, 0.40, 0.50),
+    "grey": (0.22, 0.22, 0.22),
+}
+
+
+@dataclass(frozen=True)
+class Portrait:
+    """How an object is to be pictured."""
+
+    count: int = 4
+    """Views, out of the even set."""
+    size: int = 512
+    """Height and width [px]."""
+    seed: int = 0
+    """Chooses the views."""
+
+    @property
+    def words(self) -> str:
+        """Say in words how the pictures are taken."""
+        return f"{self.count} of {DIRECTIONS} views, {self.size} px, seed {self.seed}"
+
+
+def colour_of_part(parts: int) -> list[str]:
+    """Name a colour for each part, in order; parts beyond the last colour share it."""
+    names = list(COLOURS)
+    return [names[min(k, len(names) - 1)] for k in range(parts)]
+
+
+def portraits(
+    scene: Scene, part_of_surface: list[int | None], portrait: Portrait
+) -> tuple[np.ndarray, ...]:
+    """Picture an object alone from several sides, and once more with each part in its colour.
+
+    Args:
+        scene: Holds the object.
+        part_of_surface: For each surface of the scene, which of the object's parts it is, counted
+            from 0; None: it belongs to another object.
+        portrait: How many views, how large.
+
+    Returns:
+        (size, size, 3) uint8 each. The coloured picture comes last, where there are several parts.
+
+    """
+    stage, box, parts = _alone(scene, part_of_surface)
+    size = (portrait.size, portrait.size)
+    cameras = [place(box[None, None], size, view, FILL) for view in _directions(portrait)]
+    pictures = [render(stage, camera, "draft") for camera in cameras]
+    if parts.max(initial=0) > 0:
+        colours = np.array([COLOURS[c] for c in colour_of_part(1 + int(parts.max()))])
+        painted = stage.painted(colours[parts].astype(np.float32), Light())
+        pictures.append(
+            render(painted, max(cameras, key=lambda c: _shown(stage, c, parts)), "draft")
+        )
+    return tuple(pictures)
+
+
+def _shown(stage: Stage, camera: Camera, parts: np.ndarray) -> tuple[int, float]:
+    """How many parts a camera sees, and the share of the object that the least of them takes."""
+    seen, _ = identify(stage, camera)
+    share = np.bincount(parts[seen[seen >= 0]], minlength=int(parts.max()) + 1)
+    return int((share > 0).sum()), float(share.min() / max(share.sum(), 1))
+
+
+def _alone(scene: Scene, part_of_surface: list[int | None]) -> tuple[Stage, np.ndarray, np.ndarray]:
+    """Stand the object on the floor by itself: stage, box (2, 3) [m], part of each triangle."""
+    kept = [k for k, part in enumerate(part_of_surface) if part is not None]
+    surfaces = tuple(scene.surfaces[k] for k in kept)
+    box = box_of(surfaces)
+    foot = np.array([*box.mean(axis=0)[:2], box[0, 2]])
+    alone = moved(replace(scene, surfaces=surfaces), -foot)
+    parts = np.repeat(
+        np.array([part_of_surface[k] for k in kept], dtype=int),
+        [len(s.triangles) for s in surfaces],
+    )
+    return Stage(alone), box - foot, parts
+
+
+def _directions(portrait: Portrait) -> list[Vector]:
+    """Choose views from the even set, in order round the object."""
+    random = np.random.default_rng(portrait.seed)
+    chosen = sorted(random.permutation(DIRECTIONS)[: portrait.count].tolist())
+    angles = [2 * np.pi * k / DIRECTIONS for k in chosen]
+    heights = [HEIGHTS[k % 2] for k in chosen]
+    return [(float(np.cos(a)), float(np.sin(a)), h) for a, h in zip(angles, heights, strict=True)]
