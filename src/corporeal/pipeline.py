@@ -50,6 +50,8 @@ FOLDERS = {
 }
 VERBS = tuple(FOLDERS)
 RUN = "run.json"
+WRITTEN = ("record",)
+"""Settings that name what is written, not what is read."""
 RESULTS = ("film.mp4", "report.html", "materials.json", "audit.json", "fields.png", "strip.png")
 
 
@@ -124,7 +126,8 @@ def _config(default: Any, said: dict) -> Any:
 
 def _read_files(config: Any) -> list[str]:
     """Name the content of every file that a configuration points to."""
-    values = [str(getattr(config, f.name)) for f in fields(config)] if config else []
+    named = [f.name for f in fields(config) if f.name not in WRITTEN] if config else []
+    values = [str(getattr(config, name)) for name in named]
     paths = [Path(value.removeprefix("replay:")) for value in values if value]
     return [store.digest(path) for path in paths if path.exists()]
 
@@ -205,7 +208,7 @@ class _Run:
     def _do(self, verb: str) -> None:
         config = getattr(self.settings, verb, None)
         before = [self.key] if self.key else [store.digest(p) for p in self._files()]
-        self.key = store.key(verb, config, before + _read_files(config))
+        self.key = store.key(verb, config, before + _read_files(config) + self._borrowed(verb))
         folder = self.folder / FOLDERS[verb]
         step = getattr(self, f"_{verb}")
         if store.fresh(folder, self.key):
@@ -218,6 +221,13 @@ class _Run:
         self.made[verb] = step(folder, self.tell(verb))
         self.seconds[verb] = time.perf_counter() - start
         store.finish(folder, self.key, config, self.seconds[verb])
+
+    def _borrowed(self, verb: str) -> list[str]:
+        """Name what a verb takes from another verb's settings."""
+        if verb != "describe":
+            return []
+        library = self.settings.ground.library
+        return [library, *(store.digest(p) for p in [Path(library)] if p.exists())]
 
     def _files(self) -> list[Path]:
         missing = [str(p) for p in self.inputs if not p.exists()]
@@ -254,7 +264,9 @@ class _Run:
 
     def _describe(self, folder: Path, progress: Progress) -> Any:
         progress(0.0, "recognising")
-        return self._keep(folder, describe(self.made["assemble"], self.settings.describe))
+        scene, library = self.made["assemble"], self.settings.ground.library
+        made = describe(scene, self.settings.describe, library, progress)
+        return self._keep(folder, made)
 
     def _segment(self, folder: Path, progress: Progress) -> Parts:
         progress(0.0, "finding parts")
@@ -288,6 +300,7 @@ class _Run:
         started = time.perf_counter()
         names = ("assemble", "segment", "fill", "ground", "simulate", "film")
         scene, parts, particles, made, trajectory, movie = (self.made[v] for v in names)
+        inventory = self.made["describe"]
         fields_figure(scene, parts, made, self.folder / "fields.png")
         progress(0.5, "drawing the figures")
         strip(movie, self.folder / "strip.png")
@@ -301,8 +314,10 @@ class _Run:
             "seconds": self.seconds | {"total": sum(self.seconds.values())},
             "peak_memory_mb": peak_memory_mb(),
             "settings": _spoken(self.settings),
+            "questions": inventory.usage,
         }
-        said = (scene.warnings, doubts(made, parts, scene), particles.warnings, audit["warnings"])
+        said = (scene.warnings, inventory.warnings, doubts(made, parts, scene))
+        said = (*said, particles.warnings, audit["warnings"])
         audit["warnings"] = list(dict.fromkeys(w for group in said for w in group))
         shutil.copyfile(movie.path, self.folder / "film.mp4")
         store.write_json(self.folder / "audit.json", audit)

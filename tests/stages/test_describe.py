@@ -1,22 +1,19 @@
+import json
+import re
 import sys
 
 import numpy as np
 import pytest
 
+from corporeal import materials
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.geometry.identity import identify
-from corporeal.stages.describe import (
-    DescribeConfig,
-    MaterialsAnswer,
-    PartAnswer,
-    describe,
-    question,
-)
+from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.ground import ground
 from corporeal.stages.segment import segment
 from corporeal.vlm.metadata import matter_hint
-from corporeal.vlm.recordings import record
 from handmade import plain, scene
+from oracle import Oracle, decomposed, everywhere, part, sizes, whole
 
 VINYL = {"substance": "soft_PVC", "shell_thickness_m": 0.002}
 DUCK = ("duck_0", [("body", plain("vinyl"), VINYL), ("beak", plain("vinyl"), {**VINYL, "x": 1})])
@@ -114,49 +111,262 @@ def test_an_annotation_that_does_not_fit_is_refused(tmp_path):
         describe(scene(VASE), config)
 
 
-def recorded(tmp_path, made, *answers):
-    identity = identify(made, matter_hint)
-    for number, answer in enumerate(answers):
-        asked = question(made, number, identity)
-        record(tmp_path, asked, MaterialsAnswer(parts=answer), "some-model")
-    return DescribeConfig(vlm=f"replay:{tmp_path}")
+# ---------------------------------------------------------------- a model's answers
 
 
-def test_a_recorded_answer_is_believed_before_the_names(tmp_path):
-    made = scene(VASE, THING)
-    config = recorded(
-        tmp_path,
-        made,
-        [PartAnswer(part="vase", material="glass", structure="shell", thickness_mm=3)],
-        [PartAnswer(part="thing", material=None)],
-    )
-    inventory = describe(made, config)
+@pytest.fixture
+def ask(monkeypatch):
+    """Describe a scene with an oracle in the model's place."""
+
+    def asked(oracle, *objects, name="hand-made", library="default", **config):
+        settings = DescribeConfig(**({"vlm": "oracle:1", "view_size": 32} | config))
+        with monkeypatch.context() as patched:
+            patched.setattr("corporeal.stages.describe.connect", lambda spec: oracle)
+            return describe(scene(*objects, name=name), settings, library)
+
+    return asked
+
+
+def replay(folder):
+    return DescribeConfig(vlm=f"replay:{folder}", view_size=32)
+
+
+def made_of(*parts):
+    return {"parts": list(parts)}
+
+
+def test_a_model_is_believed_before_the_names_and_unknown_leaves_them_the_word(ask):
+    answers = {
+        "hand-made/vase_0": made_of(part("vase", "glass", "shell")),
+        "hand-made/thing_0": made_of(part("thing", None, None)),
+        "hand-made/bucket_0": made_of(part("bucket", None, None)),
+    }
+    bucket = ("bucket_0", [("steel", plain(), {})])
+    oracle = Oracle(materials=lambda q: answers[q.scene])
+    inventory = ask(oracle, VASE, THING, bucket)
     said = words(inventory)
     vase = said[("vase_0", "vase")]
-    assert (vase.material, vase.answered_by, vase.thickness) == ("glass", "recording", 0.003)
+    assert (vase.material, vase.answered_by, vase.structure) == ("glass", "model", "shell")
+    assert vase.margin == 0.7
     assert said[("thing_0", "thing")].answered_by == "unknown"
-    assert [t["scene"] for t in inventory.transcript] == ["hand-made/vase_0", "hand-made/thing_0"]
+    assert said[("bucket_0", "bucket")].material == "steel"
+    assert [(t["task"], t["scene"]) for t in inventory.transcript] == [
+        ("parts", "hand-made/vase_0"),
+        ("materials", "hand-made/vase_0"),
+        ("placement", "hand-made/vase_0"),
+        ("parts", "hand-made/thing_0"),
+        ("materials", "hand-made/thing_0"),
+        ("parts", "hand-made/bucket_0"),
+        ("materials", "hand-made/bucket_0"),
+        ("placement", "hand-made/bucket_0"),
+        ("extents", "hand-made"),
+    ]
 
 
-def test_the_question_offers_the_whole_library_and_nothing_else():
-    made = scene(VASE)
-    prompt = question(made, 0, identify(made, matter_hint)).prompt
-    assert "seat_foam" in prompt
-    assert "Parts: vase." in prompt
+def test_the_question_offers_the_whole_library_in_use_and_nothing_else(ask):
+    oracle = Oracle(materials=made_of(part("vase", "ceramic")))
+    ask(oracle, VASE, library="reference")
+    question = next(q for q in oracle.asked if q.task == "materials")
+    offered = re.findall(r"[\w-]+", " ".join(question.lists["materials"].splitlines()))
+    assert set(materials.library("reference")) <= set(offered)
+    assert "seat_foam" not in question.text
+    assert "Parts: vase" in question.text
 
 
-def test_a_recording_of_something_else_is_refused(tmp_path):
-    made = scene(VASE)
-    strange = recorded(tmp_path, made, [PartAnswer(part="lid", material="glass")])
-    with pytest.raises(UserError, match="speaks of a part 'lid'"):
-        describe(made, strange)
+def test_pictures_are_taken_as_they_are_announced(ask):
+    oracle = Oracle(materials=made_of(part("body", "soft_PVC"), part("beak", "soft_PVC")))
+    inventory = ask(oracle, DUCK, views=3, view_size=32, view_seed=5)
+    (asked,) = (q for q in oracle.asked if q.task == "materials")
+    assert [p.shape for p in asked.pictures] == [(32, 32, 3)] * 4
+    assert len({p.tobytes() for p in asked.pictures}) == 4
+    assert "in 4 pictures" in asked.text
+    assert "beak (blue in the last picture)" in asked.text
+    assert asked.views == "3 of 8 views, 32 px, seed 5"
+    (row,) = (r for r in inventory.transcript if r["task"] == "materials")
+    assert row["views"] == asked.views
+    assert all(not q.pictures for q in oracle.asked if q.task in ("placement", "extents"))
+
+
+def test_the_critic_chooses_among_ways_of_taking_apart_and_shares_become_pieces(ask):
+    oracle = Oracle(
+        parts=decomposed(["hammer"], ["head", "handle"]),
+        ranking={"ranking": [{"number": 2, "reason": "Two."}, {"number": 1, "reason": "One."}]},
+        materials=made_of(
+            part("head", "steel", volume_share=0.25, surface_share=0.31),
+            part("handle", "hardwood", volume_share=0.73, surface_share=0.69),
+        ),
+    )
+    inventory = ask(oracle, ("hammer_0", [("mesh", plain(), {})]))
+    (hammer,) = inventory.objects[0].parts
+    assert (hammer.name, hammer.material, hammer.volume_share) == ("hammer", "hardwood", 1.0)
+    assert [p.name for p in hammer.pieces] == ["head", "handle"]
+    assert sum(p.volume_share for p in hammer.pieces) == pytest.approx(1.0)
+    assert hammer.pieces[0].volume_share == pytest.approx(0.25 / 0.98)
+    assert hammer.pieces[0].placements["yield_stress"].fraction == 0.25
+    assert hammer.placements == hammer.pieces[1].placements
+    assert oracle.tasks() == ["parts", "ranking", "materials", "placement", "extents"]
+    options = inventory.transcript[0]["answer"]["decompositions"]
+    assert [len(d["parts"]) for d in options] == [1, 2]
+
+
+def test_known_parts_are_not_asked_for(ask):
+    oracle = Oracle(materials=made_of(part("body", "soft_PVC"), part("beak", "ABS")))
+    ask(oracle, DUCK)
+    assert oracle.tasks() == ["materials", "placement", "extents"]
+
+
+def test_what_is_filled_has_contents_whose_density_is_placed_too(ask):
+    can = part("can", "aluminium_can_sheet", "filled", contents="water", fill=0.95)
+    inventory = ask(Oracle(materials=made_of(can)), ("can_0", [("mesh", plain(), {})]))
+    (said,) = inventory.objects[0].parts
+    assert (said.structure, said.contents, said.fill) == ("filled", "water", 0.95)
+    assert set(said.placements) >= {"contents_density", "shell_thickness", "yield_stress"}
+
+
+def test_a_silent_model_leaves_usual_values_that_are_marked_and_told(ask):
+    oracle = Oracle(materials=made_of(part("vase", "glass", "shell")), placement=None, extents=None)
+    inventory = ask(oracle, VASE)
+    (vase,) = inventory.objects[0].parts
+    assert {p.chosen_by for p in vase.placements.values()} == {"fallback"}
+    assert len(inventory.warnings) == 2
+    assert "placement got no usable answer (the oracle is silent)" in inventory.warnings[0]
+    dumb = ask(Oracle(materials=None, placement=None, extents=None), THING)
+    assert dumb.objects[0].parts[0].answered_by == "unknown"
+    assert "materials got no usable answer" in dumb.warnings[0]
+
+
+def test_values_may_be_asked_for_and_become_the_same_places(ask):
+    def values(question):
+        return {
+            "parts": [
+                {
+                    "part": "vase",
+                    "values": [
+                        {"quantity": q, "value": float(low), "reason": "Lowest."}
+                        for q, low in re.findall(
+                            r"^- (\w+): [^:]+: ([\d.e+-]+) to", question.text, flags=re.MULTILINE
+                        )
+                    ],
+                }
+            ]
+        }
+
+    oracle = Oracle(materials=made_of(part("vase", "glass", "shell")), placement=values)
+    (vase,) = ask(oracle, VASE, sampling="value").objects[0].parts
+    assert set(vase.placements) >= {"young", "density", "shell_thickness"}
+    assert {p.fraction for p in vase.placements.values()} == {0.0}
+
+
+def test_values_that_do_not_fit_each_other_are_asked_for_once_more(ask):
+    def hard_but_weak(question):
+        said = everywhere(0.0)(question)
+        for value in said["parts"][0]["values"]:
+            value["fraction"] = 1.0 if value["quantity"] == "young" else 0.0
+        return said
+
+    clay = made_of(part("thing", "plasticine"))
+    stubborn = Oracle(materials=clay, placement=hard_but_weak)
+    (said,) = ask(stubborn, THING).objects[0].parts
+    assert stubborn.tasks().count("placement") == 2
+    again = [q for q in stubborn.asked if q.task == "placement"][1]
+    assert "stiff but weak: yield_stress/young is 0.005" in again.text
+    assert (said.placements["young"].fraction, said.placements["yield_stress"].fraction) == (1, 0)
+    persuaded = Oracle(materials=clay, placement=[hard_but_weak, everywhere(0.5)])
+    (said,) = ask(persuaded, THING).objects[0].parts
+    assert {p.fraction for p in said.placements.values()} == {0.5}
+
+
+def test_a_size_far_from_what_the_model_knows_is_told(ask):
+    inventory = ask(Oracle(materials=made_of(part("vase", "glass")), extents=sizes(0.3)), VASE)
+    assert inventory.objects[0].usual_extent == 0.3
+    assert "--extent vase_0=0.3" in inventory.warnings[0]
+    close = ask(Oracle(materials=made_of(part("vase", "glass")), extents=sizes(0.5)), VASE)
+    assert close.warnings == ()
+
+
+def test_tokens_and_seconds_are_added_up_and_an_unknown_price_is_not_guessed(ask):
+    usage = ask(Oracle(materials=made_of(part("vase", "glass"))), VASE).usage
+    assert (usage["questions"], usage["calls"], usage["models"]) == (4, 4, ["oracle:1"])
+    assert (usage["input_tokens"], usage["output_tokens"]) == (4000, 400)
+    assert (usage["seconds"], usage["dollars"]) == (2.0, None)
+
+
+def test_recorded_answers_replay_without_the_model_and_without_pictures(ask, tmp_path):
+    oracle = Oracle(materials=made_of(part("vase", "glass", "shell")))
+    told = ask(oracle, VASE, record=tmp_path)
+    assert len(list(tmp_path.glob("*.json"))) == 4
+    again = describe(scene(VASE), replay(tmp_path))
+    (vase,), (old,) = again.objects[0].parts, told.objects[0].parts
+    assert (vase.material, vase.answered_by) == ("glass", "recording")
+    assert vase.placements["young"].fraction == old.placements["young"].fraction
+    assert {p.chosen_by for p in vase.placements.values()} == {"recording"}
+    assert again.usage["calls"] == 0
     with pytest.raises(UserError, match="differs in 'scene'"):
-        describe(scene(VASE, name="another"), strange)
+        describe(scene(VASE, name="another"), replay(tmp_path))
 
 
-def test_a_live_model_is_refused_with_what_to_use_instead():
-    with pytest.raises(UserError, match="not connected"):
-        describe(scene(VASE), DescribeConfig(vlm="openai:gpt-5.4"))
+def test_a_recording_outlives_a_longer_library_and_not_a_word_that_is_gone(
+    ask, tmp_path, monkeypatch
+):
+    ask(Oracle(materials=made_of(part("vase", "porcelain"))), VASE, record=tmp_path)
+    replayed = replay(tmp_path)
+    monkeypatch.setattr(
+        "corporeal.stages.describe.substances_offered", lambda library: "- new: unobtainium"
+    )
+    assert words(describe(scene(VASE), replayed))[("vase_0", "vase")].material == "porcelain"
+    with pytest.raises(UserError, match="'porcelain' is not in the list of materials"):
+        describe(scene(VASE), replayed, library="reference")
+
+
+def test_questions_wait_for_a_person_and_go_on_with_their_answers(tmp_path):
+    config = DescribeConfig(vlm=f"ask:{tmp_path}", view_size=32)
+    answers = {
+        "parts": whole("vase"),
+        "materials": made_of(part("vase", "glass", "shell")),
+        "placement": None,
+        "extents": {"classes": [{"class_name": "vase", "metres": 1.0}]},
+    }
+    rounds = 0
+    while rounds < 5:
+        rounds += 1
+        try:
+            inventory = describe(scene(VASE), config)
+            break
+        except UserError as waits:
+            assert "wait" in str(waits)
+        for page in (tmp_path / "questions").glob("*.md"):
+            file = page.with_suffix(".json")
+            task = next(t for t in answers if f"-{t}-" in page.name)
+            assert page.with_suffix(".png").exists() == (task in ("parts", "materials"))
+            if file.read_text() == "":
+                said = answers[task] or everywhere_by_hand(page.read_text())
+                file.write_text(f"```json\n{json.dumps(said)}\n```")
+    assert rounds == 4
+    assert words(inventory)[("vase_0", "vase")].material == "glass"
+    assert words(describe(scene(VASE), replay(tmp_path))) == words(inventory)
+
+
+def everywhere_by_hand(page):
+    quantities = re.findall(r"^- (\w+): ", page, flags=re.MULTILINE)
+    values = [
+        {"quantity": q, "fraction": 0.5, "reason": "Middle."} for q in quantities if q != "vase"
+    ]
+    return {"parts": [{"part": "vase", "values": values}]}
+
+
+def test_a_wrong_answer_by_hand_is_explained_on_its_page(tmp_path):
+    config = DescribeConfig(vlm=f"ask:{tmp_path}", view_size=32)
+    with pytest.raises(UserError, match="2 questions wait"):
+        describe(scene(VASE), config)
+    (page,) = (tmp_path / "questions").glob("*parts*.md")
+    page.with_suffix(".json").write_text(json.dumps(decomposed(["a", "b"], ["c", "d"])))
+    with pytest.raises(UserError, match="2 questions wait"):
+        describe(scene(VASE), config)
+    assert "does not fit:** Decompositions must differ" in page.read_text()
+    page.with_suffix(".json").write_text("{")
+    with pytest.raises(UserError, match="wait"):
+        describe(scene(VASE), config)
+    assert "Invalid JSON" in page.read_text()
 
 
 # ---------------------------------------------------------------- real objects

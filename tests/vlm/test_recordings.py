@@ -6,7 +6,7 @@ from pydantic import BaseModel
 
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.vlm import Question, Vlm, connect
-from corporeal.vlm.recordings import record
+from corporeal.vlm.recordings import Recorder, record
 
 ASKED = Question("materials", "What is it made of?", "scene/duck_0", "4 views, 512 px")
 
@@ -24,7 +24,7 @@ def test_a_recorded_answer_comes_back(tmp_path):
     record(tmp_path, ASKED, Colour(name="red"), "some-model")
     model = connect(f"replay:{tmp_path}")
     assert isinstance(model, Vlm)
-    assert model.ask(ASKED, Colour).name == "red"
+    assert model.ask(ASKED, Colour).answer.name == "red"
 
 
 def test_a_recording_does_not_go_stale_with_the_pictures(tmp_path):
@@ -32,7 +32,7 @@ def test_a_recording_does_not_go_stale_with_the_pictures(tmp_path):
     import numpy as np
 
     seen = replace(ASKED, pictures=(np.zeros((2, 2, 3), np.uint8),))
-    assert connect(f"replay:{tmp_path}").ask(seen, Colour).name == "red"
+    assert connect(f"replay:{tmp_path}").ask(seen, Colour).answer.name == "red"
 
 
 @pytest.mark.parametrize("field", ["task", "prompt", "scene", "views"])
@@ -66,15 +66,29 @@ def test_an_answer_that_does_not_fit_is_refused(tmp_path):
         connect(f"replay:{tmp_path}").ask(ASKED, Colour)
 
 
-@pytest.mark.parametrize("spec", ["openai:gpt-5.4", "ollama:llava", "anthropic:x"])
-def test_a_live_model_says_that_it_is_not_connected_and_what_to_use(spec):
-    with pytest.raises(UserError, match=r"not connected in this version.*replay:FOLDER"):
-        connect(spec)
+def test_lists_are_put_into_the_text_and_a_longer_one_does_not_make_an_answer_stale(tmp_path):
+    asked = replace(ASKED, prompt="One of: {names}.", lists={"names": "red, blue"})
+    assert asked.text == "One of: red, blue."
+    path = record(tmp_path, asked, Colour(name="red"), "some-model")
+    assert json.loads(path.read_text())["lists"] == {"names": "red, blue"}
+    longer = replace(asked, lists={"names": "red, blue, green"})
+    model = connect(f"replay:{tmp_path}")
+    assert model.ask(longer, Colour).answer.name == "red"
+    with pytest.raises(UserError, match="does not fit: no longer offered"):
+        model.ask(longer, Colour, lambda said: ["no longer offered"])
+
+
+def test_a_recorder_keeps_what_it_passes_on(tmp_path):
+    record(tmp_path / "old", ASKED, Colour(name="red"), "some-model")
+    recorder = Recorder(connect(f"replay:{tmp_path / 'old'}"), tmp_path / "new")
+    assert recorder.ask(ASKED, Colour).answer.name == "red"
+    again = connect(f"replay:{tmp_path / 'new'}").ask(ASKED, Colour)
+    assert (again.answer.name, again.by, again.model) == ("red", "recording", "some-model")
 
 
 def test_nobody_is_a_choice_and_an_unknown_name_shows_the_menu(tmp_path):
     assert connect("metadata") is None
-    with pytest.raises(UnknownChoiceError, match="Choose one of: metadata, replay"):
+    with pytest.raises(UnknownChoiceError, match="Choose one of: anthropic, ask, google, metadata"):
         connect("oracle")
     with pytest.raises(UserError, match="No folder of recordings"):
         connect(f"replay:{tmp_path}/nowhere")

@@ -1,17 +1,25 @@
 """Describe: say in words what is in the scene and what each part is made of."""
 
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, replace
+from functools import partial
+from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
-from pydantic import BaseModel, Field
-
 from corporeal import materials
-from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.errors import UnknownChoiceError
 from corporeal.geometry.identity import Identity, identify
-from corporeal.types import Inventory, ObjectWords, PartWords, Scene, Surface
-from corporeal.vlm import Question, Vlm, connect
+from corporeal.materials.offer import Choice, contents_offered, substances_offered
+from corporeal.materials.placement import choices, from_fractions, from_values, odd, spelling, usual
+from corporeal.render.portrait import Portrait, colour_of_part, portraits
+from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
+from corporeal.vlm import LIVE, Vlm, connect
 from corporeal.vlm.annotation import Annotation, read_annotations
+from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
+from corporeal.vlm.by_hand import all_answered
+from corporeal.vlm.cache import Cached
+from corporeal.vlm.interview import Interview, Offer, Subject
 from corporeal.vlm.metadata import (
     Evidence,
     matter_hint,
@@ -19,21 +27,11 @@ from corporeal.vlm.metadata import (
     stated_substance,
     stated_thickness,
 )
+from corporeal.vlm.recordings import Recorder
+from corporeal.vlm.together import together
+from corporeal.vlm.words import Asked, gathered, leaves, part_words, placed, usage, with_extents
 
-RECORDED_MARGIN = 0.7
-PROMPT = """What are the parts of this object made of?
-
-Object: {name} ({class_name}).
-Parts: {parts}.
-
-Answer for every part, with exactly these part names:
-- material: one name from the list below, or null when you cannot tell;
-- structure: "solid" when the material fills the part's shape, "shell" when it is only a wall \
-along its surface, or null when you cannot tell;
-- thickness_mm: the wall's thickness for a shell, else null;
-- reason: one sentence.
-
-Materials: {materials}."""
+TASKS = ("parts", "ranking", "materials", "placement", "extents")
 
 
 @dataclass(frozen=True)
@@ -43,56 +41,259 @@ class DescribeConfig:
     annotations: Path | None = None
     """YAML file that says what parts are made of; believed before anybody else."""
     vlm: str = "metadata"
-    """"metadata": names and materials in the file; "replay:FOLDER": recorded answers of a model."""
-
-
-class PartAnswer(BaseModel):
-    """A model's answer about one part."""
-
-    part: str
-    material: str | None
-    structure: Literal["solid", "shell"] | None = None
-    thickness_mm: float | None = Field(default=None, gt=0, lt=1e4, allow_inf_nan=False)
-    reason: str = ""
-
-
-class MaterialsAnswer(BaseModel):
-    """A model's answer about one object."""
-
-    parts: list[PartAnswer]
+    """"metadata": names and materials in the file. "openai:MODEL", "anthropic:MODEL",
+    "google:MODEL", "ollama:MODEL", or "openai:MODEL@http://host/v1" for any compatible server.
+    "ask:FOLDER": you answer. "replay:FOLDER": recorded answers."""
+    critic: str = ""
+    """Who ranks ways of taking an object apart; "": the same, or a cheaper model of OpenAI's."""
+    record: Path | None = None
+    """Folder where every answer is kept for --vlm replay:FOLDER."""
+    sampling: Literal["fraction", "value"] = "fraction"
+    """Ask for places inside the measured ranges, or for values, which are checked."""
+    views: int = 4
+    """Pictures of each object, out of 8 from all sides; one more shows its parts in colours."""
+    view_size: int = 512
+    """Their height and width [px]."""
+    view_seed: int = 0
+    """Chooses the views."""
+    parallel: int = 4
+    """Objects that a model is asked about at the same time."""
 
 
 DEFAULT = DescribeConfig()
+CRITIC = "openai:gpt-5-mini"
+Progress = Callable[[float, str], None]
 
 
-def describe(scene: Scene, config: DescribeConfig = DEFAULT) -> Inventory:
+def describe(
+    scene: Scene,
+    config: DescribeConfig = DEFAULT,
+    library: str = "default",
+    progress: Progress = lambda fraction, words: None,
+) -> Inventory:
     """Name every object's parts and their materials; the first that knows answers.
 
-    Annotation file, then recorded answers, then the file's own names, then unknown.
+    Annotation file, then the model (or its recorded answers), then the file's own names, then
+    unknown. A model is also asked where in the measured ranges each value lies, and how large
+    things usually are.
+
+    Args:
+        scene: What was assembled.
+        config: Whom to ask.
+        library: The library whose names and ranges a model is offered.
+        progress: Told the fraction done and what is being done.
 
     Raises:
-        UserError: An annotation or a recording does not fit the scene, or nobody can be asked.
+        UserError: An annotation or a recording does not fit the scene, nobody can be asked, or
+            questions wait for a person's answers.
 
     """
     identity = identify(scene, matter_hint)
     told = _annotations(scene, identity, config)
-    model = connect(config.vlm)
-    objects: list[ObjectWords] = []
-    transcript: list[dict] = []
-    for number, thing in enumerate(scene.objects):
-        parts = [k for k, p in enumerate(identity.catalogue) if p.object == number]
-        recorded = _ask(model, scene, number, identity, transcript) if model else {}
-        words = []
-        for part in parts:
-            name = identity.catalogue[part].name
-            from_file = _from_file(scene, identity, part)
-            answer = recorded.get(name, from_file)
-            words.append(_annotated(told.get((thing.name, name)), answer, config.annotations))
-        objects.append(ObjectWords(thing.name, thing.class_name, tuple(words)))
-    return Inventory(tuple(objects), tuple(transcript))
+    file = _file_words(scene, identity)
+    model = _connected(config.vlm, config)
+    if model is None:
+        objects = [
+            ObjectWords(thing.name, thing.class_name, tuple(_told(words, told, thing.name, config)))
+            for thing, words in zip(scene.objects, file, strict=True)
+        ]
+        return Inventory(tuple(objects))
+    critic = _connected(_critic(config), config) or model
+    asking = _Asking(scene, identity, config, library, model, critic)
+    return asking.inventory(file, told, progress)
+
+
+def _connected(spec: str, config: DescribeConfig) -> Vlm | None:
+    """Connect to whom ``spec`` names, with a cache for what is paid for, and a recorder."""
+    model = connect(spec)
+    if model is not None and spec.partition(":")[0] in LIVE:
+        model = Cached(model, spec, {})
+    return Recorder(model, Path(config.record)) if model and config.record else model
+
+
+def _critic(config: DescribeConfig) -> str:
+    theirs = config.vlm.startswith("openai:") and "@" not in config.vlm
+    return config.critic or (CRITIC if theirs else config.vlm)
+
+
+# ---------------------------------------------------------------- a model's answers
+
+
+class _Asking:
+    """One scene being asked about."""
+
+    def __init__(
+        self,
+        scene: Scene,
+        identity: Identity,
+        config: DescribeConfig,
+        library: str,
+        model: Vlm,
+        critic: Vlm,
+    ) -> None:
+        self.scene, self.identity, self.config, self.library = scene, identity, config, library
+        self.model, self.critic = model, critic
+        folder = files("corporeal.stages").joinpath("prompts")
+        self.prompts = {t: folder.joinpath(f"{t}.md").read_text(encoding="utf-8") for t in TASKS}
+        self.lists = {
+            "materials": substances_offered(library),
+            "contents": contents_offered(library),
+        }
+        self.names = Vocabulary(
+            partial(spelling, library_name=library, offered=materials.substances(library)),
+            partial(spelling, library_name=library, offered=materials.contents(library)),
+            lambda name: "shell_thickness" in materials.find(name, library).ranges,
+        )
+
+    def inventory(self, file: list, told: Mapping, progress: Progress) -> Inventory:
+        """Take the pictures, ask about every object, and about the sizes of all."""
+        count = len(self.scene.objects)
+        interviews = []
+        for number in range(count):
+            progress(0.5 * number / count, "taking pictures")
+            interviews.append(self._interview(number))
+        sizes = self._about(Subject(self.scene.name, self.scene.name, "", ""))
+        classes = list(dict.fromkeys(o.class_name or o.name for o in self.scene.objects))
+        jobs: list[Callable] = [
+            partial(self._object, number, interviews[number], file[number], told)
+            for number in range(count)
+        ]
+        results = together(
+            [*jobs, lambda: sizes.extents(classes)],
+            self.config.parallel,
+            lambda done: progress(0.5 + 0.5 * done / (count + 1), "asking"),
+        )
+        *objects, extents = all_answered(results, self.config.vlm)
+        interviews.append(sizes)
+        rows = tuple(row for interview in interviews for row in interview.transcript)
+        objects, doubts = with_extents(self.scene.objects, objects, extents)
+        warnings = [w for interview in interviews for w in interview.warnings]
+        return Inventory(tuple(objects), rows, usage(rows), (*warnings, *doubts))
+
+    def _about(self, subject: Subject) -> Interview:
+        return Interview(self.model, self.critic, self.prompts, subject)
+
+    def _names(self, number: int) -> list[str]:
+        return [p.name for p in self.identity.catalogue if p.object == number]
+
+    def _interview(self, number: int) -> Interview:
+        thing, parts = self.scene.objects[number], self._names(number)
+        portrait = Portrait(self.config.views, self.config.view_size, self.config.view_seed)
+        first = next(k for k, p in enumerate(self.identity.catalogue) if p.object == number)
+        own = [
+            int(part) - first if surface.object == number else None
+            for part, surface in zip(
+                self.identity.part_of_surface, self.scene.surfaces, strict=True
+            )
+        ]
+        return self._about(
+            Subject(
+                scene=f"{self.scene.name}/{thing.name}",
+                name=thing.name,
+                class_name=thing.class_name,
+                extent=_length(thing.real_extent),
+                views=portrait.words,
+                count=self.config.views + (len(parts) > 1),
+                pictures=portraits(self.scene, own, portrait) if self.model.looks else (),
+            )
+        )
+
+    def _object(
+        self, number: int, interview: Interview, file: list[PartWords], told: Mapping
+    ) -> ObjectWords:
+        """Ask everything about one object."""
+        thing, names = self.scene.objects[number], self._names(number)
+        pieces = names
+        if len(names) == 1:
+            taken = interview.parts()
+            pieces = [p.name for p in taken[0].parts] if taken else names
+            pieces = pieces if len(pieces) > 1 else names
+        words = self._materials(interview, names, pieces, file)
+        words = _told(words, told, thing.name, self.config)
+        words = self._placed(interview, words)
+        return ObjectWords(thing.name, thing.class_name, tuple(words))
+
+    def _materials(
+        self, interview: Interview, names: list[str], pieces: list[str], file: list[PartWords]
+    ) -> list[PartWords]:
+        shared = len(pieces) > len(names)
+        looks = {name: "" for name in pieces}
+        if len(names) > 1:
+            colours = zip(names, colour_of_part(len(names)), strict=True)
+            looks = {name: f"{colour} in the last picture" for name, colour in colours}
+        asked = interview.materials(looks, self.names, self.lists, shared)
+        if asked is None:
+            return file
+        words = part_words(*asked, self.names)
+        if len(names) == 1:
+            words = [gathered(names[0], words)]
+        said = {w.name: w for w in words}
+        known = zip(names, file, strict=True)
+        return [said[n] if said[n].material is not None else own for n, own in known]
+
+    def _placed(self, interview: Interview, words: list[PartWords]) -> list[PartWords]:
+        """Ask where in its measured range each open value of each part lies."""
+        parts = {leaf.name: leaf for leaf in leaves(words)}
+        offered = {name: choices(leaf, self.library) for name, leaf in parts.items()}
+        offered = {name: found for name, found in offered.items() if found}
+        if not offered:
+            return words
+
+        def problems(answer: Placed) -> list[str]:
+            return [
+                f"{name}: {clause}"
+                for name, places in _places(answer, "model", offered).items()
+                for clause in odd(parts[name], places, self.library).values()
+            ]
+
+        offers = {name: _offer(parts[name], found) for name, found in offered.items()}
+        shape = ValueAnswer if self.config.sampling == "value" else FractionAnswer
+        asked = interview.placement(offers, shape, problems)
+        if asked is None:
+            why = "The model gave no usable answer: the usual value."
+            places = {name: usual(found, why) for name, found in offered.items()}
+        else:
+            places = _places(*asked, offered)
+        return [placed(w, places) for w in words]
+
+
+def _length(metres: float) -> str:
+    return f"{metres:.3g} m" if 1 <= metres < 1000 else f"{100 * metres:.3g} cm"
+
+
+Placed = FractionAnswer | ValueAnswer
+Offered = Mapping[str, Mapping[str, Choice]]
+"""Part → quantity → what it can be."""
+
+
+def _offer(words: PartWords, offered: Mapping[str, Choice]) -> Offer:
+    made = [str(words.material), *([words.structure] if words.structure else [])]
+    if words.contents is not None:
+        made.append(f"{words.fill or 1.0:.0%} full of {words.contents}")
+    return Offer(
+        f"{words.name}: {', '.join(made)}",
+        {field: c.words for field, c in offered.items()},
+        {field: c.bounds for field, c in offered.items()},
+    )
+
+
+def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, Placement]]:
+    read = from_values if isinstance(answer, ValueAnswer) else from_fractions
+    return {
+        p.part: read({v.quantity: (v.number, v.reason) for v in p.values}, by, offered[p.part])
+        for p in answer.parts
+    }
 
 
 # ---------------------------------------------------------------- the file's own names
+
+
+def _file_words(scene: Scene, identity: Identity) -> list[list[PartWords]]:
+    """Return what the file tells of every part of every object."""
+    words: list[list[PartWords]] = [[] for _ in scene.objects]
+    for part, entry in enumerate(identity.catalogue):
+        words[entry.object].append(_from_file(scene, identity, part))
+    return words
 
 
 def _from_file(scene: Scene, identity: Identity, part: int) -> PartWords:
@@ -133,53 +334,6 @@ def _evidence(scene: Scene, identity: Identity, part: int, surfaces: list[Surfac
     )
 
 
-# ---------------------------------------------------------------- a model's recorded answers
-
-
-def question(scene: Scene, number: int, identity: Identity) -> Question:
-    """Put the question about one object's parts; its list of materials comes from the library."""
-    thing = scene.objects[number]
-    parts = [p.name for p in identity.catalogue if p.object == number]
-    prompt = PROMPT.format(
-        name=thing.name,
-        class_name=thing.class_name,
-        parts="; ".join(parts),
-        materials=", ".join(materials.library()),
-    )
-    return Question("materials", prompt, f"{scene.name}/{thing.name}")
-
-
-def _ask(
-    model: Vlm, scene: Scene, number: int, identity: Identity, transcript: list[dict]
-) -> dict[str, PartWords]:
-    asked = question(scene, number, identity)
-    answer = model.ask(asked, MaterialsAnswer)
-    transcript.append(
-        {"task": asked.task, "scene": asked.scene, "prompt": asked.prompt}
-        | {"answer": answer.model_dump()}
-    )
-    known = {p.name for p in identity.catalogue if p.object == number}
-    strange = [p.part for p in answer.parts if p.part not in known]
-    if strange:
-        raise UserError(
-            f"The recorded answer about {asked.scene!r} speaks of a part {strange[0]!r}. Its parts "
-            f"are: {', '.join(sorted(known))}. Record it again."
-        )
-    return {p.part: _recorded(p) for p in answer.parts if p.material is not None}
-
-
-def _recorded(answer: PartAnswer) -> PartWords:
-    return PartWords(
-        name=answer.part,
-        material=materials.find(str(answer.material)).name,
-        structure=answer.structure,
-        thickness=None if answer.thickness_mm is None else answer.thickness_mm * 1e-3,
-        answered_by="recording",
-        margin=RECORDED_MARGIN,
-        reason=answer.reason or "A model said so; the answer was recorded without a reason.",
-    )
-
-
 # ---------------------------------------------------------------- what a person says
 
 
@@ -195,6 +349,15 @@ def _annotations(
     return read_annotations(Path(config.annotations), names)
 
 
+def _told(
+    words: list[PartWords],
+    told: Mapping[tuple[str, str], Annotation],
+    thing: str,
+    config: DescribeConfig,
+) -> list[PartWords]:
+    return [_annotated(told.get((thing, w.name)), w, config.annotations) for w in words]
+
+
 def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> PartWords:
     """Let what a person said replace what was found; what they left open stays."""
     if said is None:
@@ -203,13 +366,23 @@ def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> 
     if said.material is not None:
         entry = materials.find(said.material)
         words = PartWords(words.name, entry.name, None, None, "annotation", 1.0, where)
-    structure = said.structure or ("shell" if said.thickness is not None else None)
-    if structure == "shell":
-        words = replace(words, structure="shell", thickness=said.thickness or words.thickness)
-    elif structure == "solid":
-        words = replace(words, structure="solid", thickness=None)
     values = {}
     for key, value in said.values.items():
         field, factor = materials.si(key)
         values[field] = value * factor
-    return replace(words, values=values)
+    return replace(_built(said, words), values=values)
+
+
+def _built(said: Annotation, words: PartWords) -> PartWords:
+    """Take over how a person says that a part is built."""
+    implied = "filled" if said.contents else "shell" if said.thickness is not None else None
+    structure = said.structure or implied
+    if structure is None:
+        return words
+    if structure == "solid":
+        return replace(words, structure="solid", thickness=None, contents=None, fill=None)
+    words = replace(words, structure=structure, thickness=said.thickness or words.thickness)
+    if structure == "shell":
+        return replace(words, contents=None, fill=None)
+    inside = materials.find(said.contents).name if said.contents else words.contents
+    return replace(words, contents=inside, fill=said.fill or words.fill)

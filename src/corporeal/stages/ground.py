@@ -1,19 +1,24 @@
 """Ground: turn a material's name into numbers, inside the range that somebody measured."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from corporeal import materials
 from corporeal.errors import UserError
 from corporeal.materials import Entry
+from corporeal.materials.consistency import contradictions
+from corporeal.materials.placement import CONTENTS
+from corporeal.materials.scale import place
 from corporeal.types import (
     Ground,
     Inventory,
+    Law,
     Material,
     MaterialField,
     Parts,
     PartWords,
+    Piece,
     Scene,
     Structure,
 )
@@ -32,6 +37,7 @@ class GroundConfig:
 
 
 DEFAULT = GroundConfig()
+UNFIT = "It does not fit the others:"
 NEUTRAL = (
     "Nobody knows what this part is made of. {name} stands in: the commonest moulded plastic, "
     "whose density and stiffness lie in the middle of what everyday solids have."
@@ -55,23 +61,32 @@ def ground(
     surfaces, bodies = [*entries, floor], [*made, floor.pick(floor.typical())]
     return MaterialField(
         materials=made,
-        structures=tuple(_structure(m, w) for m, w in zip(made, words, strict=True)),
+        structures=tuple(_structure(m, w, config) for m, w in zip(made, words, strict=True)),
         words=words,
         friction=_matrix(len(bodies), lambda a, b: _friction(surfaces, bodies, a, b)),
         restitution=_matrix(
             len(bodies), lambda a, b: materials.restitution_between(bodies[a], bodies[b])
         ),
+        pieces=tuple(tuple(_piece(p, config) for p in w.pieces) for w in words),
     )
 
 
 def doubts(field: MaterialField, parts: Parts, scene: Scene) -> tuple[str, ...]:
-    """Say, one sentence each, which parts' materials nobody knew."""
-    return tuple(
-        f"{scene.objects[part.object].name}: {part.name} is of unknown material; {material.name} "
-        "stands in. Say what it is with --annotations."
-        for part, material, words in zip(parts.catalogue, field.materials, field.words, strict=True)
-        if words.material is None
-    )
+    """Say, one sentence each, which materials nobody knew and which values are to be doubted."""
+    said = []
+    for part, material, words in zip(parts.catalogue, field.materials, field.words, strict=True):
+        where = f"{scene.objects[part.object].name}: {part.name}"
+        if words.material is None:
+            said.append(
+                f"{where} is of unknown material; {material.name} stands in. Say what it is with "
+                "--annotations."
+            )
+        said += [
+            f"{where}: {name} of {material.name}: {ground.reason[ground.reason.index(UNFIT) :]}"
+            for name, ground in material.grounds.items()
+            if UNFIT in ground.reason
+        ]
+    return tuple(said)
 
 
 def _words(inventory: Inventory, number: int, name: str) -> PartWords:
@@ -82,7 +97,14 @@ def _words(inventory: Inventory, number: int, name: str) -> PartWords:
 
 
 def _entry(words: PartWords, config: GroundConfig) -> Entry:
-    return _find(words.material or config.neutral, config.library)
+    entry = _find(words.material or config.neutral, config.library)
+    if entry.group == "liquid":
+        raise UserError(
+            f"{words.name} is said to be made of {entry.name}, a liquid, for which there is no law "
+            "of flow. Say what holds it, with structure: filled and contents: "
+            f"{entry.name}."
+        )
+    return entry
 
 
 def _find(name: str, library: str) -> Entry:
@@ -97,33 +119,91 @@ def _find(name: str, library: str) -> Entry:
 
 
 def _material(entry: Entry, words: PartWords) -> Material:
-    grounds = entry.typical()
-    if words.material is None:
-        reason = NEUTRAL.format(name=entry.name)
-        grounds = {f: Ground(g.value, g.range, "fallback", reason) for f, g in grounds.items()}
+    grounds = _placed(entry, words)
     for field, value in words.values.items():
         allowed = entry.ranges.get(field)
         if allowed is None:
             known = ", ".join(entry.ranges)
             raise UserError(f"{entry.name} has no {field} in the library. It has: {known}.")
-        grounds[field] = Ground(value, allowed, "annotation", "stated in the annotation file")
+        grounds[field] = Ground(value, allowed, "annotation", "stated in the annotation file", 1.0)
+    unfit = contradictions(entry.group, entry.ranges, {f: g.value for f, g in grounds.items()})
+    for field, clause in unfit.items():
+        reason = f"{grounds[field].reason} {UNFIT} {clause}."
+        grounds[field] = replace(grounds[field], reason=reason)
     return entry.pick(grounds)
 
 
-def _structure(material: Material, words: PartWords) -> Structure:
-    if words.structure == "shell":
-        if words.thickness:
-            return Structure("shell", words.thickness, "The wall's thickness is stated.")
-        if material.shell_thickness:
-            reason = f"Such walls of {material.name} are usually this thin."
-            return Structure("shell", material.shell_thickness, reason)
-        raise UserError(
-            f"{words.name} is said to be a shell of {material.name}, but how thin is not known. "
-            "Give thickness_mm in the annotation file."
-        )
+def _placed(entry: Entry, words: PartWords) -> dict[str, Ground]:
+    """Take every value where it was placed in its range, and where nobody placed it, the usual."""
+    grounds = {f: replace(g, margin=words.margin) for f, g in entry.typical().items()}
+    if words.material is None:
+        reason = NEUTRAL.format(name=entry.name)
+        return {f: Ground(g.value, g.range, "fallback", reason) for f, g in grounds.items()}
+    for field, r in entry.ranges.items():
+        chosen = words.placements.get(field)
+        if chosen is not None:
+            value = place(r, chosen.fraction)
+            grounds[field] = Ground(value, r, chosen.chosen_by, chosen.reason, words.margin)
+    return grounds
+
+
+def _piece(words: PartWords, config: GroundConfig) -> Piece:
+    material = _material(_entry(words, config), words)
+    return Piece(words, material, _structure(material, words, config))
+
+
+def _structure(material: Material, words: PartWords, config: GroundConfig) -> Structure:
     if words.structure == "solid":
         return Structure("solid", None, "It is stated to be solid.")
-    return Structure("solid", None, "How it is built is not said: the shape decides.")
+    if words.structure is None:
+        return Structure("solid", None, "How it is built is not said: the shape decides.")
+    thickness, reason = _wall(material, words)
+    if words.structure == "shell":
+        return Structure("shell", thickness, reason)
+    if words.contents is None:
+        raise UserError(
+            f"{words.name} is said to be filled, but not with what. Give contents in the "
+            "annotation file: corporeal materials lists them."
+        )
+    held = _held(words.contents, config)
+    fill = 1.0 if words.fill is None else words.fill
+    said = "How full is not said: it is taken as full." if words.fill is None else ""
+    inner = held.pick(_held_grounds(held, words))
+    reason = f"{reason} It is filled with {inner.name}. {said}".strip()
+    return Structure("filled", thickness, reason, inner, fill, loose=_flows(held))
+
+
+def _held_grounds(held: Entry, words: PartWords) -> dict[str, Ground]:
+    grounds = {f: replace(g, margin=words.margin) for f, g in held.typical().items()}
+    chosen = words.placements.get(CONTENTS)
+    if chosen is not None:
+        r = held.ranges["density"]
+        value = place(r, chosen.fraction)
+        grounds["density"] = Ground(value, r, chosen.chosen_by, chosen.reason, words.margin)
+    return grounds
+
+
+def _wall(material: Material, words: PartWords) -> tuple[float, str]:
+    if words.thickness:
+        return words.thickness, "The wall's thickness is stated."
+    if material.shell_thickness:
+        chosen = material.grounds["shell_thickness"].chosen_by
+        usual = "usually this thin" if chosen == "typical" else "made this thin here"
+        return material.shell_thickness, f"Such walls of {material.name} are {usual}."
+    raise UserError(
+        f"{words.name} is said to be a {words.structure or 'shell'} of {material.name}, but how "
+        "thin its wall is is not known. Give thickness_mm in the annotation file."
+    )
+
+
+def _held(name: str, config: GroundConfig) -> Entry:
+    """Look up what is inside: a library that says nothing of it leaves it to the default one."""
+    known = materials.library(config.library)
+    return known[name] if name in known else materials.find(name)
+
+
+def _flows(entry: Entry) -> bool:
+    return entry.group == "liquid" or entry.law is Law.DRUCKER_PRAGER
 
 
 # ---------------------------------------------------------------- pairs

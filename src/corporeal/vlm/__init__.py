@@ -1,7 +1,9 @@
 """Vision-language models: one question in, one validated answer out. And what to do without one."""
 
-from dataclasses import dataclass
-from typing import Protocol, TypeVar, runtime_checkable
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from importlib.util import find_spec
+from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
 from pydantic import BaseModel
@@ -11,10 +13,17 @@ from corporeal.errors import UnknownChoiceError, UserError
 
 Answer = TypeVar("Answer", bound=BaseModel)
 
-MENU = {"replay": "corporeal.vlm.recordings:Recordings"}
+MENU = {
+    "replay": "corporeal.vlm.recordings:Recordings",
+    "ask": "corporeal.vlm.by_hand:ByHand",
+    "openai": "corporeal.vlm.provider:OpenAI",
+    "anthropic": "corporeal.vlm.provider:Anthropic",
+    "google": "corporeal.vlm.provider:Google",
+    "ollama": "corporeal.vlm.provider:Ollama",
+}
 """How to reach a model: name before the colon → class that takes what stands after it."""
 LIVE = ("openai", "anthropic", "google", "ollama")
-"""Providers that a later version will connect."""
+"""Answered over a network, and so by a package that the core does without."""
 NOBODY = "metadata"
 """No model: names and materials in the file decide."""
 
@@ -26,40 +35,96 @@ class Question:
     task: str
     """Which of the house's questions this is ("materials")."""
     prompt: str
-    """The whole text."""
+    """The wording; {name} stands where one of ``lists`` goes."""
     scene: str
     """What it is about: the scene's name and the object's."""
     views: str = "none"
     """How the pictures were taken, in words; pictures themselves are not compared on replay."""
     pictures: tuple[np.ndarray, ...] = ()
     """Each H x W x 3, uint8, sRGB."""
+    lists: Mapping[str, str] = field(default_factory=dict)
+    """What the library in use offers, by name. A longer list does not make an answer stale."""
+
+    @property
+    def text(self) -> str:
+        """The whole text as it is sent."""
+        text = self.prompt
+        for name, words in self.lists.items():
+            text = text.replace(f"{{{name}}}", words)
+        return text
+
+
+@dataclass(frozen=True)
+class Spent:
+    """What an answer took."""
+
+    calls: int = 0
+    """Requests that were sent, those that failed included."""
+    input_tokens: int = 0
+    output_tokens: int = 0
+    seconds: float = 0.0
+
+
+@dataclass(frozen=True)
+class Reply(Generic[Answer]):
+    """A validated answer, and where it comes from."""
+
+    answer: Answer
+    by: Literal["model", "recording"]
+    model: str
+    """As a person types it: "openai:gpt-5.4"."""
+    spent: Spent = Spent()
+
+
+Check = Callable[[Answer], list[str]]
+"""Returns what is wrong with an answer, one sentence each, as the model is to read it."""
+
+
+def nothing(answer: BaseModel) -> list[str]:
+    """Complain about nothing."""
+    return []
+
+
+class UnansweredError(UserError):
+    """A model was asked, corrected and asked again, and gave no usable answer."""
 
 
 @runtime_checkable
 class Vlm(Protocol):
     """The whole contract."""
 
-    def ask(self, question: Question, answer: type[Answer]) -> Answer:
-        """Answer ``question`` in the shape of ``answer``."""
+    looks: bool
+    """Whether anybody looks at a question's pictures; without it they need not be taken."""
+
+    def ask(
+        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+    ) -> Reply[Answer]:
+        """Answer ``question`` in the shape of ``answer``, with nothing left to complain about.
+
+        Raises:
+            UnansweredError: There is no usable answer to this question; others may fare better.
+            UserError: No question will be answered; the message says what to do.
+
+        """
         ...
 
 
 def connect(spec: str) -> Vlm | None:
-    """Connect to ``"replay:FOLDER"``; ``"metadata"`` means nobody is asked and gives None.
+    """Connect to ``"openai:gpt-5.4"`` and the like; ``"metadata"`` asks nobody and gives None.
 
     Raises:
-        UserError: The name is unknown, or a live model, which this version cannot reach yet.
+        UserError: The name is unknown, its package is not installed, or its key is not set.
 
     """
     name, _, rest = spec.partition(":")
     if name == NOBODY:
         return None
-    if name in LIVE:
-        raise UserError(
-            f"Live models are not connected in this version, so {spec!r} cannot be asked. Use "
-            "recorded answers (--vlm replay:FOLDER), an annotation file (--annotations FILE), or "
-            "the names in the scene file (--vlm metadata)."
-        )
     if name not in MENU:
         raise UnknownChoiceError("vision-language model", name, [NOBODY, *MENU])
+    if name in LIVE and find_spec("pydantic_ai") is None:
+        raise UserError(
+            f"Asking {spec!r} needs a package that is not installed. Type: pip install "
+            "'corporeal[models]'. Without it there are --vlm ask:FOLDER (you answer), --vlm "
+            "replay:FOLDER and --vlm metadata."
+        )
     return backends.load("vision-language model", name, MENU)(rest)

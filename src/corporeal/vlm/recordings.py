@@ -1,18 +1,20 @@
 """Answers recorded earlier: free, offline, repeatable.
 
-A recording is one JSON file: task, prompt, schema, scene, views, model, answer. It is found by what
-was asked about what, not by pixels or by model, so a better renderer does not make it stale.
+A recording is one JSON file: task, scene, prompt, schema, views, model, lists, answer. It is found
+by what was asked about what, not by pixels, by model, or by how long the library's lists were; so
+neither a better renderer nor a new material makes it stale.
 """
 
 import hashlib
 import json
-import os
 from pathlib import Path
+from threading import Lock
 
 from pydantic import BaseModel, ValidationError
 
+from corporeal import store
 from corporeal.errors import BadFileError, UserError
-from corporeal.vlm import Answer, Question
+from corporeal.vlm import Answer, Check, Question, Reply, Vlm, nothing
 
 FIELDS = ("task", "scene", "prompt", "schema", "views")
 """What must be equal for a recording to answer a question, most telling last to differ."""
@@ -20,6 +22,8 @@ FIELDS = ("task", "scene", "prompt", "schema", "views")
 
 class Recordings:
     """Look each question up in a folder of recorded answers."""
+
+    looks = False
 
     def __init__(self, folder: str) -> None:
         self.folder = Path(folder)
@@ -30,18 +34,27 @@ class Recordings:
             )
         self.rows = [_read(path) for path in sorted(self.folder.glob("*.json"))]
 
-    def ask(self, question: Question, answer: type[Answer]) -> Answer:
+    def ask(
+        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+    ) -> Reply[Answer]:
         """Return the recorded answer.
 
         Raises:
             UserError: There is none; the message names the field in which the nearest one differs.
+                Or there is one that no longer fits what can be answered.
 
         """
-        wanted = _asked(question, answer)
-        for row in self.rows:
-            if all(row[f] == wanted[f] for f in FIELDS):
-                return _validated(row, answer)
-        raise UserError(self._why_not(wanted))
+        row = self._row(asked(question, answer))
+        if row is None:
+            raise UserError(self._why_not(asked(question, answer)))
+        return Reply(_validated(row, answer, check), "recording", str(row.get("model", "")))
+
+    def holds(self, question: Question, answer: type[BaseModel]) -> bool:
+        """Tell whether the question was answered."""
+        return self._row(asked(question, answer)) is not None
+
+    def _row(self, wanted: dict[str, str]) -> dict | None:
+        return next((r for r in self.rows if all(r[f] == wanted[f] for f in FIELDS)), None)
 
     def _why_not(self, wanted: dict[str, str]) -> str:
         about = f"{wanted['task']!r} about {wanted['scene']!r}"
@@ -51,31 +64,53 @@ class Recordings:
         differs = next(f for f in FIELDS if nearest[f] != wanted[f])
         return (
             f"No recording in {self.folder} answers {about}. The nearest, {nearest['file']}, "
-            f"differs in {differs!r}: recorded {_short(nearest[differs])}, asked "
-            f"{_short(wanted[differs])}. Record it again, or use --vlm metadata."
+            f"differs in {differs!r}: recorded {_short(nearest[differs], wanted[differs])}, asked "
+            f"{_short(wanted[differs], nearest[differs])}. Record it again, or use --vlm metadata."
         )
+
+
+class Recorder:
+    """Ask somebody else, and keep every answer where ``Recordings`` finds it."""
+
+    def __init__(self, model: Vlm, folder: Path) -> None:
+        self.model, self.folder, self._one = model, folder, Lock()
+        self.looks = model.looks
+
+    def ask(
+        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+    ) -> Reply[Answer]:
+        """Pass the question on and record its answer."""
+        reply = self.model.ask(question, answer, check)
+        with self._one:
+            record(self.folder, question, reply.answer, reply.model)
+        return reply
 
 
 def record(folder: Path, question: Question, answer: BaseModel, model: str) -> Path:
     """Keep an answer where ``Recordings`` finds it; the file appears whole or not at all."""
-    row = _asked(question, type(answer)) | {"model": model, "answer": answer.model_dump()}
+    row = asked(question, type(answer))
     key = hashlib.sha256("\0".join(row[f] for f in FIELDS).encode()).hexdigest()[:16]
-    folder.mkdir(parents=True, exist_ok=True)
-    path, draft = folder / f"{question.task}-{key}.json", folder / f".{key}.part"
-    draft.write_text(json.dumps(row, indent=1, ensure_ascii=False), encoding="utf-8")
-    os.replace(draft, path)
+    row = row | {"model": model, "lists": dict(question.lists), "answer": answer.model_dump()}
+    path = folder / f"{question.task}-{key}.json"
+    store.write_json(path, row)
     return path
 
 
-def _asked(question: Question, answer: type[BaseModel]) -> dict[str, str]:
-    schema = json.dumps(answer.model_json_schema(), sort_keys=True)
+def asked(question: Question, answer: type[BaseModel]) -> dict[str, str]:
+    """Name a question by all that its answer depends on."""
     return {
         "task": question.task,
         "scene": question.scene,
         "prompt": question.prompt,
-        "schema": hashlib.sha256(schema.encode()).hexdigest()[:16],
+        "schema": schema_digest(answer),
         "views": question.views,
     }
+
+
+def schema_digest(answer: type[BaseModel]) -> str:
+    """Name the shape of an answer."""
+    schema = json.dumps(answer.model_json_schema(), sort_keys=True)
+    return hashlib.sha256(schema.encode()).hexdigest()[:16]
 
 
 def _read(path: Path) -> dict:
@@ -89,16 +124,31 @@ def _read(path: Path) -> dict:
     return row | {"file": path.name}
 
 
-def _validated(row: dict, answer: type[Answer]) -> Answer:
+def _validated(row: dict, answer: type[Answer], check: Check[Answer]) -> Answer:
     try:
-        return answer.model_validate(row["answer"])
+        said = answer.model_validate(row["answer"])
     except ValidationError as error:
-        first = error.errors()[0]
-        where = ".".join(str(x) for x in first["loc"])
         raise BadFileError(
-            row["file"], f"its answer does not fit: {where}: {first['msg']}.", "Record it again."
+            row["file"], f"its answer does not fit: {first_problem(error)}.", "Record it again."
         ) from error
+    complaints = check(said)
+    if complaints:
+        raise BadFileError(
+            row["file"], f"its answer does not fit: {complaints[0]}", "Record it again."
+        )
+    return said
 
 
-def _short(text: str) -> str:
-    return repr(text if len(text) <= 60 else f"{text[:57]}...")
+def first_problem(error: ValidationError) -> str:
+    """Say where an answer first leaves its shape, and how."""
+    first = error.errors()[0]
+    return f"{'.'.join(str(x) for x in first['loc'])}: {first['msg']}"
+
+
+def _short(text: str, other: str) -> str:
+    """Quote the first words in which a text differs from another."""
+    if len(text) <= 60:
+        return repr(text)
+    at = next((k for k, (a, b) in enumerate(zip(text, other, strict=False)) if a != b), 0)
+    at = max(at - 20, 0)
+    return repr(f"{'...' if at else ''}{text[at : at + 57]}...")

@@ -1,0 +1,164 @@
+"""Answer by hand: every question becomes a page with its picture, and waits for its answer.
+
+For who has a chat window and no key, or wants to look for themselves. Answered questions are kept
+as recordings in the same folder, so ``--vlm replay:FOLDER`` needs nobody any more.
+"""
+
+import hashlib
+import re
+from collections.abc import Mapping
+from pathlib import Path
+from threading import Lock
+
+import numpy as np
+from PIL import Image
+from pydantic import BaseModel, ValidationError
+
+from corporeal import store
+from corporeal.errors import UserError
+from corporeal.vlm import Answer, Check, Question, Reply, nothing
+from corporeal.vlm.recordings import FIELDS, Recordings, asked, first_problem, record
+
+PAGES = "questions"
+BY_HAND = "by hand"
+ASIDE = """
+
+---
+Give the answer as JSON of this shape, and nothing else:
+
+```
+{shape}
+```
+"""
+
+
+class WaitingError(UserError):
+    """A question waits for somebody to answer it."""
+
+
+class ByHand:
+    """Write each question to a folder; read the answer that somebody put beside it."""
+
+    looks = True
+
+    def __init__(self, folder: str) -> None:
+        if not folder:
+            raise UserError("Say where the questions go: --vlm ask:FOLDER.")
+        self.folder = Path(folder)
+        self.pages = self.folder / PAGES
+        with store.writing(self.pages):
+            self.pages.mkdir(parents=True, exist_ok=True)
+        self.kept = Recordings(folder)
+        self._one = Lock()
+
+    def ask(
+        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+    ) -> Reply[Answer]:
+        """Return the answer beside the question, or the one that was recorded earlier.
+
+        Raises:
+            WaitingError: Nobody has answered yet, or the answer does not fit; the page says why.
+
+        """
+        page = self.pages / self._name(question, answer)
+        said = _answer(page.with_suffix(".json"), answer, check)
+        if isinstance(said, BaseModel):
+            with self._one:
+                record(self.folder, question, said, BY_HAND)
+            return Reply(said, "recording", BY_HAND)
+        if not said and self.kept.holds(question, answer):
+            return self.kept.ask(question, answer, check)
+        _write(page, question, answer, said)
+        raise WaitingError(f"{page.with_suffix('.md')} waits for an answer.")
+
+    def _name(self, question: Question, answer: type[BaseModel]) -> str:
+        row = asked(question, answer)
+        key = hashlib.sha256("\0".join(row[f] for f in FIELDS).encode()).hexdigest()[:6]
+        plain = re.sub(r"[^\w.-]+", "-", f"{question.scene}-{question.task}")
+        return f"{plain}-{key}.md"
+
+
+def all_answered(results: list, spec: str) -> list:
+    """Return the results, if none of them is an error.
+
+    Args:
+        results: Of independent questions, or the errors that they raised.
+        spec: Who was asked: "ask:FOLDER".
+
+    Raises:
+        UserError: Questions wait: the message says how many, where, and what to do.
+        Exception: Whatever else went wrong first.
+
+    """
+    failed = [r for r in results if isinstance(r, Exception)]
+    waiting = [r for r in failed if isinstance(r, WaitingError)]
+    for error in failed:
+        if error not in waiting:
+            raise error
+    if waiting:
+        count = f"{len(waiting)} question{'s wait' if len(waiting) > 1 else ' waits'}"
+        raise UserError(
+            f"{count} in {Path(spec.partition(':')[2]) / PAGES}. Each is a .md file, most with a "
+            "picture (.png): put the answer into the .json file of the same name, then type the "
+            "same command again."
+        )
+    return results
+
+
+def _answer(path: Path, answer: type[Answer], check: Check[Answer]) -> Answer | str:
+    """Return the answer in a file, or what is wrong with it; "" where there is none."""
+    text = path.read_text(encoding="utf-8").strip() if path.exists() else ""
+    if not text:
+        return ""
+    fenced = re.fullmatch(r"```\w*\s*(.*?)\s*```", text, re.DOTALL)
+    try:
+        said = answer.model_validate_json(fenced[1] if fenced else text)
+    except ValidationError as error:
+        return first_problem(error)
+    return "\n".join(check(said)) or said
+
+
+def _write(page: Path, question: Question, answer: type[BaseModel], wrong: str) -> None:
+    schema = answer.model_json_schema()
+    text = question.text + ASIDE.format(shape=shape(schema, schema.get("$defs", {})))
+    if wrong:
+        text = f"**The answer given so far does not fit:** {wrong}\n\n{text}"
+    store.write_bytes(page, text.encode())
+    page.with_suffix(".json").touch()
+    if question.pictures:
+        Image.fromarray(sheet(question.pictures)).save(page.with_suffix(".png"))
+
+
+def shape(schema: Mapping, known: Mapping, indent: str = "") -> str:
+    """Write a JSON schema as a person reads it: an example with types for values."""
+    if "$ref" in schema:
+        return shape(known[schema["$ref"].rpartition("/")[2]], known, indent)
+    if "anyOf" in schema:
+        return " or ".join(shape(option, known, indent) for option in schema["anyOf"])
+    if "enum" in schema:
+        return " | ".join(f'"{choice}"' for choice in schema["enum"])
+    if schema["type"] == "array":
+        return f"[{shape(schema['items'], known, indent)}, ...]"
+    if schema["type"] == "object":
+        inner = f"{indent}  "
+        rows = (
+            f'{inner}"{name}": {shape(value, known, inner)}'
+            for name, value in schema["properties"].items()
+        )
+        return "{\n" + ",\n".join(rows) + f"\n{indent}}}"
+    return f"{schema['type']}{_limits(schema)}"
+
+
+def _limits(schema: Mapping) -> str:
+    if "minimum" in schema and "maximum" in schema:
+        return f" {schema['minimum']}–{schema['maximum']}"
+    return ""
+
+
+def sheet(pictures: tuple[np.ndarray, ...]) -> np.ndarray:
+    """Lay pictures of one size out in rows, (H, W, 3) uint8; the last row may be short."""
+    columns = int(np.ceil(np.sqrt(len(pictures))))
+    blank = np.full_like(pictures[0], 255)
+    filled = [*pictures, *[blank] * (-len(pictures) % columns)]
+    rows = [np.hstack(filled[k : k + columns]) for k in range(0, len(filled), columns)]
+    return np.vstack(rows)

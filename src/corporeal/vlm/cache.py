@@ -1,0 +1,98 @@
+"""Answers that were paid for once: asked again with nothing changed, they come from the disk.
+
+One JSON file per validated answer, named by all that it depends on. It appears by an atomic rename:
+several processes may share the folder, and one that is killed leaves no half answer.
+"""
+
+import hashlib
+import json
+import os
+import sys
+from collections.abc import Mapping
+from pathlib import Path
+from threading import Lock
+from typing import Any
+
+from pydantic import BaseModel, ValidationError
+
+from corporeal import store
+from corporeal.vlm import Answer, Check, Question, Reply, Vlm, nothing
+from corporeal.vlm.recordings import schema_digest
+
+VARIABLE = "CORPOREAL_CACHE"
+"""Environment variable that names another folder."""
+VERSION = 1
+
+
+def folder() -> Path:
+    """Return where answers are kept: as the environment says, else where the system has such."""
+    said = os.environ.get(VARIABLE)
+    if said:
+        return Path(said).expanduser() / "answers"
+    if sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    elif sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "corporeal" / "answers"
+
+
+class Cached:
+    """Ask a model only what it has not answered before."""
+
+    looks = True
+
+    def __init__(
+        self, model: Vlm, name: str, settings: Mapping[str, Any], at: Path | None = None
+    ) -> None:
+        self.model, self.name, self.settings = model, name, dict(settings)
+        self.folder = at or folder()
+        self._locks: dict[str, Lock] = {}
+        self._one = Lock()
+
+    def ask(
+        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+    ) -> Reply[Answer]:
+        """Return the kept answer, or the model's, which is then kept.
+
+        Threads that ask the same at the same time wait for one answer.
+        """
+        key = self.key(question, answer)
+        path = self.folder / key[:2] / f"{key}.json"
+        with self._one:
+            lock = self._locks.setdefault(key, Lock())
+        with lock:
+            kept = _read(path, answer, check)
+            if kept is not None:
+                return Reply(kept, "model", self.name)
+            reply = self.model.ask(question, answer, check)
+            about = {"task": question.task, "scene": question.scene, "model": self.name}
+            store.write_json(path, about | {"answer": reply.answer.model_dump()})
+            return reply
+
+    def key(self, question: Question, answer: type[BaseModel]) -> str:
+        """Name a question by task, model, text, pictures, shape of the answer, and settings."""
+        pictures = [
+            hashlib.sha256(str(p.shape).encode() + p.tobytes()).hexdigest()
+            for p in question.pictures
+        ]
+        asked = {
+            "version": VERSION,
+            "task": question.task,
+            "model": self.name,
+            "text": question.text,
+            "pictures": pictures,
+            "schema": schema_digest(answer),
+            "settings": self.settings,
+        }
+        return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
+
+
+def _read(path: Path, answer: type[Answer], check: Check[Answer]) -> Answer | None:
+    """Return a kept answer; a damaged file, or one that no longer fits, is as good as none."""
+    try:
+        said = answer.model_validate(json.loads(path.read_text(encoding="utf-8"))["answer"])
+    except (OSError, ValueError, KeyError, TypeError, ValidationError):
+        return None
+    return None if check(said) else said

@@ -1,0 +1,255 @@
+"""The house's questions in their order: what is asked, of whom, and what is kept of the answers."""
+
+import json
+from collections.abc import Callable, Collection, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from string import Template
+
+import numpy as np
+
+from corporeal.vlm import Answer, Check, Question, Reply, UnansweredError, Vlm
+from corporeal.vlm.answers import (
+    MOST_PARTS,
+    Decomposition,
+    ExtentsAnswer,
+    FractionAnswer,
+    MaterialsAnswer,
+    PartsAnswer,
+    RankingAnswer,
+    ValueAnswer,
+    Vocabulary,
+    extents_complaints,
+    materials_complaints,
+    parts_complaints,
+    placement_complaints,
+    ranking_complaints,
+)
+from corporeal.vlm.words import Asked
+
+SHARES = (
+    "- volume_share: the share of the whole object's volume that lies within the part's outer "
+    "shape (of a shell: the volume it encloses); over all parts they add up to 1;\n"
+    "- surface_share: the share of the whole object's outer surface that belongs to the part, 0 "
+    "for what lies inside; over all parts they add up to 1;"
+)
+NO_SHARES = "- volume_share and surface_share: null;"
+FRACTION = (
+    "Answer with a fraction for each quantity: 0 is the low end of its range, 1 the high end, 0.5 "
+    "the middle; on a logarithmic scale, where one is named, 0.5 is the geometric middle."
+)
+VALUE = "Answer with a value for each quantity, in the unit and inside the range that it names."
+AGAIN = (
+    "\n\nYou answered this before, and your values do not fit each other:\n\n$answer\n\n"
+    "$problems\n\nAnswer again, for all parts. Keep a value only if it is meant so, and say why."
+)
+
+
+@dataclass(frozen=True)
+class Subject:
+    """What the questions are about."""
+
+    scene: str
+    """The scene's name and the object's."""
+    name: str
+    class_name: str
+    extent: str
+    """Longest side, in words."""
+    views: str = "none"
+    count: int = 0
+    """Pictures that are shown, or were when the answers were recorded."""
+    pictures: tuple[np.ndarray, ...] = ()
+
+
+@dataclass(frozen=True)
+class Offer:
+    """What one part's quantities can be, for question 3."""
+
+    facts: str
+    """The part, its material and its build, in one line."""
+    ranges: Mapping[str, str]
+    """Quantity → its range in words."""
+    bounds: Mapping[str, tuple[float, float]]
+    """Quantity → low and high in the unit that the words name."""
+
+
+@dataclass
+class Interview:
+    """Puts questions about one subject; keeps the transcript and what went wrong."""
+
+    model: Vlm
+    critic: Vlm
+    prompts: Mapping[str, str]
+    """Task → wording, with $facts and {lists}."""
+    subject: Subject
+    transcript: list[dict] = field(default_factory=list)
+    warnings: list[str] = field(default_factory=list)
+
+    def parts(self) -> tuple[Decomposition, PartsAnswer] | None:
+        """Ask question 1, and the critic where there is a choice; None where nobody answers.
+
+        Returns:
+            The best decomposition, and the whole answer.
+
+        """
+        asked = self._question("parts", most=str(MOST_PARTS))
+        answer = self._ask(self.model, asked, PartsAnswer, parts_complaints)
+        if answer is None:
+            return None
+        best = self._best(answer.decompositions) if len(answer.decompositions) > 1 else 0
+        return answer.decompositions[best], answer
+
+    def _best(self, options: Sequence[Decomposition]) -> int:
+        lines = (
+            f"{k}. {'; '.join(f'{p.name} ({p.look})' for p in d.parts)}. Reason: {d.why}"
+            for k, d in enumerate(options, 1)
+        )
+        asked = self._question(
+            "ranking", decompositions="\n".join(lines), alternatives=str(len(options))
+        )
+        answer = self._ask(
+            self.critic, asked, RankingAnswer, lambda a: ranking_complaints(a, len(options))
+        )
+        return answer.ranking[0].number - 1 if answer else 0
+
+    def materials(
+        self,
+        parts: Mapping[str, str],
+        names: Vocabulary,
+        lists: Mapping[str, str],
+        shared: bool,
+    ) -> tuple[MaterialsAnswer, Asked] | None:
+        """Ask question 2; None where nobody answers.
+
+        Args:
+            parts: Name → how to tell it in the pictures, "" where nothing needs saying.
+            names: What may be answered.
+            lists: What can be chosen, in words: "materials" and "contents".
+            shared: The parts share one mesh.
+
+        Returns:
+            The answer, and who gave it: "model" or "recording".
+
+        """
+        named = "; ".join(f"{name} ({look})" if look else name for name, look in parts.items())
+        asked = self._question("materials", parts=named, shares=SHARES if shared else NO_SHARES)
+        asked = replace(asked, lists=lists)
+        answer = self._ask(
+            self.model,
+            asked,
+            MaterialsAnswer,
+            lambda a: materials_complaints(a, list(parts), names, shared),
+        )
+        return None if answer is None else (answer, self.transcript[-1]["by"])
+
+    def placement(
+        self,
+        offers: Mapping[str, Offer],
+        shape: type[FractionAnswer] | type[ValueAnswer],
+        odd: Callable[[FractionAnswer | ValueAnswer], Sequence[str]],
+    ) -> tuple[FractionAnswer | ValueAnswer, Asked] | None:
+        """Ask question 3, once more where the values do not fit each other; None: no answer.
+
+        Args:
+            offers: Part → what its quantities can be.
+            shape: Whether fractions or values are asked for.
+            odd: Says what does not fit in an answer.
+
+        """
+        answer = self._placement(offers, shape, "")
+        problems = odd(answer) if answer else ()
+        if answer and problems:
+            again = Template(AGAIN).substitute(
+                answer=json.dumps(answer.model_dump()),
+                problems="\n".join(f"- {p}" for p in problems),
+            )
+            answer = self._placement(offers, shape, again) or answer
+        return (answer, self.transcript[-1]["by"]) if answer else None
+
+    def _placement(
+        self,
+        offers: Mapping[str, Offer],
+        shape: type[FractionAnswer] | type[ValueAnswer],
+        again: str,
+    ) -> FractionAnswer | ValueAnswer | None:
+        asked = self._question(
+            "placement",
+            parts="\n".join(f"- {offer.facts}" for offer in offers.values()),
+            how=FRACTION if shape is FractionAnswer else VALUE,
+        )
+        asked = replace(
+            asked,
+            prompt=asked.prompt + again,
+            lists={"ranges": _ranges(offers)},
+            views="none",
+            pictures=(),
+        )
+        wanted: dict[str, Collection[str]] = {part: list(o.ranges) for part, o in offers.items()}
+        bounds = {(p, q): b for p, o in offers.items() for q, b in o.bounds.items()}
+        return self._ask(
+            self.model, asked, shape, lambda a: placement_complaints(a, wanted, bounds)
+        )
+
+    def extents(self, classes: Sequence[str]) -> dict[str, float]:
+        """Ask question 4: class → usual longest side [m]; empty where nobody answers."""
+        asked = self._question("extents", classes="\n".join(f"- {c}" for c in classes))
+        asked = replace(asked, views="none", pictures=())
+        answer = self._ask(
+            self.model, asked, ExtentsAnswer, lambda a: extents_complaints(a, classes)
+        )
+        return {c.class_name: c.metres for c in answer.classes} if answer else {}
+
+    def _question(self, task: str, **facts: str) -> Question:
+        about = self.subject
+        common = {
+            "count": str(about.count),
+            "name": about.name,
+            "class_name": about.class_name,
+            "extent": about.extent,
+        }
+        prompt = Template(self.prompts[task]).substitute(common | facts).strip()
+        return Question(task, prompt, about.scene, about.views, about.pictures)
+
+    def _ask(
+        self, whom: Vlm, question: Question, shape: type[Answer], check: Check[Answer]
+    ) -> Answer | None:
+        try:
+            reply = whom.ask(question, shape, check)
+        except UnansweredError as error:
+            self.warnings.append(
+                f"{self.subject.name}: the question about {question.task} got no usable answer "
+                f"({error})"
+            )
+            self.transcript.append(_row(question) | {"answer": None, "error": str(error)})
+            return None
+        self.transcript.append(_row(question) | _answered(reply))
+        return reply.answer
+
+
+def _ranges(offers: Mapping[str, Offer]) -> str:
+    blocks = []
+    for part, offer in offers.items():
+        lines = (f"- {name}: {words}" for name, words in offer.ranges.items())
+        blocks.append("\n".join([f"Part {part}:", *lines]))
+    return "\n\n".join(blocks)
+
+
+def _row(question: Question) -> dict:
+    return {
+        "task": question.task,
+        "scene": question.scene,
+        "views": question.views,
+        "prompt": question.text,
+    }
+
+
+def _answered(reply: Reply) -> dict:
+    spent = reply.spent
+    return {
+        "answer": reply.answer.model_dump(),
+        "by": reply.by,
+        "model": reply.model,
+        "calls": spent.calls,
+        "input_tokens": spent.input_tokens,
+        "output_tokens": spent.output_tokens,
+        "seconds": round(spent.seconds, 3),
+    }

@@ -1,0 +1,298 @@
+"""Live models through pydantic-ai: typed answers, corrections, retries, and clear words on failure.
+
+A model is named PROVIDER:MODEL, or PROVIDER:MODEL@URL for another server that speaks the
+provider's format. Keys come from the environment alone. A provider's own key goes to the provider's
+own server only; what another server wants is read from ``CORPOREAL_API_KEY``.
+"""
+
+import asyncio
+import io
+import os
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from functools import cache
+from threading import Thread
+from typing import Any, ClassVar
+
+import numpy as np
+from PIL import Image
+from pydantic_ai import Agent, BinaryContent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput
+from pydantic_ai.exceptions import (
+    AgentRunError,
+    ModelAPIError,
+    ModelAuthenticationError,
+    ModelConnectionError,
+    ModelHTTPError,
+    ModelNotFoundError,
+    ModelQuotaExceededError,
+    ModelRateLimitError,
+    ModelRequestRejectedError,
+    ModelRequestTimeout,
+    ModelServerError,
+    ModelUnavailableError,
+)
+from pydantic_ai.models import Model
+from pydantic_ai.profiles import ModelProfile
+from pydantic_ai.settings import ModelSettings
+from pydantic_ai.usage import RunUsage
+
+from corporeal.errors import UserError
+from corporeal.vlm import Answer, Check, Question, Reply, Spent, UnansweredError, nothing
+from corporeal.vlm.patience import Gate, Patience
+
+OTHER_KEY = "CORPOREAL_API_KEY"
+NO_KEY = "none"
+"""Sent where a server wants no key: the clients insist on one."""
+INSTRUCTIONS = (
+    "You help to compute how real objects move. Answer from what the pictures show and from what "
+    "you know of such things; say plainly when you cannot tell."
+)
+IN_WORDS = ModelProfile(supports_json_object_output=False)
+"""The shape of the answer is told in the prompt, and nothing else is asked of the server."""
+PASSING = (
+    ModelRateLimitError,
+    ModelUnavailableError,
+    ModelServerError,
+    ModelConnectionError,
+    ModelRequestTimeout,
+)
+"""What may be over when one asks again."""
+
+
+@dataclass(frozen=True)
+class Address:
+    """Where a model is, taken from what a person typed."""
+
+    spec: str
+    """All of it."""
+    model: str
+    url: str | None
+
+
+class Live:
+    """A model behind an API. Each question is its own conversation."""
+
+    looks = True
+    provider: ClassVar[str]
+    key: ClassVar[str]
+    """Environment variable of the provider's own key."""
+
+    def __init__(self, rest: str, patience: Patience | None = None) -> None:
+        model, _, url = rest.partition("@http")
+        self.address = Address(f"{self.provider}:{rest}", model, f"http{url}" if url else None)
+        if not model:
+            raise UserError(f"Say which model: --vlm {self.provider}:MODEL.")
+        self.patience = patience or Patience()
+        self.model = self._model(self._secret(), ModelProfile())
+        native = self.model.profile.get("supports_json_schema_output")
+        self.mode = "native" if native else "tool"
+        self._dice = np.random.default_rng()
+        self._gate: Gate | None = None
+
+    def _model(self, secret: str, profile: ModelProfile) -> Model:
+        raise NotImplementedError
+
+    def _secret(self) -> str:
+        if self.address.url is not None:
+            return os.environ.get(OTHER_KEY) or NO_KEY
+        secret = os.environ.get(self.key)
+        if not secret:
+            raise UserError(
+                f"{self.address.spec} needs a key: set the environment variable {self.key}. "
+                "Without one there are --vlm ask:FOLDER and --vlm metadata."
+            )
+        return secret
+
+    def ask(
+        self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
+    ) -> Reply[Answer]:
+        """Ask, correct what does not fit, and try again while the failure may pass.
+
+        Raises:
+            UnansweredError: No usable answer within the patience.
+            UserError: The key is refused, the model is unknown, the account is empty, or there is
+                no server: no other question would be answered either.
+
+        """
+        asking = asyncio.run_coroutine_threadsafe(self._ask(question, answer, check), _loop())
+        return asking.result()
+
+    async def _ask(
+        self, question: Question, answer: type[Answer], check: Check[Answer]
+    ) -> Reply[Answer]:
+        if self._gate is None:
+            self._gate = Gate(self.patience.at_once)
+        usage, start = RunUsage(), time.monotonic()
+        for failures in range(1, self.patience.tries + 1):
+            mode = self.mode
+            try:
+                async with self._gate:
+                    made = await self._once(question, answer, check, usage)
+            except ModelAPIError as error:
+                wait = self._what_now(error, mode, failures)
+            except AgentRunError as error:
+                raise UnansweredError(self._plain(error)) from error
+            else:
+                seconds = time.monotonic() - start
+                spent = Spent(usage.requests, usage.input_tokens, usage.output_tokens, seconds)
+                return Reply(made, "model", self.address.spec, spent)
+            await asyncio.sleep(wait)
+        raise AssertionError("the last failure raises")
+
+    async def _once(
+        self, question: Question, answer: type[Answer], check: Check[Answer], usage: RunUsage
+    ) -> Answer:
+        agent = Agent(
+            self.model,
+            output_type=OUTPUTS[self.mode](answer),
+            instructions=INSTRUCTIONS,
+            retries=self.patience.corrections,
+        )
+
+        @agent.output_validator
+        def fits(said: Any) -> Any:
+            complaints = check(said)
+            if complaints:
+                raise ModelRetry("\n".join(complaints))
+            return said
+
+        settings = ModelSettings(timeout=self.patience.timeout, max_retries=0)
+        settings["request_timeout"] = self.patience.timeout
+        pictures = [BinaryContent(jpeg(p), media_type="image/jpeg") for p in question.pictures]
+        asked = await agent.run(
+            [question.text, *pictures], model_settings=settings, usage=usage, infer_name=False
+        )
+        return asked.output
+
+    def _what_now(self, error: ModelAPIError, mode: str, failures: int) -> float:
+        """Return how long to wait before asking again [s], or raise that it is no use."""
+        self._give_up_all(error, failures)
+        if isinstance(error, ModelRequestRejectedError) and mode != "prompted":
+            self.mode = "prompted"  # the server may only refuse the schema
+            self.model = self._model(self._secret(), IN_WORDS)
+            return 0.0
+        garbled = not isinstance(error, ModelHTTPError | ModelRequestRejectedError)
+        if not (garbled or isinstance(error, PASSING)) or failures >= self.patience.tries:
+            raise UnansweredError(self._plain(error)) from error
+        asked_for = error.retry_after
+        if asked_for is not None and asked_for > self.patience.longest_wait:
+            raise UserError(
+                f"{self.address.spec} asks to wait {asked_for:.0f} s. Answers so far are kept: run "
+                "the same command again later."
+            ) from error
+        wait = asked_for if asked_for is not None else self.patience.wait(failures, self._dice)
+        if isinstance(error, ModelRateLimitError) and self._gate is not None:
+            self._gate.close(wait)
+        return wait
+
+    def _give_up_all(self, error: ModelAPIError, failures: int) -> None:
+        """Raise what holds for every question."""
+        where = self.address.url or self.provider
+        if isinstance(error, ModelAuthenticationError):
+            key = OTHER_KEY if self.address.url else self.key
+            raise UserError(
+                f"{where} refused the key for {self.address.spec}. Check the environment variable "
+                f"{key}."
+            ) from None
+        if isinstance(error, ModelNotFoundError):
+            raise UserError(
+                f"{where} knows no model {self.address.model!r}. Check the name after --vlm."
+            ) from None
+        if isinstance(error, ModelQuotaExceededError):
+            raise UserError(
+                f"{where} says that the account's credit or quota is used up. Answers so far are "
+                "kept: run the same command again later."
+            ) from None
+        unreachable = isinstance(error, ModelConnectionError) and error.phase == "connect"
+        if unreachable and failures >= self.patience.tries:
+            raise UserError(
+                f"Nobody answers at {where}. Check the network, and that the server runs."
+            ) from None
+
+    def _plain(self, error: Exception) -> str:
+        """Say in one short line what went wrong, without the key."""
+        secret = os.environ.get(OTHER_KEY if self.address.url else self.key) or NO_KEY
+        words = " ".join(str(error).split())
+        words = words if secret == NO_KEY else words.replace(secret, "[key]")
+        return f"{self.address.spec}: {words if len(words) <= 200 else f'{words[:197]}...'}"
+
+
+class OpenAI(Live):
+    """OpenAI, and every server that speaks its chat format."""
+
+    provider, key = "openai", "OPENAI_API_KEY"
+
+    def _model(self, secret: str, profile: ModelProfile) -> Model:
+        from pydantic_ai.models.openai import OpenAIChatModel
+        from pydantic_ai.providers.openai import OpenAIProvider
+
+        provider = OpenAIProvider(base_url=self.address.url, api_key=secret)
+        return OpenAIChatModel(self.address.model, provider=provider, profile=profile)
+
+
+class Anthropic(Live):
+    """Anthropic."""
+
+    provider, key = "anthropic", "ANTHROPIC_API_KEY"
+
+    def _model(self, secret: str, profile: ModelProfile) -> Model:
+        from pydantic_ai.models.anthropic import AnthropicModel
+        from pydantic_ai.providers.anthropic import AnthropicProvider
+
+        provider = AnthropicProvider(base_url=self.address.url, api_key=secret)
+        return AnthropicModel(self.address.model, provider=provider, profile=profile)
+
+
+class Google(Live):
+    """Google's Gemini API."""
+
+    provider, key = "google", "GOOGLE_API_KEY"
+
+    def _model(self, secret: str, profile: ModelProfile) -> Model:
+        from pydantic_ai.models.google import GoogleModel
+        from pydantic_ai.providers.google import GoogleProvider
+
+        provider = GoogleProvider(base_url=self.address.url, api_key=secret)
+        return GoogleModel(self.address.model, provider=provider, profile=profile)
+
+
+class Ollama(Live):
+    """Models on one's own machine, served by Ollama."""
+
+    provider, key = "ollama", "OLLAMA_API_KEY"
+    home = "http://localhost:11434/v1"
+
+    def _secret(self) -> str:
+        return os.environ.get(self.key) or NO_KEY
+
+    def _model(self, secret: str, profile: ModelProfile) -> Model:
+        from pydantic_ai.models.ollama import OllamaModel
+        from pydantic_ai.providers.ollama import OllamaProvider
+
+        url = self.address.url or os.environ.get("OLLAMA_BASE_URL") or self.home
+        provider = OllamaProvider(base_url=url, api_key=secret)
+        return OllamaModel(self.address.model, provider=provider, profile=profile)
+
+
+OUTPUTS: dict[str, Callable[[Any], Any]] = {
+    "native": NativeOutput,
+    "tool": ToolOutput,
+    "prompted": PromptedOutput,
+}
+"""How a model is held to the shape of an answer, by what its server can do."""
+
+
+def jpeg(picture: np.ndarray) -> bytes:
+    """Encode a picture for sending: what is lost nobody sees, and it is a fifth of a PNG."""
+    file = io.BytesIO()
+    Image.fromarray(picture).save(file, "JPEG", quality=92, subsampling=0)
+    return file.getvalue()
+
+
+@cache
+def _loop() -> asyncio.AbstractEventLoop:
+    """One loop for all connections, in a thread that does not keep the program alive."""
+    loop = asyncio.new_event_loop()
+    Thread(target=loop.run_forever, daemon=True).start()
+    return loop

@@ -1,0 +1,53 @@
+"""Do several things at once that mostly wait for somebody else."""
+
+from collections.abc import Callable, Sequence
+from queue import Empty, SimpleQueue
+from threading import Thread
+from typing import TypeVar
+
+Result = TypeVar("Result")
+
+
+def together(
+    jobs: Sequence[Callable[[], Result]],
+    at_once: int,
+    done: Callable[[int], None] = lambda count: None,
+) -> list[Result | Exception]:
+    """Do every job, ``at_once`` of them at a time; return results, or what they raised, in order.
+
+    The threads are daemons: Ctrl-C ends the program at once, however long an answer takes.
+
+    Args:
+        jobs: What is to be done.
+        at_once: How many threads.
+        done: Told after each job how many are finished.
+
+    """
+    waiting: SimpleQueue[int] = SimpleQueue()
+    finished: SimpleQueue[tuple[int, Result | Exception]] = SimpleQueue()
+    for number in range(len(jobs)):
+        waiting.put(number)
+    for _ in range(min(max(at_once, 1), len(jobs))):
+        Thread(target=_work, args=(jobs, waiting, finished), daemon=True).start()
+    results = {}
+    for count in range(1, len(jobs) + 1):
+        number, result = finished.get()
+        results[number] = result
+        done(count)
+    return [results[number] for number in range(len(jobs))]
+
+
+def _work(
+    jobs: Sequence[Callable[[], Result]],
+    waiting: SimpleQueue[int],
+    finished: SimpleQueue[tuple[int, Result | Exception]],
+) -> None:
+    while True:
+        try:
+            number = waiting.get_nowait()
+        except Empty:
+            return
+        try:
+            finished.put((number, jobs[number]()))
+        except Exception as error:  # whoever asked for the result decides
+            finished.put((number, error))

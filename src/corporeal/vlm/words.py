@@ -1,0 +1,115 @@
+"""From a model's answers to what flows on: words about parts, and places in ranges."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+from typing import Literal
+
+from corporeal.types import ObjectWords, PartWords, Placement, SceneObject
+from corporeal.vlm.answers import MaterialsAnswer, PartAnswer, Vocabulary
+from corporeal.vlm.prices import date, dollars
+
+Asked = Literal["model", "recording"]
+FAR = 2.5
+"""By what factor a size may differ from the usual one before anybody is told."""
+
+
+def part_words(answer: MaterialsAnswer, by: Asked, names: Vocabulary) -> list[PartWords]:
+    """Turn an answer that was checked into words, one per part; unknown parts have no material."""
+    total = [
+        sum(getattr(p, what) or 0.0 for p in answer.parts)
+        for what in ("volume_share", "surface_share")
+    ]
+    return [_words(part, by, names, (total[0], total[1])) for part in answer.parts]
+
+
+def _words(said: PartAnswer, by: Asked, names: Vocabulary, total: tuple[float, float]) -> PartWords:
+    made = None if said.material is None else names.material(said.material)
+    others = [(names.material(a.material) or "", a.probability) for a in said.alternatives]
+    return PartWords(
+        name=said.part,
+        material=made,
+        structure=said.structure,
+        answered_by=by if made else "unknown",
+        margin=said.probability if made else 0.0,
+        reason=said.reason,
+        contents=names.contents(said.contents) if said.contents else None,
+        fill=said.fill if said.structure == "filled" else None,
+        alternatives=tuple((n, p) for n, p in others if n != made and p > 0),
+        volume_share=_share(said.volume_share, total[0]),
+        surface_share=_share(said.surface_share, total[1]),
+    )
+
+
+def _share(said: float | None, total: float) -> float:
+    """Make shares add up to 1 exactly; a part that shares with nobody has the whole."""
+    return 1.0 if said is None or total <= 0 else said / total
+
+
+def gathered(name: str, pieces: Sequence[PartWords]) -> PartWords:
+    """Let the largest piece whose material is known speak for the mesh that all of them share."""
+    if len(pieces) == 1:
+        return replace(pieces[0], name=name)
+    known = [p for p in pieces if p.material is not None] or list(pieces)
+    main = max(known, key=lambda p: (p.volume_share, p.surface_share))
+    share = main.volume_share
+    others = ", ".join(p.name for p in pieces if p is not main)
+    reason = f"{main.name}, {share:.0%} of the volume, beside {others}. {main.reason}"
+    return replace(
+        main, name=name, reason=reason, volume_share=1.0, surface_share=1.0, pieces=tuple(pieces)
+    )
+
+
+def placed(words: PartWords, placements: Mapping[str, Mapping[str, Placement]]) -> PartWords:
+    """Give a part, and each of its pieces, the places that were chosen under its name."""
+    own = dict(placements.get(words.name, {}))
+    pieces = tuple(placed(piece, placements) for piece in words.pieces)
+    if pieces:
+        main = max(pieces, key=lambda p: (p.material == words.material, p.volume_share))
+        own = dict(main.placements)
+    return replace(words, placements=own, pieces=pieces)
+
+
+def leaves(words: Sequence[PartWords]) -> list[PartWords]:
+    """Parts, or their pieces where they have some."""
+    return [leaf for part in words for leaf in (part.pieces or (part,))]
+
+
+def with_extents(
+    things: Sequence[SceneObject], objects: Sequence[ObjectWords], usual: Mapping[str, float]
+) -> tuple[list[ObjectWords], list[str]]:
+    """Keep how large things usually are [m], and say which of them are far from it."""
+    sized, doubts = [], []
+    for thing, words in zip(things, objects, strict=True):
+        kind = thing.class_name or thing.name
+        size, usually = thing.real_extent, usual.get(kind)
+        sized.append(replace(words, usual_extent=usually))
+        if usually and not 1 / FAR <= size / usually <= FAR:
+            doubts.append(
+                f"{thing.name} is {size:.2g} m large, but the model says that a thing like that "
+                f"({kind}) is usually about {usually:.2g} m. Set its size with --extent "
+                f"{thing.name}={usually:.2g}."
+            )
+    return sized, doubts
+
+
+def usage(transcript: Sequence[Mapping]) -> dict:
+    """Add up what the questions took; no price is given where one model's price is not known."""
+    rows = [r for r in transcript if r.get("answer") is not None]
+    if not rows:
+        return {}
+    costs = [
+        dollars(r["model"], r["input_tokens"], r["output_tokens"]) if r["calls"] else 0.0
+        for r in rows
+    ]
+    known = None if None in costs else round(sum(c or 0.0 for c in costs), 6)
+    total = {
+        what: sum(r[what] for r in rows)
+        for what in ("calls", "input_tokens", "output_tokens", "seconds")
+    }
+    return {
+        "models": sorted({r["model"] for r in rows}),
+        "questions": len(transcript),
+        **total,
+        "dollars": known,
+        "prices_of": date(),
+    }
