@@ -2,9 +2,11 @@ import numpy as np
 import pytest
 
 from corporeal import materials
+from corporeal.geometry.identity import identify
 from corporeal.types import Finish, SceneObject
-from corporeal.vlm.metadata import Evidence, lexicon, metals, recognise
-from handmade import plain
+from corporeal.vlm.lexicon import lexicon, metals
+from corporeal.vlm.metadata import Evidence, evidence, matter_hint, recognise
+from handmade import plain, scene
 
 
 class Named:
@@ -118,3 +120,58 @@ def test_a_thing_of_several_parts_does_not_say_what_each_is():
     assert seen("mesh", "chair", alone=True).material == "wood"
     assert seen("mesh", "chair", alone=False).material is None
     assert seen("mesh", "soda can", alone=False).material == "aluminium_can_sheet"
+
+
+# ---------------------------------------------------------------- names among names
+
+
+def told(thing, *parts):
+    """Recognise each part of a thing; a part is (surface name, finish name)."""
+    made = scene((f"{thing}_0", [(name, plain(finish), {}) for name, finish in parts]))
+    identity = identify(made, matter_hint)
+    return {
+        p.name: recognise(evidence(made, identity, k)) for k, p in enumerate(identity.catalogue)
+    }
+
+
+@pytest.mark.parametrize(
+    ("name", "material"),
+    [
+        ("shoe rack", None),
+        ("ball valve", None),
+        ("tv cabinet", "wood"),
+        ("car tire", "rubber"),
+        ("table lamp", None),
+        ("desk", "wood"),
+        ("cardboard box", "corrugated_cardboard"),
+        ("soda can holder", None),
+        ("oak shelf", "hardwood"),
+    ],
+)
+def test_of_compound_nouns_the_last_one_is_the_thing(name, material):
+    assert seen("mesh", name).material == material
+
+
+def test_what_all_parts_are_called_says_nothing_of_one():
+    said = told("sofa", ("velvet_sofa_legs", "a"), ("velvet_sofa_fabric", "b"))
+    assert {k: v.material for k, v in said.items()} == {
+        "velvet_sofa_legs": "wood",
+        "velvet_sofa_fabric": "cotton",
+    }
+    said = told("holder", ("glass_lantern_foot", "a"), ("glass_lantern_glass", "b"))
+    assert said["glass_lantern_glass"].material == "glass"
+    assert said["glass_lantern_foot"].material is None, "the glass is the other part's"
+
+
+def test_a_substance_that_no_part_claims_is_every_parts():
+    said = told("oak_table", ("top_plate", "a"), ("under_part", "b"))
+    assert {v.material for v in said.values()} == {"hardwood"}
+    assert all(v.margin < 0.5 for v in said.values())
+    numbered = told("thing", ("steel_01", "a"), ("steel_02", "b"))
+    assert [v.margin for v in numbered.values()] == [seen("steel", "thing").margin] * len(numbered)
+
+
+def test_a_name_without_words_spoils_no_prefix():
+    said = told("lamp", ("lamp_shade", "a"), ("Material.001", "b"), ("lamp_glass", "c"))
+    assert said["lamp_glass"].material == "glass"
+    assert said["lamp_shade"].material == "cotton"

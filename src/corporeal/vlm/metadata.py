@@ -1,17 +1,23 @@
 """Recognition without a model: what the file's own names and surface values tell."""
 
-import colorsys
-import tomllib
-from collections.abc import Iterable, Iterator, Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
-from importlib.resources import files
 from math import isfinite
 
-from corporeal.geometry.identity import Identity, words
+from corporeal.geometry.identity import Identity
 from corporeal.types import Finish, PartWords, Scene, SceneObject, Surface
+from corporeal.vlm.lexicon import (
+    KINDS,
+    Name,
+    Saying,
+    heads,
+    lookbook,
+    metals,
+    seen_as,
+    singular,
+    tokens_of,
+)
 
-KINDS = ("substance", "piece", "thing")
 WEAKER = 0.6
 """Factor on the margin of what is said of the whole when the part is only one of several."""
 METALLIC = 0.5
@@ -19,40 +25,6 @@ METALLIC = 0.5
 LONGEST_WALL = 10.0
 """No wall of a thing is thicker [m]."""
 UNKNOWN = PartWords("", None, reason="No name in the file says what this is made of.")
-
-
-@dataclass(frozen=True)
-class Saying:
-    """One entry of the lexicon: what a phrase tells."""
-
-    phrase: tuple[str, ...]
-    kind: str
-    material: str
-    margin: float
-    structure: str | None = None
-    thickness: float | None = None
-    """[m]"""
-    gives_way: tuple[str, ...] = ()
-    of: tuple[str, ...] = ()
-    colour: bool = False
-    every: bool = False
-    plant: bool = False
-    alpha: str = ""
-    metallic: str = ""
-
-
-@dataclass(frozen=True)
-class Look:
-    """What a part's colour tells in certain things."""
-
-    hue: tuple[float, float]
-    """[degrees]"""
-    saturation: tuple[float, float]
-    value: tuple[float, float]
-    of: frozenset[str]
-    says: str
-    material: str
-    margin: float
 
 
 @dataclass(frozen=True)
@@ -67,33 +39,63 @@ class Evidence:
     """The part is the whole object."""
     metallic_means_something: bool
     """Some surface of the object is not fully metallic: 1 is more than the exporter's default."""
+    shared: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
+    """Leading words that all of the object's surfaces have in common, and all its finishes: they
+    tell of the whole."""
+    claimed: frozenset[str] = frozenset()
+    """Materials that the object's other parts name as their own."""
 
     @property
-    def own(self) -> tuple[str, ...]:
-        """Names that are the part's own."""
-        return tuple(
-            dict.fromkeys([*(f.name for f in self.finishes), *(s.name for s in self.surfaces)])
-        )
+    def own(self) -> list[Name]:
+        """Names that are the part's own, without what its sisters are called too."""
+        finishes = [_name(f.name, self.shared[1]) for f in self.finishes]
+        return [*finishes, *(_name(s.name, self.shared[0]) for s in self.surfaces)]
 
     @property
-    def general(self) -> tuple[str, ...]:
+    def general(self) -> list[Name]:
         """Names of the whole object."""
         stem = self.thing.source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
-        return tuple(dict.fromkeys([self.thing.class_name, self.thing.name, stem]))
+        named = dict.fromkeys([self.thing.class_name, self.thing.name, stem])
+        return [*map(_name, named), *(Name(" ".join(w), list(w)) for w in self.shared if w)]
 
 
 def evidence(scene: Scene, identity: Identity, part: int) -> Evidence:
     """Gather what a scene's file says about one of its parts."""
     number = identity.catalogue[part].object
-    surfaces = [scene.surfaces[k] for k in identity.surfaces(part)]
-    worn = [scene.finishes[s.finish] for s in scene.surfaces if s.object == number]
+    alone = sum(p.object == number for p in identity.catalogue) == 1
+    worn = [(k, s) for k, s in enumerate(scene.surfaces) if s.object == number]
+    finishes = [scene.finishes[s.finish] for _, s in worn]
+    shared = (_prefix([s.name for _, s in worn]), _prefix([f.name for f in finishes]))
+    mine = identity.surfaces(part)
+    others = [s for k, s in worn if k not in mine]
+    said = [_name(s.name, shared[0]) for s in others]
+    said += [_name(scene.finishes[s.finish].name, shared[1]) for s in others]
+    told = [saying for name in said for saying in heads(name.words)]
+    own = dict.fromkeys(scene.surfaces[k].finish for k in mine)
     return Evidence(
-        surfaces=surfaces,
-        finishes=[scene.finishes[f] for f in dict.fromkeys(s.finish for s in surfaces)],
+        surfaces=[scene.surfaces[k] for k in mine],
+        finishes=[scene.finishes[f] for f in own],
         thing=scene.objects[number],
-        alone=sum(p.object == number for p in identity.catalogue) == 1,
-        metallic_means_something=any(f.metallic < 1.0 for f in worn),
+        alone=alone,
+        metallic_means_something=any(f.metallic < 1.0 for f in finishes),
+        shared=((), ()) if alone else shared,
+        claimed=frozenset(t.material for t in told if t.kind == "substance"),
     )
+
+
+def _name(text: str, shared: Sequence[str] = ()) -> Name:
+    found = tokens_of(text)
+    common = tuple(found[: len(shared)]) == tuple(shared)
+    return Name(text, found[len(shared) :] if common else found)
+
+
+def _prefix(names: Sequence[str]) -> tuple[str, ...]:
+    """Return the leading words that several different names have in common."""
+    told = list(dict.fromkeys(tuple(tokens_of(name)) for name in names))
+    if len(told) < 2:
+        return ()
+    same = [len(set(column)) == 1 for column in zip(*told, strict=False)]
+    return told[0][: same.index(False) if False in same else len(same)]
 
 
 def stated_substance(surfaces: Iterable[Surface]) -> str | None:
@@ -117,7 +119,8 @@ def _length(said: object) -> float | None:
 
 def matter_hint(surface: Surface, finish: Finish) -> str:
     """Return the material that a surface's own names state, "" for none: tells parts apart."""
-    sayings, _ = _told((finish.name, surface.name), (finish,), ("substance", "piece"), ())
+    names = [_name(finish.name), _name(surface.name)]
+    sayings, _ = _told(names, (finish,), ("substance", "piece"), ())
     return sayings[0].material if len({s.material for s in sayings}) == 1 else ""
 
 
@@ -144,18 +147,19 @@ def _general_names(evidence: Evidence) -> PartWords | None:
         return None
     if evidence.alone or sayings[0].every:
         return _answer(_of_metal(sayings, evidence), name, 1.0)
-    if sayings[0].plant:
+    told = {s.material for s in sayings}
+    if sayings[0].kind != "substance" or told & evidence.claimed:
         return None  # which of its parts this is, only the colour tells
-    return _answer(sayings, name, WEAKER) if sayings[0].kind == "substance" else None
+    return _answer(sayings, name, WEAKER)
 
 
 def _looks(evidence: Evidence) -> PartWords | None:
     """Tell a part by its plain colour where the thing has a part that looks so."""
     if evidence.alone or any(f.texture is not None for f in evidence.finishes):
         return None
-    around = {w for name in evidence.general for w in _tokens(name)}
-    for look in _lookbook():
-        if look.of & around and all(_seen_as(look, f) for f in evidence.finishes):
+    around = {w for name in evidence.general for w in name.words}
+    for look in lookbook():
+        if look.of & around and all(seen_as(look, f) for f in evidence.finishes):
             reason = f"In {evidence.thing.class_name!r} what is {look.says} is usually "
             return PartWords(
                 "", look.material, margin=look.margin, reason=f"{reason}{look.material}."
@@ -214,7 +218,7 @@ def _answer(sayings: list[Saying], name: str, factor: float) -> PartWords:
 
 
 def _told(
-    names: Sequence[str], finishes: Sequence[Finish], kinds: Sequence[str], thing: Sequence[str]
+    names: Sequence[Name], finishes: Sequence[Finish], kinds: Sequence[str], thing: Sequence[Name]
 ) -> tuple[list[Saying], str]:
     """Find the strongest sayings in any of the names, and the name they stand in.
 
@@ -223,15 +227,13 @@ def _told(
     stand in the names.
     """
     found: list[tuple[tuple[int, int, int], Saying, str]] = []
-    around = {w for n in thing for w in _tokens(n)}
+    around = {w for name in thing for w in name.words}
     for name in names:
-        tokens = _tokens(name)
-        for saying in _standing_in(tokens):
-            if saying.kind in kinds and _fits(saying, finishes, around | set(tokens)):
+        for saying in heads(name.words):
+            if saying.kind in kinds and _fits(saying, finishes, around | set(name.words)):
                 length = len(saying.phrase)
                 said = 1 if saying.kind == "piece" else length
-                rank = (said, -KINDS.index(saying.kind), length)
-                found.append((rank, saying, name))
+                found.append(((said, -KINDS.index(saying.kind), length), saying, name.text))
     if not found:
         return [], ""
     best = max(rank for rank, _, _ in found)
@@ -252,110 +254,4 @@ def _fits(saying: Saying, finishes: Sequence[Finish], around: set[str]) -> bool:
         return False
     if saying.alpha and not all(f.alpha_mode == saying.alpha for f in finishes):
         return False
-    return not saying.of or bool(around & {_singular(w) for w in saying.of})
-
-
-def _standing_in(tokens: list[str]) -> Iterator[Saying]:
-    for k, token in enumerate(tokens):
-        for saying in _by_first_word().get(token, ()):
-            if tuple(tokens[k : k + len(saying.phrase)]) == saying.phrase:
-                yield saying
-
-
-@cache
-def _by_first_word() -> dict[str, list[Saying]]:
-    index: dict[str, list[Saying]] = {}
-    for saying in lexicon():
-        index.setdefault(saying.phrase[0], []).append(saying)
-    return index
-
-
-def _tokens(name: str) -> list[str]:
-    return [_singular(w) for w in words(name)]
-
-
-def _singular(word: str) -> str:
-    return word[:-1] if len(word) > 3 and word.endswith("s") and not word.endswith("ss") else word
-
-
-def _seen_as(look: Look, finish: Finish) -> bool:
-    red, green, blue = (_as_seen(c) for c in finish.colour[:3])
-    hue, saturation, value = colorsys.rgb_to_hsv(red, green, blue)
-    seen = (360.0 * hue, saturation, value)
-    bounds = (look.hue, look.saturation, look.value)
-    return all(low <= x <= high for x, (low, high) in zip(seen, bounds, strict=True))
-
-
-def _as_seen(light: float) -> float:
-    """Linear light to sRGB (IEC 61966-2-1)."""
-    c = min(max(light, 0.0), 1.0)
-    return 12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055
-
-
-@cache
-def metals() -> frozenset[str]:
-    """Materials whose surface is metallic."""
-    general = next(s for s in lexicon() if s.phrase == ("metal",))
-    return frozenset(
-        (
-            general.material,
-            "aluminium_can_sheet",
-            "hardened_steel",
-            "zinc",
-            "lead",
-            *general.gives_way,
-        )
-    )
-
-
-@cache
-def lexicon() -> tuple[Saying, ...]:
-    """Every phrase of the lexicon with what it tells."""
-    return tuple(
-        _saying(kind, phrase, row)
-        for kind in KINDS
-        for row in _table()[kind]
-        for phrase in row["words"]
-    )
-
-
-@cache
-def _lookbook() -> tuple[Look, ...]:
-    return tuple(
-        Look(
-            hue=tuple(row["hue"]),
-            saturation=tuple(row["saturation"]),
-            value=tuple(row["value"]),
-            of=frozenset(_singular(w) for w in row["of"]),
-            says=row["says"],
-            material=row["material"],
-            margin=row["margin"],
-        )
-        for row in _table()["look"]
-    )
-
-
-@cache
-def _table() -> dict[str, list[dict]]:
-    return tomllib.loads(
-        files("corporeal.vlm").joinpath("lexicon.toml").read_text(encoding="utf-8")
-    )
-
-
-def _saying(kind: str, phrase: str, row: dict) -> Saying:
-    thickness = row.get("thickness_mm")
-    return Saying(
-        phrase=tuple(_singular(w) for w in phrase.split()),
-        kind=kind,
-        material=row["material"],
-        margin=row["margin"],
-        structure=row.get("structure"),
-        thickness=None if thickness is None else thickness * 1e-3,
-        gives_way=tuple(row.get("gives_way", ())),
-        of=tuple(row.get("of", ())),
-        colour=row.get("colour", False),
-        every=row.get("every", False),
-        plant=row.get("plant", False),
-        alpha=row.get("alpha", ""),
-        metallic=row.get("metallic", ""),
-    )
+    return not saying.of or bool(around & {singular(w) for w in saying.of})

@@ -1,0 +1,55 @@
+"""Measure what the embedded recogniser, which needs no model, says of real files.
+
+    python benchmarks/embedded.py [--assets FOLDER --record] [--json FILE] [--docs]
+
+Names and surface values of the parts are recorded in recognition/facts.json, what they are made of
+in recognition/truth.toml. ``--record`` reads the files in FOLDER/objects and FOLDER/ycb again;
+``--docs`` writes docs/recognition.md.
+"""
+
+import argparse
+import json
+from dataclasses import asdict
+from pathlib import Path
+
+from recognition import page
+from recognition.facts import FACTS, SETS, facts, record
+from recognition.score import judge, ordering, score
+
+DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
+
+
+def main() -> None:
+    """Judge every part and write what was asked for."""
+    asked = argparse.ArgumentParser(description=__doc__)
+    asked.add_argument("--assets", type=Path)
+    asked.add_argument("--record", action="store_true")
+    asked.add_argument("--json", type=Path)
+    asked.add_argument("--docs", action="store_true")
+    given = asked.parse_args()
+    if given.record and given.assets is None:
+        asked.error("--record reads files: say --assets FOLDER too.")
+    if given.record:
+        lines = ",\n".join(json.dumps(row) for row in record(given.assets))
+        FACTS.write_text(f"[\n{lines}\n]\n", encoding="utf-8")
+    rows = judge(facts())
+    for group in SETS:
+        mine = [r for r in rows if r.group == group]
+        s = score(mine)
+        print(
+            f"{group:8} {s.parts:3} parts: right {s.right:.0%}, wrong {s.wrong:.0%}, unknown "
+            f"{s.unknown:.0%}; margin orders {ordering(mine):.2f}"
+        )
+    print(f"all: margin orders {ordering(rows):.2f}")
+    for row in rows:
+        if row.verdict == "wrong":
+            print(f"  wrong: {row.file} / {row.part}: {row.answer} ({row.margin:.2f}) {row.reason}")
+    if given.json:
+        told = [asdict(r) | {"verdict": r.verdict} for r in rows]
+        given.json.write_text(json.dumps(told, indent=1), encoding="utf-8")
+    if given.docs:
+        DOCS.write_text(page.markdown(), encoding="utf-8")
+
+
+if __name__ == "__main__":
+    main()

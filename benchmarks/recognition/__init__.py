@@ -1,0 +1,1 @@
+"""How well the embedded recogniser does without a model: facts, truth, score, page."""

@@ -1,0 +1,186 @@
+"""The lexicon: what words, and plain colours, tell about matter."""
+
+import colorsys
+import tomllib
+from collections.abc import Iterator
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from corporeal.geometry.identity import words
+from corporeal.types import Finish
+
+KINDS = ("substance", "piece", "thing")
+"""The most telling first: "oak", "table leg", "table"."""
+
+
+@dataclass(frozen=True)
+class Saying:
+    """One entry of the lexicon: what a phrase tells."""
+
+    phrase: tuple[str, ...]
+    kind: str
+    material: str
+    margin: float
+    structure: str | None = None
+    thickness: float | None = None
+    """[m]"""
+    gives_way: tuple[str, ...] = ()
+    of: tuple[str, ...] = ()
+    colour: bool = False
+    every: bool = False
+    plant: bool = False
+    alpha: str = ""
+    metallic: str = ""
+
+
+@dataclass(frozen=True)
+class Look:
+    """What a part's colour tells in certain things."""
+
+    hue: tuple[float, float]
+    """[degrees]"""
+    saturation: tuple[float, float]
+    value: tuple[float, float]
+    of: frozenset[str]
+    says: str
+    material: str
+    margin: float
+
+
+@dataclass(frozen=True)
+class Name:
+    """A name as it stands in the file, and the words of it that count."""
+
+    text: str
+    words: list[str]
+
+
+def heads(tokens: list[str]) -> list[Saying]:
+    """Find what stands in a name; of compound nouns the last one is the thing.
+
+    A shoe rack is a rack, and a TV cabinet is a cabinet.
+    """
+    standing = [
+        (k, saying)
+        for k, saying in _standing_in(tokens)
+        if saying.kind == "substance" or _after(tokens, k, saying) not in _holders()
+    ]
+    last: dict[int, int] = {}
+    for k, saying in standing:
+        if saying.kind == "thing":
+            last[len(saying.phrase)] = k
+    return [s for k, s in standing if s.kind != "thing" or k == last[len(s.phrase)]]
+
+
+def _after(tokens: list[str], k: int, saying: Saying) -> str:
+    following = k + len(saying.phrase)
+    return tokens[following] if following < len(tokens) else ""
+
+
+def _standing_in(tokens: list[str]) -> Iterator[tuple[int, Saying]]:
+    for k, token in enumerate(tokens):
+        for saying in _by_first_word().get(token, ()):
+            if tuple(tokens[k : k + len(saying.phrase)]) == saying.phrase:
+                yield k, saying
+
+
+@cache
+def _by_first_word() -> dict[str, list[Saying]]:
+    index: dict[str, list[Saying]] = {}
+    for saying in lexicon():
+        index.setdefault(saying.phrase[0], []).append(saying)
+    return index
+
+
+def tokens_of(name: str) -> list[str]:
+    """Return the words of a name in the singular, without what exporters write."""
+    return [singular(w) for w in words(name)]
+
+
+def singular(word: str) -> str:
+    """Cut a plural's s; it need not be English, only the same on both sides."""
+    return word[:-1] if len(word) > 3 and word.endswith("s") and not word.endswith("ss") else word
+
+
+def seen_as(look: Look, finish: Finish) -> bool:
+    """Tell whether a finish's colour factor, as an eye sees it, lies within a look."""
+    red, green, blue = (_as_seen(c) for c in finish.colour[:3])
+    hue, saturation, value = colorsys.rgb_to_hsv(red, green, blue)
+    seen = (360.0 * hue, saturation, value)
+    bounds = (look.hue, look.saturation, look.value)
+    return all(low <= x <= high for x, (low, high) in zip(seen, bounds, strict=True))
+
+
+def _as_seen(light: float) -> float:
+    """Linear light to sRGB (IEC 61966-2-1)."""
+    c = min(max(light, 0.0), 1.0)
+    return 12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055
+
+
+@cache
+def metals() -> frozenset[str]:
+    """Materials whose surface is metallic."""
+    general = next(s for s in lexicon() if s.phrase == ("metal",))
+    others = ("aluminium_can_sheet", "hardened_steel", "magnesium", "zinc", "lead")
+    return frozenset((general.material, *others, *general.gives_way))
+
+
+@cache
+def lexicon() -> tuple[Saying, ...]:
+    """Every phrase of the lexicon with what it tells."""
+    return tuple(
+        _saying(kind, phrase, row)
+        for kind in KINDS
+        for row in _table()[kind]
+        for phrase in row["words"]
+    )
+
+
+@cache
+def lookbook() -> tuple[Look, ...]:
+    """Every plain colour that tells of a part, with the things it tells it of."""
+    return tuple(
+        Look(
+            hue=tuple(row["hue"]),
+            saturation=tuple(row["saturation"]),
+            value=tuple(row["value"]),
+            of=frozenset(singular(w) for w in row["of"]),
+            says=row["says"],
+            material=row["material"],
+            margin=row["margin"],
+        )
+        for row in _table()["look"]
+    )
+
+
+@cache
+def _holders() -> frozenset[str]:
+    """Nouns that make the noun before them a mere purpose."""
+    return frozenset(map(singular, _table()["holders"]))
+
+
+@cache
+def _table() -> dict[str, list]:
+    return tomllib.loads(
+        files("corporeal.vlm").joinpath("lexicon.toml").read_text(encoding="utf-8")
+    )
+
+
+def _saying(kind: str, phrase: str, row: dict) -> Saying:
+    thickness = row.get("thickness_mm")
+    return Saying(
+        phrase=tuple(singular(w) for w in phrase.split()),
+        kind=kind,
+        material=row["material"],
+        margin=row["margin"],
+        structure=row.get("structure"),
+        thickness=None if thickness is None else thickness * 1e-3,
+        gives_way=tuple(row.get("gives_way", ())),
+        of=tuple(row.get("of", ())),
+        colour=row.get("colour", False),
+        every=row.get("every", False),
+        plant=row.get("plant", False),
+        alpha=row.get("alpha", ""),
+        metallic=row.get("metallic", ""),
+    )
