@@ -8,7 +8,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from inspect import cleandoc
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import tyro
 from rich.console import Console
@@ -123,6 +123,51 @@ def verb_materials() -> None:
         raise UserError(f"Say `corporeal materials`, or one of: {'; '.join(MATERIAL_WORDS)}.")
 
 
+def verb_evaluate() -> None:
+    """Compare what was predicted with what was measured: `evaluate mass FOLDER --truth CSV`.
+
+    FOLDER holds models, one object each; the CSV has columns object, mass_kg and, if you like, fill
+    (solid, hollow, full: whose errors are told apart). Without --truth masses are predicted only.
+    A folder in the layout of ABO-500 needs no CSV: choose its --split.
+    """
+    from corporeal import store
+    from corporeal.evaluation import mass, report, truth
+    from corporeal.stages.describe import DescribeConfig
+    from corporeal.stages.ground import GroundConfig
+
+    @dataclass(frozen=True)
+    class Evaluate:
+        what: tyro.conf.Positional[Literal["mass"]]
+        folder: Annotated[Path, tyro.conf.Positional]
+        truth: Path | None = None
+        """Table of measured masses."""
+        split: str = "test"
+        """Of ABO-500; "all" for all."""
+        json: Path | None = None
+        """Where rows and errors go, as data."""
+        figure: Path | None = None
+        """Where the picture of predicted against measured goes (PNG)."""
+        how: mass.MassConfig = field(default_factory=mass.MassConfig)
+        describe: DescribeConfig = field(default_factory=DescribeConfig)
+        ground: GroundConfig = field(default_factory=GroundConfig)
+
+    asked = _parse(Evaluate, "evaluate", verb_evaluate.__doc__)
+    things = truth.objects(asked.folder, asked.truth, asked.split)
+    with _told() as tell:
+        done = tell("evaluate")
+        found = mass.predict_all(things, asked.describe, asked.ground, asked.how, done)
+    result = mass.compare(found)
+    for title, heads, rows in report.tables(result):
+        table = Table(*heads, title=title, box=None)
+        for row in rows:
+            table.add_row(*row)
+        Console().print(table)
+    if asked.json is not None:
+        store.write_json(asked.json, result)
+    if asked.figure is not None:
+        report.mass_figure(result["rows"], asked.figure)
+
+
 def verb_doctor() -> None:
     """Tell what works on this machine, and what would be gained by what."""
     from corporeal.doctor import examine
@@ -176,6 +221,7 @@ VERBS: dict[str, Callable[[], None]] = {
     "run": verb_run,
     "status": verb_status,
     "materials": verb_materials,
+    "evaluate": verb_evaluate,
     "doctor": verb_doctor,
 }
 REDO = ("assemble", "describe", "segment", "ground", "fill", "simulate", "film", "report")

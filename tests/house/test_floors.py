@@ -13,7 +13,7 @@ FLOORS = [
     {"geometry", "backends", "store"},
     {"materials", "vlm", "render", "showcase", "mpm", "formats"},
     {"stages"},
-    {"pipeline"},
+    {"pipeline", "evaluation"},
     {"doctor"},
     {"cli"},
 ]

@@ -73,12 +73,9 @@ def compose(
     Pieces share the mesh by their stated shares of its volume and surface; the part then weighs
     what they weigh together, and is otherwise as the piece that matters most.
     """
-    k = member.part
-    structure, material = field.structures[k], field.materials[k]
-    made = decide(member, structure, material, field.words[k])
-    pieces = field.pieces[k] if field.pieces else ()
-    single = [(structure, material, field.words[k])]
-    every = [(p.structure, p.material, p.words) for p in pieces] or single
+    structure, material, words = said_of(member.part, field)
+    made = decide(member, structure, material, words)
+    every = pieces_of(member.part, field)
     makes = [decide(member, *row) for row in every]
     holds = [contain(anatomy, member, m, row, rng) for m, row in zip(makes, every, strict=True)]
     body, sheet = sum(m.body_mass for m in makes), sum(m.sheet_mass for m in makes)
@@ -86,6 +83,37 @@ def compose(
     mean = material.density * (body + sheet) / alone if alone > 0 else material.density
     made = replace(made, body_mass=body, sheet_mass=sheet, density=mean)
     return with_contents(made, member, [h for h in holds if h])
+
+
+def weight(member: Member, field: MaterialField, room: float) -> float:
+    """Mass of a part with what is in it [kg], as ``compose`` finds it.
+
+    Args:
+        member: The part.
+        field: What it is made of.
+        room: What goes into it, if it is a vessel [m³].
+
+    """
+    total = 0.0
+    for said in pieces_of(member.part, field):
+        made = decide(member, *said)
+        structure = said[0]
+        total += made.mass
+        if structure.contents is not None:
+            inner = behind(member, made, said, room)
+            total += structure.contents.density * structure.fill * inner
+    return total
+
+
+def said_of(part: int, field: MaterialField) -> Said:
+    """Return what is said of a part as a whole."""
+    return field.structures[part], field.materials[part], field.words[part]
+
+
+def pieces_of(part: int, field: MaterialField) -> list[Said]:
+    """Return what is said of each thing that shares a part's mesh: mostly of the part alone."""
+    pieces = field.pieces[part] if field.pieces else ()
+    return [(p.structure, p.material, p.words) for p in pieces] or [said_of(part, field)]
 
 
 def with_contents(made: Make, member: Member, holds: Sequence[Held]) -> Make:
@@ -109,17 +137,30 @@ def contain(
 
     m = ρ f (V - A t), with the share f of the room that the contents take up.
     """
-    structure, material, words = said
+    structure = said[0]
     if structure.contents is None:
         return None
     room = room_of(anatomy, member, made.thickness or made.sheet, rng)
-    wall = made.body_mass / material.density
-    behind = room.volume if is_vessel(member) else member.volume
-    inner = behind * words.volume_share - (0.0 if is_vessel(member) else wall)
-    inner = max(inner, 0.0)
+    inner = behind(member, made, said, room.volume)
     level = room.level(structure.fill) if structure.loose else np.inf
     lies = room.points[room.points[:, 2] <= level]
     return Held(structure.contents.density * structure.fill * inner, inner, lies, level)
+
+
+def behind(member: Member, made: Make, said: Said, room: float) -> float:
+    """Volume of the room behind a wall [m³]: all that its outer surface encloses, less the wall.
+
+    Args:
+        member: The part.
+        made: How its wall is made.
+        said: What is said of it.
+        room: What goes into it, if it is a vessel [m³].
+
+    """
+    _, material, words = said
+    if is_vessel(member):
+        return room * words.volume_share
+    return max(member.volume * words.volume_share - made.body_mass / material.density, 0.0)
 
 
 def decide(member: Member, structure: Structure, material: Material, words: PartWords) -> Make:

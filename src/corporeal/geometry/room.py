@@ -52,8 +52,7 @@ def room_of(anatomy: Anatomy, member: Member, thickness: float, rng: np.random.G
     if is_vessel(member):
         box = np.prod(np.ptp(corners_of(member), axis=0))
         points = within(anatomy, member, box_points(member, COUNT, rng))
-        wall = member.sheet_area * thickness
-        return Room(points, max(float(box) * len(points) / COUNT - wall, 0.0))
+        return Room(points, float(box) * len(points) / COUNT)
     probes = anatomy.probes[anatomy.part_of_probe == member.part]
     deep = member.shape.closest(probes)[0] > thickness
     wall = min(member.body_area * thickness, member.volume)

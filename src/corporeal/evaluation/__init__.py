@@ -1,0 +1,1 @@
+"""How good it is: what was predicted against what was measured."""

@@ -1,0 +1,250 @@
+"""Consistent sets of values drawn from the measured ranges: what is not known, as samples.
+
+A value is drawn from a triangle on its range's own scale, whose peak is the chosen value. It spans
+the whole range where nobody chose, half of the way to either end where a model did, and nothing
+where a person stated it. Within one material the stiffer grade is also the stronger, and in porous
+and loose matter the denser; what is of one material in one object is of one grade.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from math import erf, sqrt
+
+import numpy as np
+
+from corporeal.errors import UnknownChoiceError
+from corporeal.materials.contact import friction_between, restitution_between
+from corporeal.materials.entry import Entry
+from corporeal.materials.library import substances
+from corporeal.materials.placement import CONTENTS, entry_of
+from corporeal.materials.scale import fraction_of, place
+from corporeal.types import (
+    Ground,
+    Inventory,
+    Material,
+    MaterialField,
+    PartWords,
+    Piece,
+    Range,
+    Structure,
+)
+
+SPAN = {"typical": 1.0, "fallback": 1.0, "model": 0.5, "recording": 0.5, "annotation": 0.0}
+"""How far towards the ends of its range a value is drawn, by who chose it."""
+TOGETHER = 0.9
+"""Correlation of what moves together."""
+GRADE = ("young", "yield_stress", "hardening", "cohesion", "friction_angle")
+"""Grow together within one material."""
+POROUS = ("foam", "fibrous", "granular", "bulk", "food")
+"""Groups in which the denser is also the stiffer (Gibson and Ashby 1997: E ∝ ρ²)."""
+FULLER = 0.1
+"""How far from the truth a stated share of a container's room may be [-]."""
+SHARES = 0.2
+"""Standard deviation of the logarithm of a share that was judged by eye [-]."""
+
+
+def triangle(quantile: float, low: float, peak: float, high: float) -> float:
+    """Value of a triangular distribution on [low, high] at a quantile."""
+    if high <= low:
+        return peak
+    if quantile < (peak - low) / (high - low):
+        return low + sqrt(quantile * (high - low) * (peak - low))
+    return high - sqrt((1 - quantile) * (high - low) * (high - peak))
+
+
+def otherwise(inventory: Inventory, rng: np.random.Generator, library: str) -> Inventory:
+    """Draw the material of every part among its alternatives, by their stated probabilities.
+
+    What nobody recognised may be any of the library's materials.
+    """
+    return replace(
+        inventory,
+        objects=tuple(
+            replace(thing, parts=tuple(_otherwise(p, rng, library) for p in thing.parts))
+            for thing in inventory.objects
+        ),
+    )
+
+
+def _otherwise(words: PartWords, rng: np.random.Generator, library: str) -> PartWords:
+    pieces = tuple(_otherwise(p, rng, library) for p in words.pieces)
+    words = replace(words, pieces=pieces)
+    at, drawn = 0.0, float(rng.uniform())
+    if words.material is None:
+        every = substances(library)
+        return _instead(words, every[int(drawn * len(every))], library)
+    for name, probability in words.alternatives:
+        at += probability
+        if drawn < at:
+            return _instead(words, name, library)
+    return words
+
+
+def _instead(words: PartWords, name: str, library: str) -> PartWords:
+    """Let another material stand in a part's place, unless it makes no such walls."""
+    try:
+        entry = entry_of(name, library)
+    except UnknownChoiceError:
+        return words
+    walled = words.structure in ("shell", "filled") and words.thickness is None
+    if walled and "shell_thickness" not in entry.ranges:
+        return words
+    kept = {f: p for f, p in words.placements.items() if f in ("shell_thickness", CONTENTS)}
+    reason = f"It may be {name} instead of {words.material or 'something unknown'}."
+    return replace(words, material=name, placements=kept, values={}, reason=reason)
+
+
+@dataclass
+class Grades:
+    """The luck of one draw: the same material in the same object is of the same grade."""
+
+    rng: np.random.Generator
+    known: dict[tuple[int, str, str], float]
+
+    def normal(self, owner: int, material: str, what: str) -> float:
+        """Draw a standard normal number once for each of its three names."""
+        key = (owner, material, what)
+        if key not in self.known:
+            self.known[key] = float(self.rng.normal())
+        return self.known[key]
+
+    def quantile(self, owner: int, material: str, what: str, bound: bool) -> float:
+        """Draw a quantile; what is bound moves with the material's grade."""
+        own = self.normal(owner, material, what)
+        if bound:
+            grade = self.normal(owner, material, "grade")
+            own = TOGETHER * grade + sqrt(1 - TOGETHER**2) * own
+        return 0.5 * (1 + erf(own / sqrt(2)))
+
+
+def sample(
+    field: MaterialField,
+    object_of_part: Sequence[int],
+    rng: np.random.Generator,
+    library: str = "default",
+    floor: str = "concrete",
+) -> MaterialField:
+    """Draw one consistent set of values for a whole scene; all stay inside their ranges.
+
+    Args:
+        field: What was chosen, with its grounds.
+        object_of_part: Owner of each part.
+        rng: Source of the draw.
+        library: Where materials are looked up.
+        floor: What the floor and the walls are made of.
+
+    """
+    grades = Grades(rng, {})
+    made = [
+        _material(m, owner, grades, library)
+        for m, owner in zip(field.materials, object_of_part, strict=True)
+    ]
+    words = tuple(_shares(w, rng) for w in field.words)
+    structures = tuple(
+        _structure(s, m, w, owner, grades, library)
+        for s, m, w, owner in zip(field.structures, made, words, object_of_part, strict=True)
+    )
+    pieces = tuple(
+        tuple(
+            _piece(p, said, owner, grades, library) for p, said in zip(group, w.pieces, strict=True)
+        )
+        for group, w, owner in zip(
+            field.pieces or ((),) * len(made), words, object_of_part, strict=True
+        )
+    )
+    ground = entry_of(floor, library)
+    bodies = [*made, _material(ground.pick(ground.typical()), -1, grades, library)]
+    return MaterialField(
+        materials=tuple(made),
+        structures=structures,
+        words=words,
+        friction=_friction(field, [entry_of(m.name, library) for m in bodies], grades),
+        restitution=np.array([[restitution_between(a, b) for b in bodies] for a in bodies]),
+        pieces=pieces if field.pieces else (),
+    )
+
+
+def _material(material: Material, owner: int, grades: Grades, library: str) -> Material:
+    porous = entry_of(material.name, library).group in POROUS
+    grounds = {
+        f: _drawn(g, grades.quantile(owner, material.name, f, f in GRADE or _dense(f, porous)))
+        for f, g in material.grounds.items()
+    }
+    return replace(material, grounds=grounds, **{f: g.value for f, g in grounds.items()})
+
+
+def _dense(field: str, porous: bool) -> bool:
+    return porous and field == "density"
+
+
+def _drawn(ground: Ground, quantile: float) -> Ground:
+    span = SPAN.get(ground.chosen_by, 1.0)
+    return replace(ground, value=_within(ground.range, ground.value, quantile, span))
+
+
+def _within(r: Range, chosen: float, quantile: float, span: float) -> float:
+    peak = fraction_of(r, chosen)
+    drawn = triangle(quantile, peak - span * peak, peak, peak + span * (1 - peak))
+    return place(r, drawn) if span > 0 else chosen
+
+
+def _structure(
+    structure: Structure,
+    material: Material,
+    words: PartWords,
+    owner: int,
+    grades: Grades,
+    library: str,
+) -> Structure:
+    thickness = structure.thickness
+    if structure.kind != "solid" and words.thickness is None:
+        thickness = material.shell_thickness
+    if structure.contents is None:
+        return replace(structure, thickness=thickness)
+    fill = structure.fill
+    if words.answered_by != "annotation":
+        quantile = grades.quantile(owner, words.name, "fill", False)
+        fill = triangle(quantile, max(fill - FULLER, 0.0), fill, min(fill + FULLER, 1.0))
+    inner = _material(structure.contents, owner, grades, library)
+    return replace(structure, thickness=thickness, contents=inner, fill=fill)
+
+
+def _piece(piece: Piece, words: PartWords, owner: int, grades: Grades, library: str) -> Piece:
+    material = _material(piece.material, owner, grades, library)
+    structure = _structure(piece.structure, material, words, owner, grades, library)
+    return Piece(words, material, structure)
+
+
+def _shares(words: PartWords, rng: np.random.Generator) -> PartWords:
+    """Draw the shares of a part's pieces; they still add up to what they did."""
+    if not words.pieces:
+        return words
+    found = {}
+    for what in ("volume_share", "surface_share"):
+        shares = np.array([getattr(p, what) for p in words.pieces])
+        drawn = shares * np.exp(SHARES * rng.normal(size=len(shares)))
+        found[what] = drawn * shares.sum() / max(drawn.sum(), 1e-300)
+    pieces = tuple(
+        replace(p, volume_share=float(v), surface_share=float(s))
+        for p, v, s in zip(words.pieces, found["volume_share"], found["surface_share"], strict=True)
+    )
+    return replace(words, pieces=pieces)
+
+
+def _friction(field: MaterialField, entries: Sequence[Entry], grades: Grades) -> np.ndarray:
+    """Draw the friction of every pair in its published range; what a person stated stays."""
+    stated = [_stated(m.grounds) for m in field.materials] + [False]
+    drawn = np.array(field.friction)
+    for a, one in enumerate(entries):
+        for b, other in enumerate(entries[: a + 1]):
+            r, chosen = friction_between(one, other).sliding, float(field.friction[a, b])
+            if stated[a] or stated[b] or chosen not in r:
+                continue
+            first, second = sorted((one.name, other.name))
+            quantile = grades.quantile(-1, first, f"on {second}", False)
+            drawn[a, b] = drawn[b, a] = _within(r, chosen, quantile, 1.0)
+    return drawn
+
+
+def _stated(grounds: Mapping[str, Ground]) -> bool:
+    return "friction" in grounds and grounds["friction"].chosen_by == "annotation"

@@ -1,0 +1,185 @@
+"""Sets of values drawn over the ranges: inside them, consistent, repeatable."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from corporeal import materials
+from corporeal.materials.ensemble import otherwise, sample, triangle
+from corporeal.types import (
+    Inventory,
+    MaterialField,
+    ObjectWords,
+    PartWords,
+    Piece,
+    Placement,
+    Structure,
+)
+
+
+def usual(name):
+    entry = materials.find(name)
+    return entry.pick(entry.typical())
+
+
+def field_of(*names, structures=None, words=None, pieces=()):
+    made = tuple(usual(n) for n in names)
+    count = len(made) + 1
+    floor = [*names, "concrete"]
+    friction = np.array(
+        [
+            [
+                materials.friction_between(materials.find(a), materials.find(b)).sliding.typical
+                for b in floor
+            ]
+            for a in floor
+        ]
+    )
+    return MaterialField(
+        materials=made,
+        structures=structures or (Structure("solid"),) * len(made),
+        words=words or tuple(PartWords(n, n) for n in names),
+        friction=friction,
+        restitution=np.full((count, count), 0.5),
+        pieces=pieces,
+    )
+
+
+def draws(field, owners, count=400):
+    return [sample(field, owners, np.random.default_rng(k)) for k in range(count)]
+
+
+@pytest.mark.parametrize(
+    ("low", "peak", "high"), [(0, 0.5, 1), (0, 0, 0.5), (0.3, 1, 1), (2, 3, 7)]
+)
+def test_a_triangle_is_a_distribution_on_its_support(low, peak, high):
+    quantiles = (np.arange(20_000) + 0.5) / 20_000
+    drawn = np.array([triangle(q, low, peak, high) for q in quantiles])
+    assert drawn.min() >= low
+    assert drawn.max() <= high
+    assert drawn.mean() == pytest.approx((low + peak + high) / 3, abs=1e-3)
+    assert np.all(np.diff(drawn) >= 0)
+
+
+def test_every_drawn_value_lies_in_its_range_and_spreads_over_it():
+    field = field_of("steel", "rubber")
+    found = draws(field, [0, 1])
+    for k, material in enumerate(field.materials):
+        for name, ground in material.grounds.items():
+            values = np.array([getattr(f.materials[k], name) for f in found])
+            r = ground.range
+            assert r.low <= values.min() <= values.max() <= r.high
+            if r.high > r.low:
+                assert np.ptp(values) > 0.4 * (r.high - r.low) or r.high / max(r.low, 1e-9) > 10
+            assert found[0].materials[k].grounds[name].value == values[0]
+
+
+def test_what_moves_together_in_life_moves_together_here():
+    found = draws(field_of("steel", "seat_foam", "steel"), [0, 0, 1])
+
+    def column(part, name):
+        return np.array([getattr(f.materials[part], name) for f in found])
+
+    def together(a, b):
+        rank = [np.argsort(np.argsort(x)) for x in (a, b)]
+        return np.corrcoef(*rank)[0, 1]
+
+    assert together(column(0, "young"), column(0, "yield_stress")) > 0.7
+    assert together(column(1, "young"), column(1, "density")) > 0.7
+    assert abs(together(column(0, "young"), column(0, "density"))) < 0.15
+    assert abs(together(column(0, "young"), column(2, "young"))) < 0.15
+
+
+def test_one_object_has_one_grade_of_a_material():
+    drawn = sample(
+        field_of("hardwood", "hardwood", "hardwood"), [0, 0, 1], np.random.default_rng(3)
+    )
+    legs, other = drawn.materials[:2], drawn.materials[2]
+    assert legs[0] == legs[1]
+    assert legs[0].young != other.young
+
+
+def test_what_was_chosen_narrows_the_draw_and_what_was_stated_ends_it():
+    field = field_of("steel")
+    steel = field.materials[0]
+
+    def spread(chosen_by):
+        said = replace(steel.grounds["young"], chosen_by=chosen_by)
+        told = replace(steel, grounds=steel.grounds | {"young": said})
+        found = draws(replace(field, materials=(told,)), [0])
+        return float(np.ptp([f.materials[0].young for f in found]))
+
+    assert spread("annotation") == 0.0
+    assert 0 < spread("model") < 0.6 * spread("typical")
+
+
+def test_walls_contents_and_shares_are_drawn_too():
+    soup = usual("sauce")
+    can = Structure("filled", 4e-4, contents=soup, fill=0.9, loose=True)
+    halves = tuple(
+        PartWords(n, n, volume_share=s, surface_share=s) for n, s in (("steel", 0.3), ("ABS", 0.7))
+    )
+    words = PartWords("can", "steel", "filled", contents="sauce", pieces=halves)
+    pieces = (tuple(Piece(w, usual(w.name), Structure("solid")) for w in halves),)
+    field = field_of("steel", structures=(can,), words=(words,), pieces=pieces)
+    found = draws(field, [0])
+    made = [f.structures[0] for f in found]
+    wall = field.materials[0].grounds["shell_thickness"].range
+    assert all(wall.low <= s.thickness <= wall.high for s in made)
+    assert len({s.thickness for s in made}) > 300
+    assert all(s.contents.density in soup.grounds["density"].range for s in made)
+    fills = np.array([s.fill for s in made])
+    assert 0.8 <= fills.min() < 0.85
+    assert 0.95 < fills.max() <= 1.0
+    shares = np.array([[p.words.volume_share for p in f.pieces[0]] for f in found])
+    assert np.allclose(shares.sum(axis=1), 1.0)
+    assert 0.03 < shares[:, 0].std() < 0.06
+    stated = replace(words, thickness=4e-4, answered_by="annotation")
+    fixed = draws(replace(field, words=(stated,)), [0], 5)
+    assert {(f.structures[0].thickness, f.structures[0].fill) for f in fixed} == {(4e-4, 0.9)}
+
+
+def test_friction_stays_within_what_was_published():
+    field = field_of("rubber", "steel")
+    found = draws(field, [0, 1], 100)
+    published = materials.friction_between(
+        materials.find("rubber"), materials.find("concrete")
+    ).sliding
+    drawn = np.array([f.friction[0, 2] for f in found])
+    assert published.low <= drawn.min() < drawn.max() <= published.high
+    assert all(np.array_equal(f.friction, f.friction.T) for f in found)
+
+
+def inventory(words):
+    return Inventory((ObjectWords("thing", "thing", (words,)),))
+
+
+def names(words, count=2000):
+    drawn = (otherwise(inventory(words), np.random.default_rng(k), "default") for k in range(count))
+    return [d.objects[0].parts[0].material for d in drawn]
+
+
+def test_alternatives_come_as_often_as_they_were_stated():
+    words = PartWords("cup", "porcelain", alternatives=(("glass", 0.25), ("ABS", 0.1)))
+    found = names(words)
+    assert found.count("glass") / len(found) == pytest.approx(0.25, abs=0.03)
+    assert found.count("ABS") / len(found) == pytest.approx(0.1, abs=0.02)
+    assert set(found) == {"porcelain", "glass", "ABS"}
+
+
+def test_an_alternative_keeps_the_walls_place_and_needs_walls():
+    place = {"shell_thickness": Placement(0.9, "model", ""), "young": Placement(0.1, "model", "")}
+    words = PartWords("cup", "porcelain", "shell", placements=place, alternatives=(("glass", 1.0),))
+    drawn = otherwise(inventory(words), np.random.default_rng(0), "default").objects[0].parts[0]
+    assert set(drawn.placements) == {"shell_thickness"}
+    assert "instead of porcelain" in drawn.reason
+    wall_less = next(
+        e.name for e in materials.library().values() if "shell_thickness" not in e.ranges
+    )
+    kept = PartWords("cup", "porcelain", "shell", alternatives=((wall_less, 1.0),))
+    assert set(names(kept, 20)) == {"porcelain"}
+
+
+def test_what_is_unknown_may_be_anything():
+    assert len(set(names(PartWords("it", None), 300))) > 40
