@@ -8,6 +8,7 @@ from corporeal.materials.library import (
     counterpart,
     find,
     library,
+    named,
     read,
     substances,
 )
@@ -34,6 +35,7 @@ __all__ = [
     "markdown",
     "materials_json",
     "menu",
+    "named",
     "read",
     "restitution_between",
     "show",

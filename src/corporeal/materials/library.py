@@ -59,6 +59,19 @@ def find(name: str, library_name: str = "default") -> Entry:
     raise UnknownChoiceError("material", name, list(known))
 
 
+def named(name: str, library_name: str) -> Entry:
+    """Return the entry called ``name``; what a smaller library leaves out is the default one's.
+
+    Raises:
+        UnknownChoiceError: Neither has that name or alias.
+
+    """
+    try:
+        return find(name, library_name)
+    except UnknownChoiceError:
+        return find(name)
+
+
 def counterpart(entry: Entry, library_name: str) -> Entry:
     """Return what stands for ``entry`` in another library: its own name, or the published one.
 

@@ -21,7 +21,7 @@ from corporeal.vlm.by_hand import all_answered
 from corporeal.vlm.cache import Cached
 from corporeal.vlm.interview import Interview, Offer, Subject
 from corporeal.vlm.metadata import (
-    Evidence,
+    evidence,
     matter_hint,
     recognise,
     stated_substance,
@@ -89,8 +89,8 @@ def describe(
 
     """
     identity = identify(scene, matter_hint)
-    told = _annotations(scene, identity, config)
-    file = _file_words(scene, identity)
+    told = _annotations(scene, identity, config, library)
+    file = _file_words(scene, identity, library)
     model = _connected(config.vlm, config)
     if model is None:
         objects = [
@@ -288,19 +288,19 @@ def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, 
 # ---------------------------------------------------------------- the file's own names
 
 
-def _file_words(scene: Scene, identity: Identity) -> list[list[PartWords]]:
+def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[PartWords]]:
     """Return what the file tells of every part of every object."""
     words: list[list[PartWords]] = [[] for _ in scene.objects]
     for part, entry in enumerate(identity.catalogue):
-        words[entry.object].append(_from_file(scene, identity, part))
+        words[entry.object].append(_from_file(scene, identity, part, library))
     return words
 
 
-def _from_file(scene: Scene, identity: Identity, part: int) -> PartWords:
+def _from_file(scene: Scene, identity: Identity, part: int, library: str) -> PartWords:
     entry = identity.catalogue[part]
     surfaces = [scene.surfaces[s] for s in identity.surfaces(part)]
     thickness = stated_thickness(surfaces)
-    words = _stated(surfaces) or recognise(_evidence(scene, identity, part, surfaces))
+    words = _stated(surfaces, library) or recognise(evidence(scene, identity, part))
     by = "metadata" if words.material else "unknown"
     words = replace(words, name=entry.name, answered_by=by)
     if thickness is None:
@@ -310,35 +310,22 @@ def _from_file(scene: Scene, identity: Identity, part: int) -> PartWords:
     )
 
 
-def _stated(surfaces: list[Surface]) -> PartWords | None:
+def _stated(surfaces: list[Surface], library: str) -> PartWords | None:
     substance = stated_substance(surfaces)
     if substance is None:
         return None
     try:
-        entry = materials.find(substance)
+        entry = materials.named(substance, library)
     except UnknownChoiceError:
         return None  # a foreign file's word: names may still tell
     return PartWords("", entry.name, margin=1.0, reason=f"The file states it: {substance!r}.")
-
-
-def _evidence(scene: Scene, identity: Identity, part: int, surfaces: list[Surface]) -> Evidence:
-    number = identity.catalogue[part].object
-    worn = [scene.finishes[s.finish] for s in scene.surfaces if s.object == number]
-    own = dict.fromkeys(s.finish for s in surfaces)
-    return Evidence(
-        surfaces=surfaces,
-        finishes=[scene.finishes[f] for f in own],
-        thing=scene.objects[number],
-        alone=sum(p.object == number for p in identity.catalogue) == 1,
-        metallic_means_something=any(f.metallic < 1.0 for f in worn),
-    )
 
 
 # ---------------------------------------------------------------- what a person says
 
 
 def _annotations(
-    scene: Scene, identity: Identity, config: DescribeConfig
+    scene: Scene, identity: Identity, config: DescribeConfig, library: str
 ) -> dict[tuple[str, str], Annotation]:
     if config.annotations is None:
         return {}
@@ -346,7 +333,14 @@ def _annotations(
         thing.name: [p.name for p in identity.catalogue if p.object == number]
         for number, thing in enumerate(scene.objects)
     }
-    return read_annotations(Path(config.annotations), names)
+    said = read_annotations(Path(config.annotations), names)
+    return {key: _spelt(one, library) for key, one in said.items()}
+
+
+def _spelt(said: Annotation, library: str) -> Annotation:
+    """Write the names of materials as the library spells them."""
+    named = [n and materials.named(n, library).name for n in (said.material, said.contents)]
+    return replace(said, material=named[0], contents=named[1])
 
 
 def _told(
@@ -364,8 +358,7 @@ def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> 
         return words
     where = f"Stated in {Path(str(path)).name}."
     if said.material is not None:
-        entry = materials.find(said.material)
-        words = PartWords(words.name, entry.name, None, None, "annotation", 1.0, where)
+        words = PartWords(words.name, said.material, None, None, "annotation", 1.0, where)
     values = {}
     for key, value in said.values.items():
         field, factor = materials.si(key)
@@ -384,5 +377,4 @@ def _built(said: Annotation, words: PartWords) -> PartWords:
     words = replace(words, structure=structure, thickness=said.thickness or words.thickness)
     if structure == "shell":
         return replace(words, contents=None, fill=None)
-    inside = materials.find(said.contents).name if said.contents else words.contents
-    return replace(words, contents=inside, fill=said.fill or words.fill)
+    return replace(words, contents=said.contents or words.contents, fill=said.fill or words.fill)

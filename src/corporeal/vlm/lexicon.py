@@ -4,7 +4,7 @@ import colorsys
 import tomllib
 from collections.abc import Iterator
 from dataclasses import dataclass
-from functools import cache
+from functools import cache, lru_cache
 from importlib.resources import files
 
 from corporeal.geometry.identity import words
@@ -53,10 +53,10 @@ class Name:
     """A name as it stands in the file, and the words of it that count."""
 
     text: str
-    words: list[str]
+    words: tuple[str, ...]
 
 
-def heads(tokens: list[str]) -> list[Saying]:
+def heads(tokens: tuple[str, ...]) -> list[Saying]:
     """Find what stands in a name; of compound nouns the last one is the thing.
 
     A shoe rack is a rack, and a TV cabinet is a cabinet.
@@ -73,15 +73,15 @@ def heads(tokens: list[str]) -> list[Saying]:
     return [s for k, s in standing if s.kind != "thing" or k == last[len(s.phrase)]]
 
 
-def _after(tokens: list[str], k: int, saying: Saying) -> str:
+def _after(tokens: tuple[str, ...], k: int, saying: Saying) -> str:
     following = k + len(saying.phrase)
     return tokens[following] if following < len(tokens) else ""
 
 
-def _standing_in(tokens: list[str]) -> Iterator[tuple[int, Saying]]:
+def _standing_in(tokens: tuple[str, ...]) -> Iterator[tuple[int, Saying]]:
     for k, token in enumerate(tokens):
         for saying in _by_first_word().get(token, ()):
-            if tuple(tokens[k : k + len(saying.phrase)]) == saying.phrase:
+            if tokens[k : k + len(saying.phrase)] == saying.phrase:
                 yield k, saying
 
 
@@ -93,9 +93,10 @@ def _by_first_word() -> dict[str, list[Saying]]:
     return index
 
 
-def tokens_of(name: str) -> list[str]:
+@lru_cache(maxsize=10_000)
+def tokens_of(name: str) -> tuple[str, ...]:
     """Return the words of a name in the singular, without what exporters write."""
-    return [singular(w) for w in words(name)]
+    return tuple(singular(w) for w in words(name))
 
 
 def singular(word: str) -> str:

@@ -56,7 +56,7 @@ class Evidence:
         """Names of the whole object."""
         stem = self.thing.source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
         named = dict.fromkeys([self.thing.class_name, self.thing.name, stem])
-        return [*map(_name, named), *(Name(" ".join(w), list(w)) for w in self.shared if w)]
+        return [*map(_name, named), *(Name(" ".join(w), w) for w in self.shared if w)]
 
 
 def evidence(scene: Scene, identity: Identity, part: int) -> Evidence:
@@ -83,15 +83,15 @@ def evidence(scene: Scene, identity: Identity, part: int) -> Evidence:
     )
 
 
-def _name(text: str, shared: Sequence[str] = ()) -> Name:
+def _name(text: str, shared: tuple[str, ...] = ()) -> Name:
     found = tokens_of(text)
-    common = tuple(found[: len(shared)]) == tuple(shared)
+    common = found[: len(shared)] == shared
     return Name(text, found[len(shared) :] if common else found)
 
 
 def _prefix(names: Sequence[str]) -> tuple[str, ...]:
     """Return the leading words that several different names have in common."""
-    told = list(dict.fromkeys(tuple(tokens_of(name)) for name in names))
+    told = list(dict.fromkeys(tokens_of(name) for name in names))
     if len(told) < 2:
         return ()
     same = [len(set(column)) == 1 for column in zip(*told, strict=False)]
