@@ -92,7 +92,16 @@ def _keys() -> list[Finding]:
     present = [name for name in KEYS if os.environ.get(name)]
     found = ", ".join(present) or "no API key in the environment"
     advice = (
-        "Not needed: this version asks no model over the network. Materials come from your "
-        "annotation, from recordings (--vlm replay:FOLDER) or from the names in the file."
+        "Only to ask a model what things are made of (--vlm openai:MODEL). Without one there are "
+        "the names in the file, --annotations, --vlm ask:FOLDER (you answer) and --vlm "
+        "replay:FOLDER."
     )
-    return [Finding("model keys", bool(present), found, advice)]
+    installed = find_spec("pydantic_ai") is not None
+    client = f"pydantic-ai {version('pydantic-ai-slim')}" if installed else "not installed"
+    install = (
+        "" if installed else "pip install 'corporeal[models]', to ask models over the network."
+    )
+    return [
+        Finding("model client", installed, client, install),
+        Finding("model keys", bool(present), found, "" if present else advice),
+    ]

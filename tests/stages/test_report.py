@@ -1,7 +1,7 @@
 import pytest
 
-from corporeal.stages.report import built, si, simulated
-from corporeal.types import Law, Material, Structure, Treatment
+from corporeal.stages.report import asked, built, others, si, simulated
+from corporeal.types import Law, Material, PartWords, Structure, Treatment
 
 
 @pytest.mark.parametrize(
@@ -37,3 +37,24 @@ def test_what_is_inside_is_told_with_how_it_is_built():
     soup = Material("soup", Law.NEO_HOOKEAN, 300.0, 0.49, 1050.0)
     assert built(Structure("filled", 2e-4, contents=soup, fill=0.9)) == "filled with soup"
     assert built(Structure("shell", 2e-4)) == "shell"
+
+
+def test_what_a_part_may_be_instead_and_what_was_told_apart_in_it_is_told():
+    head = PartWords("head", "steel", volume_share=0.25)
+    words = PartWords("hammer", "hardwood", alternatives=(("ABS", 0.3),), pieces=(head,))
+    assert others(words) == (
+        " It may also be ABS (30%). Told apart in it: head: steel (25% of the volume)."
+    )
+    assert others(PartWords("hammer", "hardwood")) == ""
+
+
+def test_what_the_questions_took_is_told_and_an_unknown_price_is_said_to_be_unknown():
+    took = {"models": ["openai:x"], "questions": 9, "calls": 11, "input_tokens": 20500}
+    took |= {"output_tokens": 1200, "seconds": 43.2, "dollars": 0.0693, "prices_of": "2026-11-21"}
+    assert asked(took) == (
+        "<br>9 questions to openai:x: 11 calls, 20,500 tokens in, 1,200 out, 43 s of waiting, "
+        "about $0.069 at the list prices of 2026-11-21."
+    )
+    assert "price not known" in asked(took | {"dollars": None})
+    assert "nothing was paid" in asked(took | {"calls": 0})
+    assert asked({}) == ""

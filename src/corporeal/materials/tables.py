@@ -6,6 +6,7 @@ from corporeal.materials.contact import pairs
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import find, library
 from corporeal.materials.quantities import QUANTITIES
+from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.materials.shipped import citation, source_table
 from corporeal.types import Ground, Material, MaterialField, Part, Parts, PartWords, Structure
 
@@ -85,6 +86,7 @@ def _part_json(part: Part, material: Material, made: Structure, words: PartWords
         "answered_by": words.answered_by,
         "margin": words.margin,
         "reason": words.reason,
+        "alternatives": [{"material": m, "probability": p} for m, p in words.alternatives],
         "law": material.law.name.lower(),
         "structure": _structure_json(made),
         "values": {name: _ground_json(name, g) for name, g in material.grounds.items()},
@@ -105,7 +107,10 @@ def _ground_json(name: str, ground: Ground) -> dict:
         "value": ground.value,
         "range": [ground.range.low, ground.range.high],
         "unit": QUANTITIES[name].unit,
+        "place": round(fraction_of(ground.range, ground.value), 4),
+        "scale": "logarithmic" if logarithmic(ground.range) else "linear",
         "chosen_by": ground.chosen_by,
+        "margin": ground.margin,
         "reason": ground.reason,
         "source": citation(ground.range.source),
     }

@@ -14,12 +14,14 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.types import (
     Film,
     Ground,
     MaterialField,
     Particles,
     Parts,
+    PartWords,
     Push,
     Scene,
     SceneObject,
@@ -55,6 +57,14 @@ WHO = {
     "model": "a model",
     "metadata": "the file's own words",
     "unknown": "nobody: a neutral stand-in",
+}
+
+CHOSEN = {
+    "typical": "nobody: the usual value",
+    "fallback": "nobody could say: the usual value",
+    "model": "a model",
+    "recording": "a recorded answer",
+    "annotation": "your annotation",
 }
 
 
@@ -216,22 +226,36 @@ def _grounds(story: Story, k: int) -> str:
     return (
         f"<details><summary><b>{_safe(part.name)}</b> of "
         f"{_safe(story.scene.objects[part.object].name)}: {_safe(material.name)}</summary>"
-        f"<p>{_safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})<br>"
+        f"<p>{_safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
+        f"{others(words)}<br>"
         f"{_safe(story.field.structures[k].reason)} {_safe(fill)}<br>{_safe(treatment.why)}</p>"
         "<table><tr><th>quantity</th><th>value</th><th>place in the measured range</th>"
         f"<th>chosen by</th><th>why</th><th>source</th></tr>{rows}</table></details>"
     )
 
 
+def others(words: PartWords) -> str:
+    """Say what else a part may be made of, and what a model told apart in it."""
+    maybe = [f"{name} ({p:.0%})" for name, p in words.alternatives]
+    pieces = [
+        f"{p.name}: {p.material or 'unknown'} ({p.volume_share:.0%} of the volume)"
+        for p in words.pieces
+    ]
+    said = f" It may also be {', '.join(maybe)}." if maybe else ""
+    return _safe(said + (f" Told apart in it: {'; '.join(pieces)}." if pieces else ""))
+
+
 def _ground_row(name: str, ground: Ground, of: str = "") -> str:
     label, unit = UNITS[name]
     label += _safe(of)
     low, high = ground.range.low, ground.range.high
-    place = 0.5 if high <= low else min(max((ground.value - low) / (high - low), 0), 1)
+    place = min(max(fraction_of(ground.range, ground.value), 0), 1)
     bar = f'<div class="bar"><i style="left:{place:.1%}"></i></div>'
+    scale = " (log)" if logarithmic(ground.range) else ""
     return (
         f"<tr><td>{label}</td><td>{si(ground.value, unit)}</td>"
-        f"<td>{si(low, unit)} {bar} {si(high, unit)}</td><td>{_safe(ground.chosen_by)}</td>"
+        f"<td>{si(low, unit)} {bar} {si(high, unit)}{scale}</td>"
+        f"<td>{_safe(CHOSEN.get(ground.chosen_by, ground.chosen_by))}</td>"
         f"<td>{_safe(ground.reason)}</td><td>{_safe(ground.range.source)}</td></tr>"
     )
 
@@ -278,7 +302,26 @@ def _settings(audit: Mapping[str, Any]) -> str:
     memory = audit.get("peak_memory_mb")
     peak = "" if memory is None else f" Peak memory {memory:,.0f} MB."
     settings = ", ".join(f"{k} {_safe(str(v))}" for k, v in audit.get("settings", {}).items())
-    return f"{settings}.<br>Time: {spent}.{peak}"
+    return f"{settings}.<br>Time: {spent}.{peak}{asked(audit.get('questions', {}))}"
+
+
+def asked(questions: Mapping[str, Any]) -> str:
+    """Say what the questions to models took."""
+    if not questions:
+        return ""
+    if not questions["calls"]:
+        return f"<br>{questions['questions']} questions answered from the disk: nothing was paid."
+    cost = questions["dollars"]
+    paid = (
+        "price not known"
+        if cost is None
+        else f"about ${cost:.3f} at the list prices of {questions['prices_of']}"
+    )
+    return (
+        f"<br>{questions['questions']} questions to {_safe(', '.join(questions['models']))}: "
+        f"{questions['calls']} calls, {questions['input_tokens']:,} tokens in, "
+        f"{questions['output_tokens']:,} out, {questions['seconds']:.0f} s of waiting, {paid}."
+    )
 
 
 # ---------------------------------------------------------------- small things
