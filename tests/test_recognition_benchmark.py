@@ -24,7 +24,7 @@ def of(rows, group):
 
 
 def test_every_part_is_labelled_with_materials_of_the_library(rows):
-    assert [len(of(rows, g)) for g in SETS] == [58, 21, 88]
+    assert [len(of(rows, g)) for g in SETS] == [58, 21, 88, 95]
     known = set(materials.substances())
     assert all(r.accepted and set(r.accepted) <= known for r in rows)
 
@@ -37,6 +37,7 @@ def test_a_wrong_answer_is_rare_and_unknown_is_normal(rows):
     for group in SETS:
         assert score(of(rows, group)).wrong <= 0.15
     assert score(of(rows, "unseen")).right >= 0.6
+    assert score(of(rows, "fresh")).right >= 0.4
 
 
 def test_the_margin_knows_right_from_wrong(rows):
