@@ -1,39 +1,58 @@
 // How far fields reach along the candidate normals: s(n) = max (x·n + R), R = r0 ‖Fᵀn‖, over the
 // particles around each node. Tasks: those of the particles, then one per field for rigid bodies.
+struct Own {                // a contact as its own field sees it: normals away from it
+  float n[3][3], spare[2];
+  int touch;
+  float far[4];
+};
 struct Support {
-  // One particle at one node, seen from either side. What cannot reach farther is most of them.
-  static inline void see(Aim &A, int f, f4 x, f4 y, f4 z, const float *F, float reach, float most) {
+  f8 F[9], reach, most;         // reach: r0; most: no direction stretches that more
+  // One particle of a rigid body at one node, seen from either side.
+  static inline void see(Aim &A, int f, f4 x, f4 y, f4 z, float reach) {
     if (A.fa != f && A.fc != f) return;
-    const bool first = A.fa == f;
-    const f4 nx = *(f4 *)A.n[0], ny = *(f4 *)A.n[1], nz = *(f4 *)A.n[2];
-    f4 &far = *(f4 *)A.far[first ? 0 : 1];
-    f4 h = x * nx + y * ny + z * nz;
-    if (!first) h = -h;
-    if (!__builtin_reduce_or(h + most > far)) return;
-    f4 a = F[0] * nx + F[3] * ny + F[6] * nz, b = F[1] * nx + F[4] * ny + F[7] * nz,
-       c = F[2] * nx + F[5] * ny + F[8] * nz;
-    h += reach * __builtin_elementwise_sqrt(a * a + b * b + c * c);
-    far = __builtin_elementwise_max(far, h);
+    const f4 h = x * *(f4 *)A.n[0] + y * *(f4 *)A.n[1] + z * *(f4 *)A.n[2];
+    f4 &far = *(f4 *)A.far[A.fa == f ? 0 : 1];
+    far = __builtin_elementwise_max(far, (A.fa == f ? h : -h) + reach);
   }
+  static inline f4 size(f4 a) { return __builtin_elementwise_max(a, -a); }
   static inline f4 all(float a) { return f4{a, a, a, a}; }
-  // No direction stretches more than this.
-  static inline float most(const float *F) {
-    float rows = 0, columns = 0;
-    for (int i = 0; i < 3; i++) {
-      float r = fabsf(F[3 * i]) + fabsf(F[3 * i + 1]) + fabsf(F[3 * i + 2]);
-      float q = fabsf(F[i]) + fabsf(F[3 + i]) + fabsf(F[6 + i]);
-      rows = r > rows ? r : rows;
-      columns = q > columns ? q : columns;
+  // Eight particles at one node, seen from either side. What cannot reach farther is most of them.
+  inline void see(Own &A, f8 x, f8 y, f8 z, i8 in) const {
+    f8 h[3];
+    for (int k = 0; k < 3; k++) h[k] = x * A.n[0][k] + y * A.n[1][k] + z * A.n[2][k];
+    if (!Simd::any(in & ((h[0] + most > A.far[0]) | (h[1] + most > A.far[1]) |
+                         (h[2] + most > A.far[2]))))
+      return;
+    for (int k = 0; k < 3; k++) {
+      const f8 a = F[0] * A.n[0][k] + F[3] * A.n[1][k] + F[6] * A.n[2][k],
+               b = F[1] * A.n[0][k] + F[4] * A.n[1][k] + F[7] * A.n[2][k],
+               c = F[2] * A.n[0][k] + F[5] * A.n[1][k] + F[8] * A.n[2][k];
+      h[k] += reach * Simd::root(a * a + b * b + c * c);
+      h[k] = Simd::pick(in, h[k], Simd::all(-1e30f));
     }
-    return sqrtf(rows * columns) * 1.00001f;
+    // The largest of eight, three times at once.
+    const f8 p = Simd::high(__builtin_shufflevector(h[0], h[1], 0, 8, 2, 10, 4, 12, 6, 14),
+                            __builtin_shufflevector(h[0], h[1], 1, 9, 3, 11, 5, 13, 7, 15)),
+             q = Simd::high(h[2], __builtin_shufflevector(h[2], h[2], 1, 1, 3, 3, 5, 5, 7, 7)),
+             r = Simd::high(__builtin_shufflevector(p, q, 0, 1, 8, 8, 4, 5, 12, 12),
+                            __builtin_shufflevector(p, q, 2, 3, 10, 10, 6, 7, 14, 14));
+    const f4 top = __builtin_shufflevector(r, r, 0, 1, 2, 3),
+             over = __builtin_shufflevector(r, r, 4, 5, 6, 7), now = top > over ? top : over;
+    *(f4 *)A.far = now > *(f4 *)A.far ? now : *(f4 *)A.far;
+  }
+  inline void stretch() {
+    f8 rows = Simd::all(0.0f), columns = rows;
+    for (int i = 0; i < 3; i++) {
+      rows = Simd::high(rows, Simd::size(F[3 * i]) + Simd::size(F[3 * i + 1]) + Simd::size(F[3 * i + 2]));
+      columns = Simd::high(columns, Simd::size(F[i]) + Simd::size(F[3 + i]) + Simd::size(F[6 + i]));
+    }
+    most = reach * Simd::root(rows * columns) * 1.00001f;
   }
 };
 if (index >= world->tasks) {
   const int f = index - world->tasks;
   const Field &F = world->field[f];
   if (!F.rigids) return;
-  float Q[9];
-  for (int i = 0; i < 9; i++) Q[i] = (float)F.rigid[TURN + i];
   for (int e = 0; e < F.blocks; e++) {
     const double *p = F.point + 5 * F.block[e];
     int base[3];
@@ -59,7 +78,7 @@ if (index >= world->tasks) {
           if (reach == 0) reach = (float)(0.5 * cbrt(p[4]) * inv);
           for (int t = (id & 0xffffff) - 1, end = t + (id >> 24); t < end; t++)
             Support::see(aims[t], f, Support::all(x[0] - i), Support::all(x[1] - j),
-                         Support::all(x[2] - k), Q, reach, reach);
+                         Support::all(x[2] - k), reach);
         }
       }
   }
@@ -67,62 +86,72 @@ if (index >= world->tasks) {
 }
 int *task = world->task + 4 * index;
 Field &field = world->field[task[0]];
-alignas(64) int map[512];   // node of the arena to its first contact + 1, and how many << 24
-float volume = 0, radius = 0;
+alignas(64) int map[512];   // node of the arena to its field's first contact + 1, and how many << 24
+alignas(64) Own own[512 * (HERE - 1)];
+f8 volume = Simd::all(0.0f);
+Support support;
 for (int b = task[1]; b < task[2]; b++) {
   const int *record = field.block + NB * b;
   u64 any = 0;
   for (int i = 0; i < 27; i++) any |= field.near[2 * record[5 + i] + 1];
   if (!any) continue;
   for (int i = 0; i < 512; i += 8) *(i8u *)(map + i) = i8{0, 0, 0, 0, 0, 0, 0, 0};
+  int owns = 0;
   for (int n = 0; n < 27; n++) {
     int j = field.where[4 * record[5 + n] + 3];
     if (!j) continue;
     const Junction &J = junctions[j - 1];
+    u64 have = 0;
+    for (int q = 0; q < J.fields; q++) have |= J.field[q] == task[0] ? J.have[q] : 0;
     int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
-    for (u64 left = J.several & Grid::arena(n); left; left &= left - 1) {
-      int i = __builtin_ctzll(left);
+    for (u64 left = J.several & have & Grid::arena(n); left; left &= left - 1) {
+      int i = __builtin_ctzll(left), begin = owns;
       const Meet &M = meets[Grid::meet(J, i)];
-      map[(x + (i >> 4)) * 64 + (y + (i >> 2 & 3)) * 8 + z + (i & 3)] = (M.touch + 1) | M.touches << 24;
+      for (int t = M.touch; t < M.touch + M.touches; t++) {
+        const Aim &A = aims[t];
+        if (A.fa != task[0] && A.fc != task[0]) continue;
+        Own &O = own[owns++];
+        const float sign = A.fa == task[0] ? 1.0f : -1.0f;
+        for (int d = 0; d < 3; d++)
+          for (int k = 0; k < 3; k++) O.n[d][k] = sign * A.n[d][k];
+        *(f4 *)O.far = *(f4 *)A.far[A.fa == task[0] ? 0 : 1];
+        O.touch = t;
+      }
+      map[(x + (i >> 4)) * 64 + (y + (i >> 2 & 3)) * 8 + z + (i & 3)] =
+          (begin + 1) | (owns - begin) << 24;
     }
   }
   for (int s = record[0]; s < record[1]; s += 8) {
     const float *q = field.part + (size_t)s * NC;
-    int live = record[1] - s < 8 ? record[1] - s : 8;
-    alignas(32) int low[3][8];
-    alignas(32) float at[3][8];
-    for (int d = 0; d < 3; d++) {
-      i8 x = *(i8u *)(q + 8 * (XI + d)), cell = (x - HALF) >> PLACE;
-      *(i8 *)low[d] = cell;
-      *(f8 *)at[d] = Simd::flo(x - (cell << PLACE)) * PER_UNIT;
+    Nearby P;
+    if (!P.find(field, record, q, s, 1)) continue;
+    f8 V = *(f8u *)(q + 8 * VO);
+    for (int k = 0; k < 9; k++) support.F[k] = *(f8u *)(q + 8 * (DE + k));
+    for (int k = 0; k < 9; k += 4) support.F[k] += 1.0f;
+    if (Simd::any(V != volume)) {
+      volume = V;
+      for (int l = 0; l < 8; l++) support.reach[l] = (float)(0.5 * cbrt((double)V[l]) * inv);
     }
-    for (int l = 0; l < live; l++) {
-      int x = low[0][l], y = low[1][l], z = low[2][l];
-      int near = record[5 + (((x >> 2) - record[2] + 1) * 3 + (y >> 2) - record[3] + 1) * 3 +
-                        (z >> 2) - record[4] + 1];
-      if (!(field.near[2 * near + 1] >> ((x & 3) * 16 + (y & 3) * 4 + (z & 3)) & 1)) continue;
-      float F[9];
-      for (int k = 0; k < 9; k++) F[k] = q[8 * (DE + k) + l] + (k % 4 == 0);
-      if (q[8 * VO + l] != volume) {
-        volume = q[8 * VO + l];
-        radius = (float)(0.5 * cbrt((double)volume) * inv);
-      }
-      const float most = radius * Support::most(F);
-      const int *home = map + ((x - 4 * record[2] + 1) * 8 + y - 4 * record[3] + 1) * 8 + z -
-                        4 * record[4] + 1;
-      f4 X = Support::all(at[0][l]);
-      for (int i = 0; i < 3; i++, X -= 1.0f) {
-        f4 Y = Support::all(at[1][l]);
-        for (int j = 0; j < 3; j++, Y -= 1.0f) {
-          f4 Z = Support::all(at[2][l]);
-          for (int k = 0; k < 3; k++, Z -= 1.0f) {
-            int id = home[i * 64 + j * 8 + k];
-            if (!id) continue;
-            for (int t = (id & 0xffffff) - 1, end = t + (id >> 24); t < end; t++)
-              Support::see(aims[t], task[0], X, Y, Z, F, radius, most);
-          }
+    support.stretch();
+    for (int i = P.low[0]; i <= P.high[0] + 2; i++) {
+      const i8 inx = P.in[0][i - P.low[0]];
+      const f8 x = P.at[0] - (float)i;
+      for (int j = P.low[1]; j <= P.high[1] + 2; j++) {
+        const i8 inxy = inx & P.in[1][j - P.low[1]];
+        const f8 y = P.at[1] - (float)j;
+        for (int k = P.low[2]; k <= P.high[2] + 2; k++) {
+          const int id = map[i * 64 + j * 8 + k];
+          if (!id) continue;
+          const i8 in = inxy & P.in[2][k - P.low[2]];
+          const f8 z = P.at[2] - (float)k;
+          for (int t = (id & 0xffffff) - 1, end = t + (id >> 24); t < end; t++)
+            support.see(own[t], x, y, z, in);
         }
       }
     }
+  }
+  for (int o = 0; o < owns; o++) {
+    Aim &A = aims[own[o].touch];
+    *(f4 *)A.far[A.fa == task[0] ? 0 : 1] = *(f4 *)own[o].far;
   }
 }

@@ -204,6 +204,57 @@ struct Grid {
   }
 };
 
+// Those of a batch's particles that reach listed nodes, and the nodes around them: low to high + 2.
+struct Nearby {
+  i8 lanes, in[3][8];       // in: whose splines reach each layer of nodes
+  f8 at[3];                 // places in their block's arena
+  int low[3], high[3];      // cells in it
+  // Cells of a batch in their block's arena.
+  static inline i8 cells(const int *record, const float *q, int d) {
+    return ((*(const i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE) - (4 * record[2 + d] - 1);
+  }
+  // Whether a cell's particles reach listed nodes. Kind: 0 where fields meet anything, 1 where they
+  // meet each other.
+  static inline int listed(const Field &field, const int *record, int x, int y, int z, int kind) {
+    x += 3;
+    y += 3;
+    z += 3;
+    const int other = record[5 + ((x >> 2) * 3 + (y >> 2)) * 3 + (z >> 2)];
+    return (int)(field.near[2 * other + kind] >> ((x & 3) * 16 + (y & 3) * 4 + (z & 3)) & 1);
+  }
+  static inline bool any(const Field &field, const int *record, const float *q, int s, int kind) {
+    const int live = record[1] - s < 8 ? record[1] - s : 8;
+    alignas(32) int home[3][8];
+    for (int d = 0; d < 3; d++) *(i8 *)home[d] = cells(record, q, d);
+    for (int l = 0; l < live; l++)
+      if (listed(field, record, home[0][l], home[1][l], home[2][l], kind)) return true;
+    return false;
+  }
+  inline bool find(const Field &field, const int *record, const float *q, int s, int kind) {
+    const int live = record[1] - s < 8 ? record[1] - s : 8;
+    alignas(32) int home[3][8], near[8] = {0, 0, 0, 0, 0, 0, 0, 0};
+    for (int d = 0; d < 3; d++) *(i8 *)home[d] = cells(record, q, d);
+    bool some = false;
+    for (int l = 0; l < live; l++) {
+      near[l] = -listed(field, record, home[0][l], home[1][l], home[2][l], kind);
+      some |= near[l];
+    }
+    if (!some) return false;
+    lanes = *(i8 *)near;
+    for (int d = 0; d < 3; d++) {
+      const i8 cell = *(i8 *)home[d];
+      at[d] = Simd::flo(*(const i8u *)(q + 8 * (XI + d)) - ((4 * record[2 + d] - 1) << PLACE)) * PER_UNIT;
+      low[d] = __builtin_reduce_min(lanes ? cell : i8{} + 8);
+      high[d] = __builtin_reduce_max(lanes ? cell : i8{} - 8);
+      for (int i = low[d]; i <= high[d] + 2; i++) {
+        const i8 from = i - cell;
+        in[d][i - low[d]] = lanes & (from >= 0) & (from <= 2);
+      }
+    }
+    return true;
+  }
+};
+
 Stage *stage = (Stage *)world->contact_memory;
 const double dx = world->dx, dt = world->dt, inv = 1.0 / dx;
 const int fields = world->fields, planes = world->planes, all = fields + planes;

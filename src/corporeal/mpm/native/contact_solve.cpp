@@ -62,17 +62,57 @@ struct Solver {
     return moved;
   }
 };
+// Normals of some pairs of fields, weighted by their masses, added up over the 27 nodes around each
+// node of a block: one axis after the other.
+struct Smooth {
+  enum { MOST = 8 };
+  f4 grid[MOST][216];        // of the block and one layer around; then sums, of the block
+  u64 pair[MOST];
+  int pairs = 0, last = 0;   // last: what was found last, and is likely to be looked for next
+  static inline u64 key(int a, int c) { return (u64)(unsigned)c << 32 | (unsigned)a; }
+  inline int find(u64 which) {
+    for (int k = 0; k < pairs; k++) {
+      if (pair[last] == which) return last;
+      last = last + 1 < pairs ? last + 1 : 0;
+    }
+    return pairs;
+  }
+  static inline void sum(const f4 *from, f4 *to, int rows, int step, int inner) {
+    for (int r = 0; r < rows; r++)
+      for (int k = 0; k < 4; k++)
+        for (int i = 0; i < inner; i++) {
+          const f4 *g = from + (r * step + k) * inner + i;
+          to[(r * 4 + k) * inner + i] = g[0] + g[inner] + g[2 * inner];
+        }
+  }
+  inline void up() {
+    f4 z[144], y[96];
+    for (int p = 0; p < pairs; p++) {
+      sum(grid[p], z, 36, 6, 1);
+      sum(z, y, 6, 6, 4);
+      sum(y, grid[p], 1, 6, 16);
+    }
+  }
+};
 const int from = (int)((long long)stage->junctions * index / PARTS),
           to = (int)((long long)stage->junctions * (index + 1) / PARTS);
 int entries = 0;
 if (from < to) {
   Entry *book = stage->entry + junctions[from].touch;
-  alignas(64) int map[216];   // one more than the meets of a block and one layer around
   for (int j = from; j < to; j++) {
     const Junction &J = junctions[j];
     const int end = J.meet + Grid::count(J.mask);
-    if (J.several) {
-      for (int i = 0; i < 216; i++) map[i] = 0;
+    for (int begun = J.touch; begun < J.last && J.several;) {
+      Smooth smooth;
+      int t = begun;
+      for (; t < J.last; t++) {
+        const Touch &T = touches[t];
+        const int p = T.c < 0 ? 0 : smooth.find(Smooth::key(T.fa, T.fc));
+        if (T.c < 0 || p < smooth.pairs) continue;
+        if (p == Smooth::MOST) break;
+        smooth.pair[smooth.pairs++] = Smooth::key(T.fa, T.fc);
+        for (int i = 0; i < 216; i++) smooth.grid[p][i] = f4{0, 0, 0, 0};
+      }
       for (int n = 0; n < 27; n++) {
         int at[3] = {J.at[0] + n / 9 - 1, J.at[1] + n / 3 % 3 - 1, J.at[2] + n % 3 - 1}, other = 0;
         for (int q = 0; q < J.fields && !other; q++) {
@@ -84,45 +124,50 @@ if (from < to) {
         int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
         for (u64 left = O.several & Grid::margin(n); left; left &= left - 1) {
           int i = __builtin_ctzll(left);
-          map[((x + (i >> 4)) * 6 + y + (i >> 2 & 3)) * 6 + z + (i & 3)] = Grid::meet(O, i) + 1;
+          const Meet &M = meets[Grid::meet(O, i)];
+          const int place = ((x + (i >> 4)) * 6 + y + (i >> 2 & 3)) * 6 + z + (i & 3);
+          for (int o = M.touch; o < M.touch + M.touches; o++) {
+            const Aim &U = aims[o];
+            const int p = smooth.find(Smooth::key(U.fa, U.fc));
+            if (p == smooth.pairs) continue;
+            smooth.grid[p][place] = U.weight * f4{U.chosen[0], U.chosen[1], U.chosen[2], 0};
+          }
         }
       }
+      smooth.up();
+      for (int s = begun; s < t; s++) {
+        Touch &T = touches[s];
+        if (T.c < 0) continue;
+        const int *at = meets[T.meet].at;
+        const f4 &sum = smooth.grid[smooth.find(Smooth::key(T.fa, T.fc))][(at[0] & 3) * 16 + (at[1] & 3) * 4 +
+                                                             (at[2] & 3)];
+        for (int d = 0; d < 3; d++) T.normal[d] = sum[d];
+      }
+      begun = t;
     }
     for (int k = J.meet; k < end; k++) {
       Meet &M = meets[k];
-      int home = ((M.at[0] - 4 * J.at[0]) * 6 + M.at[1] - 4 * J.at[1]) * 6 + M.at[2] - 4 * J.at[2];
       int active = 0;
       for (int t = M.touch; t < M.touch + M.touches; t++) {
         Touch &T = touches[t];
         for (int d = 0; d < 3; d++) {
           T.x[d] = M.at[d] * dx;
           T.J[d] = 0;
-          T.normal[d] = 0;
         }
         T.active = T.bounce = 0;
         if (T.c < 0) {
           for (int d = 0; d < 3; d++) T.normal[d] = -world->plane[4 * (-1 - T.c) + d];
-        } else {
-          for (int i = 0; i < 27; i++) {
-            int id = map[home + i / 9 * 36 + i / 3 % 3 * 6 + i % 3];
-            if (!id) continue;
-            const Meet &O = meets[id - 1];
-            for (int o = O.touch; o < O.touch + O.touches; o++) {
-              const Aim &U = aims[o];
-              if (U.fa != T.fa || U.fc != T.fc) continue;
-              for (int d = 0; d < 3; d++) T.normal[d] += (double)U.weight * U.chosen[d];
-            }
-          }
-          Vec::unit(T.normal);
-          if (T.normal[0] == 0 && T.normal[1] == 0 && T.normal[2] == 0) continue;
+        } else if (Vec::unit(T.normal) <= 1e-30) {
+          continue;
         }
+        double u[3];
+        Solver::slip(sides, T, u);
+        if (M.touches == 1 && !M.stiff && Vec::dot(u, T.normal) <= 0) continue;
         T.gap = Solver::gap(world, sides, T, inv) * dx;
         T.target = (T.gap > 0 ? T.gap : 0.0) / dt;
         T.mu = world->friction[T.fa * all + T.fc];
         T.active = 1;
         if (M.stiff) continue;
-        double u[3];
-        Solver::slip(sides, T, u);
         T.inverse = sides[T.a].inverse + (T.c < 0 ? 0.0 : sides[T.c].inverse);
         if (M.touches == 1) T.active = Vec::dot(u, T.normal) > T.target;
         active += T.active;

@@ -138,6 +138,11 @@ struct Simd {
   static inline bool any(i8 m) {
     return m[0] | m[1] | m[2] | m[3] | m[4] | m[5] | m[6] | m[7];
   }
+  static inline float most(f8 a) {
+    a = high(a, __builtin_shufflevector(a, a, 4, 5, 6, 7, 0, 1, 2, 3));
+    a = high(a, __builtin_shufflevector(a, a, 2, 3, 0, 1, 6, 7, 4, 5));
+    return high(a, __builtin_shufflevector(a, a, 1, 0, 3, 2, 5, 4, 7, 6))[0];
+  }
   static inline f8 flo(i8 a) { return __builtin_convertvector(a, f8); }
   static inline i8 whole(f8 a) { return __builtin_convertvector(a, i8); }
   // J - 1 of a batch, of H = F - 1.
