@@ -108,6 +108,35 @@ def test_the_published_vocabulary_grounds_the_same_scene():
     assert field.materials[0].poisson == pytest.approx(0.4999)
 
 
+OWN = """
+[sources.mine]
+cite = "Our own bench"
+
+[steel]
+law = "von_mises"
+group = "metal"
+young_GPa = { low = 200, typical = 201, high = 202, source = "mine" }
+poisson = { low = 0.28, typical = 0.29, high = 0.3, source = "mine" }
+density_kg_m3 = { low = 7800, typical = 7810, high = 7820, source = "mine" }
+yield_MPa = { low = 300, typical = 310, high = 320, source = "mine" }
+"""
+
+
+def test_a_library_of_ones_own_replaces_ours_or_extends_it(tmp_path):
+    (tmp_path / "merged.toml").write_text('extends = "default"\n' + OWN)
+    config = GroundConfig(library=str(tmp_path / "merged.toml"))
+    field, parts, _ = grounded(BLOCK, PLANK, config=config)
+    assert field.materials[0].young == pytest.approx(201e9)
+    assert field.materials[1].name == "hardwood"
+    said = materials.materials_json(field, parts)
+    assert said["parts"][0]["values"]["young"]["source"] == "Our own bench"
+    (tmp_path / "alone.toml").write_text(OWN)
+    alone = GroundConfig(library=str(tmp_path / "alone.toml"), floor="steel", neutral="steel")
+    assert grounded(BLOCK, config=alone)[0].materials[0].young == pytest.approx(201e9)
+    with pytest.raises(UserError, match=r"has nothing for 'hardwood'.*extends = \"default\""):
+        grounded(BLOCK, PLANK, config=alone)
+
+
 def test_the_record_is_plain_data_with_resolved_citations():
     field, parts, _ = grounded(DUCK, RIDDLE)
     said = json.loads(json.dumps(materials.materials_json(field, parts), allow_nan=False))

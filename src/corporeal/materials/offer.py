@@ -7,7 +7,7 @@ from math import degrees
 from corporeal.materials.library import contents, library, substances
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.scale import fraction_of, logarithmic
-from corporeal.materials.treatments import treatments
+from corporeal.materials.treatments import inside, treatments
 from corporeal.types import Range
 
 UNITS = ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (1.0, "Pa"))
@@ -50,12 +50,15 @@ class Choice:
 
 
 def choice(material: str, field: str, measured: Range) -> Choice:
-    """Offer one quantity of a material."""
+    """Offer one quantity of a material, with the uses that lie inside what was measured.
+
+    The uses are the default library's: another library's range may leave some of them out.
+    """
     factor, unit = _unit(field, measured.typical)
     uses = tuple(
         (t.words, t.bands[field][0] / factor, t.bands[field][1] / factor)
         for t in treatments(material)
-        if field in t.bands
+        if field in t.bands and inside(*t.bands[field], measured)
     )
     return Choice(field, measured, unit, factor, uses)
 

@@ -39,7 +39,7 @@ def treatment_problems(ranges: Mapping[str, Mapping[str, Range]]) -> list[str]:
         for treatment in known:
             for field, (low, high) in treatment.bands.items():
                 whole = ranges[material].get(field)
-                if whole is None or not _inside(low, high, whole):
+                if whole is None or not inside(low, high, whole):
                     found.append(
                         f"{material}: {treatment.words!r} puts {field} at {low:g} to {high:g} "
                         f"{QUANTITIES[field].unit}, outside the measured range"
@@ -47,7 +47,8 @@ def treatment_problems(ranges: Mapping[str, Mapping[str, Range]]) -> list[str]:
     return found
 
 
-def _inside(low: float, high: float, whole: Range) -> bool:
+def inside(low: float, high: float, whole: Range) -> bool:
+    """Tell whether a band lies within a measured range."""
     slack = 1e-9 * abs(whole.high)
     return whole.low - slack <= low < high <= whole.high + slack
 
