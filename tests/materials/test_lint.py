@@ -28,7 +28,7 @@ PLANTED = {
     ),
     "typical outside": (
         ("low = 240, typical = 260", "low = 240, typical = 360"),
-        "yield_MPa: is out of order: 240, 360, 300. Put typical between low and high.",
+        "yield_MPa: is out of order: 240, 360, 300. Put them in order.",
     ),
     "incompressible": (
         ("high = 0.3,", "high = 0.5,"),

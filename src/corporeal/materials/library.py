@@ -124,8 +124,8 @@ def _text(path: Path) -> str:
 def _read(path: Path, changed: int, size: int) -> dict[str, Entry]:
     problems = check(path)
     if problems:
-        count = f"{len(problems)} mistakes in all: " if len(problems) > 1 else ""
-        raise BadFileError(path, str(problems[0]), f"({count}corporeal materials check {path})")
+        more = f"All {len(problems)} mistakes: corporeal materials check {path}."
+        raise BadFileError(path, str(problems[0]), more if len(problems) > 1 else "")
     tables = tomllib.loads(_text(path))
     base = tables.get("extends")
     own = {key: row["cite"] for key, row in tables.get("sources", {}).items()}

@@ -257,7 +257,7 @@ def _look_at_sizes(
     for field, (key, cell) in fields.items():
         low, typical, high = (cell[k] for k in CELL[:3])
         if not low <= typical <= high:
-            advice = "Swap low and high." if low > high else "Put typical between low and high."
+            advice = "Swap low and high." if low > typical > high else "Put them in order."
             found.tell(name, key, f"is out of order: {low:g}, {typical:g}, {high:g}.", advice)
         elif field == "poisson" and high >= POISSON_LIMIT:
             advice = "For what hardly changes its volume write 0.49 to 0.499."
