@@ -2,6 +2,7 @@
 
 import asyncio
 import time
+from collections.abc import Mapping
 from dataclasses import dataclass
 
 import numpy as np
@@ -30,20 +31,27 @@ class Patience:
 
 
 class Gate:
-    """Lets so many through at a time, and nobody while the server asks for a pause."""
+    """Lets so many questions be under way, and no request out while the server asks for a pause."""
 
     def __init__(self, at_once: int) -> None:
-        self._places = asyncio.Semaphore(at_once)
+        self.places = asyncio.Semaphore(at_once)
         self._closed_until = 0.0
 
     def close(self, seconds: float) -> None:
-        """Let nobody through for a while [s]."""
+        """Let nothing out for a while [s]."""
         self._closed_until = max(self._closed_until, time.monotonic() + seconds)
 
-    async def __aenter__(self) -> None:
-        await self._places.acquire()
+    async def opens(self) -> None:
+        """Wait as long as the gate is closed."""
         while (left := self._closed_until - time.monotonic()) > 0:
             await asyncio.sleep(left)
 
-    async def __aexit__(self, *_: object) -> None:
-        self._places.release()
+
+def seconds_asked_for(headers: Mapping[str, str]) -> float | None:
+    """Return the pause that a response's headers ask for [s], where they say it in figures."""
+    for name, unit in (("retry-after-ms", 1e-3), ("retry-after", 1.0)):
+        try:
+            return max(float(headers[name]) * unit, 0.0)
+        except (KeyError, ValueError):
+            continue
+    return None

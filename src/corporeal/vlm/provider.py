@@ -12,10 +12,11 @@ import time
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
-from threading import Thread
+from threading import Lock, Thread
 from typing import Any, ClassVar
 
 import numpy as np
+from httpx2 import AsyncClient, Request, Response
 from PIL import Image
 from pydantic_ai import Agent, BinaryContent, ModelRetry, NativeOutput, PromptedOutput, ToolOutput
 from pydantic_ai.exceptions import (
@@ -32,16 +33,17 @@ from pydantic_ai.exceptions import (
     ModelServerError,
     ModelUnavailableError,
 )
-from pydantic_ai.models import Model
+from pydantic_ai.models import Model, create_async_httpx2_client
 from pydantic_ai.profiles import ModelProfile
 from pydantic_ai.settings import ModelSettings
 from pydantic_ai.usage import RunUsage
 
 from corporeal.errors import UserError
 from corporeal.vlm import Answer, Check, Question, Reply, Spent, UnansweredError, nothing
-from corporeal.vlm.patience import Gate, Patience
+from corporeal.vlm.patience import Gate, Patience, seconds_asked_for
 
 OTHER_KEY = "CORPOREAL_API_KEY"
+TOO_MANY = 429
 NO_KEY = "none"
 """Sent where a server wants no key: the clients insist on one."""
 INSTRUCTIONS = (
@@ -84,11 +86,11 @@ class Live:
         if not model:
             raise UserError(f"Say which model: --vlm {self.provider}:MODEL.")
         self.patience = patience or Patience()
+        self._gate = Gate(self.patience.at_once)
         self.model = self._model(self._secret(), ModelProfile())
         native = self.model.profile.get("supports_json_schema_output")
         self.mode = "native" if native else "tool"
         self._dice = np.random.default_rng()
-        self._gate: Gate | None = None
 
     def _model(self, secret: str, profile: ModelProfile) -> Model:
         raise NotImplementedError
@@ -103,6 +105,25 @@ class Live:
                 "Without one there are --vlm ask:FOLDER and --vlm metadata."
             )
         return secret
+
+    def _http(self) -> AsyncClient:
+        """Make a client whose requests wait at the gate, and whose refusals close it at once."""
+
+        async def out(request: Request) -> None:
+            await self._gate.opens()
+
+        async def back(response: Response) -> None:
+            pause = seconds_asked_for(response.headers)
+            if response.status_code == TOO_MANY and pause is not None:
+                self._gate.close(min(pause, self.patience.longest_wait))
+
+        client = create_async_httpx2_client(timeout=self.patience.timeout)
+        hooks = client.event_hooks
+        client.event_hooks = {
+            "request": [*hooks["request"], out],
+            "response": [*hooks["response"], back],
+        }
+        return client
 
     def ask(
         self, question: Question, answer: type[Answer], check: Check[Answer] = nothing
@@ -121,13 +142,11 @@ class Live:
     async def _ask(
         self, question: Question, answer: type[Answer], check: Check[Answer]
     ) -> Reply[Answer]:
-        if self._gate is None:
-            self._gate = Gate(self.patience.at_once)
         usage, start = RunUsage(), time.monotonic()
         for failures in range(1, self.patience.tries + 1):
             mode = self.mode
             try:
-                async with self._gate:
+                async with self._gate.places:
                     made = await self._once(question, answer, check, usage)
             except ModelAPIError as error:
                 wait = self._what_now(error, mode, failures)
@@ -135,7 +154,8 @@ class Live:
                 raise UnansweredError(self._plain(error)) from error
             else:
                 seconds = time.monotonic() - start
-                spent = Spent(usage.requests, usage.input_tokens, usage.output_tokens, seconds)
+                calls = usage.requests + failures - 1
+                spent = Spent(calls, usage.input_tokens, usage.output_tokens, seconds)
                 return Reply(made, "model", self.address.spec, spent)
             await asyncio.sleep(wait)
         raise AssertionError("the last failure raises")
@@ -182,7 +202,7 @@ class Live:
                 "the same command again later."
             ) from error
         wait = asked_for if asked_for is not None else self.patience.wait(failures, self._dice)
-        if isinstance(error, ModelRateLimitError) and self._gate is not None:
+        if isinstance(error, ModelRateLimitError):
             self._gate.close(wait)
         return wait
 
@@ -227,7 +247,9 @@ class OpenAI(Live):
         from pydantic_ai.models.openai import OpenAIChatModel
         from pydantic_ai.providers.openai import OpenAIProvider
 
-        provider = OpenAIProvider(base_url=self.address.url, api_key=secret)
+        provider = OpenAIProvider(
+            base_url=self.address.url, api_key=secret, http_client=self._http()
+        )
         return OpenAIChatModel(self.address.model, provider=provider, profile=profile)
 
 
@@ -240,7 +262,9 @@ class Anthropic(Live):
         from pydantic_ai.models.anthropic import AnthropicModel
         from pydantic_ai.providers.anthropic import AnthropicProvider
 
-        provider = AnthropicProvider(base_url=self.address.url, api_key=secret)
+        provider = AnthropicProvider(
+            base_url=self.address.url, api_key=secret, http_client=self._http()
+        )
         return AnthropicModel(self.address.model, provider=provider, profile=profile)
 
 
@@ -253,7 +277,9 @@ class Google(Live):
         from pydantic_ai.models.google import GoogleModel
         from pydantic_ai.providers.google import GoogleProvider
 
-        provider = GoogleProvider(base_url=self.address.url, api_key=secret)
+        provider = GoogleProvider(
+            base_url=self.address.url, api_key=secret, http_client=self._http()
+        )
         return GoogleModel(self.address.model, provider=provider, profile=profile)
 
 
@@ -271,7 +297,7 @@ class Ollama(Live):
         from pydantic_ai.providers.ollama import OllamaProvider
 
         url = self.address.url or os.environ.get("OLLAMA_BASE_URL") or self.home
-        provider = OllamaProvider(base_url=url, api_key=secret)
+        provider = OllamaProvider(base_url=url, api_key=secret, http_client=self._http())
         return OllamaModel(self.address.model, provider=provider, profile=profile)
 
 
@@ -290,9 +316,17 @@ def jpeg(picture: np.ndarray) -> bytes:
     return file.getvalue()
 
 
-@cache
 def _loop() -> asyncio.AbstractEventLoop:
     """One loop for all connections, in a thread that does not keep the program alive."""
+    with _ONE:
+        return _started()
+
+
+_ONE = Lock()
+
+
+@cache
+def _started() -> asyncio.AbstractEventLoop:
     loop = asyncio.new_event_loop()
     Thread(target=loop.run_forever, daemon=True).start()
     return loop

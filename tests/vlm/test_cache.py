@@ -1,0 +1,219 @@
+import json
+import os
+import signal
+import subprocess
+import sys
+import threading
+import time
+from collections import Counter
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+from fake_server import FakeServer
+from pydantic import BaseModel
+
+from corporeal.vlm import Question, Reply, Spent
+from corporeal.vlm import cache as cache_module
+from corporeal.vlm.cache import Cached
+from corporeal.vlm.patience import Patience
+from corporeal.vlm.provider import OpenAI
+from corporeal.vlm.together import together
+
+PICTURE = np.zeros((4, 4, 3), np.uint8)
+ASKED = Question("colours", "Which of {names}?", "s/o", "1", (PICTURE,), {"names": "red, blue"})
+
+
+class Colour(BaseModel):
+    name: str
+
+
+class Other(BaseModel):
+    name: str
+    sure: bool = True
+
+
+class Counting:
+    """Answers, and counts how often it was asked."""
+
+    looks = True
+
+    def __init__(self, name="red"):
+        self.count, self.name = 0, name
+
+    def ask(self, question, answer, check=lambda said: []):
+        self.count += 1
+        time.sleep(0.01)
+        return Reply(answer(name=self.name), "model", "m", Spent(1, 10, 1, 0.1))
+
+
+def test_the_same_question_is_paid_for_once(tmp_path):
+    model = Counting()
+    first = Cached(model, "m", {}, tmp_path).ask(ASKED, Colour)
+    again = Cached(model, "m", {}, tmp_path).ask(ASKED, Colour)
+    assert (model.count, first.spent.calls, again.spent.calls) == (1, 1, 0)
+    assert again.answer == first.answer
+    (file,) = tmp_path.rglob("*.json")
+    assert json.loads(file.read_text())["answer"] == {"name": "red"}
+
+
+@pytest.mark.parametrize(
+    "other",
+    [
+        replace(ASKED, task="shapes"),
+        replace(ASKED, prompt="Say which of {names}."),
+        replace(ASKED, lists={"names": "red, blue, green"}),
+        replace(ASKED, pictures=(PICTURE + 1,)),
+        replace(ASKED, pictures=(PICTURE, PICTURE)),
+        replace(ASKED, pictures=(PICTURE.reshape(2, 8, 3),)),
+    ],
+    ids=["task", "prompt", "list", "pixels", "number of pictures", "shape of a picture"],
+)
+def test_whatever_an_answer_depends_on_makes_it_another_question(tmp_path, other):
+    cached = Cached(Counting(), "m", {}, tmp_path)
+    assert cached.key(ASKED, Colour) != cached.key(other, Colour)
+
+
+def test_model_settings_and_shape_make_it_another_question_and_the_scenes_name_does_not(tmp_path):
+    cached = Cached(Counting(), "m", {}, tmp_path)
+    key = cached.key(ASKED, Colour)
+    assert key != cached.key(ASKED, Other)
+    assert key != Cached(Counting(), "n", {}, tmp_path).key(ASKED, Colour)
+    assert key != Cached(Counting(), "m", {"t": 1}, tmp_path).key(ASKED, Colour)
+    assert key == cached.key(replace(ASKED, scene="another/name"), Colour)
+
+
+def test_threads_that_ask_the_same_wait_for_one_answer(tmp_path):
+    model = Counting()
+    cached = Cached(model, "m", {}, tmp_path)
+    replies = together([lambda: cached.ask(ASKED, Colour)] * 20, 10)
+    assert model.count == 1
+    assert {r.answer.name for r in replies} == {"red"}
+
+
+@pytest.mark.parametrize("damage", ["", "{", "[]", '{"answer": {"name": 7}}', '{"answer": null}'])
+def test_a_damaged_file_is_as_good_as_none(tmp_path, damage):
+    model = Counting()
+    cached = Cached(model, "m", {}, tmp_path)
+    cached.ask(ASKED, Colour)
+    (file,) = tmp_path.rglob("*.json")
+    file.write_text(damage)
+    assert cached.ask(ASKED, Colour).answer.name == "red"
+    assert model.count == 2
+    assert json.loads(file.read_text())["answer"] == {"name": "red"}
+
+
+def test_an_answer_that_no_longer_fits_is_asked_for_again(tmp_path):
+    model = Counting()
+    cached = Cached(model, "m", {}, tmp_path)
+    cached.ask(ASKED, Colour)
+    cached.ask(ASKED, Colour, lambda said: ["red is out"])
+    assert model.count == 2
+
+
+def test_the_environment_says_where_answers_are_kept(monkeypatch, tmp_path):
+    monkeypatch.setenv("CORPOREAL_CACHE", str(tmp_path))
+    assert cache_module.folder() == tmp_path / "answers"
+    monkeypatch.delenv("CORPOREAL_CACHE")
+    monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "xdg"))
+    if sys.platform.startswith("linux"):
+        assert cache_module.folder() == tmp_path / "xdg" / "corporeal" / "answers"
+
+
+# ---------------------------------------------------------------- many at once
+
+COUNT = 100
+PAUSE = 0.2
+"""What the busy server asks for [s]."""
+
+
+class Busy:
+    """A slow server that fails every third time, and has spells in which it takes nothing."""
+
+    def __init__(self):
+        self.refused, self.too_early, self.good = 0, 0, Counter()
+        self._closed_until, self._seen, self._one = 0.0, 0, threading.Lock()
+
+    def __call__(self, request):
+        with self._one:
+            self._seen += 1
+            now = time.monotonic()
+            if now < self._closed_until - 0.02 and now > self._closed_until - PAUSE + 0.1:
+                self.too_early += 1
+            if self._seen % 25 == 0:
+                self.refused += 1
+                self._closed_until = now + PAUSE
+                return {"status": 429, "headers": {"Retry-After-Ms": str(int(1000 * PAUSE))}}
+            if self._seen % 3 == 0:
+                return {"status": 503, "sleep": 0.01}
+            number = request.text.split("number ")[1].split("?")[0]
+            self.good[number] += 1
+        return {"content": json.dumps({"name": f"colour {number}"}), "sleep": 0.03}
+
+
+def numbered(k):
+    return Question("colours", f"Which colour has number {k}?", f"s/{k}")
+
+
+def test_a_hundred_estimations_against_a_slow_failing_server_lose_and_double_nothing(tmp_path):
+    busy = Busy()
+    patience = Patience(tries=12, first_wait=0.01, longest_wait=1.0, at_once=8)
+    with FakeServer(busy) as server:
+        model = OpenAI(f"fake@{server.url}", patience)
+        cached = Cached(model, "m", {}, tmp_path)
+        jobs = [lambda k=k: cached.ask(numbered(k), Colour) for k in range(COUNT)]
+        replies = together([*jobs, *jobs], 32)
+        sent = len(server.requests)
+        again = together(jobs, 32)
+    assert [r.answer.name for r in replies] == 2 * [f"colour {k}" for k in range(COUNT)]
+    assert set(busy.good.values()) == {1}
+    assert len(busy.good) == COUNT
+    assert busy.refused >= 5
+    assert busy.too_early == 0
+    assert [r.answer.name for r in again] == [f"colour {k}" for k in range(COUNT)]
+    assert len(server.requests) == sent
+    assert sum(r.spent.calls for r in replies) == sent
+
+
+WORKER = """
+import sys
+sys.path.insert(0, {tests!r})
+from test_cache import Colour, numbered
+from pathlib import Path
+from corporeal.vlm.cache import Cached
+from corporeal.vlm.patience import Patience
+from corporeal.vlm.provider import OpenAI
+from corporeal.vlm.together import together
+model = OpenAI("fake@{url}", Patience(tries=12, first_wait=0.01))
+cached = Cached(model, "m", {{}}, Path({folder!r}))
+together([lambda k=k: cached.ask(numbered(k), Colour) for k in range({count})], 16)
+"""
+
+
+@pytest.mark.slow
+def test_a_killed_process_leaves_a_whole_cache_that_two_others_go_on_with(tmp_path):
+    def slow(request):
+        number = request.text.split("number ")[1].split("?")[0]
+        return {"content": json.dumps({"name": f"colour {number}"}), "sleep": 0.02}
+
+    with FakeServer(slow) as server:
+        code = WORKER.format(
+            tests=str(Path(__file__).parent), url=server.url, folder=str(tmp_path), count=COUNT
+        )
+        start = [sys.executable, "-c", code]
+        first = subprocess.Popen(start)
+        while len(list(tmp_path.rglob("*.json"))) < 10:
+            assert first.poll() is None
+            time.sleep(0.005)
+        os.kill(first.pid, signal.SIGKILL)
+        first.wait()
+        kept = list(tmp_path.rglob("*.json"))
+        assert 10 <= len(kept) < COUNT
+        assert all(json.loads(p.read_text())["answer"]["name"] for p in kept)
+        asked = len(server.requests)
+        both = [subprocess.Popen(start) for _ in range(2)]
+        assert [p.wait(60) for p in both] == [0, 0]
+    whole = [json.loads(p.read_text())["answer"]["name"] for p in tmp_path.rglob("*.json")]
+    assert sorted(whole) == sorted(f"colour {k}" for k in range(COUNT))
+    assert len(server.requests) - asked <= 2 * (COUNT - len(kept))
