@@ -3,7 +3,7 @@
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass, field, replace
 from inspect import cleandoc
@@ -12,6 +12,7 @@ from typing import Annotated, Any, Literal
 
 import tyro
 from rich.console import Console
+from rich.markup import escape
 from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
 from rich.table import Table
 
@@ -116,7 +117,8 @@ def verb_materials() -> None:
     elif asked.words[0] == "check" and len(asked.words) == 2:
         problems = materials.check(Path(asked.words[1]))
         if problems:
-            told = [f"{asked.words[1]} has {len(problems)} mistakes:", *map(str, problems)]
+            count = "a mistake" if len(problems) == 1 else f"{len(problems)} mistakes"
+            told = [f"{asked.words[1]} has {count}:", *map(str, problems)]
             raise UserError("\n  ".join(told))
         print(f"{asked.words[1]}: nothing to complain about.")
     else:
@@ -158,10 +160,7 @@ def verb_evaluate() -> None:
         found = mass.predict_all(things, asked.describe, asked.ground, asked.how, done)
     result = mass.compare(found)
     for title, heads, rows in report.tables(result):
-        table = Table(*heads, title=title, box=None)
-        for row in rows:
-            table.add_row(*row)
-        Console().print(table)
+        _show(heads, rows, title)
     if asked.json is not None:
         store.write_json(asked.json, result)
     if asked.figure is not None:
@@ -212,6 +211,56 @@ def _again(verb: str) -> Callable[[], None]:
     return redo
 
 
+def verb_simulate() -> None:
+    """Redo `simulate` of a run with other settings, or over the ranges: --samples N.
+
+    With --samples the run's own simulation stays; N sets of values are drawn from the measured
+    ranges and the stated alternatives, each is simulated, and ensemble.json and ensemble.png in the
+    run's folder say how far rebounds, dents and displacements are known.
+    """
+    from corporeal.pipeline import outdate, reopen
+    from corporeal.stages.simulate import SimulateConfig
+
+    known = reopen(Path(sys.argv[2]))[1].simulate if _names_a_run() else SimulateConfig()
+
+    @dataclass(frozen=True)
+    class Simulate:
+        run: Folder
+        samples: int | None = None
+        """Sets of values to draw and simulate beside the chosen one."""
+        seed: int = 0
+        """Of the draws."""
+        config: SimulateConfig = known
+
+    asked = _parse(Simulate, "simulate", verb_simulate.__doc__)
+    if asked.samples is not None:
+        return _spread(asked)
+    inputs, settings = reopen(asked.run)
+    outdate(asked.run, "simulate")
+    _go(inputs, asked.run, replace(settings, simulate=asked.config), Where(), until="simulate")
+
+
+def _spread(asked: Any) -> None:
+    """Simulate an ensemble, and show how far the outcome is spread."""
+    from corporeal.evaluation import spread_report
+    from corporeal.evaluation.ensemble import ensemble
+
+    with _told() as tell:
+        result = ensemble(asked.run, asked.samples, asked.seed, asked.config, tell)
+    _show(spread_report.HEADS, spread_report.rows(result))
+    spread_report.spread_figure(result, asked.run / "ensemble.png")
+    written = (asked.run / name for name in ("ensemble.json", "ensemble.png"))
+    print(*spread_report.failures(result), *written, sep="\n")
+
+
+def _show(heads: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
+    """Print a table whose words are taken as they are."""
+    table = Table(*map(escape, heads), title=title and escape(title), box=None)
+    for row in rows:
+        table.add_row(*map(escape, row))
+    Console().print(table)
+
+
 def _names_a_run() -> bool:
     return len(sys.argv) > 2 and (Path(sys.argv[2]) / "run.json").exists()
 
@@ -226,6 +275,7 @@ VERBS: dict[str, Callable[[], None]] = {
 }
 REDO = ("assemble", "describe", "segment", "ground", "fill", "simulate", "film", "report")
 VERBS |= {verb: _again(verb) for verb in REDO}
+VERBS["simulate"] = verb_simulate
 
 
 # ---------------------------------------------------------------- how a verb is done

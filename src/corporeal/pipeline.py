@@ -9,7 +9,8 @@ import resource
 import shutil
 import sys
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
@@ -52,7 +53,10 @@ VERBS = tuple(FOLDERS)
 RUN = "run.json"
 WRITTEN = ("record",)
 """Settings that name what is written, not what is read."""
-RESULTS = ("film.mp4", "report.html", "materials.json", "audit.json", "fields.png", "strip.png")
+RESULTS = (
+    *("film.mp4", "report.html", "materials.json", "audit.json", "fields.png", "strip.png"),
+    *("ensemble.json", "ensemble.png"),
+)
 
 
 @dataclass(frozen=True)
@@ -89,9 +93,24 @@ def run(
             or the simulation cannot go on.
 
     """
+    with opened(inputs, folder, settings, tell, until):
+        return folder
+
+
+@contextmanager
+def opened(
+    inputs: list[Path], folder: Path, settings: Settings, tell: Tell, until: str
+) -> Iterator[tuple[dict[str, Any], str]]:
+    """Do every verb up to ``until`` and keep the run's folder from others meanwhile.
+
+    Yields:
+        What each verb made, and the key of the last one's result.
+
+    """
     with store.alone(folder), store.writing(folder):
-        _Run(inputs, folder, settings, tell).through(until)
-    return folder
+        work = _Run(inputs, folder, settings, tell)
+        work.through(until)
+        yield work.made, work.key
 
 
 def reopen(folder: Path) -> tuple[list[Path], Settings]:
@@ -193,7 +212,8 @@ class _Run:
         except Exception as error:
             self._declare("failed", str(error))
             raise
-        self._declare("finished" if until == "report" else f"done up to {until}")
+        last = self.folder / FOLDERS["report"] / store.META
+        self._declare("finished" if last.exists() else f"done up to {until}")
 
     def _declare(self, state: str, error: str = "") -> None:
         settings = {f.name: asdict(getattr(self.settings, f.name)) for f in fields(Settings)}

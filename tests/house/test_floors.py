@@ -13,7 +13,8 @@ FLOORS = [
     {"geometry", "backends", "store"},
     {"materials", "vlm", "render", "showcase", "mpm", "formats"},
     {"stages"},
-    {"pipeline", "evaluation"},
+    {"pipeline"},
+    {"evaluation"},
     {"doctor"},
     {"cli"},
 ]

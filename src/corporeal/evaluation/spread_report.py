@@ -1,0 +1,82 @@
+"""The spread of an ensemble as a table for the terminal, and as a figure."""
+
+from pathlib import Path
+from typing import Any
+
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from corporeal.evaluation.ensemble import QUANTITIES
+from corporeal.store import writing
+
+HEADS = ("object", "quantity", "as chosen", "5 %", "median", "95 %", "members")
+STILL = 1e-9
+"""A spread below this is none."""
+PANELS = 7
+INK, FAINT, MARK = "#222222", "#9fb8c4", "#c8553d"
+
+
+def rows(result: dict[str, Any]) -> list[tuple[str, ...]]:
+    """Return one row per object and quantity that anything can be said of."""
+    return [
+        (
+            name,
+            QUANTITIES[quantity],
+            _number(s["chosen"]),
+            *(_number(s[k]) for k in ("low", "median", "high")),
+            str(s["count"]),
+        )
+        for name, own in result["spread"].items()
+        for quantity, s in own.items()
+        if s["count"]
+    ]
+
+
+def failures(result: dict[str, Any]) -> list[str]:
+    """Say which members could not be simulated to the end."""
+    return [
+        f"Member {row['number']} stopped: {row['error']}"
+        for row in result["members"]
+        if "error" in row
+    ]
+
+
+def _number(value: float | None) -> str:
+    return "–" if value is None else f"{value:.3g}"
+
+
+def spread_figure(result: dict[str, Any], path: Path) -> None:
+    """Draw a panel per quantity: every member, the interval, and what was chosen."""
+    shown = [q for q in QUANTITIES if _varies(result, q)][:PANELS]
+    names = list(result["spread"])
+    size = (2.9 * max(len(shown), 1), 0.45 * len(names) + 1.3)
+    figure = Figure(figsize=size, dpi=150, layout="constrained")
+    panels = figure.subplots(1, max(len(shown), 1), sharey=True, squeeze=False)[0]
+    for axes, quantity in zip(panels, shown, strict=False):
+        for k, name in enumerate(names):
+            _draw(axes, result, name, quantity, k)
+        axes.set_xlabel(QUANTITIES[quantity], fontsize=8)
+        axes.tick_params(labelsize=7)
+        axes.margins(x=0.12)
+    panels[0].set_yticks(range(len(names)), [n.replace("_", " ") for n in names], fontsize=8)
+    panels[0].set_ylim(len(names) - 0.5, -0.5)
+    FigureCanvasAgg(figure)
+    with writing(path):
+        figure.savefig(path)
+
+
+def _varies(result: dict[str, Any], quantity: str) -> bool:
+    found = [own[quantity] for own in result["spread"].values()]
+    return any(s["count"] and s["largest"] - s["smallest"] > STILL for s in found)
+
+
+def _draw(axes: Any, result: dict[str, Any], name: str, quantity: str, k: int) -> None:
+    own = result["spread"][name][quantity]
+    if not own["count"]:
+        return
+    values = [r["objects"][name][quantity] for r in result["members"] if r["objects"]]
+    values = [v for v in values if v is not None]
+    axes.plot([own["low"], own["high"]], [k, k], color=FAINT, lw=7, solid_capstyle="butt")
+    axes.plot(values, [k] * len(values), "o", color=INK, ms=2.5, alpha=0.6, mew=0)
+    if own["chosen"] is not None:
+        axes.plot([own["chosen"]], [k], "D", color=MARK, ms=5, mew=0)
