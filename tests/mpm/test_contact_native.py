@@ -94,3 +94,32 @@ def test_at_rest_rigid_contacts_begin_with_what_they_bore_before():
     engine.advance(0.2)
     assert engine.contact.stage["pasts"][0] > 50
     assert engine.contact.stage["sweeps"][0] < 10
+
+
+def test_bodies_more_than_a_cell_and_a_quarter_apart_are_not_looked_at():
+    """Their splines overlap, but no gap between them closes in a step."""
+    low, high = bricks(np.array([0.0, 0.0, 0.2])), bricks(np.array([0.0, 0.0, 0.2]))
+    high[:, 2] += 0.08 + 1.2 * CELL
+    given = problem(body(low), body(high, velocity=(0, 0, -0.5)), planes=(), gravity=(0, 0, 0))
+    engine = WarpEngine(given, threads=1)
+    engine.advance(0.1 * CELL / 0.5)
+    assert engine.contact.stage["touches"][0] == 0
+    assert engine.measure().pair_impulse[0, 1] == 0
+    engine.advance(1.0 * CELL / 0.5)
+    assert engine.contact.stage["touches"][0] > 0
+    engine.advance(2.0 * CELL / 0.5)
+    assert engine.measure().pair_impulse[0, 1] > 0
+
+
+def test_a_body_between_two_that_are_far_apart_meets_both_as_in_the_reference():
+    """The outer two share blocks of nodes, but nothing else: who lies between is not forgotten."""
+    side = 4 * CELL
+    near = bricks(np.array([0.0, 0.0, 0.2]), side)
+    far = near + np.array([side + 1.5 * CELL, 0.0, 0.0])
+    lid = near + np.array([0.5 * side + 0.75 * CELL, 0.0, side - 0.2 * CELL])
+    bodies = (body(near), body(far), body(lid, velocity=(0, 0, -1.0)))
+    fast, sure = side_by_side(problem(*bodies, planes=()), 20)
+    ours, theirs = fast.measure(), sure.measure()
+    assert (theirs.pair_impulse[2, :2] > 0).all()
+    assert ours.pair_impulse == pytest.approx(theirs.pair_impulse, rel=1e-3)
+    assert np.abs(fast.snapshot().position - sure.snapshot().position).max() < 2e-4 * CELL

@@ -47,8 +47,8 @@ OPTIONS = {
 }
 wp.set_module_options(OPTIONS)
 
-_POINTERS = "part node next history material table block where used near point rigid surface clump"
-_COUNTS = "blocks pool rigids points surfaces pushed swells"
+_POINTERS = "part node next history material table block where used near home box have point rigid surface clump"
+_COUNTS = "blocks pool rigids points surfaces pushed swells flows"
 FIELD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("mass", "f8"), ("slowing", "f8"), ("origin", "i4", 3), ("dim", "i4", 3)]

@@ -10,7 +10,7 @@ from corporeal.mpm.problem import Body, Problem
 PARTS = 16
 """Parts that a list of nodes or contacts is cut into."""
 BYTES = {
-    "junction": 256,
+    "junction": 304,
     "meet": 32,
     "side": 72,
     "touch": 184,

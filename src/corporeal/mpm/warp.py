@@ -237,11 +237,12 @@ class WarpEngine:
 
     def _connect_field(self, f: int, window: Window) -> None:
         record = self.field[f : f + 1]
-        for name in ("part", "node", "next", "history", "table", "block", "where", "used", "near"):
+        for name in ("part", "node", "next", "history", "table", "block", "where", "used", "near", "home", "box", "have"):
             record[name] = getattr(window, name).ctypes.data
         record["material"] = self.material[f].ctypes.data
         record["origin"], record["dim"] = window.origin, window.dim
         record["blocks"], record["pool"] = len(window.block), len(window.where)
+        record["flows"] = len(window.history) > 0
         record["swells"] = tables.swells(self.material[f])
         # One lane of a node says how high mass lies over a floor, or how it swells.
         watched = self.contact.watched(window.origin, window.dim)

@@ -14,6 +14,8 @@ from corporeal.mpm.kernels_sort import Sorter
 HALF = 1 << (PLACE - 1)
 LONGEST = (1 << (31 - PLACE)) // 4 - 4
 """Blocks that a window may span before places overflow."""
+OWN = 5 + 13
+"""Where a block's record says which node block is its own."""
 KEPT = ("part", "history", "origin", "dim", "table", "where", "block")
 """What the next step depends on."""
 
@@ -33,6 +35,12 @@ class Window:
     """Coordinates of node blocks, (blocks, 4)."""
     used: np.ndarray
     """Which of the two sets of nodes hold anything in each node block: bits."""
+    have: np.ndarray
+    """Which nodes of each node block hold mass: bits."""
+    box: np.ndarray
+    """Lowest and highest places of the particles of each block, (blocks, 6)."""
+    home: np.ndarray
+    """Block of particles at each node block, -1: none."""
     dim: np.ndarray
     """Size of the table."""
     fits: bool
@@ -83,6 +91,10 @@ class Window:
     def _make_room(self) -> None:
         """Have nodes enough, in which whatever was there before still stands."""
         self.used = np.full(len(self.where), 3, np.int32)
+        self.have = np.zeros(len(self.where), np.uint64)
+        self.box = np.zeros((len(self.block), 6), np.int32)
+        self.home = np.full(len(self.where), -1, np.int32)
+        self.home[self.block[:, OWN]] = np.arange(len(self.block))
         if len(self.node) >= len(self.where):
             return
         blocks = len(self.where) * 3 // 2

@@ -78,6 +78,7 @@ struct Bonds {
         B.slot[B.count] = B.slot[e];
         B.mass[B.count++] = node[0];
         node[0] = 0;
+        world->field[B.soft].have[B.slot[e] >> 6] &= ~(1ull << (B.slot[e] & 63));
       }
     }
   }

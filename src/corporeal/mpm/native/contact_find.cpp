@@ -1,5 +1,8 @@
 // List the blocks where fields meet each other or a plane, and number what is in them. One task:
 // it looks at blocks, not at nodes, unless something is there.
+// Particles of two fields that are farther apart along an axis [cells] are not in contact: lone ones
+// are when they come nearer than 1.5, and those of a body, less than a cell from one another, than 1.14.
+constexpr double LOOSE = 1.5, DENSE = 1.25;
 struct Find {
   static inline bool apart(const Field &A, const Field &B) {
     for (int i = 0; i < 3; i++)
@@ -16,19 +19,67 @@ struct Find {
     return h;
   }
   static inline u64 have(const Field &F, int block) {
+    if (!F.rigids) return F.have[block];
     const float *node = F.node + (size_t)block * 512;
     u64 m = 0;
     for (int i = 0; i < 64; i++) m |= (u64)(node[8 * i] > 0.0f) << i;
     return m;
   }
 };
+// The box around a field's particles in a block of nodes and the blocks next to it [units].
+struct Around {
+  long long low[3], high[3];
+  inline void begin() {
+    for (int d = 0; d < 3; d++) low[d] = 1ll << 60, high[d] = -low[d];
+  }
+  inline void add(const Field &F, int home) {
+    const int *box = F.box + 6 * home;
+    for (int d = 0; d < 3; d++) {
+      const long long shift = (long long)F.origin[d] * (4 << PLACE);
+      if (shift + box[d] < low[d]) low[d] = shift + box[d];
+      if (shift + box[3 + d] > high[d]) high[d] = shift + box[3 + d];
+    }
+  }
+  inline void all(const Field &F) {
+    begin();
+    for (int home = 0; home < F.blocks; home++) add(F, home);
+  }
+  inline void up(const Field &F, const int *at) {
+    begin();
+    for (int n = 0; n < 27; n++) {
+      const int there[3] = {at[0] + n / 9 - 1, at[1] + n / 3 % 3 - 1, at[2] + n % 3 - 1};
+      const int b = Grid::block(F, there), home = b < 0 ? -1 : F.home[b];
+      if (home >= 0) add(F, home);
+    }
+  }
+  // Whether the particles of two fields are so far apart along an axis that no gap closes in a step.
+  static inline bool apart(const Field &F, const Around &A, const Field &G, const Around &B, double far) {
+    far += F.flows || G.flows ? LOOSE : DENSE;
+    for (int d = 0; d < 3; d++)
+      if (B.low[d] - A.high[d] > far * UNIT || A.low[d] - B.high[d] > far * UNIT) return true;
+    return false;
+  }
+};
 Bonds::hold(world);
+const double meanwhile = 2.0 * world->clock->speed * dt * inv;
 int count = 0, meet = 0, side = 0, touch = 0, points = 0;
 for (int f = 0; f < fields; f++) {
   Field &F = world->field[f];
   int near[64], nears = 0, wall_of[WALLS], walls = 0;
-  for (int g = f + 1; g < fields && nears < 64; g++)
-    if (world->field[g].pool && !Find::apart(F, world->field[g])) near[nears++] = g;
+  Around mine, other;
+  bool lone = true;         // though others are near
+  if (!F.rigids) mine.all(F);
+  for (int g = f + 1; g < fields && nears < 64; g++) {
+    const Field &G = world->field[g];
+    if (!G.pool || Find::apart(F, G)) continue;
+    near[nears++] = g;
+    if (lone && !F.rigids && !G.rigids) {
+      other.all(G);
+      lone = Around::apart(F, mine, G, other, meanwhile);
+    } else {
+      lone = false;
+    }
+  }
   const bool pointed = F.rigids && F.surfaces;
   for (int w = 0; w < planes && walls < WALLS; w++) {
     const double *P = world->plane + 4 * w;
@@ -37,10 +88,10 @@ for (int f = 0; f < fields; f++) {
     else if (F.floor < 0 && Find::lowest(P, F, dx) <= WALL_REACH * dx)
       wall_of[walls++] = w;
   }
-  if (!nears && !walls) continue;
+  if (lone && !walls) continue;
   for (int b = 0; b < F.pool; b++) {
     int *w = F.where + 4 * b;
-    if (w[3]) continue;
+    if (w[3] || (!F.rigids && !F.have[b])) continue;
     Junction J;
     J.fields = 0;
     for (int i = 0; i < 3; i++) J.at[i] = w[i] + F.origin[i];
@@ -58,10 +109,22 @@ for (int f = 0; f < fields; f++) {
     J.mask = J.several = 0;
     int found = 0;
     for (int q = 0; q < J.fields; q++) J.have[q] = Find::have(world->field[J.field[q]], J.block[q]);
+    Around box[HERE];
+    int known = 0;
+    for (int q = 0; q < J.fields; q++) J.met[q] = 0;
     for (int a = 0; a < J.fields; a++)
       for (int c = a + 1; c < J.fields; c++) {
         if (world->friction[J.field[a] * all + J.field[c]] < 0) continue;   // bonded
         u64 both = J.have[a] & J.have[c];
+        if (!both) continue;
+        const Field &A = world->field[J.field[a]], &C = world->field[J.field[c]];
+        if (!A.rigids && !C.rigids) {
+          if (!(known >> a & 1)) box[a].up(A, J.at);
+          if (!(known >> c & 1)) box[c].up(C, J.at);
+          known |= 1 << a | 1 << c;
+          if (Around::apart(A, box[a], C, box[c], meanwhile)) continue;
+        }
+        J.met[a] |= 1 << c;
         J.several |= both;
         found += Grid::count(both);
       }

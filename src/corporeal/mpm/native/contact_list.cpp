@@ -52,8 +52,10 @@ for (int j = from; j < to; j++) {
     M.side = s;
     M.touch = t;
     M.stiff = 0;
+    int here[HERE];           // which of the block's fields each side is
     for (int q = 0; q < J.fields; q++) {
       if (!(J.have[q] >> i & 1)) continue;
+      here[s - M.side] = q;
       Side &S = sides[s++];
       const Field &F = world->field[J.field[q]];
       S.field = J.field[q];
@@ -82,7 +84,7 @@ for (int j = from; j < to; j++) {
         } else {
           T.c = M.side + c;
           T.fc = sides[T.c].field;
-          if (world->friction[A.field * all + T.fc] < 0) continue;   // bonded
+          if (!(J.met[here[a]] >> here[c] & 1)) continue;
         }
         T.meet = k;
         T.a = M.side + a;

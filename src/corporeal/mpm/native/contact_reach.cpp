@@ -14,7 +14,6 @@ struct Support {
     f4 &far = *(f4 *)A.far[A.fa == f ? 0 : 1];
     far = __builtin_elementwise_max(far, (A.fa == f ? h : -h) + reach);
   }
-  static inline f4 size(f4 a) { return __builtin_elementwise_max(a, -a); }
   static inline f4 all(float a) { return f4{a, a, a, a}; }
   // Eight particles at one node, seen from either side. What cannot reach farther is most of them.
   inline void see(Own &A, f8 x, f8 y, f8 z, i8 in) const {
@@ -87,7 +86,8 @@ if (index >= world->tasks) {
 int *task = world->task + 4 * index;
 Field &field = world->field[task[0]];
 alignas(64) int map[512];   // node of the arena to its field's first contact + 1, and how many << 24
-alignas(64) Own own[512 * (HERE - 1)];
+const int ROOM = 1024;    // at least what one block of nodes can hold
+alignas(64) Own own[ROOM];
 f8 volume = Simd::all(0.0f);
 Support support;
 for (int b = task[1]; b < task[2]; b++) {
@@ -95,9 +95,10 @@ for (int b = task[1]; b < task[2]; b++) {
   u64 any = 0;
   for (int i = 0; i < 27; i++) any |= field.near[2 * record[5 + i] + 1];
   if (!any) continue;
+  for (int n = 0; n < 27;) {
   for (int i = 0; i < 512; i += 8) *(i8u *)(map + i) = i8{0, 0, 0, 0, 0, 0, 0, 0};
   int owns = 0;
-  for (int n = 0; n < 27; n++) {
+  for (; n < 27 && owns + 64 * (HERE - 1) <= ROOM; n++) {
     int j = field.where[4 * record[5 + n] + 3];
     if (!j) continue;
     const Junction &J = junctions[j - 1];
@@ -121,7 +122,7 @@ for (int b = task[1]; b < task[2]; b++) {
           (begin + 1) | (owns - begin) << 24;
     }
   }
-  for (int s = record[0]; s < record[1]; s += 8) {
+  for (int s = record[0]; s < record[1] && owns; s += 8) {
     const float *q = field.part + (size_t)s * NC;
     Nearby P;
     if (!P.find(field, record, q, s, 1)) continue;
@@ -153,5 +154,6 @@ for (int b = task[1]; b < task[2]; b++) {
   for (int o = 0; o < owns; o++) {
     Aim &A = aims[own[o].touch];
     *(f4 *)A.far[A.fa == task[0] ? 0 : 1] = *(f4 *)own[o].far;
+  }
   }
 }

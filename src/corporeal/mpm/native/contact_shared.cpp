@@ -16,6 +16,7 @@ struct Junction {         // a block of nodes where fields meet each other or a 
   int at[3], fields, meet, side, touch, last;
   int field[HERE], block[HERE];
   u64 mask, several, have[HERE];
+  int met[HERE];            // of the fields here, those that each may meet: bits
 };
 struct Meet {             // one such node
   int at[3], side, sides, touch, touches, stiff;
@@ -68,7 +69,7 @@ struct Stage {
   int entries[PARTS];
 };
 
-static_assert(sizeof(Junction) <= 256 && sizeof(Meet) <= 32 && sizeof(Side) <= 72 &&
+static_assert(sizeof(Junction) <= 304 && sizeof(Meet) <= 32 && sizeof(Side) <= 72 &&
                   sizeof(Touch) <= 184 && sizeof(Aim) <= 104 && sizeof(Entry) <= 72 && sizeof(Past) <= 32 && sizeof(Line) <= 248,
               "as memory.py says");
 

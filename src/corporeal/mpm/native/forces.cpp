@@ -13,7 +13,9 @@ for (int b = task[1]; b < task[2]; b++) {
     *used &= ~later;
     for (int i = 0; i < 64; i++) next[i] = Simd::all(0.0f);
   }
+  field.have[b] = 0;
   if (!(*used & now)) continue;
+  u64 have = 0;
   for (int i = 0; i < 64; i++) {
     f8 a = node[i];
     float m = a[0];
@@ -22,9 +24,11 @@ for (int b = task[1]; b < task[2]; b++) {
       f8 f = __builtin_shufflevector(a, a, 0, 4, 5, 6, 0, 0, 0, 0);
       a = (p + h * f) * (1.0f / m) + g;
       a[0] = m;
+      have |= 1ull << i;
       node[i] = a;
     } else {
       node[i] = Simd::all(0.0f);
     }
   }
+  field.have[b] = have;
 }

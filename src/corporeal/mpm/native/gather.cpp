@@ -28,8 +28,8 @@ struct Gather {
     x += c[2];
   }
   static inline void fill(const Field &field, const int *block, f8 *arena) {
-    int low[3], high[3];
-    Simd::range(field, block, low, high);
+    int low[3], high[3], box[6];
+    Simd::range(field, block, low, high, box);
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++) {
         const int *near = block + 5 + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;

@@ -78,7 +78,7 @@ struct Scatter {
     alignas(64) f8 arena[ARENA];
     double work = 0;
     int low[3], high[3];
-    Simd::range(field, block, low, high);
+    Simd::range(field, block, low, high, field.box + 6 * (block - field.block) / NB);
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++)
         for (int k = 0; k < 8; k++) arena[i * LAYER + j * 8 + k] = Simd::all(0.0f);

@@ -71,13 +71,15 @@ struct Field {
   int *table, *block, *where;
   int *used;                // which of the two sets of nodes hold anything in a node block: bits
   u64 *near;
+  int *home, *box;          // block of particles at a node block, -1: none; lowest, highest place in it
+  u64 *have;                // nodes with mass of each node block, once forces have acted
   double *point;            // rigid: [P][5] place in the body's frame, mass, volume
   double *rigid;            // rigid: its state, see rigid.cpp
   double *surface;          // rigid: [S][3] in the body's frame
   double *clump;            // rigid: [clumps][6] first and last point, middle, radius
   double mass, slowing;     // slowing: how much viscosity shortens steps
   int origin[3], dim[3];    // in blocks; the window's corner and size
-  int blocks, pool, rigids, points, surfaces, pushed, swells;
+  int blocks, pool, rigids, points, surfaces, pushed, swells, flows;
   int floor;                // the only plane that the window reaches, or -1
   float level[3];           // its normal, or 0
   int side, clumps;         // side: of the two sets of nodes, which this step reads
@@ -180,27 +182,25 @@ struct Simd {
     w[1] = 0.75f - b * b;
     w[2] = 0.5f * c * c;
   }
-  // Nodes of a block's arena that its particles reach, first and last along each axis.
-  static inline void range(const Field &field, const int *block, int *low, int *high) {
+  // Nodes of a block's arena that its particles reach, first and last along each axis; and the
+  // lowest and highest places of its particles, six.
+  static inline void range(const Field &field, const int *block, int *low, int *high, int *box) {
     for (int d = 0; d < 3; d++) {
       const i8 zero = i8{0, 0, 0, 0, 0, 0, 0, 0};
-      i8 least = zero + 5, most = zero;
+      i8 least = zero + 0x7fffffff, most = ~least;
       for (int s = block[0]; s < block[1]; s += 8) {
-        i8 cell = *(const i8u *)(field.part + (size_t)s * NC + 8 * (XI + d));
-        cell = ((cell - HALF) >> PLACE) - (4 * block[2 + d] - 1);
-        if (block[1] - s < 8)
-          cell = i8{0, 1, 2, 3, 4, 5, 6, 7} < block[1] - s ? cell : zero + cell[0];
-        least = cell < least ? cell : least;
-        most = cell > most ? cell : most;
+        i8 x = *(const i8u *)(field.part + (size_t)s * NC + 8 * (XI + d));
+        if (block[1] - s < 8) x = i8{0, 1, 2, 3, 4, 5, 6, 7} < block[1] - s ? x : zero + x[0];
+        least = x < least ? x : least;
+        most = x > most ? x : most;
       }
-      low[d] = 5;
-      high[d] = 0;
-      for (int l = 0; l < 8; l++) {
-        if (least[l] < low[d]) low[d] = least[l];
-        if (most[l] > high[d]) high[d] = most[l];
-      }
-      if (low[d] < 0) low[d] = 0;
-      high[d] = (high[d] > 5 ? 5 : high[d]) + 2;
+      box[d] = __builtin_reduce_min(least);
+      box[3 + d] = __builtin_reduce_max(most);
+      const int first = 4 * block[2 + d] - 1;
+      low[d] = ((box[d] - HALF) >> PLACE) - first;
+      high[d] = ((box[3 + d] - HALF) >> PLACE) - first;
+      low[d] = low[d] < 0 ? 0 : low[d] > 5 ? 5 : low[d];
+      high[d] = (high[d] < 0 ? 0 : high[d] > 5 ? 5 : high[d]) + 2;
     }
   }
   // Of a batch in a block: distances from the first node, weights of 27 nodes, and the first node's
