@@ -9,6 +9,7 @@ from corporeal.errors import OutOfRangeError, UserError
 from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.ground import GroundConfig, doubts, ground
 from corporeal.stages.segment import segment
+from corporeal.types import PartWords, Placement
 from handmade import plain, scene
 
 
@@ -147,6 +148,72 @@ def test_the_record_is_plain_data_with_resolved_citations():
     assert said["parts"][1]["answered_by"] == "unknown"
 
 
+def placed(**fractions):
+    return {f: Placement(x, "model", f"{f} so.") for f, x in fractions.items()}
+
+
+def spoken(thing, words, library="default"):
+    """Ground one object of one part of which somebody said ``words``."""
+    made = scene(thing)
+    told = describe(made)
+    (known,) = told.objects
+    words = replace(words, name=known.parts[0].name)
+    told = replace(told, objects=(replace(known, parts=(words,)),))
+    parts = segment(made, told)
+    field = ground(made, parts, told, GroundConfig(library=library))
+    return field, doubts(field, parts, made)
+
+
+def test_values_are_where_a_model_placed_them_and_say_so():
+    words = PartWords(
+        "", "soft_PVC", "shell", margin=0.6, placements=placed(young=0.25, shell_thickness=0.5)
+    )
+    field, said = spoken(RIDDLE, words)
+    (material,), (structure,) = field.materials, field.structures
+    assert material.young == pytest.approx(3.6e6 + 0.25 * (21e6 - 3.6e6))
+    assert material.shell_thickness == pytest.approx(0.4e-3 + 0.5 * 3.6e-3)
+    assert structure.thickness == material.shell_thickness
+    young, density = material.grounds["young"], material.grounds["density"]
+    assert (young.chosen_by, young.reason, young.margin) == ("model", "young so.", 0.6)
+    assert (density.chosen_by, density.margin) == ("typical", 0.6)
+    assert said == ()
+
+
+def test_a_wide_range_is_placed_in_factors():
+    (foam,) = spoken(RIDDLE, PartWords("", "seat_foam", placements=placed(young=0.5)))[0].materials
+    assert foam.young == pytest.approx((10e3 * 150e3) ** 0.5)
+
+
+def test_what_is_inside_is_as_dense_as_it_was_placed():
+    words = PartWords("", "aluminium_can_sheet", "filled", contents="water", fill=0.9)
+    words = replace(words, placements=placed(contents_density=1.0))
+    (structure,) = spoken(RIDDLE, words)[0].structures
+    water = materials.library()["water"].ranges["density"]
+    assert structure.contents.density == water.high > water.typical
+    assert structure.contents.grounds["density"].chosen_by == "model"
+
+
+def test_values_that_do_not_fit_each_other_are_flagged_where_they_stand_and_in_a_warning():
+    words = PartWords("", "plasticine", placements=placed(young=1.0, yield_stress=0.0))
+    field, said = spoken(RIDDLE, words)
+    reason = field.materials[0].grounds["yield_stress"].reason
+    assert reason.startswith("yield_stress so. It does not fit the others: stiff but weak")
+    assert said[0].startswith("riddle_0: riddle: yield_stress of plasticine: It does not fit")
+
+
+def test_what_a_person_stated_outranks_what_a_model_placed():
+    words = PartWords("", "steel", placements=placed(young=0.0), values={"young": 2.1e11})
+    (steel,) = spoken(RIDDLE, words)[0].materials
+    assert (steel.young, steel.grounds["young"].chosen_by) == (2.1e11, "annotation")
+    assert steel.grounds["young"].margin == 1.0
+
+
+def test_a_place_that_nobody_could_choose_is_marked():
+    words = PartWords("", "steel", placements={"young": Placement(0.4, "fallback", "No answer.")})
+    (steel,) = spoken(RIDDLE, words)[0].materials
+    assert steel.grounds["young"].chosen_by == "fallback"
+
+
 def test_a_description_without_the_part_is_refused():
     made = scene(BLOCK)
     words = describe(made)
@@ -154,3 +221,67 @@ def test_a_description_without_the_part_is_refused():
     other = replace(words, objects=(replace(words.objects[0], parts=()),))
     with pytest.raises(UserError, match="has no part 'block'"):
         ground(made, parts, other)
+
+
+# ---------------------------------------------------------------- what is filled
+
+
+def said(tmp_path, text):
+    (tmp_path / "said.yaml").write_text(text)
+    return tmp_path / "said.yaml"
+
+
+def test_what_is_filled_has_contents_from_the_library(tmp_path):
+    path = said(
+        tmp_path,
+        "block_0: { structure: filled, thickness_mm: 0.2, contents: soup, fill: 0.9 }\n"
+        "plank_0: { material: cotton, structure: filled, contents: stuffing }",
+    )
+    field, _, _ = grounded(BLOCK, PLANK, annotations=path)
+    can, pillow = field.structures
+    assert (can.kind, can.thickness, can.fill, can.loose) == ("filled", 2e-4, 0.9, True)
+    sauce = materials.find("sauce")
+    assert can.contents.name == "sauce"
+    assert can.contents.density == sauce.ranges["density"].typical
+    assert can.contents.grounds["density"].range.source == "fao-density"
+    assert (pillow.contents.name, pillow.fill, pillow.loose) == ("fibre_fill", 1.0, False)
+    assert "taken as full" in pillow.reason
+
+
+def test_a_library_without_contents_leaves_them_to_the_default_one(tmp_path):
+    path = said(tmp_path, "block_0: { structure: filled, thickness_mm: 1, contents: sugar }")
+    small = GroundConfig(library="reference")
+    field, _, _ = grounded(BLOCK, config=small, annotations=path)
+    assert field.structures[0].contents.name == "granules"
+    assert field.structures[0].loose
+
+
+@pytest.mark.parametrize(
+    ("text", "words"),
+    [
+        ("block_0: { structure: filled, thickness_mm: 1 }", "not with what"),
+        ("block_0: { material: sand, structure: filled, contents: water }", "Give thickness_mm"),
+        ("block_0: water", "a liquid.*structure: filled"),
+        ("block_0: { structure: filled, thickness_mm: 1, contents: phlogiston }", "phlogiston"),
+        ("block_0: { structure: filled, contents: water, fill: 1.5 }", "fill is a share"),
+        ("block_0: { structure: filled, contents: 3 }", "contents must be a name"),
+    ],
+)
+def test_what_cannot_be_filled_says_what_to_do(tmp_path, text, words):
+    with pytest.raises(UserError, match=words):
+        grounded(BLOCK, annotations=said(tmp_path, text))
+
+
+def test_pieces_are_grounded_each_for_itself():
+    made = scene(BLOCK)
+    words = describe(made, DescribeConfig())
+    (thing,) = words.objects
+    shaft = PartWords("shaft", "steel", "solid", volume_share=0.2, surface_share=0.3)
+    grip = PartWords("grip", "ABS", "shell", volume_share=0.8, surface_share=0.7)
+    whole = replace(thing.parts[0], pieces=(shaft, grip))
+    told = replace(words, objects=(replace(thing, parts=(whole,)),))
+    field = ground(made, segment(made, told), told)
+    ((first, second),) = field.pieces
+    assert (first.material.name, first.structure.kind) == ("steel", "solid")
+    assert second.structure.thickness == materials.find("ABS").ranges["shell_thickness"].typical
+    assert second.words.volume_share == 0.8
