@@ -40,5 +40,16 @@ def test_an_edited_annotation_makes_its_answers_stale(tmp_path):
     assert pipeline._read_files(DescribeConfig(annotations=path)) != before
 
 
+def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do(tmp_path):
+    def names(**config):
+        return pipeline._read_files(DescribeConfig(**config))
+
+    (tmp_path / "one.json").write_text("{}")
+    written, read = names(record=tmp_path), names(vlm=f"replay:{tmp_path}")
+    (tmp_path / "two.json").write_text("{}")
+    assert names(record=tmp_path) == written
+    assert names(vlm=f"replay:{tmp_path}") != read
+
+
 def test_memory_is_counted_in_megabytes():
     assert 10 < pipeline.peak_memory_mb() < 100_000

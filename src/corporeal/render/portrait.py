@@ -92,10 +92,14 @@ def _shown(stage: Stage, camera: Camera, parts: np.ndarray) -> tuple[int, float]
 def _alone(scene: Scene, part_of_surface: list[int | None]) -> tuple[Stage, np.ndarray, np.ndarray]:
     """Stand the object on the floor by itself: stage, box (2, 3) [m], part of each triangle."""
     kept = [k for k, part in enumerate(part_of_surface) if part is not None]
-    surfaces = tuple(scene.surfaces[k] for k in kept)
+    worn = sorted({scene.surfaces[k].finish for k in kept})  # textures of others cost seconds
+    surfaces = tuple(
+        replace(scene.surfaces[k], finish=worn.index(scene.surfaces[k].finish)) for k in kept
+    )
+    finishes = tuple(scene.finishes[f] for f in worn)
     box = box_of(surfaces)
     foot = np.array([*box.mean(axis=0)[:2], box[0, 2]])
-    alone = moved(replace(scene, surfaces=surfaces), -foot)
+    alone = moved(replace(scene, surfaces=surfaces, finishes=finishes), -foot)
     parts = np.repeat(
         np.array([part_of_surface[k] for k in kept], dtype=int),
         [len(s.triangles) for s in surfaces],
