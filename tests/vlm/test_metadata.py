@@ -122,6 +122,25 @@ def test_a_thing_of_several_parts_does_not_say_what_each_is():
     assert seen("mesh", "soda can", alone=False).material == "aluminium_can_sheet"
 
 
+def test_goods_are_full_until_a_word_says_otherwise():
+    full = seen("mesh", "tomato soup can")
+    assert (full.structure, full.contents, full.thickness) == ("filled", "sauce", 0.0002)
+    assert 0.8 < full.fill <= 1
+    for name in ("empty soup can", "soup can opened", "crushed tuna can"):
+        said = seen("mesh", name)
+        assert (said.material, said.structure, said.contents) == ("steel", "shell", None)
+    label = seen("mesh", "tomato soup can", alone=False)
+    assert (label.structure, label.contents) == ("shell", None), "each part would be full"
+    assert seen("mesh", "soda can").contents is None, "as often empty as not"
+
+
+def test_every_content_of_the_lexicon_can_be_held():
+    held = [s for s in lexicon() if s.contents]
+    assert held
+    assert {s.contents for s in held} <= set(materials.contents())
+    assert all(s.thickness and s.fill and 0 < s.fill <= 1 for s in held)
+
+
 # ---------------------------------------------------------------- names among names
 
 

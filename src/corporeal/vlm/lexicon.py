@@ -32,6 +32,8 @@ class Saying:
     plant: bool = False
     alpha: str = ""
     metallic: str = ""
+    contents: str | None = None
+    fill: float | None = None
 
 
 @dataclass(frozen=True)
@@ -162,6 +164,12 @@ def _holders() -> frozenset[str]:
 
 
 @cache
+def emptied() -> frozenset[str]:
+    """Words that say of goods that they are not full any more."""
+    return frozenset(map(singular, _table()["emptied"]))
+
+
+@cache
 def _table() -> dict[str, list]:
     return tomllib.loads(
         files("corporeal.vlm").joinpath("lexicon.toml").read_text(encoding="utf-8")
@@ -184,4 +192,6 @@ def _saying(kind: str, phrase: str, row: dict) -> Saying:
         plant=row.get("plant", False),
         alpha=row.get("alpha", ""),
         metallic=row.get("metallic", ""),
+        contents=row.get("contents"),
+        fill=row.get("fill"),
     )

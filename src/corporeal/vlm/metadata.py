@@ -10,6 +10,7 @@ from corporeal.vlm.lexicon import (
     KINDS,
     Name,
     Saying,
+    emptied,
     heads,
     lookbook,
     metals,
@@ -129,7 +130,7 @@ def recognise(evidence: Evidence) -> PartWords:
     for ask in (_own_names, _general_names, _looks, _surface_values):
         answer = ask(evidence)
         if answer is not None:
-            return _weighed(answer, evidence)
+            return _emptied(_weighed(answer, evidence), evidence)
     return UNKNOWN
 
 
@@ -191,6 +192,14 @@ def _weighed(answer: PartWords, evidence: Evidence) -> PartWords:
     return answer
 
 
+def _emptied(answer: PartWords, evidence: Evidence) -> PartWords:
+    """Leave contents only in goods that are one part and are not said to be empty."""
+    said = {w for name in (*evidence.own, *evidence.general) for w in name.words}
+    if answer.contents is None or (evidence.alone and not said & emptied()):
+        return answer
+    return replace(answer, structure="shell", contents=None, fill=None)
+
+
 def _of_metal(sayings: list[Saying], evidence: Evidence) -> list[Saying]:
     """Let a thing that looks metallic be of the metal that such things are made of."""
     if not _metallic(evidence):
@@ -206,14 +215,16 @@ def _answer(sayings: list[Saying], name: str, factor: float) -> PartWords:
     said = sayings[0]
     kinds = {"substance": "names the material", "piece": "is usually", "thing": "is usually"}
     reason = f"{' '.join(said.phrase)!r} in {name!r} {kinds[said.kind]} {said.material}."
-    structure = "shell" if said.structure == "shell" else None
+    shell = "shell" if said.structure == "shell" else None
     return PartWords(
         "",
         said.material,
-        structure=structure,
+        structure="filled" if said.contents else shell,
         thickness=said.thickness,
         margin=round(said.margin * factor, 3),
         reason=reason,
+        contents=said.contents,
+        fill=said.fill,
     )
 
 
