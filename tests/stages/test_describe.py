@@ -206,15 +206,21 @@ def test_the_critic_chooses_among_ways_of_taking_apart_and_shares_become_pieces(
     assert hammer.pieces[0].volume_share == pytest.approx(0.25 / 0.98)
     assert hammer.pieces[0].placements["yield_stress"].fraction == 0.25
     assert hammer.placements == hammer.pieces[1].placements
-    assert oracle.tasks() == ["parts", "ranking", "materials", "placement", "extents"]
+    assert in_turn(oracle) == ["parts", "ranking", "materials", "placement"]
     options = inventory.transcript[0]["answer"]["decompositions"]
     assert [len(d["parts"]) for d in options] == [1, 2]
+
+
+def in_turn(oracle):
+    """Tasks in the order they were asked; extents, of all objects, are asked at the same time."""
+    assert oracle.tasks().count("extents") == 1
+    return [task for task in oracle.tasks() if task != "extents"]
 
 
 def test_known_parts_are_not_asked_for(ask):
     oracle = Oracle(materials=made_of(part("body", "soft_PVC"), part("beak", "ABS")))
     ask(oracle, DUCK)
-    assert oracle.tasks() == ["materials", "placement", "extents"]
+    assert in_turn(oracle) == ["materials", "placement"]
 
 
 def test_what_is_filled_has_contents_whose_density_is_placed_too(ask):
