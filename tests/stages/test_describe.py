@@ -292,6 +292,16 @@ def test_a_size_far_from_what_the_model_knows_is_told(ask):
     assert close.warnings == ()
 
 
+def test_nobody_is_asked_how_large_an_object_is_of_which_no_name_tells_anything(ask):
+    nameless = ("object_0", [("mesh", plain(), {})])
+    oracle = Oracle(materials=made_of(part("object", "glass")))
+    assert ask(oracle, nameless).objects[0].usual_extent is None
+    assert "extents" not in oracle.tasks()
+    assert ask(oracle, nameless, VASE).objects[1].usual_extent == 1.0
+    (asked,) = (q for q in oracle.asked if q.task == "extents")
+    assert asked.prompt.endswith("- vase")
+
+
 def test_tokens_and_seconds_are_added_up_and_an_unknown_price_is_not_guessed(ask):
     usage = ask(Oracle(materials=made_of(part("vase", "glass"))), VASE).usage
     assert (usage["questions"], usage["calls"], usage["models"]) == (4, 4, ["oracle:1"])

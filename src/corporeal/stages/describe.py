@@ -10,6 +10,7 @@ from typing import Literal
 from corporeal import materials
 from corporeal.errors import UnknownChoiceError
 from corporeal.geometry.identity import Identity, identify
+from corporeal.geometry.identity import words as telling
 from corporeal.materials.offer import Choice, contents_offered, substances_offered
 from corporeal.materials.placement import choices, from_fractions, from_values, odd, spelling, usual
 from corporeal.render.portrait import Portrait, colour_of_part, portraits
@@ -153,13 +154,14 @@ class _Asking:
             progress(0.5 * number / count, "taking pictures")
             interviews.append(self._interview(number))
         sizes = self._about(Subject(self.scene.name, self.scene.name, "", ""))
-        classes = list(dict.fromkeys(o.class_name or o.name for o in self.scene.objects))
+        named = dict.fromkeys(o.class_name or o.name for o in self.scene.objects)
+        classes = [name for name in named if telling(name)]  # "object" has no usual size
         jobs: list[Callable] = [
             partial(self._object, number, interviews[number], file[number], told)
             for number in range(count)
         ]
         results = together(
-            [*jobs, lambda: sizes.extents(classes)],
+            [*jobs, lambda: sizes.extents(classes) if classes else {}],
             self.config.parallel,
             lambda done: progress(0.5 + 0.5 * done / (count + 1), "asking"),
         )
