@@ -1,5 +1,7 @@
 """Every mistake that a person can make in a library of their own is found, placed and explained."""
 
+import random
+
 import pytest
 
 from corporeal import materials
@@ -137,6 +139,25 @@ def test_what_is_wrong_in_the_published_vocabulary_is_found_and_nothing_else():
         ("foam", "young_GPa"),
         ("rubber", "young_GPa"),
     ]
+
+
+def test_no_file_makes_the_check_itself_fail():
+    """Characters are lost, doubled and exchanged at random; whatever comes out is told or sound."""
+    chance = random.Random(5)
+    for _ in range(400):
+        letters = list('extends = "default"\n' + SOUND)
+        for _ in range(chance.randrange(1, 6)):
+            at = chance.randrange(len(letters))
+            letters[at] = chance.choice(["", letters[at] * 2, *'[]{}="\n,.-0e5x#'])
+        assert all(isinstance(line, str) and line for line in found("".join(letters)))
+    for value in ("[]", "{}", "5", "true", "[[1]]", "1979-05-27", "inf", '""'):
+        for key in ("law", "group", "aliases", "id", "young_GPa", "extends", "sources"):
+            said = SOUND.replace("[lamp_steel]", f"[lamp_steel]\nfamily = 'x'\n{key} = {value}")
+            found(said)
+            found(f"{key} = {value}\n{SOUND}")
+            found(
+                SOUND.replace("low = 195", f"low = {value}").replace('"my-bench" }', f"{value} }}")
+            )
 
 
 # ---------------------------------------------------------------- used

@@ -5,8 +5,9 @@ from math import radians
 import pytest
 
 from corporeal import materials
+from corporeal.errors import UserError
 from corporeal.materials.shipped import source_table
-from corporeal.types import Law
+from corporeal.types import Ground, Law
 
 PUBLISHED = """
 gold           1 4 77.2       .42-.44   19.29     120
@@ -123,3 +124,12 @@ def test_what_annealed_copper_and_hard_aluminium_reach_lies_inside():
     assert 450e6 in materials.find("aluminium").ranges["yield_stress"]
     assert 1500e6 in materials.find("hardened steel").ranges["yield_stress"]
     assert materials.find("snow").ranges["cohesion"].typical > 0
+
+
+def test_the_published_poissons_ratio_of_one_half_is_refused_where_it_is_chosen():
+    clay = materials.library("reference")["soil_clay"]
+    grounds = clay.typical()
+    half = Ground(0.5, clay.ranges["poisson"], "model", "")
+    with pytest.raises(UserError, match=r"0.5 for soil_clay .* no finite Lamé constant"):
+        clay.pick(grounds | {"poisson": half})
+    assert clay.pick(grounds).poisson == pytest.approx(0.4)

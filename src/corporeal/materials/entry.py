@@ -7,6 +7,8 @@ from corporeal.errors import OutOfRangeError, UserError
 from corporeal.materials.quantities import QUANTITIES, si
 from corporeal.types import Ground, Law, Material, Range
 
+POISSON_LIMIT = 0.5
+"""λ = E ν / ((1 + ν)(1 - 2 ν)) has no finite value here."""
 ABOUT = {"law": str, "group": str, "family": str, "published": str, "note": str}
 ABOUT |= {"aliases": list, "id": int}
 """Keys of a material in a file that are no numbers, with their types."""
@@ -49,6 +51,7 @@ class Entry:
 
         Raises:
             OutOfRangeError: A value lies outside the measured range.
+            UserError: The library has no such number, or nothing can be computed with it.
 
         """
         for name, ground in grounds.items():
@@ -62,6 +65,12 @@ class Entry:
                 what = f"{quantity.words} of {self.name}"
                 raise OutOfRangeError(what, ground.value, allowed.low, allowed.high, quantity.unit)
         values = {name: ground.value for name, ground in grounds.items()}
+        if values.get("poisson", 0.0) >= POISSON_LIMIT:
+            raise UserError(
+                f"A Poisson's ratio of {values['poisson']:g} for {self.name} lies in the published "
+                "range, but leaves no finite Lamé constant. Choose a smaller one, or use --library "
+                "default."
+            )
         return Material(name=self.name, law=self.law, grounds=dict(grounds), **values)
 
 

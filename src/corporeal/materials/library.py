@@ -100,7 +100,7 @@ def read(path: Path) -> dict[str, Entry]:
         stat = path.stat()
     except OSError as error:
         raise BadFileError(path, f"cannot be read ({error}).", A_FILE) from error
-    return _read(path, stat.st_mtime_ns, stat.st_size)
+    return _read(path.resolve(), path, stat.st_mtime_ns, stat.st_size)
 
 
 def check(path: Path) -> list[Problem]:
@@ -121,7 +121,7 @@ def _text(path: Path) -> str:
 
 
 @lru_cache(maxsize=8)
-def _read(path: Path, changed: int, size: int) -> dict[str, Entry]:
+def _read(where: Path, path: Path, changed: int, size: int) -> dict[str, Entry]:
     problems = check(path)
     if problems:
         more = f"All {len(problems)} mistakes: corporeal materials check {path}."

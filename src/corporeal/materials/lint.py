@@ -12,8 +12,8 @@ from math import isfinite
 from typing import Any
 
 from corporeal.errors import UserError
-from corporeal.materials.entry import ABOUT
-from corporeal.materials.plausible import POISSON_LIMIT, doubt, namesake, strain_doubt
+from corporeal.materials.entry import ABOUT, POISSON_LIMIT
+from corporeal.materials.plausible import doubt, namesake, strain_doubt
 from corporeal.materials.quantities import QUANTITIES, UNITS, examples, si
 from corporeal.types import Law
 

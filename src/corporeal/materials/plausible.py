@@ -7,8 +7,6 @@ from corporeal.materials.quantities import QUANTITIES, UNITS, si
 from corporeal.materials.shipped import shipped
 from corporeal.types import Law
 
-POISSON_LIMIT = 0.5
-"""λ = E ν / ((1 + ν)(1 - 2 ν)) has no finite value here."""
 WIDER = 3.0
 """How far a new material may lie beyond all that are like it, as a factor."""
 COMPARED = ("young", "density", "yield_stress", "hardening", "shell_thickness")
