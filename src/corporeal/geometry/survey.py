@@ -41,12 +41,12 @@ class Member:
         """``body``, ready to be asked."""
         return Shape(self.body)
 
-    @property
+    @cached_property
     def body_area(self) -> float:
         """Of every face that encloses something [m²]."""
         return float(self.body.areas.sum())
 
-    @property
+    @cached_property
     def sheet_area(self) -> float:
         """Of the open sheets, one side [m²]."""
         return float(self.sheet.areas.sum())
