@@ -100,7 +100,9 @@ def test_bodies_more_than_a_cell_and_a_quarter_apart_are_not_looked_at():
     """Their splines overlap, but no gap between them closes in a step."""
     low, high = bricks(np.array([0.0, 0.0, 0.2])), bricks(np.array([0.0, 0.0, 0.2]))
     high[:, 2] += 0.08 + 1.2 * CELL
-    given = problem(body(low), body(high, velocity=(0, 0, -0.5)), planes=(), gravity=(0, 0, 0))
+    given = problem(
+        body(low), body(high, velocity=(0, 0, -0.5)), planes=(), gravity=(0.0, 0.0, 0.0)
+    )
     engine = WarpEngine(given, threads=1)
     engine.advance(0.1 * CELL / 0.5)
     assert engine.contact.stage["touches"][0] == 0
