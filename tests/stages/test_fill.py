@@ -450,6 +450,7 @@ def test_a_pillow_is_as_soft_as_its_stuffing_and_as_heavy_as_all_of_it():
     treatment = particles.treatments[0]
     assert treatment.kind == "deformable"
     assert treatment.young_real == 5e3
+    assert "it is simulated as its fibre_fill" in treatment.why
     cover, inside = 400 * pillow.area * 5e-4, 30 * (pillow.volume - pillow.area * 5e-4)
     assert particles.mass.sum() == pytest.approx(cover + inside, rel=1e-4)
     middle = np.linalg.norm((particles.position - particles.position.mean(0))[:, :2], axis=1) < 0.1

@@ -118,7 +118,7 @@ def part_rows(scene: Scene, particles: Particles, field: MaterialField) -> list[
             "structure": structure.kind,
             "E": treatment.young_real,
             "E_sim": treatment.young,
-            "nu": material.poisson,
+            "nu": acting(material, structure, treatment).poisson,
             "density": material.density,
             "density_sim": treatment.density,
             "yield_stress": material.yield_stress,

@@ -58,7 +58,9 @@ def judge_filled(
         carried = f"its {inner.name} moves with the wall as one rigid mass"
         return replace(wall, reason=f"{wall.reason}; {carried}")
     if not structure.loose:
-        return judge(as_contents(part), motion)
+        inside = judge(as_contents(part), motion)
+        said = f"{inside.reason}; it is simulated as its {inner.name}, the wall's mass around it"
+        return replace(inside, reason=said)
     said = (
         f"it is filled with {inner.name}, which no law here lets flow: wall and contents move as "
         "one rigid mass"
