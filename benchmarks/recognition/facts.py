@@ -51,9 +51,8 @@ def facts(named: bool = True) -> list[Fact]:
     found = []
     for row in json.loads(FACTS.read_text(encoding="utf-8")):
         scene, identity = _scene(row, named)
-        for number, part in enumerate(row["parts"]):
+        for part, seen in zip(row["parts"], evidence(scene, identity), strict=True):
             accepted = tuple(truth[row["set"]][row["file"]][part["part"]])
-            seen = evidence(scene, identity, number)
             found.append(Fact(row["set"], row["file"], part["part"], seen, accepted))
     return found
 

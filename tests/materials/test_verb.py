@@ -61,3 +61,10 @@ def test_a_material_is_shown_with_its_sources_and_measured_pairs(typed):
     out = typed("show", "plywood")[1]
     assert "wood-handbook (read): USDA" in out
     assert "as wood on metal: 0.2–0.5 (0.3)" in out
+
+
+def test_uses_are_shown_where_the_library_allows_them(typed):
+    assert "tool, spring, blade: hardened: yield stress 700–1155 MPa" in typed("show", "steel")[1]
+    published = typed("show", "steel", "--library", "reference")[1]
+    assert "food tin, lid: soft tinplate: yield stress 250–450 MPa" in published
+    assert "hardened" not in published

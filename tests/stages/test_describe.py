@@ -1,5 +1,6 @@
 import json
 import re
+import time
 
 import numpy as np
 import pytest
@@ -62,6 +63,16 @@ def test_a_scene_of_a_thousand_surfaces_is_described_in_a_moment():
     pieces = [(f"piece_{k}", plain(f"Metal.{k:03d}"), {}) for k in range(1000)]
     (thing,) = describe(scene(("heap_0", pieces))).objects
     assert [p.material for p in thing.parts] == ["steel"]
+
+
+def test_an_object_of_a_thousand_parts_is_described_in_seconds():
+    colours = [(k / 1000, 0.0, 0.0, 1.0) for k in range(1000)]
+    pieces = [(f"steel_{k}", plain(f"m{k}", colour=c), {}) for k, c in enumerate(colours)]
+    start = time.perf_counter()
+    (thing,) = describe(scene(("heap_0", pieces))).objects
+    assert len(thing.parts) > 900
+    assert {p.material for p in thing.parts} == {"steel"}
+    assert time.perf_counter() - start < 5
 
 
 def test_unknown_is_a_normal_answer():

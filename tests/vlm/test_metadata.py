@@ -148,9 +148,8 @@ def told(thing, *parts):
     """Recognise each part of a thing; a part is (surface name, finish name)."""
     made = scene((f"{thing}_0", [(name, plain(finish), {}) for name, finish in parts]))
     identity = identify(made, matter_hint)
-    return {
-        p.name: recognise(evidence(made, identity, k)) for k, p in enumerate(identity.catalogue)
-    }
+    seen_parts = zip(identity.catalogue, evidence(made, identity), strict=True)
+    return {part.name: recognise(said) for part, said in seen_parts}
 
 
 @pytest.mark.parametrize(

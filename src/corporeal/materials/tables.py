@@ -8,6 +8,7 @@ from corporeal.materials.library import find, library
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.materials.shipped import citation, source_table
+from corporeal.materials.treatments import inside, treatments
 from corporeal.types import Ground, Material, MaterialField, Part, Parts, PartWords, Structure
 
 SCALES = {"Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))}
@@ -35,10 +36,29 @@ def show(name: str, library_name: str = "default") -> str:
     for field, r in entry.ranges.items():
         words = QUANTITIES[field].words
         lines.append(f"  {words:<18} {span(field, r.low, r.typical, r.high):<26} {r.source}")
+    lines += _uses(entry)
     lines += _measured_friction(entry)
     keys = sorted({key for r in entry.ranges.values() for key in _keys(r.source)})
     lines += ["", "Sources", *(f"  {key}{_seen(key)}" for key in keys)]
     return "\n".join(lines)
+
+
+def _uses(entry: Entry) -> list[str]:
+    """Tell how use or treatment narrows the ranges, as a model is told too."""
+    rows = []
+    for use in treatments(entry.name):
+        bands = [
+            f"{QUANTITIES[f].words.lower()} {span(f, low, low, high).split(' (')[0]}{_unit(f, low)}"
+            for f, (low, high) in use.bands.items()
+            if f in entry.ranges and inside(low, high, entry.ranges[f])
+        ]
+        rows += [f"  {use.words}: {', '.join(bands)}"] if bands else []
+    return ["", "Uses", *rows] if rows else []
+
+
+def _unit(field: str, value: float) -> str:
+    unit = _scale(field, value)[1]
+    return "" if unit == "-" else f" {unit}"
 
 
 def _measured_friction(entry: Entry) -> list[str]:

@@ -293,23 +293,23 @@ def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, 
 def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[PartWords]]:
     """Return what the file tells of every part of every object."""
     words: list[list[PartWords]] = [[] for _ in scene.objects]
-    for part, entry in enumerate(identity.catalogue):
-        words[entry.object].append(_from_file(scene, identity, part, library))
+    known = evidence(scene, identity)
+    for entry, seen in zip(identity.catalogue, known, strict=True):
+        told = _stated(list(seen.surfaces), library) or recognise(seen)
+        by = "metadata" if told.material else "unknown"
+        told = replace(told, name=entry.name, answered_by=by)
+        words[entry.object].append(_walled(told, stated_thickness(seen.surfaces)))
     return words
 
 
-def _from_file(scene: Scene, identity: Identity, part: int, library: str) -> PartWords:
-    entry = identity.catalogue[part]
-    surfaces = [scene.surfaces[s] for s in identity.surfaces(part)]
-    thickness = stated_thickness(surfaces)
-    words = _stated(surfaces, library) or recognise(evidence(scene, identity, part))
-    by = "metadata" if words.material else "unknown"
-    words = replace(words, name=entry.name, answered_by=by)
+def _walled(words: PartWords, thickness: float | None) -> PartWords:
+    """Let the wall's thickness [m] that the file states decide; 0: stated solid."""
     if thickness is None:
         return words
-    return replace(
-        words, structure="shell" if thickness > 0 else "solid", thickness=thickness or None
-    )
+    if thickness == 0:
+        return replace(words, structure="solid", thickness=None, contents=None, fill=None)
+    filled = words.structure == "filled"
+    return replace(words, structure="filled" if filled else "shell", thickness=thickness)
 
 
 def _stated(surfaces: list[Surface], library: str) -> PartWords | None:

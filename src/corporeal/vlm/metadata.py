@@ -1,5 +1,6 @@
 """Recognition without a model: what the file's own names and surface values tell."""
 
+from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
@@ -60,28 +61,48 @@ class Evidence:
         return [*map(_name, named), *(Name(" ".join(w), w) for w in self.shared if w)]
 
 
-def evidence(scene: Scene, identity: Identity, part: int) -> Evidence:
-    """Gather what a scene's file says about one of its parts."""
-    number = identity.catalogue[part].object
-    alone = sum(p.object == number for p in identity.catalogue) == 1
-    worn = [(k, s) for k, s in enumerate(scene.surfaces) if s.object == number]
-    finishes = [scene.finishes[s.finish] for _, s in worn]
-    shared = (_prefix([s.name for _, s in worn]), _prefix([f.name for f in finishes]))
-    mine = identity.surfaces(part)
-    others = [s for k, s in worn if k not in mine]
-    said = [_name(s.name, shared[0]) for s in others]
-    said += [_name(scene.finishes[s.finish].name, shared[1]) for s in others]
-    told = [saying for name in said for saying in heads(name.words)]
-    own = dict.fromkeys(scene.surfaces[k].finish for k in mine)
-    return Evidence(
-        surfaces=[scene.surfaces[k] for k in mine],
-        finishes=[scene.finishes[f] for f in own],
-        thing=scene.objects[number],
-        alone=alone,
-        metallic_means_something=any(f.metallic < 1.0 for f in finishes),
-        shared=((), ()) if alone else shared,
-        claimed=frozenset(t.material for t in told if t.kind == "substance"),
+def evidence(scene: Scene, identity: Identity) -> list[Evidence]:
+    """Gather what a scene's file says about each of its parts, in the catalogue's order."""
+    parts_of: dict[int, list[int]] = {}
+    for number, part in enumerate(identity.catalogue):
+        parts_of.setdefault(part.object, []).append(number)
+    gathered: dict[int, Evidence] = {}
+    for thing, parts in parts_of.items():
+        gathered |= _sisters(scene, thing, {p: identity.surfaces(p) for p in parts})
+    return [gathered[number] for number in range(len(identity.catalogue))]
+
+
+def _sisters(scene: Scene, thing: int, surfaces: dict[int, list[int]]) -> dict[int, Evidence]:
+    """Gather evidence about all parts of one object; ``surfaces`` of each part."""
+    worn = {p: [scene.surfaces[k] for k in mine] for p, mine in surfaces.items()}
+    finishes = {
+        p: [scene.finishes[f] for f in dict.fromkeys(s.finish for s in mine)]
+        for p, mine in worn.items()
+    }
+    looks = [f for mine in finishes.values() for f in mine]
+    shared = (
+        _prefix([s.name for mine in worn.values() for s in mine]),
+        _prefix([f.name for f in looks]),
     )
+    whole = Evidence(
+        surfaces=(),
+        finishes=(),
+        thing=scene.objects[thing],
+        alone=len(worn) == 1,
+        metallic_means_something=any(f.metallic < 1.0 for f in looks),
+        shared=shared if len(worn) > 1 else ((), ()),
+    )
+    found = {p: replace(whole, surfaces=worn[p], finishes=finishes[p]) for p in worn}
+    claims = {p: _substances(e.own) for p, e in found.items()}
+    times = Counter(m for told in claims.values() for m in told)
+    return {
+        p: replace(e, claimed=frozenset(m for m, n in times.items() if n > (m in claims[p])))
+        for p, e in found.items()
+    }
+
+
+def _substances(names: Sequence[Name]) -> set[str]:
+    return {s.material for name in names for s in heads(name.words) if s.kind == "substance"}
 
 
 def _name(text: str, shared: tuple[str, ...] = ()) -> Name:
