@@ -314,3 +314,21 @@ def test_a_closed_wall_that_flows_keeps_its_hinges():
         plan([replace(CAN, closed=closed)], [FALL], "draft").treatments for closed in (True, False)
     )
     assert shut == open_
+
+
+def test_a_long_part_that_is_no_known_rod_says_what_it_was_taken_for():
+    strip = block(WOOD, 0.01, 0.03, 1.0)
+    tripod = PartGeometry(0, WOOD, SOLID, (0.5, 0.5, 1.2), 3 * 1.2 * 4e-4, 3 * 1.2 * 0.08)
+    rod = replace(cylinder(WOOD, 0.02, 1.0), diameter=0.02)
+    tube = cylinder(STEEL, 0.03, 1.2, shell(1.2e-3))
+    board = block(WOOD, 0.02, 0.6, 0.9)
+    said = [plan([p], [FALL], "draft").treatments[0].why for p in (strip, tripod, rod, tube, board)]
+    assert ["solid bar" in why for why in said] == [True, True, False, False, False]
+    assert "a solid bar 10 mm across" in said[0] and "a solid bar 30 mm across" in said[1]
+
+
+def test_a_long_part_that_bends_and_is_not_thickened_says_so():
+    strip = replace(block(RUBBER, 0.004, 0.01, 0.6), object=1)
+    bent = plan([sphere(RUBBER, 0.2), strip], [FALL] * 2, "draft").treatments[1]
+    assert bent.kind == "deformable"
+    assert "rough estimate" in bent.why

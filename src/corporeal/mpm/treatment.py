@@ -15,6 +15,7 @@ from corporeal.mpm import plants
 from corporeal.mpm.budget import calm_trinkets, cap, fit_budget
 from corporeal.mpm.filled import as_contents, judge_filled, mean_density
 from corporeal.mpm.part import (
+    TUBE,
     Motion,
     PartGeometry,
     Verdict,
@@ -298,7 +299,14 @@ def treat(
         impact_speed=motion.impact_speed,
         wave_speed=wave,
         step=stable_step(wave, motion.impact_speed, cell) if soft else inf,
-        why=reason(verdict, role) + (wall_reason(part, ratio) if soft else "") + rod_reason(thin),
+        why="".join(
+            (
+                reason(verdict, role),
+                wall_reason(part, ratio) if soft else "",
+                rod_reason(thin),
+                bar_reason(part, 2 * cell if soft else 0.0),
+            )
+        ),
     )
 
 
@@ -338,6 +346,27 @@ def rod_reason(ratio: float) -> str:
         f" It is simulated {1 / ratio:.3g} times as thick, with its bending stiffness (up to 10 % "
         "less where it runs askew to the grid), its strength in bending and its mass kept; "
         "stretched it is softer than in life."
+    )
+
+
+def bar_reason(part: PartGeometry, simulated: float) -> str:
+    """Say what was assumed of a long thin part that is no known rod or tube; "" of all others.
+
+    Args:
+        part: Which.
+        simulated: How thick a known rod would at least be simulated [m].
+
+    """
+    across = width(part)
+    known = part.diameter > 0 or part.leaves > 0 or tube(part) > 0
+    plate = part.size[1] > part.size[2] / 4 and across > 0.7 * part.size[0]
+    if known or plate or not 0 < TUBE * across < part.size[2]:
+        return ""
+    thin = part.structure.kind != "shell" and across < simulated
+    grid = "; it is simulated as thin as it is, and its bending is a rough estimate" if thin else ""
+    return (
+        " It is long and thin, but not one round rod or tube: whether it flexes was judged as for "
+        f"a solid bar {1e3 * across:.2g} mm across{grid}."
     )
 
 
