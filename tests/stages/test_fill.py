@@ -485,6 +485,7 @@ def test_pieces_of_one_mesh_weigh_by_their_shares():
     mass = 7850 * 0.25 * mesh.volume + 1100 * 0.5 * mesh.area * 1e-3
     assert particles.mass_real[0] == pytest.approx(mass, rel=1e-6)
     assert particles.mass.sum() == pytest.approx(mass, rel=1e-6)
+    assert f"blade of steel, {7850 * 0.25 * mesh.volume:.3g} kg; handle" in particles.fills[0]
 
 
 def test_what_is_filled_falls_as_one_and_its_audit_is_clean(tmp_path):

@@ -58,6 +58,8 @@ class Make:
     """Mean density of its wall, or of all of it when it is solid [kg/m³]."""
     held: Held | None = None
     """None: nothing but air behind the wall, or no wall."""
+    pieces: tuple[str, ...] = ()
+    """What shares its mesh, with the mass of each, in words."""
 
     @property
     def mass(self) -> float:
@@ -81,7 +83,12 @@ def compose(
     body, sheet = sum(m.body_mass for m in makes), sum(m.sheet_mass for m in makes)
     alone = made.body_mass + made.sheet_mass
     mean = material.density * (body + sheet) / alone if alone > 0 else material.density
+    told = tuple(
+        f"{words.name} of {material.name}, {m.mass + (h.mass if h else 0.0):.3g} kg"
+        for m, h, (_, material, words) in zip(makes, holds, every, strict=True)
+    )
     made = replace(made, body_mass=body, sheet_mass=sheet, density=mean)
+    made = replace(made, pieces=told if len(every) > 1 else ())
     return with_contents(made, member, [h for h in holds if h])
 
 

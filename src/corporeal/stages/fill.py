@@ -358,5 +358,9 @@ def describe(
     for k, entry in enumerate(parts.catalogue):
         made, count = makes[k], int((part == k).sum())
         what = how_filled(members[k], made, chosen.treatments[k], chosen.cell)
-        sentences.append(f"{entry.name}: {what}; {count:,} particles, {made.mass:.3g} kg.")
+        shared = f" It weighs what its pieces weigh: {'; '.join(made.pieces)}."
+        sentences.append(
+            f"{entry.name}: {what}; {count:,} particles, {made.mass:.3g} kg."
+            + (shared if made.pieces else "")
+        )
     return tuple(sentences)
