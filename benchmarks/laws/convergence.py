@@ -128,8 +128,9 @@ PLOTS = (
         "A column of sand, as high as its radius",
         "cells across the radius",
         "error of the run-out [%]",
-        "The run-out grows slowly with the grid and passes the measured value at 12 cells, so the "
-        "error there is small by chance: 6 to 10 % is what to expect.",
+        "The run-out grows with the grid, as the front is thinner than a cell, and passes the "
+        "measured value between 8 and 12 cells, so that the error there is small by chance: about "
+        "10 % is what to expect.",
         (Series("run-out", _spread, (6, 8, 10, 12, 16)),),
         15.0,
     ),

@@ -121,7 +121,7 @@ def steepest(cells: int, rounds: int = 4) -> float:
 
 def sand(quick: bool = False) -> Outcome:
     """Case 16: run-out of a column, and the angle of repose."""
-    cells = 8 if quick else 12
+    cells = 6 if quick else 12
     column = sand_column(cells)
     checks = (
         relative("run-out ΔR/R", column.spread, LUBE, 15.0),

@@ -37,7 +37,7 @@ CASES = {
         Case("13", statics.self_weight, (1, 1)),
         Case("14", bending.cantilever, (7, 24)),
         Case("15", plastic.copper_bar, (7, 17)),
-        Case("16", grains.sand, (10, 43)),
+        Case("16", grains.sand, (5, 43)),
         Case("17", rotation.rotating_body, (2, 22)),
     )
 }
