@@ -47,7 +47,10 @@ OPTIONS = {
 }
 wp.set_module_options(OPTIONS)
 
-_POINTERS = "part node next history material table block where used near home box have point rigid surface clump"
+_POINTERS = (
+    "part node next history material table block where used near home box have point rigid surface "
+    "clump"
+)
 _COUNTS = "blocks pool rigids points surfaces pushed swells flows"
 FIELD = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]

@@ -13,7 +13,9 @@ if TYPE_CHECKING:
 
 wp.set_module_options(OPTIONS)
 
-_POINTERS = "part history to past_to old line inner count bin middle order block table where plane"
+_POINTERS = (
+    "part history to past_to old line inner count bin edge middle order block table where plane"
+)
 _COUNTS = "olds bins planes lost blocks slots pool flows"
 SORTING = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
@@ -91,6 +93,7 @@ class Sorter:
             "inner": np.empty(slots, np.int32),
             "middle": np.empty(window.count, np.int32),
             "count": np.zeros(lines, np.int32),
+            "edge": np.zeros(lines, np.int32),
             "bin": np.zeros(64 * window.kinds, np.int32),
         }
         self._point(**scratch)
@@ -99,7 +102,7 @@ class Sorter:
         scratch["order"] = np.empty(record["slots"], np.int32)
         window.block = np.zeros((blocks, BLOCK), np.int32)
         window.table = np.full(tuple(dim), -1, np.int32)
-        where = np.empty((min(lines, 27 * blocks), 4), np.int32)
+        where = np.empty((min(lines, 27 * blocks) + 1, 4), np.int32)
         self._point(order=scratch["order"], block=window.block, table=window.table, where=where)
         self.launches[RANK].launch()
         window.where = where[: record["pool"]].copy()

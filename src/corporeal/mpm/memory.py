@@ -13,7 +13,7 @@ BYTES = {
     "junction": 304,
     "meet": 32,
     "side": 72,
-    "touch": 184,
+    "touch": 168,
     "aim": 104,
     "entry": 72,
     "line": 248,
@@ -122,6 +122,8 @@ class ContactMemory:
         )
         point(world, **{name: getattr(ledger, name) for name in BOOKS.split()})
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
+        rigid = problem.contact == "multi" and any(body.rigid for body in problem.bodies)
+        self.lines = 8 if rigid else 0
         self.room, self.lists = 256, {"past": np.zeros(0, np.uint8)}
         self.lengthen()
 
@@ -160,22 +162,22 @@ class ContactMemory:
         self.stage["pasts"] = len(bytes_) // BYTES["past"]
 
     def lengthen(self) -> None:
-        """Make every list twice as long."""
-        self.room *= 2
+        """Make every list half as long again."""
+        self.room += self.room // 2
         room = {
-            "junction": self.room,
+            "junction": self.room // 2,
             "meet": 4 * self.room,
             "side": 8 * self.room,
             "touch": 8 * self.room,
             "aim": 8 * self.room,
             "entry": 8 * self.room,
-            "line": 8 * self.room,
-            "past": 8 * self.room,
+            "line": self.lines * self.room,
+            "past": self.lines * self.room,
         }
         past = self.past
         self.lists = {name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()}
         self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
-        self.slot = np.zeros(32 * self.room, np.int32)
+        self.slot = np.zeros(1 << (4 * room["past"]).bit_length(), np.int32)
         self.stage["slots"] = len(self.slot)
         point(self.stage, order=self.order, slot=self.slot, **self.lists)
         self.past = past

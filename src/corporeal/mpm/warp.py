@@ -34,7 +34,7 @@ from corporeal.mpm.memory import ContactMemory, point, rigid_grid
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.mpm.spring_records import Springs
 from corporeal.mpm.springs import longest_step
-from corporeal.mpm.window import Window
+from corporeal.mpm.window import POINTED, Window
 from corporeal.types import Vector
 
 RIGID_COURANT = 0.05
@@ -237,7 +237,7 @@ class WarpEngine:
 
     def _connect_field(self, f: int, window: Window) -> None:
         record = self.field[f : f + 1]
-        for name in ("part", "node", "next", "history", "table", "block", "where", "used", "near", "home", "box", "have"):
+        for name in POINTED:
             record[name] = getattr(window, name).ctypes.data
         record["material"] = self.material[f].ctypes.data
         record["origin"], record["dim"] = window.origin, window.dim

@@ -14,6 +14,8 @@ from corporeal.mpm.kernels_sort import Sorter
 HALF = 1 << (PLACE - 1)
 LONGEST = (1 << (31 - PLACE)) // 4 - 4
 """Blocks that a window may span before places overflow."""
+POINTED = tuple("part history node next table block where used near home box have".split())
+"""Arrays that the native pieces work in."""
 OWN = 5 + 13
 """Where a block's record says which node block is its own."""
 KEPT = ("part", "history", "origin", "dim", "table", "where", "block")
@@ -32,7 +34,7 @@ class Window:
     table: np.ndarray
     """Number of each node block, -1: none."""
     where: np.ndarray
-    """Coordinates of node blocks, (blocks, 4)."""
+    """Coordinates of node blocks, (blocks, 4); the last stands for those that nobody reaches."""
     used: np.ndarray
     """Which of the two sets of nodes hold anything in each node block: bits."""
     have: np.ndarray
@@ -97,7 +99,7 @@ class Window:
         self.home[self.block[:, OWN]] = np.arange(len(self.block))
         if len(self.node) >= len(self.where):
             return
-        blocks = len(self.where) * 3 // 2
+        blocks = len(self.where) * 9 // 8
         self.node = aligned((blocks, 64, 8), np.float32)
         self.next = aligned((blocks, 64, 8), np.float32)
         self.near = np.zeros(2 * blocks, np.uint64)

@@ -70,7 +70,7 @@ struct Stage {
 };
 
 static_assert(sizeof(Junction) <= 304 && sizeof(Meet) <= 32 && sizeof(Side) <= 72 &&
-                  sizeof(Touch) <= 184 && sizeof(Aim) <= 104 && sizeof(Entry) <= 72 && sizeof(Past) <= 32 && sizeof(Line) <= 248,
+                  sizeof(Touch) <= 168 && sizeof(Aim) <= 104 && sizeof(Entry) <= 72 && sizeof(Past) <= 32 && sizeof(Line) <= 248,
               "as memory.py says");
 
 struct Face {             // a half space u < s through the quadratic spline

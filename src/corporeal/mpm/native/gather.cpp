@@ -44,7 +44,16 @@ struct Gather {
           for (int k = 0; k < 3; k++) h[5 + k] = g2[k];
       }
   }
-  inline void batch(const World *world, const Field &field, const int *block, int s, const f8 *arena) {
+  // Cells of a block's arena whose nodes it has.
+  static inline void allowed(const Field &field, const int *block, int *least, int *most) {
+    const int own = 5 + 13, step[3] = {9, 3, 1}, none = field.pool - 1;
+    for (int d = 0; d < 3; d++) {
+      least[d] = block[own - step[d]] == none;
+      most[d] = block[own + step[d]] == none ? 2 : 5;
+    }
+  }
+  inline void batch(const World *world, const Field &field, const int *block, int s, const f8 *arena,
+                    const int *least, const int *most) {
     const float dt = (float)world->dt, step = (float)(world->dt / world->dx), dx = (float)world->dx;
     float *q = field.part + (size_t)s * NC, *past = field.history + (size_t)s * NH;
     for (int k = 0; k < NC * 8; k += 16) __builtin_prefetch(q + 2 * NC * 8 + k, 1, 3);
@@ -93,7 +102,7 @@ struct Gather {
       i8 next = *x + Simd::whole(move);
       *x = next;
       i8 inside = ((next - HALF) >> PLACE) - (4 * block[2 + k] - 1);
-      off |= (inside < 0) | (inside > 5);
+      off |= (inside < least[k]) | (inside > most[k]);
     }
     if (Simd::any(off & alive)) astray = 1;
     speed2 = Simd::high(speed2, v2 * on);
@@ -220,8 +229,10 @@ struct Gather {
   }
   void block(const World *world, const Field &field, const int *block) {
     alignas(64) f8 arena[ARENA];
+    int least[3], most[3];
+    allowed(field, block, least, most);
     fill(field, block, arena);
-    for (int s = block[0]; s < block[1]; s += 8) batch(world, field, block, s, arena);
+    for (int s = block[0]; s < block[1]; s += 8) batch(world, field, block, s, arena, least, most);
   }
   void report(double *row) const {
     float top = 0, fast = 0;

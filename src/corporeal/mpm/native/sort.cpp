@@ -4,6 +4,7 @@ struct Sorting {
   int *old;                 // [olds][2]: runs of slots in use before
   int *line, *inner;        // [slots before]: a particle's block, its material and cell
   int *count, *bin;         // [lines], [bins]: how many there are
+  int *edge;                // [lines]: neighbours that particles may reach before the next sort
   int *middle, *order;      // particles sorted by material and cell; source of every slot, -1: none
   int *block, *table, *where;
   double *plane;            // [planes][4]
@@ -69,6 +70,7 @@ struct Stage {
         for (int l = 0; l < live; l++) {
           S.count[S.line[s + l]]++;
           S.bin[S.inner[s + l]]++;
+          S.edge[S.line[s + l]] |= edges(S.inner[s + l]);
         }
       }
     S.blocks = S.slots = 0;
@@ -101,7 +103,8 @@ struct Stage {
           record[4] = z;
           S.count[line] = slot;
           slot += (n + 7) & ~7;
-          for (int k = 0; k < 27; k++) S.table[reached(S, line, k)] = 0;
+          for (int k = 0; k < 27; k++)
+            if (near(S.edge[line], k)) S.table[reached(S, line, k)] = 0;
         }
     for (int i = 0; i < S.slots; i++) S.order[i] = -1;
     for (int i = 0; i < sum; i++) S.order[S.count[S.line[S.middle[i]]]++] = S.middle[i];
@@ -117,11 +120,28 @@ struct Stage {
           w[3] = 0;
           S.table[line] = S.pool++;
         }
+    // The last is none: it stands for neighbours out of reach.
+    const int none = S.pool++;
+    for (int d = 0; d < 4; d++) S.where[4 * none + d] = 0;
     for (b = 0; b < S.blocks; b++) {
       int *record = S.block + NB * b;
       line = (record[2] * S.dim[1] + record[3]) * S.dim[2] + record[4];
-      for (int k = 0; k < 27; k++) record[5 + k] = S.table[reached(S, line, k)];
+      for (int k = 0; k < 27; k++)
+        record[5 + k] = near(S.edge[line], k) ? S.table[reached(S, line, k)] : none;
     }
+  }
+  // A particle reaches its cell's node and two more, and may move by a cell: along each axis the
+  // block below (1, 2, 4) from the first cell only, the block above (8, 16, 32) from all others.
+  static inline int edges(int inner) {
+    int bits = 0;
+    for (int d = 0; d < 3; d++) bits |= (inner >> (4 - 2 * d) & 3 ? 8 : 1) << d;
+    return bits;
+  }
+  static inline bool near(int edge, int k) {
+    const int step[3] = {k / 9 - 1, k / 3 % 3 - 1, k % 3 - 1};
+    bool in = true;
+    for (int d = 0; d < 3; d++) in &= step[d] == 0 || (edge >> (step[d] < 0 ? d : 3 + d) & 1);
+    return in;
   }
   static inline int reached(const Sorting &S, int line, int k) {
     return line + ((k / 9 - 1) * S.dim[1] + k / 3 % 3 - 1) * S.dim[2] + k % 3 - 1;
