@@ -163,3 +163,42 @@ def test_what_lies_open_at_rest_pays_nothing_more():
     assert torn.plastic_strain[0] > 1e-3
     assert again.plastic_strain[0] < 1e-12
     np.testing.assert_allclose(again.volume, torn.volume)
+
+
+@pytest.mark.parametrize(("degrees", "cohesion"), [(20.0, 0.0), (30.0, 3.0), (40.0, 1.0)])
+def test_soil_in_a_triaxial_cell_fails_on_its_cone(degrees, cohesion):
+    """σ₁ - σ₃ = √3 sin φ (p + c cot φ), squeezed along one axis at a constant pressure around."""
+    around, sine = 5.0, np.sin(np.radians(degrees))
+    strain, volume, stress = np.full((1, 3), -around / (3 * LAM + 2 * MU)), 0.0, []
+    for _ in range(80):
+
+        def squeezed(side, strain=strain, volume=volume):
+            step = np.array([[-1e-3, side, side]])
+            return drucker_prager(strain + step, degrees, cohesion, volume)
+
+        def excess(side, squeezed=squeezed):
+            return principal_tau(squeezed(side).strain)[0, 1] + around
+
+        back = squeezed(brentq(excess, -0.01, 0.01, xtol=1e-16))
+        strain, volume = back.strain, back.volume[0]
+        stress.append(-principal_tau(strain)[0, 0])
+    pressure = (stress[-1] + 2 * around) / 3
+    strength = np.sqrt(3.0) * sine * (pressure + cohesion / np.tan(np.radians(degrees)))
+    assert stress[0] - around < 0.5 * strength
+    assert stress[-1] - around == pytest.approx(strength, rel=1e-9)
+    assert stress[-1] == pytest.approx(stress[-20], rel=1e-9)
+
+
+@pytest.mark.parametrize("cohesion", [0.0, 2.0])
+def test_soil_sheared_to_and_fro_gains_neither_volume_nor_pressure(cohesion):
+    F, volume, slipped = np.eye(3)[None] * 0.99, np.zeros(1), 0.0
+    for shear in [0.06, -0.06, -0.06, 0.06] * 25:
+        step = np.eye(3)
+        step[0, 1] = shear
+        soil = 0.5 * ONE, cohesion * ONE
+        flow = plasticity.flow_drucker_prager(step @ F, (MU * ONE, LAM * ONE), soil, volume)
+        F, volume = flow.F, flow.volume
+        slipped += float(flow.plastic_strain[0])
+    assert slipped > 0.5
+    assert np.linalg.det(F)[0] == pytest.approx(0.99**3, rel=1e-12)
+    assert volume[0] == pytest.approx(0.0, abs=1e-12)
