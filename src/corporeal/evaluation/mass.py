@@ -37,12 +37,12 @@ LOW, HIGH = 0.05, 0.95
 """Quantiles of the samples that bound the interval."""
 METHODS = {
     "solid_water": "solid water",
-    "constant": "geometric mean of the others",
-    "hull_fit": "fit on the hull, others only",
-    "direct": "a model asked for the number",
-    "solid_usual": "everything solid, usual values",
-    "built_usual": "as built and filled, usual values",
-    "mass": "values placed in their ranges",
+    "constant": "mean of the others",
+    "hull_fit": "fit on the hull",
+    "direct": "asked for the number",
+    "solid_usual": "solid, usual values",
+    "built_usual": "as built, usual values",
+    "mass": "as built, placed values",
 }
 """From knowing least to knowing most; the last is the prediction."""
 PROMPT = """How heavy is this object?
