@@ -61,3 +61,9 @@ def test_the_solver_could_leave_the_house():
     """The solver depends on the ground floor only, never on torch, models or stages."""
     for path in (ROOT / "mpm").rglob("*.py"):
         assert {words[1] for words in rooms(path)} <= {"mpm", *FLOORS[0]}, path
+
+
+def test_every_test_file_has_a_name_of_its_own():
+    """Pytest takes two files of one name, in folders without packages, for one module."""
+    names = [path.name for path in Path(__file__).parents[1].rglob("test_*.py")]
+    assert len(names) == len(set(names))
