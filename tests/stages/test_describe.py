@@ -4,8 +4,7 @@ import time
 
 import numpy as np
 import pytest
-from recognition.facts import facts
-from recognition.score import judge
+from recognition.facts import facts, judge
 
 from corporeal import materials
 from corporeal.errors import UnknownChoiceError, UserError
@@ -311,6 +310,12 @@ def test_nobody_is_asked_how_large_an_object_is_of_which_no_name_tells_anything(
     assert ask(oracle, nameless, VASE).objects[1].usual_extent == 1.0
     (asked,) = (q for q in oracle.asked if q.task == "extents")
     assert asked.prompt.endswith("- vase")
+
+
+@pytest.mark.parametrize("wrong", [{"views": 0}, {"views": 9}, {"view_size": 8}, {"parallel": 0}])
+def test_pictures_that_cannot_be_taken_are_refused(wrong):
+    with pytest.raises(UserError, match=f"--{next(iter(wrong)).replace('_', '-')} is"):
+        describe(scene(VASE), DescribeConfig(**wrong))
 
 
 def test_tokens_and_seconds_are_added_up_and_an_unknown_price_is_not_guessed(ask):

@@ -124,14 +124,17 @@ def test_the_environment_says_where_answers_are_kept(monkeypatch, tmp_path):
 # ---------------------------------------------------------------- many at once
 
 COUNT = 100
-PAUSE = 0.2
+PAUSE = 0.6
 """What the busy server asks for [s]."""
+FLIGHT = 0.3
+"""How long a request may have been on its way when it was asked for [s]."""
 
 
 class Busy:
-    """A slow server that fails every third time, and has spells in which it takes nothing."""
+    """A slow server that fails every third time, and every so often wants to be left alone."""
 
-    def __init__(self):
+    def __init__(self, every):
+        self.every = every
         self.refused, self.too_early, self.good = 0, 0, Counter()
         self._closed_until, self._seen, self._one = 0.0, 0, threading.Lock()
 
@@ -139,9 +142,9 @@ class Busy:
         with self._one:
             self._seen += 1
             now = time.monotonic()
-            if now < self._closed_until - 0.02 and now > self._closed_until - PAUSE + 0.1:
+            if self._closed_until - PAUSE + FLIGHT < now < self._closed_until - 0.02:
                 self.too_early += 1
-            if self._seen % 25 == 0:
+            if self._seen % self.every == 0:
                 self.refused += 1
                 self._closed_until = now + PAUSE
                 return {"status": 429, "headers": {"Retry-After-Ms": str(int(1000 * PAUSE))}}
@@ -156,29 +159,30 @@ def numbered(k):
     return Question("colours", f"Which colour has number {k}?", f"s/{k}")
 
 
-def test_a_hundred_estimations_against_a_slow_failing_server_lose_and_double_nothing(tmp_path):
-    busy = Busy()
+@pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.slow)])
+def test_many_estimations_against_a_slow_failing_server_lose_and_double_nothing(tmp_path, count):
+    busy = Busy(every=max(count // 4, 12))
     patience = Patience(tries=12, first_wait=0.01, longest_wait=1.0, at_once=8)
     with FakeServer(busy) as server:
         model = OpenAI(f"fake@{server.url}", patience)
         cached = Cached(model, "m", {}, tmp_path)
-        jobs = [lambda k=k: cached.ask(numbered(k), Colour) for k in range(COUNT)]
+        jobs = [lambda k=k: cached.ask(numbered(k), Colour) for k in range(count)]
         replies = together([*jobs, *jobs], 32)
         sent = len(server.requests)
         again = together(jobs, 32)
-    assert [r.answer.name for r in replies] == 2 * [f"colour {k}" for k in range(COUNT)]
+    assert [r.answer.name for r in replies] == 2 * [f"colour {k}" for k in range(count)]
     assert set(busy.good.values()) == {1}
-    assert len(busy.good) == COUNT
-    assert busy.refused >= 5
+    assert len(busy.good) == count
+    assert busy.refused >= 2
     assert busy.too_early == 0
-    assert [r.answer.name for r in again] == [f"colour {k}" for k in range(COUNT)]
+    assert [r.answer.name for r in again] == [f"colour {k}" for k in range(count)]
     assert len(server.requests) == sent
     assert sum(r.spent.calls for r in replies) == sent
 
 
 WORKER = """
 import sys
-sys.path.insert(0, {tests!r})
+sys.path[:0] = {tests!r}
 from test_cache import Colour, numbered
 from pathlib import Path
 from corporeal.vlm.cache import Cached
@@ -199,7 +203,10 @@ def test_a_killed_process_leaves_a_whole_cache_that_two_others_go_on_with(tmp_pa
 
     with FakeServer(slow) as server:
         code = WORKER.format(
-            tests=str(Path(__file__).parent), url=server.url, folder=str(tmp_path), count=COUNT
+            tests=[str(p) for p in Path(__file__).parents[:2]],
+            url=server.url,
+            folder=str(tmp_path),
+            count=COUNT,
         )
         start = [sys.executable, "-c", code]
         first = subprocess.Popen(start)
@@ -213,7 +220,7 @@ def test_a_killed_process_leaves_a_whole_cache_that_two_others_go_on_with(tmp_pa
         assert all(json.loads(p.read_text())["answer"]["name"] for p in kept)
         asked = len(server.requests)
         both = [subprocess.Popen(start) for _ in range(2)]
-        assert [p.wait(60) for p in both] == [0, 0]
+        assert [p.wait(180) for p in both] == [0, 0]
     whole = [json.loads(p.read_text())["answer"]["name"] for p in tmp_path.rglob("*.json")]
     assert sorted(whole) == sorted(f"colour {k}" for k in range(COUNT))
     assert len(server.requests) - asked <= 2 * (COUNT - len(kept))

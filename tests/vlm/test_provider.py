@@ -190,6 +190,14 @@ def test_no_server_at_all_is_said_plainly():
         model.ask(ASKED, Colours, check)
 
 
+def test_ollama_is_looked_for_where_it_usually_listens_or_where_the_environment_says(monkeypatch):
+    monkeypatch.delenv("OLLAMA_BASE_URL", raising=False)
+    assert str(Ollama("llava").model.base_url).startswith("http://localhost:11434/v1")
+    monkeypatch.setenv("OLLAMA_BASE_URL", "http://127.0.0.1:9/v1")
+    with pytest.raises(UserError, match=r"Nobody answers at http://127\.0\.0\.1:9/v1"):
+        Ollama("llava", QUICK).ask(ASKED, Colours, check)
+
+
 def test_a_pause_that_the_server_asks_for_is_kept():
     with FakeServer({"status": 429, "headers": {"Retry-After": "1"}}, GOOD) as server:
         start = time.monotonic()

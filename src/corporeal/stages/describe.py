@@ -8,12 +8,12 @@ from pathlib import Path
 from typing import Literal
 
 from corporeal import materials
-from corporeal.errors import UnknownChoiceError
+from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.geometry.identity import Identity, identify
 from corporeal.geometry.identity import words as telling
 from corporeal.materials.offer import Choice, contents_offered, substances_offered
 from corporeal.materials.placement import choices, from_fractions, from_values, odd, spelling, usual
-from corporeal.render.portrait import Portrait, colour_of_part, portraits
+from corporeal.render.portrait import DIRECTIONS, Portrait, colour_of_part, portraits
 from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
 from corporeal.vlm import LIVE, Vlm, connect
 from corporeal.vlm.annotation import Annotation, read_annotations
@@ -89,6 +89,7 @@ def describe(
             questions wait for a person's answers.
 
     """
+    _check(config)
     identity = identify(scene, matter_hint)
     told = _annotations(scene, identity, config, library)
     file = _file_words(scene, identity, library)
@@ -102,6 +103,16 @@ def describe(
     critic = _connected(_critic(config), config) or model
     asking = _Asking(scene, identity, config, library, model, critic)
     return asking.inventory(file, told, progress)
+
+
+def _check(config: DescribeConfig) -> None:
+    for name, value, low, high in (
+        ("--views", config.views, 1, DIRECTIONS),
+        ("--view-size", config.view_size, 16, 2048),
+        ("--parallel", config.parallel, 1, 64),
+    ):
+        if not low <= value <= high:
+            raise UserError(f"{name} is {value}. Give a number from {low} to {high}.")
 
 
 def _connected(spec: str, config: DescribeConfig) -> Vlm | None:

@@ -46,6 +46,8 @@ OTHER_KEY = "CORPOREAL_API_KEY"
 TOO_MANY = 429
 NO_KEY = "none"
 """Sent where a server wants no key: the clients insist on one."""
+OLLAMA = "http://localhost:11434/v1"
+"""Where Ollama listens unless it was told otherwise."""
 INSTRUCTIONS = (
     "You help to compute how real objects move. Answer from what the pictures show and from what "
     "you know of such things; say plainly when you cannot tell."
@@ -94,6 +96,10 @@ class Live:
 
     def _model(self, secret: str, profile: ModelProfile) -> Model:
         raise NotImplementedError
+
+    def _where(self) -> str:
+        """Say which server is asked."""
+        return self.address.url or self.provider
 
     def _secret(self) -> str:
         if self.address.url is not None:
@@ -208,7 +214,7 @@ class Live:
 
     def _give_up_all(self, error: ModelAPIError, failures: int) -> None:
         """Raise what holds for every question."""
-        where = self.address.url or self.provider
+        where = self._where()
         if isinstance(error, ModelAuthenticationError):
             key = OTHER_KEY if self.address.url else self.key
             raise UserError(
@@ -287,7 +293,9 @@ class Ollama(Live):
     """Models on one's own machine, served by Ollama."""
 
     provider, key = "ollama", "OLLAMA_API_KEY"
-    home = "http://localhost:11434/v1"
+
+    def _where(self) -> str:
+        return self.address.url or os.environ.get("OLLAMA_BASE_URL") or OLLAMA
 
     def _secret(self) -> str:
         return os.environ.get(self.key) or NO_KEY
@@ -296,8 +304,7 @@ class Ollama(Live):
         from pydantic_ai.models.ollama import OllamaModel
         from pydantic_ai.providers.ollama import OllamaProvider
 
-        url = self.address.url or os.environ.get("OLLAMA_BASE_URL") or self.home
-        provider = OllamaProvider(base_url=url, api_key=secret, http_client=self._http())
+        provider = OllamaProvider(base_url=self._where(), api_key=secret, http_client=self._http())
         return OllamaModel(self.address.model, provider=provider, profile=profile)
 
 
