@@ -9,12 +9,13 @@ in recognition/truth.toml. ``--record`` reads the files in FOLDER/objects and FO
 
 import argparse
 import json
-from dataclasses import asdict
 from pathlib import Path
 
 from recognition import page
-from recognition.facts import FACTS, SETS, facts, record
-from recognition.score import judge, ordering, score
+from recognition.facts import FACTS, SETS, facts, judge, record
+
+from corporeal import store
+from corporeal.evaluation import recognition as measured
 
 DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
 
@@ -35,18 +36,17 @@ def main() -> None:
     rows = judge(facts())
     for group in SETS:
         mine = [r for r in rows if r.group == group]
-        s = score(mine)
+        s = measured.score(mine)
         print(
             f"{group:8} {s.parts:3} parts: right {s.right:.0%}, wrong {s.wrong:.0%}, unknown "
-            f"{s.unknown:.0%}; margin orders {ordering(mine):.2f}"
+            f"{s.unknown:.0%}; margin orders {s.ordering:.2f}"
         )
-    print(f"all: margin orders {ordering(rows):.2f}")
+    print(f"all: margin orders {measured.ordering(rows):.2f}")
     for row in rows:
         if row.verdict == "wrong":
             print(f"  wrong: {row.file} / {row.part}: {row.answer} ({row.margin:.2f}) {row.reason}")
     if given.json:
-        told = [asdict(r) | {"verdict": r.verdict} for r in rows]
-        given.json.write_text(json.dumps(told, indent=1), encoding="utf-8")
+        store.write_json(given.json, measured.record(rows))
     if given.docs:
         DOCS.write_text(page.markdown(), encoding="utf-8")
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 import pytest
 from recognition import page
-from recognition.facts import FACTS, SETS, facts, read
-from recognition.score import Row, bands, judge, ordering, score
+from recognition.facts import FACTS, SETS, facts, judge, read
 
 from corporeal import materials
+from corporeal.evaluation.recognition import Row, bands, ordering, score
 
 DOCS = Path(__file__).parents[1] / "docs" / "recognition.md"
 SEEN_AGAIN = ("armchair_kaolin", "plant_potted_market", "guitar_market")
@@ -50,7 +50,7 @@ def test_the_margin_knows_right_from_wrong(rows):
 
 def test_the_order_is_measured_as_it_is_said():
     def row(answer, margin):
-        return Row("a", "b", "c", answer, margin, ("steel",), "")
+        return Row("a", "b", answer, margin, ("steel",))
 
     perfect = [row("steel", 0.8), row("steel", 0.7), row("wood", 0.3)]
     assert ordering(perfect) == 1.0

@@ -2,15 +2,17 @@
 
 import json
 import tomllib
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
+from corporeal.evaluation.recognition import Row
 from corporeal.geometry.identity import Identity, identify, words
 from corporeal.stages.assemble import assemble
 from corporeal.types import Finish, Part, Scene, SceneObject, Surface
-from corporeal.vlm.metadata import Evidence, evidence, matter_hint
+from corporeal.vlm.metadata import Evidence, evidence, matter_hint, recognise
 
 HERE = Path(__file__).parent
 FACTS = HERE / "facts.json"
@@ -55,6 +57,16 @@ def facts(named: bool = True) -> list[Fact]:
             accepted = tuple(truth[row["set"]][row["file"]][part["part"]])
             found.append(Fact(row["set"], row["file"], part["part"], seen, accepted))
     return found
+
+
+def judge(recorded: Sequence[Fact]) -> list[Row]:
+    """Ask the recogniser about every part."""
+    rows = []
+    for fact in recorded:
+        said = recognise(fact.evidence)
+        answer = (said.material, said.margin, fact.accepted, said.reason)
+        rows.append(Row(fact.file, fact.part, *answer, group=fact.group))
+    return rows
 
 
 def record(folder: Path) -> list[dict]:

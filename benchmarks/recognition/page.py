@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
-from recognition.facts import SETS, facts
-from recognition.score import Row, bands, judge, ordering, score
+from corporeal.evaluation.recognition import Row, bands, score
+from recognition.facts import SETS, facts, judge
 
 HEAD = """# Recognition without a model
 
@@ -15,6 +15,8 @@ answer**: a neutral material stands in, with a warning. Each answer carries a ma
 
 The truth was labelled by hand: per part all materials that somebody who sees it would accept, the
 likeliest first (`benchmarks/recognition/truth.toml`). *Likeliest* counts only the first of them.
+`corporeal evaluate materials FOLDER --truth TOML` judges anybody's files, and any model, by such a
+table.
 """
 SETS_HEAD = (
     "| set | parts | right | likeliest | wrong | unknown | margin orders |",
@@ -58,8 +60,7 @@ def markdown() -> str:
 
 def _line(about: str, rows: Sequence[Row]) -> str:
     s = score(rows)
-    order = ordering(rows)
-    told = f"{order:.2f}" if order == order else "–"
+    told = "–" if s.ordering is None else f"{s.ordering:.2f}"
     shares = (s.right, s.likeliest, s.wrong, s.unknown)
     return f"| {about} | {s.parts} | {' | '.join(f'{x:.0%}' for x in shares)} | {told} |"
 
@@ -71,4 +72,4 @@ def _bands(rows: Sequence[Row]) -> list[str]:
         f"| {low:.2f}–{high:.2f} | {count} | {mean:.2f} | {right:.0%} |"
         for low, high, count, mean, right in bands(rows)
     ]
-    return [*lines, "", f"Over all sets margin orders {ordering(rows):.2f}."]
+    return [*lines, "", f"Over all sets margin orders {score(rows).ordering:.2f}."]

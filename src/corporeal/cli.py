@@ -126,11 +126,12 @@ def verb_materials() -> None:
 
 
 def verb_evaluate() -> None:
-    """Compare what was predicted with what was measured: `evaluate mass FOLDER --truth CSV`.
+    """Compare what was predicted with what is known: `evaluate mass | materials FOLDER`.
 
     FOLDER holds models, one object each; the CSV has columns object, mass_kg and, if you like, fill
     (solid, hollow, full: whose errors are told apart). Without --truth masses are predicted only.
-    A folder in the layout of ABO-500 needs no CSV: choose its --split.
+    A folder in the layout of ABO-500 needs no CSV: choose its --split. `evaluate materials` needs
+    --truth TOML: per file and part the materials that are right, the likeliest first.
     """
     from corporeal import store
     from corporeal.evaluation import mass, report, truth
@@ -139,10 +140,10 @@ def verb_evaluate() -> None:
 
     @dataclass(frozen=True)
     class Evaluate:
-        what: tyro.conf.Positional[Literal["mass"]]
+        what: tyro.conf.Positional[Literal["mass", "materials"]]
         folder: Annotated[Path, tyro.conf.Positional]
         truth: Path | None = None
-        """Table of measured masses."""
+        """Table of measured masses (CSV), or of what parts are made of (TOML)."""
         split: str = "test"
         """Of ABO-500; "all" for all."""
         json: Path | None = None
@@ -154,6 +155,9 @@ def verb_evaluate() -> None:
         ground: GroundConfig = field(default_factory=GroundConfig)
 
     asked = _parse(Evaluate, "evaluate", verb_evaluate.__doc__)
+    if asked.what == "materials":
+        _judge_materials(asked)
+        return
     things = truth.objects(asked.folder, asked.truth, asked.split)
     with _told() as tell:
         done = tell("evaluate")
@@ -165,6 +169,23 @@ def verb_evaluate() -> None:
         store.write_json(asked.json, result)
     if asked.figure is not None:
         report.mass_figure(result["rows"], asked.figure)
+
+
+def _judge_materials(asked: Any) -> None:
+    from corporeal import store
+    from corporeal.evaluation import recognition
+
+    if asked.truth is None:
+        raise UserError(f"Nothing to judge by. Say --truth TOML. {recognition.EXAMPLE}")
+    library = asked.ground.library
+    truth = recognition.read_truth(asked.truth, library)
+    with _told() as tell:
+        rows = recognition.judge(asked.folder, truth, asked.describe, library, tell("evaluate"))
+    for title, heads, cells in recognition.tables(rows):
+        if cells:
+            _show(heads, cells, title)
+    if asked.json is not None:
+        store.write_json(asked.json, recognition.record(rows))
 
 
 def verb_doctor() -> None:
