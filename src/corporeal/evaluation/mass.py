@@ -133,8 +133,8 @@ def predict(
     scene = assemble([thing.file])
     if config.anonymous:
         scene = anonymous(scene, thing.file)
-    direct = _ask(scene, describing) if config.direct else None
     inventory = describe(scene, describing, grounding.library)
+    direct = _ask(scene, describing) if config.direct else None
     parts = segment(scene, inventory)
     scale = Scale(scene, parts, grounding, config.seed)
     masses = scale.samples(inventory, config.samples)
@@ -289,7 +289,7 @@ def compare(predictions: Sequence[Prediction]) -> dict:
         measured masses inside the intervals. Without measured masses the last two are empty.
 
     """
-    rows = [asdict(p) for p in predictions]
+    rows = [asdict(p) | {"constant": None, "hull_fit": None} for p in predictions]
     weighed = [r for r in rows if r["mass_true"] is not None]
     truth = [r["mass_true"] for r in weighed]
     fits = {
