@@ -286,6 +286,8 @@ class _Run:
         progress(0.0, "recognising")
         scene, library = self.made["assemble"], self.settings.ground.library
         made = describe(scene, self.settings.describe, library, progress)
+        if made.transcript:
+            store.write_json(folder / "transcript.json", made.transcript)
         return self._keep(folder, made)
 
     def _segment(self, folder: Path, progress: Progress) -> Parts:

@@ -32,6 +32,12 @@ def entry_of(name: str, library_name: str = "default") -> Entry:
     return entries[name] if name in entries else counterpart(find(name), library_name)
 
 
+def held(name: str, library_name: str = "default") -> Entry:
+    """Look up what is inside: a library that says nothing of it leaves it to the default one."""
+    known = library(library_name)
+    return known[name] if name in known else find(name)
+
+
 def spelling(name: str, library_name: str, offered: list[str]) -> str | None:
     """Return how a library spells a name that somebody gave, None where it is not offered."""
     try:
@@ -50,7 +56,7 @@ def choices(words: PartWords, library_name: str = "default") -> dict[str, Choice
     fields = [f for f in PLACED if f in entry.ranges and (walled or f != "shell_thickness")]
     offered = {f: choice(entry.name, f, entry.ranges[f]) for f in fields if f not in words.values}
     if words.contents is not None:
-        inside = entry_of(words.contents, library_name)
+        inside = held(words.contents, library_name)
         offered[CONTENTS] = choice(inside.name, "density", inside.ranges["density"])
     return {f: c for f, c in offered.items() if c.range.low < c.range.high}
 

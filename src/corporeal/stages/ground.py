@@ -8,7 +8,7 @@ from corporeal import materials
 from corporeal.errors import UserError
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
-from corporeal.materials.placement import CONTENTS
+from corporeal.materials.placement import CONTENTS, entry_of, held
 from corporeal.materials.scale import place
 from corporeal.types import (
     Ground,
@@ -57,7 +57,7 @@ def ground(
     words = tuple(_words(inventory, part.object, part.name) for part in parts.catalogue)
     entries = [_entry(w, config) for w in words]
     made = tuple(_material(e, w) for e, w in zip(entries, words, strict=True))
-    floor = _find(config.floor, config.library)
+    floor = entry_of(config.floor, config.library)
     surfaces, bodies = [*entries, floor], [*made, floor.pick(floor.typical())]
     return MaterialField(
         materials=made,
@@ -97,7 +97,7 @@ def _words(inventory: Inventory, number: int, name: str) -> PartWords:
 
 
 def _entry(words: PartWords, config: GroundConfig) -> Entry:
-    entry = _find(words.material or config.neutral, config.library)
+    entry = entry_of(words.material or config.neutral, config.library)
     if entry.group == "liquid":
         raise UserError(
             f"{words.name} is said to be made of {entry.name}, a liquid, for which there is no law "
@@ -105,14 +105,6 @@ def _entry(words: PartWords, config: GroundConfig) -> Entry:
             f"{entry.name}."
         )
     return entry
-
-
-def _find(name: str, library: str) -> Entry:
-    """Look a material up; a smaller library gives what stands for it there."""
-    entries = materials.library(library)
-    return (
-        entries[name] if name in entries else materials.counterpart(materials.find(name), library)
-    )
 
 
 # ---------------------------------------------------------------- numbers
@@ -165,19 +157,19 @@ def _structure(material: Material, words: PartWords, config: GroundConfig) -> St
             f"{words.name} is said to be filled, but not with what. Give contents in the "
             "annotation file: corporeal materials lists them."
         )
-    held = _held(words.contents, config)
+    inside = held(words.contents, config.library)
     fill = 1.0 if words.fill is None else words.fill
     said = "How full is not said: it is taken as full." if words.fill is None else ""
-    inner = held.pick(_held_grounds(held, words))
+    inner = inside.pick(_inner_grounds(inside, words))
     reason = f"{reason} It is filled with {inner.name}. {said}".strip()
-    return Structure("filled", thickness, reason, inner, fill, loose=_flows(held))
+    return Structure("filled", thickness, reason, inner, fill, loose=_flows(inside))
 
 
-def _held_grounds(held: Entry, words: PartWords) -> dict[str, Ground]:
-    grounds = {f: replace(g, margin=words.margin) for f, g in held.typical().items()}
+def _inner_grounds(inside: Entry, words: PartWords) -> dict[str, Ground]:
+    grounds = {f: replace(g, margin=words.margin) for f, g in inside.typical().items()}
     chosen = words.placements.get(CONTENTS)
     if chosen is not None:
-        r = held.ranges["density"]
+        r = inside.ranges["density"]
         value = place(r, chosen.fraction)
         grounds["density"] = Ground(value, r, chosen.chosen_by, chosen.reason, words.margin)
     return grounds
@@ -194,12 +186,6 @@ def _wall(material: Material, words: PartWords) -> tuple[float, str]:
         f"{words.name} is said to be a {words.structure or 'shell'} of {material.name}, but how "
         "thin its wall is is not known. Give thickness_mm in the annotation file."
     )
-
-
-def _held(name: str, config: GroundConfig) -> Entry:
-    """Look up what is inside: a library that says nothing of it leaves it to the default one."""
-    known = materials.library(config.library)
-    return known[name] if name in known else materials.find(name)
 
 
 def _flows(entry: Entry) -> bool:

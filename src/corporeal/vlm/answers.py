@@ -226,7 +226,8 @@ def _part_problems(part: PartAnswer, names: Vocabulary) -> list[str]:
 def _structure_problems(part: PartAnswer, names: Vocabulary) -> list[str]:
     found = []
     walled = part.structure in ("shell", "filled")
-    if walled and part.material is not None and not names.walled(part.material):
+    made = names.material(part.material) if part.material is not None else None
+    if walled and made is not None and not names.walled(made):
         found.append(f"Nobody makes walls of {part.material}: the structure must be solid.")
     if part.structure != "filled":
         if part.contents is not None:
