@@ -9,6 +9,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 from pydantic import BaseModel, Field
@@ -289,7 +290,8 @@ def compare(predictions: Sequence[Prediction]) -> dict:
         measured masses inside the intervals. Without measured masses the last two are empty.
 
     """
-    rows = [asdict(p) | {"constant": None, "hull_fit": None} for p in predictions]
+    empty = {"constant": None, "hull_fit": None}
+    rows: list[dict[str, Any]] = [asdict(p) | empty for p in predictions]
     weighed = [r for r in rows if r["mass_true"] is not None]
     truth = [r["mass_true"] for r in weighed]
     fits = {

@@ -12,7 +12,7 @@ from corporeal.store import writing
 HEADS = ("object", "quantity", "as chosen", "5 %", "median", "95 %", "members")
 STILL = 1e-9
 """A spread below this is none."""
-PANELS = 7
+COLUMNS = 4
 INK, FAINT, MARK = "#222222", "#9fb8c4", "#c8553d"
 
 
@@ -47,18 +47,21 @@ def _number(value: float | None) -> str:
 
 def spread_figure(result: dict[str, Any], path: Path) -> None:
     """Draw a panel per quantity: every member, the interval, and what was chosen."""
-    shown = [q for q in QUANTITIES if _varies(result, q)][:PANELS]
+    shown = [q for q in QUANTITIES if _varies(result, q)]
     names = list(result["spread"])
-    size = (2.9 * max(len(shown), 1), 0.45 * len(names) + 1.3)
+    lines = -(-max(len(shown), 1) // COLUMNS)
+    size = (2.6 * COLUMNS, lines * (0.3 * len(names) + 0.9))
     figure = Figure(figsize=size, dpi=150, layout="constrained")
-    panels = figure.subplots(1, max(len(shown), 1), sharey=True, squeeze=False)[0]
+    panels = figure.subplots(lines, COLUMNS, sharey=True, squeeze=False).ravel()
     for axes, quantity in zip(panels, shown, strict=False):
         for k, name in enumerate(names):
             _draw(axes, result, name, quantity, k)
         axes.set_xlabel(QUANTITIES[quantity], fontsize=8)
         axes.tick_params(labelsize=7)
         axes.margins(x=0.12)
-    panels[0].set_yticks(range(len(names)), [n.replace("_", " ") for n in names], fontsize=8)
+    for axes in panels[len(shown) :]:
+        axes.axis("off")
+    panels[0].set_yticks(range(len(names)), [n.replace("_", " ") for n in names], fontsize=7)
     panels[0].set_ylim(len(names) - 0.5, -0.5)
     FigureCanvasAgg(figure)
     with writing(path):
