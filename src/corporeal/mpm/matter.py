@@ -63,9 +63,8 @@ class Matter:
         stiff = np.array([b.rigid for b in bodies])[body]
         wave = np.where(stiff, 0.0, np.sqrt((lam + 2.0 * mu) / density))
         affine = stiff | (problem.transfer == "apic") | (mu == 0.0)
-        dry = (law == Law.DRUCKER_PRAGER.value) & (gathered("cohesion") == 0.0)
-        pull = float(np.linalg.norm(problem.gravity))
-        forgets = np.where(affine, np.inf, forgetting_rate(wave, dry, pull, problem.cell))
+        sand, pull = law == Law.DRUCKER_PRAGER.value, float(np.linalg.norm(problem.gravity))
+        forgets = np.where(affine, np.inf, forgetting_rate(wave, sand, pull, problem.cell))
         field = np.zeros_like(body) if problem.contact == "single" else body
         fastest = np.array([forgets[field == f].max() for f in range(field.max() + 1)])
         bulky = elasticity.is_stiff_in_bulk(law, np.asarray(mu), np.asarray(lam)) & ~stiff

@@ -16,7 +16,7 @@ FORGETTING = 0.1
 """κ: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
 
 SETTLING = 0.5
-"""Dry grains forget so often in the time √(dx/g) in which they fall half a cell."""
+"""Granular matter forgets so often in the time √(dx/g) in which it falls half a cell."""
 
 
 def p_wave_speed(young: float, poisson: float, density: float) -> float:
@@ -65,23 +65,24 @@ def stable_step(wave: float, motion: float, cell: float, courant: float = COURAN
 
 
 def forgetting_rate(
-    wave: Float[np.ndarray, " P"], dry: Bool[np.ndarray, " P"], pull: float, cell: float
+    wave: Float[np.ndarray, " P"], granular: Bool[np.ndarray, " P"], pull: float, cell: float
 ) -> Float[np.ndarray, " P"]:
     """Rate at which matter forgets the velocities that its grid cannot see [1/s].
 
-    κ c/dx: what rings, rings away within some passages of its waves. Dry grains do not ring, and
-    the stiffness of a grain must not tell how far a heap flows: ½ √(g/dx) for them (decision 6).
+    κ c/dx: what rings, rings away within some passages of its waves. What flows like sand does not
+    ring, and the stiffness of a grain must not tell how far a heap runs out: ½ √(g/dx) for it
+    (decision 6).
 
     Args:
         wave: Wave speed c [m/s].
-        dry: Which is granular matter without cohesion.
-        pull: Strength g of gravity [m/s²]; without any, grains forget as the others do.
+        granular: Which of it is granular.
+        pull: Strength g of gravity [m/s²]; without any, all forget alike.
         cell: dx [m].
 
     """
     rings = FORGETTING * wave / cell
     settles = SETTLING * sqrt(pull / cell) if pull > 0 else inf
-    return np.where(dry, np.minimum(rings, settles), rings)
+    return np.where(granular, np.minimum(rings, settles), rings)
 
 
 def yield_speed(yield_stress: float | None, wave: float, density: float) -> float:

@@ -66,7 +66,7 @@ def _rows(problem: Problem, body: Body, number: int) -> np.ndarray:
     rows[:, 8] = body.viscosity
     affine = (problem.transfer == "apic") | (body.young == 0.0)
     pull = float(np.linalg.norm(problem.gravity))
-    rate = forgetting_rate(wave, sand & (body.cohesion == 0.0), pull, problem.cell)
+    rate = forgetting_rate(wave, sand, pull, problem.cell)
     rows[:, 9] = np.where(affine, 1e30, rate)
     return rows
 
