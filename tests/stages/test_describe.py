@@ -289,6 +289,9 @@ def test_values_that_do_not_fit_each_other_are_asked_for_once_more(ask):
     again = [q for q in stubborn.asked if q.task == "placement"][1]
     assert "stiff but weak: yield_stress/young is 0.005" in again.text
     assert (said.placements["young"].fraction, said.placements["yield_stress"].fraction) == (1, 0)
+    mute = Oracle(materials=clay, placement=[hard_but_weak, None])
+    (said,) = ask(mute, THING).objects[0].parts
+    assert (said.placements["young"].fraction, said.placements["young"].chosen_by) == (1, "model")
     persuaded = Oracle(materials=clay, placement=[hard_but_weak, everywhere(0.5)])
     (said,) = ask(persuaded, THING).objects[0].parts
     assert {p.fraction for p in said.placements.values()} == {0.5}

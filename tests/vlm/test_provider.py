@@ -1,11 +1,13 @@
 import json
 import time
+from pathlib import Path
 
 import numpy as np
 import pytest
 from fake_server import FakeServer
 from pydantic import BaseModel
 
+import corporeal
 from corporeal.errors import UserError
 from corporeal.vlm import Question, UnansweredError, Vlm, connect
 from corporeal.vlm.patience import Patience
@@ -246,6 +248,13 @@ def test_a_missing_key_is_named(spec, monkeypatch):
         connect(spec)
     with pytest.raises(UserError, match="Say which model"):
         connect("openai:")
+
+
+def test_only_one_file_needs_the_package():
+    source = Path(corporeal.__file__).parent
+    needing = [p.name for p in source.rglob("*.py") if "import pydantic_ai" in p.read_text()]
+    needing += [p.name for p in source.rglob("*.py") if "from pydantic_ai" in p.read_text()]
+    assert needing == ["provider.py"]
 
 
 def test_without_the_package_the_way_to_install_it_is_said(monkeypatch):

@@ -92,11 +92,11 @@ class Interview:
 
         """
         asked = self._question("parts", most=str(MOST_PARTS))
-        answer = self._ask(self.model, asked, PartsAnswer, parts_complaints)
-        if answer is None:
+        reply = self._ask(self.model, asked, PartsAnswer, parts_complaints)
+        if reply is None:
             return None
-        best = self._best(answer.decompositions) if len(answer.decompositions) > 1 else 0
-        return answer.decompositions[best], answer
+        options = reply.answer.decompositions
+        return options[self._best(options) if len(options) > 1 else 0], reply.answer
 
     def _best(self, options: Sequence[Decomposition]) -> int:
         lines = (
@@ -106,10 +106,10 @@ class Interview:
         asked = self._question(
             "ranking", decompositions="\n".join(lines), alternatives=str(len(options))
         )
-        answer = self._ask(
+        reply = self._ask(
             self.critic, asked, RankingAnswer, lambda a: ranking_complaints(a, len(options))
         )
-        return answer.ranking[0].number - 1 if answer else 0
+        return reply.answer.ranking[0].number - 1 if reply else 0
 
     def materials(
         self,
@@ -133,13 +133,13 @@ class Interview:
         named = "; ".join(f"{name} ({look})" if look else name for name, look in parts.items())
         asked = self._question("materials", parts=named, shares=SHARES if shared else NO_SHARES)
         asked = replace(asked, lists=lists)
-        answer = self._ask(
+        reply = self._ask(
             self.model,
             asked,
             MaterialsAnswer,
             lambda a: materials_complaints(a, list(parts), names, shared),
         )
-        return None if answer is None else (answer, self.transcript[-1]["by"])
+        return (reply.answer, reply.by) if reply else None
 
     def placement(
         self,
@@ -155,22 +155,22 @@ class Interview:
             odd: Says what does not fit in an answer.
 
         """
-        answer = self._placement(offers, shape, "")
-        problems = odd(answer) if answer else ()
-        if answer and problems:
+        reply = self._placement(offers, shape, "")
+        problems = odd(reply.answer) if reply else ()
+        if reply and problems:
             again = Template(AGAIN).substitute(
-                answer=json.dumps(answer.model_dump()),
+                answer=json.dumps(reply.answer.model_dump()),
                 problems="\n".join(f"- {p}" for p in problems),
             )
-            answer = self._placement(offers, shape, again) or answer
-        return (answer, self.transcript[-1]["by"]) if answer else None
+            reply = self._placement(offers, shape, again) or reply
+        return (reply.answer, reply.by) if reply else None
 
     def _placement(
         self,
         offers: Mapping[str, Offer],
         shape: type[FractionAnswer] | type[ValueAnswer],
         again: str,
-    ) -> FractionAnswer | ValueAnswer | None:
+    ) -> Reply[FractionAnswer | ValueAnswer] | None:
         asked = self._question(
             "placement",
             parts="\n".join(f"- {offer.facts}" for offer in offers.values()),
@@ -193,10 +193,10 @@ class Interview:
         """Ask question 4: class → usual longest side [m]; empty where nobody answers."""
         asked = self._question("extents", classes="\n".join(f"- {c}" for c in classes))
         asked = replace(asked, views="none", pictures=())
-        answer = self._ask(
+        reply = self._ask(
             self.model, asked, ExtentsAnswer, lambda a: extents_complaints(a, classes)
         )
-        return {c.class_name: c.metres for c in answer.classes} if answer else {}
+        return {c.class_name: c.metres for c in reply.answer.classes} if reply else {}
 
     def _question(self, task: str, **facts: str) -> Question:
         about = self.subject
@@ -211,7 +211,7 @@ class Interview:
 
     def _ask(
         self, whom: Vlm, question: Question, shape: type[Answer], check: Check[Answer]
-    ) -> Answer | None:
+    ) -> Reply[Answer] | None:
         try:
             reply = whom.ask(question, shape, check)
         except UnansweredError as error:
@@ -222,7 +222,7 @@ class Interview:
             self.transcript.append(_row(question) | {"answer": None, "error": str(error)})
             return None
         self.transcript.append(_row(question) | _answered(reply))
-        return reply.answer
+        return reply
 
 
 def _ranges(offers: Mapping[str, Offer]) -> str:
