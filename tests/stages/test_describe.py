@@ -14,6 +14,7 @@ from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.ground import ground
 from corporeal.stages.segment import segment
 from corporeal.vlm.metadata import matter_hint
+from corporeal.vlm.recordings import Recorder
 from handmade import plain, scene
 from oracle import Oracle, decomposed, everywhere, part, sizes, whole
 
@@ -132,8 +133,12 @@ def ask(monkeypatch):
 
     def asked(oracle, *objects, name="hand-made", library="default", **config):
         settings = DescribeConfig(**({"vlm": "oracle:1", "view_size": 32} | config))
+
+        def connected(spec, record):
+            return Recorder(oracle, record) if record else oracle
+
         with monkeypatch.context() as patched:
-            patched.setattr("corporeal.stages.describe.connect", lambda spec: oracle)
+            patched.setattr("corporeal.stages.describe.connect", connected)
             return describe(scene(*objects, name=name), settings, library)
 
     return asked

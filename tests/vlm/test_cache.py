@@ -14,7 +14,7 @@ import pytest
 from fake_server import FakeServer
 from pydantic import BaseModel
 
-from corporeal.vlm import Question, Reply, Spent
+from corporeal.vlm import Question, Reply, Spent, connect
 from corporeal.vlm import cache as cache_module
 from corporeal.vlm.cache import Cached
 from corporeal.vlm.patience import Patience
@@ -82,6 +82,17 @@ def test_model_settings_and_shape_make_it_another_question_and_the_scenes_name_d
     assert key != Cached(Counting(), "n", {}, tmp_path).key(ASKED, Colour)
     assert key != Cached(Counting(), "m", {"t": 1}, tmp_path).key(ASKED, Colour)
     assert key == cached.key(replace(ASKED, scene="another/name"), Colour)
+
+
+def test_a_live_model_is_connected_with_the_cache_and_recorded_where_asked(tmp_path, monkeypatch):
+    monkeypatch.setenv("CORPOREAL_CACHE", str(tmp_path / "cache"))
+    with FakeServer({"content": '{"name": "red"}'}) as server:
+        spec = f"openai:fake@{server.url}"
+        model = connect(spec)
+        assert [model.ask(ASKED, Colour).answer.name for _ in range(2)] == ["red", "red"]
+        assert connect(spec, tmp_path / "kept").ask(ASKED, Colour).spent.calls == 0
+    assert len(server.requests) == 1
+    assert connect(f"replay:{tmp_path / 'kept'}").ask(ASKED, Colour).model == spec
 
 
 def test_threads_that_ask_the_same_wait_for_one_answer(tmp_path):

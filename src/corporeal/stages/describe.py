@@ -15,11 +15,10 @@ from corporeal.materials.offer import Choice, contents_offered, substances_offer
 from corporeal.materials.placement import choices, from_fractions, from_values, odd, spelling, usual
 from corporeal.render.portrait import DIRECTIONS, Portrait, colour_of_part, portraits
 from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
-from corporeal.vlm import LIVE, Vlm, connect
+from corporeal.vlm import Vlm, connect
 from corporeal.vlm.annotation import Annotation, read_annotations
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
 from corporeal.vlm.by_hand import all_answered
-from corporeal.vlm.cache import Cached
 from corporeal.vlm.interview import Interview, Offer, Subject
 from corporeal.vlm.metadata import (
     evidence,
@@ -28,7 +27,6 @@ from corporeal.vlm.metadata import (
     stated_substance,
     stated_thickness,
 )
-from corporeal.vlm.recordings import Recorder
 from corporeal.vlm.together import together
 from corporeal.vlm.words import Asked, gathered, leaves, part_words, placed, usage, with_extents
 
@@ -93,14 +91,14 @@ def describe(
     identity = identify(scene, matter_hint)
     told = _annotations(scene, identity, config, library)
     file = _file_words(scene, identity, library)
-    model = _connected(config.vlm, config)
+    model = connect(config.vlm, config.record)
     if model is None:
         objects = [
             ObjectWords(thing.name, thing.class_name, tuple(_told(words, told, thing.name, config)))
             for thing, words in zip(scene.objects, file, strict=True)
         ]
         return Inventory(tuple(objects))
-    critic = _connected(_critic(config), config) or model
+    critic = connect(_critic(config), config.record) or model
     asking = _Asking(scene, identity, config, library, model, critic)
     return asking.inventory(file, told, progress)
 
@@ -113,14 +111,6 @@ def _check(config: DescribeConfig) -> None:
     ):
         if not low <= value <= high:
             raise UserError(f"{name} is {value}. Give a number from {low} to {high}.")
-
-
-def _connected(spec: str, config: DescribeConfig) -> Vlm | None:
-    """Connect to whom ``spec`` names, with a cache for what is paid for, and a recorder."""
-    model = connect(spec)
-    if model is not None and spec.partition(":")[0] in LIVE:
-        model = Cached(model, spec, {})
-    return Recorder(model, Path(config.record)) if model and config.record else model
 
 
 def _critic(config: DescribeConfig) -> str:

@@ -3,6 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from importlib.util import find_spec
+from pathlib import Path
 from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -22,6 +23,11 @@ MENU = {
     "ollama": "corporeal.vlm.provider:Ollama",
 }
 """How to reach a model: name before the colon → class that takes what stands after it."""
+WRAPPERS = {
+    "cache": "corporeal.vlm.cache:Cached",
+    "record": "corporeal.vlm.recordings:Recorder",
+}
+"""What stands between a question and a model."""
 LIVE = ("openai", "anthropic", "google", "ollama")
 """Answered over a network, and so by a package that the core does without."""
 NOBODY = "metadata"
@@ -109,8 +115,14 @@ class Vlm(Protocol):
         ...
 
 
-def connect(spec: str) -> Vlm | None:
+def connect(spec: str, record: Path | None = None) -> Vlm | None:
     """Connect to ``"openai:gpt-5.4"`` and the like; ``"metadata"`` asks nobody and gives None.
+
+    What a live model answered once is not paid for again.
+
+    Args:
+        spec: Whom to ask, as a person types it.
+        record: Folder where every answer is kept for ``"replay:FOLDER"``.
 
     Raises:
         UserError: The name is unknown, its package is not installed, or its key is not set.
@@ -127,4 +139,9 @@ def connect(spec: str) -> Vlm | None:
             "'corporeal[models]'. Without it there are --vlm ask:FOLDER (you answer), --vlm "
             "replay:FOLDER and --vlm metadata."
         )
-    return backends.load("vision-language model", name, MENU)(rest)
+    model = backends.load("vision-language model", name, MENU)(rest)
+    if name in LIVE:
+        model = backends.load("wrapper", "cache", WRAPPERS)(model, spec, {})
+    if record is not None:
+        model = backends.load("wrapper", "record", WRAPPERS)(model, Path(record))
+    return model
