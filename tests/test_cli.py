@@ -162,3 +162,15 @@ def test_help_is_there_for_every_verb(typed):
         code, text = typed(verb, "--help")
         assert code == 0
         assert verb in text.out
+
+
+def test_who_is_asked_is_said_in_one_word_and_what_is_missing_in_one_line(
+    typed, tmp_path, monkeypatch
+):
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    write_glb(tmp_path / "box.glb", a_box())
+    ask = ("run", "box.glb", "--view-size", 32, "--vlm")
+    refused(typed(*ask, "ask:answers"), "questions wait in answers/questions", "type the same")
+    refused(typed(*ask, "openai:gpt-5.4"), "set the environment variable OPENAI_API_KEY")
+    refused(typed(*ask, "oracle:1"), "Choose one of: anthropic, ask, google, metadata, ollama")
+    refused(typed(*ask, "replay:nowhere"), "No folder of recordings")
