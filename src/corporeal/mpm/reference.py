@@ -18,7 +18,8 @@ from corporeal.mpm.grip import Grip, Hold, check, regripped, take_hold, take_hol
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.matter import Matter, State, flowed
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
-from corporeal.mpm.springs import longest_step, stored, struck
+from corporeal.mpm.reckoning import measured, shown
+from corporeal.mpm.springs import longest_step, struck
 from corporeal.mpm.stencil import Stencil, stencil
 from corporeal.mpm.swelling import relief
 from corporeal.types import Vector
@@ -314,54 +315,11 @@ class ReferenceEngine:
 
     def snapshot(self) -> Snapshot:
         """Copy every particle's state."""
-        s, m = self.state, self.matter
-        turned, stiff = s.rotation[m.body], m.rigid[:, None, None]
-        return Snapshot(
-            time=self.time,
-            position=s.position.copy(),
-            velocity=s.velocity.copy(),
-            deformation=np.where(stiff, turned, s.F),
-            motion=np.where(stiff, turned, s.motion),
-            plastic_strain=s.plastic.copy(),
-        )
+        return shown(self.matter, self.state)
 
     def measure(self) -> Measure:
         """Add up the ledger."""
-        m, s, book = self.matter, self.state, self.ledger
-        apic = 0.25 * self.problem.cell**2
-        energy = 0.5 * m.mass * (_square(s.velocity) + apic * np.sum(s.affine**2, axis=(1, 2)))
-        swirl = np.stack([s.affine[:, i, j] - s.affine[:, j, i] for i, j in _AXIAL], axis=1)
-        moment = m.mass[:, None] * (np.cross(s.position, s.velocity) + apic * swirl)
-        soft = np.flatnonzero(~m.rigid)
-        strained = np.zeros(len(m.mass))
-        sprung = stored(self.problem, s.position, s.centre, s.rotation, m.centre)
-        strained[soft] = elasticity.psi(m.law[soft], s.F[soft], m.mu[soft], m.lam[soft])
-        momentum = self._per_body(m.mass[:, None] * s.velocity)
-        centre = self._per_body(m.mass[:, None] * s.position) / m.total[:, None]
-        angular, kinetic = self._per_body(moment), self._per_body(energy)
-        for b in [b for b, body in enumerate(self.problem.bodies) if body.rigid]:
-            spin = s.spin(m)[b]
-            momentum[b] = m.total[b] * s.speed[b]
-            angular[b] = np.cross(s.centre[b], momentum[b]) + s.spin_momentum[b]
-            kinetic[b] = 0.5 * (momentum[b] @ s.speed[b] + s.spin_momentum[b] @ spin)
-        return Measure(
-            time=self.time,
-            mass=m.total.copy(),
-            centre=centre,
-            momentum=momentum,
-            angular_momentum=angular,
-            kinetic=kinetic,
-            elastic=self._per_body(m.volume * strained) + sprung,
-            potential=-m.total * (centre @ np.array(self.problem.gravity)),
-            speed=float(np.sqrt(_square(s.velocity).max())),
-            lost=self.lost.copy(),
-            **book.as_measured(),
-        )
-
-    def _per_body(self, values: np.ndarray) -> np.ndarray:
-        out = np.zeros((len(self.problem.bodies), *values.shape[1:]))
-        np.add.at(out, self.matter.body, values)
-        return out
+        return measured(self.problem, self.matter, self.state, self.ledger, self.lost)
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything needed to go on later exactly as if nothing had happened."""
@@ -382,15 +340,8 @@ class ReferenceEngine:
         self.lost = self._lost(self.state)
 
 
-_AXIAL = ((2, 1), (0, 2), (1, 0))
-
-
 def _of(kind: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
     return {k.removeprefix(kind): np.array(v) for k, v in saved.items() if k.startswith(kind)}
-
-
-def _square(v: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, " P"]:
-    return np.sum(v * v, axis=1)
 
 
 def _ramped(time: float, ramp: float) -> float:
