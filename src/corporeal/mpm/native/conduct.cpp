@@ -18,15 +18,15 @@ struct Conduct {
       crew->done = 0;
       int epoch = (crew->epoch + 1) & 0xffffff, T = crew->threads;
       for (int t = 0; t < T; t++) {
-        u64 low = (u64)((long long)count * t / T), high = (u64)((long long)count * (t + 1) / T);
-        u64 share = (u64)epoch << 40 | low << 20 | high;
+        u64 high = t < count ? (u64)((count - t + T - 1) / T) : 0, share = (u64)epoch << 40 | high;
         __atomic_store_n(&crew->post[t].share, share, __ATOMIC_RELAXED);
       }
       __atomic_store_n(&crew->epoch, epoch, __ATOMIC_RELEASE);
       return;
     }
   }
-  // Claim a task of this epoch from one's own share, or from another's.
+  // Claim a task of this epoch from one's own share, every so manieth task, or from another's: the
+  // largest tasks come first, so that the last ones to end are small.
   static inline int claim(Crew *crew, int thread, int epoch) {
     for (int k = 0; k < crew->threads; k++) {
       int t = thread + k < crew->threads ? thread + k : thread + k - crew->threads;
@@ -34,7 +34,7 @@ struct Conduct {
       while ((int)(word >> 40) == epoch && (word >> 20 & 0xfffff) < (word & 0xfffff)) {
         if (__atomic_compare_exchange_n(share, &word, word + (1 << 20), 0, __ATOMIC_ACQ_REL,
                                         __ATOMIC_ACQUIRE))
-          return (int)(word >> 20 & 0xfffff);
+          return (int)(word >> 20 & 0xfffff) * crew->threads + t;
       }
     }
     return -1;
@@ -47,7 +47,7 @@ struct Conduct {
 #endif
   }
 };
-const int PATIENCE = 2000;   // pauses before a waiting thread offers its core to others
+const int PATIENCE = 200;   // pauses before a waiting thread offers its core to others
 Crew *crew = world->crew;
 Post *post = crew->post + thread;
 if (post->busy) {
