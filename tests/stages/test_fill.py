@@ -475,6 +475,19 @@ def test_a_cup_holds_what_goes_in_up_to_its_rim():
     assert top == pytest.approx(0.5 + 0.004 + 0.048, abs=0.004)
 
 
+def test_what_a_soft_cup_holds_is_as_light_as_it_is():
+    outline = [(0, 0), (0.05, 0), (0.05, 0.1), (0.046, 0.1), (0.046, 0.004), (0, 0.004)]
+    cup = put(trimesh.creation.revolve(np.array(outline), sections=64), 0.5)
+    particles = fill(*inputs(thing((cup, RUBBER, filled(STUFFING, loose=False)))))
+    assert particles.treatments[0].kind == "deformable"
+    inside = np.linalg.norm(particles.position[:, :2], axis=1) < 0.04
+    inside &= particles.position[:, 2] > 0.51
+    assert inside.sum() > 100
+    assert particles.density[inside] == pytest.approx(30, rel=1e-6)
+    assert particles.density.max() == pytest.approx(1100, rel=1e-6)
+    assert particles.mass.sum() == pytest.approx(sum(particles.mass_real), rel=1e-6)
+
+
 def test_pieces_of_one_mesh_weigh_by_their_shares():
     scene, parts, field = inputs(thing((ball(0.05), STEEL)))
     blade = PartWords("blade", "steel", "solid", volume_share=0.25, surface_share=0.5)

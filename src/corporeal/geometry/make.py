@@ -28,6 +28,8 @@ class Held:
     """[kg]"""
     room: float
     """Volume that it could take up [m³]."""
+    fill: float
+    """Share of it that it does, where it lies at the bottom; else 1 [-]."""
     lies: Float[np.ndarray, "N 3"]
     """Points evenly in it [m]."""
     level: float
@@ -130,6 +132,7 @@ def with_contents(made: Make, member: Member, holds: Sequence[Held]) -> Make:
     held = Held(
         mass=sum(h.mass for h in holds),
         room=sum(h.room for h in holds),
+        fill=max(h.fill for h in holds),
         lies=np.concatenate([h.lies for h in holds]),
         level=max(h.level for h in holds),
     )
@@ -151,7 +154,8 @@ def contain(
     inner = behind(member, made, said, room.volume)
     level = room.level(structure.fill) if structure.loose else np.inf
     lies = room.points[room.points[:, 2] <= level]
-    return Held(structure.contents.density * structure.fill * inner, inner, lies, level)
+    mass = structure.contents.density * structure.fill * inner
+    return Held(mass, inner, structure.fill if structure.loose else 1.0, lies, level)
 
 
 def behind(member: Member, made: Make, said: Said, room: float) -> float:

@@ -10,7 +10,7 @@ from corporeal.geometry.filling import match_moments
 from corporeal.geometry.foliage import crown_volume
 from corporeal.geometry.make import Make, is_porous
 from corporeal.geometry.packing import Packing, reference
-from corporeal.geometry.shape import Shape
+from corporeal.geometry.room import is_vessel
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.types import Treatment
 
@@ -59,12 +59,13 @@ def weigh(
         own = np.flatnonzero(packing.part == member.part)
         points, volumes = packing.points[own], packing.volumes[own]
         mass = _shared(volumes, packing.sheet[own], made)
+        whole = np.zeros(0)
         if made.held:
-            mass = _around(member, points, volumes, made, cell)
+            mass, whole = _with_held(anatomy, member, packing.only(own), made, cell)
         if treatment.kind == "rigid":
             mass = match_moments(points, mass, *_truth(anatomy, member, made, rng))
         if made.held:
-            density[own] = mass / (made.volume * volumes / volumes.sum())
+            density[own] = mass / whole
         elif treatment.kind == "foliage":
             density[own] = mass.sum() / crown_volume(points, cell)
         else:
@@ -94,26 +95,40 @@ def _truth(
     return np.concatenate([p for p, _ in groups]), np.concatenate(weights)
 
 
-def _around(
-    member: Member,
-    points: Float[np.ndarray, "N 3"],
-    volumes: Float[np.ndarray, " N"],
-    made: Make,
-    cell: float,
-) -> Float[np.ndarray, " N"]:
-    """Give points next to the surface the wall's mass, and those below the level what lies there.
+def _with_held(
+    anatomy: Anatomy, member: Member, packing: Packing, made: Make, cell: float
+) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+    """Mass [kg] and volume [m³] of a filled part's points: wall and contents apart.
 
-    A solid's own points make up the wall's layer; it is at least half a cell deep.
+    Behind a closed surface the outermost points bear the wall, at least half a cell deep, and all
+    below the level what lies there; of a vessel those between its faces do.
     """
     assert made.held is not None
-    faces = [m for m in (member.body, member.sheet) if len(m.triangles)]
-    depth = np.min([Shape(m).closest(points)[0] for m in faces], axis=0)
-    wall = depth <= max(made.thickness, made.sheet, 0.5 * cell, depth.min())
+    points, volumes = packing.points, packing.volumes
     low = points[:, 2] <= max(made.held.level, points[:, 2].min())
-    mass = np.zeros(len(points))
-    for these, total in ((wall, made.body_mass + made.sheet_mass), (low, made.held.mass)):
-        mass[these] += total * volumes[these] / volumes[these].sum()
-    return np.maximum(mass, 1e-6 * made.mass / len(mass))
+    if is_vessel(member):
+        wall = packing.sheet.copy()
+        if anatomy.shape is not None:
+            wall |= anatomy.shape.inside(points)
+        low, room = ~wall, made.held.room
+        parts = [(wall, made.volume - room), (low, room * made.held.fill)]
+        least = 1e-9 * made.volume
+        whole = _spread(volumes, [(m, max(v, least)) for m, v in parts if m.any()])
+    else:
+        depth = member.shape.closest(points)[0]
+        wall = depth <= max(made.thickness, 0.5 * cell, depth.min())
+        whole = _spread(volumes, [(np.ones(len(points), dtype=bool), made.volume)])
+    loads = [(wall, made.body_mass + made.sheet_mass), (low, made.held.mass)]
+    mass = _spread(volumes, [(m if m.any() else ~m, load) for m, load in loads])
+    return np.maximum(mass, 1e-6 * made.mass / len(mass)), whole
+
+
+def _spread(volumes: np.ndarray, totals: list[tuple[np.ndarray, float]]) -> np.ndarray:
+    """Spread each total over the points of its mask, in proportion to their volumes."""
+    found = np.zeros(len(volumes))
+    for mask, total in totals:
+        found[mask] += total * volumes[mask] / volumes[mask].sum()
+    return found
 
 
 def _shared(volumes: np.ndarray, sheet: np.ndarray, made: Make) -> np.ndarray:
