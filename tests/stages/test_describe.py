@@ -238,6 +238,17 @@ def test_known_parts_are_not_asked_for(ask):
     assert in_turn(oracle) == ["materials", "placement"]
 
 
+def test_what_a_person_has_stated_is_not_asked_for_again(ask, tmp_path):
+    (tmp_path / "said.yaml").write_text("vase_0: glass\n")
+    oracle = Oracle(materials=made_of(part("thing", "steel")))
+    inventory = ask(oracle, VASE, THING, annotations=tmp_path / "said.yaml")
+    assert [(q.task, q.scene) for q in oracle.asked if "vase_0" in q.scene] == [
+        ("placement", "hand-made/vase_0")
+    ]
+    vase = words(inventory)[("vase_0", "vase")]
+    assert (vase.answered_by, vase.placements["young"].fraction) == ("annotation", 0.25)
+
+
 def test_what_is_filled_has_contents_whose_density_is_placed_too(ask):
     can = part("can", "aluminium_can_sheet", "filled", contents="water", fill=0.95)
     inventory = ask(Oracle(materials=made_of(can)), ("can_0", [("mesh", plain(), {})]))

@@ -206,15 +206,19 @@ class _Asking:
     ) -> ObjectWords:
         """Ask everything about one object."""
         thing, names = self.scene.objects[number], self._names(number)
-        pieces = names
-        if len(names) == 1:
-            taken = interview.parts()
-            pieces = [p.name for p in taken[0].parts] if taken else names
-            pieces = pieces if len(pieces) > 1 else names
-        words = self._materials(interview, names, pieces, file)
+        stated = (told.get((thing.name, name)) for name in names)
+        words = file
+        if not all(said is not None and said.material for said in stated):
+            words = self._materials(interview, names, self._pieces(interview, names), file)
         words = _told(words, told, thing.name, self.config)
         words = self._placed(interview, words)
         return ObjectWords(thing.name, thing.class_name, tuple(words))
+
+    def _pieces(self, interview: Interview, names: list[str]) -> list[str]:
+        """Name the parts to ask about: the file's, or what a single mesh is taken apart into."""
+        taken = interview.parts() if len(names) == 1 else None
+        pieces = [p.name for p in taken[0].parts] if taken else names
+        return pieces if len(pieces) > 1 else names
 
     def _materials(
         self, interview: Interview, names: list[str], pieces: list[str], file: list[PartWords]

@@ -115,13 +115,13 @@ def _summary(story: Story) -> str:
     scene, field = story.scene, story.field
     things = ", ".join(_safe(o.name.replace("_", " ")) for o in scene.objects)
     unknown = sum(w.answered_by == "unknown" for w in field.words)
-    asked = any(w.answered_by in ("model", "recording") for w in field.words)
+    seen = any(w.answered_by in ("model", "recording") for w in field.words)
     sentences = [
         f"{len(scene.objects)} object{'s' * (len(scene.objects) != 1)} ({things}), "
         f"{len(field.materials)} part{'s' * (len(field.materials) != 1)}, "
         f"{scene.duration:g} s simulated with {story.particles.count:,} particles.",
-        "A vision-language model chose the materials from pictures."
-        if asked
+        _looked(story.audit.get("questions", {}))
+        if seen
         else "No vision-language model looked at pictures of this scene: materials come from "
         "annotations and from the words in the file.",
     ]
@@ -132,6 +132,12 @@ def _summary(story: Story) -> str:
             "neutral stand-in material: name it with --annotations."
         )
     return " ".join(sentences)
+
+
+def _looked(questions: Mapping[str, Any]) -> str:
+    """Say who chose the materials from pictures."""
+    models = ", ".join(questions.get("models", ())) or "a model"
+    return f"Materials were chosen from pictures: {_safe(models)}."
 
 
 def _forced(thing: SceneObject) -> str:

@@ -16,7 +16,7 @@ class Patience:
     """Requests for one question that may fail on the way, the first included."""
     corrections: int = 3
     """Answers that do not fit which a model may correct."""
-    timeout: float = 120.0
+    timeout: float = 180.0
     """For one answer [s]."""
     first_wait: float = 1.0
     """After the first failure, where the server names no time; doubled each time [s]."""
