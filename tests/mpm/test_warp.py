@@ -270,3 +270,15 @@ def test_the_control_books_its_floor_as_the_floor():
     first = engine.measure().first_contact
     assert np.isnan(first[0, 1])
     assert np.isfinite(first[0, 2])
+
+
+def test_bodies_that_travel_together_are_sorted_together(monkeypatch):
+    """Particles lie down anew after every sort of any body, so sorts must not come one by one."""
+    balls = [
+        body(ball((0.1537 * k, 0, 0), 0.05), velocity=(2.0, 0, 0), viscosity=0.0) for k in range(4)
+    ]
+    engine = WarpEngine(problem(*balls, planes=(), gravity=(0.0, 0.0, 0.0)))
+    sorts = []
+    monkeypatch.setattr(engine, "connect", lambda go=engine.connect: (sorts.append(1), go()))
+    engine.advance(6 * CELL / 2.0)
+    assert 3 <= len(sorts) <= 8

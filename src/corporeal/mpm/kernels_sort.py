@@ -16,7 +16,7 @@ wp.set_module_options(OPTIONS)
 _POINTERS = (
     "part history to past_to old line inner count bin edge middle order block table where plane"
 )
-_COUNTS = "olds bins planes lost blocks slots pool flows"
+_COUNTS = "olds bins planes lost blocks slots pool flows strangers"
 SORTING = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("deepest", "f8"), ("farthest", "f8")]
@@ -69,15 +69,20 @@ class Sorter:
         ]
         self.share = program.share
 
-    def survey(self, window: "Window") -> bool:
-        """See where a window's particles are; True when one is lost."""
-        self.old = np.ascontiguousarray(window.block[:, :2])
+    def survey(self, window: "Window") -> tuple[bool, float]:
+        """See where a window's particles are.
+
+        Returns:
+            Whether one is lost, and which share of them is outside of the block it was sorted into.
+
+        """
+        self.old = np.ascontiguousarray(window.block[:, :5])
         self._point(part=window.part, history=window.history, old=self.old)
         record = self.record[0]
         record["olds"], record["flows"] = len(self.old), len(window.history) > 0
         record["origin"] = window.origin
         self.launches[SURVEY].launch()
-        return bool(record["lost"])
+        return bool(record["lost"]), int(record["strangers"]) / window.count
 
     def arrange(self, window: "Window", longest: int) -> bool:
         """Sort what was surveyed; False, and nothing done, where it spans too many blocks."""

@@ -15,7 +15,6 @@ from corporeal.mpm.grip import Grip
 from corporeal.mpm.kernels import (
     ASTRAY,
     CLOCK,
-    COLOURS,
     FIELD,
     INFINITE,
     PLASTIC,
@@ -34,7 +33,7 @@ from corporeal.mpm.memory import ContactMemory, point, rigid_grid
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.mpm.spring_records import Springs
 from corporeal.mpm.springs import longest_step
-from corporeal.mpm.window import POINTED, Window
+from corporeal.mpm.window import POINTED, Window, node_tasks, particle_tasks
 from corporeal.types import Vector
 
 RIGID_COURANT = 0.05
@@ -48,10 +47,8 @@ FARTHEST = 1e5
 LARGEST = 1e9
 """A particle with a larger velocity [m/s], velocity gradient or strain is as good as infinite."""
 MOST_THREADS = 4
-CHUNK = 32
-"""Node blocks of one task."""
-HEIGHT = 4
-"""Particle blocks, one above the other, of one task."""
+STRANGERS = 0.1
+"""Share of a field's particles outside of their blocks from which it is sorted with others."""
 BREATH = 0.2
 """Seconds of computing after which Python looks whether somebody wants to stop."""
 KEPT = ("count", "smallest", "largest", "speed", "wave")
@@ -186,18 +183,8 @@ class WarpEngine:
 
     def connect(self) -> None:
         """List the tasks and point the native structs to where everything is."""
-        columns, nodes = [], []
-        for f, window in self.window.items():
-            pieces = window.columns(HEIGHT)
-            columns.append(np.column_stack([np.full(len(pieces), f), pieces]))
-            pool = len(window.where)
-            nodes += [(f, low, min(low + CHUNK, pool), 0) for low in range(0, pool, CHUNK)]
-        column = np.concatenate([np.zeros((0, 6), np.int64), *columns])
-        colour = column[:, 1:4] % 2 @ (2, 1, 4)
-        counts = np.bincount(colour, minlength=COLOURS)
-        self.task = np.zeros((len(column), 4), np.int32)
-        self.task[:, :3] = column[np.argsort(colour, kind="stable")][:, [0, 4, 5]]
-        self.node_task = np.array(nodes, np.int32).reshape(-1, 4)
+        self.task, counts = particle_tasks(self.window)
+        self.node_task = node_tasks(self.window)
         self.report = np.zeros((len(self.task), REPORT))
         for f, window in self.window.items():
             self._connect_field(f, window)
@@ -218,8 +205,9 @@ class WarpEngine:
         world["blows"] = len(self.blows.record)
         world["blown"] = len(self.field) if len(self.blows.record) else 0
         world["fields"], world["dx"] = len(self.field), self.problem.cell
-        world["tasks"], world["nodes"], world["colour"] = len(self.task), len(nodes), counts
-        world["stands"] = self.contact.stand(self.field["floor"], len(nodes))
+        world["tasks"], world["nodes"] = len(self.task), len(self.node_task)
+        world["colour"] = counts
+        world["stands"] = self.contact.stand(self.field["floor"], len(self.node_task))
         world["rigids"] = len(self.field) if self.field["rigids"].any() else 0
         self.clock["laid"] = 0
         particles = sum(window.count for window in self.window.values())
@@ -317,8 +305,11 @@ class WarpEngine:
 
     def _sort(self, fields: set[int]) -> None:
         self.book()
-        if any(self.window[f].survey() for f in fields):
+        lost = [window.survey() for window in self.window.values()]
+        if any(lost):
             self._find_lost()
+        # Who would be next soon is sorted now: all particles must lie down again after every sort.
+        fields |= {f for f, window in self.window.items() if window.strangers > STRANGERS}
         wide = [f for f in sorted(fields) if not self.window[f].sort()]
         self.connect()
         if wide:

@@ -8,7 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
-from corporeal.mpm.kernels import BLOCK, ID, MT, NC, NH, PLACE, XI, aligned
+from corporeal.mpm.kernels import BLOCK, COLOURS, ID, MT, NC, NH, PLACE, XI, aligned
 from corporeal.mpm.kernels_sort import Sorter
 
 HALF = 1 << (PLACE - 1)
@@ -16,6 +16,10 @@ LONGEST = (1 << (31 - PLACE)) // 4 - 4
 """Blocks that a window may span before places overflow."""
 POINTED = tuple("part history node next table block where used near home box have".split())
 """Arrays that the native pieces work in."""
+CHUNK = 32
+"""Node blocks of one task."""
+HEIGHT = 2
+"""Particle blocks, one above the other, of one task."""
 OWN = 5 + 13
 """Where a block's record says which node block is its own."""
 KEPT = ("part", "history", "origin", "dim", "table", "where", "block")
@@ -43,6 +47,8 @@ class Window:
     """Lowest and highest places of the particles of each block, (blocks, 6)."""
     home: np.ndarray
     """Block of particles at each node block, -1: none."""
+    strangers: float
+    """Share of particles that stood outside of their blocks when it was surveyed."""
     dim: np.ndarray
     """Size of the table."""
     fits: bool
@@ -79,7 +85,8 @@ class Window:
 
     def survey(self) -> bool:
         """Whether a particle is not finite or left the domain."""
-        return self.sorter.survey(self)
+        lost, self.strangers = self.sorter.survey(self)
+        return lost
 
     def sort(self) -> bool:
         """Sort again and move the window; False when its particles no longer fit into one."""
@@ -136,11 +143,17 @@ class Window:
         return fixed / float(1 << PLACE) + 4.0 * self.origin
 
     def columns(self, height: int) -> np.ndarray:
-        """List pieces of columns of blocks: (R, 5) x, y, number in the column, first, last."""
+        """List pieces of columns of blocks, (R, 6).
+
+        Their x, y, number in the column, first and last block, and how many particles they hold.
+        """
         at = self.block[:, 2:5].copy()
         at[:, 2] = (at[:, 2] - 1) // height
         first = np.flatnonzero(np.r_[True, (at[1:] != at[:-1]).any(axis=1)])
-        return np.column_stack([at[first], first, np.r_[first[1:], len(at)]])
+        last = np.r_[first[1:], len(at)]
+        end = np.cumsum(self.block[:, 1] - self.block[:, 0])
+        held = end[last - 1] - np.r_[0, end[last[:-1] - 1]]
+        return np.column_stack([at[first], first, last, held])
 
     def saved(self) -> dict[str, np.ndarray]:
         """Everything that the next step depends on."""
@@ -155,3 +168,29 @@ class Window:
         self.fits = True
         self.__dict__.pop("slot", None)
         self._make_room()
+
+
+def particle_tasks(windows: dict[int, Window]) -> tuple[np.ndarray, np.ndarray]:
+    """List tasks on particles by colour, (T, 4) field, first and last block; how many of each.
+
+    The largest come first, so that those which end a phase are small, and no thread waits long.
+    """
+    pieces = [np.zeros((0, 7), np.int64)]
+    for f, window in windows.items():
+        columns = window.columns(HEIGHT)
+        pieces.append(np.column_stack([np.full(len(columns), f), columns]))
+    column = np.concatenate(pieces)
+    colour = column[:, 1:4] % 2 @ (2, 1, 4)
+    task = np.zeros((len(column), 4), np.int32)
+    task[:, :3] = column[np.lexsort([-column[:, 6], colour])][:, [0, 4, 5]]
+    return task, np.bincount(colour, minlength=COLOURS)
+
+
+def node_tasks(windows: dict[int, Window]) -> np.ndarray:
+    """List tasks on nodes, (T, 4) field, first and last node block."""
+    rows = [
+        (f, low, min(low + CHUNK, len(window.where)), 0)
+        for f, window in windows.items()
+        for low in range(0, len(window.where), CHUNK)
+    ]
+    return np.array(rows, np.int32).reshape(-1, 4)

@@ -1,7 +1,8 @@
 // Sorts one field's particles by block, material and cell, in four stages with Python's memory between.
+const int RUN = 5;
 struct Sorting {
   float *from, *past_from, *to, *past_to;
-  int *old;                 // [olds][2]: runs of slots in use before
+  int *old;                 // [olds][RUN]: runs of slots in use before, and the blocks they were
   int *line, *inner;        // [slots before]: a particle's block, its material and cell
   int *count, *bin;         // [lines], [bins]: how many there are
   int *edge;                // [lines]: neighbours that particles may reach before the next sort
@@ -11,7 +12,7 @@ struct Sorting {
   double deepest, farthest;
   int low[3], high[3];      // of blocks, in the old window
   int dim[3], origin[3];    // of the new one
-  int olds, bins, planes, lost, blocks, slots, pool, flows;
+  int olds, bins, planes, lost, blocks, slots, pool, flows, strangers;
 };
 Sorting &S = *(Sorting *)memory.data;
 struct Stage {
@@ -22,15 +23,17 @@ struct Stage {
   static void survey(Sorting &S) {
     i8 low[3], high[3];
     for (int d = 0; d < 3; d++) low[d] = i8{} + (1 << 30), high[d] = -low[d];
-    i8 lost = i8{};
+    i8 lost = i8{}, away = lost;
     for (int r = 0; r < S.olds; r++)
-      for (int s = S.old[2 * r]; s < S.old[2 * r + 1]; s += 8) {
+      for (int s = S.old[RUN * r]; s < S.old[RUN * r + 1]; s += 8) {
         const float *q = S.from + (size_t)s * NC;
-        i8 alive = i8{0, 1, 2, 3, 4, 5, 6, 7} < S.old[2 * r + 1] - s;
+        i8 alive = i8{0, 1, 2, 3, 4, 5, 6, 7} < S.old[RUN * r + 1] - s;
         f8 x[3], v = Simd::all(0.0f);
+        i8 out = i8{};
         for (int d = 0; d < 3; d++) {
           i8 b = block(q, d), first = i8{} + b[0];
           b = alive ? b : first;
+          out |= alive & (b != S.old[RUN * r + 2 + d]);
           low[d] = b < low[d] ? b : low[d];
           high[d] = b > high[d] ? b : high[d];
           x[d] = Simd::flo(*(const i8u *)(q + 8 * (XI + d))) * PER_UNIT + 4.0f * S.origin[d];
@@ -38,6 +41,7 @@ struct Stage {
           v += Simd::size(*(const f8u *)(q + 8 * (VE + d)));
         }
         lost |= alive & ~(v < 1e30f);
+        away -= out;
         for (int w = 0; w < S.planes; w++) {
           const double *P = S.plane + 4 * w;
           f8 h = x[0] * (float)P[0] + x[1] * (float)P[1] + x[2] * (float)P[2] - (float)P[3];
@@ -45,6 +49,7 @@ struct Stage {
         }
       }
     S.lost = Simd::any(lost);
+    S.strangers = __builtin_reduce_add(away);
     for (int d = 0; d < 3; d++) {
       S.low[d] = 1 << 30;
       S.high[d] = -(1 << 30);
@@ -57,7 +62,7 @@ struct Stage {
   // Keys, how many share one, blocks and slots needed.
   static void count(Sorting &S) {
     for (int r = 0; r < S.olds; r++)
-      for (int s = S.old[2 * r]; s < S.old[2 * r + 1]; s += 8) {
+      for (int s = S.old[RUN * r]; s < S.old[RUN * r + 1]; s += 8) {
         const float *q = S.from + (size_t)s * NC;
         i8 line = i8{}, inner = *(const i8u *)(q + 8 * MT);
         for (int d = 0; d < 3; d++) {
@@ -66,7 +71,7 @@ struct Stage {
         }
         *(i8u *)(S.line + s) = line;
         *(i8u *)(S.inner + s) = inner;
-        int live = S.old[2 * r + 1] - s < 8 ? S.old[2 * r + 1] - s : 8;
+        int live = S.old[RUN * r + 1] - s < 8 ? S.old[RUN * r + 1] - s : 8;
         for (int l = 0; l < live; l++) {
           S.count[S.line[s + l]]++;
           S.bin[S.inner[s + l]]++;
@@ -88,7 +93,7 @@ struct Stage {
       sum += n;
     }
     for (int r = 0; r < S.olds; r++)
-      for (int s = S.old[2 * r]; s < S.old[2 * r + 1]; s++) S.middle[S.bin[S.inner[s]]++] = s;
+      for (int s = S.old[RUN * r]; s < S.old[RUN * r + 1]; s++) S.middle[S.bin[S.inner[s]]++] = s;
     int line = 0, slot = 0, b = 0;
     for (int x = 0; x < S.dim[0]; x++)
       for (int y = 0; y < S.dim[1]; y++)
