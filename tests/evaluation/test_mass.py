@@ -86,6 +86,7 @@ def test_a_table_weighs_the_models_that_it_scores(tmp_path):
         {"file": "models/c.glb", "mass_kg": "9", "fill": "solid", "scored": "0"},
         {"file": "models/not_here.glb", "mass_kg": "9", "fill": "solid", "scored": "1"},
     ]
+    rows = [{"object": "in other words"} | row for row in rows]
     write_table(tmp_path / "truth.csv", rows)
     found = objects(tmp_path / "models", tmp_path / "truth.csv", "test")
     assert [(w.name, w.mass, w.fill) for w in found] == [("b", 0.5, "solid"), ("a", 0.25, "all")]

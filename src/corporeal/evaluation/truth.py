@@ -1,7 +1,7 @@
 """Measured masses: a table of one's own, or the layout of ABO-500.
 
-A table is a CSV file with a column for the object (its model's file name, with or without the
-ending), one for its mass in kilograms, and optionally one for how it is filled (solid, hollow,
+A table is a CSV file with a column that names the object's model (its file name, with or without
+folder and ending), one for its mass in kilograms, and optionally one for how it is filled (solid, hollow,
 full …) and one that says which rows to score. ABO-500 is a folder with ``splits.json`` (split →
 names of scenes), ``filtered_product_weights.json`` (product → kg; a scene's name begins with its
 product, up to the first underscore) and ``scenes/<scene>/``; here each scene holds its mesh as a
@@ -18,10 +18,10 @@ from corporeal import store
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.sources import models_in
 
-OBJECT = ("object", "file", "name")
+OBJECT = ("object", "file", "mesh", "model", "name")
 MASS = ("mass_kg", "mass", "measured_mass_kg", "known_mass_kg", "weight_kg")
 FILL = ("fill", "group")
-SCORED = ("scored",)
+SCORED = "scored"
 NO = ("0", "no", "false", "n", "")
 SPLITS, WEIGHTS, SCENES = "splits.json", "filtered_product_weights.json", "scenes"
 UNGROUPED = "all"
@@ -69,22 +69,27 @@ def read_truth(folder: Path, table: Path) -> list[Weighed]:
     models = {w.name: w for w in models_of(folder)}
     rows = _rows(table)
     heads = list(rows[0]) if rows else []
-    named, mass = _column(table, heads, OBJECT), _column(table, heads, MASS)
+    _column(table, heads, OBJECT)
+    mass = _column(table, heads, MASS)
     fill = next((h for h in FILL if h in heads), None)
-    scored = next((h for h in SCORED if h in heads), None)
     found = []
     for row in rows:
-        model = models.get(Path(row[named] or "").stem)
-        counts = scored is None or (row[scored] or "").strip().lower() not in NO
-        if model is None or not counts:
+        model = _model(row, models)
+        if model is None or row.get(SCORED, "yes").strip().lower() in NO:
             continue
         group = (row[fill] or "").strip() if fill else ""
-        kilograms = _mass(table, row[named], row[mass])
+        kilograms = _mass(table, model.name, row[mass])
         found.append(Weighed(model.name, model.file, kilograms, group or UNGROUPED))
     if not found:
-        step = f"Its column {named!r} must name them, such as {next(iter(models))!r}."
+        step = f"One of {', '.join(OBJECT)} must name them, such as {next(iter(models))!r}."
         raise BadFileError(table, f"weighs none of the models in {folder}.", step)
     return found
+
+
+def _model(row: dict[str, str], models: dict[str, Weighed]) -> Weighed | None:
+    """Return the model that any of a row's names means."""
+    names = (Path(row[head]).stem for head in OBJECT if row.get(head))
+    return next((models[name] for name in names if name in models), None)
 
 
 def _rows(table: Path) -> list[dict[str, str]]:
