@@ -83,7 +83,7 @@ def test_a_table_weighs_the_models_that_it_scores(tmp_path):
     rows = [
         {"file": "models/b.glb", "mass_kg": "0.5", "fill": "solid", "scored": "yes"},
         {"file": "models/a.glb", "mass_kg": "0.25", "fill": "", "scored": "1"},
-        {"file": "models/c.glb", "mass_kg": "9", "fill": "solid", "scored": "0"},
+        {"file": "models/c.glb", "mass_kg": "9", "fill": "solid", "scored": "no: bent"},
         {"file": "models/not_here.glb", "mass_kg": "9", "fill": "solid", "scored": "1"},
     ]
     rows = [{"object": "in other words"} | row for row in rows]

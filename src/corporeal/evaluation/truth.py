@@ -1,8 +1,8 @@
 """Measured masses: a table of one's own, or the layout of ABO-500.
 
 A table is a CSV file with a column that names the object's model (its file name, with or without
-folder and ending), one for its mass in kilograms, and optionally one for how it is filled (solid, hollow,
-full …) and one that says which rows to score. ABO-500 is a folder with ``splits.json`` (split →
+folder and ending), one for its mass in kilograms, and optionally one for how it is filled (solid,
+hollow, full …) and one that says which rows to score. ABO-500 is a folder with ``splits.json`` (split →
 names of scenes), ``filtered_product_weights.json`` (product → kg; a scene's name begins with its
 product, up to the first underscore) and ``scenes/<scene>/``; here each scene holds its mesh as a
 ``.glb`` file beside the pictures.
@@ -75,7 +75,7 @@ def read_truth(folder: Path, table: Path) -> list[Weighed]:
     found = []
     for row in rows:
         model = _model(row, models)
-        if model is None or row.get(SCORED, "yes").strip().lower() in NO:
+        if model is None or not _scored(row):
             continue
         group = (row[fill] or "").strip() if fill else ""
         kilograms = _mass(table, model.name, row[mass])
@@ -84,6 +84,11 @@ def read_truth(folder: Path, table: Path) -> list[Weighed]:
         step = f"One of {', '.join(OBJECT)} must name them, such as {next(iter(models))!r}."
         raise BadFileError(table, f"weighs none of the models in {folder}.", step)
     return found
+
+
+def _scored(row: dict[str, str]) -> bool:
+    """Whether a row counts; "no: for a reason" does not."""
+    return (row.get(SCORED, "yes") or "").partition(":")[0].strip().lower() not in NO
 
 
 def _model(row: dict[str, str], models: dict[str, Weighed]) -> Weighed | None:
