@@ -180,8 +180,10 @@ def test_the_providers_own_key_never_goes_to_another_server(monkeypatch):
 )
 def test_what_holds_for_every_question_ends_the_run(step, match):
     with FakeServer(step) as server:
-        with pytest.raises(UserError, match=match) as failure:
-            openai(server).ask(ASKED, Colours, check)
+        model = openai(server)
+        for _ in range(3):
+            with pytest.raises(UserError, match=match) as failure:
+                model.ask(ASKED, Colours, check)
     assert not isinstance(failure.value, UnansweredError)
     assert len(server.requests) == 1
 

@@ -44,6 +44,27 @@ def test_a_failure_stands_in_its_place():
     assert together([], 4) == []
 
 
+def test_a_fatal_error_ends_it_at_once_and_drops_what_waits():
+    started = []
+
+    def fail():
+        raise OSError("over")
+
+    def slow(k):
+        started.append(k)
+        time.sleep(2)
+
+    start = time.monotonic()
+    with pytest.raises(OSError, match="over"):
+        together(
+            [lambda: slow(0), fail, *(lambda k=k: slow(k) for k in range(1, 40))],
+            2,
+            fatal=lambda error: isinstance(error, OSError),
+        )
+    assert time.monotonic() - start < 1.5
+    assert len(started) <= 3
+
+
 def test_waiting_doubles_up_to_a_limit_and_is_spread():
     dice = np.random.default_rng(0)
     patience = Patience(first_wait=1.0, longest_wait=6.0)

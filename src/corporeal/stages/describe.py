@@ -18,7 +18,7 @@ from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene,
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.annotation import Annotation, read_annotations
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
-from corporeal.vlm.by_hand import all_answered
+from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Offer, Subject
 from corporeal.vlm.metadata import (
     evidence,
@@ -165,6 +165,7 @@ class _Asking:
             [*jobs, lambda: sizes.extents(classes) if classes else {}],
             self.config.parallel,
             lambda done: progress(0.5 + 0.5 * done / (count + 1), "asking"),
+            is_more,
         )
         *objects, extents = all_answered(results, self.config.vlm)
         interviews.append(sizes)

@@ -79,30 +79,30 @@ class ByHand:
 
 
 def all_answered(results: list, spec: str) -> list:
-    """Return the results, if none of them is an error.
+    """Return the results, if no question waits.
 
     Args:
-        results: Of independent questions, or the errors that they raised.
+        results: Of independent questions; ``WaitingError`` where one waits.
         spec: Who was asked: "ask:FOLDER".
 
     Raises:
         UserError: Questions wait: the message says how many, where, and what to do.
-        Exception: Whatever else went wrong first.
 
     """
-    failed = [r for r in results if isinstance(r, Exception)]
-    waiting = [r for r in failed if isinstance(r, WaitingError)]
-    for error in failed:
-        if error not in waiting:
-            raise error
+    waiting = sum(isinstance(r, WaitingError) for r in results)
     if waiting:
-        count = f"{len(waiting)} question{'s wait' if len(waiting) > 1 else ' waits'}"
+        count = f"{waiting} question{'s wait' if waiting > 1 else ' waits'}"
         raise UserError(
             f"{count} in {Path(spec.partition(':')[2]) / PAGES}. Each is a .md file, most with a "
             "picture (.png): put the answer into the .json file of the same name, then type the "
             "same command again."
         )
     return results
+
+
+def is_more(error: Exception) -> bool:
+    """Tell whether an error is more than a question that waits."""
+    return not isinstance(error, WaitingError)
 
 
 def _answer(path: Path, answer: type[Answer], check: Check[Answer]) -> Answer | str:

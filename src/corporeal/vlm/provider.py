@@ -93,6 +93,8 @@ class Live:
         native = self.model.profile.get("supports_json_schema_output")
         self.mode = "native" if native else "tool"
         self._dice = np.random.default_rng()
+        self._over: UserError | None = None
+        """What ended the asking for good."""
 
     def _model(self, secret: str, profile: ModelProfile) -> Model:
         raise NotImplementedError
@@ -142,8 +144,16 @@ class Live:
                 no server: no other question would be answered either.
 
         """
+        if self._over is not None:
+            raise self._over
         asking = asyncio.run_coroutine_threadsafe(self._ask(question, answer, check), _loop())
-        return asking.result()
+        try:
+            return asking.result()
+        except UnansweredError:
+            raise
+        except UserError as error:
+            self._over = error
+            raise
 
     async def _ask(
         self, question: Question, answer: type[Answer], check: Check[Answer]

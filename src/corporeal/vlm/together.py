@@ -12,6 +12,7 @@ def together(
     jobs: Sequence[Callable[[], Result]],
     at_once: int,
     done: Callable[[int], None] = lambda count: None,
+    fatal: Callable[[Exception], bool] = lambda error: False,
 ) -> list[Result | Exception]:
     """Do every job, ``at_once`` of them at a time; return results, or what they raised, in order.
 
@@ -21,6 +22,10 @@ def together(
         jobs: What is to be done.
         at_once: How many threads.
         done: Told after each job how many are finished.
+        fatal: Tells which errors make the rest not worth waiting for.
+
+    Raises:
+        Exception: The first fatal error; jobs that wait are dropped.
 
     """
     waiting: SimpleQueue[int] = SimpleQueue()
@@ -32,9 +37,20 @@ def together(
     results = {}
     for count in range(1, len(jobs) + 1):
         number, result = finished.get()
+        if isinstance(result, Exception) and fatal(result):
+            _drop(waiting)
+            raise result
         results[number] = result
         done(count)
     return [results[number] for number in range(len(jobs))]
+
+
+def _drop(waiting: SimpleQueue[int]) -> None:
+    try:
+        while True:
+            waiting.get_nowait()
+    except Empty:
+        return
 
 
 def _work(
