@@ -209,12 +209,25 @@ def test_a_pause_that_the_server_asks_for_is_kept():
     assert server.requests[1].time - start >= 1.0
 
 
-@pytest.mark.parametrize("kind", [Anthropic, Google, Ollama], ids=lambda kind: kind.provider)
-def test_the_other_providers_answer_too(kind, monkeypatch):
+@pytest.mark.parametrize(
+    ("kind", "name"),
+    [
+        (OpenAI, "gpt-5.4"),
+        (OpenAI, "gpt-5-mini"),
+        (Anthropic, "claude-sonnet-5-5"),
+        (Anthropic, "claude-haiku-4-5"),
+        (Anthropic, "fake-model"),
+        (Google, "gemini-3.1-pro-preview"),
+        (Google, "fake-model"),
+        (Ollama, "qwen3-vl"),
+    ],
+)
+def test_every_provider_answers_in_its_own_format(kind, name, monkeypatch):
     monkeypatch.setenv("CORPOREAL_API_KEY", "k-other")
+    monkeypatch.delenv("OLLAMA_API_KEY", raising=False)
     with FakeServer(GOOD) as server:
-        url = server.url if kind is Ollama else server.root
-        model = kind(f"fake-model@{url}", QUICK)
+        url = server.url if kind in (OpenAI, Ollama) else server.root
+        model = kind(f"{name}@{url}", QUICK)
         reply = model.ask(ASKED, Colours, check)
     assert [p.colour for p in reply.answer.parts] == ["red", "blue"]
     assert (reply.spent.input_tokens, reply.spent.output_tokens) == (1200, 80)
@@ -223,7 +236,9 @@ def test_the_other_providers_answer_too(kind, monkeypatch):
     assert ("k-other" in str(request.headers)) == (kind is not Ollama)
 
 
-@pytest.mark.parametrize("kind", [Anthropic, Google], ids=lambda kind: kind.provider)
+@pytest.mark.parametrize(
+    ("kind", "name"), [(Anthropic, "claude-sonnet-5-5"), (Google, "gemini-3.1-pro-preview")]
+)
 @pytest.mark.parametrize(
     "first",
     [
@@ -233,9 +248,9 @@ def test_the_other_providers_answer_too(kind, monkeypatch):
     ],
     ids=["out of range", "429", "503"],
 )
-def test_the_other_providers_recover_too(kind, first):
+def test_the_other_providers_recover_too(kind, name, first):
     with FakeServer(first, GOOD) as server:
-        model = kind(f"fake-model@{server.root}", QUICK)
+        model = kind(f"{name}@{server.root}", QUICK)
         reply = model.ask(ASKED, Colours, check)
     assert reply.answer.parts[0].share == 0.4
     assert len(server.requests) == 2

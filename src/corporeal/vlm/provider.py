@@ -81,6 +81,7 @@ class Live:
     provider: ClassVar[str]
     key: ClassVar[str]
     """Environment variable of the provider's own key."""
+    limits: ClassVar[ModelSettings] = {}
 
     def __init__(self, rest: str, patience: Patience | None = None) -> None:
         model, _, url = rest.partition("@http")
@@ -193,8 +194,9 @@ class Live:
                 raise ModelRetry("\n".join(complaints))
             return said
 
-        settings = ModelSettings(timeout=self.patience.timeout, max_retries=0)
-        settings["request_timeout"] = self.patience.timeout
+        longest = self.patience.timeout
+        settings = ModelSettings(timeout=longest, request_timeout=longest, max_retries=0)
+        settings.update(self.limits)
         pictures = [BinaryContent(jpeg(p), media_type="image/jpeg") for p in question.pictures]
         asked = await agent.run(
             [question.text, *pictures], model_settings=settings, usage=usage, infer_name=False
@@ -273,6 +275,7 @@ class Anthropic(Live):
     """Anthropic."""
 
     provider, key = "anthropic", "ANTHROPIC_API_KEY"
+    limits: ClassVar[ModelSettings] = {"max_tokens": 16000}  # more would have to be streamed
 
     def _model(self, secret: str, profile: ModelProfile) -> Model:
         from pydantic_ai.models.anthropic import AnthropicModel
