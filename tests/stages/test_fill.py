@@ -22,6 +22,7 @@ from corporeal.types import (
     Parts,
     PartWords,
     Piece,
+    Placement,
     Push,
     Scene,
     SceneObject,
@@ -473,6 +474,19 @@ def test_a_cup_holds_what_goes_in_up_to_its_rim():
     inside = np.linalg.norm(particles.position[:, :2], axis=1) < 0.04
     top = particles.position[inside, 2].max()
     assert top == pytest.approx(0.5 + 0.004 + 0.048, abs=0.004)
+
+
+@pytest.mark.parametrize(("chosen_by", "thickness"), [("recording", 1e-3), ("fallback", 4e-3)])
+def test_who_looked_at_a_thin_wall_knows_it_better_than_the_mesh(chosen_by, thickness):
+    outline = [(0, 0), (0.05, 0), (0.05, 0.1), (0.046, 0.1), (0.046, 0.004), (0, 0.004)]
+    cup = put(trimesh.creation.revolve(np.array(outline), sections=64), 0.5)
+    scene, parts, field = inputs(thing((cup, STEEL, Structure("shell", 1e-3))))
+    placed = {"shell_thickness": Placement(0.1, chosen_by, "It looks thin.")}
+    words = (replace(field.words[0], structure="shell", placements=placed),)
+    particles = fill(scene, parts, replace(field, words=words))
+    wall = min(cup.area / 2 * thickness, abs(cup.volume))
+    assert particles.mass_real[0] == pytest.approx(7850 * wall, rel=0.01)
+    assert particles.mass.sum() == pytest.approx(particles.mass_real[0], rel=1e-6)
 
 
 def test_what_a_soft_cup_holds_is_as_light_as_it_is():

@@ -2,7 +2,9 @@
 
 A table is a CSV file with a column that names the object's model (its file name, with or without
 folder and ending), one for its mass in kilograms, and optionally one for how it is filled (solid,
-hollow, full …) and one that says which rows to score. ABO-500 is a folder with ``splits.json`` (split →
+hollow, full …) and one that says which rows to score.
+
+ABO-500 is a folder with ``splits.json`` (split →
 names of scenes), ``filtered_product_weights.json`` (product → kg; a scene's name begins with its
 product, up to the first underscore) and ``scenes/<scene>/``; here each scene holds its mesh as a
 ``.glb`` file beside the pictures.

@@ -178,8 +178,9 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
     """Say how thick a part's walls are and what they weigh.
 
     Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ min(A t, V) with the area A of one
-    face. A wall whose mesh shows both faces is 2 V / A thick unless somebody stated otherwise.
-    Open sheets weigh ρ A t. Of a piece, its shares of V and A count.
+    face. A wall whose mesh shows both faces is 2 V / A thick unless somebody stated or judged
+    otherwise: thin walls are drawn too thick, in scans as in models. Open sheets weigh ρ A t. Of a
+    piece, its shares of V and A count.
     """
     wall = member.build is Build.WALL
     shown = 2 * member.volume / member.body_area if wall else 0.0
@@ -189,7 +190,8 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
     sheet = (words.thickness or stated or guess) if member.sheet_area or only_sheet else 0.0
     thickness, walled = 0.0, structure.kind != "solid"
     if walled:
-        thickness = words.thickness or shown or stated or guess
+        judged = structure.thickness if is_judged(words) else None
+        thickness = words.thickness or judged or shown or stated or guess
     elif wall:
         thickness = shown
     face = member.body_area * (0.5 if wall else 1.0) * words.surface_share
@@ -215,6 +217,12 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
         volume=volume + sheets * sheet,
         density=material.density,
     )
+
+
+def is_judged(words: PartWords) -> bool:
+    """Whether somebody who looked at the thing said how thick such a wall is."""
+    placed = words.placements.get("shell_thickness")
+    return placed is not None and placed.chosen_by != "fallback"
 
 
 def recipe(member: Member, made: Make, treatment: Treatment, cell: float) -> Recipe:
