@@ -162,6 +162,17 @@ def test_a_refused_key_stops_everything_at_once_and_is_never_shown(monkeypatch):
     assert "[key]" in str(failure.value)
 
 
+def test_the_key_for_ollama_is_its_own_and_is_not_shown_either(monkeypatch):
+    monkeypatch.setenv("OLLAMA_API_KEY", "k-ollama")
+    with FakeServer({"status": 401}) as server:
+        with pytest.raises(UserError, match="environment variable OLLAMA_API_KEY"):
+            Ollama(f"llava@{server.url}", QUICK).ask(ASKED, Colours, check)
+        assert server.requests[0].headers["authorization"] == "Bearer k-ollama"
+    with FakeServer({"status": 400, "error": "odd k-ollama"}) as server:
+        with pytest.raises(UnansweredError, match=r"odd \[key\]"):
+            Ollama(f"llava@{server.url}", QUICK).ask(ASKED, Colours, check)
+
+
 def test_the_providers_own_key_never_goes_to_another_server(monkeypatch):
     monkeypatch.setenv("OPENAI_API_KEY", "sk-openai")
     monkeypatch.delenv("CORPOREAL_API_KEY", raising=False)

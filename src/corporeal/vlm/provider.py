@@ -43,6 +43,8 @@ from corporeal.vlm import Answer, Check, Question, Reply, Spent, UnansweredError
 from corporeal.vlm.patience import Gate, Patience, seconds_asked_for
 
 OTHER_KEY = "CORPOREAL_API_KEY"
+VENDORS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
+"""Keys without which nobody answers."""
 TOO_MANY = 429
 NO_KEY = "none"
 """Sent where a server wants no key: the clients insist on one."""
@@ -104,16 +106,18 @@ class Live:
         """Say which server is asked."""
         return self.address.url or self.provider
 
+    def _variable(self) -> str:
+        """Name the environment variable of the key for the server that is asked."""
+        return OTHER_KEY if self.address.url else self.key
+
     def _secret(self) -> str:
-        if self.address.url is not None:
-            return os.environ.get(OTHER_KEY) or NO_KEY
-        secret = os.environ.get(self.key)
-        if not secret:
+        secret = os.environ.get(self._variable())
+        if not secret and self._variable() in VENDORS:
             raise UserError(
-                f"{self.address.spec} needs a key: set the environment variable {self.key}. "
-                "Without one there are --vlm ask:FOLDER and --vlm metadata."
+                f"{self.address.spec} needs a key: set the environment variable "
+                f"{self._variable()}. Without one there are --vlm ask:FOLDER and --vlm metadata."
             )
-        return secret
+        return secret or NO_KEY
 
     def _http(self) -> AsyncClient:
         """Make a client whose requests wait at the gate, and whose refusals close it at once."""
@@ -228,10 +232,9 @@ class Live:
         """Raise what holds for every question."""
         where = self._where()
         if isinstance(error, ModelAuthenticationError):
-            key = OTHER_KEY if self.address.url else self.key
             raise UserError(
                 f"{where} refused the key for {self.address.spec}. Check the environment variable "
-                f"{key}."
+                f"{self._variable()}."
             ) from None
         if isinstance(error, ModelNotFoundError):
             raise UserError(
@@ -250,7 +253,7 @@ class Live:
 
     def _plain(self, error: Exception) -> str:
         """Say in one short line what went wrong, without the key."""
-        secret = os.environ.get(OTHER_KEY if self.address.url else self.key) or NO_KEY
+        secret = self._secret()
         words = " ".join(str(error).split())
         words = words if secret == NO_KEY else words.replace(secret, "[key]")
         return f"{self.address.spec}: {words if len(words) <= 200 else f'{words[:197]}...'}"
@@ -310,8 +313,8 @@ class Ollama(Live):
     def _where(self) -> str:
         return self.address.url or os.environ.get("OLLAMA_BASE_URL") or OLLAMA
 
-    def _secret(self) -> str:
-        return os.environ.get(self.key) or NO_KEY
+    def _variable(self) -> str:
+        return self.key
 
     def _model(self, secret: str, profile: ModelProfile) -> Model:
         from pydantic_ai.models.ollama import OllamaModel
