@@ -183,3 +183,17 @@ def test_an_alternative_keeps_the_walls_place_and_needs_walls():
 
 def test_what_is_unknown_may_be_anything():
     assert len(set(names(PartWords("it", None), 300))) > 40
+
+
+def test_a_small_library_can_be_drawn_from_too():
+    entry = materials.find("steel", "reference")
+    tin = entry.pick(entry.typical())
+    can = Structure("filled", 4e-4, contents=usual("granules"), fill=0.9, loose=True)
+    words = (PartWords("can", "steel", "filled", thickness=4e-4, contents="granules"),)
+    field = replace(field_of("steel", structures=(can,), words=words), materials=(tin,))
+    drawn = sample(field, [0], np.random.default_rng(1), "reference", "concrete")
+    assert drawn.structures[0].contents.density != can.contents.density
+    assert drawn.materials[0].density in entry.ranges["density"]
+    odd = PartWords("cup", "steel", alternatives=(("phlogiston", 1.0),))
+    kept = otherwise(inventory(odd), np.random.default_rng(0), "reference")
+    assert kept.objects[0].parts[0].material == "steel"

@@ -12,10 +12,10 @@ from math import erf, sqrt
 
 import numpy as np
 
-from corporeal.errors import UnknownChoiceError
+from corporeal.errors import UserError
 from corporeal.materials.contact import friction_between, restitution_between
 from corporeal.materials.entry import Entry
-from corporeal.materials.library import substances
+from corporeal.materials.library import find, library, substances
 from corporeal.materials.placement import CONTENTS, entry_of
 from corporeal.materials.scale import fraction_of, place
 from corporeal.types import (
@@ -84,7 +84,7 @@ def _instead(words: PartWords, name: str, library: str) -> PartWords:
     """Let another material stand in a part's place, unless it makes no such walls."""
     try:
         entry = entry_of(name, library)
-    except UnknownChoiceError:
+    except UserError:
         return words
     walled = words.structure in ("shell", "filled") and words.thickness is None
     if walled and "shell_thickness" not in entry.ranges:
@@ -165,12 +165,18 @@ def sample(
 
 
 def _material(material: Material, owner: int, grades: Grades, library: str) -> Material:
-    porous = entry_of(material.name, library).group in POROUS
+    porous = _group(material.name, library) in POROUS
     grounds = {
         f: _drawn(g, grades.quantile(owner, material.name, f, f in GRADE or _dense(f, porous)))
         for f, g in material.grounds.items()
     }
     return replace(material, grounds=grounds, **{f: g.value for f, g in grounds.items()})
+
+
+def _group(name: str, library_name: str) -> str:
+    """Look a group up; what a library does not hold came from the default one, as contents may."""
+    entries = library(library_name)
+    return (entries[name] if name in entries else find(name)).group
 
 
 def _dense(field: str, porous: bool) -> bool:
