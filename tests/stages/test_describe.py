@@ -180,6 +180,41 @@ def test_a_model_is_believed_before_the_names_and_unknown_leaves_them_the_word(a
     ]
 
 
+def test_what_a_model_says_of_a_part_of_unknown_material_is_kept(ask):
+    maybe = [{"material": "ABS", "probability": 0.2}, {"material": "steel", "probability": 0.1}]
+    seen = {"reason": "Painted all over.", "alternatives": maybe}
+    answers = {
+        "hand-made/thing_0": made_of(part("thing", None, "shell", **seen)),
+        "hand-made/bucket_0": made_of(part("bucket", None, "shell", **seen)),
+    }
+    bucket = ("bucket_0", [("steel", plain(), {})])
+    said = words(ask(Oracle(materials=lambda q: answers[q.scene]), THING, bucket))
+    thing, bucket = said[("thing_0", "thing")], said[("bucket_0", "bucket")]
+    assert (thing.material, thing.structure, thing.answered_by) == (None, "shell", "unknown")
+    assert thing.alternatives == (("ABS", 0.2), ("steel", 0.1))
+    assert thing.reason == (
+        "The pictures do not show what it is made of: Painted all over. "
+        "No name in the file says what this is made of."
+    )
+    assert (bucket.material, bucket.structure, bucket.answered_by) == ("steel", "shell", "metadata")
+    assert bucket.alternatives == (("ABS", 0.2),)
+    assert bucket.reason.endswith("Painted all over. 'steel' in 'steel' names the material steel.")
+    assert bucket.placements["shell_thickness"].fraction == 0.25
+
+
+def test_pieces_of_unknown_material_are_of_what_the_file_names_and_built_as_they_look(ask):
+    shares = {"volume_share": 0.5, "surface_share": 0.5}
+    oracle = Oracle(
+        parts=decomposed(["rim", "body"]),
+        materials=made_of(part("rim", None, **shares), part("body", None, "shell", **shares)),
+    )
+    (bucket,) = ask(oracle, ("bucket_0", [("steel", plain(), {})])).objects[0].parts
+    assert [(p.name, p.material, p.structure, p.volume_share) for p in bucket.pieces] == [
+        ("rim", "steel", "solid", 0.5),
+        ("body", "steel", "shell", 0.5),
+    ]
+
+
 def test_the_question_offers_the_whole_library_in_use_and_nothing_else(ask):
     oracle = Oracle(materials=made_of(part("vase", "ceramic")))
     ask(oracle, VASE, library="reference")

@@ -285,3 +285,12 @@ def test_pieces_are_grounded_each_for_itself():
     assert (first.material.name, first.structure.kind) == ("steel", "solid")
     assert second.structure.thickness == materials.find("ABS").ranges["shell_thickness"].typical
     assert second.words.volume_share == 0.8
+
+
+def test_a_wall_of_unknown_material_is_as_thick_as_the_stand_ins_where_those_are_known():
+    words = PartWords("", None, "shell", reason="Painted.")
+    (structure,) = spoken(RIDDLE, words)[0].structures
+    assert (structure.kind, structure.thickness) == ("shell", pytest.approx(0.0015))
+    (structure,) = spoken(RIDDLE, words, "reference")[0].structures
+    assert (structure.kind, structure.thickness) == ("solid", None)
+    assert "a shell of unknown material" in structure.reason

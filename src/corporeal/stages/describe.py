@@ -12,11 +12,19 @@ from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.geometry.identity import Identity, identify
 from corporeal.geometry.identity import words as telling
 from corporeal.materials.offer import Choice, contents_offered, substances_offered
-from corporeal.materials.placement import choices, from_fractions, from_values, odd, spelling, usual
+from corporeal.materials.placement import (
+    choices,
+    entry_of,
+    from_fractions,
+    from_values,
+    odd,
+    spelling,
+    usual,
+)
 from corporeal.render.portrait import DIRECTIONS, Portrait, colour_of_part, portraits
 from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
 from corporeal.vlm import Vlm, connect
-from corporeal.vlm.annotation import Annotation, read_annotations
+from corporeal.vlm.annotation import Annotation, built, read_annotations
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Offer, Subject
@@ -26,9 +34,19 @@ from corporeal.vlm.metadata import (
     recognise,
     stated_substance,
     stated_thickness,
+    walled,
 )
 from corporeal.vlm.together import together
-from corporeal.vlm.words import Asked, gathered, leaves, part_words, placed, usage, with_extents
+from corporeal.vlm.words import (
+    Asked,
+    gathered,
+    leaves,
+    part_words,
+    placed,
+    settled,
+    usage,
+    with_extents,
+)
 
 TASKS = ("parts", "ranking", "materials", "placement", "extents")
 
@@ -144,7 +162,7 @@ class _Asking:
         self.names = Vocabulary(
             partial(spelling, library_name=library, offered=materials.substances(library)),
             partial(spelling, library_name=library, offered=materials.contents(library)),
-            lambda name: "shell_thickness" in materials.find(name, library).ranges,
+            lambda name: "shell_thickness" in entry_of(name, library).ranges,
         )
 
     def inventory(self, file: list, told: Mapping, progress: Progress) -> Inventory:
@@ -237,7 +255,7 @@ class _Asking:
             words = [gathered(names[0], words)]
         said = {w.name: w for w in words}
         known = zip(names, file, strict=True)
-        return [said[n] if said[n].material is not None else own for n, own in known]
+        return [settled(said[name], own, self.names.walled) for name, own in known]
 
     def _placed(self, interview: Interview, words: list[PartWords]) -> list[PartWords]:
         """Ask where in its measured range each open value of each part lies."""
@@ -304,18 +322,8 @@ def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[Par
         told = _stated(list(seen.surfaces), library) or recognise(seen)
         by = "metadata" if told.material else "unknown"
         told = replace(told, name=entry.name, answered_by=by)
-        words[entry.object].append(_walled(told, stated_thickness(seen.surfaces)))
+        words[entry.object].append(walled(told, stated_thickness(seen.surfaces)))
     return words
-
-
-def _walled(words: PartWords, thickness: float | None) -> PartWords:
-    """Let the wall's thickness [m] that the file states decide; 0: stated solid."""
-    if thickness is None:
-        return words
-    if thickness == 0:
-        return replace(words, structure="solid", thickness=None, contents=None, fill=None)
-    filled = words.structure == "filled"
-    return replace(words, structure="filled" if filled else "shell", thickness=thickness)
 
 
 def _stated(surfaces: list[Surface], library: str) -> PartWords | None:
@@ -371,18 +379,4 @@ def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> 
     for key, value in said.values.items():
         field, factor = materials.si(key)
         values[field] = value * factor
-    return replace(_built(said, words), values=values)
-
-
-def _built(said: Annotation, words: PartWords) -> PartWords:
-    """Take over how a person says that a part is built."""
-    implied = "filled" if said.contents else "shell" if said.thickness is not None else None
-    structure = said.structure or implied
-    if structure is None:
-        return words
-    if structure == "solid":
-        return replace(words, structure="solid", thickness=None, contents=None, fill=None)
-    words = replace(words, structure=structure, thickness=said.thickness or words.thickness)
-    if structure == "shell":
-        return replace(words, contents=None, fill=None)
-    return replace(words, contents=said.contents or words.contents, fill=said.fill or words.fill)
+    return replace(built(said, words), values=values)

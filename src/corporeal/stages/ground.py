@@ -149,6 +149,9 @@ def _structure(material: Material, words: PartWords, config: GroundConfig) -> St
         return Structure("solid", None, "It is stated to be solid.")
     if words.structure is None:
         return Structure("solid", None, "How it is built is not said: the shape decides.")
+    if not (words.material or words.thickness or material.shell_thickness):
+        said = f"It is said to be a {words.structure} of unknown material"
+        return Structure("solid", None, f"{said}; of {material.name} none are: the shape decides.")
     thickness, reason = _wall(material, words)
     if words.structure == "shell":
         return Structure("shell", thickness, reason)

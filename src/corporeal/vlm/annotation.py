@@ -1,7 +1,7 @@
 """What a person says about a scene's parts, in a YAML file. It is believed before anybody else."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
 from typing import Any
@@ -9,6 +9,7 @@ from typing import Any
 import yaml
 
 from corporeal.errors import BadFileError
+from corporeal.types import PartWords
 
 KEYS = ("material", "structure", "thickness_mm", "contents", "fill", "values")
 EXAMPLE = "For example: 'duck_0: soft_PVC', or 'duck_0: { material: soft_PVC, thickness_mm: 2 }'."
@@ -142,3 +143,17 @@ def _nobody(path: Path, kind: str, name: object, real: object) -> BadFileError:
 
 def _list(names: Any) -> str:
     return ", ".join(str(n) for n in names)
+
+
+def built(said: Annotation, words: PartWords) -> PartWords:
+    """Take over how a person says that a part is built."""
+    implied = "filled" if said.contents else "shell" if said.thickness is not None else None
+    structure = said.structure or implied
+    if structure is None:
+        return words
+    if structure == "solid":
+        return replace(words, structure="solid", thickness=None, contents=None, fill=None)
+    words = replace(words, structure=structure, thickness=said.thickness or words.thickness)
+    if structure == "shell":
+        return replace(words, contents=None, fill=None)
+    return replace(words, contents=said.contents or words.contents, fill=said.fill or words.fill)

@@ -139,6 +139,16 @@ def _length(said: object) -> float | None:
     return float(said) if isfinite(said) and 0 <= said < LONGEST_WALL else None
 
 
+def walled(words: PartWords, thickness: float | None) -> PartWords:
+    """Let the wall's thickness [m] that the file states decide; 0: stated solid."""
+    if thickness is None:
+        return words
+    if thickness == 0:
+        return replace(words, structure="solid", thickness=None, contents=None, fill=None)
+    filled = words.structure == "filled"
+    return replace(words, structure="filled" if filled else "shell", thickness=thickness)
+
+
 def matter_hint(surface: Surface, finish: Finish) -> str:
     """Return the material that a surface's own names state, "" for none: tells parts apart."""
     names = [_name(finish.name), _name(surface.name)]

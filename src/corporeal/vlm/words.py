@@ -1,6 +1,6 @@
 """From a model's answers to what flows on: words about parts, and places in ranges."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
@@ -56,6 +56,35 @@ def gathered(name: str, pieces: Sequence[PartWords]) -> PartWords:
     reason = f"{main.name}, {share:.0%} of the volume, beside {others}. {main.reason}"
     return replace(
         main, name=name, reason=reason, volume_share=1.0, surface_share=1.0, pieces=tuple(pieces)
+    )
+
+
+def settled(said: PartWords, file: PartWords, walled: Callable[[str], bool]) -> PartWords:
+    """Let the file name the material that a model could not, and keep all else that it said.
+
+    Args:
+        said: What the model said.
+        file: What the file's own words say of the same part.
+        walled: Tells whether walls of a material were ever measured.
+
+    """
+    if said.material is not None:
+        return said
+    why = f"{said.reason.rstrip('. ')}. " if said.reason else ""
+    own = file
+    if said.structure == "solid":
+        own = replace(file, structure="solid", thickness=None, contents=None, fill=None)
+    elif said.structure and (file.thickness or file.material is None or walled(file.material)):
+        kept = {"structure": said.structure, "contents": said.contents, "fill": said.fill}
+        own = replace(file, **kept)
+    return replace(
+        own,
+        name=said.name,
+        reason=f"The pictures do not show what it is made of: {why}{file.reason}",
+        alternatives=tuple((n, p) for n, p in said.alternatives if n != file.material),
+        volume_share=said.volume_share,
+        surface_share=said.surface_share,
+        pieces=tuple(settled(piece, file, walled) for piece in said.pieces),
     )
 
 
