@@ -80,7 +80,7 @@ for (int n = 0; n < world->tethers; n++) {
         x[d] -= s[RIGID_CENTRE + d];
       }
       T.lost += given * brake * lost;
-      Hand::over(world, field, q, lane, J);
+      Hand::over(world, field, q, lane, J, false);
       Spring::cross(x, J, about);
       for (int d = 0; d < 3; d++) {
         total[d] -= J[d];
