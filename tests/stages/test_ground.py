@@ -287,6 +287,26 @@ def test_pieces_are_grounded_each_for_itself():
     assert second.words.volume_share == 0.8
 
 
+def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
+    shaft = PartWords("shaft", "steel", "solid", volume_share=0.2, reason="It shines.")
+    grip = PartWords("grip", None, "solid", volume_share=0.8, placements=placed(density=0.5))
+    made = scene(BLOCK, PLANK)
+    told = describe(made)
+    whole = replace(told.objects[0].parts[0], pieces=(shaft, grip))
+    told = replace(told, objects=(replace(told.objects[0], parts=(whole,)), told.objects[1]))
+    parts = segment(made, told)
+    field = ground(made, parts, told)
+    block, plank = json.loads(json.dumps(materials.materials_json(field, parts)))["parts"]
+    assert "pieces" not in plank
+    first, second = block["pieces"]
+    assert (first["name"], first["volume_share"], first["reason"]) == ("shaft", 0.2, "It shines.")
+    assert first["values"]["density"]["range"] == [7800, 7900]
+    assert len(first["values"]["density"]["source"]) > 20
+    assert (second["recognised"], second["material"]) == (None, "plastics-PP")
+    (warning,) = doubts(field, parts, made)
+    assert warning.startswith("block_0: block: grip is of unknown material; plastics-PP stands in")
+
+
 def test_a_wall_of_unknown_material_is_as_thick_as_the_stand_ins_where_those_are_known():
     words = PartWords("", None, "shell", reason="Painted.")
     (structure,) = spoken(RIDDLE, words)[0].structures

@@ -1,7 +1,25 @@
+import re
+from dataclasses import replace
+
 import pytest
 
-from corporeal.stages.report import asked, built, others, si, simulated
-from corporeal.types import Law, Material, PartWords, Structure, Treatment
+from corporeal import materials
+from corporeal.stages.describe import describe
+from corporeal.stages.fill import fill
+from corporeal.stages.ground import ground
+from corporeal.stages.report import Story, asked, built, others, report, si, simulated
+from corporeal.stages.segment import segment
+from corporeal.types import (
+    Film,
+    Law,
+    Material,
+    ObjectWords,
+    PartWords,
+    Placement,
+    Structure,
+    Treatment,
+)
+from handmade import plain, scene
 
 
 @pytest.mark.parametrize(
@@ -58,3 +76,41 @@ def test_what_the_questions_took_is_told_and_an_unknown_price_is_said_to_be_unkn
     assert "price not known" in asked(took | {"dollars": None})
     assert "nothing was paid" in asked(took | {"calls": 0})
     assert asked({}) == ""
+
+
+# ---------------------------------------------------------------- the whole page
+
+
+@pytest.fixture
+def page(tmp_path):
+    """Write the page of one object of one part of which somebody said something."""
+
+    def written(words, **audit):
+        made = scene(("thing_0", [("mesh", plain(), {})]))
+        told = describe(made)
+        words = replace(words, name=told.objects[0].parts[0].name)
+        told = replace(told, objects=(ObjectWords("thing_0", "thing", (words,)),))
+        parts = segment(made, told)
+        field = ground(made, parts, told)
+        film = Film(tmp_path / "film.mp4", 24, 64, 64)
+        film.path.write_bytes(b"")
+        particles = fill(made, parts, field)
+        report(
+            Story(made, parts, field, particles, film, audit, {}, materials.sources()),
+            tmp_path / "report.html",
+        )
+        return (tmp_path / "report.html").read_text(encoding="utf-8")
+
+    return written
+
+
+def test_every_piece_of_a_mesh_has_its_values_with_range_source_and_reason(page):
+    low = {"density": Placement(0.25, "model", "A dense grade.")}
+    head = PartWords("head", "steel", "solid", reason="It shines.", volume_share=0.25)
+    grip = PartWords("grip", "ABS", "shell", volume_share=0.75, placements=low)
+    told = page(PartWords("", "ABS", "shell", answered_by="model", pieces=(head, grip)))
+    assert "<b>head</b>: steel, 25% of the volume" in told
+    assert "It shines." in told and "A dense grade." in told
+    assert told.count("<td>density ρ</td>") == 2
+    sources = {r.source for m in ("steel", "ABS") for r in materials.find(m).ranges.values()}
+    assert sources <= set(re.findall("<dt>([^<]*)</dt>", told))

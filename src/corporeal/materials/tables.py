@@ -9,7 +9,16 @@ from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.materials.shipped import citation, source_table
 from corporeal.materials.treatments import inside, treatments
-from corporeal.types import Ground, Material, MaterialField, Part, Parts, PartWords, Structure
+from corporeal.types import (
+    Ground,
+    Material,
+    MaterialField,
+    Part,
+    Parts,
+    PartWords,
+    Piece,
+    Structure,
+)
 
 SCALES = {"Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))}
 COLUMNS = ("young", "poisson", "density", "yield_stress", "friction_angle", "cohesion")
@@ -85,8 +94,13 @@ def _seen(key: str) -> str:
 
 
 def materials_json(field: MaterialField, parts: Parts) -> dict:
-    """Return what every part is made of as plain data, with the grounds of every value [SI]."""
-    rows = zip(parts.catalogue, field.materials, field.structures, field.words, strict=True)
+    """Return what every part is made of as plain data, with the grounds of every value [SI].
+
+    A part whose mesh several things share has ``pieces``; its own values, with which it moves, are
+    those of the piece that matters most, and it weighs what its pieces weigh together.
+    """
+    pieces = field.pieces or ((),) * len(field.materials)
+    rows = zip(parts.catalogue, field.materials, field.structures, field.words, pieces, strict=True)
     return {
         "units": {q.field: q.unit for q in QUANTITIES.values()},
         "parts": [_part_json(*row) for row in rows],
@@ -96,11 +110,22 @@ def materials_json(field: MaterialField, parts: Parts) -> dict:
     }
 
 
-def _part_json(part: Part, material: Material, made: Structure, words: PartWords) -> dict:
+def _part_json(
+    part: Part, material: Material, made: Structure, words: PartWords, pieces: tuple[Piece, ...]
+) -> dict:
+    said = {"name": part.name, "object": part.object, "found_by": part.found_by}
+    said |= _made_json(material, made, words)
+    return said | ({"pieces": [_piece_json(p) for p in pieces]} if pieces else {})
+
+
+def _piece_json(piece: Piece) -> dict:
+    words = piece.words
+    shares = {"volume_share": words.volume_share, "surface_share": words.surface_share}
+    return {"name": words.name} | shares | _made_json(piece.material, piece.structure, words)
+
+
+def _made_json(material: Material, made: Structure, words: PartWords) -> dict:
     return {
-        "name": part.name,
-        "object": part.object,
-        "found_by": part.found_by,
         "material": material.name,
         "recognised": words.material,
         "answered_by": words.answered_by,

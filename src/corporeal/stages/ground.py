@@ -74,19 +74,25 @@ def ground(
 def doubts(field: MaterialField, parts: Parts, scene: Scene) -> tuple[str, ...]:
     """Say, one sentence each, which materials nobody knew and which values are to be doubted."""
     said = []
-    for part, material, words in zip(parts.catalogue, field.materials, field.words, strict=True):
+    for k, part in enumerate(parts.catalogue):
         where = f"{scene.objects[part.object].name}: {part.name}"
-        if words.material is None:
-            said.append(
-                f"{where} is of unknown material; {material.name} stands in. Say what it is with "
-                "--annotations."
-            )
-        said += [
-            f"{where}: {name} of {material.name}: {ground.reason[ground.reason.index(UNFIT) :]}"
-            for name, ground in material.grounds.items()
-            if UNFIT in ground.reason
-        ]
+        pieces = field.pieces[k] if field.pieces else ()
+        told = [(f"{where}: {p.words.name}", p.material, p.words) for p in pieces]
+        for row in told or [(where, field.materials[k], field.words[k])]:
+            said += _doubts(*row)
     return tuple(said)
+
+
+def _doubts(where: str, material: Material, words: PartWords) -> list[str]:
+    unknown = (
+        f"{where} is of unknown material; {material.name} stands in. Say what it is with "
+        "--annotations."
+    )
+    return ([unknown] if words.material is None else []) + [
+        f"{where}: {name} of {material.name}: {ground.reason[ground.reason.index(UNFIT) :]}"
+        for name, ground in material.grounds.items()
+        if UNFIT in ground.reason
+    ]
 
 
 def _words(inventory: Inventory, number: int, name: str) -> PartWords:

@@ -18,10 +18,12 @@ from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.types import (
     Film,
     Ground,
+    Material,
     MaterialField,
     Particles,
     Parts,
     PartWords,
+    Piece,
     Push,
     Scene,
     SceneObject,
@@ -220,23 +222,43 @@ def simulated(treatment: Treatment) -> str:
 
 
 def _grounds(story: Story, k: int) -> str:
-    part, material = story.parts.catalogue[k], story.field.materials[k]
-    treatment, words = story.particles.treatments[k], story.field.words[k]
-    rows = "".join(
-        _ground_row(name, ground) for name, ground in material.grounds.items() if name in UNITS
-    )
-    inner = story.field.structures[k].contents
-    if inner is not None and "density" in inner.grounds:
-        rows += _ground_row("density", inner.grounds["density"], f" of the {inner.name} in it")
+    part, field = story.parts.catalogue[k], story.field
+    material, words, structure = field.materials[k], field.words[k], field.structures[k]
+    pieces = field.pieces[k] if field.pieces else ()
+    tables = "".join(_piece_grounds(p) for p in pieces) or _values(material, structure)
     fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
     return (
         f"<details><summary><b>{_safe(part.name)}</b> of "
         f"{_safe(story.scene.objects[part.object].name)}: {_safe(material.name)}</summary>"
         f"<p>{_safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
-        f"{others(words)}<br>"
-        f"{_safe(story.field.structures[k].reason)} {_safe(fill)}<br>{_safe(treatment.why)}</p>"
+        f"{others(words)}<br>{_safe(structure.reason)} {_safe(fill)}<br>"
+        f"{_safe(story.particles.treatments[k].why)}</p>{tables}</details>"
+    )
+
+
+def _piece_grounds(piece: Piece) -> str:
+    """Tell of one of several things that share a part's mesh why it is as it is."""
+    words = piece.words
+    return (
+        f"<p><b>{_safe(words.name)}</b>: {_safe(piece.material.name)}, "
+        f"{words.volume_share:.0%} of the volume, {words.surface_share:.0%} of the surface. "
+        f"{_safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
+        f"{others(words)} {_safe(piece.structure.reason)}</p>"
+        f"{_values(piece.material, piece.structure)}"
+    )
+
+
+def _values(material: Material, structure: Structure) -> str:
+    """Lay out every value with its range, who chose it, why, and where the range was read."""
+    rows = "".join(
+        _ground_row(name, ground) for name, ground in material.grounds.items() if name in UNITS
+    )
+    inner = structure.contents
+    if inner is not None and "density" in inner.grounds:
+        rows += _ground_row("density", inner.grounds["density"], f" of the {inner.name} in it")
+    return (
         "<table><tr><th>quantity</th><th>value</th><th>place in the measured range</th>"
-        f"<th>chosen by</th><th>why</th><th>source</th></tr>{rows}</table></details>"
+        f"<th>chosen by</th><th>why</th><th>source</th></tr>{rows}</table>"
     )
 
 
@@ -290,8 +312,10 @@ def _audit_table(audit: Mapping[str, Any]) -> str:
 
 
 def _sources(story: Story) -> str:
-    held = [s.contents for s in story.field.structures if s.contents is not None]
-    known = [*story.field.materials, *held]
+    pieces = [p for shared in story.field.pieces for p in shared]
+    made = [*story.field.structures, *(p.structure for p in pieces)]
+    held = [s.contents for s in made if s.contents is not None]
+    known = [*story.field.materials, *(p.material for p in pieces), *held]
     used = sorted({g.range.source for m in known for g in m.grounds.values()})
     items = (f"<dt>{_safe(k)}</dt><dd>{_safe(story.sources.get(k, k))}</dd>" for k in used)
     return "".join(items)
