@@ -165,6 +165,9 @@ class Placement:
     """Why there, in one sentence."""
 
 
+Speaker = Literal["annotation", "recording", "model", "metadata", "unknown"]
+
+
 @dataclass(frozen=True)
 class PartWords:
     """What somebody or something said about one part."""
@@ -176,7 +179,7 @@ class PartWords:
     """How the part is made; None: not said, the shape decides."""
     thickness: float | None = None
     """Thickness of the wall of what is a shell or filled, where it is known [m]."""
-    answered_by: Literal["annotation", "recording", "model", "metadata", "unknown"] = "unknown"
+    answered_by: Speaker = "unknown"
     margin: float = 0.0
     """How sure: 0 (a guess) to 1 (stated outright)."""
     reason: str = ""
@@ -199,6 +202,8 @@ class PartWords:
     pieces: "tuple[PartWords, ...]" = ()
     """What the part consists of where its mesh does not tell them apart: the shaft and the handle
     of a scanned screwdriver. The words above are then those of the piece that matters most."""
+    built_by: Speaker = "unknown"
+    """Who said how it is built; ``answered_by`` said what it is made of."""
 
 
 @dataclass(frozen=True)

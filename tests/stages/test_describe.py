@@ -31,7 +31,7 @@ def words(inventory):
 def test_what_the_file_states_is_certain():
     said = words(describe(scene(DUCK)))[("duck_0", "body")]
     assert (said.material, said.margin, said.answered_by) == ("soft_PVC", 1.0, "metadata")
-    assert (said.structure, said.thickness) == ("shell", 0.002)
+    assert (said.structure, said.thickness, said.built_by) == ("shell", 0.002, "metadata")
 
 
 def test_a_stated_thickness_of_zero_means_solid():
@@ -108,6 +108,7 @@ def test_a_person_may_say_only_how_it_is_built(tmp_path):
     config = DescribeConfig(annotations=tmp_path / "said.yaml")
     said = words(describe(scene(VASE), config))[("vase_0", "vase")]
     assert (said.material, said.thickness) == ("ceramic", pytest.approx(0.004))
+    assert (said.answered_by, said.built_by) == ("metadata", "annotation")
 
 
 def test_an_annotation_that_does_not_fit_is_refused(tmp_path):
@@ -164,6 +165,7 @@ def test_a_model_is_believed_before_the_names_and_unknown_leaves_them_the_word(a
     said = words(inventory)
     vase = said[("vase_0", "vase")]
     assert (vase.material, vase.answered_by, vase.structure) == ("glass", "model", "shell")
+    assert vase.built_by == "model"
     assert vase.margin == 0.7
     assert said[("thing_0", "thing")].answered_by == "unknown"
     assert said[("bucket_0", "bucket")].material == "steel"
@@ -197,6 +199,7 @@ def test_what_a_model_says_of_a_part_of_unknown_material_is_kept(ask):
         "No name in the file says what this is made of."
     )
     assert (bucket.material, bucket.structure, bucket.answered_by) == ("steel", "shell", "metadata")
+    assert (thing.built_by, bucket.built_by) == ("model", "model")
     assert bucket.alternatives == (("ABS", 0.2),)
     assert bucket.reason.endswith("Painted all over. 'steel' in 'steel' names the material steel.")
     assert bucket.placements["shell_thickness"].fraction == 0.25

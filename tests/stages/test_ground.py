@@ -307,6 +307,34 @@ def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
     assert warning.startswith("block_0: block: grip is of unknown material; plastics-PP stands in")
 
 
+@pytest.mark.parametrize(
+    ("built_by", "who"),
+    [
+        ("annotation", "Your annotation says"),
+        ("model", "A model says"),
+        ("recording", "A recorded answer says"),
+        ("metadata", "The file's own words say"),
+    ],
+)
+def test_who_said_how_a_part_is_built_is_named(built_by, who):
+    (solid,) = spoken(RIDDLE, PartWords("", "steel", "solid", built_by=built_by))[0].structures
+    assert solid.reason == f"{who} that it is solid."
+    shell = PartWords("", "terracotta", "shell", built_by=built_by)
+    (usual,) = spoken(RIDDLE, shell)[0].structures
+    wall = f"{who} that it has a wall."
+    assert usual.reason == (
+        f"{wall} Its thickness, unless its mesh shows it, is the usual 7 mm, in the range of "
+        "terracotta: 4 to 15 mm."
+    )
+    put = replace(shell, placements={"shell_thickness": Placement(1.0, "model", "Thick.")})
+    (here,) = spoken(RIDDLE, put)[0].structures
+    assert here.reason == (
+        f"{wall} A model puts its thickness at 15 mm, in the range of terracotta: 4 to 15 mm."
+    )
+    (stated,) = spoken(RIDDLE, replace(shell, thickness=0.003))[0].structures
+    assert stated.reason == f"{wall} Its thickness, 3 mm, is stated."
+
+
 def test_a_wall_of_unknown_material_is_as_thick_as_the_stand_ins_where_those_are_known():
     words = PartWords("", None, "shell", reason="Painted.")
     (structure,) = spoken(RIDDLE, words)[0].structures

@@ -322,7 +322,9 @@ def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[Par
         told = _stated(list(seen.surfaces), library) or recognise(seen)
         by = "metadata" if told.material else "unknown"
         told = replace(told, name=entry.name, answered_by=by)
-        words[entry.object].append(walled(told, stated_thickness(seen.surfaces)))
+        told = walled(told, stated_thickness(seen.surfaces))
+        built_by = "metadata" if told.structure else "unknown"
+        words[entry.object].append(replace(told, built_by=built_by))
     return words
 
 

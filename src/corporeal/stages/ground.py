@@ -37,6 +37,20 @@ class GroundConfig:
 
 
 DEFAULT = GroundConfig()
+SAID = {
+    "annotation": "Your annotation says",
+    "recording": "A recorded answer says",
+    "model": "A model says",
+    "metadata": "The file's own words say",
+    "unknown": "It is assumed",
+}
+"""Who said how a part is built."""
+PUT = {
+    "annotation": "Your annotation puts",
+    "recording": "A recorded answer puts",
+    "model": "A model puts",
+}
+"""Who chose a wall's thickness."""
 UNFIT = "It does not fit the others:"
 NEUTRAL = (
     "Nobody knows what this part is made of. {name} stands in: the commonest moulded plastic, "
@@ -152,13 +166,14 @@ def _piece(words: PartWords, config: GroundConfig) -> Piece:
 
 def _structure(material: Material, words: PartWords, config: GroundConfig) -> Structure:
     if words.structure == "solid":
-        return Structure("solid", None, "It is stated to be solid.")
+        return Structure("solid", None, f"{SAID[words.built_by]} that it is solid.")
     if words.structure is None:
         return Structure("solid", None, "How it is built is not said: the shape decides.")
     if not (words.material or words.thickness or material.shell_thickness):
         said = f"It is said to be a {words.structure} of unknown material"
         return Structure("solid", None, f"{said}; of {material.name} none are: the shape decides.")
     thickness, reason = _wall(material, words)
+    reason = f"{SAID[words.built_by]} that it has a wall. {reason}"
     if words.structure == "shell":
         return Structure("shell", thickness, reason)
     if words.contents is None:
@@ -186,15 +201,23 @@ def _inner_grounds(inside: Entry, words: PartWords) -> dict[str, Ground]:
 
 def _wall(material: Material, words: PartWords) -> tuple[float, str]:
     if words.thickness:
-        return words.thickness, "The wall's thickness is stated."
+        return words.thickness, f"Its thickness, {_mm(words.thickness)} mm, is stated."
     if material.shell_thickness:
-        chosen = material.grounds["shell_thickness"].chosen_by
-        usual = "usually this thin" if chosen == "typical" else "made this thin here"
-        return material.shell_thickness, f"Such walls of {material.name} are {usual}."
+        ground = material.grounds["shell_thickness"]
+        said = f"{_mm(ground.value)} mm, in the range of {material.name}: " + " to ".join(
+            (_mm(ground.range.low), f"{_mm(ground.range.high)} mm.")
+        )
+        if ground.chosen_by in PUT:
+            return ground.value, f"{PUT[ground.chosen_by]} its thickness at {said}"
+        return ground.value, f"Its thickness, unless its mesh shows it, is the usual {said}"
     raise UserError(
         f"{words.name} is said to be a {words.structure or 'shell'} of {material.name}, but how "
         "thin its wall is is not known. Give thickness_mm in the annotation file."
     )
+
+
+def _mm(metres: float) -> str:
+    return f"{metres * 1e3:.3g}"
 
 
 def _flows(entry: Entry) -> bool:

@@ -151,6 +151,7 @@ def built(said: Annotation, words: PartWords) -> PartWords:
     structure = said.structure or implied
     if structure is None:
         return words
+    words = replace(words, built_by="annotation")
     if structure == "solid":
         return replace(words, structure="solid", thickness=None, contents=None, fill=None)
     words = replace(words, structure=structure, thickness=said.thickness or words.thickness)

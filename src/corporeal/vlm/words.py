@@ -37,6 +37,7 @@ def _words(said: PartAnswer, by: Asked, names: Vocabulary, total: tuple[float, f
         alternatives=tuple((n, p) for n, p in others if n != made and p > 0),
         volume_share=_share(said.volume_share, total[0]),
         surface_share=_share(said.surface_share, total[1]),
+        built_by=by,
     )
 
 
@@ -74,9 +75,10 @@ def settled(said: PartWords, file: PartWords, walled: Callable[[str], bool]) -> 
     own = file
     if said.structure == "solid":
         own = replace(file, structure="solid", thickness=None, contents=None, fill=None)
+        own = replace(own, built_by=said.built_by)
     elif said.structure and (file.thickness or file.material is None or walled(file.material)):
         kept = {"structure": said.structure, "contents": said.contents, "fill": said.fill}
-        own = replace(file, **kept)
+        own = replace(file, **kept, built_by=said.built_by)
     return replace(
         own,
         name=said.name,
