@@ -18,9 +18,9 @@ $(VENV)/.installed: pyproject.toml
 demo: install
 	$(BIN)/corporeal demo
 
-# CI runs the slow validation too.
+# On every core, and CI runs the slow validation too.
 test: install
-	$(BIN)/python -m pytest $(if $(CI),,-m "not slow")
+	$(BIN)/python -m pytest -n auto --dist worksteal $(if $(CI),,-m "not slow")
 
 check: install
 	$(BIN)/ruff check .
