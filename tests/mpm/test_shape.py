@@ -55,6 +55,13 @@ def test_what_gives_on_the_other_side_is_another_dent():
     assert mark.place[2] > 0.01
 
 
+def test_grains_that_flew_off_make_no_deeper_dent():
+    thrown = pressed(CUBE)
+    thrown[::97] += [0.0, 0.0, 0.5]
+    mark = dent(CUBE, [thrown], 0.002)
+    assert mark.depth == pytest.approx(0.01, rel=0.2)
+
+
 def test_a_vibration_is_no_dent():
     swing = [CUBE * (1 + 0.05 * np.sin(t) * np.array([1, -1, 0])) for t in np.arange(8) / 8 * 6.28]
     assert dent(CUBE, swing, 0.001).share == 0

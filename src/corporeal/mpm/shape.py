@@ -64,6 +64,12 @@ def shape_error(start: Float[np.ndarray, "N 3"], now: Float[np.ndarray, "N 3"]) 
     return float(np.sqrt(np.mean(np.sum((fit.undo(now) - start) ** 2, axis=1)))) / diagonal(start)
 
 
+PATCH = 27
+"""So many neighbours, a cube of three particles' side, are a patch."""
+THROWN = 2.0
+"""What moved farther than so many times the median of its patch did not move with it."""
+
+
 def largest(size: Float[np.ndarray, " N"]) -> float:
     """Mean of the eight largest values: one cell's worth of particles."""
     few = min(8, len(size))
@@ -75,7 +81,7 @@ class Dent:
     """A residual change of shape: the patch that moved the way its deepest place did."""
 
     depth: float
-    """Largest residual displacement, averaged over one cell's worth of particles [m]."""
+    """Largest residual displacement of a patch, averaged over one cell's worth [m]."""
     place: Float[np.ndarray, " 3"]
     """Centroid, weighted by displacement squared, on the body as it started [m]; nan: no dent."""
     share: float
@@ -88,7 +94,7 @@ def dent(
     """Residual displacement of a body, averaged over its last frames so that vibration cancels.
 
     A can that is struck on top also gives where it stands: only what moved within 60° of the
-    deepest place's direction counts as the same dent.
+    deepest place's direction counts as the same dent, and of that nothing that flew off by itself.
 
     Args:
         start: Where the particles started [m].
@@ -97,14 +103,15 @@ def dent(
 
     """
     shift = np.mean([trusted_fit(start, x).undo(x) - start for x in now], axis=0)
+    around = KDTree(start).query(start, k=min(PATCH, len(start)))[1].reshape(len(start), -1)
     size = np.linalg.norm(shift, axis=1)
-    if not (size > threshold).any():
-        return Dent(largest(size), np.full(3, np.nan), 0.0)
-    nearest = KDTree(start).query(start, k=min(8, len(start)))[1].reshape(len(start), -1)
-    smooth = shift[nearest].mean(axis=1)
+    together = size <= THROWN * np.median(size[around], axis=1)
+    if not (size[together] > threshold).any():
+        return Dent(largest(size[together]), np.full(3, np.nan), 0.0)
+    smooth = shift[around[:, :8]].mean(axis=1)
     way = smooth[np.argmax(np.linalg.norm(smooth, axis=1))]
     along = shift @ way / np.linalg.norm(way)
-    dented = (size > threshold) & (along > 0.5 * size)
+    dented = together & (size > threshold) & (along > 0.5 * size)
     place = np.average(start[dented], axis=0, weights=size[dented] ** 2)
     return Dent(largest(size[dented]), place, float(dented.mean()))
 
