@@ -484,9 +484,21 @@ def test_who_looked_at_a_thin_wall_knows_it_better_than_the_mesh(chosen_by, thic
     placed = {"shell_thickness": Placement(0.1, chosen_by, "It looks thin.")}
     words = (replace(field.words[0], structure="shell", placements=placed),)
     particles = fill(scene, parts, replace(field, words=words))
+    said = "1 mm thick as a recorded answer says (its mesh draws 3.93 mm)"
+    shown = "3.93 mm thick as its mesh shows"
+    assert (said if chosen_by == "recording" else shown) in particles.fills[0]
     wall = min(cup.area / 2 * thickness, abs(cup.volume))
     assert particles.mass_real[0] == pytest.approx(7850 * wall, rel=0.01)
     assert particles.mass.sum() == pytest.approx(particles.mass_real[0], rel=1e-6)
+
+
+def test_a_thickness_that_a_person_states_outranks_the_mesh():
+    outline = [(0, 0), (0.05, 0), (0.05, 0.1), (0.046, 0.1), (0.046, 0.004), (0, 0.004)]
+    cup = put(trimesh.creation.revolve(np.array(outline), sections=64), 0.5)
+    scene, parts, field = inputs(thing((cup, STEEL, Structure("shell", 1e-3))))
+    words = (replace(field.words[0], values={"shell_thickness": 1e-3}),)
+    told = fill(scene, parts, replace(field, words=words)).fills[0]
+    assert "1 mm thick as your annotation says (its mesh draws 3.93 mm)" in told
 
 
 def test_what_a_soft_cup_holds_is_as_light_as_it_is():

@@ -16,6 +16,16 @@ SHEET_SHARE = 0.01
 """Thickness of an open sheet, of its middle extent, where nobody states it."""
 Said = tuple[Structure, Material, PartWords]
 """How one piece is built, of what, and in whose words."""
+DRAWN = "as its mesh shows"
+JUDGED = {
+    "annotation": "as your annotation says",
+    "recording": "as a recorded answer says",
+    "model": "as a model says",
+    "metadata": "as the file's own words say",
+}
+"""Who said how thick a wall is."""
+ALIKE = 0.05
+"""Relative difference of two thicknesses that needs no telling."""
 POROUS_CELLS = 6
 """A shell narrower than this many cells is filled through, with the shell's mass."""
 
@@ -62,6 +72,10 @@ class Make:
     """None: nothing but air behind the wall, or no wall."""
     pieces: tuple[str, ...] = ()
     """What shares its mesh, with the mass of each, in words."""
+    shown: float = 0.0
+    """Thickness that its mesh draws [m]; 0: it draws no wall with two faces."""
+    whose: str = ""
+    """Where its wall's thickness comes from, in a clause."""
 
     @property
     def mass(self) -> float:
@@ -188,12 +202,11 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
     guess = SHEET_SHARE * (member.size[1] or member.size[2])
     only_sheet = member.volume == 0
     sheet = (words.thickness or stated or guess) if member.sheet_area or only_sheet else 0.0
-    thickness, walled = 0.0, structure.kind != "solid"
+    thickness, whose, walled = 0.0, "", structure.kind != "solid"
     if walled:
-        judged = structure.thickness if is_judged(words) else None
-        thickness = words.thickness or judged or shown or stated or guess
+        thickness, whose = wall_of(structure, words, shown, stated or 0.0, guess)
     elif wall:
-        thickness = shown
+        thickness, whose = shown, DRAWN
     face = member.body_area * (0.5 if wall else 1.0) * words.surface_share
     volume = member.volume * words.volume_share if not only_sheet else face * sheet
     sheets = member.sheet_area * words.surface_share
@@ -216,13 +229,40 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
         area=face + sheets,
         volume=volume + sheets * sheet,
         density=material.density,
+        shown=shown,
+        whose=whose,
     )
 
 
-def is_judged(words: PartWords) -> bool:
-    """Whether somebody who looked at the thing said how thick such a wall is."""
+def wall_of(
+    structure: Structure, words: PartWords, shown: float, usual: float, guess: float
+) -> tuple[float, str]:
+    """Return a wall's thickness [m], and who said it: the first that knows.
+
+    Args:
+        structure: How it is built.
+        words: What was said of it.
+        shown: What its mesh draws [m]; 0: nothing.
+        usual: Of such walls [m]; 0: not known.
+        guess: What is taken where nobody knows [m].
+
+    """
+    if words.thickness:
+        return words.thickness, JUDGED.get(words.built_by, "as is stated")
+    by = judge(words)
+    if by and structure.thickness:
+        return structure.thickness, JUDGED[by]
+    if shown:
+        return shown, DRAWN
+    return (usual, "as such walls usually are") if usual else (guess, "as is guessed from its size")
+
+
+def judge(words: PartWords) -> str:
+    """Tell who said how thick such a wall is, having looked at the thing; "" for nobody."""
+    if "shell_thickness" in words.values:
+        return "annotation"
     placed = words.placements.get("shell_thickness")
-    return placed is not None and placed.chosen_by != "fallback"
+    return placed.chosen_by if placed is not None and placed.chosen_by in JUDGED else ""
 
 
 def recipe(member: Member, made: Make, treatment: Treatment, cell: float) -> Recipe:
@@ -261,19 +301,28 @@ def how_held(made: Make) -> str:
     )
 
 
+def how_walled(made: Make) -> str:
+    """Say in words how thick the wall is, who said so, and whether the mesh draws another."""
+    if not made.thickness:
+        return f"a wall {made.sheet * 1e3:.3g} mm thick"
+    wall = f"a wall {made.thickness * 1e3:.3g} mm thick {made.whose}"
+    if made.shown and abs(made.shown / made.thickness - 1) > ALIKE:
+        return f"{wall} (its mesh draws {made.shown * 1e3:.3g} mm)"
+    return wall
+
+
 def how_filled(member: Member, made: Make, treatment: Treatment, cell: float) -> str:
     """Say in words what the fill is."""
     if treatment.kind == "foliage":
         return "leaves on springs"
     if made.held:
-        return f"a wall {(made.thickness or made.sheet) * 1e3:.3g} mm thick{how_held(made)}"
+        return f"{how_walled(made)}{how_held(made)}"
     if member.volume == 0:
         return f"an open sheet, taken as {made.sheet * 1e3:.3g} mm thick"
     open_too = f", with open sheets {made.sheet * 1e3:.3g} mm thick" if member.sheet_area else ""
     if made.thickness == 0:
         return f"solid, {member.volume * 1e6:.4g} cm³ by winding number{open_too}"
-    shown = " as its mesh shows" if made.modelled else ""
-    wall = f"a wall {made.thickness * 1e3:.3g} mm thick{shown}"
+    wall = how_walled(made)
     if not made.modelled and is_porous(member, cell):
         return f"{wall}, filled through because it is narrow, with the wall's mass{open_too}"
     if treatment.kind == "shell" and treatment.thickness and treatment.thickness > made.thickness:
