@@ -74,7 +74,11 @@ def test_what_the_questions_took_is_told_and_an_unknown_price_is_said_to_be_unkn
         "about $0.069 at the list prices of 2026-11-21."
     )
     assert "price not known" in asked(took | {"dollars": None})
-    assert "nothing was paid" in asked(took | {"calls": 0})
+    by_hand = took | {"calls": 0, "models": ["by hand, from the sheets"]}
+    assert asked(by_hand) == (
+        "<br>9 questions answered from the disk, by recorded answers (by hand, from the sheets): "
+        "no cost."
+    )
     assert asked({}) == ""
 
 
@@ -114,3 +118,15 @@ def test_every_piece_of_a_mesh_has_its_values_with_range_source_and_reason(page)
     assert told.count("<td>density ρ</td>") == 2
     sources = {r.source for m in ("steel", "ABS") for r in materials.find(m).ranges.values()}
     assert sources <= set(re.findall("<dt>([^<]*)</dt>", told))
+
+
+def test_who_looked_at_the_pictures_is_named(page):
+    words = PartWords("", "ABS", "solid", answered_by="recording")
+    took = {"models": ["by hand, from the sheets"], "questions": 4, "calls": 0}
+    told = page(words, questions=took)
+    assert "from pictures by recorded answers (by hand, from the sheets)." in told
+    assert "vision-language" not in told
+    took = {"models": ["openai:x"], "questions": 4, "calls": 4, "input_tokens": 1, "seconds": 1.0}
+    took |= {"output_tokens": 1, "dollars": None}
+    seen = replace(words, answered_by="model")
+    assert "from pictures by openai:x." in page(seen, questions=took)

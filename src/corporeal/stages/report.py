@@ -138,8 +138,13 @@ def _summary(story: Story) -> str:
 
 def _looked(questions: Mapping[str, Any]) -> str:
     """Say who chose the materials from pictures."""
-    models = ", ".join(questions.get("models", ())) or "a model"
-    return f"Materials were chosen from pictures: {_safe(models)}."
+    return f"Materials were chosen from pictures by {_safe(_answerers(questions))}."
+
+
+def _answerers(questions: Mapping[str, Any]) -> str:
+    """Name who answered: a model, or who gave the answers that were recorded."""
+    models = ", ".join(questions.get("models", ())) or "not said by whom"
+    return models if questions.get("calls") else f"recorded answers ({models})"
 
 
 def _forced(thing: SceneObject) -> str:
@@ -340,7 +345,8 @@ def asked(questions: Mapping[str, Any]) -> str:
     if not questions:
         return ""
     if not questions["calls"]:
-        return f"<br>{questions['questions']} questions answered from the disk: nothing was paid."
+        who = _safe(_answerers(questions))
+        return f"<br>{questions['questions']} questions answered from the disk, by {who}: no cost."
     cost = questions["dollars"]
     paid = (
         "price not known"
@@ -348,7 +354,7 @@ def asked(questions: Mapping[str, Any]) -> str:
         else f"about ${cost:.3f} at the list prices of {questions['prices_of']}"
     )
     return (
-        f"<br>{questions['questions']} questions to {_safe(', '.join(questions['models']))}: "
+        f"<br>{questions['questions']} questions to {_safe(_answerers(questions))}: "
         f"{questions['calls']} calls, {questions['input_tokens']:,} tokens in, "
         f"{questions['output_tokens']:,} out, {questions['seconds']:.0f} s of waiting, {paid}."
     )
