@@ -108,7 +108,7 @@ def dent(
     together = size <= THROWN * np.median(size[around], axis=1)
     if not (size[together] > threshold).any():
         return Dent(largest(size[together]), np.full(3, np.nan), 0.0)
-    smooth = shift[around[:, :8]].mean(axis=1)
+    smooth = np.median(shift[around[:, :8]], axis=1)
     way = smooth[np.argmax(np.linalg.norm(smooth, axis=1))]
     along = shift @ way / np.linalg.norm(way)
     dented = together & (size > threshold) & (along > 0.5 * size)
