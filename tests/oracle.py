@@ -103,5 +103,3 @@ class Oracle:
     def tasks(self):
         """What was asked, in order."""
         return [q.task for q in self.asked]
-
-
