@@ -3,26 +3,21 @@
 import os
 import sys
 import traceback
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from inspect import cleandoc
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
-from rich.console import Console
-from rich.markup import escape
-from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, TimeRemainingColumn
-from rich.table import Table
 
 from corporeal import __version__
 from corporeal.errors import UserError
+from corporeal.terminal import console, show_table, told
 
 Inputs = Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE ...")]
 Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
 MATERIAL_WORDS = ("corporeal materials show NAME", "corporeal materials check FILE")
-console = Console(stderr=True)
 
 
 @dataclass(frozen=True)
@@ -92,10 +87,11 @@ def verb_status() -> None:
     class Status:
         run: Folder
 
-    table = Table("verb", "state", "seconds", box=None)
-    for verb, state, seconds in status(_parse(Status, "status", verb_status.__doc__).run):
-        table.add_row(verb, state, "" if seconds is None else f"{seconds:.1f}")
-    Console().print(table)
+    rows = status(_parse(Status, "status", verb_status.__doc__).run)
+    show_table(
+        ("verb", "state", "seconds"),
+        [(verb, state, "" if took is None else f"{took:.1f}") for verb, state, took in rows],
+    )
 
 
 def verb_materials() -> None:
@@ -159,12 +155,12 @@ def verb_evaluate() -> None:
         _judge_materials(asked)
         return
     things = truth.objects(asked.folder, asked.truth, asked.split)
-    with _told() as tell:
+    with told() as tell:
         done = tell("evaluate")
         found = mass.predict_all(things, asked.describe, asked.ground, asked.how, done)
     result = mass.compare(found)
     for title, heads, rows in report.tables(result):
-        _show(heads, rows, title)
+        show_table(heads, rows, title)
     if asked.json is not None:
         store.write_json(asked.json, result)
     if asked.figure is not None:
@@ -179,11 +175,11 @@ def _judge_materials(asked: Any) -> None:
         raise UserError(f"Nothing to judge by. Say --truth TOML. {recognition.EXAMPLE}")
     library = asked.ground.library
     truth = recognition.read_truth(asked.truth, library)
-    with _told() as tell:
+    with told() as tell:
         rows = recognition.judge(asked.folder, truth, asked.describe, library, tell("evaluate"))
     for title, heads, cells in recognition.tables(rows):
         if cells:
-            _show(heads, cells, title)
+            show_table(heads, cells, title)
     if asked.json is not None:
         store.write_json(asked.json, recognition.record(rows))
 
@@ -193,11 +189,10 @@ def verb_doctor() -> None:
     from corporeal.doctor import examine
 
     _parse(dataclass(frozen=True)(type("Doctor", (), {})), "doctor", verb_doctor.__doc__)
-    table = Table("", "", "found", "advice", box=None)
-    for finding in examine():
-        mark = "[green]✓[/]" if finding.works else "[yellow]–[/]"
-        table.add_row(mark, finding.what, finding.found, finding.advice)
-    Console().print(table)
+    show_table(
+        ("", "", "found", "advice"),
+        [("✓" if f.works else "–", f.what, f.found, f.advice) for f in examine()],
+    )
 
 
 def _again(verb: str) -> Callable[[], None]:
@@ -266,20 +261,12 @@ def _spread(asked: Any) -> None:
     from corporeal.evaluation import spread_report
     from corporeal.evaluation.ensemble import ensemble
 
-    with _told() as tell:
+    with told() as tell:
         result = ensemble(asked.run, asked.samples, asked.seed, asked.config, tell)
-    _show(spread_report.HEADS, spread_report.rows(result))
+    show_table(spread_report.HEADS, spread_report.rows(result))
     spread_report.spread_figure(result, asked.run / "ensemble.png")
     written = (asked.run / name for name in ("ensemble.json", "ensemble.png"))
     print(*spread_report.failures(result), *written, sep="\n")
-
-
-def _show(heads: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None) -> None:
-    """Print a table whose words are taken as they are."""
-    table = Table(*map(escape, heads), title=title and escape(title), box=None)
-    for row in rows:
-        table.add_row(*map(escape, row))
-    Console().print(table)
 
 
 def _names_a_run() -> bool:
@@ -323,42 +310,13 @@ def _go(
 
     if not where.resume:
         forget_simulation(folder)
-    with _told() as tell:
+    with told() as tell:
         run(inputs, folder, settings, tell, until)
     if until == "report":
         print(folder / "report.html")
         print(folder / "film.mp4")
     else:
         print(f"{until} done. Go on with: corporeal report {folder}")
-
-
-@contextmanager
-def _told() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
-    """Draw one bar per verb, with the time left; in a log, one line per verb."""
-    columns = (
-        TextColumn("[bold]{task.fields[verb]:>9}"),
-        BarColumn(30),
-        TaskProgressColumn(),
-        TimeRemainingColumn(),
-        TextColumn("[dim]{task.description}"),
-    )
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
-
-        def tell(verb: str) -> Callable[[float, str], None]:
-            for task in bars.task_ids:
-                bars.update(task, completed=1.0, description="")
-            task = bars.add_task("", total=1.0, verb=verb)
-            if not console.is_terminal:
-                console.print(verb)
-
-            def progress(fraction: float, words: str) -> None:
-                bars.update(task, completed=fraction, description=words)
-
-            return progress
-
-        yield tell
-        for task in bars.task_ids:
-            bars.update(task, completed=1.0, description="")
 
 
 def _usage() -> str:

@@ -15,7 +15,7 @@ FLOORS = [
     {"stages"},
     {"pipeline"},
     {"evaluation"},
-    {"doctor"},
+    {"doctor", "terminal"},
     {"cli"},
 ]
 FLOOR = {room: floor for floor, rooms in enumerate(FLOORS) for room in rooms}
