@@ -287,6 +287,36 @@ def test_what_a_person_has_stated_is_not_asked_for_again(ask, tmp_path):
     assert (vase.answered_by, vase.placements["young"].fraction) == ("annotation", 0.25)
 
 
+def test_a_model_that_contradicts_what_the_file_states_is_believed_and_told_once(ask):
+    thin = everywhere(0.0)  # soft_PVC's walls: 0.4 mm; the file states 2 mm
+    oracle = Oracle(
+        materials=made_of(part("body", "soft_PVC", "shell"), part("beak", "ABS", "solid")),
+        placement=thin,
+    )
+    inventory = ask(oracle, DUCK)
+    assert words(inventory)[("duck_0", "beak")].material == "ABS"
+    assert inventory.warnings == (
+        "duck_0: the file states a wall 2 mm thick for body, the model said a wall 0.4 mm thick; "
+        "the file states soft_PVC, a wall 2 mm thick for beak, the model said ABS, solid. "
+        "The latter was believed; --annotations decides.",
+    )
+    block = ("block_0", [("block", plain(), {"substance": "wood", "shell_thickness_m": 0.0})])
+    oracle = Oracle(parts=whole("block"), materials=made_of(part("block", "wood", "shell")))
+    (warning,) = ask(oracle, block).warnings
+    assert warning.startswith("block_0: the file states solid for block, the model said shell.")
+    oracle = Oracle(parts=whole("block"), materials=made_of(part("block", "wood", "solid")))
+    assert ask(oracle, block).warnings == ()
+
+
+def test_where_a_person_or_the_file_is_believed_nothing_is_contradicted(ask, tmp_path):
+    (tmp_path / "said.yaml").write_text("duck_0: { material: ABS, structure: solid }\n")
+    model = made_of(part("body", "steel"), part("beak", "steel"))
+    told = ask(Oracle(materials=model), DUCK, annotations=tmp_path / "said.yaml")
+    assert told.warnings == ()
+    unknown = made_of(part("body", None, "shell"), part("beak", None, "shell"))
+    assert ask(Oracle(materials=unknown), DUCK).warnings == ()
+
+
 def test_what_is_filled_has_contents_whose_density_is_placed_too(ask):
     can = part("can", "aluminium_can_sheet", "filled", contents="water", fill=0.95)
     inventory = ask(Oracle(materials=made_of(can)), ("can_0", [("mesh", plain(), {})]))

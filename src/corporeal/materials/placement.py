@@ -88,6 +88,14 @@ def usual(offered: Mapping[str, Choice], why: str) -> dict[str, Placement]:
     }
 
 
+def wall_put(words: PartWords, library_name: str = "default") -> float | None:
+    """How thick a part's wall was put inside the measured range [m]; None: nobody placed it."""
+    placed = words.placements.get("shell_thickness")
+    if words.material is None or placed is None or placed.chosen_by == "fallback":
+        return None
+    return place(entry_of(words.material, library_name).ranges["shell_thickness"], placed.fraction)
+
+
 def odd(
     words: PartWords, placements: Mapping[str, Placement], library_name: str = "default"
 ) -> dict[str, str]:

@@ -20,6 +20,7 @@ from corporeal.materials.placement import (
     odd,
     spelling,
     usual,
+    wall_put,
 )
 from corporeal.render.portrait import DIRECTIONS, Portrait, colour_of_part, portraits
 from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
@@ -39,8 +40,10 @@ from corporeal.vlm.metadata import (
 from corporeal.vlm.together import together
 from corporeal.vlm.words import (
     Asked,
+    against,
     gathered,
     leaves,
+    length,
     part_words,
     placed,
     settled,
@@ -188,9 +191,23 @@ class _Asking:
         *objects, extents = all_answered(results, self.config.vlm)
         interviews.append(sizes)
         rows = tuple(row for interview in interviews for row in interview.transcript)
-        objects, doubts = with_extents(self.scene.objects, objects, extents)
         warnings = [w for interview in interviews for w in interview.warnings]
+        warnings += filter(None, map(self._contradicted, range(count), objects))
+        objects, doubts = with_extents(self.scene.objects, objects, extents)
         return Inventory(tuple(objects), rows, usage(rows), (*warnings, *doubts))
+
+    def _contradicted(self, number: int, words: ObjectWords) -> str:
+        """Say where a model was believed before what the file states of an object outright."""
+        said, clauses = {w.name: w for w in words.parts}, []
+        for k, entry in enumerate(self.identity.catalogue):
+            if entry.object == number:
+                own = [self.scene.surfaces[s] for s in self.identity.surfaces(k)]
+                made = _stated(own, self.library)
+                name = made and entry_of(str(made.material), self.library).name
+                put = wall_put(said[entry.name], self.library)
+                clauses.append(against(said[entry.name], name, stated_thickness(own), put))
+        told = "; ".join(filter(None, clauses))
+        return f"{words.name}: {told}. The latter was believed; --annotations decides." * bool(told)
 
     def _about(self, subject: Subject) -> Interview:
         return Interview(self.model, self.critic, self.prompts, subject)
@@ -213,7 +230,7 @@ class _Asking:
                 scene=f"{self.scene.name}/{thing.name}",
                 name=thing.name,
                 class_name=thing.class_name,
-                extent=_length(thing.real_extent),
+                extent=length(thing.real_extent),
                 views=portrait.words,
                 count=self.config.views + (len(parts) > 1),
                 pictures=portraits(self.scene, own, portrait) if self.model.looks else (),
@@ -281,10 +298,6 @@ class _Asking:
         else:
             places = _places(*asked, offered)
         return [placed(w, places) for w in words]
-
-
-def _length(metres: float) -> str:
-    return f"{metres:.3g} m" if 1 <= metres < 1000 else f"{100 * metres:.3g} cm"
 
 
 Placed = FractionAnswer | ValueAnswer

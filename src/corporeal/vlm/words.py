@@ -9,6 +9,10 @@ from corporeal.vlm.answers import MaterialsAnswer, PartAnswer, Vocabulary
 from corporeal.vlm.prices import date, dollars
 
 Asked = Literal["model", "recording"]
+LOOKED = {"model": "the model", "recording": "a recorded answer"}
+"""Who looks at pictures."""
+ALIKE = 1.25
+"""By what factor a wall's thickness may differ from the stated one before anybody is told."""
 FAR = 2.5
 """By what factor a size may differ from the usual one before anybody is told."""
 
@@ -90,6 +94,30 @@ def settled(said: PartWords, file: PartWords, walled: Callable[[str], bool]) -> 
     )
 
 
+def against(words: PartWords, material: str | None, wall: float | None, put: float | None) -> str:
+    """Say in a clause where a model contradicts what the file states; "" where it does not.
+
+    Args:
+        words: What is believed of a part.
+        material: What the file states it is made of.
+        wall: How thick the file states its wall is [m]; 0: stated solid; None: not said.
+        put: How thick the model put its wall [m].
+
+    """
+    stated, said = [], []
+    if material not in (None, words.material) and words.answered_by in LOOKED:
+        stated, said = [str(material)], [str(words.material)]
+    other = words.structure == "solid" if wall else words.structure != "solid"
+    apart = bool(wall and put and not 1 / ALIKE <= put / wall <= ALIKE)
+    if wall is not None and words.built_by in LOOKED and (other or apart):
+        stated.append(f"a wall {wall * 1e3:.3g} mm thick" if wall else "solid")
+        said.append(f"a wall {put * 1e3:.3g} mm thick" if apart and put else str(words.structure))
+    if not stated:
+        return ""
+    who = LOOKED[words.answered_by if words.answered_by in LOOKED else words.built_by]
+    return f"the file states {', '.join(stated)} for {words.name}, {who} said {', '.join(said)}"
+
+
 def placed(words: PartWords, placements: Mapping[str, Mapping[str, Placement]]) -> PartWords:
     """Give a part, and each of its pieces, the places that were chosen under its name."""
     own = dict(placements.get(words.name, {}))
@@ -103,6 +131,11 @@ def placed(words: PartWords, placements: Mapping[str, Mapping[str, Placement]]) 
 def leaves(words: Sequence[PartWords]) -> list[PartWords]:
     """Parts, or their pieces where they have some."""
     return [leaf for part in words for leaf in (part.pieces or (part,))]
+
+
+def length(metres: float) -> str:
+    """Write a length as a person would."""
+    return f"{metres:.3g} m" if 1 <= metres < 1000 else f"{100 * metres:.3g} cm"
 
 
 def with_extents(
