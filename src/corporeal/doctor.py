@@ -46,10 +46,8 @@ def _machine() -> list[Finding]:
 
 def _engines() -> list[Finding]:
     try:
-        import warp as wp
+        from corporeal.mpm.kernels import wp  # started without its word about cards on stderr
 
-        wp.config.log_level = wp.LOG_ERROR
-        wp.init()
         cards = [_card(device) for device in wp.get_cuda_devices()]
     except Exception as error:  # whatever is broken in a native library belongs in the table
         return [Finding("warp engine", False, str(error), "Reinstall: pip install warp-lang.")]
