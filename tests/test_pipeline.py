@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -7,6 +8,8 @@ from corporeal.errors import UserError
 from corporeal.pipeline import Settings, reopen, run
 from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.fill import FillConfig
+from corporeal.types import Inventory, ObjectWords
+from handmade import plain, scene
 
 
 def silent(verb):
@@ -53,3 +56,16 @@ def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do
 
 def test_memory_is_counted_in_megabytes():
     assert 10 < pipeline.peak_memory_mb() < 100_000
+
+
+def test_a_size_that_a_model_has_judged_is_doubted_once():
+    objects = [(name, [("mesh", plain(), {})]) for name in ("vase_0", "vase_01", "hut_0")]
+    table = [f"{name} is 9 m large. Set its size with --extent {name}=0.3." for name, _ in objects]
+    made = replace(scene(*objects), warnings=("vase_0 and hut_0 overlap at the start.", *table))
+    words = [ObjectWords(name, "", (), usual_extent=None) for name, _ in objects]
+    assert pipeline.still_doubted(made, Inventory(tuple(words))) == made.warnings
+    words[0] = replace(words[0], usual_extent=0.25)
+    assert pipeline.still_doubted(made, Inventory(tuple(words))) == (
+        "vase_0 and hut_0 overlap at the start.",
+        *table[1:],
+    )

@@ -32,7 +32,7 @@ from corporeal.stages.ground import GroundConfig, doubts, ground
 from corporeal.stages.report import Story, report
 from corporeal.stages.segment import SegmentConfig, segment
 from corporeal.stages.simulate import SimulateConfig, simulate
-from corporeal.types import Film, MaterialField, Particles, Parts, Scene, Trajectory
+from corporeal.types import Film, Inventory, MaterialField, Particles, Parts, Scene, Trajectory
 
 Progress = Callable[[float, str], None]
 """Told the fraction done and what is being done."""
@@ -338,7 +338,7 @@ class _Run:
             "settings": _spoken(self.settings),
             "questions": inventory.usage,
         }
-        said = (scene.warnings, inventory.warnings, doubts(made, parts, scene))
+        said = (still_doubted(scene, inventory), inventory.warnings, doubts(made, parts, scene))
         said = (*said, particles.warnings, audit["warnings"])
         audit["warnings"] = list(dict.fromkeys(w for group in said for w in group))
         shutil.copyfile(movie.path, self.folder / "film.mp4")
@@ -359,6 +359,12 @@ class _Run:
             expectations=tuple((e.sentence, e.value, e.target, e.met) for e in seen),
         )
         report(story, self.folder / "report.html")
+
+
+def still_doubted(scene: Scene, inventory: Inventory) -> tuple[str, ...]:
+    """Return a scene's warnings, less doubts about sizes that a model has judged since."""
+    judged = [f"--extent {o.name}=" for o in inventory.objects if o.usual_extent]
+    return tuple(w for w in scene.warnings if not any(words in w for words in judged))
 
 
 def peak_memory_mb() -> float:

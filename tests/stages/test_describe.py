@@ -384,7 +384,12 @@ def test_values_that_do_not_fit_each_other_are_asked_for_once_more(ask):
 def test_a_size_far_from_what_the_model_knows_is_told(ask):
     inventory = ask(Oracle(materials=made_of(part("vase", "glass")), extents=sizes(0.3)), VASE)
     assert inventory.objects[0].usual_extent == 0.3
-    assert "--extent vase_0=0.3" in inventory.warnings[0]
+    assert inventory.warnings == (
+        "vase_0 is 1 m large, but the model says that a thing like that (vase) is usually about "
+        "30 cm. Set its size with --extent vase_0=0.3.",
+    )
+    tower = ask(Oracle(materials=made_of(part("vase", "glass")), extents=sizes(112.4)), VASE)
+    assert "usually about 112 m. Set its size with --extent vase_0=112." in tower.warnings[0]
     close = ask(Oracle(materials=made_of(part("vase", "glass")), extents=sizes(0.5)), VASE)
     assert close.warnings == ()
 

@@ -135,7 +135,9 @@ def leaves(words: Sequence[PartWords]) -> list[PartWords]:
 
 def length(metres: float) -> str:
     """Write a length as a person would."""
-    return f"{metres:.3g} m" if 1 <= metres < 1000 else f"{100 * metres:.3g} cm"
+    if metres >= 1000:
+        return f"{metres:.0f} m"
+    return f"{metres:.3g} m" if metres >= 1 else f"{100 * metres:.3g} cm"
 
 
 def with_extents(
@@ -149,9 +151,9 @@ def with_extents(
         sized.append(replace(words, usual_extent=usually))
         if usually and not 1 / FAR <= size / usually <= FAR:
             doubts.append(
-                f"{thing.name} is {size:.2g} m large, but the model says that a thing like that "
-                f"({kind}) is usually about {usually:.2g} m. Set its size with --extent "
-                f"{thing.name}={usually:.2g}."
+                f"{thing.name} is {length(size)} large, but the model says that a thing like that "
+                f"({kind}) is usually about {length(usually)}. Set its size with --extent "
+                f"{thing.name}={float(f'{usually:.3g}'):g}."
             )
     return sized, doubts
 
