@@ -455,6 +455,8 @@ class Particles:
     """Of plants that stand in soil."""
     fills: tuple[str, ...] = ()
     """How each part was filled, in words, for the report."""
+    walls: tuple[tuple[float, float], ...] = ()
+    """Thickness of each part's wall and of its open sheets, as weighed [m]; 0: it has none."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about resolution and treatments, in sentences."""
 

@@ -130,3 +130,18 @@ def test_who_looked_at_the_pictures_is_named(page):
     took |= {"output_tokens": 1, "dollars": None}
     seen = replace(words, answered_by="model")
     assert "from pictures by openai:x." in page(seen, questions=took)
+
+
+def test_a_wall_thickness_stands_only_where_a_wall_has_it(page):
+    assert "wall thickness" not in page(PartWords("", "steel", "solid"))
+    assert "<td>wall thickness</td><td>700 µm</td>" in page(PartWords("", "steel", "shell"))
+    assert "<td>wall thickness" not in page(PartWords("", "steel", "shell", 0.002))
+
+
+def test_margin_is_explained_and_an_estimate_is_no_measurement(page):
+    told = page(PartWords("", "steel", "shell"))
+    assert "Margin: how sure the material is, from 0 (a guess) to 1 (stated outright)." in told
+    (wall,) = re.findall("<tr><td>wall thickness.*?</tr>", told)
+    assert "the usual value in the estimated range" in wall
+    (density,) = re.findall("<tr><td>density.*?</tr>", told)
+    assert "the usual value in the measured range" in density

@@ -15,7 +15,7 @@ from corporeal.materials.library import (
 from corporeal.materials.lint import Problem
 from corporeal.materials.page import markdown
 from corporeal.materials.quantities import QUANTITIES, Quantity, si
-from corporeal.materials.shipped import citation, sources
+from corporeal.materials.shipped import citation, estimated, sources
 from corporeal.materials.tables import materials_json, menu, show
 
 __all__ = [
@@ -29,6 +29,7 @@ __all__ = [
     "combine",
     "contents",
     "counterpart",
+    "estimated",
     "find",
     "friction_between",
     "library",

@@ -30,6 +30,11 @@ def citation(key: str) -> str:
     return " / ".join(known[k]["cite"] for k in keys) if set(keys) <= set(known) else key
 
 
+def estimated(key: str) -> bool:
+    """Tell whether a source, or one of two, is our own estimate and nobody's measurement."""
+    return any(source_table().get(k, {}).get("check") == "ours" for k in key.split("+"))
+
+
 def sources() -> dict[str, str]:
     """Every source key that a value of the shipped libraries carries, with what it stands for."""
     ranges = [r for name in SHIPPED for e in shipped(name).values() for r in e.ranges.values()]

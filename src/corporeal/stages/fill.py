@@ -306,6 +306,7 @@ def gather(
         particle_of_face=np.concatenate([np.zeros(0, np.int64), *columns["bearer"]]),
         mass_real=tuple(makes[k].mass for k in range(len(parts.catalogue))),
         fills=describe(parts, anatomies, makes, chosen, part),
+        walls=tuple((makes[k].thickness, makes[k].sheet) for k in range(len(parts.catalogue))),
         warnings=chosen.warnings,
     )
 

@@ -147,7 +147,7 @@ def _material(entry: Entry, words: PartWords) -> Material:
 
 def _placed(entry: Entry, words: PartWords) -> dict[str, Ground]:
     """Take every value where it was placed in its range, and where nobody placed it, the usual."""
-    grounds = {f: replace(g, margin=words.margin) for f, g in entry.typical().items()}
+    grounds = _usual(entry, words)
     if words.material is None:
         reason = NEUTRAL.format(name=entry.name)
         return {f: Ground(g.value, g.range, "fallback", reason) for f, g in grounds.items()}
@@ -157,6 +157,17 @@ def _placed(entry: Entry, words: PartWords) -> dict[str, Ground]:
             value = place(r, chosen.fraction)
             grounds[field] = Ground(value, r, chosen.chosen_by, chosen.reason, words.margin)
     return grounds
+
+
+def _usual(entry: Entry, words: PartWords) -> dict[str, Ground]:
+    """Take every usual value, and say where its range is an estimate."""
+    grounds = {f: replace(g, margin=words.margin) for f, g in entry.typical().items()}
+    return {
+        f: replace(g, reason=g.reason.replace("measured", "estimated"))
+        if materials.estimated(g.range.source)
+        else g
+        for f, g in grounds.items()
+    }
 
 
 def _piece(words: PartWords, config: GroundConfig) -> Piece:
@@ -190,7 +201,7 @@ def _structure(material: Material, words: PartWords, config: GroundConfig) -> St
 
 
 def _inner_grounds(inside: Entry, words: PartWords) -> dict[str, Ground]:
-    grounds = {f: replace(g, margin=words.margin) for f, g in inside.typical().items()}
+    grounds = _usual(inside, words)
     chosen = words.placements.get(CONTENTS)
     if chosen is not None:
         r = inside.ranges["density"]

@@ -230,7 +230,8 @@ def _grounds(story: Story, k: int) -> str:
     part, field = story.parts.catalogue[k], story.field
     material, words, structure = field.materials[k], field.words[k], field.structures[k]
     pieces = field.pieces[k] if field.pieces else ()
-    tables = "".join(_piece_grounds(p) for p in pieces) or _values(material, structure)
+    own = _values(material, structure, _walled(story.particles, k, material))
+    tables = "".join(_piece_grounds(p) for p in pieces) or own
     fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
     return (
         f"<details><summary><b>{_safe(part.name)}</b> of "
@@ -249,20 +250,29 @@ def _piece_grounds(piece: Piece) -> str:
         f"{words.volume_share:.0%} of the volume, {words.surface_share:.0%} of the surface. "
         f"{_safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
         f"{others(words)} {_safe(piece.structure.reason)}</p>"
-        f"{_values(piece.material, piece.structure)}"
+        f"{_values(piece.material, piece.structure, piece.structure.kind != 'solid')}"
     )
 
 
-def _values(material: Material, structure: Structure) -> str:
-    """Lay out every value with its range, who chose it, why, and where the range was read."""
+def _walled(particles: Particles, k: int, material: Material) -> bool:
+    """Whether a wall or a sheet of a part is as thick as its material says."""
+    made = particles.walls[k] if particles.walls else ()
+    usual = material.shell_thickness or 0.0
+    return any(t > 0 and math.isclose(t, usual, rel_tol=1e-6) for t in made)
+
+
+def _values(material: Material, structure: Structure, walled: bool) -> str:
+    """Lay out every value that is used with its range, who chose it, why, and its source."""
     rows = "".join(
-        _ground_row(name, ground) for name, ground in material.grounds.items() if name in UNITS
+        _ground_row(name, ground)
+        for name, ground in material.grounds.items()
+        if name in UNITS and (walled or name != "shell_thickness")
     )
     inner = structure.contents
     if inner is not None and "density" in inner.grounds:
         rows += _ground_row("density", inner.grounds["density"], f" of the {inner.name} in it")
     return (
-        "<table><tr><th>quantity</th><th>value</th><th>place in the measured range</th>"
+        "<table><tr><th>quantity</th><th>value</th><th>place in the range</th>"
         f"<th>chosen by</th><th>why</th><th>source</th></tr>{rows}</table>"
     )
 
