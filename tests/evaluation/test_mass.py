@@ -199,6 +199,16 @@ def test_the_comparison_has_every_method_and_every_group(weighed, tmp_path):
         mass_figure(unweighed["rows"], tmp_path / "none.png")
 
 
+def test_questions_about_all_objects_that_wait_are_counted(weighed, tmp_path):
+    things, _ = weighed
+    asking = DescribeConfig(vlm=f"ask:{tmp_path}", view_size=16)
+    with pytest.raises(UserError) as waits:
+        predict_all(things[:3], asking, GroundConfig(), FEW)
+    pages = list((tmp_path / "questions").glob("*.md"))
+    assert len(pages) >= 3
+    assert str(waits.value).startswith(f"{len(pages)} questions wait in ")
+
+
 def test_the_same_seed_draws_the_same_interval(weighed):
     things, found = weighed
     again = predict_all(things[:1], DescribeConfig(), GroundConfig(), FEW)[0]

@@ -32,6 +32,7 @@ from corporeal.stages.ground import GroundConfig, ground
 from corporeal.stages.segment import segment
 from corporeal.types import Inventory, MaterialField, Parts, PartWords, Scene
 from corporeal.vlm import LIVE, Question, connect
+from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.together import together
 
 LOW, HIGH = 0.05, 0.95
@@ -109,7 +110,8 @@ def predict_all(
     """Predict every object's mass; a model that answers over a network is asked in parallel.
 
     Raises:
-        UserError: What the first object that failed says.
+        UserError: What the first object that failed says, or how many questions about all of them
+            wait for a person's answers.
 
     """
     live = describing.vlm.partition(":")[0] in LIVE
@@ -119,7 +121,9 @@ def predict_all(
         describing.parallel if live else 1,
         lambda done: progress(done / len(jobs), f"{done} of {len(jobs)} objects"),
     )
-    failed = [r for r in results if isinstance(r, Exception)]
+    failed = [r for r in results if isinstance(r, Exception) and is_more(r)]
+    if not failed:
+        all_answered(results, describing.vlm)
     if failed and isinstance(failed[0], UserError) and len(failed) > 1:
         raise UserError(f"{len(failed)} of {len(jobs)} objects could not be judged. {failed[0]}")
     for error in failed:

@@ -33,7 +33,12 @@ Give the answer as JSON of this shape, and nothing else:
 
 
 class WaitingError(UserError):
-    """A question waits for somebody to answer it."""
+    """Questions wait for somebody to answer them."""
+
+    def __init__(self, message: str, count: int = 1) -> None:
+        super().__init__(message)
+        self.count = count
+        """How many of them."""
 
 
 class ByHand:
@@ -82,20 +87,21 @@ def all_answered(results: list, spec: str) -> list:
     """Return the results, if no question waits.
 
     Args:
-        results: Of independent questions; ``WaitingError`` where one waits.
+        results: Of independent jobs; ``WaitingError`` where questions wait.
         spec: Who was asked: "ask:FOLDER".
 
     Raises:
-        UserError: Questions wait: the message says how many, where, and what to do.
+        WaitingError: Questions wait: the message says how many, where, and what to do.
 
     """
-    waiting = sum(isinstance(r, WaitingError) for r in results)
+    waiting = sum(r.count for r in results if isinstance(r, WaitingError))
     if waiting:
         count = f"{waiting} question{'s wait' if waiting > 1 else ' waits'}"
-        raise UserError(
+        raise WaitingError(
             f"{count} in {Path(spec.partition(':')[2]) / PAGES}. Each is a .md file, most with a "
             "picture (.png): put the answer into the .json file of the same name, then type the "
-            "same command again."
+            "same command again.",
+            waiting,
         )
     return results
 
