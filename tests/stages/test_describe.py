@@ -10,6 +10,7 @@ from corporeal import materials
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.formats.glb import read_glb
 from corporeal.geometry.identity import identify
+from corporeal.render.portrait import portraits
 from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.ground import ground
 from corporeal.stages.segment import segment
@@ -444,7 +445,7 @@ def test_a_recording_outlives_a_longer_library_and_not_a_word_that_is_gone(
         describe(scene(VASE), replayed, library="reference")
 
 
-def test_questions_wait_for_a_person_and_go_on_with_their_answers(tmp_path):
+def test_questions_wait_for_a_person_and_go_on_with_their_answers(tmp_path, monkeypatch):
     config = DescribeConfig(vlm=f"ask:{tmp_path}", view_size=32)
     answers = {
         "parts": whole("vase"),
@@ -452,6 +453,13 @@ def test_questions_wait_for_a_person_and_go_on_with_their_answers(tmp_path):
         "placement": None,
         "extents": {"classes": [{"class_name": "vase", "metres": 1.0}]},
     }
+    taken = []
+
+    def counted(*args):
+        taken.append(args)
+        return portraits(*args)
+
+    monkeypatch.setattr("corporeal.stages.describe.portraits", counted)
     rounds = 0
     while rounds < 5:
         rounds += 1
@@ -468,6 +476,7 @@ def test_questions_wait_for_a_person_and_go_on_with_their_answers(tmp_path):
                 said = answers[task] or everywhere_by_hand(page.read_text())
                 file.write_text(f"```json\n{json.dumps(said)}\n```")
     assert rounds == 4
+    assert len(taken) == 2  # for the pages of parts and materials, not for placement
     assert words(inventory)[("vase_0", "vase")].material == "glass"
     assert words(describe(scene(VASE), replay(tmp_path))) == words(inventory)
 

@@ -24,7 +24,7 @@ from corporeal.materials.placement import (
 )
 from corporeal.render.portrait import DIRECTIONS, Portrait, colour_of_part, portraits
 from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
-from corporeal.vlm import Vlm, connect
+from corporeal.vlm import Album, Vlm, connect
 from corporeal.vlm.annotation import Annotation, built, read_annotations
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
 from corporeal.vlm.by_hand import all_answered, is_more
@@ -169,12 +169,9 @@ class _Asking:
         )
 
     def inventory(self, file: list, told: Mapping, progress: Progress) -> Inventory:
-        """Take the pictures, ask about every object, and about the sizes of all."""
+        """Ask about every object, and about the sizes of all."""
         count = len(self.scene.objects)
-        interviews = []
-        for number in range(count):
-            progress(0.5 * number / count, "taking pictures")
-            interviews.append(self._interview(number))
+        interviews = [self._interview(number) for number in range(count)]
         sizes = self._about(Subject(self.scene.name, self.scene.name, "", ""))
         named = dict.fromkeys(o.class_name or o.name for o in self.scene.objects)
         classes = [name for name in named if telling(name)]  # "object" has no usual size
@@ -185,7 +182,7 @@ class _Asking:
         results = together(
             [*jobs, lambda: sizes.extents(classes) if classes else {}],
             self.config.parallel,
-            lambda done: progress(0.5 + 0.5 * done / (count + 1), "asking"),
+            lambda done: progress(done / (count + 1), "asking"),
             is_more,
         )
         *objects, extents = all_answered(results, self.config.vlm)
@@ -233,7 +230,9 @@ class _Asking:
                 extent=length(thing.real_extent),
                 views=portrait.words,
                 count=self.config.views + (len(parts) > 1),
-                pictures=portraits(self.scene, own, portrait) if self.model.looks else (),
+                pictures=Album(partial(portraits, self.scene, own, portrait))
+                if self.model.looks
+                else (),
             )
         )
 

@@ -1,9 +1,10 @@
 """Vision-language models: one question in, one validated answer out. And what to do without one."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field
 from importlib.util import find_spec
 from pathlib import Path
+from threading import Lock
 from typing import Generic, Literal, Protocol, TypeVar, runtime_checkable
 
 import numpy as np
@@ -34,6 +35,27 @@ NOBODY = "metadata"
 """No model: names and materials in the file decide."""
 
 
+class Album(Sequence[np.ndarray]):
+    """Pictures that are taken, one album at a time, when somebody first looks at them."""
+
+    _one = Lock()
+
+    def __init__(self, take: Callable[[], Sequence[np.ndarray]]) -> None:
+        self._take, self._taken = take, None
+
+    def _pictures(self) -> Sequence[np.ndarray]:
+        with Album._one:
+            if self._taken is None:
+                self._taken = self._take()
+            return self._taken
+
+    def __len__(self) -> int:
+        return len(self._pictures())
+
+    def __getitem__(self, index):
+        return self._pictures()[index]
+
+
 @dataclass(frozen=True)
 class Question:
     """What is asked, about what, and what it was asked with."""
@@ -46,7 +68,7 @@ class Question:
     """What it is about: the scene's name and the object's."""
     views: str = "none"
     """How the pictures were taken, in words; pictures themselves are not compared on replay."""
-    pictures: tuple[np.ndarray, ...] = ()
+    pictures: Sequence[np.ndarray] = ()
     """Each H x W x 3, uint8, sRGB."""
     lists: Mapping[str, str] = field(default_factory=dict)
     """What the library in use offers, by name. A longer list does not make an answer stale."""

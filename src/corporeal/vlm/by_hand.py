@@ -6,7 +6,7 @@ as recordings in the same folder, so ``--vlm replay:FOLDER`` needs nobody any mo
 
 import hashlib
 import re
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from threading import Lock
 
@@ -161,7 +161,7 @@ def _limits(schema: Mapping) -> str:
     return ""
 
 
-def sheet(pictures: tuple[np.ndarray, ...]) -> np.ndarray:
+def sheet(pictures: Sequence[np.ndarray]) -> np.ndarray:
     """Lay pictures of one size out in rows, (H, W, 3) uint8; the last row may be short."""
     columns = int(np.ceil(np.sqrt(len(pictures))))
     blank = np.full_like(pictures[0], 255)

@@ -57,7 +57,7 @@ class Subject:
     views: str = "none"
     count: int = 0
     """Pictures that are shown, or were when the answers were recorded."""
-    pictures: tuple[np.ndarray, ...] = ()
+    pictures: Sequence[np.ndarray] = ()
 
 
 @dataclass(frozen=True)
