@@ -9,6 +9,7 @@ import asyncio
 import io
 import os
 import time
+from abc import ABC, abstractmethod
 from collections.abc import Callable
 from dataclasses import dataclass
 from functools import cache
@@ -76,7 +77,7 @@ class Address:
     url: str | None
 
 
-class Live:
+class Live(ABC):
     """A model behind an API. Each question is its own conversation."""
 
     looks = True
@@ -99,8 +100,9 @@ class Live:
         self._over: UserError | None = None
         """What ended the asking for good."""
 
+    @abstractmethod
     def _model(self, secret: str, profile: ModelProfile) -> Model:
-        raise NotImplementedError
+        """Make the client's model with this key."""
 
     def _where(self) -> str:
         """Say which server is asked."""
