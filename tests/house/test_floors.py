@@ -11,10 +11,11 @@ ROOT = Path(corporeal.__file__).parent
 FLOORS = [
     {"errors", "machine", "types"},
     {"geometry", "backends", "store"},
-    {"materials", "vlm", "render", "showcase", "mpm", "formats"},
+    {"formats"},
+    {"materials", "vlm", "render", "showcase", "mpm", "pool", "settle"},
     {"stages"},
     {"pipeline"},
-    {"evaluation"},
+    {"corpus", "evaluation"},
     {"doctor", "terminal"},
     {"cli"},
 ]
