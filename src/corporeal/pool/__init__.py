@@ -1,0 +1,1 @@
+"""The asset pool: what scenes are made of."""
