@@ -1,0 +1,1 @@
+"""From things in the air to a scene at rest."""
