@@ -11,6 +11,8 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, Field
 
+from corporeal.formats.typical_extents import typical_extent
+
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Lookup = Callable[[str], str | None]
 """Returns the library's spelling of a name, or None."""
@@ -30,6 +32,10 @@ class Vocabulary:
 MOST_PARTS = 6
 SLACK = 0.05
 """By how much shares may miss 1."""
+SMALLEST_THING, LARGEST_THING = 1e-3, 100.0
+"""Extents of what may stand in a scene [m]."""
+SLIP = 10.0
+"""A size this many times beyond the known ones is in another unit."""
 
 
 class SeenPart(BaseModel):
@@ -159,6 +165,15 @@ class ExtentsAnswer(BaseModel):
     """Question 4: every class of things in the scene."""
 
     classes: list[Extent]
+
+
+class SizeAnswer(BaseModel):
+    """How large one class of things is along its longest side, in metres."""
+
+    smallest: float = Field(gt=0, allow_inf_nan=False)
+    usual: float = Field(gt=0, allow_inf_nan=False)
+    largest: float = Field(gt=0, allow_inf_nan=False)
+    reason: str
 
 
 # ---------------------------------------------------------------- what can be wrong
@@ -293,3 +308,19 @@ def _within(value: float, low: float, high: float) -> bool:
 def extents_complaints(answer: ExtentsAnswer, classes: Sequence[str]) -> list[str]:
     """Check that exactly the classes asked about are answered for."""
     return name_complaints([c.class_name for c in answer.classes], classes)
+
+
+def size_complaints(answer: SizeAnswer, class_name: str) -> list[str]:
+    """Check that sizes are lengths of things, in order, and no slip of a unit."""
+    sizes = (answer.smallest, answer.usual, answer.largest)
+    if not all(SMALLEST_THING <= size <= LARGEST_THING for size in sizes):
+        return [f"Sizes must lie between {SMALLEST_THING:g} and {LARGEST_THING:g} metres."]
+    if not answer.smallest <= answer.usual <= answer.largest:
+        return ["smallest, usual and largest must be in this order."]
+    known = typical_extent(class_name)
+    if known is None or known.low / SLIP <= answer.usual <= known.high * SLIP:
+        return []
+    return [
+        f"You said that an ordinary {class_name} is {answer.usual:g} metres long. That is "
+        f"{SLIP:g} times beyond what such things are known to be. Answer in metres."
+    ]

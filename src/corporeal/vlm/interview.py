@@ -16,6 +16,7 @@ from corporeal.vlm.answers import (
     MaterialsAnswer,
     PartsAnswer,
     RankingAnswer,
+    SizeAnswer,
     ValueAnswer,
     Vocabulary,
     extents_complaints,
@@ -23,6 +24,7 @@ from corporeal.vlm.answers import (
     parts_complaints,
     placement_complaints,
     ranking_complaints,
+    size_complaints,
 )
 from corporeal.vlm.words import Asked
 
@@ -197,6 +199,12 @@ class Interview:
             self.model, asked, ExtentsAnswer, lambda a: extents_complaints(a, classes)
         )
         return {c.class_name: c.metres for c in reply.answer.classes} if reply else {}
+
+    def size(self) -> Reply[SizeAnswer] | None:
+        """Ask how large the real thing is, in words alone; None where nobody answers."""
+        kind = self.subject.class_name
+        asked = self._question("sizes")
+        return self._ask(self.model, asked, SizeAnswer, lambda a: size_complaints(a, kind))
 
     def _question(self, task: str, **facts: str) -> Question:
         about = self.subject
