@@ -71,7 +71,7 @@ def test_what_was_recorded_is_replayed_without_anybody(tmp_path):
 def test_a_class_that_was_not_recorded_is_told(tmp_path):
     with FakeServer(answer()) as server:
         ask(server, "couch", record=tmp_path / "kept")
-    with pytest.raises(UserError, match="No recording in .* answers 'sizes' about 'vase'"):
+    with pytest.raises(UserError, match=r"No recording in .* answers 'sizes' about 'vase'"):
         usual_sizes(["couch", "vase"], f"replay:{tmp_path / 'kept'}")
 
 
@@ -136,7 +136,7 @@ def test_a_recording_is_checked_like_a_model(tmp_path):
     said = json.loads(row.read_text())
     said["answer"]["usual"] = 2100.0
     (tmp_path / row.name).write_text(json.dumps(said))
-    with pytest.raises(BadFileError, match="between 0.001 and 100 metres"):
+    with pytest.raises(BadFileError, match=r"between 0\.001 and 100 metres"):
         usual_sizes(["couch"], f"replay:{tmp_path}")
 
 
