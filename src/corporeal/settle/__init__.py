@@ -1,1 +1,1 @@
-"""From things in the air to a scene at rest."""
+"""From meshes to objects that lie at rest on a floor and on each other, with a certificate."""

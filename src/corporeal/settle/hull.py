@@ -1,0 +1,122 @@
+"""Convex hulls: of anything that has a surface, and how they stand."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import ConvexHull, QhullError
+
+from corporeal.errors import UserError
+
+THINNEST = 1e-3
+"""Of its largest side: what is flatter is thickened to this, so that it has a volume."""
+FOOT = 2e-3
+"""Of the largest side: what is no higher than this above the lowest point carries weight."""
+FACES = 16
+"""Faces of a hull that are tried as undersides, largest first."""
+
+
+@dataclass(frozen=True)
+class Piece:
+    """A convex body."""
+
+    vertices: Float[np.ndarray, "V 3"]
+    """[m]"""
+    triangles: Int[np.ndarray, "T 3"]
+    """Anticlockwise seen from outside."""
+
+    @property
+    def volume(self) -> float:
+        """How much it holds [m³]."""
+        return float(self._tetrahedra.sum())
+
+    @property
+    def centre(self) -> Float[np.ndarray, "3"]:
+        """Centre of mass [m]."""
+        middle = self.vertices.mean(axis=0)
+        corners = self.vertices[self.triangles]
+        weight = self._tetrahedra
+        return (corners.sum(axis=1) + middle).T @ weight / (4 * weight.sum())
+
+    @property
+    def _tetrahedra(self) -> Float[np.ndarray, " T"]:
+        """Volume between each triangle and the middle [m³]."""
+        a, b, c = np.swapaxes(self.vertices[self.triangles] - self.vertices.mean(axis=0), 0, 1)
+        return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
+
+
+def hull_of(points: Float[np.ndarray, "N 3"], thinnest: float = THINNEST) -> Piece:
+    """Enclose points; what is flat becomes a plate of ``thinnest`` times its largest side.
+
+    Raises:
+        UserError: The points lie on a line or are fewer than three.
+
+    """
+    points = np.unique(points, axis=0)
+    points = points if len(points) < 3 else _thickened(points, thinnest)
+    try:
+        hull = ConvexHull(points)
+    except (QhullError, ValueError) as error:
+        raise UserError("it has no surface: its points are fewer than three, or on a line") from (
+            error
+        )
+    triangles = hull.simplices
+    a, b, c = np.swapaxes(points[triangles], 0, 1)
+    inward = np.einsum("ij,ij->i", np.cross(b - a, c - a), hull.equations[:, :3]) < 0
+    triangles = np.where(inward[:, None], triangles[:, ::-1], triangles)
+    used, number = np.unique(triangles, return_inverse=True)
+    return Piece(points[used], number.reshape(-1, 3).astype(np.int64))
+
+
+def _thickened(points: np.ndarray, thinnest: float) -> np.ndarray:
+    """Move points apart along the direction in which there is least of them."""
+    _, spread, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
+    if spread[1] <= 1e-6 * spread[0]:
+        return points
+    across = np.ptp(points @ axes[2])
+    lacking = thinnest * float(np.ptp(points @ axes[0])) - across
+    if lacking <= 0:
+        return points
+    shift = 0.5 * lacking * axes[2]
+    return np.concatenate([points - shift, points + shift])
+
+
+def tip_angle(hull: Piece, centre: Float[np.ndarray, "3"], down: Float[np.ndarray, "3"]) -> float:
+    """How far a body must be tilted before it falls over [rad]; 0 where it does not stand at all.
+
+    The least angle, over the edges of the polygon it stands on, by which its centre of mass must
+    turn to be above the edge.
+
+    Args:
+        hull: The body's.
+        centre: Its centre of mass [m].
+        down: Unit, in the body's frame: where the floor is.
+
+    """
+    below = (hull.vertices - centre) @ down
+    side = float(np.ptp(hull.vertices, axis=0).max())
+    foot = hull.vertices[below > below.max() - FOOT * side] - centre
+    across = np.linalg.svd(down[None])[2][1:]
+    try:
+        edges = ConvexHull(foot @ across.T).equations
+    except (QhullError, ValueError):
+        return 0.0
+    margin = float(-edges[:, 2].max())
+    return float(np.arctan2(margin, below.max())) if margin > 0 else 0.0
+
+
+def steadiest(hull: Piece, centre: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
+    """Return the direction in the body's frame that must point down for it to stand best."""
+    a, b, c = np.swapaxes(hull.vertices[hull.triangles], 0, 1)
+    vector = 0.5 * np.cross(b - a, c - a)
+    area = np.linalg.norm(vector, axis=1)
+    normal = vector / np.maximum(area, 1e-300)[:, None]
+    tried: list[np.ndarray] = []
+    for _ in range(FACES):
+        if area.max() <= 0:
+            break
+        best = normal[np.argmax(area)]
+        alike = normal @ best > np.cos(0.1)
+        tried.append(best)
+        area = np.where(alike, 0.0, area)
+    return max(tried, key=lambda d: tip_angle(hull, centre, d))

@@ -1,0 +1,164 @@
+"""Let bodies fall and come to rest in MuJoCo.
+
+The floor meets the exact convex hull of each mesh; bodies meet each other with their convex
+pieces. All is computed for a scene of unit size: lengths are divided by the scene's unit and times
+by the root of it (Froude's similarity keeps gravity and friction as they are), because the
+engine's softness, tolerances and thresholds are absolute.
+"""
+
+# The engine's names come from compiled modules without stubs.
+# pyright: reportAttributeAccessIssue=false
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import mujoco
+import numpy as np
+
+from corporeal.settle.body import Body, Pose, unit_of
+from corporeal.settle.hull import Piece
+
+
+@dataclass(frozen=True)
+class SettleConfig:
+    """How long to wait, and what counts as rest, in a scene of unit size."""
+
+    step: float = 2e-3
+    """[s]"""
+    longest: float = 10.0
+    """[s]"""
+    calm_after: float = 3.0
+    """When velocities begin to be damped [s]."""
+    damping: float = 2e-3
+    """Share of the velocity taken away at every step from then on."""
+    speed: float = 2e-3
+    """Of what rests, at most [m/s]."""
+    spin: float = 2e-2
+    """The same [rad/s]."""
+    hold: float = 0.25
+    """How long it must rest [s]."""
+
+
+DEFAULT = SettleConfig()
+FRICTION = [0.6, 0.02, 0.002]
+SOLREF = [0.008, 1.0]
+SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
+FLOOR_AND_HULLS, PIECES = 1, 2
+
+
+@dataclass(frozen=True)
+class Settled:
+    """Where bodies came to rest, or were when time was up."""
+
+    poses: list[Pose]
+    seconds: float
+    """Simulated, in a scene of unit size [s]."""
+    quiet: bool
+    """Whether all were at rest."""
+
+
+def settle(
+    bodies: Sequence[Body], poses: Sequence[Pose], config: SettleConfig = DEFAULT
+) -> Settled:
+    """Drop bodies and wait until all are at rest.
+
+    Args:
+        bodies: What falls.
+        poses: Where from, free of each other and of the floor.
+        config: When it is over.
+
+    """
+    engine = Engine(bodies, poses, config.step)
+    quiet = 0.0
+    while engine.data.time < config.longest and quiet < config.hold:
+        engine.step()
+        if engine.data.time > config.calm_after:
+            engine.data.qvel *= 1 - config.damping
+        rests = engine.speed() < config.speed and engine.spin() < config.spin
+        quiet = quiet + config.step if rests else 0.0
+    return Settled(engine.poses(), float(engine.data.time), quiet >= config.hold)
+
+
+class Engine:
+    """One scene in MuJoCo, in lengths of the scene's unit."""
+
+    def __init__(self, bodies: Sequence[Body], poses: Sequence[Pose], step: float) -> None:
+        self.unit, self.count = unit_of(bodies), len(bodies)
+        self.model = _spec(bodies, poses, self.unit, step).compile()
+        self.data = mujoco.MjData(self.model)
+
+    def step(self) -> None:
+        """Go one step ahead."""
+        mujoco.mj_step(self.model, self.data)
+
+    def speed(self) -> float:
+        """Return the largest velocity component of any body [unit/s]."""
+        return float(np.abs(self.data.qvel.reshape(self.count, 6)[:, :3]).max())
+
+    def spin(self) -> float:
+        """Return the largest component of any body's angular velocity [rad/s]."""
+        return float(np.abs(self.data.qvel.reshape(self.count, 6)[:, 3:]).max())
+
+    def poses(self) -> list[Pose]:
+        """Where bodies are [m]."""
+        found = []
+        for row in self.data.qpos.reshape(self.count, 7):
+            x, y, z, qw, qx, qy, qz = (float(value) for value in row)
+            position = (x * self.unit, y * self.unit, z * self.unit)
+            norm = float(np.linalg.norm(row[3:]))
+            found.append(Pose(position, (qw / norm, qx / norm, qy / norm, qz / norm)))
+        return found
+
+
+def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: float) -> mujoco.MjSpec:
+    spec = mujoco.MjSpec()
+    spec.option.timestep = step
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.iterations = 100
+    spec.option.noslip_iterations = 4
+    spec.option.tolerance = 1e-10
+    surface = {"friction": FRICTION, "solref": SOLREF, "solimp": SOLIMP, "condim": 6}
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[5, 5, 0.1],
+        contype=FLOOR_AND_HULLS,
+        conaffinity=0,
+        **surface,
+    )
+    # Contacts are as soft for any mass; only masses near the engine's smallest number matter.
+    lightest = min(b.volume * b.density for b in bodies) / unit**3
+    for k, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
+        thing = spec.worldbody.add_body(
+            name=f"{k}", pos=np.array(pose.position) / unit, quat=pose.quaternion
+        )
+        thing.add_freejoint()
+        _add_mesh(spec, f"{k} hull", body.hull, unit)
+        thing.add_geom(
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=f"{k} hull",
+            mass=0,
+            contype=0,
+            conaffinity=FLOOR_AND_HULLS,
+            **surface,
+        )
+        for number, piece in enumerate(body.pieces):
+            _add_mesh(spec, f"{k} piece {number}", piece, unit)
+            thing.add_geom(
+                type=mujoco.mjtGeom.mjGEOM_MESH,
+                meshname=f"{k} piece {number}",
+                density=body.density / lightest,
+                contype=PIECES,
+                conaffinity=PIECES,
+                **surface,
+            )
+    return spec
+
+
+def _add_mesh(spec: mujoco.MjSpec, name: str, piece: Piece, unit: float) -> None:
+    spec.add_mesh(
+        name=name,
+        uservert=(piece.vertices / unit).astype(np.float32).ravel(),
+        userface=piece.triangles.astype(np.int32).ravel(),
+        inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_CONVEX,
+    )
