@@ -1,9 +1,19 @@
 import math
+import tempfile
+from dataclasses import replace
+from pathlib import Path
 
 import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
 
 from corporeal.errors import BadFileError
-from corporeal.formats.scene_file import read_scene_file
+from corporeal.formats.scene_file import (
+    ObjectEntry,
+    SceneFile,
+    read_scene_file,
+    write_scene_file,
+)
 from corporeal.types import Push, Wall, Wind
 
 WHOLE = """
@@ -108,3 +118,106 @@ def test_a_scene_file_may_have_walls(tmp_path):
 def test_a_missing_scene_file_is_named(tmp_path):
     with pytest.raises(BadFileError, match="no such file"):
         read_scene_file(tmp_path / "none.toml")
+
+
+# ---------------------------------------------------------------- writing
+
+
+def vectors(most=1000.0):
+    return st.tuples(*[st.floats(-most, most, allow_subnormal=False)] * 3)
+
+
+@st.composite
+def windows(draw):
+    start = draw(st.floats(0.0, 59.0))
+    return start, draw(st.just(math.inf) | st.floats(start, 60.0, exclude_min=True))
+
+
+@st.composite
+def entries(draw, whole):
+    maybe = lambda strategy: draw(st.none() | strategy)  # noqa: E731
+    words = st.text(st.characters(codec="utf-8"), min_size=1).filter(str.strip)
+    name = draw(words) if whole else maybe(words)
+    files = st.sampled_from(["duck.glb", "models/a b.glb", "ünï\x7fcode.glb", 'quo"te.glb'])
+    push, wind = maybe(windows()), maybe(windows())
+    return ObjectEntry(
+        name=name,
+        file=None if whole and draw(st.booleans()) else Path("scenes", draw(files)),
+        class_name=maybe(words),
+        extent=maybe(st.floats(1e-4, 1000.0)),
+        position=maybe(vectors()),
+        velocity=maybe(vectors()),
+        push=push and Push(draw(vectors()), *push),
+        wind=wind and Wind(draw(vectors(28.0)), draw(st.floats(0.0, 1.0)), *wind),
+    )
+
+
+@st.composite
+def scene_files(draw):
+    file = draw(st.none() | st.just(Path("scenes/scene.glb")))
+    return SceneFile(
+        path=Path("scenes/scene.toml"),
+        file=file,
+        duration=draw(st.none() | st.floats(0.01, 60.0)),
+        fps=draw(st.none() | st.integers(1, 1000)),
+        gravity=draw(st.none() | vectors()),
+        objects=tuple(draw(st.lists(entries(file is not None), min_size=file is None, max_size=3))),
+        walls=tuple(
+            Wall(normal, point)
+            for normal, point in draw(
+                st.lists(st.tuples(st.sampled_from([(0.0, 0.0, 1.0), (-1.0, 0.0, 0.0)]), vectors()))
+            )
+        ),
+    )
+
+
+@given(scene=scene_files())
+@settings(max_examples=30, deadline=None)
+def test_what_is_written_is_read_back(scene):
+    with tempfile.TemporaryDirectory() as folder:
+        path = Path(folder) / "scene.toml"
+        here = lambda file: file and Path(folder) / file.relative_to("scenes")  # noqa: E731
+        there = replace(
+            scene,
+            path=path,
+            file=here(scene.file),
+            objects=tuple(replace(o, file=here(o.file)) for o in scene.objects),
+        )
+        write_scene_file(path, there)
+        assert read_scene_file(path) == there
+
+
+def test_files_elsewhere_are_still_found(tmp_path):
+    duck = tmp_path / "models" / "duck.glb"
+    path = tmp_path / "scenes" / "scene.toml"
+    write_scene_file(path, SceneFile(path, file=duck))
+    found = read_scene_file(path).file
+    assert found is not None and found.resolve() == duck
+
+
+@pytest.mark.parametrize(
+    ("scene", "said"),
+    [
+        (SceneFile(Path("x")), "names no model"),
+        (SceneFile(Path("x"), Path("a.glb"), duration=math.nan), "'duration' is nan"),
+        (SceneFile(Path("x"), Path("a.glb"), gravity=(0.0, 0.0, -math.inf)), "'gravity' is"),
+        (SceneFile(Path("x"), Path("a.glb"), fps=0), "'fps' is 0"),
+        (SceneFile(Path("x"), Path("a.glb"), objects=(ObjectEntry(),)), "object 1 names no file"),
+        (
+            SceneFile(Path("x"), objects=(ObjectEntry(name="\ud800", file=Path("a.glb")),)),
+            "is not valid TOML",
+        ),
+        (
+            SceneFile(
+                Path("x"),
+                objects=(ObjectEntry(file=Path("a.glb"), wind=Wind((99.0, 0.0, 0.0), gust=1.0)),),
+            ),
+            "it blows at up to 198 m/s",
+        ),
+    ],
+)
+def test_what_reading_refuses_is_not_written(tmp_path, scene, said):
+    path = tmp_path / "scene.toml"
+    with pytest.raises(BadFileError, match=said):
+        write_scene_file(path, scene)
+    assert not path.exists()

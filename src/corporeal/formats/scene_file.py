@@ -1,4 +1,4 @@
-"""Read ``scene.toml``: what is where, how it starts, what pushes it or blows on it. [m], [s].
+"""Read and write ``scene.toml``: what is where, how it starts, what acts on it. [m], [s].
 
 There is nothing numerical to tune in it: quality is one word on the command line (``--detail``).
 
@@ -22,12 +22,16 @@ There is nothing numerical to tune in it: quality is one word on the command lin
     normal = [-1, 0, 0]           # out of the wall into the room
 """
 
+import json
 import math
+import os
 import tomllib
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, NoReturn
 
+from corporeal import store
 from corporeal.errors import BadFileError
 from corporeal.types import Push, Vector, Wall, Wind
 
@@ -85,7 +89,84 @@ def read_scene_file(path: Path) -> SceneFile:
         BadFileError: It is no TOML, has an unknown key, or a value of the wrong kind or size.
 
     """
-    table = _Table(path, "", _load(path))
+    return _checked(path, _parsed(path, _load(path)))
+
+
+def write_scene_file(path: Path, scene: SceneFile) -> None:
+    """Write what ``read_scene_file`` reads back, files relative to the scene file's folder.
+
+    Raises:
+        BadFileError: Reading would refuse it; nothing is written.
+        UserError: The disk refuses it.
+
+    """
+    data = "\n".join(_lines(replace(scene, path=path))).encode(errors="surrogatepass")
+    _checked(path, _parsed(path, data))
+    store.write_bytes(path, data)
+
+
+def _lines(scene: SceneFile) -> Iterator[str]:
+    folder = scene.path.parent
+    gravity = scene.gravity
+    told = {"file": scene.file, "duration": scene.duration, "fps": scene.fps, "gravity": gravity}
+    yield from _pairs(told, folder)
+    for entry in scene.objects:
+        yield from ("", "[[object]]")
+        yield from _pairs(_said_of(entry), folder)
+    for wall in scene.walls:
+        yield from ("", "[[wall]]")
+        yield from _pairs({"point": wall.point, "normal": wall.normal}, folder)
+    yield ""
+
+
+def _said_of(entry: ObjectEntry) -> dict[str, Any]:
+    said = {
+        "name": entry.name,
+        "file": entry.file,
+        "class": entry.class_name,
+        "extent": entry.extent,
+        "position": entry.position,
+        "velocity": entry.velocity,
+    }
+    if entry.push is not None:
+        said["push"] = {"acceleration": entry.push.acceleration} | _when(entry.push)
+    if entry.wind is not None:
+        blown = {"velocity": entry.wind.velocity, "gust": entry.wind.gust}
+        said["wind"] = blown | _when(entry.wind)
+    return said
+
+
+def _when(force: Push | Wind) -> dict[str, float]:
+    return {"from": force.start} | ({"to": force.end} if force.end < math.inf else {})
+
+
+def _pairs(said: dict[str, Any], folder: Path) -> Iterator[str]:
+    return (f"{key} = {_toml(x, folder)}" for key, x in said.items() if x is not None)
+
+
+def _toml(x: Any, folder: Path) -> str:
+    """Return a value as TOML writes it."""
+    if isinstance(x, dict):
+        return f"{{ {', '.join(_pairs(x, folder))} }}"
+    if isinstance(x, tuple):
+        return f"[{', '.join(_toml(c, folder) for c in x)}]"
+    if isinstance(x, int):
+        return str(x)
+    if isinstance(x, float):
+        return repr(float(x))
+    text = _relative(x, folder) if isinstance(x, Path) else x
+    # JSON's texts are TOML's too, but for one character.
+    return json.dumps(text, ensure_ascii=False).replace("\x7f", "\\u007f")
+
+
+def _relative(file: Path, folder: Path) -> str:
+    if file.is_relative_to(folder):
+        return file.relative_to(folder).as_posix()
+    return str(file) if file.is_absolute() else os.path.relpath(file, folder)
+
+
+def _checked(path: Path, said: dict[str, Any]) -> SceneFile:
+    table = _Table(path, "", said)
     table.only(SCENE_KEYS)
     objects = tuple(_object(t) for t in table.tables("object"))
     file = table.file("file")
@@ -154,16 +235,21 @@ def _wind(table: "_Table") -> Wind | None:
     return Wind(velocity, gust, *wind.window())
 
 
-def _load(path: Path) -> dict[str, Any]:
+def _load(path: Path) -> bytes:
     if not path.is_file():
         raise BadFileError(path, "there is no such file.", "Check the path.")
     try:
-        return tomllib.loads(path.read_bytes().decode("utf-8"))
+        return path.read_bytes()
+    except OSError as problem:
+        raise BadFileError(path, f"cannot be read ({problem.strerror}).") from None
+
+
+def _parsed(path: Path, data: bytes) -> dict[str, Any]:
+    try:
+        return tomllib.loads(data.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
         step = "See the example in the documentation."
         raise BadFileError(path, f"is not valid TOML ({str(problem)[:100]}).", step) from None
-    except OSError as problem:
-        raise BadFileError(path, f"cannot be read ({problem.strerror}).") from None
 
 
 @dataclass(frozen=True)
