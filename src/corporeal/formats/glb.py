@@ -73,7 +73,7 @@ def read_glb(path: Path, objects: Objects = "auto") -> Scene:
 def read_model(path: Path, objects: Objects = "auto") -> Model:
     """Do as ``read_glb``, and tell whether the file is one of our own."""
     document = Document(Path(path))
-    _check_extensions(document)
+    check_extensions(document)
     tree = list(walk(document))
     wardrobe = Wardrobe(document)
     shapes = _shapes(document, tree, wardrobe)
@@ -88,7 +88,8 @@ def read_model(path: Path, objects: Objects = "auto") -> Model:
     return Model(replace(scene, finishes=finishes, warnings=warnings), written_by_us(document))
 
 
-def _check_extensions(document: Document) -> None:
+def check_extensions(document: Document) -> None:
+    """Refuse a file that means something else without an extension that is not understood."""
     for name in document.required:
         if not name.startswith(READABLE) and "meshopt" not in name:
             document.root.fail(

@@ -35,10 +35,11 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
     """
     extras = _extras(document, head)
     asset = document.root.child("asset")
-    copyright = asset.text("copyright") if asset else ""
+    ours = written_by_us(document)
+    # A file of ours states the credit of each object; its copyright sums up all of them.
+    copyright = asset.text("copyright") if asset and not ours else ""
     real = _real_extent(extras) or extent
     measured = extent / real if real > 0 else 1.0
-    ours = written_by_us(document)
     return SceneObject(
         name=safe(head.text("name")) if head and extras.text("class") else "",
         class_name=_class(document, head, extras),
@@ -48,8 +49,15 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
         push=_push(extras) if ours else None,
         wind=_wind(extras) if ours else None,
         source=extras.text("source") or str(document.path),
-        credit=(extras.text("credit") or copyright)[:500],
+        credit=(credit(extras.value) or copyright)[:500],
     )
+
+
+def credit(extras: dict) -> str:
+    """Return whom to thank for an object, and under which licence it may be used, if it says so."""
+    said = [extras.get(key) for key in ("licence", "attribution")]
+    whole = extras.get("credit") or "; ".join(x for x in said if isinstance(x, str) and x)
+    return whole if isinstance(whole, str) else ""
 
 
 def _extras(document: Document, head: Entry | None) -> Entry:

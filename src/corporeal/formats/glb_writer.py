@@ -6,14 +6,13 @@ has no word for (class, real extent, gravity, forces) stands in ``extras``; ``re
 """
 
 import io
-import json
 import math
-import struct
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
+from corporeal.formats.gltf_container import pack_glb
 from corporeal.types import Finish, Push, Scene, SceneObject, Surface, Wind
 
 GENERATOR = "corporeal"
@@ -182,17 +181,9 @@ class _Document:
         self.json["scenes"] = [{"name": scene.name, "nodes": [self.add("nodes", root)]}]
         if self.extensions:
             self.json["extensionsUsed"] = sorted(self.extensions)
-        self.binary += b"\0" * (-len(self.binary) % 4)
-        if self.binary:
-            self.json["buffers"] = [{"byteLength": len(self.binary)}]
 
     def bytes(self) -> bytes:
-        text = json.dumps(self.json, allow_nan=False, separators=(",", ":")).encode()
-        chunks = [(b"JSON", text + b" " * (-len(text) % 4))]
-        if self.binary:
-            chunks.append((b"BIN\0", bytes(self.binary)))
-        body = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
-        return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
+        return pack_glb(self.json, self.binary)
 
 
 def _asset(scene: Scene) -> dict:

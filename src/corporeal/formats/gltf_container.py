@@ -1,4 +1,4 @@
-"""From a path to the JSON and the binary chunk of a glTF file. glTF 2.0, section 4 (GLB)."""
+"""Between a file and the JSON and the binary chunk of a glTF. glTF 2.0, section 4 (GLB)."""
 
 import json
 import struct
@@ -36,6 +36,24 @@ def split_glb(path: Path, data: memoryview) -> tuple[memoryview, memoryview | No
     if b"JSON" not in chunks:
         raise BadFileError(path, "the GLB has no JSON chunk.", EXPORT_AGAIN)
     return chunks[b"JSON"], chunks.get(b"BIN\0")
+
+
+def pack_glb(document: dict, binary: bytes | bytearray) -> bytes:
+    """Return the bytes of a GLB; ``document`` gets its one buffer by the way.
+
+    Raises:
+        ValueError: A number in the document is NaN or infinite, which JSON cannot say.
+
+    """
+    chunk = bytes(binary) + b"\0" * (-len(binary) % 4)
+    if chunk:
+        document["buffers"] = [{"byteLength": len(chunk)}]
+    text = json.dumps(document, allow_nan=False, separators=(",", ":")).encode()
+    chunks = [(b"JSON", text + b" " * (-len(text) % 4))]
+    if chunk:
+        chunks.append((b"BIN\0", chunk))
+    body = b"".join(struct.pack("<I4s", len(data), kind) + data for kind, data in chunks)
+    return struct.pack("<4sII", b"glTF", 2, 12 + len(body)) + body
 
 
 def read_whole(path: Path) -> memoryview:
