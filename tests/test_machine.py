@@ -25,3 +25,13 @@ def test_a_quota_counts(tmp_path, text, most):
     free = cores(tmp_path / "none")
     (tmp_path / "cpu.max").write_text(text)
     assert cores(tmp_path / "cpu.max") == min(most or free, free)
+
+
+@pytest.mark.parametrize(
+    ("text", "most"), [("1", 1), ("1,2", 1), ("0", None), ("many", None), ("", None)]
+)
+def test_a_wish_in_the_environment_counts(tmp_path, monkeypatch, text, most):
+    monkeypatch.delenv("OMP_NUM_THREADS", raising=False)
+    free = cores(tmp_path / "none")
+    monkeypatch.setenv("OMP_NUM_THREADS", text)
+    assert cores(tmp_path / "none") == min(most or free, free)

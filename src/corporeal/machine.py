@@ -6,23 +6,30 @@ from pathlib import Path
 
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
 """Where a container's share of the processor stands, as "microseconds per-period" (Linux)."""
+UNLIMITED = 1 << 16
 
 
 def cores(quota: Path = QUOTA) -> int:
     """Count the processor cores that this process may keep busy, at least 1.
 
-    Fewer than the machine has where an affinity mask (``taskset``, a batch system) or a
-    container's quota says so: threads beyond that number only stand in each other's way.
+    Fewer than the machine has where an affinity mask (``taskset``, a batch system), a container's
+    quota or ``OMP_NUM_THREADS`` says so: threads beyond that number only stand in each other's
+    way.
     """
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
-    return max(1, min(allowed or 1, _granted(quota)))
+    return max(1, min(allowed or 1, _granted(quota), _wished()))
 
 
 def _granted(quota: Path) -> int:
     """Give the cores that a container's quota amounts to; very many where there is none."""
-    unlimited = 1 << 16
     try:
         share, period = quota.read_text(encoding="ascii").split()
     except (OSError, ValueError):
-        return unlimited
-    return unlimited if share == "max" else ceil(int(share) / int(period))
+        return UNLIMITED
+    return UNLIMITED if share == "max" else ceil(int(share) / int(period))
+
+
+def _wished() -> int:
+    """Give the threads that the environment grants; very many where it says nothing."""
+    said = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
+    return int(said) if said.isdecimal() and int(said) > 0 else UNLIMITED
