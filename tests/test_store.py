@@ -1,10 +1,14 @@
 import errno
 import os
+import threading
+import time
+from contextlib import ExitStack
 
 import numpy as np
 import pytest
 
 from corporeal import store
+from corporeal.errors import UserError
 from corporeal.types import (
     Finish,
     Law,
@@ -100,3 +104,14 @@ def test_a_full_disk_is_one_clear_error_and_leaves_no_half_file(tmp_path, monkey
 def test_a_range_knows_what_it_contains():
     assert 2.0 in Range(1.0, 2.0, 3.0, "book")
     assert 4.0 not in Range(1.0, 2.0, 3.0, "book")
+
+
+def test_who_has_patience_waits_until_a_folder_is_let_go_of(tmp_path):
+    with ExitStack() as held:
+        held.enter_context(store.alone(tmp_path))
+        with pytest.raises(UserError, match="works in"), store.alone(tmp_path, 0.1):
+            pass
+        threading.Timer(0.2, held.pop_all().close).start()
+        start = time.monotonic()
+        with store.alone(tmp_path, 20.0):
+            assert 0.1 < time.monotonic() - start < 10.0

@@ -11,13 +11,14 @@ import hashlib
 import json
 import os
 import shutil
+import time
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import fields, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import Any
+from typing import IO, Any
 
 import numpy as np
 
@@ -85,8 +86,12 @@ def require_room(folder: Path, needed: int) -> None:
 
 
 @contextmanager
-def alone(folder: Path) -> Iterator[None]:
+def alone(folder: Path, patience: float = 0.0) -> Iterator[None]:
     """Keep other processes out of a run's folder; a process that dies lets go of it.
+
+    Args:
+        folder: The run's.
+        patience: How long to wait for another process to let go of it [s].
 
     Raises:
         UserError: Another process works in it.
@@ -96,19 +101,29 @@ def alone(folder: Path) -> Iterator[None]:
         folder.mkdir(parents=True, exist_ok=True)
         lock = (folder / LOCK).open("a+", encoding="utf-8")
     with lock:
-        try:
-            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
-        except BlockingIOError:
+        if not _locked(lock, patience):
             lock.seek(0)
             raise UserError(
                 f"Another corporeal (process {lock.read().strip() or 'unknown'}) works in {folder}."
                 " Wait until it is done, or choose another folder with --name or --out."
-            ) from None
+            )
         with writing(folder):
             lock.truncate(0)
             lock.write(str(os.getpid()))
             lock.flush()
         yield
+
+
+def _locked(lock: IO[str], patience: float) -> bool:
+    until = time.monotonic() + patience
+    while True:
+        try:
+            fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            return True
+        except BlockingIOError:
+            if time.monotonic() >= until:
+                return False
+            time.sleep(0.05)
 
 
 def write_bytes(path: Path, data: bytes) -> None:
