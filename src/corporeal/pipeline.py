@@ -143,7 +143,7 @@ def _config(default: Any, said: dict) -> Any:
     return replace(default, **given)
 
 
-def _read_files(config: Any) -> list[str]:
+def files_read(config: Any) -> list[str]:
     """Name the content of every file that a configuration points to."""
     named = [f.name for f in fields(config) if f.name not in WRITTEN] if config else []
     values = [str(getattr(config, name)) for name in named]
@@ -228,7 +228,7 @@ class _Run:
     def _do(self, verb: str) -> None:
         config = getattr(self.settings, verb, None)
         before = [self.key] if self.key else [store.digest(p) for p in self._files()]
-        self.key = store.key(verb, config, before + _read_files(config) + self._borrowed(verb))
+        self.key = store.key(verb, config, before + files_read(config) + self._borrowed(verb))
         folder = self.folder / FOLDERS[verb]
         step = getattr(self, f"_{verb}")
         if store.fresh(folder, self.key):

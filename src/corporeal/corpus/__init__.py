@@ -1,0 +1,1 @@
+"""Many scenes: planned, assembled, run and reported."""

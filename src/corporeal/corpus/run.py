@@ -1,0 +1,125 @@
+"""Run every assembled scene of a corpus through the pipeline, each in a process of its own.
+
+``<corpus>/scenes/<scene>/scene.toml`` becomes ``<corpus>/runs/<scene>/``, a run like any other. A
+scene that is interrupted goes on from its checkpoint.
+"""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, fields, replace
+from pathlib import Path
+from typing import Any
+
+from corporeal import pipeline, store
+from corporeal.corpus.carry_out import Say, carry_out
+from corporeal.corpus.jobs import Hire, Job, Progress
+from corporeal.corpus.manifest import Row
+from corporeal.corpus.plan import Plan, PlannedScene, read_plan
+from corporeal.errors import UserError
+from corporeal.pipeline import Settings
+from corporeal.showcase.scenes import view
+
+SCENES, RUNS = "scenes", "runs"
+SCENE = "scene.toml"
+ORPHAN = 60.0
+"""Longest wait for a worker of a killed corpus run to be gone [s]."""
+SHARES: Mapping[str, tuple[float, float]] = {
+    "assemble": (0.0, 0.01),
+    "describe": (0.01, 0.03),
+    "segment": (0.03, 0.05),
+    "ground": (0.05, 0.06),
+    "fill": (0.06, 0.12),
+    "simulate": (0.12, 0.8),
+    "film": (0.8, 0.97),
+    "report": (0.97, 1.0),
+}
+"""Where each verb begins and ends in the time of a run at draft detail, roughly."""
+
+
+@dataclass(frozen=True)
+class RunConfig:
+    """Which scenes are run."""
+
+    first: int | None = None
+    """Only so many, from the start of the plan."""
+    resume: bool = True
+    """Keep what is finished and go on with what was interrupted; else begin all scenes anew."""
+
+
+def run_corpus(
+    folder: Path, config: RunConfig, settings: Settings, hire: Hire, progress: Progress, say: Say
+) -> dict[str, Row]:
+    """Run the scenes of a corpus; return what became of each.
+
+    Raises:
+        UserError: The folder is no corpus, no scene of it is assembled, or another process works
+            in it.
+
+    """
+    plan = read_plan(folder)
+    planned = plan.scenes[: config.first]
+    there = [s for s in planned if (folder / SCENES / s.name / store.META).exists()]
+    if not there:
+        raise UserError(
+            f"No scene of {folder} is assembled. Do it with: corporeal corpus assemble {folder}."
+        )
+    if len(there) < len(planned):
+        say(f"{len(planned) - len(there)} of {len(planned)} scenes are not assembled: left out.")
+    with store.alone(folder):
+        jobs = [run_job(folder, plan, scene, settings) for scene in there]
+        if not config.resume:
+            _forget(jobs)
+        return carry_out(folder, "run", jobs, hire, progress, say)
+
+
+def run_job(folder: Path, plan: Plan, scene: PlannedScene, settings: Settings) -> Job:
+    """Say what is to be done for one scene."""
+    path = folder / SCENES / scene.name
+    if plan.config.preset == "seven" and settings.film.view is None:
+        settings = replace(settings, film=replace(settings.film, view=view(scene.name)))
+    configs = {f.name: getattr(settings, f.name) for f in fields(Settings)}
+    read = [name for config in configs.values() for name in pipeline.files_read(config)]
+    made = store.read_json(path / store.META)["key"]
+    return Job(
+        name=scene.name,
+        function=run_scene,
+        folder=folder / RUNS / scene.name,
+        key=store.key("corpus run", configs, [made, *read]),
+        arguments={"scene": (path / SCENE).resolve(), "settings": settings},
+        resumable=True,
+    )
+
+
+def run_scene(folder: Path, progress: Progress, scene: Path, settings: Settings) -> None:
+    """Take one scene through the pipeline, in the process of a worker."""
+    with store.alone(folder, ORPHAN):
+        pass
+    pipeline.run([scene], folder, settings, _tell(progress))
+
+
+def _tell(progress: Progress) -> pipeline.Tell:
+    """Spread the verbs over one bar."""
+
+    def tell(verb: str) -> Progress:
+        low, high = SHARES[verb]
+        return lambda done, words: progress(low + (high - low) * done, f"{verb} {words}")
+
+    return tell
+
+
+def _forget(jobs: Sequence[Job]) -> None:
+    for job in jobs:
+        if job.folder.exists():
+            pipeline.forget_simulation(job.folder)
+            for name in pipeline.FOLDERS.values():
+                (job.folder / name / store.META).unlink(missing_ok=True)
+            (job.folder / store.META).unlink(missing_ok=True)
+
+
+def failures(rows: Mapping[str, Row]) -> list[str]:
+    """Say which scenes failed, and why."""
+    return [f"{name}: {row.error}" for name, row in rows.items() if row.status == "failed"]
+
+
+def settings_of(said: Mapping[str, Any]) -> str:
+    """Name a run's settings in a few words."""
+    return ", ".join(f"{key} {value}" for key, value in said.items())

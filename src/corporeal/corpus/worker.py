@@ -1,0 +1,76 @@
+"""The process of one job: ``python -m corporeal.corpus.worker``, started by ``local``.
+
+The job comes pickled on the standard input, which stays open as long as the one who started it
+lives: when it closes, nobody waits for the job any more, and the process ends at once. What there
+is to tell goes out as lines of JSON. A first interrupt lets the job keep what it has.
+"""
+
+import json
+import os
+import pickle
+import sys
+import threading
+import time
+import traceback
+from collections.abc import Callable
+from typing import Any
+
+from corporeal.corpus.jobs import perform
+from corporeal.errors import UserError
+
+ABANDONED, STOPPED = 3, 130
+"""Exit codes."""
+PAUSE = 0.2
+"""Least time between two words about progress [s]."""
+
+
+def main() -> int:
+    """Do one job; return the exit code."""
+    out = os.fdopen(os.dup(1), "w", encoding="utf-8")
+    os.dup2(2, 1)  # what anybody prints goes to the log, not among the lines of JSON
+
+    def say(**words: Any) -> None:
+        out.write(json.dumps(words) + "\n")
+        out.flush()
+
+    try:
+        path, packed = pickle.load(sys.stdin.buffer)
+        threading.Thread(target=_watch, daemon=True).start()
+        sys.path[:] = path
+        job = pickle.loads(packed)
+        perform(job, _seldom(lambda done, words: say(fraction=done, words=words)))
+    except KeyboardInterrupt:
+        return STOPPED
+    except UserError as error:
+        say(failed=str(error))
+    except MemoryError:
+        say(failed="Out of memory. Use fewer --workers, or --detail draft.")
+    except Exception as error:
+        traceback.print_exc()
+        say(failed=f"A mistake of ours ({type(error).__name__}: {error}).")
+    else:
+        say(finished=True)
+    return 0
+
+
+def _seldom(say: Callable[[float, str], None]) -> Callable[[float, str], None]:
+    """Pass on what is said a few times a second at most."""
+    last = 0.0
+
+    def tell(done: float, words: str) -> None:
+        nonlocal last
+        if time.monotonic() - last >= PAUSE:
+            last = time.monotonic()
+            say(done, words)
+
+    return tell
+
+
+def _watch() -> None:
+    while os.read(0, 1):
+        pass
+    os._exit(ABANDONED)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
