@@ -5,13 +5,13 @@ import sys
 import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
-from inspect import cleandoc
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import tyro
 
 from corporeal import __version__
+from corporeal.cli.parse import parse
 from corporeal.errors import UserError
 from corporeal.terminal import console, show_table, told
 
@@ -47,7 +47,7 @@ def verb_run() -> None:
         where: Where = Where()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
-    asked = _parse(Run, "run", verb_run.__doc__)
+    asked = parse(Run, "run", verb_run.__doc__)
     _go(list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where)
 
 
@@ -68,7 +68,7 @@ def verb_demo() -> None:
         where: Where = Where()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
-    asked = _parse(Demo, "demo", f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}.")
+    asked = parse(Demo, "demo", f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}.")
     where = replace(asked.where, name=asked.where.name or asked.scene)
     folder = where.out / where.name
     with console.status("building the scene"):
@@ -87,7 +87,7 @@ def verb_status() -> None:
     class Status:
         run: Folder
 
-    rows = status(_parse(Status, "status", verb_status.__doc__).run)
+    rows = status(parse(Status, "status", verb_status.__doc__).run)
     show_table(
         ("verb", "state", "seconds"),
         [(verb, state, "" if took is None else f"{took:.1f}") for verb, state, took in rows],
@@ -105,7 +105,7 @@ def verb_materials() -> None:
         """"default", "reference" (the 22 materials as first published), or the path of a TOML
         file."""
 
-    asked = _parse(Menu, "materials", verb_materials.__doc__)
+    asked = parse(Menu, "materials", verb_materials.__doc__)
     if not asked.words:
         print(materials.menu(asked.library))
     elif asked.words[0] == "show" and len(asked.words) == 2:
@@ -150,7 +150,7 @@ def verb_evaluate() -> None:
         describe: DescribeConfig = field(default_factory=DescribeConfig)
         ground: GroundConfig = field(default_factory=GroundConfig)
 
-    asked = _parse(Evaluate, "evaluate", verb_evaluate.__doc__)
+    asked = parse(Evaluate, "evaluate", verb_evaluate.__doc__)
     if asked.what == "materials":
         _judge_materials(asked)
         return
@@ -188,7 +188,7 @@ def verb_doctor() -> None:
     """Tell what works on this machine, and what would be gained by what."""
     from corporeal.doctor import examine
 
-    _parse(dataclass(frozen=True)(type("Doctor", (), {})), "doctor", verb_doctor.__doc__)
+    parse(dataclass(frozen=True)(type("Doctor", (), {})), "doctor", verb_doctor.__doc__)
     show_table(
         ("", "", "found", "advice"),
         [("✓" if f.works else "–", f.what, f.found, f.advice) for f in examine()],
@@ -216,7 +216,7 @@ def _again(verb: str) -> Callable[[], None]:
                     {"__annotations__": {"run": Folder, "config": type(config)}, "config": config},
                 )
             )
-        asked = _parse(shape, verb, f"Redo `{verb}` of a run; what comes after goes stale.")
+        asked = parse(shape, verb, f"Redo `{verb}` of a run; what comes after goes stale.")
         inputs, settings = reopen(asked.run)
         if known:
             settings = replace(settings, **{verb: asked.config})
@@ -248,7 +248,7 @@ def verb_simulate() -> None:
         """Of the draws."""
         config: SimulateConfig = known
 
-    asked = _parse(Simulate, "simulate", verb_simulate.__doc__)
+    asked = parse(Simulate, "simulate", verb_simulate.__doc__)
     if asked.samples is not None:
         return _spread(asked)
     inputs, settings = reopen(asked.run)
@@ -287,16 +287,6 @@ VERBS["simulate"] = verb_simulate
 
 
 # ---------------------------------------------------------------- how a verb is done
-
-
-def _parse(kind: Any, verb: str, description: str | None) -> Any:
-    """Read the rest of the command line into ``kind``; its nested settings become plain flags."""
-    return tyro.cli(
-        tyro.conf.OmitArgPrefixes[kind],
-        prog=f"corporeal {verb}",
-        description=cleandoc(description or ""),
-        args=sys.argv[2:],
-    )
 
 
 def _folder(where: Where, inputs: list[Path]) -> Path:
@@ -373,7 +363,3 @@ def _confess(error: Exception) -> int:
         file=sys.stderr,
     )
     return 1
-
-
-if __name__ == "__main__":
-    main()
