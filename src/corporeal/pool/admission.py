@@ -1,0 +1,103 @@
+"""From verdicts to members: classes, credits and units; no shape twice, no name twice."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+
+from corporeal.formats.typical_extents import LARGEST, SMALLEST, doubt, typical_extent
+from corporeal.formats.words import safe
+from corporeal.pool.asset import UNKNOWN, Asset, Rejection
+from corporeal.pool.candidate import Candidate
+from corporeal.pool.verdict import MODELS, Verdict
+
+ABSURD = 10.0
+"""How many times beyond the usual sizes of its class a thing that is in metres may be."""
+OTHER = 0.1
+"""Relative difference of a stated and a measured extent from which the units are in doubt."""
+
+
+@dataclass(frozen=True)
+class Member:
+    """An asset, and what tells it from others."""
+
+    asset: Asset
+    found: Path
+    """The file that was judged."""
+    mesh: str
+    """Names its shape."""
+
+
+class Admission:
+    """Lets candidates into a pool, one after the other."""
+
+    def __init__(self, pool: Path, members: Iterable[Member], rejections: Iterable[Rejection]):
+        self.pool = pool
+        self.members = list(members)
+        self.rejections = list(rejections)
+        self._names = {m.asset.name for m in self.members}
+        self._shapes = {m.mesh: m.asset.name for m in self.members}
+
+    def ask(self, candidate: Candidate, verdict: Verdict) -> None:
+        """Let a candidate in, or write down why not."""
+        said = candidate.said
+        words = said.class_name or verdict.class_name or "object"
+        metric = is_metric(candidate, verdict.extent, words)
+        reason = verdict.reason or self._why_not(verdict, words, bool(said.metric) and metric)
+        if reason:
+            self.rejections.append(Rejection(str(candidate.file), words, reason))
+            return
+        asset = Asset(
+            name=self._name(candidate),
+            class_name=words,
+            file=self.pool / MODELS / verdict.copy if verdict.copy else candidate.file.resolve(),
+            source=said.source or str(candidate.file),
+            sha256=verdict.sha256,
+            licence=said.licence or verdict.licence or UNKNOWN,
+            attribution=said.attribution or verdict.attribution,
+            extent=verdict.extent,
+            metric=metric,
+            triangles=verdict.triangles,
+            open_edges=verdict.open_edges,
+            texture=verdict.texture,
+        )
+        self._names.add(asset.name)
+        self._shapes[verdict.mesh] = asset.name
+        self.members.append(Member(asset, candidate.file.resolve(), verdict.mesh))
+
+    def _why_not(self, verdict: Verdict, words: str, in_metres: bool) -> str:
+        if verdict.mesh in self._shapes:
+            return f"has the same mesh as {self._shapes[verdict.mesh]}"
+        return absurd(verdict.extent, words) if in_metres else ""
+
+    def _name(self, candidate: Candidate) -> str:
+        """Return a name that is not taken, counted up where the file's is."""
+        stem = safe(candidate.name or candidate.file.stem).replace(" ", "_") or "object"
+        name, k = stem, 1
+        while name in self._names:
+            name, k = f"{stem}_{k}", k + 1
+        return name
+
+
+def is_metric(candidate: Candidate, extent: float, words: str) -> bool:
+    """Tell whether lengths are metres: what is said, unless the mesh has another extent.
+
+    Where nobody says, they are if the thing is then as large as such things are: glTF is in metres
+    by its specification, and most files are not.
+    """
+    said = candidate.said
+    if said.extent is not None and abs(said.extent / max(extent, 1e-300) - 1) > OTHER:
+        return False
+    return doubt("", words, extent) is None if said.metric is None else said.metric
+
+
+def absurd(extent: float, words: str) -> str:
+    """Return why a thing of such an extent [m] can't be in metres; empty where it can."""
+    known = typical_extent(words)
+    low, high = (known.low, known.high) if known else (SMALLEST, LARGEST)
+    if low / ABSURD <= extent <= high * ABSURD:
+        return ""
+    usual = f"a {known.words} is usually {known.usual:g} m" if known else "nothing is so"
+    return (
+        f"is said to be in metres and is {extent:.3g} m large; {usual}. Say metric = no if only "
+        "its shape counts"
+    )

@@ -1,0 +1,71 @@
+"""What a pool holds: models that passed the gate, and the reasons why others did not."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+UNKNOWN = "unknown"
+"""Licence of what says nothing about it."""
+
+
+@dataclass(frozen=True)
+class Asset:
+    """One model that scenes can be made of."""
+
+    name: str
+    """Unique in the pool."""
+    class_name: str
+    """What it is, in words ("soda can")."""
+    file: Path
+    """A GLB: the file as found, or a cleaned copy below the pool's folder."""
+    source: str
+    """The file as found."""
+    sha256: str
+    """Of ``file``'s bytes."""
+    licence: str
+    """"CC-BY-4.0", …; "unknown" where nothing says."""
+    attribution: str
+    """Whom to name, and how; empty where nothing says."""
+    extent: float
+    """Largest extent of the mesh, in units of the file; [m] where ``metric``."""
+    metric: bool
+    """Whether the file's lengths are metres; otherwise only its shape counts."""
+    triangles: int
+    open_edges: float
+    """Share of the edges that bound one triangle only [-]; recorded, never a reason to reject."""
+    texture: int
+    """Side of its finest base-colour picture [px], repeats counted; 0: plain colours."""
+
+    @property
+    def credit(self) -> str:
+        """Attribution and licence in one line; empty where nothing is known of either."""
+        known = [w for w in (self.attribution, self.licence) if w and w != UNKNOWN]
+        return ", ".join(known)
+
+
+@dataclass(frozen=True)
+class Rejection:
+    """One file that did not get into the pool."""
+
+    source: str
+    class_name: str
+    reason: str
+
+
+@dataclass(frozen=True)
+class Pool:
+    """Models by class, kept in a folder."""
+
+    folder: Path
+    assets: tuple[Asset, ...]
+    """By class, then by name."""
+    rejections: tuple[Rejection, ...] = ()
+
+    @property
+    def classes(self) -> dict[str, tuple[Asset, ...]]:
+        """The assets of each class, classes in alphabetical order."""
+        names = sorted({a.class_name for a in self.assets})
+        return {c: tuple(a for a in self.assets if a.class_name == c) for c in names}
+
+    def asset(self, name: str) -> Asset | None:
+        """Return the asset of that name, None where there is none."""
+        return next((a for a in self.assets if a.name == name), None)

@@ -1,0 +1,83 @@
+"""Files that ask to be let into a pool, and what is said about them beside what they say."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+from corporeal.errors import UserError
+from corporeal.formats.obj import OBJ
+from corporeal.formats.sources import MODELS
+from corporeal.formats.words import everyday
+from corporeal.pool.table import Row, read_table
+
+MANIFEST = "manifest.csv"
+"""Table that is picked up where it lies in an indexed folder or right above it."""
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """A model file, with what somebody says about it; empty or None: nothing."""
+
+    file: Path
+    said: Row = field(default_factory=Row)
+    name: str = ""
+
+
+def candidates_in(
+    folders: Sequence[Path], table: Path | None = None, pool: Path | None = None
+) -> list[Candidate]:
+    """Return every model below the folders, each once, in the order of their paths.
+
+    A file's class is what a table says; else the name of the folder it lies in, right below the
+    indexed one; else nothing, and the file's own name will do.
+
+    Args:
+        folders: Searched with all their folders below.
+        table: CSV of classes; what it says goes before a manifest.
+        pool: A folder whose own copies are no candidates.
+
+    Raises:
+        UserError: A folder is absent, or a table cannot be used.
+
+    """
+    said = {} if table is None else read_table(table, [table.parent, *folders])
+    found: dict[Path, Candidate] = {}
+    for folder in folders:
+        rows = _manifest(folder) | said
+        for file in models_below(folder, pool):
+            row = rows.get(file.resolve()) or Row(class_name=_class_by_folder(file, folder))
+            found.setdefault(file.resolve(), Candidate(file, row))
+    return [found[path] for path in sorted(found)]
+
+
+def models_below(folder: Path, pool: Path | None = None) -> list[Path]:
+    """Return all model files below a folder, by path; nothing hidden, nothing of the pool's own.
+
+    Raises:
+        UserError: There is no such folder.
+
+    """
+    if not folder.is_dir():
+        raise UserError(f"{folder}: there is no such folder. Name a folder that holds models.")
+    own = pool.resolve() if pool is not None else None
+    return [
+        path
+        for path in sorted(folder.rglob("*"))
+        if path.suffix.lower() in (*MODELS, *OBJ)
+        and not any(part.startswith(".") for part in path.relative_to(folder).parts)
+        and path.is_file()
+        and (own is None or not path.resolve().is_relative_to(own))
+    ]
+
+
+def _manifest(folder: Path) -> dict[Path, Row]:
+    for place in (folder, folder.resolve().parent):
+        path = place / MANIFEST
+        if path.is_file():
+            return read_table(path, [place])
+    return {}
+
+
+def _class_by_folder(file: Path, folder: Path) -> str:
+    below = file.relative_to(folder).parts[:-1]
+    return everyday(below[0]) if below else ""

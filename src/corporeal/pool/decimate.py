@@ -1,0 +1,150 @@
+"""Fewer triangles for the same shape and the same look.
+
+Shape: quadric error metrics (Garland & Heckbert, SIGGRAPH 1997) on welded vertices, so that
+texture seams do not tear open. Look: each new corner takes texture coordinates, normal and colour
+from the nearest point of the old surface. Where that lies across a seam, on another piece of the
+picture than the middle of the triangle, the face at the middle is continued to the corner.
+"""
+
+from dataclasses import replace
+
+import fast_simplification
+import igl
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.types import Scene, Surface
+
+GRID = 2**21 - 1
+"""Steps along an extent within which vertices are one: three numbers fit into 63 bits."""
+ALONE = 4
+"""A surface with fewer triangles than this is left as it is."""
+FAR = 3.0
+"""How far beyond a triangle its texture is continued, in barycentric coordinates."""
+CREASE = 0.7
+"""Cosine of the angle to its triangle beyond which a corner's normal is from round an edge."""
+ALIKE = 1e5
+"""Steps per unit within which two corners of one vertex look the same."""
+
+
+def decimated(scene: Scene, most: int) -> Scene:
+    """Return the scene with about ``most`` triangles, shared out as they were before."""
+    total = sum(len(s.triangles) for s in scene.surfaces)
+    surfaces = (_decimated(s, int(most * len(s.triangles) / total)) for s in scene.surfaces)
+    return replace(scene, surfaces=tuple(s for s in surfaces if len(s.triangles)))
+
+
+def _decimated(surface: Surface, target: int) -> Surface:
+    old = _Old(surface)
+    if len(old.triangles) <= max(target, ALONE):
+        return surface
+    vertices, triangles = fast_simplification.simplify(
+        old.vertices, old.triangles.astype(np.int32), target_count=target
+    )[:2]
+    triangles = np.asarray(triangles, np.int64)
+    if not len(triangles):
+        return replace(surface, triangles=surface.triangles[:0])
+    return _dressed(surface, old, np.asarray(vertices, np.float64), triangles)
+
+
+class _Old:
+    """The surface as found, welded by position, and the way back to what its corners wore."""
+
+    def __init__(self, surface: Surface) -> None:
+        x = np.asarray(surface.vertices, np.float64)
+        low, size = x.min(axis=0), max(float(np.ptp(x, axis=0).max()), 1e-300)
+        steps = np.round((x - low) / size * GRID).astype(np.int64)
+        key = (steps[:, 0] << 42) | (steps[:, 1] << 21) | steps[:, 2]
+        _, first, joined = np.unique(key, return_index=True, return_inverse=True)
+        welded = joined.reshape(-1)[surface.triangles]
+        a, b, c = welded.T
+        real = (a != b) & (b != c) & (c != a)
+        self.vertices = np.ascontiguousarray(x[first])
+        self.triangles = np.ascontiguousarray(welded[real])
+        self.corners = surface.triangles[real]
+        """For each triangle, its vertices in the surface's own numbers."""
+        self.tree = igl.AABB()
+        self.tree.init(self.vertices, self.triangles)
+
+    def nearest(self, points: Float[np.ndarray, "N 3"]) -> tuple[np.ndarray, np.ndarray]:
+        """For each point the nearest triangle, and the weights of its corners there."""
+        _, face, foot = self.tree.squared_distance(self.vertices, self.triangles, points)
+        face = np.asarray(face)
+        return face, self.weights(face, np.asarray(foot))
+
+    def weights(self, face: np.ndarray, points: np.ndarray) -> Float[np.ndarray, "N 3"]:
+        """Barycentric coordinates of points in the planes of triangles; beyond them, bounded."""
+        a, b, c = np.swapaxes(self.vertices[self.triangles[face]], 0, 1)
+        u, v, w = b - a, c - a, points - a
+        uu, uv, vv = _dot(u, u), _dot(u, v), _dot(v, v)
+        wu, wv = _dot(w, u), _dot(w, v)
+        area = np.maximum(uu * vv - uv * uv, 1e-300)
+        s = np.clip((vv * wu - uv * wv) / area, -FAR, FAR)
+        t = np.clip((uu * wv - uv * wu) / area, -FAR, FAR)
+        return np.stack([1 - s - t, s, t], axis=1)
+
+    def worn(self, values: np.ndarray, face: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Interpolate what the corners wear."""
+        return np.einsum("nk,nkd->nd", weights, np.asarray(values, np.float64)[self.corners[face]])
+
+
+def _dressed(surface: Surface, old: _Old, x: np.ndarray, triangles: np.ndarray) -> Surface:
+    """Give each corner of the new triangles what the old surface wears there."""
+    face, weights = old.nearest(x)
+    columns = {}
+    if surface.uv is not None:
+        columns["uv"] = _uv(surface.uv, old, x, triangles, old.worn(surface.uv, face, weights))
+    if surface.normals is not None:
+        found = old.worn(surface.normals, face, weights)
+        columns["normals"] = _normals(found, x, triangles)
+    if surface.colours is not None:
+        colours = np.clip(old.worn(surface.colours, face, weights), 0, 1)
+        columns["colours"] = colours[triangles]
+    return _joined(surface, x, triangles, columns)
+
+
+def _uv(uv: np.ndarray, old: _Old, x: np.ndarray, triangles: np.ndarray, own: np.ndarray):
+    """Return texture coordinates (T, 3, 2), each triangle's on one piece of the picture."""
+    middle = x[triangles].mean(axis=1)
+    face, at = old.nearest(middle)
+    centre = old.worn(uv, face, at)
+    continued = np.stack(
+        [old.worn(uv, face, old.weights(face, x[triangles[:, k]])) for k in range(3)], axis=1
+    )
+    reach = np.linalg.norm(continued - centre[:, None], axis=2).max(axis=1)
+    taken = own[triangles]
+    across = np.linalg.norm(taken - continued, axis=2) > reach[:, None]
+    return np.where(across[:, :, None], continued, taken)
+
+
+def _normals(found: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> np.ndarray:
+    """Return unit normals (T, 3, 3); a triangle's own where the corner's is from round an edge."""
+    a, b, c = np.swapaxes(x[triangles], 0, 1)
+    flat = _unit(np.cross(b - a, c - a))[:, None]
+    smooth = _unit(found)[triangles]
+    return np.where((smooth * flat).sum(axis=2, keepdims=True) < CREASE, flat, smooth)
+
+
+def _joined(
+    surface: Surface, x: np.ndarray, triangles: np.ndarray, columns: dict[str, np.ndarray]
+) -> Surface:
+    """Make corners of one vertex that look the same into one."""
+    flat = {name: v.reshape(-1, v.shape[2]) for name, v in columns.items()}
+    rows = np.column_stack([triangles.reshape(-1), *(np.round(v * ALIKE) for v in flat.values())])
+    _, first, joined = np.unique(
+        rows.astype(np.int64), axis=0, return_index=True, return_inverse=True
+    )
+    return replace(
+        surface,
+        vertices=x[triangles.reshape(-1)[first]],
+        triangles=joined.reshape(-1, 3),
+        **{name: v[first] for name, v in flat.items()},
+    )
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.einsum("nk,nk->n", a, b)
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return v / np.maximum(np.linalg.norm(v, axis=-1, keepdims=True), 1e-300)

@@ -1,0 +1,234 @@
+"""The gate: which models are good enough for a scene, and why the others are not."""
+
+import hashlib
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import coo_matrix
+from scipy.sparse.csgraph import connected_components
+
+from corporeal.geometry.mesh import Mesh, weld
+from corporeal.pool.decimate import decimated
+from corporeal.types import Scene, Surface
+
+SLIVER = 1e-12
+"""Area, in squares of the extent, below which a triangle is degenerate: a millionth across."""
+MESSY = 0.01
+"""Share of degenerate triangles from which a cleaned copy is kept."""
+BROKEN = 0.5
+"""Share of degenerate triangles from which a model is no model."""
+MAIN = 0.01
+"""Share of the area that at least one connected component must have."""
+FEW_COLOURS = 64
+"""A picture with no more colours than this is a palette: its pixels carry no detail."""
+FLAT = 1e-6
+"""Area in texture coordinates below which every triangle takes one colour off a picture."""
+SIZES = 1e-6, 1e6
+"""Extents in any unit between which single precision places vertices well."""
+
+
+@dataclass(frozen=True)
+class GateConfig:
+    """What a model must be like to get into the pool."""
+
+    least_triangles: int = 12
+    """Fewer make no thing but a placeholder."""
+    least_plain: int = 100
+    """The same, of a model without any picture on it."""
+    most_triangles: int = 200_000
+    """A model with more is decimated, and the copy is kept."""
+    least_texture: int = 512
+    """Side of the finest base-colour picture, repeats counted [px]; plain colours need none."""
+
+
+DEFAULT = GateConfig()
+
+
+@dataclass(frozen=True)
+class Measures:
+    """What was measured on a model that passed."""
+
+    scene: Scene
+    """As it enters the pool."""
+    changed: bool
+    """Whether ``scene`` is cleaned or decimated."""
+    mesh: str
+    """Names the shape as found, whatever its look and file."""
+    extent: float
+    """Largest extent, in units of the file."""
+    triangles: int
+    open_edges: float
+    texture: int
+
+
+class Rejected(Exception):  # noqa: N818
+    """The model stays outside; the message says why."""
+
+
+def inspect(scene: Scene, config: GateConfig = DEFAULT) -> Measures:
+    """Clean and decimate a model where it needs it, and measure it.
+
+    Raises:
+        Rejected: It is not good enough.
+
+    """
+    extent = _extent(scene)
+    name = fingerprint(scene)
+    cleaned = _without_slivers(scene, extent)
+    changed = cleaned is not scene
+    found = sum(len(s.triangles) for s in cleaned.surfaces)
+    if found > config.most_triangles:
+        cleaned, changed = decimated(cleaned, config.most_triangles), True
+        left = sum(len(s.triangles) for s in cleaned.surfaces)
+        if left > config.most_triangles:
+            raise Rejected(
+                f"has {found:,} triangles and cannot be decimated below {left:,}; "
+                f"at most {config.most_triangles:,} are of use"
+            )
+    texture = _texture(cleaned)
+    _check_count(found, texture, config)
+    if 0 < texture < config.least_texture and not _all_plain(cleaned):
+        raise Rejected(
+            f"its finest base-colour picture is {texture} px across; "
+            f"{config.least_texture} px are needed, or plain colours"
+        )
+    mesh = _welded(cleaned)
+    _check_components(mesh)
+    return Measures(
+        scene=cleaned,
+        changed=changed,
+        mesh=name,
+        extent=extent,
+        triangles=sum(len(s.triangles) for s in cleaned.surfaces),
+        open_edges=open_edges(mesh),
+        texture=texture,
+    )
+
+
+def fingerprint(scene: Scene) -> str:
+    """Name a shape by its corners and triangles; looks, names and the file's form don't count."""
+    total = hashlib.sha256()
+    for s in scene.surfaces:
+        total.update(np.ascontiguousarray(s.vertices, "<f4").tobytes())
+        total.update(np.ascontiguousarray(s.triangles, "<u4").tobytes())
+    return total.hexdigest()[:20]
+
+
+def open_edges(mesh: Mesh) -> float:
+    """Share of the edges that bound one triangle only [-]; 0 when watertight."""
+    t = mesh.triangles
+    edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
+    _, count = np.unique(edges, axis=0, return_counts=True)
+    return float(np.mean(count == 1)) if len(count) else 0.0
+
+
+def largest_component(mesh: Mesh) -> float:
+    """Share of the area that the largest connected component has [-]."""
+    t, n = mesh.triangles, len(mesh.vertices)
+    ends = np.concatenate([t[:, :2], t[:, 1:]])
+    links = coo_matrix((np.ones(len(ends), bool), (ends[:, 0], ends[:, 1])), shape=(n, n))
+    component = connected_components(links, directed=False)[1][t[:, 0]]
+    areas = np.bincount(component, mesh.areas)
+    return float(areas.max() / areas.sum())
+
+
+def _extent(scene: Scene) -> float:
+    """Return the largest extent; unlike NaN, 1e30 can be written in a file."""
+    used = [s.vertices[np.unique(s.triangles)] for s in scene.surfaces if len(s.triangles)]
+    if not used:
+        raise Rejected("holds no triangles")
+    corners = np.concatenate(used)
+    if not np.isfinite(corners).all():
+        raise Rejected("has vertices that are not finite numbers")
+    extent = float(np.ptp(corners, axis=0).max())
+    low, high = SIZES
+    if not low <= extent <= high:
+        raise Rejected(f"is {extent:.3g} units large; {low:g} to {high:g} can be a thing")
+    return extent
+
+
+def _without_slivers(scene: Scene, extent: float) -> Scene:
+    """Return the scene without degenerate triangles, where there are many of them."""
+    kept = [_areas(s) > SLIVER * extent**2 for s in scene.surfaces]
+    share = 1 - np.concatenate(kept).mean()
+    if share > BROKEN:
+        raise Rejected(f"{share:.0%} of its triangles have no area")
+    if share < MESSY:
+        return scene
+    surfaces = (only(s, k) for s, k in zip(scene.surfaces, kept, strict=True))
+    return replace(scene, surfaces=tuple(s for s in surfaces if len(s.triangles)))
+
+
+def only(surface: Surface, kept: Bool[np.ndarray, " T"]) -> Surface:
+    """Return the chosen triangles of a surface, with the vertices that they need."""
+    used, numbers = np.unique(surface.triangles[kept], return_inverse=True)
+    rows = {
+        name: None if (values := getattr(surface, name)) is None else values[used]
+        for name in ("vertices", "normals", "uv", "colours")
+    }
+    return replace(surface, triangles=numbers.reshape(-1, 3), **rows)
+
+
+def _areas(s: Surface) -> Float[np.ndarray, " T"]:
+    a, b, c = np.swapaxes(np.asarray(s.vertices, np.float64)[s.triangles], 0, 1)
+    return 0.5 * np.linalg.norm(np.cross(b - a, c - a), axis=1)
+
+
+def _check_count(triangles: int, texture: int, config: GateConfig) -> None:
+    """Tell a placeholder from a simple thing: a cardboard box has few triangles and a picture."""
+    least = config.least_triangles if texture else config.least_plain
+    if triangles < least:
+        look = "" if texture else " and no picture"
+        raise Rejected(f"has {triangles} triangles{look}: a placeholder (at least {least})")
+
+
+def _texture(scene: Scene) -> int:
+    """Return the side of the finest picture, repeats counted [px]; 0: there is none."""
+    sides = (max(picture.shape[:2]) * max(1.0, area**0.5) for picture, area in _pictures(scene))
+    return round(max(sides, default=0))
+
+
+def _all_plain(scene: Scene) -> bool:
+    """Whether the pictures carry colours and no detail."""
+    return all(area < FLAT or _is_palette(picture) for picture, area in _pictures(scene))
+
+
+def _pictures(scene: Scene) -> Iterator[tuple[np.ndarray, float]]:
+    """Every base-colour picture, with the area in its own coordinates that is put on surfaces."""
+    for number in sorted({s.finish for s in scene.surfaces}):
+        picture = scene.finishes[number].texture
+        areas = [_uv_area(s) for s in scene.surfaces if s.finish == number and s.uv is not None]
+        if picture is not None and areas:
+            yield picture, sum(areas)
+
+
+def _uv_area(s: Surface) -> float:
+    assert s.uv is not None
+    a, b, c = np.swapaxes(np.asarray(s.uv, np.float64)[s.triangles], 0, 1)
+    (x, y), (u, v) = (b - a).T, (c - a).T
+    return float(np.abs(x * v - y * u).sum() / 2)
+
+
+def _is_palette(picture: np.ndarray) -> bool:
+    rows = picture.reshape(-1, picture.shape[2])[:, :3].astype(np.uint32)
+    return len(np.unique(rows @ np.array([1, 1 << 8, 1 << 16], np.uint32))) <= FEW_COLOURS
+
+
+def _welded(scene: Scene) -> Mesh:
+    starts = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
+    triangles: Int[np.ndarray, "T 3"] = np.concatenate(
+        [s.triangles + n for s, n in zip(scene.surfaces, starts, strict=False)]
+    )
+    return weld(np.concatenate([s.vertices for s in scene.surfaces]), triangles)[0]
+
+
+def _check_components(mesh: Mesh) -> None:
+    if not len(mesh.triangles):
+        raise Rejected("none of its triangles has an area")
+    share = largest_component(mesh)
+    if share <= MAIN:
+        raise Rejected(
+            f"falls into crumbs: its largest connected piece has {share:.2%} of the area"
+        )

@@ -1,0 +1,136 @@
+"""Make a pool of folders of models, and read it back.
+
+A pool is a folder with ``pool.json`` (assets, and rejections with reasons), ``verdicts.jsonl``
+(what the gate said of each content, so that no content is judged twice) and ``models/`` (copies of
+what had to be cleaned, decimated or converted).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field
+from pathlib import Path
+
+from corporeal import store
+from corporeal.errors import BadFileError, UserError
+from corporeal.pool.admission import Admission, Member
+from corporeal.pool.asset import Asset, Pool, Rejection
+from corporeal.pool.candidate import candidates_in
+from corporeal.pool.gate import GateConfig
+from corporeal.pool.verdict import Verdicts
+
+POOL = "pool.json"
+INDEX_AGAIN = "Make it again: corporeal assets index FOLDER --pool POOL."
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class IndexConfig:
+    """What is said about the files, and how good they must be."""
+
+    csv: Path | None = None
+    """Table with columns file, class and, where known, licence, attribution, extent_m, metric."""
+    gate: GateConfig = field(default_factory=GateConfig)
+
+
+DEFAULT = IndexConfig()
+
+
+def index(
+    folders: Sequence[Path],
+    pool_folder: Path,
+    config: IndexConfig = DEFAULT,
+    progress: Progress = lambda fraction, words: None,
+) -> Pool:
+    """Judge every model below the folders and keep the good ones in the pool.
+
+    What other folders gave the pool before stays in it. A content that was judged before, with the
+    same gate, is not judged again; an interrupted run goes on where it was.
+
+    Args:
+        folders: Hold .glb, .gltf and .obj files, at any depth.
+        pool_folder: Made where it is absent.
+        config: Table of classes, gate.
+        progress: Told the fraction done and the file.
+
+    Raises:
+        UserError: A folder is absent, a table cannot be used, or another process works here.
+
+    """
+    folders = [Path(f) for f in folders]
+    with store.alone(pool_folder):
+        candidates = candidates_in(folders, config.csv, pool_folder)
+        if not candidates:
+            named = ", ".join(map(str, folders))
+            raise UserError(f"{named}: no .glb, .gltf or .obj file lies there or below.")
+        verdicts = Verdicts(pool_folder, config.gate)
+        admission = _reopened(pool_folder, folders)
+        for k, candidate in enumerate(candidates):
+            progress(k / len(candidates), candidate.file.name)
+            admission.ask(candidate, verdicts.of(candidate.file))
+        progress(1.0, "")
+        _write(pool_folder, admission)
+        return read_pool(pool_folder)
+
+
+def read_pool(folder: Path) -> Pool:
+    """Read a pool.
+
+    Raises:
+        UserError: There is none in the folder, or its index is damaged.
+
+    """
+    members, rejections = _read(Path(folder))
+    assets = sorted((m.asset for m in members), key=lambda a: (a.class_name, a.name))
+    return Pool(Path(folder), tuple(assets), tuple(rejections))
+
+
+def _reopened(pool: Path, folders: Sequence[Path]) -> Admission:
+    """Return what the pool has from elsewhere than these folders, as far as it is still there."""
+    if not (pool / POOL).exists():
+        return Admission(pool, (), ())
+    members, rejections = _read(pool)
+    roots = [f.resolve() for f in folders]
+
+    def elsewhere(path: Path) -> bool:
+        return path.exists() and not any(path.resolve().is_relative_to(r) for r in roots)
+
+    return Admission(
+        pool,
+        (m for m in members if elsewhere(m.found) and m.asset.file.exists()),
+        (r for r in rejections if elsewhere(Path(r.source))),
+    )
+
+
+def _write(pool: Path, admission: Admission) -> None:
+    value = {
+        "assets": [
+            asdict(m.asset) | {"file": _kept(pool, m.asset.file), "found": m.found, "mesh": m.mesh}
+            for m in admission.members
+        ],
+        "rejections": [asdict(r) for r in admission.rejections],
+    }
+    store.write_json(pool / POOL, value)
+
+
+def _kept(pool: Path, file: Path) -> str:
+    """Return a path as it stands in the index: what is the pool's own moves with it."""
+    return str(file.relative_to(pool)) if file.is_relative_to(pool) else str(file)
+
+
+def _read(pool: Path) -> tuple[list[Member], list[Rejection]]:
+    path = pool / POOL
+    if not path.exists():
+        raise UserError(f"{pool}: there is no asset pool. {INDEX_AGAIN}")
+    said = store.read_json(path)
+    try:
+        return (
+            [_member(pool, dict(entry)) for entry in said["assets"]],
+            [Rejection(**entry) for entry in said["rejections"]],
+        )
+    except (KeyError, TypeError, ValueError) as problem:
+        words = f"is no index of an asset pool ({type(problem).__name__}: {problem})."
+        raise BadFileError(path, words, INDEX_AGAIN) from problem
+
+
+def _member(pool: Path, entry: dict) -> Member:
+    found, mesh = Path(entry.pop("found")), entry.pop("mesh")
+    return Member(Asset(**entry | {"file": pool / entry["file"]}), found, mesh)
