@@ -16,12 +16,21 @@ from jaxtyping import Float
 
 from corporeal.formats.scene_file import ObjectEntry
 from corporeal.geometry.placing import lifted
+from corporeal.settle.arrange import Arrangement
 from corporeal.types import Vector, Wind
 
 Kind = Literal["fall", "fall-onto", "collision", "chain", "wind"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
 NEEDS: dict[Kind, int] = {"fall": 1, "wind": 1, "fall-onto": 2, "collision": 2, "chain": 3}
 """Fewest objects that an interaction takes."""
+STANDING: dict[Kind, tuple[Arrangement, ...]] = {
+    "fall": ("scatter", "stack", "onto"),
+    "fall-onto": ("scatter", "row"),
+    "collision": ("scatter", "row"),
+    "chain": ("row",),
+    "wind": ("scatter", "stack", "onto"),
+}
+"""How several things may stand before it begins."""
 
 GRAVITY = 9.81
 FALL = (0.5, 1.5)
@@ -34,7 +43,7 @@ WIND = (6.0, 12.0)
 """A fresh to a strong breeze (Beaufort 4 to 6) [m/s]."""
 GUST = 0.3
 CLEAR = 0.02
-"""Free space kept about a path, over the scene's size."""
+"""Free space kept beside what falls, over the larger thing's size."""
 AFTER = 0.8
 """How long to go on watching after the first impact [s]."""
 
@@ -155,14 +164,11 @@ def _way(boxes: Boxes, mover: int, target: int) -> Float[np.ndarray, "2"] | None
     """Return the direction along the floor in which the way to the target is free."""
     if not _level(boxes[mover], boxes[target]):
         return None
-    _, heading = _gap(boxes, mover, target)
-    there = boxes[target].mean(axis=0)[:2]
-    here = boxes[mover].mean(axis=0)[:2]
-    steps = np.linspace(0.0, 1.0, 33)[:, None] * (there - here)
+    gap, heading = _gap(boxes, mover, target)
     others = [k for k in range(len(boxes)) if k not in (mover, target)]
-    for step in steps:
-        swept = boxes[mover] + np.array([*step, 0.0])
-        if any(_meet(swept, boxes[k]) for k in others):
+    for way in np.linspace(0.0, gap, 33):
+        swept = boxes[mover] + np.array([*(way * heading), 0.0])
+        if any(_meet(swept, boxes[k], margin=0.0) for k in others):
             return None
     return heading
 
@@ -217,9 +223,9 @@ def _vector(across: np.ndarray) -> Vector:
     return (round(float(across[0]), 6), round(float(across[1]), 6), 0.0)
 
 
-def _meet(a: np.ndarray, b: np.ndarray) -> bool:
-    margin = CLEAR * max(_size(a), _size(b))
-    return bool(((a[0] - margin < b[1]) & (b[0] - margin < a[1])).all())
+def _meet(a: np.ndarray, b: np.ndarray, margin: float = CLEAR) -> bool:
+    space = margin * max(_size(a), _size(b))
+    return bool(((a[0] - space < b[1]) & (b[0] - space < a[1])).all())
 
 
 def _level(a: np.ndarray, b: np.ndarray) -> bool:

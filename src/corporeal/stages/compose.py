@@ -1,0 +1,356 @@
+"""Compose a scene of things from a pool: draw, size, settle, certify, begin, write it all down.
+
+A composed scene is a folder: ``scene.glb`` (everything at rest), ``scene.toml`` (what happens),
+``certificate.json`` (that it is at rest), ``composition.json`` (what it is made of, and why so
+large), and ``views/`` (posed pictures).
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+
+from corporeal import store
+from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.formats.glb import read_model
+from corporeal.formats.glb_merge import Member, merge
+from corporeal.formats.scene_file import SceneFile, write_scene_file
+from corporeal.formats.words import numbered
+from corporeal.geometry.sizes import Sizing, scene_extents
+from corporeal.pool.asset import Asset, Pool
+from corporeal.pool.draw import draw
+from corporeal.settle.arrange import Arrangement
+from corporeal.settle.body import Body, Pose
+from corporeal.settle.certificate import Certificate
+from corporeal.settle.decompose import decompose
+from corporeal.settle.interactions import KINDS, NEEDS, STANDING, Action, Kind, act
+from corporeal.settle.rest import at_rest
+from corporeal.types import Scene
+from corporeal.vlm.sizes import RealExtent, real_extent, usual_sizes
+
+Progress = Callable[[float, str], None]
+
+TRIES = 6
+"""Compositions that are settled until one leaves room for its interaction."""
+FINEST = 48
+"""Cells along the largest object at draft detail: half of one is the penetration allowed."""
+PIECES = "pieces"
+"""Folder of the pool that keeps convex pieces."""
+AT_REST = 1.0
+"""How long to film a scene in which nothing happens [s]."""
+
+
+@dataclass(frozen=True)
+class ComposeConfig:
+    """What goes into a scene and what happens in it."""
+
+    classes: tuple[str, ...] = ()
+    """Draw from these classes; by default from all of the pool."""
+    assets: tuple[str, ...] = ()
+    """Exactly these things, by their names in the pool; nothing is drawn then."""
+    count: str = "1-4"
+    """How many things: a number, or a range to draw from."""
+    repeat: bool = False
+    """A class may come twice."""
+    seed: int = 0
+    """Of everything that is left to chance."""
+    arrangement: Arrangement | Literal["auto"] = "auto"
+    """How things stand at rest: side by side, stacked, dropped onto one, in a row."""
+    interaction: Kind | Literal["auto", "none"] = "auto"
+    """What happens when the film starts."""
+    sizing: Sizing = field(default_factory=Sizing)
+    vlm: str = "metadata"
+    """Who says how large things of a class are: as --vlm of `describe`; by default a table."""
+    record: Path | None = None
+    """Keep a model's answers in this folder, for --vlm replay:FOLDER."""
+
+
+DEFAULT = ComposeConfig()
+
+
+@dataclass(frozen=True)
+class Composed:
+    """A scene that was composed."""
+
+    folder: Path
+    names: tuple[str, ...]
+    """Of its objects."""
+    arrangement: Arrangement
+    action: Action | None
+    certificate: Certificate
+    warnings: tuple[str, ...]
+
+
+def compose(
+    pool: Pool, folder: Path, config: ComposeConfig = DEFAULT, progress: Progress | None = None
+) -> Composed:
+    """Compose one scene and write it into a folder; the same pool and seed give the same bytes.
+
+    Raises:
+        UserError: The pool lacks what is asked for, no rest is found, or nothing has room to
+            happen.
+
+    """
+    tell = progress or (lambda fraction, words: None)
+    rng = np.random.default_rng(config.seed)
+    tell(0.0, "choosing")
+    kind = None if config.interaction in ("auto", "none") else config.interaction
+    assets = _chosen(pool, config, kind, rng)
+    kind = kind or _possible_kind(config, len(assets), rng)
+    sizes = _sized(assets, config)
+    tell(0.1, "cutting into convex pieces")
+    things = _things(pool, assets, sizes, config.sizing)
+    tell(0.3, "settling")
+    settled = _settled(things, kind, config, rng)
+    tell(0.9, "writing")
+    warnings = _write(folder, things, settled, config)
+    told = tuple(dict.fromkeys([*(w for s in sizes for w in s.warnings), *warnings]))
+    _keep(folder, things, settled, config, told)
+    names = tuple(t.name for t in things)
+    return Composed(folder, names, settled.arrangement, settled.action, settled.certificate, told)
+
+
+# ---------------------------------------------------------------- what is in it
+
+
+def _possible_kind(config: ComposeConfig, count: int, rng: np.random.Generator) -> Kind | None:
+    """Draw what is to happen among what so many things, standing as asked, can do."""
+    if config.interaction == "none":
+        return None
+    stands = config.arrangement
+    able: list[Kind] = [
+        k for k in KINDS if NEEDS[k] <= count and (count == 1 or stands in ("auto", *STANDING[k]))
+    ]
+    return able[rng.integers(len(able))] if able else "fall"
+
+
+def _chosen(
+    pool: Pool, config: ComposeConfig, kind: Kind | None, rng: np.random.Generator
+) -> list[Asset]:
+    """Return the assets named, or draw classes and one asset of each."""
+    if config.assets:
+        return [_named(pool, name) for name in config.assets]
+    by_class = pool.classes
+    if not by_class:
+        raise UserError(
+            f"The pool {pool.folder} has no usable asset. See why: corporeal assets list --rejected"
+        )
+    for name in config.classes:
+        if name not in by_class:
+            raise UnknownChoiceError("class", name, list(by_class))
+    offered = list(dict.fromkeys(config.classes)) or list(by_class)
+    low, high = _counts(config.count)
+    low = max(low, NEEDS[kind]) if kind else low
+    most = high if config.repeat else min(high, len(offered))
+    if most < low:
+        raise UserError(
+            f"{low} things are asked for, of {len(offered)} "
+            f"class{'es' * (len(offered) != 1)} that may come once each. Name more --classes, or "
+            "say --repeat."
+        )
+    count = int(rng.integers(low, most + 1))
+    classes = draw(offered, {}, count, rng, config.repeat)
+    return [by_class[c][rng.integers(len(by_class[c]))] for c in classes]
+
+
+def _named(pool: Pool, name: str) -> Asset:
+    found = pool.asset(name)
+    if found is None:
+        raise UnknownChoiceError("asset", name, [a.name for a in pool.assets])
+    return found
+
+
+def _counts(said: str) -> tuple[int, int]:
+    """Return fewest and most of "3" or "1-4"."""
+    low, _, high = said.partition("-")
+    if not low.strip().isdigit() or not (high or low).strip().isdigit():
+        raise UserError(f"--count {said!r}: write a number or a range, for example 1-4.")
+    least, most = int(low), int(high or low)
+    if not 1 <= least <= most <= 16:
+        raise UserError(f"--count {said!r}: give numbers from 1 to 16, the smaller first.")
+    return least, most
+
+
+# ---------------------------------------------------------------- how large
+
+
+@dataclass(frozen=True)
+class _Thing:
+    """One object of the scene to be."""
+
+    name: str
+    asset: Asset
+    real: RealExtent
+    extent: float
+    """In the scene [m]."""
+    body: Body
+    centre: np.ndarray
+    """Of the file's box [its own unit]: the origin of the body."""
+
+    @property
+    def scale_of_file(self) -> float:
+        """Scene size over the file's."""
+        return self.extent / self.asset.extent
+
+
+def _sized(assets: Sequence[Asset], config: ComposeConfig) -> list[RealExtent]:
+    known = usual_sizes((a.class_name for a in assets), config.vlm, config.record)
+    sizes = [real_extent(a.name, a.class_name, a.extent, a.metric, known) for a in assets]
+    if sizes and known.warnings:
+        sizes[0] = replace(sizes[0], warnings=(*sizes[0].warnings, *known.warnings))
+    return sizes
+
+
+def _things(
+    pool: Pool, assets: Sequence[Asset], sizes: Sequence[RealExtent], sizing: Sizing
+) -> list[_Thing]:
+    """Give every asset its name, its size in the scene and a body."""
+    names = numbered([a.class_name for a in assets])
+    extents = scene_extents([s.extent for s in sizes], sizing)
+    things = []
+    for name, asset, size, extent in zip(names, assets, sizes, extents, strict=True):
+        vertices, triangles = _mesh(read_model(asset.file, "one").scene)
+        centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+        points = (vertices - centre) * (float(extent) / asset.extent)
+        try:
+            pieces = decompose(points, triangles, pool.folder / PIECES)
+        except UserError as problem:
+            raise UserError(f"{asset.name}: {problem}") from None
+        body = Body(name, points, triangles, pieces)
+        things.append(_Thing(name, asset, size, float(extent), body, centre))
+    return things
+
+
+def _mesh(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+    start = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
+    vertices = np.concatenate([s.vertices for s in scene.surfaces]).astype(np.float64)
+    triangles = [s.triangles + k for s, k in zip(scene.surfaces, start, strict=False)]
+    return vertices, np.concatenate(triangles)
+
+
+# ---------------------------------------------------------------- how it stands, what happens
+
+
+@dataclass(frozen=True)
+class _Settled:
+    poses: list[Pose]
+    arrangement: Arrangement
+    action: Action | None
+    certificate: Certificate
+
+
+def _settled(
+    things: Sequence[_Thing], kind: Kind | None, config: ComposeConfig, rng: np.random.Generator
+) -> _Settled:
+    """Settle until what is to happen has room."""
+    bodies = [t.body for t in things]
+    deepest = 0.5 * max(t.extent for t in things) / FINEST
+    for _ in range(TRIES):
+        arrangement = _arrangement(config, kind, len(things), rng)
+        seed = int(rng.integers(2**31))
+        poses, certificate = at_rest(bodies, arrangement, seed, deepest)
+        if kind is None:
+            return _Settled(poses, arrangement, None, certificate)
+        boxes = np.array([_box(t.body, p) for t, p in zip(things, poses, strict=True)])
+        action = act(boxes, [t.name for t in things], kind, rng)
+        if action is not None:
+            return _Settled(poses, arrangement, action, certificate)
+    names = ", ".join(t.name for t in things)
+    raise UserError(
+        f"{names}: no room for a {kind} in {TRIES} compositions. Try another --seed, another "
+        "--interaction, or other things."
+    )
+
+
+def _arrangement(
+    config: ComposeConfig, kind: Kind | None, count: int, rng: np.random.Generator
+) -> Arrangement:
+    if config.arrangement != "auto":
+        return config.arrangement
+    if count == 1:
+        return "scatter"
+    ways = STANDING[kind] if kind else ("scatter", "stack", "onto", "row")
+    return ways[rng.integers(len(ways))]
+
+
+def _box(body: Body, pose: Pose) -> np.ndarray:
+    points = pose.world(body.hull.vertices)
+    return np.stack([points.min(axis=0), points.max(axis=0)])
+
+
+# ---------------------------------------------------------------- written down
+
+
+def _write(
+    folder: Path, things: Sequence[_Thing], settled: _Settled, config: ComposeConfig
+) -> tuple[str, ...]:
+    """Write ``scene.glb`` and ``scene.toml``; return what was left out of the files."""
+    action = settled.action
+    duration = action.duration if action else AT_REST
+    members = [_member(t, p) for t, p in zip(things, settled.poses, strict=True)]
+    extras = {"gravity_m_s2": [0.0, 0.0, -9.81], "duration_s": duration, "fps": 30}
+    warnings = merge(folder / "scene.glb", members, "scene", extras)
+    scene_file = SceneFile(
+        folder / "scene.toml",
+        file=folder / "scene.glb",
+        duration=duration,
+        objects=action.entries if action else (),
+    )
+    write_scene_file(folder / "scene.toml", scene_file)
+    return warnings
+
+
+def _member(thing: _Thing, pose: Pose) -> Member:
+    asset, scale = thing.asset, thing.scale_of_file
+    x, y, z = pose.world(-scale * thing.centre[None])[0].tolist()
+    extras = {
+        "object_id": thing.name,
+        "class": asset.class_name,
+        "asset": asset.name,
+        "asset_sha256": asset.sha256,
+        "source": asset.source,
+        "licence": asset.licence,
+        "attribution": asset.attribution,
+        "real_extent_m": thing.real.extent,
+        "scale": thing.extent / thing.real.extent,
+    }
+    return Member(asset.file, thing.name, (x, y, z), pose.quaternion, scale, extras)
+
+
+def _keep(
+    folder: Path,
+    things: Sequence[_Thing],
+    settled: _Settled,
+    config: ComposeConfig,
+    warnings: tuple[str, ...],
+) -> None:
+    """Write ``certificate.json`` and ``composition.json``."""
+    store.write_json(folder / "certificate.json", asdict(settled.certificate))
+    action = settled.action
+    composition = {
+        "seed": config.seed,
+        "arrangement": settled.arrangement,
+        "interaction": action.kind if action else "none",
+        "what_happens": action.words if action else "nothing: everything stays at rest",
+        "sizing": asdict(config.sizing),
+        "objects": [
+            {
+                "name": t.name,
+                "class": t.asset.class_name,
+                "asset": t.asset.name,
+                "source": t.asset.source,
+                "sha256": t.asset.sha256,
+                "licence": t.asset.licence,
+                "attribution": t.asset.attribution,
+                "real_extent_m": t.real.extent,
+                "said_by": t.real.said_by,
+                "reason": t.real.reason,
+                "extent_m": t.extent,
+            }
+            for t in things
+        ],
+        "warnings": list(warnings),
+    }
+    store.write_json(folder / "composition.json", composition)
