@@ -151,6 +151,43 @@ class Scene:
         )
 
 
+@dataclass(frozen=True)
+class Camera:
+    """A pinhole camera and where it stands: x to the right, y down, z ahead (OpenCV).
+
+    A world point X is seen at (u, v, 1) ~ K (camera_from_world X). Pixel (row, column) covers
+    u from column to column + 1 and v from row to row + 1; its middle is half a pixel further.
+    """
+
+    K: Float[np.ndarray, "3 3"]
+    """Picture from camera coordinates [px]."""
+    world_from_camera: Float[np.ndarray, "4 4"]
+    """Rotation and place [m]."""
+    width: int
+    """[px]"""
+    height: int
+    """[px]"""
+
+
+@dataclass(frozen=True)
+class Views:
+    """Pictures of one scene from several sides, all of one size; V views, H rows, W columns."""
+
+    rgb: UInt8[np.ndarray, "V H W 3"]
+    """sRGB."""
+    cameras: tuple[Camera, ...]
+    """One per view."""
+    depth: Float[np.ndarray, "V H W"] | None = None
+    """Of what the middle of each pixel shows, along the camera's z [m]; inf where there is nothing.
+    The floor is something."""
+    normals: Float[np.ndarray, "V H W 3"] | None = None
+    """Unit shading normals in the world, towards the camera; 0 where there is nothing."""
+    object_of_pixel: Int[np.ndarray, "V H W"] | None = None
+    """Index into ``Scene.objects``; -1: the floor, or nothing."""
+    part_of_pixel: Int[np.ndarray, "V H W"] | None = None
+    """Which part; of pictures made from surfaces, an index into ``Scene.surfaces``. -1: none."""
+
+
 # ---------------------------------------------------------------- what it is, in words
 
 

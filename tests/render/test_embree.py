@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 import trimesh
 
-from corporeal.render.camera import Camera, axes, place
+from corporeal.render.camera import Aim, axes, place
 from corporeal.render.embree import Stage, identify, render
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
@@ -31,7 +31,7 @@ def scene(surfaces, finishes=(RED,)):
 
 
 def front(z=0.5, distance=3.0):
-    return Camera((0.0, -distance, z + 0.3), (0.0, 0.0, z), 30.0, *SIZE)
+    return Aim((0.0, -distance, z + 0.3), (0.0, 0.0, z), 30.0, *SIZE)
 
 
 def look(s, camera=None, quality="draft", **kwargs):
@@ -60,7 +60,7 @@ def test_a_scene_looks_the_same_at_any_size_and_place():
         b = ball()
         moved = Surface(b.name, 0, 0, b.vertices * factor + shift, b.triangles, b.normals)
         eye, target = (np.array(x) * factor + shift for x in (front().eye, front().target))
-        there = look(scene([moved]), Camera(tuple(eye), tuple(target), 30.0, *SIZE))
+        there = look(scene([moved]), Aim(tuple(eye), tuple(target), 30.0, *SIZE))
         assert np.percentile(np.abs(there - here), 99) <= 4
 
 

@@ -2,9 +2,10 @@
 
 import io
 import warnings
+from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import UInt8, UInt16
 from PIL import Image, ImageFile
 
 FORMATS = ("PNG", "JPEG", "WEBP")
@@ -14,19 +15,35 @@ MAX_SIDE = 4096
 """Larger pictures are halved until they fit; nobody renders more of one object [px]."""
 
 
-def decode_image(data: bytes) -> UInt8[np.ndarray, "H W C"]:
+def decode_image(data: bytes, side: int = MAX_SIDE) -> UInt8[np.ndarray, "H W C"]:
     """Return a PNG, JPEG or WebP picture as sRGB, or sRGB with alpha where it has some.
+
+    Larger pictures than ``side`` are halved until they fit.
 
     Raises:
         ValueError: The bytes are no such picture, or it is broken or absurdly large.
 
     """
+    return _decoded(data, lambda picture: np.array(_eight_bit(_small(picture, side)), np.uint8))
+
+
+def decode_numbers(data: bytes) -> UInt16[np.ndarray, "H W"]:
+    """Return the numbers of a grey PNG of 8 or 16 bits.
+
+    Raises:
+        ValueError: The bytes are no such picture, or it is broken or absurdly large.
+
+    """
+    return _decoded(data, _numbers)
+
+
+def _decoded(data: bytes, take: Callable[[ImageFile.ImageFile], np.ndarray]) -> np.ndarray:
     if not data:
         raise ValueError("the picture is empty (0 bytes)")
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")
-            return _decode(data)
+            return _opened(data, take)
     except Image.DecompressionBombError:
         raise ValueError("the picture claims more pixels than any texture has") from None
     except MemoryError:
@@ -37,18 +54,24 @@ def decode_image(data: bytes) -> UInt8[np.ndarray, "H W C"]:
         raise ValueError(f"the picture is broken ({str(problem)[:80]})") from None
 
 
-def _decode(data: bytes) -> np.ndarray:
+def _opened(data: bytes, take: Callable[[ImageFile.ImageFile], np.ndarray]) -> np.ndarray:
     with Image.open(io.BytesIO(data), formats=FORMATS) as picture:
         if picture.width * picture.height > MAX_PIXELS:
             size = f"{picture.width} × {picture.height}"
             raise ValueError(f"the picture claims {size} pixels, too many to unpack")
         picture.load()
-        return np.array(_eight_bit(_small(picture)), dtype=np.uint8)
+        return take(picture)
 
 
-def _small(picture: ImageFile.ImageFile) -> Image.Image:
+def _numbers(picture: ImageFile.ImageFile) -> np.ndarray:
+    if picture.mode != "L" and not picture.mode.startswith("I"):
+        raise ValueError(f"the picture holds colours ({picture.mode}), not grey numbers")
+    return np.asarray(picture).astype(np.uint16)
+
+
+def _small(picture: ImageFile.ImageFile, side: int) -> Image.Image:
     factor = 1
-    while max(picture.size) > factor * MAX_SIDE:
+    while max(picture.size) > factor * side:
         factor *= 2
     return picture if factor == 1 else picture.reduce(factor)
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.types import Vector
+from corporeal.types import Camera, Vector
 
 VIEW: Vector = (0.80, -0.62, 0.36)
 """Three-quarter view: things face +x."""
@@ -15,8 +15,12 @@ FILL = 0.84
 
 
 @dataclass(frozen=True)
-class Camera:
-    """A pinhole that looks at a target, +z up in the picture."""
+class Aim:
+    """Where to look from and at what, +z up in the picture: what a picture is ordered by.
+
+    Rays are cast from these numbers and not from a ``Camera``, whose matrices would round them:
+    equal aims give equal bytes, and recorded answers are matched by the bytes of pictures.
+    """
 
     eye: Vector
     """[m]"""
@@ -39,12 +43,22 @@ def axes(view: Sequence[float] | np.ndarray) -> Float[np.ndarray, "3 3"]:
     return np.stack([right, np.cross(back, right), back])
 
 
+def camera_of(aim: Aim) -> Camera:
+    """Return the camera that an aim amounts to."""
+    right, up, back = axes(np.subtract(aim.eye, aim.target))
+    focal = aim.height / 2 / np.tan(np.radians(aim.field_of_view) / 2)
+    world_from_camera = np.eye(4)
+    world_from_camera[:3] = np.stack([right, -up, -back, np.asarray(aim.eye)], axis=1)
+    K = np.array([[focal, 0, aim.width / 2], [0, focal, aim.height / 2], [0, 0, 1.0]])
+    return Camera(K, world_from_camera, aim.width, aim.height)
+
+
 def place(
     boxes: Float[np.ndarray, "F B 2 3"],
     size: tuple[int, int],
     view: Vector | None = None,
     fill: float = FILL,
-) -> Camera:
+) -> Aim:
     """See every box of every frame, as large as the picture allows.
 
     boxes: lower and upper corners [m] of B objects in F frames; nan where an object is absent.
@@ -63,7 +77,7 @@ def place(
     centre, distance = _fit(local, tangent)
     target = centre @ frame
     eye = target + distance * frame[2]
-    return Camera(tuple(eye.tolist()), tuple(target.tolist()), 30.0, *size)
+    return Aim(tuple(eye.tolist()), tuple(target.tolist()), 30.0, *size)
 
 
 def _fit(local: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, float]:

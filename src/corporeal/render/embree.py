@@ -16,7 +16,7 @@ from embreex.rtcore_scene import EmbreeScene
 
 from corporeal.machine import cores
 from corporeal.render import kernels, kernels_light
-from corporeal.render.camera import Camera, axes
+from corporeal.render.camera import Aim, axes
 from corporeal.render.kernels import NOTHING, Samples
 from corporeal.render.kernels_light import CHANNELS, GLOSSY, SHARP, Lamps
 from corporeal.render.look import (
@@ -28,13 +28,16 @@ from corporeal.render.look import (
     sees_through,
     vertex_normals,
 )
-from corporeal.types import Scene
+from corporeal.types import Scene, Vector
 
 Quality = Literal["draft", "normal", "fine"]
 BAND = 32
 """Rows of pixels cast together, at least: bands overlap by a dozen."""
 LAYERS = 4
 """Of see-through surfaces, one behind the other."""
+
+WORTH_A_BATCH = 2**18
+"""Rays that are cast together where no light is asked for."""
 
 
 @dataclass(frozen=True)
@@ -60,8 +63,11 @@ SAMPLING: dict[str, Sampling] = {
 class Light:
     """The studio. Colours are light, or sRGB where they are written in hex."""
 
+    front: Vector | None = None
+    """From where the scene is seen that the sun stands by; None: from the camera, so that the sun
+    stands at the same side of every picture."""
     sun: tuple[float, float, float] = (-0.69, -0.41, 0.90)
-    """Towards the sun, as seen from the camera: right, ahead, up."""
+    """Towards the sun, as seen from the front: right, ahead, up."""
     sun_colour: tuple[float, float, float] = (3.0, 2.75, 2.4)
     softness: float = 0.07
     zenith: tuple[float, float, float] = (0.62, 0.74, 0.95)
@@ -140,7 +146,7 @@ class Stage:
 
 
 def render(
-    stage: Stage, camera: Camera, quality: Quality = "normal", threads: int | None = None
+    stage: Stage, camera: Aim, quality: Quality = "normal", threads: int | None = None
 ) -> np.ndarray:
     """One picture (height, width, 3) uint8. Equal input gives equal bytes."""
     job = _Job(stage, camera, SAMPLING[quality])
@@ -154,7 +160,7 @@ def render(
     return out
 
 
-def identify(stage: Stage, camera: Camera, grid: int = 1) -> tuple[np.ndarray, np.ndarray]:
+def identify(stage: Stage, camera: Aim, grid: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """For each sample, the triangle it sees (-1: none) and its depth [m]; rows first."""
     job = _Job(stage, camera, Sampling(grid, 1, 1))
     o, d = job.rays((0, camera.height))
@@ -163,14 +169,31 @@ def identify(stage: Stage, camera: Camera, grid: int = 1) -> tuple[np.ndarray, n
     return prim.reshape(shape), t.reshape(shape)
 
 
+def first_seen(stage: Stage, camera: Aim) -> Samples:
+    """Return what the middle of each pixel shows, holes looked through; rows first.
+
+    Depths [m] are along the ray; points are about the stage's origin.
+    """
+    job = _Job(stage, camera, Sampling(1, 1, 1))
+    seen = kernels.samples(camera.width * camera.height)
+    lines = max(1, WORTH_A_BATCH // camera.width)
+    for row in range(0, camera.height, lines):
+        o, d = job.rays((row, min(row + lines, camera.height)))
+        part = slice(row * camera.width, row * camera.width + len(o))
+        met = job.meet(o, d, np.arange(len(o)), stage.hit(o, d))
+        for whole, piece in zip(seen, met, strict=True):
+            whole[part] = piece
+    return seen
+
+
 def _beyond(o: np.ndarray, d: np.ndarray, t: np.ndarray, size: float) -> np.ndarray:
     return np.ascontiguousarray(o + (t + np.float32(2e-5 * size))[:, None] * d, dtype=np.float32)
 
 
-def lamps(stage: Stage, camera: Camera) -> Lamps:
-    """Turn the studio with the camera: the sun stands at the same side of every picture."""
+def lamps(stage: Stage, camera: Aim) -> Lamps:
+    """Set up the studio about its front."""
     light = stage.light
-    back = np.subtract(camera.eye, camera.target)
+    back = np.subtract(camera.eye, camera.target) if light.front is None else light.front
     right, _, _ = axes(back)
     ahead = np.array([-right[1], right[0], 0.0])
     sun = light.sun[0] * right + light.sun[1] * ahead + [0, 0, light.sun[2]]
@@ -196,7 +219,7 @@ def lamps(stage: Stage, camera: Camera) -> Lamps:
 class _Job:
     """One picture being taken."""
 
-    def __init__(self, stage: Stage, camera: Camera, sampling: Sampling) -> None:
+    def __init__(self, stage: Stage, camera: Aim, sampling: Sampling) -> None:
         self.stage, self.camera, self.sampling = stage, camera, sampling
         self.frame = axes(np.subtract(camera.eye, camera.target))
         self.eye = np.subtract(camera.eye, stage.origin)

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from corporeal.geometry.arrangement import box_of, moved
-from corporeal.render.camera import Camera, place
+from corporeal.render.camera import Aim, place
 from corporeal.render.embree import Light, Stage, identify, render
 from corporeal.types import Scene, Vector
 
@@ -82,7 +82,7 @@ def portraits(
     return tuple(pictures)
 
 
-def _shown(stage: Stage, camera: Camera, parts: np.ndarray) -> tuple[int, float]:
+def _shown(stage: Stage, camera: Aim, parts: np.ndarray) -> tuple[int, float]:
     """How many parts a camera sees, and the share of the object that the least of them takes."""
     seen, _ = identify(stage, camera)
     share = np.bincount(parts[seen[seen >= 0]], minlength=int(parts.max()) + 1)

@@ -16,7 +16,7 @@ from PIL import Image
 
 from corporeal.errors import UserError
 from corporeal.render import video
-from corporeal.render.camera import Camera, place
+from corporeal.render.camera import Aim, place
 from corporeal.render.embree import Stage, render
 from corporeal.render.skin import Skin, bind
 from corporeal.store import writing
@@ -116,7 +116,7 @@ def granular(field: MaterialField) -> np.ndarray:
 
 def watch(
     skin: Skin, scene: Scene, particles: Particles, trajectory: Trajectory, config: FilmConfig
-) -> Camera:
+) -> Aim:
     """Place one camera for the whole motion."""
     count = len(trajectory.frames)
     numbers = np.unique(np.linspace(0, count - 1, min(count, LOOKS)).round().astype(int))

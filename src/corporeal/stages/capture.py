@@ -1,0 +1,128 @@
+"""Capture: posed pictures of a scene at rest, with depth, normals and who is where.
+
+The cameras stand evenly about the upper half of a sphere, each as near as it can while it sees
+every object whole. Nothing is left to chance.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.errors import UserError
+from corporeal.geometry.arrangement import boxes_of
+from corporeal.render.camera import VIEW, Aim, camera_of, place
+from corporeal.render.embree import Light, Stage, first_seen, render
+from corporeal.render.kernels import NOTHING
+from corporeal.types import Camera, Scene, Vector, Views
+
+Progress = Callable[[float, str], None]
+
+LOWEST, HIGHEST = 0.17, 0.96
+"""Sines of the least and the greatest angle above the horizon: 10° and 74°."""
+GOLDEN = np.pi * (3 - np.sqrt(5))
+"""Turn from one camera to the next [rad]."""
+FILL = 0.9
+"""Share of the picture that the objects take at most."""
+LARGEST = 2**28
+"""Pixels of all views together."""
+
+
+@dataclass(frozen=True)
+class CaptureConfig:
+    """How many pictures, and how large."""
+
+    views: int = 24
+    """Cameras about the scene."""
+    size: tuple[int, int] = (256, 256)
+    """Width and height [px]."""
+    quality: Literal["draft", "normal", "fine"] = "draft"
+    """How many rays; depth, normals and numbers are exact at any."""
+    threads: int | None = None
+    """None: one per processor."""
+
+
+DEFAULT = CaptureConfig()
+
+
+def capture(
+    scene: Scene,
+    config: CaptureConfig = DEFAULT,
+    progress: Progress = lambda fraction, words: None,
+) -> Views:
+    """Picture a scene from all sides above the floor, which is in the pictures.
+
+    Raises:
+        UserError: The scene holds nothing, or more is asked for than makes sense.
+
+    """
+    _check(scene, config)
+    progress(0.0, "placing the cameras")
+    stage = Stage(scene, Light(front=VIEW))  # shadows stay where they are from view to view
+    boxes = boxes_of(scene)[None]
+    aims = [place(boxes, config.size, v, FILL) for v in directions(config.views)]
+    cameras = tuple(camera_of(aim) for aim in aims)
+    shape = (config.views, config.size[1], config.size[0])
+    views = Views(
+        rgb=np.empty((*shape, 3), np.uint8),
+        cameras=cameras,
+        depth=np.empty(shape, np.float32),
+        normals=np.empty((*shape, 3), np.float32),
+        object_of_pixel=np.empty(shape, np.int32),
+        part_of_pixel=np.empty(shape, np.int32),
+    )
+    for k, aim in enumerate(aims):
+        views.rgb[k] = render(stage, aim, config.quality, config.threads)
+        _measure(scene, stage, aim, views, k)
+        progress((k + 1) / len(aims), f"view {k + 1} of {len(aims)}")
+    return views
+
+
+def directions(count: int) -> list[Vector]:
+    """Return unit vectors towards cameras: a spiral of equal areas (Fibonacci lattice)."""
+    z = HIGHEST - (HIGHEST - LOWEST) * (np.arange(count) + 0.5) / count
+    turn = GOLDEN * np.arange(count)
+    flat = np.sqrt(1 - z * z)
+    x, y = flat * np.cos(turn), flat * np.sin(turn)
+    return [(float(a), float(b), float(c)) for a, b, c in zip(x, y, z, strict=True)]
+
+
+def stretch(camera: Camera) -> Float[np.ndarray, "H W"]:
+    """Return the length of each pixel's ray per metre of depth [-]."""
+    u, v = np.arange(camera.width) + 0.5, np.arange(camera.height) + 0.5
+    K = camera.K
+    x, y = (u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1]
+    return np.sqrt(1 + x[None] ** 2 + y[:, None] ** 2)
+
+
+def _measure(scene: Scene, stage: Stage, aim: Aim, views: Views, k: int) -> None:
+    """Fill in what is not colour."""
+    seen = first_seen(stage, aim)
+    shape = aim.height, aim.width
+    nothing = (seen.kind == NOTHING).reshape(shape)
+    depth = seen.depth.reshape(shape) / stretch(views.cameras[k])
+    counts = [len(s.triangles) for s in scene.surfaces]
+    surface_of_triangle = np.repeat(np.arange(len(counts), dtype=np.int32), counts)
+    part = np.where(seen.triangle < 0, -1, surface_of_triangle[seen.triangle]).reshape(shape)
+    owner = np.array([*(s.object for s in scene.surfaces), -1], np.int32)
+    assert views.depth is not None and views.normals is not None
+    assert views.object_of_pixel is not None and views.part_of_pixel is not None
+    views.depth[k] = np.where(nothing, np.inf, depth)
+    views.normals[k] = np.where(nothing[..., None], 0, seen.normal.reshape(*shape, 3))
+    views.part_of_pixel[k] = part
+    views.object_of_pixel[k] = owner[part]
+
+
+def _check(scene: Scene, config: CaptureConfig) -> None:
+    if not any(len(s.triangles) for s in scene.surfaces):
+        raise UserError(f"{scene.name} holds no surface to take a picture of.")
+    width, height = config.size
+    if config.views < 1 or min(width, height) < 8:
+        raise UserError("Ask for at least 1 view, and for pictures of at least 8 × 8 pixels.")
+    if config.views * width * height > LARGEST:
+        raise UserError(
+            f"{config.views} views of {width} × {height} pixels do not fit into memory. "
+            f"Ask for at most {LARGEST >> 20} million pixels in all."
+        )
