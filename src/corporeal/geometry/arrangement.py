@@ -48,8 +48,26 @@ def scaled(scene: Scene, factor: float) -> Scene:
         scene,
         metres_per_unit=scene.metres_per_unit * factor,
         objects=tuple(replace(o, scale=o.scale * factor) for o in scene.objects),
+        walls=tuple(replace(w, point=_scaled(w.point, factor)) for w in scene.walls),
     )
     return _reshaped(scene, None, lambda x: x * factor)
+
+
+def life_sized(scene: Scene) -> Scene:
+    """Return the scene with each object at its real size, about the middle of its underside."""
+    for k, thing in enumerate(scene.objects):
+        if thing.scale != 1:
+            low, high = box_of(_surfaces(scene, k))
+            foot = np.array([*(low + high)[:2] / 2, low[2]])
+            scene = _reshaped(
+                scene, k, lambda x, foot=foot, thing=thing: foot + (x - foot) / thing.scale
+            )
+    return replace(scene, objects=tuple(replace(o, scale=1.0) for o in scene.objects))
+
+
+def _scaled(point: Vector, factor: float) -> Vector:
+    x, y, z = point
+    return (x * factor, y * factor, z * factor)
 
 
 def intersecting(scene: Scene) -> list[tuple[int, int]]:

@@ -33,12 +33,19 @@ def leaves_of(member: Member, material: Material) -> int:
 
 
 def swinging(
-    member: Member, points: Float[np.ndarray, "N 3"], tissue: Material
+    member: Member, points: Float[np.ndarray, "N 3"], tissue: Material, scale: float
 ) -> Float[np.ndarray, " N"]:
     """Natural angular frequency of the leaf that each point belongs to [rad/s].
 
     A cantilever of length L and thickness t under its own weight: its centre shifts by
     C a = .4 · 1.5 ρ L⁴/(E t²) a in an acceleration a, and ω = 1/√C.
+
+    Args:
+        member: The foliage.
+        points: [m]
+        tissue: What leaves are made of.
+        scale: Scene size over real size: t and the longest leaf are real lengths.
+
     """
     assert tissue.shell_thickness is not None
     middles, lengths = [], []
@@ -47,8 +54,8 @@ def swinging(
             middles.append(mesh.corners.mean(axis=1))
             lengths.append(lengths_of_pieces(mesh))
     nearest = KDTree(np.concatenate(middles)).query(points)[1]
-    length = np.minimum(np.concatenate(lengths)[nearest], LONGEST_LEAF)
-    stiffness = tissue.young * tissue.shell_thickness**2
+    length = np.minimum(np.concatenate(lengths)[nearest], LONGEST_LEAF * scale)
+    stiffness = tissue.young * (tissue.shell_thickness * scale) ** 2
     return np.sqrt(stiffness / (1.5 * CENTROID * tissue.density)) / length**2
 
 

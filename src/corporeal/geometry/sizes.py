@@ -1,16 +1,22 @@
-"""How large things stand in a scene together: their real sizes, with the differences compressed.
+"""How large things stand in a scene together, and what that makes of their walls.
 
 A duck beside a couch is a dot. A power law between 0 (all of one size) and 1 (true relative sizes)
-brings things nearer to each other and keeps their order.
+brings things nearer to each other and keeps their order. A thing that is not life-size is the real
+one with all its lengths scaled, walls included: made of the same matter, it weighs scale³ times as
+much.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from corporeal.errors import UserError
+from corporeal.types import Material, MaterialField, Parts, PartWords, Piece, Scene, Structure
+
+LIFE_SIZE = 5e-3
+"""Difference of a scale from 1 that nobody needs to be told: files round their extents."""
 
 
 @dataclass(frozen=True)
@@ -60,3 +66,59 @@ def _check(sizing: Sizing) -> None:
     ):
         if not low <= value <= high:
             raise UserError(f"The {name} is {value}. Give a number from {low:g} to {high:g}.")
+
+
+# ---------------------------------------------------------------- what is not life-size
+
+
+def scale_of_part(scene: Scene, parts: Parts) -> tuple[float, ...]:
+    """Return scene size over real size of each part's object."""
+    return tuple(scene.objects[part.object].scale for part in parts.catalogue)
+
+
+def is_scaled(scale: float) -> bool:
+    """Tell whether a thing is noticeably not life-size."""
+    return abs(scale - 1) > LIFE_SIZE
+
+
+def in_scene(field: MaterialField, scales: Sequence[float]) -> MaterialField:
+    """Return what parts are made of with their walls as thick as in the scene.
+
+    Lengths that were said or looked up are real ones; in the scene they are scaled with the rest.
+
+    Args:
+        field: With real lengths.
+        scales: Scene size over real size, one per part.
+
+    """
+    if all(scale == 1 for scale in scales):
+        return field
+    rows = zip(field.materials, field.structures, field.words, scales, strict=True)
+    made = [_scaled(*row) for row in rows]
+    shared = zip(field.pieces, scales, strict=True) if field.pieces else ()
+    return replace(
+        field,
+        materials=tuple(m for m, _, _ in made),
+        structures=tuple(s for _, s, _ in made),
+        words=tuple(w for _, _, w in made),
+        pieces=tuple(tuple(_scaled_piece(p, k) for p in pieces) for pieces, k in shared),
+    )
+
+
+def _scaled_piece(piece: Piece, scale: float) -> Piece:
+    material, structure, words = _scaled(piece.material, piece.structure, piece.words, scale)
+    return Piece(words, material, structure)
+
+
+def _scaled(
+    material: Material, structure: Structure, words: PartWords, scale: float
+) -> tuple[Material, Structure, PartWords]:
+    return (
+        replace(material, shell_thickness=_times(material.shell_thickness, scale)),
+        replace(structure, thickness=_times(structure.thickness, scale)),
+        replace(words, thickness=_times(words.thickness, scale)),
+    )
+
+
+def _times(length: float | None, scale: float) -> float | None:
+    return None if length is None else length * scale

@@ -3,7 +3,7 @@
 A part's wall may be simulated thicker than it is; here is what that does to its numbers.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import inf, pi
 
 from corporeal.mpm.stability import closed_wall, thin_wall
@@ -39,6 +39,8 @@ class PartGeometry:
     """Of a solid rod with a known centreline [m]; 0: it is none."""
     burden: float = 0.0
     """What it carries at its far end, over its own mass [-]."""
+    scale: float = 1.0
+    """Size here over the real thing's [-]."""
 
 
 @dataclass(frozen=True)
@@ -63,6 +65,21 @@ class Verdict:
     """[m/s]"""
     rigid: bool
     reason: str
+
+
+def life_sized(part: PartGeometry) -> PartGeometry:
+    """Return the part of the real thing: all lengths over its scale."""
+    k, made = part.scale, part.structure
+    thickness = None if made.thickness is None else made.thickness / k
+    return replace(
+        part,
+        structure=replace(made, thickness=thickness),
+        size=(part.size[0] / k, part.size[1] / k, part.size[2] / k),
+        volume=part.volume / k**3,
+        area=part.area / k**2,
+        diameter=part.diameter / k,
+        scale=1.0,
+    )
 
 
 def is_grain(part: PartGeometry, cell: float) -> bool:

@@ -20,6 +20,7 @@ from corporeal.mpm.part import (
     PartGeometry,
     Verdict,
     is_grain,
+    life_sized,
     rod_ratio,
     tube,
     wall_factors,
@@ -305,6 +306,7 @@ def treat(
                 wall_reason(part, ratio) if soft else "",
                 rod_reason(thin),
                 bar_reason(part, 2 * cell if soft else 0.0),
+                scale_reason(part, motion),
             )
         ),
     )
@@ -336,6 +338,22 @@ def reason(verdict: Verdict, role: Role) -> str:
         "trinket": "Deformable with the rest of its object; by itself it would be rigid.",
         "soft": f"Deformable, because {verdict.reason}.",
     }[role]
+
+
+def scale_reason(part: PartGeometry, motion: Motion) -> str:
+    """Say where the real thing, struck as fast, would be judged otherwise; "" where it would not.
+
+    Stiffness against stress waves does not depend on size; against its own weight it does.
+    """
+    if part.scale == 1:
+        return ""
+    here, life = judge(part, motion), judge(life_sized(part), motion)
+    if here.rigid == life.rigid:
+        return ""
+    return (
+        f" At its real size, {1 / part.scale:.3g} times this one, it would be judged otherwise: "
+        f"{life.reason}."
+    )
 
 
 def rod_reason(ratio: float) -> str:

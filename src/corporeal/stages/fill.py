@@ -13,6 +13,7 @@ from corporeal.geometry.foliage import leaves_of, root_of, swinging
 from corporeal.geometry.make import Make, compose, how_filled, recipe
 from corporeal.geometry.packing import Packing, Recipe, pack
 from corporeal.geometry.rods import Rod, rod_of
+from corporeal.geometry.sizes import in_scene, is_scaled, scale_of_part
 from corporeal.geometry.survey import Anatomy, Member, survey
 from corporeal.geometry.weights import keep_apart, weigh
 from corporeal.materials import find
@@ -39,7 +40,11 @@ DEFAULT = FillConfig()
 def fill(
     scene: Scene, parts: Parts, field: MaterialField, config: FillConfig = DEFAULT
 ) -> Particles:
-    """Turn meshes into material points, choosing resolution and treatment on the way."""
+    """Turn meshes into material points, choosing resolution and treatment on the way.
+
+    Walls are as thick as their thing is large in the scene: real thickness times its scale.
+    """
+    field = in_scene(field, scale_of_part(scene, parts))
     anatomies = examine(scene, parts, config.seed)
     makes = {
         m.part: compose(a, m, field, np.random.default_rng([config.seed, m.part, 5]))
@@ -71,7 +76,7 @@ def fill(
         packings.append(pack(anatomy, recipes, chosen.cell / 2, rng, coarse=coarse))
     packings = keep_apart(packings, chosen.cell)
     particles = gather(scene, parts, anatomies, makes, chosen, packings)
-    return with_plants(particles, anatomies, field)
+    return with_plants(scene, particles, anatomies, field)
 
 
 # ------------------------------------------------------------------ what is there
@@ -177,6 +182,7 @@ def resolve(
             leaves=leaves_of(m, field.materials[m.part]),
             diameter=rods[m.part].diameter if m.part in rods else 0.0,
             burden=burden(m, anatomy, makes, field),
+            scale=scene.objects[number].scale,
         )
         for number, anatomy in enumerate(anatomies)
         for m in anatomy.members
@@ -305,13 +311,15 @@ def gather(
         face=np.concatenate([np.zeros((0, 3)), *columns["face"]]),
         particle_of_face=np.concatenate([np.zeros(0, np.int64), *columns["bearer"]]),
         mass_real=tuple(makes[k].mass for k in range(len(parts.catalogue))),
-        fills=describe(parts, anatomies, makes, chosen, part),
+        fills=describe(scene, parts, anatomies, makes, (chosen, part)),
         walls=tuple((makes[k].thickness, makes[k].sheet) for k in range(len(parts.catalogue))),
         warnings=chosen.warnings,
     )
 
 
-def with_plants(particles: Particles, anatomies: list[Anatomy], field: MaterialField) -> Particles:
+def with_plants(
+    scene: Scene, particles: Particles, anatomies: list[Anatomy], field: MaterialField
+) -> Particles:
     """Put leaves on springs, and what bears them into its soil."""
     leafy = [k for k, t in enumerate(particles.treatments) if t.kind == "foliage"]
     if not leafy:
@@ -323,7 +331,8 @@ def with_plants(particles: Particles, anatomies: list[Anatomy], field: MaterialF
         crowns = [m for m in anatomy.members if m.part in leafy]
         for member in crowns:
             own = particles.part == member.part
-            rate[own] = swinging(member, particles.position[own], tissue)
+            scale = scene.objects[number].scale
+            rate[own] = swinging(member, particles.position[own], tissue, scale)
         if crowns:
             swing = Swing(particles, [m.part for m in crowns])
             root = root_of(anatomy, number, field.materials, swing)
@@ -347,13 +356,14 @@ class Swing:
 
 
 def describe(
+    scene: Scene,
     parts: Parts,
     anatomies: list[Anatomy],
     makes: dict[int, Make],
-    chosen: Plan,
-    part: np.ndarray,
+    packed: tuple[Plan, np.ndarray],
 ) -> tuple[str, ...]:
-    """One sentence per part."""
+    """One sentence per part; a second one where its thing is not life-size."""
+    chosen, part = packed
     members = {m.part: m for a in anatomies for m in a.members}
     sentences = []
     for k, entry in enumerate(parts.catalogue):
@@ -363,5 +373,16 @@ def describe(
         sentences.append(
             f"{entry.name}: {what}; {count:,} particles, {made.mass:.3g} kg."
             + (shared if made.pieces else "")
+            + in_life(made, scene.objects[entry.object].scale)
         )
     return tuple(sentences)
+
+
+def in_life(made: Make, scale: float) -> str:
+    """Say what a part weighs at its real size, and how thick its wall is; "" where it has it."""
+    if not is_scaled(scale):
+        return ""
+    wall = made.thickness or made.sheet
+    thick = f", with a wall {wall / scale * 1e3:.3g} mm thick" if wall else ""
+    weighs = f"it weighs {made.mass / scale**3:.3g} kg{thick}"
+    return f" In life, {1 / scale:.3g} times as large, {weighs}."
