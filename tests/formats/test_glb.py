@@ -3,6 +3,7 @@ import csv
 import io
 import json
 import struct
+from dataclasses import replace
 
 import DracoPy
 import numpy as np
@@ -12,6 +13,7 @@ from PIL import Image
 
 from corporeal.formats.glb import read_glb
 from corporeal.formats.glb_writer import encode_glb, write_glb
+from corporeal.geometry.arrangement import boxes_of
 from corporeal.types import Finish, Push, Scene, SceneObject, Surface, Wind
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube
 
@@ -346,6 +348,16 @@ def test_nodes_that_state_their_class_are_objects(tmp_path):
     assert scene.objects[0].real_extent == 0.9
     assert scene.objects[0].scale == pytest.approx(1 / 0.9)
     assert len(read_glb(tmp_path / "a.glb", "one").objects) == 1
+
+
+@pytest.mark.parametrize("nonsense", [0.0, -2.0, 1e9])
+def test_a_scale_that_makes_no_sense_is_measured_instead(scene, tmp_path, nonsense):
+    things = [replace(o, scale=nonsense) for o in scene.objects]
+    write_glb(tmp_path / "a.glb", replace(scene, objects=tuple(things)))
+    back = read_glb(tmp_path / "a.glb")
+    for k, thing in enumerate(back.objects):
+        extent = np.diff(boxes_of(back)[k], axis=0).max()
+        assert thing.scale == pytest.approx(extent / thing.real_extent)
 
 
 def test_the_copyright_follows_the_object(tmp_path):

@@ -236,3 +236,23 @@ def test_real_objects_collide_with_nothing_at_the_start(shared_assets):
         assert overlapping(boxes_of(scene)) == []
         assert scene.warnings == ()
         assert [o.class_name for o in scene.objects] == ["vase", "ball", "soda can coke"]
+
+
+def test_a_size_is_doubted_as_the_real_thing_has_it_not_the_scene(tmp_path):
+    """A file that states how large the real thing is may hold it at any scale."""
+    stated = {"class": "duck", "real_extent_m": 0.1}
+    scene = assemble([cube(scale=[1.6] * 3, extras=stated).save(tmp_path / "a.glb")])
+    assert scene.warnings == ()
+    assert scene.objects[0].scale == pytest.approx(16.0)
+    wrong = stated | {"real_extent_m": 1.6}
+    (said,) = assemble([cube(scale=[0.1] * 3, extras=wrong).save(tmp_path / "b.glb")]).warnings
+    assert "is 1.6 m large, but a duck is usually about 10 cm" in said
+
+
+def test_a_working_extent_moves_the_walls_with_the_things(models):
+    room = '[[object]]\nfile = "ball.glb"\n[[wall]]\npoint = [0.3, 0, 0.1]\nnormal = [-1, 0, 0]\n'
+    path = toml(models[0].parent, room)
+    scene = assemble([path], AssembleConfig(working_extent=1.0))
+    assert scene.objects[0].scale == pytest.approx(5.0)
+    assert scene.walls[0].point == pytest.approx((1.5, 0.0, 0.5))
+    assert scene.walls[0].normal == (-1, 0, 0)

@@ -8,6 +8,8 @@ from corporeal.formats.words import everyday, safe
 from corporeal.types import Push, SceneObject, Wind
 
 NO_MOTION = (0.0, 0.0, 0.0)
+SMALLEST_SCALE = 1e-6
+"""Scales beyond it, and beyond its inverse, are slips."""
 
 
 def written_by_us(document: Document) -> bool:
@@ -39,12 +41,11 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
     # A file of ours states the credit of each object; its copyright sums up all of them.
     copyright = asset.text("copyright") if asset and not ours else ""
     real = _real_extent(extras) or extent
-    measured = extent / real if real > 0 else 1.0
     return SceneObject(
         name=safe(head.text("name")) if head and extras.text("class") else "",
         class_name=_class(document, head, extras),
         real_extent=real,
-        scale=extras.number("scale", measured) if ours else measured,
+        scale=_scale(extras, extent / real if extent > 0 else 1.0, ours),
         velocity=_vector(extras.numbers("velocity_m_s", NO_MOTION)) if ours else NO_MOTION,
         push=_push(extras) if ours else None,
         wind=_wind(extras) if ours else None,
@@ -97,6 +98,12 @@ def _real_extent(extras: Entry) -> float | None:
     numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
     good = [float(x) for x in numbers if 0 < x < 1e6]
     return max(good) if good and len(good) == len(values) else None
+
+
+def _scale(extras: Entry, measured: float, ours: bool) -> float:
+    """Return scene size over real size; a nonsensical one counts as not stated."""
+    stated = extras.number("scale", measured) if ours else measured
+    return stated if SMALLEST_SCALE <= stated <= 1 / SMALLEST_SCALE else measured
 
 
 def _push(extras: Entry) -> Push | None:

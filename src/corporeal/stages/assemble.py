@@ -196,7 +196,7 @@ def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
             used.update(hits)
             if hits:
                 scene = resized(scene, k, hits[-1][1])
-            elif sentence := doubt(thing.name, thing.class_name, thing.real_extent * thing.scale):
+            elif sentence := doubt(thing.name, thing.class_name, thing.real_extent):
                 told.append(sentence)
         told = [s for s in told if not block.ours]
         blocks[i] = replace(block, scene=replace(scene, warnings=(*scene.warnings, *told)))
