@@ -11,6 +11,7 @@ from typing import Annotated, Any, Literal
 import tyro
 
 from corporeal import __version__
+from corporeal.cli.assets import verb_assets
 from corporeal.cli.parse import parse
 from corporeal.errors import UserError
 from corporeal.terminal import console, show_table, told
@@ -227,6 +228,13 @@ def _again(verb: str) -> Callable[[], None]:
     return redo
 
 
+def verb_assemble() -> None:
+    """Assemble a settled scene from a pool of models, or redo `assemble` of a run."""
+    from corporeal.cli.assemble import compose_from_pool
+
+    return _again("assemble")() if _names_a_run() else compose_from_pool()
+
+
 def verb_simulate() -> None:
     """Redo `simulate` of a run with other settings, or over the ranges: --samples N.
 
@@ -278,12 +286,13 @@ VERBS: dict[str, Callable[[], None]] = {
     "run": verb_run,
     "status": verb_status,
     "materials": verb_materials,
+    "assets": verb_assets,
     "evaluate": verb_evaluate,
     "doctor": verb_doctor,
 }
 REDO = ("assemble", "describe", "segment", "ground", "fill", "simulate", "film", "report")
 VERBS |= {verb: _again(verb) for verb in REDO}
-VERBS["simulate"] = verb_simulate
+VERBS |= {"assemble": verb_assemble, "simulate": verb_simulate}
 
 
 # ---------------------------------------------------------------- how a verb is done

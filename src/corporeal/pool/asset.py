@@ -41,6 +41,13 @@ class Asset:
         known = [w for w in (self.attribution, self.licence) if w and w != UNKNOWN]
         return ", ".join(known)
 
+    @property
+    def size(self) -> str:
+        """Write the extent: in metres or centimetres, or as mere units."""
+        if not self.metric:
+            return f"{self.extent:.3g} units"
+        return f"{self.extent:.3g} m" if self.extent >= 1 else f"{100 * self.extent:.3g} cm"
+
 
 @dataclass(frozen=True)
 class Rejection:

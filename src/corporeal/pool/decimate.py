@@ -3,7 +3,7 @@
 Shape: quadric error metrics (Garland & Heckbert, SIGGRAPH 1997) on welded vertices, so that
 texture seams do not tear open. Look: each new corner takes texture coordinates, normal and colour
 from the nearest point of the old surface. Where that lies across a seam, on another piece of the
-picture than the middle of the triangle, the face at the middle is continued to the corner.
+picture than the middle of its triangle, the corner takes what is a little nearer to the middle.
 """
 
 from dataclasses import replace
@@ -19,8 +19,10 @@ GRID = 2**21 - 1
 """Steps along an extent within which vertices are one: three numbers fit into 63 bits."""
 ALONE = 4
 """A surface with fewer triangles than this is left as it is."""
-FAR = 3.0
-"""How far beyond a triangle its texture is continued, in barycentric coordinates."""
+STRETCH = 3.0
+"""How many times more of a picture than usual a triangle may show before it crosses a seam."""
+INWARD = (0.125, 0.25, 0.5, 0.75)
+"""How far a corner that lies across a seam looks towards its triangle's middle, step by step."""
 CREASE = 0.7
 """Cosine of the angle to its triangle beyond which a corner's normal is from round an edge."""
 ALIKE = 1e5
@@ -69,19 +71,14 @@ class _Old:
     def nearest(self, points: Float[np.ndarray, "N 3"]) -> tuple[np.ndarray, np.ndarray]:
         """For each point the nearest triangle, and the weights of its corners there."""
         _, face, foot = self.tree.squared_distance(self.vertices, self.triangles, points)
-        face = np.asarray(face)
-        return face, self.weights(face, np.asarray(foot))
-
-    def weights(self, face: np.ndarray, points: np.ndarray) -> Float[np.ndarray, "N 3"]:
-        """Barycentric coordinates of points in the planes of triangles; beyond them, bounded."""
+        face, foot = np.asarray(face), np.asarray(foot)
         a, b, c = np.swapaxes(self.vertices[self.triangles[face]], 0, 1)
-        u, v, w = b - a, c - a, points - a
-        uu, uv, vv = _dot(u, u), _dot(u, v), _dot(v, v)
-        wu, wv = _dot(w, u), _dot(w, v)
+        u, v, w = b - a, c - a, foot - a
+        uu, uv, vv, wu, wv = _dot(u, u), _dot(u, v), _dot(v, v), _dot(w, u), _dot(w, v)
         area = np.maximum(uu * vv - uv * uv, 1e-300)
-        s = np.clip((vv * wu - uv * wv) / area, -FAR, FAR)
-        t = np.clip((uu * wv - uv * wu) / area, -FAR, FAR)
-        return np.stack([1 - s - t, s, t], axis=1)
+        s = np.clip((vv * wu - uv * wv) / area, 0, 1)
+        t = np.clip((uu * wv - uv * wu) / area, 0, 1 - s)
+        return face, np.stack([1 - s - t, s, t], axis=1)
 
     def worn(self, values: np.ndarray, face: np.ndarray, weights: np.ndarray) -> np.ndarray:
         """Interpolate what the corners wear."""
@@ -93,7 +90,8 @@ def _dressed(surface: Surface, old: _Old, x: np.ndarray, triangles: np.ndarray) 
     face, weights = old.nearest(x)
     columns = {}
     if surface.uv is not None:
-        columns["uv"] = _uv(surface.uv, old, x, triangles, old.worn(surface.uv, face, weights))
+        picture = _Picture(old, np.asarray(surface.uv, np.float64))
+        columns["uv"] = picture.on(x, triangles, face, weights)
     if surface.normals is not None:
         found = old.worn(surface.normals, face, weights)
         columns["normals"] = _normals(found, x, triangles)
@@ -103,18 +101,52 @@ def _dressed(surface: Surface, old: _Old, x: np.ndarray, triangles: np.ndarray) 
     return _joined(surface, x, triangles, columns)
 
 
-def _uv(uv: np.ndarray, old: _Old, x: np.ndarray, triangles: np.ndarray, own: np.ndarray):
-    """Return texture coordinates (T, 3, 2), each triangle's on one piece of the picture."""
-    middle = x[triangles].mean(axis=1)
-    face, at = old.nearest(middle)
-    centre = old.worn(uv, face, at)
-    continued = np.stack(
-        [old.worn(uv, face, old.weights(face, x[triangles[:, k]])) for k in range(3)], axis=1
-    )
-    reach = np.linalg.norm(continued - centre[:, None], axis=2).max(axis=1)
-    taken = own[triangles]
-    across = np.linalg.norm(taken - continued, axis=2) > reach[:, None]
-    return np.where(across[:, :, None], continued, taken)
+class _Picture:
+    """A picture as the old surface wore it."""
+
+    def __init__(self, old: _Old, uv: np.ndarray) -> None:
+        self.old, self.uv = old, uv
+        self.density = np.sqrt(
+            _areas(uv[old.corners]) / np.maximum(_areas(old.vertices[old.triangles]), 1e-300)
+        )
+        """Of each old triangle, length in the picture per length in space."""
+
+    def on(
+        self, x: np.ndarray, triangles: np.ndarray, face: np.ndarray, weights: np.ndarray
+    ) -> Float[np.ndarray, "T 3 2"]:
+        """Texture coordinates of new triangles, each on one piece of the picture.
+
+        Args:
+            x: Vertices (V, 3).
+            triangles: New triangles on them.
+            face: For each vertex, the nearest old triangle.
+            weights: Where in it.
+
+        """
+        corners = x[triangles]
+        middle = corners.mean(axis=1)
+        at, inside = self.old.nearest(middle)
+        centre = self.old.worn(self.uv, at, inside)
+        density = np.median(self.density[np.column_stack([at, face[triangles]])], axis=1)
+        reach = STRETCH * density[:, None] * np.linalg.norm(corners - middle[:, None], axis=2)
+        taken = self.old.worn(self.uv, face, weights)[triangles]
+        across = np.linalg.norm(taken - centre[:, None], axis=2) > reach
+        for step in INWARD:
+            t, k = np.nonzero(across)
+            if not len(t):
+                return taken
+            points = corners[t, k] + step * (middle[t] - corners[t, k])
+            found = self.old.worn(self.uv, *self.old.nearest(points))
+            taken[t, k] = found
+            across[t, k] = np.linalg.norm(found - centre[t], axis=1) > reach[t, k]
+        return np.where(across[:, :, None], centre[:, None], taken)
+
+
+def _areas(corners: np.ndarray) -> Float[np.ndarray, " T"]:
+    """Areas of triangles (T, 3, 2 or 3)."""
+    a, b, c = np.swapaxes(corners, 0, 1)
+    u, v = b - a, c - a
+    return 0.5 * np.sqrt(np.maximum(_dot(u, u) * _dot(v, v) - _dot(u, v) ** 2, 0))
 
 
 def _normals(found: np.ndarray, x: np.ndarray, triangles: np.ndarray) -> np.ndarray:

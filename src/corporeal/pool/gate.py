@@ -25,6 +25,8 @@ FEW_COLOURS = 64
 """A picture with no more colours than this is a palette: its pixels carry no detail."""
 FLAT = 1e-6
 """Area in texture coordinates below which every triangle takes one colour off a picture."""
+MOST_READ = 5_000_000
+"""Triangles beyond which decimating takes more than about a minute."""
 SIZES = 1e-6, 1e6
 """Extents in any unit between which single precision places vertices well."""
 
@@ -74,6 +76,9 @@ def inspect(scene: Scene, config: GateConfig = DEFAULT) -> Measures:
         Rejected: It is not good enough.
 
     """
+    count = sum(len(s.triangles) for s in scene.surfaces)
+    if count > MOST_READ:
+        raise Rejected(f"has {count:,} triangles; at most {MOST_READ:,} are decimated")
     extent = _extent(scene)
     name = fingerprint(scene)
     cleaned = _without_slivers(scene, extent)
@@ -136,10 +141,9 @@ def largest_component(mesh: Mesh) -> float:
 
 def _extent(scene: Scene) -> float:
     """Return the largest extent; unlike NaN, 1e30 can be written in a file."""
-    used = [s.vertices[np.unique(s.triangles)] for s in scene.surfaces if len(s.triangles)]
-    if not used:
+    if not any(len(s.triangles) for s in scene.surfaces):
         raise Rejected("holds no triangles")
-    corners = np.concatenate(used)
+    corners = np.concatenate([s.vertices[_used(s)] for s in scene.surfaces])
     if not np.isfinite(corners).all():
         raise Rejected("has vertices that are not finite numbers")
     extent = float(np.ptp(corners, axis=0).max())
@@ -147,6 +151,12 @@ def _extent(scene: Scene) -> float:
     if not low <= extent <= high:
         raise Rejected(f"is {extent:.3g} units large; {low:g} to {high:g} can be a thing")
     return extent
+
+
+def _used(s: Surface) -> Bool[np.ndarray, " V"]:
+    used = np.zeros(len(s.vertices), dtype=bool)
+    used[s.triangles] = True
+    return used
 
 
 def _without_slivers(scene: Scene, extent: float) -> Scene:

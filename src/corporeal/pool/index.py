@@ -13,8 +13,9 @@ from corporeal import store
 from corporeal.errors import BadFileError, UserError
 from corporeal.pool.admission import Admission, Member
 from corporeal.pool.asset import Asset, Pool, Rejection
-from corporeal.pool.candidate import candidates_in
+from corporeal.pool.candidate import Candidate
 from corporeal.pool.gate import GateConfig
+from corporeal.pool.origins import OriginConfig, candidates
 from corporeal.pool.verdict import Verdicts
 
 POOL = "pool.json"
@@ -26,8 +27,7 @@ Progress = Callable[[float, str], None]
 class IndexConfig:
     """What is said about the files, and how good they must be."""
 
-    csv: Path | None = None
-    """Table with columns file, class and, where known, licence, attribution, extent_m, metric."""
+    origin: OriginConfig = field(default_factory=OriginConfig)
     gate: GateConfig = field(default_factory=GateConfig)
 
 
@@ -42,13 +42,13 @@ def index(
 ) -> Pool:
     """Judge every model below the folders and keep the good ones in the pool.
 
-    What other folders gave the pool before stays in it. A content that was judged before, with the
-    same gate, is not judged again; an interrupted run goes on where it was.
+    What other files gave the pool before stays in it as long as they are there. A content that was
+    judged before, with the same gate, is not judged again; an interrupted run goes on where it was.
 
     Args:
-        folders: Hold .glb, .gltf and .obj files, at any depth.
+        folders: Hold .glb, .gltf and .obj files, at any depth, or a collection.
         pool_folder: Made where it is absent.
-        config: Table of classes, gate.
+        config: What the folders are, who says the classes, how good a model must be.
         progress: Told the fraction done and the file.
 
     Raises:
@@ -57,14 +57,11 @@ def index(
     """
     folders = [Path(f) for f in folders]
     with store.alone(pool_folder):
-        candidates = candidates_in(folders, config.csv, pool_folder)
-        if not candidates:
-            named = ", ".join(map(str, folders))
-            raise UserError(f"{named}: no .glb, .gltf or .obj file lies there or below.")
+        asking = candidates(folders, config.origin, pool_folder)
         verdicts = Verdicts(pool_folder, config.gate)
-        admission = _reopened(pool_folder, folders)
-        for k, candidate in enumerate(candidates):
-            progress(k / len(candidates), candidate.file.name)
+        admission = _reopened(pool_folder, asking)
+        for k, candidate in enumerate(asking):
+            progress(k / len(asking), candidate.file.name)
             admission.ask(candidate, verdicts.of(candidate.file))
         progress(1.0, "")
         _write(pool_folder, admission)
@@ -83,20 +80,20 @@ def read_pool(folder: Path) -> Pool:
     return Pool(Path(folder), tuple(assets), tuple(rejections))
 
 
-def _reopened(pool: Path, folders: Sequence[Path]) -> Admission:
-    """Return what the pool has from elsewhere than these folders, as far as it is still there."""
+def _reopened(pool: Path, asking: Sequence[Candidate]) -> Admission:
+    """Return what else the pool has, as far as it is still there."""
     if not (pool / POOL).exists():
         return Admission(pool, (), ())
     members, rejections = _read(pool)
-    roots = [f.resolve() for f in folders]
+    again = {c.file.resolve() for c in asking}
 
-    def elsewhere(path: Path) -> bool:
-        return path.exists() and not any(path.resolve().is_relative_to(r) for r in roots)
+    def stays(path: Path) -> bool:
+        return path.exists() and path.resolve() not in again
 
     return Admission(
         pool,
-        (m for m in members if elsewhere(m.found) and m.asset.file.exists()),
-        (r for r in rejections if elsewhere(Path(r.source))),
+        (m for m in members if stays(m.found) and m.asset.file.exists()),
+        (r for r in rejections if stays(Path(r.source))),
     )
 
 

@@ -1,0 +1,168 @@
+"""`corporeal assets index | list | show`: the pool that scenes are made of."""
+
+import re
+import sys
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from corporeal.cli.parse import parse
+from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.pool.asset import Asset, Pool
+from corporeal.terminal import show_table, told
+
+WORDS = ("index", "list", "show")
+POOL = Path("pool")
+Folder = Annotated[Path, tyro.conf.arg(metavar="POOL")]
+
+
+def verb_assets() -> None:
+    """Make a pool of models, and look at it: `assets index FOLDER ...`, `list`, `show`."""
+    word = sys.argv[2] if len(sys.argv) > 2 else ""
+    verbs = {"index": _index, "list": _list, "show": _show}
+    if word not in verbs:
+        if word in ("", "-h", "--help"):
+            raise UserError("Say one of: " + "; ".join(f"corporeal assets {w}" for w in WORDS))
+        raise UnknownChoiceError("word after assets", word, list(WORDS))
+    verbs[word]()
+
+
+def _index() -> None:
+    """Judge every model below the folders, and keep the good ones in a pool.
+
+    A model is a .glb, .gltf or .obj file. Its class is what a table says (--csv, or a manifest.csv
+    in the folder or above it), else the folder it lies in, else its own name in everyday words.
+    Each file gets in or gets a reason. What was judged before is not judged again.
+    """
+    from corporeal.pool.gate import GateConfig
+    from corporeal.pool.index import IndexConfig, index
+    from corporeal.pool.objaverse import Wanted
+    from corporeal.pool.origins import Origin, OriginConfig
+
+    @dataclass(frozen=True)
+    class Index:
+        folders: Annotated[
+            tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="FOLDER ...")
+        ] = ()
+        """Searched with all folders below."""
+        pool: Folder = POOL
+        """The pool's folder."""
+        origin: Annotated[Origin, tyro.conf.arg(name="from")] = "folders"
+        """What the folders are: plain folders, the cache of the package objaverse, or Amazon
+        Berkeley Objects."""
+        csv: Path | None = None
+        """Table with columns file, class and, where known, licence, attribution, metric (whether
+        lengths are metres: yes or no), extent_m, source."""
+        objaverse: Wanted = field(default_factory=Wanted)
+        gate: GateConfig = field(default_factory=GateConfig)
+
+    asked = parse(Index, "assets index", _index.__doc__, words=2)
+    if not asked.folders and asked.origin != "objaverse":
+        raise UserError("Name at least one folder of models: corporeal assets index FOLDER.")
+    origin = OriginConfig(asked.origin, asked.csv, asked.objaverse)
+    with told() as tell:
+        pool = index(asked.folders, asked.pool, IndexConfig(origin, asked.gate), tell("index"))
+    _sum_up(pool)
+
+
+def _sum_up(pool: Pool) -> None:
+    print(
+        f"{pool.folder}: {_count(len(pool.assets), 'asset')} of "
+        f"{_count(len(pool.classes), 'class', 'classes')}, {len(pool.rejections)} rejected."
+    )
+    unknown = sum(not a.credit for a in pool.assets)
+    if unknown:
+        print(f"Of {_count(unknown, 'asset')} neither licence nor maker is known.")
+    if pool.rejections:
+        print(f"The reasons: corporeal assets list --pool {pool.folder} --rejected")
+
+
+def _list() -> None:
+    """List what a pool holds, or what was rejected, and why."""
+    from corporeal.pool.index import read_pool
+
+    @dataclass(frozen=True)
+    class List:
+        pool: Folder = POOL
+        """The pool's folder."""
+        rejected: bool = False
+        """What did not get in, with reasons."""
+        class_name: Annotated[str, tyro.conf.arg(name="class")] = ""
+        """Only of this class."""
+
+    asked = parse(List, "assets list", _list.__doc__, words=2)
+    pool = read_pool(asked.pool)
+    if asked.rejected:
+        rows = [
+            (Path(r.source).name, r.class_name, r.reason)
+            for r in pool.rejections
+            if asked.class_name in ("", r.class_name)
+        ]
+        show_table(("file", "class", "reason"), rows, f"{len(rows)} rejected")
+        return
+    assets = _of_class(pool, asked.class_name)
+    heads = ("class", "name", "extent", "triangles", "licence")
+    title = f"{_count(len(assets), 'asset')} of {len({a.class_name for a in assets})} classes"
+    show_table(heads, [_row(a) for a in assets], title)
+
+
+def _row(a: Asset) -> tuple[str, ...]:
+    return (
+        a.class_name,
+        a.name,
+        a.size,
+        f"{a.triangles:,}",
+        re.split(r" \(|;", a.licence)[0],
+    )
+
+
+def _of_class(pool: Pool, class_name: str) -> Sequence[Asset]:
+    if not class_name:
+        return pool.assets
+    if class_name not in pool.classes:
+        raise UnknownChoiceError("class", class_name, list(pool.classes))
+    return pool.classes[class_name]
+
+
+def _show() -> None:
+    """Draw a contact sheet of a pool: every asset with its name, class and extent."""
+    from corporeal.cli.contact_sheet import contact_sheet
+    from corporeal.pool.index import read_pool
+
+    @dataclass(frozen=True)
+    class Show:
+        names: Annotated[
+            tuple[str, ...], tyro.conf.Positional, tyro.conf.arg(metavar="NAME ...")
+        ] = ()
+        pool: Folder = POOL
+        """The pool's folder."""
+        class_name: Annotated[str, tyro.conf.arg(name="class")] = ""
+        """Only of this class."""
+        out: Path | None = None
+        """Where the picture goes; by default assets.png in the pool."""
+        size: int = 224
+        """Of one picture [px]."""
+
+    asked = parse(Show, "assets show", _show.__doc__, words=2)
+    pool = read_pool(asked.pool)
+    assets = _named(pool, asked.names) if asked.names else _of_class(pool, asked.class_name)
+    if not assets:
+        raise UserError(f"{asked.pool} is empty: every file was rejected. See --rejected.")
+    path = asked.out or asked.pool / "assets.png"
+    with told() as tell:
+        contact_sheet(assets, path, asked.size, tell("show"))
+    print(path)
+
+
+def _named(pool: Pool, names: Sequence[str]) -> Sequence[Asset]:
+    for name in names:
+        if pool.asset(name) is None:
+            raise UnknownChoiceError("asset", name, [a.name for a in pool.assets])
+    return [a for name in names if (a := pool.asset(name)) is not None]
+
+
+def _count(number: int, word: str, words: str = "") -> str:
+    return f"{number} {word if number == 1 else words or word + 's'}"

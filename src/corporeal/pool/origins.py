@@ -1,0 +1,52 @@
+"""Where candidates come from: plain folders, or collections with a layout of their own."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal
+
+from corporeal.errors import UserError
+from corporeal.pool import abo, objaverse
+from corporeal.pool.candidate import Candidate, candidates_in
+
+Origin = Literal["folders", "objaverse", "abo"]
+
+
+@dataclass(frozen=True)
+class OriginConfig:
+    """What the folders are, and what is said about the files in them."""
+
+    origin: Origin = "folders"
+    """Plain folders, the cache of the package objaverse, or Amazon Berkeley Objects."""
+    csv: Path | None = None
+    """Of plain folders: table with columns file, class and, where known, licence, attribution,
+    extent_m, metric."""
+    wanted: objaverse.Wanted = field(default_factory=objaverse.Wanted)
+
+
+def candidates(folders: Sequence[Path], config: OriginConfig, pool: Path) -> list[Candidate]:
+    """Return what asks to be let into the pool.
+
+    Raises:
+        UserError: There is nothing, or a folder, table or collection cannot be used.
+
+    """
+    if config.origin == "folders":
+        found = candidates_in(folders, config.csv, pool)
+    elif config.origin == "abo":
+        found = [c for folder in folders for c in abo.candidates(folder)]
+    else:
+        found = _of_objaverse(folders, config.wanted)
+    if not found:
+        named = ", ".join(map(str, folders)) or str(objaverse.CACHE)
+        raise UserError(f"{named}: no model (.glb, .gltf, .obj) lies there or below.")
+    return found
+
+
+def _of_objaverse(folders: Sequence[Path], wanted: objaverse.Wanted) -> list[Candidate]:
+    """Return what the caches hold; of the wanted categories only, where some are named."""
+    if wanted.classes and not folders:
+        folders = [objaverse.fetch(wanted)]
+    found = [c for cache in folders or [None] for c in objaverse.candidates(cache)]
+    names = {objaverse.words(c) for c in wanted.classes}
+    return [c for c in found if not names or c.said.class_name in names]
