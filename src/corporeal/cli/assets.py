@@ -2,7 +2,7 @@
 
 import re
 import sys
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
@@ -14,20 +14,25 @@ from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.pool.asset import Asset, Pool
 from corporeal.terminal import show_table, told
 
-WORDS = ("index", "list", "show")
 POOL = Path("pool")
 Folder = Annotated[Path, tyro.conf.arg(metavar="POOL")]
 
 
 def verb_assets() -> None:
     """Make a pool of models, and look at it: `assets index FOLDER ...`, `list`, `show`."""
-    word = sys.argv[2] if len(sys.argv) > 2 else ""
     verbs = {"index": _index, "list": _list, "show": _show}
+    word = sys.argv[2] if len(sys.argv) > 2 else "--help"
+    if word in ("--help", "-h"):
+        lines = (f"  corporeal assets {w:6} {_first_line(v)}" for w, v in verbs.items())
+        print(*lines, "", "corporeal assets WORD --help tells more.", sep="\n")
+        return
     if word not in verbs:
-        if word in ("", "-h", "--help"):
-            raise UserError("Say one of: " + "; ".join(f"corporeal assets {w}" for w in WORDS))
-        raise UnknownChoiceError("word after assets", word, list(WORDS))
+        raise UnknownChoiceError("word after assets", word, list(verbs))
     verbs[word]()
+
+
+def _first_line(verb: Callable[[], None]) -> str:
+    return (verb.__doc__ or "").splitlines()[0]
 
 
 def _index() -> None:
