@@ -1,0 +1,168 @@
+"""Assemble the scenes of a corpus: each planned scene is made in a process of its own.
+
+A scene's folder below ``<corpus>/scenes`` appears whole or not at all, under an id that covers the
+settings, the seed and the bytes of its assets.
+"""
+
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass, replace
+from pathlib import Path
+
+from corporeal import pipeline, store
+from corporeal.corpus.carry_out import Hands, carry_out
+from corporeal.corpus.jobs import Job, Progress
+from corporeal.corpus.manifest import Row
+from corporeal.corpus.plan import (
+    PLAN,
+    CorpusConfig,
+    Plan,
+    PlannedScene,
+    plan,
+    read_plan,
+    write_plan,
+)
+from corporeal.corpus.run import SCENE, SCENES
+from corporeal.errors import UserError
+from corporeal.formats.glb import read_model
+from corporeal.formats.scene_file import SceneFile, write_scene_file
+from corporeal.formats.transforms import write_views
+from corporeal.pool.asset import Asset, Pool
+from corporeal.stages.capture import CaptureConfig, capture
+from corporeal.stages.compose import ComposeConfig, compose
+
+VIEWS = "views"
+"""Folder of a scene's posed pictures."""
+
+VIEWS = "views"
+SETTLED = 0.5
+"""Share of the time that it takes to compose a scene; the pictures take the rest."""
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What scenes are made of, and how."""
+
+    pool: Pool | None
+    """None for the showcase."""
+    composing: ComposeConfig
+    """How every scene is composed; what the plan decides is taken from the plan."""
+    capturing: CaptureConfig
+    """Which pictures are taken of it."""
+
+
+def assemble_corpus(
+    folder: Path, config: CorpusConfig, sources: Sources, hands: Hands
+) -> dict[str, Row]:
+    """Plan a corpus and make its scenes; return what became of each.
+
+    A folder that was planned before with the same settings keeps its plan, whatever the pool has
+    got since.
+
+    Raises:
+        UserError: The pool is empty or lost what the plan needs, the folder holds a corpus that was
+            planned otherwise, or another process works in it.
+
+    """
+    with store.alone(folder):
+        made = _planned(folder, config, sources.pool)
+        for message in made.messages:
+            hands.say(message)
+        return carry_out(folder, "assemble", assembly(folder, made, sources), hands)
+
+
+def _planned(folder: Path, config: CorpusConfig, pool: Pool | None) -> Plan:
+    if (folder / PLAN).exists():
+        made = read_plan(folder)
+        if made.config != config:
+            raise UserError(
+                f"{folder} holds a corpus that was planned with other settings. Choose another "
+                f"folder, or delete {folder / PLAN} and what was made from it."
+            )
+        return made
+    made = plan(pool.assets if pool else (), config)
+    write_plan(folder, made)
+    return made
+
+
+def assembly(folder: Path, made: Plan, sources: Sources) -> list[Job]:
+    """Say what is to be done for every scene of a plan.
+
+    Raises:
+        UserError: The pool no longer has an asset of the plan.
+
+    """
+    pool = sources.pool
+    if pool is None:
+        return [_showcase_job(folder, scene) for scene in made.scenes]
+    return [
+        _compose_job(folder / SCENES / scene.name, pool, planned(scene, sources.composing), sources)
+        for scene in made.scenes
+    ]
+
+
+def planned(scene: PlannedScene, composing: ComposeConfig) -> ComposeConfig:
+    """Say how one scene of a plan is composed."""
+    return replace(
+        composing,
+        assets=scene.assets,
+        seed=scene.seed,
+        arrangement=scene.arrangement,
+        interaction=scene.interaction,
+    )
+
+
+def _compose_job(folder: Path, pool: Pool, config: ComposeConfig, sources: Sources) -> Job:
+    assets = _assets(pool, config.assets)
+    capturing = replace(sources.capturing, threads=None)
+    said = [asdict(replace(config, record=None)), asdict(capturing)]
+    inputs = [*(a.sha256 for a in assets), *pipeline.files_read(config)]
+    few = Pool(pool.folder.resolve(), assets)
+    return Job(
+        name=folder.name,
+        function=compose_scene,
+        folder=folder,
+        key=store.key("corpus assemble", said, inputs),
+        arguments={"pool": few, "config": config, "capturing": sources.capturing},
+    )
+
+
+def _showcase_job(folder: Path, scene: PlannedScene) -> Job:
+    return Job(
+        name=scene.name,
+        function=showcase_scene,
+        folder=folder / SCENES / scene.name,
+        key=store.key("corpus assemble", {"showcase": scene.name}, []),
+        arguments={"name": scene.name},
+    )
+
+
+def compose_scene(
+    folder: Path, progress: Progress, pool: Pool, config: ComposeConfig, capturing: CaptureConfig
+) -> None:
+    """Compose one scene and take its pictures, in the process of a worker."""
+    compose(pool, folder, config, lambda done, words: progress(SETTLED * done, words))
+    if capturing.views:
+        scene = read_model(folder / "scene.glb").scene
+        views = capture(
+            scene, capturing, lambda d, words: progress(SETTLED + (1 - SETTLED) * d, words)
+        )
+        write_views(folder / VIEWS, views)
+
+
+def showcase_scene(folder: Path, progress: Progress, name: str) -> None:
+    """Write one scene of the showcase, in the process of a worker."""
+    progress(0.0, "building")
+    path = pipeline.write_showcase(name, folder)
+    path = path.rename(folder / "scene.glb")
+    write_scene_file(folder / SCENE, SceneFile(folder / SCENE, file=path))
+
+
+def _assets(pool: Pool, names: Sequence[str]) -> tuple[Asset, ...]:
+    found = [pool.asset(name) for name in names]
+    gone = [name for name, asset in zip(names, found, strict=True) if asset is None]
+    if gone:
+        raise UserError(
+            f"{pool.folder} no longer has {', '.join(gone)}, which the corpus was planned with. "
+            "Choose another folder for a new corpus."
+        )
+    return tuple(asset for asset in found if asset is not None)
