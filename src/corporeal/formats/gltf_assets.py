@@ -90,13 +90,12 @@ class Assets:
         return self._numbers[entry.pointer]
 
     def _primitive(self, entry: Entry) -> dict:
-        item = kept(entry) | {"attributes": self._attributes(entry.needed("attributes"))}
+        item = kept(entry, "material")
+        item["attributes"] = self._attributes(entry.needed("attributes"))
         indices = entry.refer("indices", "accessors")
         if indices:
             item["indices"] = self.accessor(indices)
-        material = entry.refer("material", "materials")
-        if material:
-            item["material"] = self._once("materials", material, lambda: self._material(material))
+        item |= self._look(entry)
         if entry.has("targets"):
             item["targets"] = [self._attributes(t) for t in entry.children("targets")]
         packed = entry.extension(DRACO)
@@ -128,6 +127,17 @@ class Assets:
         return self._numbers[view.pointer]
 
     # ------------------------------------------------------------ how it looks
+
+    def _look(self, primitive: Entry) -> dict:
+        """Copy a primitive's material; a broken one refuses no file, as for a reader."""
+        try:
+            entry = primitive.refer("material", "materials")
+            if entry is None:
+                return {}
+            return {"material": self._once("materials", entry, lambda: self._material(entry))}
+        except BadFileError as problem:
+            self.document.warn_of("a material", problem)
+            return {}
 
     def _material(self, entry: Entry) -> dict:
         """Copy a material, or a part of one; what is called a texture and has an index is one."""
