@@ -38,8 +38,10 @@ class Asset:
     @property
     def credit(self) -> str:
         """Attribution and licence in one line; empty where nothing is known of either."""
-        known = [w for w in (self.attribution, self.licence) if w and w != UNKNOWN]
-        return ", ".join(known)
+        licence = "" if self.licence in (UNKNOWN, "") else self.licence
+        if licence and licence in self.attribution:
+            return self.attribution
+        return ", ".join(w for w in (self.attribution, licence) if w)
 
     @property
     def size(self) -> str:

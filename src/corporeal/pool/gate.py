@@ -125,7 +125,7 @@ def open_edges(mesh: Mesh) -> float:
     """Share of the edges that bound one triangle only [-]; 0 when watertight."""
     t = mesh.triangles
     edges = np.sort(np.concatenate([t[:, [0, 1]], t[:, [1, 2]], t[:, [2, 0]]]), axis=1)
-    _, count = np.unique(edges, axis=0, return_counts=True)
+    _, count = np.unique(edges[:, 0] * len(mesh.vertices) + edges[:, 1], return_counts=True)
     return float(np.mean(count == 1)) if len(count) else 0.0
 
 

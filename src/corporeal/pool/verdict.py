@@ -69,7 +69,8 @@ class Verdicts:
         verdict = judge(file, key, self.gate, self.pool)
         self.known[key] = verdict
         with store.writing(self.path), self.path.open("a", encoding="utf-8") as log:
-            log.write(json.dumps(asdict(verdict), ensure_ascii=False) + "\n")
+            # The line break comes first: a line that was cut off must not swallow this one.
+            log.write("\n" + json.dumps(asdict(verdict), ensure_ascii=False))
         return verdict
 
 
