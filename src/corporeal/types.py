@@ -119,6 +119,8 @@ class SceneObject:
     """The file it came from."""
     credit: str = ""
     """Licence and attribution, where the file states them."""
+    sized_by: str = ""
+    """Who said how large the real thing is, in a clause; "": the file."""
 
 
 @dataclass(frozen=True)
@@ -186,6 +188,34 @@ class Views:
     """Index into ``Scene.objects``; -1: the floor, or nothing."""
     part_of_pixel: Int[np.ndarray, "V H W"] | None = None
     """Which part; of pictures made from surfaces, an index into ``Scene.surfaces``. -1: none."""
+
+
+@dataclass(frozen=True)
+class Gaussians:
+    """A scene as a cloud of N soft ellipsoids (3D Gaussian splatting, Kerbl et al. 2023).
+
+    One is exp(-x^T Σ^-1 x / 2) about its mean, Σ = R diag(scale²) R^T. Seen along the unit vector
+    d (from the camera to the mean) its colour is 0.5 + Σ_k sh_k Y_k(d) in sRGB, Y as in
+    ``geometry.harmonics``.
+    """
+
+    mean: Float[np.ndarray, "N 3"]
+    """[m], or the file's unit where nobody said its size."""
+    rotation: Float[np.ndarray, "N 4"]
+    """World from the ellipsoid's axes: unit quaternions (w, x, y, z)."""
+    scale: Float[np.ndarray, "N 3"]
+    """Standard deviations along the ellipsoid's axes [m]."""
+    opacity: Float[np.ndarray, " N"]
+    """At the mean, in [0, 1]."""
+    sh: Float[np.ndarray, "N K 3"]
+    """Colour: K = (degree + 1)² coefficients of real spherical harmonics for R, G and B."""
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know about the input, in sentences."""
+
+    @property
+    def count(self) -> int:
+        """Number of Gaussians N."""
+        return len(self.mean)
 
 
 # ---------------------------------------------------------------- what it is, in words
