@@ -12,6 +12,7 @@ import tyro
 
 from corporeal import __version__
 from corporeal.cli.assets import verb_assets
+from corporeal.cli.corpus import verb_corpus
 from corporeal.cli.parse import parse
 from corporeal.errors import UserError
 from corporeal.terminal import console, show_table, told
@@ -287,6 +288,7 @@ VERBS: dict[str, Callable[[], None]] = {
     "status": verb_status,
     "materials": verb_materials,
     "assets": verb_assets,
+    "corpus": verb_corpus,
     "evaluate": verb_evaluate,
     "doctor": verb_doctor,
 }
@@ -299,7 +301,12 @@ VERBS |= {"assemble": verb_assemble, "simulate": verb_simulate}
 
 
 def _folder(where: Where, inputs: list[Path]) -> Path:
-    return where.out / (where.name or "-".join(p.stem for p in inputs[:3]) or "scene")
+    return where.out / (where.name or "-".join(map(_called, inputs[:3])) or "scene")
+
+
+def _called(path: Path) -> str:
+    """Return a scene's name: a file's own, but of the many that are scene.toml their folder's."""
+    return path.resolve().parent.name if path.name == "scene.toml" else path.stem
 
 
 def _go(

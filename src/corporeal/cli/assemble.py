@@ -41,15 +41,12 @@ def compose_from_pool() -> None:
         """The scene's own folder inside; by default its classes and seed."""
         compose: ComposeConfig = field(default_factory=ComposeConfig)
         capture: CaptureConfig = field(default_factory=CaptureConfig)
-        no_views: bool = False
-        """Take no pictures."""
 
     asked = parse(Assemble, "assemble", compose_from_pool.__doc__)
     folder = asked.out / (asked.name or _name(asked.compose))
     with told() as tell:
         pool = _pool(asked.sources, asked.out, tell)
-        capturing = None if asked.no_views else asked.capture
-        arguments = {"pool": pool, "config": asked.compose, "capturing": capturing}
+        arguments = {"pool": pool, "config": asked.compose, "capturing": asked.capture}
         perform(Job(folder.name, compose_scene, folder, "", arguments), tell("assemble"))
     _show(folder)
 
