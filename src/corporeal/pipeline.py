@@ -19,6 +19,7 @@ from corporeal import materials, store
 from corporeal.errors import UserError
 from corporeal.formats.glb_writer import write_glb
 from corporeal.formats.sources import sources
+from corporeal.geometry.sizes import scale_of_part
 from corporeal.mpm.frames import read_trajectory
 from corporeal.mpm.outcome import outcome
 from corporeal.render.figures import fields_figure, strip
@@ -343,7 +344,9 @@ class _Run:
         audit["warnings"] = list(dict.fromkeys(w for group in said for w in group))
         shutil.copyfile(movie.path, self.folder / "film.mp4")
         store.write_json(self.folder / "audit.json", audit)
-        store.write_json(self.folder / "materials.json", materials.materials_json(made, parts))
+        heavy = particles.mass_real, scale_of_part(scene, parts)
+        made_of = materials.materials_json(made, parts, *heavy)
+        store.write_json(self.folder / "materials.json", made_of)
         story = Story(
             scene=scene,
             parts=parts,

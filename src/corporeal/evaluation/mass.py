@@ -20,6 +20,7 @@ from corporeal.errors import UserError
 from corporeal.evaluation.baselines import constant, hull_fit, solid_water
 from corporeal.evaluation.metrics import coverage, errors
 from corporeal.evaluation.truth import Weighed
+from corporeal.geometry.arrangement import life_sized
 from corporeal.geometry.make import weight
 from corporeal.geometry.room import is_vessel, room_of
 from corporeal.geometry.survey import Anatomy
@@ -134,8 +135,8 @@ def predict_all(
 def predict(
     thing: Weighed, describing: DescribeConfig, grounding: GroundConfig, config: MassConfig
 ) -> Prediction:
-    """Predict one object's mass by every method that needs no other object."""
-    scene = assemble([thing.file])
+    """Predict one object's mass at its real size by every method that needs no other object."""
+    scene = life_sized(assemble([thing.file]))
     if config.anonymous:
         scene = anonymous(scene, thing.file)
     inventory = describe(scene, describing, grounding.library)

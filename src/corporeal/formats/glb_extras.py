@@ -51,6 +51,7 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
         wind=_wind(extras) if ours else None,
         source=extras.text("source") or str(document.path),
         credit=(credit(extras.value) or copyright)[:500],
+        sized_by=extras.text("sized_by")[:500] if ours else "",
     )
 
 

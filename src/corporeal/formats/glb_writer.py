@@ -206,7 +206,8 @@ def _object_extras(thing: SceneObject) -> dict:
     if thing.wind is not None:
         blown = {"velocity_m_s": list(thing.wind.velocity), "gust": thing.wind.gust}
         extras["wind"] = blown | _window(thing.wind)
-    for key, words in (("source", thing.source), ("credit", thing.credit)):
+    said = {"source": thing.source, "credit": thing.credit, "sized_by": thing.sized_by}
+    for key, words in said.items():
         if words:
             extras[key] = words
     return extras

@@ -13,7 +13,16 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.errors import UserError
-from corporeal.types import Material, MaterialField, Parts, PartWords, Piece, Scene, Structure
+from corporeal.types import (
+    Material,
+    MaterialField,
+    Parts,
+    PartWords,
+    Piece,
+    Scene,
+    SceneObject,
+    Structure,
+)
 
 LIFE_SIZE = 5e-3
 """Difference of a scale from 1 that nobody needs to be told: files round their extents."""
@@ -79,6 +88,31 @@ def scale_of_part(scene: Scene, parts: Parts) -> tuple[float, ...]:
 def is_scaled(scale: float) -> bool:
     """Tell whether a thing is noticeably not life-size."""
     return abs(scale - 1) > LIFE_SIZE
+
+
+def how_scaled(things: Sequence[SceneObject]) -> str:
+    """Say in a sentence or two what is not life-size, and what follows; "" where all is."""
+    odd = [thing for thing in things if is_scaled(thing.scale)]
+    if not odd:
+        return ""
+    told = "; ".join(
+        f"{o.name.replace('_', ' ')} at {o.scale:.3g} times its real {_centimetres(o.real_extent)}"
+        + (f" ({o.sized_by})" if o.sized_by else "")
+        for o in odd
+    )
+    return (
+        f"Not life-size: {told}. Walls are scaled with their thing; masses, and what follows from "
+        "them, are those of the scene, and the real masses stand in brackets."
+    )
+
+
+def how_heavy(mass: float, scale: float) -> str:
+    """Write a mass in the scene [kg], and in brackets that of the real thing where it differs."""
+    return f"{mass:.3g} ({mass / scale**3:.3g} in life)" if is_scaled(scale) else f"{mass:.3g}"
+
+
+def _centimetres(metres: float) -> str:
+    return f"{metres:.3g} m" if metres >= 1 else f"{100 * metres:.3g} cm"
 
 
 def in_scene(field: MaterialField, scales: Sequence[float]) -> MaterialField:

@@ -1,5 +1,6 @@
 """The library as text for the terminal, and what a scene is made of as data."""
 
+from collections.abc import Sequence
 from math import degrees
 
 from corporeal.materials.contact import pairs
@@ -93,17 +94,30 @@ def _seen(key: str) -> str:
     return f" ({row['check']}): {row['cite']}" if row else ""
 
 
-def materials_json(field: MaterialField, parts: Parts) -> dict:
+def materials_json(
+    field: MaterialField, parts: Parts, masses: Sequence[float] = (), scales: Sequence[float] = ()
+) -> dict:
     """Return what every part is made of as plain data, with the grounds of every value [SI].
 
     A part whose mesh several things share has ``pieces``; its own values, with which it moves, are
-    those of the piece that matters most, and it weighs what its pieces weigh together.
+    those of the piece that matters most, and it weighs what its pieces weigh together. Lengths are
+    those of the real thing, whatever its scale in the scene.
+
+    Args:
+        field: What they are made of.
+        parts: The catalogue.
+        masses: Of each part in the scene [kg], where they are known.
+        scales: Scene size over real size of each part.
+
     """
     pieces = field.pieces or ((),) * len(field.materials)
     rows = zip(parts.catalogue, field.materials, field.structures, field.words, pieces, strict=True)
+    weighed = zip(masses, scales, strict=True)
+    heavy = [{"scale": s, "mass_kg": m, "real_mass_kg": m / s**3} for m, s in weighed]
+    told = [_part_json(*row) for row in rows]
     return {
         "units": {q.field: q.unit for q in QUANTITIES.values()},
-        "parts": [_part_json(*row) for row in rows],
+        "parts": [part | own for part, own in zip(told, heavy or [{}] * len(told), strict=True)],
         "friction": field.friction.round(4).tolist(),
         "restitution": field.restitution.round(4).tolist(),
         "order": "rows and columns are the parts in order, then the floor and the walls",

@@ -108,10 +108,11 @@ def mass_error(particles: Particles) -> float:
 def part_rows(scene: Scene, particles: Particles, field: MaterialField) -> list[dict[str, Any]]:
     """One row per part: real and simulated numbers side by side (SI)."""
     first = {int(k): int(p) for p, k in reversed(list(enumerate(particles.part)))}
+    owner = {k: scene.objects[particles.object[p]] for k, p in first.items()}
     return [
         {
             "name": words.name,
-            "object": scene.objects[particles.object[first[k]]].name if k in first else None,
+            "object": owner[k].name if k in owner else None,
             "material": material.name,
             "law": acting(material, structure, treatment).law.name.lower(),
             "treatment": treatment.kind,
@@ -128,6 +129,7 @@ def part_rows(scene: Scene, particles: Particles, field: MaterialField) -> list[
             "fill": structure.fill if structure.contents else None,
             "thickness_sim_m": treatment.thickness,
             "mass_kg": mass,
+            "real_mass_kg": mass / owner[k].scale ** 3 if k in owner else None,
             "why": treatment.why,
         }
         for k, (words, material, treatment, structure, mass) in enumerate(

@@ -14,6 +14,7 @@ from pathlib import Path
 from string import Template
 from typing import Any
 
+from corporeal.geometry.sizes import how_heavy, how_scaled
 from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.types import (
     Film,
@@ -60,7 +61,6 @@ WHO = {
     "metadata": "the file's own words",
     "unknown": "nobody: a neutral stand-in",
 }
-
 CHOSEN = {
     "typical": "nobody: the usual value",
     "fallback": "nobody could say: the usual value",
@@ -128,6 +128,7 @@ def _summary(story: Story) -> str:
         "annotations and from the words in the file.",
     ]
     sentences += [_forced(o) for o in scene.objects if o.push or o.wind]
+    sentences += filter(None, [_safe(how_scaled(scene.objects))])
     if unknown:
         sentences.append(
             f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got a "
@@ -202,7 +203,7 @@ def _part_row(story: Story, k: int) -> str:
         f"{material.poisson:.3g}",
         f"{material.density:.4g}",
         yields,
-        f"{story.particles.mass_real[k]:.3g}",
+        how_heavy(story.particles.mass_real[k], story.scene.objects[part.object].scale),
         _safe(built(story.field.structures[k])),
         _safe(treatment.kind),
         simulated(treatment),
@@ -230,7 +231,8 @@ def _grounds(story: Story, k: int) -> str:
     part, field = story.parts.catalogue[k], story.field
     material, words, structure = field.materials[k], field.words[k], field.structures[k]
     pieces = field.pieces[k] if field.pieces else ()
-    own = _values(material, structure, _walled(story.particles, k, material))
+    usual = (material.shell_thickness or 0.0) * story.scene.objects[part.object].scale
+    own = _values(material, structure, _walled(story.particles, k, usual))
     tables = "".join(_piece_grounds(p) for p in pieces) or own
     fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
     return (
@@ -254,10 +256,9 @@ def _piece_grounds(piece: Piece) -> str:
     )
 
 
-def _walled(particles: Particles, k: int, material: Material) -> bool:
-    """Whether a wall or a sheet of a part is as thick as its material says."""
+def _walled(particles: Particles, k: int, usual: float) -> bool:
+    """Whether a wall or a sheet of a part is as thick as its material says it is here [m]."""
     made = particles.walls[k] if particles.walls else ()
-    usual = material.shell_thickness or 0.0
     return any(t > 0 and math.isclose(t, usual, rel_tol=1e-6) for t in made)
 
 
@@ -332,8 +333,7 @@ def _sources(story: Story) -> str:
     held = [s.contents for s in made if s.contents is not None]
     known = [*story.field.materials, *(p.material for p in pieces), *held]
     used = sorted({g.range.source for m in known for g in m.grounds.values()})
-    items = (f"<dt>{_safe(k)}</dt><dd>{_safe(story.sources.get(k, k))}</dd>" for k in used)
-    return "".join(items)
+    return "".join(f"<dt>{_safe(k)}</dt><dd>{_safe(story.sources.get(k, k))}</dd>" for k in used)
 
 
 def _credits(scene: Scene) -> str:

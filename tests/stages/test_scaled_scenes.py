@@ -1,0 +1,177 @@
+"""A scene that is not life-size: same words, same materials, masses by the cube; and all told."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import trimesh
+
+from corporeal import materials
+from corporeal.evaluation.mass import MassConfig, predict
+from corporeal.evaluation.truth import Weighed
+from corporeal.formats.glb_writer import write_glb
+from corporeal.geometry.arrangement import scaled
+from corporeal.geometry.sizes import how_heavy, how_scaled, scale_of_part
+from corporeal.mpm.audit import part_rows
+from corporeal.mpm.part import Motion, PartGeometry
+from corporeal.mpm.treatment import plan
+from corporeal.showcase.scenes import build
+from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.fill import fill
+from corporeal.stages.ground import GroundConfig, ground
+from corporeal.stages.report import Story, report
+from corporeal.stages.segment import segment
+from corporeal.types import Film, Law, Material, Scene, SceneObject, Structure, Surface
+from handmade import plain
+
+REPLAY = f"replay:{Path(__file__).parents[1] / 'recordings' / 'showcase'}"
+FALL = Motion(impact_speed=1.0, acceleration=9.81)
+
+
+def through(scene, vlm="metadata"):
+    """Describe, segment, ground and fill a scene."""
+    said = describe(scene, DescribeConfig(vlm=vlm))
+    parts = segment(scene, said)
+    field = ground(scene, parts, said)
+    return said, parts, field, fill(scene, parts, field)
+
+
+def a_can(sized_by=""):
+    """Return a steel can of 10 cm whose wall the file states to be 0.4 mm thick."""
+    mesh = trimesh.creation.cylinder(0.03, 0.1).apply_translation((0, 0, 0.05))
+    stated = {"substance": "steel", "shell_thickness_m": 4e-4}
+    points, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+    surface = Surface("can", 0, 0, points, triangles, extras=stated)
+    thing = SceneObject("can_0", "can", 0.1, sized_by=sized_by)
+    return Scene("one-can", "", (thing,), (surface,), (plain(),))
+
+
+@pytest.fixture(scope="module")
+def life():
+    return through(a_can())
+
+
+@pytest.fixture(scope="module")
+def large():
+    return through(scaled(a_can("a recorded answer"), 5.0))
+
+
+def test_words_and_materials_are_those_of_the_real_thing(life, large):
+    assert life[0] == large[0]
+    assert life[2].materials == large[2].materials
+    assert life[2].structures == large[2].structures
+    assert large[2].structures[0].thickness == 4e-4
+
+
+def test_particles_weigh_with_the_cube_of_the_scale(life, large):
+    (was,), (now,) = life[3].mass_real, large[3].mass_real
+    assert now == pytest.approx(125 * was, rel=1e-9)
+    assert large[3].mass.sum() == pytest.approx(125 * life[3].mass.sum(), rel=1e-9)
+    assert large[3].walls[0][0] == pytest.approx(2e-3, rel=1e-9)
+    assert large[3].count == life[3].count
+    assert large[3].treatments[0].kind == life[3].treatments[0].kind
+
+
+def test_both_masses_stand_side_by_side(life, large, tmp_path):
+    real = life[3].mass_real[0]
+    told = page(scaled(a_can("a recorded answer"), 5.0), large, tmp_path)
+    assert f">{how_heavy(125 * real, 5.0)}<" in told
+    assert f"{125 * real:.3g} ({real:.3g} in life)" == how_heavy(125 * real, 5.0)
+    assert (
+        "Not life-size: can 0 at 5 times its real 10 cm (a recorded answer). Walls are scaled with "
+        "their thing"
+    ) in told
+    assert (
+        f"In life, 0.2 times as large, it weighs {real:.3g} kg, with a wall 0.4 mm thick." in told
+    )
+    assert "<td>wall thickness</td>" not in told, "the wall is as stated, not as its material says"
+    assert "life-size" not in page(a_can(), life, tmp_path)
+    assert "in life" not in page(a_can(), life, tmp_path).lower()
+
+
+def test_the_usual_wall_of_a_material_is_recognised_at_any_scale(tmp_path):
+    can = a_can()
+    usual = replace(can.surfaces[0], extras={"substance": "aluminium_can_sheet"})
+    for k in (1.0, 5.0):
+        scene = scaled(replace(can, surfaces=(usual,)), k)
+        said = describe(scene)
+        words = replace(said.objects[0].parts[0], structure="shell")
+        said = replace(said, objects=(replace(said.objects[0], parts=(words,)),))
+        parts = segment(scene, said)
+        field = ground(scene, parts, said)
+        made = (said, parts, field, fill(scene, parts, field))
+        assert "<td>wall thickness</td>" in page(scene, made, tmp_path)
+
+
+def page(scene, made, folder):
+    _, parts, field, particles = made
+    film = Film(folder / "film.mp4", 24, 64, 64)
+    film.path.write_bytes(b"")
+    story = Story(scene, parts, field, particles, film, {}, {}, materials.sources())
+    report(story, folder / "report.html")
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_both_masses_are_data(large):
+    _, parts, field, particles = large
+    scene = scaled(a_can(), 5.0)
+    heavy = particles.mass_real, scale_of_part(scene, parts)
+    (row,) = materials.materials_json(field, parts, *heavy)["parts"]
+    assert (row["scale"], row["mass_kg"]) == (5.0, particles.mass_real[0])
+    assert row["real_mass_kg"] == pytest.approx(particles.mass_real[0] / 125, rel=1e-12)
+    assert row["structure"]["thickness"] == 4e-4
+    (row,) = part_rows(scene, particles, field)
+    assert row["real_mass_kg"] == pytest.approx(row["mass_kg"] / 125, rel=1e-12)
+    assert row["thickness_m"] == 4e-4
+
+
+def test_a_sentence_tells_only_what_is_not_life_size():
+    things = (SceneObject("duck_0", "duck", 0.12, 1.85), SceneObject("couch_0", "couch", 2.1, 0.24))
+    told = how_scaled((*things, SceneObject("vase_0", "vase", 0.3, 1.001)))
+    assert told.startswith(
+        "Not life-size: duck 0 at 1.85 times its real 12 cm; couch 0 at 0.24 times its real 2.1 m."
+    )
+    assert "vase" not in told
+    assert how_scaled([SceneObject("vase_0", "vase", 0.3)]) == ""
+
+
+def test_masses_are_compared_with_the_scales_at_real_size(tmp_path):
+    """A file of a scene that was scaled holds the same thing."""
+    found = []
+    for k in (1.0, 5.0):
+        path = tmp_path / str(k) / "can.glb"
+        path.parent.mkdir()
+        write_glb(path, scaled(a_can(), k))
+        thing = Weighed("can", path, None, "all")
+        row = predict(thing, DescribeConfig(), GroundConfig(), MassConfig(samples=5))
+        found.append((row.mass, row.low, row.high, row.volume_m3, row.hull_m3, row.solid_usual))
+    assert found[1] == pytest.approx(found[0], rel=1e-5)
+
+
+def test_where_the_real_thing_would_be_judged_otherwise_it_is_told():
+    """A long stick bends under itself; the short one that it stands for does not."""
+    wood = Material("wood", Law.HENCKY, 1e10, 0.38, 700.0)
+    size, volume, area = (0.15, 0.15, 5.0), 0.15**2 * 5.0, 4 * 0.15 * 5.0
+    stick = PartGeometry(0, wood, Structure("solid"), size, volume, area, scale=5.0)
+    (treated,) = plan([stick], [FALL], "draft").treatments
+    assert treated.kind == "deformable"
+    assert "At its real size, 0.2 times this one, it would be judged otherwise" in treated.why
+    assert "otherwise" not in plan([replace(stick, scale=1.0)], [FALL], "draft").treatments[0].why
+    stiff = replace(stick, material=replace(wood, young=1e13))
+    assert "otherwise" not in plan([stiff], [FALL], "draft").treatments[0].why
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(("name", "k"), [("duck-on-can", 0.37), ("ficus-pushed", 2.0)])
+def test_a_scene_of_the_showcase_at_another_scale_has_the_same_answers(name, k):
+    """The questions are the same words, so recorded answers fit; masses go with the cube."""
+    scene = build(name)
+    said, _, field, particles = through(scene, REPLAY)
+    other = through(scaled(scene, k), REPLAY)
+    assert other[0] == said
+    assert other[2].materials == field.materials
+    assert other[2].structures == field.structures
+    assert np.array(other[3].mass_real) / k**3 == pytest.approx(particles.mass_real, rel=1e-9)
+    for a, b in zip(particles.treatments, other[3].treatments, strict=True):
+        assert a.kind == b.kind or "flex" in b.why
