@@ -8,7 +8,10 @@ from corporeal.geometry.shape import sphere_directions
 from corporeal.geometry.spread import sample_surface, thin_out
 from corporeal.geometry.survey import Anatomy
 
-MOST, EXTREMES = 5000, 600
+MOST, EXTREMES, LOWEST = 5000, 600, 2000
+CAP = 0.02
+"""Every corner of the hull up to this high over the lowest counts [of its height]: what is round
+stands on small faces, and it would roll on if some of their corners were missing."""
 
 
 def contact_points(
@@ -16,7 +19,7 @@ def contact_points(
 ) -> Float[np.ndarray, "S 3"]:
     """Cover the outside evenly, at most ``MOST`` points, the farthest corners first [m].
 
-    The corners in ``EXTREMES`` directions and straight down make the object rest exactly.
+    The corners in ``EXTREMES`` directions and the lowest make the object rest exactly.
 
     Args:
         anatomy: The object.
@@ -39,15 +42,15 @@ def contact_points(
 
 
 def extremes(vertices: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "E 3"]:
-    """Corners that lie farthest in some direction [m], and all that are lowest."""
+    """Corners that lie farthest in some direction [m], and the lowest, at most ``LOWEST``."""
     try:
         hull = vertices[ConvexHull(vertices).vertices]
     except QhullError:  # flat
         hull = vertices
     directions = np.concatenate([sphere_directions(EXTREMES), np.eye(3), -np.eye(3)])
     chosen = np.unique(np.argmax(hull @ directions.T, axis=0))
-    span = float(np.ptp(hull[:, 2])) or 1.0
-    lowest = np.flatnonzero(hull[:, 2] < hull[:, 2].min() + 1e-6 * span)
-    if len(lowest) > EXTREMES:
-        lowest = lowest[:: len(lowest) // EXTREMES + 1]
+    height = hull[:, 2] - hull[:, 2].min()
+    lowest = np.flatnonzero(height <= CAP * height.max())
+    if len(lowest) > LOWEST:
+        lowest = lowest[:: len(lowest) // LOWEST + 1]
     return hull[np.union1d(chosen, lowest)]
