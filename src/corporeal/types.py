@@ -183,7 +183,7 @@ class Views:
     """Of what the middle of each pixel shows, along the camera's z [m]; inf where there is nothing.
     The floor is something."""
     normals: Float[np.ndarray, "V H W 3"] | None = None
-    """Unit shading normals in the world, towards the camera; 0 where there is nothing."""
+    """Of the facets: unit, in the world, towards the camera; 0 where there is nothing."""
     object_of_pixel: Int[np.ndarray, "V H W"] | None = None
     """Index into ``Scene.objects``; -1: the floor, or nothing."""
     part_of_pixel: Int[np.ndarray, "V H W"] | None = None

@@ -5,6 +5,7 @@ every object whole. Nothing is left to chance.
 """
 
 from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
 
@@ -13,6 +14,7 @@ from jaxtyping import Float
 
 from corporeal.errors import UserError
 from corporeal.geometry.arrangement import boxes_of
+from corporeal.machine import cores
 from corporeal.render.camera import VIEW, Aim, camera_of, place
 from corporeal.render.embree import Light, Stage, first_seen, render
 from corporeal.render.kernels import NOTHING
@@ -73,10 +75,15 @@ def capture(
         object_of_pixel=np.empty(shape, np.int32),
         part_of_pixel=np.empty(shape, np.int32),
     )
-    for k, aim in enumerate(aims):
-        views.rgb[k] = render(stage, aim, config.quality, config.threads)
-        _measure(scene, stage, aim, views, k)
-        progress((k + 1) / len(aims), f"view {k + 1} of {len(aims)}")
+
+    def take(k: int) -> None:
+        # One thread a picture: the renderer's bands depend on how many there are.
+        views.rgb[k] = render(stage, aims[k], config.quality, threads=1)
+        _measure(scene, stage, aims[k], views, k)
+
+    with ThreadPoolExecutor(config.threads or cores()) as pool:
+        for k, _ in enumerate(pool.map(take, range(len(aims)))):
+            progress((k + 1) / len(aims), f"view {k + 1} of {len(aims)}")
     return views
 
 
@@ -110,7 +117,7 @@ def _measure(scene: Scene, stage: Stage, aim: Aim, views: Views, k: int) -> None
     assert views.depth is not None and views.normals is not None
     assert views.object_of_pixel is not None and views.part_of_pixel is not None
     views.depth[k] = np.where(nothing, np.inf, depth)
-    views.normals[k] = np.where(nothing[..., None], 0, seen.normal.reshape(*shape, 3))
+    views.normals[k] = np.where(nothing[..., None], 0, seen.flat.reshape(*shape, 3))
     views.part_of_pixel[k] = part
     views.object_of_pixel[k] = owner[part]
 
