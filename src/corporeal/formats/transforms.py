@@ -210,7 +210,7 @@ class _Shot:
         if model not in STRAIGHT or any(self.number(k, 0.0) for k in BENT):
             self.fail("its lens bends straight lines.", "Undistort the pictures first.")
         for key, size in (("w", width), ("h", height)):
-            if self.number(key, size) != size:
+            if self.number(key, float(size)) != size:
                 self.fail(
                     f"{key!r} is {self.value[key]}, but its picture has {size}.", "Correct it."
                 )
