@@ -14,6 +14,9 @@ from corporeal.types import Vector
 
 Quaternion = tuple[float, float, float, float]
 
+FLATTEST = 1e-4
+"""Of the extent: thickness that the hull of a flat body is given."""
+
 
 @dataclass(frozen=True)
 class Pose:
@@ -66,7 +69,8 @@ class Body:
     @cached_property
     def hull(self) -> Piece:
         """The convex hull of the mesh."""
-        return hull_of(self.vertices[np.unique(self.triangles)])
+        points = self.vertices[np.unique(self.triangles)]
+        return hull_of(points, FLATTEST * float(np.ptp(points, axis=0).max()))
 
     @cached_property
     def shape(self) -> Shape:

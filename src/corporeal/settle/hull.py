@@ -8,8 +8,6 @@ from scipy.spatial import ConvexHull, QhullError
 
 from corporeal.errors import UserError
 
-THINNEST = 1e-3
-"""Of its largest side: what is flatter is thickened to this, so that it has a volume."""
 FOOT = 2e-3
 """Of the largest side: what is no higher than this above the lowest point carries weight."""
 FACES = 16
@@ -45,8 +43,8 @@ class Piece:
         return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
 
 
-def hull_of(points: Float[np.ndarray, "N 3"], thinnest: float = THINNEST) -> Piece:
-    """Enclose points; what is flat becomes a plate of ``thinnest`` times its largest side.
+def hull_of(points: Float[np.ndarray, "N 3"], thinnest: float) -> Piece:
+    """Enclose points; what is flatter than ``thinnest`` [m] becomes a plate of that thickness.
 
     Raises:
         UserError: The points lie on a line or are fewer than three.
@@ -73,8 +71,7 @@ def _thickened(points: np.ndarray, thinnest: float) -> np.ndarray:
     _, spread, axes = np.linalg.svd(points - points.mean(axis=0), full_matrices=False)
     if spread[1] <= 1e-6 * spread[0]:
         return points
-    across = np.ptp(points @ axes[2])
-    lacking = thinnest * float(np.ptp(points @ axes[0])) - across
+    lacking = thinnest - float(np.ptp(points @ axes[2]))
     if lacking <= 0:
         return points
     shift = 0.5 * lacking * axes[2]
