@@ -8,7 +8,7 @@ from pathlib import Path
 
 import fake_jobs  # itself: what runs as a program has no name that a worker could import
 
-from corporeal.corpus.carry_out import carry_out
+from corporeal.corpus.carry_out import Hands, carry_out
 from corporeal.corpus.jobs import Job
 from corporeal.corpus.local import local
 from corporeal.errors import UserError
@@ -76,7 +76,8 @@ def silent(*words):
 
 def do(folder, jobs, slots=2, say=silent):
     """Carry jobs out on this machine."""
-    return carry_out(folder, "run", jobs, lambda: local(slots, 1, folder / "logs"), silent, say)
+    hands = Hands(lambda: local(slots, 1, folder / "logs"), silent, say)
+    return carry_out(folder, "run", jobs, hands)
 
 
 if __name__ == "__main__":

@@ -28,7 +28,7 @@ from corporeal.types import (
     Trajectory,
 )
 
-SMALL = FilmConfig(width=128, height=96, quality="draft", threads=2)
+SMALL = FilmConfig(width=128, height=96, quality="draft")
 
 
 class Played(Sequence):
@@ -120,7 +120,7 @@ def test_a_sphere_that_is_squashed_is_seen_lower_and_wider(tmp_path):
 
 def test_what_does_not_move_does_not_flicker(tmp_path):
     still = play(cube(), lambda t: (np.eye(3), np.zeros(3)))
-    config = FilmConfig(width=128, height=96, quality="draft", threads=2, stills=True)
+    config = FilmConfig(width=128, height=96, quality="draft", stills=True)
     film(*still, config, tmp_path)
     stills = [np.asarray(Image.open(p)) for p in sorted((tmp_path / "stills").iterdir())]
     assert len(stills) == 6

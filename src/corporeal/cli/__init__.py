@@ -12,6 +12,7 @@ import tyro
 
 from corporeal import __version__
 from corporeal.cli.assets import verb_assets
+from corporeal.cli.capture import verb_capture
 from corporeal.cli.corpus import verb_corpus
 from corporeal.cli.parse import parse
 from corporeal.errors import UserError
@@ -288,6 +289,7 @@ VERBS: dict[str, Callable[[], None]] = {
     "status": verb_status,
     "materials": verb_materials,
     "assets": verb_assets,
+    "capture": verb_capture,
     "corpus": verb_corpus,
     "evaluate": verb_evaluate,
     "doctor": verb_doctor,

@@ -1,15 +1,14 @@
 """`corporeal assets index | list | show`: the pool that scenes are made of."""
 
 import re
-import sys
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated
 
 import tyro
 
-from corporeal.cli.parse import parse
+from corporeal.cli.parse import do_second_word, parse
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.pool.asset import Asset, Pool
 from corporeal.terminal import show_table, told
@@ -20,19 +19,7 @@ Folder = Annotated[Path, tyro.conf.arg(metavar="POOL")]
 
 def verb_assets() -> None:
     """Make a pool of models, and look at it: `assets index FOLDER ...`, `list`, `show`."""
-    verbs = {"index": _index, "list": _list, "show": _show}
-    word = sys.argv[2] if len(sys.argv) > 2 else "--help"
-    if word in ("--help", "-h"):
-        lines = (f"  corporeal assets {w:6} {_first_line(v)}" for w, v in verbs.items())
-        print(*lines, "", "corporeal assets WORD --help tells more.", sep="\n")
-        return
-    if word not in verbs:
-        raise UnknownChoiceError("word after assets", word, list(verbs))
-    verbs[word]()
-
-
-def _first_line(verb: Callable[[], None]) -> str:
-    return (verb.__doc__ or "").splitlines()[0]
+    do_second_word("assets", {"index": _index, "list": _list, "show": _show})
 
 
 def _index() -> None:

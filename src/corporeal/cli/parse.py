@@ -1,10 +1,13 @@
 """From the rest of the command line to a dataclass."""
 
 import sys
+from collections.abc import Callable, Mapping
 from inspect import cleandoc
 from typing import Any
 
 import tyro
+
+from corporeal.errors import UnknownChoiceError
 
 
 def parse(kind: Any, verb: str, description: str | None, words: int = 1) -> Any:
@@ -23,3 +26,24 @@ def parse(kind: Any, verb: str, description: str | None, words: int = 1) -> Any:
         description=cleandoc(description or ""),
         args=sys.argv[1 + words :],
     )
+
+
+def do_second_word(verb: str, verbs: Mapping[str, Callable[[], None]]) -> None:
+    """Do what the second word of the command line says, or list the words there are.
+
+    Raises:
+        UnknownChoiceError: There is no such word.
+
+    """
+    word = sys.argv[2] if len(sys.argv) > 2 else "--help"
+    if word in ("--help", "-h"):
+        lines = (f"  corporeal {verb} {w:8} {_first_line(v)}" for w, v in verbs.items())
+        print(*lines, "", f"corporeal {verb} WORD --help tells more.", sep="\n")
+        return
+    if word not in verbs:
+        raise UnknownChoiceError(f"word after {verb}", word, list(verbs))
+    verbs[word]()
+
+
+def _first_line(verb: Callable[[], None]) -> str:
+    return (verb.__doc__ or "").splitlines()[0]

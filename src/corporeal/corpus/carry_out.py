@@ -2,6 +2,7 @@
 
 from collections import deque
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.corpus.jobs import Event, Hire, Job, Progress, Workers, sweep
@@ -16,9 +17,19 @@ Say = Callable[[str], None]
 """Told each event in a sentence."""
 
 
-def carry_out(
-    folder: Path, verb: Verb, jobs: Sequence[Job], hire: Hire, progress: Progress, say: Say
-) -> dict[str, Row]:
+@dataclass(frozen=True)
+class Hands:
+    """Who does the jobs, and who is told about it."""
+
+    hire: Hire
+    """Opens the workers."""
+    progress: Progress
+    """Told the fraction done."""
+    say: Say
+    """Told what happens."""
+
+
+def carry_out(folder: Path, verb: Verb, jobs: Sequence[Job], hands: Hands) -> dict[str, Row]:
     """Do all jobs that are not done; return what became of each.
 
     A job that fails is noted and left; one whose process dies is tried once more. An interrupt
@@ -28,17 +39,15 @@ def carry_out(
         folder: The corpus's.
         verb: What is done.
         jobs: One per scene.
-        hire: Opens the workers.
-        progress: Told the fraction done.
-        say: Told what happens.
+        hands: Who does them, and who is told.
 
     """
     for place in {job.folder.parent for job in jobs}:
         sweep(place)
-    shift = _Shift(Manifest(folder, verb, jobs), jobs, progress, say)
+    shift = _Shift(Manifest(folder, verb, jobs), jobs, hands)
     if shift.waiting:
         try:
-            with hire() as workers:
+            with hands.hire() as workers:
                 shift.work(workers)
         finally:
             shift.close()
@@ -48,10 +57,9 @@ def carry_out(
 class _Shift:
     """One call's work: what waits, what runs, and how far each came."""
 
-    def __init__(
-        self, manifest: Manifest, jobs: Sequence[Job], progress: Progress, say: Say
-    ) -> None:
-        self.manifest, self.jobs, self.progress, self.say = manifest, jobs, progress, say
+    def __init__(self, manifest: Manifest, jobs: Sequence[Job], hands: Hands) -> None:
+        self.manifest, self.jobs = manifest, jobs
+        self.progress, self.say = hands.progress, hands.say
         self.waiting = deque(job for job in jobs if not job.done)
         self.running: dict[str, float] = {}
         self.words = ""
@@ -60,7 +68,7 @@ class _Shift:
         """In this call."""
         self.already = len(jobs) - len(self.waiting)
         if self.already:
-            say(f"{self.already} of {len(jobs)} are done already.")
+            self.say(f"{self.already} of {len(jobs)} are done already.")
 
     def work(self, workers: Workers) -> None:
         """Keep the workers busy until nothing waits and nothing runs."""

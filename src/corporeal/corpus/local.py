@@ -16,8 +16,11 @@ from contextlib import contextmanager, suppress
 from pathlib import Path
 
 from corporeal.corpus.jobs import Event, Job
+from corporeal.corpus.worker import pack
 from corporeal.store import writing
 
+LOGS = "logs"
+"""Folder of a corpus for what its processes print."""
 PATIENCE = 30.0
 """How long a job may take to keep what it has when it is stopped [s]."""
 
@@ -52,7 +55,7 @@ class LocalWorkers:
         self.buffer[job.name] = b""
         self.ready.register(process.stdout, selectors.EVENT_READ, job.name)
         with suppress(BrokenPipeError):  # it died at once: ``wait`` will say so
-            process.stdin.write(pickle.dumps((sys.path, pickle.dumps(job))))
+            process.stdin.write(pickle.dumps(pack(job)))
             process.stdin.flush()
 
     def wait(self, seconds: float) -> list[Event]:
@@ -88,7 +91,7 @@ class LocalWorkers:
         process.stdout.close()
         with suppress(BrokenPipeError):
             process.stdin.close()
-        died = Event(job, "died", words=f"{ending(code)} Its words are in logs/{name}.log.")
+        died = Event(job, "died", words=f"{ending(code)} Its words are in {LOGS}/{name}.log.")
         return self.said.pop(name, died)
 
     def stop(self) -> None:

@@ -9,32 +9,22 @@ from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Literal, Protocol
+from typing import Literal
 
 import numpy as np
 
 from corporeal import store
 from corporeal.errors import BadFileError, UserError
-from corporeal.pool.draw import draw
-from corporeal.settle.interactions import KINDS, NEEDS, Kind
+from corporeal.pool.asset import Asset
+from corporeal.pool.draw import counts, draw
+from corporeal.settle.arrange import Arrangement
+from corporeal.settle.interactions import KINDS, NEEDS, STANDING, Kind
 from corporeal.showcase.scenes import SCENES
 
 PLAN = "corpus.json"
 MOST = 10_000
 """Scenes of one corpus."""
-FULLEST = 8
-"""Objects of one scene."""
 
-Arrangement = Literal["scatter", "stack", "onto", "row"]
-
-ARRANGEMENTS: Mapping[Kind, tuple[Arrangement, ...]] = {
-    "fall": ("scatter", "stack", "onto"),
-    "fall-onto": ("scatter", "row"),
-    "collision": ("scatter", "row"),
-    "chain": ("row",),
-    "wind": ("scatter", "stack", "onto"),
-}
-"""How objects may stand before each kind of interaction; a single one is always "scatter"."""
 SHOWCASE: Mapping[str, Kind] = {
     "duck-on-mud": "fall-onto",
     "duck-on-can": "fall-onto",
@@ -47,20 +37,6 @@ SHOWCASE: Mapping[str, Kind] = {
 """What happens in the showcase's scenes; a push on a whole plant counts as wind."""
 
 
-class Model(Protocol):
-    """What a plan needs to know of an asset."""
-
-    @property
-    def name(self) -> str:
-        """Its own in the pool."""
-        ...
-
-    @property
-    def class_name(self) -> str:
-        """What it is."""
-        ...
-
-
 @dataclass(frozen=True)
 class CorpusConfig:
     """What a corpus consists of."""
@@ -71,7 +47,7 @@ class CorpusConfig:
     """How many; the showcase has seven."""
     classes: int = 15
     """How many classes of the pool take part: those with the most models, then by lot."""
-    count: tuple[int, int] = (1, 4)
+    count: str = "1-4"
     """Fewest and most objects of a scene."""
     repeat: bool = False
     """A class may come twice in a scene."""
@@ -108,7 +84,7 @@ class Plan:
     """What could not be as asked for."""
 
 
-def plan(models: Sequence[Model], config: CorpusConfig) -> Plan:
+def plan(models: Sequence[Asset], config: CorpusConfig) -> Plan:
     """Plan a corpus.
 
     Args:
@@ -123,12 +99,12 @@ def plan(models: Sequence[Model], config: CorpusConfig) -> Plan:
         return Plan(config, tuple(_showcase(name) for name in SCENES))
     _check(config)
     if not models:
-        raise UserError("The pool has no usable asset. See why: corporeal assets list.")
+        raise UserError("The pool has no usable asset. See why: corporeal assets list --rejected.")
     rng = np.random.default_rng(config.seed)
     by_class = _by_class(models)
     classes = choose_classes(by_class, config.classes, rng)
     messages = [_fewer(len(classes), config.classes)] if len(classes) < config.classes else []
-    least, most = config.count
+    least, most = counts(config.count)
     if not config.repeat and most > len(classes):
         least, most = min(least, len(classes)), len(classes)
         messages.append(
@@ -163,7 +139,7 @@ def read_plan(folder: Path) -> Plan:
                         f"assemble {folder}.")  # fmt: skip
     said = store.read_json(path)
     try:
-        config = CorpusConfig(**{**said["config"], "count": tuple(said["config"]["count"])})
+        config = CorpusConfig(**said["config"])
         scenes = [
             PlannedScene(**{**s, "classes": tuple(s["classes"]), "assets": tuple(s["assets"])})
             for s in said["scenes"]
@@ -213,14 +189,25 @@ def interactions_and_counts(
     pairs: list[tuple[Kind, int]] = []
     for group in _alike(kinds):
         allowed = [n for n in numbers if int(n) >= NEEDS[group[0]]]
-        own = Counter({kind: used[kind] for kind in group})
-        for _ in range(own.total()):
+        own: list[Kind] = [kind for kind in group for _ in range(used[kind])]
+        mine: list[int] = []
+        for _ in own:
             (number,) = draw(allowed, taken, 1, rng)
             taken[number] += 1
-            kind = max(group, key=lambda k: own[k])
-            own[kind] -= 1
-            pairs.append((kind, int(number)))
+            mine.append(int(number))
+        pairs += _dealt(sorted(mine), own)
     return [pairs[k] for k in rng.permutation(len(pairs))]
+
+
+def _dealt(numbers: Sequence[int], kinds: Sequence[Kind]) -> list[tuple[Kind, int]]:
+    """Deal numbers to interactions in turns, so that each gets its share of every number."""
+    left = Counter(kinds)
+    order: list[Kind] = []
+    while left.total():
+        turn = sorted(left, key=lambda k: -left[k])
+        order += turn
+        left -= Counter(turn)
+    return list(zip(order, numbers, strict=True))
 
 
 def _alike(kinds: Sequence[Kind]) -> list[list[Kind]]:
@@ -249,7 +236,7 @@ def _fill(
         for name in mine:
             assets += draw(by_class[name], of_asset, 1, rng)
             of_asset.update(assets[-1:])
-        stands = ARRANGEMENTS[kind] if count > 1 else ("scatter",)
+        stands = STANDING[kind] if count > 1 else ("scatter",)
         (arrangement,) = draw(stands, of_arrangement, 1, rng)
         of_arrangement[arrangement] += count > 1
         made.append(
@@ -265,7 +252,7 @@ def _fill(
     return made
 
 
-def _by_class(models: Sequence[Model]) -> dict[str, list[str]]:
+def _by_class(models: Sequence[Asset]) -> dict[str, list[str]]:
     found: dict[str, list[str]] = {}
     for model in sorted(models, key=lambda m: m.name):
         found.setdefault(model.class_name, []).append(model.name)
@@ -285,12 +272,9 @@ def _fewer(found: int, wanted: int) -> str:
 
 
 def _check(config: CorpusConfig) -> None:
-    least, most = config.count
     for name, value, low, high in (
         ("--scenes", config.scenes, 1, MOST),
         ("--classes", config.classes, 1, MOST),
-        ("the smallest --count", least, 1, FULLEST),
-        ("the largest --count", most, least, FULLEST),
         ("--seed", config.seed, 0, 2**63),
     ):
         if not low <= value <= high:

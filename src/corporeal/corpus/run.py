@@ -7,11 +7,10 @@ scene that is interrupted goes on from its checkpoint.
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
-from typing import Any
 
 from corporeal import pipeline, store
-from corporeal.corpus.carry_out import Say, carry_out
-from corporeal.corpus.jobs import Hire, Job, Progress
+from corporeal.corpus.carry_out import Hands, carry_out
+from corporeal.corpus.jobs import Job, Progress
 from corporeal.corpus.manifest import Row
 from corporeal.corpus.plan import Plan, PlannedScene, read_plan
 from corporeal.errors import UserError
@@ -45,9 +44,7 @@ class RunConfig:
     """Keep what is finished and go on with what was interrupted; else begin all scenes anew."""
 
 
-def run_corpus(
-    folder: Path, config: RunConfig, settings: Settings, hire: Hire, progress: Progress, say: Say
-) -> dict[str, Row]:
+def run_corpus(folder: Path, config: RunConfig, settings: Settings, hands: Hands) -> dict[str, Row]:
     """Run the scenes of a corpus; return what became of each.
 
     Raises:
@@ -56,6 +53,8 @@ def run_corpus(
 
     """
     plan = read_plan(folder)
+    if config.first is not None and config.first < 1:
+        raise UserError(f"--first is {config.first}. Give a number from 1.")
     planned = plan.scenes[: config.first]
     there = [s for s in planned if (folder / SCENES / s.name / store.META).exists()]
     if not there:
@@ -63,12 +62,14 @@ def run_corpus(
             f"No scene of {folder} is assembled. Do it with: corporeal corpus assemble {folder}."
         )
     if len(there) < len(planned):
-        say(f"{len(planned) - len(there)} of {len(planned)} scenes are not assembled: left out.")
+        hands.say(
+            f"{len(planned) - len(there)} of {len(planned)} scenes are not assembled: left out."
+        )
     with store.alone(folder):
         jobs = [run_job(folder, plan, scene, settings) for scene in there]
         if not config.resume:
             _forget(jobs)
-        return carry_out(folder, "run", jobs, hire, progress, say)
+        return carry_out(folder, "run", jobs, hands)
 
 
 def run_job(folder: Path, plan: Plan, scene: PlannedScene, settings: Settings) -> Job:
@@ -113,13 +114,3 @@ def _forget(jobs: Sequence[Job]) -> None:
             for name in pipeline.FOLDERS.values():
                 (job.folder / name / store.META).unlink(missing_ok=True)
             (job.folder / store.META).unlink(missing_ok=True)
-
-
-def failures(rows: Mapping[str, Row]) -> list[str]:
-    """Say which scenes failed, and why."""
-    return [f"{name}: {row.error}" for name, row in rows.items() if row.status == "failed"]
-
-
-def settings_of(said: Mapping[str, Any]) -> str:
-    """Name a run's settings in a few words."""
-    return ", ".join(f"{key} {value}" for key, value in said.items())

@@ -12,10 +12,9 @@ import sys
 import threading
 import time
 import traceback
-from collections.abc import Callable
 from typing import Any
 
-from corporeal.corpus.jobs import perform
+from corporeal.corpus.jobs import Job, Progress, perform
 from corporeal.errors import UserError
 
 ABANDONED, STOPPED = 3, 130
@@ -36,24 +35,37 @@ def main() -> int:
     try:
         path, packed = pickle.load(sys.stdin.buffer)
         threading.Thread(target=_watch, daemon=True).start()
-        sys.path[:] = path
-        job = pickle.loads(packed)
-        perform(job, _seldom(lambda done, words: say(fraction=done, words=words)))
+        wrong = attempt(path, packed, _seldom(lambda done, words: say(fraction=done, words=words)))
     except KeyboardInterrupt:
         return STOPPED
-    except UserError as error:
-        say(failed=str(error))
-    except MemoryError:
-        say(failed="Out of memory. Use fewer --workers, or --detail draft.")
-    except Exception as error:
-        traceback.print_exc()
-        say(failed=f"A mistake of ours ({type(error).__name__}: {error}).")
-    else:
+    if wrong is None:
         say(finished=True)
+    else:
+        say(failed=wrong)
     return 0
 
 
-def _seldom(say: Callable[[float, str], None]) -> Callable[[float, str], None]:
+def pack(job: Job) -> tuple[list[str], bytes]:
+    """Make a job ready to travel: where modules are found, and the job itself."""
+    return sys.path, pickle.dumps(job)
+
+
+def attempt(path: list[str], packed: bytes, progress: Progress) -> str | None:
+    """Do a packed job; return what went wrong in a sentence, None when nothing did."""
+    try:
+        sys.path[:] = path
+        perform(pickle.loads(packed), progress)
+    except UserError as error:
+        return str(error)
+    except MemoryError:
+        return "Out of memory. Use fewer --workers, or --detail draft."
+    except Exception as error:
+        traceback.print_exc()
+        return f"A mistake of ours ({type(error).__name__}: {error})."
+    return None
+
+
+def _seldom(say: Progress) -> Progress:
     """Pass on what is said a few times a second at most."""
     last = 0.0
 

@@ -4,6 +4,8 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from corporeal.errors import UserError
+
 
 def draw(
     names: Sequence[str],
@@ -30,6 +32,22 @@ def draw(
     """
     if not names or (count > len(names) and not repeat):
         raise ValueError(f"{count} of {len(names)}")
-    order = list(rng.permutation(len(names)))
+    order: list[int] = rng.permutation(len(names)).tolist()
     order.sort(key=lambda k: used.get(names[k], 0))
     return [names[order[k % len(names)]] for k in range(count)]
+
+
+def counts(said: str) -> tuple[int, int]:
+    """Return fewest and most of "3" or "1-4".
+
+    Raises:
+        UserError: It is neither.
+
+    """
+    low, _, high = said.partition("-")
+    if not low.strip().isdigit() or not (high or low).strip().isdigit():
+        raise UserError(f"--count {said!r}: write a number or a range, for example 1-4.")
+    least, most = int(low), int(high or low)
+    if not 1 <= least <= most <= 16:
+        raise UserError(f"--count {said!r}: give numbers from 1 to 16, the smaller first.")
+    return least, most

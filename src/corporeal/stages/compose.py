@@ -20,7 +20,7 @@ from corporeal.formats.scene_file import SceneFile, write_scene_file
 from corporeal.formats.words import numbered
 from corporeal.geometry.sizes import Sizing, scene_extents
 from corporeal.pool.asset import Asset, Pool
-from corporeal.pool.draw import draw
+from corporeal.pool.draw import counts, draw
 from corporeal.settle.arrange import Arrangement
 from corporeal.settle.body import Body, Pose
 from corporeal.settle.certificate import Certificate
@@ -141,7 +141,7 @@ def _chosen(
         if name not in by_class:
             raise UnknownChoiceError("class", name, list(by_class))
     offered = list(dict.fromkeys(config.classes)) or list(by_class)
-    low, high = _counts(config.count)
+    low, high = counts(config.count)
     low = max(low, NEEDS[kind]) if kind else low
     most = high if config.repeat else min(high, len(offered))
     if most < low:
@@ -160,17 +160,6 @@ def _named(pool: Pool, name: str) -> Asset:
     if found is None:
         raise UnknownChoiceError("asset", name, [a.name for a in pool.assets])
     return found
-
-
-def _counts(said: str) -> tuple[int, int]:
-    """Return fewest and most of "3" or "1-4"."""
-    low, _, high = said.partition("-")
-    if not low.strip().isdigit() or not (high or low).strip().isdigit():
-        raise UserError(f"--count {said!r}: write a number or a range, for example 1-4.")
-    least, most = int(low), int(high or low)
-    if not 1 <= least <= most <= 16:
-        raise UserError(f"--count {said!r}: give numbers from 1 to 16, the smaller first.")
-    return least, most
 
 
 # ---------------------------------------------------------------- how large

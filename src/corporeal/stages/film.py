@@ -59,8 +59,6 @@ class FilmConfig:
     """From where to look, as a direction; None: where things hide each other least."""
     stills: bool = False
     """Keep every picture as PNG too."""
-    threads: int | None = None
-    """None: one per processor."""
 
 
 DEFAULT = FilmConfig()
@@ -102,7 +100,7 @@ def film(  # noqa: PLR0913
     size = config.width, config.height
     with video.reel(folder / FILM, fps, size) as reel:
         for number, stage in enumerate(_stages(Stage(scene), skin, trajectory)):
-            picture = render(stage, camera, config.quality, config.threads)
+            picture = render(stage, camera, config.quality)
             reel.add(picture)
             _keep(picture, number, count, config, folder)
             progress((number + 1) / count, f"frame {number + 1} of {count}")

@@ -1,0 +1,152 @@
+"""`corporeal corpus assemble | run`: many scenes at once."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Any, Literal
+
+import tyro
+
+from corporeal.cli.parse import do_second_word, parse
+from corporeal.errors import UserError
+from corporeal.machine import cores
+from corporeal.terminal import console, show_table, told
+
+Corpus = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CORPUS")]
+
+
+@dataclass(frozen=True)
+class Crew:
+    """Who does the work."""
+
+    workers: int = 0
+    """Scenes at the same time, each in a process of its own; 0: one per core and --threads."""
+    threads: int = 1
+    """Of each scene."""
+    on: Literal["local", "ray"] = "local"
+    """Where: processes of this machine, or a Ray cluster (extra [cluster])."""
+    address: str = ""
+    """Of a running Ray cluster, "auto" for the one of this machine; by default one is started
+    here and ended again. The corpus must lie where every machine sees it."""
+    gpus: float = 0.0
+    """Share of a graphics card that each scene takes on Ray."""
+
+
+def verb_corpus() -> None:
+    """Assemble and run many scenes: `corpus assemble`, `corpus run`."""
+    do_second_word("corpus", {"assemble": _assemble, "run": _run})
+
+
+def _assemble() -> None:
+    """Plan a balanced corpus and assemble its scenes.
+
+        corporeal corpus assemble corpus/ --pool pool/
+        corporeal corpus assemble showcase/ --preset seven
+
+    Classes, models, numbers of objects and interactions come out even. Each scene is made in a
+    process of its own and appears in CORPUS/scenes whole or not at all. Say the same again to go on
+    with what was interrupted and to try again what failed. CORPUS/manifest.json says what became of
+    each scene.
+    """
+    from corporeal.corpus.assemble import Sources, assemble_corpus
+    from corporeal.corpus.plan import CorpusConfig
+    from corporeal.geometry.sizes import Sizing
+    from corporeal.pool.index import read_pool
+    from corporeal.stages.capture import CaptureConfig
+    from corporeal.stages.compose import ComposeConfig
+
+    @dataclass(frozen=True)
+    class Assemble:
+        corpus: Corpus
+        pool: Path = Path("pool")
+        """What scenes are made of, from `corporeal assets index`."""
+        plan: CorpusConfig = field(default_factory=CorpusConfig)
+        sizing: Sizing = field(default_factory=Sizing)
+        vlm: str = ComposeConfig.vlm
+        """Who says how large things of a class are; by default a table."""
+        record: Path | None = None
+        """Keep a model's answers in this folder, for --vlm replay:FOLDER."""
+        views: int = CaptureConfig.views
+        """Posed pictures of each scene."""
+        size: tuple[int, int] = CaptureConfig.size
+        """Their width and height [px]."""
+        crew: Crew = Crew()
+
+    asked = parse(Assemble, "corpus assemble", _assemble.__doc__, words=2)
+    pool = read_pool(asked.pool) if asked.plan.preset == "fortytwo" else None
+    composing = ComposeConfig(sizing=asked.sizing, vlm=asked.vlm, record=asked.record)
+    capturing = CaptureConfig(views=asked.views, size=asked.size, threads=asked.crew.threads)
+    sources = Sources(pool, composing, capturing)
+    _carry_out(
+        asked,
+        "assemble",
+        lambda hands: assemble_corpus(asked.corpus, asked.plan, sources, hands),
+        f"Go on with: corporeal corpus run {asked.corpus}",
+    )
+
+
+def _run() -> None:
+    """Run every scene of a corpus to its film and report, several at a time.
+
+        corporeal corpus run corpus/ --detail draft --workers 4
+
+    CORPUS/runs/<scene> is a run like any other. A scene that fails or whose process is killed never
+    stops the others; what is finished is not done again, an interrupted simulation goes on from its
+    checkpoint. Say the same again to go on.
+    """
+    from corporeal.corpus.run import RUNS, RunConfig, run_corpus
+    from corporeal.pipeline import Settings
+
+    @dataclass(frozen=True)
+    class Run:
+        corpus: Corpus
+        scenes: RunConfig = field(default_factory=RunConfig)
+        crew: Crew = Crew()
+        settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
+
+    asked = parse(Run, "corpus run", _run.__doc__, words=2)
+    _carry_out(
+        asked,
+        "run",
+        lambda hands: run_corpus(asked.corpus, asked.scenes, asked.settings, hands),
+        f"Look at {asked.corpus / RUNS}.",
+    )
+
+
+# ---------------------------------------------------------------- how it is done
+
+
+def _carry_out(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: str) -> None:
+    """Do it with a bar or with lines, and say what came of it."""
+    from corporeal.corpus.carry_out import Hands
+    from corporeal.corpus.local import LOGS
+
+    with told() as tell:
+        rows = do(Hands(_hire(asked), tell(verb), _say))
+    failed = {name: row for name, row in rows.items() if row.status == "failed"}
+    print(f"{len(rows) - len(failed)} of {len(rows)} scenes finished: {asked.corpus}")
+    if failed:
+        show_table(("scene", "why it failed"), [(n, r.error) for n, r in failed.items()])
+    if len(failed) == len(rows):
+        raise UserError(f"Not one scene finished. {asked.corpus / LOGS} has their words.")
+    print(then)
+
+
+def _say(words: str) -> None:
+    """Say an event as a line in a log; in a terminal the bar shows it, failures aside."""
+    if not console.is_terminal or "failed" in words or "again" in words:
+        console.print(words, markup=False, highlight=False)
+
+
+def _hire(asked: Any) -> Callable[[], Any]:
+    crew: Crew = asked.crew
+    if crew.workers < 0 or crew.threads < 1 or crew.gpus < 0:
+        raise UserError("--workers, --threads and --gpus cannot be negative, --threads not 0.")
+    slots = crew.workers or max(1, cores() // crew.threads)
+    if crew.on == "ray":
+        from corporeal.corpus.on_ray import on_ray
+
+        return lambda: on_ray(slots, crew.threads, crew.gpus, crew.address)
+    from corporeal.corpus.local import LOGS, local
+
+    return lambda: local(slots, crew.threads, asked.corpus / LOGS)
