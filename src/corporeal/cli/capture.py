@@ -1,0 +1,37 @@
+"""`corporeal capture`: posed views of a scene, for tools that reconstruct."""
+
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from corporeal.cli.parse import parse
+from corporeal.terminal import told
+
+
+def verb_capture() -> None:
+    """Take posed views of a scene: colours, depth, normals, and which object is where.
+
+    SCENE is what `corporeal run` takes. The folder gets transforms.json, as instant-ngp and
+    nerfstudio read it, and the pictures.
+    """
+    from corporeal.formats.transforms import write_views
+    from corporeal.stages.assemble import AssembleConfig, assemble
+    from corporeal.stages.capture import CaptureConfig, capture
+
+    @dataclass(frozen=True)
+    class Capture:
+        inputs: Annotated[
+            tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE ...")
+        ]
+        out: Path = Path("views")
+        """The folder of the views."""
+        assemble: AssembleConfig = field(default_factory=AssembleConfig)
+        capture: CaptureConfig = field(default_factory=CaptureConfig)
+
+    asked = parse(Capture, "capture", verb_capture.__doc__)
+    with told() as tell:
+        scene = assemble(list(asked.inputs), asked.assemble)
+        views = capture(scene, asked.capture, tell("capture"))
+        print(write_views(asked.out, views))
