@@ -99,7 +99,7 @@ def test_a_model_that_differs_from_the_table_is_believed_and_told():
         sizes = ask(server, "couch")
     assert sizes.usual["couch"].usual == 0.5
     (warning,) = sizes.warnings
-    assert "says that a couch is usually about 50 cm" in warning
+    assert ", 50 cm is usual for things like this: couch; the table" in warning
     assert "knows 1 m to 4 m. The former was believed." in warning
 
 
@@ -156,14 +156,14 @@ def test_a_file_in_metres_is_doubted_and_yet_believed():
     assert (real.extent, real.said_by) == (1.65, "file")
     (warning,) = real.warnings
     assert "duck_khronos is 1.65 m large in its file" in warning
-    assert "a recorded answer knows a duck from 5 cm to 60 cm" in warning
+    assert "a recorded answer (by hand) knows such things (duck) from 5 cm to 60 cm" in warning
 
 
 def test_a_file_in_other_units_says_nothing_of_its_size():
     for extent in (1.65, 112.0):
         real = real_extent("duck_khronos", "duck", extent, False, DUCKS)
         assert (real.extent, real.said_by, real.warnings) == (0.12, "recording", ())
-        assert real.reason == "A bath toy. (by hand)"
+        assert (real.by, real.reason) == ("a recorded answer (by hand)", "A bath toy.")
 
 
 def test_what_nobody_knows_gets_a_stand_in_and_a_warning():

@@ -25,7 +25,7 @@ AT_ONCE = 4
 """Questions that are asked at the same time."""
 
 SizedBy = Literal["file", "model", "recording", "table", "nobody"]
-SAID = {"model": "a model", "recording": "a recorded answer", "table": TABLE}
+SAID = {"model": "a model", "recording": "a recorded answer"}
 
 
 @dataclass(frozen=True)
@@ -66,8 +66,10 @@ class RealExtent:
     extent: float
     """Largest extent [m]."""
     said_by: SizedBy
+    by: str
+    """Who said it, in a clause: "a model (openai:gpt-5.4)"."""
     reason: str
-    """Who said it and why, in one sentence."""
+    """Why, in one sentence."""
     warnings: tuple[str, ...] = ()
     """What speaks against it, in sentences."""
 
@@ -119,14 +121,15 @@ def real_extent(
     known = sizes.usual.get(class_name)
     if metric:
         doubt = _beyond(name, extent, known)
-        return RealExtent(extent, "file", "The file is in metres.", (doubt,) if doubt else ())
+        told = (doubt,) if doubt else ()
+        return RealExtent(extent, "file", "its file", "The file is in metres.", told)
     if known is not None:
-        return RealExtent(known.usual, known.said_by, f"{known.reason} ({known.who})")
+        return RealExtent(known.usual, known.said_by, _whose(known), known.reason)
     warning = (
         f"Nobody knows how large {name} ({class_name}) is: its file is not in metres, and its "
         f"class is not in {TABLE}. It is taken as {length(NEUTRAL)}. Name a model with --vlm."
     )
-    return RealExtent(NEUTRAL, "nobody", "A neutral stand-in.", (warning,))
+    return RealExtent(NEUTRAL, "nobody", "nobody", "A neutral stand-in.", (warning,))
 
 
 # ---------------------------------------------------------------- a model's answers
@@ -165,13 +168,18 @@ def _tabled(class_name: str) -> UsualSize | None:
     return UsualSize(class_name, found.low, found.usual, found.high, "table", TABLE, reason)
 
 
+def _whose(size: UsualSize) -> str:
+    """Name who said a size: a table is its own name."""
+    return TABLE if size.said_by == "table" else f"{SAID[size.said_by]} ({size.who})"
+
+
 def _against(said: UsualSize, known: UsualSize | None) -> str:
     """Say where a model's size is beyond the table's; "" where it is not."""
     if known is None or known.low / MARGIN <= said.usual <= known.high * MARGIN:
         return ""
     return (
-        f"{SAID[said.said_by].capitalize()} ({said.who}) says that a {said.class_name} is usually "
-        f"about {length(said.usual)}; {TABLE} knows {length(known.low)} to {length(known.high)}. "
+        f"According to {_whose(said)}, {length(said.usual)} is usual for things like this: "
+        f"{said.class_name}; {TABLE} knows {length(known.low)} to {length(known.high)}. "
         "The former was believed."
     )
 
@@ -181,7 +189,7 @@ def _beyond(name: str, extent: float, known: UsualSize | None) -> str:
     if known is None or known.low / MARGIN <= extent <= known.high * MARGIN:
         return ""
     return (
-        f"{name} is {length(extent)} large in its file, which is in metres; {SAID[known.said_by]} "
-        f"knows a {known.class_name} from {length(known.low)} to {length(known.high)}. The file "
-        "was believed."
+        f"{name} is {length(extent)} large in its file, which is in metres; {_whose(known)} knows "
+        f"such things ({known.class_name}) from {length(known.low)} to {length(known.high)}. The "
+        "file was believed."
     )
