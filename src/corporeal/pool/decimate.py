@@ -19,6 +19,9 @@ GRID = 2**21 - 1
 """Steps along an extent within which vertices are one: three numbers fit into 63 bits."""
 ALONE = 4
 """A surface with fewer triangles than this is left as it is."""
+HASTE = (3.0, 5.0, 7.0)
+"""How fast the threshold for a collapse grows: folds come with haste, so it grows only if needed.
+"""
 STRETCH = 3.0
 """How many times more of a picture than usual a triangle may show before it crosses a seam."""
 INWARD = (0.125, 0.25, 0.5, 0.75)
@@ -40,13 +43,27 @@ def _decimated(surface: Surface, target: int) -> Surface:
     old = _Old(surface)
     if len(old.triangles) <= max(target, ALONE):
         return surface
-    vertices, triangles = fast_simplification.simplify(
-        old.vertices, old.triangles.astype(np.int32), target_count=target
-    )[:2]
-    triangles = np.asarray(triangles, np.int64)
+    vertices, triangles = _simplified(old.vertices, old.triangles, target)
     if not len(triangles):
         return replace(surface, triangles=surface.triangles[:0])
-    return _dressed(surface, old, np.asarray(vertices, np.float64), triangles)
+    return _dressed(surface, old, vertices, triangles)
+
+
+def _simplified(
+    vertices: np.ndarray, triangles: np.ndarray, target: int
+) -> tuple[np.ndarray, np.ndarray]:
+    """Collapse edges, the cheapest first, until there are no more than ``target`` triangles.
+
+    The library's threshold is an absolute squared distance: hence the unit size.
+    """
+    low = vertices.min(axis=0)
+    size = float(np.ptp(vertices, axis=0).max())
+    x, t = (vertices - low) / size, triangles.astype(np.int32)
+    for haste in HASTE:
+        if len(t) > target:
+            x, t = fast_simplification.simplify(x, t, target_count=target, agg=haste)[:2]
+            t = np.asarray(t, np.int32)
+    return np.asarray(x, np.float64) * size + low, t.astype(np.int64)
 
 
 class _Old:
