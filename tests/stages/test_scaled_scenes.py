@@ -10,6 +10,7 @@ import trimesh
 from corporeal import materials
 from corporeal.evaluation.mass import MassConfig, predict
 from corporeal.evaluation.truth import Weighed
+from corporeal.formats.glb_merge import Member, merge
 from corporeal.formats.glb_writer import write_glb
 from corporeal.geometry.arrangement import scaled
 from corporeal.geometry.sizes import how_heavy, how_scaled, scale_of_part
@@ -17,6 +18,7 @@ from corporeal.mpm.audit import part_rows
 from corporeal.mpm.part import Motion, PartGeometry
 from corporeal.mpm.treatment import plan
 from corporeal.showcase.scenes import build
+from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.fill import fill
 from corporeal.stages.ground import GroundConfig, ground
@@ -111,6 +113,22 @@ def page(scene, made, folder):
     story = Story(scene, parts, field, particles, film, {}, {}, materials.sources())
     report(story, folder / "report.html")
     return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_a_merged_and_tilted_thing_keeps_its_scale_wherever_it_lies(life, tmp_path):
+    """Its box in the scene says nothing of its size: what its node states does."""
+    write_glb(tmp_path / "can.glb", a_can())
+    said = {"class": "can", "real_extent_m": 0.1, "scale": 5.0, "sized_by": "the table"}
+    half = np.pi / 8
+    tilt = (float(np.cos(half)), float(np.sin(half)), 0.0, 0.0)
+    member = Member(tmp_path / "can.glb", "can_0", (0.0, 0.0, 0.4), tilt, 5.0, said)
+    merge(tmp_path / "scene.glb", [member], "scene", {})
+    scene = assemble([tmp_path / "scene.glb"])
+    (can,) = scene.objects
+    assert (can.real_extent, can.scale, can.sized_by) == (0.1, 5.0, "the table")
+    assert scene.warnings == ()
+    (mass,) = through(scene)[3].mass_real
+    assert mass == pytest.approx(125 * life[3].mass_real[0], rel=1e-5)
 
 
 def test_both_masses_are_data(large):
