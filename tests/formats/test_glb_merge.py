@@ -6,6 +6,7 @@ import json
 import math
 from base64 import b64encode
 
+import DracoPy
 import numpy as np
 import pytest
 from hypothesis import given, settings
@@ -18,7 +19,7 @@ from corporeal.formats import gltf_assets
 from corporeal.formats.glb import read_glb, read_model
 from corporeal.formats.glb_merge import Member, merge
 from corporeal.formats.gltf_document import Document
-from glb_maker import CUBE, Maker, cube, pack
+from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube, pack
 
 UPRIGHT = (1.0, 0.0, 0.0, 0.0)
 HERE = (0.0, 0.0, 0.0)
@@ -102,7 +103,7 @@ turns = st.tuples(*[st.floats(-1, 1)] * 4).filter(lambda q: math.hypot(*q) > 0.1
 
 
 @given(st.tuples(finite, finite, finite), turns, st.floats(1e-3, 1e3))
-@settings(max_examples=25, deadline=None)
+@settings(max_examples=12, deadline=None)
 def test_an_object_stands_where_its_member_says(tmp_path_factory, position, quaternion, scale):
     folder = tmp_path_factory.mktemp("merge")
     m = member(cube(name="box").save(folder / "box.glb"), "box_0", position, quaternion, scale)
@@ -193,6 +194,60 @@ def test_a_webp_picture_survives_with_its_extension(tmp_path):
     texture = read_glb(path).finishes[0].texture
     assert texture is not None
     assert (texture == (1, 200, 3)).all()
+
+
+def packed():
+    made = cube()
+    data = DracoPy.encode(CUBE, CUBE_TRIANGLES.astype(np.uint32), quantization_bits=14)
+    draco = {"bufferView": made.view(data), "attributes": {"POSITION": 0}}
+    made.primitive()["extensions"] = {"KHR_draco_mesh_compression": draco}
+    made.json["extensionsRequired"] = ["KHR_draco_mesh_compression"]
+    for accessor in made.json["accessors"]:
+        del accessor["bufferView"]
+    return made
+
+
+def sparse():
+    made = cube()
+    which = made.view(np.array([7], np.uint8).tobytes())
+    made.json["accessors"][0]["sparse"] = {
+        "count": 1,
+        "indices": {"bufferView": which, "componentType": 5121},
+        "values": {"bufferView": made.view(np.array([[3, 1, 1]], np.float32).tobytes())},
+    }
+    return made
+
+
+def quantised():
+    made = cube(scale=[0.1, 0.1, 0.1])
+    position = made.accessor((CUBE * 10).astype(np.uint16))
+    made.primitive()["attributes"]["POSITION"] = position
+    made.json["extensionsUsed"] = made.json["extensionsRequired"] = ["KHR_mesh_quantization"]
+    return made
+
+
+@pytest.mark.parametrize("make", [packed, sparse, quantised])
+def test_meshes_in_any_packing_keep_their_shapes(tmp_path, make):
+    made = make()
+    target = made.accessor(np.ones((8, 3), np.float32))
+    if make is not packed:
+        made.primitive()["targets"] = [{"POSITION": target}]
+    file = made.save(tmp_path / "a.glb")
+    path = merged(tmp_path, member(cube().save(tmp_path / "b.glb"), "b_0"), member(file, "a_0"))
+    before, after = read_glb(file).surfaces[0], read_glb(path).surfaces[1]
+    np.testing.assert_array_equal(after.vertices, before.vertices)
+    np.testing.assert_array_equal(after.triangles, before.triangles)
+    written = json_of(path)
+    assert written.get("extensionsRequired", []) == made.json.get("extensionsRequired", [])
+    assert set(written.get("extensionsRequired", [])) <= set(written.get("extensionsUsed", []))
+    moved = [
+        p["targets"][0]["POSITION"] for p in written["meshes"][1]["primitives"] if p.get("targets")
+    ]
+    for accessor in moved:
+        view = written["bufferViews"][written["accessors"][accessor]["bufferView"]]
+        chunk = Document(path).chunk[view["byteOffset"] :][: view["byteLength"]]
+        assert bytes(chunk) == np.ones((8, 3), np.float32).tobytes()
+    assert len(moved) == (make is not packed)
 
 
 def test_companions_and_data_uris_move_into_the_file(tmp_path):

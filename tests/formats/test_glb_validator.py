@@ -91,6 +91,7 @@ def test_the_validator_is_asked(judge, tmp_path):
     assert errors(found)
 
 
+@pytest.mark.slow
 def test_the_showcase_is_valid(judge, tmp_path):
     write_glb(tmp_path / "scene.glb", build("duck-on-mud"))
     (found,) = judge(tmp_path / "scene.glb")

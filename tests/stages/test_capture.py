@@ -1,12 +1,16 @@
 """Posed views: pictures, depths, normals and numbers must agree with the cameras."""
 
+import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
+from corporeal.cli import main
 from corporeal.errors import UserError
+from corporeal.formats.glb_writer import write_glb
+from corporeal.formats.transforms import read_views
 from corporeal.stages.capture import CaptureConfig, capture, directions
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
@@ -126,7 +130,7 @@ def test_the_depth_of_the_floor_is_analytic(views):
 
 
 def test_above_the_horizon_there_is_nothing():
-    low = capture(scene(box()), replace(SMALL, views=40))
+    low = capture(scene(box()), replace(SMALL, views=40, size=(40, 40)))
     k = 39
     sky = rays(low.cameras[k])[..., 2] > 0
     assert sky.any()
@@ -256,3 +260,29 @@ def test_senseless_wishes_are_refused(config, said):
 def test_a_scene_of_nothing_has_no_views():
     with pytest.raises(UserError, match="holds no surface"):
         capture(Scene("void", "", (), (), ()), SMALL)
+
+
+# ---------------------------------------------------------------- the verb
+
+
+def typed(monkeypatch, *words):
+    monkeypatch.setattr(sys, "argv", ["corporeal", *map(str, words)])
+    with pytest.raises(SystemExit) as stopped:
+        main()
+    return stopped.value.code
+
+
+def test_a_person_can_take_views_of_a_file(monkeypatch, tmp_path, capsys):
+    write_glb(tmp_path / "scene.glb", scene(box(), ball()))
+    out = tmp_path / "views"
+    words = ("capture", tmp_path / "scene.glb", "--out", out, "--views", 2, "--size", 24, 16)
+    assert typed(monkeypatch, *words) == 0
+    assert capsys.readouterr().out.strip() == str(out / "transforms.json")
+    made = read_views(out)
+    assert made.rgb.shape == (2, 16, 24, 3)
+    assert {-1, 0, 1} == set(np.unique(made.object_of_pixel))
+
+
+def test_a_scene_that_is_not_there_is_one_line(monkeypatch, tmp_path, capsys):
+    assert typed(monkeypatch, "capture", tmp_path / "no.glb") == 2
+    assert "no.glb: there is no such file" in capsys.readouterr().err
