@@ -4,18 +4,15 @@ The page holds its film and figures, so that it can be mailed. Every number carr
 range it was chosen from and where that range was read.
 """
 
-import base64
-import html
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass
-from importlib.resources import files
 from pathlib import Path
-from string import Template
 from typing import Any
 
 from corporeal.geometry.sizes import how_heavy, how_scaled
 from corporeal.materials.scale import fraction_of, logarithmic
+from corporeal.render.page import figure, inlined, page, safe
 from corporeal.types import (
     Film,
     Ground,
@@ -91,13 +88,14 @@ class Story:
 def report(story: Story, path: Path) -> None:
     """Write the page to ``path``."""
     audit = story.audit
-    page = Template(files("corporeal.stages").joinpath("report.html").read_text(encoding="utf-8"))
-    text = page.substitute(
-        title=_safe(story.scene.name),
+    text = page(
+        "corporeal.stages",
+        "report.html",
+        title=safe(story.scene.name),
         summary=_summary(story),
-        film=_data(story.film.path, "video/mp4"),
+        film=inlined(story.film.path),
         width=story.film.width,
-        figures="".join(_figure(caption, file) for caption, file in story.figures.items()),
+        figures="".join(figure(caption, inlined(file)) for caption, file in story.figures.items()),
         verdict=_verdict(audit),
         expectations=_expectations(story),
         parts="".join(_part_row(story, k) for k in range(len(story.parts.catalogue))),
@@ -115,7 +113,7 @@ def report(story: Story, path: Path) -> None:
 
 def _summary(story: Story) -> str:
     scene, field = story.scene, story.field
-    things = ", ".join(_safe(o.name.replace("_", " ")) for o in scene.objects)
+    things = ", ".join(safe(o.name.replace("_", " ")) for o in scene.objects)
     unknown = sum(w.answered_by == "unknown" for w in field.words)
     seen = any(w.answered_by in ("model", "recording") for w in field.words)
     sentences = [
@@ -128,7 +126,7 @@ def _summary(story: Story) -> str:
         "annotations and from the words in the file.",
     ]
     sentences += [_forced(o) for o in scene.objects if o.push or o.wind]
-    sentences += filter(None, [_safe(how_scaled(scene.objects))])
+    sentences += filter(None, [safe(how_scaled(scene.objects))])
     if unknown:
         sentences.append(
             f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got a "
@@ -139,7 +137,7 @@ def _summary(story: Story) -> str:
 
 def _looked(questions: Mapping[str, Any]) -> str:
     """Say who chose the materials from pictures."""
-    return f"Materials were chosen from pictures by {_safe(_answerers(questions))}."
+    return f"Materials were chosen from pictures by {safe(_answerers(questions))}."
 
 
 def _answerers(questions: Mapping[str, Any]) -> str:
@@ -158,7 +156,7 @@ def _forced(thing: SceneObject) -> str:
         gusts = f" in gusts of ± {thing.wind.gust:.0%}" if thing.wind.gust else ""
         size = math.hypot(*thing.wind.velocity)
         said.append(f"stands in a wind of {size:.3g} m/s{gusts} {_window(thing.wind)}")
-    return f"{_safe(thing.name.replace('_', ' '))} {' and '.join(said)}."
+    return f"{safe(thing.name.replace('_', ' '))} {' and '.join(said)}."
 
 
 def _window(force: Push | Wind) -> str:
@@ -170,7 +168,7 @@ def _verdict(audit: Mapping[str, Any]) -> str:
     warnings = list(audit.get("warnings", ()))
     if not warnings:
         return '<p class="good">The audit found nothing to warn about.</p>'
-    items = "".join(f"<li>{_safe(w)}</li>" for w in warnings)
+    items = "".join(f"<li>{safe(w)}</li>" for w in warnings)
     return f'<div class="warn"><b>Read this before you trust the film.</b><ul>{items}</ul></div>'
 
 
@@ -179,7 +177,7 @@ def _expectations(story: Story) -> str:
         return ""
     rows = "".join(
         f'<tr><td class="{"yes" if met else "no"}">{"✓" if met else "✗"}</td>'
-        f"<td>{_safe(sentence)}</td><td>{_safe(value)}</td><td>{_safe(target)}</td></tr>"
+        f"<td>{safe(sentence)}</td><td>{safe(value)}</td><td>{safe(target)}</td></tr>"
         for sentence, value, target, met in story.expectations
     )
     head = "<tr><th></th><th></th><th>measured</th><th>wanted</th></tr>"
@@ -194,9 +192,9 @@ def _part_row(story: Story, k: int) -> str:
     treatment, words = story.particles.treatments[k], story.field.words[k]
     yields = "–" if material.yield_stress is None else si(material.yield_stress, "Pa")
     cells = (
-        _safe(story.scene.objects[part.object].name),
-        _safe(part.name),
-        f"<b>{_safe(material.name)}</b>",
+        safe(story.scene.objects[part.object].name),
+        safe(part.name),
+        f"<b>{safe(material.name)}</b>",
         f"{WHO[words.answered_by]}",
         LAWS[material.law.name],
         si(material.young, "Pa"),
@@ -204,8 +202,8 @@ def _part_row(story: Story, k: int) -> str:
         f"{material.density:.4g}",
         yields,
         how_heavy(story.particles.mass_real[k], story.scene.objects[part.object].scale),
-        _safe(built(story.field.structures[k])),
-        _safe(treatment.kind),
+        safe(built(story.field.structures[k])),
+        safe(treatment.kind),
         simulated(treatment),
     )
     return "<tr>" + "".join(f'<td class="n">{c}</td>' for c in cells) + "</tr>"
@@ -236,11 +234,11 @@ def _grounds(story: Story, k: int) -> str:
     tables = "".join(_piece_grounds(p) for p in pieces) or own
     fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
     return (
-        f"<details><summary><b>{_safe(part.name)}</b> of "
-        f"{_safe(story.scene.objects[part.object].name)}: {_safe(material.name)}</summary>"
-        f"<p>{_safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
-        f"{others(words)}<br>{_safe(structure.reason)} {_safe(fill)}<br>"
-        f"{_safe(story.particles.treatments[k].why)}</p>{tables}</details>"
+        f"<details><summary><b>{safe(part.name)}</b> of "
+        f"{safe(story.scene.objects[part.object].name)}: {safe(material.name)}</summary>"
+        f"<p>{safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
+        f"{others(words)}<br>{safe(structure.reason)} {safe(fill)}<br>"
+        f"{safe(story.particles.treatments[k].why)}</p>{tables}</details>"
     )
 
 
@@ -248,10 +246,10 @@ def _piece_grounds(piece: Piece) -> str:
     """Tell of one of several things that share a part's mesh why it is as it is."""
     words = piece.words
     return (
-        f"<p><b>{_safe(words.name)}</b>: {_safe(piece.material.name)}, "
+        f"<p><b>{safe(words.name)}</b>: {safe(piece.material.name)}, "
         f"{words.volume_share:.0%} of the volume, {words.surface_share:.0%} of the surface. "
-        f"{_safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
-        f"{others(words)} {_safe(piece.structure.reason)}</p>"
+        f"{safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
+        f"{others(words)} {safe(piece.structure.reason)}</p>"
         f"{_values(piece.material, piece.structure, piece.structure.kind != 'solid')}"
     )
 
@@ -286,12 +284,12 @@ def others(words: PartWords) -> str:
         for p in words.pieces
     ]
     said = f" It may also be {', '.join(maybe)}." if maybe else ""
-    return _safe(said + (f" Told apart in it: {'; '.join(pieces)}." if pieces else ""))
+    return safe(said + (f" Told apart in it: {'; '.join(pieces)}." if pieces else ""))
 
 
 def _ground_row(name: str, ground: Ground, of: str = "") -> str:
     label, unit = UNITS[name]
-    label += _safe(of)
+    label += safe(of)
     low, high = ground.range.low, ground.range.high
     place = min(max(fraction_of(ground.range, ground.value), 0), 1)
     bar = f'<div class="bar"><i style="left:{place:.1%}"></i></div>'
@@ -299,8 +297,8 @@ def _ground_row(name: str, ground: Ground, of: str = "") -> str:
     return (
         f"<tr><td>{label}</td><td>{si(ground.value, unit)}</td>"
         f"<td>{si(low, unit)} {bar} {si(high, unit)}{scale}</td>"
-        f"<td>{_safe(CHOSEN.get(ground.chosen_by, ground.chosen_by))}</td>"
-        f"<td>{_safe(ground.reason)}</td><td>{_safe(ground.range.source)}</td></tr>"
+        f"<td>{safe(CHOSEN.get(ground.chosen_by, ground.chosen_by))}</td>"
+        f"<td>{safe(ground.reason)}</td><td>{safe(ground.range.source)}</td></tr>"
     )
 
 
@@ -333,12 +331,12 @@ def _sources(story: Story) -> str:
     held = [s.contents for s in made if s.contents is not None]
     known = [*story.field.materials, *(p.material for p in pieces), *held]
     used = sorted({g.range.source for m in known for g in m.grounds.values()})
-    return "".join(f"<dt>{_safe(k)}</dt><dd>{_safe(story.sources.get(k, k))}</dd>" for k in used)
+    return "".join(f"<dt>{safe(k)}</dt><dd>{safe(story.sources.get(k, k))}</dd>" for k in used)
 
 
 def _credits(scene: Scene) -> str:
     credits = dict.fromkeys(o.credit for o in scene.objects if o.credit)
-    return "".join(f"<li>{_safe(c)}</li>" for c in credits) or "<li>none stated in the files</li>"
+    return "".join(f"<li>{safe(c)}</li>" for c in credits) or "<li>none stated in the files</li>"
 
 
 def _settings(audit: Mapping[str, Any]) -> str:
@@ -346,7 +344,7 @@ def _settings(audit: Mapping[str, Any]) -> str:
     spent = ", ".join(f"{stage} {value:.1f} s" for stage, value in seconds.items())
     memory = audit.get("peak_memory_mb")
     peak = "" if memory is None else f" Peak memory {memory:,.0f} MB."
-    settings = ", ".join(f"{k} {_safe(str(v))}" for k, v in audit.get("settings", {}).items())
+    settings = ", ".join(f"{k} {safe(str(v))}" for k, v in audit.get("settings", {}).items())
     return f"{settings}.<br>Time: {spent}.{peak}{asked(audit.get('questions', {}))}"
 
 
@@ -355,7 +353,7 @@ def asked(questions: Mapping[str, Any]) -> str:
     if not questions:
         return ""
     if not questions["calls"]:
-        who = _safe(_answerers(questions))
+        who = safe(_answerers(questions))
         return f"<br>{questions['questions']} questions answered from the disk, by {who}: no cost."
     cost = questions["dollars"]
     paid = (
@@ -364,7 +362,7 @@ def asked(questions: Mapping[str, Any]) -> str:
         else f"about ${cost:.3f} at the list prices of {questions['prices_of']}"
     )
     return (
-        f"<br>{questions['questions']} questions to {_safe(_answerers(questions))}: "
+        f"<br>{questions['questions']} questions to {safe(_answerers(questions))}: "
         f"{questions['calls']} calls, {questions['input_tokens']:,} tokens in, "
         f"{questions['output_tokens']:,} out, {questions['seconds']:.0f} s of waiting, {paid}."
     )
@@ -385,16 +383,3 @@ def si(value: float, unit: str) -> str:
         if abs(value) >= size * 0.9995:
             return f"{value / size:.3g} {prefix}{unit}"
     return f"{value:.3g} {unit}"
-
-
-def _safe(text: str) -> str:
-    return html.escape(str(text))
-
-
-def _data(path: Path, kind: str) -> str:
-    return f"data:{kind};base64,{base64.b64encode(path.read_bytes()).decode()}"
-
-
-def _figure(caption: str, path: Path) -> str:
-    image = f'<img src="{_data(path, "image/png")}" alt="{_safe(caption)}">'
-    return f"<figure>{image}<figcaption>{_safe(caption)}</figcaption></figure>"

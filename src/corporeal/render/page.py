@@ -1,0 +1,44 @@
+"""Pages of HTML that hold all they show: one look, templates, and pictures inside the text."""
+
+import base64
+import html
+from importlib.resources import files
+from pathlib import Path
+from string import Template
+
+KINDS = {".png": "image/png", ".jpg": "image/jpeg", ".svg": "image/svg+xml", ".mp4": "video/mp4"}
+
+
+def page(room: str, name: str, **content: object) -> str:
+    """Fill a template that lies in a package with ready HTML, in the look of all pages.
+
+    Args:
+        room: The package ("corporeal.stages").
+        name: Of the template, which names ``$style``.
+        content: What takes the place of each ``$name``.
+
+    """
+    text = files(room).joinpath(name).read_text(encoding="utf-8")
+    style = files("corporeal.render").joinpath("page.css").read_text(encoding="utf-8")
+    return Template(text).substitute(content, style=style)
+
+
+def safe(text: object) -> str:
+    """Write text so that nothing in it is taken for HTML."""
+    return html.escape(str(text))
+
+
+def inlined(path: Path) -> str:
+    """Return a picture or film as an address that holds it."""
+    return held(path.read_bytes(), KINDS[path.suffix])
+
+
+def held(data: bytes, kind: str) -> str:
+    """Return an address that holds the data."""
+    return f"data:{kind};base64,{base64.b64encode(data).decode()}"
+
+
+def figure(caption: str, address: str) -> str:
+    """Show a picture with its caption."""
+    image = f'<img src="{address}" alt="{safe(caption)}">'
+    return f"<figure>{image}<figcaption>{safe(caption)}</figcaption></figure>"
