@@ -1,0 +1,129 @@
+"""Where Gaussians stand: turned, scaled and moved as one; made sound."""
+
+from dataclasses import replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from corporeal.geometry.harmonics import turned
+from corporeal.types import Gaussians, Vector
+
+Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
+"""Which of a file's axes points up."""
+LARGEST = 1e6
+"""Nothing is as far away or as large as this, in the file's unit."""
+THINNEST = 1e-9
+"""Flatter ones are taken to be that thick, in the file's unit."""
+SHORTEST = 1e-6
+"""A quaternion shorter than this is no rotation."""
+
+
+def upright(up: Up) -> Float[np.ndarray, "3 3"]:
+    """Return the rotation to +Z up: a quarter turn about x for ±y, about y for ±x.
+
+    What INRIA's and COLMAP's files call down is +y, so that their up is "-y".
+    """
+    sign = 1.0 if up[0] == "+" else -1.0
+    rotations = {
+        "x": [[0, 0, -sign], [0, 1, 0], [sign, 0, 0]],
+        "y": [[1, 0, 0], [0, 0, -sign], [0, sign, 0]],
+        "z": [[1, 0, 0], [0, sign, 0], [0, 0, sign]],
+    }
+    return np.array(rotations[up[1]], dtype=float)
+
+
+def placed(
+    gaussians: Gaussians,
+    rotation: Float[np.ndarray, "3 3"],
+    scale: float = 1.0,
+    shift: Vector = (0.0, 0.0, 0.0),
+) -> Gaussians:
+    """Return the same scene after x → scale · R x + shift; its colours turn with it."""
+    kind = gaussians.mean.dtype
+    mean = scale * gaussians.mean.astype(np.float64) @ rotation.T + np.array(shift)
+    return replace(
+        gaussians,
+        mean=mean.astype(kind),
+        rotation=product(quaternion(rotation), gaussians.rotation).astype(kind),
+        scale=(scale * gaussians.scale).astype(kind),
+        sh=turned(gaussians.sh, rotation),
+    )
+
+
+def quaternion(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:
+    """Return the unit quaternion (w, x, y, z), w ≥ 0, of a rotation (Bar-Itzhack 2000).
+
+    It is the eigenvector of the greatest eigenvalue of a symmetric matrix of R's elements.
+    """
+    R = rotation
+    K = np.array(
+        [
+            [R[0, 0] + R[1, 1] + R[2, 2], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
+            [0, R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
+            [0, 0, R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
+            [0, 0, 0, R[2, 2] - R[0, 0] - R[1, 1]],
+        ]
+    )
+    q = np.linalg.eigh(np.triu(K, 1).T + np.triu(K))[1][:, -1]
+    return q if q[0] >= 0 else -q
+
+
+def matrix(q: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
+    """Return the rotation of a quaternion (w, x, y, z) of any length but 0."""
+    w, x, y, z = np.asarray(q, dtype=float) / np.linalg.norm(q)
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
+            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
+            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def product(a: Float[np.ndarray, "4"], b: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
+    """Return the quaternions of turning by each b, then by a."""
+    w, x, y, z = a
+    left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
+    return b @ left.T
+
+
+def sound(raw: Gaussians) -> tuple[Gaussians, dict[str, int]]:
+    """Return what can be used, with unit quaternions, and how many were left out for what."""
+    length = np.linalg.norm(raw.rotation.astype(np.float64), axis=1)
+    finite = _finite(raw)
+    reasons = {
+        "hold NaN or infinite numbers": ~finite,
+        "have a rotation of length 0": finite & ~(length >= SHORTEST),
+        f"are {LARGEST:.0e} units or more away or large": finite & _huge(raw),
+    }
+    bad = np.any(list(reasons.values()), axis=0)
+    counts = {why: int(which.sum()) for why, which in reasons.items() if which.any()}
+    good = slice(None) if not counts else ~bad
+    unit = raw.rotation[good] / length[good, None]
+    return (
+        replace(
+            raw,
+            mean=_single(raw.mean[good]),
+            rotation=_single(unit),
+            scale=_single(np.maximum(raw.scale[good], THINNEST)),
+            opacity=_single(np.clip(raw.opacity[good], 0, 1)),
+            sh=_single(raw.sh[good]),
+        ),
+        counts,
+    )
+
+
+def _finite(raw: Gaussians) -> Bool[np.ndarray, " N"]:
+    good = np.isfinite(raw.opacity)
+    for values in (raw.mean, raw.rotation, raw.scale, raw.sh.reshape(raw.count, -1)):
+        good &= np.isfinite(values).all(axis=1)
+    return good
+
+
+def _huge(raw: Gaussians) -> Bool[np.ndarray, " N"]:
+    return (np.abs(raw.mean).max(axis=1) >= LARGEST) | (raw.scale.max(axis=1) >= LARGEST)
+
+
+def _single(values: np.ndarray) -> np.ndarray:
+    return np.ascontiguousarray(values, dtype=np.float32)
