@@ -101,8 +101,8 @@ def how_scaled(things: Sequence[SceneObject]) -> str:
         for o in odd
     )
     return (
-        f"Not life-size: {told}. Walls are scaled with their thing; masses, and what follows from "
-        "them, are those of the scene, and the real masses stand in brackets."
+        f"Not life-size: {told}. Walls are scaled with their thing; lengths, masses and all that "
+        "follows from them are those of the scene, and the real masses stand in brackets."
     )
 
 
