@@ -96,6 +96,12 @@ def test_the_same_mesh_comes_in_once_whatever_the_file_is_called(tmp_path):
     assert reasons(pool) == {"b": "has the same mesh as a"}
 
 
+def test_hostile_words_do_not_harm_the_index(tmp_path):
+    put(tmp_path / "in", a=plain_ball(copyright="x\ud800\u0000y", extras={"license": "\udfff"}))
+    (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+    assert (asset.attribution, asset.licence) == ("x? y", "?")
+
+
 def test_a_pool_of_one_class_is_a_pool(tmp_path):
     put(tmp_path / "in" / "ball", a=plain_ball(0.1), b=plain_ball(0.11), c=plain_ball(0.12))
     pool = index([tmp_path / "in"], tmp_path / "pool")

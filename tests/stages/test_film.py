@@ -1,5 +1,6 @@
 import subprocess
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -106,6 +107,20 @@ def test_a_film_has_all_frames_and_any_browser_plays_it(tmp_path):
     assert told == sorted(told) and told[-1] == 1.0
     assert sorted(p.name for p in tmp_path.iterdir()) == ["film.mp4", "thumbnail.png"]
     assert np.asarray(Image.open(tmp_path / "thumbnail.png")).shape == (96, 128, 3)
+
+
+def test_the_film_carries_whom_to_thank_for_what_is_seen(tmp_path):
+    scene, *rest = play(cube(), spin, 2)
+    things = [
+        replace(scene.objects[0], credit=c) for c in ("CC0; Ada", "MIT;\0 Bo", "CC0; Ada", "")
+    ]
+    made = film(replace(scene, objects=tuple(things)), *rest, SMALL, tmp_path)
+    probe = subprocess.run(
+        [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(made.path)], capture_output=True, text=True
+    ).stderr
+    said = dict(line.split(":", 1) for line in probe.splitlines() if ":" in line)
+    said = {key.strip(): value.strip() for key, value in said.items()}
+    assert said["copyright"] == said["comment"] == "CC0; Ada; MIT; Bo"
 
 
 def test_a_sphere_that_is_squashed_is_seen_lower_and_wider(tmp_path):

@@ -4,6 +4,7 @@ import re
 from dataclasses import dataclass
 
 from corporeal.formats.gltf_document import Document
+from corporeal.formats.words import writable
 
 LONGEST = 500
 """Of what is kept of a credit [characters]."""
@@ -21,13 +22,19 @@ class Credit:
     licence: str = ""
     attribution: str = ""
 
+    @property
+    def words(self) -> str:
+        """Both in one line."""
+        said = () if self.licence in self.attribution else (self.licence,)
+        return "; ".join(w for w in (*said, self.attribution) if w)
+
 
 def credit_in(document: Document) -> Credit:
     """Return what ``asset.copyright`` and, as Sketchfab writes them, ``asset.extras`` say."""
     asset = document.root.child("asset")
     if asset is None:
         return Credit()
-    copyright = " ".join(asset.text("copyright").split())
+    copyright = writable(asset.text("copyright"))
     extras = asset.value.get("extras")
     words = {k.lower(): v for k, v in extras.items()} if isinstance(extras, dict) else {}
     licence = _text(words, "license", "licence")
@@ -46,4 +53,4 @@ def _by(words: dict) -> str:
 
 def _text(words: dict, *keys: str) -> str:
     values = (words.get(k) for k in keys)
-    return next((" ".join(v.split()) for v in values if isinstance(v, str) and v.strip()), "")
+    return next((writable(v) for v in values if isinstance(v, str) and v.strip()), "")

@@ -2,6 +2,7 @@
 
 import math
 
+from corporeal.formats.credits import credit_in
 from corporeal.formats.glb_writer import GENERATOR
 from corporeal.formats.gltf_document import Document, Entry
 from corporeal.formats.words import everyday, safe
@@ -36,10 +37,9 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
     A name stays empty where the file gives none of use; the extent is the mesh's own [m].
     """
     extras = _extras(document, head)
-    asset = document.root.child("asset")
     ours = written_by_us(document)
     # A file of ours states the credit of each object; its copyright sums up all of them.
-    copyright = asset.text("copyright") if asset and not ours else ""
+    whole = "" if ours else credit_in(document).words
     real = _real_extent(extras) or extent
     return SceneObject(
         name=safe(head.text("name")) if head and extras.text("class") else "",
@@ -50,7 +50,7 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
         push=_push(extras) if ours else None,
         wind=_wind(extras) if ours else None,
         source=extras.text("source") or str(document.path),
-        credit=(credit(extras.value) or copyright)[:500],
+        credit=(credit(extras.value) or whole)[:500],
         sized_by=extras.text("sized_by")[:500] if ours else "",
     )
 

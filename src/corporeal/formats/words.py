@@ -29,6 +29,12 @@ def safe(name: str) -> str:
     return kept[:80]
 
 
+def writable(text: str) -> str:
+    """Return a text that any file, program and terminal takes: one line, no half characters."""
+    line = re.sub(r"[\x00-\x1f\x7f\s]+", " ", text).strip()
+    return line.encode("utf-8", "replace").decode("utf-8")
+
+
 def unique(names: list[str]) -> list[str]:
     """Return the names, later doubles counted up ("duck_0", "duck_1"), so that each occurs once."""
     taken: set[str] = set()

@@ -20,6 +20,7 @@ from pathlib import Path
 from typing import Any
 
 from corporeal.errors import BadFileError, UserError
+from corporeal.formats.words import writable
 from corporeal.pool.candidate import Candidate
 from corporeal.pool.table import Row
 
@@ -119,8 +120,8 @@ def _candidate(uid: str, file: Path, class_name: str, note: dict) -> Candidate:
     said = Row(
         class_name=class_name,
         licence=LICENCES.get(str(note.get("license")), str(note.get("license") or "")),
-        attribution=_attribution(note),
-        source=str(note.get("viewerUrl") or f"objaverse:{uid}"),
+        attribution=writable(_attribution(note)),
+        source=writable(str(note.get("viewerUrl") or f"objaverse:{uid}")),
         metric=False,
     )
     return Candidate(file, said, name=f"{class_name or 'objaverse'} {uid[:8]}")

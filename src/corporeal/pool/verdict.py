@@ -15,7 +15,7 @@ from corporeal.formats.glb import read_glb
 from corporeal.formats.glb_writer import encode_glb
 from corporeal.formats.gltf_document import Document
 from corporeal.formats.sources import sources
-from corporeal.formats.words import everyday
+from corporeal.formats.words import everyday, writable
 from corporeal.pool.gate import GateConfig, Measures, Rejected, inspect
 from corporeal.types import Scene
 
@@ -66,12 +66,18 @@ class Verdicts:
         known = self.known.get(key)
         if known is not None and (not known.copy or (self.pool / MODELS / known.copy).exists()):
             return known
-        verdict = judge(file, key, self.gate, self.pool)
+        verdict = _in_words_of_one_line(judge(file, key, self.gate, self.pool))
         self.known[key] = verdict
         with store.writing(self.path), self.path.open("a", encoding="utf-8") as log:
             # The line break comes first: a line that was cut off must not swallow this one.
             log.write("\n" + json.dumps(asdict(verdict), ensure_ascii=False))
         return verdict
+
+
+def _in_words_of_one_line(verdict: Verdict) -> Verdict:
+    """Return the verdict without what a hostile file may have put into names and credits."""
+    said = {k: writable(v) for k, v in asdict(verdict).items() if isinstance(v, str)}
+    return replace(verdict, **said)
 
 
 def content_key(file: Path, gate: GateConfig) -> str:

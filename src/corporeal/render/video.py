@@ -11,10 +11,14 @@ import imageio_ffmpeg
 import numpy as np
 
 from corporeal.errors import UserError
+from corporeal.formats.words import writable
 from corporeal.store import DiskError, writing
 
 COMPRESSION = 17
 """x264's constant rate factor: 0 is lossless, 23 its default."""
+
+MOST_CREDIT = 20_000
+"""Of a film [characters]: a command line takes no more than 128 KiB at a time."""
 
 
 class Reel:
@@ -61,8 +65,14 @@ class Reel:
 
 
 @contextmanager
-def reel(path: Path, fps: int, size: tuple[int, int]) -> Iterator[Reel]:
+def reel(path: Path, fps: int, size: tuple[int, int], credit: str = "") -> Iterator[Reel]:
     """Write H.264 that any browser plays to ``path``, which appears only when it is finished.
+
+    Args:
+        path: Of the film.
+        fps: Pictures per second.
+        size: Width and height [px].
+        credit: Whose things are to be seen, and under which licences; the film carries it.
 
     Raises:
         UserError: The size is odd, the disk is full, or the encoder is missing or fails.
@@ -78,7 +88,8 @@ def reel(path: Path, fps: int, size: tuple[int, int]) -> Iterator[Reel]:
         path.parent.mkdir(parents=True, exist_ok=True)
         log = tempfile.TemporaryFile()
     try:
-        film = Reel(_encoder(partial, fps, size, log), log, path)
+        options = [*_picture_options(fps, size), *_credit_options(credit)]
+        film = Reel(_encoder(partial, options, log), log, path)
         try:
             yield film
             film.close()
@@ -93,10 +104,10 @@ def reel(path: Path, fps: int, size: tuple[int, int]) -> Iterator[Reel]:
         partial.unlink(missing_ok=True)
 
 
-def _encoder(path: Path, fps: int, size: tuple[int, int], log: IO[Any]) -> Any:
+def _encoder(path: Path, options: list[str], log: IO[Any]) -> Any:
     try:
         program = imageio_ffmpeg.get_ffmpeg_exe()
-        command = [program, "-y", "-loglevel", "error", *_picture_options(fps, size), str(path)]
+        command = [program, "-y", "-loglevel", "error", *options, str(path)]
         return subprocess.Popen(
             command, stdin=subprocess.PIPE, stdout=subprocess.DEVNULL, stderr=log
         )
@@ -116,6 +127,12 @@ def _picture_options(fps: int, size: tuple[int, int]) -> list[str]:
         *("-c:v", "libx264", "-preset", "medium", "-crf", str(COMPRESSION), "-threads", "2"),
         *(*colour, "-color_range", "tv", "-movflags", "+faststart"),
     ]
+
+
+def _credit_options(credit: str) -> list[str]:
+    """Return what puts the credit where players and catalogues look for it."""
+    words = writable(credit)[:MOST_CREDIT]
+    return ["-metadata", f"copyright={words}", "-metadata", f"comment={words}"] if words else []
 
 
 def length(path: Path) -> int:

@@ -98,7 +98,8 @@ def film(  # noqa: PLR0913
     camera = watch(skin, scene, particles, trajectory, config)
     fps = max(round(scene.fps * config.speed), 1)
     size = config.width, config.height
-    with video.reel(folder / FILM, fps, size) as reel:
+    credit = "; ".join(dict.fromkeys(o.credit for o in scene.objects if o.credit))
+    with video.reel(folder / FILM, fps, size, credit) as reel:
         for number, stage in enumerate(_stages(Stage(scene), skin, trajectory)):
             picture = render(stage, camera, config.quality)
             reel.add(picture)
