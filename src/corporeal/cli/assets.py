@@ -1,4 +1,4 @@
-"""`corporeal assets index | list | show`: the pool that scenes are made of."""
+"""`corporeal assets index | list | show | props`: the pool that scenes are made of."""
 
 import re
 from collections.abc import Sequence
@@ -19,7 +19,8 @@ Folder = Annotated[Path, tyro.conf.arg(metavar="POOL")]
 
 def verb_assets() -> None:
     """Make a pool of models, and look at it: `assets index FOLDER ...`, `list`, `show`."""
-    do_second_word("assets", {"index": _index, "list": _list, "show": _show})
+    verbs = {"index": _index, "list": _list, "show": _show, "props": _props}
+    do_second_word("assets", verbs)
 
 
 def _index() -> None:
@@ -158,3 +159,31 @@ def _named(pool: Pool, names: Sequence[str]) -> Sequence[Asset]:
 
 def _count(number: int, word: str, words: str = "") -> str:
     return f"{number} {word if number == 1 else words or word + 's'}"
+
+
+def _props() -> None:
+    """Write the showcase's own eighteen models as files: something to make a first pool of.
+
+    corporeal assets props props/
+    corporeal assets index props/
+    corporeal assemble --from pool/ --seed 7
+    """
+    from corporeal.formats.glb_writer import write_glb
+    from corporeal.showcase.models import MODELS
+    from corporeal.showcase.props import prop
+    from corporeal.store import writing
+
+    @dataclass(frozen=True)
+    class Props:
+        folder: Annotated[Path, tyro.conf.Positional] = Path("props")
+
+    asked = parse(Props, "assets props", _props.__doc__, words=2)
+    with told() as tell, writing(asked.folder):
+        progress = tell("props")
+        for k, name in enumerate(MODELS):
+            progress(k / len(MODELS), name)
+            path = asked.folder / name.replace("_", " ") / f"{name}.glb"
+            path.parent.mkdir(parents=True, exist_ok=True)
+            write_glb(path, prop(name))
+    print(f"{len(MODELS)} models in {asked.folder}. Go on with: corporeal assets index "
+          f"{asked.folder}")  # fmt: skip

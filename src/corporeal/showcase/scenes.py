@@ -5,7 +5,7 @@ has there: the film begins when something is about to happen. Nothing numerical 
 """
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 import numpy as np
@@ -195,7 +195,13 @@ def build(name: str) -> Scene:
 
     """
     composition = _chosen(name)
-    models = place(composition)
+    return scene_of(name, place(composition), composition.things, composition.duration)
+
+
+def scene_of(
+    name: str, models: Sequence[Model], things: Sequence[Placed], duration: float
+) -> Scene:
+    """Put models, one per thing, into a scene."""
     finishes = {id(p.finish): p.finish for m in models for p in m.parts}
     places = list(finishes)
     surfaces = tuple(
@@ -205,7 +211,7 @@ def build(name: str) -> Scene:
     )
     objects = tuple(
         _scene_object(model, placed, _count_before(models, k))
-        for k, (model, placed) in enumerate(zip(models, composition.things, strict=True))
+        for k, (model, placed) in enumerate(zip(models, things, strict=True))
     )
     return Scene(
         name=name,
@@ -214,7 +220,7 @@ def build(name: str) -> Scene:
         surfaces=surfaces,
         finishes=tuple(finishes.values()),
         gravity=(0.0, 0.0, -GRAVITY),
-        duration=composition.duration,
+        duration=duration,
         fps=60,
     )
 
@@ -258,7 +264,7 @@ def _chosen(name: str) -> Composition:
     return SCENES[name]()
 
 
-def _count_before(models: list[Model], k: int) -> int:
+def _count_before(models: Sequence[Model], k: int) -> int:
     return sum(m.name == models[k].name for m in models[:k])
 
 
