@@ -13,8 +13,9 @@ from PIL import Image
 from corporeal.errors import BadFileError
 from corporeal.formats.splat_ply import write_splat
 from corporeal.formats.splats import read_splat
-from corporeal.geometry.gaussians import matrix, placed, upright
+from corporeal.geometry.gaussians import placed, upright
 from corporeal.geometry.harmonics import DC, basis
+from corporeal.geometry.rotation import matrix
 from corporeal.types import Gaussians
 
 STEP = 2 * 0.5 / 511 * 0.5**0.5 * 12**0.5

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from corporeal.geometry.harmonics import turned
+from corporeal.geometry.rotation import product, quaternion
 from corporeal.types import Gaussians, Vector
 
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
@@ -49,43 +50,6 @@ def placed(
         scale=(scale * gaussians.scale).astype(kind),
         sh=turned(gaussians.sh, rotation),
     )
-
-
-def quaternion(rotation: Float[np.ndarray, "3 3"]) -> Float[np.ndarray, "4"]:
-    """Return the unit quaternion (w, x, y, z), w ≥ 0, of a rotation (Bar-Itzhack 2000).
-
-    It is the eigenvector of the greatest eigenvalue of a symmetric matrix of R's elements.
-    """
-    R = rotation
-    K = np.array(
-        [
-            [R[0, 0] + R[1, 1] + R[2, 2], R[2, 1] - R[1, 2], R[0, 2] - R[2, 0], R[1, 0] - R[0, 1]],
-            [0, R[0, 0] - R[1, 1] - R[2, 2], R[0, 1] + R[1, 0], R[0, 2] + R[2, 0]],
-            [0, 0, R[1, 1] - R[0, 0] - R[2, 2], R[1, 2] + R[2, 1]],
-            [0, 0, 0, R[2, 2] - R[0, 0] - R[1, 1]],
-        ]
-    )
-    q = np.linalg.eigh(np.triu(K, 1).T + np.triu(K))[1][:, -1]
-    return q if q[0] >= 0 else -q
-
-
-def matrix(q: Float[np.ndarray, "4"]) -> Float[np.ndarray, "3 3"]:
-    """Return the rotation of a quaternion (w, x, y, z) of any length but 0."""
-    w, x, y, z = np.asarray(q, dtype=float) / np.linalg.norm(q)
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - w * z), 2 * (x * z + w * y)],
-            [2 * (x * y + w * z), 1 - 2 * (x * x + z * z), 2 * (y * z - w * x)],
-            [2 * (x * z - w * y), 2 * (y * z + w * x), 1 - 2 * (x * x + y * y)],
-        ]
-    )
-
-
-def product(a: Float[np.ndarray, "4"], b: Float[np.ndarray, "N 4"]) -> Float[np.ndarray, "N 4"]:
-    """Return the quaternions of turning by each b, then by a."""
-    w, x, y, z = a
-    left = np.array([[w, -x, -y, -z], [x, w, -z, y], [y, z, w, -x], [z, -y, x, w]])
-    return b @ left.T
 
 
 def sound(raw: Gaussians) -> tuple[Gaussians, dict[str, int]]:
