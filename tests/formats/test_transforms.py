@@ -177,7 +177,7 @@ def frame(said, k=0, **change):
         (lambda s: s.update(frames=[1]), "no list of frames"),
         (lambda s: s.pop("camera_angle_x"), "frame 1: it states no focal length"),
         (lambda s: s.update(camera_angle_x="wide"), "'camera_angle_x' is wide"),
-        (lambda s: s.update(camera_angle_x=4.0), "focal length is negative"),
+        (lambda s: s.update(camera_angle_x=4.0), "'camera_angle_x' is 4. Give an angle between 0"),
         (lambda s: s.update(fl_x=-3), "focal length is negative"),
         (lambda s: s.update(k1=0.1), "bends straight lines. Undistort"),
         (lambda s: s.update(camera_model="OPENCV_FISHEYE"), "bends straight lines"),

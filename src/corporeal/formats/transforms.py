@@ -14,9 +14,7 @@ they leave that alone.
 
 import math
 from collections.abc import Callable
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, NoReturn
 
 import numpy as np
 from PIL import Image
@@ -25,11 +23,9 @@ from corporeal import store
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.images import decode_image, decode_numbers
 from corporeal.formats.resources import read_beside
+from corporeal.formats.transforms_frame import FILE, OPENGL, Frame, frames_of
 from corporeal.types import Camera, Views
 
-FILE = "transforms.json"
-OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
-"""Between the axes of an OpenCV camera and an OpenGL one."""
 MOST = 2**16 - 1
 """Largest number in a picture of 16 bits."""
 UNIT = 1e-3
@@ -40,8 +36,6 @@ LARGEST_FILE = 2**28
 """Of one picture [bytes]."""
 LARGEST = 2**30
 """Pixels of all views together."""
-BENT = ("k1", "k2", "k3", "k4", "p1", "p2")
-STRAIGHT = ("", "OPENCV", "PINHOLE", "SIMPLE_PINHOLE", "perspective")
 
 
 # ---------------------------------------------------------------- writing
@@ -144,10 +138,10 @@ def _coloured(normals: np.ndarray) -> np.ndarray:
 
 
 def read_views(folder: Path) -> Views:
-    """Read a folder of posed pictures: ours, or anybody's photographs in the same form.
+    """Read a folder of posed pictures with all that was measured with them, as it was written.
 
-    Pictures may be PNG, JPEG or WebP; transparent ones are laid on white. What a frame says of its
-    camera goes before what the file says. All but colours and cameras is optional.
+    What a frame says of its camera goes before what the file says. All but colours and cameras is
+    optional. ``photographs.read_photographs`` reads what others took, and is more patient.
 
     Raises:
         BadFileError: It is no such folder, a number or picture in it is bad, the pictures are not
@@ -155,13 +149,7 @@ def read_views(folder: Path) -> Views:
 
     """
     path = folder / FILE
-    if not path.is_file():
-        raise BadFileError(path, "there is no such file.", "Name a folder that holds one.")
-    said = store.read_json(path)
-    frames = said.get("frames") if isinstance(said, dict) else None
-    if not isinstance(frames, list) or not frames or not all(isinstance(f, dict) for f in frames):
-        raise BadFileError(path, "it has no list of frames.", "Each needs its file_path.")
-    shots = [_Shot(path, f"frame {k + 1}: ", said | frame) for k, frame in enumerate(frames)]
+    shots = frames_of(path)
     rgb = _stacked(shots, "file_path", _flat)
     if rgb is None:
         raise BadFileError(path, "frame 1: 'file_path' is missing.", "Name its picture.")
@@ -178,7 +166,7 @@ def read_views(folder: Path) -> Views:
     unit = shots[0].number("integer_depth_scale", UNIT)
     return Views(
         rgb=rgb,
-        cameras=tuple(s.camera(width, height) for s in shots),
+        cameras=tuple(_camera(s, width, height) for s in shots),
         depth=None if depth is None else _metres(depth, unit),
         normals=normals,
         object_of_pixel=_numbered(objects),
@@ -186,74 +174,30 @@ def read_views(folder: Path) -> Views:
     )
 
 
-@dataclass(frozen=True)
-class _Shot:
-    """What is said of one frame, by itself or for all."""
+def _camera(frame: Frame, width: int, height: int) -> Camera:
+    """Return the camera of a picture of this size."""
+    lens = frame.lens(width, height)
+    if not lens.straight:
+        frame.fail("its lens bends straight lines.", "Undistort the pictures first.")
+    for key, stated, size in (("w", lens.width, width), ("h", lens.height, height)):
+        if stated != size:
+            frame.fail(f"{key!r} is {stated}, but its picture has {size}.", "Correct it.")
+    return Camera(lens.K, frame.pose(), width, height)
 
-    path: Path
-    where: str
-    value: dict[str, Any]
 
-    def fail(self, what: str, next_step: str) -> NoReturn:
-        raise BadFileError(self.path, f"{self.where}{what}", next_step)
-
-    def number(self, key: str, default: float | None = None) -> float:
-        x = self.value.get(key, default)
-        good = isinstance(x, int | float) and not isinstance(x, bool) and math.isfinite(x)
-        if not good or (x == 0 and key not in BENT):
-            self.fail(f"{key!r} is {str(x)[:40]}.", "Give a finite number other than 0.")
-        return float(x)
-
-    def camera(self, width: int, height: int) -> Camera:
-        """Return the camera of a picture of this size."""
-        model = str(self.value.get("camera_model", ""))
-        if model not in STRAIGHT or any(self.number(k, 0.0) for k in BENT):
-            self.fail("its lens bends straight lines.", "Undistort the pictures first.")
-        for key, size in (("w", width), ("h", height)):
-            if self.number(key, float(size)) != size:
-                self.fail(
-                    f"{key!r} is {self.value[key]}, but its picture has {size}.", "Correct it."
-                )
-        if "fl_x" not in self.value and "camera_angle_x" not in self.value:
-            self.fail("it states no focal length.", "Give fl_x [px] or camera_angle_x [rad].")
-        angle = self.value.get("camera_angle_x") and self.number("camera_angle_x")
-        fx = self.number("fl_x", width / 2 / math.tan(angle / 2) if angle else None)
-        fy = self.number("fl_y", fx)
-        if min(fx, fy) < 0:
-            self.fail("its focal length is negative.", "Correct it.")
-        cx, cy = self.number("cx", width / 2), self.number("cy", height / 2)
-        K = np.array([[fx, 0, cx], [0, fy, cy], [0, 0, 1.0]])
-        return Camera(K, self.pose() @ OPENGL, width, height)
-
-    def pose(self) -> np.ndarray:
-        """Return world from camera (4, 4), both as OpenGL has them."""
-        try:
-            matrix = np.array(self.value.get("transform_matrix"), dtype=float)
-        except (ValueError, TypeError):
-            matrix = np.zeros(0)
-        if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
-            self.fail("'transform_matrix' is no 4 × 4 matrix.", "Give it row by row.")
-        turn = matrix[:3, :3]
-        rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) and np.linalg.det(turn) > 0
-        if not rigid or not np.allclose(matrix[3], (0, 0, 0, 1)):
-            self.fail("'transform_matrix' is no rotation and place.", "It must neither scale.")
-        return matrix
-
-    def picture(self, key: str, decode: Callable[[bytes], np.ndarray]) -> np.ndarray:
-        """Return a picture of this frame."""
-        name = self.value[key]
-        if not isinstance(name, str) or not name:
-            self.fail(f"{key!r} is {str(name)[:40]!r}.", "Name a picture.")
-        if not Path(name).suffix:
-            name += ".png"
-        try:
-            return decode(read_beside(self.path.parent, name, LARGEST_FILE))
-        except ValueError as problem:
-            self.fail(f"{name[:80]}: {problem}.", "Keep the pictures in the folder.")
+def _picture(frame: Frame, key: str, decode: Callable[[bytes], np.ndarray]) -> np.ndarray:
+    """Return a picture of one frame."""
+    name = frame.text(key)
+    if not Path(name).suffix:
+        name += ".png"
+    try:
+        return decode(read_beside(frame.path.parent, name, LARGEST_FILE))
+    except ValueError as problem:
+        frame.fail(f"{name[:80]}: {problem}.", "Keep the pictures in the folder.")
 
 
 def _stacked(
-    shots: list[_Shot],
+    shots: list[Frame],
     key: str,
     decode: Callable[[bytes], np.ndarray],
     shape: tuple[int, ...] | None = None,
@@ -264,14 +208,14 @@ def _stacked(
         return None
     if lacking:
         lacking[0].fail(f"{key!r} is missing, but others have it.", "Add it, or leave all out.")
-    first = shots[0].picture(key, decode)
+    first = _picture(shots[0], key, decode)
     if len(shots) * first.shape[0] * first.shape[1] > LARGEST:
         shots[0].fail(f"{len(shots)} pictures of this size are too many.", "Shrink them first.")
     if shape is not None and first.shape[:2] != shape[1:]:
         shots[0].fail(f"{shots[0].value[key]} is not as large as its colours.", "Bring it to size.")
     whole = np.empty((len(shots), *first.shape), first.dtype)
     for k, shot in enumerate(shots):
-        picture = shot.picture(key, decode) if k else first
+        picture = _picture(shot, key, decode) if k else first
         if picture.shape != first.shape:
             step = "Bring all to one size, or take pictures of one camera."
             shot.fail(f"{shot.value[key]} is of another size than that of frame 1.", step)

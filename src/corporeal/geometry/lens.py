@@ -1,0 +1,135 @@
+"""Lenses that bend straight lines, and pictures straightened.
+
+Brown's model as OpenCV and COLMAP have it: at x, y = the direction over its depth, r² = x² + y²,
+
+    x' = x (1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸) + 2 p1 x y + p2 (r² + 2 x²)
+    y' = y (1 + k1 r² + k2 r⁴ + k3 r⁶ + k4 r⁸) + p1 (r² + 2 y²) + 2 p2 x y
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float, UInt8
+from scipy.ndimage import map_coordinates
+
+ZOOMS = (0.5, 4.0)
+"""How much the focal length may change so that a straightened picture has no empty border."""
+
+
+@dataclass(frozen=True)
+class Lens:
+    """How a camera maps directions to a picture of a certain size."""
+
+    K: Float[np.ndarray, "3 3"]
+    """Picture from camera coordinates [px]."""
+    width: int
+    """[px]"""
+    height: int
+    """[px]"""
+    radial: tuple[float, ...] = ()
+    """k1, k2, k3, k4, as many as there are."""
+    tangential: tuple[float, float] = (0.0, 0.0)
+    """p1, p2."""
+
+    @property
+    def straight(self) -> bool:
+        """Whether straight lines stay straight."""
+        return not any(self.radial) and not any(self.tangential)
+
+    def resized(self, width: int, height: int) -> "Lens":
+        """Return the same lens in front of a picture of another size."""
+        stretch = np.diag([width / self.width, height / self.height, 1.0])
+        return replace(self, K=stretch @ self.K, width=width, height=height)
+
+
+def bent(lens: Lens, xy: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2"]:
+    """Return where directions x, y appear to lie."""
+    x, y = xy[:, 0], xy[:, 1]
+    r2 = x * x + y * y
+    scale = 1 + sum(k * r2 ** (n + 1) for n, k in enumerate(lens.radial))
+    p1, p2 = lens.tangential
+    return np.stack(
+        [
+            x * scale + 2 * p1 * x * y + p2 * (r2 + 2 * x * x),
+            y * scale + p1 * (r2 + 2 * y * y) + 2 * p2 * x * y,
+        ],
+        axis=-1,
+    )
+
+
+def straightened(
+    picture: UInt8[np.ndarray, "H W C"], lens: Lens
+) -> tuple[UInt8[np.ndarray, "H W C"], Float[np.ndarray, "3 3"]]:
+    """Return the picture as a pinhole camera would have taken it, and that camera's K.
+
+    It has the same size and principal point, and shows as much as it can without an empty border.
+
+    Raises:
+        ValueError: The lens bends more than that allows.
+
+    """
+    if lens.straight:
+        return picture, lens.K
+    K = _without_border(lens)
+    source = _seen_at(lens, K, _middles(lens.width, lens.height))
+    rows, columns = (source[:, k].reshape(lens.height, lens.width) - 0.5 for k in (1, 0))
+    planes = [
+        map_coordinates(picture[..., c], [rows, columns], np.float32, order=1, mode="nearest")
+        for c in range(picture.shape[2])
+    ]
+    return np.round(np.stack(planes, axis=-1)).astype(np.uint8), K
+
+
+def _without_border(lens: Lens) -> np.ndarray:
+    """Return the K of least focal length at which every pixel was photographed."""
+    edge = _edge(lens.width, lens.height)
+    low, high = ZOOMS
+    if not _covered(lens, _zoomed(lens.K, high), edge):
+        raise ValueError("its lens bends too much")
+    if _covered(lens, _zoomed(lens.K, low), edge):
+        return _zoomed(lens.K, low)
+    while high - low > 1e-4:
+        middle = (low + high) / 2
+        if _covered(lens, _zoomed(lens.K, middle), edge):
+            high = middle
+        else:
+            low = middle
+    return _zoomed(lens.K, high)
+
+
+def _covered(lens: Lens, K: np.ndarray, edge: np.ndarray) -> bool:
+    """Tell whether the edge of the picture, and so all of it, lies within the photograph."""
+    xy = _directions(K, edge)
+    r = np.linspace(0, np.sqrt((xy**2).sum(axis=1).max()), 64)
+    slope = 1 + sum((2 * n + 3) * k * r ** (2 * n + 2) for n, k in enumerate(lens.radial))
+    if np.min(slope) <= 0:
+        return False
+    seen = _seen_at(lens, K, edge)
+    return bool((seen >= 0).all() and (seen <= (lens.width, lens.height)).all())
+
+
+def _seen_at(lens: Lens, K: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Return where the photograph shows what a pinhole camera K shows at points [px]."""
+    xy = bent(lens, _directions(K, points))
+    return xy @ lens.K[:2, :2].T + lens.K[:2, 2]
+
+
+def _directions(K: np.ndarray, points: np.ndarray) -> np.ndarray:
+    return (points - K[:2, 2]) @ np.linalg.inv(K[:2, :2]).T
+
+
+def _zoomed(K: np.ndarray, zoom: float) -> np.ndarray:
+    zoomed = K.copy()
+    zoomed[:2, :2] *= zoom
+    return zoomed
+
+
+def _middles(width: int, height: int) -> np.ndarray:
+    v, u = np.mgrid[:height, :width] + 0.5
+    return np.stack([u.ravel(), v.ravel()], axis=-1)
+
+
+def _edge(width: int, height: int) -> np.ndarray:
+    u, v = np.linspace(0.5, width - 0.5, 65), np.linspace(0.5, height - 0.5, 65)
+    sides = [(u, v[0] + 0 * u), (u, v[-1] + 0 * u), (u[0] + 0 * v, v), (u[-1] + 0 * v, v)]
+    return np.concatenate([np.stack(side, axis=-1) for side in sides])
