@@ -374,6 +374,35 @@ def test_a_number_too_large_for_json_is_not_passed_on(tmp_path):
         merged(tmp_path, member(tmp_path / "a.glb"))
 
 
+def nested(depth):
+    return json.loads('{"x":' * depth + "1" + "}" * depth)
+
+
+def test_what_is_nested_too_deeply_is_left_out_or_refused(tmp_path):
+    made = dressed()
+    made.json["materials"][0]["extensions"]["ACME_maze"] = nested(600)
+    path = tmp_path / "scene.glb"
+    (told,) = merge(path, [member(made.save(tmp_path / "a.glb"))], "scene", {})
+    assert "nested too deeply" in told
+    assert len(read_glb(path).surfaces[0].triangles) == 12
+    with pytest.raises(UserError, match="nested too deeply"):
+        merged(tmp_path, member(cube().save(tmp_path / "b.glb"), maze=deep()))
+
+
+def deep():
+    x: dict = {}
+    for _ in range(3000):
+        x = {"x": x}
+    return x
+
+
+def test_a_file_that_shows_nothing_is_refused(tmp_path):
+    made = cube()
+    made.json["scenes"][0]["nodes"] = []
+    with pytest.raises(BadFileError, match="shows no mesh"):
+        merged(tmp_path, member(made.save(tmp_path / "a.glb")))
+
+
 def test_nothing_two_of_one_name_and_too_much_are_refused(tmp_path, monkeypatch):
     file = cube().save(tmp_path / "a.glb")
     with pytest.raises(UserError, match="nothing to merge"):

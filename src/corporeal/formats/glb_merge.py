@@ -99,6 +99,8 @@ class _Model:
         check_extensions(self.document)
         self.merged = merged
         self.tree = list(walk(self.document))
+        if not any(p.node.has("mesh") for p in self.tree):
+            self.document.root.fail("the scene shows no mesh.", "Export it with its mesh.")
         self.assets = Assets(self.document, merged)
         for group in IDLE:
             if self.document.root.has(group):
@@ -176,8 +178,9 @@ def _bytes(path: Path, merged: Merged) -> bytes:
     document = {"asset": asset} | merged.json | {k: x for k, x in lists.items() if x}
     try:
         return pack_glb(document, merged.binary)
-    except ValueError:
-        raise UserError(
-            f"{path} is not written: a number in it is NaN or infinite, which JSON cannot say. "
-            "Look at the extras of its objects and of their files."
-        ) from None
+    except (ValueError, RecursionError) as problem:
+        what = "something in it is nested too deeply for JSON"
+        if isinstance(problem, ValueError):
+            what = "a number in it is NaN or infinite, which JSON cannot say"
+        step = "Look at the extras of its objects and of their files."
+        raise UserError(f"{path} is not written: {what}. {step}") from None

@@ -137,7 +137,9 @@ class Assets:
             return {"material": self._once("materials", entry, lambda: self._material(entry))}
         except BadFileError as problem:
             self.document.warn_of("a material", problem)
-            return {}
+        except RecursionError:
+            self.document.warn("a material is left out: it is nested too deeply.")
+        return {}
 
     def _material(self, entry: Entry) -> dict:
         """Copy a material, or a part of one; what is called a texture and has an index is one."""
