@@ -7,7 +7,7 @@ import numpy as np
 
 from corporeal.geometry.spread import sample_surface
 from corporeal.settle.body import Body, Pose, unit_of
-from corporeal.settle.mujoco import DEFAULT, Engine
+from corporeal.settle.mujoco import DEFAULT, FIRM_STEP, Engine
 
 DRIFT = 1e-3
 """Of what rests within a second, at most, per metre of scene."""
@@ -73,11 +73,13 @@ def examine(bodies: Sequence[Body], poses: Sequence[Pose]) -> Evidence:
 
 
 def drift(bodies: Sequence[Body], poses: Sequence[Pose]) -> float:
-    """How far any vertex of a hull moves in a second, undamped, after small kicks [m]."""
+    """How far hulls move in a second on hard ground that lets them roll, after small kicks [m]."""
     engine = Engine(bodies, poses, DEFAULT.step)
+    engine.let_roll()
+    engine.harden()
     spin = engine.data.qvel.reshape(len(bodies), 6)[:, 3:]
     seconds = max(1.0, unit_of(bodies) ** -0.5)
-    for number in range(round(seconds / DEFAULT.step)):
+    for number in range(round(seconds / FIRM_STEP)):
         if number in (0, 25):
             spin[:, number // 25] += KICK
         engine.step()

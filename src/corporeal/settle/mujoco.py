@@ -4,6 +4,10 @@ The floor meets the exact convex hull of each mesh; bodies meet each other with 
 pieces. All is computed for a scene of unit size: lengths are divided by the scene's unit and times
 by the root of it (Froude's similarity keeps gravity and friction as they are), because the
 engine's softness, tolerances and thresholds are absolute.
+
+Soft contacts and some resistance to rolling bring everything to rest soon, but elsewhere than hard
+smooth things rest: what is round would roll on, and what stands on small faces would tilt. So the
+resistance is taken away and contacts are hardened before the end.
 """
 
 # The engine's names come from compiled modules without stubs.
@@ -14,6 +18,7 @@ from dataclasses import dataclass
 
 import mujoco
 import numpy as np
+from jaxtyping import Float
 
 from corporeal.settle.body import Body, Pose, unit_of
 from corporeal.settle.hull import Piece
@@ -31,17 +36,25 @@ class SettleConfig:
     """When velocities begin to be damped [s]."""
     damping: float = 2e-3
     """Share of the velocity taken away at every step from then on."""
-    speed: float = 2e-3
-    """Of what rests, at most [m/s]."""
-    spin: float = 2e-2
-    """The same [rad/s]."""
     hold: float = 0.25
-    """How long it must rest [s]."""
+    """How long things must stay where they are [s] …"""
+    shift: float = 5e-5
+    """… but for so much [m] …"""
+    turn: float = 5e-4
+    """… and so much [rad]. Contacts on many points chatter: speeds would tell less."""
+    roll: float = 6.0
+    """How long what is round may look for a better place [s]."""
+    firm: float = 2.0
+    """How long things may take to find their places on hard ground [s]."""
 
 
 DEFAULT = SettleConfig()
 FRICTION = [0.6, 0.02, 0.002]
+"""Against sliding [-], turning about the normal and rolling [unit]."""
 SOLREF = [0.008, 1.0]
+FIRM_STEP, FIRM_SOLREF = 5e-4, 1e-3
+"""Step [s] and time constant [s] of hard contacts: they give way a few thousandths of a millimetre
+per metre of scene."""
 SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
 FLOOR_AND_HULLS, PIECES = 1, 2
 
@@ -69,14 +82,31 @@ def settle(
 
     """
     engine = Engine(bodies, poses, config.step)
-    quiet = 0.0
-    while engine.data.time < config.longest and quiet < config.hold:
+    quiet = _wait(engine, config, config.longest, config.calm_after)
+    if quiet:
+        engine.let_roll()
+        quiet = _wait(engine, config, config.roll, 0.0)
+    if quiet:
+        engine.harden()
+        quiet = _wait(engine, config, config.firm, 0.0)
+    return Settled(engine.poses(), float(engine.data.time), quiet)
+
+
+def _wait(engine: "Engine", config: SettleConfig, longest: float, calm_after: float) -> bool:
+    """Step until nothing moves for a while; say whether that was before time was up."""
+    step = float(engine.model.opt.timestep)
+    window, calm = round(config.hold / step), round(calm_after / step)
+    before = engine.data.qpos.copy()
+    for number in range(1, round(longest / step) + 1):
         engine.step()
-        if engine.data.time > config.calm_after:
-            engine.data.qvel *= 1 - config.damping
-        rests = engine.speed() < config.speed and engine.spin() < config.spin
-        quiet = quiet + config.step if rests else 0.0
-    return Settled(engine.poses(), float(engine.data.time), quiet >= config.hold)
+        if number > calm:
+            engine.data.qvel *= 1 - config.damping * step / config.step
+        if number % window == 0:
+            shift, turn = engine.moved(before)
+            if shift < config.shift and turn < config.turn:
+                return True
+            before = engine.data.qpos.copy()
+    return False
 
 
 class Engine:
@@ -91,13 +121,21 @@ class Engine:
         """Go one step ahead."""
         mujoco.mj_step(self.model, self.data)
 
-    def speed(self) -> float:
-        """Return the largest velocity component of any body [unit/s]."""
-        return float(np.abs(self.data.qvel.reshape(self.count, 6)[:, :3]).max())
+    def let_roll(self) -> None:
+        """Resist nothing but sliding from now on."""
+        self.model.geom_condim[:] = 3
 
-    def spin(self) -> float:
-        """Return the largest component of any body's angular velocity [rad/s]."""
-        return float(np.abs(self.data.qvel.reshape(self.count, 6)[:, 3:]).max())
+    def harden(self) -> None:
+        """Make contacts hard from now on."""
+        self.model.opt.timestep = FIRM_STEP
+        self.model.geom_solref[:, 0] = FIRM_SOLREF
+
+    def moved(self, before: Float[np.ndarray, " Q"]) -> tuple[float, float]:
+        """Return how far any body went [unit] and turned [rad] since an earlier ``qpos``."""
+        was, now = before.reshape(self.count, 7), self.data.qpos.reshape(self.count, 7)
+        shift = np.linalg.norm(now[:, :3] - was[:, :3], axis=1).max()
+        turn = 2 * np.arcsin(np.minimum(1.0, 0.5 * np.linalg.norm(now[:, 3:] - was[:, 3:], axis=1)))
+        return float(shift), float(2 * turn.max())
 
     def poses(self) -> list[Pose]:
         """Where bodies are [m]."""
