@@ -5,6 +5,7 @@ import json
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from corporeal import store
 from corporeal.errors import UserError
@@ -245,6 +246,25 @@ def test_companions_count_as_content_and_a_gltf_becomes_a_glb(tmp_path):
         (2 * vertices).astype("<f4").tobytes() + triangles.astype("<u4").tobytes(),
     )
     assert index([folder], tmp_path / "pool").assets[0].extent == pytest.approx(0.4)
+
+
+def test_an_obj_becomes_a_glb_and_its_picture_counts_as_content(tmp_path):
+    vertices, triangles, uv = ball()
+    lines = ["mtllib ball.mtl", "usemtl look"]
+    lines += [f"v {x} {y} {z}" for x, y, z in vertices] + [f"vt {u} {v}" for u, v in uv]
+    lines += [f"f {a}/{a} {b}/{b} {c}/{c}" for a, b, c in triangles + 1]
+    save(tmp_path / "in" / "toy" / "ball.obj", "\n".join(lines).encode())
+    save(tmp_path / "in" / "toy" / "ball.mtl", b"newmtl look\nmap_Kd ball.png\n")
+    picture = tmp_path / "in" / "toy" / "ball.png"
+    for k in (512, 1024):
+        Image.fromarray(checks(k, k)).save(picture)
+        (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
+        assert (asset.class_name, asset.texture, asset.triangles) == ("toy", k, len(triangles))
+    scene = read_glb(asset.file)
+    assert np.array_equal(scene.finishes[0].texture, checks(k, k))
+    used = uv[np.unique(triangles)] * (1, -1) + (0, 1)
+    found, wanted = (np.unique(np.round(x, 4), axis=0) for x in (scene.surfaces[0].uv, used))
+    np.testing.assert_allclose(found, wanted, atol=1e-9)
 
 
 def test_the_progress_names_every_file(tmp_path):

@@ -70,7 +70,8 @@ def _sum_up(pool: Pool) -> None:
     if unknown:
         print(f"Of {_count(unknown, 'asset')} neither licence nor maker is known.")
     if pool.rejections:
-        print(f"The reasons: corporeal assets list --pool {pool.folder} --rejected")
+        reasons = "reason" if len(pool.rejections) == 1 else "reasons"
+        print(f"The {reasons}: corporeal assets list --pool {pool.folder} --rejected")
 
 
 def _list() -> None:
@@ -98,7 +99,8 @@ def _list() -> None:
         return
     assets = _of_class(pool, asked.class_name)
     heads = ("class", "name", "extent", "triangles", "licence")
-    title = f"{_count(len(assets), 'asset')} of {len({a.class_name for a in assets})} classes"
+    classes = _count(len({a.class_name for a in assets}), "class", "classes")
+    title = f"{_count(len(assets), 'asset')} of {classes}"
     show_table(heads, [_row(a) for a in assets], title)
 
 
@@ -143,7 +145,10 @@ def _show() -> None:
     pool = read_pool(asked.pool)
     assets = _named(pool, asked.names) if asked.names else _of_class(pool, asked.class_name)
     if not assets:
-        raise UserError(f"{asked.pool} is empty: every file was rejected. See --rejected.")
+        raise UserError(
+            f"{asked.pool} is empty: every file was rejected. "
+            f"The reasons: corporeal assets list --pool {asked.pool} --rejected"
+        )
     path = asked.out or asked.pool / "assets.png"
     with told() as tell:
         contact_sheet(assets, path, asked.size, tell("show"))

@@ -99,6 +99,10 @@ def _dressed(path: Path, meshes: dict[str, trimesh.Trimesh]) -> tuple[list[Surfa
     for name, mesh in meshes.items():
         if not len(mesh.faces):
             continue
+        if mesh.vertices.shape[1] != 3 or mesh.faces.max() >= len(mesh.vertices):
+            raise BadFileError(
+                path, "cannot be read as OBJ (a face without corners).", EXPORT_AGAIN
+            )
         finishes.append(_finish(path, mesh.visual))
         uv = getattr(mesh.visual, "uv", None)
         surfaces.append(
