@@ -1,4 +1,4 @@
-"""`corporeal corpus assemble | run`: many scenes at once."""
+"""`corporeal corpus assemble | run | report`: many scenes at once."""
 
 from collections.abc import Callable
 from dataclasses import dataclass, field
@@ -33,8 +33,8 @@ class Crew:
 
 
 def verb_corpus() -> None:
-    """Assemble and run many scenes: `corpus assemble`, `corpus run`."""
-    do_second_word("corpus", {"assemble": _assemble, "run": _run})
+    """Assemble, run and report many scenes: `corpus assemble`, `corpus run`, `corpus report`."""
+    do_second_word("corpus", {"assemble": _assemble, "run": _run, "report": _report})
 
 
 def _assemble() -> None:
@@ -94,7 +94,7 @@ def _run() -> None:
     stops the others; what is finished is not done again, an interrupted simulation goes on from its
     checkpoint. Say the same again to go on.
     """
-    from corporeal.corpus.run import RUNS, RunConfig, run_corpus
+    from corporeal.corpus.run import RunConfig, run_corpus
     from corporeal.pipeline import Settings
 
     @dataclass(frozen=True)
@@ -109,8 +109,22 @@ def _run() -> None:
         asked,
         "run",
         lambda hands: run_corpus(asked.corpus, asked.scenes, asked.settings, hands),
-        f"Look at {asked.corpus / RUNS}.",
+        f"Look at it: corporeal corpus report {asked.corpus}",
     )
+
+
+def _report() -> None:
+    """Write CORPUS/report.html, report.csv and report.json of what was run so far."""
+    from corporeal.corpus.report import report_corpus
+
+    @dataclass(frozen=True)
+    class Report:
+        corpus: Corpus
+
+    asked = parse(Report, "corpus report", _report.__doc__, words=2)
+    with told() as tell:
+        written = report_corpus(asked.corpus, tell("report"))
+    print(*written, sep="\n")
 
 
 # ---------------------------------------------------------------- how it is done

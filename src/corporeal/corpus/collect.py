@@ -1,0 +1,227 @@
+"""Read what a corpus left on the disk: one record per scene, and one per simulated part."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from corporeal import store
+from corporeal.corpus.manifest import Row, read_rows
+from corporeal.corpus.plan import Plan, PlannedScene, read_plan
+from corporeal.corpus.run import RUNS, SCENES
+from corporeal.errors import UserError
+from corporeal.materials import library
+from corporeal.mpm.audit import breaches
+from corporeal.render.colours import LAWS
+from corporeal.settle.interactions import Kind
+from corporeal.types import Law
+
+SWAY = 1e-3
+"""Least movement or deformation that counts as having been moved by the wind [m]."""
+RIGID, OTHER = "rigid body", "other"
+
+Numbers = dict[str, Any]
+
+
+@dataclass(frozen=True)
+class PartRecord:
+    """One part of one object, as it was simulated."""
+
+    scene: str
+    object: str
+    material: str
+    group: str
+    """Material class: metal, polymer, …"""
+    law: str
+    """In words; "rigid body" where no law acts."""
+    mass: float
+    """[kg]"""
+    at_rest: bool
+    """Whether its object was, at the end."""
+
+
+@dataclass(frozen=True)
+class SceneRecord:
+    """One scene: what was planned, and as far as it came, what was made and what happened."""
+
+    planned: PlannedScene
+    assembled: Row | None
+    ran: Row | None
+    certificate: Mapping[str, Any] | None
+    composition: Mapping[str, Any] | None
+    numbers: Mapping[str, Any] | None
+    """What was measured; None: it was not run."""
+    parts: tuple[PartRecord, ...] = ()
+    strip: Path | None = None
+    """The film as a row of frames."""
+    settings: Mapping[str, Any] | None = None
+
+    @property
+    def name(self) -> str:
+        """Of the scene."""
+        return self.planned.name
+
+    @property
+    def error(self) -> str:
+        """Why it was not made or not run; empty where nothing failed."""
+        for verb, row in (("assemble", self.assembled), ("run", self.ran)):
+            if row is not None and row.status == "failed":
+                return f"{verb}: {row.error}"
+        return ""
+
+
+@dataclass(frozen=True)
+class Collected:
+    """A whole corpus."""
+
+    name: str
+    plan: Plan
+    scenes: tuple[SceneRecord, ...]
+
+    @property
+    def run(self) -> list[SceneRecord]:
+        """Scenes with numbers."""
+        return [s for s in self.scenes if s.numbers is not None]
+
+
+def collect(folder: Path) -> Collected:
+    """Read a corpus.
+
+    Raises:
+        UserError: The folder is no corpus, or a file of it is damaged.
+
+    """
+    plan = read_plan(folder)
+    assembled, ran = read_rows(folder, "assemble"), read_rows(folder, "run")
+    scenes = [_record(folder, s, assembled.get(s.name), ran.get(s.name)) for s in plan.scenes]
+    return Collected(folder.resolve().name, plan, tuple(scenes))
+
+
+def _record(
+    folder: Path, planned: PlannedScene, assembled: Row | None, ran: Row | None
+) -> SceneRecord:
+    scene, run = folder / SCENES / planned.name, folder / RUNS / planned.name
+    audit = _json(run / "audit.json") if (run / store.META).exists() else None
+    said = None if audit is None else store.read_json(run / "run.json")["settings"]
+    return SceneRecord(
+        planned=planned,
+        assembled=assembled,
+        ran=ran,
+        certificate=_json(scene / "certificate.json"),
+        composition=_json(scene / "composition.json"),
+        numbers=None if audit is None else measures(audit, planned.interaction),
+        parts=() if audit is None or said is None else _parts(planned.name, audit, said),
+        strip=run / "strip.png" if (run / "strip.png").exists() else None,
+        settings=said,
+    )
+
+
+def _json(path: Path) -> Any:
+    return store.read_json(path) if path.exists() else None
+
+
+# ---------------------------------------------------------------- numbers of one scene
+
+
+def measures(audit: Mapping[str, Any], kind: Kind) -> Numbers:
+    """Condense an audit into the numbers that scenes are compared by.
+
+    ``clean``: no bound of the audit is broken; ``breaches``: sentences. ``impacts``: objects that
+    met each other or the floor after the first frame. ``met``, ``separated``: pairs of objects.
+    ``seen``: what the interaction promises happened; in the showcase, all that is expected of the
+    scene; ``expected``, ``expected_met``: how many. The rest is copied from the audit.
+    """
+    happened = audit["outcome"]
+    things, pairs = happened["objects"], happened["pairs"]
+    first = happened["duration_s"] / max(1, audit["frames"] - 1)
+    among = [p for name, p in pairs.items() if not name.endswith("|floor")]
+    landed = [
+        p
+        for name, p in pairs.items()
+        if name.endswith("|floor") and (p["first_contact_s"] or 0.0) > first
+    ]
+    met = [p for p in among if p["first_contact_s"] is not None]
+    wrong, wanted = breaches(dict(audit)), audit["expectations"]
+    return {
+        "clean": not wrong,
+        "breaches": wrong,
+        "warnings": list(audit["warnings"]),
+        "objects": len(things),
+        "at_rest": sum(bool(t["at_rest"]) for t in things.values()),
+        "impacts": len(happened["order"]) + len(landed),
+        "met": len(met),
+        "separated": sum(bool(p["separated"]) for p in met),
+        "seen": all(e["met"] for e in wanted) if wanted else _seen(kind, happened, len(landed)),
+        "expected": len(wanted),
+        "expected_met": sum(bool(e["met"]) for e in wanted),
+        "largest_dent_dx": max((t["dent_depth_dx"] for t in things.values()), default=0.0),
+        "seconds": audit["seconds"]["total"],
+        "seconds_simulate": audit["seconds"]["simulate"],
+        "duration_s": happened["duration_s"],
+        **{name: audit[name] for name in COPIED},
+    }
+
+
+COPIED = (
+    "particles",
+    "steps",
+    "cell_m",
+    "momentum_residual",
+    "energy_growth",
+    "mechanical_growth",
+    "mass_error",
+    "max_penetration_dx",
+    "max_penetration_m",
+    "floor_penetration_m",
+    "pair_penetration_m",
+    "nan_count",
+    "particles_out_of_domain",
+    "peak_memory_mb",
+)
+
+
+def _seen(kind: Kind, happened: Mapping[str, Any], landed: int) -> bool:
+    """Tell whether what the interaction promises happened.
+
+    fall: something came down on the floor or on another. fall-onto, collision: two objects met.
+    chain: a second pair met after the first. wind: something moved or gave way by a millimetre.
+    """
+    met = len(happened["order"])
+    if kind == "fall":
+        return met + landed > 0
+    if kind == "wind":
+        moves = (
+            max(t["moved_level_m"], t["deepest_squeeze_m"]) for t in happened["objects"].values()
+        )
+        return max(moves, default=0.0) > SWAY
+    return met > (kind == "chain")
+
+
+# ---------------------------------------------------------------- parts
+
+
+def _parts(
+    scene: str, audit: Mapping[str, Any], settings: Mapping[str, Any]
+) -> tuple[PartRecord, ...]:
+    things = audit["outcome"]["objects"]
+    known = _groups(settings["ground"]["library"])
+    return tuple(
+        PartRecord(
+            scene=scene,
+            object=p["object"],
+            material=p["material"],
+            group=known.get(p["material"], OTHER),
+            law=RIGID if p["treatment"] == "rigid" else LAWS[Law[p["law"].upper()]][0],
+            mass=p["mass_kg"],
+            at_rest=bool(things[p["object"]]["at_rest"]),
+        )
+        for p in audit["parts"]
+        if p["object"] is not None
+    )
+
+
+def _groups(name: str) -> dict[str, str]:
+    try:
+        return {m: entry.group for m, entry in library(name).items()}
+    except UserError:
+        return {}  # a library of one's own that has gone: its materials count as "other"

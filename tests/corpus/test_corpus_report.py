@@ -1,0 +1,210 @@
+"""The report counts what happened, hides no failure, and needs no other file to be read."""
+
+import csv
+import json
+import re
+from pathlib import Path
+
+import pytest
+from PIL import Image
+from test_plan import pool
+
+from corporeal import store
+from corporeal.corpus.breakdown import breakdowns, credits, total
+from corporeal.corpus.collect import RIGID, collect, measures
+from corporeal.corpus.manifest import Row
+from corporeal.corpus.plan import CorpusConfig, plan, write_plan
+from corporeal.corpus.report import report_corpus
+from corporeal.errors import UserError
+
+SETTINGS = {
+    "ground": {"library": "default"},
+    "fill": {"detail": "draft"},
+    "simulate": {"engine": "warp", "contact": "multi"},
+    "describe": {"vlm": "metadata"},
+}
+
+
+def thing(**what):
+    said = {"at_rest": True, "dent_depth_dx": 0.1, "moved_level_m": 0.0, "deepest_squeeze_m": 0.0}
+    return said | what
+
+
+def part(name, material, law, treatment="deformable", mass=1.0):
+    return {"object": name, "material": material, "law": law, "treatment": treatment,
+            "mass_kg": mass}  # fmt: skip
+
+
+def audit(**what):
+    """Two things of which one is thrown into the other, and both end on the floor."""
+    said = {
+        "particles": 1000, "objects": 2, "frames": 61, "cell_m": 0.01, "steps": 100,
+        "momentum_residual": 1e-6, "energy_growth": 0.0, "mechanical_growth": 0.0,
+        "mass_error": 0.0, "max_penetration_m": 0.002, "max_penetration_dx": 0.2,
+        "floor_penetration_m": 0.001, "pair_penetration_m": 0.002, "nan_count": 0,
+        "particles_out_of_domain": 0, "peak_memory_mb": 400.0, "warnings": [], "expectations": [],
+        "seconds": {"simulate": 40.0, "total": 60.0},
+        "parts": [
+            part("a_0", "steel", "von_mises", "rigid", 5.0),
+            part("b_0", "rubber", "neo_hookean"),
+        ],
+        "outcome": {
+            "objects": {"a_0": thing(), "b_0": thing(at_rest=False)},
+            "pairs": {
+                "a_0|b_0": {"first_contact_s": 0.5, "separated": True},
+                "a_0|floor": {"first_contact_s": 0.0, "separated": None},
+                "b_0|floor": {"first_contact_s": 0.8, "separated": None},
+            },
+            "order": [["a_0", "b_0"]],
+            "duration_s": 1.0,
+        },
+    }  # fmt: skip
+    return said | what
+
+
+def a_corpus(folder, audits, failed=()):
+    """Write a corpus with so many runs; return its plan."""
+    made = plan(pool(4), CorpusConfig(scenes=len(audits) + len(failed), seed=2))
+    write_plan(folder, made)
+    rows = {"assemble": {}, "run": {}}
+    for scene, found in zip(made.scenes, [*audits, *failed], strict=True):
+        place = folder / "scenes" / scene.name
+        store.write_json(place / "certificate.json",
+                         {"drift_m": 1e-5, "penetration_m": 1e-4, "extent_m": 0.5})  # fmt: skip
+        objects = [
+            {"asset": a, "class": c, "licence": "CC-BY-4.0", "attribution": f"<b>{a}'s maker</b>",
+             "source": "somewhere"}
+            for a, c in zip(scene.assets, scene.classes, strict=True)
+        ]  # fmt: skip
+        store.write_json(place / "composition.json",
+                         {"what_happens": "it <falls>", "objects": objects})  # fmt: skip
+        rows["assemble"][scene.name] = Row("finished", 2.0, "", 1, "k")
+        if isinstance(found, str):
+            rows["run"][scene.name] = Row("failed", None, found, 2, "k")
+            continue
+        run = folder / "runs" / scene.name
+        store.write_json(run / "audit.json", found)
+        store.write_json(run / "run.json", {"settings": SETTINGS})
+        Image.new("RGB", (600, 80), (200, 60, 60)).save(run / "strip.png")
+        store.finish(run, "k", {}, 61.0)
+        rows["run"][scene.name] = Row("finished", 61.0, "", 1, "k")
+    store.write_json(folder / "manifest.json", rows)
+    return made
+
+
+def silent(*words):
+    """Hear nothing."""
+
+
+def test_numbers_of_a_scene_are_those_of_its_audit():
+    found = measures(audit(), "collision")
+    assert found["clean"] and found["seen"] and found["breaches"] == []
+    assert (found["objects"], found["at_rest"]) == (2, 1)
+    assert found["impacts"] == 2, "the two met, and one came down; the other stood from the start"
+    assert (found["met"], found["separated"]) == (1, 1)
+    assert (found["seconds"], found["particles"]) == (60.0, 1000)
+
+
+@pytest.mark.parametrize(
+    ("wrong", "words"),
+    [
+        ({"max_penetration_dx": 1.2}, "sink"),
+        ({"momentum_residual": 2e-3}, "momentum"),
+        ({"mechanical_growth": 0.02}, "Energy grew"),
+        ({"nan_count": 1}, "not numbers"),
+    ],
+)
+def test_a_broken_bound_is_no_clean_audit(wrong, words):
+    found = measures(audit(**wrong), "fall")
+    assert not found["clean"] and len(found["breaches"]) == 1 and words in found["breaches"][0]
+
+
+def test_what_an_interaction_promises_must_have_happened():
+    quiet = audit()
+    quiet["outcome"] = quiet["outcome"] | {
+        "order": [],
+        "pairs": {"a_0|floor": {"first_contact_s": 0.0, "separated": None}},
+    }
+    for kind in ("fall", "fall-onto", "collision", "chain", "wind"):
+        assert not measures(quiet, kind)["seen"], kind
+    for kind, seen in (("fall", True), ("fall-onto", True), ("collision", True), ("chain", False)):
+        assert measures(audit(), kind)["seen"] is seen, kind
+    swayed = audit()
+    swayed["outcome"]["objects"]["b_0"]["deepest_squeeze_m"] = 2e-3
+    assert measures(swayed, "wind")["seen"] and not measures(audit(), "wind")["seen"]
+
+
+def test_the_showcase_is_judged_by_its_own_expectations():
+    wanted = [{"met": True}, {"met": False}]
+    found = measures(audit(expectations=wanted), "collision")
+    assert not found["seen"] and (found["expected_met"], found["expected"]) == (1, 2)
+
+
+def test_groups_count_scenes_and_objects_and_give_median_and_worst(tmp_path):
+    deep = [0.1, 0.2, 0.9, 1.5]
+    a_corpus(tmp_path, [audit(max_penetration_dx=d) for d in deep])
+    corpus = collect(tmp_path)
+    whole, groups = total(corpus), breakdowns(corpus)
+    assert whole is not None
+    assert (whole.scenes, whole.objects, whole.clean, whole.at_rest) == (4, 8, 3, 4)
+    assert whole.penetration_median == pytest.approx(0.55) and whole.penetration_worst == 1.5
+    assert sum(line.scenes for line in groups["interaction"]) == 4
+    assert sum(line.scenes for line in groups["objects"]) == 4
+    law = {line.group: line for line in groups["law"]}
+    assert set(law) == {RIGID, "Neo-Hookean"}, "no law acts in what is rigid"
+    assert (law[RIGID].objects, law[RIGID].at_rest, law["Neo-Hookean"].at_rest) == (4, 4, 0)
+    group = {line.group: line.objects for line in groups["material class"]}
+    assert group == {"metal": 4, "elastomer": 4}
+
+
+def test_the_page_the_table_and_the_data_tell_of_every_scene(tmp_path):
+    bad = audit(max_penetration_dx=1.7)
+    made = a_corpus(tmp_path, [audit(), bad, audit()], failed=["the <grid> is too wide"])
+    written = report_corpus(tmp_path, silent)
+    assert [p.name for p in written] == ["report.html", "report.csv", "report.json"]
+    page = written[0].read_text()
+    assert all(s.name in page for s in made.scenes)
+    assert "the &lt;grid&gt; is too wide" in page and "<grid>" not in page
+    assert "it &lt;falls&gt;" in page and "&#x27;s maker&lt;/b&gt;" in page
+    assert "Objects sink up to 1.7 grid cells" in page
+    assert len(re.findall(r'src="data:image/jpeg', page)) == 3
+    assert len(re.findall(r'src="data:image/svg', page)) == 4
+    assert not re.findall(r'(?:src|href)="(?!data:)', page), "it must hold all that it shows"
+    assert not re.findall(r"\$\w", page), "something was left out of the template"
+    table = list(csv.DictReader(written[1].open()))
+    assert [row["scene"] for row in table] == [s.name for s in made.scenes]
+    assert [row["run"] for row in table] == ["finished"] * 3 + ["failed"]
+    assert [row["clean"] for row in table] == ["True", "False", "True", ""]
+    data = json.loads(written[2].read_text())
+    assert data["total"]["scenes"] == 3 and data["total"]["clean"] == 2
+    assert data["scenes"][3]["error"] == "run: the <grid> is too wide"
+
+
+def test_every_model_that_was_used_is_credited_once(tmp_path):
+    made = a_corpus(tmp_path, [audit()] * 6)
+    found = credits(collect(tmp_path).scenes)
+    used = [a for s in made.scenes for a in s.assets]
+    assert [c["asset"] for c in found] == sorted(set(used))
+    assert sum(c["scenes"] for c in found) == len(used)
+
+
+def test_a_report_of_what_was_not_run_yet_says_so_and_the_same_data_gives_the_same_page(tmp_path):
+    write_plan(tmp_path, plan(pool(4), CorpusConfig(scenes=3)))
+    report_corpus(tmp_path, silent)
+    page = (tmp_path / "report.html").read_text()
+    assert "Nothing was run yet" in page and "not begun" in page
+    report_corpus(tmp_path, silent)
+    assert (tmp_path / "report.html").read_text() == page
+
+
+def test_a_run_that_was_begun_again_is_not_taken_for_finished(tmp_path):
+    made = a_corpus(tmp_path, [audit(), audit()])
+    (tmp_path / "runs" / made.scenes[0].name / store.META).unlink()
+    assert [s.numbers is None for s in collect(tmp_path).scenes] == [True, False]
+    (tmp_path / "runs" / made.scenes[1].name / "audit.json").unlink()
+    assert collect(tmp_path).run == []
+
+
+def test_what_is_no_corpus_is_said_to_be_none(tmp_path):
+    with pytest.raises(UserError, match="not a corpus"):
+        report_corpus(Path(tmp_path), silent)
