@@ -9,6 +9,7 @@ from base64 import b64encode
 import DracoPy
 import numpy as np
 import pytest
+import trimesh
 from hypothesis import given, settings
 from hypothesis import strategies as st
 from PIL import Image
@@ -110,6 +111,24 @@ def test_an_object_stands_where_its_member_says(tmp_path_factory, position, quat
     before = read_glb(m.file).surfaces[0].vertices
     after = read_glb(merged(folder, m)).surfaces[0].vertices
     assert np.abs(after - placed(before, m)).max() <= 1e-12 * (scale + 50)
+
+
+def test_another_reader_sees_the_same_objects_at_the_same_places(tmp_path):
+    """Trimesh reads the file as it is, Y up."""
+    file = cube(name="box").save(tmp_path / "box.glb")
+    turn = (math.sqrt(0.5), 0.0, 0.0, math.sqrt(0.5))  # a quarter about the vertical
+    members = [
+        member(file, "box_0", (1.0, 2.0, 3.0), turn, 2.0),
+        member(file, "box_1", (-4.0, 0.0, 0.5)),
+    ]
+    seen = trimesh.load_scene(merged(tmp_path, *members))
+    assert {"scene", "box_0", "box_1"} <= set(seen.graph.nodes)
+    # The file's cube is x, y, z in [0, 1], and so x, -z, y of ours.
+    ours = placed([[0, -1, 0], [1, 0, 1]], members[0])
+    ours = np.concatenate([ours, placed([[0, -1, 0], [1, 0, 1]], members[1])])
+    low, high = ours.min(axis=0), ours.max(axis=0)
+    wanted = [[low[0], low[2], -high[1]], [high[0], high[2], -low[1]]]
+    np.testing.assert_allclose(seen.bounds, wanted, atol=1e-6)
 
 
 def test_a_file_reads_back_as_one_of_ours(tmp_path):

@@ -19,7 +19,7 @@ class Aim:
     """Where to look from and at what, +z up in the picture: what a picture is ordered by.
 
     Rays are cast from these numbers and not from a ``Camera``, whose matrices would round them:
-    equal aims give equal bytes, and recorded answers are matched by the bytes of pictures.
+    equal aims give equal bytes, and a model's kept answers are found by the bytes of pictures.
     """
 
     eye: Vector
