@@ -15,7 +15,7 @@ from corporeal.formats.glb_writer import write_glb
 from corporeal.geometry.arrangement import scaled
 from corporeal.geometry.sizes import how_heavy, how_scaled, scale_of_part
 from corporeal.mpm.audit import part_rows
-from corporeal.mpm.part import Motion, PartGeometry
+from corporeal.mpm.part import Motion, PartGeometry, life_sized
 from corporeal.mpm.treatment import plan
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import assemble
@@ -165,6 +165,27 @@ def test_masses_are_compared_with_the_scales_at_real_size(tmp_path):
         row = predict(thing, DescribeConfig(), GroundConfig(), MassConfig(samples=5))
         found.append((row.mass, row.low, row.high, row.volume_m3, row.hull_m3, row.solid_usual))
     assert found[1] == pytest.approx(found[0], rel=1e-5)
+
+
+def test_the_real_thing_is_the_same_with_all_its_lengths_over_the_scale():
+    steel = Material("steel", Law.VON_MISES, 2e11, 0.3, 7850.0)
+    wall = Structure("shell", 4e-4)
+    real = PartGeometry(0, steel, wall, (0.06, 0.06, 0.1), 2.8e-4, 0.024, diameter=0.01)
+    here = PartGeometry(
+        0,
+        steel,
+        replace(wall, thickness=16e-4),
+        (0.24, 0.24, 0.4),
+        64 * 2.8e-4,
+        16 * 0.024,
+        diameter=0.04,
+        scale=4.0,
+    )
+    back = life_sized(here)
+    assert back.size == pytest.approx(real.size, rel=1e-12)
+    assert (back.volume, back.area) == pytest.approx((real.volume, real.area), rel=1e-12)
+    assert (back.diameter, back.structure.thickness) == pytest.approx((0.01, 4e-4), rel=1e-12)
+    assert (back.scale, back.material, back.structure.kind) == (1.0, steel, "shell")
 
 
 def test_where_the_real_thing_would_be_judged_otherwise_it_is_told():
