@@ -83,17 +83,17 @@ def test_real_hostile_files_get_a_reason_or_get_in(shared_assets, tmp_path):
     assert not [r for r in pool.rejections if "mistake of ours" in r.reason or not r.reason]
 
 
-def test_the_same_mesh_comes_in_once_whatever_the_file_is_called(tmp_path):
+def test_the_same_mesh_comes_in_once_unless_both_class_and_look_differ(tmp_path):
     vertices, triangles, uv = ball()
-    put(
-        tmp_path / "in",
-        a=glb(vertices, triangles),
-        b=glb(vertices, triangles, uv, checks(512, 512)),
-        c=glb(vertices * 1.01, triangles),
-    )
+    plain, dressed = glb(vertices, triangles), glb(vertices, triangles, uv, checks(512, 512))
+    put(tmp_path / "in" / "rubber ball", a=plain, b=dressed, c=glb(vertices * 1.01, triangles))
+    put(tmp_path / "in" / "steel ball", d=plain + b"\0\0\0\0", e=dressed)
     pool = index([tmp_path / "in"], tmp_path / "pool")
-    assert [a.name for a in pool.assets] == ["a", "c"]
-    assert reasons(pool) == {"b": "has the same mesh as a"}
+    assert [a.name for a in pool.assets] == ["a", "c", "e"]
+    assert reasons(pool) == {"b": "has the same mesh as a", "d": "has the same mesh as a"}
+    put(tmp_path / "more" / "steel ball", f=plain)
+    pool = index([tmp_path / "more"], tmp_path / "pool")
+    assert reasons(pool)["f"] == "has the same mesh as a", "what came earlier counts too"
 
 
 def test_hostile_words_do_not_harm_the_index(tmp_path):

@@ -25,6 +25,8 @@ class Member:
     """The file that was judged."""
     mesh: str
     """Names its shape."""
+    look: str
+    """Names its colours and pictures."""
 
 
 class Admission:
@@ -35,7 +37,9 @@ class Admission:
         self.members = list(members)
         self.rejections = list(rejections)
         self._names = {m.asset.name for m in self.members}
-        self._shapes = {m.mesh: m.asset.name for m in self.members}
+        self._doubles: dict[tuple[str, str], str] = {}
+        for member in self.members:
+            self._remember(member)
 
     def ask(self, candidate: Candidate, verdict: Verdict) -> None:
         """Let a candidate in, or write down why not."""
@@ -61,12 +65,22 @@ class Admission:
             texture=verdict.texture,
         )
         self._names.add(asset.name)
-        self._shapes[verdict.mesh] = asset.name
-        self.members.append(Member(asset, candidate.file.resolve(), verdict.mesh))
+        member = Member(asset, candidate.file.resolve(), verdict.mesh, verdict.look)
+        self.members.append(member)
+        self._remember(member)
+
+    def _remember(self, member: Member) -> None:
+        """Keep what a double would share: the mesh, and either the class or the look.
+
+        A rubber ball and a steel ball may well have one mesh; they are two things.
+        """
+        for other in (member.asset.class_name, member.look):
+            self._doubles.setdefault((member.mesh, other), member.asset.name)
 
     def _why_not(self, verdict: Verdict, words: str, in_metres: bool) -> str:
-        if verdict.mesh in self._shapes:
-            return f"has the same mesh as {self._shapes[verdict.mesh]}"
+        for other in (words, verdict.look):
+            if (verdict.mesh, other) in self._doubles:
+                return f"has the same mesh as {self._doubles[verdict.mesh, other]}"
         return absurd(verdict.extent, words) if in_metres else ""
 
     def _name(self, candidate: Candidate) -> str:

@@ -58,6 +58,8 @@ class Measures:
     """Whether ``scene`` is cleaned or decimated."""
     mesh: str
     """Names the shape as found, whatever its look and file."""
+    look: str
+    """Names colours and pictures as found."""
     extent: float
     """Largest extent, in units of the file."""
     triangles: int
@@ -80,7 +82,7 @@ def inspect(scene: Scene, config: GateConfig = DEFAULT) -> Measures:
     if count > MOST_READ:
         raise Rejected(f"has {count:,} triangles; at most {MOST_READ:,} are decimated")
     extent = _extent(scene)
-    name = fingerprint(scene)
+    mesh_name, look = fingerprint(scene), fingerprint_of_look(scene)
     cleaned = _without_slivers(scene, extent)
     changed = cleaned is not scene
     found = sum(len(s.triangles) for s in cleaned.surfaces)
@@ -104,7 +106,8 @@ def inspect(scene: Scene, config: GateConfig = DEFAULT) -> Measures:
     return Measures(
         scene=cleaned,
         changed=changed,
-        mesh=name,
+        mesh=mesh_name,
+        look=look,
         extent=extent,
         triangles=sum(len(s.triangles) for s in cleaned.surfaces),
         open_edges=open_edges(mesh),
@@ -118,6 +121,16 @@ def fingerprint(scene: Scene) -> str:
     for s in scene.surfaces:
         total.update(np.ascontiguousarray(s.vertices, "<f4").tobytes())
         total.update(np.ascontiguousarray(s.triangles, "<u4").tobytes())
+    return total.hexdigest()[:20]
+
+
+def fingerprint_of_look(scene: Scene) -> str:
+    """Name what a shape wears, by colours, factors and pictures."""
+    total = hashlib.sha256()
+    for f in scene.finishes:
+        total.update(repr((*f.colour, f.metallic, f.roughness, f.transmission)).encode())
+        if f.texture is not None:
+            total.update(repr(f.texture.shape).encode() + np.ascontiguousarray(f.texture).tobytes())
     return total.hexdigest()[:20]
 
 
@@ -191,7 +204,8 @@ def _check_count(triangles: int, texture: int, config: GateConfig) -> None:
     least = config.least_triangles if texture else config.least_plain
     if triangles < least:
         look = "" if texture else " and no picture"
-        raise Rejected(f"has {triangles} triangles{look}: a placeholder (at least {least})")
+        count = "1 triangle" if triangles == 1 else f"{triangles} triangles"
+        raise Rejected(f"has {count}{look}: a placeholder (at least {least})")
 
 
 def _texture(scene: Scene) -> int:

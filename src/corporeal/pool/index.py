@@ -100,7 +100,9 @@ def _reopened(pool: Path, asking: Sequence[Candidate]) -> Admission:
 def _write(pool: Path, admission: Admission) -> None:
     value = {
         "assets": [
-            asdict(m.asset) | {"file": _kept(pool, m.asset.file), "found": m.found, "mesh": m.mesh}
+            asdict(m.asset)
+            | {"file": _kept(pool, m.asset.file)}
+            | {"found": m.found, "mesh": m.mesh, "look": m.look}
             for m in admission.members
         ],
         "rejections": [asdict(r) for r in admission.rejections],
@@ -129,5 +131,5 @@ def _read(pool: Path) -> tuple[list[Member], list[Rejection]]:
 
 
 def _member(pool: Path, entry: dict) -> Member:
-    found, mesh = Path(entry.pop("found")), entry.pop("mesh")
-    return Member(Asset(**entry | {"file": pool / entry["file"]}), found, mesh)
+    found, mesh, look = (entry.pop(key) for key in ("found", "mesh", "look"))
+    return Member(Asset(**entry | {"file": pool / entry["file"]}), Path(found), mesh, look)

@@ -39,6 +39,8 @@ class Verdict:
     """Of the bytes of the file or its copy."""
     mesh: str = ""
     """Names the shape."""
+    look: str = ""
+    """Names colours and pictures."""
     class_name: str = ""
     """What the file itself says it is."""
     licence: str = ""
@@ -119,6 +121,7 @@ def _accepted(file: Path, key: str, m: Measures, pool: Path) -> Verdict:
         copy=copy,
         sha256=sha256 or _digest(file),
         mesh=m.mesh,
+        look=m.look,
         class_name=m.scene.objects[0].class_name,
         licence=credit.licence,
         attribution=credit.attribution,
