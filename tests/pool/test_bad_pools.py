@@ -93,7 +93,7 @@ def test_the_same_mesh_comes_in_once_unless_both_class_and_look_differ(tmp_path)
     assert reasons(pool) == {"b": "has the same mesh as a", "d": "has the same mesh as a"}
     put(tmp_path / "more" / "steel ball", f=plain)
     pool = index([tmp_path / "more"], tmp_path / "pool")
-    assert reasons(pool)["f"] == "has the same mesh as a", "what came earlier counts too"
+    assert reasons(pool)["f"] == "has the same mesh as e", "what came earlier counts too"
 
 
 def test_hostile_words_do_not_harm_the_index(tmp_path):
