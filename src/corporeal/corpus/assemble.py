@@ -6,6 +6,7 @@ settings, the seed and the bytes of its assets.
 
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace
+from functools import partial
 from pathlib import Path
 
 from corporeal import pipeline, store
@@ -22,6 +23,7 @@ from corporeal.corpus.plan import (
     write_plan,
 )
 from corporeal.corpus.run import SCENE, SCENES
+from corporeal.corpus.weighing import weigh
 from corporeal.errors import UserError
 from corporeal.formats.glb import read_model
 from corporeal.formats.scene_file import SceneFile, write_scene_file
@@ -140,7 +142,8 @@ def compose_scene(
     folder: Path, progress: Progress, pool: Pool, config: ComposeConfig, capturing: CaptureConfig
 ) -> None:
     """Compose one scene and take its pictures, in the process of a worker."""
-    compose(pool, folder, config, lambda done, words: progress(SETTLED * done, words))
+    weigher = partial(weigh, folder=pool.folder)
+    compose(pool, folder, config, lambda d, words: progress(SETTLED * d, words), weigher)
     if capturing.views:
         scene = read_model(folder / "scene.glb").scene
         views = capture(

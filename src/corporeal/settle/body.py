@@ -10,6 +10,7 @@ from jaxtyping import Float, Int
 from corporeal.geometry.mesh import orient, weld
 from corporeal.geometry.shape import Shape
 from corporeal.settle.hull import Piece, hull_of
+from corporeal.settle.matter import Matter
 from corporeal.types import Vector
 
 Quaternion = tuple[float, float, float, float]
@@ -55,7 +56,7 @@ class Pose:
 
 @dataclass(frozen=True)
 class Body:
-    """A rigid body of uniform density, in a frame of its own with +Z up."""
+    """A rigid body in a frame of its own with +Z up."""
 
     name: str
     vertices: Float[np.ndarray, "V 3"]
@@ -64,7 +65,9 @@ class Body:
     pieces: tuple[Piece, ...]
     """Convex; together about the body."""
     density: float = 500.0
-    """[kg/m³]"""
+    """Of the pieces, where nothing is known of the matter [kg/m³]."""
+    matter: Matter | None = None
+    """How its mass lies, where that is known."""
 
     @cached_property
     def hull(self) -> Piece:
@@ -87,15 +90,23 @@ class Body:
         """Of the pieces [m³]."""
         return sum(p.volume for p in self.pieces)
 
+    @property
+    def mass(self) -> float:
+        """In kilograms."""
+        return self.matter.mass if self.matter else self.volume * self.density
+
     @cached_property
     def centre(self) -> Float[np.ndarray, "3"]:
         """Centre of mass [m]."""
+        if self.matter:
+            return self.matter.centre
         return np.array([p.volume * p.centre for p in self.pieces]).sum(axis=0) / self.volume
 
     def scaled(self, factor: float) -> "Body":
         """Return the same body in another size."""
         pieces = tuple(Piece(p.vertices * factor, p.triangles) for p in self.pieces)
-        return replace(self, vertices=self.vertices * factor, pieces=pieces)
+        matter = self.matter.scaled(factor) if self.matter else None
+        return replace(self, vertices=self.vertices * factor, pieces=pieces, matter=matter)
 
 
 def unit_of(bodies: Sequence[Body]) -> float:

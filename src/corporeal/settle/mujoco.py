@@ -22,6 +22,7 @@ from jaxtyping import Float
 
 from corporeal.settle.body import Body, Pose, unit_of
 from corporeal.settle.hull import Piece
+from corporeal.settle.matter import Matter
 
 
 @dataclass(frozen=True)
@@ -57,6 +58,8 @@ FIRM_STEP, FIRM_SOLREF = 5e-4, 1e-3
 per metre of scene."""
 SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
 FLOOR_AND_HULLS, PIECES = 1, 2
+LEAST_INERTIA = 1e-6
+"""Of a body's inertia, added about every axis."""
 
 
 @dataclass(frozen=True)
@@ -165,11 +168,13 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
         **surface,
     )
     # Contacts are as soft for any mass; only masses near the engine's smallest number matter.
-    lightest = min(b.volume * b.density for b in bodies) / unit**3
+    lightest = min(b.mass for b in bodies)
     for k, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
         thing = spec.worldbody.add_body(
             name=f"{k}", pos=np.array(pose.position) / unit, quat=pose.quaternion
         )
+        if body.matter:
+            _give(thing, body.matter, unit, lightest)
         thing.add_freejoint()
         _add_mesh(spec, f"{k} hull", body.hull, unit)
         thing.add_geom(
@@ -185,12 +190,23 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
             thing.add_geom(
                 type=mujoco.mjtGeom.mjGEOM_MESH,
                 meshname=f"{k} piece {number}",
-                density=body.density / lightest,
+                density=0.0 if body.matter else body.density * unit**3 / lightest,
                 contype=PIECES,
                 conaffinity=PIECES,
                 **surface,
             )
     return spec
+
+
+def _give(thing: "mujoco.MjsBody", matter: Matter, unit: float, lightest: float) -> None:
+    """Say how a body's mass lies, in units of length and of the lightest mass."""
+    tensor = matter.inertia / (lightest * unit**2)
+    # The engine refuses what is thinner than any body can be.
+    tensor = tensor + LEAST_INERTIA * np.trace(tensor) * np.eye(3)
+    thing.explicitinertial = True
+    thing.mass = matter.mass / lightest
+    thing.ipos = matter.centre / unit
+    thing.fullinertia = [*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
 
 
 def _add_mesh(spec: mujoco.MjSpec, name: str, piece: Piece, unit: float) -> None:

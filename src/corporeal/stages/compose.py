@@ -26,11 +26,15 @@ from corporeal.settle.body import Body, Pose
 from corporeal.settle.certificate import Certificate
 from corporeal.settle.decompose import decompose
 from corporeal.settle.interactions import KINDS, NEEDS, STANDING, Action, Kind, act
+from corporeal.settle.matter import Matter
 from corporeal.settle.rest import at_rest
 from corporeal.types import Scene
 from corporeal.vlm.sizes import RealExtent, real_extent, usual_sizes
 
 Progress = Callable[[float, str], None]
+Weigh = Callable[[Asset, float], Matter]
+"""Given an asset and its real extent [m], says how its mass lies: at that size, about the middle of
+its box."""
 
 TRIES = 6
 """Compositions that are settled until one leaves room for its interaction."""
@@ -84,9 +88,20 @@ class Composed:
 
 
 def compose(
-    pool: Pool, folder: Path, config: ComposeConfig = DEFAULT, progress: Progress | None = None
+    pool: Pool,
+    folder: Path,
+    config: ComposeConfig = DEFAULT,
+    progress: Progress | None = None,
+    weigh: Weigh | None = None,
 ) -> Composed:
     """Compose one scene and write it into a folder; the same pool and seed give the same bytes.
+
+    Args:
+        pool: What there is.
+        folder: Where the scene goes.
+        config: What goes into it.
+        progress: Told the fraction done and what is being done.
+        weigh: Says how the mass of a thing lies; None: as in a solid of one material.
 
     Raises:
         UserError: The pool lacks what is asked for, no rest is found, or nothing has room to
@@ -101,7 +116,7 @@ def compose(
     kind = kind or _possible_kind(config, len(assets), rng)
     sizes = _sized(assets, config)
     tell(0.1, "cutting into convex pieces")
-    things = _things(pool, assets, sizes, config.sizing)
+    things = _weighed(_things(pool, assets, sizes, config.sizing), weigh)
     tell(0.3, "settling")
     settled = _settled(things, kind, config, rng)
     tell(0.9, "writing")
@@ -210,6 +225,15 @@ def _things(
         body = Body(name, points, triangles, pieces)
         things.append(_Thing(name, asset, size, float(extent), body, centre))
     return things
+
+
+def _weighed(things: list[_Thing], weigh: Weigh | None) -> list[_Thing]:
+    """Let bodies know how their mass lies, walls being as thick as the thing is large."""
+    if weigh is None:
+        return things
+    matters = [weigh(t.asset, t.real.extent).scaled(t.extent / t.real.extent) for t in things]
+    bodies = [replace(t.body, matter=m) for t, m in zip(things, matters, strict=True)]
+    return [replace(t, body=b) for t, b in zip(things, bodies, strict=True)]
 
 
 def _mesh(scene: Scene) -> tuple[np.ndarray, np.ndarray]:

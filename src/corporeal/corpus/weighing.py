@@ -1,0 +1,65 @@
+"""Weigh the things of a pool, so that they settle where what is simulated later comes to rest.
+
+Pieces of uniform density would do for a stone. A pot is heavier than its plant, a can is a wall
+around its contents, and a cup on its side rolls to where its handle is lowest.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from corporeal import store
+from corporeal.pool.asset import Asset
+from corporeal.settle.matter import Matter, matter_of
+from corporeal.stages.assemble import AssembleConfig, assemble
+from corporeal.stages.describe import describe
+from corporeal.stages.fill import FillConfig, fill
+from corporeal.stages.ground import ground
+from corporeal.stages.segment import segment
+
+FOLDER = "matter"
+"""Of a pool: what its things weigh."""
+VERSION = 1
+"""Of the way things are weighed: kept results of another version are made anew."""
+
+
+def weigh(asset: Asset, extent: float, folder: Path | None = None) -> Matter:
+    """Fill a thing of the pool with the materials that its names suggest, and weigh it.
+
+    Args:
+        asset: What.
+        extent: Its largest real extent [m].
+        folder: The pool's, where the result is kept; None: nowhere.
+
+    Returns:
+        Of the thing at its real size, about the middle of its box, +Z up.
+
+    Raises:
+        UserError: It cannot be filled.
+
+    """
+    config = FillConfig()
+    said = {"extent": round(extent, 6), "class": asset.class_name, "version": VERSION}
+    name = store.key("weigh", said | {"detail": config.detail}, [asset.sha256])
+    kept = folder / FOLDER / f"{name}.json" if folder else None
+    if kept and kept.exists():
+        found = store.read_json(kept)
+        return Matter(found["mass"], np.array(found["centre"]), np.array(found["inertia"]))
+    matter = _weighed(asset, extent, config)
+    if kept:
+        kept.parent.mkdir(parents=True, exist_ok=True)
+        store.write_json(kept, store.plain(matter))
+    return matter
+
+
+def _weighed(asset: Asset, extent: float, config: FillConfig) -> Matter:
+    scene = assemble([asset.file], AssembleConfig(objects="one", extent=(f"{extent:.9g}",)))
+    thing = replace(scene.objects[0], class_name=asset.class_name)
+    scene = replace(scene, objects=(thing,))
+    inventory = describe(scene)
+    parts = segment(scene, inventory)
+    particles = fill(scene, parts, ground(scene, parts, inventory), config)
+    corners = np.concatenate([s.vertices for s in scene.surfaces])
+    middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
+    return matter_of(particles.position - middle, particles.mass, np.cbrt(particles.volume))

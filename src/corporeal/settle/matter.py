@@ -1,0 +1,42 @@
+"""How the mass of a body lies, where more is known of it than its convex pieces say."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+
+@dataclass(frozen=True)
+class Matter:
+    """Mass, and the first two moments of where it is, in the body's frame."""
+
+    mass: float
+    """[kg]"""
+    centre: Float[np.ndarray, "3"]
+    """[m]"""
+    inertia: Float[np.ndarray, "3 3"]
+    """About the centre [kg m²]."""
+
+    def scaled(self, factor: float) -> "Matter":
+        """Return that of a body of the same materials and another size, walls and all."""
+        mass, inertia = self.mass * factor**3, self.inertia * factor**5
+        return Matter(mass, self.centre * factor, inertia)
+
+
+def matter_of(
+    points: Float[np.ndarray, "N 3"], mass: Float[np.ndarray, " N"], size: Float[np.ndarray, " N"]
+) -> Matter:
+    """Add up cubes.
+
+    Args:
+        points: Their middles [m].
+        mass: [kg]
+        size: Their sides [m].
+
+    """
+    total = float(mass.sum())
+    centre = mass @ points / total
+    arm = points - centre
+    own = float(mass @ size**2) / 6 * np.eye(3)
+    square = float(mass @ (arm**2).sum(axis=1)) * np.eye(3)
+    return Matter(total, centre, own + square - (mass * arm.T) @ arm)
