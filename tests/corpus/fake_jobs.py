@@ -23,7 +23,7 @@ def count(folder, progress, pause=0.03):
         time.sleep(pause)
         (folder / f"step-{number}").touch()
         progress((number + 1) / STEPS, f"step {number}")
-    (folder / "threads").write_text(os.environ["OMP_NUM_THREADS"])
+    (folder / "threads").write_text(os.environ.get("OMP_NUM_THREADS", ""))
     (folder / "pid").write_text(str(os.getpid()))
 
 

@@ -6,14 +6,15 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import fake_jobs
 import pytest
-from fake_jobs import STEPS, counting, do
+from fake_jobs import STEPS, counting, do, silent
 
 from corporeal import store
-from corporeal.corpus.jobs import Job
+from corporeal.corpus.jobs import Job, perform, sweep
 from corporeal.corpus.manifest import Manifest, read_rows
 
 NAMES = ("a", "b", "c", "d", "e", "f")
@@ -76,21 +77,25 @@ def test_every_job_is_done_once_in_a_process_of_its_own(tmp_path):
 
 def test_what_is_done_is_not_done_again_until_its_key_changes(tmp_path):
     jobs = counting(tmp_path, NAMES[:2])
-    do(tmp_path, jobs)
+    for j in jobs:
+        perform(j, silent)
     before, heard = finished(tmp_path), []
-    do(tmp_path, jobs, say=heard.append)
+    rows = do(tmp_path, jobs, say=heard.append)
     assert heard == ["2 of 2 are done already."] and finished(tmp_path) == before
-    other = Job("a", jobs[0].function, jobs[0].folder, "another", jobs[0].arguments, True)
+    assert {r.status for r in rows.values()} == {"finished"} and rows["a"].seconds is not None
+    other = replace(jobs[0], key="another")
+    assert not other.done
     rows = do(tmp_path, [other, jobs[1]])
     assert [n for n, when in finished(tmp_path).items() if before[n] != when] == ["a"]
     assert rows["a"].attempts == 1, "attempts count from the change of the key"
 
 
-def test_failures_say_why_and_leave_the_others_alone(tmp_path):
+def test_failures_say_why_leave_the_others_alone_and_are_tried_again_by_the_next_call(tmp_path):
     jobs = [
         job(tmp_path, "refused", fake_jobs.refuse, words="the shape is no shape"),
         job(tmp_path, "broken", fake_jobs.blunder),
-        job(tmp_path, "killed", fake_jobs.die, times=2),
+        job(tmp_path, "killed", fake_jobs.die, times=3),
+        job(tmp_path, "unlucky", fake_jobs.die, times=1),
         *counting(tmp_path, ["well"]),
     ]
     heard = []
@@ -99,6 +104,7 @@ def test_failures_say_why_and_leave_the_others_alone(tmp_path):
         "refused": ("failed", 1),
         "broken": ("failed", 1),
         "killed": ("failed", 2),
+        "unlucky": ("finished", 2),
         "well": ("finished", 1),
     }
     assert rows["refused"].error == "the shape is no shape"
@@ -106,32 +112,23 @@ def test_failures_say_why_and_leave_the_others_alone(tmp_path):
     assert "SIGKILL" in rows["killed"].error and "--workers" in rows["killed"].error
     assert "ZeroDivisionError" in (tmp_path / "logs" / "broken.log").read_text()
     assert sum("failed" in line for line in heard) == 3
-    assert list(finished(tmp_path)) == ["well"]
-
-
-def test_a_job_whose_process_is_killed_once_is_tried_again(tmp_path):
-    rows = do(tmp_path, [job(tmp_path, "unlucky", fake_jobs.die, times=1)])
-    assert (rows["unlucky"].status, rows["unlucky"].attempts) == ("finished", 2)
-
-
-def test_what_failed_is_tried_again_by_the_next_call(tmp_path):
-    unlucky = job(tmp_path, "unlucky", fake_jobs.die, times=3)
-    assert do(tmp_path, [unlucky])["unlucky"].status == "failed"
-    rows = do(tmp_path, [unlucky])
-    assert (rows["unlucky"].status, rows["unlucky"].attempts) == ("finished", 4)
+    assert sorted(finished(tmp_path)) == ["unlucky", "well"]
+    rows = do(tmp_path, [jobs[2]])
+    assert (rows["killed"].status, rows["killed"].attempts) == ("finished", 4)
 
 
 def test_a_folder_that_cannot_be_resumed_appears_whole_or_not_at_all(tmp_path):
-    jobs = counting(tmp_path, ["a"], resumable=False)
-    left = tmp_path / "runs" / ".a.999.part"
-    left.mkdir(parents=True)
-    (left / "step-0").touch()
-    stale = jobs[0].folder
-    stale.mkdir()
-    (stale / "old").touch()
-    do(tmp_path, jobs)
-    assert sorted(p.name for p in (tmp_path / "runs").iterdir()) == ["a"]
-    assert len(list(stale.glob("step-*"))) == STEPS and not (stale / "old").exists()
+    whole, broken = counting(tmp_path, ["a", "b"], resumable=False)
+    whole.folder.mkdir(parents=True)
+    (whole.folder / "old").touch()
+    perform(whole, silent)
+    assert len(list(whole.folder.glob("step-*"))) == STEPS
+    assert whole.done and not (whole.folder / "old").exists()
+    with pytest.raises(ZeroDivisionError):
+        perform(replace(broken, function=fake_jobs.blunder), silent)
+    assert not broken.folder.exists()
+    sweep(tmp_path / "runs")
+    assert [p.name for p in (tmp_path / "runs").iterdir()] == ["a"]
 
 
 @pytest.mark.parametrize("seed", [1, *(pytest.param(k, marks=pytest.mark.slow) for k in (2, 3))])
@@ -158,7 +155,9 @@ def test_killed_at_random_moments_it_loses_nothing_and_does_nothing_twice(tmp_pa
 
 def test_a_finished_folder_outranks_a_manifest_that_was_not_written_any_more(tmp_path):
     jobs = counting(tmp_path, ["a", "b"])
-    do(tmp_path, jobs)
+    for j in jobs:
+        perform(j, silent)
+    Manifest(tmp_path, "run", jobs)
     path = tmp_path / "manifest.json"
     said = store.read_json(path)
     said["run"]["a"]["status"], said["run"]["b"]["status"] = "running", "running"

@@ -149,7 +149,7 @@ def _carry_out(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: s
 def _say(words: str) -> None:
     """Say an event as a line in a log; in a terminal the bar shows it, failures aside."""
     if not console.is_terminal or "failed" in words or "again" in words:
-        console.print(words, markup=False, highlight=False)
+        console.print(words, markup=False, highlight=False, soft_wrap=True)
 
 
 def _hire(asked: Any) -> Callable[[], Any]:

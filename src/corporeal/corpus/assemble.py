@@ -9,6 +9,8 @@ from dataclasses import asdict, dataclass, replace
 from functools import partial
 from pathlib import Path
 
+import numpy as np
+
 from corporeal import pipeline, store
 from corporeal.corpus.carry_out import Hands, carry_out
 from corporeal.corpus.jobs import Job, Progress
@@ -22,20 +24,23 @@ from corporeal.corpus.plan import (
     read_plan,
     write_plan,
 )
-from corporeal.corpus.run import SCENE, SCENES
+from corporeal.corpus.run import SCENE, SCENES, VIEWS
 from corporeal.corpus.weighing import weigh
 from corporeal.errors import UserError
 from corporeal.formats.glb import read_model
 from corporeal.formats.scene_file import SceneFile, write_scene_file
 from corporeal.formats.transforms import write_views
 from corporeal.pool.asset import Asset, Pool
+from corporeal.settle.interactions import KINDS, STANDING
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.stages.compose import ComposeConfig, compose
 
-VIEWS = "views"
+SEEDS = 2
+"""Other seeds that a planned scene is tried with."""
 """Folder of a scene's posed pictures."""
 
-VIEWS = "views"
+SEEDS = 2
+"""Other seeds that a planned scene is tried with."""
 SETTLED = 0.5
 """Share of the time that it takes to compose a scene; the pictures take the rest."""
 
@@ -121,7 +126,7 @@ def _compose_job(folder: Path, pool: Pool, config: ComposeConfig, sources: Sourc
     few = Pool(pool.folder.resolve(), assets)
     return Job(
         name=folder.name,
-        function=compose_scene,
+        function=planned_scene,
         folder=folder,
         key=store.key("corpus assemble", said, inputs),
         arguments={"pool": few, "config": config, "capturing": sources.capturing},
@@ -150,6 +155,38 @@ def compose_scene(
             scene, capturing, lambda d, words: progress(SETTLED + (1 - SETTLED) * d, words)
         )
         write_views(folder / VIEWS, views)
+
+
+def planned_scene(
+    folder: Path, progress: Progress, pool: Pool, config: ComposeConfig, capturing: CaptureConfig
+) -> None:
+    """Compose a scene of a plan; where it does not come to rest, from other seeds and otherwise.
+
+    Raises:
+        UserError: It never came to rest; the reason is that of the planned way.
+
+    """
+    first: UserError | None = None
+    for way in ways(config):
+        try:
+            return compose_scene(folder, progress, pool, way, capturing)
+        except UserError as error:
+            first = first or error
+    assert first is not None
+    raise first
+
+
+def ways(config: ComposeConfig) -> list[ComposeConfig]:
+    """Return how a planned scene may be composed, the best way first.
+
+    As planned; then from other seeds; then standing otherwise, as its interaction allows.
+    """
+    seeds = [int(n) for n in np.random.SeedSequence(config.seed).generate_state(SEEDS)]
+    same = [config, *(replace(config, seed=n) for n in seeds)]
+    if len(config.assets) < 2 or config.interaction not in KINDS:
+        return same
+    others = [a for a in STANDING[config.interaction] if a != config.arrangement]
+    return same + [replace(config, arrangement=a) for a in others]
 
 
 def showcase_scene(folder: Path, progress: Progress, name: str) -> None:

@@ -8,7 +8,7 @@ from typing import Any
 from corporeal import store
 from corporeal.corpus.manifest import Row, read_rows
 from corporeal.corpus.plan import Plan, PlannedScene, read_plan
-from corporeal.corpus.run import RUNS, SCENES
+from corporeal.corpus.run import RUNS, SCENES, VIEWS
 from corporeal.errors import UserError
 from corporeal.materials import library
 from corporeal.mpm.audit import breaches
@@ -52,8 +52,8 @@ class SceneRecord:
     numbers: Mapping[str, Any] | None
     """What was measured; None: it was not run."""
     parts: tuple[PartRecord, ...] = ()
-    strip: Path | None = None
-    """The film as a row of frames."""
+    picture: Path | None = None
+    """The film as a row of frames; of a scene that was not run, a view of it at rest."""
     settings: Mapping[str, Any] | None = None
 
     @property
@@ -111,9 +111,16 @@ def _record(
         composition=_json(scene / "composition.json"),
         numbers=None if audit is None else measures(audit, planned.interaction),
         parts=() if audit is None or said is None else _parts(planned.name, audit, said),
-        strip=run / "strip.png" if (run / "strip.png").exists() else None,
+        picture=_picture(run / "strip.png", scene / VIEWS / "rgb"),
         settings=said,
     )
+
+
+def _picture(strip: Path, views: Path) -> Path | None:
+    if strip.exists():
+        return strip
+    found = sorted(views.glob("*.png"))
+    return found[len(found) // 2] if found else None
 
 
 def _json(path: Path) -> Any:

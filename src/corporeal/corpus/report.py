@@ -185,13 +185,14 @@ def _line(line: Line, style: str = "") -> str:
 
 def _scene(scene: SceneRecord) -> str:
     planned, numbers = scene.planned, scene.numbers
-    words = safe((scene.composition or {}).get("what_happens", ""))
-    things = ", ".join(planned.classes)
-    made = ", ".join(materials_of(scene))
+    made = scene.composition or {}
+    words = safe(made.get("what_happens", ""))
+    stands = made.get("arrangement", planned.arrangement)
+    things, matter = ", ".join(planned.classes), ", ".join(materials_of(scene))
     cells = [
         _thumbnail(scene),
-        f"<b>{safe(scene.name)}</b><br><small>{safe(planned.arrangement)}. {words}</small>",
-        f"{safe(things)}<br><small>{safe(made)}</small>",
+        f"<b>{safe(scene.name)}</b><br><small>{safe(stands)}. {words}</small>",
+        f"{safe(things)}<br><small>{safe(matter)}</small>",
     ]
     if numbers is None:
         state = scene.error or _state(scene)
@@ -226,14 +227,15 @@ def _tick(good: bool, why: str = "") -> str:
 
 
 def _thumbnail(scene: SceneRecord) -> str:
-    if scene.strip is None:
+    if scene.picture is None:
         return ""
-    with Image.open(scene.strip) as picture:
-        height = round(picture.height * THUMB / picture.width)
-        small = picture.convert("RGB").resize((THUMB, height), Image.Resampling.LANCZOS)
+    with Image.open(scene.picture) as picture:
+        small = picture.convert("RGB")
+        small.thumbnail((THUMB, THUMB), Image.Resampling.LANCZOS)
     out = io.BytesIO()
     small.save(out, "JPEG", quality=78, optimize=True)
-    return f'<img src="{held(out.getvalue(), "image/jpeg")}" alt="{safe(scene.name)}">'
+    style = "" if scene.numbers else ' class="still"'
+    return f'<img{style} src="{held(out.getvalue(), "image/jpeg")}" alt="{safe(scene.name)}">'
 
 
 def _failures(corpus: Collected) -> str:

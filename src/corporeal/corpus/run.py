@@ -18,7 +18,7 @@ from corporeal.pipeline import Settings
 from corporeal.showcase.scenes import view
 
 SCENES, RUNS = "scenes", "runs"
-SCENE = "scene.toml"
+SCENE, VIEWS = "scene.toml", "views"
 ORPHAN = 60.0
 """Longest wait for a worker of a killed corpus run to be gone [s]."""
 SHARES: Mapping[str, tuple[float, float]] = {
