@@ -127,7 +127,7 @@ def _read(pool: Path) -> tuple[list[Member], list[Rejection]]:
         )
     except (KeyError, TypeError, ValueError) as problem:
         words = f"is no index of an asset pool ({type(problem).__name__}: {problem})."
-        raise BadFileError(path, words, INDEX_AGAIN) from problem
+        raise BadFileError(path, words, f"Delete it. {INDEX_AGAIN}") from problem
 
 
 def _member(pool: Path, entry: dict) -> Member:
