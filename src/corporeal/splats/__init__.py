@@ -1,0 +1,1 @@
+"""Scenes made of Gaussians: drawing them, learning them from pictures, deforming them."""

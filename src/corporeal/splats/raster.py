@@ -1,0 +1,157 @@
+"""Pictures of Gaussians on the processor, and gradients back to all their numbers.
+
+Tiles of 16 × 16 pixels, front to back (Kerbl et al. 2023); ``reference`` says the same plainly.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Float32, Int
+from scipy.sparse import csr_array
+
+from corporeal.errors import UserError
+from corporeal.splats import kernels_blend, kernels_project
+from corporeal.splats.crew import Crew
+from corporeal.splats.kernels_blend import PLANES, TILE
+from corporeal.splats.kernels_project import GRADIENTS, REACH, WIDTH, Pinhole, Z
+from corporeal.splats.parameters import Parameters, parameters
+from corporeal.types import Camera, Gaussians, Vector
+
+SEEN = 1e-3
+"""Where less than this is covered, there is no depth to speak of."""
+BLACK: Vector = (0.0, 0.0, 0.0)
+
+
+@dataclass(frozen=True)
+class Picture:
+    """What a camera sees."""
+
+    rgb: Float32[np.ndarray, "H W 3"]
+    """sRGB in [0, 1], a little more where harmonics overshoot, before the background."""
+    alpha: Float32[np.ndarray, "H W"]
+    """Share that is covered [0–1]."""
+    depth: Float32[np.ndarray, "H W"]
+    """Mean along the camera's z of what covers it [m]; inf where there is nothing."""
+
+
+@dataclass(frozen=True)
+class Drawing:
+    """A picture with what it takes to go back; P planes, E entries: one Gaussian in one tile."""
+
+    theta: Parameters
+    camera: Pinhole
+    ellipses: Float32[np.ndarray, "N 12"]
+    first: Int[np.ndarray, " tiles_and_1"]
+    """Where each tile's entries begin."""
+    ids: Int[np.ndarray, " E"]
+    """Of each entry, which Gaussian."""
+    places: Int[np.ndarray, " E"]
+    spans: Int[np.ndarray, "N 2"]
+    """Gaussian i's entries: places[spans[i, 0] : spans[i, 1]]."""
+    planes: Float32[np.ndarray, "5 H W"]
+    """Red, green and blue before the background, transmittance, depth times coverage."""
+
+
+def render(
+    gaussians: Gaussians, camera: Camera, background: Vector = BLACK, threads: int | None = None
+) -> Picture:
+    """Picture some Gaussians before a background.
+
+    Raises:
+        UserError: The camera is skewed.
+
+    """
+    with Crew(threads) as crew:
+        return picture_of(draw(parameters(gaussians), pinhole(camera), np.array(background), crew))
+
+
+def picture_of(drawing: Drawing) -> Picture:
+    """Return a drawing as people take pictures: rows, columns, colours."""
+    planes = drawing.planes
+    alpha = 1 - planes[3]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        depth = np.where(alpha > SEEN, planes[4] / alpha, np.float32(np.inf))
+    return Picture(np.ascontiguousarray(np.moveaxis(planes[:3], 0, -1)), alpha, depth)
+
+
+def draw(
+    theta: Parameters, camera: Pinhole, background: Float[np.ndarray, "3"], crew: Crew
+) -> Drawing:
+    """Draw Gaussians from front to back."""
+    ellipses = np.zeros((len(theta), WIDTH), np.float32)
+    shares = [(theta, *span, camera, ellipses) for span in crew.spans(len(theta))]
+    crew.each(kernels_project.project, shares)
+    seen = np.flatnonzero(ellipses[:, REACH] > 0)
+    order = seen[np.argsort(ellipses[seen, Z], kind="stable")]
+    across, down = -(-camera.width // TILE), -(-camera.height // TILE)
+    first, ids, places, spans = kernels_blend.deal(order, ellipses, across, down)
+    planes = np.empty((PLANES, camera.height, camera.width), np.float32)
+    background = background.astype(np.float32)
+    shares = [(t, first, ids, ellipses, background, planes) for t in _tiles(first, crew)]
+    crew.each(kernels_blend.blend, shares)
+    return Drawing(theta, camera, ellipses, first, ids, places, spans, planes)
+
+
+def back(
+    drawing: Drawing, slope: Float32[np.ndarray, "4 H W"], crew: Crew
+) -> Float32[np.ndarray, "N D"]:
+    """Return dL/dθ from the slope, dL/d(red, green, blue, transmittance) of every pixel."""
+    d = drawing
+    entries = np.empty((len(d.ids), GRADIENTS), np.float32)
+    tiles = _tiles(d.first, crew)
+    shares = [(t, d.first, d.ids, d.ellipses, d.planes, slope, entries) for t in tiles]
+    crew.each(kernels_blend.blend_back, shares)
+    gradient = np.empty_like(d.theta)
+    rest = d.camera, d.ellipses, entries, d.places, d.spans, gradient
+    shares = [(d.theta, *span, *rest) for span in crew.spans(len(d.theta))]
+    crew.each(kernels_project.project_back, shares)
+    return gradient
+
+
+def weights(
+    gaussians: Gaussians, camera: Camera, cell: int = 1, threads: int | None = None
+) -> csr_array:
+    """Return how much each Gaussian contributes to each cell of a picture.
+
+    cell: pixels along a cell: 1, 2, 4, 8 or 16. Row: Gaussian; column: row of cells times cells in
+    a row plus column of cells; value: sum of the weights T α over the cell's pixels.
+    """
+    if cell not in (1, 2, 4, 8, TILE):
+        raise UserError(f"A cell of {cell} pixels does not divide a tile. Take 1, 2, 4, 8 or 16.")
+    with Crew(threads) as crew:
+        d = draw(parameters(gaussians), pinhole(camera), np.zeros(3), crew)
+        within = TILE // cell
+        sums = np.empty((len(d.ids), within, within), np.float32)
+        size = camera.height, camera.width
+        rest = d.first, d.ids, d.ellipses, size, cell, sums
+        crew.each(kernels_blend.shares, [(t, *rest) for t in _tiles(d.first, crew)])
+    entry, y, x = np.nonzero(sums)
+    tile = np.repeat(np.arange(len(d.first) - 1), np.diff(d.first))[entry]
+    across = -(-camera.width // TILE)
+    columns = -(-camera.width // cell)
+    column = (tile // across * within + y) * columns + tile % across * within + x
+    shape = gaussians.count, -(-camera.height // cell) * columns
+    return csr_array((sums[entry, y, x], (d.ids[entry], column)), shape=shape)
+
+
+def pinhole(camera: Camera, scale: float = 1.0) -> Pinhole:
+    """Return a camera as kernels read it; a scale of 0.5 halves the picture.
+
+    Raises:
+        UserError: The camera is skewed.
+
+    """
+    K = camera.K
+    if abs(K[0, 1]) > 1e-6 * K[0, 0]:
+        raise UserError("A camera's K is skewed: its pixels are no rectangles. Rectify pictures.")
+    turn = np.ascontiguousarray(camera.world_from_camera[:3, :3].T, dtype=np.float64)
+    eye = np.ascontiguousarray(camera.world_from_camera[:3, 3], dtype=np.float64)
+    fx, fy, cx, cy = (float(scale * k) for k in (K[0, 0], K[1, 1], K[0, 2], K[1, 2]))
+    size = round(scale * camera.width), round(scale * camera.height)
+    return Pinhole(turn, -turn @ eye, eye, fx, fy, cx, cy, *size)
+
+
+def _tiles(first: Int[np.ndarray, " tiles_and_1"], crew: Crew) -> list[Int[np.ndarray, " t"]]:
+    """Deal tiles to threads, the fullest first, so that all have about as much to do."""
+    order = np.argsort(-np.diff(first), kind="stable")
+    return [np.ascontiguousarray(order[k :: crew.threads]) for k in range(crew.threads)]
