@@ -328,6 +328,7 @@ def _member(thing: _Thing, pose: Pose) -> Member:
         "attribution": asset.attribution,
         "real_extent_m": thing.real.extent,
         "scale": thing.extent / thing.real.extent,
+        "sized_by": thing.real.by,
     }
     return Member(asset.file, thing.name, (x, y, z), pose.quaternion, scale, extras)
 
