@@ -15,17 +15,19 @@ from scipy.spatial.transform import Rotation
 from corporeal.errors import UnknownChoiceError
 from corporeal.geometry.shape import random_rotation
 from corporeal.settle.body import Body, Pose, unit_of
-from corporeal.settle.hull import Piece, steadiest, tip_angle
+from corporeal.settle.hull import Piece, Stance
 
 Arrangement = Literal["scatter", "stack", "onto", "row"]
 
 GAP = 0.02
 """Free height before a body falls, of the scene's unit."""
-STANDS = 0.12
+STANDS = 0.1
 """A body starts upright where it takes at least this tilt to make it fall over [rad]."""
 STANDS_IN_A_STACK = 0.35
 """The same under and on other bodies [rad]."""
-STEPS = 60
+STEPS = 40
+NEAR = 0.1
+"""What comes stops when it could go on by less than this share of the gap."""
 
 
 def arrange(
@@ -35,8 +37,8 @@ def arrange(
 
     Args:
         bodies: At least one.
-        arrangement: ``scatter``: side by side; ``stack``: one above the other, large ones below;
-            ``onto``: all above the largest; ``row``: in a line along +x, heavy ones first.
+        arrangement: ``scatter``: side by side; ``stack``: one above the other, below what carries
+            most; ``onto``: all above that one; ``row``: in a line along +x, heavy ones first.
         rng: Source of what is left to chance.
 
     """
@@ -52,28 +54,23 @@ def _gap(body: Body, bodies: Sequence[Body]) -> float:
 
 def _scatter(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
     room = _Room()
-    poses: dict[int, Pose] = {}
-    reach = 2 * unit_of(bodies) * len(bodies)
     for k in map(int, rng.permutation(len(bodies))):
         body = bodies[k]
-        pose = _on_floor(body, _turned(body, rng, STANDS), _gap(body, bodies))
+        pose = _on_floor(body, _turned(body, rng), _gap(body, bodies))
         bearing = rng.uniform(0, 2 * np.pi)
-        outward = np.array([np.cos(bearing), np.sin(bearing), 0.0])
-        between = rng.uniform(0.05, 0.3) * body.extent
-        if poses:
-            pose = room.approach(body.hull, pose.moved(reach * outward), -outward, reach, between)
-        room.add(body.hull, pose)
-        poses[k] = pose
-    return [poses[k] for k in range(len(bodies))]
+        inward = -np.array([np.cos(bearing), np.sin(bearing), 0.0])
+        room.bring(k, body.hull, pose, inward, rng.uniform(0.05, 0.3) * body.extent)
+    return room.poses()
 
 
 def _stack(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
-    order = sorted(range(len(bodies)), key=lambda k: -bodies[k].hull.volume)
+    """Pile up, what offers most room on top below."""
+    order = sorted(range(len(bodies)), key=lambda k: -_steady(bodies[k]).top)
     return _piled(bodies, order, rng, 0.05)
 
 
 def _onto(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
-    largest = max(range(len(bodies)), key=lambda k: bodies[k].hull.volume)
+    largest = max(range(len(bodies)), key=lambda k: _steady(bodies[k]).top)
     rest = [int(k) for k in rng.permutation(len(bodies)) if k != largest]
     return _piled(bodies, [largest, *rest], rng, 0.3)
 
@@ -82,57 +79,47 @@ def _piled(
     bodies: Sequence[Body], order: list[int], rng: np.random.Generator, aside: float
 ) -> list[Pose]:
     """Lower one after the other over the first one's middle, ``aside`` of its width at most."""
-    room = _Room()
-    poses: dict[int, Pose] = {}
-    height = 2 * unit_of(bodies) * len(bodies)
-    first = bodies[order[0]]
+    room, down = _Room(), np.array([0.0, 0.0, -1.0])
+    first = bodies[order[0]].hull.vertices
     for k in order:
-        body = bodies[k]
-        gap = _gap(body, bodies)
-        pose = _on_floor(body, _turned(body, rng, STANDS_IN_A_STACK), gap)
-        if poses:
-            width = np.ptp(poses[order[0]].world(first.hull.vertices)[:, :2], axis=0)
-            shift = np.array([*(aside * rng.uniform(-0.5, 0.5, 2) * width), height])
-            down = np.array([0.0, 0.0, -1.0])
-            pose = room.approach(_whole(body), pose.moved(shift), down, height, gap)
-        room.add(_whole(body), pose)
-        poses[k] = pose
-    return [poses[k] for k in range(len(bodies))]
+        body, gap = bodies[k], _gap(bodies[k], bodies)
+        pose = _on_floor(body, _stood(_steady(body), rng), gap)
+        if room.standing:
+            width = np.ptp(room.standing[order[0]].world(first)[:, :2], axis=0)
+            pose = pose.moved([*(aside * rng.uniform(-0.5, 0.5, 2) * width), 0.0])
+        room.bring(k, _whole(body), pose, down, gap)
+    return room.poses()
 
 
 def _row(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
     order = sorted(range(len(bodies)), key=lambda k: -bodies[k].volume * bodies[k].density)
-    room = _Room()
-    poses: dict[int, Pose] = {}
-    reach = 2 * unit_of(bodies) * len(bodies)
-    ahead = np.array([1.0, 0.0, 0.0])
+    room, back = _Room(), np.array([-1.0, 0.0, 0.0])
     for k in order:
         body = bodies[k]
-        pose = _on_floor(body, _standing(body, rng), _gap(body, bodies))
-        between = rng.uniform(0.1, 0.2) * body.extent
-        if poses:
-            pose = room.approach(body.hull, pose.moved(reach * ahead), -ahead, reach, between)
-        room.add(body.hull, pose)
-        poses[k] = pose
-    return [poses[k] for k in range(len(bodies))]
+        pose = _on_floor(body, _stood(_standing(body), rng), _gap(body, bodies))
+        room.bring(k, body.hull, pose, back, rng.uniform(0.1, 0.2) * body.extent)
+    return room.poses()
 
 
 # ---------------------------------------------------------------- how one body stands
 
 
-def _turned(body: Body, rng: np.random.Generator, stands: float) -> np.ndarray:
-    """Upright with a random yaw where that is stable, else tumbled."""
-    if tip_angle(body.hull, body.centre, np.array([0.0, 0.0, -1.0])) >= stands:
-        return _yaw(rng)
-    if stands > STANDS:
-        return _yaw(rng) @ _down(steadiest(body.hull, body.centre))
-    return random_rotation(rng)
+def _turned(body: Body, rng: np.random.Generator) -> np.ndarray:
+    """Upright where that is stable, else tumbled."""
+    return _stood(body.upright, rng) if body.upright.tip >= STANDS else random_rotation(rng)
 
 
-def _standing(body: Body, rng: np.random.Generator) -> np.ndarray:
-    if tip_angle(body.hull, body.centre, np.array([0.0, 0.0, -1.0])) >= STANDS:
-        return _yaw(rng)
-    return _yaw(rng) @ _down(steadiest(body.hull, body.centre))
+def _standing(body: Body) -> Stance:
+    return body.upright if body.upright.tip >= STANDS else body.steadiest
+
+
+def _steady(body: Body) -> Stance:
+    return body.upright if body.upright.tip >= STANDS_IN_A_STACK else body.steadiest
+
+
+def _stood(stance: Stance, rng: np.random.Generator) -> np.ndarray:
+    """With a random yaw."""
+    return _yaw(rng) @ _down(stance.down)
 
 
 def _yaw(rng: np.random.Generator) -> np.ndarray:
@@ -143,8 +130,11 @@ def _yaw(rng: np.random.Generator) -> np.ndarray:
 
 def _down(direction: np.ndarray) -> np.ndarray:
     """Return a rotation that takes ``direction`` to -z."""
-    u, _, vt = np.linalg.svd(np.outer([0.0, 0.0, -1.0], direction))
-    return u @ np.diag([1.0, 1.0, np.linalg.det(u) * np.linalg.det(vt)]) @ vt
+    axis = np.cross(direction, [0.0, 0.0, -1.0])
+    sine, cosine = float(np.linalg.norm(axis)), -float(direction[2])
+    if sine < 1e-9:
+        return np.diag([1.0, 1.0, 1.0]) if cosine > 0 else np.diag([1.0, -1.0, -1.0])
+    return Rotation.from_rotvec(axis / sine * np.arctan2(sine, cosine)).as_matrix()
 
 
 def _on_floor(body: Body, rotation: np.ndarray, gap: float) -> Pose:
@@ -174,30 +164,55 @@ class _Room:
     """Bodies that stand already."""
 
     def __init__(self) -> None:
-        self.taken: list[fcl.CollisionObject] = []
+        self.standing: dict[int, Pose] = {}
+        self._solids: list[fcl.CollisionObject] = []
+        self._corners: list[np.ndarray] = []
 
-    def add(self, surface: Piece, pose: Pose) -> None:
-        self.taken.append(_solid(surface, pose))
+    def poses(self) -> list[Pose]:
+        """Where they stand, in the order of their numbers."""
+        return [self.standing[k] for k in range(len(self.standing))]
 
-    def approach(
-        self, surface: Piece, pose: Pose, direction: np.ndarray, reach: float, gap: float
-    ) -> Pose:
-        """Move along ``direction`` [unit] by ``reach`` [m] at most, until ``gap`` [m] is left."""
-        solid, travelled = _solid(surface, pose), 0.0
-        start = np.array(pose.position)
+    def bring(
+        self, number: int, surface: Piece, pose: Pose, direction: np.ndarray, gap: float
+    ) -> None:
+        """Let a body come along ``direction`` [unit] to ``pose``, or until ``gap`` [m] is left."""
+        corners = pose.world(surface.vertices)
+        if self.standing:
+            solid = _solid(surface, pose)
+            reach = self._reach(corners, direction) + gap
+            left = self._advance(solid, np.array(pose.position), direction, reach, gap)
+            pose = pose.moved(-left * direction)
+            corners = corners - left * direction
+        self.standing[number] = pose
+        self._solids.append(_solid(surface, pose))
+        self._corners.append(corners)
+
+    def _reach(self, corners: np.ndarray, direction: np.ndarray) -> float:
+        """From how far away it has to come to start free of all [m]."""
+        nearest = min(float((c @ direction).min()) for c in self._corners)
+        return max(0.0, float((corners @ direction).max()) - nearest)
+
+    def _advance(
+        self,
+        solid: fcl.CollisionObject,
+        goal: np.ndarray,
+        direction: np.ndarray,
+        reach: float,
+        gap: float,
+    ) -> float:
+        """Return how far from its goal it stops [m]."""
+        left = reach
         for _ in range(STEPS):
+            solid.setTranslation(goal - left * direction)
             free = self._distance(solid) - gap
-            if free < 0.02 * gap or travelled >= reach:
+            if free < NEAR * gap or left <= 0:
                 break
-            travelled = min(travelled + free, reach)
-            solid.setTranslation(start + travelled * direction)
-        return pose.moved(travelled * direction)
+            left = max(0.0, left - free)
+        return left
 
     def _distance(self, solid: fcl.CollisionObject) -> float:
-        return min(
-            fcl.distance(solid, other, fcl.DistanceRequest(), fcl.DistanceResult())
-            for other in self.taken
-        )
+        request = fcl.DistanceRequest()
+        return min(fcl.distance(solid, o, request, fcl.DistanceResult()) for o in self._solids)
 
 
 def _solid(surface: Piece, pose: Pose) -> fcl.CollisionObject:

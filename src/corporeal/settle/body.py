@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from corporeal.geometry.mesh import orient, weld
 from corporeal.geometry.shape import Shape
-from corporeal.settle.hull import Piece, hull_of
+from corporeal.settle.hull import Piece, Stance, hull_of, stances
 from corporeal.settle.matter import Matter
 from corporeal.types import Vector
 
@@ -101,6 +101,20 @@ class Body:
         if self.matter:
             return self.matter.centre
         return np.array([p.volume * p.centre for p in self.pieces]).sum(axis=0) / self.volume
+
+    @cached_property
+    def upright(self) -> Stance:
+        """How it stands upright."""
+        return self._stances[0]
+
+    @cached_property
+    def steadiest(self) -> Stance:
+        """How it stands best."""
+        return self._stances[1]
+
+    @cached_property
+    def _stances(self) -> tuple[Stance, Stance]:
+        return stances(self.hull, self.centre)
 
     def scaled(self, factor: float) -> "Body":
         """Return the same body in another size."""

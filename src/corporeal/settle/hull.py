@@ -12,6 +12,8 @@ FOOT = 2e-3
 """Of the largest side: what is no higher than this above the lowest point carries weight."""
 FACES = 16
 """Faces of a hull that are tried as undersides, largest first."""
+LEAN, LEVEL = 0.17, 0.1
+"""How far a face may be from the horizontal: of a body that is upright, and of its top [rad]."""
 
 
 @dataclass(frozen=True)
@@ -102,18 +104,46 @@ def tip_angle(hull: Piece, centre: Float[np.ndarray, "3"], down: Float[np.ndarra
     return float(np.arctan2(margin, below.max())) if margin > 0 else 0.0
 
 
-def steadiest(hull: Piece, centre: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3"]:
-    """Return the direction in the body's frame that must point down for it to stand best."""
+@dataclass(frozen=True)
+class Stance:
+    """One way for a body to stand."""
+
+    down: Float[np.ndarray, "3"]
+    """Unit, in the body's frame: where the floor is."""
+    tip: float
+    """How far it must be tilted before it falls over [rad]."""
+    top: float
+    """Area of what is level at its top [m²]: what other things can stand on."""
+
+
+def stances(hull: Piece, centre: Float[np.ndarray, "3"]) -> tuple[Stance, Stance]:
+    """Return how a body stands upright, and how it stands best of all.
+
+    Feet are seldom even: upright is any face of the hull that looks down to within ``LEAN``.
+    """
     a, b, c = np.swapaxes(hull.vertices[hull.triangles], 0, 1)
     vector = 0.5 * np.cross(b - a, c - a)
     area = np.linalg.norm(vector, axis=1)
     normal = vector / np.maximum(area, 1e-300)[:, None]
-    tried: list[np.ndarray] = []
-    for _ in range(FACES):
-        if area.max() <= 0:
-            break
+    below = np.where(normal[:, 2] < -np.cos(LEAN), area, 0.0)
+
+    def stance(down: np.ndarray) -> Stance:
+        level = normal @ down < -np.cos(LEVEL)
+        return Stance(down, tip_angle(hull, centre, down), float(area[level].sum()))
+
+    straight = stance(np.array([0.0, 0.0, -1.0]))
+    leaning = [stance(d) for d in _faces(normal, below, 0.01)]
+    upright = max([straight, *leaning], key=lambda s: s.tip)
+    any_way = [stance(d) for d in _faces(normal, area, LEVEL)]
+    return upright, max([upright, *any_way], key=lambda s: s.tip)
+
+
+def _faces(normal: np.ndarray, area: np.ndarray, alike: float) -> list[np.ndarray]:
+    """Return the normals of the largest faces, no two within ``alike`` [rad]."""
+    found: list[np.ndarray] = []
+    area = area.copy()
+    while len(found) < FACES and area.max() > 0:
         best = normal[np.argmax(area)]
-        alike = normal @ best > np.cos(0.1)
-        tried.append(best)
-        area = np.where(alike, 0.0, area)
-    return max(tried, key=lambda d: tip_angle(hull, centre, d))
+        found.append(best)
+        area[normal @ best > np.cos(alike)] = 0.0
+    return found

@@ -2,15 +2,22 @@
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
 from corporeal.errors import UserError
 from corporeal.settle.arrange import Arrangement, arrange
-from corporeal.settle.body import Body, Pose
-from corporeal.settle.certificate import Certificate, examine
-from corporeal.settle.mujoco import SettleConfig, settle
+from corporeal.settle.body import Body, Pose, unit_of
+from corporeal.settle.certificate import Certificate, Evidence, examine
+from corporeal.settle.mujoco import SettleConfig, Settled, settle
+
+STRAY = 0.75
+"""How far along the floor a body may end from where it started, of the scene's unit."""
+PILES: tuple[Arrangement, ...] = ("stack", "onto")
+"""Arrangements in which something is meant to lie on something else."""
+PILINGS = 3
+"""Attempts at that; then a pile that fell apart and came to rest is taken."""
 
 
 @dataclass(frozen=True)
@@ -47,33 +54,59 @@ def at_rest(
     if not bodies:
         raise UserError("There is nothing to settle. Give at least one body.")
     begun = time.perf_counter()
-    reason = ""
+    reasons: list[str] = []
+    first: tuple[list[Pose], Certificate] | None = None
+    wants_pile = arrangement in PILES and len(bodies) > 1
     for attempt in range(config.attempts):
         rng = np.random.default_rng([seed, attempt])
-        settled = settle(bodies, arrange(bodies, arrangement, rng), config.settle)
-        if not settled.quiet:
-            reason = f"it still moved after {settled.seconds:.0f} s"
-            continue
+        start = arrange(bodies, arrangement, rng)
+        settled = settle(bodies, start, config.settle)
+        evidence = None
+        reason = _lost(bodies, start, settled)
         poses = _around_origin(bodies, settled.poses)
-        evidence = examine(bodies, poses)
-        objections = evidence.objections(deepest)
-        if not objections:
-            certificate = Certificate(
-                drift_m=evidence.drift,
-                penetration_m=evidence.penetration,
-                extent_m=evidence.extent,
-                seed=seed,
-                attempts=attempt + 1,
-                seconds=time.perf_counter() - begun,
-                objects=len(bodies),
-                hover_m=evidence.hover,
-            )
-            return poses, certificate
-        reason = " and ".join(objections)
+        if not reason:
+            evidence = examine(bodies, poses, deepest)
+            reason = " and ".join(evidence.objections)
+        if reason or evidence is None:
+            reasons.append(reason)
+        else:
+            seconds = time.perf_counter() - begun
+            found = poses, _certificate(evidence, seed, attempt + 1, seconds)
+            if not wants_pile or evidence.lifted:
+                return found
+            first = first or found
+        if first and attempt + 1 >= PILINGS:
+            return first[0], replace(first[1], attempts=attempt + 1)
     names = ", ".join(b.name for b in bodies)
     raise UserError(
         f"{names}: no rest found as a {arrangement} in {config.attempts} attempts; in the last one "
-        f"{reason}. Try another seed, another arrangement or fewer objects."
+        f"{reasons[-1]}. Try another seed, another arrangement or fewer objects."
+    )
+
+
+def _lost(bodies: Sequence[Body], start: Sequence[Pose], settled: Settled) -> str:
+    """Say why bodies are not worth examining; "": they are."""
+    if not settled.quiet:
+        return f"something still moved after {settled.seconds:.0f} s"
+    far = STRAY * unit_of(bodies)
+    for body, before, after in zip(bodies, start, settled.poses, strict=True):
+        way = after.world(body.centre[None]) - before.world(body.centre[None])
+        if np.linalg.norm(way[0, :2]) > far:
+            return f"{body.name} rolled away"
+    return ""
+
+
+def _certificate(evidence: Evidence, seed: int, attempts: int, seconds: float) -> Certificate:
+    return Certificate(
+        drift_m=evidence.drift,
+        penetration_m=evidence.penetration,
+        extent_m=evidence.extent,
+        seed=seed,
+        attempts=attempts,
+        seconds=seconds,
+        objects=evidence.objects,
+        hover_m=evidence.hover,
+        lifted=evidence.lifted,
     )
 
 
