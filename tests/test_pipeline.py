@@ -38,14 +38,14 @@ def test_a_failed_run_says_why(tmp_path):
 def test_an_edited_annotation_makes_its_answers_stale(tmp_path):
     path = tmp_path / "said.yaml"
     path.write_text("a: steel")
-    before = pipeline._read_files(DescribeConfig(annotations=path))
+    before = pipeline.files_read(DescribeConfig(annotations=path))
     path.write_text("a: glass")
-    assert pipeline._read_files(DescribeConfig(annotations=path)) != before
+    assert pipeline.files_read(DescribeConfig(annotations=path)) != before
 
 
 def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do(tmp_path):
     def names(**config):
-        return pipeline._read_files(DescribeConfig(**config))
+        return pipeline.files_read(DescribeConfig(**config))
 
     (tmp_path / "one.json").write_text("{}")
     written, read = names(record=tmp_path), names(vlm=f"replay:{tmp_path}")
