@@ -1,6 +1,7 @@
 """Whatever lies in a folder, every file gets in or gets a reason, and none ends the work."""
 
 import json
+import os
 import random
 import time
 
@@ -89,17 +90,28 @@ def test_the_same_mesh_comes_in_once_unless_both_class_and_look_differ(tmp_path)
     put(tmp_path / "in" / "rubber ball", a=plain, b=dressed, c=glb(vertices * 1.01, triangles))
     put(tmp_path / "in" / "steel ball", d=plain + b"\0\0\0\0", e=dressed)
     pool = index([tmp_path / "in"], tmp_path / "pool")
-    assert [a.name for a in pool.assets] == ["a", "c", "e"]
-    assert reasons(pool) == {"b": "has the same mesh as a", "d": "has the same mesh as a"}
+    assert [a.name for a in pool.assets] == ["rubber_ball_a", "rubber_ball_c", "steel_ball_e"]
+    assert reasons(pool) == dict.fromkeys("bd", "has the same mesh as rubber_ball_a")
     put(tmp_path / "more" / "steel ball", f=plain)
     pool = index([tmp_path / "more"], tmp_path / "pool")
-    assert reasons(pool)["f"] == "has the same mesh as e", "what came earlier counts too"
+    assert reasons(pool)["f"] == "has the same mesh as steel_ball_e", "what came earlier counts too"
 
 
 def test_hostile_words_do_not_harm_the_index(tmp_path):
     put(tmp_path / "in", a=plain_ball(copyright="x\ud800\u0000y", extras={"license": "\udfff"}))
     (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
     assert (asset.attribution, asset.licence) == ("x? y", "?")
+
+
+def test_a_file_whose_name_is_no_text_gets_a_reason(tmp_path):
+    put(tmp_path / "in", good=plain_ball())
+    try:
+        (tmp_path / "in" / os.fsdecode(b"caf\xe9.glb")).write_bytes(plain_ball(0.2))
+    except OSError:
+        pytest.skip("this file system has names in UTF-8 only")
+    pool = index([tmp_path / "in"], tmp_path / "pool")
+    assert [a.name for a in pool.assets] == ["good"]
+    assert reasons(pool) == {"caf?": "its path is not plain text in UTF-8: rename it"}
 
 
 def test_a_pool_of_one_class_is_a_pool(tmp_path):

@@ -65,10 +65,29 @@ def test_the_class_is_the_tables_then_the_folders_then_the_files(tmp_path):
     table.write_text("file, class, licence, attribution, metric\nin/mug/x2.glb, Cup, MIT, Bo, no\n")
     pool = index([tmp_path / "in"], tmp_path / "pool", with_table(table))
     classes = {a.name: a.class_name for a in pool.assets}
-    assert classes == {"x1": "mug", "x2": "Cup", "tea_pot": "tea pot"}
-    assert pool.asset("x2").licence == "MIT" and pool.asset("x2").attribution == "Bo"
-    assert not pool.asset("x2").metric
-    assert pool.asset("x1").licence == "unknown" and pool.asset("x1").credit == ""
+    assert classes == {"mug_x1": "mug", "mug_x2": "Cup", "tea_pot": "tea pot"}
+    assert pool.asset("mug_x2").licence == "MIT" and pool.asset("mug_x2").attribution == "Bo"
+    assert not pool.asset("mug_x2").metric
+    assert pool.asset("mug_x1").licence == "unknown" and pool.asset("mug_x1").credit == ""
+
+
+def test_folders_that_say_nothing_are_passed_over_and_models_called_model_take_their_name(tmp_path):
+    save(tmp_path / "in" / "objects" / "Garden Chair" / "model.glb", plain_ball(0.5))
+    save(tmp_path / "in" / "Duck" / "glTF-Binary" / "Duck.glb", plain_ball(0.05))
+    pool = index([tmp_path / "in"], tmp_path / "pool")
+    classes = {a.name: a.class_name for a in pool.assets}
+    assert classes == {"Garden_Chair_model": "garden chair", "Duck": "duck"}
+
+
+def test_what_a_table_names_and_is_not_there_is_told(tmp_path):
+    save(tmp_path / "in" / "x.glb", plain_ball())
+    table = tmp_path / "said.csv"
+    table.write_text("file,class\nin/x.glb,ball\nin/y.glb,mug\n")
+    pool = index([tmp_path / "in"], tmp_path / "pool", with_table(table))
+    assert len(pool.assets) == 1
+    (told,) = pool.rejections
+    assert (told.source, told.class_name) == (str(tmp_path / "in" / "y.glb"), "mug")
+    assert told.reason == "there is no such file, though a table names it"
 
 
 def test_a_manifest_in_the_folder_or_above_it_is_picked_up(tmp_path):

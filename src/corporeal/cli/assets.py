@@ -91,7 +91,7 @@ def _list() -> None:
     pool = read_pool(asked.pool)
     if asked.rejected:
         rows = [
-            (Path(r.source).name, r.class_name, r.reason)
+            ("/".join(Path(r.source).parts[-2:]), r.class_name, r.reason)
             for r in pool.rejections
             if asked.class_name in ("", r.class_name)
         ]

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.formats.typical_extents import LARGEST, SMALLEST, doubt, typical_extent
-from corporeal.formats.words import safe
+from corporeal.formats.words import safe, writable
 from corporeal.pool.asset import UNKNOWN, Asset, Rejection
 from corporeal.pool.candidate import Candidate
 from corporeal.pool.verdict import MODELS, Verdict
@@ -48,7 +48,7 @@ class Admission:
         metric = is_metric(candidate, verdict.extent, words)
         reason = verdict.reason or self._why_not(verdict, words, bool(said.metric) and metric)
         if reason:
-            self.rejections.append(Rejection(str(candidate.file), words, reason))
+            self.rejections.append(Rejection(writable(str(candidate.file)), words, reason))
             return
         asset = Asset(
             name=self._name(candidate),

@@ -12,6 +12,11 @@ from corporeal.pool.table import Row, read_table
 
 MANIFEST = "manifest.csv"
 """Table that is picked up where it lies in an indexed folder or right above it."""
+CONTAINERS = frozenset(
+    "models objects assets files meshes scenes glbs original originals source binary embedded "
+    "draco".split()
+)
+"""Folders of these names say nothing about what lies in them."""
 
 
 @dataclass(frozen=True)
@@ -33,7 +38,8 @@ def candidates_in(
 
     Args:
         folders: Searched with all their folders below.
-        table: CSV of classes; what it says goes before a manifest.
+        table: CSV of classes; what it says goes before a manifest. What it names and is not there
+            is a candidate too, so that somebody hears of it.
         pool: A folder whose own copies are no candidates.
 
     Raises:
@@ -46,7 +52,10 @@ def candidates_in(
         rows = _manifest(folder) | said
         for file in models_below(folder, pool):
             row = rows.get(file.resolve()) or Row(class_name=_class_by_folder(file, folder))
-            found.setdefault(file.resolve(), Candidate(file, row))
+            found.setdefault(file.resolve(), Candidate(file, row, _name(file, folder)))
+    for path, row in said.items():
+        if not path.exists():
+            found.setdefault(path, Candidate(path, row))
     return [found[path] for path in sorted(found)]
 
 
@@ -79,5 +88,12 @@ def _manifest(folder: Path) -> dict[Path, Row]:
 
 
 def _class_by_folder(file: Path, folder: Path) -> str:
-    below = file.relative_to(folder).parts[:-1]
-    return everyday(below[0]) if below else ""
+    words = (everyday(part) for part in file.relative_to(folder).parts[:-1])
+    return next((w for w in words if w and w not in CONTAINERS), "")
+
+
+def _name(file: Path, folder: Path) -> str:
+    """Return what to call a model: its file, with the folder of one that is called model.glb."""
+    if everyday(file.stem) or file.parent == folder:
+        return file.stem
+    return f"{file.parent.name}_{file.stem}"

@@ -11,6 +11,7 @@ from pathlib import Path
 
 from corporeal import store
 from corporeal.errors import BadFileError, UserError
+from corporeal.formats.words import writable
 from corporeal.pool.admission import Admission, Member
 from corporeal.pool.asset import Asset, Pool, Rejection
 from corporeal.pool.candidate import Candidate
@@ -61,7 +62,7 @@ def index(
         verdicts = Verdicts(pool_folder, config.gate)
         admission = _reopened(pool_folder, asking)
         for k, candidate in enumerate(asking):
-            progress(k / len(asking), candidate.file.name)
+            progress(k / len(asking), writable(candidate.file.name))
             admission.ask(candidate, verdicts.of(candidate.file))
         progress(1.0, "")
         _write(pool_folder, admission)

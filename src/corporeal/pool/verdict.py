@@ -61,6 +61,10 @@ class Verdicts:
 
     def of(self, file: Path) -> Verdict:
         """Return what the gate says of a file; known content is not judged again."""
+        if writable(str(file)) != str(file):
+            return Verdict("", "its path is not plain text in UTF-8: rename it")
+        if not file.is_file():
+            return Verdict("", "there is no such file, though a table names it")
         try:
             key = content_key(file, self.gate)
         except OSError as problem:
