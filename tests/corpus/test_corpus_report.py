@@ -78,6 +78,7 @@ def a_corpus(folder, audits, failed=()):
         ]  # fmt: skip
         store.write_json(place / "composition.json",
                          {"what_happens": "it <falls>", "objects": objects})  # fmt: skip
+        store.finish(place, "k", {}, 2.0)
         rows["assemble"][scene.name] = Row("finished", 2.0, "", 1, "k")
         if isinstance(found, str):
             rows["run"][scene.name] = Row("failed", None, found, 2, "k")
@@ -167,6 +168,7 @@ def test_the_page_the_table_and_the_data_tell_of_every_scene(tmp_path):
     assert "the &lt;grid&gt; is too wide" in page and "<grid>" not in page
     assert "it &lt;falls&gt;" in page and "&#x27;s maker&lt;/b&gt;" in page
     assert "Objects sink up to 1.7 grid cells" in page
+    assert "4 assembled, 3 run, 1 failed." in page
     assert len(re.findall(r'src="data:image/jpeg', page)) == 3
     assert len(re.findall(r'src="data:image/svg', page)) == 4
     assert not re.findall(r'(?:src|href)="(?!data:)', page), "it must hold all that it shows"

@@ -45,6 +45,8 @@ class SceneRecord:
     """One scene: what was planned, and as far as it came, what was made and what happened."""
 
     planned: PlannedScene
+    made: bool
+    """Whether it is assembled."""
     assembled: Row | None
     ran: Row | None
     certificate: Mapping[str, Any] | None
@@ -105,6 +107,7 @@ def _record(
     said = None if audit is None else store.read_json(run / "run.json")["settings"]
     return SceneRecord(
         planned=planned,
+        made=(scene / store.META).exists(),
         assembled=assembled,
         ran=ran,
         certificate=_json(scene / "certificate.json"),

@@ -131,7 +131,7 @@ def _tiles(corpus: Collected) -> str:
 
 
 def _assembled(corpus: Collected) -> list[SceneRecord]:
-    return [s for s in corpus.scenes if s.assembled and s.assembled.status == "finished"]
+    return [s for s in corpus.scenes if s.made]
 
 
 def _failed(corpus: Collected) -> list[SceneRecord]:

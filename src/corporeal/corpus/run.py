@@ -26,10 +26,10 @@ SHARES: Mapping[str, tuple[float, float]] = {
     "describe": (0.01, 0.03),
     "segment": (0.03, 0.05),
     "ground": (0.05, 0.06),
-    "fill": (0.06, 0.12),
-    "simulate": (0.12, 0.8),
-    "film": (0.8, 0.97),
-    "report": (0.97, 1.0),
+    "fill": (0.06, 0.15),
+    "simulate": (0.15, 0.4),
+    "film": (0.4, 0.92),
+    "report": (0.92, 1.0),
 }
 """Where each verb begins and ends in the time of a run at draft detail, roughly."""
 
