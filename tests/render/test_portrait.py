@@ -64,3 +64,13 @@ def test_every_part_has_a_colour_with_a_name():
 def test_as_many_views_as_asked_for(count):
     assert len(portraits(scene(block(0, 0, (0, 0, 0))), [0], Portrait(count, 16))) == count
     assert Portrait(count, 16).words == f"{count} of 8 views, 16 px, seed 0"
+
+
+def test_the_bytes_by_which_answers_are_cached_do_not_depend_on_the_number_of_cores(monkeypatch):
+    thing = scene(block(0, 0, (0, 0, 0)), block(0, 1, (0.2, 0.3, 1), 0.4))
+    taken = []
+    for count in (1, 4):
+        for room in ("portrait", "embree"):
+            monkeypatch.setattr(f"corporeal.render.{room}.cores", lambda n=count: n)
+        taken.append(portraits(thing, [0, 1], Portrait(2, 256)))
+    assert all(np.array_equal(a, b) for a, b in zip(*taken, strict=True))

@@ -1,10 +1,12 @@
 """Pictures of one object for somebody who is to recognise it and say what it is made of."""
 
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
 
 import numpy as np
 
 from corporeal.geometry.arrangement import box_of, moved
+from corporeal.machine import cores
 from corporeal.render.camera import Aim, place
 from corporeal.render.embree import Light, Stage, identify, render
 from corporeal.types import Scene, Vector
@@ -72,12 +74,15 @@ def portraits(
     stage, box, parts = _alone(scene, part_of_surface)
     size = (portrait.size, portrait.size)
     cameras = [place(box[None, None], size, view, FILL) for view in _directions(portrait)]
-    pictures = [render(stage, camera, "draft") for camera in cameras]
+    # One thread a picture: the bands that several share would leave their number in the bytes, by
+    # which answers are cached.
+    with ThreadPoolExecutor(cores()) as pool:
+        pictures = list(pool.map(lambda camera: render(stage, camera, "draft", 1), cameras))
     if parts.max(initial=0) > 0:
         colours = np.array([COLOURS[c] for c in colour_of_part(1 + int(parts.max()))])
         painted = stage.painted(colours[parts].astype(np.float32), Light())
         pictures.append(
-            render(painted, max(cameras, key=lambda c: _shown(stage, c, parts)), "draft")
+            render(painted, max(cameras, key=lambda c: _shown(stage, c, parts)), "draft", 1)
         )
     return tuple(pictures)
 
