@@ -62,10 +62,12 @@ def test_the_class_is_the_tables_then_the_folders_then_the_files(tmp_path):
     save(tmp_path / "in" / "mug" / "x2.glb", plain_ball(0.051))
     save(tmp_path / "in" / "tea_pot.glb", plain_ball(0.1))
     table = tmp_path / "said.csv"
-    table.write_text("file, class, licence, attribution, metric\nin/mug/x2.glb, Cup, MIT, Bo, no\n")
+    table.write_text(
+        "file, class, licence, attribution, metric\nin/mug/x2.glb, Soda_Can, MIT, Bo, no\n"
+    )
     pool = index([tmp_path / "in"], tmp_path / "pool", with_table(table))
     classes = {a.name: a.class_name for a in pool.assets}
-    assert classes == {"mug_x1": "mug", "mug_x2": "Cup", "tea_pot": "tea pot"}
+    assert classes == {"mug_x1": "mug", "mug_x2": "soda can", "tea_pot": "tea pot"}
     assert pool.asset("mug_x2").licence == "MIT" and pool.asset("mug_x2").attribution == "Bo"
     assert not pool.asset("mug_x2").metric
     assert pool.asset("mug_x1").licence == "unknown" and pool.asset("mug_x1").credit == ""

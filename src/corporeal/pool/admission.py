@@ -44,7 +44,7 @@ class Admission:
     def ask(self, candidate: Candidate, verdict: Verdict) -> None:
         """Let a candidate in, or write down why not."""
         said = candidate.said
-        words = said.class_name or verdict.class_name or "object"
+        words = _in_words(said.class_name or verdict.class_name) or "object"
         metric = is_metric(candidate, verdict.extent, words)
         reason = verdict.reason or self._why_not(verdict, words, bool(said.metric) and metric)
         if reason:
@@ -90,6 +90,11 @@ class Admission:
         while name in self._names:
             name, k = f"{stem}_{k}", k + 1
         return name
+
+
+def _in_words(class_name: str) -> str:
+    """Return a class as one writes it, so that "Soda_Can" and "soda can" are one."""
+    return " ".join(writable(class_name).replace("_", " ").lower().split())
 
 
 def is_metric(candidate: Candidate, extent: float, words: str) -> bool:
