@@ -66,25 +66,31 @@ def run_corpus(folder: Path, config: RunConfig, settings: Settings, hands: Hands
             f"{len(planned) - len(there)} of {len(planned)} scenes are not assembled: left out."
         )
     with store.alone(folder):
-        jobs = [run_job(folder, plan, scene, settings) for scene in there]
+        configs = [getattr(settings, f.name) for f in fields(Settings)]
+        read = [name for config in configs for name in pipeline.files_read(config)]
+        jobs = [_job(folder, scene, _looking(plan, scene, settings), read) for scene in there]
         if not config.resume:
             _forget(jobs)
         return carry_out(folder, "run", jobs, hands)
 
 
-def run_job(folder: Path, plan: Plan, scene: PlannedScene, settings: Settings) -> Job:
-    """Say what is to be done for one scene."""
+def _looking(plan: Plan, scene: PlannedScene, settings: Settings) -> Settings:
+    """Let a scene of the showcase be seen from where it shows best."""
+    if plan.config.preset != "seven" or settings.film.view is not None:
+        return settings
+    return replace(settings, film=replace(settings.film, view=view(scene.name)))
+
+
+def _job(folder: Path, scene: PlannedScene, settings: Settings, read: Sequence[str]) -> Job:
+    """Say what is to be done for one scene; ``read`` names the files that settings point to."""
     path = folder / SCENES / scene.name
-    if plan.config.preset == "seven" and settings.film.view is None:
-        settings = replace(settings, film=replace(settings.film, view=view(scene.name)))
-    configs = {f.name: getattr(settings, f.name) for f in fields(Settings)}
-    read = [name for config in configs.values() for name in pipeline.files_read(config)]
     made = store.read_json(path / store.META)["key"]
+    said = replace(settings, describe=replace(settings.describe, record=None))
     return Job(
         name=scene.name,
         function=run_scene,
         folder=folder / RUNS / scene.name,
-        key=store.key("corpus run", configs, [made, *read]),
+        key=store.key("corpus run", said, [made, *read]),
         arguments={"scene": (path / SCENE).resolve(), "settings": settings},
         resumable=True,
     )
