@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 from fake_jobs import silent
 
+from corporeal import store
 from corporeal.corpus.assemble import Sources, assemble_corpus, assembly, ways
 from corporeal.corpus.carry_out import Hands
+from corporeal.corpus.jobs import Job
 from corporeal.corpus.local import local
 from corporeal.corpus.plan import CorpusConfig, plan
 from corporeal.corpus.report import report_corpus
-from corporeal.corpus.run import RunConfig, run_corpus
+from corporeal.corpus.run import RunConfig, forget, run_corpus, run_scene
 from corporeal.errors import UserError
 from corporeal.geometry.sizes import Sizing
 from corporeal.pipeline import Settings
@@ -125,3 +127,15 @@ def test_a_corpus_comes_out_of_a_pool_and_is_neither_made_nor_run_twice(tmp_path
     assert said == ["1 of 1 are done already."]
     page = report_corpus(tmp_path, silent)[0].read_text()
     assert page.count("data:image/jpeg") == 3, "a film, and views of what was not run"
+
+
+def test_beginning_anew_forgets_what_was_finished_and_begun(tmp_path):
+    run = tmp_path / "a"
+    for folder in (run, run / "7-fill", run / "8-simulate"):
+        store.finish(folder, "k", {}, 1.0)
+    (run / "8-simulate" / "checkpoint.npz").touch()
+    job = Job("a", run_scene, run, "k")
+    assert job.done
+    forget([job, Job("b", run_scene, tmp_path / "b", "k")])
+    assert not job.done and not (run / "8-simulate").exists()
+    assert not store.fresh(run / "7-fill", "k") and not (tmp_path / "b").exists()

@@ -70,7 +70,7 @@ def run_corpus(folder: Path, config: RunConfig, settings: Settings, hands: Hands
         read = [name for config in configs for name in pipeline.files_read(config)]
         jobs = [_job(folder, scene, _looking(plan, scene, settings), read) for scene in there]
         if not config.resume:
-            _forget(jobs)
+            forget(jobs)
         return carry_out(folder, "run", jobs, hands)
 
 
@@ -113,7 +113,8 @@ def _tell(progress: Progress) -> pipeline.Tell:
     return tell
 
 
-def _forget(jobs: Sequence[Job]) -> None:
+def forget(jobs: Sequence[Job]) -> None:
+    """Have every verb of these runs done again."""
     for job in jobs:
         if job.folder.exists():
             pipeline.forget_simulation(job.folder)
