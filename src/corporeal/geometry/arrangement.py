@@ -14,6 +14,8 @@ SAMPLES = 2000
 """Vertices of an object that are looked up in another."""
 TOUCH = 0.01
 """Share of them that may lie inside before the two are said to overlap."""
+DEPTH = 2e-3
+"""What rests on another may sink in so far, over the size of the smaller."""
 
 
 def box_of(surfaces: Sequence[Surface]) -> Float[np.ndarray, "2 3"]:
@@ -77,13 +79,20 @@ def intersecting(scene: Scene) -> list[tuple[int, int]]:
 
 
 def _inside(scene: Scene, a: int, b: int) -> bool:
-    """Tell whether vertices of ``a`` lie within ``b``, by the generalised winding number."""
+    """Tell whether vertices of ``a`` lie within ``b``, deeper than what merely touches."""
     points = np.concatenate([s.vertices for s in _surfaces(scene, a)])
     points = points[:: max(1, len(points) // SAMPLES)]
-    winding = np.zeros(len(points))
+    winding, depth = np.zeros(len(points)), np.full(len(points), np.inf)
     for s in _surfaces(scene, b):
         winding += np.asarray(igl.fast_winding_number(s.vertices, s.triangles, points), float)
-    return bool(np.mean(winding > 0.5) > TOUCH)
+    held = winding > 0.5
+    if held.mean() <= TOUCH:
+        return False
+    for s in _surfaces(scene, b):
+        squared = igl.point_mesh_squared_distance(points[held], s.vertices, s.triangles)[0]
+        depth[held] = np.minimum(depth[held], np.sqrt(squared))
+    sizes = [float(np.ptp(box_of(_surfaces(scene, k)), axis=0).max()) for k in (a, b)]
+    return bool(np.mean(held & (depth > DEPTH * min(sizes))) > TOUCH)
 
 
 def _surfaces(scene: Scene, k: int) -> list[Surface]:

@@ -8,7 +8,7 @@ large), and ``views/`` (posed pictures).
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Literal
+from typing import Literal, get_args
 
 import numpy as np
 
@@ -257,13 +257,24 @@ class _Settled:
 def _settled(
     things: Sequence[_Thing], kind: Kind | None, config: ComposeConfig, rng: np.random.Generator
 ) -> _Settled:
-    """Settle until what is to happen has room."""
+    """Settle until things rest and what is to happen has room.
+
+    Where nobody asked for an arrangement, another one is tried when one finds no rest.
+    """
     bodies = [t.body for t in things]
     deepest = 0.5 * max(t.extent for t in things) / FINEST
-    for _ in range(TRIES):
-        arrangement = _arrangement(config, kind, len(things), rng)
-        seed = int(rng.integers(2**31))
-        poses, certificate = at_rest(bodies, arrangement, seed, deepest)
+    ways = _arrangements(config, kind, len(things), rng)
+    reason = ""
+    for k in range(TRIES):
+        arrangement = ways[k % len(ways)]
+        try:
+            poses, certificate = at_rest(bodies, arrangement, int(rng.integers(2**31)), deepest)
+        except UserError as refusal:
+            reason = str(refusal)
+            ways.remove(arrangement)
+            if not ways:
+                break
+            continue
         if kind is None:
             return _Settled(poses, arrangement, None, certificate)
         boxes = np.array([_box(t.body, p) for t, p in zip(things, poses, strict=True)])
@@ -272,20 +283,22 @@ def _settled(
             return _Settled(poses, arrangement, action, certificate)
     names = ", ".join(t.name for t in things)
     raise UserError(
-        f"{names}: no room for a {kind} in {TRIES} compositions. Try another --seed, another "
+        reason
+        or f"{names}: no room for a {kind} in {TRIES} compositions. Try another --seed, another "
         "--interaction, or other things."
     )
 
 
-def _arrangement(
+def _arrangements(
     config: ComposeConfig, kind: Kind | None, count: int, rng: np.random.Generator
-) -> Arrangement:
+) -> list[Arrangement]:
+    """Return the ways in which things may stand, in an order of chance."""
     if config.arrangement != "auto":
-        return config.arrangement
+        return [config.arrangement]
     if count == 1:
-        return "scatter"
-    ways = STANDING[kind] if kind else ("scatter", "stack", "onto", "row")
-    return ways[rng.integers(len(ways))]
+        return ["scatter"]
+    ways: Sequence[Arrangement] = STANDING[kind] if kind else get_args(Arrangement)
+    return [ways[k] for k in rng.permutation(len(ways))]
 
 
 def _box(body: Body, pose: Pose) -> np.ndarray:
