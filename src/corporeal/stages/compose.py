@@ -19,7 +19,7 @@ from corporeal.formats.glb_merge import Member, merge
 from corporeal.formats.scene_file import SceneFile, write_scene_file
 from corporeal.formats.words import numbered
 from corporeal.geometry.sizes import Sizing, scene_extents
-from corporeal.pool.asset import Asset, Pool
+from corporeal.pool.asset import UNKNOWN, Asset, Pool
 from corporeal.pool.draw import counts, draw
 from corporeal.settle.arrange import Arrangement
 from corporeal.settle.body import Body, Pose
@@ -337,12 +337,12 @@ def _member(thing: _Thing, pose: Pose) -> Member:
         "asset": asset.name,
         "asset_sha256": asset.sha256,
         "source": asset.source,
-        "licence": asset.licence,
-        "attribution": asset.attribution,
         "real_extent_m": thing.real.extent,
         "scale": thing.extent / thing.real.extent,
         "sized_by": thing.real.by,
     }
+    known = {"licence": asset.licence, "attribution": asset.attribution}
+    extras |= {key: words for key, words in known.items() if words not in ("", UNKNOWN)}
     return Member(asset.file, thing.name, (x, y, z), pose.quaternion, scale, extras)
 
 
