@@ -11,7 +11,7 @@ from test_plan import pool
 
 from corporeal import store
 from corporeal.corpus.breakdown import breakdowns, credits, total
-from corporeal.corpus.collect import RIGID, collect, measures
+from corporeal.corpus.collect import RIGID, collect, hops, measures
 from corporeal.corpus.manifest import Row
 from corporeal.corpus.plan import CorpusConfig, plan, write_plan
 from corporeal.corpus.report import report_corpus
@@ -127,12 +127,20 @@ def test_what_an_interaction_promises_must_have_happened():
         "pairs": {"a_0|floor": {"first_contact_s": 0.0, "separated": None}},
     }
     for kind in ("fall", "fall-onto", "collision", "chain", "wind"):
-        assert not measures(quiet, kind)["seen"], kind
+        assert not measures(quiet, kind, ["a_0"])["seen"], kind
     for kind, seen in (("fall", True), ("fall-onto", True), ("collision", True), ("chain", False)):
-        assert measures(audit(), kind)["seen"] is seen, kind
+        assert measures(audit(), kind, ["a_0"])["seen"] is seen, kind
     swayed = audit()
     swayed["outcome"]["objects"]["b_0"]["deepest_squeeze_m"] = 2e-3
     assert measures(swayed, "wind")["seen"] and not measures(audit(), "wind")["seen"]
+
+
+def test_a_chain_is_one_only_when_what_was_struck_strikes_a_third():
+    assert hops([("a", "b"), ("b", "c")], ["a"]) == 2
+    assert hops([("b", "a"), ("c", "b"), ("d", "c")], ["a"]) == 3
+    assert hops([("a", "b"), ("c", "a")], ["a"]) == 1, "the first one struck both"
+    assert hops([("b", "c"), ("a", "b")], ["a"]) == 1, "those two met before anything reached them"
+    assert hops([], ["a"]) == hops([("a", "b")], []) == 0
 
 
 def test_the_showcase_is_judged_by_its_own_expectations():

@@ -1,6 +1,6 @@
 """Read what a corpus left on the disk: one record per scene, and one per simulated part."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -8,8 +8,9 @@ from typing import Any
 from corporeal import store
 from corporeal.corpus.manifest import Row, read_rows
 from corporeal.corpus.plan import Plan, PlannedScene, read_plan
-from corporeal.corpus.run import RUNS, SCENES, VIEWS
+from corporeal.corpus.run import RUNS, SCENE, SCENES, VIEWS
 from corporeal.errors import UserError
+from corporeal.formats.scene_file import read_scene_file
 from corporeal.materials import library
 from corporeal.mpm.audit import breaches
 from corporeal.render.colours import LAWS
@@ -112,7 +113,7 @@ def _record(
         ran=ran,
         certificate=_json(scene / "certificate.json"),
         composition=_json(scene / "composition.json"),
-        numbers=None if audit is None else measures(audit, planned.interaction),
+        numbers=None if audit is None else measures(audit, planned.interaction, _sent(scene)),
         parts=() if audit is None or said is None else _parts(planned.name, audit, said),
         picture=_picture(run / "strip.png", scene / VIEWS / "rgb"),
         settings=said,
@@ -126,6 +127,13 @@ def _picture(strip: Path, views: Path) -> Path | None:
     return found[len(found) // 2] if found else None
 
 
+def _sent(scene: Path) -> list[str]:
+    """Name what a scene file sends off."""
+    path = scene / SCENE
+    entries = read_scene_file(path).objects if path.exists() else ()
+    return [e.name for e in entries if e.name and e.velocity is not None]
+
+
 def _json(path: Path) -> Any:
     return store.read_json(path) if path.exists() else None
 
@@ -133,13 +141,21 @@ def _json(path: Path) -> Any:
 # ---------------------------------------------------------------- numbers of one scene
 
 
-def measures(audit: Mapping[str, Any], kind: Kind) -> Numbers:
+def measures(audit: Mapping[str, Any], kind: Kind, sent: Sequence[str] = ()) -> Numbers:
     """Condense an audit into the numbers that scenes are compared by.
 
-    ``clean``: no bound of the audit is broken; ``breaches``: sentences. ``impacts``: objects that
-    met each other or the floor after the first frame. ``met``, ``separated``: pairs of objects.
-    ``seen``: what the interaction promises happened; in the showcase, all that is expected of the
-    scene; ``expected``, ``expected_met``: how many. The rest is copied from the audit.
+    Args:
+        audit: Of a finished run.
+        kind: What was to happen.
+        sent: Objects that were sent off at the start.
+
+    Returns:
+        ``clean``: no bound of the audit is broken; ``breaches``: sentences. ``impacts``: objects
+        that met each other or the floor after the first frame. ``met``, ``separated``: pairs of
+        objects. ``seen``: what the interaction promises happened; in the showcase, all that is
+        expected of the scene; ``expected``, ``expected_met``: how many. The rest is copied from
+        the audit.
+
     """
     happened = audit["outcome"]
     things, pairs = happened["objects"], happened["pairs"]
@@ -161,7 +177,9 @@ def measures(audit: Mapping[str, Any], kind: Kind) -> Numbers:
         "impacts": len(happened["order"]) + len(landed),
         "met": len(met),
         "separated": sum(bool(p["separated"]) for p in met),
-        "seen": all(e["met"] for e in wanted) if wanted else _seen(kind, happened, len(landed)),
+        "seen": all(e["met"] for e in wanted)
+        if wanted
+        else _seen(kind, happened, len(landed), sent),
         "expected": len(wanted),
         "expected_met": sum(bool(e["met"]) for e in wanted),
         "largest_dent_dx": max((t["dent_depth_dx"] for t in things.values()), default=0.0),
@@ -190,21 +208,38 @@ COPIED = (
 )
 
 
-def _seen(kind: Kind, happened: Mapping[str, Any], landed: int) -> bool:
+def _seen(kind: Kind, happened: Mapping[str, Any], landed: int, sent: Sequence[str]) -> bool:
     """Tell whether what the interaction promises happened.
 
     fall: something came down on the floor or on another. fall-onto, collision: two objects met.
-    chain: a second pair met after the first. wind: something moved or gave way by a millimetre.
+    chain: what was struck struck a third. wind: something moved or gave way by a millimetre.
     """
-    met = len(happened["order"])
+    met = happened["order"]
     if kind == "fall":
-        return met + landed > 0
+        return len(met) + landed > 0
     if kind == "wind":
         moves = (
             max(t["moved_level_m"], t["deepest_squeeze_m"]) for t in happened["objects"].values()
         )
         return max(moves, default=0.0) > SWAY
-    return met > (kind == "chain")
+    return hops(met, sent) > 1 if kind == "chain" else len(met) > 0
+
+
+def hops(met: Sequence[Sequence[str]], sent: Sequence[str]) -> int:
+    """Count how far a blow was passed on: 1 for what was struck, 2 for what that struck.
+
+    Args:
+        met: Pairs of objects in the order in which they met.
+        sent: Objects that were moving at the start.
+
+    """
+    reached = dict.fromkeys(sent, 0)
+    for a, b in met:
+        for one, other in ((a, b), (b, a)):
+            if one in reached and other not in reached:
+                reached[other] = reached[one] + 1
+                break
+    return max(reached.values(), default=0)
 
 
 # ---------------------------------------------------------------- parts
