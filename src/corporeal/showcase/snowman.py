@@ -11,7 +11,7 @@ TWIG_SHARE = np.linspace(0, 1, 7)[:, None]
 def snowman() -> Model:
     """Model a snowman, 1.20 m tall."""
     snow = _balls()
-    bark = paint.bark(256, 3, "#3b2a1e", "#6b4c35", "#8f6e52")
+    bark = paint.bark(512, 3, "#3b2a1e", "#6b4c35", "#8f6e52")
     return Model(
         "snowman",
         (
