@@ -1,0 +1,179 @@
+"""Posed photographs of any kind: what a folder holds tells how they are read."""
+
+from dataclasses import dataclass
+from functools import partial
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float, UInt8
+
+from corporeal.errors import BadFileError
+from corporeal.formats.colmap import ColmapModel, is_colmap, read_colmap
+from corporeal.formats.projections import check_focal, parted, projections_in, read_projection
+from corporeal.formats.resources import beside
+from corporeal.formats.shots import Shot, develop
+from corporeal.formats.transforms_frame import FILE, Frame, frames_of
+from corporeal.geometry.lens import Lens
+from corporeal.types import Views
+
+TRANSFORMS = (FILE, "transforms_train.json")
+MODELS = (
+    "",
+    "sparse/0",
+    "sparse",
+    "colmap/sparse/0",
+    "model",
+    "dense/sparse",
+    "undistorted/sparse",
+)
+IMAGES = ("images", "", "input", "rgb", "images_2", "images_4", "images_8")
+SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".webp", ".PNG", ".JPG", ".JPEG")
+MASKS = ("masks", "mask")
+LONGEST = 1024
+"""Of a picture's sides, unless more is asked for [px]."""
+KINDS = "Name a folder with transforms.json, a COLMAP model, or 3 × 4 projection matrices."
+
+
+@dataclass(frozen=True)
+class Photographs:
+    """Posed pictures, and what else the file says of the scene."""
+
+    views: Views
+    """Where there is a mask, all outside it is white."""
+    names: tuple[str, ...]
+    """Of the pictures, as the file has them."""
+    z_up: bool
+    """Whether the file's kind says that the world's +z is up."""
+    masks: UInt8[np.ndarray, "V H W"] | None = None
+    """Share of each pixel that belongs to the objects, 255: all; None: nobody says."""
+    points: Float[np.ndarray, "N 3"] | None = None
+    """Sparse points of the scene, where the file holds some, in the unit of the poses."""
+    colours: UInt8[np.ndarray, "N 3"] | None = None
+    """Of the points, sRGB."""
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know about the input, in sentences."""
+
+
+def read_photographs(path: Path, longest: int = LONGEST) -> Photographs:
+    """Read a folder of posed photographs, or the ``transforms.json`` of one.
+
+    All come out at one size, the most frequent one, at most ``longest`` pixels long, with lenses
+    straightened. A minority of pictures that are missing or broken is left out and named.
+
+    Raises:
+        BadFileError: There are no poses, a pose or camera is bad, or too few pictures can be used.
+
+    """
+    path = Path(path)
+    if path.is_file():
+        return _of_transforms(path, longest)
+    file = next((path / name for name in TRANSFORMS if (path / name).is_file()), None)
+    if file is not None:
+        return _of_transforms(file, longest)
+    model = next((path / name for name in MODELS if is_colmap(path / name)), None)
+    if model is not None:
+        return _of_colmap(path, model, longest)
+    pairs = projections_in(path) if path.is_dir() else []
+    if pairs:
+        return _of_projections(path, pairs, longest)
+    raise BadFileError(path, "holds no photographs with poses.", KINDS)
+
+
+def _developed(
+    source: Path, shots: list[Shot], longest: int, z_up: bool, model: ColmapModel | None = None
+) -> Photographs:
+    done = develop(source, shots, longest)
+    seen = model if model is not None and len(model.points) else None
+    return Photographs(
+        views=Views(rgb=done.rgb, cameras=done.cameras),
+        names=done.names,
+        z_up=z_up,
+        masks=done.masks,
+        points=seen.points if seen else None,
+        colours=seen.colours if seen else None,
+        warnings=done.warnings,
+    )
+
+
+# ---------------------------------------------------------------- transforms.json
+
+
+def _of_transforms(path: Path, longest: int) -> Photographs:
+    shots = [_shot(frame) for frame in frames_of(path)]
+    return _developed(path, shots, longest, z_up=True)
+
+
+def _shot(frame: Frame) -> Shot:
+    name, folder = frame.text("file_path"), frame.path.parent
+    picture = _found(folder, name)
+    mask = None
+    if frame.value.get("mask_path") is not None:
+        mask = _found(folder, frame.text("mask_path"))
+        if mask is None:
+            frame.fail(f"its mask {frame.text('mask_path')[:60]!r} is not there.", "Correct it.")
+    frame.lens(1, 1)  # refuse a bad lens even where the picture is bad too
+    mask = mask or _mask(picture, folder)
+    return Shot(name, picture, frame.lens, frame.pose(), mask)
+
+
+def _found(folder: Path, name: str) -> Path | None:
+    """Return a picture in or below the folder; the suffix of its name may be missing."""
+    return next((p for s in SUFFIXES if (p := beside(folder, name + s)) is not None), None)
+
+
+def _mask(picture: Path | None, folder: Path) -> Path | None:
+    """Return the mask of a picture: in ``masks`` beside it, above it, or in the whole's folder."""
+    if picture is None:
+        return None
+    for base in dict.fromkeys((picture.parent, picture.parent.parent, folder)):
+        for name in MASKS:
+            for file in (picture.name, picture.stem, f"{picture.name}.png"):
+                found = _found(base / name, file) if (base / name).is_dir() else None
+                if found is not None and found != picture:
+                    return found
+    return None
+
+
+# ---------------------------------------------------------------- COLMAP
+
+
+def _of_colmap(folder: Path, place: Path, longest: int) -> Photographs:
+    model = read_colmap(place)
+    root = _images_folder(folder, model)
+    shots = []
+    for image in model.images:
+        picture = beside(root, image.name)
+        lens = partial(_as_stated, model.lens(image))
+        mask = _mask(picture, folder)
+        shots.append(Shot(image.name, picture, lens, image.world_from_camera, mask))
+    shots.sort(key=lambda shot: shot.name)
+    return _developed(folder, shots, longest, False, model)
+
+
+def _images_folder(folder: Path, model: ColmapModel) -> Path:
+    """Return the folder that holds most of the model's images."""
+    bases = [folder, model.folder, model.folder.parent, model.folder.parent.parent]
+    places = [base / name for base in bases for name in IMAGES if (base / name).is_dir()]
+    names = [image.name for image in model.images]
+    return max(places, key=lambda p: sum(beside(p, name) is not None for name in names))
+
+
+def _as_stated(lens: Lens, width: int, height: int) -> Lens:
+    return lens
+
+
+# ---------------------------------------------------------------- projection matrices
+
+
+def _of_projections(folder: Path, pairs: list[tuple[Path, Path]], longest: int) -> Photographs:
+    shots = []
+    for picture, file in pairs:
+        K, pose = parted(file, read_projection(file))
+        mask = _mask(picture, folder)
+        shots.append(Shot(picture.name, picture, partial(_pinhole, file, K), pose, mask))
+    return _developed(folder, shots, longest, z_up=False)
+
+
+def _pinhole(path: Path, K: np.ndarray, width: int, height: int) -> Lens:
+    check_focal(path, K, width, height)
+    return Lens(K, width, height)

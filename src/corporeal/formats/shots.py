@@ -1,0 +1,251 @@
+"""Photographs developed: read, straightened and brought to one size, with the cameras that took it.
+
+A few bad ones among many are left out and named.
+"""
+
+from collections import Counter
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image
+
+from corporeal.errors import BadFileError
+from corporeal.formats.images import FORMATS, MAX_PIXELS, decode_image
+from corporeal.geometry.lens import Lens, straightened
+from corporeal.types import Camera
+
+FEWEST = 3
+"""Pictures: two show no more than one depth per pixel, and nothing checks it."""
+MOST_BAD = 0.5
+"""Share of pictures that may be unusable."""
+LARGEST_FILE = 2**28
+"""Of one picture [bytes]."""
+LARGEST = 2**28
+"""Pixels of all pictures together."""
+NAMED = 5
+"""So many bad pictures are named."""
+PROPORTION = 0.01
+"""Pictures may differ that much in proportion from what the camera was said to take."""
+
+
+@dataclass(frozen=True)
+class Shot:
+    """One photograph as a file of poses has it."""
+
+    name: str
+    picture: Path | None
+    """None: it is not there."""
+    lens: Callable[[int, int], Lens]
+    """Its lens, told the picture's width and height, for files that don't state them."""
+    world_from_camera: np.ndarray
+    """(4, 4), the camera's axes as OpenCV has them."""
+    mask: Path | None = None
+    """A picture that is white where the objects are; None: the photograph's own alpha, if any."""
+
+
+@dataclass(frozen=True)
+class Developed:
+    """Photographs ready to use."""
+
+    rgb: UInt8[np.ndarray, "V H W 3"]
+    cameras: tuple[Camera, ...]
+    masks: UInt8[np.ndarray, "V H W"] | None
+    """Share of each pixel that belongs to the objects, 255: all; None: nobody says."""
+    names: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+class _UnusableError(Exception):
+    """Why one photograph cannot be used, in a clause."""
+
+
+@dataclass(frozen=True)
+class _Print:
+    """One photograph in its final size."""
+
+    name: str
+    rgba: np.ndarray
+    masked: bool
+    camera: Camera
+    straightened: bool
+
+
+def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
+    """Read all photographs.
+
+    Args:
+        source: The file or folder to name in errors.
+        shots: What to read.
+        longest: Larger pictures are reduced until their longer side has that many pixels.
+
+    Raises:
+        BadFileError: Fewer than three can be used, or most cannot, or all are too large together.
+
+    """
+    bad: dict[str, str] = {}
+    sizes = [_size(shot, bad) for shot in shots]
+    known = [size for size in sizes if size is not None]
+    counts = Counter(_reduced(*size, longest) for size in known)
+    size = min(counts, key=lambda s: (-counts[s], s)) if counts else (1, 1)
+    if len(known) * size[0] * size[1] > LARGEST:
+        what = f"{len(known)} pictures of {size[0]} × {size[1]} pixels do not fit into memory."
+        raise BadFileError(source, what, "Take fewer, or reduce them.")
+    prints = []
+    for shot, found in zip(shots, sizes, strict=True):
+        if found is not None:
+            try:
+                prints.append(_printed(shot, size))
+            except _UnusableError as problem:
+                bad[shot.name] = str(problem)
+    prints = _masked_alike(prints, bad)
+    _refuse_most(source, len(shots), bad)
+    warnings = [*_left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
+    return _developed(prints, tuple(warnings))
+
+
+def _developed(prints: list[_Print], warnings: tuple[str, ...]) -> Developed:
+    rgba = np.stack([p.rgba for p in prints])
+    masked = bool(prints[0].masked and (rgba[..., 3] < 255).any())
+    return Developed(
+        rgb=np.ascontiguousarray(rgba[..., :3]),
+        cameras=tuple(p.camera for p in prints),
+        masks=np.ascontiguousarray(rgba[..., 3]) if masked else None,
+        names=tuple(p.name for p in prints),
+        warnings=warnings,
+    )
+
+
+# ---------------------------------------------------------------- one photograph
+
+
+def _size(shot: Shot, bad: dict[str, str]) -> tuple[int, int] | None:
+    """Return width and height without unpacking; None where it is bad."""
+    if shot.picture is None:
+        bad[shot.name] = "is not there"
+        return None
+    try:
+        with Image.open(shot.picture, formats=FORMATS) as picture:
+            width, height = picture.size
+    except Exception:  # Pillow's decoders raise almost anything on broken input
+        bad[shot.name] = "is no PNG, JPEG or WebP picture"
+        return None
+    if width * height > MAX_PIXELS or not width or not height:
+        bad[shot.name] = f"claims {width} × {height} pixels"
+        return None
+    return width, height
+
+
+def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
+    picture = _decoded(shot.picture)
+    height, width = picture.shape[:2]
+    lens = shot.lens(width, height)
+    if abs(width * lens.height / (height * lens.width) - 1) > PROPORTION:
+        stated = f"{lens.width} × {lens.height}"
+        raise _UnusableError(f"has {width} × {height} pixels, but its camera takes {stated}")
+    masked = shot.mask is not None or picture.shape[2] == 4
+    alpha = _alpha(shot, picture)
+    small = np.dstack([_resized(_on_white(picture[..., :3], alpha), size), _resized(alpha, size)])
+    lens = lens.resized(*size)
+    try:
+        straight, K = straightened(small, lens)
+    except ValueError as problem:
+        raise _UnusableError(f"cannot be straightened: {problem}") from None
+    camera = Camera(K, shot.world_from_camera, *size)
+    return _Print(shot.name, straight, masked, camera, not lens.straight)
+
+
+def _decoded(path: Path | None) -> np.ndarray:
+    assert path is not None
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise _UnusableError(f"is larger than {LARGEST_FILE >> 20} MiB")
+        return decode_image(path.read_bytes(), side=2**20)
+    except OSError as problem:
+        raise _UnusableError(f"cannot be read ({problem.strerror})") from None
+    except ValueError as problem:
+        raise _UnusableError(str(problem).removeprefix("the picture ")) from None
+
+
+def _alpha(shot: Shot, picture: np.ndarray) -> np.ndarray:
+    """Return what of a photograph belongs to the objects (H, W): its mask, else its alpha."""
+    if shot.mask is None:
+        return picture[..., 3] if picture.shape[2] == 4 else np.full(picture.shape[:2], 255, "u1")
+    try:
+        mask = _decoded(shot.mask)[..., 0]
+    except _UnusableError as problem:
+        raise _UnusableError(f"has a mask that {problem}") from None
+    return mask if mask.shape == picture.shape[:2] else _resized(mask, picture.shape[1::-1])
+
+
+def _on_white(rgb: np.ndarray, alpha: np.ndarray) -> np.ndarray:
+    if alpha.min() == 255:
+        return rgb
+    share = alpha[..., None] / np.float32(255)
+    return np.round(rgb * share + 255 * (1 - share)).astype(np.uint8)
+
+
+def _resized(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    if picture.shape[1::-1] == size:
+        return picture
+    return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.LANCZOS))
+
+
+def _reduced(width: int, height: int, longest: int) -> tuple[int, int]:
+    share = min(1.0, longest / max(width, height))
+    return max(1, round(width * share)), max(1, round(height * share))
+
+
+# ---------------------------------------------------------------- all of them
+
+
+def _masked_alike(prints: list[_Print], bad: dict[str, str]) -> list[_Print]:
+    """Leave out the few without a mask where others have one, or ignore that there are none."""
+    masked = [p for p in prints if p.masked]
+    if not masked or len(masked) == len(prints):
+        return prints
+    bad |= {p.name: "has no mask, but others have one" for p in prints if not p.masked}
+    return masked
+
+
+def _refuse_most(source: Path, total: int, bad: dict[str, str]) -> None:
+    good = total - len(bad)
+    if len(bad) > MOST_BAD * total:
+        what = f"{len(bad)} of {total} pictures cannot be used: {_listed(bad)}."
+        raise BadFileError(source, what, "Put them where the file says, or correct the file.")
+    if good < FEWEST:
+        what = f"{good} of {total} pictures can be used, but at least {FEWEST} are needed."
+        step = "Photograph the scene from all sides: 20 to 50 pictures are good."
+        raise BadFileError(source, what, step)
+
+
+def _left_out(total: int, bad: dict[str, str]) -> list[str]:
+    return [f"{len(bad)} of {total} pictures were left out: {_listed(bad)}."] * bool(bad)
+
+
+def _listed(bad: dict[str, str]) -> str:
+    names = [f"{name[-60:]} {why}" for name, why in list(bad.items())[:NAMED]]
+    more = len(bad) - len(names)
+    return "; ".join(names) + (f"; and {more} more" if more else "")
+
+
+def _changes(
+    prints: list[_Print], sizes: Counter[tuple[int, int]], size: tuple[int, int]
+) -> list[str]:
+    """Return what was done to the pictures, in sentences."""
+    changes = []
+    if len(sizes) > 1:
+        kinds = ", ".join(f"{n} of {w} × {h}" for (w, h), n in sizes.most_common(NAMED))
+        changes.append(f"Pictures of several sizes ({kinds}) were brought to {_sized(size)}.")
+    elif size not in sizes:
+        changes.append(f"Pictures were reduced to {_sized(size)}.")
+    bent = sum(p.straightened for p in prints)
+    if bent:
+        changes.append(f"{bent} pictures were straightened: their lenses bend straight lines.")
+    return changes
+
+
+def _sized(size: tuple[int, int]) -> str:
+    return f"{size[0]} × {size[1]} pixels, and their cameras with them"
