@@ -1,0 +1,67 @@
+"""How near pictures of Gaussians come to photographs that they were not learned from."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from corporeal.splats.crew import Crew
+from corporeal.splats.kernels_learn import similarity
+from corporeal.splats.parameters import parameters
+from corporeal.splats.raster import BLACK, draw, picture_of, pinhole
+from corporeal.types import Gaussians, Vector, Views
+
+Rgb = Float[np.ndarray, "H W 3"]
+
+
+@dataclass(frozen=True)
+class Quality:
+    """Means over the views looked at."""
+
+    psnr: float
+    """Whole pictures [dB]."""
+    psnr_things: float | None
+    """Only pixels on things [dB]; None without masks."""
+    ssim: float
+    """Of whole pictures."""
+    views: tuple[int, ...]
+    """Which."""
+
+
+def quality(
+    gaussians: Gaussians,
+    views: Views,
+    which: Sequence[int],
+    masks: Bool[np.ndarray, "V H W"] | None = None,
+    background: Vector = BLACK,
+) -> Quality:
+    """Compare pictures with views. With masks, what is beside things is the background in both."""
+    theta, rows = parameters(gaussians), []
+    with Crew() as crew:
+        for k in which:
+            made = draw(theta, pinhole(views.cameras[k]), np.array(background), crew)
+            rgb, real = np.clip(picture_of(made).rgb, 0, 1), views.rgb[k] / np.float32(255)
+            if masks is not None:
+                real = np.where(masks[k][..., None], real, np.array(background, np.float32))
+            on = [psnr(rgb[masks[k]], real[masks[k]])] if masks is not None else []
+            rows.append([psnr(rgb, real), ssim(rgb, real), *on])
+    whole, alike, *on = (float(x) for x in np.nanmean(rows, axis=0))
+    return Quality(whole, on[0] if on else None, alike, tuple(which))
+
+
+def psnr(a: np.ndarray, b: np.ndarray) -> float:
+    """Return the peak signal-to-noise ratio [dB] of values in [0, 1]; nan of none."""
+    if a.size == 0:
+        return float("nan")
+    error = np.mean((a.astype(np.float64) - b) ** 2)
+    return float(-10 * np.log10(max(error, 1e-12)))
+
+
+def ssim(a: Rgb, b: Rgb) -> float:
+    """Return the structural similarity (Wang et al. 2004), mean over pixels and channels."""
+    total, slope = 0.0, np.empty(a.shape[:2], np.float32)
+    for q in range(3):
+        x, y = (np.ascontiguousarray(p[..., q], dtype=np.float32) for p in (a, b))
+        total += similarity(x, y, 0, len(x), np.float32(0), slope)
+    return total / a.size

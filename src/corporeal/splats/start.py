@@ -1,0 +1,175 @@
+"""Where Gaussians start: on given points, on the visual hull, or where pictures agree."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import binary_erosion
+from scipy.spatial import KDTree
+
+from corporeal.errors import UserError
+from corporeal.geometry.harmonics import DC
+from corporeal.splats.crew import Crew
+from corporeal.splats.kernels_learn import witness
+from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE, Parameters
+from corporeal.types import Camera, Vector, Views
+
+CELLS = 2_000_000
+"""Of the grid that the visual hull is carved from."""
+ASTRAY = 0.05
+"""Share of the views that may see a point of the hull beside things: masks err at edges."""
+RIVALS = 8
+"""Points at random of which the one that pictures agree on most is kept."""
+REACH = 12.0
+"""How far a background goes, in radii of the region that the cameras look at."""
+
+
+@dataclass(frozen=True)
+class Points:
+    """Coloured points to start from."""
+
+    position: Float[np.ndarray, "N 3"]
+    """[m]"""
+    colour: Float[np.ndarray, "N 3"]
+    """sRGB in [0, 1]."""
+    opacity: float = 0.5
+    """Of the Gaussians that begin there."""
+
+
+@dataclass(frozen=True)
+class Region:
+    """The ball that the cameras look at."""
+
+    centre: Vector
+    radius: float
+    """[m]"""
+
+
+def region(cameras: tuple[Camera, ...]) -> Region:
+    """Return the ball about the point nearest to all optical axes.
+
+    Its radius is the largest that fits into the pictures of half of the cameras.
+    """
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
+    axes = np.stack([c.world_from_camera[:3, 2] for c in cameras])
+    across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
+    # Where axes hardly cross, a weak pull keeps the point near the cameras.
+    weak = 1e-3 * len(cameras) * np.eye(3)
+    wanted = (across @ eyes[:, :, None]).sum(axis=0)[:, 0] + weak @ eyes.mean(axis=0)
+    centre = np.linalg.solve(across.sum(axis=0) + weak, wanted)
+    sines = [np.sin(np.arctan(min(c.width / c.K[0, 0], c.height / c.K[1, 1]) / 2)) for c in cameras]
+    radius = float(np.median(np.linalg.norm(eyes - centre, axis=1) * sines))
+    return Region((float(centre[0]), float(centre[1]), float(centre[2])), radius)
+
+
+def hull(
+    views: Views, masks: Bool[np.ndarray, "V H W"], count: int, rng: np.random.Generator, crew: Crew
+) -> Points:
+    """Return points on the visual hull: the surface of what all masks allow.
+
+    Raises:
+        UserError: Nothing is inside all masks.
+
+    """
+    around = region(views.cameras)
+    middle, reach = np.array(around.centre), 1.5 * around.radius
+    rough = _carved(middle - reach, middle + reach, views, masks, crew)
+    found = rough.cells[rough.inside]
+    low, high = found.min(axis=0) - 2 * rough.side, found.max(axis=0) + 2 * rough.side
+    fine = _carved(low, high, views, masks, crew)
+    shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
+    chosen = shell[rng.choice(len(shell), count, replace=len(shell) < count)]
+    position = chosen + fine.side * rng.uniform(-0.5, 0.5, chosen.shape)
+    seen = _witnessed(position, views, masks, crew)
+    return Points(position, seen[:, 2:5] / np.maximum(seen[:, :1], 1))
+
+
+def agreed(views: Views, count: int, rng: np.random.Generator, crew: Crew) -> Points:
+    """Return points at random where pictures agree on a colour, near and far.
+
+    Half of them are in the ball that the cameras look at, half around it, ever sparser.
+
+    Raises:
+        UserError: The cameras see no common place.
+
+    """
+    around = region(views.cameras)
+    tries = 2 * RIVALS * count
+    near = rng.random(tries) < 0.5
+    distance = np.where(near, np.cbrt(rng.random(tries)), REACH ** rng.random(tries))
+    direction = rng.normal(size=(tries, 3))
+    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
+    position = np.array(around.centre) + around.radius * distance[:, None] * direction
+    seen = _witnessed(position, views, np.zeros((0, 1, 1), bool), crew)
+    common = seen[:, 0] >= min(3, len(views.cameras))
+    position, seen = position[common], seen[common]
+    count = min(count, len(position) // RIVALS)
+    if count == 0:
+        raise UserError("The cameras see no common place. Check the convention of their poses.")
+    mean = seen[:, 2:5] / seen[:, :1]
+    spread = (seen[:, 5:8] / seen[:, :1] - mean**2).sum(axis=1)
+    groups = rng.permutation(len(position))[: RIVALS * count].reshape(count, RIVALS)
+    best = groups[np.arange(count), spread[groups].argmin(axis=1)]
+    return Points(position[best], mean[best], opacity=0.1)
+
+
+def seeded(points: Points, count: int, degree: int, rng: np.random.Generator) -> Parameters:
+    """Return round Gaussians on some of the points, as wide as these are apart."""
+    if len(points.position) > count:
+        chosen = rng.choice(len(points.position), count, replace=False)
+        points = Points(points.position[chosen], points.colour[chosen], points.opacity)
+    n = len(points.position)
+    theta = np.zeros((n, COLOUR + 3 * (degree + 1) ** 2), np.float32)
+    theta[:, MEAN:ROTATION] = points.position
+    theta[:, ROTATION:SCALE] = rng.normal(size=(n, 4))
+    theta[:, ROTATION:SCALE] /= np.linalg.norm(theta[:, ROTATION:SCALE], axis=1, keepdims=True)
+    near, _ = KDTree(points.position).query(points.position, k=min(4, n))
+    apart = np.atleast_2d(near.T).T[:, 1:].mean(axis=1) if n > 1 else np.ones(1)
+    middle = float(np.median(apart)) or 1.0
+    theta[:, SCALE:OPACITY] = np.log(np.clip(apart, 0.1 * middle, 10 * middle))[:, None]
+    theta[:, OPACITY] = np.log(points.opacity / (1 - points.opacity))
+    theta[:, COLOUR : COLOUR + 3] = (points.colour - 0.5) / DC
+    return theta
+
+
+@dataclass(frozen=True)
+class _Carved:
+    """Cubes that fill a box, and which of them are inside all masks."""
+
+    cells: Float[np.ndarray, "X Y Z 3"]
+    """Their middles [m]."""
+    side: float
+    """[m]"""
+    inside: Bool[np.ndarray, "X Y Z"]
+
+
+def _carved(
+    low: np.ndarray, high: np.ndarray, views: Views, masks: np.ndarray, crew: Crew
+) -> _Carved:
+    """Carve a box: what is left is on things in all views that see it, but for a few."""
+    side = float(np.cbrt(np.prod(high - low) / CELLS))
+    axes = [np.arange(a + side / 2, b, side) for a, b in zip(low, high, strict=True)]
+    cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    seen = _witnessed(cells.reshape(-1, 3), views, masks, crew)
+    count = len(views.cameras)
+    inside = (seen[:, 1] <= ASTRAY * count) & (seen[:, 0] >= max(1, count / 4))
+    if not inside.any():
+        raise UserError(
+            "No place in space is inside all masks. Check that cameras, pictures and masks "
+            "belong together, and the convention of the camera poses."
+        )
+    return _Carved(cells, side, inside.reshape(cells.shape[:3]))
+
+
+def _witnessed(points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew) -> np.ndarray:
+    cameras = np.empty((len(views.cameras), 16))
+    for row, camera in zip(cameras, views.cameras, strict=True):
+        row[:12] = np.linalg.inv(camera.world_from_camera)[:3].ravel()
+        K = camera.K
+        row[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    out = np.empty((len(points), 8))
+    patience = ASTRAY * len(cameras)
+    rest = cameras, views.rgb, masks, patience, out
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    crew.each(witness, [(points, *span, *rest) for span in crew.spans(len(points))])
+    return out

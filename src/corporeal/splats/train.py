@@ -1,0 +1,321 @@
+"""Gaussians from posed pictures.
+
+Adam on the loss of ``loss``, one view a step, with random backgrounds where masks say what belongs
+to the things; the first steps look at pictures of half the size. Everything left to chance comes
+from the seed and the number of the step, so that a training that was cut off goes on as if it had
+not been.
+"""
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool, Float32, UInt8
+
+from corporeal.errors import UserError
+from corporeal.splats import growth, saved
+from corporeal.splats.crew import Crew
+from corporeal.splats.kernels_learn import adam
+from corporeal.splats.kernels_project import Pinhole
+from corporeal.splats.loss import goal, loss
+from corporeal.splats.parameters import (
+    COLOUR,
+    MEAN,
+    OPACITY,
+    ROTATION,
+    SCALE,
+    Parameters,
+    gaussians_of,
+    opacity,
+)
+from corporeal.splats.quality import Quality, quality
+from corporeal.splats.raster import back, draw, pinhole
+from corporeal.splats.start import Points, agreed, hull, region, seeded
+from corporeal.types import Gaussians, Vector, Views
+
+Progress = Callable[[float, str], None]
+Masks = Bool[np.ndarray, "V H W"]
+
+RATES = {MEAN: 3e-4, ROTATION: 2e-3, SCALE: 8e-3, OPACITY: 0.05, COLOUR: 0.012, COLOUR + 3: 2e-3}
+"""Adam's, from each column on; of means in radii of what the cameras look at."""
+FALL = {MEAN: 0.02, SCALE: 0.15, COLOUR: 0.15}
+"""What is left of them at the end."""
+COARSE = 0.4
+"""Share of the steps that look at pictures of half the size."""
+COARSE_COST = 0.4
+"""Time that such a step takes, in steps."""
+SMALLEST = 64
+"""Narrower pictures are not halved [px]."""
+PULL = 0.01
+"""On opacities and scales, so that what nobody needs fades (Kheradmand et al. 2024)."""
+ROUND = 50
+"""Steps between rounds of growth."""
+SETTLED = (100, 0.8)
+"""Growth begins after so many steps, and ends after this share of them."""
+STIR = 1e3
+"""Reach of the random steps that faint ones take [standard deviations], per rate of the means."""
+EVERY = 15.0
+"""Seconds between checkpoints."""
+GREY: Vector = (0.5, 0.5, 0.5)
+"""Behind things when pictures are compared."""
+
+
+@dataclass(frozen=True)
+class Preset:
+    """How much work."""
+
+    gaussians: int
+    degree: int
+    """Of the harmonics."""
+    steps: int
+    longest: int
+    """Larger pictures are shrunk by a whole number until no side is longer [px]."""
+
+
+PRESETS = {"draft": Preset(20_000, 1, 700, 256), "normal": Preset(30_000, 2, 2500, 512)}
+
+
+@dataclass(frozen=True)
+class TrainConfig:
+    """How to learn Gaussians from pictures."""
+
+    preset: Literal["draft", "normal"] = "normal"
+    """draft: within a minute on two cores; normal: within four."""
+    gaussians: int | None = None
+    """How many at most; None: as the preset says."""
+    steps: int | None = None
+    """None: as the preset says."""
+    held_out: int = 8
+    """Every so-many-th view is not learned from but compared with; 0: none is."""
+    seed: int = 0
+    """Of everything that is left to chance."""
+    threads: int | None = None
+    """None: one per processor. Changes no result."""
+
+
+DEFAULT = TrainConfig()
+
+
+@dataclass(frozen=True)
+class Trained:
+    """What came of it."""
+
+    gaussians: Gaussians
+    quality: Quality | None
+    """On held-out views."""
+    seconds: float
+
+
+def train(
+    views: Views,
+    masks: Masks | None = None,
+    points: Points | None = None,
+    config: TrainConfig = DEFAULT,
+    checkpoint: Path | None = None,
+    progress: Progress = lambda fraction, words: None,
+) -> Trained:
+    """Learn Gaussians from posed pictures.
+
+    masks: what belongs to the things; only that is learned then. points: where to start; None: the
+    visual hull of the masks, or places on whose colour pictures agree. checkpoint: a file that is
+    written now and then; a training that was cut off goes on from it.
+
+    Raises:
+        UserError: There are too few pictures, masks of another shape, a skewed camera, or cameras
+            and pictures do not belong together.
+
+    """
+    begun = time.monotonic()
+    lesson = Lesson(views, masks, points, config)
+    with Crew(config.threads) as crew:
+        pupil = _begun(lesson, checkpoint, crew)
+        spent = pupil.seconds
+        for fraction, words in _learn(pupil, lesson, checkpoint, crew):
+            pupil.seconds = spent + time.monotonic() - begun
+            progress(fraction, words)
+    made = gaussians_of(pupil.theta)
+    background = GREY if masks is not None else (0.0, 0.0, 0.0)
+    out = quality(made, views, lesson.held_out, masks, background) if lesson.held_out else None
+    if checkpoint is not None:
+        checkpoint.unlink(missing_ok=True)
+    return Trained(made, out, spent + time.monotonic() - begun)
+
+
+class Lesson:
+    """What there is to learn from: pictures in two sizes, and how."""
+
+    def __init__(
+        self, views: Views, masks: Masks | None, points: Points | None, config: TrainConfig
+    ) -> None:
+        _check(views, masks)
+        preset = PRESETS[config.preset]
+        self.preset = replace(
+            preset,
+            gaussians=config.gaussians or preset.gaussians,
+            steps=config.steps or preset.steps,
+        )
+        self.seed = config.seed
+        self.views, self.masks, self.points = views, masks, points
+        count = len(views.cameras)
+        every = config.held_out
+        self.held_out = tuple(range(every // 2, count, every)) if every and count > every else ()
+        self.learned = [k for k in range(count) if k not in self.held_out]
+        self.radius = region(views.cameras).radius
+        factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
+        halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
+        self.sizes = [_Size(self, factor)] + ([_Size(self, 2 * factor)] if halves else [])
+
+    @property
+    def name(self) -> str:
+        """What a checkpoint of this lesson is called."""
+        cameras = [(c.K.tolist(), c.world_from_camera.tolist()) for c in self.views.cameras]
+        p = self.points
+        begin = () if p is None else (p.position, p.colour, p.opacity)
+        rest = cameras, self.preset, self.seed, self.held_out
+        return saved.fingerprint(self.views.rgb, self.masks, *begin, *rest)
+
+    def size(self, step: int) -> "_Size":
+        """Return the pictures that a step looks at."""
+        return self.sizes[-1] if step < COARSE * self.preset.steps else self.sizes[0]
+
+    def cost(self, step: int) -> float:
+        """Return the time that the steps before this one take, in steps."""
+        coarse = COARSE * self.preset.steps if len(self.sizes) > 1 else 0.0
+        return min(step, coarse) * COARSE_COST + max(0.0, step - coarse)
+
+
+class _Size:
+    """The pictures, shrunk by a whole number."""
+
+    def __init__(self, lesson: Lesson, factor: int) -> None:
+        views, masks = lesson.views, lesson.masks
+        self.rgb = {k: shrunk(views.rgb[k], factor) for k in lesson.learned}
+        full = {} if masks is None else {k: masks[k] * np.uint8(255) for k in lesson.learned}
+        self.masks = {k: shrunk(mask[..., None], factor)[..., 0] for k, mask in full.items()}
+        self.cameras: dict[int, Pinhole] = {}
+        for k, picture in self.rgb.items():
+            eye = pinhole(views.cameras[k], 1 / factor)
+            self.cameras[k] = eye._replace(height=picture.shape[0], width=picture.shape[1])
+
+
+def shrunk(picture: UInt8[np.ndarray, "H W C"], factor: int) -> UInt8[np.ndarray, "h w C"]:
+    """Return a picture of means over squares of pixels; what is left over at the rim is cut off."""
+    if factor == 1:
+        return picture
+    h, w, c = picture.shape[0] // factor, picture.shape[1] // factor, picture.shape[2]
+    cut = picture[: h * factor, : w * factor].reshape(h, factor, w, factor, c)
+    return np.round(cut.mean(axis=(1, 3), dtype=np.float32)).astype(np.uint8)
+
+
+@dataclass
+class Pupil:
+    """What learning changes."""
+
+    theta: Parameters
+    first: Parameters
+    second: Parameters
+    """Adam's moments."""
+    step: int = 0
+    seconds: float = 0.0
+    """Spent so far."""
+
+
+def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew) -> Pupil:
+    """Return the state to go on from: a checkpoint's, or that of a beginner."""
+    found = saved.kept(checkpoint, lesson.name) if checkpoint is not None else {}
+    if found:
+        arrays = found["theta"], found["first"], found["second"]
+        return Pupil(*arrays, int(found["step"]), float(found["seconds"]))
+    rng = np.random.default_rng([lesson.seed, 0])
+    preset, points = lesson.preset, lesson.points
+    views, masks = _of(lesson.views, lesson.masks, lesson.learned)
+    if points is None and masks is not None:
+        points = hull(views, masks, preset.gaussians, rng, crew)
+    elif points is None:
+        points = agreed(views, preset.gaussians, rng, crew)
+    theta = seeded(points, preset.gaussians, preset.degree, rng)
+    return Pupil(theta, np.zeros_like(theta), np.zeros_like(theta))
+
+
+def _learn(pupil: Pupil, lesson: Lesson, checkpoint: Path | None, crew: Crew):
+    """Take the steps that are left; yields fraction done and words."""
+    steps = lesson.preset.steps
+    start, begun = lesson.cost(pupil.step), time.monotonic()
+    errors: list[float] = []
+    written = begun
+    while pupil.step < steps:
+        errors.append(_step(pupil, lesson, crew))
+        pupil.step += 1
+        done, now = lesson.cost(pupil.step), time.monotonic()
+        left = (now - begun) / (done - start) * (lesson.cost(steps) - done)
+        recent = -10 * np.log10(max(np.mean(errors[-len(lesson.learned) :]), 1e-12))
+        words = f"step {pupil.step} of {steps}, {recent:.1f} dB, {len(pupil.theta)} Gaussians"
+        yield done / lesson.cost(steps), f"{words}, {left:.0f} s left"
+        if checkpoint is not None and now - written > EVERY:
+            written = now
+            saved.keep(checkpoint, lesson.name, vars(pupil))
+
+
+def _step(pupil: Pupil, lesson: Lesson, crew: Crew) -> float:
+    """Learn from one view; returns the mean of Δ²."""
+    rng = np.random.default_rng([lesson.seed, 1, pupil.step])
+    size, k = lesson.size(pupil.step), _turn(lesson, pupil.step)
+    background = rng.random(3, np.float32) if size.masks else np.zeros(3, np.float32)
+    aim = goal(size.rgb[k], size.masks.get(k), background)
+    drawing = draw(pupil.theta, size.cameras[k], background, crew)
+    off = loss(drawing, aim, crew)
+    gradient = back(drawing, off.slope, crew)
+    rates = _rates(lesson, pupil)
+    count = len(pupil.theta)
+    decay = np.float32(PULL / count), np.float32(PULL / 3 / count / lesson.radius)
+    longest = np.float32(np.log(10 * lesson.radius))
+    rest = gradient, pupil.first, pupil.second, rates, pupil.step + 1, (*decay, longest)
+    crew.each(adam, [(pupil.theta, *rest, *span) for span in crew.spans(count)])
+    _stir(pupil, lesson, float(rates[MEAN]), rng)
+    return off.error
+
+
+def _stir(pupil: Pupil, lesson: Lesson, rate: float, rng: np.random.Generator) -> None:
+    """Move dead Gaussians to live ones now and then; let faint ones wander."""
+    begin, end = SETTLED
+    if begin < pupil.step < end * lesson.preset.steps and pupil.step % ROUND == 0:
+        moments = [pupil.first, pupil.second]
+        most = lesson.preset.gaussians
+        pupil.theta, moments = growth.moved(pupil.theta, moments, most, rng)
+        pupil.first, pupil.second = moments
+    faint = np.flatnonzero(opacity(pupil.theta) < 0.1)
+    reach = STIR * rate / lesson.radius
+    pupil.theta[faint, MEAN:ROTATION] += growth.jitter(pupil.theta[faint], reach, rng)
+
+
+def _rates(lesson: Lesson, pupil: Pupil) -> Float32[np.ndarray, " D"]:
+    """Return Adam's rate for each column."""
+    share = pupil.step / lesson.preset.steps
+    rates = np.empty(pupil.theta.shape[1], np.float32)
+    for column, rate in RATES.items():
+        rates[column:] = rate * FALL.get(column, 1.0) ** share
+    rates[MEAN:ROTATION] *= lesson.radius
+    return rates
+
+
+def _turn(lesson: Lesson, step: int) -> int:
+    """Return whose turn it is: every view once, then again in another order."""
+    lap, place = divmod(step, len(lesson.learned))
+    return lesson.learned[
+        np.random.default_rng([lesson.seed, 2, lap]).permutation(len(lesson.learned))[place]
+    ]
+
+
+def _of(views: Views, masks: Masks | None, which: list[int]) -> tuple[Views, Masks | None]:
+    cameras = tuple(views.cameras[k] for k in which)
+    return Views(views.rgb[which], cameras), None if masks is None else masks[which]
+
+
+def _check(views: Views, masks: Masks | None) -> None:
+    if len(views.cameras) < 2:
+        raise UserError("One picture shows no depth. Give at least two, from several sides.")
+    if masks is not None and masks.shape != views.rgb.shape[:3]:
+        raise UserError(f"Masks are {masks.shape}, but pictures {views.rgb.shape[:3]}.")

@@ -1,0 +1,49 @@
+"""Small scenes for tests: cameras about the origin, and pictures of known Gaussians."""
+
+import numpy as np
+
+from corporeal.splats.crew import Crew
+from corporeal.splats.parameters import parameters
+from corporeal.splats.raster import draw, picture_of, pinhole
+from corporeal.types import Camera, Gaussians, Views
+
+
+def around(count, size=(48, 40), distance=3.0, focal=50.0, centre=(0.0, 0.0, 0.0)):
+    """Cameras on a spiral about a point, looking at it."""
+    cameras = []
+    for k in range(count):
+        z = 0.8 - 1.2 * (k + 0.5) / count
+        turn = 2.4 * k
+        flat = np.sqrt(1 - z * z)
+        back = np.array([flat * np.cos(turn), flat * np.sin(turn), z])
+        right = np.cross([0, 0, 1], back) / flat
+        pose = np.eye(4)
+        pose[:3] = np.stack([right, np.cross(right, back), -back, centre + distance * back], axis=1)
+        K = np.array([[focal, 0, size[0] / 2], [0, focal, size[1] / 2], [0, 0, 1]])
+        cameras.append(Camera(K, pose, *size))
+    return tuple(cameras)
+
+
+def blobs(count=60, seed=0, degree=0):
+    """Coloured blobs within a ball of radius 0.6."""
+    rng = np.random.default_rng(seed)
+    sh = np.zeros((count, (degree + 1) ** 2, 3))
+    sh[:, 0] = (rng.random((count, 3)) - 0.5) / 0.2821
+    return Gaussians(
+        mean=rng.normal(size=(count, 3)) * 0.25,
+        rotation=np.tile([1.0, 0, 0, 0], (count, 1)),
+        scale=rng.uniform(0.05, 0.15, (count, 3)),
+        opacity=rng.uniform(0.7, 0.95, count),
+        sh=sh,
+    )
+
+
+def pictured(gaussians, cameras, background=(0.0, 0.0, 0.0)):
+    """Views of some Gaussians, and masks of where they are."""
+    made = []
+    with Crew(1) as crew:
+        for camera in cameras:
+            drawing = draw(parameters(gaussians), pinhole(camera), np.array(background), crew)
+            made.append(picture_of(drawing))
+    rgb = np.stack([np.round(np.clip(p.rgb, 0, 1) * 255).astype(np.uint8) for p in made])
+    return Views(rgb, cameras), np.stack([p.alpha > 0.5 for p in made])

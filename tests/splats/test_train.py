@@ -1,0 +1,142 @@
+"""Gaussians are learned from pictures, and a training that was cut off goes on."""
+
+import numpy as np
+import pytest
+from splat_scenes import around, blobs, pictured
+
+from corporeal.errors import UserError
+from corporeal.splats import start
+from corporeal.splats import train as module
+from corporeal.splats.start import Points
+from corporeal.splats.train import TrainConfig, shrunk, train
+from corporeal.types import Views
+
+SMALL = TrainConfig(preset="draft", gaussians=400, steps=160, threads=1)
+
+
+@pytest.fixture(scope="module")
+def scene():
+    """Pictures before grey, and where the things are."""
+    return pictured(blobs(40), around(16, (64, 64), focal=80.0), (0.5, 0.5, 0.5))
+
+
+@pytest.fixture(autouse=True)
+def coarse_hull(monkeypatch):
+    monkeypatch.setattr(start, "CELLS", 30_000)
+
+
+def test_things_are_learned_from_pictures_and_masks(scene):
+    views, masks = scene
+    told = []
+    out = train(views, masks, config=SMALL, progress=lambda f, w: told.append((f, w)))
+    assert out.quality.views == (4, 12)
+    assert out.quality.psnr > 24 and out.quality.psnr_things > 22
+    fractions = [f for f, _ in told]
+    assert len(told) == 160 and fractions == sorted(fractions) and fractions[-1] == 1
+    assert "dB" in told[80][1] and "s left" in told[80][1]
+    assert np.linalg.norm(out.gaussians.mean, axis=1).max() < 3
+
+
+def test_a_scene_without_masks_starts_where_pictures_agree(scene):
+    views, _ = scene
+    out = train(views, config=SMALL)
+    assert out.quality.psnr > 20 and out.quality.psnr_things is None
+
+
+def test_given_points_are_where_it_starts(scene):
+    views, masks = scene
+    truth = blobs(40)
+    points = Points(truth.mean, 0.5 + 0.2821 * truth.sh[:, 0])
+    out = train(views, masks, points, SMALL)
+    assert out.quality.psnr > 24
+    # 40 points at first; none of them was dead, so that they grew by a twentieth at a time.
+    assert 40 <= out.gaussians.count < 60
+
+
+def test_nobody_sees_the_held_out_views(scene):
+    views, masks = scene
+    spoilt = views.rgb.copy()
+    spoilt[[4, 12]] = 0
+    config = TrainConfig(preset="draft", gaussians=200, steps=20, threads=1)
+    honest = train(views, masks, config=config).gaussians
+    blind = train(Views(spoilt, views.cameras), masks, config=config).gaussians
+    np.testing.assert_array_equal(honest.mean, blind.mean)
+    all_of_them = TrainConfig(preset="draft", gaussians=200, steps=20, held_out=0, threads=1)
+    assert train(views, masks, config=all_of_them).quality is None
+
+
+class KilledError(Exception):
+    pass
+
+
+def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_path, monkeypatch):
+    monkeypatch.setattr(module, "EVERY", 0.0)
+    views, masks = scene
+    path = tmp_path / "training.npz"
+    whole = train(views, masks, config=SMALL).gaussians
+
+    def kill(fraction, words):
+        if words.startswith("step 120 "):
+            raise KilledError
+
+    steps = []
+    with pytest.raises(KilledError):
+        train(views, masks, config=SMALL, checkpoint=path, progress=kill)
+    two = TrainConfig(preset="draft", gaussians=400, steps=160, threads=2)
+    again = train(
+        views, masks, config=two, checkpoint=path, progress=lambda f, w: steps.append(w)
+    ).gaussians
+    assert steps[0].startswith("step 120 ")
+    for name in ("mean", "rotation", "scale", "opacity", "sh"):
+        np.testing.assert_array_equal(getattr(whole, name), getattr(again, name))
+    assert not path.exists()
+
+
+@pytest.mark.parametrize("spoil", ["another", "torn"])
+def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, monkeypatch, spoil):
+    monkeypatch.setattr(module, "EVERY", 0.0)
+    views, masks = scene
+    path, steps = tmp_path / "training.npz", []
+    config = TrainConfig(preset="draft", gaussians=200, steps=6, threads=1)
+
+    def kill(fraction, words):
+        if words.startswith("step 4 "):
+            raise KilledError
+
+    with pytest.raises(KilledError):
+        train(views, masks, config=config, checkpoint=path, progress=kill)
+    if spoil == "torn":
+        path.write_bytes(path.read_bytes()[:1000])
+    else:
+        config = TrainConfig(preset="draft", gaussians=200, steps=6, threads=1, seed=1)
+    train(views, masks, config=config, checkpoint=path, progress=lambda f, w: steps.append(w))
+    assert steps[0].startswith("step 1 ")
+
+
+@pytest.mark.parametrize("shade", [0, 255])
+def test_pictures_of_nothing_give_no_nan(shade):
+    cameras = around(4)
+    views = Views(np.full((4, 40, 48, 3), shade, np.uint8), cameras)
+    config = TrainConfig(preset="draft", gaussians=100, steps=30, threads=1)
+    out = train(views, config=config)
+    for name in ("mean", "rotation", "scale", "opacity", "sh"):
+        assert np.isfinite(getattr(out.gaussians, name)).all()
+
+
+def test_shrinking_takes_means_and_cuts_the_rim():
+    picture = np.arange(5 * 7 * 1, dtype=np.uint8).reshape(5, 7, 1)
+    small = shrunk(picture, 2)
+    assert small.shape == (2, 3, 1)
+    assert small[0, 0, 0] == round((0 + 1 + 7 + 8) / 4)
+
+
+def test_one_picture_is_refused(scene):
+    views, _ = scene
+    with pytest.raises(UserError, match="at least two"):
+        train(Views(views.rgb[:1], views.cameras[:1]))
+
+
+def test_masks_of_another_size_are_refused(scene):
+    views, masks = scene
+    with pytest.raises(UserError, match="Masks are"):
+        train(views, masks[:, :10])
