@@ -8,13 +8,21 @@ from jaxtyping import Float
 
 from corporeal.types import Camera
 
+SAME = 1e-9
+"""Cameras nearer to each other than this share of their distance from the origin are in one place.
+"""
 Points = Float[np.ndarray, "N 2"]
 
 
 def fundamental(a: Camera, b: Camera) -> Float[np.ndarray, "3 3"]:
-    """Return F with x_b^T F x_a = 0 for pictures x of one point: K_b^-T [t]x R K_a^-1."""
+    """Return F with x_b^T F x_a = 0 for pictures x of one point: K_b^-T [t]x R K_a^-1.
+
+    It is 0 for cameras in one place.
+    """
     b_from_a = np.linalg.inv(b.world_from_camera) @ a.world_from_camera
-    x, y, z = b_from_a[:3, 3]
+    shift = a.world_from_camera[:3, 3] - b.world_from_camera[:3, 3]
+    here = np.abs([c.world_from_camera[:3, 3] for c in (a, b)]).max()
+    x, y, z = b_from_a[:3, 3] if np.abs(shift).max() > SAME * here else np.zeros(3)
     across = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
     return np.linalg.inv(b.K).T @ across @ b_from_a[:3, :3] @ np.linalg.inv(a.K)
 

@@ -1,0 +1,69 @@
+"""Points that two pictures share, found without knowing how the cameras stood (ORB features).
+
+Rublee et al., "ORB: an efficient alternative to SIFT or SURF" (ICCV 2011).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, UInt8
+from PIL import Image
+from skimage.color import rgb2gray
+from skimage.feature import ORB, match_descriptors
+
+SIDE = 320
+"""Longer side at which features are looked for [px]."""
+THUMB = 16
+"""Edge of the thumbnails that tell which pictures are alike [px]."""
+MOST = 800
+"""Features per picture."""
+CONTRAST = 0.02
+"""Least difference of a corner from its surroundings, of white: matte things have no more."""
+RATIO = 0.85
+"""A match must be so much better than the next best (Lowe)."""
+
+
+@dataclass(frozen=True)
+class Features:
+    """Where the corners of a picture are, and what they look like."""
+
+    points: Float[np.ndarray, "N 2"]
+    """(u, v) [px] of the picture as given."""
+    descriptors: np.ndarray
+
+
+def features(picture: UInt8[np.ndarray, "H W 3"]) -> Features:
+    """Return the corners of a picture; none where it is smooth."""
+    share = min(1.0, SIDE / max(picture.shape[:2]))
+    size = (round(picture.shape[1] * share), round(picture.shape[0] * share))
+    grey = rgb2gray(_resized(picture, size))
+    finder = ORB(n_keypoints=MOST, fast_threshold=CONTRAST)
+    try:
+        finder.detect_and_extract(grey)
+    except RuntimeError:  # it found none
+        return Features(np.zeros((0, 2)), np.zeros((0, 256), bool))
+    scale = np.array(picture.shape[1::-1]) / grey.shape[::-1]
+    points = (np.asarray(finder.keypoints)[:, ::-1] + 0.5) * scale
+    return Features(points, np.asarray(finder.descriptors))
+
+
+def matches(a: Features, b: Features) -> tuple[np.ndarray, np.ndarray]:
+    """Return points of two pictures that look the same, (N, 2) each."""
+    if min(len(a.points), len(b.points)) < 2:
+        return np.zeros((0, 2)), np.zeros((0, 2))
+    pairs = match_descriptors(a.descriptors, b.descriptors, cross_check=True, max_ratio=RATIO)
+    return a.points[pairs[:, 0]], b.points[pairs[:, 1]]
+
+
+def likeness(pictures: UInt8[np.ndarray, "V H W 3"]) -> Float[np.ndarray, "V V"]:
+    """Return how alike pictures are as a whole, at most 1; a picture is not like itself."""
+    thumbs = np.stack([_resized(p, (THUMB, THUMB)).ravel() for p in pictures]).astype(np.float64)
+    thumbs -= thumbs.mean(axis=0)
+    thumbs /= np.maximum(np.linalg.norm(thumbs, axis=1, keepdims=True), 1e-9)
+    alike = thumbs @ thumbs.T
+    np.fill_diagonal(alike, -np.inf)
+    return alike
+
+
+def _resized(picture: np.ndarray, size: tuple[int, int]) -> np.ndarray:
+    return np.asarray(Image.fromarray(picture).resize(size, Image.Resampling.BOX))

@@ -1,0 +1,80 @@
+"""Whether silhouettes can be those of one thing: the coherence of their visual hull.
+
+Under the right poses the part of space that all silhouettes allow fills each of them. After
+Hernández, Schmitt & Cipolla, "Silhouette coherence for camera calibration under circular motion"
+(2007).
+"""
+
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image
+
+from corporeal.geometry.epipolar import projection
+from corporeal.types import Camera
+
+SIDE = 24
+"""Longer side at which silhouettes are compared [px]."""
+GRID = 40
+"""Points along each edge of the cube that is searched."""
+MARGIN = 1.3
+"""Half edge of that cube, in radii of the thing as the cameras see it."""
+INSIDE = 127
+"""What a mask must exceed."""
+
+
+def coherence(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> float:
+    """Return which share of a silhouette the visual hull fills, the median of all views."""
+    aims = [_aim(mask, camera) for mask, camera in zip(masks, cameras, strict=True)]
+    centre = _nearest([(eye, ray) for eye, ray, _ in aims])
+    radius = float(np.median([np.linalg.norm(centre - eye) * size for eye, _, size in aims]))
+    line = np.linspace(-1, 1, GRID) * radius * MARGIN
+    points = centre + np.stack(np.meshgrid(line, line, line), axis=-1).reshape(-1, 3)
+    small = [_small(mask) for mask in masks]
+    allowed = np.ones(len(points), bool)
+    cells = []
+    for mask, camera in zip(small, cameras, strict=True):
+        cell = _cells(points, camera, mask.shape)
+        cells.append(cell)
+        allowed &= (cell < 0) | mask.ravel()[cell]
+    return float(np.median([_filled(m, c[allowed]) for m, c in zip(small, cells, strict=True)]))
+
+
+def _filled(mask: np.ndarray, cells: np.ndarray) -> float:
+    covered = np.zeros(mask.size, bool)
+    covered[cells[cells >= 0]] = True
+    return float((covered & mask.ravel()).sum() / max(mask.sum(), 1))
+
+
+def _cells(points: np.ndarray, camera: Camera, shape: tuple[int, ...]) -> np.ndarray:
+    """Return which pixel of a small picture shows each point; -1: none."""
+    P = projection(camera)
+    u, v, depth = (points @ P[:, :3].T + P[:, 3]).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        column = np.floor(u / depth * shape[1] / camera.width)
+        row = np.floor(v / depth * shape[0] / camera.height)
+    seen = (depth > 0) & (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
+    return np.where(seen, row * shape[1] + column, -1).astype(np.int64)
+
+
+def _aim(mask: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray, float]:
+    """Return where the camera is, the ray to the middle of its silhouette, and its half angle."""
+    rows, columns = np.nonzero(mask > INSIDE)
+    if not len(rows):
+        rows, columns = np.indices(mask.shape).reshape(2, -1)
+    middle = np.array([(columns.min() + columns.max() + 1) / 2, (rows.min() + rows.max() + 1) / 2])
+    size = max(np.ptp(columns), np.ptp(rows)) / 2 / min(camera.K[0, 0], camera.K[1, 1])
+    ray = camera.world_from_camera[:3, :3] @ np.linalg.solve(camera.K, [*middle, 1.0])
+    return camera.world_from_camera[:3, 3], ray / np.linalg.norm(ray), float(size)
+
+
+def _nearest(rays: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+    """Return the point nearest to all rays, in least squares."""
+    across = [np.eye(3) - np.outer(ray, ray) for _, ray in rays]
+    right = np.sum([a @ eye for a, (eye, _) in zip(across, rays, strict=True)], axis=0)
+    return np.linalg.lstsq(np.sum(across, axis=0), right, rcond=None)[0]
+
+
+def _small(mask: np.ndarray) -> np.ndarray:
+    share = min(1.0, SIDE / max(mask.shape))
+    size = (max(1, round(mask.shape[1] * share)), max(1, round(mask.shape[0] * share)))
+    return np.asarray(Image.fromarray(mask).resize(size, Image.Resampling.BOX)) > INSIDE
