@@ -19,7 +19,7 @@ from corporeal.settle.hull import Piece, Stance
 
 Arrangement = Literal["scatter", "stack", "onto", "row"]
 
-GAP = 0.02
+GAP = 0.01
 """Free height before a body falls, of the scene's unit."""
 STANDS = 0.1
 """A body starts upright where it takes at least this tilt to make it fall over [rad]."""
@@ -64,15 +64,18 @@ def _scatter(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
 
 
 def _stack(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
-    """Pile up, what offers most room on top below."""
-    order = sorted(range(len(bodies)), key=lambda k: -_steady(bodies[k]).top)
-    return _piled(bodies, order, rng, 0.05)
+    return _piled(bodies, _carriers(bodies, rng), rng, 0.6 * rng.uniform() ** 3)
 
 
 def _onto(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
-    largest = max(range(len(bodies)), key=lambda k: _steady(bodies[k]).top)
-    rest = [int(k) for k in rng.permutation(len(bodies)) if k != largest]
-    return _piled(bodies, [largest, *rest], rng, 0.3)
+    first, *rest = _carriers(bodies, rng)
+    return _piled(bodies, [first, *map(int, rng.permutation(rest))], rng, rng.uniform(0.2, 0.8))
+
+
+def _carriers(bodies: Sequence[Body], rng: np.random.Generator) -> list[int]:
+    """Order bodies by the room on top, what offers most first; near equals by chance."""
+    room = [_steady(b).top * np.exp(0.5 * rng.normal()) for b in bodies]
+    return [int(k) for k in np.argsort(-np.array(room), kind="stable")]
 
 
 def _piled(

@@ -31,26 +31,24 @@ class SettleConfig:
 
     step: float = 2e-3
     """[s]"""
-    longest: float = 10.0
+    longest: float = 6.0
     """[s]"""
-    calm_after: float = 3.0
+    calm_after: float = 0.5
     """When velocities begin to be damped [s]."""
-    damping: float = 2e-3
+    damping: float = 4e-3
     """Share of the velocity taken away at every step from then on."""
     hold: float = 0.25
     """How long things must stay where they are [s] …"""
-    shift: float = 5e-5
-    """… but for so much [m] …"""
-    turn: float = 5e-4
-    """… and so much [rad]. Contacts on many points chatter: speeds would tell less."""
-    roll: float = 6.0
+    shift: float = 1e-4
+    """… but for so much [m]. Contacts on many points chatter: speeds would tell less."""
+    roll: float = 4.0
     """How long what is round may look for a better place [s]."""
     firm: float = 2.0
     """How long things may take to find their places on hard ground [s]."""
 
 
 DEFAULT = SettleConfig()
-FRICTION = [0.6, 0.02, 0.002]
+FRICTION = [0.6, 0.02, 0.01]
 """Against sliding [-], turning about the normal and rolling [unit]."""
 SOLREF = [0.008, 1.0]
 FIRM_STEP, FIRM_SOLREF = 5e-4, 1e-3
@@ -105,8 +103,7 @@ def _wait(engine: "Engine", config: SettleConfig, longest: float, calm_after: fl
         if number > calm:
             engine.data.qvel *= 1 - config.damping * step / config.step
         if number % window == 0:
-            shift, turn = engine.moved(before)
-            if shift < config.shift and turn < config.turn:
+            if engine.moved(before) < config.shift:
                 return True
             before = engine.data.qpos.copy()
     return False
@@ -117,6 +114,8 @@ class Engine:
 
     def __init__(self, bodies: Sequence[Body], poses: Sequence[Pose], step: float) -> None:
         self.unit, self.count = unit_of(bodies), len(bodies)
+        farthest = [np.linalg.norm(b.hull.vertices, axis=1).max() for b in bodies]
+        self._radius = np.array(farthest) / self.unit
         self.model = _spec(bodies, poses, self.unit, step).compile()
         self.data = mujoco.MjData(self.model)
 
@@ -133,12 +132,12 @@ class Engine:
         self.model.opt.timestep = FIRM_STEP
         self.model.geom_solref[:, 0] = FIRM_SOLREF
 
-    def moved(self, before: Float[np.ndarray, " Q"]) -> tuple[float, float]:
-        """Return how far any body went [unit] and turned [rad] since an earlier ``qpos``."""
+    def moved(self, before: Float[np.ndarray, " Q"]) -> float:
+        """How far at most any point of any body went since an earlier ``qpos`` [unit]."""
         was, now = before.reshape(self.count, 7), self.data.qpos.reshape(self.count, 7)
-        shift = np.linalg.norm(now[:, :3] - was[:, :3], axis=1).max()
-        turn = 2 * np.arcsin(np.minimum(1.0, 0.5 * np.linalg.norm(now[:, 3:] - was[:, 3:], axis=1)))
-        return float(shift), float(2 * turn.max())
+        shift = np.linalg.norm(now[:, :3] - was[:, :3], axis=1)
+        half = np.minimum(1.0, 0.5 * np.linalg.norm(now[:, 3:] - was[:, 3:], axis=1))
+        return float((shift + 4 * np.arcsin(half) * self._radius).max())
 
     def poses(self) -> list[Pose]:
         """Where bodies are [m]."""
