@@ -194,6 +194,20 @@ def test_a_step_budget_keeps_the_order_of_stiffness_and_the_yield_speed():
     assert steps == pytest.approx(QUALITIES["draft"].steps_per_second, rel=1e-6)
 
 
+def test_what_the_step_budget_would_let_sag_is_rigid_where_that_is_nearer_to_life():
+    """A pole of 5 m droops by an inch; with a hundredth of its stiffness it would hang."""
+    pole = cylinder(WOOD, 0.15, 5.0)
+    calm = Motion(impact_speed=0.1, acceleration=9.81)
+    (draft,) = plan([pole], [calm], "draft").treatments
+    assert not judge(pole, calm).rigid
+    assert draft.kind == "rigid"
+    assert "step budget" in draft.why
+    flabby = cylinder(replace(WOOD, young=12e6), 0.15, 5.0)
+    assert plan([flabby], [calm], "draft").treatments[0].kind == "deformable"
+    for thing in (BALL, DUCK, CAN, block(SAND, 0.33, 2, 2), block(RUBBER, 0.004, 0.01, 0.6)):
+        assert plan([thing], [FALL], "draft").treatments[0].kind != "rigid"
+
+
 def test_a_crowded_scene_takes_fewer_steps_than_a_small_one():
     draft = QUALITIES["draft"]
     assert draft.steps(2_000) == 20e3

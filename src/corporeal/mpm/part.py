@@ -65,6 +65,10 @@ class Verdict:
     """[m/s]"""
     rigid: bool
     reason: str
+    weight: float = 0.0
+    """Strain that its own weight causes as long as it rests [-]."""
+    impact: float = 0.0
+    """Strain that the impact causes [-]."""
 
 
 def life_sized(part: PartGeometry) -> PartGeometry:

@@ -3,17 +3,18 @@
 One policy for all scenes (no scene can tune it): a part that would neither yield nor visibly flex
 is rigid, by itself or as the frame of softer parts; everything else keeps its true stiffness; thin
 walls are thickened with the stiffness that counts and the areal mass kept; only a step budget may
-compress wave speeds, in their order.
+compress wave speeds, in their order, and what would then sag too far is rigid after all.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
-from math import inf, sqrt
+from dataclasses import dataclass, replace
+from math import inf
 from typing import Literal
 
 from corporeal.mpm import plants
-from corporeal.mpm.budget import calm_trinkets, cap, fit_budget
-from corporeal.mpm.filled import as_contents, judge_filled, mean_density
+from corporeal.mpm.budget import calm_trinkets, cap, fit_budget, nearer_rigid, slowed
+from corporeal.mpm.filled import as_contents, mean_density
+from corporeal.mpm.judging import judge
 from corporeal.mpm.part import (
     TUBE,
     Motion,
@@ -33,18 +34,14 @@ from corporeal.mpm.stability import (
     fold_factor,
     p_wave_speed,
     stable_step,
-    yield_speed,
 )
-from corporeal.types import Law, Material, Treatment
+from corporeal.types import Law, Treatment
 
 Detail = Literal["draft", "normal", "fine"]
 Stiffness = Literal["true", "capped"]
 Role = Literal["soft", "rigid", "frame", "trinket", "crown"]
 """A frame is a rigid inclusion: it holds the softer parts of its object. A trinket is too small to
 be one and goes with them. A crown is leaves on springs."""
-
-INVISIBLE_STRAIN = 5e-3
-"""Half a percent of strain is not seen."""
 
 PARTICLES_PER_CELL = 8
 
@@ -105,11 +102,31 @@ def plan(
         stiffness: "capped" is the published rule, a control only.
 
     """
-    quality = QUALITIES[detail]
     verdicts = [judge(part, motions[part.object]) for part in parts]
     crowns: set[int] = set()
     if stiffness == "true":
         verdicts, crowns = plants.settle(parts, verdicts)
+    while True:
+        made, unslowed = _plan(parts, motions, (verdicts, crowns), detail, stiffness)
+        stiff = nearer_rigid(parts, verdicts, unslowed, made.treatments)
+        if stiffness == "capped" or not stiff:
+            return made
+        verdicts = [
+            replace(v, rigid=True, reason=slowed(v)) if k in stiff else v
+            for k, v in enumerate(verdicts)
+        ]
+
+
+def _plan(
+    parts: Sequence[PartGeometry],
+    motions: Sequence[Motion],
+    judged: tuple[Sequence[Verdict], set[int]],
+    detail: Detail,
+    stiffness: Stiffness,
+) -> tuple[Plan, Sequence[Treatment]]:
+    """Choose for given verdicts and crowns; return also the treatments before the step budget."""
+    quality = QUALITIES[detail]
+    verdicts, crowns = judged
     yields = [not v.rigid or stiffness == "capped" for v in verdicts]
     soft = [p for p, deforms in zip(parts, yields, strict=True) if deforms]
     cell = choose_cell(parts, soft, quality)
@@ -119,7 +136,7 @@ def plan(
         "crown" if k in crowns else role(p, deforms, mixed, cell)
         for k, (p, deforms) in enumerate(zip(parts, yields, strict=True))
     ]
-    treatments = [
+    treatments = unslowed = [
         treat(p, v, motions[p.object], cell, r)
         for p, v, r in zip(parts, verdicts, roles, strict=True)
     ]
@@ -128,11 +145,11 @@ def plan(
         treatments = [cap(as_contents(p), t, cell) for p, t in zip(parts, treatments, strict=True)]
         warnings.append("Stiffness is capped by the published rule: a control, not a prediction.")
     else:
-        treatments = calm_trinkets(parts, treatments, cell)
+        unslowed = calm_trinkets(parts, treatments, cell)
         steps = quality.steps(particles_needed(parts, cell))
-        treatments, compressed = fit_budget(treatments, cell, steps)
+        treatments, compressed = fit_budget(unslowed, cell, steps)
         warnings.extend(compressed)
-    return Plan(cell=cell, treatments=tuple(treatments), warnings=tuple(warnings))
+    return Plan(cell=cell, treatments=tuple(treatments), warnings=tuple(warnings)), unslowed
 
 
 # ------------------------------------------------------------------ rigid or not
@@ -153,65 +170,6 @@ def role(part: PartGeometry, deforms: bool, mixed: set[int], cell: float) -> Rol
     if part.object not in mixed:
         return "rigid"
     return "trinket" if is_grain(part, cell) else "frame"
-
-
-def judge(part: PartGeometry, motion: Motion) -> Verdict:
-    """Say whether a part would yield or visibly flex.
-
-    ε = max(v/c, ρ a L/E, tip shift of a cantilever / L) and v_y = σ_y/(ρ c); rigid when ε is below
-    half a percent and v below v_y. A thin wall is judged by its mapped values at a tenth of the
-    part's width, which is the wall the finest detail would simulate: so the verdict depends neither
-    on the detail nor on what else is in the scene. A tube is judged as the bar that it is.
-    """
-    if part.structure.contents is not None:
-        return judge_filled(part, motion, judge)
-    material, speed = part.material, motion.impact_speed
-    young, poisson = bounded_poisson(material.young, material.poisson)
-    density = material.density
-    ratio = 1.0 if tube(part) else wall_ratio(part, width(part) / 10)
-    stiffer, _, denser = wall_factors(part, ratio)
-    real = p_wave_speed(young, poisson, density)
-    mapped = stiffer / denser
-    strain = max(
-        speed / (real * sqrt(mapped)),
-        density * motion.acceleration * part.size[2] / (young * mapped),
-        # The shape of a plant has its own weight and its leaves' in it already.
-        sag(part, motion.driven if part.burden else motion.acceleration),
-    )
-    yields_at = yield_speed(resistance(material), real, density)
-    rigid = strain < INVISIBLE_STRAIN and speed < yields_at
-    return Verdict(strain, yields_at, rigid, explain(strain, speed, yields_at))
-
-
-def explain(strain: float, speed: float, yields_at: float) -> str:
-    """Give the verdict in words."""
-    if strain >= INVISIBLE_STRAIN:
-        return f"it would visibly flex: a strain of about {strain:.2g} is expected"
-    if speed >= yields_at:
-        return f"it would yield: {speed:.2g} m/s exceeds its yield speed of {yields_at:.2g} m/s"
-    return f"it would neither yield nor visibly flex: a strain of about {strain:.1g} is expected"
-
-
-def resistance(material: Material) -> float | None:
-    """Stress [Pa] that the material bears before it flows; None: it does not flow."""
-    if material.law is Law.DRUCKER_PRAGER:
-        return material.cohesion or 0.0
-    return material.yield_stress
-
-
-def sag(part: PartGeometry, acceleration: float) -> float:
-    """Tip shift over length of the part as a cantilever in a uniform acceleration [-].
-
-    δ/L = (3 ρ a L² / 2 E h) (L / h) for a solid bar of depth h (Euler–Bernoulli). The second moment
-    of a thin tube, A d²/8, is that of a bar with h = √1.5 d.
-    """
-    length, depth = part.size[2], sqrt(1.5) * tube(part) or 2 / 3 * width(part)
-    if depth <= 0 or length < 4 * depth:
-        return 0.0
-    density, young = part.material.density, part.material.young
-    # A load at the tip bends 8/3 as much as one spread along.
-    loaded = 1.0 + 8 / 3 * part.burden
-    return 1.5 * loaded * density * acceleration * length**3 / (young * depth**2)
 
 
 # ------------------------------------------------------------------ resolution
