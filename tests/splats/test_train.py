@@ -1,5 +1,7 @@
 """Gaussians are learned from pictures, and a training that was cut off goes on."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from splat_scenes import around, blobs, pictured
@@ -71,22 +73,25 @@ class KilledError(Exception):
 
 def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "EVERY", 0.0)
+    monkeypatch.setattr(module, "SETTLED", (10, 0.8))
+    monkeypatch.setattr(module, "ROUND", 7)
     views, masks = scene
     path = tmp_path / "training.npz"
-    whole = train(views, masks, config=SMALL).gaussians
+    few = replace(SMALL, steps=60)
+    whole = train(views, masks, config=few).gaussians
 
     def kill(fraction, words):
-        if words.startswith("step 120 "):
+        if words.startswith("step 40 "):
             raise KilledError
 
     steps = []
     with pytest.raises(KilledError):
-        train(views, masks, config=SMALL, checkpoint=path, progress=kill)
-    two = TrainConfig(preset="draft", gaussians=400, steps=160, threads=2)
+        train(views, masks, config=few, checkpoint=path, progress=kill)
+    two = replace(few, threads=2)
     again = train(
         views, masks, config=two, checkpoint=path, progress=lambda f, w: steps.append(w)
     ).gaussians
-    assert steps[0].startswith("step 120 ")
+    assert steps[0].startswith("step 40 ")
     for name in ("mean", "rotation", "scale", "opacity", "sh"):
         np.testing.assert_array_equal(getattr(whole, name), getattr(again, name))
     assert not path.exists()
