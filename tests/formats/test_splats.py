@@ -4,10 +4,12 @@ import gzip
 import io
 import json
 import struct
+import sys
 import zipfile
 
 import numpy as np
 import pytest
+import trimesh
 from PIL import Image
 
 from corporeal.errors import BadFileError
@@ -114,6 +116,17 @@ def test_the_written_file_is_laid_out_as_viewers_expect(tmp_path):
     table = dict(zip(names, np.frombuffer(body, "<f4").reshape(2, 62).T, strict=True))
     np.testing.assert_array_equal(table["f_rest_15"], given.sh[:, 1, 1])  # green begins at 15
     np.testing.assert_allclose(table["scale_2"], np.log(given.scale[:, 2]), rtol=1e-6)
+
+
+def test_another_program_reads_what_is_written(tmp_path):
+    given = some_gaussians(count=7, degree=2)
+    found = trimesh.load(write_splat(tmp_path / "a.ply", given), process=False)
+    np.testing.assert_array_equal(found.vertices, given.mean)
+    rows = found.metadata["_ply_raw"]["vertex"]["data"]
+    np.testing.assert_array_equal(rows["f_dc_2"].ravel(), given.sh[:, 0, 2])
+    np.testing.assert_array_equal(rows["f_rest_7"].ravel(), given.sh[:, 8, 0])
+    np.testing.assert_array_equal(rows["f_rest_8"].ravel(), given.sh[:, 1, 1])
+    np.testing.assert_array_equal(rows["rot_0"].ravel(), given.rotation[:, 0])
 
 
 @pytest.mark.parametrize("form", ["binary_little_endian", "binary_big_endian", "ascii"])
@@ -626,6 +639,45 @@ def test_no_byte_of_a_file_can_make_the_reader_crash(kept):
     assert refused > 40
 
 
+def test_a_folder_and_a_missing_file_are_refused(tmp_path):
+    with pytest.raises(BadFileError, match=r"folder without the meta.json.*SPZ"):
+        read_splat(tmp_path)
+    with pytest.raises(BadFileError, match="no such file"):
+        read_splat(tmp_path / "a.ply")
+
+
+def test_what_is_packed_with_zstandard_says_what_to_install(kept, monkeypatch):
+    path = kept(spz(some_gaussians(9), 4, 3), "a.spz")
+    monkeypatch.setitem(sys.modules, "zstandard", None)
+    with pytest.raises(BadFileError, match=r"Zstandard .SPZ version 4.*pip install"):
+        read_splat(path)
+
+
+def test_a_broken_stream_of_version_4_is_refused(kept):
+    good = spz(some_gaussians(50), 4, 3)
+    for at, words in (
+        (15, "table of streams"),
+        (40, "not as long as"),
+        (140, "stream is broken|ends"),
+    ):
+        broken = bytearray(good)
+        broken[at] ^= 0x5A
+        with pytest.raises(BadFileError, match=words):
+            read_splat(kept(bytes(broken)))
+    with pytest.raises(BadFileError, match="not as long as its table says"):
+        read_splat(kept(good[:-9]))
+    # Extensions stand before the table: unknown ones are skipped, those that matter are refused.
+    for kind, refused in ((0xADBE0002, False), (0xADBE0001, True)):
+        record = struct.pack("<III", kind, 4, 0)
+        longer = good[:14] + b"\2" + good[15:16] + struct.pack("<I12x", 32 + len(record))
+        path = kept(longer + record + good[32:])
+        if refused:
+            with pytest.raises(BadFileError, match="bounds of their own"):
+                read_splat(path)
+        else:
+            assert read_splat(path).count == 50
+
+
 def test_a_bomb_is_not_unpacked(kept, monkeypatch):
     head = struct.pack("<4sIIBBBB", b"NGSP", 3, 10, 0, 12, 0, 0)
     bomb = gzip.compress(head + bytes(10 * 20) + bytes(2**24), 9)
@@ -649,6 +701,9 @@ def test_splats_of_other_programs_are_read(shared_assets):
     good = guitar.mean[guitar.opacity > 0.5]
     low, high = np.percentile(good, [1, 99], axis=0)
     assert 2 < np.ptp([low, high], axis=0)[1] / np.ptp([low, high], axis=0)[0] < 4
+    upright = read_splat(folder / "guitar.compressed.ply", "-y").mean
+    assert np.percentile(upright[:, 2], 1) > -0.2  # its stand is on the floor, its neck is up
+    assert np.percentile(upright[:, 2], 99) > 3.5
     with pytest.raises(BadFileError, match="cloud of points"):
         read_splat(folder / "brush_test_init.ply")
 

@@ -3,6 +3,7 @@
 A few bad ones among many are left out and named.
 """
 
+import warnings
 from collections import Counter
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -102,11 +103,11 @@ def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
                 bad[shot.name] = str(problem)
     prints = _masked_alike(prints, bad)
     _refuse_most(source, len(shots), bad)
-    warnings = [*_left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
-    return _developed(prints, tuple(warnings))
+    said = [*_left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
+    return _developed(prints, tuple(said))
 
 
-def _developed(prints: list[_Print], warnings: tuple[str, ...]) -> Developed:
+def _developed(prints: list[_Print], said: tuple[str, ...]) -> Developed:
     rgba = np.stack([p.rgba for p in prints])
     masked = bool(prints[0].masked and (rgba[..., 3] < 255).any())
     return Developed(
@@ -114,7 +115,7 @@ def _developed(prints: list[_Print], warnings: tuple[str, ...]) -> Developed:
         cameras=tuple(p.camera for p in prints),
         masks=np.ascontiguousarray(rgba[..., 3]) if masked else None,
         names=tuple(p.name for p in prints),
-        warnings=warnings,
+        warnings=said,
     )
 
 
@@ -127,8 +128,10 @@ def _size(shot: Shot, bad: dict[str, str]) -> tuple[int, int] | None:
         bad[shot.name] = "is not there"
         return None
     try:
-        with Image.open(shot.picture, formats=FORMATS) as picture:
-            width, height = picture.size
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore")  # Pillow's of large pictures; ours is the limit below
+            with Image.open(shot.picture, formats=FORMATS) as picture:
+                width, height = picture.size
     except Exception:  # Pillow's decoders raise almost anything on broken input
         bad[shot.name] = "is no PNG, JPEG or WebP picture"
         return None

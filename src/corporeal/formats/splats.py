@@ -35,6 +35,8 @@ def read_splat(path: Path, up: Up | None = None) -> Gaussians:
     path = Path(path)
     if path.is_dir() and (path / META).is_file():
         path = path / META
+    if path.is_dir():
+        raise BadFileError(path, "is a folder without the meta.json of a splat.", KINDS)
     raw = _raw(path)
     if not raw.count:
         raise BadFileError(path, "holds no Gaussians.", AGAIN)
