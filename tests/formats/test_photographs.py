@@ -463,7 +463,7 @@ def test_no_byte_of_a_colmap_file_can_make_the_reader_crash(tmp_path, views):
     refused = 0
     for file in ("cameras.bin", "images.bin", "points3D.bin"):
         good = (tmp_path / "0" / file).read_bytes()
-        for _ in range(60):
+        for _ in range(30):
             bad = bytearray(good)
             bad[rng.integers(len(bad))] = rng.integers(256)
             (tmp_path / "0" / file).write_bytes(bad[: rng.integers(8, len(bad) + 40)])
@@ -472,7 +472,7 @@ def test_no_byte_of_a_colmap_file_can_make_the_reader_crash(tmp_path, views):
             except BadFileError:
                 refused += 1
         (tmp_path / "0" / file).write_bytes(good)
-    assert refused > 90
+    assert refused > 45
     assert len(read_colmap(tmp_path / "0").images) == 5
 
 

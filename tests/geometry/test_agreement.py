@@ -223,6 +223,7 @@ def test_good_matches_are_told_from_random_ones_without_poses():
     assert np.isinf(sampson(fundamental(a, replace(a)), x, y)).all()
 
 
+@pytest.mark.slow
 def test_poses_of_other_programs_are_let_pass_and_their_opposites_named(shared_assets):
     read = read_photographs(shared_assets / "posed" / "trivial", longest=160)
     assert pose_doubt(read.views, read.masks) is None

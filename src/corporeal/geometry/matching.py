@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image
 from skimage.color import rgb2gray
-from skimage.feature import ORB, match_descriptors
+from skimage.feature import ORB
 
 SIDE = 320
 """Longer side at which features are looked for [px]."""
@@ -48,11 +48,19 @@ def features(picture: UInt8[np.ndarray, "H W 3"]) -> Features:
 
 
 def matches(a: Features, b: Features) -> tuple[np.ndarray, np.ndarray]:
-    """Return points of two pictures that look the same, (N, 2) each."""
+    """Return points of two pictures that look the same, (N, 2) each.
+
+    Each must be the other's nearest, and clearly nearer than the next.
+    """
     if min(len(a.points), len(b.points)) < 2:
         return np.zeros((0, 2)), np.zeros((0, 2))
-    pairs = match_descriptors(a.descriptors, b.descriptors, cross_check=True, max_ratio=RATIO)
-    return a.points[pairs[:, 0]], b.points[pairs[:, 1]]
+    x, y = (f.descriptors.astype(np.float32) * 2 - 1 for f in (a, b))
+    distance = (x.shape[1] - x @ y.T) / 2  # Hamming
+    nearest = distance.argmin(axis=1)
+    mutual = distance.argmin(axis=0)[nearest] == np.arange(len(x))
+    best, second = np.partition(distance, 1, axis=1)[:, :2].T
+    good = np.flatnonzero(mutual & (best < RATIO * second))
+    return a.points[good], b.points[nearest[good]]
 
 
 def likeness(pictures: UInt8[np.ndarray, "V H W 3"]) -> Float[np.ndarray, "V V"]:
