@@ -46,7 +46,9 @@ def turned(
     for band in range(1, degree + 1):
         of = slice(band * band, (band + 1) ** 2)
         matrix = np.linalg.pinv(here[:, of]) @ there[:, of]
-        new[:, of] = np.einsum("kj,njc->nkc", matrix.astype(sh.dtype), sh[:, of])
+        channels = sh[:, of].swapaxes(1, 2).reshape(-1, 2 * band + 1)
+        after = channels @ matrix.T.astype(sh.dtype)
+        new[:, of] = after.reshape(len(sh), 3, 2 * band + 1).swapaxes(1, 2)
     return new
 
 
