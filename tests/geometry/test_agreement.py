@@ -129,11 +129,14 @@ WRONG = {
 }
 
 
-@pytest.mark.parametrize("case", WRONG)
-def test_a_wrong_convention_is_named(shared_points, case):
+def test_a_third_of_wrong_matches_does_no_harm(shared_points):
     found = agreement(shared_points)
     assert (found.by, found.doubt, found.matches) == ("matches", None, 480)
     assert 0.6 < found.share < 0.72
+
+
+@pytest.mark.parametrize("case", WRONG)
+def test_a_wrong_convention_is_named(shared_points, case):
     change, words = WRONG[case]
     assert re.search(words, pose_doubt(posed(shared_points, change)))
 
