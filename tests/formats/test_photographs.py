@@ -407,6 +407,7 @@ def test_a_picture_of_another_proportion_than_its_camera_is_left_out(tmp_path):
         ({"fl_x": float("1e999")}, "'fl_x' is inf"),
         ({"k1": "a"}, "'k1' is a"),
         ({"camera_angle_x": 7.0}, "'camera_angle_x' is 7. Give an angle"),
+        ({"fl_x": 1e-300, "k1": 1e300}, "cannot be straightened: its lens bends too much"),
         ({"fl_x": 2.0, "k1": 5.0, "k2": -90.0}, "cannot be straightened: its lens bends too much"),
     ],
 )
@@ -414,6 +415,24 @@ def test_a_bad_transforms_file_is_refused(tmp_path, change, words):
     said(tmp_path, **change)
     with pytest.raises(BadFileError, match=words):
         read_photographs(tmp_path)
+
+
+def test_bad_pictures_of_one_name_count_one_by_one(tmp_path):
+    whole = said(tmp_path)
+    for frame in whole["frames"]:
+        frame["file_path"] = "gone"
+    keep(tmp_path, whole)
+    with pytest.raises(BadFileError, match="4 of 4 pictures cannot be used"):
+        read_photographs(tmp_path)
+
+
+def test_what_is_no_description_of_photographs_is_refused(tmp_path):
+    with pytest.raises(BadFileError, match="no such file or folder"):
+        read_photographs(tmp_path / "gone")
+    for data in (b"\xff\xd8\xff", b"[1, 2", b"[" * 100_000, b""):
+        (tmp_path / "transforms.json").write_bytes(data)
+        with pytest.raises(BadFileError, match=r"is no JSON .*transforms.json, or write"):
+            read_photographs(tmp_path)
 
 
 def test_a_mask_that_is_named_and_missing_is_refused(tmp_path):

@@ -65,6 +65,8 @@ def read_photographs(path: Path, longest: int = LONGEST) -> Photographs:
 
     """
     path = Path(path)
+    if not path.exists():
+        raise BadFileError(path, "there is no such file or folder.", KINDS)
     if path.is_file():
         return _of_transforms(path, longest)
     file = next((path / name for name in TRANSFORMS if (path / name).is_file()), None)

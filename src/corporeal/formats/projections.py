@@ -108,4 +108,5 @@ def _text(path: Path) -> np.ndarray:
 def _files(folder: Path, suffixes: tuple[str, ...]) -> list[Path]:
     if not folder.is_dir():
         return []
-    return sorted(p for p in folder.iterdir() if p.suffix.lower() in suffixes)
+    found = (p for p in folder.iterdir() if p.suffix.lower() in suffixes and p.is_file())
+    return sorted(found)

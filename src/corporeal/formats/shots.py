@@ -31,6 +31,9 @@ NAMED = 5
 PROPORTION = 0.01
 """Pictures may differ that much in proportion from what the camera was said to take."""
 
+Bad = tuple[str, str]
+"""The name of a picture, and why it cannot be used, in a clause."""
+
 
 @dataclass(frozen=True)
 class Shot:
@@ -86,7 +89,7 @@ def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
         BadFileError: Fewer than three can be used, or most cannot, or all are too large together.
 
     """
-    bad: dict[str, str] = {}
+    bad: list[Bad] = []
     sizes = [_size(shot, bad) for shot in shots]
     known = [size for size in sizes if size is not None]
     counts = Counter(_reduced(*size, longest) for size in known)
@@ -100,7 +103,7 @@ def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
             try:
                 prints.append(_printed(shot, size))
             except _UnusableError as problem:
-                bad[shot.name] = str(problem)
+                bad.append((shot.name, str(problem)))
     prints = _masked_alike(prints, bad)
     _refuse_most(source, len(shots), bad)
     said = [*_left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
@@ -122,10 +125,10 @@ def _developed(prints: list[_Print], said: tuple[str, ...]) -> Developed:
 # ---------------------------------------------------------------- one photograph
 
 
-def _size(shot: Shot, bad: dict[str, str]) -> tuple[int, int] | None:
+def _size(shot: Shot, bad: list[Bad]) -> tuple[int, int] | None:
     """Return width and height without unpacking; None where it is bad."""
     if shot.picture is None:
-        bad[shot.name] = "is not there"
+        bad.append((shot.name, "is not there"))
         return None
     try:
         with warnings.catch_warnings():
@@ -133,10 +136,10 @@ def _size(shot: Shot, bad: dict[str, str]) -> tuple[int, int] | None:
             with Image.open(shot.picture, formats=FORMATS) as picture:
                 width, height = picture.size
     except Exception:  # Pillow's decoders raise almost anything on broken input
-        bad[shot.name] = "is no PNG, JPEG or WebP picture"
+        bad.append((shot.name, "is no PNG, JPEG or WebP picture"))
         return None
     if width * height > MAX_PIXELS or not width or not height:
-        bad[shot.name] = f"claims {width} × {height} pixels"
+        bad.append((shot.name, f"claims {width} × {height} pixels"))
         return None
     return width, height
 
@@ -204,16 +207,16 @@ def _reduced(width: int, height: int, longest: int) -> tuple[int, int]:
 # ---------------------------------------------------------------- all of them
 
 
-def _masked_alike(prints: list[_Print], bad: dict[str, str]) -> list[_Print]:
+def _masked_alike(prints: list[_Print], bad: list[Bad]) -> list[_Print]:
     """Leave out the few without a mask where others have one, or ignore that there are none."""
     masked = [p for p in prints if p.masked]
     if not masked or len(masked) == len(prints):
         return prints
-    bad |= {p.name: "has no mask, but others have one" for p in prints if not p.masked}
+    bad += [(p.name, "has no mask, but others have one") for p in prints if not p.masked]
     return masked
 
 
-def _refuse_most(source: Path, total: int, bad: dict[str, str]) -> None:
+def _refuse_most(source: Path, total: int, bad: list[Bad]) -> None:
     good = total - len(bad)
     if len(bad) > MOST_BAD * total:
         what = f"{len(bad)} of {total} pictures cannot be used: {_listed(bad)}."
@@ -224,12 +227,12 @@ def _refuse_most(source: Path, total: int, bad: dict[str, str]) -> None:
         raise BadFileError(source, what, step)
 
 
-def _left_out(total: int, bad: dict[str, str]) -> list[str]:
+def _left_out(total: int, bad: list[Bad]) -> list[str]:
     return [f"{len(bad)} of {total} pictures were left out: {_listed(bad)}."] * bool(bad)
 
 
-def _listed(bad: dict[str, str]) -> str:
-    names = [f"{name[-60:]} {why}" for name, why in list(bad.items())[:NAMED]]
+def _listed(bad: list[Bad]) -> str:
+    names = [f"{name[-60:]} {why}" for name, why in bad[:NAMED]]
     more = len(bad) - len(names)
     return "; ".join(names) + (f"; and {more} more" if more else "")
 

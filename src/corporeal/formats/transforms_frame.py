@@ -5,6 +5,7 @@ picture; instant-ngp and nerfstudio state ``fl_x``, ``cx``, ``w`` … for all fr
 the coefficients of a lens (OPENCV).
 """
 
+import json
 import math
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,7 +13,6 @@ from typing import Any, NoReturn
 
 import numpy as np
 
-from corporeal import store
 from corporeal.errors import BadFileError
 from corporeal.geometry.lens import Lens
 from corporeal.geometry.rotation import nearest
@@ -20,6 +20,9 @@ from corporeal.geometry.rotation import nearest
 FILE = "transforms.json"
 OPENGL = np.diag([1.0, -1.0, -1.0, 1.0])
 """Between the axes of an OpenCV camera and an OpenGL one."""
+LARGEST_FILE = 2**27
+"""[bytes]"""
+KIND = "Name a folder of photographs with their transforms.json, or write the file again."
 RADIAL = ("k1", "k2", "k3", "k4")
 TANGENTIAL = ("p1", "p2")
 MODELS = (
@@ -120,8 +123,19 @@ def frames_of(path: Path) -> list[Frame]:
     """
     if not path.is_file():
         raise BadFileError(path, "there is no such file.", "Name a folder that holds one.")
-    said = store.read_json(path)
+    said = _parsed(path)
     frames = said.get("frames") if isinstance(said, dict) else None
     if not isinstance(frames, list) or not frames or not all(isinstance(f, dict) for f in frames):
         raise BadFileError(path, "it has no list of frames.", "Each needs its file_path.")
     return [Frame(path, f"frame {k + 1}: ", said | frame) for k, frame in enumerate(frames)]
+
+
+def _parsed(path: Path) -> Any:
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise BadFileError(path, f"is larger than {LARGEST_FILE >> 20} MiB.", KIND)
+        return json.loads(path.read_bytes())
+    except OSError as problem:
+        raise BadFileError(path, f"cannot be read ({problem.strerror}).") from problem
+    except (ValueError, RecursionError) as problem:
+        raise BadFileError(path, f"is no JSON ({str(problem)[:80]}).", KIND) from None

@@ -99,13 +99,13 @@ def _without_border(lens: Lens) -> np.ndarray:
 
 def _covered(lens: Lens, K: np.ndarray, edge: np.ndarray) -> bool:
     """Tell whether the edge of the picture, and so all of it, lies within the photograph."""
-    xy = _directions(K, edge)
-    r = np.linspace(0, np.sqrt((xy**2).sum(axis=1).max()), 64)
-    slope = 1 + sum((2 * n + 3) * k * r ** (2 * n + 2) for n, k in enumerate(lens.radial))
-    if np.min(slope) <= 0:
-        return False
-    seen = _seen_at(lens, K, edge)
-    return bool((seen >= 0).all() and (seen <= (lens.width, lens.height)).all())
+    with np.errstate(over="ignore", invalid="ignore"):
+        xy = _directions(K, edge)
+        r = np.linspace(0, np.sqrt((xy**2).sum(axis=1).max()), 64)
+        slope = 1 + sum((2 * n + 3) * k * r ** (2 * n + 2) for n, k in enumerate(lens.radial))
+        seen = _seen_at(lens, K, edge)
+        good = (seen >= 0).all() and (seen <= (lens.width, lens.height)).all()
+        return bool(good and np.min(slope) > 0)
 
 
 def _seen_at(lens: Lens, K: np.ndarray, points: np.ndarray) -> np.ndarray:
