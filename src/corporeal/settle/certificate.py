@@ -14,7 +14,7 @@ DRIFT = 1e-3
 """Of what rests within a second, at most, per metre of scene."""
 KICK = 0.01
 """Spin given to every body to topple what is merely balanced [rad/s]."""
-HOVER = 0.005
+HOVER = 0.008
 """Gap below a body that still counts as touching, of the scene's unit."""
 SAMPLES = 4000
 """Points of a surface beside its vertices that are looked up in other bodies."""

@@ -22,15 +22,15 @@ from corporeal.geometry.shape import Shape
 from corporeal.settle.hull import Piece, hull_of
 from corporeal.store import load, save
 
-VERSION = 1
+VERSION = 2
 """Of the way pieces are made: kept ones of another version are made anew."""
-CELLS = 60_000
+CELLS = 80_000
 """Of the grid, about."""
 FINEST, COARSEST = 1 / 128, 1 / 32
 """Of the extent: side of a cell."""
 EXCESS = 0.12
 """Pieces are enough when they hold no more than this share beyond the body's cells."""
-MOST = 48
+MOST = 64
 """Pieces of one body."""
 BALANCE = 0.2
 """Weight of halves that differ in size: slicing a bowl's rim off never opens it."""

@@ -48,8 +48,9 @@ class SettleConfig:
 
 
 DEFAULT = SettleConfig()
-FRICTION = [0.6, 0.02, 0.01]
-"""Against sliding [-], turning about the normal and rolling [unit]."""
+SLIDING, SPIN, ROLL = 0.6, 0.02, 0.02
+"""Coefficients of friction: against sliding [-], turning about the normal [unit], and rolling, of a
+body's extent."""
 SOLREF = [0.008, 1.0]
 FIRM_STEP, FIRM_SOLREF = 5e-4, 1e-3
 """Step [s] and time constant [s] of hard contacts: they give way a few thousandths of a millimetre
@@ -158,10 +159,11 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
     spec.option.iterations = 100
     spec.option.noslip_iterations = 4
     spec.option.tolerance = 1e-10
-    surface = {"friction": FRICTION, "solref": SOLREF, "solimp": SOLIMP, "condim": 6}
+    surface = {"solref": SOLREF, "solimp": SOLIMP, "condim": 6}
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[5, 5, 0.1],
+        friction=[SLIDING, 0.0, 0.0],
         contype=FLOOR_AND_HULLS,
         conaffinity=0,
         **surface,
@@ -175,6 +177,7 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
         if body.matter:
             _give(thing, body.matter, unit, lightest)
         thing.add_freejoint()
+        surface["friction"] = [SLIDING, SPIN, ROLL * body.extent / unit]
         _add_mesh(spec, f"{k} hull", body.hull, unit)
         thing.add_geom(
             type=mujoco.mjtGeom.mjGEOM_MESH,
