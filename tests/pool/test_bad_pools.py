@@ -174,6 +174,19 @@ def test_a_non_manifold_tangle_is_measured_like_any_other(tmp_path):
     assert 0 < asset.open_edges < 1
 
 
+@pytest.mark.parametrize(("gap", "things"), [(0.1, 2), (0.01, 1), (0.0, 1)])
+def test_what_stands_apart_is_several_things(tmp_path, gap, things):
+    """Two balls with a gap between them, over their common extent; touching, they are one toy."""
+    vertices, triangles, _ = ball(12)
+    shift = 2 * 0.1 * (1 + gap / (1 - gap))
+    both = np.concatenate([vertices, vertices + np.array([shift, 0, 0])])
+    put(tmp_path / "in", pair=glb(both, np.concatenate([triangles, triangles + len(vertices)])))
+    pool = index([tmp_path / "in"], tmp_path / "pool")
+    assert len(pool.assets) == (things == 1)
+    if things == 2:
+        assert "holds 2 things that stand apart; the largest has 50% of" in reasons(pool)["pair"]
+
+
 def test_open_edges_are_counted(tmp_path):
     vertices, triangles, _ = ball(10)
     upper = (vertices[triangles, 2] > -1e-9).all(axis=1)

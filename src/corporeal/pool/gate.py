@@ -6,10 +6,12 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.ndimage import label
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
 from corporeal.geometry.mesh import Mesh, weld
+from corporeal.geometry.spread import sample_surface
 from corporeal.pool.decimate import decimated
 from corporeal.types import Scene, Surface
 
@@ -21,6 +23,12 @@ BROKEN = 0.5
 """Share of degenerate triangles from which a model is no model."""
 MAIN = 0.01
 """Share of the area that at least one connected component must have."""
+APART = 0.02
+"""Gap that makes two things of what one file holds, over its extent."""
+WHOLE = 0.9
+"""Share of the area that hangs together, within that gap, in one thing."""
+SAMPLES = 60_000
+"""Points of the surface by which that is told."""
 FEW_COLOURS = 64
 """A picture with no more colours than this is a palette: its pixels carry no detail."""
 FLAT = 1e-6
@@ -152,6 +160,23 @@ def largest_component(mesh: Mesh) -> float:
     return float(areas.max() / areas.sum())
 
 
+def things_apart(mesh: Mesh) -> Float[np.ndarray, " K"]:
+    """Share of the area [-] of each thing that stands clear of the others, the largest first.
+
+    Told by voxels as large as the gap, which sampled points fill: what they bridge is one thing,
+    whether its pieces are joined or, as in most models, merely stuck together.
+    """
+    points, _ = sample_surface(mesh, SAMPLES, np.random.default_rng(0))
+    low = points.min(axis=0)
+    places = ((points - low) / (APART * np.ptp(points, axis=0).max())).astype(int)
+    taken = np.zeros(places.max(axis=0) + 1, dtype=bool)
+    taken[tuple(places.T)] = True
+    thing = np.empty(taken.shape, dtype=np.int32)
+    label(taken, np.ones((3, 3, 3)), output=thing)
+    counts = np.bincount(thing[tuple(places.T)])[1:]
+    return np.sort(counts)[::-1] / SAMPLES
+
+
 def _extent(scene: Scene) -> float:
     """Return the largest extent; unlike NaN, 1e30 can be written in a file."""
     if not any(len(s.triangles) for s in scene.surfaces):
@@ -255,4 +280,10 @@ def _check_components(mesh: Mesh) -> None:
     if share <= MAIN:
         raise Rejected(
             f"falls into crumbs: its largest connected piece has {share:.2%} of the area"
+        )
+    things = things_apart(mesh)
+    if things[0] < WHOLE:
+        raise Rejected(
+            f"holds {len(things)} things that stand apart; the largest has {things[0]:.0%} of the "
+            "area. Save each in a file of its own"
         )

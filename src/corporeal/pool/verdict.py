@@ -19,7 +19,7 @@ from corporeal.formats.words import everyday, writable
 from corporeal.pool.gate import GateConfig, Measures, Rejected, inspect
 from corporeal.types import Scene
 
-RULES = "1"
+RULES = "2"
 """Changes when the gate judges otherwise: older verdicts then count no more."""
 VERDICTS = "verdicts.jsonl"
 MODELS = "models"
