@@ -218,6 +218,29 @@ class Gaussians:
         return len(self.mean)
 
 
+@dataclass(frozen=True)
+class Cloud:
+    """Points of a scene with what they look like to a model; N points."""
+
+    position: Float[np.ndarray, "N 3"]
+    """World position [m]."""
+    colour: Float[np.ndarray, "N 3"]
+    """sRGB in [0, 1]."""
+    semantic: Float[np.ndarray, "N S"]
+    """What it is: unit vectors, comparable with words where they come from CLIP."""
+    structural: Float[np.ndarray, "N D"]
+    """Which part of a thing it is: unit vectors."""
+    seen: Int[np.ndarray, " N"]
+    """In how many views; 0: its features are its neighbours'."""
+    gaussian_of_point: Int[np.ndarray, " N"] | None = None
+    """Where points are Gaussians' means, or were sampled from Gaussians."""
+
+    @property
+    def count(self) -> int:
+        """Number of points N."""
+        return len(self.position)
+
+
 # ---------------------------------------------------------------- what it is, in words
 
 

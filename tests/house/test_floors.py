@@ -12,7 +12,7 @@ FLOORS = [
     {"errors", "machine", "types"},
     {"geometry", "backends", "store"},
     {"formats"},
-    {"materials", "vlm", "render", "showcase", "mpm", "pool", "settle", "splats"},
+    {"materials", "vlm", "render", "showcase", "mpm", "pool", "settle", "splats", "features"},
     {"stages"},
     {"pipeline"},
     {"corpus", "evaluation"},
