@@ -84,13 +84,11 @@ def settle(
 
     """
     engine = Engine(bodies, poses, config.step)
-    quiet = _wait(engine, config, config.longest, config.calm_after)
-    if quiet:
-        engine.let_roll()
-        quiet = _wait(engine, config, config.roll, 0.0)
-    if quiet:
-        engine.harden()
-        quiet = _wait(engine, config, config.firm, 0.0)
+    _wait(engine, config, config.longest, config.calm_after)
+    engine.let_roll()
+    _wait(engine, config, config.roll, 0.0)
+    engine.harden()
+    quiet = _wait(engine, config, config.firm, 0.0)
     return Settled(engine.poses(), float(engine.data.time), quiet)
 
 
