@@ -9,6 +9,7 @@ them is a sparse linear problem of which that sum is the normalised first step (
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from typing import cast
 
 import numpy as np
 from jaxtyping import Bool, Float, Float16, Float32, Int
@@ -85,7 +86,7 @@ def lift(weights: Weights, maps: Sequence[np.ndarray], count: int, least: float 
 
 def _agreeing(share: csr_array, pixels: np.ndarray, mean: np.ndarray, view: int) -> csr_array:
     wanted = len(mean), pixels.shape[0] * pixels.shape[1]
-    given = np.shape(share)
+    given = _size(share)
     if given != wanted or pixels.shape[2] != mean.shape[1]:
         raise UserError(
             f"View {view}'s map is {' x '.join(map(str, pixels.shape))}; its weights are for "
@@ -97,9 +98,13 @@ def _agreeing(share: csr_array, pixels: np.ndarray, mean: np.ndarray, view: int)
 
 def _add(mean: np.ndarray, share: csr_array, rows: np.ndarray, pixels: np.ndarray) -> None:
     flat = np.ascontiguousarray(pixels.reshape(-1, pixels.shape[-1]), np.float32)
-    single = share.astype(np.float32)
+    single = csr_array(share, dtype=np.float32)
     for batch in batches(len(rows)):
         mean[rows[batch]] += single[rows[batch]] @ flat
+
+
+def _size(share: csr_array) -> tuple[int, int]:
+    return cast("tuple[int, int]", share.shape)
 
 
 def batches(count: int) -> list[slice]:
@@ -137,7 +142,7 @@ def _resampled(weights: Weights, cells: tuple[int, int], maps: Sequence[np.ndarr
     def of(view: int) -> csr_array:
         size = maps[view].shape[:2]
         share = weights(view)
-        given = np.shape(share)[1]
+        given = _size(share)[1]
         if given != cells[0] * cells[1]:
             raise UserError(
                 f"View {view} has weights for {given} cells, not {cells[0]} x {cells[1]}."
