@@ -208,6 +208,16 @@ def test_what_the_step_budget_would_let_sag_is_rigid_where_that_is_nearer_to_lif
         assert plan([thing], [FALL], "draft").treatments[0].kind != "rigid"
 
 
+def test_a_limp_looking_wall_is_rigid_at_rest_and_gives_way_when_struck():
+    """A ball of 40 cm on a coarse grid: simulated many times thicker, it would sag by a tenth."""
+    ball = replace(sphere(RUBBER, 0.4, shell(0.002)), closed=True)
+    calm = Motion(impact_speed=0.0, acceleration=9.81)
+    assert not judge(ball, calm).rigid
+    (still,), (struck,) = (plan([ball], [m], "draft").treatments for m in (calm, FALL))
+    assert still.kind == "rigid"
+    assert struck.kind == "shell"
+
+
 def test_a_crowded_scene_takes_fewer_steps_than_a_small_one():
     draft = QUALITIES["draft"]
     assert draft.steps(2_000) == 20e3

@@ -8,7 +8,7 @@ from dataclasses import replace
 from math import sqrt
 
 from corporeal.mpm.judging import INVISIBLE_STRAIN
-from corporeal.mpm.part import PartGeometry, Verdict, is_trinket
+from corporeal.mpm.part import Motion, PartGeometry, Verdict, is_trinket
 from corporeal.mpm.stability import (
     COURANT,
     capped_young,
@@ -73,36 +73,41 @@ def fit_budget(
 
 def nearer_rigid(
     parts: Sequence[PartGeometry],
+    motions: Sequence[Motion],
     verdicts: Sequence[Verdict],
     unslowed: Sequence[Treatment],
     slowed: Sequence[Treatment],
 ) -> set[int]:
-    """Say which parts the step budget softens so much that rigid is nearer to the truth.
+    """Say which parts would be simulated so much too soft that rigid is nearer to the truth.
 
-    In life a part strains by ε_w for good under its own weight; softened f times, by ε_w f. It is
-    better rigid where that is off by more than ε_w; no strain counts as more than 1, at which all
-    shape is lost. What would visibly flex when struck stays soft, and what yields or flows has to
-    do so at any stiffness.
+    In life a part strains by ε_w for good under its own weight; softened f times by the step
+    budget, by ε_w f; and thickened, which keeps its bending stiffness only, by ρ a L/E of the
+    simulated numbers. It is better rigid where that is off by more than ε_w; no strain counts as
+    more than 1, at which all shape is lost. What would visibly flex when struck stays soft, and
+    what yields or flows has to do so at any stiffness.
     """
     found = set()
     for k, (true, soft) in enumerate(zip(unslowed, slowed, strict=True)):
-        verdict = verdicts[k]
-        flows = parts[k].material.law is Law.DRUCKER_PRAGER
+        part, verdict = parts[k], verdicts[k]
+        flows = part.material.law is Law.DRUCKER_PRAGER
         yields = flows or true.impact_speed >= verdict.yield_speed
         flexes = verdict.impact >= INVISIBLE_STRAIN
         if verdict.rigid or yields or flexes or true.wave_speed == 0:
             continue
-        sags = min(1.0, verdict.weight * true.young / soft.young)
+        motion = motions[part.object]
+        pull = motion.driven if part.burden else motion.acceleration
+        squashed = soft.density * pull * part.size[2] / soft.young
+        sags = min(1.0, max(squashed, verdict.weight * true.young / soft.young))
         if sags - min(1.0, verdict.weight) > max(verdict.weight, INVISIBLE_STRAIN):
             found.add(k)
     return found
 
 
-def slowed(verdict: Verdict) -> str:
+def softened(verdict: Verdict) -> str:
     """Say why such a part is rigid."""
     return (
-        f"it is expected to strain by about {verdict.strain:.2g}, and the step budget would soften "
-        "it until it sagged by more than that"
+        f"it is expected to strain by about {verdict.strain:.2g}, and as soft as the grid and the "
+        "step budget would make it, it would sag by more than that"
     )
 
 

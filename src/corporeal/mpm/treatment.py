@@ -3,7 +3,8 @@
 One policy for all scenes (no scene can tune it): a part that would neither yield nor visibly flex
 is rigid, by itself or as the frame of softer parts; everything else keeps its true stiffness; thin
 walls are thickened with the stiffness that counts and the areal mass kept; only a step budget may
-compress wave speeds, in their order, and what would then sag too far is rigid after all.
+compress wave speeds, in their order. What would sag far more than in life, as soft as thick walls
+and the step budget make it, is rigid after all.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from math import inf
 from typing import Literal
 
 from corporeal.mpm import plants
-from corporeal.mpm.budget import calm_trinkets, cap, fit_budget, nearer_rigid, slowed
+from corporeal.mpm.budget import calm_trinkets, cap, fit_budget, nearer_rigid, softened
 from corporeal.mpm.filled import as_contents, mean_density
 from corporeal.mpm.judging import judge
 from corporeal.mpm.part import (
@@ -108,11 +109,11 @@ def plan(
         verdicts, crowns = plants.settle(parts, verdicts)
     while True:
         made, unslowed = _plan(parts, motions, (verdicts, crowns), detail, stiffness)
-        stiff = nearer_rigid(parts, verdicts, unslowed, made.treatments)
+        stiff = nearer_rigid(parts, motions, verdicts, unslowed, made.treatments)
         if stiffness == "capped" or not stiff:
             return made
         verdicts = [
-            replace(v, rigid=True, reason=slowed(v)) if k in stiff else v
+            replace(v, rigid=True, reason=softened(v)) if k in stiff else v
             for k, v in enumerate(verdicts)
         ]
 
