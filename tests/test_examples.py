@@ -16,3 +16,7 @@ def test_a_rubber_ball_comes_back_but_not_all_the_way():
 
 def test_a_dragged_ball_trails_behind_the_hand():
     assert 0.05 < example("02_drag_an_object.py") < 0.4
+
+
+def test_three_bricks_make_a_pile_as_high_as_themselves():
+    assert abs(example("03_settle_a_pile.py") - 1) < 0.005
