@@ -18,6 +18,7 @@ install_import_hook(
         "corporeal.mpm.plasticity",
         "corporeal.stages",
         "corporeal.formats",
+        "corporeal.features",
         "corporeal.store",
     ],
     "beartype.beartype",

@@ -17,10 +17,9 @@ from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
+from corporeal.features.vectors import batches, unit
 from corporeal.types import Camera
 
-BATCH = 8192
-"""Points that are worked on at a time: what bounds the memory beside the sum itself."""
 LEAST = 1e-2
 """A Gaussian that has less weight in a view is not seen in it [px]."""
 LEEWAY = 0.005
@@ -105,18 +104,6 @@ def _add(mean: np.ndarray, share: csr_array, rows: np.ndarray, pixels: np.ndarra
 
 def _size(share: csr_array) -> tuple[int, int]:
     return cast("tuple[int, int]", share.shape)
-
-
-def batches(count: int) -> list[slice]:
-    """Cut 0 … count into spans of at most ``BATCH``."""
-    return [slice(k, min(k + BATCH, count)) for k in range(0, count, BATCH)]
-
-
-def unit(rows: Float[np.ndarray, "N D"]) -> Float32[np.ndarray, "N D"]:
-    """Return rows at unit length; rows of zeros stay zeros."""
-    rows = np.asarray(rows, np.float32)
-    length = np.linalg.norm(rows, axis=-1, keepdims=True)
-    return rows / np.where(length > 0, length, 1)
 
 
 # ---------------------------------------------------------------- by Gaussians' weights
