@@ -1,5 +1,7 @@
 """What training is made of: the loss and its slope, Adam, growth, where Gaussians start."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import correlate1d
@@ -8,7 +10,7 @@ from splat_scenes import around, blobs, pictured
 
 from corporeal.errors import UserError
 from corporeal.geometry.rotation import matrix
-from corporeal.splats import start
+from corporeal.splats import start, sweep
 from corporeal.splats.crew import Crew
 from corporeal.splats.growth import CROWD, jitter, moved, shared, turn
 from corporeal.splats.kernels_learn import WINDOW, adam
@@ -16,7 +18,9 @@ from corporeal.splats.loss import Goal, goal, loss
 from corporeal.splats.parameters import gaussians_of, opacity, parameters
 from corporeal.splats.quality import psnr, quality, ssim
 from corporeal.splats.raster import draw, pinhole
-from corporeal.splats.start import Points, agreed, hull, region, seeded
+from corporeal.splats.start import Points, clearance, hull, region, seeded
+from corporeal.splats.sweep import neighbours, swept
+from corporeal.types import Views
 
 RNG = np.random.default_rng
 
@@ -161,6 +165,10 @@ def test_the_region_is_what_the_cameras_look_at():
     assert found.radius == pytest.approx(3 * np.sin(np.arctan(20 / 50)), rel=0.01)
 
 
+def test_cameras_have_free_space_before_them():
+    np.testing.assert_allclose(clearance(around(12, centre=(1.0, -2.0, 0.5))), 0.9, atol=0.01)
+
+
 def test_parallel_cameras_have_a_region():
     assert np.isfinite(region(around(1) * 3).centre).all()
 
@@ -181,24 +189,65 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
             hull(views, np.zeros_like(masks), 10, RNG(0), crew)
 
 
-def test_points_are_where_pictures_agree():
-    ball = blobs(300)
-    unit = RNG(3).normal(size=(300, 3))
-    ball.mean[:] = 0.5 * unit / np.linalg.norm(unit, axis=1, keepdims=True)
-    views, _ = pictured(ball, around(20), background=(1.0, 1.0, 1.0))
+@pytest.fixture(scope="module")
+def ball():
+    """A blotched ball of radius 0.6 before grey, its centre half a metre to one side.
+
+    It is of blobs, so that seen from outside it bulges by about a standard deviation.
+    """
+    unit = RNG(3).normal(size=(4000, 3))
+    unit /= np.linalg.norm(unit, axis=1, keepdims=True)
+    made = blobs(4000)
+    made.mean[:] = 0.6 * unit + [0.5, 0, 0]
+    made.scale[:] = 0.02
+    made.opacity[:] = 0.99
+    made.sh[:, 0] = np.sin(9 * unit + [0, 1, 2])
+    cameras = around(40, (64, 64), focal=80.0, centre=(0.5, 0, 0))
+    return pictured(made, cameras, (0.5, 0.5, 0.5))[0]
+
+
+def test_a_sweep_finds_the_surface(ball, monkeypatch):
+    monkeypatch.setattr(sweep, "PIXELS", 8_000)
     with Crew(1) as crew:
-        points = agreed(views, 400, RNG(0), crew)
-        away = tuple(
-            type(c)(c.K, c.world_from_camera @ np.diag([1, -1, -1, 1]), c.width, c.height)
-            for c in views.cameras
-        )
-        with pytest.raises(UserError, match="no common place"):
-            agreed(type(views)(views.rgb, away), 400, RNG(0), crew)
-    assert len(points.position) == 400
-    near = np.linalg.norm(points.position, axis=1) < 0.9
-    assert 0.2 < near.mean() < 0.8
-    assert np.median(points.colour[~near]) > 0.96, "the background is white"
-    assert np.median(points.colour[near]) < 0.95
+        points = swept(ball, 20_000, RNG(0), crew)
+    distance = np.linalg.norm(points.position - [0.5, 0, 0], axis=1)
+    near = distance < 1
+    assert near.sum() > 200
+    np.testing.assert_allclose(np.median(distance[near]), 0.62, atol=0.015)
+    assert np.mean(np.abs(distance[near] - 0.62) < 0.06) > 0.8
+    assert np.mean((distance > 0.8) & (distance < 2)) < 0.1, "something floats before the cameras"
+    assert points.colour[near].std() > 0.1
+
+
+def test_the_number_of_threads_changes_no_sweep(ball, monkeypatch):
+    monkeypatch.setattr(sweep, "PIXELS", 3_000)
+    found = []
+    for threads in (1, 3):
+        with Crew(threads) as crew:
+            found.append(swept(ball, 500, RNG(0), crew).position)
+    np.testing.assert_array_equal(*found)
+
+
+def test_cameras_that_look_past_each_other_agree_nowhere(ball, monkeypatch):
+    monkeypatch.setattr(sweep, "PIXELS", 1_000)
+    away = []
+    for k, camera in enumerate(ball.cameras[:6]):
+        pose = camera.world_from_camera.copy()
+        pose[:3, 3] += [100 * k, 0, 0]
+        away.append(replace(camera, world_from_camera=pose))
+    with Crew(1) as crew, pytest.raises(UserError, match="agree on no place"):
+        swept(Views(ball.rgb[:6], tuple(away)), 500, RNG(0), crew)
+
+
+def test_neighbours_are_beside_but_not_on_the_spot():
+    cameras = around(24)
+    cameras = (*cameras, cameras[3])
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
+    mates = neighbours(cameras, 3)
+    assert len(mates) == 4 and 3 not in mates and 24 not in mates
+    apart = np.linalg.norm(eyes - eyes[3], axis=1)
+    assert set(mates) == set(np.argsort(apart)[2:6])
+    assert list(neighbours(cameras[:2], 0)) == [1]
 
 
 def test_gaussians_begin_as_wide_as_they_are_apart():

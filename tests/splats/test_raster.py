@@ -171,6 +171,15 @@ def test_nothing_at_all_is_the_background():
     assert not picture.alpha.any() and np.isinf(picture.depth).all()
 
 
+def test_what_is_too_near_is_not_drawn():
+    theta, eye = cloud(40, 1), camera()
+    z = pinhole(eye).turn[2] @ theta[:, :3].T + pinhole(eye).shift[2]
+    near = float(np.median(z))
+    some, far = render(gaussians_of(theta), eye, near=near), theta[z >= near]
+    np.testing.assert_array_equal(some.rgb, render(gaussians_of(far), eye).rgb)
+    assert np.abs(some.rgb - render(gaussians_of(theta), eye).rgb).max() > 0.1
+
+
 def test_depth_is_that_of_a_wall():
     """A dense flat sheet across the view, 2.5 m away."""
     theta = cloud(4000, 0, scale=(0.06, 0.08))

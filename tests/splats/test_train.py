@@ -7,7 +7,7 @@ import pytest
 from splat_scenes import around, blobs, pictured
 
 from corporeal.errors import UserError
-from corporeal.splats import start
+from corporeal.splats import start, sweep
 from corporeal.splats import train as module
 from corporeal.splats.start import Points
 from corporeal.splats.train import TrainConfig, shrunk, train
@@ -23,8 +23,9 @@ def scene():
 
 
 @pytest.fixture(autouse=True)
-def coarse_hull(monkeypatch):
+def coarse_beginnings(monkeypatch):
     monkeypatch.setattr(start, "CELLS", 30_000)
+    monkeypatch.setattr(sweep, "PIXELS", 4_000)
 
 
 def test_things_are_learned_from_pictures_and_masks(scene):
@@ -39,7 +40,7 @@ def test_things_are_learned_from_pictures_and_masks(scene):
     assert np.linalg.norm(out.gaussians.mean, axis=1).max() < 3
 
 
-def test_a_scene_without_masks_starts_where_pictures_agree(scene):
+def test_a_scene_without_masks_starts_from_a_sweep(scene):
     views, _ = scene
     out = train(views, config=SMALL)
     assert out.quality.psnr > 20 and out.quality.psnr_things is None
@@ -119,7 +120,8 @@ def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, mon
 
 
 @pytest.mark.parametrize("shade", [0, 255])
-def test_pictures_of_nothing_give_no_nan(shade):
+def test_pictures_of_nothing_give_no_nan(shade, monkeypatch):
+    monkeypatch.setattr(sweep, "PIXELS", 500)
     cameras = around(4)
     views = Views(np.full((4, 40, 48, 3), shade, np.uint8), cameras)
     config = TrainConfig(preset="draft", gaussians=100, steps=30, threads=1)

@@ -143,9 +143,9 @@ def witness(points, first, last, cameras, pictures, masks, patience, out):
     """Ask every view about points first to last.
 
     cameras (V, 16): camera from world (3 × 4), fx, fy, cx, cy; pictures (V, H, W, 3); masks
-    (V, H, W), true on things, or of no views; patience: after more views that see it beside things
-    nobody else is asked. out (N, 8): views that see it, views that see it beside things, sums of
-    red, green and blue [0–1], sums of their squares.
+    (V, H, W), true on things; patience: after more views that see it beside things
+    nobody else is asked. out (N, 5): views that see it, views that see it beside things, sums of
+    red, green and blue [0–1].
     """
     views, height, width, _ = pictures.shape
     p = np.empty(3)
@@ -162,13 +162,11 @@ def witness(points, first, last, cameras, pictures, masks, patience, out):
             u, v = c[12] * p[0] / p[2] + c[14], c[13] * p[1] / p[2] + c[15]
             if not (0 <= u < width and 0 <= v < height):
                 continue
-            if masks.shape[0] > 0 and not masks[k, int(v), int(u)]:
+            if not masks[k, int(v), int(u)]:
                 out[i, 1] += 1
                 if out[i, 1] > patience:
                     break
                 continue
             out[i, 0] += 1
             for q in range(3):
-                shade = pictures[k, int(v), int(u), q] / 255
-                out[i, 2 + q] += shade
-                out[i, 5 + q] += shade * shade
+                out[i, 2 + q] += pictures[k, int(v), int(u), q] / 255

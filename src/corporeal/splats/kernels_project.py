@@ -25,8 +25,6 @@ THINNEST = 2.5e-5
 """Least share of the opacity, squared, that dilation leaves."""
 FAINTEST = 1 / 255
 """Less opaque is not drawn."""
-NEAR = 0.01
-"""Nearer ones are not drawn [m]."""
 HUGE = 1e6
 """Wider ones are not drawn [px]."""
 
@@ -46,6 +44,8 @@ class Pinhole(NamedTuple):
     cy: float
     width: int
     height: int
+    near: float
+    """What is nearer is not drawn [m]"""
 
 
 @numba.njit(**JIT)
@@ -116,7 +116,7 @@ def project(theta, first, last, camera, ellipses):
         e = ellipses[i]
         e[REACH] = e[REACH + 1] = -1
         _seen(theta, i, camera, p)
-        if not p[2] >= NEAR:
+        if not p[2] >= camera.near:
             continue
         _flatten(theta, i, camera, p, T, R, P, scale)
         a0 = P[0, 0] * P[0, 0] + P[0, 1] * P[0, 1] + P[0, 2] * P[0, 2]

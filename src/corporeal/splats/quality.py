@@ -10,6 +10,7 @@ from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_learn import similarity
 from corporeal.splats.parameters import parameters
 from corporeal.splats.raster import BLACK, draw, picture_of, pinhole
+from corporeal.splats.start import clearance
 from corporeal.types import Gaussians, Vector, Views
 
 Rgb = Float[np.ndarray, "H W 3"]
@@ -34,16 +35,23 @@ def quality(
     views: Views,
     which: Sequence[int],
     masks: Bool[np.ndarray, "V H W"] | None = None,
-    background: Vector = BLACK,
+    background: Vector | None = None,
 ) -> Quality:
-    """Compare pictures with views. With masks, what is beside things is the background in both."""
-    theta, rows = parameters(gaussians), []
+    """Compare pictures with views.
+
+    masks: which pixels are on things. background: where given, what is beside things is that in
+    both; else whole photographs are compared, and black is behind everything. What is nearer to a
+    camera than its ``start.clearance`` is not drawn.
+    """
+    theta, rows, clear = parameters(gaussians), [], clearance(views.cameras)
+    behind = np.array(BLACK if background is None else background, np.float32)
     with Crew() as crew:
         for k in which:
-            made = draw(theta, pinhole(views.cameras[k]), np.array(background), crew)
+            eye = pinhole(views.cameras[k], near=clear[k])
+            made = draw(theta, eye, behind, crew)
             rgb, real = np.clip(picture_of(made).rgb, 0, 1), views.rgb[k] / np.float32(255)
-            if masks is not None:
-                real = np.where(masks[k][..., None], real, np.array(background, np.float32))
+            if masks is not None and background is not None:
+                real = np.where(masks[k][..., None], real, behind)
             on = [psnr(rgb[masks[k]], real[masks[k]])] if masks is not None else []
             rows.append([psnr(rgb, real), ssim(rgb, real), *on])
     whole, alike, *on = (float(x) for x in np.nanmean(rows, axis=0))

@@ -20,6 +20,8 @@ from corporeal.types import Camera, Gaussians, Vector
 SEEN = 1e-3
 """Where less than this is covered, there is no depth to speak of."""
 BLACK: Vector = (0.0, 0.0, 0.0)
+NEAR = 0.01
+"""Nearest depth that is drawn where nobody says another [m]."""
 
 
 @dataclass(frozen=True)
@@ -53,16 +55,24 @@ class Drawing:
 
 
 def render(
-    gaussians: Gaussians, camera: Camera, background: Vector = BLACK, threads: int | None = None
+    gaussians: Gaussians,
+    camera: Camera,
+    background: Vector = BLACK,
+    near: float = NEAR,
+    threads: int | None = None,
 ) -> Picture:
     """Picture some Gaussians before a background.
+
+    near: what is nearer is not drawn [m]; where a training left something before the cameras,
+    ``start.clearance``.
 
     Raises:
         UserError: The camera is skewed.
 
     """
     with Crew(threads) as crew:
-        return picture_of(draw(parameters(gaussians), pinhole(camera), np.array(background), crew))
+        eye = pinhole(camera, near=near)
+        return picture_of(draw(parameters(gaussians), eye, np.array(background), crew))
 
 
 def picture_of(drawing: Drawing) -> Picture:
@@ -134,8 +144,10 @@ def weights(
     return csr_array((sums[entry, y, x], (d.ids[entry], column)), shape=shape)
 
 
-def pinhole(camera: Camera, scale: float = 1.0) -> Pinhole:
+def pinhole(camera: Camera, scale: float = 1.0, near: float = NEAR) -> Pinhole:
     """Return a camera as kernels read it; a scale of 0.5 halves the picture.
+
+    near: what is nearer is not drawn [m].
 
     Raises:
         UserError: The camera is skewed.
@@ -148,7 +160,7 @@ def pinhole(camera: Camera, scale: float = 1.0) -> Pinhole:
     eye = np.ascontiguousarray(camera.world_from_camera[:3, 3], dtype=np.float64)
     fx, fy, cx, cy = (float(scale * k) for k in (K[0, 0], K[1, 1], K[0, 2], K[1, 2]))
     size = round(scale * camera.width), round(scale * camera.height)
-    return Pinhole(turn, -turn @ eye, eye, fx, fy, cx, cy, *size)
+    return Pinhole(turn, -turn @ eye, eye, fx, fy, cx, cy, *size, float(near))
 
 
 def _tiles(first: Int[np.ndarray, " tiles_and_1"], crew: Crew) -> list[Int[np.ndarray, " t"]]:

@@ -9,7 +9,7 @@ from jaxtyping import Float, Inexact
 
 from corporeal.geometry.harmonics import DEGREES, basis
 from corporeal.splats.kernels_blend import CUTOFF, MOST, SHUT
-from corporeal.splats.kernels_project import DILATION, FAINTEST, NEAR, THINNEST, Pinhole
+from corporeal.splats.kernels_project import DILATION, FAINTEST, THINNEST, Pinhole
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE
 
 Matrix = Inexact[np.ndarray, "N D"]
@@ -25,7 +25,7 @@ def reference(
     seen = theta[:, MEAN:ROTATION] @ camera.turn.T + camera.shift
     for i in np.argsort(np.real(seen[:, 2]), kind="stable"):
         p = seen[i]
-        if not p[2].real >= NEAR:
+        if not p[2].real >= camera.near:
             continue
         covariance = flattened(theta[i], p, camera)
         dilated = covariance + DILATION * np.eye(2)

@@ -1,6 +1,6 @@
-"""Where Gaussians start: on given points, on the visual hull, or where pictures agree."""
+"""Where Gaussians start: on the visual hull of masks, or on given points."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -18,10 +18,10 @@ CELLS = 2_000_000
 """Of the grid that the visual hull is carved from."""
 ASTRAY = 0.05
 """Share of the views that may see a point of the hull beside things: masks err at edges."""
-RIVALS = 8
-"""Points at random of which the one that pictures agree on most is kept."""
-REACH = 12.0
-"""How far a background goes, in radii of the region that the cameras look at."""
+
+
+ROOM = 0.3
+"""Depth of the free space before a camera, in its distances from what all look at."""
 
 
 @dataclass(frozen=True)
@@ -62,6 +62,15 @@ def region(cameras: tuple[Camera, ...]) -> Region:
     return Region((float(centre[0]), float(centre[1]), float(centre[2])), radius)
 
 
+def clearance(cameras: tuple[Camera, ...]) -> Float[np.ndarray, " V"]:
+    """Return the depth before each camera where nothing is drawn [m].
+
+    Photographers keep a distance. What a training puts there helps one picture and spoils others.
+    """
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
+    return ROOM * np.linalg.norm(eyes - region(cameras).centre, axis=1)
+
+
 def hull(
     views: Views, masks: Bool[np.ndarray, "V H W"], count: int, rng: np.random.Generator, crew: Crew
 ) -> Points:
@@ -84,40 +93,11 @@ def hull(
     return Points(position, seen[:, 2:5] / np.maximum(seen[:, :1], 1))
 
 
-def agreed(views: Views, count: int, rng: np.random.Generator, crew: Crew) -> Points:
-    """Return points at random where pictures agree on a colour, near and far.
-
-    Half of them are in the ball that the cameras look at, half around it, ever sparser.
-
-    Raises:
-        UserError: The cameras see no common place.
-
-    """
-    around = region(views.cameras)
-    tries = 2 * RIVALS * count
-    near = rng.random(tries) < 0.5
-    distance = np.where(near, np.cbrt(rng.random(tries)), REACH ** rng.random(tries))
-    direction = rng.normal(size=(tries, 3))
-    direction /= np.linalg.norm(direction, axis=1, keepdims=True)
-    position = np.array(around.centre) + around.radius * distance[:, None] * direction
-    seen = _witnessed(position, views, np.zeros((0, 1, 1), bool), crew)
-    common = seen[:, 0] >= min(3, len(views.cameras))
-    position, seen = position[common], seen[common]
-    count = min(count, len(position) // RIVALS)
-    if count == 0:
-        raise UserError("The cameras see no common place. Check the convention of their poses.")
-    mean = seen[:, 2:5] / seen[:, :1]
-    spread = (seen[:, 5:8] / seen[:, :1] - mean**2).sum(axis=1)
-    groups = rng.permutation(len(position))[: RIVALS * count].reshape(count, RIVALS)
-    best = groups[np.arange(count), spread[groups].argmin(axis=1)]
-    return Points(position[best], mean[best], opacity=0.1)
-
-
 def seeded(points: Points, count: int, degree: int, rng: np.random.Generator) -> Parameters:
     """Return round Gaussians on some of the points, as wide as these are apart."""
     if len(points.position) > count:
         chosen = rng.choice(len(points.position), count, replace=False)
-        points = Points(points.position[chosen], points.colour[chosen], points.opacity)
+        points = replace(points, position=points.position[chosen], colour=points.colour[chosen])
     n = len(points.position)
     theta = np.zeros((n, COLOUR + 3 * (degree + 1) ** 2), np.float32)
     theta[:, MEAN:ROTATION] = points.position
@@ -162,14 +142,19 @@ def _carved(
 
 
 def _witnessed(points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew) -> np.ndarray:
-    cameras = np.empty((len(views.cameras), 16))
-    for row, camera in zip(cameras, views.cameras, strict=True):
-        row[:12] = np.linalg.inv(camera.world_from_camera)[:3].ravel()
-        K = camera.K
-        row[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
-    out = np.empty((len(points), 8))
-    patience = ASTRAY * len(cameras)
-    rest = cameras, views.rgb, masks, patience, out
+    out = np.empty((len(points), 5))
+    patience = ASTRAY * len(views.cameras)
+    rest = camera_rows(views.cameras), views.rgb, masks, patience, out
     points = np.ascontiguousarray(points, dtype=np.float64)
     crew.each(witness, [(points, *span, *rest) for span in crew.spans(len(points))])
     return out
+
+
+def camera_rows(cameras: tuple[Camera, ...]) -> Float[np.ndarray, "V 16"]:
+    """Return cameras as kernels read many: camera from world (3 × 4), then fx, fy, cx, cy."""
+    rows = np.empty((len(cameras), 16))
+    for row, camera in zip(rows, cameras, strict=True):
+        row[:12] = np.linalg.inv(camera.world_from_camera)[:3].ravel()
+        K = camera.K
+        row[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    return rows

@@ -33,7 +33,8 @@ from corporeal.splats.parameters import (
 )
 from corporeal.splats.quality import Quality, quality
 from corporeal.splats.raster import back, draw, pinhole
-from corporeal.splats.start import Points, agreed, hull, region, seeded
+from corporeal.splats.start import Points, clearance, hull, region, seeded
+from corporeal.splats.sweep import swept
 from corporeal.types import Gaussians, Vector, Views
 
 Progress = Callable[[float, str], None]
@@ -75,7 +76,7 @@ class Preset:
     """Larger pictures are shrunk by a whole number until no side is longer [px]."""
 
 
-PRESETS = {"draft": Preset(20_000, 1, 700, 256), "normal": Preset(30_000, 2, 2500, 512)}
+PRESETS = {"draft": Preset(20_000, 1, 1000, 256), "normal": Preset(30_000, 2, 2500, 512)}
 
 
 @dataclass(frozen=True)
@@ -120,7 +121,7 @@ def train(
     """Learn Gaussians from posed pictures.
 
     masks: what belongs to the things; only that is learned then. points: where to start; None: the
-    visual hull of the masks, or places on whose colour pictures agree. checkpoint: a file that is
+    visual hull of the masks, or what a plane sweep finds. checkpoint: a file that is
     written now and then; a training that was cut off goes on from it.
 
     Raises:
@@ -136,9 +137,9 @@ def train(
         for fraction, words in _learn(pupil, lesson, checkpoint, crew):
             pupil.seconds = spent + time.monotonic() - begun
             progress(fraction, words)
-    made = gaussians_of(pupil.theta)
-    background = GREY if masks is not None else (0.0, 0.0, 0.0)
-    out = quality(made, views, lesson.held_out, masks, background) if lesson.held_out else None
+    made = gaussians_of(pupil.theta[opacity(pupil.theta) > growth.DEAD])
+    behind = None if masks is None else GREY
+    out = quality(made, views, lesson.held_out, masks, behind) if lesson.held_out else None
     if checkpoint is not None:
         checkpoint.unlink(missing_ok=True)
     return Trained(made, out, spent + time.monotonic() - begun)
@@ -164,6 +165,7 @@ class Lesson:
         self.held_out = tuple(range(every // 2, count, every)) if every and count > every else ()
         self.learned = [k for k in range(count) if k not in self.held_out]
         self.radius = region(views.cameras).radius
+        self.clear = clearance(views.cameras)
         factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
         halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
         self.sizes = [_Size(self, factor)] + ([_Size(self, 2 * factor)] if halves else [])
@@ -197,7 +199,7 @@ class _Size:
         self.masks = {k: shrunk(mask[..., None], factor)[..., 0] for k, mask in full.items()}
         self.cameras: dict[int, Pinhole] = {}
         for k, picture in self.rgb.items():
-            eye = pinhole(views.cameras[k], 1 / factor)
+            eye = pinhole(views.cameras[k], 1 / factor, lesson.clear[k])
             self.cameras[k] = eye._replace(height=picture.shape[0], width=picture.shape[1])
 
 
@@ -235,7 +237,7 @@ def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew) -> Pupil:
     if points is None and masks is not None:
         points = hull(views, masks, preset.gaussians, rng, crew)
     elif points is None:
-        points = agreed(views, preset.gaussians, rng, crew)
+        points = swept(views, preset.gaussians, rng, crew)
     theta = seeded(points, preset.gaussians, preset.degree, rng)
     return Pupil(theta, np.zeros_like(theta), np.zeros_like(theta))
 
@@ -279,7 +281,7 @@ def _step(pupil: Pupil, lesson: Lesson, crew: Crew) -> float:
 
 
 def _stir(pupil: Pupil, lesson: Lesson, rate: float, rng: np.random.Generator) -> None:
-    """Move dead Gaussians to live ones now and then; let faint ones wander."""
+    """Move Gaussians that are dead to live ones now and then; let faint ones wander."""
     begin, end = SETTLED
     if begin < pupil.step < end * lesson.preset.steps and pupil.step % ROUND == 0:
         moments = [pupil.first, pupil.second]
