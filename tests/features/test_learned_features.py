@@ -190,14 +190,14 @@ def test_the_same_picture_gives_the_same_map(clip, dinov2, tmp_path):
     for kind, folder in (("clip", clip), ("dinov2", dinov2)):
         copy = shutil.copytree(folder, tmp_path / "elsewhere" / kind)
         here, there = connect(f"{kind}:{folder}"), connect(f"{kind}:{copy}")
-        assert here.name == there.name
+        assert here.name() == there.name()
         np.testing.assert_array_equal(here.map(picture), there.map(picture))
 
 
 def test_other_weights_have_another_name_and_so_other_files(tmp_path, dinov2):
     other = save_dinov2(tmp_path / "other", seed=1)
     here, there = (connect(f"dinov2:{f}", tmp_path / "maps") for f in (dinov2, other))
-    assert here.name != there.name
+    assert here.name() != there.name()
     assert here.path(photograph()) != there.path(photograph())
     assert (here.map(photograph()) != there.map(photograph())).any()
 

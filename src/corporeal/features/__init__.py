@@ -2,7 +2,7 @@
 
 from importlib.util import find_spec
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Float16, UInt8
@@ -21,10 +21,10 @@ PACKAGES = ("torch", "transformers")
 """Which the core does without."""
 
 
+@runtime_checkable
 class Encoder(Protocol):
     """The whole contract: one picture in, one map out."""
 
-    @property
     def name(self) -> str:
         """All that a map depends on beside its picture: model, revision, size."""
         ...

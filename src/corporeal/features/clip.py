@@ -50,9 +50,8 @@ class Clip:
         options = {} if self.weights.local else {"revision": self.weights.revision}
         return CLIPTokenizer.from_pretrained(self.weights.place, **options)
 
-    @property
     def name(self) -> str:
-        """The kind of model, and which weights very exactly."""
+        """Name the kind of model, and which weights very exactly."""
         return self.weights.name
 
     def map(self, picture: UInt8[np.ndarray, "H W 3"]) -> Float16[np.ndarray, "h w D"]:

@@ -27,9 +27,8 @@ class Dinov2:
         logging.disable_progress_bar()
         return self.weights.load(Dinov2Model)
 
-    @property
     def name(self) -> str:
-        """The kind of model, and which weights very exactly."""
+        """Name the kind of model, and which weights very exactly."""
         return self.weights.name
 
     def map(self, picture: UInt8[np.ndarray, "H W 3"]) -> Float16[np.ndarray, "h w D"]:

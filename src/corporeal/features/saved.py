@@ -19,10 +19,9 @@ class Kept:
     def __init__(self, encoder: Encoder, folder: Path) -> None:
         self.encoder, self.folder = encoder, Path(folder)
 
-    @property
     def name(self) -> str:
-        """The encoder's."""
-        return self.encoder.name
+        """Name the encoder."""
+        return self.encoder.name()
 
     def map(self, picture: UInt8[np.ndarray, "H W 3"]) -> Float16[np.ndarray, "h w D"]:
         """Return the kept map, or the encoder's, which is then kept."""
@@ -40,7 +39,7 @@ class Kept:
 
     def path(self, picture: UInt8[np.ndarray, "H W 3"]) -> Path:
         """Name a map by version, encoder, and the picture's size and bytes."""
-        key = hashlib.sha256(f"{VERSION}|{self.name}|{picture.shape}|".encode())
+        key = hashlib.sha256(f"{VERSION}|{self.name()}|{picture.shape}|".encode())
         key.update(np.ascontiguousarray(picture).tobytes())
         name = key.hexdigest()
         return self.folder / name[:2] / f"{name}.npy"
