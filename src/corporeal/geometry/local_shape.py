@@ -1,0 +1,80 @@
+"""The shape of a surface known by points alone: which way it faces, and how thick things are."""
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import KDTree
+
+BLUNT = np.radians(60.0)
+"""A ball whose two touching points stand less than this apart, seen from its middle, touches noise
+or a blunt edge, not another side (Peters, "Geographical point cloud modelling with the 3D medial
+axis transform", 2018, takes 20° to 32°). It is twice the tilt from the one point to the other."""
+TURNS = 30
+"""Balls shrink a handful of times; points that are still shrinking then are as thin as noise."""
+
+
+def neighbours(position: Float[np.ndarray, "N 3"], count: int) -> Int[np.ndarray, "N k"]:
+    """Return the nearest points of every point, itself first; all where there are fewer."""
+    near = min(count, len(position))
+    _, found = KDTree(position).query(position, k=near)
+    return np.asarray(found, np.int64).reshape(-1, near)
+
+
+def normals(
+    position: Float[np.ndarray, "N 3"],
+    near: Int[np.ndarray, "N k"],
+    towards: Float[np.ndarray, "N 3"],
+) -> Float[np.ndarray, "N 3"]:
+    """Return unit normals: the direction of least spread among neighbours (Hoppe et al. 1992).
+
+    Args:
+        position: World [m].
+        near: Neighbours of every point.
+        towards: Roughly where the outside is, of any length.
+
+    """
+    made = np.empty((len(position), 3))
+    for start in range(0, len(position), 1 << 16):
+        rows = slice(start, start + (1 << 16))
+        local = position[near[rows]]
+        local = local - local.mean(axis=1, keepdims=True)
+        _, axes = np.linalg.eigh(np.einsum("nki,nkj->nij", local, local))
+        made[rows] = axes[:, :, 0]
+    inward = np.sum(made * towards, axis=1) < 0
+    made[inward] *= -1
+    return made
+
+
+def thickness(
+    position: Float[np.ndarray, "N 3"], normal: Float[np.ndarray, "N 3"]
+) -> Float[np.ndarray, " N"]:
+    """Return the diameter of the largest ball inside that touches the surface here [m].
+
+    Balls shrink until they hold no point (Ma, Bae and Choi, "3D medial axis point approximation
+    using nearest neighbors and the normal field", 2012). Nothing is thicker than the points' box is
+    long: where the other side was not seen, that is the answer.
+
+    Args:
+        position: World [m].
+        normal: Unit, outward.
+
+    """
+    tree = KDTree(position)
+    radius = np.full(len(position), np.linalg.norm(np.ptp(position, axis=0)) / 2)
+    active = np.arange(len(position))
+    for _ in range(TURNS):
+        if not len(active):
+            break
+        p, n = position[active], normal[active]
+        centre = p - radius[active, None] * n
+        distance, who = tree.query(centre)
+        to = p - position[who]
+        depth = 2 * np.sum(n * to, axis=1)
+        apart = np.sum(to**2, axis=1)
+        inside = (distance < radius[active] * (1 - 1e-6)) & (depth > 0) & (apart > 0)
+        smaller = apart / np.where(inside, depth, 1)
+        half = np.sqrt(apart) / (2 * np.maximum(smaller, 1e-300))
+        angle = 2 * np.arcsin(np.minimum(half, 1))
+        inside &= (smaller < radius[active]) & (angle > BLUNT)
+        radius[active[inside]] = smaller[inside]
+        active = active[inside]
+    return 2 * radius
