@@ -1,0 +1,197 @@
+"""Learn Gaussians from pictures of composed scenes, and compare with views that were held out.
+
+    python benchmarks/splats.py SCENE ... [--presets draft normal] [--sources masks pictures]
+                                          [--out runs/splats] [--docs]
+
+SCENE is a folder that ``corporeal assemble`` wrote: its ``views`` are posed pictures. Every eighth
+view is held out. With masks, things alone are learned (and compared before grey); from pictures
+alone, whole photographs, floor and backdrop included. Time is the processor's, divided by two: what
+it takes on two cores of this machine, however busy it is, were all work shared evenly; seconds on
+the clock stand beside it. What lies in ``--out`` already is not learned again. ``--docs`` writes
+docs/splats.md.
+"""
+
+import argparse
+import json
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from corporeal.formats.transforms import read_views
+from corporeal.machine import cores
+from corporeal.splats.crew import Crew
+from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE
+from corporeal.splats.quality import quality
+from corporeal.splats.raster import back, draw, pinhole
+from corporeal.splats.train import PRESETS, TrainConfig, train
+from corporeal.types import Camera, Views
+
+PAGE = Path(__file__).parents[1] / "docs" / "splats.md"
+CORES = 2
+LARGE = (200_000, 512)
+"""Gaussians, and pixels along a picture, of the rasteriser's test."""
+
+
+def learned(scene: Path, preset: str, masked: bool) -> dict:
+    """Learn one scene; return how well and how long."""
+    seen = read_views(scene / "views")
+    if seen.object_of_pixel is None:
+        raise SystemExit(f"{scene}: its views do not say where things are.")
+    masks = seen.object_of_pixel >= 0
+    views = Views(seen.rgb, seen.cameras)
+    config = TrainConfig(preset, threads=min(CORES, cores()))
+    start = time.process_time()
+    out = train(views, masks if masked else None, config=config)
+    spent = time.process_time() - start
+    if out.quality is None:
+        raise SystemExit(f"{scene}: too few views to hold any out.")
+    found = out.quality
+    if not masked:
+        found = quality(out.gaussians, views, found.views, masks)
+    return {
+        "scene": scene.name,
+        "preset": preset,
+        "masked": masked,
+        "views": len(views.cameras),
+        "size": list(views.rgb.shape[1:3]),
+        "psnr": found.psnr,
+        "psnr_things": found.psnr_things,
+        "ssim": found.ssim,
+        "gaussians": out.gaussians.count,
+        "two_cores_s": spent / CORES,
+        "clock_s": out.seconds,
+    }
+
+
+def drawn() -> dict:
+    """Draw very many Gaussians on a sphere, and go back; the best of five."""
+    count, side = LARGE
+    rng = np.random.default_rng(0)
+    theta = rng.normal(size=(count, COLOUR + 3 * 16)).astype(np.float32)
+    theta[:, MEAN:ROTATION] /= np.linalg.norm(theta[:, MEAN:ROTATION], axis=1)[:, None]
+    theta[:, SCALE:OPACITY] = np.log(rng.uniform(0.004, 0.012, (count, 3)))
+    theta[:, COLOUR:] *= 0.3
+    pose = np.eye(4)
+    pose[2, 3] = -2.5
+    K = np.array([[side, 0, side / 2], [0, side, side / 2], [0, 0, 1.0]])
+    eye = pinhole(Camera(K, pose, side, side))
+    slope = np.ones((4, side, side), np.float32)
+    forward, backward = [], []
+    with Crew(1) as crew:
+        for _ in range(5):
+            start = time.process_time()
+            drawing = draw(theta, eye, np.zeros(3), crew)
+            middle = time.process_time()
+            back(drawing, slope, crew)
+            forward.append(middle - start)
+            backward.append(time.process_time() - middle)
+    return {"draw_s": min(forward) / CORES, "back_s": min(backward) / CORES}
+
+
+def kept(out: Path, name: str, make: Callable[..., dict], *what: Any) -> dict:
+    """Return what was measured before, or measure it."""
+    path = out / f"{name}.json"
+    if not path.exists():
+        made = make(*what)
+        out.mkdir(parents=True, exist_ok=True)
+        path.write_text(json.dumps(made, indent=1))
+    return json.loads(path.read_text())
+
+
+def lines(rows: list[dict], raster: dict) -> list[str]:
+    """Set everything as Markdown."""
+    text = [
+        "| scene | preset | learned from | whole [dB] | things [dB] | SSIM | two cores [s] | "
+        "clock [s] |",
+        "|---|---|---|---:|---:|---:|---:|---:|",
+    ]
+    for r in rows:
+        source = "pictures, masks" if r["masked"] else "pictures"
+        text.append(
+            f"| {r['scene']} | {r['preset']} | {source} | {r['psnr']:.1f} | "
+            f"{r['psnr_things']:.1f} | {r['ssim']:.3f} | {r['two_cores_s']:.0f} | "
+            f"{r['clock_s']:.0f} |"
+        )
+    count, side = LARGE
+    return [
+        *text,
+        "",
+        f"{count // 1000}k Gaussians of degree 3 at {side} × {side} are drawn in "
+        f"{raster['draw_s']:.2f} s on two cores; their gradients take {raster['back_s']:.2f} s.",
+    ]
+
+
+def main() -> None:
+    """Learn every scene, print a table, write the page."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("scenes", nargs="+", type=Path)
+    parser.add_argument("--out", type=Path, default=Path("runs/splats"))
+    parser.add_argument("--presets", nargs="+", default=list(PRESETS), choices=list(PRESETS))
+    parser.add_argument("--sources", nargs="+", default=["masks"], choices=["masks", "pictures"])
+    parser.add_argument("--docs", action="store_true", help="write docs/splats.md")
+    asked = parser.parse_args()
+    raster, rows = kept(asked.out, "raster", drawn), []
+    for preset in asked.presets:
+        for source in asked.sources:
+            for scene in asked.scenes:
+                name = f"{scene.name}-{preset}-{source}"
+                rows.append(kept(asked.out, name, learned, scene, preset, source == "masks"))
+                print(lines(rows[-1:], raster)[2], flush=True)
+    text = lines(rows, raster)
+    print("\n".join(text))
+    if asked.docs:
+        PAGE.write_text("\n".join([*HEAD, *text, *TAIL]))
+
+
+HEAD = (
+    "# Gaussians from pictures",
+    "",
+    "`corporeal.splats` draws Gaussians on the processor, learns them from posed pictures, and "
+    "carries them along with deformed matter:",
+    "",
+    "    train(views, masks) -> Trained            pictures and cameras in, Gaussians out",
+    "    render(gaussians, camera) -> Picture      colours, coverage, depth",
+    "    weights(gaussians, camera) -> csr_array   what each contributes to each pixel",
+    "    deformed(gaussians, F, x) -> Gaussians    after a simulation",
+    "",
+    "Written by `python benchmarks/splats.py scenes/helmet scenes/plant scenes/duck --docs`. Three "
+    "scenes are composed from models of public collections and pictured from 48 sides:",
+    "",
+    "    corporeal assemble --from models/ --name duck --seed 7 --assets duck_khronos "
+    "soda_can_coke --views 48 --size 256 256",
+    "    corporeal assemble --from models/ --name plant --seed 3 --assets plant_potted_market "
+    "006_mustard_bottle cardboard_box_gazebo --views 48 --size 256 256",
+    "    corporeal assemble --from models/ --name helmet --seed 5 --assets flight_helmet_khronos "
+    "chair_smallhouse_a 004_sugar_box 024_bowl --views 48 --size 256 256",
+    "",
+    "Every eighth view is held out: 42 are learned from, 6 compared with. Neither depth nor mesh "
+    "is used. The aims are 28 dB for the whole picture and 26 dB for the pixels on things, within "
+    "four minutes on two cores; a draft within one minute.",
+    "",
+)
+TAIL = (
+    "",
+    "- With masks only the things are learned, before random backgrounds; the whole picture is "
+    "then things before grey. Two cores: seconds of the processor, halved. Clock: what passed "
+    "while other programs kept the machine busy.",
+    "- Things [dB] is mostly lost along their outlines: a mask says yes or no for each pixel, "
+    "while the picture mixes thing and floor there. Two pixels further in, the helmet scene has 29 "
+    "to 33 dB at preset normal.",
+    "- Without masks (`--sources pictures`) a plane sweep says where to begin, and floor and "
+    "backdrop are learned too. That is much weaker: on a smooth floor depths are a guess, and haze "
+    "that serves one camera stands before another. The helmet scene's draft reaches 29 to 31 dB in "
+    "held-out views from above, but 13 to 16 dB in those that look along the floor, 21.8 dB in the "
+    "mean, in 63 s on two cores. Give masks where there are any.",
+    "- `tests/splats` holds every gradient of the rasteriser equal to a plain reference within "
+    "1e-5, by a complex step and, where torch is installed, by its autograd.",
+    "",
+)
+
+
+if __name__ == "__main__":
+    main()
