@@ -7,6 +7,7 @@ import trimesh
 
 from corporeal.settle.body import Body
 from corporeal.settle.decompose import decompose
+from corporeal.settle.hull import hull_of
 
 
 def body(mesh, name="body", **more):
@@ -14,14 +15,20 @@ def body(mesh, name="body", **more):
     return Body(name, vertices, triangles, decompose(vertices, triangles), **more)
 
 
+def convex(mesh, name):
+    """A body that is its own hull: there is nothing to cut."""
+    vertices, triangles = np.asarray(mesh.vertices, float), np.asarray(mesh.faces)
+    return Body(name, vertices, triangles, (hull_of(vertices, 0.0),))
+
+
 @lru_cache
 def box(*sides, name="box"):
-    return body(trimesh.creation.box(sides), name)
+    return convex(trimesh.creation.box(sides), name)
 
 
 @lru_cache
 def ball(radius, name="ball"):
-    return body(trimesh.creation.icosphere(2, radius), name)
+    return convex(trimesh.creation.icosphere(2, radius), name)
 
 
 @lru_cache

@@ -3,14 +3,23 @@
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
+from typing import Literal
 
 import numpy as np
 
+from corporeal.backends import load
 from corporeal.errors import UserError
 from corporeal.settle.arrange import Arrangement, arrange
+from corporeal.settle.blender import BlenderConfig
 from corporeal.settle.body import Body, Pose, unit_of
 from corporeal.settle.certificate import Certificate, Evidence, examine
-from corporeal.settle.mujoco import SettleConfig, Settled, settle
+from corporeal.settle.mujoco import SettleConfig, Settled
+
+SettlingEngine = Literal["mujoco", "blenderproc"]
+ENGINES = {
+    "mujoco": "corporeal.settle.mujoco:settle",
+    "blenderproc": "corporeal.settle.blender:settle_in_blender",
+}
 
 STRAY = 0.75
 """How far along the floor a body may end from where it started, of the scene's unit."""
@@ -25,7 +34,12 @@ class RestConfig:
     """How hard to try."""
 
     attempts: int = 8
+    engine: SettlingEngine = "mujoco"
+    """What lets things fall; the certificate is the same for both."""
     settle: SettleConfig = field(default_factory=SettleConfig)
+    """In MuJoCo."""
+    blender: BlenderConfig = field(default_factory=BlenderConfig)
+    """In Blender, through BlenderProc."""
 
 
 DEFAULT = RestConfig()
@@ -43,12 +57,12 @@ def at_rest(
     Args:
         bodies: At least one.
         arrangement: How they begin.
-        seed: The same seed gives the same poses, bit by bit.
+        seed: The same seed gives the same poses, with MuJoCo bit by bit.
         deepest: Penetration allowed between the meshes [m].
         config: How hard to try.
 
     Raises:
-        UserError: No attempt came to rest; it says why.
+        UserError: No attempt came to rest, or BlenderProc does not work; it says why.
 
     """
     if not bodies:
@@ -60,7 +74,7 @@ def at_rest(
     for attempt in range(config.attempts):
         rng = np.random.default_rng([seed, attempt])
         start = arrange(bodies, arrangement, rng)
-        settled = settle(bodies, start, config.settle)
+        settled = _settled(bodies, start, config)
         evidence = None
         reason = _lost(bodies, start, settled)
         poses = _around_origin(bodies, settled.poses)
@@ -81,6 +95,13 @@ def at_rest(
     raise UserError(
         f"{names}: no rest found as a {arrangement} in {config.attempts} attempts; in the last one "
         f"{reasons[-1]}. Try another seed, another arrangement or fewer objects."
+    )
+
+
+def _settled(bodies: Sequence[Body], start: Sequence[Pose], config: RestConfig) -> Settled:
+    settle = load("settling engine", config.engine, ENGINES)
+    return settle(
+        bodies, start, config.blender if config.engine == "blenderproc" else config.settle
     )
 
 

@@ -22,12 +22,13 @@ from corporeal.geometry.sizes import Sizing, scene_extents
 from corporeal.pool.asset import UNKNOWN, Asset, Pool
 from corporeal.pool.draw import counts, draw
 from corporeal.settle.arrange import Arrangement
+from corporeal.settle.blender import BlenderError
 from corporeal.settle.body import Body, Pose
 from corporeal.settle.certificate import Certificate
 from corporeal.settle.decompose import decompose
 from corporeal.settle.interactions import KINDS, NEEDS, STANDING, Action, Kind, act
 from corporeal.settle.matter import Matter
-from corporeal.settle.rest import at_rest
+from corporeal.settle.rest import RestConfig, SettlingEngine, at_rest
 from corporeal.types import Scene
 from corporeal.vlm.sizes import RealExtent, real_extent, usual_sizes
 
@@ -62,6 +63,8 @@ class ComposeConfig:
     """Of everything that is left to chance."""
     arrangement: Arrangement | Literal["auto"] = "auto"
     """How things stand at rest: side by side, stacked, dropped onto one, in a row."""
+    settle_with: SettlingEngine = "mujoco"
+    """What lets them fall: MuJoCo, or Blender through the program blenderproc on the PATH."""
     interaction: Kind | Literal["auto", "none"] = "auto"
     """What happens when the film starts."""
     sizing: Sizing = field(default_factory=Sizing)
@@ -263,12 +266,16 @@ def _settled(
     """
     bodies = [t.body for t in things]
     deepest = 0.5 * max(t.extent for t in things) / FINEST
+    trying = RestConfig(engine=config.settle_with)
     ways = _arrangements(config, kind, len(things), rng)
     reason = ""
     for k in range(TRIES):
         arrangement = ways[k % len(ways)]
         try:
-            poses, certificate = at_rest(bodies, arrangement, int(rng.integers(2**31)), deepest)
+            seed = int(rng.integers(2**31))
+            poses, certificate = at_rest(bodies, arrangement, seed, deepest, trying)
+        except BlenderError:
+            raise
         except UserError as refusal:
             reason = str(refusal)
             ways.remove(arrangement)
@@ -359,6 +366,7 @@ def _keep(
     composition = {
         "seed": config.seed,
         "arrangement": settled.arrangement,
+        "settled_with": config.settle_with,
         "interaction": action.kind if action else "none",
         "what_happens": action.words if action else "nothing: everything stays at rest",
         "sizing": asdict(config.sizing),
