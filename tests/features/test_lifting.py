@@ -8,7 +8,8 @@ from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
 from corporeal.features.lifting import Lifted, back_projection, fill, lift, uplift, visible
-from corporeal.types import Cloud
+from corporeal.splats.raster import weights
+from corporeal.types import Cloud, Gaussians
 
 PIXEL = 2.2 / 120
 """Width of a pixel at the middle of the boxes [m]."""
@@ -67,17 +68,17 @@ def test_uplift_gives_every_gaussian_what_its_pixels_show():
     rng = np.random.default_rng(1)
     truth = rng.integers(0, 5, 300)
     cells = (12, 12)
-    weights, maps = [], []
+    shares, maps = [], []
     for _ in range(6):
         shown = np.where(rng.random(144) < 0.9, rng.integers(0, 300, 144), -1)
         at = np.flatnonzero(shown >= 0)
         share = rng.uniform(0.5, 4, len(at))
-        weights.append(csr_array((share, (shown[at], at)), shape=(300, 144)))
+        shares.append(csr_array((share, (shown[at], at)), shape=(300, 144)))
         codes = np.zeros((144, 6))
         codes[at, truth[shown[at]]] = 1
         codes[shown < 0, 5] = 1
         maps.append(codes.reshape(12, 12, 6))
-    lifted = uplift(weights.__getitem__, cells, maps, 300)
+    lifted = uplift(shares.__getitem__, cells, maps, 300)
     known = lifted.seen > 0
     assert 0.9 < known.mean() < 1
     assert (lifted.mean.argmax(1) == truth)[known].all()
@@ -88,10 +89,10 @@ def test_uplift_is_the_weighted_mean():
     rng = np.random.default_rng(2)
     dense = rng.random((3, 7, 20)) * (rng.random((3, 7, 20)) < 0.5)
     maps = rng.normal(size=(3, 4, 5, 9))
-    weights = [csr_array(w) for w in dense]
+    shares = [csr_array(w) for w in dense]
     expected = np.einsum("vnc,vcd->nd", dense, maps.reshape(3, 20, 9))
     expected /= dense.sum((0, 2))[:, None]
-    lifted = uplift(weights.__getitem__, (4, 5), list(maps), 7)
+    lifted = uplift(shares.__getitem__, (4, 5), list(maps), 7)
     np.testing.assert_allclose(lifted.mean, expected, rtol=2e-5, atol=1e-6)
     np.testing.assert_array_equal(lifted.seen, (dense.sum(2) > 0.01).sum(0))
 
@@ -168,3 +169,23 @@ def test_points_and_cameras_of_different_frames_are_refused(boxes):
     lifted = back_projection(away, cameras, depth, [one_hot(w, 8, 2) for w in which])
     with pytest.raises(UserError, match="one frame and one unit"):
         fill(away, lifted)
+
+
+def test_gaussians_take_what_the_rasteriser_blended_them_into(boxes):
+    """Discs on the boxes' faces, pictured; each takes the label that its pixels show."""
+    cameras, _, which, position, normal, owner = boxes
+    rows = np.arange(0, len(position), 2)
+    turn = np.column_stack([1 + normal[rows, 2], -normal[rows, 1], normal[rows, 0], 0 * rows])
+    turn[normal[rows, 2] == -1] = [0, 1, 0, 0]
+    scale = np.tile([0.018, 0.018, 0.001], (len(rows), 1))
+    turn /= np.linalg.norm(turn, axis=1, keepdims=True)
+    sh = np.zeros((len(rows), 1, 3))
+    discs = Gaussians(position[rows], turn, scale, np.full(len(rows), 0.95), sh)
+    maps = [np.eye(3)[w + 1] for w in which]
+    lifted = uplift(lambda view: weights(discs, cameras[view], 1, 1), (96, 96), maps, len(rows))
+    right = lifted.mean[:, 1:].argmax(1) == owner[rows]
+    free = sum(unhidden(TWO, position[rows], normal[rows], owner[rows], c) for c in cameras) > 2
+    assert free.mean() > 0.6
+    assert np.mean(lifted.seen[free] > 2) > 0.99
+    assert np.mean(right[free]) > 0.99
+    assert np.mean(right[lifted.seen > 2]) > 0.985

@@ -20,8 +20,9 @@ from corporeal.errors import UserError
 from corporeal.features.vectors import batches, unit
 from corporeal.types import Camera
 
-LEAST = 1e-2
-"""A Gaussian that has less weight in a view is not seen in it [px]."""
+LEAST = 0.1
+"""A Gaussian that has less weight in a view is not seen in it [px]: what little shows of those
+behind shows through others' soft edges, at outlines, where the map is another thing's."""
 LEEWAY = 0.005
 """A point this much deeper than what its pixel shows is still seen, as a share of its depth."""
 HALF_WAY = 0.75
@@ -110,7 +111,11 @@ def _size(share: csr_array) -> tuple[int, int]:
 
 
 def uplift(
-    weights: Weights, cells: tuple[int, int], maps: Sequence[np.ndarray], count: int
+    weights: Weights,
+    cells: tuple[int, int],
+    maps: Sequence[np.ndarray],
+    count: int,
+    least: float = LEAST,
 ) -> Lifted:
     """Average maps onto Gaussians, each place by the weight that the Gaussian was blended with.
 
@@ -120,9 +125,11 @@ def uplift(
         cells: Rows and columns of cells that cover a picture.
         maps: Of each view, h x w x D, over the same picture, in any resolution.
         count: Number of Gaussians.
+        least: Weight in a view from which a Gaussian counts as seen in it [px]; less where there
+            are more Gaussians than pixels.
 
     """
-    return lift(_resampled(weights, cells, maps), maps, count, LEAST)
+    return lift(_resampled(weights, cells, maps), maps, count, least)
 
 
 def _resampled(weights: Weights, cells: tuple[int, int], maps: Sequence[np.ndarray]) -> Weights:
