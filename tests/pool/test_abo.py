@@ -100,9 +100,17 @@ def test_what_was_not_unpacked_is_passed_over_and_a_path_leads_nowhere_else(root
     ("file", "data", "said"),
     [
         ("3dmodels/metadata/3dmodels.csv.gz", b"no gzip", "cannot be read"),
-        ("3dmodels/metadata/3dmodels.csv.gz", gzip.compress(b"a,b\n1,2\n"), "no columns"),
-        ("listings/metadata/listings_0.json.gz", gzip.compress(b'{"3dmodel_id"')[:-6], "cannot"),
-        ("listings/metadata/listings_0.json.gz", gzip.compress(b'{"3dmodel_id"'), "cannot be read"),
+        ("3dmodels/metadata/3dmodels.csv.gz", gzip.compress(b"a,b\n1,2\n", mtime=0), "no columns"),
+        (
+            "listings/metadata/listings_0.json.gz",
+            gzip.compress(b'{"3dmodel_id"', mtime=0)[:-6],
+            "cannot",
+        ),
+        (
+            "listings/metadata/listings_0.json.gz",
+            gzip.compress(b'{"3dmodel_id"', mtime=0),
+            "cannot be read",
+        ),
     ],
 )
 def test_a_broken_table_is_named(root, file, data, said):
