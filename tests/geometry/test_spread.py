@@ -132,3 +132,9 @@ def test_a_point_is_inside_whichever_way_the_surface_faces(rng):
     for shape in (ball, turned):
         assert shape.inside(points[radius < 0.97]).all()
         assert not shape.inside(points[radius > 1.0]).any()
+
+
+def test_a_reference_that_is_a_point_gives_its_mass_and_no_shape():
+    points = np.random.default_rng(0).uniform(-1, 1, (50, 3))
+    masses = match_moments(points, np.ones(50), np.zeros((4, 3)), np.full(4, 0.5))
+    assert masses == pytest.approx(np.full(50, 0.04))

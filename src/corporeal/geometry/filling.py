@@ -141,8 +141,8 @@ def match_moments(
     """Adjust masses so that mass, centre and inertia equal those of a reference.
 
     The smallest relative change m_i (1 + Σ_k λ_k φ_k(x_i)) over the ten monomials φ up to second
-    order; returned unchanged in shape when the points cannot carry it (fewer than 30, or a change
-    that would make a mass negative).
+    order; returned unchanged in shape when the points cannot carry it (fewer than 30, a change
+    that would make a mass negative, or a reference that is a single point).
 
     Returns:
         Masses [kg].
@@ -153,6 +153,8 @@ def match_moments(
         return masses
     centre = np.average(wanted, axis=0, weights=wanted_masses)
     scale = np.sqrt(np.average(((wanted - centre) ** 2).sum(axis=1), weights=wanted_masses))
+    if scale <= 1e-9 * np.ptp(points, axis=0).max():
+        return masses
     phi = _monomials((points - centre) / scale)
     missing = wanted_masses @ _monomials((wanted - centre) / scale) - masses @ phi
     factors = np.linalg.lstsq((phi * masses[:, None]).T @ phi, missing, rcond=1e-8)[0]
