@@ -1,7 +1,5 @@
 """The rasteriser draws what the plain reference says, and knows how every number changes it."""
 
-import time
-
 import numpy as np
 import pytest
 
@@ -247,18 +245,3 @@ def test_a_skewed_camera_is_refused():
 def test_a_cell_that_does_not_divide_a_tile_is_refused():
     with pytest.raises(UserError, match="1, 2, 4, 8 or 16"):
         weights(gaussians_of(cloud(1, 0)), camera(), 3)
-
-
-@pytest.mark.slow
-def test_two_hundred_thousand_take_half_a_second_on_two_cores():
-    """One core may take twice that; the processor's time is taken, since the machine is shared."""
-    theta = cloud(200_000, 3, scale=(0.004, 0.012))
-    theta[:, :3] /= np.linalg.norm(theta[:, :3], axis=1, keepdims=True)
-    eye = pinhole(camera(512, 512, 512.0))
-    seconds = []
-    with Crew(1) as crew:
-        for _ in range(4):
-            start = time.process_time()
-            draw(theta, eye, BACKGROUND, crew)
-            seconds.append(time.process_time() - start)
-    assert min(seconds) < 2 * 0.5
