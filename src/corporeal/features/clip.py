@@ -47,7 +47,7 @@ class Clip:
 
     @cached_property
     def _tokenizer(self) -> Any:
-        options = {} if self.weights.local else {"revision": self.weights.revision}
+        options: dict[str, Any] = {} if self.weights.local else {"revision": self.weights.revision}
         return CLIPTokenizer.from_pretrained(self.weights.place, **options)
 
     def name(self) -> str:
