@@ -35,7 +35,7 @@ class _Beside(Resolver):
         return read_beside(self.folder, key.strip(), MAX_FILE)
 
     def write(self, name: str, data) -> None:
-        raise NotImplementedError
+        raise PermissionError(f"{name} is not written: companions are only read")
 
     def namespaced(self, namespace: str) -> "_Beside":
         return self

@@ -44,7 +44,7 @@ def sog_in_zip(path: Path, data: memoryview) -> Gaussians:
     """
     try:
         archive = zipfile.ZipFile(io.BytesIO(data))
-    except (zipfile.BadZipFile, ValueError, OSError, NotImplementedError) as problem:
+    except (zipfile.BadZipFile, ValueError, OSError, RuntimeError) as problem:
         raise BadFileError(path, f"its ZIP is broken ({str(problem)[:60]}).", AGAIN) from None
 
     def source(name: str) -> bytes:
@@ -55,7 +55,7 @@ def sog_in_zip(path: Path, data: memoryview) -> Gaussians:
                 return stream.read(LARGEST)
         except KeyError:
             raise ValueError("it is not in the archive") from None
-        except (zipfile.BadZipFile, OSError, EOFError, RuntimeError, NotImplementedError) as p:
+        except (zipfile.BadZipFile, OSError, EOFError, RuntimeError) as p:
             raise ValueError(str(p)[:60]) from None
         except Exception as p:  # zlib and lzma have errors of their own
             raise ValueError(f"it cannot be unpacked ({str(p)[:60]})") from None
