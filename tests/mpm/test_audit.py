@@ -163,6 +163,19 @@ def test_the_stone_bounced_and_kept_its_shape(seen):
     assert seen["order"] == [["clay_0", "stone_0"]]
 
 
+@pytest.mark.parametrize(("gap", "order"), [(1.0, [["clay_0", "stone_0"]]), (0.45, [])])
+def test_what_meets_before_the_second_frame_was_apart_if_there_was_a_gap(story, gap, order):
+    """Ways between things in a row are crossed sooner than a film can show."""
+    scene, particles, _, trajectory = story
+    ledger = {name: values.copy() for name, values in trajectory.ledger.items()}
+    ledger["first_contact"][-1, 0, 1] = 0.4 / FPS
+    ledger["contact_point"][-1, 0, 1] = 0.0
+    ledger["gap"][0, 0, 1] = gap * CELL
+    seen = outcome(scene, particles, replace(trajectory, ledger=ledger))
+    assert seen["order"] == order
+    assert seen["pairs"]["clay_0|stone_0"]["gap_start_dx"] == pytest.approx(gap)
+
+
 def test_a_sound_run_has_no_warnings(story):
     found = audit(*story)
     assert found["warnings"] == []

@@ -25,7 +25,7 @@ class Line:
     at_rest: int
     """Objects at rest at the end."""
     impacts: int
-    """First contacts after the first frame, of objects with each other or with the floor."""
+    """First contacts: of objects that were apart at the start, and with the floor later on."""
     met: int
     """Pairs of objects that touched."""
     separated: int

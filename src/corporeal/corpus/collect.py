@@ -151,10 +151,10 @@ def measures(audit: Mapping[str, Any], kind: Kind, sent: Sequence[str] = ()) -> 
 
     Returns:
         ``clean``: no bound of the audit is broken; ``breaches``: sentences. ``impacts``: objects
-        that met each other or the floor after the first frame. ``met``, ``separated``: pairs of
-        objects. ``seen``: what the interaction promises happened; in the showcase, all that is
-        expected of the scene; ``expected``, ``expected_met``: how many. The rest is copied from
-        the audit.
+        that were apart and met, or met the floor after the first frame. ``met``, ``separated``:
+        pairs of objects. ``seen``: what the interaction promises happened; in the showcase, all
+        that is expected of the scene; ``expected``, ``expected_met``: how many. The rest is copied
+        from the audit.
 
     """
     happened = audit["outcome"]

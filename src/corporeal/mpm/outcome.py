@@ -16,6 +16,9 @@ APART = 0.1
 """Bodies have separated when they stay apart so long [s]."""
 SAMPLES = 8
 """Frames that are averaged over the rest."""
+TOUCHING = 0.5
+"""Bodies no farther apart touch [cells]: the distance of two particles in one body. Surfaces are
+known no better. What rests on something is within 0.45, what stands beside it from 1 on."""
 
 Ledger = dict[str, np.ndarray]
 
@@ -32,10 +35,11 @@ def outcome(scene: Scene, particles: Particles, trajectory: Trajectory) -> dict[
     ``rest_drift_m`` (of the centre in the last 0.3 s); ``length_m`` (longest side).
 
     ``pairs["a|b"]`` (scene order; "floor" comes last): ``first_contact_s``, ``contact_point``,
-    ``separated``, ``gap_end_m``, ``gap_end_dx``, ``largest_gap_after_m``, ``impulse``.
+    ``separated``, ``gap_start_dx``, ``gap_end_m``, ``gap_end_dx``, ``largest_gap_after_m``,
+    ``impulse``.
 
-    ``order``: pairs of objects [a, b] by first contact, the floor and things that touch from the
-    first frame on left out. ``cell_m``, ``duration_s``.
+    ``order``: pairs of objects [a, b] by first contact, the floor and things that touch as the
+    run begins left out. ``cell_m``, ``duration_s``.
     """
     names = [o.name for o in scene.objects]
     bodies = Bodies(scene, particles, trajectory)
@@ -43,7 +47,7 @@ def outcome(scene: Scene, particles: Particles, trajectory: Trajectory) -> dict[
     return {
         "objects": {name: object_row(b, names, bodies) for b, name in enumerate(names)},
         "pairs": pairs,
-        "order": order(pairs, float(trajectory.time[1]) if len(trajectory.time) > 1 else 0.0),
+        "order": order(pairs),
         "cell_m": particles.cell,
         "duration_s": float(trajectory.time[-1]),
     }
@@ -196,6 +200,7 @@ def pair_rows(names: list[str], cell: float, trajectory: Trajectory) -> dict[str
             "first_contact_s": instant if touched else None,
             "contact_point": ledger["contact_point"][-1, a, c].tolist() if touched else None,
             "separated": None if after is None else separated(after, time[time > instant], cell),
+            "gap_start_dx": None if gap is None else float(gap[0]) / cell,
             "gap_end_m": None if gap is None else float(gap[-1]),
             "gap_end_dx": None if gap is None else float(gap[-1]) / cell,
             "largest_gap_after_m": float(after.max()) if after is not None and len(after) else None,
@@ -211,11 +216,13 @@ def separated(gap: Float[np.ndarray, " F"], time: Float[np.ndarray, " F"], cell:
     return any(time[last - 1] - time[first] >= APART - 1e-9 for first, last in edges)
 
 
-def order(pairs: dict[str, dict[str, Any]], first_frame: float) -> list[list[str]]:
+def order(pairs: dict[str, dict[str, Any]]) -> list[list[str]]:
     """Pairs of objects by the time they first touched, those that touched at the start left out."""
     met = [
         (row["first_contact_s"], name)
         for name, row in pairs.items()
-        if not name.endswith("|floor") and (row["first_contact_s"] or 0.0) > first_frame
+        if not name.endswith("|floor")
+        and row["first_contact_s"] is not None
+        and row["gap_start_dx"] > TOUCHING
     ]
     return [name.split("|") for _, name in sorted(met)]
