@@ -9,6 +9,7 @@ from skimage.metrics import structural_similarity
 from splat_scenes import around, blobs, pictured
 
 from corporeal.errors import UserError
+from corporeal.geometry.region import region
 from corporeal.geometry.rotation import matrix
 from corporeal.splats import start, sweep
 from corporeal.splats.crew import Crew
@@ -18,7 +19,7 @@ from corporeal.splats.loss import Goal, goal, loss
 from corporeal.splats.parameters import gaussians_of, opacity, parameters
 from corporeal.splats.quality import psnr, quality, ssim
 from corporeal.splats.raster import draw, pinhole
-from corporeal.splats.start import Points, clearance, hull, region, seeded
+from corporeal.splats.start import Points, clearance, hull, seeded
 from corporeal.splats.sweep import neighbours, swept
 from corporeal.types import Views
 

@@ -8,9 +8,10 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.errors import UserError
+from corporeal.geometry.region import region
 from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_sweep import support, sweep
-from corporeal.splats.start import Points, camera_rows, region
+from corporeal.splats.start import Points, camera_rows
 from corporeal.types import Camera, Views
 
 LONGEST = 160

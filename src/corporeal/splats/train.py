@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
 from corporeal.errors import UserError
+from corporeal.geometry.region import region
 from corporeal.splats import growth, saved
 from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_learn import adam
@@ -33,7 +34,7 @@ from corporeal.splats.parameters import (
 )
 from corporeal.splats.quality import Quality, quality
 from corporeal.splats.raster import back, draw, pinhole
-from corporeal.splats.start import Points, clearance, hull, region, seeded
+from corporeal.splats.start import Points, clearance, hull, seeded
 from corporeal.splats.sweep import swept
 from corporeal.types import Gaussians, Vector, Views
 
