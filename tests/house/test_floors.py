@@ -12,7 +12,8 @@ FLOORS = [
     {"errors", "machine", "types"},
     {"geometry", "backends", "store"},
     {"formats"},
-    {"materials", "vlm", "render", "showcase", "mpm", "pool", "settle", "splats", "features"},
+    {"materials", "vlm", "render", "showcase", "mpm", "pool", "settle"}
+    | {"splats", "features", "regions"},
     {"stages"},
     {"pipeline"},
     {"corpus", "evaluation"},

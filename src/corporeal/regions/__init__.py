@@ -1,0 +1,1 @@
+"""Which points belong together: things, and parts of things."""
