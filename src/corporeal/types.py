@@ -241,6 +241,27 @@ class Cloud:
         return len(self.position)
 
 
+@dataclass(frozen=True)
+class Reconstruction:
+    """A scene found in pictures or in a trained splat: in metres, +Z up, the floor at z = 0."""
+
+    gaussians: Gaussians
+    object_of_gaussian: Int[np.ndarray, " N"]
+    """Index into ``names``; -1: the floor, the background, or haze."""
+    cloud: Cloud
+    """Of the Gaussians that belong to objects."""
+    object_of_point: Int[np.ndarray, " M"]
+    """Of the cloud's points."""
+    names: tuple[str, ...]
+    """Of the objects."""
+    metres_per_unit: float
+    """What one unit of the file was taken to be [m]."""
+    statements: tuple[str, ...] = ()
+    """How it was made and how sure that is, in sentences, for the report."""
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know about the input, in sentences."""
+
+
 # ---------------------------------------------------------------- what it is, in words
 
 

@@ -1,6 +1,9 @@
 import json
 
-from corporeal.formats.sources import sources
+import pytest
+
+from corporeal.errors import UserError
+from corporeal.formats.sources import kind_of, sources
 from glb_maker import cube
 
 
@@ -26,3 +29,18 @@ def test_a_broken_file_still_counts_as_itself(tmp_path):
         (tmp_path / name).write_text("{ broken")
         assert sources([tmp_path / name]) == [tmp_path / name]
     assert sources([tmp_path / "none.glb"]) == []
+
+
+def test_names_tell_what_an_input_is(tmp_path):
+    posed, splat, models = (tmp_path / name for name in ("posed", "sog", "models"))
+    for folder in (posed, splat, models):
+        folder.mkdir()
+    for file in (posed / "transforms.json", splat / "meta.json", splat / "means_l.webp"):
+        file.touch()
+    (models / "a.glb").touch()
+    assert kind_of([posed]) == kind_of([posed / "transforms.json"]) == "photographs"
+    assert kind_of([splat]) == kind_of([tmp_path / "a.PLY"]) == "splat"
+    assert kind_of([models]) == kind_of([models / "a.glb"]) == kind_of([tmp_path]) == "model"
+    assert sources([posed / "transforms.json"]) == [posed] == sources([posed])
+    with pytest.raises(UserError, match=r"a\.ply is a whole scene \(splat\), which stands alone"):
+        kind_of([models / "a.glb", tmp_path / "a.ply"])

@@ -10,6 +10,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from corporeal.errors import BadFileError, UserError
+from corporeal.formats.photographs import read_photographs
 from corporeal.formats.transforms import read_views, write_views
 from corporeal.types import Camera, Views
 
@@ -58,6 +59,15 @@ def test_views_come_back_as_they_were(tmp_path):
     np.testing.assert_array_equal(back.normals.any(axis=-1), made.normals.any(axis=-1))
     np.testing.assert_allclose(back.normals, made.normals, atol=0.008)
     np.testing.assert_allclose(np.linalg.norm(back.normals[:, 1:], axis=-1), 1, atol=1e-6)
+
+
+def test_masks_tell_other_tools_where_objects_are(tmp_path):
+    made = views()
+    write_views(tmp_path, made)
+    owners = made.object_of_pixel
+    photographs = read_photographs(tmp_path)
+    np.testing.assert_array_equal(photographs.masks, np.where(owners < 0, 0, 255))
+    np.testing.assert_array_equal(photographs.views.rgb[owners >= 0], made.rgb[owners >= 0])
 
 
 def test_colours_and_cameras_are_enough(tmp_path):

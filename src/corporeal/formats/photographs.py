@@ -81,6 +81,12 @@ def read_photographs(path: Path, longest: int = LONGEST) -> Photographs:
     raise BadFileError(path, "holds no photographs with poses.", KINDS)
 
 
+def holds_photographs(folder: Path) -> bool:
+    """Tell a folder of photographs with poses by its files, without reading them."""
+    posed = any((folder / name).is_file() for name in TRANSFORMS)
+    return posed or any(is_colmap(folder / m) for m in MODELS) or bool(projections_in(folder))
+
+
 def _developed(
     source: Path, shots: list[Shot], longest: int, z_up: bool, model: ColmapModel | None = None
 ) -> Photographs:

@@ -1,14 +1,49 @@
 """Which files a scene is made of: a result is stale when any of them changes."""
 
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from pathlib import Path
+from typing import Literal
 
 from corporeal.errors import UserError
 from corporeal.formats.gltf_document import Document
+from corporeal.formats.photographs import holds_photographs
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
 
 MODELS = (".glb", ".gltf")
+SPLATS = (".ply", ".spz", ".sog", ".splat", ".ksplat")
+SOG = "meta.json"
+"""Of an unpacked SOG."""
+Kind = Literal["model", "photographs", "splat"]
+
+
+def kind_of(inputs: Sequence[Path]) -> Kind:
+    """Say what the inputs are, by their names; what is nothing else is taken for a model.
+
+    Raises:
+        UserError: Photographs or a splat are named beside something else.
+
+    """
+    kinds = [_kind(Path(path)) for path in inputs]
+    if len(kinds) > 1 and set(kinds) != {"model"}:
+        strange = next(p for p, kind in zip(inputs, kinds, strict=True) if kind != "model")
+        what = f"{strange} is a whole scene ({_kind(strange)}), which stands alone."
+        raise UserError(f"{what} Name it by itself.")
+    return kinds[0] if kinds else "model"
+
+
+def _kind(path: Path) -> Kind:
+    if path.is_dir():
+        if models_in(path):
+            return "model"
+        return "splat" if _is_sog(path) else "photographs" if holds_photographs(path) else "model"
+    if path.suffix.lower() in SPLATS or path.name == SOG:
+        return "splat"
+    return "photographs" if path.suffix.lower() == ".json" else "model"
+
+
+def _is_sog(folder: Path) -> bool:
+    return (folder / SOG).is_file() and any(folder.glob("means*"))
 
 
 def sources(inputs: Iterable[Path]) -> list[Path]:
@@ -26,6 +61,9 @@ def models_in(folder: Path) -> list[Path]:
 
 
 def _named_by(path: Path) -> list[Path]:
+    if _kind(path) != "model":
+        alone = path.is_dir() or path.suffix.lower() in SPLATS
+        return [path if alone else path.parent]
     if path.is_dir():
         return [f for model in models_in(path) for f in _named_by(model)]
     if not path.is_file():

@@ -10,6 +10,7 @@ they leave that alone.
     normals/0000.png   (n + 1) / 2 in 8 bits, in the world; black: nothing
     objects/0000.png   16 bits: 1 + object; 0: none
     parts/0000.png     16 bits: 1 + part; 0: none
+    masks/0000.png     8 bits: white where objects are, for tools that learn only what is there
 """
 
 import math
@@ -89,6 +90,9 @@ def _layers(views: Views, unit: float) -> list[tuple[str, str, Callable[[int], n
         if numbers.max(initial=0) >= MOST:
             raise UserError(f"More than {MOST - 1} {name} do not fit into a picture.")
         layers.append((key, name, lambda k, n=numbers: (n[k] + 1).astype(np.uint16)))
+    owners = views.object_of_pixel
+    if owners is not None:
+        layers.append(("mask_path", "masks", lambda k: np.uint8(255) * (owners[k] >= 0)))
     return layers
 
 
