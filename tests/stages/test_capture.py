@@ -11,7 +11,8 @@ from corporeal.cli import main
 from corporeal.errors import UserError
 from corporeal.formats.glb_writer import write_glb
 from corporeal.formats.transforms import read_views
-from corporeal.stages.capture import CaptureConfig, capture, directions
+from corporeal.render.camera import directions
+from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
 WHITE = Finish("white", (0.8, 0.8, 0.8, 1.0))

@@ -12,6 +12,10 @@ VIEW: Vector = (0.80, -0.62, 0.36)
 """Three-quarter view: things face +x."""
 FILL = 0.84
 """Share of the picture that the motion takes at most."""
+LOWEST, HIGHEST = 0.17, 0.96
+"""Sines of the least and the greatest angle above the horizon, of cameras all around: 10°, 74°."""
+GOLDEN = np.pi * (3 - np.sqrt(5))
+"""Turn from one of them to the next [rad]."""
 
 
 @dataclass(frozen=True)
@@ -78,6 +82,22 @@ def place(
     target = centre @ frame
     eye = target + distance * frame[2]
     return Aim(tuple(eye.tolist()), tuple(target.tolist()), 30.0, *size)
+
+
+def around(
+    boxes: Float[np.ndarray, "F B 2 3"], count: int, size: tuple[int, int], fill: float = FILL
+) -> list[Aim]:
+    """See every box of every frame from evenly about the upper half of a sphere."""
+    return [place(boxes, size, view, fill) for view in directions(count)]
+
+
+def directions(count: int) -> list[Vector]:
+    """Return unit vectors towards cameras: a spiral of equal areas (Fibonacci lattice)."""
+    z = HIGHEST - (HIGHEST - LOWEST) * (np.arange(count) + 0.5) / count
+    turn = GOLDEN * np.arange(count)
+    flat = np.sqrt(1 - z * z)
+    x, y = flat * np.cos(turn), flat * np.sin(turn)
+    return [(float(a), float(b), float(c)) for a, b, c in zip(x, y, z, strict=True)]
 
 
 def _fit(local: np.ndarray, tangent: np.ndarray) -> tuple[np.ndarray, float]:

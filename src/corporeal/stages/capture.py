@@ -15,17 +15,13 @@ from jaxtyping import Float
 from corporeal.errors import UserError
 from corporeal.geometry.arrangement import boxes_of
 from corporeal.machine import cores
-from corporeal.render.camera import VIEW, Aim, camera_of, place
+from corporeal.render.camera import VIEW, Aim, around, camera_of
 from corporeal.render.embree import Light, Stage, first_seen, render
 from corporeal.render.kernels import NOTHING
-from corporeal.types import Camera, Scene, Vector, Views
+from corporeal.types import Camera, Scene, Views
 
 Progress = Callable[[float, str], None]
 
-LOWEST, HIGHEST = 0.17, 0.96
-"""Sines of the least and the greatest angle above the horizon: 10° and 74°."""
-GOLDEN = np.pi * (3 - np.sqrt(5))
-"""Turn from one camera to the next [rad]."""
 FILL = 0.9
 """Share of the picture that the objects take at most."""
 LARGEST = 2**28
@@ -64,7 +60,7 @@ def capture(
     progress(0.0, "placing the cameras")
     stage = Stage(scene, Light(front=VIEW))  # shadows stay where they are from view to view
     boxes = boxes_of(scene)[None]
-    aims = [place(boxes, config.size, v, FILL) for v in directions(config.views)]
+    aims = around(boxes, config.views, config.size, FILL)
     cameras = tuple(camera_of(aim) for aim in aims)
     shape = (config.views, config.size[1], config.size[0])
     views = Views(
@@ -85,15 +81,6 @@ def capture(
         for k, _ in enumerate(pool.map(take, range(len(aims)))):
             progress((k + 1) / len(aims), f"view {k + 1} of {len(aims)}")
     return views
-
-
-def directions(count: int) -> list[Vector]:
-    """Return unit vectors towards cameras: a spiral of equal areas (Fibonacci lattice)."""
-    z = HIGHEST - (HIGHEST - LOWEST) * (np.arange(count) + 0.5) / count
-    turn = GOLDEN * np.arange(count)
-    flat = np.sqrt(1 - z * z)
-    x, y = flat * np.cos(turn), flat * np.sin(turn)
-    return [(float(a), float(b), float(c)) for a, b, c in zip(x, y, z, strict=True)]
 
 
 def stretch(camera: Camera) -> Float[np.ndarray, "H W"]:
