@@ -3,8 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from jaxtyping import Bool, Float
 
 from corporeal.types import Camera, Vector
+
+CROSSING = 0.01
+"""Least mean square of the sine between optical axes and their main direction, for the place where
+they cross to be known: 6°."""
 
 
 @dataclass(frozen=True)
@@ -16,10 +21,16 @@ class Region:
     """[m]"""
 
 
-def region(cameras: tuple[Camera, ...]) -> Region:
+def region(cameras: tuple[Camera, ...], points: Float[np.ndarray, "N 3"] | None = None) -> Region:
     """Return the ball about the point nearest to all optical axes.
 
     Its radius is the largest that fits into the pictures of half of the cameras.
+
+    Args:
+        cameras: One or more.
+        points: On what is in the pictures. Where all cameras look the same way, so that their axes
+            do not cross, the middle of those that most of them see is the ball's.
+
     """
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
     axes = np.stack([c.world_from_camera[:3, 2] for c in cameras])
@@ -28,6 +39,19 @@ def region(cameras: tuple[Camera, ...]) -> Region:
     weak = 1e-3 * len(cameras) * np.eye(3)
     wanted = (across @ eyes[:, :, None]).sum(axis=0)[:, 0] + weak @ eyes.mean(axis=0)
     centre = np.linalg.solve(across.sum(axis=0) + weak, wanted)
+    crossing = np.linalg.eigvalsh(across.mean(axis=0))[0] > CROSSING
+    if points is not None and not crossing:
+        votes = np.sum([_sees(c, points) for c in cameras], axis=0)
+        if votes.any():
+            centre = np.median(points[votes >= 0.75 * votes.max()], axis=0)
     sines = [np.sin(np.arctan(min(c.width / c.K[0, 0], c.height / c.K[1, 1]) / 2)) for c in cameras]
     radius = float(np.median(np.linalg.norm(eyes - centre, axis=1) * sines))
     return Region((float(centre[0]), float(centre[1]), float(centre[2])), radius)
+
+
+def _sees(camera: Camera, points: np.ndarray) -> Bool[np.ndarray, " N"]:
+    """Tell which points are within a camera's picture."""
+    turn, eye = camera.world_from_camera[:3, :3], camera.world_from_camera[:3, 3]
+    x, y, depth = camera.K @ ((points - eye) @ turn).T
+    inside = (x >= 0) & (x < camera.width * depth) & (y >= 0) & (y < camera.height * depth)
+    return inside & (depth > 0)

@@ -1,0 +1,202 @@
+"""The frame of a reconstruction: +z up, the floor at z = 0, what the cameras look at above it.
+
+Poses from pictures have no up, and trained splats neither. It is taken from what the file says,
+else from the cameras, which people hold level, else from what programs usually write; a plane that
+things stand on corrects it.
+"""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.geometry.ground_plane import Plane, Search, ground_plane
+from corporeal.geometry.level import Level, level
+from corporeal.geometry.region import Region, region
+from corporeal.geometry.similarity import moved_points, similarity
+from corporeal.types import Camera, Vector
+
+STRONG = 0.6
+"""From here on a direction is believed unless something stronger speaks."""
+TILTS = {True: np.radians(12), False: np.radians(35)}
+"""How far a floor's normal may be from an up that is strong, or not."""
+AGAINST = np.radians(20)
+"""Angle from which on cameras that agree speak against the file."""
+LEVEL = np.radians(0.3)
+"""Standard error of an up that knows better than a plane nearby."""
+NEARBY = np.radians(1.0)
+"""Angle between that plane's normal and up."""
+WITHIN = 2.0
+"""Points farther from the middle are not looked at, in radii of what the cameras look at."""
+LOWEST = 0.5
+"""Percentile of heights that is the underside of things."""
+AXIS = "the axis that programs usually write as up"
+
+
+@dataclass(frozen=True)
+class Upright:
+    """How a file's frame becomes the world's, and how that was found."""
+
+    world_from_file: Float[np.ndarray, "4 4"]
+    """Rotation and shift; lengths stay."""
+    found_by: str
+    """Who said what is up: "file", "cameras", "floor" or "custom"."""
+    confidence: float
+    """In up: 0 (a guess) to 1."""
+    floor_by: str
+    """"plane": it is in the pictures; "things": their lowest points; "nothing": there are none."""
+    radius: float
+    """Of the scene, in the file's unit."""
+    reason: str
+    """In a sentence or two, for the report."""
+    warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class _Up:
+    up: np.ndarray
+    found_by: str
+    sure: float
+    error: float
+    reason: str
+    warnings: tuple[str, ...]
+
+
+def upright(
+    cameras: tuple[Camera, ...],
+    points: Float[np.ndarray, "N 3"],
+    z_up: bool = False,
+    things: Float[np.ndarray, "M 3"] | None = None,
+    usual: Vector | None = None,
+    seed: int = 0,
+) -> Upright:
+    """Find the frame of a reconstruction.
+
+    Args:
+        cameras: Posed, in the file's frame; () for a splat without any.
+        points: On all that is in the pictures, in the file's frame and unit; a floor is looked for
+            among them.
+        z_up: Whether the file says that its +z is up.
+        things: Points that are on things for sure, as masks tell; None: nobody knows.
+        usual: What is up in such files as a rule; for want of cameras.
+        seed: Of what is left to chance.
+
+    """
+    around = _around(cameras, points if things is None else things)
+    told = _told(cameras, z_up, usual)
+    near = np.linalg.norm(points - around.centre, axis=1) < WITHIN * around.radius
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras]) if cameras else np.empty((0, 3))
+    tilt = TILTS[told.sure >= STRONG] if told.sure > 0.3 or not len(eyes) else np.pi
+    search = Search(told.up, tilt, around.radius, eyes)
+    plane = ground_plane(points[near], search, np.random.default_rng(seed))
+    if plane is not None:
+        told = _corrected(told, plane)
+    lowest = points[near] if things is None else things
+    return _framed(told, plane, around, lowest)
+
+
+def turned_up(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
+    """Return the smallest rotation that takes a direction to +z."""
+    x, y, z = up / np.linalg.norm(up)
+    if z < -1 + 1e-12:
+        return np.diag([1.0, -1.0, -1.0])
+    k = 1 / (1 + z)
+    return np.array([[1 - k * x * x, -k * x * y, -x], [-k * x * y, 1 - k * y * y, -y], [x, y, z]])
+
+
+# ---------------------------------------------------------------- up
+
+
+def _told(cameras: tuple[Camera, ...], z_up: bool, usual: Vector | None) -> _Up:
+    """Return what is up before anybody looks for a floor."""
+    seen = level(cameras) if cameras else None
+    if z_up:
+        return _by_file(seen)
+    if seen is not None:
+        many = f"{len(cameras)} cameras"
+        reason = f"Up is what {many} agree on, which people hold level (to {_degrees(seen.error)})."
+        if not np.isfinite(seen.error):
+            reason = "Up is the mean of what is up in the pictures."
+        return _Up(seen.up, "cameras", seen.sure, seen.error, reason, seen.warnings)
+    axis = np.array((0.0, 0.0, 1.0) if usual is None else usual, dtype=float)
+    words = "No camera and no file says what is up: look at the result."
+    return _Up(axis, "custom", 0.4, np.inf, f"Up is {AXIS}.", (words,))
+
+
+def _by_file(seen: Level | None) -> _Up:
+    z = np.array([0.0, 0.0, 1.0])
+    said = _Up(z, "file", 0.9, 0.0, "Up is +z, as such files have it.", ())
+    if seen is None or seen.sure < 0.8:
+        return said
+    angle = _angle(seen.up, z)
+    if angle < AGAINST:
+        return said
+    words = (
+        f"Such files have +z up, but the cameras, which agree with each other, were held level "
+        f"about a direction {np.degrees(angle):.0f}° from it. The cameras were believed."
+    )
+    reason = f"Up is what the cameras agree on (to {_degrees(seen.error)})."
+    return _Up(seen.up, "cameras", seen.sure * 0.8, seen.error, reason, (*seen.warnings, words))
+
+
+def _corrected(told: _Up, plane: Plane) -> _Up:
+    """Let a plane that things stand on correct what is up."""
+    angle = _angle(told.up, plane.normal)
+    if told.sure >= STRONG and told.error < LEVEL and angle < NEARBY:
+        return told
+    reason = f"{told.reason} The floor, {np.degrees(angle):.1f}° from it, corrected that."
+    by = told.found_by if told.sure >= STRONG else "floor"
+    sure = max(told.sure, min(0.9, 0.5 + plane.share))
+    return replace(told, up=plane.normal, found_by=by, sure=sure, reason=reason)
+
+
+def _angle(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.arctan2(np.linalg.norm(np.cross(a, b)), a @ b))
+
+
+def _degrees(angle: float) -> str:
+    return f"{np.degrees(angle):.1f}°"
+
+
+# ---------------------------------------------------------------- the frame
+
+
+def _around(cameras: tuple[Camera, ...], points: np.ndarray) -> Region:
+    """Return the ball that matters: what the cameras look at, else where most points are."""
+    if cameras:
+        return region(cameras, points)
+    low, high = np.percentile(points, [2, 98], axis=0)
+    x, y, z = ((low + high) / 2).tolist()
+    return Region((x, y, z), float(np.linalg.norm(high - low)) / 2)
+
+
+def _framed(told: _Up, plane: Plane | None, around: Region, lowest: np.ndarray) -> Upright:
+    rotation = turned_up(told.up)
+    centre = rotation @ np.array(around.centre)
+    warnings = list(told.warnings)
+    if plane is not None:
+        # Where the plane is below the middle: it may be tilted against up by a little.
+        below = (plane.offset - plane.normal @ np.array(around.centre)) / (plane.normal @ told.up)
+        height, by = float(centre[2] + below), "plane"
+        reason = f"The floor is a plane with {plane.share:.0%} of the points."
+    elif len(lowest):
+        heights = moved_points(lowest, similarity(rotation))[:, 2]
+        height, by = float(np.percentile(heights, LOWEST)), "things"
+        reason = "No floor was found: it is put below the lowest points."
+        warnings.append(f"{reason} Things that float above it will fall.")
+    else:
+        height, by, reason = (
+            float(centre[2]),
+            "nothing",
+            "There are no points to put a floor below.",
+        )
+    shift = -np.array([centre[0], centre[1], height])
+    return Upright(
+        world_from_file=similarity(rotation, 1.0, shift),
+        found_by=told.found_by,
+        confidence=float(told.sure),
+        floor_by=by,
+        radius=around.radius,
+        reason=f"{told.reason} {reason}",
+        warnings=tuple(warnings),
+    )

@@ -1,0 +1,157 @@
+"""Up is found again, however the file's frame is turned, and the floor under the things."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from corporeal.geometry.rotation import matrix
+from corporeal.geometry.similarity import moved_cameras, moved_points, similarity
+from corporeal.geometry.upright import turned_up, upright
+from corporeal.types import Camera
+
+
+def cameras_at(eyes, target=(0.0, 0.0, 0.2), roll=0.0, rng=None):
+    """Return cameras held level but for a random roll [deg], looking at a place."""
+    made = []
+    for eye in np.asarray(eyes, dtype=float):
+        back = (eye - target) / np.linalg.norm(eye - target)
+        right = np.cross([0, 0, 1.0], back)
+        right = right / np.linalg.norm(right) if np.linalg.norm(right) > 1e-9 else np.eye(3)[0]
+        axes = np.stack([right, np.cross(right, back), -back], axis=1)
+        turn = np.radians(roll) * (rng.normal() if rng is not None else 0.0)
+        c, s = np.cos(turn), np.sin(turn)
+        pose = np.eye(4)
+        pose[:3, :3] = axes @ np.array([[c, -s, 0], [s, c, 0], [0, 0, 1.0]])
+        pose[:3, 3] = eye
+        K = np.array([[200.0, 0, 100], [0, 200, 100], [0, 0, 1]])
+        made.append(Camera(K, pose, 200, 200))
+    return tuple(made)
+
+
+def ring(count=24, distance=2.0, low=15, high=60):
+    """Return places around a thing, from low to high [deg]."""
+    turn = 2.4 * np.arange(count)
+    rise = np.radians(np.linspace(low, high, count))
+    flat = np.cos(rise)
+    return distance * np.stack([flat * np.cos(turn), flat * np.sin(turn), np.sin(rise)], axis=1)
+
+
+def room(rng, floor=2000, things=1500, anywhere=0, noise=0.004):
+    """Return points on a floor and on a box that stands on it, and points anywhere."""
+    on_floor = np.concatenate(
+        [rng.uniform(-0.9, 0.9, (floor, 2)), noise * rng.normal(size=(floor, 1))], axis=1
+    )
+    middle = np.array([0, 0, 0.2])
+    box = rng.uniform(-0.2, 0.2, (things, 3)) + middle
+    side = rng.integers(3, size=things)
+    # Its top and two sides: nobody sees the underside.
+    box[np.arange(things), side] = np.array([0.2, 0.2, 0.4])[side]
+    return np.concatenate([on_floor, box, rng.uniform(-1, 1, (anywhere, 3)) + middle]), box
+
+
+def somewhere(rng):
+    """Return a similarity that a structure from motion might choose."""
+    return similarity(matrix(rng.normal(size=4)), float(np.exp(rng.normal())), rng.normal(size=3))
+
+
+def off(found, file_from_world):
+    """Return the angle between true and found up [deg] and the height of the true floor [m]."""
+    whole = found.world_from_file @ file_from_world
+    scale = np.cbrt(np.linalg.det(whole[:3, :3]))
+    up = whole[:3, 2] / scale
+    return np.degrees(np.arccos(np.clip(up[2], -1, 1))), whole[2, 3] / scale
+
+
+@pytest.mark.parametrize("anywhere", [0, 3500])
+def test_up_and_floor_are_found_in_any_frame(rng, anywhere):
+    for _ in range(3):
+        points, _ = room(rng, anywhere=anywhere)
+        made = somewhere(rng)
+        cameras = moved_cameras(cameras_at(ring(), roll=3, rng=rng), made)
+        found = upright(cameras, moved_points(points, made))
+        angle, floor = off(found, made)
+        assert angle < 0.5
+        assert abs(floor) < 0.004
+        assert (found.found_by, found.floor_by) == ("cameras", "plane")
+        assert found.warnings == ()
+        assert found.confidence > 0.8
+
+
+def test_things_without_a_floor_stand_on_their_lowest_points(rng):
+    _, box = room(rng)
+    made = somewhere(rng)
+    cameras = moved_cameras(cameras_at(ring()), made)
+    things = moved_points(box, made)
+    found = upright(cameras, things, things=things)
+    angle, floor = off(found, made)
+    assert angle < 1e-6
+    assert abs(floor) < 0.01
+    assert found.floor_by == "things"
+    assert "below the lowest points" in found.warnings[0]
+    middle = moved_points(np.zeros((1, 3)), found.world_from_file @ made)[0]
+    np.testing.assert_allclose(middle[:2], 0, atol=0.01 * found.radius)
+
+
+def test_a_file_with_z_up_is_believed(rng):
+    points, _ = room(rng)
+    found = upright(cameras_at(ring(), roll=3, rng=rng), points, z_up=True)
+    np.testing.assert_allclose(found.world_from_file[:3, :3], np.eye(3), atol=1e-12)
+    assert abs(found.world_from_file[2, 3]) < 0.003
+    assert found.found_by == "file"
+
+
+def test_a_file_with_y_up_that_should_have_z_up_is_noticed(rng):
+    points, _ = room(rng)
+    made = similarity(np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]]))
+    found = upright(moved_cameras(cameras_at(ring()), made), moved_points(points, made), z_up=True)
+    assert off(found, made)[0] < 0.1
+    assert any("90° from it. The cameras were believed" in w for w in found.warnings)
+
+
+def test_cameras_that_were_held_upright_do_not_count(rng):
+    points, _ = room(rng, floor=0)
+    cameras = list(cameras_at(ring(), roll=2, rng=rng))
+    quarter = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+    for k in range(0, 24, 4):
+        cameras[k] = replace(cameras[k], world_from_camera=cameras[k].world_from_camera @ quarter)
+    found = upright(tuple(cameras), points, things=points)
+    assert off(found, np.eye(4))[0] < 2
+
+
+def test_cameras_that_look_straight_down_are_above(rng):
+    points, _ = room(rng)
+    eyes = [(x, y, 2.5) for x in (-0.5, 0, 0.5) for y in (-0.5, 0, 0.5)]
+    cameras = tuple(c for x, y, z in eyes for c in cameras_at([(x, y, z)], target=(x, y, 0.0)))
+    made = somewhere(rng)
+    found = upright(moved_cameras(cameras, made), moved_points(points, made))
+    angle, floor = off(found, made)
+    assert angle < 0.5
+    assert abs(floor) < 0.004
+    assert found.found_by == "floor"
+    assert found.warnings
+
+
+def test_one_camera_finds_the_floor_and_says_how_little_it_knows(rng):
+    points, _ = room(rng)
+    found = upright(cameras_at([(2.0, 0, 1.0)]), points)
+    assert off(found, np.eye(4))[0] < 0.5
+    assert found.warnings
+
+
+def test_without_cameras_what_is_usual_is_corrected_by_a_floor(rng):
+    points, _ = room(rng)
+    tilted = similarity(matrix(np.array([1, 0.1, 0.05, 0])), 2.0, (1, 2, 3))
+    found = upright((), moved_points(points, tilted), usual=(0, 0, 1))
+    angle, floor = off(found, tilted)
+    assert angle < 0.5
+    assert abs(floor) < 0.004
+    assert "look at the result" in found.warnings[0]
+
+
+def test_any_direction_can_be_turned_up(rng):
+    for up in [*rng.normal(size=(20, 3)), (0, 0, 1), (0, 0, -1), (1e-9, 0, -1)]:
+        turn = turned_up(np.asarray(up, dtype=float))
+        np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-6)
+        assert np.linalg.det(turn) == pytest.approx(1)
+        np.testing.assert_allclose(turn @ up / np.linalg.norm(up), [0, 0, 1], atol=1e-6)
