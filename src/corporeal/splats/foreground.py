@@ -1,0 +1,109 @@
+"""Which Gaussians belong to the things: not the floor, not what is behind, no haze."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from corporeal.errors import UserError
+from corporeal.geometry.region import region
+from corporeal.splats.raster import weights
+from corporeal.types import Camera, Gaussians
+
+CELL = 2
+"""Pixels along a cell in which contributions are summed."""
+VISIBLE = 0.1
+"""Least contribution to a picture, in pixels, for a view to count as having seen it."""
+INSIDE = 0.5
+"""Share of what shows of a Gaussian that must be inside masks."""
+FAINT = 0.05
+"""Opacity below which it is haze."""
+THICK = 0.015
+"""Height of the layer that is the floor, in radii of what the cameras look at."""
+AROUND = 1.1
+"""Radius of what may be a thing, in those."""
+COMMON = 0.2
+"""Share of the views that must see it, where there are no masks."""
+WIDE = 0.5
+"""Standard deviation of haze, in those radii."""
+
+
+@dataclass(frozen=True)
+class Shown:
+    """What the pictures show of each of N Gaussians."""
+
+    weight: Float[np.ndarray, " N"]
+    """Sum of its blending weights T α over all pictures [px]."""
+    inside: Float[np.ndarray, " N"]
+    """The part of that inside masks [px]; all of it where there are none."""
+    views: Int[np.ndarray, " N"]
+    """In how many pictures it shows."""
+
+
+def shown(
+    gaussians: Gaussians,
+    cameras: Sequence[Camera],
+    masks: Bool[np.ndarray, "V H W"] | None = None,
+    threads: int | None = None,
+) -> Shown:
+    """Say what cameras see of each Gaussian.
+
+    Raises:
+        UserError: There is not a mask for each camera.
+
+    """
+    if masks is not None and len(masks) != len(cameras):
+        raise UserError(f"There are {len(masks)} masks for {len(cameras)} cameras. Give one each.")
+    total, inside = np.zeros(gaussians.count), np.zeros(gaussians.count)
+    views = np.zeros(gaussians.count, np.int64)
+    for k, camera in enumerate(cameras):
+        shares = weights(gaussians, camera, CELL, threads)
+        own = np.asarray(shares.sum(axis=1)).ravel()
+        total += own
+        views += own > VISIBLE
+        inside += own if masks is None else shares @ _shrunk(masks[k]).ravel()
+    return Shown(total, inside, views)
+
+
+def foreground(
+    gaussians: Gaussians,
+    cameras: Sequence[Camera],
+    masks: Bool[np.ndarray, "V H W"] | None = None,
+    floor: bool = True,
+    threads: int | None = None,
+) -> Bool[np.ndarray, " N"]:
+    """Tell which Gaussians belong to the things.
+
+    With masks: those that show mostly inside them. Without: those that are above the floor, within
+    the ball that the cameras look at, in a fair share of the pictures, and neither faint nor as
+    wide as haze.
+
+    Args:
+        gaussians: In the world's frame: +z up, the floor at z = 0.
+        cameras: In the same frame.
+        masks: Which pixels are on things.
+        floor: Whether a floor is among the Gaussians; masks leave none.
+        threads: None: one per processor.
+
+    """
+    seen = shown(gaussians, cameras, masks, threads)
+    kept = (seen.weight > VISIBLE) & (gaussians.opacity > FAINT)
+    if masks is not None:
+        return kept & (seen.inside > INSIDE * seen.weight)
+    around = region(tuple(cameras), gaussians.mean)
+    distance = np.linalg.norm(gaussians.mean - np.array(around.centre), axis=1)
+    kept &= distance < AROUND * around.radius
+    kept &= gaussians.scale.max(axis=1) < WIDE * around.radius
+    kept &= seen.views >= COMMON * len(cameras)
+    if floor:
+        kept &= gaussians.mean[:, 2] > THICK * around.radius
+    return kept
+
+
+def _shrunk(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "h w"]:
+    """Return the share of each cell that is inside."""
+    rows, columns = np.arange(0, mask.shape[0], CELL), np.arange(0, mask.shape[1], CELL)
+    sums = np.add.reduceat(np.add.reduceat(mask.astype(float), rows, axis=0), columns, axis=1)
+    ones = np.ones(mask.shape)
+    return sums / np.add.reduceat(np.add.reduceat(ones, rows, axis=0), columns, axis=1)
