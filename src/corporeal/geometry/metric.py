@@ -1,13 +1,19 @@
 """How large a reconstruction is in metres, and who said so."""
 
 import math
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
 
 from corporeal.errors import UserError
 from corporeal.types import Vector
+
+DOUBT = 2.0
+"""Factor between two scales from which on somebody must be told."""
+NEUTRAL = 0.5
+"""Stands in for the size of a scene of which nobody knows it [m]."""
 
 
 @dataclass(frozen=True)
@@ -16,11 +22,98 @@ class MetricScale:
 
     metres_per_unit: float
     """[m]"""
-    source: Literal["file", "distance", "extent"]
+    source: Literal["file", "distance", "extent", "nobody"]
     """The file's kind is in metres; two points whose distance is known; how large such a thing is
-    as a rule, which somebody or a model said."""
+    as a rule, which somebody or a model said; a neutral stand-in."""
     reason: str
     """In one sentence."""
+    warnings: tuple[str, ...] = ()
+    """What speaks against it, in sentences."""
+
+
+@dataclass(frozen=True)
+class Extent:
+    """How large one thing is, in the file and in reality."""
+
+    name: str
+    units: float
+    """Longest side in the file [its unit]."""
+    metres: float
+    """The same in reality [m]."""
+    who: str
+    """Who said so, in words for the report ("the command line", "a model")."""
+
+
+def chosen(
+    distance: MetricScale | None = None,
+    stated: Sequence[Extent] = (),
+    file: MetricScale | None = None,
+    usual: Sequence[Extent] = (),
+    size: float = 1.0,
+) -> MetricScale:
+    """Return the scale that the best witness names, and what the others say against it.
+
+    In this order: a distance that somebody measured, sizes of things that somebody stated, a file
+    in metres, how large such things usually are, and for want of all a neutral stand-in.
+
+    Args:
+        distance: Of two points, or of cameras.
+        stated: What a person said of single things.
+        file: Where the file's kind is in metres.
+        usual: What a model or a table says of things of these classes.
+        size: Of the whole in the file, for the stand-in [its unit].
+
+    Raises:
+        UserError: A size is not positive and finite.
+
+    """
+    witnesses = [distance, of_extents(stated), file, of_extents(usual)]
+    heard = [w for w in witnesses if w is not None]
+    if not heard:
+        return _stand_in(size)
+    first, *others = heard
+    against = [_against(first, other) for other in others]
+    return replace(first, warnings=(*first.warnings, *(w for w in against if w)))
+
+
+def of_extents(extents: Sequence[Extent]) -> MetricScale | None:
+    """Return the scale at which most things have their sizes: the median of their ratios.
+
+    Raises:
+        UserError: A size is not positive and finite.
+
+    """
+    if not extents:
+        return None
+    ratios = [_ratio(e.metres, e.units, f"The extent of {e.name}") for e in extents]
+    scale = float(np.exp(np.median(np.log(ratios))))
+    told = "; ".join(f"{e.name} {e.units:.4g} units, {e.metres:.3g} m ({e.who})" for e in extents)
+    odd = [e.name for e, r in zip(extents, ratios, strict=True) if _differ(r, scale)]
+    warnings = ()
+    if odd:
+        warnings = (
+            f"At one unit = {scale:.4g} m the sizes of {', '.join(odd)} are off by more than a "
+            f"factor of {DOUBT:g}. State the size of one thing with --extent NAME=METRES.",
+        )
+    return MetricScale(scale, "extent", f"One unit is {scale:.4g} m: {told}.", warnings)
+
+
+def _stand_in(size: float) -> MetricScale:
+    scale = _ratio(NEUTRAL, size, "The whole")
+    words = f"Nobody knows how large it is: the whole was taken as {NEUTRAL:g} m."
+    warning = f"{words} State the size of one thing with --extent NAME=METRES."
+    return MetricScale(scale, "nobody", words, (warning,))
+
+
+def _against(believed: MetricScale, other: MetricScale) -> str:
+    if not _differ(believed.metres_per_unit, other.metres_per_unit):
+        return ""
+    ratio = believed.metres_per_unit / other.metres_per_unit
+    return f"{other.reason} That differs by a factor of {ratio:.3g} from what was believed."
+
+
+def _differ(a: float, b: float) -> bool:
+    return not 1 / DOUBT <= a / b <= DOUBT
 
 
 def of_file(kind: str) -> MetricScale:
