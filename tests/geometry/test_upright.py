@@ -149,6 +149,54 @@ def test_without_cameras_what_is_usual_is_corrected_by_a_floor(rng):
     assert "look at the result" in found.warnings[0]
 
 
+def stool(rng):
+    """Return points on a ball on four splayed legs: it rolls off all its sides but one."""
+    ball = rng.normal(size=(2000, 3))
+    ball = 0.15 * ball / np.linalg.norm(ball, axis=1, keepdims=True) + [0, 0, 1]
+    along = rng.random((300, 1))
+    legs = [(1 - along) * [0, 0, 1] + along * [x, y, 0] for x in (-0.6, 0.6) for y in (-0.6, 0.6)]
+    return np.concatenate([ball, *legs])
+
+
+@pytest.mark.parametrize("usual", [(0, 0, 1), (0, 0, -1), (0, 1, 0), (1, 0, 0)])
+def test_without_cameras_and_floor_things_are_put_as_they_would_rest(rng, usual):
+    tilted = similarity(matrix(np.array([1, 0.03, -0.05, 0.02])))
+    found = upright((), moved_points(stool(rng), tilted), usual=usual)
+    angle, floor = off(found, tilted)
+    assert angle < 0.5
+    assert abs(floor) < 0.01
+    assert found.found_by == "rest"
+    assert found.confidence <= 0.5
+    assert ("would fall over" in found.reason) is (usual != (0, 0, 1))
+
+
+def test_the_top_of_a_table_is_no_floor(rng):
+    board = rng.uniform(-1, 1, (4000, 3)) * [0.5, 0.3, 0.02] + [0, 0, 1]
+    legs = rng.uniform(size=(4, 300, 3)) * [0.02, 0.02, 1]
+    legs += np.array([[[x, y, 0]] for x in (-0.45, 0.45) for y in (-0.25, 0.25)])
+    found = upright((), np.concatenate([board, *legs]), usual=(0, 0, 1))
+    assert off(found, np.eye(4))[0] < 0.5
+    assert abs(off(found, np.eye(4))[1]) < 0.02
+    assert found.floor_by == "things"
+
+
+def test_astray_points_do_not_change_how_things_rest(rng):
+    points = np.concatenate([stool(rng), rng.uniform(-3, 3, (60, 3))])
+    found = upright((), points, usual=(0, 0, 1))
+    assert off(found, np.eye(4))[0] < 0.5
+
+
+def test_what_somebody_states_goes_before_cameras_and_file(rng):
+    points, box = room(rng)
+    cameras = cameras_at(ring())
+    found = upright(cameras, box, z_up=True, things=box, stated=(0.0, -2.0, 0.0))
+    np.testing.assert_allclose(found.world_from_file[2, :3], [0, -1, 0], atol=1e-12)
+    assert (found.found_by, found.confidence) == ("person", 1.0)
+    made = similarity(matrix(np.array([1, 0.03, -0.05, 0.02])))
+    found = upright((), moved_points(points, made), stated=(0, 0, 1))
+    assert off(found, made)[0] < 0.5
+
+
 def test_any_direction_can_be_turned_up(rng):
     for up in [*rng.normal(size=(20, 3)), (0, 0, 1), (0, 0, -1), (1e-9, 0, -1)]:
         turn = turned_up(np.asarray(up, dtype=float))

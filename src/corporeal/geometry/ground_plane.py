@@ -8,12 +8,15 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial import ConvexHull, QhullError
 
-SAMPLES = 4000
+from corporeal.geometry.rest import together
+
+SAMPLES = 3000
 """Planes through three points that are tried."""
-ASKED = 4000
+ASKED = 2500
 """Points that judge each of them."""
-REFINED = 60_000
+REFINED = 30_000
 """Points that the best are fitted to."""
 TOLERANCE = 0.02
 """Distance from the plane of what belongs to it, in radii of the scene, at first."""
@@ -25,6 +28,10 @@ LEAST = 0.08
 """Share of the points that must be on a plane for it to be one."""
 PROMINENT = 2.5
 """How many times denser points must be on it than in the layers just above it."""
+FEW = 0.05
+"""Share of the points that may be below it, though fewer are above."""
+CARRIED = 0.75
+"""Share of what is above it that must be above the patch of it that was seen."""
 ABOVE = 0.8
 """Share of the cameras that must be above it."""
 
@@ -71,7 +78,9 @@ def ground_plane(
         score = plane.share - BELOW * _below(many, plane, search)
         if score > most and _allowed(plane, search):
             best, most = plane, score
-    return best if best is not None and most > LEAST / 2 and _stands_out(many, best) else None
+    return (
+        best if best is not None and most > LEAST / 2 and _is_ground(many, best, search) else None
+    )
 
 
 def _candidates(points: np.ndarray, search: Search, rng: np.random.Generator) -> list:
@@ -95,7 +104,7 @@ def _candidates(points: np.ndarray, search: Search, rng: np.random.Generator) ->
         heights = (points @ normals[some].T - offsets[some]) / near
         on = np.maximum(0, 1 - heights**2).mean(axis=0)
         scores[some] = on - BELOW * (heights < -2).mean(axis=0)
-    return [(normals[k], offsets[k]) for k in np.argsort(-scores, kind="stable")[:8]]
+    return [(normals[k], offsets[k]) for k in np.argsort(-scores, kind="stable")[:5]]
 
 
 def _refined(points: np.ndarray, normal: np.ndarray, offset: float, search: Search) -> Plane:
@@ -132,9 +141,33 @@ def _allowed(plane: Plane, search: Search) -> bool:
     return not len(eyes) or (eyes > 0).mean() >= ABOVE
 
 
-def _stands_out(points: np.ndarray, plane: Plane) -> bool:
+def _is_ground(points: np.ndarray, plane: Plane, search: Search) -> bool:
+    return _stands_out(points, plane, search) and _carries(points, plane, search)
+
+
+def _stands_out(points: np.ndarray, plane: Plane, search: Search) -> bool:
+    """Tell whether many more points are on it than just above it."""
     heights = points @ plane.normal - plane.offset
-    half = 3 * max(plane.thickness, 1e-12)
+    half = max(3 * plane.thickness, FINEST * search.radius)
     on = (np.abs(heights) < half).sum()
     over = ((heights > 2 * half) & (heights < 8 * half)).sum() / 3
     return bool(on >= PROMINENT * over)
+
+
+def _carries(points: np.ndarray, plane: Plane, search: Search) -> bool:
+    """Tell whether things are above it, and most of them above the patch that was seen of it."""
+    heights = points @ plane.normal - plane.offset
+    half = max(3 * plane.thickness, FINEST * search.radius)
+    flat = points @ np.linalg.svd(plane.normal[None])[2][1:].T
+    patch = together(flat[np.abs(heights) < half])
+    above, below = flat[heights > 2 * half], (heights < -2 * half).mean()
+    if below > max(FEW, len(above) / len(points)):
+        return False
+    if not len(above):
+        return True
+    try:
+        hull = ConvexHull(patch)
+    except (QhullError, ValueError):
+        return False
+    rim = above @ hull.equations[:, :2].T + hull.equations[:, 2]
+    return bool((rim.max(axis=1) <= 0).mean() >= CARRIED)

@@ -1,8 +1,8 @@
 """The frame of a reconstruction: +z up, the floor at z = 0, what the cameras look at above it.
 
 Poses from pictures have no up, and trained splats neither. It is taken from what the file says,
-else from the cameras, which people hold level, else from what programs usually write; a plane that
-things stand on corrects it.
+else from the cameras, which people hold level, else from what programs usually write and how things
+would rest; a plane that things stand on corrects it.
 """
 
 from dataclasses import dataclass, replace
@@ -13,6 +13,7 @@ from jaxtyping import Float
 from corporeal.geometry.ground_plane import Plane, Search, ground_plane
 from corporeal.geometry.level import Level, level
 from corporeal.geometry.region import Region, region
+from corporeal.geometry.rest import rest, together
 from corporeal.geometry.similarity import moved_points, similarity
 from corporeal.types import Camera, Vector
 
@@ -28,9 +29,17 @@ NEARBY = np.radians(1.0)
 """Angle between that plane's normal and up."""
 WITHIN = 2.0
 """Points farther from the middle are not looked at, in radii of what the cameras look at."""
-LOWEST = 0.5
-"""Percentile of heights that is the underside of things."""
+LOWEST = 0.1
+"""Percentile of heights that is the underside of things, where no point is astray."""
+UNUSUAL = np.radians(10)
+"""How much farther things may roll from the usual axis than from another to be believed there."""
+STANDS = np.radians(12)
+"""Things that roll less were, and their frame was a little tilted."""
+WEAK = 0.3
+"""An up less sure than this says nothing of where a floor is, if there are cameras above it."""
+Z: Vector = (0.0, 0.0, 1.0)
 AXIS = "the axis that programs usually write as up"
+LOOK = "No camera and no file says what is up: look at the result, and say it with --up."
 
 
 @dataclass(frozen=True)
@@ -40,7 +49,7 @@ class Upright:
     world_from_file: Float[np.ndarray, "4 4"]
     """Rotation and shift; lengths stay."""
     found_by: str
-    """Who said what is up: "file", "cameras", "floor" or "custom"."""
+    """Who said what is up: "person", "file", "cameras", "floor", "rest" or "custom"."""
     confidence: float
     """In up: 0 (a guess) to 1."""
     floor_by: str
@@ -68,7 +77,7 @@ def upright(
     z_up: bool = False,
     things: Float[np.ndarray, "M 3"] | None = None,
     usual: Vector | None = None,
-    seed: int = 0,
+    stated: Vector | None = None,
 ) -> Upright:
     """Find the frame of a reconstruction.
 
@@ -79,20 +88,23 @@ def upright(
         z_up: Whether the file says that its +z is up.
         things: Points that are on things for sure, as masks tell; None: nobody knows.
         usual: What is up in such files as a rule; for want of cameras.
-        seed: Of what is left to chance.
+        stated: What somebody says is up, which goes before all else.
 
     """
     around = _around(cameras, points if things is None else things)
-    told = _told(cameras, z_up, usual)
-    near = np.linalg.norm(points - around.centre, axis=1) < WITHIN * around.radius
-    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras]) if cameras else np.empty((0, 3))
-    tilt = TILTS[told.sure >= STRONG] if told.sure > 0.3 or not len(eyes) else np.pi
-    search = Search(told.up, tilt, around.radius, eyes)
-    plane = ground_plane(points[near], search, np.random.default_rng(seed))
+    near = points[np.linalg.norm(points - around.centre, axis=1) < WITHIN * around.radius]
+    if stated is not None:
+        told = _Up(_unit(stated), "person", 1.0, 0.0, "Up is what was stated.", ())
+    elif z_up or cameras:
+        told = _told(cameras, z_up)
+    else:
+        told = _Up(_unit(usual or Z), "custom", 0.4, np.inf, f"Up is {AXIS}.", (LOOK,))
+    plane = _floor(told, cameras, near, around)
+    if plane is None and told.found_by == "custom":
+        told = _rested(told, near)
     if plane is not None:
         told = _corrected(told, plane)
-    lowest = points[near] if things is None else things
-    return _framed(told, plane, around, lowest)
+    return _framed(told, plane, around, near if things is None else things)
 
 
 def turned_up(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
@@ -107,24 +119,44 @@ def turned_up(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:
 # ---------------------------------------------------------------- up
 
 
-def _told(cameras: tuple[Camera, ...], z_up: bool, usual: Vector | None) -> _Up:
-    """Return what is up before anybody looks for a floor."""
+def _told(cameras: tuple[Camera, ...], z_up: bool) -> _Up:
+    """Return what is up as the file or its cameras say."""
     seen = level(cameras) if cameras else None
-    if z_up:
+    if seen is None or z_up:
         return _by_file(seen)
-    if seen is not None:
-        many = f"{len(cameras)} cameras"
-        reason = f"Up is what {many} agree on, which people hold level (to {_degrees(seen.error)})."
-        if not np.isfinite(seen.error):
-            reason = "Up is the mean of what is up in the pictures."
-        return _Up(seen.up, "cameras", seen.sure, seen.error, reason, seen.warnings)
-    axis = np.array((0.0, 0.0, 1.0) if usual is None else usual, dtype=float)
-    words = "No camera and no file says what is up: look at the result."
-    return _Up(axis, "custom", 0.4, np.inf, f"Up is {AXIS}.", (words,))
+    many = f"{len(cameras)} cameras"
+    reason = f"Up is what {many} agree on, which people hold level (to {_degrees(seen.error)})."
+    if not np.isfinite(seen.error):
+        reason = "Up is the mean of what is up in the pictures."
+    return _Up(seen.up, "cameras", seen.sure, seen.error, reason, seen.warnings)
+
+
+def _rested(told: _Up, points: np.ndarray) -> _Up:
+    """Return what is up as things would rest, for want of cameras and of a floor.
+
+    Near the usual axis, unless they would fall over, and there is another along which they stand.
+    """
+    usual, body = told.up, together(points)
+    rests = [(axis, rest(body, axis)) for axis in (usual, -usual, *_others(usual))]
+    found = [(axis, stood) for axis, stood in rests if stood is not None]
+    if not found:
+        return told
+    axis, stood = min(found, key=lambda f: f[1].tilt + (f[0] is not usual) * UNUSUAL)
+    if stood.tilt > STANDS:
+        return told
+    fell = "" if axis is usual else f" Up is not {AXIS}: the things would fall over."
+    reason = f"Up is as the things would rest on a floor, {_degrees(stood.tilt)} from an axis."
+    return _Up(stood.up, "rest", 0.5, np.inf, reason + fell, (LOOK + fell,))
+
+
+def _others(up: np.ndarray) -> list[np.ndarray]:
+    """Return the axes beside one, both ways."""
+    first = np.argmax(np.abs(up))
+    return [sign * np.eye(3)[k] for k in range(3) if k != first for sign in (1.0, -1.0)]
 
 
 def _by_file(seen: Level | None) -> _Up:
-    z = np.array([0.0, 0.0, 1.0])
+    z = _unit(Z)
     said = _Up(z, "file", 0.9, 0.0, "Up is +z, as such files have it.", ())
     if seen is None or seen.sure < 0.8:
         return said
@@ -139,6 +171,16 @@ def _by_file(seen: Level | None) -> _Up:
     return _Up(seen.up, "cameras", seen.sure * 0.8, seen.error, reason, (*seen.warnings, words))
 
 
+def _floor(
+    told: _Up, cameras: tuple[Camera, ...], points: np.ndarray, around: Region
+) -> Plane | None:
+    eyes = np.array([c.world_from_camera[:3, 3] for c in cameras]).reshape(-1, 3)
+    lost = told.sure < WEAK and len(eyes) > 0
+    tilt = np.pi if lost else TILTS[told.sure >= STRONG]
+    search = Search(told.up, tilt, around.radius, eyes)
+    return ground_plane(points, search, np.random.default_rng(0))
+
+
 def _corrected(told: _Up, plane: Plane) -> _Up:
     """Let a plane that things stand on correct what is up."""
     angle = _angle(told.up, plane.normal)
@@ -148,6 +190,10 @@ def _corrected(told: _Up, plane: Plane) -> _Up:
     by = told.found_by if told.sure >= STRONG else "floor"
     sure = max(told.sure, min(0.9, 0.5 + plane.share))
     return replace(told, up=plane.normal, found_by=by, sure=sure, reason=reason)
+
+
+def _unit(vector: Vector | np.ndarray) -> np.ndarray:
+    return np.asarray(vector, dtype=float) / np.linalg.norm(vector)
 
 
 def _angle(a: np.ndarray, b: np.ndarray) -> float:
@@ -180,7 +226,7 @@ def _framed(told: _Up, plane: Plane | None, around: Region, lowest: np.ndarray) 
         height, by = float(centre[2] + below), "plane"
         reason = f"The floor is a plane with {plane.share:.0%} of the points."
     elif len(lowest):
-        heights = moved_points(lowest, similarity(rotation))[:, 2]
+        heights = moved_points(together(lowest), similarity(rotation))[:, 2]
         height, by = float(np.percentile(heights, LOWEST)), "things"
         reason = "No floor was found: it is put below the lowest points."
         warnings.append(f"{reason} Things that float above it will fall.")
