@@ -1,0 +1,167 @@
+"""Clusters of an object's points → the parts that words name.
+
+With a model that compares points with words (CLIP) in two passes. First a cluster's prototype, the
+mean of its points' semantic features, each weighted by how typical its structural feature is of
+the cluster, takes the name that it is most similar to. Then clusters of one name must look alike:
+one that looks more like those of another name goes over to them. Without a model, words are held
+against colour, height and shape (``regions.attributes``).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.special import log_softmax, softmax
+
+from corporeal.regions.attributes import described, log_likelihood, observed
+from corporeal.regions.match import match
+from corporeal.regions.parts import DEFAULT, Clusters, PartsConfig, parts
+from corporeal.types import Cloud, ObjectWords, PartWords
+
+TEMPERATURE = 0.01
+"""Of cosines between CLIP's pictures and words, as it was trained (Radford et al. 2021)."""
+
+
+@dataclass(frozen=True)
+class Named:
+    """Which of an object's parts every point belongs to; N points, C clusters, K parts."""
+
+    part_of_point: Int[np.ndarray, " N"]
+    """Index into the object's parts."""
+    confidence: Float[np.ndarray, " N"]
+    """In [0, 1]: how probable the name is for the cluster, times how surely the point is of it."""
+    part_of_cluster: Int[np.ndarray, " C"]
+    found_by: str
+    """"one part", "attributes" or "words"."""
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know, in sentences."""
+
+
+def name_parts(
+    cloud: Cloud,
+    thing: ObjectWords,
+    words: Float[np.ndarray, "K S"] | None = None,
+    config: PartsConfig = DEFAULT,
+) -> Named:
+    """Find the parts that words name among one object's points.
+
+    Args:
+        cloud: Points of one object, the world's z up.
+        thing: Its parts, at least one.
+        words: One unit vector per part in the space of ``cloud.semantic``; None: no model.
+        config: How finely the object is taken apart first.
+
+    """
+    if len(thing.parts) == 1:
+        none = np.zeros(cloud.count, np.int64)
+        return Named(none, np.ones(cloud.count), np.zeros(1, np.int64), "one part")
+    return named(parts(cloud, config), cloud, words, thing.parts)
+
+
+def named(
+    clusters: Clusters,
+    cloud: Cloud,
+    words: Float[np.ndarray, "K S"] | None,
+    told: Sequence[PartWords],
+) -> Named:
+    """Give every cluster a part's name; each part gets a cluster where there are enough.
+
+    Args:
+        clusters: Of the cloud's points.
+        cloud: Points of one object, the world's z up.
+        words: One unit vector per part in the space of ``cloud.semantic``; None: no model.
+        told: The parts.
+
+    """
+    if words is None:
+        score = _by_attributes(clusters, cloud, told)
+        part = _claimed(score)
+    else:
+        score = _by_words(clusters, cloud, words)
+        part = _agreed(_looks(clusters, cloud), score, _claimed(score))
+    sure = softmax(score, axis=1)[np.arange(len(part)), part]
+    of_point = part[clusters.cluster_of_point]
+    return Named(
+        of_point,
+        sure[clusters.cluster_of_point] * clusters.confidence,
+        part,
+        "attributes" if words is None else "words",
+        _missing(of_point, told),
+    )
+
+
+def _missing(part_of_point: np.ndarray, told: Sequence[PartWords]) -> tuple[str, ...]:
+    points = np.bincount(part_of_point, minlength=len(told))
+    lost = [f"'{part.name}'" for part, n in zip(told, points, strict=True) if not n]
+    return (f"No points were found for {', '.join(lost)}.",) if lost else ()
+
+
+def _claimed(score: Float[np.ndarray, "C K"]) -> Int[np.ndarray, " C"]:
+    """Give each name the cluster that is most surely its own, and each other cluster its best name.
+
+    A name that something else beats everywhere is still somebody's: who described the object saw
+    it.
+    """
+    part = score.argmax(axis=1)
+    own = match(log_softmax(score, axis=1).T)
+    claimed = np.flatnonzero(own >= 0)
+    part[own[claimed]] = claimed
+    return part
+
+
+# ---------------------------------------------------------------- without a model
+
+
+def _by_attributes(clusters: Clusters, cloud: Cloud, told: Sequence[PartWords]) -> np.ndarray:
+    seen = observed(cloud, clusters.cluster_of_point, clusters.count)
+    return log_likelihood(seen, [described(part) for part in told])
+
+
+# ---------------------------------------------------------------- with words' vectors
+
+
+def _by_words(clusters: Clusters, cloud: Cloud, words: np.ndarray) -> Float[np.ndarray, "C K"]:
+    """Compare prototypes with words, in units of ``TEMPERATURE``."""
+    made = np.empty((clusters.count, len(words)))
+    for c in range(clusters.count):
+        rows = np.flatnonzero(clusters.cluster_of_point == c)
+        look = cloud.structural[rows].astype(np.float32)
+        typical = np.maximum(look @ _unit(look.mean(axis=0)), 0)
+        prototype = _unit(typical @ cloud.semantic[rows].astype(np.float32))
+        made[c] = words @ prototype / TEMPERATURE
+    return made
+
+
+def _looks(clusters: Clusters, cloud: Cloud) -> Float[np.ndarray, "C D"]:
+    """Return the sum of structural features of every cluster."""
+    look = np.zeros((clusters.count, cloud.structural.shape[1]))
+    for c in range(clusters.count):
+        look[c] = cloud.structural[clusters.cluster_of_point == c].sum(axis=0, dtype=np.float64)
+    return look
+
+
+def _agreed(look: np.ndarray, score: np.ndarray, part: np.ndarray) -> Int[np.ndarray, " C"]:
+    """Let each cluster go over to the name whose other clusters it looks most like.
+
+    Once, all by what the first pass said. The last cluster of a name stays, and nobody takes a name
+    that words find less probable than one in a hundred of their own.
+    """
+    total = np.stack([look[part == k].sum(axis=0) for k in range(score.shape[1])])
+    left = np.bincount(part, minlength=score.shape[1])
+    made = part.copy()
+    for c, own in enumerate(part):
+        if left[own] == 1:
+            continue
+        others = total.copy()
+        others[own] -= look[c]
+        alike = _unit(others) @ _unit(look[c])
+        alike[score[c] < score[c, own] - np.log(100)] = -np.inf
+        made[c] = int(np.argmax(alike))
+        left[own] -= made[c] != own
+    return made
+
+
+def _unit(rows: np.ndarray) -> np.ndarray:
+    length = np.linalg.norm(rows, axis=-1, keepdims=True)
+    return rows / np.where(length > 0, length, 1)
