@@ -75,9 +75,11 @@ def test_clusters_of_unlike_density_are_both_found():
 
 
 def test_leaves_are_the_finest_clusters_and_mass_prefers_what_lasts():
-    """Two pairs: the halves of a pair part late, the pairs early."""
+    """Two pairs of plates: the halves of a pair part late, the pairs early."""
     rng = np.random.default_rng(4)
-    points, truth = blobs(rng, [(0, 0), (0.8, 0), (20, 0), (20.8, 0)], 200, 0.1)
+    grid = 0.03 * np.stack(np.meshgrid(np.arange(14), np.arange(14)), -1).reshape(-1, 2)
+    plates = [grid + [x, 0] + rng.uniform(-3e-3, 3e-3, grid.shape) for x in (0, 0.45, 20, 20.45)]
+    points, truth = np.concatenate(plates), np.repeat(np.arange(4), len(grid))
     leaves = hdbscan(points, 50, 5, "leaf").cluster_of_point
     lasting = hdbscan(points, 50, 5, "mass").cluster_of_point
     inside = leaves != NOISE
