@@ -32,14 +32,14 @@ class ObjectsConfig:
 
     patches: int = 2000
     """Into which the points are cut, about."""
-    unlike: float = 1.0
+    unlike: float = 1.5
     """Difference of looks at which two patches hold together by e^-1/2, over the scene's own root
     mean square difference between neighbours."""
     concave: float = 0.2
     """Inward fold at which two patches hold together by e^-1/2: roughly the sine of the angle."""
     narrowest: float = 0.003
     """Share of all borders that a cut counts for at least, so that crumbs are not cut off."""
-    apart: float = 0.05
+    apart: float = 0.018
     """Score up to which a cut is made where nobody counted the things."""
 
 
@@ -135,6 +135,7 @@ def _graph(found: Patches, borders: Borders, config: ObjectsConfig) -> Graph:
         borders.length * np.maximum(holds, 1e-9),
         borders.length,
         found.size.astype(np.float64),
+        found.look.astype(np.float64),
     )
 
 
