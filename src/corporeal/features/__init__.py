@@ -1,11 +1,12 @@
 """What pictures and points look like to a model, or to no model: features to find parts by."""
 
+from collections.abc import Sequence
 from importlib.util import find_spec
 from pathlib import Path
 from typing import Protocol, runtime_checkable
 
 import numpy as np
-from jaxtyping import Float16, UInt8
+from jaxtyping import Float16, Float32, UInt8
 
 from corporeal import backends
 from corporeal.errors import UnknownChoiceError, UserError
@@ -31,6 +32,15 @@ class Encoder(Protocol):
 
     def map(self, picture: UInt8[np.ndarray, "H W 3"]) -> Float16[np.ndarray, "h w D"]:
         """Return unit features of a grid of patches that covers the whole picture."""
+        ...
+
+
+@runtime_checkable
+class Reader(Encoder, Protocol):
+    """An encoder whose features are comparable with words."""
+
+    def words(self, names: Sequence[str]) -> Float32[np.ndarray, "M D"]:
+        """Return one unit vector per name."""
         ...
 
 

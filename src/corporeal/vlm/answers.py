@@ -30,6 +30,7 @@ class Vocabulary:
 
 
 MOST_PARTS = 6
+MOST_THINGS = 12
 SLACK = 0.05
 """By how much shares may miss 1."""
 SMALLEST_THING, LARGEST_THING = 1e-3, 100.0
@@ -174,6 +175,34 @@ class SizeAnswer(BaseModel):
     usual: float = Field(gt=0, allow_inf_nan=False)
     largest: float = Field(gt=0, allow_inf_nan=False)
     reason: str
+
+
+class SeenThing(BaseModel):
+    """One of the things that pictures of a scene show."""
+
+    class_name: str = Field(min_length=1, max_length=60)
+    look: str
+    metres: float = Field(ge=1e-3, le=100.0, allow_inf_nan=False)
+    """Length of its longest side in reality."""
+
+
+class ThingsAnswer(BaseModel):
+    """Which things stand in a scene that was photographed."""
+
+    things: list[SeenThing]
+
+
+class PaintedRegion(BaseModel):
+    """Which thing a painted region is."""
+
+    colour: str
+    thing: int | None
+
+
+class RegionsAnswer(BaseModel):
+    """Which thing each painted region is."""
+
+    regions: list[PaintedRegion]
 
 
 # ---------------------------------------------------------------- what can be wrong
@@ -324,3 +353,24 @@ def size_complaints(answer: SizeAnswer, class_name: str) -> list[str]:
         f"You said that an ordinary {class_name} is {answer.usual:g} metres long. That is "
         f"{SLIP:g} times beyond what such things are known to be. Answer in metres."
     ]
+
+
+def things_complaints(answer: ThingsAnswer) -> list[str]:
+    """Check that there are things, and not more than can be told apart."""
+    if 1 <= len(answer.things) <= MOST_THINGS:
+        return []
+    return [f"Name 1 to {MOST_THINGS} things; you named {len(answer.things)}."]
+
+
+def regions_complaints(answer: RegionsAnswer, colours: Collection[str], things: int) -> list[str]:
+    """Check that every colour is answered for once, with a thing that exists, each at most once."""
+    said = [r.colour for r in answer.regions]
+    numbers = [r.thing for r in answer.regions if r.thing is not None]
+    found = []
+    if sorted(said) != sorted(colours):
+        found.append(f"Answer once for each of these colours: {', '.join(colours)}.")
+    if any(not 1 <= n <= things for n in numbers):
+        found.append(f"Things have numbers from 1 to {things}.")
+    if len(set(numbers)) < len(numbers):
+        found.append("A thing can be one region only.")
+    return found

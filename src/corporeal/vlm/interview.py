@@ -10,13 +10,16 @@ import numpy as np
 from corporeal.vlm import Answer, Check, Question, Reply, UnansweredError, Vlm
 from corporeal.vlm.answers import (
     MOST_PARTS,
+    MOST_THINGS,
     Decomposition,
     ExtentsAnswer,
     FractionAnswer,
     MaterialsAnswer,
     PartsAnswer,
     RankingAnswer,
+    RegionsAnswer,
     SizeAnswer,
+    ThingsAnswer,
     ValueAnswer,
     Vocabulary,
     extents_complaints,
@@ -24,7 +27,9 @@ from corporeal.vlm.answers import (
     parts_complaints,
     placement_complaints,
     ranking_complaints,
+    regions_complaints,
     size_complaints,
+    things_complaints,
 )
 from corporeal.vlm.words import Asked
 
@@ -205,6 +210,28 @@ class Interview:
         kind = self.subject.class_name
         asked = self._question("sizes")
         return self._ask(self.model, asked, SizeAnswer, lambda a: size_complaints(a, kind))
+
+    def things(self) -> Reply[ThingsAnswer] | None:
+        """Ask which things stand in a scene; None where nobody answers."""
+        asked = self._question("things", most=str(MOST_THINGS))
+        return self._ask(self.model, asked, ThingsAnswer, things_complaints)
+
+    def regions(self, colours: Sequence[str], things: Sequence[str]) -> Reply[RegionsAnswer] | None:
+        """Ask which thing each painted region is; None where nobody answers.
+
+        Args:
+            colours: Names of the regions' colours.
+            things: What there is, in words.
+
+        """
+        lines = "\n".join(f"{k}. {words}" for k, words in enumerate(things, 1))
+        asked = self._question("regions", colours=", ".join(colours), things=lines)
+        return self._ask(
+            self.model,
+            asked,
+            RegionsAnswer,
+            lambda a: regions_complaints(a, colours, len(things)),
+        )
 
     def _question(self, task: str, **facts: str) -> Question:
         about = self.subject

@@ -1,0 +1,116 @@
+"""Which things stand in a photographed scene, and which found region each of them is."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from corporeal.vlm import Vlm, connect
+from corporeal.vlm.interview import Interview, Subject
+from corporeal.vlm.sizes import SAID
+from corporeal.vlm.words import usage
+
+
+@dataclass(frozen=True)
+class Thing:
+    """A thing that pictures of a scene show."""
+
+    class_name: str
+    look: str = ""
+    """In words that tell it from the others."""
+    extent: float | None = None
+    """Largest extent of the real thing [m]; None: nobody knows."""
+    sized_by: str = ""
+    """Who said that, in words for the report."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What was put to a model about one scene, as data, and what went wrong."""
+
+    transcript: tuple[dict, ...] = ()
+    usage: dict | None = None
+    warnings: tuple[str, ...] = ()
+
+
+class Viewer:
+    """Somebody who is shown pictures of one scene."""
+
+    def __init__(self, scene: str, vlm: str, record: Path | None = None) -> None:
+        """Connect to whoever answers; ``looks`` is False where nobody does.
+
+        Args:
+            scene: Its name.
+            vlm: Whom to ask, as a person types it; "metadata": nobody.
+            record: Folder where every answer is kept for "replay:FOLDER".
+
+        Raises:
+            UserError: Nobody can be asked.
+
+        """
+        self.scene = scene
+        self.model = connect(vlm, record)
+        self.interviews: list[Interview] = []
+
+    def things(self, pictures: Sequence[np.ndarray]) -> list[Thing]:
+        """Ask which things there are; empty where nobody answers.
+
+        Args:
+            pictures: Of the scene, H x W x 3, uint8, sRGB.
+
+        """
+        if self.model is None:
+            return []
+        reply = self._interview(self.model, "things", pictures, len(pictures)).things()
+        seen = reply.answer.things if reply else []
+        who = "" if reply is None else f"{SAID[reply.by]} ({reply.model})"
+        return [Thing(t.class_name, t.look, t.metres, who) for t in seen]
+
+    def regions(
+        self, pictures: Sequence[np.ndarray], colours: Sequence[str], things: Sequence[Thing]
+    ) -> list[int | None] | None:
+        """Ask which thing each painted region is.
+
+        Args:
+            pictures: Each one followed by itself with painted regions.
+            colours: Of the regions.
+            things: What there is.
+
+        Returns:
+            Per region the place of its thing, or None where it is none of them; None where nobody
+            answers.
+
+        """
+        if self.model is None:
+            return None
+        interview = self._interview(self.model, "regions", pictures, len(pictures) // 2)
+        reply = interview.regions(colours, [f"{t.class_name}: {t.look}" for t in things])
+        if reply is None:
+            return None
+        said = {r.colour: r.thing for r in reply.answer.regions}
+        return [None if (n := said[colour]) is None else n - 1 for colour in colours]
+
+    def asked(self) -> Asked:
+        """Return all that was asked so far."""
+        rows = tuple(row for interview in self.interviews for row in interview.transcript)
+        said = tuple(w for interview in self.interviews for w in interview.warnings)
+        return Asked(rows, usage(rows), said)
+
+    def _interview(
+        self, model: Vlm, task: str, pictures: Sequence[np.ndarray], count: int
+    ) -> Interview:
+        prompt = files("corporeal.vlm").joinpath(f"{task}.md").read_text(encoding="utf-8")
+        views = f"{count} of its photographs"
+        subject = Subject(
+            scene=self.scene,
+            name=self.scene,
+            class_name="",
+            extent="",
+            views=views,
+            count=count,
+            pictures=pictures if model.looks else (),
+        )
+        self.interviews.append(Interview(model, model, {task: prompt}, subject))
+        return self.interviews[-1]
