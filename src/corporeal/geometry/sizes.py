@@ -6,6 +6,7 @@ one with all its lengths scaled, walls included: made of the same matter, it wei
 much.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
@@ -75,6 +76,28 @@ def _check(sizing: Sizing) -> None:
     ):
         if not low <= value <= high:
             raise UserError(f"The {name} is {value}. Give a number from {low:g} to {high:g}.")
+
+
+def said_extent(text: str, only: str = "") -> tuple[str, float]:
+    """Return name and metres of "duck=0.1", or of "0.1" where there is only one thing.
+
+    Args:
+        text: What a person typed after --extent.
+        only: Name of the only thing there is; "": there are several.
+
+    Raises:
+        UserError: It says something else.
+
+    """
+    name, _, number = text.rpartition("=")
+    try:
+        metres = float(number)
+    except ValueError:
+        metres = math.nan
+    name = name or only
+    if not name or not 1e-4 <= metres <= 1000:
+        raise UserError(f"--extent {text!r}: write NAME=METRES, for example duck=0.1.")
+    return name, metres
 
 
 # ---------------------------------------------------------------- what is not life-size

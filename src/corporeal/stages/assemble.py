@@ -23,6 +23,7 @@ from corporeal.geometry.arrangement import (
     resized,
     scaled,
 )
+from corporeal.geometry.sizes import said_extent
 from corporeal.types import Scene, SceneObject
 
 SHORTEST, LONGEST = 1.0, 3.0
@@ -187,7 +188,9 @@ def _named(blocks: list[_Block]) -> list[_Block]:
 
 def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
     """Give objects the extents asked for, and tell where the others look implausible."""
-    wanted = [_extent_of(text, len(blocks), blocks[0].scene) for text in extents]
+    alone = len(blocks) == len(blocks[0].scene.objects) == 1
+    only = blocks[0].scene.objects[0].name if alone else ""
+    wanted = [said_extent(text, only) for text in extents]
     used = set()
     for i, block in enumerate(blocks):
         scene, told = block.scene, []
@@ -205,20 +208,6 @@ def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
             names = [o.name for b in blocks for o in b.scene.objects]
             raise UserError(f"--extent: no object {name!r}. Choose one of: {', '.join(names)}.")
     return blocks
-
-
-def _extent_of(text: str, blocks: int, scene: Scene) -> tuple[str, float]:
-    """Return name and metres of "duck=0.1", or of "0.1" where there is a single object."""
-    name, _, number = text.rpartition("=")
-    try:
-        metres = float(number)
-    except ValueError:
-        metres = math.nan
-    if not name and blocks == len(scene.objects) == 1:
-        name = scene.objects[0].name
-    if not name or not 1e-4 <= metres <= 1000:
-        raise UserError(f"--extent {text!r}: write NAME=METRES, for example duck=0.1.")
-    return name, metres
 
 
 def _means(words: str, thing: SceneObject) -> bool:
