@@ -6,7 +6,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any
 
 import tyro
 
@@ -14,6 +14,7 @@ from corporeal import __version__
 from corporeal.cli.assets import verb_assets
 from corporeal.cli.capture import verb_capture
 from corporeal.cli.corpus import verb_corpus
+from corporeal.cli.evaluate import verb_evaluate
 from corporeal.cli.parse import parse
 from corporeal.errors import UserError
 from corporeal.terminal import console, show_table, told
@@ -122,69 +123,6 @@ def verb_materials() -> None:
         print(f"{asked.words[1]}: nothing to complain about.")
     else:
         raise UserError(f"Say `corporeal materials`, or one of: {'; '.join(MATERIAL_WORDS)}.")
-
-
-def verb_evaluate() -> None:
-    """Compare what was predicted with what is known: `evaluate mass | materials FOLDER`.
-
-    FOLDER holds models, one object each; the CSV has columns object, mass_kg and, if you like, fill
-    (solid, hollow, full: whose errors are told apart). Without --truth masses are predicted only.
-    A folder in the layout of ABO-500 needs no CSV: choose its --split. `evaluate materials` needs
-    --truth TOML: per file and part the materials that are right, the likeliest first.
-    """
-    from corporeal import store
-    from corporeal.evaluation import mass, report, truth
-    from corporeal.stages.describe import DescribeConfig
-    from corporeal.stages.ground import GroundConfig
-
-    @dataclass(frozen=True)
-    class Evaluate:
-        what: tyro.conf.Positional[Literal["mass", "materials"]]
-        folder: Annotated[Path, tyro.conf.Positional]
-        truth: Path | None = None
-        """Table of measured masses (CSV), or of what parts are made of (TOML)."""
-        split: str = "test"
-        """Of ABO-500; "all" for all."""
-        json: Path | None = None
-        """Where rows and errors go, as data."""
-        figure: Path | None = None
-        """Where the picture of predicted against measured goes (PNG)."""
-        how: mass.MassConfig = field(default_factory=mass.MassConfig)
-        describe: DescribeConfig = field(default_factory=DescribeConfig)
-        ground: GroundConfig = field(default_factory=GroundConfig)
-
-    asked = parse(Evaluate, "evaluate", verb_evaluate.__doc__)
-    if asked.what == "materials":
-        _judge_materials(asked)
-        return
-    things = truth.objects(asked.folder, asked.truth, asked.split)
-    with told() as tell:
-        done = tell("evaluate")
-        found = mass.predict_all(things, asked.describe, asked.ground, asked.how, done)
-    result = mass.compare(found)
-    for title, heads, rows in report.tables(result):
-        show_table(heads, rows, title)
-    if asked.json is not None:
-        store.write_json(asked.json, result)
-    if asked.figure is not None:
-        report.mass_figure(result["rows"], asked.figure)
-
-
-def _judge_materials(asked: Any) -> None:
-    from corporeal import store
-    from corporeal.evaluation import recognition
-
-    if asked.truth is None:
-        raise UserError(f"Nothing to judge by. Say --truth TOML. {recognition.EXAMPLE}")
-    library = asked.ground.library
-    truth = recognition.read_truth(asked.truth, library)
-    with told() as tell:
-        rows = recognition.judge(asked.folder, truth, asked.describe, library, tell("evaluate"))
-    for title, heads, cells in recognition.tables(rows):
-        if cells:
-            show_table(heads, cells, title)
-    if asked.json is not None:
-        store.write_json(asked.json, recognition.record(rows))
 
 
 def verb_doctor() -> None:

@@ -6,8 +6,11 @@ from dataclasses import asdict, dataclass
 from itertools import pairwise
 from pathlib import Path
 
+import numpy as np
+
 from corporeal import materials
 from corporeal.errors import BadFileError, UserError
+from corporeal.evaluation.overlap import roc_area
 from corporeal.formats.sources import models_in
 from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import DescribeConfig, describe
@@ -128,14 +131,11 @@ def score(rows: Sequence[Row]) -> Score:
 
 
 def ordering(rows: Sequence[Row]) -> float | None:
-    """Area under the ROC curve: how often a right answer has a larger margin than a wrong one.
-
-    Ties count half; 0.5 is chance, None where there is only one kind.
-    """
-    right = [r.margin for r in rows if r.verdict == "right"]
-    wrong = [r.margin for r in rows if r.verdict == "wrong"]
-    pairs = [(a > b) + 0.5 * (a == b) for a in right for b in wrong]
-    return sum(pairs) / len(pairs) if pairs else None
+    """Return how often a right answer has a larger margin than a wrong one, as ``roc_area``."""
+    right, wrong = (
+        np.array([r.margin for r in rows if r.verdict == kind]) for kind in ("right", "wrong")
+    )
+    return roc_area(right, wrong)
 
 
 def bands(rows: Sequence[Row]) -> list[tuple[float, float, int, float, float]]:

@@ -30,7 +30,7 @@ class PartsConfig:
     """Difference of looks that parts patches as much as one patch's width does."""
     smallest: int = 10
     """Superpoints that make a cluster."""
-    samples: int = 5
+    dense: int = 5
     """Superpoints near which a place is dense, the one there included."""
     selection: Selection = "leaf"
     """The finest clusters ("leaf"), or those that persist over most densities ("mass")."""
@@ -74,7 +74,7 @@ def parts(cloud: Cloud, config: PartsConfig = DEFAULT) -> Clusters:
     patch = superpoints(cloud.position, look, config.superpoints, config.alike)
     g, x = _means(look, patch), _means(_place(cloud), patch)
     z = np.concatenate([g, config.position_weight * x], axis=1)
-    found = hdbscan(z, config.smallest, config.samples, config.selection)
+    found = hdbscan(z, config.smallest, config.dense, config.selection)
     whole = _attached(np.concatenate([g, NEAR * x], axis=1), found)
     return Clusters(whole.cluster_of_point[patch], whole.strength[patch])
 

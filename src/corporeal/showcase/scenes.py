@@ -198,6 +198,18 @@ def build(name: str) -> Scene:
     return scene_of(name, place(composition), composition.things, composition.duration)
 
 
+def alone(model: str) -> Scene:
+    """Build a scene of one model of the showcase, at rest.
+
+    Raises:
+        UnknownChoiceError: There is no such model.
+
+    """
+    if model not in MODELS:
+        raise UnknownChoiceError("showcase model", model, list(MODELS))
+    return scene_of(model, [MODELS[model]()], [Placed(model)], duration=1.0)
+
+
 def scene_of(
     name: str, models: Sequence[Model], things: Sequence[Placed], duration: float
 ) -> Scene:

@@ -1,0 +1,334 @@
+"""Are an object's parts found? Photographed models, whose files say which point is whose.
+
+A model is pictured from all sides; points on its surface that a picture shows take their colours,
+and what models see, from the pictures, as points of photographs do. Which node or material a point
+is of stays secret, but for the names.
+"""
+
+import time
+import tomllib
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import asdict, dataclass, field, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from jaxtyping import Int
+
+from corporeal import features
+from corporeal.errors import BadFileError, UserError
+from corporeal.evaluation.overlap import best_names, matched_iou, named_iou, roc_area
+from corporeal.features.descriptor import descriptor, seen_from
+from corporeal.features.lifting import back_projection, visible
+from corporeal.formats.sources import models_in
+from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.spread import sample_surface
+from corporeal.regions.naming import named
+from corporeal.regions.parts import PartsConfig, parts
+from corporeal.showcase.scenes import alone
+from corporeal.stages.assemble import assemble
+from corporeal.stages.capture import CaptureConfig, capture
+from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.segment import segment
+from corporeal.types import Cloud, Inventory, PartWords, Scene, Views
+
+SHOWCASE = ("potted_ficus", "armchair", "floor_lamp", "couch")
+EXAMPLE = "Write [file] with part = 'how a person would call it', as in pot = 'clay pot'."
+
+Names = Mapping[str, Mapping[str, str]]
+"""File's stem → part as the file calls it → as somebody calls it who sees it."""
+
+
+@dataclass(frozen=True)
+class PartsEvaluationConfig:
+    """How models are pictured, and who looks."""
+
+    points: int = 20_000
+    """On the surface; those that no picture shows are left out."""
+    photographs: int = 24
+    """From all sides above the floor."""
+    photograph_size: int = 256
+    """Height and width [px]."""
+    point_seed: int = 0
+    """Chooses the points."""
+    structural: str = "descriptor"
+    """What tells parts apart: "descriptor" needs no model; or "dinov2", or "dinov2:FOLDER"."""
+    semantic: str = ""
+    """What finds names' points: "clip", "clip:FOLDER"; "": colour, height and shape."""
+
+
+@dataclass(frozen=True)
+class PartsRow:
+    """One object."""
+
+    object: str
+    parts: tuple[str, ...]
+    """As they were called; those that a picture shows."""
+    points: int
+    clusters: int
+    clusters_iou: float
+    """Mean IoU of clusters and parts, paired by the Hungarian method: no word was given."""
+    best_iou: float
+    """Of clusters that are named after what most of their points are: no naming could do better."""
+    found_iou: float
+    """Of named parts, paired by the Hungarian method: how well they are told apart."""
+    named_iou: float
+    """Of named parts, each with its own name's: whether they are also called what they are."""
+    right: float
+    """Share of points under the right name."""
+    matter_iou: float
+    """As ``named_iou``, parts of one material taken together: what mass and motion depend on."""
+    chance_iou: float
+    """As ``named_iou``, were everything called what most points are."""
+    ordering: float | None
+    """How often a right point is surer than a wrong one; None: there are not both."""
+    seconds: float
+    """For clusters and names."""
+
+    @property
+    def ratio(self) -> float:
+        """Clusters per part."""
+        return self.clusters / len(self.parts)
+
+
+@dataclass(frozen=True)
+class Photographed:
+    """One object's points with the truth."""
+
+    cloud: Cloud
+    part_of_point: Int[np.ndarray, " N"]
+    """Index into the parts of the inventory's first object."""
+    inventory: Inventory
+
+
+@dataclass(frozen=True)
+class Lookers:
+    """Who looks at pictures."""
+
+    structural: Any
+    """None: the descriptor."""
+    semantic: Any
+    """None: nobody compares points with words."""
+
+
+Progress = Callable[[float, str], None]
+
+
+@dataclass(frozen=True)
+class Judging:
+    """How parts are looked for."""
+
+    look: PartsEvaluationConfig = field(default_factory=PartsEvaluationConfig)
+    clusters: PartsConfig = field(default_factory=PartsConfig)
+    describe: DescribeConfig = field(default_factory=DescribeConfig)
+    """Who says what parts are made of."""
+
+
+@dataclass(frozen=True)
+class Judged:
+    """One object's points, with what they were taken for."""
+
+    taken: Photographed
+    truth: Int[np.ndarray, " N"]
+    """Index into the parts that a picture shows."""
+    cluster_of_point: Int[np.ndarray, " N"]
+    part_of_point: Int[np.ndarray, " N"]
+
+
+def judge(
+    folder: Path | None,
+    names: Names,
+    how: Judging,
+    progress: Progress = lambda share, text: None,
+) -> list[tuple[PartsRow, Judged]]:
+    """Find the parts of every model that has several, and compare.
+
+    Args:
+        folder: Models, one object each; None: four of the showcase.
+        names: What parts are called; those not in it are called as the file does.
+        how: How they are pictured and taken apart, and who looks.
+        progress: Told the share done.
+
+    Raises:
+        UserError: There is no model of several parts, or an encoder cannot be had.
+
+    """
+    look = lookers(how.look)
+    chosen = list(SHOWCASE) if folder is None else _models(folder)
+    found = []
+    for number, each in enumerate(chosen):
+        scene = alone(each) if isinstance(each, str) else assemble([each])
+        stem = each if isinstance(each, str) else each.stem
+        progress(number / len(chosen), stem)
+        taken = photographed(scene, how.look, look, how.describe)
+        if len(np.unique(taken.part_of_point)) > 1:
+            found.append(judged(stem, taken, names.get(stem, {}), look, how.clusters))
+    if not found:
+        raise UserError(f"No model in {folder} has two parts that a picture shows.")
+    return found
+
+
+def lookers(how: PartsEvaluationConfig) -> Lookers:
+    """Connect to those who look.
+
+    Raises:
+        UserError: One cannot be had, or does not know words.
+
+    """
+    semantic = features.connect(how.semantic) if how.semantic else None
+    if how.semantic and not hasattr(semantic, "words"):
+        raise UserError(
+            f"{how.semantic!r} does not compare points with words. Say --semantic clip, or leave "
+            "it out."
+        )
+    return Lookers(features.connect(how.structural), semantic)
+
+
+def _models(folder: Path) -> list[Path]:
+    found = models_in(folder) if folder.is_dir() else []
+    if not found:
+        raise UserError(
+            f"There are no models in {folder}. Name a folder of GLB, glTF or OBJ files."
+        )
+    return found
+
+
+# ---------------------------------------------------------------- photographs of a model
+
+
+def photographed(
+    scene: Scene, how: PartsEvaluationConfig, look: Lookers, words: DescribeConfig
+) -> Photographed:
+    """Picture a scene of one object, and take its points from the pictures."""
+    inventory = describe(scene, words)
+    truth = segment(scene, inventory)
+    size = (how.photograph_size, how.photograph_size)
+    views = capture(scene, CaptureConfig(how.photographs, size))
+    rng = np.random.default_rng(how.point_seed)
+    position, triangle = sample_surface(_mesh(scene), how.points, rng)
+    assert views.depth is not None
+    colour = back_projection(position, views.cameras, views.depth, list(views.rgb / 255))
+    shown = colour.seen > 0
+    cloud = _cloud(position[shown], colour.mean[shown], colour.seen[shown], views, look)
+    return Photographed(cloud, truth.part_of_point[triangle[shown]], inventory)
+
+
+def _mesh(scene: Scene) -> Mesh:
+    starts = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
+    triangles = [s.triangles + k for s, k in zip(scene.surfaces, starts, strict=False)]
+    return Mesh(np.concatenate([s.vertices for s in scene.surfaces]), np.concatenate(triangles))
+
+
+def _cloud(
+    position: np.ndarray, colour: np.ndarray, seen: np.ndarray, views: Views, look: Lookers
+) -> Cloud:
+    assert views.depth is not None
+    depth = views.depth
+
+    def lifted(encoder: Any) -> np.ndarray:
+        maps = [encoder.map(picture) for picture in views.rgb]
+        return back_projection(position, views.cameras, depth, maps).unit()
+
+    if look.structural is None:
+        pairs = zip(views.cameras, depth, strict=True)
+        shares = [visible(position, camera, d) for camera, d in pairs]
+        structural = descriptor(position, colour, seen_from(position, views.cameras, shares))
+    else:
+        structural = lifted(look.structural)
+    nothing = np.zeros((len(position), 0), np.float16)
+    return Cloud(
+        position=position,
+        colour=colour,
+        semantic=nothing if look.semantic is None else lifted(look.semantic),
+        structural=structural,
+        seen=seen,
+    )
+
+
+# ---------------------------------------------------------------- how good
+
+
+def judged(
+    name: str, taken: Photographed, names: Mapping[str, str], look: Lookers, config: PartsConfig
+) -> tuple[PartsRow, Judged]:
+    """Find one object's parts, and compare; only what a picture shows is asked for."""
+    present, truth = np.unique(taken.part_of_point, return_inverse=True)
+    said = [p for thing in taken.inventory.objects for p in thing.parts]
+    told = [replace(said[k], name=names.get(said[k].name, said[k].name)) for k in present]
+    vectors = None if look.semantic is None else look.semantic.words([p.name for p in told])
+    start = time.process_time()
+    clusters = parts(taken.cloud, config)
+    found = named(clusters, taken.cloud, vectors, told)
+    seconds = time.process_time() - start
+    part, cluster = found.part_of_point, clusters.cluster_of_point
+    right = part == truth
+    matter = _matters(told)
+    row = PartsRow(
+        object=name,
+        parts=tuple(p.name for p in told),
+        points=len(truth),
+        clusters=clusters.count,
+        clusters_iou=matched_iou(truth, cluster),
+        best_iou=named_iou(truth, best_names(truth, cluster)),
+        found_iou=matched_iou(truth, part),
+        named_iou=named_iou(truth, part),
+        right=float(right.mean()),
+        matter_iou=named_iou(matter[truth], matter[part]),
+        chance_iou=named_iou(truth, np.full_like(truth, np.bincount(truth).argmax())),
+        ordering=roc_area(found.confidence[right], found.confidence[~right]),
+        seconds=seconds,
+    )
+    return row, Judged(taken, truth, cluster, part)
+
+
+def _matters(told: Sequence[PartWords]) -> np.ndarray:
+    """Return one number per material; parts of unknown ones are each of their own."""
+    keys = [part.material or f"? {k}" for k, part in enumerate(told)]
+    return np.array([keys.index(key) for key in keys])
+
+
+def read_names(path: Path) -> Names:
+    """Read what parts are called.
+
+    Raises:
+        BadFileError: The file cannot be read, or says something else.
+
+    """
+    try:
+        tables = tomllib.loads(path.read_text(encoding="utf-8"))
+    except (OSError, ValueError) as error:
+        raise BadFileError(path, f"cannot be read ({error}).", EXAMPLE) from error
+    for file, table in tables.items():
+        if not isinstance(table, dict) or not all(isinstance(v, str) and v for v in table.values()):
+            raise BadFileError(path, f"{file}: must map the file's names to names.", EXAMPLE)
+    return tables
+
+
+# ---------------------------------------------------------------- for people and programs
+
+HEADS = ("object", "parts", "clusters", "alone", "best", "told apart", "named", "by matter")
+
+
+def tables(rows: Sequence[PartsRow]) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+    """Return title, heads and cells of what a person is shown."""
+    cells = [
+        (r.object, str(len(r.parts)), f"{r.clusters} ({r.ratio:.1f}×)", *map(_share, _scores(r)))
+        for r in rows
+    ]
+    mean = np.mean([_scores(r) for r in rows], axis=0)
+    ratio = np.mean([r.ratio for r in rows])
+    last = ("mean", "", f"({ratio:.1f}×)", *map(_share, mean))
+    return [("Parts: mean IoU", HEADS, [*cells, last])]
+
+
+def _scores(r: PartsRow) -> tuple[float, ...]:
+    return (r.clusters_iou, r.best_iou, r.found_iou, r.named_iou, r.matter_iou)
+
+
+def _share(x: float) -> str:
+    return f"{x:.2f}"
+
+
+def record(rows: Sequence[PartsRow]) -> dict:
+    """Return rows as plain data."""
+    return {"rows": [asdict(r) | {"ratio": r.ratio} for r in rows]}
