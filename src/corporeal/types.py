@@ -141,6 +141,9 @@ class Scene:
     duration: float = 2.0
     """[s]"""
     fps: int = 60
+    settled: bool = False
+    """Whether everything that lies or stands has come to rest before it begins: then what is soft
+    finds its balance before time 0, and pushes, winds and velocities begin there."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
 

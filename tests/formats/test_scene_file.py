@@ -58,9 +58,20 @@ def test_a_scene_file_says_what_is_where_and_how_it_starts(tmp_path):
     assert can.position is can.velocity is can.name is None
 
 
+@pytest.mark.parametrize(("said", "meant"), [("true", True), ("false", False)])
+def test_a_scene_file_says_that_things_had_come_to_rest(tmp_path, said, meant):
+    scene = read(tmp_path, f'file = "a.glb"\nsettled = {said}\n')
+    assert scene.settled is meant
+    write_scene_file(tmp_path / "again.toml", scene)
+    assert f"settled = {said}" in (tmp_path / "again.toml").read_text()
+    assert read_scene_file(tmp_path / "again.toml").settled is meant
+    assert read(tmp_path, 'file = "a.glb"').settled is None
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
+        ('file = "a.glb"\nsettled = 1', "'settled' is 1. Write true or false."),
         ('file = "a.glb"\ndt = 1e-4', "unknown key 'dt'. Allowed here: file, duration"),
         ('[[object]]\nfile = "a.glb"\nyoung = 1e6', "object 1: unknown key 'young'"),
         ('[[object]]\nfile = "a.glb"\ndamping = 0.1', "unknown key 'damping'"),

@@ -1,3 +1,4 @@
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -163,6 +164,19 @@ def test_several_objects_of_one_file_keep_their_places(tmp_path):
     scene = assemble([room(tmp_path)])
     assert boxes_of(scene)[:, 0, 2] == pytest.approx([0, 2])
     assert len(assemble([tmp_path / "room.glb"], AssembleConfig(objects="one")).objects) == 1
+
+
+@pytest.mark.parametrize(("said", "meant"), [("", True), ("settled = false", False)])
+def test_whether_things_had_come_to_rest_is_said_by_our_file_or_the_scene_file(
+    models, tmp_path, said, meant
+):
+    assert not assemble(models).settled
+    assert not assemble([toml(tmp_path, 'file = "duck.glb"')]).settled
+    (tmp_path / "ours").mkdir()
+    write_glb(tmp_path / "ours" / "own.glb", replace(assemble(models), settled=True))
+    assert assemble([tmp_path / "ours" / "own.glb"]).settled
+    assert assemble([toml(tmp_path / "ours", f'file = "own.glb"\n{said}')]).settled is meant
+    assert assemble([toml(tmp_path, 'file = "duck.glb"\nsettled = true')]).settled
 
 
 def test_our_own_file_keeps_its_gravity_duration_and_height(models, tmp_path):

@@ -20,7 +20,7 @@ def written_by_us(document: Document) -> bool:
 
 
 def scene_of_extras(document: Document, root: Entry) -> dict:
-    """Return gravity, duration and fps of a file of ours; empty for other files."""
+    """Return what a file of ours says of the whole scene; empty for other files."""
     if not written_by_us(document) or not isinstance(root.value.get("extras"), dict):
         return {}
     extras = root.needed("extras")
@@ -28,6 +28,7 @@ def scene_of_extras(document: Document, root: Entry) -> dict:
         "gravity": extras.numbers("gravity_m_s2", (0.0, 0.0, -9.81)),
         "duration": extras.number("duration_s", 2.0),
         "fps": extras.whole("fps", 60, most=1000) or 60,
+        "settled": extras.flag("settled"),
     }
 
 

@@ -173,7 +173,8 @@ class _Document:
                 "gravity_m_s2": list(scene.gravity),
                 "duration_s": scene.duration,
                 "fps": scene.fps,
-            },
+            }
+            | ({"settled": True} if scene.settled else {}),
         }
         if objects:
             root["children"] = objects

@@ -8,6 +8,7 @@ There is nothing numerical to tune in it: quality is one word on the command lin
     duration = 2.0
     fps = 60
     gravity = [0, 0, -9.81]
+    settled = true                # what lies or stands had come to rest before all this begins
     [[object]]
     name = "duck_0"               # of an object in ``file``, or a name to give
     file = "duck.glb"
@@ -35,7 +36,7 @@ from corporeal import store
 from corporeal.errors import BadFileError
 from corporeal.types import Push, Vector, Wall, Wind
 
-SCENE_KEYS = ("file", "duration", "fps", "gravity", "object", "wall")
+SCENE_KEYS = ("file", "duration", "fps", "gravity", "settled", "object", "wall")
 WALL_KEYS = ("point", "normal")
 OBJECT_KEYS = ("name", "file", "class", "extent", "position", "velocity", "push", "wind")
 PUSH_KEYS = ("acceleration", "from", "to")
@@ -78,6 +79,8 @@ class SceneFile:
     fps: int | None = None
     gravity: Vector | None = None
     """[m/s²]"""
+    settled: bool | None = None
+    """Whether what lies or stands had come to rest before it begins."""
     objects: tuple[ObjectEntry, ...] = ()
     walls: tuple[Wall, ...] = ()
 
@@ -107,8 +110,9 @@ def write_scene_file(path: Path, scene: SceneFile) -> None:
 
 def _lines(scene: SceneFile) -> Iterator[str]:
     folder = scene.path.parent
-    gravity = scene.gravity
-    told = {"file": scene.file, "duration": scene.duration, "fps": scene.fps, "gravity": gravity}
+    told = {
+        name: getattr(scene, name) for name in ("file", "duration", "fps", "gravity", "settled")
+    }
     yield from _pairs(told, folder)
     for entry in scene.objects:
         yield from ("", "[[object]]")
@@ -151,7 +155,7 @@ def _toml(x: Any, folder: Path) -> str:
     if isinstance(x, tuple):
         return f"[{', '.join(_toml(c, folder) for c in x)}]"
     if isinstance(x, int):
-        return str(x)
+        return str(x).lower()
     if isinstance(x, float):
         return repr(float(x))
     text = _relative(x, folder) if isinstance(x, Path) else x
@@ -181,6 +185,7 @@ def _checked(path: Path, said: dict[str, Any]) -> SceneFile:
         duration=table.number("duration", 0.01, LONGEST),
         fps=table.whole("fps", 1, 1000),
         gravity=table.vector("gravity", FASTEST),
+        settled=table.flag("settled"),
         objects=objects,
         walls=tuple(_wall(t) for t in table.tables("wall")),
     )
@@ -317,6 +322,12 @@ class _Table:
         if not x.is_integer():
             self.fail(f"{key!r} is {x}.", "Give a whole number.")
         return int(x)
+
+    def flag(self, key: str) -> bool | None:
+        x = self.value.get(key)
+        if x is not None and not isinstance(x, bool):
+            self.fail(f"{key!r} is {_shown(x)}.", "Write true or false.")
+        return x
 
     def vector(self, key: str, most: float) -> Vector | None:
         x = self.value.get(key)

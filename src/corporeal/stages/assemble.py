@@ -312,12 +312,13 @@ def _title(plan: SceneFile, blocks: list[_Block]) -> str:
 
 
 def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: AssembleConfig) -> Scene:
-    """Settle gravity, duration and fps: the options first, then the scene file, then our GLB."""
+    """Say gravity, duration and the like: the options first, then the scene file, then our GLB."""
     own = blocks[0].scene if len(blocks) == 1 and blocks[0].ours else None
     scene = replace(
         scene,
         gravity=plan.gravity or (own or scene).gravity,
         fps=config.fps or plan.fps or (own.fps if own else FPS),
+        settled=(own or scene).settled if plan.settled is None else plan.settled,
     )
     stated = config.duration or plan.duration or (own.duration if own else None)
     return replace(scene, duration=stated or _watched(scene))

@@ -323,12 +323,13 @@ def _write(
     action = settled.action
     duration = action.duration if action else AT_REST
     members = [_member(t, p) for t, p in zip(things, settled.poses, strict=True)]
-    extras = {"gravity_m_s2": [0.0, 0.0, -9.81], "duration_s": duration, "fps": 30}
+    extras = {"gravity_m_s2": [0.0, 0.0, -9.81], "duration_s": duration, "fps": 30, "settled": True}
     warnings = merge(folder / "scene.glb", members, "scene", extras)
     scene_file = SceneFile(
         folder / "scene.toml",
         file=folder / "scene.glb",
         duration=duration,
+        settled=True,
         objects=action.entries if action else (),
     )
     write_scene_file(folder / "scene.toml", scene_file)
