@@ -27,7 +27,11 @@ Ledger = dict[str, np.ndarray]
 
 
 def audit(
-    scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
+    scene: Scene,
+    particles: Particles,
+    field: MaterialField,
+    trajectory: Trajectory,
+    settling: dict[str, Any] | None = None,
 ) -> dict[str, Any]:
     """Check a run against the laws it must obey. Field names are part of the interface.
 
@@ -36,7 +40,8 @@ def audit(
     ``energy_growth``, ``mechanical_growth`` (the same without booked losses), ``mass_error`` [-];
     ``max_penetration_m``, ``max_penetration_dx`` with
     ``floor_penetration_m`` and ``pair_penetration_m``; ``gravity_ramp_s``; ``parts``: one row
-    each; ``warnings``: sentences.
+    each; ``settling``: how everything found its balance before time 0, None: it did not;
+    ``warnings``: sentences.
     """
     ledger, cell = trajectory.ledger, particles.cell
     floor = float(ledger["plane_depth"].max(initial=0.0))
@@ -60,8 +65,9 @@ def audit(
         "floor_penetration_m": floor,
         "pair_penetration_m": pair,
         "parts": part_rows(scene, particles, field),
+        "settling": settling,
     }
-    return found | {"warnings": [*particles.warnings, *breaches(found)]}
+    return found | {"warnings": [*particles.warnings, *unsettled(settling), *breaches(found)]}
 
 
 # ------------------------------------------------------------------ laws
@@ -170,3 +176,26 @@ def breaches(found: dict[str, Any]) -> list[str]:
     }
     limits = ALLOWED | {"nan_count": 0, "particles_out_of_domain": 0}
     return [text.format(found[key]) for key, text in said.items() if found[key] > limits[key]]
+
+
+SAGGED = 1.0
+"""Worth a sentence [cells]: the film does not begin as the file shows the scene."""
+
+
+def unsettled(settling: dict[str, Any] | None) -> list[str]:
+    """Say what settling changed that a person would see, and where it found no end."""
+    if settling is None:
+        return []
+    said = [
+        f"{row['name']} moved by {np.linalg.norm(row['moved_m']) * 1e3:.2g} mm "
+        f"({row['moved_dx']:.1f} cells) before the film begins: the pose in the file is not one "
+        "in which it bears its weight."
+        for row in settling["objects"]
+        if row["moved_dx"] > SAGGED
+    ]
+    if not settling["found"]:
+        said.append(
+            f"After {settling['seconds']:.2g} s of settling something still moved: the film begins "
+            "before everything is at rest."
+        )
+    return said

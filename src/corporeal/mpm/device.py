@@ -5,6 +5,7 @@ to the grid, rigid bodies and impulses in double precision. ``device="cpu"`` run
 graph on the processor, one thread, which is how it is tested where there is no card.
 """
 
+from collections.abc import Collection
 from dataclasses import MISSING, fields
 from typing import Any
 
@@ -232,6 +233,15 @@ class DeviceEngine:
         self.arrays.sheet.flag.zero_()
         self._arrange()
         self._read_steps()
+
+    def halt(self, bodies: Collection[int]) -> None:
+        """Take all motion out of some bodies; nothing of it is booked."""
+        hands.halt(self, bodies)
+
+    def begin(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+        """Put some bodies where they were in another's ``save``: see ``problem.Engine``."""
+        hands.begin(self, saved, bodies)
+        self._arrange()
 
 
 def _present(device: str) -> str:

@@ -1,5 +1,6 @@
-"""Touching what the device engine simulates: blows at a point, and springs that drag."""
+"""Touching what the device engine simulates: blows, springs that drag, and where it begins."""
 
+from collections.abc import Collection
 from typing import TYPE_CHECKING
 
 import numpy as np
@@ -61,6 +62,36 @@ def drag(
     _tell(engine)
 
 
+def halt(engine: "DeviceEngine", bodies: Collection[int]) -> None:
+    """Take all motion out of some bodies."""
+    p, r = engine.arrays.particles, engine.arrays.rigid
+    mine = np.isin(engine.matter.body[p.number.numpy()], list(bodies))
+    for array in (p.velocity, p.affine):
+        _change(array, mine, 0.0)
+    for array in (r.speed, r.moment, r.spin):
+        _change(array, np.array(list(bodies), int), 0.0)
+
+
+def begin(engine: "DeviceEngine", saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+    """Put some bodies where they were in another engine's ``save``."""
+    p, r, owner = engine.arrays.particles, engine.arrays.rigid, engine.matter.body
+    there = np.empty(len(owner), int)
+    there[saved["particle.number"][: p.count]] = np.arange(p.count)
+    number = p.number.numpy()[: p.count]
+    mine = np.flatnonzero(np.isin(owner[number], list(bodies)))
+    for name in "cell place strain motion stress plastic opened".split():
+        _change(getattr(p, name), mine, saved[f"particle.{name}"][there[number[mine]]])
+    which = np.array(list(bodies), int)
+    for name in "centre turn inertia".split():
+        _change(getattr(r, name), which, saved[f"rigid.{name}"][which])
+    riding = np.flatnonzero(np.isin(r.body.numpy(), which))
+    for name in ("cell", "place"):
+        _change(getattr(r, name), riding, saved[f"rigid.{name}"][riding])
+    fast = engine.arrays.sheet.fast.numpy()
+    fast[3] = max(fast[3], saved["sheet.fast"][3])
+    engine.arrays.sheet.fast.assign(fast)
+
+
 def _tell(engine: "DeviceEngine") -> None:
     """Put all grips on the device."""
     acting, m, bodies = engine.arrays.loads, engine.matter, len(engine.problem.bodies)
@@ -96,4 +127,11 @@ def _add(array: wp.array, row: int, values: np.ndarray) -> None:
     """Add to one row on the device."""
     there = array.numpy()
     there[row] += values
+    array.assign(there)
+
+
+def _change(array: wp.array, rows: np.ndarray, values: np.ndarray | float) -> None:
+    """Overwrite some rows on the device."""
+    there = array.numpy()
+    there[rows] = values
     array.assign(there)

@@ -1,5 +1,6 @@
 """All particles of a problem in one list: what never changes of them, and what does."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, fields, replace
 from functools import cached_property
 
@@ -191,6 +192,34 @@ class State:
             F=np.where(stiff[:, None], still, self.F),
             motion=np.where(stiff[:, None], still, self.motion),
         )
+
+    def halted(self, matter: Matter, bodies: Collection[int]) -> "State":
+        """Return the same place with some bodies' motion taken out."""
+        mine, body = self._of(matter, bodies)
+        return replace(
+            self,
+            velocity=np.where(mine[:, None], 0.0, self.velocity),
+            affine=np.where(mine[:, None, None], 0.0, self.affine),
+            speed=np.where(body[:, None], 0.0, self.speed),
+            spin_momentum=np.where(body[:, None], 0.0, self.spin_momentum),
+        )
+
+    def placed_as(self, there: "State", matter: Matter, bodies: Collection[int]) -> "State":
+        """Return the same motion with some bodies where, and as strained as, they are there."""
+        mine, body = self._of(matter, bodies)
+        taken = {name: mine for name in ("position", "F", "motion", "plastic", "volume", "relief")}
+        taken |= {name: body for name in ("centre", "rotation")}
+        found = {}
+        for name, chosen in taken.items():
+            here = getattr(self, name)
+            which = chosen.reshape(-1, *(1,) * (here.ndim - 1))
+            found[name] = np.where(which, getattr(there, name), here)
+        return replace(self, **found).follow_rigid(matter)
+
+    def _of(self, matter: Matter, bodies: Collection[int]) -> tuple[np.ndarray, np.ndarray]:
+        """Which particles and which bodies are meant."""
+        body = np.isin(np.arange(len(self.centre)), list(bodies))
+        return body[matter.body], body
 
     def as_arrays(self) -> dict[str, np.ndarray]:
         """Copy everything into a dict."""

@@ -331,17 +331,19 @@ def starts_settled(scene: Scene, particles: Particles) -> bool:
     moving = np.abs(particles.velocity).max(initial=0.0) > 0.0
     if moving or any(o.push or o.wind for o in scene.objects):
         return False
+    return len(standing(scene, particles)) == len(scene.objects)
+
+
+def standing(scene: Scene, particles: Particles) -> set[int]:
+    """Objects that stand on the floor, or on what does: within half a cell."""
     near = 0.5 * particles.cell
     bodies = [particles.position[particles.object == b] for b in range(len(scene.objects))]
     gap, _ = pair_gaps(bodies, particles.cell)
-    standing = {b for b, x in enumerate(bodies) if x[:, 2].min() < near}
+    found = {b for b, x in enumerate(bodies) if x[:, 2].min() < near}
     while True:
         carried = {
-            b
-            for b in range(len(bodies))
-            for a in standing
-            if b not in standing and gap[a, b] < near
+            b for b in range(len(bodies)) for a in found if b not in found and gap[a, b] < near
         }
         if not carried:
-            return len(standing) == len(bodies)
-        standing |= carried
+            return found
+        found |= carried

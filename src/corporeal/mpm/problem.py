@@ -1,5 +1,6 @@
 """What an engine is given and what it gives back: the contract that every engine keeps."""
 
+from collections.abc import Collection
 from dataclasses import dataclass, field
 from typing import Literal, Protocol, runtime_checkable
 
@@ -247,6 +248,18 @@ class Engine(Protocol):
 
     def restore(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from what ``save`` returned, on an engine built from the same problem."""
+        ...
+
+    def halt(self, bodies: Collection[int]) -> None:
+        """Take all motion out of some bodies; nothing of it is booked."""
+        ...
+
+    def begin(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+        """Put some bodies, before the first step, where they were in what another engine saved.
+
+        Place, strain and history are taken over; how they move is what the problem says. Both
+        engines' problems have the same bodies but for velocities and forces.
+        """
         ...
 
 

@@ -4,6 +4,7 @@ Moving-least-squares MPM (Hu et al. 2018) with one field per body and explicit c
 fields. Every other engine is compared with this one.
 """
 
+from collections.abc import Collection
 from dataclasses import replace
 
 import numpy as np
@@ -338,6 +339,15 @@ class ReferenceEngine:
         count, smallest, largest = saved["steps"].tolist()
         self.steps = Steps(int(count), smallest, largest)
         self.lost = self._lost(self.state)
+
+    def halt(self, bodies: Collection[int]) -> None:
+        """Take all motion out of some bodies; nothing of it is booked."""
+        self.state = self.state.halted(self.matter, bodies)
+
+    def begin(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+        """Put some bodies where they were in another's ``save``: see ``problem.Engine``."""
+        there = State(**_of("state.", saved))
+        self.state = self.state.placed_as(there, self.matter, bodies)
 
 
 def _of(kind: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

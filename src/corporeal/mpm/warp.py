@@ -4,11 +4,13 @@ Moving-least-squares MPM (Hu et al. 2018) with quadratic B-splines and affine FL
 particles, nodes and contacts are the native pieces of ``kernels``, launched by Warp.
 """
 
+from collections.abc import Collection
+
 import numpy as np
 
 from corporeal.errors import SimulationError
 from corporeal.machine import cores
-from corporeal.mpm import pacing, tables, touching
+from corporeal.mpm import beginning, pacing, tables, touching
 from corporeal.mpm.blow import Blows
 from corporeal.mpm.carried import Carried
 from corporeal.mpm.grip import Grip
@@ -33,7 +35,7 @@ from corporeal.mpm.memory import ContactMemory, point, rigid_grid
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.mpm.spring_records import Springs
 from corporeal.mpm.springs import longest_step
-from corporeal.mpm.window import POINTED, Window, node_tasks, particle_tasks
+from corporeal.mpm.window import POINTED, Window, node_tasks, particle_tasks, too_wide
 from corporeal.types import Vector
 
 RIGID_COURANT = 0.05
@@ -112,7 +114,7 @@ class WarpEngine:
             flows = any(np.isin(problem.bodies[b].law, tables.PLASTIC_LAWS).any() for b in bodies)
             self.window[f] = Window(place, rows, flows, sorter)
             if not self.window[f].fits:
-                raise SimulationError(_too_wide(problem, bodies, 0.0))
+                raise SimulationError(too_wide(problem, bodies, 0.0))
         separate = [b for b in self.rigid if self._is_rigid(b)]
         self.grids = [
             rigid_grid(
@@ -313,7 +315,7 @@ class WarpEngine:
         wide = [f for f in sorted(fields) if not self.window[f].sort()]
         self.connect()
         if wide:
-            raise SimulationError(_too_wide(self.problem, self.members[wide[0]], self.time))
+            raise SimulationError(too_wide(self.problem, self.members[wide[0]], self.time))
 
     def _find_lost(self) -> None:
         """Raise when a particle is not finite or left the domain."""
@@ -389,10 +391,10 @@ class WarpEngine:
         self.lost[:] = False
         self.connect()
 
+    def halt(self, bodies: Collection[int]) -> None:
+        """Take all motion out of some bodies; nothing of it is booked."""
+        beginning.halt(self, bodies)
 
-def _too_wide(problem: Problem, bodies: list[int], time: float) -> str:
-    names = " and ".join(repr(problem.bodies[b].name) for b in bodies)
-    return (
-        f"At t = {time:.4g} s {names} no longer fits into one grid: it spans more than 500 cells. "
-        "Use less detail, a shorter time, or contact='multi'."
-    )
+    def begin(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+        """Put some bodies where they were in another's ``save``: see ``problem.Engine``."""
+        beginning.begin(self, saved, bodies)

@@ -10,6 +10,7 @@ import numpy as np
 
 from corporeal.mpm.kernels import BLOCK, COLOURS, ID, MT, NC, NH, PLACE, XI, aligned
 from corporeal.mpm.kernels_sort import Sorter
+from corporeal.mpm.problem import Problem
 
 HALF = 1 << (PLACE - 1)
 LONGEST = (1 << (31 - PLACE)) // 4 - 4
@@ -168,6 +169,15 @@ class Window:
         self.fits = True
         self.__dict__.pop("slot", None)
         self._make_room()
+
+
+def too_wide(problem: Problem, bodies: list[int], time: float) -> str:
+    """Say that some bodies no longer fit into one window."""
+    names = " and ".join(repr(problem.bodies[b].name) for b in bodies)
+    return (
+        f"At t = {time:.4g} s {names} no longer fits into one grid: it spans more than 500 cells. "
+        "Use less detail, a shorter time, or contact='multi'."
+    )
 
 
 def particle_tasks(windows: dict[int, Window]) -> tuple[np.ndarray, np.ndarray]:
