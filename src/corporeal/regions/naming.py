@@ -12,11 +12,13 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float, Int
+from scipy.sparse import csr_array
 from scipy.special import log_softmax, softmax
 
 from corporeal.regions.attributes import described, log_likelihood, observed
 from corporeal.regions.match import match
 from corporeal.regions.parts import DEFAULT, Clusters, PartsConfig, parts
+from corporeal.regions.reduce import BATCH
 from corporeal.types import Cloud, ObjectWords, PartWords
 
 TEMPERATURE = 0.01
@@ -79,7 +81,8 @@ def named(
         part = _claimed(score)
     else:
         score = _by_words(clusters, cloud, words)
-        part = _agreed(_looks(clusters, cloud), score, _claimed(score))
+        look = _sums(cloud.structural, clusters.cluster_of_point, clusters.count)
+        part = _agreed(look, score, _claimed(score))
     sure = softmax(score, axis=1)[np.arange(len(part)), part]
     of_point = part[clusters.cluster_of_point]
     return Named(
@@ -123,22 +126,30 @@ def _by_attributes(clusters: Clusters, cloud: Cloud, told: Sequence[PartWords]) 
 
 def _by_words(clusters: Clusters, cloud: Cloud, words: np.ndarray) -> Float[np.ndarray, "C K"]:
     """Compare prototypes with words, in units of ``TEMPERATURE``."""
-    made = np.empty((clusters.count, len(words)))
-    for c in range(clusters.count):
-        rows = np.flatnonzero(clusters.cluster_of_point == c)
-        look = cloud.structural[rows].astype(np.float32)
-        typical = np.maximum(look @ _unit(look.mean(axis=0)), 0)
-        prototype = _unit(typical @ cloud.semantic[rows].astype(np.float32))
-        made[c] = words @ prototype / TEMPERATURE
+    of, count = clusters.cluster_of_point, clusters.count
+    mean = _unit(_sums(cloud.structural, of, count))
+    typical = np.empty(cloud.count)
+    for rows in _batches(cloud.count):
+        typical[rows] = np.sum(cloud.structural[rows].astype(np.float32) * mean[of[rows]], axis=1)
+    prototypes = _unit(_sums(cloud.semantic, of, count, np.maximum(typical, 0)))
+    return prototypes @ words.T / TEMPERATURE
+
+
+def _sums(
+    features: np.ndarray, of: np.ndarray, count: int, weight: np.ndarray | None = None
+) -> Float[np.ndarray, "C D"]:
+    """Return every cluster's weighted sum of features, which may be in half precision."""
+    made = np.zeros((count, features.shape[1]))
+    share = np.ones(len(of)) if weight is None else weight
+    for rows in _batches(len(of)):
+        number = np.arange(len(of[rows]))
+        own = csr_array((share[rows], (of[rows], number)), shape=(count, len(number)))
+        made += own @ features[rows].astype(np.float32)
     return made
 
 
-def _looks(clusters: Clusters, cloud: Cloud) -> Float[np.ndarray, "C D"]:
-    """Return the sum of structural features of every cluster."""
-    look = np.zeros((clusters.count, cloud.structural.shape[1]))
-    for c in range(clusters.count):
-        look[c] = cloud.structural[clusters.cluster_of_point == c].sum(axis=0, dtype=np.float64)
-    return look
+def _batches(count: int) -> list[slice]:
+    return [slice(k, k + BATCH) for k in range(0, count, BATCH)]
 
 
 def _agreed(look: np.ndarray, score: np.ndarray, part: np.ndarray) -> Int[np.ndarray, " C"]:
