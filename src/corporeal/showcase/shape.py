@@ -6,13 +6,14 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float, Int
 from numpy.typing import ArrayLike
-from skimage.measure import approximate_polygon
 
 from corporeal.showcase.mesh import Mesh, Point, corner_normals, make, smooth_normals, union
 
 
 def soften(points: ArrayLike, rounds: int = 3) -> Float[np.ndarray, "N D"]:
     """Cut corners (Chaikin 1974; doubled points stay sharp), then drop points on straight runs."""
+    from skimage.measure import approximate_polygon  # brings a second of start-up with it
+
     p = np.asarray(points, float)
     for _ in range(rounds):
         a, b = p[:-1], p[1:]
