@@ -7,6 +7,7 @@ import pytest
 
 from corporeal import cli, store
 from corporeal.formats.glb_writer import write_glb
+from corporeal.render import figures
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
@@ -35,6 +36,7 @@ def corporeal(monkeypatch, *words):
 @pytest.fixture
 def typed(monkeypatch, tmp_path, capsys):
     monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(figures, "PANEL", (130, 98))
 
     def type_(*words):
         code = corporeal(monkeypatch, *words)

@@ -18,6 +18,8 @@ from corporeal.corpus.jobs import Job, perform, sweep
 from corporeal.corpus.manifest import Manifest, read_rows
 
 NAMES = ("a", "b", "c", "d", "e", "f")
+PATIENCE = 120.0
+"""Longest that a process may take to end on a busy machine [s]."""
 
 
 def job(folder, name, function, **arguments):
@@ -51,8 +53,9 @@ def workers_of(process):
 
 
 def gone(pid):
-    """Whether a process is no more within five seconds."""
-    for _ in range(500):
+    """Whether a process ends before patience does."""
+    until = time.monotonic() + PATIENCE
+    while time.monotonic() < until:
         status = Path(f"/proc/{pid}/status")
         if not status.exists() or "\nState:\tZ" in status.read_text():
             return True
@@ -173,7 +176,7 @@ def test_an_interrupt_lets_jobs_keep_what_they_have(tmp_path):
         assert process.poll() is None
         time.sleep(0.01)
     process.send_signal(signal.SIGINT)
-    assert process.wait(20) != 0
+    assert process.wait(PATIENCE) != 0
     assert (tmp_path / "runs" / "wait" / "kept").exists()
     assert read_rows(tmp_path, "run")["wait"].status == "interrupted"
 

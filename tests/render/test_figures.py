@@ -47,8 +47,14 @@ def row_of_blocks(count, names=None):
     return scene, parts, MaterialField(tuple(made), solid, words, pair, pair)
 
 
+@pytest.fixture
+def coarse(monkeypatch):
+    """Draw small pictures into the panels: the layout of the page does not depend on them."""
+    monkeypatch.setattr(figures, "PANEL", (130, 98))
+
+
 @pytest.mark.parametrize("count", [1, 30])
-def test_the_figure_takes_any_number_of_parts(count, tmp_path):
+def test_the_figure_takes_any_number_of_parts(count, tmp_path, coarse):
     scene, parts, field = row_of_blocks(count)
     fields_figure(scene, parts, field, tmp_path / "fields.png")
     picture = np.asarray(Image.open(tmp_path / "fields.png").convert("RGB"))
@@ -63,7 +69,7 @@ def texts(axes):
     return [t for t in found + (legend.get_texts() if legend else []) if t.get_text()]
 
 
-def test_no_label_covers_another(tmp_path, monkeypatch):
+def test_no_label_covers_another(tmp_path, monkeypatch, coarse):
     caught = []
     monkeypatch.setattr(
         figures.Figure, "savefig", lambda self, path, **k: caught.append(self) or path.touch()
