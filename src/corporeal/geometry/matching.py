@@ -9,7 +9,6 @@ import numpy as np
 from jaxtyping import Float, UInt8
 from PIL import Image
 from skimage.color import rgb2gray
-from skimage.feature import ORB
 
 SIDE = 320
 """Longer side at which features are looked for [px]."""
@@ -34,6 +33,8 @@ class Features:
 
 def features(picture: UInt8[np.ndarray, "H W 3"]) -> Features:
     """Return the corners of a picture; none where it is smooth."""
+    from skimage.feature import ORB  # brings a second of start-up with it
+
     share = min(1.0, SIDE / max(picture.shape[:2]))
     size = (round(picture.shape[1] * share), round(picture.shape[0] * share))
     grey = rgb2gray(_resized(picture, size))
