@@ -97,7 +97,7 @@ def draw(
     first, ids, places, spans = kernels_blend.deal(order, ellipses, across, down)
     planes = np.empty((PLANES, camera.height, camera.width), np.float32)
     background = background.astype(np.float32)
-    shares = [(t, first, ids, ellipses, background, planes) for t in _tiles(first, crew)]
+    shares = [(t, first, ids, ellipses, background, planes) for t in dealt(first, crew)]
     crew.each(kernels_blend.blend, shares)
     return Drawing(theta, camera, ellipses, first, ids, places, spans, planes)
 
@@ -108,7 +108,7 @@ def back(
     """Return dL/dθ from the slope, dL/d(red, green, blue, transmittance) of every pixel."""
     d = drawing
     entries = np.empty((len(d.ids), GRADIENTS), np.float32)
-    tiles = _tiles(d.first, crew)
+    tiles = dealt(d.first, crew)
     shares = [(t, d.first, d.ids, d.ellipses, d.planes, slope, entries) for t in tiles]
     crew.each(kernels_blend.blend_back, shares)
     gradient = np.empty_like(d.theta)
@@ -134,7 +134,7 @@ def weights(
         sums = np.empty((len(d.ids), within, within), np.float32)
         size = camera.height, camera.width
         rest = d.first, d.ids, d.ellipses, size, cell, sums
-        crew.each(kernels_blend.shares, [(t, *rest) for t in _tiles(d.first, crew)])
+        crew.each(kernels_blend.shares, [(t, *rest) for t in dealt(d.first, crew)])
     entry, y, x = np.nonzero(sums)
     tile = np.repeat(np.arange(len(d.first) - 1), np.diff(d.first))[entry]
     across = -(-camera.width // TILE)
@@ -163,7 +163,7 @@ def pinhole(camera: Camera, scale: float = 1.0, near: float = NEAR) -> Pinhole:
     return Pinhole(turn, -turn @ eye, eye, fx, fy, cx, cy, *size, float(near))
 
 
-def _tiles(first: Int[np.ndarray, " tiles_and_1"], crew: Crew) -> list[Int[np.ndarray, " t"]]:
+def dealt(first: Int[np.ndarray, " tiles_and_1"], crew: Crew) -> list[Int[np.ndarray, " t"]]:
     """Deal tiles to threads, the fullest first, so that all have about as much to do."""
     order = np.argsort(-np.diff(first), kind="stable")
     return [np.ascontiguousarray(order[k :: crew.threads]) for k in range(crew.threads)]

@@ -1,0 +1,86 @@
+"""Space carved by what cameras see (Kutulakos and Seitz 2000): a signed distance on a grid.
+
+A place is free where views see past it. One view may err, and all do along outlines; so a cell's
+distance is not the largest that any view allows, but the one that four in ten of those views
+exceed that see the cell at all. Both sides of a thin wall are seen by about as many, and each
+side's views agree among themselves, so that the wall stays. What nobody sees, inside things and
+below them, is filled in smoothly between (∇²f = 0), which closes a seat from below with about the
+least area.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32
+
+from corporeal.splats.crew import Crew
+from corporeal.splats.kernels_carve import carve, relax
+from corporeal.splats.sight import Sight
+from corporeal.types import Vector
+
+TRUST = 3.0
+"""Distances are taken at their word up to so many cells."""
+EMPTIER = 0.4
+"""Share of the views that see a cell which may take it for emptier than it is."""
+WITNESSES = 0.04
+"""Share of all views that must see a cell, and at least one."""
+ROUNDS = 100
+"""Of filling in what nobody sees."""
+
+
+@dataclass(frozen=True)
+class Grid:
+    """Cubic cells; X, Y, Z of them."""
+
+    low: Vector
+    """Middle of the first cell [m]."""
+    cell: float
+    """[m]"""
+    shape: tuple[int, int, int]
+
+    @property
+    def axes(self) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Middles of the cells along x, y and z [m]."""
+        x, y, z = (a + self.cell * np.arange(n) for a, n in zip(self.low, self.shape, strict=True))
+        return x, y, z
+
+    def points(self, chosen: Bool[np.ndarray, "X Y Z"]) -> Float[np.ndarray, "N 3"]:
+        """Middles of the chosen cells [m]."""
+        return np.array(self.low) + self.cell * np.argwhere(chosen)
+
+
+def gridded(
+    low: np.ndarray, high: np.ndarray, cells: int, floor: float, finest: float = 0.0
+) -> Grid:
+    """Return a grid of about so many cells over a box, with the floor half-way between two layers.
+
+    finest: no cell is smaller [m].
+    """
+    span = np.maximum(high - low, 1e-9)
+    cell = max(float(np.cbrt(np.prod(np.maximum(span, span.max() / 50)) / cells)), finest)
+    start = np.array(low, dtype=float)
+    start[2] = floor + cell * (np.floor((low[2] - floor) / cell) + 0.5)
+    x, y, z = (int(n) for n in np.ceil((high - start) / cell) + 1)
+    return Grid((float(start[0]), float(start[1]), float(start[2])), cell, (x, y, z))
+
+
+def carved(grid: Grid, sight: Sight, floor: float, crew: Crew) -> Float32[np.ndarray, "X Y Z"]:
+    """Return the signed distance to what is seen, cut off at a few cells [m]; positive outside.
+
+    Nothing is below the floor.
+    """
+    field = np.empty(grid.shape, np.float32)
+    place = np.array([*grid.low, grid.cell])
+    reach = TRUST * grid.cell
+    rule = np.array([reach, EMPTIER, max(1, round(WITNESSES * len(sight.depth)))])
+    rest = place, sight.rows, sight.depth, rule, field
+    crew.each(carve, [(*span, *rest) for span in crew.spans(grid.shape[0])])
+    above = grid.axes[2] > floor
+    room = field[:, :, above]  # the floor is no witness: below it everything is unknown
+    unseen = np.isnan(room)
+    room[unseen] = -reach
+    relax(room, np.argwhere(unseen), ROUNDS)
+    field[:, :, above] = room
+    field[:, :, ~above] = -reach
+    np.maximum(field, (floor - grid.axes[2]).astype(np.float32), out=field)
+    return field

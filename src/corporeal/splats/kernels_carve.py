@@ -1,0 +1,198 @@
+"""Where Gaussians hide what is behind them, and what is left of space. Compiled by numba."""
+
+import numba
+import numpy as np
+
+from corporeal.splats.kernels_basis import JIT
+from corporeal.splats.kernels_blend import CUTOFF, LAST, MOST, TILE, _decay, _rows
+from corporeal.splats.kernels_project import REACH, A, B, C, O, U, Z
+
+f4 = np.float32
+MET = f4(0.85)
+"""Transmittance at which a ray has met a surface. Learned Gaussians lie in a layer that ends where
+masks and outlines say: where half of the light is lost is already below what is seen."""
+HALF = f4(0.5)
+"""A pixel that lets more light through shows no thing."""
+OVERTAKEN = 1.6
+"""Factor of successive overrelaxation."""
+
+
+@numba.njit(**JIT)
+def meet(tiles, first, ids, ellipses, slopes, depth, met):
+    """Find where the ray of each pixel has lost some of its light; ids -1 and inf where never.
+
+    slopes (N, 3): how the depth of a Gaussian's densest point along a ray changes with the pixel,
+    along u and v [m/px], and at most by how much from the mean's depth [m].
+    """
+    height, width = depth.shape
+    across = (width + TILE - 1) // TILE
+    T = np.empty((TILE, TILE), np.float32)
+    for t in tiles:
+        y0, x0 = t // across * TILE, t % across * TILE
+        T[:] = 1
+        left = min(TILE, height - y0) * min(TILE, width - x0)
+        for k in range(first[t], first[t + 1]):
+            if left == 0:
+                break
+            i = ids[k]
+            e, s_ = ellipses[i], slopes[i]
+            mx = e[U] - f4(x0) - f4(0.5)
+            my, low, high = _rows(e, y0)
+            a, b, c = f4(0.5) * e[A], e[B], f4(0.5) * e[C]
+            begin = max(0, int(np.ceil(mx - e[REACH])))
+            end = min(TILE, width - x0, int(np.floor(mx + e[REACH])) + 1)
+            for y in range(low, min(high, height - y0)):
+                dy = f4(y) - my
+                for x in range(begin, end):
+                    before = T[y, x]
+                    if before <= HALF:
+                        continue
+                    dx = f4(x) - mx
+                    s = c * dy * dy + dx * (b * dy + a * dx)
+                    alpha = e[O] * _decay(s if s < LAST else LAST)
+                    alpha = alpha if alpha < MOST else MOST
+                    if alpha < CUTOFF:
+                        continue
+                    T[y, x] = before * (f4(1) - alpha)
+                    left -= T[y, x] <= HALF
+                    if before > MET and T[y, x] <= MET:
+                        off = s_[0] * dx + s_[1] * dy
+                        off = min(max(off, -s_[2]), s_[2])
+                        depth[y0 + y, x0 + x] = e[Z] + off
+                        met[y0 + y, x0 + x] = i
+        for y in range(min(TILE, height - y0)):
+            for x in range(min(TILE, width - x0)):
+                if T[y, x] > HALF:
+                    depth[y0 + y, x0 + x], met[y0 + y, x0 + x] = np.inf, -1
+
+
+@numba.njit(**JIT)
+def carve(first, last, grid, cameras, depths, rule, out):
+    """Fill out[first:last] of a grid (X, Y, Z): signed distance to what is seen [m], + outside.
+
+    grid: low corner's middle (3) and cell (1) [m]; cameras (V, 18): ``Sight.rows``;
+    depths (V, H, W), inf where there is nothing. rule: reach of distances [m], share
+    of the views that see a cell which may take it for emptier than the others do, and how
+    many must. A cell that too few see is nan.
+    """
+    views = len(depths)
+    _, ny, nz = out.shape
+    reach, share, need = rule[0], rule[1], int(rule[2])
+    found = np.empty(views, np.float32)
+    p = np.empty(3)
+    for i in range(first, last):
+        x = grid[0] + i * grid[3]
+        for j in range(ny):
+            y = grid[1] + j * grid[3]
+            for k in range(nz):
+                z = grid[2] + k * grid[3]
+                n, free = 0, 0
+                for v in range(views):
+                    c = cameras[v]
+                    for a in range(3):
+                        p[a] = c[4 * a] * x + c[4 * a + 1] * y + c[4 * a + 2] * z + c[4 * a + 3]
+                    if not p[2] > 0:
+                        continue
+                    u, w = c[12] * p[0] / p[2] + c[14], c[13] * p[1] / p[2] + c[15]
+                    if not (0 <= u < c[16] and 0 <= w < c[17]):
+                        continue
+                    off = depths[v, int(w), int(u)] - p[2]
+                    if off < -reach:
+                        continue
+                    found[n] = min(off, reach)
+                    n += 1
+                    free += off >= reach
+                    if free > need and free > share * views:
+                        break
+                if n < need:
+                    out[i, j, k] = np.nan
+                    continue
+                place = max(need - 1, int(share * n))
+                if free > place:
+                    out[i, j, k] = reach
+                    continue
+                out[i, j, k] = _largest(found, n, place)
+
+
+@numba.njit(**JIT)
+def _largest(values, count, place):
+    """Return the value with so many larger ones, by quickselect; values are put out of order."""
+    low, high = 0, count - 1
+    while low < high:
+        pivot = values[(low + high) // 2]
+        i, j = low, high
+        while i <= j:
+            while values[i] > pivot:
+                i += 1
+            while values[j] < pivot:
+                j -= 1
+            if i <= j:
+                values[i], values[j] = values[j], values[i]
+                i += 1
+                j -= 1
+        if place <= j:
+            high = j
+        elif place >= i:
+            low = i
+        else:
+            break
+    return values[place]
+
+
+@numba.njit(**JIT)
+def relax(field, unknown, rounds):
+    """Make the unknown cells of field (X, Y, Z) the mean of their neighbours that are numbers."""
+    shape = np.array(field.shape)
+    at = np.empty(3, np.int64)
+    for _ in range(rounds):
+        for row in range(len(unknown)):
+            i, j, k = unknown[row]
+            total, n = f4(0), 0
+            for side in range(6):
+                at[0], at[1], at[2] = i, j, k
+                at[side // 2] += 2 * (side % 2) - 1
+                if not 0 <= at[side // 2] < shape[side // 2]:
+                    continue
+                value = field[at[0], at[1], at[2]]
+                if not np.isnan(value):
+                    total += value
+                    n += 1
+            if n:
+                field[i, j, k] += f4(OVERTAKEN) * (total / n - field[i, j, k])
+
+
+@numba.njit(**JIT)
+def paint(first, last, points, normals, cameras, depths, pictures, reach, out):
+    """Sum what the views see of points first to last: out (N, 4): red, green, blue, weight.
+
+    A view counts by the square of the cosine at which it sees the surface, and only where nothing
+    nearer than reach [m] is before the point.
+    """
+    p = np.empty(3)
+    for i in range(first, last):
+        out[i] = 0
+        for v in range(len(depths)):
+            c = cameras[v]
+            for a in range(3):
+                p[a] = c[4 * a + 3]
+                for b in range(3):
+                    p[a] += c[4 * a + b] * points[i, b]
+            if not p[2] > 0:
+                continue
+            u, w = c[12] * p[0] / p[2] + c[14], c[13] * p[1] / p[2] + c[15]
+            if not (0 <= u < c[16] and 0 <= w < c[17]):
+                continue
+            if abs(depths[v, int(w), int(u)] - p[2]) > reach:
+                continue
+            towards = 0.0
+            for a in range(3):
+                turned = 0.0
+                for b in range(3):
+                    turned += c[4 * a + b] * normals[i, b]
+                towards -= turned * p[a]
+            if towards <= 0:
+                continue
+            weight = towards * towards / (p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+            out[i, 3] += weight
+            for q in range(3):
+                out[i, q] += weight * pictures[v, int(w), int(u), q]

@@ -1,0 +1,201 @@
+"""Solids made of Gaussians are the things that the Gaussians show."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial.transform import Rotation
+from splat_scenes import around
+
+from corporeal.errors import UserError
+from corporeal.geometry.harmonics import DC
+from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.shape import Shape
+from corporeal.splats.solid import solids
+from corporeal.types import Gaussians
+
+PIXEL = 3.5 / 168
+"""Of the pictures, at the things [m]."""
+CELLS = {"CELLS": 60_000, "ROUGH": 20_000, "OWN_SIZE": 200, "OWN_VIEWS": 24}
+
+
+@pytest.fixture(autouse=True)
+def small(monkeypatch):
+    for name, value in CELLS.items():
+        monkeypatch.setattr(f"corporeal.splats.solid.{name}", value)
+
+
+def clad(mesh, count=5000, colour=(0.8, 0.3, 0.1), seed=0):
+    """Flat Gaussians on a mesh's surface."""
+    points, face = trimesh.sample.sample_surface_even(mesh, count, seed=seed)
+    normal = mesh.face_normals[face]
+    across = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.9, [1.0, 0, 0], [0, 1.0, 0]))
+    across /= np.linalg.norm(across, axis=1, keepdims=True)
+    axes = np.stack([across, np.cross(normal, across), normal], axis=2)
+    wide = 0.8 * np.sqrt(mesh.area / count)
+    sh = np.tile((np.array(colour) - 0.5) / DC, (len(points), 1, 1))
+    return Gaussians(
+        mean=np.asarray(points),
+        rotation=Rotation.from_matrix(axes).as_quat(scalar_first=True),
+        scale=np.tile([wide, wide, 0.1 * wide], (len(points), 1)),
+        opacity=np.full(len(points), 0.95),
+        sh=sh,
+    )
+
+
+def together(*some):
+    owner = np.repeat(np.arange(len(some)), [g.count for g in some])
+    names = ("mean", "rotation", "scale", "opacity", "sh")
+    whole = {n: np.concatenate([getattr(g, n) for g in some]) for n in names}
+    return Gaussians(**whole), owner
+
+
+def eyes(count=16, focal=168.0, centre=(0.0, 0.0, 0.5)):
+    return tuple(
+        c
+        for c in around(2 * count, (192, 192), 3.5, focal, np.array(centre))
+        if c.world_from_camera[2, 3] > 0.8
+    )
+
+
+def shape(solid):
+    return Shape(Mesh(solid.vertices, solid.triangles))
+
+
+def box(low, high):
+    return trimesh.creation.box(bounds=[low, high])
+
+
+def test_a_ball_on_the_floor_becomes_a_closed_ball():
+    ball = trimesh.creation.icosphere(4, 0.5).apply_translation([0, 0, 0.5])
+    gaussians, owner = together(clad(ball))
+    (solid,) = solids(gaussians, owner, eyes(), threads=1)
+    assert shape(solid).closed and not solid.warnings
+    away = np.abs(np.linalg.norm(solid.vertices - [0, 0, 0.5], axis=1) - 0.5)
+    assert np.mean(away) < 0.5 * PIXEL
+    assert solid.volume == pytest.approx(ball.volume, rel=4 * PIXEL)
+    np.testing.assert_allclose(solid.colours, np.tile([0.8, 0.3, 0.1], (len(away), 1)), atol=0.03)
+    near = np.linalg.norm(gaussians.mean[solid.gaussian_of_vertex] - solid.vertices, axis=1)
+    assert near.max() < 0.12
+
+
+def test_what_stands_on_the_floor_is_closed_by_it():
+    cube = box([-0.4, -0.4, 0], [0.4, 0.4, 0.8])
+    gaussians, owner = together(clad(cube))
+    bare = gaussians.mean[:, 2] > 0.01  # nobody ever saw it from below
+    kept = {n: getattr(gaussians, n)[bare] for n in ("mean", "rotation", "scale", "opacity", "sh")}
+    (solid,) = solids(Gaussians(**kept), owner[bare], eyes(), threads=1)
+    assert solid.vertices[:, 2].min() > -1e-9
+    low = (solid.vertices[:, 2] < 0.1 * solid.cell) & (
+        np.abs(solid.vertices[:, :2]).max(axis=1) < 0.35
+    )
+    np.testing.assert_allclose(solid.vertices[low, 2], 0, atol=1e-9)
+    assert low.sum() > 100
+    assert solid.volume == pytest.approx(0.512, rel=0.06)
+    assert shape(solid).closed
+
+
+def test_a_bowl_stays_open():
+    outer = trimesh.creation.icosphere(4, 0.6).apply_translation([0, 0, 0.6])
+    inner = trimesh.creation.icosphere(4, 0.45).apply_translation([0, 0, 0.6])
+    bowl = trimesh.boolean.difference(
+        [outer, inner, box([-1, -1, 0.6], [1, 1, 2])], engine="manifold"
+    )
+    gaussians, owner = together(clad(bowl, 6000))
+    (solid,) = solids(gaussians, owner, eyes(20), threads=1)
+    inside = shape(solid).inside(
+        np.array([[0, 0, 0.5], [0, 0, 0.3], [0, 0, 0.07], [0.525, 0, 0.5]])
+    )
+    assert inside.tolist() == [False, False, True, True]
+    assert solid.volume == pytest.approx(bowl.volume, rel=0.15)
+    assert shape(solid).closed
+
+
+@pytest.mark.slow
+def test_what_stands_on_legs_is_hollow_below():
+    legs = [box([x - 0.04, y - 0.04, 0], [x + 0.04, y + 0.04, 0.6]) for x, y in LEGS]
+    table = trimesh.boolean.union([box([-0.5, -0.5, 0.6], [0.5, 0.5, 0.7]), *legs])
+    gaussians, owner = together(clad(table, 8000))
+    (solid,) = solids(gaussians, owner, eyes(20), threads=1)
+    points = np.array([[x, y, z] for x, y in LEGS for z in (0.1, 0.3, 0.5)])
+    assert shape(solid).inside(points).all()
+    assert not shape(solid).inside(np.array([[0, 0, 0.1], [0, 0, 0.3], [0.2, 0, 0.4]])).any()
+    assert shape(solid).closed and not solid.warnings
+
+
+LEGS = [(x, y) for x in (-0.44, 0.44) for y in (-0.44, 0.44)]
+
+
+def test_every_place_in_touching_things_belongs_to_one_of_them():
+    below, above = (
+        box([-0.5, -0.5, 0], [0.5, 0.5, 0.4]),
+        box([-0.25, -0.25, 0.4], [0.25, 0.25, 0.9]),
+    )
+    gaussians, owner = together(clad(below, 5000), clad(above, 3000))
+    hidden = (np.abs(gaussians.mean[:, 2] - 0.4) < 1e-3) & (
+        np.abs(gaussians.mean[:, :2]).max(axis=1) < 0.25
+    )
+    names = ("mean", "rotation", "scale", "opacity", "sh")
+    kept = {n: getattr(gaussians, n)[~hidden] for n in names}
+    one, two = solids(Gaussians(**kept), owner[~hidden], eyes(20), threads=1)
+    places = np.random.default_rng(0).uniform([-0.5, -0.5, 0], [0.5, 0.5, 0.9], (40000, 3))
+    in_one, in_two = shape(one).inside(places), shape(two).inside(places)
+    assert (in_one & in_two).mean() < 0.002
+    assert one.volume == pytest.approx(below.volume, rel=0.08)
+    assert two.volume == pytest.approx(above.volume, rel=0.08)
+
+
+@pytest.mark.slow
+def test_floor_and_background_are_no_things_but_hide_what_is_behind():
+    ball = trimesh.creation.icosphere(4, 0.4).apply_translation([0, 0, 0.4])
+    ground = box([-1.5, -1.5, -0.05], [1.5, 1.5, 0.0])
+    gaussians, owner = together(clad(ball), clad(ground, 6000))
+    owner = np.where(owner == 1, -1, owner)
+    (solid,) = solids(gaussians, owner, eyes(), threads=1)
+    assert solid.volume == pytest.approx(ball.volume, rel=5 * PIXEL)
+    assert np.abs(solid.vertices[:, :2]).max() < 0.4 + PIXEL
+
+
+@pytest.mark.slow
+def test_a_splat_without_cameras_is_looked_at_from_a_dome():
+    ball = trimesh.creation.icosphere(4, 0.5).apply_translation([3, -2, 0.5])
+    gaussians, owner = together(clad(ball))
+    (solid,) = solids(gaussians, owner, threads=1)
+    assert solid.volume == pytest.approx(ball.volume, rel=0.05)
+
+
+def test_specks_in_the_air_are_left_out():
+    ball = trimesh.creation.icosphere(4, 0.4).apply_translation([0, 0, 0.4])
+    speck = trimesh.creation.icosphere(2, 0.05).apply_translation([0.5, 0.3, 0.9])
+    gaussians, owner = together(clad(ball), clad(speck, 200))
+    (solid,) = solids(gaussians, 0 * owner, eyes(), threads=1)
+    assert solid.vertices[:, 2].max() < 0.82 and not solid.warnings
+
+
+@pytest.mark.slow
+def test_the_number_of_threads_changes_nothing():
+    gaussians, owner = together(
+        clad(trimesh.creation.icosphere(3, 0.5).apply_translation([0, 0, 0.5]))
+    )
+    (one,), (two,) = (solids(gaussians, owner, eyes(8), threads=n) for n in (1, 3))
+    np.testing.assert_array_equal(one.vertices, two.vertices)
+    np.testing.assert_array_equal(one.colours, two.colours)
+
+
+def test_an_object_without_gaussians_is_named():
+    gaussians, owner = together(clad(trimesh.creation.icosphere(2, 0.5), 200))
+    with pytest.raises(UserError, match="object 0"):
+        solids(gaussians, owner + 1, eyes(8))
+    with pytest.raises(UserError, match="no object"):
+        solids(gaussians, owner - 1, eyes(8))
+
+
+def test_an_object_that_is_only_haze_is_named():
+    ball = trimesh.creation.icosphere(2, 0.3)
+    solid = clad(ball.copy().apply_translation([0, 0, 0.3]), 800)
+    haze = clad(ball.copy().apply_translation([0.8, 0, 0.3]), 800)
+    haze = replace(haze, opacity=np.full(haze.count, 1e-4))
+    gaussians, owner = together(solid, haze)
+    with pytest.raises(UserError, match="object 1"):
+        solids(gaussians, owner, eyes(8), threads=1)
