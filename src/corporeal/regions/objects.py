@@ -16,12 +16,18 @@ from scipy.sparse.csgraph import connected_components
 from corporeal.errors import UserError
 from corporeal.geometry.local_shape import neighbours
 from corporeal.regions.cuts import Cut, Graph, cut
+from corporeal.regions.masks import agreement
 from corporeal.regions.patches import Borders, Patches, concavity, difference, joined, patches
 from corporeal.regions.reduce import reduced
+from corporeal.regions.stacks import stacked
 from corporeal.types import Cloud
 
 LEAST_UNLIKE = 0.04
 """Differences of looks are told from this on, however much alike all is."""
+LEAST_HELD = 1e-9
+"""Of a border's weight: nothing is cut for nothing."""
+DOUBTFUL = 1.3
+"""Cuts whose scores differ by less than this factor are equally good."""
 MOST = 200
 """Things in one scene."""
 
@@ -37,6 +43,8 @@ class ObjectsConfig:
     mean square difference between neighbours."""
     concave: float = 0.2
     """Inward fold at which two patches hold together by e^-1/2: roughly the sine of the angle."""
+    disagreement: float = 0.3
+    """Share of views that take two patches for two things at which they hold together by e^-1/2."""
     narrowest: float = 0.003
     """Share of all borders that a cut counts for at least, so that crumbs are not cut off."""
     apart: float = 0.018
@@ -64,14 +72,17 @@ def objects(
     cloud: Cloud,
     count: int | None = None,
     normals: Float[np.ndarray, "N 3"] | None = None,
+    masks: Int[np.ndarray, "V N"] | None = None,
     config: ObjectsConfig = DEFAULT,
 ) -> Split:
     """Tell things apart that may touch.
 
     Args:
-        cloud: Points with features; what they are, ``semantic``, decides.
+        cloud: Points with features; ``semantic`` decides, or ``structural`` where that is empty.
         count: How many things there are, if somebody said so.
-        normals: Unit, outward; None: found from the points.
+        normals: Unit, outward; None: found from the points, which is less sure.
+        masks: What each view takes each point for, where somebody drew instance masks (see
+            ``masks.lifted``); -1: not said.
         config: How things are told apart.
 
     Raises:
@@ -79,20 +90,28 @@ def objects(
 
     """
     _check(cloud, count)
-    look = reduced(cloud.semantic)
+    look = reduced(cloud.semantic if cloud.semantic.shape[1] else cloud.structural)
     found, meeting = patches(cloud.position, look, normals, config.patches)
-    whole = joined(found, meeting)
-    graph = _graph(found, whole, config)
-    thing, _ = _cut(graph, count, config)
-    order = np.argsort(-np.bincount(thing, found.size), kind="stable")
-    rank = np.empty(len(order), np.int64)
-    rank[order] = np.arange(len(order))
-    thing = rank[thing]
+    borders = joined(found, meeting)
+    held = _held(found, borders, config)
+    if masks is not None:
+        said = agreement(masks, found, borders)
+        held = held * np.exp(-(((1 - said) / config.disagreement) ** 2) / 2)
+    graph = Graph(
+        borders.first,
+        borders.second,
+        borders.length * np.maximum(held, LEAST_HELD),
+        borders.length,
+        found.size.astype(np.float64),
+        found.look.astype(np.float64),
+    )
+    thing, cuts = _cut(graph, count, config)
+    thing = _by_size(thing, found.size)
     return Split(
         thing[found.of_point],
         _confidence(graph, thing)[found.of_point],
-        _warnings(count, len(order)),
-        "superpoints cut by look and concavity",
+        (*_counted(count, int(thing.max()) + 1), *_doubts(found, thing, cuts)),
+        "look and concavity" + (" and instance masks" if masks is not None else ""),
     )
 
 
@@ -106,11 +125,15 @@ def components(position: Float[np.ndarray, "N 3"], k: int = 20) -> Int[np.ndarra
     graph = csr_array(
         (np.ones(near.size, np.int8), (rows, near.ravel())), shape=(len(position),) * 2
     )
-    piece = connected_components(graph, directed=False)[1]
-    order = np.argsort(-np.bincount(piece), kind="stable")
+    return _by_size(connected_components(graph, directed=False)[1])
+
+
+def _by_size(number: np.ndarray, size: np.ndarray | None = None) -> np.ndarray:
+    """Return groups numbered anew, the largest first."""
+    order = np.argsort(-np.bincount(number, size), kind="stable")
     rank = np.empty(len(order), np.int64)
     rank[order] = np.arange(len(order))
-    return rank[piece]
+    return rank[number]
 
 
 def _check(cloud: Cloud, count: int | None) -> None:
@@ -123,42 +146,34 @@ def _check(cloud: Cloud, count: int | None) -> None:
         )
 
 
-def _graph(found: Patches, borders: Borders, config: ObjectsConfig) -> Graph:
-    """Weigh borders: w = length exp(-(difference / δ)² / 2 - (concavity / c)² / 2)."""
+def _held(found: Patches, borders: Borders, config: ObjectsConfig) -> np.ndarray:
+    """Return how well patches hold together: exp(-(difference / δ)² / 2 - (concavity / c)² / 2)."""
     unlike, fold = difference(found, borders), np.maximum(concavity(found, borders), 0)
     usual = np.sqrt(np.average(unlike**2, weights=borders.length)) if len(unlike) else 0.0
     scale = config.unlike * max(float(usual), LEAST_UNLIKE)
-    holds = np.exp(-((unlike / scale) ** 2) / 2 - (fold / config.concave) ** 2 / 2)
-    return Graph(
-        borders.first,
-        borders.second,
-        borders.length * np.maximum(holds, 1e-9),
-        borders.length,
-        found.size.astype(np.float64),
-        found.look.astype(np.float64),
-    )
+    return np.exp(-((unlike / scale) ** 2) / 2 - (fold / config.concave) ** 2 / 2)
 
 
-def _cut(graph: Graph, count: int | None, config: ObjectsConfig) -> tuple[np.ndarray, list[float]]:
+def _cut(graph: Graph, count: int | None, config: ObjectsConfig) -> tuple[np.ndarray, list[Cut]]:
     """Cut where it costs least until there are ``count`` things, or until it costs too much."""
     thing = np.zeros(len(graph.size), np.int64)
-    open_cuts: dict[int, Cut | None] = {0: cut(graph, config.narrowest)}
-    scores = []
-    while count is None or len(open_cuts) < count:
-        possible = {k: found.score for k, found in open_cuts.items() if found is not None}
-        if not possible or len(open_cuts) == MOST:
+    possible = {0: cut(graph, config.narrowest)}
+    made: list[Cut] = []
+    while count is None or len(possible) < count:
+        scores = {k: found.score for k, found in possible.items() if found is not None}
+        if not scores or len(possible) == MOST:
             break
-        k = min(possible, key=possible.__getitem__)
-        if count is None and possible[k] > config.apart:
+        k = min(scores, key=scores.__getitem__)
+        if count is None and scores[k] > config.apart:
             break
-        scores.append(possible[k])
-        found, own = open_cuts[k], np.flatnonzero(thing == k)
+        found, own, new = possible[k], np.flatnonzero(thing == k), len(possible)
         assert found is not None
-        thing[own[found.side]] = new = len(open_cuts)
+        made.append(found)
+        thing[own[found.side]] = new
         for piece in (k, new):
             nodes = np.flatnonzero(thing == piece)
-            open_cuts[piece] = cut(graph.only(nodes), config.narrowest)
-    return thing, scores
+            possible[piece] = cut(graph.only(nodes), config.narrowest)
+    return thing, made
 
 
 def _confidence(graph: Graph, thing: np.ndarray) -> np.ndarray:
@@ -170,10 +185,30 @@ def _confidence(graph: Graph, thing: np.ndarray) -> np.ndarray:
     return np.where(own + other > 0, own / np.maximum(own + other, 1e-300), 1.0)
 
 
-def _warnings(count: int | None, found: int) -> tuple[str, ...]:
+def _counted(count: int | None, found: int) -> list[str]:
     if count is None:
-        return (
+        return [
             f"Nobody said how many things there are: {found} were counted by where the scene is "
-            "narrow. Say the number where it is known.",
+            "narrow, look and notches. Say the number where it is known."
+        ]
+    if found < count:
+        return [f"{count} things are to be found; there are points for {found} only."]
+    return []
+
+
+def _doubts(found: Patches, thing: np.ndarray, cuts: list[Cut]) -> list[str]:
+    """Say where another answer is nearly as good, and where things are too thin to be sure of."""
+    told = []
+    if any(made.other < DOUBTFUL * made.score for made in cuts):
+        told.append(
+            "Things could be told apart in quite another way that is nearly as good. Instance "
+            "masks would decide."
         )
-    return ()
+    thin = stacked(found, thing)
+    if thin:
+        told.append(
+            f"{thin} of the things {'lies' if thin == 1 else 'lie'} flat on or under another and "
+            f"{'is' if thin == 1 else 'are'} thin. Where such things meet little is seen, and "
+            "stacks of them are often told apart wrongly. Instance masks would decide."
+        )
+    return told

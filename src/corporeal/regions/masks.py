@@ -1,0 +1,72 @@
+"""Instance masks on views, brought to points: what each view takes each point for.
+
+Numbers need not mean the same from view to view: what counts is whether two points have one number
+where both are seen. Some views take two things for one, some take one for several; over all views,
+what belongs together mostly has one number.
+"""
+
+from collections.abc import Callable, Sequence
+from typing import cast
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.sparse import csr_array
+
+from corporeal.errors import UserError
+from corporeal.regions.patches import Borders, Patches
+
+
+def lifted(
+    weights: Callable[[int], csr_array], labels: Sequence[Int[np.ndarray, "H W"]], count: int
+) -> Int[np.ndarray, "V N"]:
+    """Return the label that most of each point's weight falls on in each view; -1: none.
+
+    Args:
+        weights: View → how much each pixel (columns, row by row) belongs to each point (rows).
+        labels: Of each view, the instance that each pixel shows; -1: none.
+        count: Number of points N.
+
+    Raises:
+        UserError: A view's labels and weights are of different sizes.
+
+    """
+    made = np.full((len(labels), count), -1, np.int64)
+    for view, label in enumerate(labels):
+        share, flat = weights(view), np.asarray(label).ravel()
+        points, pixels = cast("tuple[int, int]", share.shape)
+        if (points, pixels) != (count, len(flat)):
+            raise UserError(
+                f"View {view}'s mask has {' x '.join(map(str, np.shape(label)))} pixels; its "
+                f"weights are of {points} points and {pixels} pixels, for {count} points. Make "
+                "masks as large as the pictures."
+            )
+        known, number = np.unique(flat, return_inverse=True)
+        votes = share @ np.eye(len(known))[number.ravel()]
+        made[view] = np.where(votes.any(axis=1), known[votes.argmax(axis=1)], -1)
+    return made
+
+
+def agreement(
+    label_of_point: Int[np.ndarray, "V N"], found: Patches, borders: Borders
+) -> Float[np.ndarray, " E"]:
+    """Return how often two patches that meet have one label where both are seen, in [0, 1].
+
+    1 where no view shows both: nobody says that they are not one.
+    """
+    same, both = np.zeros(len(borders.first)), np.zeros(len(borders.first))
+    for labels in label_of_point:
+        shares = _shares(labels, found)
+        first, second = shares[borders.first], shares[borders.second]
+        same += np.asarray(first.multiply(second).sum(axis=1)).ravel()
+        both += np.asarray(first.sum(axis=1) * second.sum(axis=1)).ravel()
+    return np.where(both > 0, same / np.where(both > 0, both, 1), 1.0)
+
+
+def _shares(labels: np.ndarray, found: Patches) -> csr_array:
+    """Return the share of each label among each patch's labelled points; patches without: 0."""
+    seen = np.flatnonzero(labels >= 0)
+    known, number = np.unique(labels[seen], return_inverse=True)
+    shape = len(found.size), max(len(known), 1)
+    counted = csr_array((np.ones(len(seen)), (found.of_point[seen], number)), shape=shape)
+    total = np.asarray(counted.sum(axis=1)).ravel()
+    return csr_array(counted.multiply(1 / np.maximum(total, 1)[:, None]))
