@@ -11,11 +11,12 @@ from test_plan import pool
 
 from corporeal import store
 from corporeal.corpus.breakdown import breakdowns, credits, total
-from corporeal.corpus.collect import RIGID, collect, hops, measures
+from corporeal.corpus.collect import RIGID, collect, measures
 from corporeal.corpus.manifest import Row
 from corporeal.corpus.plan import CorpusConfig, plan, write_plan
 from corporeal.corpus.report import report_corpus
 from corporeal.errors import UserError
+from corporeal.settle.rehearsal import hops
 
 SETTINGS = {
     "ground": {"library": "default"},
@@ -136,11 +137,11 @@ def test_what_an_interaction_promises_must_have_happened():
 
 
 def test_a_chain_is_one_only_when_what_was_struck_strikes_a_third():
-    assert hops([("a", "b"), ("b", "c")], ["a"]) == 2
-    assert hops([("b", "a"), ("c", "b"), ("d", "c")], ["a"]) == 3
-    assert hops([("a", "b"), ("c", "a")], ["a"]) == 1, "the first one struck both"
-    assert hops([("b", "c"), ("a", "b")], ["a"]) == 1, "those two met before anything reached them"
-    assert hops([], ["a"]) == hops([("a", "b")], []) == 0
+    assert hops([("a", "b"), ("b", "c")], ["a"]) == {"a": 0, "b": 1, "c": 2}
+    assert hops([("b", "a"), ("c", "b"), ("d", "c")], ["a"])["d"] == 3
+    assert hops([("a", "b"), ("c", "a")], ["a"])["c"] == 1, "the first one struck both"
+    assert "c" not in hops([("b", "c"), ("a", "b")], ["a"]), "they met before they were reached"
+    assert hops([], ["a"]) == {"a": 0} and hops([("a", "b")], []) == {}
 
 
 def test_the_showcase_is_judged_by_its_own_expectations():

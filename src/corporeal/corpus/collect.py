@@ -15,6 +15,7 @@ from corporeal.materials import library
 from corporeal.mpm.audit import breaches
 from corporeal.render.colours import LAWS
 from corporeal.settle.interactions import Kind
+from corporeal.settle.rehearsal import hops
 from corporeal.types import Law
 
 SWAY = 1e-3
@@ -222,24 +223,7 @@ def _seen(kind: Kind, happened: Mapping[str, Any], landed: int, sent: Sequence[s
             max(t["moved_level_m"], t["deepest_squeeze_m"]) for t in happened["objects"].values()
         )
         return max(moves, default=0.0) > SWAY
-    return hops(met, sent) > 1 if kind == "chain" else len(met) > 0
-
-
-def hops(met: Sequence[Sequence[str]], sent: Sequence[str]) -> int:
-    """Count how far a blow was passed on: 1 for what was struck, 2 for what that struck.
-
-    Args:
-        met: Pairs of objects in the order in which they met.
-        sent: Objects that were moving at the start.
-
-    """
-    reached = dict.fromkeys(sent, 0)
-    for a, b in met:
-        for one, other in ((a, b), (b, a)):
-            if one in reached and other not in reached:
-                reached[other] = reached[one] + 1
-                break
-    return max(reached.values(), default=0)
+    return max(hops(met, sent).values(), default=0) > 1 if kind == "chain" else len(met) > 0
 
 
 # ---------------------------------------------------------------- parts

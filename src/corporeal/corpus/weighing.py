@@ -20,7 +20,7 @@ from corporeal.stages.segment import segment
 
 FOLDER = "matter"
 """Of a pool: what its things weigh."""
-VERSION = 1
+VERSION = 2
 """Of the way things are weighed: kept results of another version are made anew."""
 
 
@@ -45,7 +45,8 @@ def weigh(asset: Asset, extent: float, folder: Path | None = None) -> Matter:
     kept = folder / FOLDER / f"{name}.json" if folder else None
     if kept and kept.exists():
         found = store.read_json(kept)
-        return Matter(found["mass"], np.array(found["centre"]), np.array(found["inertia"]))
+        centre, inertia = np.array(found["centre"]), np.array(found["inertia"])
+        return Matter(found["mass"], centre, inertia, found["friction"])
     matter = _weighed(asset, extent, config)
     if kept:
         kept.parent.mkdir(parents=True, exist_ok=True)
@@ -59,7 +60,10 @@ def _weighed(asset: Asset, extent: float, config: FillConfig) -> Matter:
     scene = replace(scene, objects=(thing,))
     inventory = describe(scene)
     parts = segment(scene, inventory)
-    particles = fill(scene, parts, ground(scene, parts, inventory), config)
+    field = ground(scene, parts, inventory)
+    particles = fill(scene, parts, field, config)
     corners = np.concatenate([s.vertices for s in scene.surfaces])
     middle = 0.5 * (corners.min(axis=0) + corners.max(axis=0))
-    return matter_of(particles.position - middle, particles.mass, np.cbrt(particles.volume))
+    matter = matter_of(particles.position - middle, particles.mass, np.cbrt(particles.volume))
+    # Which part it will stand on is not known yet: the roughest holds it best.
+    return replace(matter, friction=float(field.friction[:-1, -1].max()))

@@ -10,6 +10,7 @@ from typing import Literal, get_args
 
 import fcl
 import numpy as np
+from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from corporeal.errors import UnknownChoiceError
@@ -38,7 +39,8 @@ def arrange(
     Args:
         bodies: At least one.
         arrangement: ``scatter``: side by side; ``stack``: one above the other, below what carries
-            most; ``onto``: all above that one; ``row``: in a line along +x, heavy ones first.
+            most; ``onto``: all above that one; ``row``: in a line along +x, heavy ones first,
+        broadside on.
         rng: Source of what is left to chance.
 
     """
@@ -46,6 +48,11 @@ def arrange(
     if arrangement not in ways:
         raise UnknownChoiceError("arrangement", arrangement, list(get_args(Arrangement)))
     return ways[arrangement](bodies, rng)
+
+
+def standing_alone(body: Body) -> Pose:
+    """Return how a body stands on the floor, upright where it can, its centre above the origin."""
+    return _on_floor(body, _down(_standing(body).down), 0.0)
 
 
 def _gap(body: Body, bodies: Sequence[Body]) -> float:
@@ -95,11 +102,11 @@ def _piled(
 
 
 def _row(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
-    order = sorted(range(len(bodies)), key=lambda k: -bodies[k].volume * bodies[k].density)
+    order = sorted(range(len(bodies)), key=lambda k: -bodies[k].mass)
     room, back = _Room(), np.array([-1.0, 0.0, 0.0])
     for k in order:
         body = bodies[k]
-        pose = _on_floor(body, _stood(_standing(body), rng), _gap(body, bodies))
+        pose = _on_floor(body, _broadside(body, _standing(body), rng), _gap(body, bodies))
         room.bring(k, body.hull, pose, back, rng.uniform(0.1, 0.2) * body.extent)
     return room.poses()
 
@@ -125,8 +132,24 @@ def _stood(stance: Stance, rng: np.random.Generator) -> np.ndarray:
     return _yaw(rng) @ _down(stance.down)
 
 
+def _broadside(body: Body, stance: Stance, rng: np.random.Generator) -> np.ndarray:
+    """With its narrowest width along x, turned about by chance: like a domino.
+
+    Flat sides then face each other, a blow goes through the middle, and what is tall topples on.
+    """
+    rotation = _down(stance.down)
+    outline = (body.hull.vertices @ rotation.T)[:, :2]
+    normal = ConvexHull(outline).equations[:, :2]
+    narrow = normal[np.argmin(np.ptp(outline @ normal.T, axis=0))]
+    return _turn(np.pi * int(rng.integers(2)) - np.arctan2(narrow[1], narrow[0])) @ rotation
+
+
 def _yaw(rng: np.random.Generator) -> np.ndarray:
-    angle = rng.uniform(0, 2 * np.pi)
+    return _turn(rng.uniform(0, 2 * np.pi))
+
+
+def _turn(angle: float) -> np.ndarray:
+    """Return a rotation about the vertical."""
     c, s = np.cos(angle), np.sin(angle)
     return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
 

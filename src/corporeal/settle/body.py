@@ -15,6 +15,8 @@ from corporeal.types import Vector
 
 Quaternion = tuple[float, float, float, float]
 
+FRICTION = 0.6
+"""Coulomb μ of what nothing is known of [-]."""
 FLATTEST = 1e-4
 """Of the extent: thickness that the hull of a flat body is given."""
 
@@ -94,6 +96,12 @@ class Body:
     def mass(self) -> float:
         """In kilograms."""
         return self.matter.mass if self.matter else self.volume * self.density
+
+    @property
+    def friction(self) -> float:
+        """Coulomb μ on the floor [-]."""
+        known = self.matter.friction if self.matter else None
+        return FRICTION if known is None else known
 
     @cached_property
     def centre(self) -> Float[np.ndarray, "3"]:

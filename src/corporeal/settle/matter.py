@@ -1,6 +1,6 @@
 """How the mass of a body lies, where more is known of it than its convex pieces say."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
@@ -16,11 +16,13 @@ class Matter:
     """[m]"""
     inertia: Float[np.ndarray, "3 3"]
     """About the centre [kg m²]."""
+    friction: float | None = None
+    """Coulomb μ of what it may slide on [-]; None: unknown."""
 
     def scaled(self, factor: float) -> "Matter":
         """Return that of a body of the same materials and another size, walls and all."""
         mass, inertia = self.mass * factor**3, self.inertia * factor**5
-        return Matter(mass, self.centre * factor, inertia)
+        return replace(self, mass=mass, centre=self.centre * factor, inertia=inertia)
 
 
 def matter_of(

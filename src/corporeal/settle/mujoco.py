@@ -20,7 +20,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.settle.body import Body, Pose, unit_of
+from corporeal.settle.body import FRICTION, Body, Pose, unit_of
 from corporeal.settle.hull import Piece
 from corporeal.settle.matter import Matter
 
@@ -48,7 +48,7 @@ class SettleConfig:
 
 
 DEFAULT = SettleConfig()
-SLIDING, SPIN, ROLL = 0.6, 0.02, 0.02
+SLIDING, SPIN, ROLL = FRICTION, 0.02, 0.02
 """Coefficients of friction: against sliding [-], turning about the normal [unit], and rolling, of a
 body's extent."""
 SOLREF = [0.008, 1.0]
@@ -130,6 +130,34 @@ class Engine:
         """Make contacts hard from now on."""
         self.model.opt.timestep = FIRM_STEP
         self.model.geom_solref[:, 0] = FIRM_SOLREF
+
+    def roughen(self, friction: Sequence[float]) -> None:
+        """Give every body, and where it meets others, its own friction; the rougher one counts."""
+        self.model.geom_friction[0, 0] = 0.0
+        for geom, body in enumerate(self.model.geom_bodyid):
+            if body > 0:
+                self.model.geom_friction[geom, 0] = friction[body - 1]
+
+    def send(self, number: int, velocity: Float[np.ndarray, "2"]) -> None:
+        """Let a body go along the floor with a velocity [m/s]."""
+        self.data.qvel.reshape(self.count, 6)[number, :2] = velocity / self.unit**0.5
+
+    def speed(self) -> float:
+        """Largest speed of any body's origin [unit/s]."""
+        return float(np.linalg.norm(self.data.qvel.reshape(self.count, 6)[:, :3], axis=1).max())
+
+    def near(self, distance: float) -> set[tuple[int, int]]:
+        """Pairs of bodies that are no farther apart than that [unit]."""
+        self.model.geom_margin[:] = self.model.geom_gap[:] = distance
+        mujoco.mj_forward(self.model, self.data)
+        found = self.touching()
+        self.model.geom_margin[:] = self.model.geom_gap[:] = 0.0
+        return found
+
+    def touching(self) -> set[tuple[int, int]]:
+        """Pairs of bodies that touch now, the smaller number first."""
+        owners = self.model.geom_bodyid[self.data.contact.geom.reshape(-1, 2)] - 1
+        return {(int(min(p)), int(max(p))) for p in owners if min(p) >= 0}
 
     def moved(self, before: Float[np.ndarray, " Q"]) -> float:
         """How far at most any point of any body went since an earlier ``qpos`` [unit]."""

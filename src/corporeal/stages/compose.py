@@ -8,7 +8,7 @@ large), and ``views/`` (posed pictures).
 from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
-from typing import Literal, get_args
+from typing import Literal
 
 import numpy as np
 
@@ -22,14 +22,14 @@ from corporeal.geometry.sizes import Sizing, scene_extents
 from corporeal.pool.asset import UNKNOWN, Asset, Pool
 from corporeal.pool.draw import counts, draw
 from corporeal.settle.arrange import Arrangement
-from corporeal.settle.blender import BlenderError
+from corporeal.settle.begin import Settled, settle_and_begin
 from corporeal.settle.body import Body, Pose
+from corporeal.settle.breeze import slowest_wind
 from corporeal.settle.certificate import Certificate
 from corporeal.settle.decompose import decompose
-from corporeal.settle.interactions import KINDS, NEEDS, STANDING, Action, Kind, act
+from corporeal.settle.interactions import KINDS, NEEDS, STANDING, STORM, WIND, Action, Kind
 from corporeal.settle.matter import Matter
-from corporeal.settle.rest import RestConfig, SettlingEngine, at_rest
-from corporeal.types import Scene
+from corporeal.settle.rest import RestConfig, SettlingEngine
 from corporeal.vlm.sizes import RealExtent, real_extent, usual_sizes
 
 Progress = Callable[[float, str], None]
@@ -37,8 +37,6 @@ Weigh = Callable[[Asset, float], Matter]
 """Given an asset and its real extent [m], says how its mass lies: at that size, about the middle of
 its box."""
 
-TRIES = 6
-"""Compositions that are settled until one leaves room for its interaction."""
 FINEST = 48
 """Cells along the largest object at draft detail: half of one is the penetration allowed."""
 PIECES = "pieces"
@@ -116,12 +114,14 @@ def compose(
     tell(0.0, "choosing")
     kind = None if config.interaction in ("auto", "none") else config.interaction
     assets = _chosen(pool, config, kind, rng)
-    kind = kind or _possible_kind(config, len(assets), rng)
+    kinds: list[Kind] = [kind] if kind else _possible_kinds(config, len(assets), rng)
     sizes = _sized(assets, config)
     tell(0.1, "cutting into convex pieces")
     things = _weighed(_things(pool, assets, sizes, config.sizing), weigh)
     tell(0.3, "settling")
-    settled = _settled(things, kind, config, rng)
+    deepest = 0.5 * max(t.extent for t in things) / FINEST
+    bodies, rest = [t.body for t in things], RestConfig(engine=config.settle_with)
+    settled = settle_and_begin(bodies, config.arrangement, kinds, rng, (deepest, rest))
     tell(0.9, "writing")
     warnings = _write(folder, things, settled, config)
     told = tuple(dict.fromkeys([*(w for s in sizes for w in s.warnings), *warnings]))
@@ -130,18 +130,36 @@ def compose(
     return Composed(folder, names, settled.arrangement, settled.action, settled.certificate, told)
 
 
+def moved_by_wind(assets: Sequence[Asset], config: ComposeConfig, weigh: Weigh) -> bool:
+    """Tell whether any of the things of a scene could be moved by a wind, standing alone.
+
+    Args:
+        assets: What the scene is of.
+        config: How large things are.
+        weigh: Says how the mass of a thing lies.
+
+    """
+    real = [s.extent for s in _sized(assets, config)]
+    for asset, size, extent in zip(assets, real, scene_extents(real, config.sizing), strict=True):
+        points, triangles, _ = _shape(asset, float(extent))
+        matter = weigh(asset, size).scaled(float(extent) / size)
+        if WIND[1] * slowest_wind(Body(asset.name, points, triangles, (), matter=matter)) <= STORM:
+            return True
+    return False
+
+
 # ---------------------------------------------------------------- what is in it
 
 
-def _possible_kind(config: ComposeConfig, count: int, rng: np.random.Generator) -> Kind | None:
-    """Draw what is to happen among what so many things, standing as asked, can do."""
+def _possible_kinds(config: ComposeConfig, count: int, rng: np.random.Generator) -> list[Kind]:
+    """Return what so many things, standing as asked, can do, in an order of chance."""
     if config.interaction == "none":
-        return None
+        return []
     stands = config.arrangement
     able: list[Kind] = [
         k for k in KINDS if NEEDS[k] <= count and (count == 1 or stands in ("auto", *STANDING[k]))
     ]
-    return able[rng.integers(len(able))] if able else "fall"
+    return [able[k] for k in rng.permutation(len(able))] or ["fall"]
 
 
 def _chosen(
@@ -218,9 +236,7 @@ def _things(
     extents = scene_extents([s.extent for s in sizes], sizing)
     things = []
     for name, asset, size, extent in zip(names, assets, sizes, extents, strict=True):
-        vertices, triangles = _mesh(read_model(asset.file, "one").scene)
-        centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-        points = (vertices - centre) * (float(extent) / asset.extent)
+        points, triangles, centre = _shape(asset, float(extent))
         try:
             pieces = decompose(points, triangles, pool.folder / PIECES)
         except UserError as problem:
@@ -239,85 +255,21 @@ def _weighed(things: list[_Thing], weigh: Weigh | None) -> list[_Thing]:
     return [replace(t, body=b) for t, b in zip(things, bodies, strict=True)]
 
 
-def _mesh(scene: Scene) -> tuple[np.ndarray, np.ndarray]:
+def _shape(asset: Asset, extent: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Return vertices about the middle of the box [m], triangles, and that middle in the file."""
+    scene = read_model(asset.file, "one").scene
     start = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
     vertices = np.concatenate([s.vertices for s in scene.surfaces]).astype(np.float64)
     triangles = [s.triangles + k for s, k in zip(scene.surfaces, start, strict=False)]
-    return vertices, np.concatenate(triangles)
-
-
-# ---------------------------------------------------------------- how it stands, what happens
-
-
-@dataclass(frozen=True)
-class _Settled:
-    poses: list[Pose]
-    arrangement: Arrangement
-    action: Action | None
-    certificate: Certificate
-
-
-def _settled(
-    things: Sequence[_Thing], kind: Kind | None, config: ComposeConfig, rng: np.random.Generator
-) -> _Settled:
-    """Settle until things rest and what is to happen has room.
-
-    Where nobody asked for an arrangement, another one is tried when one finds no rest.
-    """
-    bodies = [t.body for t in things]
-    deepest = 0.5 * max(t.extent for t in things) / FINEST
-    trying = RestConfig(engine=config.settle_with)
-    ways = _arrangements(config, kind, len(things), rng)
-    reason = ""
-    for k in range(TRIES):
-        arrangement = ways[k % len(ways)]
-        try:
-            seed = int(rng.integers(2**31))
-            poses, certificate = at_rest(bodies, arrangement, seed, deepest, trying)
-        except BlenderError:
-            raise
-        except UserError as refusal:
-            reason = str(refusal)
-            ways.remove(arrangement)
-            if not ways:
-                break
-            continue
-        if kind is None:
-            return _Settled(poses, arrangement, None, certificate)
-        boxes = np.array([_box(t.body, p) for t, p in zip(things, poses, strict=True)])
-        action = act(boxes, [t.name for t in things], kind, rng)
-        if action is not None:
-            return _Settled(poses, arrangement, action, certificate)
-    names = ", ".join(t.name for t in things)
-    raise UserError(
-        reason
-        or f"{names}: no room for a {kind} in {TRIES} compositions. Try another --seed, another "
-        "--interaction, or other things."
-    )
-
-
-def _arrangements(
-    config: ComposeConfig, kind: Kind | None, count: int, rng: np.random.Generator
-) -> list[Arrangement]:
-    """Return the ways in which things may stand, in an order of chance."""
-    if config.arrangement != "auto":
-        return [config.arrangement]
-    if count == 1:
-        return ["scatter"]
-    ways: Sequence[Arrangement] = STANDING[kind] if kind else get_args(Arrangement)
-    return [ways[k] for k in rng.permutation(len(ways))]
-
-
-def _box(body: Body, pose: Pose) -> np.ndarray:
-    points = pose.world(body.hull.vertices)
-    return np.stack([points.min(axis=0), points.max(axis=0)])
+    centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
+    return (vertices - centre) * (extent / asset.extent), np.concatenate(triangles), centre
 
 
 # ---------------------------------------------------------------- written down
 
 
 def _write(
-    folder: Path, things: Sequence[_Thing], settled: _Settled, config: ComposeConfig
+    folder: Path, things: Sequence[_Thing], settled: Settled, config: ComposeConfig
 ) -> tuple[str, ...]:
     """Write ``scene.glb`` and ``scene.toml``; return what was left out of the files."""
     action = settled.action
@@ -357,7 +309,7 @@ def _member(thing: _Thing, pose: Pose) -> Member:
 def _keep(
     folder: Path,
     things: Sequence[_Thing],
-    settled: _Settled,
+    settled: Settled,
     config: ComposeConfig,
     warnings: tuple[str, ...],
 ) -> None:
