@@ -13,7 +13,7 @@ from corporeal.corpus.assemble import Sources, assemble_corpus, assembly, ways
 from corporeal.corpus.carry_out import Hands
 from corporeal.corpus.jobs import Job
 from corporeal.corpus.local import local
-from corporeal.corpus.plan import CorpusConfig, plan
+from corporeal.corpus.plan import CorpusConfig, plan, read_plan
 from corporeal.corpus.report import report_corpus
 from corporeal.corpus.run import RunConfig, forget, run_corpus, run_scene
 from corporeal.errors import UserError
@@ -106,7 +106,7 @@ def test_a_corpus_comes_out_of_a_pool_and_is_neither_made_nor_run_twice(tmp_path
     hands = Hands(lambda: local(2, 1, tmp_path / "logs"), silent, said.append)
     rows = assemble_corpus(tmp_path, few, sources, hands)
     assert {r.status for r in rows.values()} == {"finished"}, rows
-    for scene in plan(pool.assets, few).scenes:
+    for scene in read_plan(tmp_path).scenes:
         place = tmp_path / "scenes" / scene.name
         made = json.loads((place / "composition.json").read_text())
         assert made["interaction"] == scene.interaction

@@ -17,6 +17,7 @@ from corporeal.corpus.plan import (
     interactions_and_counts,
     plan,
     read_plan,
+    with_wind,
     write_plan,
 )
 from corporeal.errors import BadFileError, UserError
@@ -88,6 +89,26 @@ def test_every_plan_is_even_and_possible(scenes, classes, count, seed, repeat):
         assert [a.rpartition("_")[0] for a in scene.assets] == list(scene.classes)
         allowed = STANDING[scene.interaction] if scene.count > 1 else ("scatter",)
         assert scene.arrangement in allowed
+
+
+def test_wind_blows_where_it_moves_something_and_nothing_else_changes():
+    """Every second class is too heavy."""
+
+    def windy(names):
+        return any(int(name[1:3]) % 2 for name in names)
+
+    calm, blown = (plan(pool(20), CorpusConfig(seed=3), w) for w in (None, windy))
+    assert not all(windy(s.assets) for s in calm.scenes if s.interaction == "wind")
+    assert all(windy(s.assets) for s in blown.scenes if s.interaction == "wind")
+    assert [s.assets for s in blown.scenes] == [s.assets for s in calm.scenes]
+    for made in (calm, blown):
+        assert spread(Counter(s.interaction for s in made.scenes).values()) <= 1
+    assert all(s.count >= NEEDS[s.interaction] for s in blown.scenes) and not blown.messages
+
+
+def test_where_no_wind_moves_anything_things_fall_and_it_is_said():
+    kinds, said = with_wind(["wind", "fall"], [["anvil"], ["safe"]], lambda names: False)
+    assert kinds == ["fall", "fall"] and "No wind moves anvil" in said[0]
 
 
 def test_the_models_of_a_class_come_evenly():

@@ -20,6 +20,7 @@ from corporeal.corpus.plan import (
     CorpusConfig,
     Plan,
     PlannedScene,
+    Windy,
     plan,
     read_plan,
     write_plan,
@@ -33,11 +34,7 @@ from corporeal.formats.transforms import write_views
 from corporeal.pool.asset import Asset, Pool
 from corporeal.settle.interactions import KINDS, STANDING
 from corporeal.stages.capture import CaptureConfig, capture
-from corporeal.stages.compose import ComposeConfig, compose
-
-SEEDS = 2
-"""Other seeds that a planned scene is tried with."""
-"""Folder of a scene's posed pictures."""
+from corporeal.stages.compose import ComposeConfig, compose, moved_by_wind
 
 SEEDS = 2
 """Other seeds that a planned scene is tried with."""
@@ -71,13 +68,13 @@ def assemble_corpus(
 
     """
     with store.alone(folder):
-        made = _planned(folder, config, sources.pool)
+        made = _planned(folder, config, sources)
         for message in made.messages:
             hands.say(message)
         return carry_out(folder, "assemble", assembly(folder, made, sources), hands)
 
 
-def _planned(folder: Path, config: CorpusConfig, pool: Pool | None) -> Plan:
+def _planned(folder: Path, config: CorpusConfig, sources: Sources) -> Plan:
     if (folder / PLAN).exists():
         made = read_plan(folder)
         if made.config != config:
@@ -86,9 +83,15 @@ def _planned(folder: Path, config: CorpusConfig, pool: Pool | None) -> Plan:
                 f"folder, or delete {folder / PLAN} and what was made from it."
             )
         return made
-    made = plan(pool.assets if pool else (), config)
+    pool = sources.pool
+    made = plan(pool.assets, config, _windy(pool, sources.composing)) if pool else plan((), config)
     write_plan(folder, made)
     return made
+
+
+def _windy(pool: Pool, composing: ComposeConfig) -> Windy:
+    weigher = partial(weigh, folder=pool.folder)
+    return lambda names: moved_by_wind(_assets(pool, names), composing, weigher)
 
 
 def assembly(folder: Path, made: Plan, sources: Sources) -> list[Job]:

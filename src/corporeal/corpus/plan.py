@@ -1,12 +1,13 @@
 """Which scenes a corpus has: how many objects of which classes, how they stand, what happens.
 
 Everything is balanced and drawn by deficit: classes, models of a class, object counts, interaction
-kinds and arrangements each come out even to within one, as far as their needs allow. A plan
-follows from the pool and the seed alone; it is written to ``corpus.json``.
+kinds and arrangements each come out even to within one, as far as their needs allow. Wind blows
+where it moves something. A plan follows from the pool and the seed alone; it is written to
+``corpus.json``.
 """
 
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Literal
@@ -24,6 +25,9 @@ from corporeal.showcase.scenes import SCENES
 PLAN = "corpus.json"
 MOST = 10_000
 """Scenes of one corpus."""
+
+Windy = Callable[[Sequence[str]], bool]
+"""Given the models of a scene, says whether a wind could move any of them."""
 
 SHOWCASE: Mapping[str, Kind] = {
     "duck-on-mud": "fall-onto",
@@ -84,12 +88,13 @@ class Plan:
     """What could not be as asked for."""
 
 
-def plan(models: Sequence[Asset], config: CorpusConfig) -> Plan:
+def plan(models: Sequence[Asset], config: CorpusConfig, windy: Windy | None = None) -> Plan:
     """Plan a corpus.
 
     Args:
         models: The pool's assets; not looked at for the showcase.
         config: What is asked for.
+        windy: Says what the wind can move; None: everything.
 
     Raises:
         UserError: The pool is empty, or a number makes no sense.
@@ -116,8 +121,12 @@ def plan(models: Sequence[Asset], config: CorpusConfig) -> Plan:
         left_out = ", ".join(k for k in KINDS if k not in kinds)
         messages.append(f"No {left_out}: that takes more than {most} in a scene.")
     pairs = interactions_and_counts(config.scenes, kinds, (least, most), rng)
-    drawn = _fill(pairs, classes, by_class, config.repeat, rng)
-    return Plan(config, tuple(drawn), tuple(messages))
+    sets = _sets([n for _, n in pairs], classes, by_class, config.repeat, rng)
+    happens: Sequence[Kind] = [k for k, _ in pairs]
+    if windy:
+        happens, said = with_wind(happens, [assets for _, assets in sets], windy)
+        messages += said
+    return Plan(config, tuple(_scenes(happens, sets, rng)), tuple(messages))
 
 
 def write_plan(folder: Path, made: Plan) -> None:
@@ -216,29 +225,76 @@ def _alike(kinds: Sequence[Kind]) -> list[list[Kind]]:
     return [[k for k in kinds if NEEDS[k] == n] for n in needs]
 
 
-def _fill(
-    pairs: Sequence[tuple[Kind, int]],
+def with_wind(
+    kinds: Sequence[Kind], sets: Sequence[Sequence[str]], windy: Windy
+) -> tuple[list[Kind], list[str]]:
+    """Let wind blow where it moves something.
+
+    A scene in which it would move nothing changes its interaction with another one, of as many
+    objects where there is one; where none can, its things fall instead.
+
+    Args:
+        kinds: What is to happen in every scene.
+        sets: The models of every scene.
+        windy: Says what the wind can move.
+
+    Returns:
+        What happens, and what is to be told.
+
+    """
+    happens, messages = list(kinds), []
+    for k in [k for k, kind in enumerate(kinds) if kind == "wind" and not windy(sets[k])]:
+        others = [
+            n
+            for n, kind in enumerate(happens)
+            if kind != "wind" and NEEDS[kind] <= len(sets[k]) and windy(sets[n])
+        ]
+        other = min(others, key=lambda n: abs(len(sets[n]) - len(sets[k])), default=None)
+        if other is None:
+            happens[k] = "fall"
+            messages.append(f"No wind moves {' or '.join(sets[k])}: a fall instead.")
+        else:
+            happens[k], happens[other] = happens[other], happens[k]
+    return happens, messages
+
+
+Drawn = tuple[list[str], list[str]]
+"""Classes and models of a scene."""
+
+
+def _sets(
+    numbers: Sequence[int],
     classes: Sequence[str],
     by_class: Mapping[str, Sequence[str]],
     repeat: bool,
     rng: np.random.Generator,
-) -> list[PlannedScene]:
-    """Draw classes, models, an arrangement and a seed for every scene."""
+) -> list[Drawn]:
+    """Draw classes, and a model of each, for every scene."""
     of_class: Counter[str] = Counter()
     of_asset: Counter[str] = Counter()
-    of_arrangement: Counter[str] = Counter()
-    digits = len(str(len(pairs) - 1))
-    made = []
-    for number, (kind, count) in enumerate(pairs):
+    drawn = []
+    for count in numbers:
         mine = draw(classes, of_class, count, rng, repeat)
         of_class.update(mine)
         assets = []
         for name in mine:
             assets += draw(by_class[name], of_asset, 1, rng)
             of_asset.update(assets[-1:])
-        stands = STANDING[kind] if count > 1 else ("scatter",)
+        drawn.append((mine, assets))
+    return drawn
+
+
+def _scenes(
+    kinds: Sequence[Kind], sets: Sequence[Drawn], rng: np.random.Generator
+) -> list[PlannedScene]:
+    """Draw an arrangement and a seed for every scene."""
+    of_arrangement: Counter[str] = Counter()
+    digits = len(str(len(kinds) - 1))
+    made = []
+    for number, (kind, (mine, assets)) in enumerate(zip(kinds, sets, strict=True)):
+        stands = STANDING[kind] if len(mine) > 1 else ("scatter",)
         (arrangement,) = draw(stands, of_arrangement, 1, rng)
-        of_arrangement[arrangement] += count > 1
+        of_arrangement[arrangement] += len(mine) > 1
         made.append(
             PlannedScene(
                 name=f"{number:0{digits}d}-{kind}",
