@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from corporeal import pipeline, store
+from corporeal import pipeline, results, store
 from corporeal.errors import UserError
 from corporeal.pipeline import Settings, reopen, run
 from corporeal.stages.describe import DescribeConfig
@@ -55,7 +55,7 @@ def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do
 
 
 def test_memory_is_counted_in_megabytes():
-    assert 10 < pipeline.peak_memory_mb() < 100_000
+    assert 10 < results.peak_memory_mb() < 100_000
 
 
 def test_a_size_that_a_model_has_judged_is_doubted_once():
@@ -63,9 +63,9 @@ def test_a_size_that_a_model_has_judged_is_doubted_once():
     table = [f"{name} is 9 m large. Set its size with --extent {name}=0.3." for name, _ in objects]
     made = replace(scene(*objects), warnings=("vase_0 and hut_0 overlap at the start.", *table))
     words = [ObjectWords(name, "", (), usual_extent=None) for name, _ in objects]
-    assert pipeline.still_doubted(made, Inventory(tuple(words))) == made.warnings
+    assert results.still_doubted(made, Inventory(tuple(words))) == made.warnings
     words[0] = replace(words[0], usual_extent=0.25)
-    assert pipeline.still_doubted(made, Inventory(tuple(words))) == (
+    assert results.still_doubted(made, Inventory(tuple(words))) == (
         "vase_0 and hut_0 overlap at the start.",
         *table[1:],
     )

@@ -5,9 +5,7 @@ covers everything it depends on: what is fresh is read back, what is stale is do
 interrupted goes on. ``run.json`` says how far the run came.
 """
 
-import resource
 import shutil
-import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -15,25 +13,35 @@ from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
-from corporeal import materials, store
+from corporeal import store
 from corporeal.errors import UserError
 from corporeal.formats.glb_writer import write_glb
-from corporeal.formats.sources import sources
-from corporeal.geometry.sizes import scale_of_part
+from corporeal.formats.sources import kind_of, sources
+from corporeal.formats.splat_ply import write_splat
+from corporeal.formats.words import safe
+from corporeal.geometry.followed import followed
 from corporeal.mpm.frames import read_trajectory
-from corporeal.mpm.outcome import outcome
-from corporeal.render.figures import fields_figure, strip
-from corporeal.showcase.expectations import expect
+from corporeal.results import FILES as RESULTS
+from corporeal.results import write_results
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import AssembleConfig, assemble
 from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.fill import FillConfig, fill
 from corporeal.stages.film import FilmConfig, film
-from corporeal.stages.ground import GroundConfig, doubts, ground
-from corporeal.stages.report import Story, report
+from corporeal.stages.ground import GroundConfig, ground
+from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
 from corporeal.stages.segment import SegmentConfig, segment
 from corporeal.stages.simulate import SimulateConfig, simulate
-from corporeal.types import Film, Inventory, MaterialField, Particles, Parts, Scene, Trajectory
+from corporeal.types import (
+    Film,
+    MaterialField,
+    Particles,
+    Parts,
+    Reconstruction,
+    Scene,
+    Trajectory,
+)
+from corporeal.vlm.things import Viewer
 
 Progress = Callable[[float, str], None]
 """Told the fraction done and what is being done."""
@@ -41,6 +49,7 @@ Tell = Callable[[str], Progress]
 """Given a verb, returns whom to tell about its progress."""
 
 FOLDERS = {
+    "reconstruct": "0-reconstruct",
     "assemble": "1-assemble",
     "describe": "4-describe",
     "segment": "5-segment",
@@ -51,19 +60,19 @@ FOLDERS = {
     "report": "10-report",
 }
 VERBS = tuple(FOLDERS)
+RESUMABLE = ("reconstruct", "simulate")
+"""Verbs that go on from what an interrupted run left in their folders."""
 RUN = "run.json"
 WRITTEN = ("record",)
 """Settings that name what is written, not what is read."""
-RESULTS = (
-    *("film.mp4", "report.html", "materials.json", "audit.json", "fields.png", "strip.png"),
-    *("ensemble.json", "ensemble.png"),
-)
+GAUSSIANS = "gaussians.ply"
 
 
 @dataclass(frozen=True)
 class Settings:
     """One configuration per verb."""
 
+    reconstruct: ReconstructConfig = field(default_factory=ReconstructConfig)
     assemble: AssembleConfig = field(default_factory=AssembleConfig)
     describe: DescribeConfig = field(default_factory=DescribeConfig)
     segment: SegmentConfig = field(default_factory=SegmentConfig)
@@ -83,7 +92,7 @@ def run(
     """Do every verb up to ``until``; return the run's folder.
 
     Args:
-        inputs: What a person typed: scene files.
+        inputs: What a person typed: scene files, a folder of photographs, or a splat.
         folder: The run's folder; made when absent.
         settings: Configuration of every verb.
         tell: Whom to tell about progress.
@@ -154,15 +163,26 @@ def files_read(config: Any) -> list[str]:
 
 def status(folder: Path) -> list[tuple[str, str, float | None]]:
     """For each verb: its name, "finished", "unfinished" or "not yet", and its seconds."""
-    reopen(folder)
+    inputs, _ = reopen(folder)
     rows = []
-    for verb, name in FOLDERS.items():
+    for verb in verbs(inputs):
+        name = FOLDERS[verb]
         meta = folder / name / store.META
         if meta.exists():
             rows.append((verb, "finished", store.read_json(meta)["seconds"]))
         else:
             rows.append((verb, "unfinished" if (folder / name).exists() else "not yet", None))
     return rows
+
+
+def verbs(inputs: list[Path]) -> tuple[str, ...]:
+    """Return what is to be done with an input: models need no reconstruction.
+
+    Raises:
+        UserError: The inputs don't go together.
+
+    """
+    return VERBS[1:] if kind_of(inputs) == "model" else VERBS
 
 
 def outdate(folder: Path, verb: str) -> None:
@@ -205,7 +225,10 @@ class _Run:
         self.folder.mkdir(parents=True, exist_ok=True)
         self._declare("running")
         try:
-            for verb in VERBS[: VERBS.index(until) + 1]:
+            todo = verbs(self.inputs)
+            if until not in todo:
+                raise UserError("A model needs no reconstruction: run the other verbs.")
+            for verb in todo[: todo.index(until) + 1]:
                 self._do(verb)
         except KeyboardInterrupt:
             self._declare("interrupted")
@@ -245,6 +268,9 @@ class _Run:
 
     def _borrowed(self, verb: str) -> list[str]:
         """Name what a verb takes from another verb's settings."""
+        if verb == "reconstruct":
+            asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
+            return [*self.settings.assemble.extent, *asked]
         if verb != "describe":
             return []
         library = self.settings.ground.library
@@ -264,7 +290,7 @@ class _Run:
             (self.folder / FOLDERS[later] / store.META).unlink(missing_ok=True)
         started = folder / "started.json"
         unfinished = started.exists() and store.read_json(started).get("key") == self.key
-        if not (verb == "simulate" and unfinished) and folder.exists():
+        if not (verb in RESUMABLE and unfinished) and folder.exists():
             shutil.rmtree(folder)
         store.write_json(started, {"key": self.key})
 
@@ -279,9 +305,31 @@ class _Run:
 
     # ------------------------------------------------------------ the verbs
 
+    def _reconstruct(self, folder: Path, progress: Progress) -> Reconstruction:
+        config, asked = self.settings.reconstruct, self.settings.describe
+        extents, viewer = (
+            self.settings.assemble.extent,
+            Viewer(safe(self.inputs[0].resolve().stem), asked.vlm, asked.record),
+        )
+        made, scene = reconstruct(self.inputs[0], config, extents, viewer, folder, progress)
+        if viewer.asked().transcript:
+            store.write_json(folder / "transcript.json", viewer.asked().transcript)
+        write_splat(folder / GAUSSIANS, made.gaussians)
+        write_glb(folder / f"{scene.name}.glb", scene)
+        return self._keep(folder, made)
+
     def _assemble(self, folder: Path, progress: Progress) -> Scene:
         progress(0.0, "reading the scene")
-        return self._keep(folder, assemble(self.inputs, self.settings.assemble))
+        inputs, config = self.inputs, self.settings.assemble
+        if "reconstruct" in self.made:
+            inputs = list((self.folder / FOLDERS["reconstruct"]).glob("*.glb"))
+            config = replace(config, extent=())  # the reconstruction has its size from them
+        return self._keep(folder, assemble(inputs, config))
+
+    def _found(self) -> Reconstruction | None:
+        """Return what was reconstructed, where the scene's objects stand now."""
+        made = self.made.get("reconstruct")
+        return None if made is None else followed(made, self.made["assemble"])
 
     def _describe(self, folder: Path, progress: Progress) -> Any:
         progress(0.0, "recognising")
@@ -320,60 +368,9 @@ class _Run:
 
     def _report(self, folder: Path, progress: Progress) -> None:
         progress(0.0, "writing the report")
-        started = time.perf_counter()
-        names = ("assemble", "segment", "fill", "ground", "simulate", "film")
-        scene, parts, particles, made, trajectory, movie = (self.made[v] for v in names)
-        inventory = self.made["describe"]
-        fields_figure(scene, parts, made, self.folder / "fields.png")
-        progress(0.5, "drawing the figures")
-        strip(movie, self.folder / "strip.png")
         audit = store.read_json(self.folder / FOLDERS["simulate"] / "audit.json")
-        happened = outcome(scene, particles, trajectory)
-        seen = expect(scene.name, happened)
-        self.seconds["report"] = time.perf_counter() - started
-        audit |= {
-            "outcome": happened,
-            "expectations": [asdict(e) for e in seen],
-            "seconds": self.seconds | {"total": sum(self.seconds.values())},
-            "peak_memory_mb": peak_memory_mb(),
-            "settings": _spoken(self.settings),
-            "questions": inventory.usage,
-        }
-        said = (still_doubted(scene, inventory), inventory.warnings, doubts(made, parts, scene))
-        said = (*said, particles.warnings, audit["warnings"])
-        audit["warnings"] = list(dict.fromkeys(w for group in said for w in group))
-        shutil.copyfile(movie.path, self.folder / "film.mp4")
-        store.write_json(self.folder / "audit.json", audit)
-        heavy = particles.mass_real, scale_of_part(scene, parts)
-        made_of = materials.materials_json(made, parts, *heavy)
-        store.write_json(self.folder / "materials.json", made_of)
-        story = Story(
-            scene=scene,
-            parts=parts,
-            field=made,
-            particles=particles,
-            film=movie,
-            audit=audit,
-            figures={
-                "The film as a row of frames": self.folder / "strip.png",
-                "Materials, laws and values of every part": self.folder / "fields.png",
-            },
-            sources=materials.sources(),
-            expectations=tuple((e.sentence, e.value, e.target, e.met) for e in seen),
-        )
-        report(story, self.folder / "report.html")
-
-
-def still_doubted(scene: Scene, inventory: Inventory) -> tuple[str, ...]:
-    """Return a scene's warnings, less doubts about sizes that a model has judged since."""
-    judged = [f"--extent {o.name}=" for o in inventory.objects if o.usual_extent]
-    return tuple(w for w in scene.warnings if not any(words in w for words in judged))
-
-
-def peak_memory_mb() -> float:
-    """Largest resident memory of this process so far [MB]."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return round(peak / (1e6 if sys.platform == "darwin" else 1e3), 1)
+        settings = _spoken(self.settings)
+        write_results(self.folder, self.made, audit, settings, self.seconds, progress)
 
 
 def _spoken(settings: Settings) -> dict[str, str]:

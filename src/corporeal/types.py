@@ -257,6 +257,8 @@ class Reconstruction:
     """Of the cloud's points."""
     names: tuple[str, ...]
     """Of the objects."""
+    boxes: Float[np.ndarray, "K 2 3"]
+    """Of the objects' surfaces: low and high corners [m]."""
     metres_per_unit: float
     """What one unit of the file was taken to be [m]."""
     statements: tuple[str, ...] = ()

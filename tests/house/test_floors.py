@@ -15,6 +15,7 @@ FLOORS = [
     {"materials", "vlm", "render", "showcase", "mpm", "pool", "settle"}
     | {"splats", "features", "regions"},
     {"stages"},
+    {"results"},
     {"pipeline"},
     {"corpus", "evaluation"},
     {"doctor", "terminal"},

@@ -39,7 +39,8 @@ class Where:
 def verb_run() -> None:
     """Do everything, from a scene to a film and a report.
 
-    SCENE is a GLB or glTF file, several of them (each one object), or a scene.toml.
+    SCENE is a GLB or glTF file, several of them (each one object), or a scene.toml; or a folder of
+    photographs with poses (transforms.json, COLMAP, 3 x 4 matrices), or a trained Gaussian splat.
     Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
     What is already done with the same settings is not done again.
     """
@@ -232,7 +233,8 @@ VERBS: dict[str, Callable[[], None]] = {
     "evaluate": verb_evaluate,
     "doctor": verb_doctor,
 }
-REDO = ("assemble", "describe", "segment", "ground", "fill", "simulate", "film", "report")
+REDO = ("reconstruct", "assemble", "describe", "segment", "ground", "fill", "simulate", "film")
+REDO = (*REDO, "report")
 VERBS |= {verb: _again(verb) for verb in REDO}
 VERBS |= {"assemble": verb_assemble, "simulate": verb_simulate}
 

@@ -83,6 +83,8 @@ class Story:
     """Citation key → where it was read."""
     expectations: tuple[tuple[str, str, str, bool], ...] = ()
     """What should be seen: sentence, measured value and target in words, whether it was."""
+    origin: tuple[str, ...] = ()
+    """How the scene was found in pictures, in sentences."""
 
 
 def report(story: Story, path: Path) -> None:
@@ -125,6 +127,7 @@ def _summary(story: Story) -> str:
         else "No vision-language model looked at pictures of this scene: materials come from "
         "annotations and from the words in the file.",
     ]
+    sentences += map(safe, story.origin)
     sentences += [_forced(o) for o in scene.objects if o.push or o.wind]
     sentences += filter(None, [safe(how_scaled(scene.objects))])
     if unknown:

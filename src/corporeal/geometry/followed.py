@@ -1,0 +1,43 @@
+"""A reconstruction that follows its objects to where a scene has put them."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from corporeal.errors import UserError
+from corporeal.geometry.arrangement import boxes_of
+from corporeal.types import Reconstruction, Scene
+
+
+def followed(found: Reconstruction, scene: Scene) -> Reconstruction:
+    """Return Gaussians and points where a scene's objects stand now.
+
+    Objects may have been moved and resized, but not turned. Floor and background stay.
+
+    Raises:
+        UserError: The scene's objects are not those that were found.
+
+    """
+    names = tuple(o.name for o in scene.objects)
+    if names != found.names:
+        raise UserError(
+            f"The scene has {', '.join(names)}, the reconstruction {', '.join(found.names)}. "
+            "Reconstruct it again."
+        )
+    before, after = found.boxes, boxes_of(scene)
+    factor = np.ptp(after, axis=1).max(axis=1) / np.ptp(before, axis=1).max(axis=1)
+    shift = after[:, 0] - factor[:, None] * before[:, 0]
+    # The last row is for what is nobody's: -1.
+    factor, shift = np.append(factor, 1.0), np.concatenate([shift, np.zeros((1, 3))])
+    gaussians, cloud = found.gaussians, found.cloud
+    of_gaussian, of_point = found.object_of_gaussian, found.object_of_point
+    mean = factor[of_gaussian, None] * gaussians.mean + shift[of_gaussian]
+    scale = factor[of_gaussian, None] * gaussians.scale
+    kind = gaussians.mean.dtype
+    position = factor[of_point, None] * cloud.position + shift[of_point]
+    return replace(
+        found,
+        gaussians=replace(gaussians, mean=mean.astype(kind), scale=scale.astype(kind)),
+        cloud=replace(cloud, position=position),
+        boxes=after,
+    )

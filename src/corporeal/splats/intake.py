@@ -1,0 +1,140 @@
+"""Gaussians from whatever a person has: photographs that they are learned from, or a splat."""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Bool
+
+from corporeal.formats.photographs import Photographs, read_photographs
+from corporeal.formats.sources import kind_of
+from corporeal.formats.splats import read_splat
+from corporeal.geometry.agreement import pose_doubt
+from corporeal.geometry.similarity import moved_cameras, moved_gaussians
+from corporeal.geometry.upright import upright
+from corporeal.splats.quality import Quality
+from corporeal.splats.start import Points
+from corporeal.splats.train import PRESETS, TrainConfig, Trained, train
+from corporeal.types import Camera, Gaussians, Vector, Views
+
+Progress = Callable[[float, str], None]
+Up = Literal["auto", "x", "-x", "y", "-y", "z", "-z"]
+
+SOLID = 0.5
+"""Opacity from which on a Gaussian says where something is."""
+ON = 128
+"""Of 255: from here on a pixel of a mask belongs to things."""
+AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
+USUAL: dict[str, Vector] = {".spz": (0.0, 1.0, 0.0)}
+"""What is up in files of a kind as a rule; in others it is -y."""
+
+
+@dataclass(frozen=True)
+class Intake:
+    """What there is to begin with."""
+
+    gaussians: Gaussians
+    cameras: tuple[Camera, ...] = ()
+    """Empty: it came without any."""
+    views: Views | None = None
+    """The photographs; their cameras stay as the file has them."""
+    masks: Bool[np.ndarray, "V H W"] | None = None
+    """Which pixels are on things; None: nobody says."""
+    z_up: bool = False
+    """The file's kind says so, and that its unit is the metre."""
+    usual: Vector | None = None
+    """What is up in such files as a rule."""
+    statements: tuple[str, ...] = ()
+    """How it came about, in sentences, for the report."""
+    warnings: tuple[str, ...] = ()
+
+    @property
+    def solid(self) -> np.ndarray:
+        """Means of Gaussians that say where something is (M, 3)."""
+        g = self.gaussians
+        return g.mean[g.opacity > SOLID].astype(np.float64)
+
+
+def take_in(
+    source: Path,
+    training: TrainConfig,
+    checkpoint: Path | None = None,
+    progress: Progress = lambda fraction, words: None,
+) -> Intake:
+    """Read a splat, or photographs and learn Gaussians from them, in the file's own frame and unit.
+
+    Args:
+        source: A folder of photographs with poses, or a splat.
+        training: How to learn.
+        checkpoint: Where a training that is cut off leaves what it has.
+        progress: Told the fraction done and what is being done.
+
+    Raises:
+        UserError: The input cannot be used.
+
+    """
+    progress(0.0, f"reading {source.name}")
+    if kind_of([source]) == "splat":
+        given = read_splat(source)
+        usual = USUAL.get(source.suffix.lower(), (0.0, -1.0, 0.0))
+        said = (f"{given.count:,} Gaussians were read from {source.name}.",)
+        return Intake(given, usual=usual, statements=said, warnings=given.warnings)
+    shown = read_photographs(source, PRESETS[training.preset].longest)
+    masks = None if shown.masks is None else shown.masks >= ON
+    doubt = pose_doubt(shown.views, shown.masks)
+    trained = train(shown.views, masks, _points(shown), training, checkpoint, progress)
+    return Intake(
+        trained.gaussians,
+        shown.views.cameras,
+        shown.views,
+        masks,
+        shown.z_up,
+        statements=_told(trained, len(shown.views.cameras)),
+        warnings=(*shown.warnings, *([doubt] if doubt else [])),
+    )
+
+
+def turned_upright(taken: Intake, up: Up = "auto") -> Intake:
+    """Return the same with +z up, the floor at z = 0, and what is looked at above the origin.
+
+    Args:
+        taken: In the file's own frame.
+        up: Which axis of the file points up; auto: what the file or the cameras say.
+
+    """
+    stated = None
+    if up != "auto":
+        sign = -1.0 if up[0] == "-" else 1.0
+        x, y, z = AXES[up[-1]]
+        stated = sign * x, sign * y, sign * z
+    of_things = None if taken.masks is None else taken.solid
+    frame = upright(taken.cameras, taken.solid, taken.z_up, of_things, taken.usual, stated)
+    return replace(
+        taken,
+        gaussians=moved_gaussians(taken.gaussians, frame.world_from_file),
+        cameras=moved_cameras(taken.cameras, frame.world_from_file),
+        statements=(*taken.statements, frame.reason),
+        warnings=(*taken.warnings, *frame.warnings),
+    )
+
+
+def _points(shown: Photographs) -> Points | None:
+    if shown.points is None or shown.colours is None:
+        return None
+    return Points(shown.points, shown.colours / 255)
+
+
+def _told(trained: Trained, photographs: int) -> tuple[str, ...]:
+    count = f"{trained.gaussians.count:,}"
+    said = f"{count} Gaussians were learned from {photographs} photographs."
+    return (said,) if trained.quality is None else (said, _agreed(trained.quality))
+
+
+def _agreed(quality: Quality) -> str:
+    things = "" if quality.psnr_things is None else f", {quality.psnr_things:.1f} dB on things"
+    return (
+        f"Pictures of them agree with {len(quality.views)} photographs that they were not learned "
+        f"from to {quality.psnr:.1f} dB{things}."
+    )

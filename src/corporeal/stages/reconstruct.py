@@ -1,0 +1,410 @@
+"""Reconstruct: from posed photographs, or a trained splat, to objects with closed surfaces.
+
+What comes out is a scene of objects like any other, which ``assemble`` reads as a GLB; and the
+Gaussians themselves, for the film and for telling parts apart.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Int, UInt8
+from scipy.spatial import KDTree
+
+from corporeal.errors import UserError
+from corporeal.features import Reader, connect
+from corporeal.features.descriptor import descriptor, seen_from
+from corporeal.features.lifting import LEAST, fill, uplift
+from corporeal.features.vectors import similarity as likeness
+from corporeal.features.vectors import unit
+from corporeal.formats.typical_extents import typical_extent
+from corporeal.formats.words import safe, unique
+from corporeal.geometry.harmonics import DC
+from corporeal.geometry.metric import Extent, MetricScale, chosen, of_file
+from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
+from corporeal.geometry.sizes import said_extent
+from corporeal.regions.match import match
+from corporeal.regions.objects import Split, objects
+from corporeal.render.camera import around, camera_of
+from corporeal.render.look import linear
+from corporeal.render.portrait import COLOURS, colour_of_part
+from corporeal.splats.foreground import foreground
+from corporeal.splats.intake import Intake, Up, take_in, turned_upright
+from corporeal.splats.raster import render, weights
+from corporeal.splats.solid import Solid, solids
+from corporeal.splats.train import TrainConfig
+from corporeal.types import (
+    Camera,
+    Cloud,
+    Finish,
+    Gaussians,
+    Reconstruction,
+    Scene,
+    SceneObject,
+    Surface,
+)
+from corporeal.vlm.things import Thing, Viewer
+
+Progress = Callable[[float, str], None]
+
+MOST_POINTS = 100_000
+"""Points that are looked at; other Gaussians do as their neighbours."""
+CELL = 8
+"""Pixels along a cell of blending weights: maps of features are no finer."""
+ROUGHNESS = 0.8
+"""Of surfaces: pictures do not tell it apart from light."""
+OWN_VIEWS, OWN_SIZE = 48, (384, 384)
+"""Of a splat that comes without cameras."""
+OUTLIERS = 1.0
+"""Percent of a splat, at either end, that need not be in those pictures."""
+SHOWN = 4
+"""Pictures that somebody is shown of the whole scene."""
+UNKNOWN = "object"
+"""What nobody has a name for."""
+GREY = (0.2, 0.2, 0.2)
+"""Linear RGB of what is nobody's, in painted pictures."""
+NOBODY = Viewer("", "metadata")
+TRAINED, LOOKED, FOUND = 0.75, 0.85, 0.9
+"""Share of the work that is done after each step."""
+
+
+@dataclass(frozen=True)
+class ReconstructConfig:
+    """How pictures, or a splat, become objects. Says nothing where the input is a model."""
+
+    things: tuple[str, ...] = ()
+    """What the objects are, the largest first, such as "armchair" "soda can"."""
+    count: int | None = None
+    """How many objects there are; by default as many as --things names, else it is estimated."""
+    up: Up = "auto"
+    """Which axis of the file points up; auto: what the file or the cameras say."""
+    metres_per_unit: float | None = None
+    """What one unit of the file is [m]; by default sizes of things say it."""
+    training: Literal["draft", "normal"] = "normal"
+    """How long Gaussians are learned from photographs: one minute or four on two cores."""
+    semantic: str = "descriptor"
+    """What tells what a point is: "clip", "clip:FOLDER", or "descriptor", which needs no model."""
+    structural: str = "descriptor"
+    """What tells which part a point is of: "dinov2", "dinov2:FOLDER", or "descriptor"."""
+    training_seed: int = 0
+    """Of everything that is left to chance."""
+
+
+DEFAULT = ReconstructConfig()
+
+
+@dataclass(frozen=True)
+class _Found:
+    """Objects before anybody knows what they are, in order of size."""
+
+    taken: Intake
+    cloud: Cloud
+    object_of_point: Int[np.ndarray, " M"]
+    owner: Int[np.ndarray, " N"]
+    """Whose each Gaussian is."""
+    solids: tuple[Solid, ...]
+
+    @property
+    def count(self) -> int:
+        return len(self.solids)
+
+
+def reconstruct(
+    source: Path,
+    config: ReconstructConfig = DEFAULT,
+    extents: Sequence[str] = (),
+    viewer: Viewer = NOBODY,
+    folder: Path | None = None,
+    progress: Progress = lambda fraction, words: None,
+) -> tuple[Reconstruction, Scene]:
+    """Find the objects of a scene in photographs, or in a splat.
+
+    Args:
+        source: A folder of photographs with poses, or a splat.
+        config: How.
+        extents: Real largest extents, such as "duck=0.1" [m].
+        viewer: Who is asked what the pictures show, where ``config.things`` does not say it.
+        folder: Where an interrupted training, and maps of learned features, are kept.
+        progress: Told the fraction done and what is being done.
+
+    Returns:
+        What was found, and the scene: every object with one closed, coloured surface.
+
+    Raises:
+        UserError: The input cannot be used, holds nothing that could be an object, or an option
+            does not fit it.
+
+    """
+    _check(config)
+    training = TrainConfig(config.training, seed=config.training_seed)
+    kept = None if folder is None else folder / "training.npz"
+    taken = take_in(source, training, kept, lambda f, words: progress(TRAINED * f, words))
+    taken = turned_upright(taken, config.up)
+    if not taken.cameras:
+        taken = replace(taken, cameras=_own_cameras(taken))
+    progress(TRAINED, "telling things from the background")
+    of_things = _of_things(source, taken)
+    cloud = _cloud(taken, of_things, config, folder)
+    progress(LOOKED, "finding objects")
+    wanted = _wanted(config, viewer, taken)
+    split = objects(cloud, config.count or len(wanted) or None)
+    progress(FOUND, "closing surfaces")
+    found = _solid(taken, cloud, split, of_things)
+    things = _recognised(wanted, found, config, viewer)
+    names = unique([safe(thing.class_name) or UNKNOWN for thing in things])
+    sizes = dict(zip(names, map(_extent, found.solids), strict=True))
+    scale = _scale(config, extents, taken.z_up, sizes, things)
+    warnings = [*taken.warnings, *split.warnings, *viewer.asked().warnings, *scale.warnings]
+    warnings += [f"{n}: {w}" for n, s in zip(names, found.solids, strict=True) for w in s.warnings]
+    said = (*taken.statements, _told(split), scale.reason)
+    result = _in_metres(found, names, scale, said, tuple(dict.fromkeys(warnings)))
+    return result, _scene(source, found, names, things, scale)
+
+
+def _check(config: ReconstructConfig) -> None:
+    if config.count is not None and not 1 <= config.count <= 1000:
+        raise UserError(f"--count is {config.count}. Give a number of objects from 1 to 1000.")
+    if config.count and config.things and config.count != len(config.things):
+        raise UserError(
+            f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
+            "--count out, or name all of them."
+        )
+    scale = config.metres_per_unit
+    if scale is not None and not 1e-6 <= scale <= 1e6:
+        raise UserError(f"--metres-per-unit is {scale}. Give a number from 1e-6 to 1e6.")
+
+
+# ---------------------------------------------------------------- what is a thing
+
+
+def _own_cameras(taken: Intake) -> tuple[Camera, ...]:
+    """Place cameras around a splat that came without any."""
+    box = np.percentile(taken.solid, (OUTLIERS, 100 - OUTLIERS), axis=0)
+    return tuple(camera_of(aim) for aim in around(box[None, None], OWN_VIEWS, OWN_SIZE))
+
+
+def _of_things(source: Path, taken: Intake) -> Int[np.ndarray, " M"]:
+    """Return which Gaussians belong to things."""
+    found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, taken.masks))
+    if not len(found):
+        what = "shows nothing but floor and background"
+        raise UserError(f"{source} {what}. Masks would say what belongs to things.")
+    return found
+
+
+def _cloud(
+    taken: Intake, things: Int[np.ndarray, " M"], config: ReconstructConfig, folder: Path | None
+) -> Cloud:
+    """Return points on things with what they look like."""
+    gaussians, cameras = taken.gaussians, taken.cameras
+    if len(things) > MOST_POINTS:
+        random = np.random.default_rng(config.training_seed)
+        things = np.sort(random.choice(things, MOST_POINTS, replace=False))
+    shares = [weights(gaussians, camera, CELL) for camera in cameras]
+    shown = np.stack([np.asarray(share.sum(axis=1)).ravel()[things] for share in shares])
+    position = gaussians.mean[things].astype(np.float64)
+    colour = np.clip(0.5 + DC * gaussians.sh[things, 0], 0, 1)
+    looks = {}
+    for spec in dict.fromkeys((config.semantic, config.structural)):
+        encoder = connect(spec, None if folder is None else folder / "maps")
+        if encoder is None:
+            towards = seen_from(position, cameras, list(shown))
+            looks[spec] = descriptor(position, colour, towards)
+            continue
+        pictures = _pictures(taken)
+        cells = -(-cameras[0].height // CELL), -(-cameras[0].width // CELL)
+        maps = [encoder.map(picture) for picture in pictures]
+        lifted = uplift(lambda v: shares[v][things], cells, maps, len(things))
+        looks[spec] = fill(position, lifted).unit()
+    return Cloud(
+        position=position,
+        colour=colour,
+        semantic=looks[config.semantic],
+        structural=looks[config.structural],
+        seen=np.asarray((shown > LEAST).sum(axis=0), dtype=np.int64),
+        gaussian_of_point=things,
+    )
+
+
+def _pictures(taken: Intake) -> Sequence[np.ndarray]:
+    """Return the photographs, or pictures of a splat that came without any."""
+    if taken.views is not None:
+        return list(taken.views.rgb)
+    return [_picture(taken.gaussians, camera) for camera in taken.cameras]
+
+
+def _picture(gaussians: Gaussians, camera: Camera) -> UInt8[np.ndarray, "H W 3"]:
+    rgb = render(gaussians, camera).rgb
+    return np.round(255 * np.clip(rgb, 0, 1)).astype(np.uint8)
+
+
+# ---------------------------------------------------------------- which thing is it
+
+
+def _wanted(config: ReconstructConfig, viewer: Viewer, taken: Intake) -> list[Thing]:
+    """Return what things there are: as the command line says, else as somebody sees; or nothing."""
+    if not config.things:
+        pictures = _pictures(taken)
+        return viewer.things([pictures[k] for k in _spread(len(pictures))])
+    known = {name: typical_extent(name) for name in config.things}
+    return [
+        Thing(name, extent=k.usual, sized_by="the table of typical extents") if k else Thing(name)
+        for name, k in ((name, known[name]) for name in config.things)
+    ]
+
+
+def _spread(count: int) -> list[int]:
+    return np.unique(np.linspace(0, count - 1, min(count, SHOWN)).round().astype(int)).tolist()
+
+
+def _recognised(
+    wanted: Sequence[Thing], found: _Found, config: ReconstructConfig, viewer: Viewer
+) -> list[Thing]:
+    """Return which thing each object is; the objects are in order of size.
+
+    Who named things on the command line named the largest first. Others are told by CLIP where
+    there is one, else by whoever sees the objects painted.
+    """
+    count = found.count
+    if config.things or not wanted:
+        said: Sequence[int | None] = range(len(wanted))
+    elif config.semantic.startswith("clip"):
+        said = _by_words(wanted, found, config.semantic)
+    else:
+        said = viewer.regions(_painted(found), colour_of_part(count), wanted) or []
+    known = [None if k is None or k < 0 or k >= len(wanted) else wanted[k] for k in said]
+    return [thing or Thing(UNKNOWN) for thing in [*known, *[None] * count][:count]]
+
+
+def _by_words(wanted: Sequence[Thing], found: _Found, spec: str) -> list[int]:
+    """Pair objects and things so that what CLIP sees fits best what they are called."""
+    encoder = connect(spec)
+    assert isinstance(encoder, Reader)
+    looks = np.stack(
+        [
+            found.cloud.semantic[found.object_of_point == k].astype(np.float64).mean(axis=0)
+            for k in range(found.count)
+        ]
+    )
+    words = encoder.words([f"{thing.class_name}" for thing in wanted])
+    return match(likeness(unit(looks), words)).tolist()
+
+
+def _painted(found: _Found) -> list[np.ndarray]:
+    """Return pictures, each followed by itself with the objects in colours of their own."""
+    taken = found.taken
+    paints = np.array([*COLOURS.values()])
+    ink = np.concatenate([paints[np.minimum(np.arange(found.count), len(paints) - 1)], [GREY]])
+    flat = (np.sqrt(ink[found.owner]) - 0.5)[:, None] / DC
+    dressed = replace(taken.gaussians, sh=flat.astype(np.float32))
+    pictures = _pictures(taken)
+    shown = []
+    for k in _spread(len(pictures)):
+        shown += [pictures[k], _picture(dressed, taken.cameras[k])]
+    return shown
+
+
+# ---------------------------------------------------------------- what comes out
+
+
+def _solid(taken: Intake, cloud: Cloud, split: Split, of_things: Int[np.ndarray, " M"]) -> _Found:
+    """Give every object a surface, and number them by size: the one with the largest box first."""
+    owner = np.full(taken.gaussians.count, -1, np.int64)
+    nearest = KDTree(cloud.position).query(taken.gaussians.mean[of_things])[1]
+    owner[of_things] = split.object_of_point[nearest]
+    found = solids(taken.gaussians, owner, taken.cameras)
+    order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
+    place = np.append(np.argsort(order), -1)  # the last for what is nobody's
+    ordered = tuple(found[k] for k in order)
+    return _Found(taken, cloud, place[split.object_of_point], place[owner], ordered)
+
+
+def _extent(solid: Solid) -> float:
+    return float(np.ptp(solid.vertices, axis=0).max())
+
+
+def _told(split: Split) -> str:
+    count = int(split.object_of_point.max()) + 1
+    return f"{count} object{'s' * (count != 1)}, told apart by {split.found_by}."
+
+
+def _scale(
+    config: ReconstructConfig,
+    extents: Sequence[str],
+    z_up: bool,
+    sizes: Mapping[str, float],
+    things: Sequence[Thing],
+) -> MetricScale:
+    """Decide what one unit of the file is in metres.
+
+    Args:
+        config: May state it.
+        extents: What a person stated, such as "duck=0.1" [m].
+        z_up: Whether the file's kind has +z up, and metres.
+        sizes: Name → largest extent in the file [its unit].
+        things: In the same order.
+
+    """
+    only = next(iter(sizes)) if len(sizes) == 1 else ""
+    wanted = [said_extent(text, only) for text in extents]
+    strange = [name for name, _ in wanted if name not in sizes]
+    if strange:
+        raise UserError(f"--extent: no object {strange[0]!r}. Choose one of: {', '.join(sizes)}.")
+    given = config.metres_per_unit
+    reason = f"One unit of the file is {given:.4g} m, the command line said." if given else ""
+    usual = zip(sizes.items(), things, strict=True)
+    return chosen(
+        MetricScale(given, "distance", reason) if given else None,
+        [Extent(name, sizes[name], metres, "the command line") for name, metres in wanted],
+        of_file("transforms.json") if z_up else None,
+        [Extent(name, size, t.extent, t.sized_by) for (name, size), t in usual if t.extent],
+        max(sizes.values()),
+    )
+
+
+def _in_metres(
+    found: _Found,
+    names: Sequence[str],
+    scale: MetricScale,
+    statements: tuple[str, ...],
+    warnings: tuple[str, ...],
+) -> Reconstruction:
+    made = similarity(scale=scale.metres_per_unit)
+    boxes = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in found.solids]
+    return Reconstruction(
+        gaussians=moved_gaussians(found.taken.gaussians, made),
+        object_of_gaussian=found.owner,
+        cloud=replace(found.cloud, position=moved_points(found.cloud.position, made)),
+        object_of_point=found.object_of_point,
+        names=tuple(names),
+        boxes=scale.metres_per_unit * np.array(boxes),
+        metres_per_unit=scale.metres_per_unit,
+        statements=statements,
+        warnings=warnings,
+    )
+
+
+def _scene(
+    source: Path,
+    found: _Found,
+    names: Sequence[str],
+    named: Sequence[Thing],
+    scale: MetricScale,
+) -> Scene:
+    """Make one object of each solid, coloured as its Gaussians are."""
+    factor = scale.metres_per_unit
+    things, surfaces = [], []
+    for k, (name, thing, solid) in enumerate(zip(names, named, found.solids, strict=True)):
+        extent, by = factor * _extent(solid), scale.reason
+        things.append(SceneObject(name, thing.class_name, extent, source=str(source), sized_by=by))
+        colours, vertices = linear(solid.colours), factor * solid.vertices
+        surfaces.append(Surface(name, k, 0, vertices, solid.triangles, colours=colours))
+    return Scene(
+        name=safe(source.resolve().stem) or "scene",
+        source=str(source),
+        objects=tuple(things),
+        surfaces=tuple(surfaces),
+        finishes=(Finish("as seen", roughness=ROUGHNESS),),
+    )

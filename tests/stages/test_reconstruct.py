@@ -1,0 +1,190 @@
+"""From a splat, or photographs, to objects with closed surfaces, in metres and on the floor."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+from corporeal.errors import UserError
+from corporeal.formats.glb import read_glb
+from corporeal.formats.glb_writer import write_glb
+from corporeal.formats.splat_ply import write_splat
+from corporeal.geometry.arrangement import moved
+from corporeal.geometry.followed import followed
+from corporeal.geometry.gaussians import placed
+from corporeal.geometry.harmonics import DC
+from corporeal.geometry.mesh import Mesh, signed_volume
+from corporeal.splats import solid
+from corporeal.stages import reconstruct as stage
+from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
+from corporeal.types import Gaussians
+from corporeal.vlm.things import Thing, Viewer
+
+RED, BLUE = (0.8, 0.1, 0.1), (0.1, 0.2, 0.8)
+SIDES = ((0.4, 0.3, 0.2), (0.16, 0.16, 0.3))
+MIDDLES = ((0.0, 0.0, 0.1), (0.45, 0.1, 0.15))
+"""Of two boxes that stand on the floor."""
+SPACING = 0.014
+"""Of Gaussians on their faces [m]."""
+
+
+def box(sides, middle, colour):
+    """Flat Gaussians all over the faces of a box."""
+    mean, rotation = [], []
+    for axis in range(3):
+        u, v = (a for a in range(3) if a != axis)
+        inner = (sides[u] / 2 - SPACING, sides[v] / 2 - SPACING)  # their edges are soft
+        grid = [np.linspace(-half, half, round(2 * half / SPACING) + 1) for half in inner]
+        a, b = (x.ravel() for x in np.meshgrid(*grid))
+        turn = Rotation.align_vectors([np.eye(3)[axis]], [[0, 0, 1]])[0].as_quat(scalar_first=True)
+        for side in (-1, 1):
+            place = np.zeros((len(a), 3))
+            place[:, u], place[:, v], place[:, axis] = a, b, side * sides[axis] / 2
+            mean.append(place + middle)
+            rotation.append(np.tile(turn, (len(a), 1)))
+    mean, rotation = np.concatenate(mean), np.concatenate(rotation)
+    count = len(mean)
+    return Gaussians(
+        mean=mean.astype(np.float32),
+        rotation=rotation.astype(np.float32),
+        scale=np.tile(np.float32([0.6, 0.6, 0.1]) * np.float32(SPACING), (count, 1)),
+        opacity=np.full(count, 0.98, np.float32),
+        sh=np.tile(((np.float32(colour) - np.float32(0.5)) / np.float32(DC)), (count, 1, 1)),
+    )
+
+
+def both(first, second):
+    names = ("mean", "rotation", "scale", "opacity", "sh")
+    return replace(
+        first, **{n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in names}
+    )
+
+
+@pytest.fixture(scope="module", autouse=True)
+def fewer_cameras():
+    """Look at splats in fewer and smaller pictures, and carve more coarsely, than for people."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(stage, "OWN_VIEWS", 16)
+        patch.setattr(stage, "OWN_SIZE", (160, 160))
+        patch.setattr(solid, "CELLS", 250_000)
+        yield
+
+
+@pytest.fixture(scope="module")
+def splat(tmp_path_factory):
+    """Two boxes in a file whose -y is up and whose unit is half a metre."""
+    path = tmp_path_factory.mktemp("splat") / "boxes.ply"
+    scene = both(box(SIDES[0], MIDDLES[0], RED), box(SIDES[1], MIDDLES[1], BLUE))
+    down = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # +z to -y
+    write_splat(path, placed(scene, down, 2.0, (0.3, -0.2, 5.0)))
+    return path
+
+
+@pytest.fixture(scope="module")
+def made(splat):
+    config = ReconstructConfig(things=("crate", "blue pillar"))
+    return reconstruct(splat, config, ("crate=0.4",))
+
+
+def test_things_come_out_in_metres_on_the_floor(made):
+    found, scene = made
+    assert [(o.name, o.class_name) for o in scene.objects] == [
+        ("crate", "crate"),
+        ("blue pillar", "blue pillar"),
+    ]
+    assert found.metres_per_unit == pytest.approx(0.5, rel=0.05)
+    for surface, sides in zip(scene.surfaces, SIDES, strict=True):
+        np.testing.assert_allclose(np.ptp(surface.vertices, axis=0), sides, atol=0.02)
+        volume = signed_volume(Mesh(surface.vertices, surface.triangles))
+        assert volume == pytest.approx(np.prod(sides), rel=0.15)  # their edges are cut off
+        assert surface.vertices[:, 2].min() == pytest.approx(0, abs=0.01)
+    between = found.boxes.mean(axis=1)
+    np.testing.assert_allclose(
+        np.linalg.norm(between[1] - between[0]), np.linalg.norm(np.subtract(*MIDDLES)), atol=0.02
+    )
+
+
+def test_every_gaussian_knows_whose_it_is(made):
+    found, _ = made
+    red = found.gaussians.sh[:, 0, 0] > 0
+    sides = found.gaussians.mean[:, 2] > 0.02  # nobody sees undersides
+    assert np.mean(found.object_of_gaussian[red & sides] == 0) > 0.99
+    assert np.mean(found.object_of_gaussian[~red & sides] == 1) > 0.99
+    assert len(found.object_of_point) == found.cloud.count
+    np.testing.assert_array_equal(
+        found.object_of_point, found.object_of_gaussian[found.cloud.gaussian_of_point]
+    )
+
+
+def test_surfaces_are_coloured_as_seen(made):
+    _, scene = made
+    for surface, colour in zip(scene.surfaces, (RED, BLUE), strict=True):
+        expected = np.where(
+            np.array(colour) <= 0.04045, 0, ((np.array(colour) + 0.055) / 1.055) ** 2.4
+        )
+        np.testing.assert_allclose(np.median(surface.colours[:, :3], axis=0), expected, atol=0.03)
+
+
+def test_the_scene_is_a_glb_like_any_other(made, tmp_path):
+    _, scene = made
+    write_glb(tmp_path / "boxes.glb", scene)
+    back = read_glb(tmp_path / "boxes.glb")
+    assert [o.name for o in back.objects] == ["crate", "blue pillar"]
+
+
+def test_gaussians_follow_their_objects(made):
+    found, scene = made
+    there = followed(found, moved(scene, (0.0, 0.0, 1.0), 1))
+    shift = there.gaussians.mean - found.gaussians.mean
+    up = (found.object_of_gaussian == 1)[:, None] * np.array([0.0, 0.0, 1.0])
+    np.testing.assert_allclose(shift, up, atol=1e-5)
+    with pytest.raises(UserError, match="Reconstruct it again"):
+        followed(found, replace(scene, objects=scene.objects[:1]))
+
+
+def test_the_report_is_told_how_it_came_about(made):
+    found, _ = made
+    told = " ".join(found.statements)
+    assert "Gaussians were read from boxes.ply" in told
+    assert "2 objects, told apart by" in told
+    assert "the command line" in told
+
+
+class Seer(Viewer):
+    """Somebody who sees two things, and which region is which."""
+
+    def __init__(self):
+        super().__init__("boxes", "metadata")
+
+    def things(self, pictures):
+        assert all(p.dtype == np.uint8 and p.ndim == 3 for p in pictures)
+        return [
+            Thing("pillar", "blue", 0.3, "a model (x)"),
+            Thing("crate", "red", 0.4, "a model (x)"),
+        ]
+
+    def regions(self, pictures, colours, things):
+        painted = pictures[1].reshape(-1, 3).astype(int)
+        assert (painted[:, 0] - painted[:, 2] > 60).any(), "the first region is red"
+        assert colours == ["red", "blue"]
+        return [1, 0]
+
+
+def test_somebody_who_sees_the_pictures_names_things_and_their_sizes(splat):
+    found, scene = reconstruct(splat, viewer=Seer())
+    assert [o.class_name for o in scene.objects] == ["crate", "pillar"]
+    assert found.metres_per_unit == pytest.approx(0.5, rel=0.05)
+
+
+@pytest.mark.parametrize(
+    ("config", "extents", "told"),
+    [
+        ({"count": 0}, (), "--count is 0"),
+        ({"count": 3, "things": ("crate",)}, (), "--count says 3 objects, --things names 1"),
+        ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1.0"),
+    ],
+)
+def test_options_that_make_no_sense_are_refused(splat, config, extents, told):
+    with pytest.raises(UserError, match=told):
+        reconstruct(splat, ReconstructConfig(**config), extents)
