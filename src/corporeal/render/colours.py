@@ -78,4 +78,9 @@ def turbo(values: Sequence[float], log: bool) -> tuple[Float[np.ndarray, "N 3"],
         x = np.log(np.maximum(x, 1e-300))
     span = x.max() - x.min()
     share = (x - x.min()) / span if span > 1e-9 * max(abs(x.max()), 1e-30) else x * 0 + 0.5
-    return matplotlib.colormaps["turbo"](0.04 + 0.92 * share)[:, :3], low, high
+    return ramp(share), low, high
+
+
+def ramp(share: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
+    """Colours of shares from 0, the lowest, to 1, the highest: turbo without its dark ends."""
+    return matplotlib.colormaps["turbo"](0.04 + 0.92 * share)[:, :3]

@@ -91,6 +91,7 @@ class Stage:
         self.vertices = (rest - self.origin).astype(np.float32)
         self.normals = vertex_normals(scene).astype(np.float32)
         self.scene = self._built()
+        self.shown = True
 
     def posed(self, vertices: np.ndarray, normals: np.ndarray) -> "Stage":
         """Return the stage with vertices (V, 3) [m] and unit normals (V, 3) elsewhere."""
@@ -110,6 +111,12 @@ class Stage:
         there.light, there.see_through = light, False
         return there
 
+    def shadows(self) -> "Stage":
+        """Return the stage with surfaces that nobody sees, but for their shadows on the floor."""
+        there = copy(self)
+        there.shown = False
+        return there
+
     def _built(self) -> EmbreeScene:
         scene = EmbreeScene()
         if len(self.look.triangles):
@@ -121,10 +128,14 @@ class Stage:
     def hit(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, ...]:
         """Nearest triangle (-1: none), barycentric u, v and distance of each ray."""
         if not len(self.look.triangles) or not len(o):
-            none = np.zeros(len(o), np.float32)
-            return np.full(len(o), -1, np.int32), none, none, none
+            return self.missed(o)
         r = self.scene.run(o, d, output=True)
         return r["primID"], r["u"], r["v"], r["tfar"]
+
+    def missed(self, o: np.ndarray) -> tuple[np.ndarray, ...]:
+        """As ``hit`` where no ray hits anything."""
+        none = np.zeros(len(o), np.float32)
+        return np.full(len(o), -1, np.int32), none, none, none
 
     def free(self, o: np.ndarray, d: np.ndarray, ray: np.ndarray) -> np.ndarray:
         """Whether each ray gets away; holes and glass let it through (by ``ray``'s fixed dice)."""
@@ -241,7 +252,7 @@ class _Job:
         light = np.empty((len(o), 3), np.float32)
         kernels_light.backdrop(self.lamps, wide, height, width, grid, light)
         shape = (wide[1] - wide[0]) * grid, width * grid
-        hit = self.stage.hit(o, d)
+        hit = self.stage.hit(o, d) if self.stage.shown else self.stage.missed(o)
         looked = kernels.worth(hit[0], shape, every)
         index = np.flatnonzero(looked)
         hit = tuple(x[index] for x in hit)

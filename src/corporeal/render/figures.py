@@ -4,10 +4,10 @@ import os
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
-import matplotlib
 import numpy as np
+from jaxtyping import Float
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
@@ -38,6 +38,10 @@ LETTERS = 24
 """Of a name in a legend before it is cut."""
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"))
 INK = "#222222"
+
+
+Quantity = Literal["material", "law", "object", "part", "young", "poisson", "density"]
+"""What parts can be coloured by."""
 
 
 @dataclass(frozen=True)
@@ -75,12 +79,9 @@ def fields_figure(scene: Scene, parts: Parts, field: MaterialField, path: Path) 
     share = _share(seen, parts)
     figure = Figure(figsize=(13.5, 9.5), dpi=110, facecolor="white")
     FigureCanvasAgg(figure)
-    panels: list[Names | Numbers] = [
-        *_names(scene, parts, field),
-        *_numbers(field),
-    ]
-    order = (0, 1, 3, 4, 5, 2)
-    for k, panel in enumerate(panels[j] for j in order):
+    shown = panels(scene, parts, field)
+    order: tuple[Quantity, ...] = ("material", "law", "young", "poisson", "density", "object")
+    for k, panel in enumerate(shown[name] for name in order):
         column, row = k % 3, k // 3
         box = (0.012 + column * 0.329, 0.622 - row * 0.500, 0.318, 0.339)
         axes = figure.add_axes(box)
@@ -142,32 +143,42 @@ def si(value: float, unit: str) -> str:
     return f"{value / factor:.3g} {prefix}{unit}"
 
 
-def _names(scene: Scene, parts: Parts, field: MaterialField) -> list[Names]:
-    laws = [colours.LAWS[m.law] for m in field.materials]
+def panels(scene: Scene, parts: Parts, field: MaterialField) -> dict[Quantity, Names | Numbers]:
+    """Return what parts can be coloured by."""
+    made, palette = field.materials, [colours.of_hex(c) for c in colours.OBJECTS]
+    laws = [colours.LAWS[m.law] for m in made]
     things = [part.object for part in parts.catalogue]
-    palette = colours.OBJECTS
-    return [
-        Names(
+    numbers = range(len(parts.catalogue))
+    return {
+        "material": Names(
             "Material",
-            [m.name.replace("_", " ") for m in field.materials],
-            [colours.of_material(m.name) for m in field.materials],
+            [m.name.replace("_", " ") for m in made],
+            [colours.of_material(m.name) for m in made],
         ),
-        Names("Constitutive law", [n for n, _ in laws], [colours.of_hex(c) for _, c in laws]),
-        Names(
+        "law": Names(
+            "Constitutive law", [n for n, _ in laws], [colours.of_hex(c) for _, c in laws]
+        ),
+        "object": Names(
             "Object",
             [scene.objects[k].name.replace("_", " ") for k in things],
-            [colours.of_hex(palette[k % len(palette)]) for k in things],
+            [palette[k % len(palette)] for k in things],
         ),
-    ]
+        "part": Names(
+            "Part",
+            [part.name.replace("_", " ") for part in parts.catalogue],
+            [palette[k % len(palette)] for k in numbers],
+        ),
+        "young": Numbers("Young's modulus E", "Pa", [m.young for m in made], log=True),
+        "poisson": Numbers("Poisson's ratio ν", "", [m.poisson for m in made]),
+        "density": Numbers("Density ρ", "kg/m³", [m.density for m in made], log=True),
+    }
 
 
-def _numbers(field: MaterialField) -> list[Numbers]:
-    made = field.materials
-    return [
-        Numbers("Young's modulus E", "Pa", [m.young for m in made], log=True),
-        Numbers("Poisson's ratio ν", "", [m.poisson for m in made]),
-        Numbers("Density ρ", "kg/m³", [m.density for m in made], log=True),
-    ]
+def shades(panel: Names | Numbers) -> Float[np.ndarray, "K 3"]:
+    """Return the colour of every part, sRGB."""
+    if isinstance(panel, Names):
+        return np.array(panel.colour, dtype=float).reshape(-1, 3)
+    return colours.turbo(panel.value or [0.0], panel.log)[0]
 
 
 def _coloured(
@@ -175,11 +186,9 @@ def _coloured(
 ) -> tuple[np.ndarray, Callable[[Axes, np.ndarray], None]]:
     """Give the colour of every part (K, 3) sRGB, and what draws the key."""
     if isinstance(panel, Names):
-        return np.array(panel.colour).reshape(-1, 3), lambda axes, share: _legend(
-            axes, panel, share
-        )
-    shown, low, high = colours.turbo(panel.value or [0.0], panel.log)
-    return shown, lambda axes, share: _scale(axes, panel, low, high)
+        return shades(panel), lambda axes, share: _legend(axes, panel, share)
+    _, low, high = colours.turbo(panel.value or [0.0], panel.log)
+    return shades(panel), lambda axes, share: _scale(axes, panel, low, high)
 
 
 def _painted(stage: Stage, parts: Parts, colour_of_part: np.ndarray) -> Stage:
@@ -230,7 +239,7 @@ def _scale(axes: Axes, panel: Numbers, low: float, high: float) -> None:
     inset = axes.inset_axes((0.1, -0.1, 0.8, 0.045))
     flat = high - low <= 1e-9 * max(abs(high), 1e-30)
     middle = np.sqrt(low * high) if panel.log else (low + high) / 2
-    ramp = matplotlib.colormaps["turbo"](0.04 + 0.92 * np.linspace(0, 1, 256))
+    ramp = colours.ramp(np.linspace(0, 1, 256))
     if flat:
         ramp[:] = ramp[128]
     inset.imshow(ramp[None], aspect="auto", extent=(0, 1, 0, 1))

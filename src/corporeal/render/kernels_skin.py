@@ -1,4 +1,4 @@
-"""Vertices carried by particles. Loops compiled by numba."""
+"""Points carried by particles. Loops compiled by numba."""
 
 import numba
 import numpy as np
@@ -73,3 +73,25 @@ def carry(rest, normals, near, weight, start, now, F, place, turned):
         length = np.sqrt(length)
         for a in range(3):
             turned[v, a] = turned[v, a] / length if length > 1e-12 else normals[v, a]
+
+
+@numba.njit(**JIT)
+def stretch(rest, near, weight, start, now, F, place, gradient):
+    """X' = Σ w (x_p + F_p (X - X_p)) and Σ w F_p; what has no particles stays as it is."""
+    for v in range(len(rest)):
+        bare = weight[v].sum() == 0
+        for a in range(3):
+            place[v, a] = rest[v, a] if bare else 0.0
+            for b in range(3):
+                gradient[v, a, b] = 1.0 if bare and a == b else 0.0
+        for k in range(near.shape[1]):
+            w = weight[v, k]
+            if w == 0:
+                continue
+            p = near[v, k]
+            for a in range(3):
+                moved = now[p, a]
+                for b in range(3):
+                    moved += F[p, a, b] * (rest[v, b] - start[p, b])
+                    gradient[v, a, b] += w * F[p, a, b]
+                place[v, a] += w * moved

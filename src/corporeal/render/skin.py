@@ -1,4 +1,4 @@
-"""The mesh follows the matter: each vertex is bound at the start to the particles around it.
+"""Points follow the matter: vertices and Gaussians are bound at the start to particles near them.
 
 Weights depend on position and part only, so vertices doubled along a texture seam stay together,
 and a rigid object, whose particles all share one rotation, moves exactly.
@@ -23,13 +23,14 @@ LOOSE = (0.7, 1.4)
 
 @dataclass(frozen=True)
 class Skin:
-    """Vertices of all surfaces in order, bound to particles."""
+    """Points bound to particles: vertices of all surfaces in order, or Gaussians."""
 
     rest: Float[np.ndarray, "V 3"]
     """[m]"""
     normals: Float[np.ndarray, "V 3"]
+    """Unit; 0 of what has none."""
     near: Int[np.ndarray, "V k"]
-    """Particles of each vertex."""
+    """Particles of each point, the nearest first."""
     weight: Float[np.ndarray, "V k"]
     start: Float[np.ndarray, "P 3"]
     """Particles' first positions [m]."""
@@ -38,16 +39,28 @@ class Skin:
     def pose(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (V, 3) [m] and unit normals (V, 3) at one instant."""
         place, turned = np.empty_like(self.rest), np.empty_like(self.normals)
+        moved = self._moved(frame)
+        kernels_skin.carry(
+            self.rest, self.normals, self.near, self.weight, self.start, *moved, place, turned
+        )
+        return place, turned
+
+    def carried(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+        """Places (V, 3) [m] and deformation gradients (V, 3, 3) at one instant."""
+        place, gradient = np.empty_like(self.rest), np.empty((len(self.rest), 3, 3))
+        moved = self._moved(frame)
+        kernels_skin.stretch(self.rest, self.near, self.weight, self.start, *moved, place, gradient)
+        return place, gradient
+
+    def _moved(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
+        """Particles' positions [m] and gradients, made fit to be seen."""
         F = np.ascontiguousarray(frame.deformation, dtype=np.float64)
         F = bounded(bounded(F, STRETCH), LOOSE, self.loose)
         now = np.ascontiguousarray(frame.position, dtype=np.float64)
         lost = ~np.all(np.isfinite(now), axis=1)
         if lost.any():
             now = np.where(lost[:, None], self.start, now)
-        kernels_skin.carry(
-            self.rest, self.normals, self.near, self.weight, self.start, now, F, place, turned
-        )
-        return place, turned
+        return now, F
 
 
 def bind(scene: Scene, parts: Parts, particles: Particles, loose: Bool[np.ndarray, " K"]) -> Skin:
@@ -55,15 +68,36 @@ def bind(scene: Scene, parts: Parts, particles: Particles, loose: Bool[np.ndarra
 
     loose: which parts are granular.
     """
-    rest = positions(scene)
     part, thing = _owners(scene, parts)
+    return _bound(positions(scene), vertex_normals(scene), (part, thing), particles, loose)
+
+
+def bind_points(
+    points: Float[np.ndarray, "V 3"],
+    thing: Int[np.ndarray, " V"],
+    particles: Particles,
+    loose: Bool[np.ndarray, " K"],
+) -> Skin:
+    """Bind every point to the nearest particles of its own object; without any it stays."""
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    owners = np.full(len(points), -1), np.asarray(thing)
+    return _bound(points, np.zeros_like(points), owners, particles, loose)
+
+
+def _bound(
+    rest: np.ndarray,
+    normals: np.ndarray,
+    owners: tuple[np.ndarray, np.ndarray],
+    particles: Particles,
+    loose: np.ndarray,
+) -> Skin:
     near = np.zeros((len(rest), NEIGHBOURS), dtype=np.int64)
     weight = np.zeros((len(rest), NEIGHBOURS))
-    for vertices, own in _families(part, thing, particles):
+    for vertices, own in _families(*owners, particles):
         near[vertices], weight[vertices] = _nearest(rest[vertices], own, particles.position)
     return Skin(
         rest=rest,
-        normals=vertex_normals(scene),
+        normals=normals,
         near=near,
         weight=weight,
         start=np.ascontiguousarray(particles.position, dtype=np.float64),

@@ -1,4 +1,8 @@
-"""Film: the textured scene itself moves, carried by its particles, and a camera watches.
+"""Film: the scene itself moves, carried by its particles, and a camera watches.
+
+What is seen are textured surfaces, or the Gaussians that were learned from pictures: those move and
+stretch with the matter (F Σ F^T), stand before the usual floor, and the surfaces that were made of
+them are only seen by their shadows on it.
 
 The camera stands where it sees the whole motion; light and camera do not move; the dice of the
 ray caster are fixed per pixel, so that nothing flickers.
@@ -7,21 +11,29 @@ ray caster are fixed per pixel, so that nothing flickers.
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float, Int
 from PIL import Image
 
 from corporeal.errors import UserError
-from corporeal.render import video
-from corporeal.render.camera import Aim, place
+from corporeal.geometry.harmonics import DC
+from corporeal.render import colours, key, video
+from corporeal.render.camera import Aim, camera_of, place
 from corporeal.render.embree import Stage, render
-from corporeal.render.skin import Skin, bind
+from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, shades, si
+from corporeal.render.look import linear
+from corporeal.render.skin import Skin, bind, bind_points
+from corporeal.splats import raster
+from corporeal.splats.deform import deformed
 from corporeal.store import writing
 from corporeal.types import (
     Film,
+    Frame,
+    Gaussians,
     Law,
     MaterialField,
     Particles,
@@ -37,6 +49,8 @@ LOOKS = 60
 """Frames that the camera's place is chosen by, at most."""
 STRAYS = 0.4
 """Percent of an object's particles, at either end, that need not be in the picture."""
+NEAR = 0.1
+"""Gaussians nearer than this share of the way to the scene are haze, and not drawn."""
 FAR = 2.5
 """Sizes of the scene beyond which the camera lets things go."""
 
@@ -59,6 +73,10 @@ class FilmConfig:
     """From where to look, as a direction; None: where things hide each other least."""
     stills: bool = False
     """Keep every picture as PNG too."""
+    look: Literal["surfaces", "gaussians"] | None = None
+    """What is drawn; None: Gaussians where the scene was made of them."""
+    colour_by: Literal["itself", "speed"] | Quantity = "itself"
+    """What the colours of things tell, with a key in the corner."""
 
 
 DEFAULT = FilmConfig()
@@ -73,8 +91,10 @@ def film(  # noqa: PLR0913
     config: FilmConfig,
     folder: Path,
     progress: Progress = lambda fraction, words: None,
+    gaussians: Gaussians | None = None,
+    object_of_gaussian: Int[np.ndarray, " N"] | None = None,
 ) -> Film:
-    """Write ``film.mp4`` and ``thumbnail.png``: the scene's own surfaces following the particles.
+    """Write ``film.mp4`` and ``thumbnail.png``: what the scene looks like follows the particles.
 
     Args:
         scene: What is to be seen.
@@ -85,9 +105,12 @@ def film(  # noqa: PLR0913
         config: Size, quality, view.
         folder: Where the film goes.
         progress: Told the fraction done and what is going on.
+        gaussians: What the scene was made of, where it was made of Gaussians.
+        object_of_gaussian: Which object each belongs to; -1: floor or background, standing still.
 
     Raises:
-        UserError: There is nothing to show, the disk is full, or the encoder fails.
+        UserError: There is nothing to show, Gaussians are asked for and there are none, the disk
+            is full, or the encoder fails.
 
     """
     count = len(trajectory.frames)
@@ -99,9 +122,13 @@ def film(  # noqa: PLR0913
     fps = max(round(scene.fps * config.speed), 1)
     size = config.width, config.height
     credit = "; ".join(dict.fromkeys(o.credit for o in scene.objects if o.credit))
+    puppet = _puppet(config, gaussians, object_of_gaussian, particles, granular(field))
+    paint = _paint(config.colour_by, scene, parts, particles, field, trajectory)
+    troupe = _Troupe(Stage(scene), skin, puppet, paint)
     with video.reel(folder / FILM, fps, size, credit) as reel:
-        for number, stage in enumerate(_stages(Stage(scene), skin, trajectory)):
-            picture = render(stage, camera, config.quality)
+        for number, scenery in enumerate(_sceneries(troupe, trajectory)):
+            picture = scenery.picture(camera, config.quality)
+            picture = picture if paint is None else paint.keyed(picture)
             reel.add(picture)
             _keep(picture, number, count, config, folder)
             progress((number + 1) / count, f"frame {number + 1} of {count}")
@@ -162,11 +189,152 @@ def _near(boxes: np.ndarray) -> np.ndarray:
     return boxes
 
 
-def _stages(stage: Stage, skin: Skin, trajectory: Trajectory) -> Iterator[Stage]:
-    """Every frame's surfaces in order; the next one is made ready while one is drawn."""
+@dataclass(frozen=True)
+class _Scenery:
+    """What is to be seen at one instant."""
 
-    def ready(number: int) -> Stage:
-        return stage.posed(*skin.pose(trajectory.frames[number]))
+    stage: Stage
+    gaussians: Gaussians | None
+
+    def picture(self, camera: Aim, quality: Literal["draft", "normal", "fine"]) -> np.ndarray:
+        behind = render(self.stage, camera, quality)
+        if self.gaussians is None:
+            return behind
+        near = NEAR * float(np.linalg.norm(np.subtract(camera.eye, camera.target)))
+        front = raster.render(self.gaussians, camera_of(camera), near=near)
+        through = (1 - front.alpha[..., None]) * behind
+        return np.clip(255 * front.rgb + through + 0.5, 0, 255).astype(np.uint8)
+
+
+@dataclass(frozen=True)
+class _Puppet:
+    """Gaussians that follow particles; those of no object stand still."""
+
+    gaussians: Gaussians
+    moving: Int[np.ndarray, " M"]
+    skin: Skin
+    """Of those that move."""
+
+    def at(self, frame: Frame, colour: np.ndarray | None) -> Gaussians:
+        """Return all Gaussians at one instant; colour: of every particle, (P, 3) sRGB."""
+        g, names = self.gaussians, ("mean", "rotation", "scale", "opacity", "sh")
+        place, F = self.skin.carried(frame)
+        moved = deformed(replace(g, **{n: getattr(g, n)[self.moving] for n in names}), F, place)
+        if colour is not None:
+            moved = replace(moved, sh=_flat(moved.sh, colour[self.skin.near[:, 0]]))
+        arrays = {n: getattr(g, n).copy() for n in names}
+        for name, values in arrays.items():
+            values[self.moving] = getattr(moved, name)
+        return replace(g, **arrays)
+
+
+def _flat(sh: np.ndarray, colour: np.ndarray) -> np.ndarray:
+    """Return coefficients of colours that are the same from all sides."""
+    out = np.zeros_like(sh)
+    out[:, 0] = (colour - 0.5) / DC
+    return out
+
+
+def _puppet(
+    config: FilmConfig,
+    gaussians: Gaussians | None,
+    owner: np.ndarray | None,
+    particles: Particles,
+    loose: np.ndarray,
+) -> _Puppet | None:
+    if config.look == "surfaces" or (config.look is None and gaussians is None):
+        return None
+    if gaussians is None or owner is None:
+        raise UserError(
+            "This scene was made of surfaces and has no Gaussians to be filmed. "
+            "Film it with look 'surfaces', or run it from photographs or a splat."
+        )
+    moving = np.flatnonzero(owner >= 0)
+    skin = bind_points(gaussians.mean[moving], owner[moving], particles, loose)
+    return _Puppet(gaussians, moving, skin)
+
+
+@dataclass(frozen=True)
+class _Paint:
+    """Colours that tell something of every particle."""
+
+    panel: Names | Numbers
+    of_particle: Float[np.ndarray, "P 3"] | None
+    """sRGB; None where they change with time."""
+    trajectory: Trajectory
+    fastest: float = 1.0
+    """[m/s]"""
+
+    def at(self, number: int) -> np.ndarray:
+        """Colours (P, 3) of all particles in one frame."""
+        if self.of_particle is not None:
+            return self.of_particle
+        share = np.clip(speeds(self.trajectory, number) / self.fastest, 0, 1)
+        return colours.ramp(share)
+
+    def keyed(self, picture: np.ndarray) -> np.ndarray:
+        """Say in the picture what the colours mean."""
+        p = self.panel
+        if isinstance(p, Names):
+            return key.names(picture, p.title, list(zip(p.label, p.colour, strict=True)))
+        return key.scale(picture, p.title, *(si(f(p.value), p.unit) for f in (min, max)))
+
+
+def _paint(
+    colour_by: Literal["itself", "speed"] | Quantity,
+    scene: Scene,
+    parts: Parts,
+    particles: Particles,
+    field: MaterialField,
+    trajectory: Trajectory,
+) -> _Paint | None:
+    if colour_by == "itself":
+        return None
+    if colour_by == "speed":
+        count = len(trajectory.frames)
+        some = np.unique(np.linspace(0, count - 1, min(count, LOOKS)).round().astype(int))
+        top = max(float(np.percentile(speeds(trajectory, int(k)), 99.5)) for k in some)
+        return _Paint(Numbers("Speed", "m/s", [0.0, top]), None, trajectory, max(top, 1e-9))
+    panel = panels(scene, parts, field)[colour_by]
+    return _Paint(panel, shades(panel)[particles.part], trajectory)
+
+
+def speeds(trajectory: Trajectory, number: int) -> Float[np.ndarray, " P"]:
+    """How fast every particle goes on its way to the next frame, or to the last one [m/s]."""
+    last = len(trajectory.frames) - 1
+    if last == 0:
+        return np.zeros(len(trajectory.frames[0].position))
+    a = trajectory.frames[min(number, last - 1)]
+    b = trajectory.frames[min(number, last - 1) + 1]
+    way = np.linalg.norm(b.position.astype(float) - a.position, axis=1)
+    return np.nan_to_num(way / (b.time - a.time))
+
+
+@dataclass(frozen=True)
+class _Troupe:
+    """All that moves, in the pose it starts from."""
+
+    stage: Stage
+    skin: Skin
+    puppet: _Puppet | None
+    paint: _Paint | None
+
+    def at(self, number: int, frame: Frame) -> _Scenery:
+        stage = self.stage.posed(*self.skin.pose(frame))
+        colour = None if self.paint is None else self.paint.at(number)
+        if self.puppet is not None:
+            return _Scenery(stage.shadows(), self.puppet.at(frame, colour))
+        if colour is not None:
+            nearest = self.skin.near[self.stage.look.triangles[:, 0], 0]
+            stage = stage.painted(linear(colour[nearest]), PAPER)
+        return _Scenery(stage, None)
+
+
+def _sceneries(troupe: _Troupe, trajectory: Trajectory) -> Iterator[_Scenery]:
+    """Every frame's scenery in order; the next one is made ready while one is drawn."""
+
+    def ready(number: int) -> _Scenery:
+        return troupe.at(number, trajectory.frames[number])
 
     count = len(trajectory.frames)
     with ThreadPoolExecutor(1) as ahead:
