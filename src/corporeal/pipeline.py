@@ -342,7 +342,8 @@ class _Run:
     def _segment(self, folder: Path, progress: Progress) -> Parts:
         progress(0.0, "finding parts")
         scene, inventory = self.made["assemble"], self.made["describe"]
-        return self._keep(folder, segment(scene, inventory, self.settings.segment))
+        config, semantic = self.settings.segment, self.settings.reconstruct.semantic
+        return self._keep(folder, segment(scene, inventory, config, self._found(), semantic))
 
     def _ground(self, folder: Path, progress: Progress) -> MaterialField:
         progress(0.0, "looking numbers up")

@@ -94,6 +94,7 @@ def _warnings(made: Mapping[str, Any], audit: Mapping[str, Any]) -> list[str]:
         found.warnings if found else (),
         still_doubted(scene, inventory),
         inventory.warnings,
+        made["segment"].warnings,
         doubts(made["ground"], made["segment"], scene),
         made["fill"].warnings,
         audit["warnings"],

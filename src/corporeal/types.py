@@ -366,6 +366,8 @@ class Parts:
     confidence: Float[np.ndarray, " N"]
     """In [0, 1]."""
     catalogue: tuple[Part, ...]
+    warnings: tuple[str, ...] = ()
+    """What a reader of the report should know, in sentences."""
 
 
 # ---------------------------------------------------------------- what it is made of

@@ -110,9 +110,13 @@ def _doubts(where: str, material: Material, words: PartWords) -> list[str]:
 
 
 def _words(inventory: Inventory, number: int, name: str) -> PartWords:
-    for words in inventory.objects[number].parts:
+    parts = inventory.objects[number].parts
+    for words in parts:
         if words.name == name:
             return words
+    for piece in (p for words in parts for p in words.pieces):
+        if piece.name == name:  # it has a surface of its own, and shares it with nobody
+            return replace(piece, volume_share=1.0, surface_share=1.0)
     raise UserError(f"The description has no part {name!r}. Describe the scene again.")
 
 

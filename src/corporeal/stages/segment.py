@@ -1,28 +1,54 @@
 """Segment: say of every point which object and which part it belongs to."""
 
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
+from corporeal.features import Reader, connect
 from corporeal.geometry.identity import identify
-from corporeal.types import Inventory, Parts, Scene
+from corporeal.regions.naming import Named, name_parts
+from corporeal.regions.parts import PartsConfig
+from corporeal.types import Cloud, Inventory, ObjectWords, Part, Parts, Reconstruction, Scene
 from corporeal.vlm.metadata import matter_hint
+
+VOTERS = 5
+"""Points nearest to a triangle that say what part it is of."""
 
 
 @dataclass(frozen=True)
 class SegmentConfig:
-    """Nothing to choose on the mesh path: the file's own identity decides."""
+    """How objects from pictures are taken apart; of a model the file's own identity decides."""
+
+    position_weight: float = 0.3
+    """How much place counts beside look; 0: not at all."""
 
 
 DEFAULT = SegmentConfig()
 
 
-def segment(scene: Scene, inventory: Inventory, config: SegmentConfig = DEFAULT) -> Parts:
-    """Give every triangle its object and part, by the identity that the file itself holds.
+def segment(
+    scene: Scene,
+    inventory: Inventory,
+    config: SegmentConfig = DEFAULT,
+    found: Reconstruction | None = None,
+    semantic: str = "descriptor",
+) -> Parts:
+    """Give every triangle its object and part.
 
-    Points are the scene's triangles in order. Identity is exact by construction, so the
-    confidence is 1.
+    Points are the scene's triangles in order. What the file tells apart is exact by construction,
+    with confidence 1. An object from pictures is one surface: if its description names several
+    pieces, they are found among the points of the reconstruction.
+
+    Args:
+        scene: What was assembled.
+        inventory: What its parts are called.
+        config: How objects from pictures are taken apart.
+        found: Points with features, where the scene's objects stand now; None: from a model.
+        semantic: What the semantic features of these points are, as for ``features.connect``.
 
     Raises:
         UserError: The inventory describes another scene.
@@ -32,12 +58,24 @@ def segment(scene: Scene, inventory: Inventory, config: SegmentConfig = DEFAULT)
     _agree(scene, inventory, [p.name for p in identity.catalogue])
     triangles = [len(s.triangles) for s in scene.surfaces]
     part_of_point = np.repeat(identity.part_of_surface, triangles)
-    return Parts(
+    parts = Parts(
         object_of_point=scene.object_of_triangle,
         part_of_point=part_of_point,
         confidence=np.ones(len(part_of_point)),
         catalogue=identity.catalogue,
     )
+    if found is None:
+        return parts
+    middle = np.concatenate([s.vertices[s.triangles].mean(axis=1) for s in scene.surfaces])
+    for number, thing in enumerate(inventory.objects):
+        pieces = thing.parts[0].pieces if len(thing.parts) == 1 else ()
+        if len(pieces) > 1:
+            thing = replace(thing, parts=pieces)
+            cloud = _of_object(found.cloud, found.object_of_point == number)
+            vectors = _vectors(semantic, thing)
+            named = name_parts(cloud, thing, vectors, PartsConfig(config.position_weight))
+            parts = _taken_apart(parts, number, thing, named, cloud, middle)
+    return parts
 
 
 def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
@@ -47,3 +85,78 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
             f"The description speaks of the parts {', '.join(described) or 'none'}, but "
             f"{scene.name!r} has {', '.join(names)}. Describe the scene again."
         )
+
+
+# ---------------------------------------------------------------- objects from pictures
+
+
+def _of_object(cloud: Cloud, mine: Bool[np.ndarray, " N"]) -> Cloud:
+    return replace(
+        cloud,
+        position=cloud.position[mine],
+        colour=cloud.colour[mine],
+        semantic=cloud.semantic[mine],
+        structural=cloud.structural[mine],
+        seen=cloud.seen[mine],
+        gaussian_of_point=None,
+    )
+
+
+def _vectors(semantic: str, thing: ObjectWords) -> Float[np.ndarray, "K S"] | None:
+    """Return what the parts' names are among features; None where these know no words."""
+    encoder = connect(semantic)
+    if not isinstance(encoder, Reader):
+        return None
+    return encoder.words([f"{part.name} of a {thing.class_name}" for part in thing.parts])
+
+
+def _taken_apart(
+    parts: Parts,
+    number: int,
+    thing: ObjectWords,
+    named: Named,
+    cloud: Cloud,
+    middle: Float[np.ndarray, "T 3"],
+) -> Parts:
+    """Put the pieces that were found in the place of the object's only part."""
+    own = np.flatnonzero(parts.object_of_point == number)
+    share = _voted(middle[own], cloud.position, named, len(thing.parts))
+    best = share.argmax(axis=1)
+    kept = np.unique(best)
+    place = next(k for k, p in enumerate(parts.catalogue) if p.object == number)
+    new = [Part(thing.parts[k].name, number, named.found_by) for k in kept]
+    later = parts.part_of_point > place
+    of_point = np.where(later, parts.part_of_point + len(new) - 1, parts.part_of_point)
+    of_point[own] = place + np.searchsorted(kept, best)
+    confidence = parts.confidence.copy()
+    confidence[own] = share[np.arange(len(own)), best]
+    said = [f"{thing.name}: {words}" for words in _doubts(named, thing, kept.tolist())]
+    return replace(
+        parts,
+        part_of_point=of_point,
+        confidence=confidence,
+        catalogue=(*parts.catalogue[:place], *new, *parts.catalogue[place + 1 :]),
+        warnings=(*parts.warnings, *said),
+    )
+
+
+def _voted(
+    places: Float[np.ndarray, "T 3"],
+    points: Float[np.ndarray, "N 3"],
+    named: Named,
+    count: int,
+) -> Float[np.ndarray, "T K"]:
+    """Return how sure the nearest points are, together, that each place is of each part."""
+    near = np.asarray(KDTree(points).query(places, k=min(VOTERS, len(points)))[1])
+    near = near.reshape(len(places), -1)
+    share = np.zeros((len(places), count))
+    rows = np.arange(len(places))
+    for column in near.T:
+        share[rows, named.part_of_point[column]] += named.confidence[column] / near.shape[1]
+    return share
+
+
+def _doubts(named: Named, thing: ObjectWords, kept: Sequence[int]) -> list[str]:
+    lost = [p.name for k, p in enumerate(thing.parts) if k not in kept]
+    gone = f"{', '.join(lost)} has no place on its surface, and is left out."
+    return [*named.warnings, *([gone] if lost and not named.warnings else [])]
