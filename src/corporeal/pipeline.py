@@ -363,8 +363,9 @@ class _Run:
     def _film(self, folder: Path, progress: Progress) -> Film:
         names = ("assemble", "segment", "fill", "ground", "simulate")
         scene, parts, particles, made, trajectory = (self.made[v] for v in names)
-        config = self.settings.film
-        done = film(scene, parts, particles, made, trajectory, config, folder, progress)
+        config, found = self.settings.film, self._found()
+        of = (found.gaussians, found.object_of_gaussian) if found else ()
+        done = film(scene, parts, particles, made, trajectory, config, folder, progress, *of)
         return self._keep(folder, done)
 
     def _report(self, folder: Path, progress: Progress) -> None:
