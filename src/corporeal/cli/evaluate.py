@@ -9,7 +9,6 @@ import tyro
 from corporeal import store
 from corporeal.cli.parse import parse
 from corporeal.errors import UserError
-from corporeal.regions.parts import PartsConfig
 from corporeal.terminal import show_table, told
 
 
@@ -25,6 +24,7 @@ def verb_evaluate() -> None:
     four models of the showcase. With --structural dinov2 --semantic clip models look at them.
     """
     from corporeal.evaluation import mass, parts
+    from corporeal.regions.parts import PartsConfig
     from corporeal.stages.describe import DescribeConfig
     from corporeal.stages.ground import GroundConfig
 

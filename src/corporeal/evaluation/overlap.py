@@ -3,7 +3,6 @@
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.optimize import linear_sum_assignment
-from scipy.stats import rankdata
 
 
 def iou(
@@ -53,5 +52,6 @@ def roc_area(right: Float[np.ndarray, " R"], wrong: Float[np.ndarray, " W"]) -> 
     """
     if not (len(right) and len(wrong)):
         return None
-    ranks = rankdata(np.concatenate([right, wrong]))[: len(right)]
-    return float((ranks.mean() - (len(right) + 1) / 2) / len(wrong))
+    ordered = np.sort(wrong)
+    below = np.searchsorted(ordered, right, "left") + np.searchsorted(ordered, right, "right")
+    return float(below.mean() / (2 * len(wrong)))

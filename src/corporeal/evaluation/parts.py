@@ -23,7 +23,7 @@ from corporeal.features.lifting import back_projection, visible
 from corporeal.formats.sources import models_in
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.spread import sample_surface
-from corporeal.regions.naming import named
+from corporeal.regions.naming import named, phrases
 from corporeal.regions.parts import PartsConfig, parts
 from corporeal.showcase.scenes import alone
 from corporeal.stages.assemble import assemble
@@ -176,7 +176,7 @@ def lookers(how: PartsEvaluationConfig) -> Lookers:
 
     """
     semantic = features.connect(how.semantic) if how.semantic else None
-    if how.semantic and not hasattr(semantic, "words"):
+    if how.semantic and not isinstance(semantic, features.Reader):
         raise UserError(
             f"{how.semantic!r} does not compare points with words. Say --semantic clip, or leave "
             "it out."
@@ -255,7 +255,8 @@ def judged(
     present, truth = np.unique(taken.part_of_point, return_inverse=True)
     said = [p for thing in taken.inventory.objects for p in thing.parts]
     told = [replace(said[k], name=names.get(said[k].name, said[k].name)) for k in present]
-    vectors = None if look.semantic is None else look.semantic.words([p.name for p in told])
+    thing = replace(taken.inventory.objects[0], parts=tuple(told))
+    vectors = None if look.semantic is None else look.semantic.words(phrases(thing))
     start = time.process_time()
     clusters = parts(taken.cloud, config)
     found = named(clusters, taken.cloud, vectors, told)

@@ -40,6 +40,11 @@ class Named:
     """What a reader of the report should know, in sentences."""
 
 
+def phrases(thing: ObjectWords) -> list[str]:
+    """Return what a model that knows words is asked for, part by part."""
+    return [f"{part.name} of a {thing.class_name}" for part in thing.parts]
+
+
 def name_parts(
     cloud: Cloud,
     thing: ObjectWords,

@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from corporeal.errors import UserError
 from corporeal.features import Reader, connect
 from corporeal.geometry.identity import identify
-from corporeal.regions.naming import Named, name_parts
+from corporeal.regions.naming import Named, name_parts, phrases
 from corporeal.regions.parts import PartsConfig
 from corporeal.types import Cloud, Inventory, ObjectWords, Part, Parts, Reconstruction, Scene
 from corporeal.vlm.metadata import matter_hint
@@ -107,7 +107,7 @@ def _vectors(semantic: str, thing: ObjectWords) -> Float[np.ndarray, "K S"] | No
     encoder = connect(semantic)
     if not isinstance(encoder, Reader):
         return None
-    return encoder.words([f"{part.name} of a {thing.class_name}" for part in thing.parts])
+    return encoder.words(phrases(thing))
 
 
 def _taken_apart(
