@@ -2,10 +2,11 @@
 
 import math
 
+import numpy as np
 import pytest
 
 from corporeal.errors import UserError
-from corporeal.geometry.metric import of_distance, of_extent, of_file
+from corporeal.geometry.metric import Extent, chosen, of_distance, of_extent, of_extents, of_file
 
 
 def test_a_scale_states_its_source():
@@ -24,3 +25,48 @@ def test_no_scale_comes_of_nonsense(metres):
         of_distance((0, 0, 0), (1, 0, 0), metres)
     with pytest.raises(UserError, match="Both must be positive"):
         of_extent((1, 1, 1), (1, 1, 1), 1.0, "a model")
+
+
+# ---------------------------------------------------------------- whom to believe
+
+MEASURED = of_distance((0, 0, 0), (2, 0, 0), 1.0)
+FILE = of_file("A capture")
+STATED = (Extent("duck", 4.0, 0.2, "the command line"),)
+USUAL = (
+    Extent("duck", 4.0, 0.4, "the table"),
+    Extent("can", 1.0, 0.12, "the table"),
+    Extent("chair", 2.0, 0.22, "a model"),
+)
+
+
+def test_the_best_witness_is_believed_and_the_others_are_heard():
+    all_of_them = chosen(MEASURED, STATED, FILE, USUAL)
+    assert (all_of_them.metres_per_unit, all_of_them.source) == (0.5, "distance")
+    assert len(all_of_them.warnings) == 2, "the file is off by a factor of 2 only"
+    assert "4 units, 0.2 m (the command line)" in all_of_them.warnings[0]
+    assert "factor of 10" in all_of_them.warnings[0]
+    assert chosen(None, STATED, FILE, USUAL).metres_per_unit == pytest.approx(0.05)
+    assert chosen(None, (), FILE, USUAL).source == "file"
+    assert chosen(None, (), None, USUAL).metres_per_unit == pytest.approx(0.11)
+
+
+def test_a_thing_that_disagrees_with_the_others_is_named():
+    odd = (*USUAL, Extent("ant", 1.0, 0.003, "the table"))
+    found = of_extents(odd)
+    assert found.metres_per_unit == pytest.approx(np.sqrt(0.1 * 0.11))
+    assert "sizes of ant are off" in found.warnings[0]
+    assert "--extent NAME=METRES" in found.warnings[0]
+    assert of_extents(USUAL).warnings == ()
+    assert of_extents(()) is None
+
+
+def test_where_nobody_knows_a_stand_in_is_named():
+    found = chosen(size=10.0)
+    assert (found.metres_per_unit, found.source) == (pytest.approx(0.05), "nobody")
+    assert "Nobody knows how large it is" in found.warnings[0]
+
+
+@pytest.mark.parametrize("metres", [0.0, -1.0, math.nan, math.inf])
+def test_nonsense_is_refused_by_the_name_of_the_thing(metres):
+    with pytest.raises(UserError, match="The extent of duck"):
+        chosen(stated=[Extent("duck", 1.0, metres, "the command line")])
