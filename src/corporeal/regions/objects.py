@@ -15,7 +15,8 @@ from scipy.sparse.csgraph import connected_components
 
 from corporeal.errors import UserError
 from corporeal.geometry.local_shape import neighbours
-from corporeal.regions.cuts import Cut, Graph, cut
+from corporeal.regions.cuts import Cut, cut
+from corporeal.regions.families import Graph
 from corporeal.regions.masks import agreement
 from corporeal.regions.patches import Borders, Patches, concavity, difference, joined, patches
 from corporeal.regions.reduce import reduced
