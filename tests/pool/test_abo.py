@@ -72,7 +72,7 @@ def test_models_become_assets_with_product_types_and_attribution(root, tmp_path)
     }
     ottoman = pool.asset("abo_B01")
     assert ottoman.credit == (
-        "Round Ottoman, Blue, Amazon Berkeley Objects (c) Amazon.com, CC-BY-4.0"
+        "CC-BY-4.0; Round Ottoman, Blue, Amazon Berkeley Objects (c) Amazon.com"
     )
     assert ottoman.extent == pytest.approx(0.8)
 

@@ -2,7 +2,7 @@
 
 import math
 
-from corporeal.formats.credits import credit_in
+from corporeal.formats.credits import Credit, credit_in
 from corporeal.formats.glb_writer import GENERATOR
 from corporeal.formats.gltf_document import Document, Entry
 from corporeal.formats.words import everyday, safe
@@ -58,9 +58,11 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
 
 def credit(extras: dict) -> str:
     """Return whom to thank for an object, and under which licence it may be used, if it says so."""
-    said = [extras.get(key) for key in ("licence", "attribution")]
-    whole = extras.get("credit") or "; ".join(x for x in said if isinstance(x, str) and x)
-    return whole if isinstance(whole, str) else ""
+    whole, *said = (
+        x if isinstance(x := extras.get(key), str) else ""
+        for key in ("credit", "licence", "attribution")
+    )
+    return whole or Credit(*said).words
 
 
 def _extras(document: Document, head: Entry | None) -> Entry:

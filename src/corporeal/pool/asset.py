@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from pathlib import Path
 
+from corporeal.formats.credits import Credit
+
 UNKNOWN = "unknown"
 """Licence of what says nothing about it."""
 
@@ -37,11 +39,9 @@ class Asset:
 
     @property
     def credit(self) -> str:
-        """Attribution and licence in one line; empty where nothing is known of either."""
-        licence = "" if self.licence in (UNKNOWN, "") else self.licence
-        if licence and licence in self.attribution:
-            return self.attribution
-        return ", ".join(w for w in (self.attribution, licence) if w)
+        """Licence and attribution in one line; empty where nothing is known of either."""
+        licence = "" if self.licence == UNKNOWN else self.licence
+        return Credit(licence, self.attribution).words
 
     @property
     def size(self) -> str:
