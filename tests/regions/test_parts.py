@@ -1,3 +1,4 @@
+import tracemalloc
 from dataclasses import replace
 
 import numpy as np
@@ -8,6 +9,8 @@ from corporeal.regions.naming import TEMPERATURE, _agreed, name_parts, named
 from corporeal.regions.parts import Clusters, PartsConfig, parts
 from corporeal.types import Cloud, ObjectWords, PartWords
 
+QUICK = PartsConfig(superpoints=600)
+
 
 def sides(count, rng):
     """Points on the sides of the unit cube, and which way they face."""
@@ -16,7 +19,7 @@ def sides(count, rng):
     return np.where(normal > 0, 1.0, np.where(normal < 0, 0.0, points)), normal
 
 
-def boxes(rng, count=1500):
+def boxes(rng, count=800):
     """Three boxes of one size in a pile, brown, white and green from below."""
     shades = [(0.42, 0.28, 0.17), (0.95, 0.95, 0.95), (0.25, 0.56, 0.2)]
     place, facing, colour, truth = [], [], [], []
@@ -61,7 +64,7 @@ def purity(cluster, truth):
 
 def test_no_cluster_holds_two_parts_of_unlike_colour(pile):
     cloud, truth = pile
-    found = parts(cloud)
+    found = parts(cloud, QUICK)
     assert found.count >= 3
     assert purity(found.cluster_of_point, truth) > 0.995
     assert ((found.confidence >= 0) & (found.confidence <= 1)).all()
@@ -71,7 +74,7 @@ def test_no_cluster_holds_two_parts_of_unlike_colour(pile):
 def test_where_a_thing_stands_and_how_large_it_is_does_not_matter(pile):
     cloud, _ = pile
     moved = replace(cloud, position=32 * cloud.position + 64)
-    a, b = parts(cloud), parts(moved)
+    a, b = parts(cloud, QUICK), parts(moved, QUICK)
     pairs = set(zip(a.cluster_of_point, b.cluster_of_point, strict=True))
     assert len(pairs) == a.count == b.count
 
@@ -79,13 +82,15 @@ def test_where_a_thing_stands_and_how_large_it_is_does_not_matter(pile):
 def test_place_tells_apart_what_looks_the_same():
     """Two plates of one look, a plate's length apart: no look parts them, place does."""
     rng = np.random.default_rng(1)
-    points = np.concatenate([rng.random((2000, 3)) * [1, 1, 0] + [2 * k, 0, 0] for k in (0, 1)])
-    same = np.tile(np.array([[1.0, 0.0]], np.float16), (4000, 1))
-    nothing = np.zeros((4000, 0), np.float16)
-    cloud = Cloud(points, np.full((4000, 3), 0.5), nothing, same, np.ones(4000, int))
-    apart = parts(cloud, PartsConfig(selection="mass", smallest=100)).cluster_of_point
-    assert apart.max() >= 1 and purity(apart, np.repeat([0, 1], 2000)) == 1
-    together = parts(cloud, PartsConfig(position_weight=0.0)).cluster_of_point
+    points = np.concatenate([rng.random((1000, 3)) * [1, 1, 0] + [2 * k, 0, 0] for k in (0, 1)])
+    same = np.tile(np.array([[1.0, 0.0]], np.float16), (2000, 1))
+    nothing = np.zeros((2000, 0), np.float16)
+    cloud = Cloud(points, np.full((2000, 3), 0.5), nothing, same, np.ones(2000, int))
+    apart = parts(
+        cloud, PartsConfig(selection="mass", smallest=100, superpoints=1000)
+    ).cluster_of_point
+    assert apart.max() >= 1 and purity(apart, np.repeat([0, 1], 1000)) == 1
+    together = parts(cloud, replace(QUICK, position_weight=0.0)).cluster_of_point
     assert together.max() == 0
 
 
@@ -100,7 +105,7 @@ def test_a_handful_of_points_is_one_cluster(count):
 
 def test_names_find_their_colours_without_a_model(pile):
     cloud, truth = pile
-    found = name_parts(cloud, thing("green lid", "wooden base", "white middle"))
+    found = name_parts(cloud, thing("green lid", "wooden base", "white middle"), config=QUICK)
     assert (found.part_of_point == np.array([1, 2, 0])[truth]).mean() > 0.98
     assert found.found_by == "attributes" and not found.warnings
     assert ((found.confidence > 0) & (found.confidence <= 1)).all()
@@ -109,7 +114,7 @@ def test_names_find_their_colours_without_a_model(pile):
 def test_names_find_their_heights_where_colours_are_not_said(pile):
     cloud, truth = pile
     grey = replace(cloud, colour=np.full_like(cloud.colour, 0.5))
-    found = name_parts(grey, thing("lid", "base"))
+    found = name_parts(grey, thing("lid", "base"), config=QUICK)
     assert (found.part_of_point[truth == 0] == 1).mean() > 0.98
     assert (found.part_of_point[truth == 2] == 0).mean() > 0.98
 
@@ -117,7 +122,7 @@ def test_names_find_their_heights_where_colours_are_not_said(pile):
 def test_the_order_of_names_does_not_matter(pile):
     cloud, _ = pile
     names = ("green lid", "wooden base", "white middle")
-    forward, back = (name_parts(cloud, thing(*n)) for n in (names, names[::-1]))
+    forward, back = (name_parts(cloud, thing(*n), config=QUICK) for n in (names, names[::-1]))
     np.testing.assert_array_equal(forward.part_of_point, 2 - back.part_of_point)
 
 
@@ -126,6 +131,28 @@ def test_one_part_is_everything_and_sure(pile):
     found = name_parts(cloud, thing("pile"))
     assert (found.part_of_point == 0).all() and (found.confidence == 1).all()
     assert found.found_by == "one part"
+
+
+def test_an_object_without_points_has_no_parts():
+    none = np.zeros((0, 3))
+    cloud = Cloud(none, none, np.zeros((0, 4)), np.zeros((0, 4)), np.zeros(0, int))
+    found = name_parts(cloud, thing("legs", "seat"))
+    assert not len(found.part_of_point) and not len(found.confidence)
+    assert found.warnings == ("No points were found for 'legs', 'seat'.",)
+
+
+def test_features_in_half_precision_are_not_widened_all_at_once():
+    rng = np.random.default_rng(6)
+    rows = rng.normal(size=(60_000, 64)).astype(np.float16)
+    cloud = Cloud(
+        rng.random((60_000, 3)), rng.random((60_000, 3)), rows, rows, np.ones(60_000, int)
+    )
+    clusters = Clusters(rng.integers(0, 5, 60_000), np.ones(60_000))
+    tracemalloc.start()
+    named(clusters, cloud, np.eye(64)[:2], thing("a", "b").parts)
+    peak = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert peak < 1.5 * rows.nbytes  # in single precision they alone are twice as large
 
 
 def test_more_names_than_clusters_are_told():
@@ -144,7 +171,7 @@ def test_words_find_what_points_at_them(pile):
     rng = np.random.default_rng(3)
     (words, semantic), (_, structural) = with_words(truth, rng)
     seen = replace(cloud, semantic=semantic, structural=structural)
-    found = name_parts(seen, thing("a", "b", "c"), words[[2, 0, 1]])
+    found = name_parts(seen, thing("a", "b", "c"), words[[2, 0, 1]], QUICK)
     assert (found.part_of_point == np.array([1, 2, 0])[truth]).mean() > 0.99
     assert found.found_by == "words"
 

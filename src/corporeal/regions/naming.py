@@ -35,7 +35,7 @@ class Named:
     """In [0, 1]: how probable the name is for the cluster, times how surely the point is of it."""
     part_of_cluster: Int[np.ndarray, " C"]
     found_by: str
-    """"one part", "attributes" or "words"."""
+    """"words", "attributes", "one part" or "no points"."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know, in sentences."""
 
@@ -60,8 +60,10 @@ def name_parts(
         config: How finely the object is taken apart first.
 
     """
+    none = np.zeros(cloud.count, np.int64)
+    if not cloud.count:
+        return Named(none, np.ones(0), none, "no points", _missing(none, thing.parts))
     if len(thing.parts) == 1:
-        none = np.zeros(cloud.count, np.int64)
         return Named(none, np.ones(cloud.count), np.zeros(1, np.int64), "one part")
     return named(parts(cloud, config), cloud, words, thing.parts)
 
@@ -132,7 +134,7 @@ def _by_attributes(clusters: Clusters, cloud: Cloud, told: Sequence[PartWords]) 
 def _by_words(clusters: Clusters, cloud: Cloud, words: np.ndarray) -> Float[np.ndarray, "C K"]:
     """Compare prototypes with words, in units of ``TEMPERATURE``."""
     of, count = clusters.cluster_of_point, clusters.count
-    mean = _unit(_sums(cloud.structural, of, count))
+    mean = _unit(_sums(cloud.structural, of, count)).astype(np.float32)
     typical = np.empty(cloud.count)
     for rows in _batches(cloud.count):
         typical[rows] = np.sum(cloud.structural[rows].astype(np.float32) * mean[of[rows]], axis=1)
