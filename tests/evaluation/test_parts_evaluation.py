@@ -3,6 +3,7 @@
 import importlib.util
 import json
 import sys
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -113,6 +114,22 @@ def test_the_same_seed_gives_the_same_numbers(folder, judged_boxes):
     np.testing.assert_array_equal(a.part_of_point, b.part_of_point)
 
 
+def test_what_is_called_the_same_is_one_part(folder, tmp_path):
+    lower = Surface("foot", 0, 0, 0.5 * CUBE.astype(float), CUBE_TRIANGLES.astype(np.int64))
+    red = Finish("c", (0.4, 0.0, 0.0, 1.0))
+    made = boxes()
+    feet = replace(lower, vertices=lower.vertices + np.array([0.25, 0.25, -0.5]), finish=2)
+    three = replace(made, surfaces=(*made.surfaces, feet), finishes=(*made.finishes, red))
+    write_glb(tmp_path / "three.glb", three)
+    names = {"three": {"base": "wooden thing", "foot": "wooden thing"}}
+    ((apart, _),) = judge(tmp_path, {}, CHEAP)
+    ((together, judged),) = judge(tmp_path, names, CHEAP)
+    assert apart.parts == ("base", "top", "foot") and together.parts == ("wooden thing", "top")
+    assert set(np.unique(judged.truth)) == {0, 1}
+    with pytest.raises(UserError, match="two parts"):
+        judge(tmp_path, {"three": dict.fromkeys(apart.parts, "thing")}, CHEAP)
+
+
 def test_only_what_pictures_show_is_asked_for(judged_boxes):
     row, judged = judged_boxes
     assert (judged.taken.cloud.seen > 0).all()
@@ -144,9 +161,10 @@ def test_names_that_are_no_names_are_told(tmp_path, text):
 
 @pytest.mark.slow
 def test_the_names_of_the_documentation_are_those_of_the_showcase():
-    names = read_names(ROOT / "benchmarks" / "parts.toml")
+    tables = [read_names(ROOT / "benchmarks" / f"parts_{k}.toml") for k in ("each", "asked")]
     for name in SHOWCASE:
-        assert set(names[name]) == {surface.name for surface in alone(name).surfaces}
+        own = {surface.name for surface in alone(name).surfaces}
+        assert all(set(names[name]) == own for names in tables)
 
 
 def test_models_that_look_are_asked_for_pixels_and_words(folder, tmp_path):

@@ -36,7 +36,8 @@ SHOWCASE = ("potted_ficus", "armchair", "floor_lamp", "couch")
 EXAMPLE = "Write [file] with part = 'how a person would call it', as in pot = 'clay pot'."
 
 Names = Mapping[str, Mapping[str, str]]
-"""File's stem → part as the file calls it → as somebody calls it who sees it."""
+"""File's stem → part as the file calls it → as somebody calls it who sees it.
+What is called the same is one part."""
 
 
 @dataclass(frozen=True)
@@ -161,7 +162,7 @@ def judge(
         stem = each if isinstance(each, str) else each.stem
         progress(number / len(chosen), stem)
         taken = photographed(scene, how.look, look, how.describe)
-        if len(np.unique(taken.part_of_point)) > 1:
+        if len(_called(taken, names.get(stem, {}))[0]) > 1:
             found.append(judged(stem, taken, names.get(stem, {}), look, how.clusters))
     if not found:
         raise UserError(f"No model in {folder} has two parts that a picture shows.")
@@ -252,9 +253,7 @@ def judged(
     name: str, taken: Photographed, names: Mapping[str, str], look: Lookers, config: PartsConfig
 ) -> tuple[PartsRow, Judged]:
     """Find one object's parts, and compare; only what a picture shows is asked for."""
-    present, truth = np.unique(taken.part_of_point, return_inverse=True)
-    said = [p for thing in taken.inventory.objects for p in thing.parts]
-    told = [replace(said[k], name=names.get(said[k].name, said[k].name)) for k in present]
+    told, truth = _called(taken, names)
     thing = replace(taken.inventory.objects[0], parts=tuple(told))
     vectors = None if look.semantic is None else look.semantic.words(phrases(thing))
     start = time.process_time()
@@ -280,6 +279,18 @@ def judged(
         seconds=seconds,
     )
     return row, Judged(taken, truth, cluster, part)
+
+
+def _called(taken: Photographed, names: Mapping[str, str]) -> tuple[list[PartWords], np.ndarray]:
+    """Return the parts that a picture shows, and each point's; parts of one name are one part."""
+    said = [p for thing in taken.inventory.objects for p in thing.parts]
+    present = np.unique(taken.part_of_point)
+    called = {int(k): names.get(said[k].name, said[k].name) for k in present}
+    distinct = list(dict.fromkeys(called.values()))
+    number = np.full(len(said), -1)
+    number[present] = [distinct.index(called[int(k)]) for k in present]
+    first = {called[int(k)]: said[k] for k in present[::-1]}
+    return [replace(first[name], name=name) for name in distinct], number[taken.part_of_point]
 
 
 def _matters(told: Sequence[PartWords]) -> np.ndarray:
