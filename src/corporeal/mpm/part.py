@@ -6,13 +6,15 @@ A part's wall may be simulated thicker than it is; here is what that does to its
 from dataclasses import dataclass, replace
 from math import inf, pi
 
-from corporeal.mpm.stability import closed_wall, thin_wall
+from corporeal.mpm.stability import closed_wall, limp_wall, thin_wall
 from corporeal.types import Law, Material, Structure
 
 TRINKET_CELLS, TRINKET_LENGTH = 8.0, 5.0
 """A part of fewer cells than the first, and nowhere longer than the second [cells], is a trinket:
 its own stiffness cannot be seen."""
 
+GRAVITY = 9.81
+"""[m/s²]"""
 TUBE = 8.0
 """Least length over diameter of a tube."""
 
@@ -139,8 +141,24 @@ def tube(part: PartGeometry) -> float:
 def wall_factors(part: PartGeometry, ratio: float) -> tuple[float, float, float]:
     """Factors on (E, σ_y, ρ) of a part's wall, by how it gives way.
 
-    A closed wall that does not flow answers by its indentation stiffness; an open one bends; and
-    what flows (a can) folds along plastic hinges.
+    A closed wall that does not flow answers by its indentation stiffness; an open one bends, but
+    what is limp only resists in its plane; and what flows (a can) folds along plastic hinges.
     """
-    elastic = part.material.law not in (Law.VON_MISES, Law.DRUCKER_PRAGER)
-    return closed_wall(ratio) if part.closed and elastic else thin_wall(ratio)
+    if part.material.law in (Law.VON_MISES, Law.DRUCKER_PRAGER):
+        return thin_wall(ratio)
+    if part.closed:
+        return closed_wall(ratio)
+    return limp_wall(ratio) if is_limp(part, ratio) else thin_wall(ratio)
+
+
+def is_limp(part: PartGeometry, ratio: float) -> bool:
+    """Tell whether a wall hangs down as cloth does, even as stiff in bending as it becomes.
+
+    With its stiffness in the plane kept, a wall t/r thick bends r² times less than the real one:
+    the end of a strip would sink by 3 ρ g L⁴/(2 E t²) r², which must be more than its length.
+    """
+    thickness, material = part.structure.thickness, part.material
+    if part.structure.kind != "shell" or not thickness:
+        return False
+    load = 1.5 * material.density * GRAVITY * part.size[2] ** 3
+    return load * ratio**2 > material.young * thickness**2

@@ -102,6 +102,15 @@ def thin_wall(ratio: float) -> tuple[float, float, float]:
     return ratio**3, ratio**2, ratio
 
 
+def limp_wall(ratio: float) -> tuple[float, float, float]:
+    """Factors on (E, σ_y, ρ) for a thickened wall that hangs down as cloth does.
+
+    How it bends is not seen, but it must not be pulled to pieces: E r and σ_y r keep what it
+    resists in its plane, per width.
+    """
+    return ratio, ratio, ratio
+
+
 def closed_wall(ratio: float) -> tuple[float, float, float]:
     """Factors on (E, σ_y, ρ) for a thickened wall that goes all around and does not flow.
 

@@ -33,6 +33,7 @@ from corporeal.mpm.stability import (
     bounded_poisson,
     closed_wall,
     fold_factor,
+    limp_wall,
     p_wave_speed,
     stable_step,
 )
@@ -351,9 +352,14 @@ def wall_reason(part: PartGeometry, ratio: float) -> str:
     """Say what a thickened wall keeps."""
     if ratio >= 1:
         return ""
-    dents = wall_factors(part, ratio) == closed_wall(ratio)
-    kept = "the stiffness with which it dents" if dents else "its bending stiffness"
+    factors = wall_factors(part, ratio)
+    if factors == limp_wall(ratio):
+        kept, lost = "its stiffness in its plane", "limp as it is, it bends less easily"
+    else:
+        dents = factors == closed_wall(ratio)
+        kept = "the stiffness with which it dents" if dents else "its bending stiffness"
+        lost = "in its plane it is softer"
     return (
         f" Its wall is simulated {1 / ratio:.3g} times as thick, with {kept} and its mass kept; "
-        "in its plane it is softer than in life."
+        f"{lost} than in life."
     )
