@@ -364,9 +364,9 @@ class _Run:
         names = ("assemble", "segment", "fill", "ground", "simulate")
         scene, parts, particles, made, trajectory = (self.made[v] for v in names)
         config, found = self.settings.film, self._found()
-        of = (found.gaussians, found.object_of_gaussian) if found else ()
-        done = film(scene, parts, particles, made, trajectory, config, folder, progress, *of)
-        return self._keep(folder, done)
+        splat, owner = (found.gaussians, found.object_of_gaussian) if found else (None, None)
+        taken = scene, parts, particles, made, trajectory, config, folder, progress
+        return self._keep(folder, film(*taken, splat, owner))
 
     def _report(self, folder: Path, progress: Progress) -> None:
         progress(0.0, "writing the report")
