@@ -132,6 +132,20 @@ def test_a_chair_stands(engine):
     assert m.plane_impulse[0, :, 2].sum() == pytest.approx(m.mass.sum() * 9.81 * 0.05, rel=0.05)
 
 
+def test_a_frame_as_thin_as_foil_holds_what_is_soft_around_it(engine):
+    """A can's tab on its lid: the steel is a thousandth of a cell thick, and must not fall off."""
+    lid = box((0.1, 0.1, 0.3), (4 * CELL, 4 * CELL, CELL), CELL / 2, stuff=FOAM, fill="lattice")
+    tab = box((0.1, 0.1, 0.3), (CELL, CELL, CELL / 2), CELL / 2, stuff=STEEL, rigid=True)
+    tab = replace(tab, volume=tab.volume * 2e-3)
+    held = replace(lid, velocity=np.tile([0.0, 0.0, 1.0], (len(lid.position), 1)))
+    run = engine(problem(held, tab, cell=CELL, bonds=((1, 0),), transfer="apic"))
+    run.advance(0.02)
+    m = run.measure()
+    speed = m.momentum[:, 2] / m.mass
+    assert speed[1] == pytest.approx(speed[0], rel=0.1)
+    assert m.momentum[:, 2].sum() == pytest.approx(m.mass[0], rel=1e-5)
+
+
 def test_the_ledger_adds_up_what_belongs_to_one_object():
     frame, cushion = chair()
     given = problem(cushion, frame, block(), cell=CELL, bonds=((1, 0),), planes=[floor()])

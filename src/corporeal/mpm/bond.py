@@ -25,6 +25,8 @@ half: a face on a grid plane would be a tie."""
 NEAR = 2.0
 """Soft matter this near to the frame [cells] says how dense what it holds is."""
 
+PARTICLES_PER_CELL = 8
+
 REACH = 6.0
 """Particles of a frame farther than this from what it holds [cells] never share a node with it."""
 
@@ -68,12 +70,17 @@ class Composite:
 
 
 def densities(frame: Body, soft: Body, cell: float) -> tuple[float, float]:
-    """Mean densities [kg/m³] of a frame and of the soft matter around it; masses give volumes."""
+    """Mean densities [kg/m³] of a frame and of the soft matter around it; masses give volumes.
+
+    On the grid a frame's wall is no thinner than the layer of particles that it is made of: as thin
+    as in life it would hold nothing.
+    """
     far = KDTree(frame.position).query(soft.position, distance_upper_bound=NEAR * cell)[0]
     near = np.isfinite(far)
     near = near if near.any() else np.ones(len(near), bool)
     held = float(soft.volume[near] @ soft.density[near] / soft.volume[near].sum())
-    return float(frame.volume @ frame.density / frame.volume.sum()), held
+    layer = len(frame.volume) * cell**3 / PARTICLES_PER_CELL
+    return float(frame.volume @ frame.density) / max(float(frame.volume.sum()), layer), held
 
 
 def around(frame: Body, soft: Body, cell: float) -> Int[np.ndarray, " K"]:
