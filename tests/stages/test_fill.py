@@ -192,6 +192,24 @@ def test_a_leaf_without_volume_still_has_particles_and_a_mass():
     assert particles.mass[particles.part == 0].sum() == pytest.approx(1100 * stem.volume, rel=0.01)
 
 
+def test_a_narrow_sheet_is_as_light_as_its_thick_wall_and_no_hollow_body():
+    """A gutter of foil, open above: what is narrow and closed is filled, a sheet is not."""
+    foil = Structure("shell", 1e-4)
+    bent = trimesh.creation.cylinder(0.03, 0.4, sections=24)
+    bent.update_faces((bent.triangles_center[:, 1] < 0) & (np.abs(bent.face_normals[:, 2]) < 0.5))
+    bent.apply_transform(trimesh.transformations.rotation_matrix(np.pi / 2, [0, 1, 0]))
+    scene, parts, field = inputs(
+        thing((put(bent, 0.0), replace(RUBBER, young=1e8), foil)), thing((ball(), RUBBER))
+    )
+    particles = fill(scene, parts, field, FillConfig(detail="draft"))
+    treatment, own = particles.treatments[0], particles.part == 0
+    assert treatment.kind == "shell"
+    assert np.ptp(particles.position[own], axis=0).min() < 6 * particles.cell
+    assert treatment.density < 0.1 * RUBBER.density
+    np.testing.assert_allclose(particles.density[own], treatment.density, rtol=1e-9)
+    assert particles.mass[own].sum() == pytest.approx(1100.0 * 1e-4 * bent.area, rel=0.01)
+
+
 def test_the_same_seed_gives_the_same_particles():
     scene = inputs(thing((ball(0.1), RUBBER)))
     first, again, other = (fill(*scene, FillConfig(seed=s)) for s in (0, 0, 1))

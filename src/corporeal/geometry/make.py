@@ -285,8 +285,8 @@ def recipe(member: Member, made: Make, treatment: Treatment, cell: float) -> Rec
 
 
 def is_porous(member: Member, cell: float) -> bool:
-    """Whether a shell is too narrow for two walls with a hollow between them."""
-    return member.size[0] < POROUS_CELLS * cell
+    """Whether a shell is too narrow for two walls with a hollow between them; sheets have none."""
+    return member.volume > 0 and member.size[0] < POROUS_CELLS * cell
 
 
 def how_held(made: Make) -> str:
