@@ -164,7 +164,7 @@ def test_without_cameras_and_floor_things_are_put_as_they_would_rest(rng, usual)
     found = upright((), moved_points(stool(rng), tilted), usual=usual)
     angle, floor = off(found, tilted)
     assert angle < 0.5
-    assert abs(floor) < 0.01
+    assert abs(floor) < 0.02
     assert found.found_by == "rest"
     assert found.confidence <= 0.5
     assert ("would fall over" in found.reason) is (usual != (0, 0, 1))
@@ -176,7 +176,7 @@ def test_the_top_of_a_table_is_no_floor(rng):
     legs += np.array([[[x, y, 0]] for x in (-0.45, 0.45) for y in (-0.25, 0.25)])
     found = upright((), np.concatenate([board, *legs]), usual=(0, 0, 1))
     assert off(found, np.eye(4))[0] < 0.5
-    assert abs(off(found, np.eye(4))[1]) < 0.02
+    assert abs(off(found, np.eye(4))[1]) < 0.03
     assert found.floor_by == "things"
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, KDTree, QhullError
 
-STEPS = 1500
+STEPS = 800
 STEP = np.radians(1.5)
 """Of the first step; the last is 0."""
 MATES = 8

@@ -29,7 +29,7 @@ NEARBY = np.radians(1.0)
 """Angle between that plane's normal and up."""
 WITHIN = 2.0
 """Points farther from the middle are not looked at, in radii of what the cameras look at."""
-LOWEST = 0.1
+LOWEST = 0.5
 """Percentile of heights that is the underside of things, where no point is astray."""
 UNUSUAL = np.radians(10)
 """How much farther things may roll from the usual axis than from another to be believed there."""

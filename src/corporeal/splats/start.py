@@ -57,10 +57,10 @@ def hull(
     """
     around = region(views.cameras)
     middle, reach = np.array(around.centre), 1.5 * around.radius
-    rough = _carved(middle - reach, middle + reach, views, masks, crew)
+    rough = carved(middle - reach, middle + reach, views, masks, crew)
     found = rough.cells[rough.inside]
     low, high = found.min(axis=0) - 2 * rough.side, found.max(axis=0) + 2 * rough.side
-    fine = _carved(low, high, views, masks, crew)
+    fine = carved(low, high, views, masks, crew)
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
     chosen = shell[rng.choice(len(shell), count, replace=len(shell) < count)]
     position = chosen + fine.side * rng.uniform(-0.5, 0.5, chosen.shape)
@@ -88,7 +88,7 @@ def seeded(points: Points, count: int, degree: int, rng: np.random.Generator) ->
 
 
 @dataclass(frozen=True)
-class _Carved:
+class Carved:
     """Cubes that fill a box, and which of them are inside all masks."""
 
     cells: Float[np.ndarray, "X Y Z 3"]
@@ -98,27 +98,41 @@ class _Carved:
     inside: Bool[np.ndarray, "X Y Z"]
 
 
-def _carved(
-    low: np.ndarray, high: np.ndarray, views: Views, masks: np.ndarray, crew: Crew
-) -> _Carved:
-    """Carve a box: what is left is on things in all views that see it, but for a few."""
+def carved(
+    low: np.ndarray,
+    high: np.ndarray,
+    views: Views,
+    masks: np.ndarray,
+    crew: Crew,
+    astray: float = ASTRAY,
+) -> Carved:
+    """Carve a box: what is left is on things in all views that see it, but for a few.
+
+    astray: the share of the views that these may be.
+
+    Raises:
+        UserError: Nothing is left.
+
+    """
     side = float(np.cbrt(np.prod(high - low) / CELLS))
     axes = [np.arange(a + side / 2, b, side) for a, b in zip(low, high, strict=True)]
     cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    seen = _witnessed(cells.reshape(-1, 3), views, masks, crew)
+    seen = _witnessed(cells.reshape(-1, 3), views, masks, crew, astray)
     count = len(views.cameras)
-    inside = (seen[:, 1] <= ASTRAY * count) & (seen[:, 0] >= max(1, count / 4))
+    inside = (seen[:, 1] <= astray * count) & (seen[:, 0] >= max(1, count / 4))
     if not inside.any():
         raise UserError(
             "No place in space is inside all masks. Check that cameras, pictures and masks "
             "belong together, and the convention of the camera poses."
         )
-    return _Carved(cells, side, inside.reshape(cells.shape[:3]))
+    return Carved(cells, side, inside.reshape(cells.shape[:3]))
 
 
-def _witnessed(points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew) -> np.ndarray:
+def _witnessed(
+    points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew, astray: float = ASTRAY
+) -> np.ndarray:
     out = np.empty((len(points), 5))
-    patience = ASTRAY * len(views.cameras)
+    patience = astray * len(views.cameras)
     rest = camera_rows(views.cameras), views.rgb, masks, patience, out
     points = np.ascontiguousarray(points, dtype=np.float64)
     crew.each(witness, [(points, *span, *rest) for span in crew.spans(len(points))])
