@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from corporeal.mpm import checkpoint
+from corporeal.mpm.audit import how_settled, unsettled
 from corporeal.stages.simulate import SETTLING, SimulateConfig, simulate
 from corporeal.types import (
     Law,
@@ -116,6 +117,22 @@ def test_the_audit_says_how_long_it_took_and_what_sank(tmp_path):
     assert audit["energy_growth"] < 0.05
     assert trajectory.time[0] == 0.0
     assert trajectory.ledger["steps"][0] == 0
+
+
+def test_the_words_say_who_sank_by_how_much_and_whether_it_ended():
+    rows = [
+        {"name": name, "moved_m": [0.0, 0.0, -sunk * 0.01], "moved_dx": sunk, "farthest_m": 0.05}
+        for name, sunk in (("quilt_0", 4.2), ("toy_0", 0.5), ("vase_0", 0.01))
+    ]
+    said = {"seconds": 0.5512, "found": True, "objects": rows}
+    words = how_settled(said)
+    assert "settled for 0.55 s: quilt_0 moved by 42 mm (4.2 cells), toy_0 moved by 5 mm" in words
+    assert "vase_0" not in words
+    (warning,) = unsettled(said)
+    assert warning.startswith("quilt_0 moved by 42 mm")
+    *_, last = unsettled(said | {"found": False})
+    assert "something still moved" in last
+    assert how_settled(None) == "" and unsettled(None) == []
 
 
 def test_what_hangs_is_held_and_falls_from_time_0(tmp_path):

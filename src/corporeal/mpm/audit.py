@@ -178,8 +178,8 @@ def breaches(found: dict[str, Any]) -> list[str]:
     return [text.format(found[key]) for key, text in said.items() if found[key] > limits[key]]
 
 
-SAGGED = 1.0
-"""Worth a sentence [cells]: the film does not begin as the file shows the scene."""
+SAGGED, SEEN = 1.0, 0.1
+"""Worth a warning, and worth telling at all [cells]."""
 
 
 def unsettled(settling: dict[str, Any] | None) -> list[str]:
@@ -187,9 +187,8 @@ def unsettled(settling: dict[str, Any] | None) -> list[str]:
     if settling is None:
         return []
     said = [
-        f"{row['name']} moved by {np.linalg.norm(row['moved_m']) * 1e3:.2g} mm "
-        f"({row['moved_dx']:.1f} cells) before the film begins: the pose in the file is not one "
-        "in which it bears its weight."
+        f"{row['name']} moved by {shift(row)} before the film begins: the pose in the file is not "
+        "one in which everything bears its weight."
         for row in settling["objects"]
         if row["moved_dx"] > SAGGED
     ]
@@ -199,3 +198,24 @@ def unsettled(settling: dict[str, Any] | None) -> list[str]:
             "before everything is at rest."
         )
     return said
+
+
+def how_settled(settling: dict[str, Any] | None) -> str:
+    """Say in a sentence how long things settled and how far each sank; "" where they did not."""
+    if settling is None:
+        return ""
+    moved = [
+        f"{row['name']} moved by {shift(row)}"
+        for row in settling["objects"]
+        if row["moved_dx"] > SEEN
+    ]
+    return (
+        f"Before the film what lies or stands settled for {settling['seconds']:.2g} s: "
+        f"{', '.join(moved) or 'nothing moved to speak of'}."
+    )
+
+
+def shift(row: dict[str, Any]) -> str:
+    """How far the centre of mass of an object moved, in words."""
+    metres = float(np.linalg.norm(row["moved_m"]))
+    return f"{metres * 1e3:.2g} mm ({row['moved_dx']:.1f} cells)"

@@ -12,6 +12,7 @@ from typing import Any
 
 from corporeal.geometry.sizes import how_heavy, how_scaled
 from corporeal.materials.scale import fraction_of, logarithmic
+from corporeal.mpm.audit import how_settled
 from corporeal.render.page import figure, inlined, page, safe
 from corporeal.types import (
     Film,
@@ -129,7 +130,8 @@ def _summary(story: Story) -> str:
     ]
     sentences += map(safe, story.origin)
     sentences += [_forced(o) for o in scene.objects if o.push or o.wind]
-    sentences += filter(None, [safe(how_scaled(scene.objects))])
+    settled = how_settled(story.audit.get("settling"))
+    sentences += filter(None, [safe(how_scaled(scene.objects)), safe(settled)])
     if unknown:
         sentences.append(
             f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got a "
