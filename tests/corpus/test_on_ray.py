@@ -55,7 +55,7 @@ def test_a_killed_worker_is_replaced_and_the_manifest_is_the_same_as_here(tmp_pa
     heard = []
     carry_out(tmp_path, "run", jobs[:3], replace(hands, say=heard.append))
     assert heard == ["3 of 3 are done already."]
-    for _ in range(100):
+    for _ in range(600):
         if len(rays()) <= len(before):
             break
         time.sleep(0.1)

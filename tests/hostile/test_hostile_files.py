@@ -35,7 +35,7 @@ def hostile(shared_assets):
 
 def outcome(read, path):
     """The scene, or the one sentence; anything else is a failure, and so is slowness."""
-    start = time.monotonic()
+    start = time.process_time()
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("error")
@@ -46,7 +46,7 @@ def outcome(read, path):
         assert 20 < len(said) < 600 + len(str(path))
         return said
     finally:
-        assert time.monotonic() - start < 10, path
+        assert time.process_time() - start < 10, path
     assert isinstance(scene, Scene)
     for s in scene.surfaces:
         assert len(s.triangles) and np.isfinite(s.vertices).all()

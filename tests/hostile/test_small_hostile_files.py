@@ -18,10 +18,10 @@ from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube, pack
 
 
 def refused(path, said, seconds=10.0):
-    start = time.monotonic()
+    start = time.process_time()
     with pytest.raises(BadFileError, match=said) as error:
         read_glb(path)
-    assert time.monotonic() - start < seconds
+    assert time.process_time() - start < seconds
     assert path.name in str(error.value)
 
 

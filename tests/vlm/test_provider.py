@@ -13,7 +13,7 @@ from corporeal.vlm import Question, UnansweredError, Vlm, connect
 from corporeal.vlm.patience import Patience
 from corporeal.vlm.provider import Anthropic, Google, Ollama, OpenAI
 
-QUICK = Patience(tries=3, corrections=2, timeout=2.0, first_wait=0.02, longest_wait=5.0)
+QUICK = Patience(tries=3, corrections=2, timeout=30.0, first_wait=0.02, longest_wait=5.0)
 PICTURES = tuple(np.full((8, 8, 3), shade, np.uint8) for shade in (0, 100, 200))
 ASKED = Question(
     "colours", "What colour is each part? Parts: seat, legs.", "s/chair", "3", PICTURES
@@ -83,7 +83,7 @@ def test_a_typed_answer_about_several_pictures_comes_back_with_what_it_took():
         ({"status": 429, "headers": {"Retry-After": "0"}}, None),
         ({"status": 429}, None),
         ({"status": 400, "error": "response_format is not supported"}, None),
-        ({"sleep": 0.6, "content": said()}, None),
+        ({"sleep": 3.0, "content": said()}, None),
     ],
     ids=[
         "half a JSON",
@@ -104,7 +104,7 @@ def test_a_typed_answer_about_several_pictures_comes_back_with_what_it_took():
     ],
 )
 def test_one_failure_is_survived(first, told):
-    patience = Patience(tries=3, corrections=2, timeout=0.3 if "sleep" in first else 5.0)
+    patience = Patience(tries=3, corrections=2, timeout=1.5 if "sleep" in first else 30.0)
     patience = Patience(**{**vars(patience), "first_wait": 0.02})
     with FakeServer(first, GOOD) as server:
         reply = openai(server, patience).ask(ASKED, Colours, check)
