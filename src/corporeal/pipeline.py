@@ -334,7 +334,8 @@ class _Run:
     def _describe(self, folder: Path, progress: Progress) -> Any:
         progress(0.0, "recognising")
         scene, library = self.made["assemble"], self.settings.ground.library
-        made = describe(scene, self.settings.describe, library, progress)
+        pictures = "reconstruct" in self.made
+        made = describe(scene, self.settings.describe, library, progress, pictures)
         if made.transcript:
             store.write_json(folder / "transcript.json", made.transcript)
         return self._keep(folder, made)

@@ -69,11 +69,11 @@ def test_a_scene_of_a_thousand_surfaces_is_described_in_a_moment():
 def test_an_object_of_a_thousand_parts_is_described_in_seconds():
     colours = [(k / 1000, 0.0, 0.0, 1.0) for k in range(1000)]
     pieces = [(f"steel_{k}", plain(f"m{k}", colour=c), {}) for k, c in enumerate(colours)]
-    start = time.perf_counter()
+    start = time.process_time()
     (thing,) = describe(scene(("heap_0", pieces))).objects
     assert len(thing.parts) > 900
     assert {p.material for p in thing.parts} == {"steel"}
-    assert time.perf_counter() - start < 5
+    assert time.process_time() - start < 5
 
 
 def test_unknown_is_a_normal_answer():
@@ -110,6 +110,20 @@ def test_a_person_may_say_only_how_it_is_built(tmp_path):
     said = words(describe(scene(VASE), config))[("vase_0", "vase")]
     assert (said.material, said.thickness) == ("ceramic", pytest.approx(0.004))
     assert (said.answered_by, said.built_by) == ("metadata", "annotation")
+
+
+def test_a_person_may_name_pieces_of_an_object_from_pictures(tmp_path):
+    path = tmp_path / "said.yaml"
+    path.write_text(
+        "vase_0: { parts: { foot: ABS, bowl: { material: glass, thickness_mm: 3 } } }\n"
+    )
+    config = DescribeConfig(annotations=path)
+    said = words(describe(scene(VASE), config, from_pictures=True))[("vase_0", "vase")]
+    assert [(p.name, p.material) for p in said.pieces] == [("foot", "ABS"), ("bowl", "glass")]
+    assert said.pieces[1].thickness == pytest.approx(0.003)
+    assert sum(p.volume_share for p in said.pieces) == 1
+    with pytest.raises(UserError, match="no part of 'vase_0' called 'foot'"):
+        describe(scene(VASE), config)
 
 
 def test_an_annotation_that_does_not_fit_is_refused(tmp_path):

@@ -25,6 +25,12 @@ def test_what_is_said_of_a_part_comes_before_what_is_said_of_its_object(tmp_path
     assert said[("duck_0", "beak")] == Annotation("ABS")
 
 
+def test_pieces_of_what_nobody_told_apart_may_be_named(tmp_path):
+    (tmp_path / "said.yaml").write_text("vase_0: {parts: {foot: wood, bowl: glass}}\n")
+    said = read_annotations(tmp_path / "said.yaml", SCENE, free=["vase_0"])
+    assert said == {("vase_0", "foot"): Annotation("wood"), ("vase_0", "bowl"): Annotation("glass")}
+
+
 @pytest.mark.parametrize(
     ("text", "message"),
     [

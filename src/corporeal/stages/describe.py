@@ -90,18 +90,19 @@ def describe(
     config: DescribeConfig = DEFAULT,
     library: str = "default",
     progress: Progress = lambda fraction, words: None,
+    from_pictures: bool = False,
 ) -> Inventory:
     """Name every object's parts and their materials; the first that knows answers.
 
-    Annotation file, then the model (or its recorded answers), then the file's own names, then
-    unknown. A model is also asked where in the measured ranges each value lies, and how large
-    things usually are.
+    Annotation file, model (or its recorded answers), the file's own names, unknown. A model is also
+    asked where in the measured ranges each value lies, and how large things usually are.
 
     Args:
         scene: What was assembled.
         config: Whom to ask.
         library: The library whose names and ranges a model is offered.
         progress: Told the fraction done and what is being done.
+        from_pictures: Objects are one surface each; an annotation may name the pieces of one.
 
     Raises:
         UserError: An annotation or a recording does not fit the scene, nobody can be asked, or
@@ -110,7 +111,7 @@ def describe(
     """
     _check(config)
     identity = identify(scene, matter_hint)
-    told = _annotations(scene, identity, config, library)
+    told = _annotations(scene, identity, config, library, from_pictures)
     file = _file_words(scene, identity, library)
     model = connect(config.vlm, config.record)
     if model is None:
@@ -241,9 +242,9 @@ class _Asking:
     ) -> ObjectWords:
         """Ask everything about one object."""
         thing, names = self.scene.objects[number], self._names(number)
-        stated = (told.get((thing.name, name)) for name in names)
+        stated = {part: said.material for (name, part), said in told.items() if name == thing.name}
         words = file
-        if not all(said is not None and said.material for said in stated):
+        if not (all(stated.get(name) for name in names) or stated.keys() - set(names)):
             words = self._materials(interview, names, self._pieces(interview, names), file)
         words = _told(words, told, thing.name, self.config)
         words = self._placed(interview, words)
@@ -329,8 +330,7 @@ def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, 
 def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[PartWords]]:
     """Return what the file tells of every part of every object."""
     words: list[list[PartWords]] = [[] for _ in scene.objects]
-    known = evidence(scene, identity)
-    for entry, seen in zip(identity.catalogue, known, strict=True):
+    for entry, seen in zip(identity.catalogue, evidence(scene, identity), strict=True):
         told = _stated(list(seen.surfaces), library) or recognise(seen)
         by = "metadata" if told.material else "unknown"
         told = replace(told, name=entry.name, answered_by=by)
@@ -355,7 +355,7 @@ def _stated(surfaces: list[Surface], library: str) -> PartWords | None:
 
 
 def _annotations(
-    scene: Scene, identity: Identity, config: DescribeConfig, library: str
+    scene: Scene, identity: Identity, config: DescribeConfig, library: str, from_pictures: bool
 ) -> dict[tuple[str, str], Annotation]:
     if config.annotations is None:
         return {}
@@ -363,7 +363,7 @@ def _annotations(
         thing.name: [p.name for p in identity.catalogue if p.object == number]
         for number, thing in enumerate(scene.objects)
     }
-    said = read_annotations(Path(config.annotations), names)
+    said = read_annotations(Path(config.annotations), names, names if from_pictures else ())
     return {key: _spelt(one, library) for key, one in said.items()}
 
 
@@ -379,7 +379,14 @@ def _told(
     thing: str,
     config: DescribeConfig,
 ) -> list[PartWords]:
-    return [_annotated(told.get((thing, w.name)), w, config.annotations) for w in words]
+    own = [_annotated(told.get((thing, w.name)), w, config.annotations) for w in words]
+    named = [part for name, part in told if name == thing and part not in {w.name for w in own}]
+    if not named:
+        return own
+    share = 1 / len(named)  # until they are found on the surface
+    pieces = [PartWords(n, None, volume_share=share, surface_share=share) for n in named]
+    said = [_annotated(told[thing, p.name], p, config.annotations) for p in pieces]
+    return [gathered(own[0].name, said)]
 
 
 def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> PartWords:
@@ -388,9 +395,9 @@ def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> 
         return words
     where = f"Stated in {Path(str(path)).name}."
     if said.material is not None:
+        shares = words.volume_share, words.surface_share
         words = PartWords(words.name, said.material, None, None, "annotation", 1.0, where)
-    values = {}
-    for key, value in said.values.items():
-        field, factor = materials.si(key)
-        values[field] = value * factor
+        words = replace(words, volume_share=shares[0], surface_share=shares[1])
+    known = ((*materials.si(key), value) for key, value in said.values.items())
+    values = {field: value * factor for field, factor, value in known}
     return replace(built(said, words), values=values)

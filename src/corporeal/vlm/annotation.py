@@ -1,6 +1,6 @@
 """What a person says about a scene's parts, in a YAML file. It is believed before anybody else."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from math import isfinite
 from pathlib import Path
@@ -33,13 +33,14 @@ class Annotation:
 
 
 def read_annotations(
-    path: Path, scene: Mapping[str, Sequence[str]]
+    path: Path, scene: Mapping[str, Sequence[str]], free: Collection[str] = ()
 ) -> dict[tuple[str, str], Annotation]:
     """Read the file and check it against the scene.
 
     Args:
         path: The YAML file.
         scene: Every object's name with its parts' names.
+        free: Objects whose parts nobody has told apart yet: the file may name them.
 
     Returns:
         (object, part) → what is said of it. What is said of an object holds for all its parts that
@@ -58,7 +59,7 @@ def read_annotations(
             raise BadFileError(path, f"'parts' of {name!r} must map part names.", EXAMPLE)
         parts = {str(part): answer for part, answer in parts.items()}
         for part in parts:
-            if part not in scene[name]:
+            if part not in scene[name] and name not in free:
                 raise _nobody(path, f"part of {name!r}", part, scene[name])
         if said:
             told |= {(name, part): _annotation(path, name, said) for part in scene[name]}
