@@ -63,6 +63,11 @@ def shape(solid):
     return Shape(Mesh(solid.vertices, solid.triangles))
 
 
+def fits(solid, mesh):
+    """Whether the surface lies within 0.6 pixels of the true one in the mean, by volume."""
+    return abs(solid.volume - mesh.volume) < 0.6 * PIXEL * mesh.area
+
+
 def box(low, high):
     return trimesh.creation.box(bounds=[low, high])
 
@@ -74,7 +79,7 @@ def test_a_ball_on_the_floor_becomes_a_closed_ball():
     assert shape(solid).closed and not solid.warnings
     away = np.abs(np.linalg.norm(solid.vertices - [0, 0, 0.5], axis=1) - 0.5)
     assert np.mean(away) < 0.5 * PIXEL
-    assert solid.volume == pytest.approx(ball.volume, rel=4 * PIXEL)
+    assert fits(solid, ball)
     np.testing.assert_allclose(solid.colours, np.tile([0.8, 0.3, 0.1], (len(away), 1)), atol=0.03)
     near = np.linalg.norm(gaussians.mean[solid.gaussian_of_vertex] - solid.vertices, axis=1)
     assert near.max() < 0.12
@@ -92,7 +97,7 @@ def test_what_stands_on_the_floor_is_closed_by_it():
     )
     np.testing.assert_allclose(solid.vertices[low, 2], 0, atol=1e-9)
     assert low.sum() > 100
-    assert solid.volume == pytest.approx(0.512, rel=0.06)
+    assert fits(solid, cube)
     assert shape(solid).closed
 
 
@@ -108,7 +113,7 @@ def test_a_bowl_stays_open():
         np.array([[0, 0, 0.5], [0, 0, 0.3], [0, 0, 0.07], [0.525, 0, 0.5]])
     )
     assert inside.tolist() == [False, False, True, True]
-    assert solid.volume == pytest.approx(bowl.volume, rel=0.15)
+    assert fits(solid, bowl)
     assert shape(solid).closed
 
 
@@ -142,8 +147,8 @@ def test_every_place_in_touching_things_belongs_to_one_of_them():
     places = np.random.default_rng(0).uniform([-0.5, -0.5, 0], [0.5, 0.5, 0.9], (40000, 3))
     in_one, in_two = shape(one).inside(places), shape(two).inside(places)
     assert (in_one & in_two).mean() < 0.002
-    assert one.volume == pytest.approx(below.volume, rel=0.08)
-    assert two.volume == pytest.approx(above.volume, rel=0.08)
+    assert fits(one, below)
+    assert fits(two, above)
 
 
 @pytest.mark.slow
@@ -153,7 +158,7 @@ def test_floor_and_background_are_no_things_but_hide_what_is_behind():
     gaussians, owner = together(clad(ball), clad(ground, 6000))
     owner = np.where(owner == 1, -1, owner)
     (solid,) = solids(gaussians, owner, eyes(), threads=1)
-    assert solid.volume == pytest.approx(ball.volume, rel=5 * PIXEL)
+    assert fits(solid, ball)
     assert np.abs(solid.vertices[:, :2]).max() < 0.4 + PIXEL
 
 
@@ -162,7 +167,7 @@ def test_a_splat_without_cameras_is_looked_at_from_a_dome():
     ball = trimesh.creation.icosphere(4, 0.5).apply_translation([3, -2, 0.5])
     gaussians, owner = together(clad(ball))
     (solid,) = solids(gaussians, owner, threads=1)
-    assert solid.volume == pytest.approx(ball.volume, rel=0.05)
+    assert fits(solid, ball)
 
 
 def test_specks_in_the_air_are_left_out():

@@ -24,6 +24,8 @@ EMPTIER = 0.4
 """Share of the views that see a cell which may take it for emptier than it is."""
 WITNESSES = 0.04
 """Share of all views that must see a cell, and at least one."""
+PLATE = 1.5
+"""How thick what lies flat on the floor is at least [cells]."""
 ROUNDS = 100
 """Of filling in what nobody sees."""
 
@@ -67,13 +69,13 @@ def gridded(
 def carved(grid: Grid, sight: Sight, floor: float, crew: Crew) -> Float32[np.ndarray, "X Y Z"]:
     """Return the signed distance to what is seen, cut off at a few cells [m]; positive outside.
 
-    Nothing is below the floor.
+    Nothing is below the floor: what is seen there is a plate that lies on it.
     """
     field = np.empty(grid.shape, np.float32)
     place = np.array([*grid.low, grid.cell])
     reach = TRUST * grid.cell
     rule = np.array([reach, EMPTIER, max(1, round(WITNESSES * len(sight.depth)))])
-    rest = place, sight.rows, sight.depth, rule, field
+    rest = place, sight.rows, _on(sight, floor + PLATE * grid.cell, floor), rule, field
     crew.each(carve, [(*span, *rest) for span in crew.spans(grid.shape[0])])
     above = grid.axes[2] > floor
     room = field[:, :, above]  # the floor is no witness: below it everything is unknown
@@ -84,3 +86,19 @@ def carved(grid: Grid, sight: Sight, floor: float, crew: Crew) -> Float32[np.nda
     field[:, :, ~above] = -reach
     np.maximum(field, (floor - grid.axes[2]).astype(np.float32), out=field)
     return field
+
+
+def _on(sight: Sight, top: float, floor: float) -> Float32[np.ndarray, "V H W"]:
+    """Return depths with what things show below the floor lifted to a plate's upper side [m]."""
+    lifted = sight.depth.copy()
+    height, width = lifted.shape[1:]
+    u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
+    for depth, met, row in zip(lifted, sight.met, sight.rows, strict=True):
+        turn, shift = row[:12].reshape(3, 4)[:, :3], row[:12].reshape(3, 4)[:, 3]
+        fx, fy, cx, cy = row[12:16]
+        up = turn[0, 2] * (u - cx) / fx + turn[1, 2] * (v - cy) / fy + turn[2, 2]
+        eye = -float(turn[:, 2] @ shift)
+        with np.errstate(invalid="ignore"):
+            below = (met >= 0) & (up < 0) & (eye + depth * up < floor)
+        depth[below] = ((top - eye) / up[below]).astype(np.float32)
+    return lifted

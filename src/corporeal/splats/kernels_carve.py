@@ -9,8 +9,8 @@ from corporeal.splats.kernels_project import REACH, A, B, C, O, U, Z
 
 f4 = np.float32
 MET = f4(0.85)
-"""Transmittance at which a ray has met a surface. Learned Gaussians lie in a layer that ends where
-masks and outlines say: where half of the light is lost is already below what is seen."""
+"""Transmittance at which a ray has met a surface. Learned Gaussians lie in a layer, and where half
+of the light is lost is already below what is seen."""
 HALF = f4(0.5)
 """A pixel that lets more light through shows no thing."""
 OVERTAKEN = 1.6
@@ -21,8 +21,8 @@ OVERTAKEN = 1.6
 def meet(tiles, first, ids, ellipses, slopes, depth, met):
     """Find where the ray of each pixel has lost some of its light; ids -1 and inf where never.
 
-    slopes (N, 3): how the depth of a Gaussian's densest point along a ray changes with the pixel,
-    along u and v [m/px], and at most by how much from the mean's depth [m].
+    slopes (N, 4): how the depth of a Gaussian's densest point along a ray changes with the pixel,
+    along u and v [m/px], by how much at most, and how far before it the Gaussian begins [m].
     """
     height, width = depth.shape
     across = (width + TILE - 1) // TILE
@@ -58,7 +58,7 @@ def meet(tiles, first, ids, ellipses, slopes, depth, met):
                     if before > MET and T[y, x] <= MET:
                         off = s_[0] * dx + s_[1] * dy
                         off = min(max(off, -s_[2]), s_[2])
-                        depth[y0 + y, x0 + x] = e[Z] + off
+                        depth[y0 + y, x0 + x] = e[Z] + off - s_[3]
                         met[y0 + y, x0 + x] = i
         for y in range(min(TILE, height - y0)):
             for x in range(min(TILE, width - x0)):

@@ -25,9 +25,9 @@ class Sight:
     rgb: Float32[np.ndarray, "V H W 3"]
     """sRGB."""
     depth: Float32[np.ndarray, "V H W"]
-    """Along the camera's z, where enough of the light is lost [m]; inf where there is nothing."""
+    """Along the camera's z, to where the first surface begins [m]; inf where there is nothing."""
     met: Int[np.ndarray, "V H W"]
-    """Which Gaussian takes it; -1: none."""
+    """Which Gaussian it is of; -1: none."""
     rows: Float[np.ndarray, "V 18"]
     """Cameras as kernels read them: camera from world (3 × 4), fx, fy, cx, cy, width, height."""
 
@@ -61,11 +61,12 @@ def covariances(gaussians: Gaussians) -> Float[np.ndarray, "N 3 3"]:
 
 def slopes(
     mean: Float[np.ndarray, "N 3"], spread: Float[np.ndarray, "N 3 3"], eye: Pinhole
-) -> Float32[np.ndarray, "N 3"]:
-    """Return how the depth of each Gaussian's densest point changes with the pixel, and its bound.
+) -> Float32[np.ndarray, "N 4"]:
+    """Return how the depth of each Gaussian's densest point changes with the pixel, along u and v.
 
-    In the affine approximation of the projection (u, v, z) is Gaussian, and the mean of z given
-    (u, v) is z_0 + Σ_z,uv Σ_uv^-1 (u - u_0, v - v_0).
+    In the affine approximation of the projection (u, v, z) is Gaussian, and z given (u, v) has the
+    mean z_0 + Σ_z,uv Σ_uv^-1 (u - u_0, v - v_0). Also how far from z_0 that may be, and how far
+    before it the Gaussian begins: one standard deviation of z given (u, v).
     """
     p = mean.astype(np.float64) @ eye.turn.T + eye.shift
     z = np.maximum(p[:, 2], eye.near)
@@ -79,7 +80,10 @@ def slopes(
     det = a * c - b * b
     along_u = (c * S[:, 0, 2] - b * S[:, 1, 2]) / det
     along_v = (a * S[:, 1, 2] - b * S[:, 0, 2]) / det
-    return np.stack([along_u, along_v, REACH * np.sqrt(S[:, 2, 2])], axis=1).astype(np.float32)
+    # The dilation of pictures makes nothing thicker.
+    left = np.linalg.det(S) / np.maximum(S[:, 0, 0] * S[:, 1, 1] - S[:, 0, 1] ** 2, 1e-30)
+    columns = [along_u, along_v, REACH * np.sqrt(S[:, 2, 2]), np.sqrt(np.maximum(left, 0))]
+    return np.stack(columns, axis=1).astype(np.float32)
 
 
 def _row(eye: Pinhole) -> Float[np.ndarray, "18"]:
