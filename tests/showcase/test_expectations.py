@@ -72,5 +72,5 @@ def test_an_expectation_reads_as_words():
         "rubber_duck_0": {"shape_error_end": 0.004},
     }
     imprint, shape = expect("duck-on-mud", {"objects": objects})
-    assert (imprint.value, imprint.target) == ("2.5 grid cells", "above 1 grid cells")
+    assert (imprint.value, imprint.target) == ("2.5 grid cells", "above 1 grid cell")
     assert (shape.value, shape.target) == ("0.4 %", "below 2 %")

@@ -47,7 +47,8 @@ class Demand:
 
     def _said(self, value: float) -> str:
         scale = {"%": 100, "mm": 1000}.get(self.unit, 1)
-        return f"{value * scale:.3g} {self.unit}".strip()
+        number = f"{value * scale:.3g}"
+        return f"{number} {self.unit.removesuffix('s') if number == '1' else self.unit}".strip()
 
 
 @dataclass(frozen=True)

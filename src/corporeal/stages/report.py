@@ -196,22 +196,26 @@ def _part_row(story: Story, k: int) -> str:
     part, material = story.parts.catalogue[k], story.field.materials[k]
     treatment, words = story.particles.treatments[k], story.field.words[k]
     yields = "–" if material.yield_stress is None else si(material.yield_stress, "Pa")
-    cells = (
-        safe(story.scene.objects[part.object].name),
-        safe(part.name),
-        f"<b>{safe(material.name)}</b>",
-        f"{WHO[words.answered_by]}",
-        LAWS[material.law.name],
+    names = (story.scene.objects[part.object].name, part.name)
+    numbers = (
         si(material.young, "Pa"),
         f"{material.poisson:.3g}",
         f"{material.density:.4g}",
         yields,
         how_heavy(story.particles.mass_real[k], story.scene.objects[part.object].scale),
-        safe(built(story.field.structures[k])),
-        safe(treatment.kind),
-        simulated(treatment),
     )
-    return "<tr>" + "".join(f'<td class="n">{c}</td>' for c in cells) + "</tr>"
+    cells = (
+        _cells(*map(safe, names), f"<b>{safe(material.name)}</b>"),
+        _cells(WHO[words.answered_by], LAWS[material.law.name], wrap=True),
+        _cells(*numbers),
+        _cells(safe(built(story.field.structures[k])), safe(treatment.kind), wrap=True),
+        _cells(simulated(treatment), wrap=True),
+    )
+    return f"<tr>{''.join(cells)}</tr>"
+
+
+def _cells(*texts: str, wrap: bool = False) -> str:
+    return "".join(f"<td>{t}</td>" if wrap else f'<td class="n">{t}</td>' for t in texts)
 
 
 def built(structure: Structure) -> str:
