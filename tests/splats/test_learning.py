@@ -11,7 +11,7 @@ from splat_scenes import around, blobs, pictured
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
 from corporeal.geometry.rotation import matrix
-from corporeal.splats import start, sweep
+from corporeal.splats import limits, start, sweep
 from corporeal.splats.crew import Crew
 from corporeal.splats.growth import CROWD, jitter, moved, shared, turn
 from corporeal.splats.kernels_learn import WINDOW, adam
@@ -100,17 +100,18 @@ def test_adam_takes_the_published_steps_and_survives_nan():
     before = theta.copy()
     rng, rates = RNG(0), np.linspace(0.01, 0.1, theta.shape[1]).astype(np.float32)
     first, second = np.zeros_like(theta), np.zeros_like(theta)
+    bounds = limits.free(theta, 1.0), np.array([[0, 1]] * len(theta))
     m, v, plain = 0.0, 0.0, before.astype(float)
     for step in range(1, 5):
         g = rng.normal(size=theta.shape).astype(np.float32)
         m, v = 0.9 * m + 0.1 * g, 0.999 * v + 0.001 * g.astype(float) ** 2
         plain -= rates * (m / (1 - 0.9**step)) / np.sqrt(v / (1 - 0.999**step))
-        pull = np.float32(0), np.float32(0), np.float32(5)
-        adam(theta, g, first, second, rates, step, pull, 0, len(theta))
+        pull = np.float32(0), np.float32(0)
+        adam(theta, g, first, second, rates, step, pull, *bounds, 0, len(theta))
     np.testing.assert_allclose(theta, plain, atol=1e-5)
     bad = np.full_like(theta, np.nan)
     bad[:, ::2] = np.inf
-    adam(theta, bad, first, second, rates, 5, pull, 0, len(theta))
+    adam(theta, bad, first, second, rates, 5, pull, *bounds, 0, len(theta))
     assert np.isfinite(theta).all()
 
 
@@ -210,7 +211,7 @@ def ball():
 def test_a_sweep_finds_the_surface(ball, monkeypatch):
     monkeypatch.setattr(sweep, "PIXELS", 8_000)
     with Crew(1) as crew:
-        points = swept(ball, 20_000, RNG(0), crew)
+        points = swept(ball, 20_000, RNG(0), crew).points
     distance = np.linalg.norm(points.position - [0.5, 0, 0], axis=1)
     near = distance < 1
     assert near.sum() > 200
@@ -225,7 +226,7 @@ def test_the_number_of_threads_changes_no_sweep(ball, monkeypatch):
     found = []
     for threads in (1, 3):
         with Crew(threads) as crew:
-            found.append(swept(ball, 500, RNG(0), crew).position)
+            found.append(swept(ball, 500, RNG(0), crew).points.position)
     np.testing.assert_array_equal(*found)
 
 

@@ -113,20 +113,22 @@ def compare(planes, target, mask, weights, top, bottom, slope, sums):
 
 
 @numba.njit(**JIT)
-def adam(theta, gradient, first, second, rates, step, decay, start, stop):
+def adam(theta, gradient, first, second, rates, step, decay, limits, spans, start, stop):
     """One step of Adam (Kingma and Ba 2015) for rows start to stop.
 
-    decay: pull on opacities and on scales, as a slope of the loss; longest: no scale grows beyond.
-    A gradient that is no finite number moves nothing.
+    decay: pull on opacities and on scales, as a slope of the loss; limits: as ``limits.Limits``;
+    spans: as ``raster.Drawing``. A gradient that is no finite number moves nothing.
     """
-    opacity_pull, scale_pull, longest = decay
+    opacity_pull, scale_pull = decay
     unbias = np.sqrt(1 - BETA2**step) / (1 - BETA1**step)
     for i in range(start, stop):
+        if limits[i, 3] > 0 and spans[i, 0] == spans[i, 1]:
+            continue
         o = f4(1) / (f4(1) + np.exp(-theta[i, OPACITY]))
         gradient[i, OPACITY] += opacity_pull * o * (f4(1) - o)
         for j in range(SCALE, SCALE + 3):
             gradient[i, j] += scale_pull * np.exp(theta[i, j])
-        for j in range(theta.shape[1]):
+        for j in range(int(limits[i, 2])):
             g = gradient[i, j]
             g = g if abs(g) < f4(1e15) else f4(0)
             m = BETA1 * first[i, j] + (f4(1) - BETA1) * g
@@ -134,8 +136,11 @@ def adam(theta, gradient, first, second, rates, step, decay, start, stop):
             first[i, j], second[i, j] = m, v
             theta[i, j] -= rates[j] * f4(unbias) * m / (np.sqrt(v) + TINY)
         theta[i, OPACITY] = min(max(theta[i, OPACITY], -SUREST), SUREST)
+        flat = SCALE
         for j in range(SCALE, SCALE + 3):
-            theta[i, j] = min(theta[i, j], longest)
+            flat = j if theta[i, j] < theta[i, flat] else flat
+        for j in range(SCALE, SCALE + 3):
+            theta[i, j] = min(theta[i, j], limits[i, 1] if j == flat else limits[i, 0])
 
 
 @numba.njit(**JIT)

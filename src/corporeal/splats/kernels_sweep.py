@@ -10,8 +10,12 @@ REACH = 2
 """Patches are that many pixels wide to each side of their middle."""
 CLEARLY, LITTLE = f4(0.9), f4(0.004)
 """A nearer depth must differ less than such a share of the best so far, less that [0–1]."""
+SMOOTH, SLACK = f4(0.01), f4(0.04)
+"""A patch that varies less says nothing of its depth, unless it differs by more."""
 REFINED = 8
 """Depths looked at between two planes."""
+MARGIN = 0.1
+"""Relative difference of depths that is clearly one."""
 BEYOND = f4(9)
 """Difference of a patch that is not in a picture."""
 
@@ -101,6 +105,44 @@ def sweep(k, first, last, pace, pictures, lenses, mates, turns, shifts, planes, 
 
 
 @numba.njit(**JIT)
+def _texture(patch):
+    """Mean difference of a patch from its mean."""
+    total = f4(0)
+    for q in range(3):
+        middle = f4(0)
+        for j in range(patch.shape[0]):
+            for i in range(patch.shape[1]):
+                middle += patch[j, i, q]
+        middle /= f4(patch.shape[0] * patch.shape[1])
+        for j in range(patch.shape[0]):
+            for i in range(patch.shape[1]):
+                total += abs(patch[j, i, q] - middle)
+    return total / f4(3 * patch.shape[0] * patch.shape[1])
+
+
+@numba.njit(**JIT)
+def prefer(k, first, last, pace, pictures, lenses, mates, turns, shifts, wanted, depth):
+    """Take the wanted depths (h, w) of view k, rows first to last, where they look as good."""
+    picture = pictures[k]
+    ray, step = np.ones(3), np.array([1 / lenses[k, 0], 1 / lenses[k, 1]])
+    for gy in range(first, last):
+        y = gy * pace + pace // 2
+        for gx in range(depth.shape[1]):
+            x = gx * pace + pace // 2
+            if not depth[gy, gx] < np.inf:
+                continue
+            ray[0] = (x + 0.5 - lenses[k, 2]) / lenses[k, 0]
+            ray[1] = (y + 0.5 - lenses[k, 3]) / lenses[k, 1]
+            patch = picture[y - REACH : y + REACH + 1, x - REACH : x + REACH + 1]
+            z, w = depth[gy, gx], wanted[gy, gx]
+            found = _mismatch(patch, ray, z, k, mates, turns, shifts, lenses, pictures, step)
+            other = _mismatch(patch, ray, w, k, mates, turns, shifts, lenses, pictures, step)
+            slack = SLACK if _texture(patch) < SMOOTH else LITTLE
+            if CLEARLY * other - slack < found:
+                depth[gy, gx] = w
+
+
+@numba.njit(**JIT)
 def support(points, owners, first, last, cameras, depths, pace, near, votes):
     """Count for points first to last the views that see them where they are, and that see past.
 
@@ -130,3 +172,39 @@ def support(points, owners, first, last, cameras, depths, pace, near, votes):
                 votes[i, 0] += 1
             elif p[2] < z and z < np.inf:
                 votes[i, 1] += 1
+
+
+@numba.njit(**JIT)
+def before(points, widths, first, last, cameras, depths, behind, clear, pace, votes):
+    """Ask every view about balls first to last.
+
+    widths: standard deviations [m]; depths, behind (V, h, w): of what is confirmed (else inf), and
+    of what encloses everything; clear (V,): what is nearer is not in a picture; pace: pixels of
+    the cameras from one depth to the next; votes (N, 5): views that see something there, that see
+    past, that may see past, in which it is wider than a pace, and the least depth.
+    """
+    views, rows, columns = depths.shape
+    p = np.empty(3)
+    for i in range(first, last):
+        votes[i] = 0
+        votes[i, 4] = np.inf
+        for k in range(views):
+            c = cameras[k]
+            for a in range(3):
+                p[a] = c[4 * a + 3]
+                for b in range(3):
+                    p[a] += c[4 * a + b] * points[i, b]
+            if not p[2] > clear[k]:
+                continue
+            u = (c[12] * p[0] / p[2] + c[14]) / pace
+            v = (c[13] * p[1] / p[2] + c[15]) / pace
+            if not (0 <= u < columns and 0 <= v < rows):
+                continue
+            z = depths[k, int(v), int(u)]
+            if z < np.inf:
+                votes[i, 0] += abs(p[2] - z) <= MARGIN * z
+                votes[i, 1] += p[2] < (1 - MARGIN) * z
+            else:
+                votes[i, 2] += p[2] < (1 - MARGIN) * behind[k, int(v), int(u)]
+            votes[i, 3] += widths[i] * c[12] > pace * p[2]
+            votes[i, 4] = min(votes[i, 4], p[2])

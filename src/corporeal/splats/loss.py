@@ -13,6 +13,8 @@ from corporeal.splats.kernels_learn import compare
 from corporeal.splats.raster import Drawing
 
 L1, SSIM, COVER = 0.8, 0.2, 0.1
+EVEN = np.ones(3, np.float32)
+"""The gain of a photograph that is as bright as it is to be."""
 
 
 @dataclass(frozen=True)
@@ -40,9 +42,13 @@ def goal(
     rgb: UInt8[np.ndarray, "H W 3"],
     mask: UInt8[np.ndarray, "H W"] | None,
     background: Float32[np.ndarray, "3"],
+    gain: Float32[np.ndarray, "3"] = EVEN,
 ) -> Goal:
-    """Return a photograph laid on a background; mask: 255 on things."""
-    planes = np.moveaxis(rgb, -1, 0).astype(np.float32) / 255
+    """Return a photograph laid on a background.
+
+    mask: 255 on things. gain: of red, green and blue, by which the photograph is too bright.
+    """
+    planes = np.moveaxis(rgb, -1, 0) / (255 * gain[:, None, None])
     if mask is None:
         return Goal(planes, np.zeros((0, 0), np.float32))
     cover = mask.astype(np.float32) / 255

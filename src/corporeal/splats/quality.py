@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from corporeal.splats.crew import Crew
+from corporeal.splats.exposure import gain
 from corporeal.splats.kernels_learn import similarity
 from corporeal.splats.parameters import parameters
 from corporeal.splats.raster import BLACK, draw, picture_of, pinhole
@@ -36,12 +37,14 @@ def quality(
     which: Sequence[int],
     masks: Bool[np.ndarray, "V H W"] | None = None,
     background: Vector | None = None,
+    apart: bool = False,
 ) -> Quality:
     """Compare pictures with views.
 
     masks: which pixels are on things. background: where given, what is beside things is that in
     both; else whole photographs are compared, and black is behind everything. What is nearer to a
-    camera than its ``start.clearance`` is not drawn.
+    camera than its ``start.clearance`` is not drawn. apart: photographs differ in exposure; each
+    drawing has the gain that suits it best.
     """
     theta, rows, clear = parameters(gaussians), [], clearance(views.cameras)
     behind = np.array(BLACK if background is None else background, np.float32)
@@ -49,7 +52,11 @@ def quality(
         for k in which:
             eye = pinhole(views.cameras[k], near=clear[k])
             made = draw(theta, eye, behind, crew)
-            rgb, real = np.clip(picture_of(made).rgb, 0, 1), views.rgb[k] / np.float32(255)
+            rgb, real = picture_of(made).rgb, views.rgb[k] / np.float32(255)
+            if apart:
+                on_thing = None if masks is None else masks[k] * np.uint8(255)
+                rgb = rgb * np.nan_to_num(gain(made, views.rgb[k], on_thing), nan=1.0)
+            rgb = np.clip(rgb, 0, 1)
             if masks is not None and background is not None:
                 real = np.where(masks[k][..., None], real, behind)
             on = [psnr(rgb[masks[k]], real[masks[k]])] if masks is not None else []

@@ -1,9 +1,9 @@
 """Where Gaussians start: on the visual hull of masks, or on given points."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import binary_erosion
 from scipy.spatial import KDTree
 
@@ -21,6 +21,8 @@ ASTRAY = 0.05
 """Share of the views that may see a point of the hull beside things: masks err at edges."""
 
 
+FLAT = 0.1
+"""Scale along known normals over that across, at first."""
 ROOM = 0.3
 """Depth of the free space before a camera, in its distances from what all look at."""
 
@@ -33,8 +35,39 @@ class Points:
     """[m]"""
     colour: Float[np.ndarray, "N 3"]
     """sRGB in [0, 1]."""
-    opacity: float = 0.5
+    opacity: float | Float[np.ndarray, " N"] = 0.5
     """Of the Gaussians that begin there."""
+    normal: Float[np.ndarray, "N 3"] | None = None
+    """Unit, of surfaces, along which Gaussians begin flat; 0: nobody knows."""
+    width: Float[np.ndarray, " N"] | None = None
+    """Scale of the Gaussians that begin there [m]; nan: they are as wide as they are apart."""
+
+
+def joined(*groups: Points) -> Points:
+    """Return points of several kinds together."""
+    return Points(
+        np.concatenate([p.position for p in groups]),
+        np.concatenate([p.colour for p in groups]),
+        np.concatenate([np.broadcast_to(p.opacity, len(p.position)) for p in groups]),
+        np.concatenate([_or(p.normal, np.zeros((len(p.position), 3))) for p in groups]),
+        np.concatenate([_or(p.width, np.full(len(p.position), np.nan)) for p in groups]),
+    )
+
+
+def _or(value: np.ndarray | None, unknown: np.ndarray) -> np.ndarray:
+    return unknown if value is None else value
+
+
+def chosen(points: Points, which: Int[np.ndarray, " n"]) -> Points:
+    """Return some of the points."""
+    o, normal, width = points.opacity, points.normal, points.width
+    return Points(
+        points.position[which],
+        points.colour[which],
+        o[which] if isinstance(o, np.ndarray) else o,
+        None if normal is None else normal[which],
+        None if width is None else width[which],
+    )
 
 
 def clearance(cameras: tuple[Camera, ...]) -> Float[np.ndarray, " V"]:
@@ -69,10 +102,9 @@ def hull(
 
 
 def seeded(points: Points, count: int, degree: int, rng: np.random.Generator) -> Parameters:
-    """Return round Gaussians on some of the points, as wide as these are apart."""
+    """Return Gaussians on some of the points, as wide as these are apart; flat on surfaces."""
     if len(points.position) > count:
-        chosen = rng.choice(len(points.position), count, replace=False)
-        points = replace(points, position=points.position[chosen], colour=points.colour[chosen])
+        points = chosen(points, rng.choice(len(points.position), count, replace=False))
     n = len(points.position)
     theta = np.zeros((n, COLOUR + 3 * (degree + 1) ** 2), np.float32)
     theta[:, MEAN:ROTATION] = points.position
@@ -81,10 +113,28 @@ def seeded(points: Points, count: int, degree: int, rng: np.random.Generator) ->
     near, _ = KDTree(points.position).query(points.position, k=min(4, n))
     apart = np.atleast_2d(near.T).T[:, 1:].mean(axis=1) if n > 1 else np.ones(1)
     middle = float(np.median(apart)) or 1.0
-    theta[:, SCALE:OPACITY] = np.log(np.clip(apart, 0.1 * middle, 10 * middle))[:, None]
+    # What is far away is wide.
+    away = np.linalg.norm(points.position - np.median(points.position, axis=0), axis=1)
+    widest = np.maximum(10 * middle, 0.1 * away)
+    width = np.clip(apart, 0.1 * middle, widest)
+    if points.width is not None:
+        width = np.where(np.isfinite(points.width), points.width, width)
+    theta[:, SCALE:OPACITY] = np.log(width)[:, None]
+    if points.normal is not None:
+        flat = points.normal.any(axis=1)
+        theta[flat, ROTATION:SCALE] = _facing(points.normal[flat])
+        theta[flat, OPACITY - 1] += np.log(FLAT)
     theta[:, OPACITY] = np.log(points.opacity / (1 - points.opacity))
     theta[:, COLOUR : COLOUR + 3] = (points.colour - 0.5) / DC
     return theta
+
+
+def _facing(normal: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 4"]:
+    """Return quaternions of rotations that take +z to unit normals."""
+    x, y, z = normal.T
+    q = np.stack([1 + z, -y, x, np.zeros(len(normal))], axis=1)
+    q[z < -1 + 1e-9] = 0, 1, 0, 0
+    return q / np.linalg.norm(q, axis=1, keepdims=True)
 
 
 @dataclass(frozen=True)

@@ -1,17 +1,22 @@
 """Points on what posed pictures show, found by sweeping planes through space (Collins 1996).
 
 For pixels of every view, the depth at which the views beside it show the same; kept is what other
-views confirm. No mask and no mesh is needed; smooth surfaces come out rough, which training mends.
+views confirm. No mask and no mesh is needed. Where pictures are too smooth to say, things are taken
+to be as far away as what encloses the scene.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
 from corporeal.splats.crew import Crew
-from corporeal.splats.kernels_sweep import support, sweep
-from corporeal.splats.start import Points, camera_rows
+from corporeal.splats.enclosure import cover, enclosure
+from corporeal.splats.kernels_sweep import prefer, support, sweep
+from corporeal.splats.start import Points, camera_rows, clearance, joined
+from corporeal.splats.surfaces import Surfaces
 from corporeal.types import Camera, Views
 
 LONGEST = 160
@@ -30,60 +35,129 @@ NEAR = 0.04
 """Relative difference of depths that agree."""
 FEWEST = 50
 """Points that must be found."""
+OWN, BEHIND, COVER = 9, 2, 1
+"""Shares of the points: on things, on the enclosure where views see it, and all over it."""
 
 
-def swept(views: Views, count: int, rng: np.random.Generator, crew: Crew) -> Points:
-    """Return points on what the pictures show, at most so many.
+@dataclass(frozen=True)
+class Swept:
+    """What a sweep finds."""
+
+    points: Points
+    surfaces: Surfaces
+
+
+def swept(views: Views, count: int, rng: np.random.Generator, crew: Crew) -> Swept:
+    """Find points on what the pictures show, at most so many.
 
     Raises:
         UserError: The pictures agree nowhere.
 
     """
-    factor = -(-max(views.rgb.shape[1:3]) // LONGEST)
-    pictures = np.stack([_shrunk(p, factor) for p in views.rgb])
-    rows = camera_rows(views.cameras)
-    rows[:, 12:] /= factor
-    area = pictures.shape[0] * pictures.shape[1] * pictures.shape[2]
-    pace = max(1, round(np.sqrt(area / PIXELS)))
-    depths = _depths(views.cameras, pictures, rows, pace, crew)
-    view, y, x = np.nonzero(np.isfinite(depths))
-    pixel = np.stack([x, y], axis=1) * pace + pace // 2
-    points = _unprojected(views.cameras, view, pixel + 0.5, depths[view, y, x], rows)
-    votes = np.empty((len(points), 2))
-    rest = rows, depths, float(pace), NEAR, votes
-    crew.each(support, [(points, view, *span, *rest) for span in crew.spans(len(points))])
-    wanted = 1 if len(views.cameras) < 6 else 2
-    good = np.flatnonzero((votes[:, 0] >= wanted) & (votes[:, 0] > votes[:, 1]))
-    if len(good) < FEWEST:
+    looks = _Looks(views)
+    depths = looks.depths(crew)
+    good = looks.confirmed(depths, crew)
+    if np.count_nonzero(good) < FEWEST:
         raise UserError(
             "The pictures agree on no place in space. Check that cameras and pictures belong "
             "together, and the convention of the camera poses; or give masks."
         )
-    chosen = rng.choice(good, min(count, len(good)), replace=False)
-    colour = pictures[view[chosen], pixel[chosen, 1], pixel[chosen, 0]]
-    return Points(points[chosen], colour.astype(np.float64))
+    about = enclosure(looks.points(depths)[good.ravel()], views.cameras, rng)
+    behind = about.reach(looks.eyes, looks.rays).reshape(depths.shape)
+    depths = looks.preferred(depths, behind, crew)
+    good = looks.confirmed(depths, crew)
+    unit = count // (OWN + BEHIND + COVER)
+    own = _some(np.flatnonzero(good & (depths != behind)), OWN * unit, rng)
+    beyond = _some(np.arange(depths.size), BEHIND * unit, rng)
+    hit = looks.points(behind)
+    smooth = np.flatnonzero(np.logical_not(good) | (depths == behind))
+    smooth = smooth if len(smooth) else beyond
+    points = joined(
+        Points(looks.points(depths)[own], looks.colours[own]),
+        Points(hit[beyond], looks.colours[beyond], normal=about.normals(hit[beyond])),
+        cover(about, views.cameras, COVER * unit, hit[smooth], looks.colours[smooth]),
+    )
+    known = np.where(good, depths, np.inf)
+    clear = clearance(views.cameras)
+    return Swept(points, Surfaces(looks.rows, float(looks.pace), clear, known, behind))
 
 
-def _depths(
-    cameras: tuple[Camera, ...], pictures: np.ndarray, rows: np.ndarray, pace: int, crew: Crew
-) -> Float[np.ndarray, "V h w"]:
-    """Sweep every view."""
-    around = region(cameras)
-    lenses = rows[:, 12:].copy()
-    grid = tuple(size // pace for size in pictures.shape[1:3])
-    depths = np.full((len(cameras), *grid), np.inf)
-    for k, camera in enumerate(cameras):
-        mates = neighbours(cameras, k)
-        from_k = np.stack(
-            [np.linalg.inv(cameras[n].world_from_camera) @ camera.world_from_camera for n in mates]
-        )
-        turns, shifts = from_k[:, :3, :3].copy(), from_k[:, :3, 3].copy()
-        middle = float(np.linalg.norm(camera.world_from_camera[:3, 3] - around.centre))
-        near = max(0.1 * middle, middle - 1.5 * around.radius)
-        planes = np.linspace(1 / (middle + FARTHEST * around.radius), 1 / near, PLANES)
-        rest = pace, pictures, lenses, mates, turns, shifts, planes, depths[k]
-        crew.each(sweep, [(k, *span, *rest) for span in crew.spans(grid[0])])
-    return depths
+class _Looks:
+    """Small pictures, and the pixels of each that are looked at: V views of h × w."""
+
+    def __init__(self, views: Views) -> None:
+        factor = -(-max(views.rgb.shape[1:3]) // LONGEST)
+        self.cameras = views.cameras
+        self.pictures = np.stack([_shrunk(p, factor) for p in views.rgb])
+        self.rows = camera_rows(views.cameras)
+        self.rows[:, 12:] /= factor
+        self.lenses = self.rows[:, 12:].copy()
+        count, height, width = self.pictures.shape[:3]
+        self.pace = max(1, round(np.sqrt(count * height * width / PIXELS)))
+        self.grid = count, height // self.pace, width // self.pace
+        self.view, y, x = (i.ravel() for i in np.indices(self.grid))
+        y, x = (i * self.pace + self.pace // 2 for i in (y, x))
+        self.colours = self.pictures[self.view, y, x].astype(np.float64)
+        lens = self.lenses[self.view]
+        u, v = ((np.stack([x, y], axis=1) + 0.5 - lens[:, 2:]) / lens[:, :2]).T
+        poses = np.stack([c.world_from_camera for c in self.cameras])[self.view]
+        self.eyes = poses[:, :3, 3]
+        self.rays = np.einsum("nij,nj->ni", poses[:, :3, :3], np.stack([u, v, u**0], axis=1))
+
+    def points(self, depths: Float[np.ndarray, "V h w"]) -> Float[np.ndarray, "N 3"]:
+        """Return what every pixel shows; nan where it has no depth."""
+        with np.errstate(invalid="ignore"):
+            return np.where(
+                np.isfinite(z := depths.reshape(-1, 1)), self.eyes + z * self.rays, np.nan
+            )
+
+    def depths(self, crew: Crew) -> Float[np.ndarray, "V h w"]:
+        """Sweep every view."""
+        around = region(self.cameras)
+        depths = np.full(self.grid, np.inf)
+        for k, camera in enumerate(self.cameras):
+            middle = float(np.linalg.norm(camera.world_from_camera[:3, 3] - around.centre))
+            near = max(0.1 * middle, middle - 1.5 * around.radius)
+            planes = np.linspace(1 / (middle + FARTHEST * around.radius), 1 / near, PLANES)
+            rest = *self._mates(k), planes, depths[k]
+            crew.each(sweep, [(k, *span, *rest) for span in crew.spans(self.grid[1])])
+        return depths
+
+    def preferred(
+        self, depths: Float[np.ndarray, "V h w"], wanted: Float[np.ndarray, "V h w"], crew: Crew
+    ) -> Float[np.ndarray, "V h w"]:
+        """Return other depths where they look as good."""
+        depths = depths.copy()
+        for k in range(len(self.cameras)):
+            rest = *self._mates(k), wanted[k], depths[k]
+            crew.each(prefer, [(k, *span, *rest) for span in crew.spans(self.grid[1])])
+        return depths
+
+    def confirmed(
+        self, depths: Float[np.ndarray, "V h w"], crew: Crew
+    ) -> Bool[np.ndarray, "V h w"]:
+        """Return which depths more of the other views confirm than deny, and enough of them."""
+        found = np.flatnonzero(np.isfinite(depths))
+        points, view = self.points(depths)[found], self.view[found]
+        votes = np.empty((len(points), 2))
+        rest = self.rows, depths, float(self.pace), NEAR, votes
+        crew.each(support, [(points, view, *span, *rest) for span in crew.spans(len(points))])
+        wanted = 1 if len(self.cameras) < 6 else 2
+        good = np.zeros(depths.size, np.bool_)
+        good[found] = (votes[:, 0] >= wanted) & (votes[:, 0] > votes[:, 1])
+        return good.reshape(depths.shape)
+
+    def _mates(self, k: int) -> tuple:
+        """Return what a sweep of view k looks at: its neighbours, and the way to each."""
+        mates = neighbours(self.cameras, k)
+        here = self.cameras[k].world_from_camera
+        ways = np.stack([np.linalg.inv(self.cameras[n].world_from_camera) @ here for n in mates])
+        shared = self.pace, self.pictures, self.lenses, mates
+        return *shared, ways[:, :3, :3].copy(), ways[:, :3, 3].copy()
+
+
+def _some(which: np.ndarray, count: int, rng: np.random.Generator) -> Int[np.ndarray, " n"]:
+    return rng.choice(which, min(count, len(which)), replace=False)
 
 
 def neighbours(cameras: tuple[Camera, ...], k: int) -> Int[np.ndarray, " mates"]:
@@ -94,19 +168,6 @@ def neighbours(cameras: tuple[Camera, ...], k: int) -> Int[np.ndarray, " mates"]
     alike[alike > TOO_NEAR] = -2 - np.arange(len(cameras))[alike > TOO_NEAR]
     alike[k] = -np.inf
     return np.argsort(-alike, kind="stable")[: min(MATES, len(cameras) - 1)]
-
-
-def _unprojected(
-    cameras: tuple[Camera, ...],
-    view: np.ndarray,
-    pixel: np.ndarray,
-    z: np.ndarray,
-    rows: np.ndarray,
-) -> Float[np.ndarray, "N 3"]:
-    lens = rows[view, 12:]
-    local = np.stack([*((pixel - lens[:, 2:]) / lens[:, :2]).T, np.ones(len(z))], axis=1)
-    poses = np.stack([c.world_from_camera for c in cameras])[view]
-    return (poses[:, :3, :3] @ (z[:, None] * local)[:, :, None])[..., 0] + poses[:, :3, 3]
 
 
 def _shrunk(picture: np.ndarray, factor: int) -> Float[np.ndarray, "h w 3"]:

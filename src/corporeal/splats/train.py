@@ -1,9 +1,9 @@
 """Gaussians from posed pictures.
 
-Adam on the loss of ``loss``, one view a step, with random backgrounds where masks say what belongs
-to the things; the first steps look at pictures of half the size. Everything left to chance comes
-from the seed and the number of the step, so that a training that was cut off goes on as if it had
-not been.
+Adam on the loss of ``loss``, one view a step, before random backgrounds: where there are masks,
+nothing beside the things is drawn, and without, no place is left empty. The first steps look at
+pictures of half the size. Everything left to chance comes from the seed and the number of the step,
+so that a training that was cut off goes on as if it had not been.
 """
 
 import time
@@ -17,10 +17,11 @@ from jaxtyping import Bool, Float32, UInt8
 
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
-from corporeal.splats import growth, saved
+from corporeal.splats import exposure, growth, limits, saved
 from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_learn import adam
 from corporeal.splats.kernels_project import Pinhole
+from corporeal.splats.limits import Limits
 from corporeal.splats.loss import goal, loss
 from corporeal.splats.parameters import (
     COLOUR,
@@ -34,7 +35,8 @@ from corporeal.splats.parameters import (
 )
 from corporeal.splats.quality import Quality, quality
 from corporeal.splats.raster import back, draw, pinhole
-from corporeal.splats.start import Points, clearance, hull, seeded
+from corporeal.splats.start import Points, clearance, hull, joined, seeded
+from corporeal.splats.surfaces import Surfaces
 from corporeal.splats.sweep import swept
 from corporeal.types import Gaussians, Vector, Views
 
@@ -57,6 +59,8 @@ ROUND = 50
 """Steps between rounds of growth."""
 SETTLED = (100, 0.8)
 """Growth begins after so many steps, and ends after this share of them."""
+GONE = -7.0
+"""Logit of the opacity that haze is left with: it is dead."""
 STIR = 1e3
 """Reach of the random steps that faint ones take [standard deviations], per rate of the means."""
 EVERY = 15.0
@@ -109,6 +113,8 @@ class Trained:
     quality: Quality | None
     """On held-out views."""
     seconds: float
+    exposures: Float32[np.ndarray, "V 3"]
+    """How much brighter than on average each photograph is, by channel; 1 where held out."""
 
 
 def train(
@@ -121,9 +127,12 @@ def train(
 ) -> Trained:
     """Learn Gaussians from posed pictures.
 
-    masks: what belongs to the things; only that is learned then. points: where to start; None: the
-    visual hull of the masks, or what a plane sweep finds. checkpoint: a file that is
-    written now and then; a training that was cut off goes on from it.
+    masks: what belongs to the things; only that is learned then. points: where to start, too, or
+    with masks instead of their visual hull; without masks a plane sweep finds where things are.
+    checkpoint: a file that is written now and then; a training that was cut off goes on from it.
+
+    Where exposures differ, Gaussians have the mean one, and held-out views are compared after the
+    gain that suits each.
 
     Raises:
         UserError: There are too few pictures, masks of another shape, a skewed camera, or cameras
@@ -140,10 +149,14 @@ def train(
             progress(fraction, words)
     made = gaussians_of(pupil.theta[opacity(pupil.theta) > growth.DEAD])
     behind = None if masks is None else GREY
-    out = quality(made, views, lesson.held_out, masks, behind) if lesson.held_out else None
+    apart = exposure.differ(pupil.gains)
+    held = lesson.held_out
+    out = quality(made, views, held, masks, behind, apart) if held else None
     if checkpoint is not None:
         checkpoint.unlink(missing_ok=True)
-    return Trained(made, out, spent + time.monotonic() - begun)
+    exposures = np.ones((len(views.cameras), 3), np.float32)
+    exposures[lesson.learned] = pupil.gains
+    return Trained(made, out, spent + time.monotonic() - begun, exposures)
 
 
 class Lesson:
@@ -169,6 +182,7 @@ class Lesson:
         self.clear = clearance(views.cameras)
         factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
         halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
+        self.surfaces: Surfaces | None = None
         self.sizes = [_Size(self, factor)] + ([_Size(self, 2 * factor)] if halves else [])
 
     @property
@@ -176,7 +190,7 @@ class Lesson:
         """What a checkpoint of this lesson is called."""
         cameras = [(c.K.tolist(), c.world_from_camera.tolist()) for c in self.views.cameras]
         p = self.points
-        begin = () if p is None else (p.position, p.colour, p.opacity)
+        begin = () if p is None else vars(p).values()
         rest = cameras, self.preset, self.seed, self.held_out
         return saved.fingerprint(self.views.rgb, self.masks, *begin, *rest)
 
@@ -221,6 +235,9 @@ class Pupil:
     first: Parameters
     second: Parameters
     """Adam's moments."""
+    limits: Limits
+    gains: exposure.Gains
+    """Of the views that are learned from."""
     step: int = 0
     seconds: float = 0.0
     """Spent so far."""
@@ -228,19 +245,25 @@ class Pupil:
 
 def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew) -> Pupil:
     """Return the state to go on from: a checkpoint's, or that of a beginner."""
-    found = saved.kept(checkpoint, lesson.name) if checkpoint is not None else {}
-    if found:
-        arrays = found["theta"], found["first"], found["second"]
-        return Pupil(*arrays, int(found["step"]), float(found["seconds"]))
     rng = np.random.default_rng([lesson.seed, 0])
     preset, points = lesson.preset, lesson.points
     views, masks = _of(lesson.views, lesson.masks, lesson.learned)
+    if masks is None:
+        found = swept(views, preset.gaussians, rng, crew)
+        lesson.surfaces = found.surfaces
+        points = found.points if points is None else joined(points, found.points)
+    state = saved.kept(checkpoint, lesson.name) if checkpoint is not None else {}
+    if state:
+        learned = state["theta"], state["first"], state["second"]
+        rest = state["limits"], state["gains"], int(state["step"]), float(state["seconds"])
+        return Pupil(*learned, *rest)
     if points is None and masks is not None:
         points = hull(views, masks, preset.gaussians, rng, crew)
-    elif points is None:
-        points = swept(views, preset.gaussians, rng, crew)
+    assert points is not None
     theta = seeded(points, preset.gaussians, preset.degree, rng)
-    return Pupil(theta, np.zeros_like(theta), np.zeros_like(theta))
+    bounds, _ = _bounds(theta, lesson, crew)
+    gains = np.ones((len(lesson.learned), 3), np.float32)
+    return Pupil(theta, np.zeros_like(theta), np.zeros_like(theta), bounds, gains)
 
 
 def _learn(pupil: Pupil, lesson: Lesson, checkpoint: Path | None, crew: Crew):
@@ -266,32 +289,48 @@ def _step(pupil: Pupil, lesson: Lesson, crew: Crew) -> float:
     """Learn from one view; returns the mean of Δ²."""
     rng = np.random.default_rng([lesson.seed, 1, pupil.step])
     size, k = lesson.size(pupil.step), _turn(lesson, pupil.step)
-    background = rng.random(3, np.float32) if size.masks else np.zeros(3, np.float32)
-    aim = goal(size.rgb[k], size.masks.get(k), background)
+    place = lesson.learned.index(k)
+    background = rng.random(3, np.float32)
+    aim = goal(size.rgb[k], size.masks.get(k), background, pupil.gains[place])
     drawing = draw(pupil.theta, size.cameras[k], background, crew)
     off = loss(drawing, aim, crew)
     gradient = back(drawing, off.slope, crew)
     rates = _rates(lesson, pupil)
     count = len(pupil.theta)
     decay = np.float32(PULL / count), np.float32(PULL / 3 / count / lesson.radius)
-    longest = np.float32(np.log(10 * lesson.radius))
-    rest = gradient, pupil.first, pupil.second, rates, pupil.step + 1, (*decay, longest)
-    crew.each(adam, [(pupil.theta, *rest, *span) for span in crew.spans(count)])
-    _stir(pupil, lesson, float(rates[MEAN]), rng)
+    rest = gradient, pupil.first, pupil.second, rates, pupil.step + 1, decay
+    bounds = pupil.limits, drawing.spans
+    crew.each(adam, [(pupil.theta, *rest, *bounds, *span) for span in crew.spans(count)])
+    if pupil.step >= len(lesson.learned):
+        seen = exposure.gain(drawing, size.rgb[k], size.masks.get(k))
+        pupil.gains = exposure.followed(pupil.gains, place, seen)
+    _stir(pupil, lesson, float(rates[MEAN]), rng, crew)
     return off.error
 
 
-def _stir(pupil: Pupil, lesson: Lesson, rate: float, rng: np.random.Generator) -> None:
+def _stir(pupil: Pupil, lesson: Lesson, rate: float, rng: np.random.Generator, crew: Crew) -> None:
     """Move Gaussians that are dead to live ones now and then; let faint ones wander."""
     begin, end = SETTLED
-    if begin < pupil.step < end * lesson.preset.steps and pupil.step % ROUND == 0:
+    growing = begin < pupil.step < end * lesson.preset.steps
+    if pupil.step % ROUND == 0 and growing:
+        _, haze = _bounds(pupil.theta, lesson, crew)
+        pupil.theta[haze, OPACITY] = GONE
         moments = [pupil.first, pupil.second]
         most = lesson.preset.gaussians
         pupil.theta, moments = growth.moved(pupil.theta, moments, most, rng)
         pupil.first, pupil.second = moments
+    if pupil.step % ROUND == 0:
+        pupil.limits, _ = _bounds(pupil.theta, lesson, crew)
     faint = np.flatnonzero(opacity(pupil.theta) < 0.1)
     reach = STIR * rate / lesson.radius
     pupil.theta[faint, MEAN:ROTATION] += growth.jitter(pupil.theta[faint], reach, rng)
+
+
+def _bounds(theta: Parameters, lesson: Lesson, crew: Crew) -> tuple[Limits, Bool[np.ndarray, " N"]]:
+    """Return what Gaussians may do, and which of them are haze; masks leave no room for any."""
+    if lesson.surfaces is None:
+        return limits.free(theta, lesson.radius), np.zeros(len(theta), np.bool_)
+    return limits.strict(theta, lesson.radius, lesson.surfaces, crew)
 
 
 def _rates(lesson: Lesson, pupil: Pupil) -> Float32[np.ndarray, " D"]:
