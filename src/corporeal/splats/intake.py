@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool
+from jaxtyping import Bool, Float
 
 from corporeal.formats.photographs import Photographs, read_photographs
 from corporeal.formats.sources import kind_of
@@ -14,8 +14,11 @@ from corporeal.formats.splats import read_splat
 from corporeal.geometry.agreement import pose_doubt
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians
 from corporeal.geometry.upright import upright
+from corporeal.splats.crew import Crew
+from corporeal.splats.cutout import cut_out
 from corporeal.splats.quality import Quality
 from corporeal.splats.start import Points
+from corporeal.splats.sweep import swept
 from corporeal.splats.train import PRESETS, TrainConfig, Trained, train
 from corporeal.types import Camera, Gaussians, Vector, Views
 
@@ -26,6 +29,14 @@ SOLID = 0.5
 """Opacity from which on a Gaussian says where something is."""
 ON = 128
 """Of 255: from here on a pixel of a mask belongs to things."""
+CUT_OUT = (
+    "There were no masks: what looks other than the floor was taken for things. Things of the "
+    "floor's own colour are lost; masks are better."
+)
+NO_MASKS = (
+    "There were no masks, and no floor that things could be told from: whole photographs were "
+    "learned, which is much coarser. Give masks."
+)
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 USUAL: dict[str, Vector] = {".spz": (0.0, 1.0, 0.0)}
 """What is up in files of a kind as a rule; in others it is -y."""
@@ -46,6 +57,11 @@ class Intake:
     """The file's kind says so, and that its unit is the metre."""
     usual: Vector | None = None
     """What is up in such files as a rule."""
+    floor: bool = False
+    """Whether the floor is among the Gaussians."""
+    seen: Float[np.ndarray, "N 3"] | None = None
+    """Points on all that the photographs show, the floor too; None: there are none but Gaussians.
+    """
     statements: tuple[str, ...] = ()
     """How it came about, in sentences, for the report."""
     warnings: tuple[str, ...] = ()
@@ -84,15 +100,23 @@ def take_in(
     shown = read_photographs(source, PRESETS[training.preset].longest)
     masks = None if shown.masks is None else shown.masks >= ON
     doubt = pose_doubt(shown.views, shown.masks)
-    trained = train(shown.views, masks, _points(shown), training, checkpoint, progress)
+    seen, told = _points(shown), ()
+    if masks is None:
+        progress(0.0, "telling things from the floor")
+        seen = seen or _swept(shown.views, training)
+        masks = cut_out(shown.views, seen.position, shown.z_up, threads=training.threads)
+        told = (NO_MASKS if masks is None else CUT_OUT,)
+    start = seen if masks is None or shown.masks is not None else None  # else the masks' hull
+    trained = train(shown.views, masks, start, training, checkpoint, progress)
     return Intake(
         trained.gaussians,
         shown.views.cameras,
         shown.views,
         masks,
         shown.z_up,
+        seen=None if seen is None else seen.position,
         statements=_told(trained, len(shown.views.cameras)),
-        warnings=(*shown.warnings, *([doubt] if doubt else [])),
+        warnings=(*shown.warnings, *([doubt] if doubt else []), *told),
     )
 
 
@@ -110,11 +134,13 @@ def turned_upright(taken: Intake, up: Up = "auto") -> Intake:
         x, y, z = AXES[up[-1]]
         stated = sign * x, sign * y, sign * z
     of_things = None if taken.masks is None else taken.solid
-    frame = upright(taken.cameras, taken.solid, taken.z_up, of_things, taken.usual, stated)
+    points = taken.solid if taken.seen is None else taken.seen
+    frame = upright(taken.cameras, points, taken.z_up, of_things, taken.usual, stated)
     return replace(
         taken,
         gaussians=moved_gaussians(taken.gaussians, frame.world_from_file),
         cameras=moved_cameras(taken.cameras, frame.world_from_file),
+        floor=frame.floor_by == "plane",
         statements=(*taken.statements, frame.reason),
         warnings=(*taken.warnings, *frame.warnings),
     )
@@ -124,6 +150,13 @@ def _points(shown: Photographs) -> Points | None:
     if shown.points is None or shown.colours is None:
         return None
     return Points(shown.points, shown.colours / 255)
+
+
+def _swept(views: Views, training: TrainConfig) -> Points:
+    """Find points on what photographs show, where nobody gave any."""
+    count = training.gaussians or PRESETS[training.preset].gaussians
+    with Crew(training.threads) as crew:
+        return swept(views, count, np.random.default_rng([training.seed, 0]), crew)
 
 
 def _told(trained: Trained, photographs: int) -> tuple[str, ...]:

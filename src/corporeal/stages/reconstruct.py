@@ -59,6 +59,8 @@ OWN_VIEWS, OWN_SIZE = 48, (384, 384)
 """Of a splat that comes without cameras."""
 OUTLIERS = 1.0
 """Percent of a splat, at either end, that need not be in those pictures."""
+NEAR = 3.0
+"""Distances between neighbours within which a Gaussian goes with a thing."""
 SHOWN = 4
 """Pictures that somebody is shown of the whole scene."""
 UNKNOWN = "object"
@@ -187,7 +189,7 @@ def _own_cameras(taken: Intake) -> tuple[Camera, ...]:
 
 def _of_things(source: Path, taken: Intake) -> Int[np.ndarray, " M"]:
     """Return which Gaussians belong to things."""
-    found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, taken.masks))
+    found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, taken.masks, taken.floor))
     if not len(found):
         what = "shows nothing but floor and background"
         raise UserError(f"{source} {what}. Masks would say what belongs to things.")
@@ -315,10 +317,28 @@ def _solid(taken: Intake, cloud: Cloud, split: Split, of_things: Int[np.ndarray,
     nearest = KDTree(cloud.position).query(taken.gaussians.mean[of_things])[1]
     owner[of_things] = split.object_of_point[nearest]
     found = solids(taken.gaussians, owner, taken.cameras)
+    owner = _with_company(taken, owner)
     order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
     place = np.append(np.argsort(order), -1)  # the last for what is nobody's
     ordered = tuple(found[k] for k in order)
     return _Found(taken, cloud, place[split.object_of_point], place[owner], ordered)
+
+
+def _with_company(taken: Intake, owner: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """Let faint and hidden Gaussians go with the thing they are near, or they would stay behind.
+
+    Where a floor is among them, only those above it.
+    """
+    mean = taken.gaussians.mean
+    own, rest = np.flatnonzero(owner >= 0), np.flatnonzero(owner < 0)
+    tree = KDTree(mean[own])
+    apart = float(np.median(np.asarray(tree.query(mean[own], k=2)[0])[:, 1]))
+    distance, nearest = map(np.asarray, tree.query(mean[rest]))
+    goes = (distance < NEAR * apart) & (mean[rest, 2] > NEAR * apart)
+    goes |= not taken.floor
+    made = owner.copy()
+    made[rest[goes]] = owner[own[nearest[goes]]]
+    return made
 
 
 def _extent(solid: Solid) -> float:
