@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from pathlib import Path
+from textwrap import fill
 
 import numpy as np
 from matplotlib import colormaps
@@ -13,6 +14,8 @@ from corporeal.store import writing
 
 FROM = (0.75, -0.55, 0.38)
 """Direction from the object to who looks at it."""
+WIDE = 44
+"""Letters below a picture."""
 COLUMNS = ("points of photographs", "true parts", "clusters", "parts found by their names")
 
 
@@ -21,19 +24,24 @@ def draw(found: Sequence[tuple[PartsRow, Judged]], path: Path) -> None:
     figure = Figure(figsize=(11, 2.9 * len(found)), dpi=110, layout="constrained")
     grid = figure.subplots(len(found), len(COLUMNS), squeeze=False)
     for (row, judged), axes in zip(found, grid, strict=True):
-        place, order = _seen(judged.taken.cloud.position)
+        place, order = seen(judged.taken.cloud.position)
         shades = (
             np.clip(judged.taken.cloud.colour, 0, 1),
-            _shades(judged.truth, "tab10"),
-            _shades(judged.cluster_of_point, "tab20"),
-            _shades(judged.part_of_point, "tab10"),
+            tinted(judged.truth, "tab10"),
+            tinted(judged.cluster_of_point, "tab20"),
+            tinted(judged.part_of_point, "tab10"),
         )
         for axis, shade in zip(axes, shades, strict=True):
             axis.scatter(*place[order].T, s=1.2, c=shade[order], lw=0)
             axis.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
-        said = ("", ", ".join(row.parts), f"{row.clusters}", f"mean IoU {row.named_iou:.2f}")
+        said = (
+            "",
+            fill(", ".join(row.parts), WIDE),
+            f"{row.clusters}",
+            f"mean IoU {row.named_iou:.2f}",
+        )
         for axis, text in zip(axes, said, strict=True):
-            axis.set_xlabel(text, fontsize=7, wrap=True)
+            axis.set_xlabel(text, fontsize=7)
         axes[0].set_ylabel(row.object, fontsize=9)
     for axis, title in zip(grid[0], COLUMNS, strict=True):
         axis.set_title(title, fontsize=9)
@@ -43,7 +51,7 @@ def draw(found: Sequence[tuple[PartsRow, Judged]], path: Path) -> None:
         figure.savefig(path)
 
 
-def _seen(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def seen(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Return where points are drawn, and which first: the far ones."""
     towards = np.array(FROM) / np.linalg.norm(FROM)
     right = np.cross([0.0, 0.0, 1.0], towards)
@@ -53,6 +61,7 @@ def _seen(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     )
 
 
-def _shades(number: np.ndarray, palette: str) -> np.ndarray:
+def tinted(number: np.ndarray, palette: str) -> np.ndarray:
+    """Return a colour for every number, red, green and blue."""
     colours = np.asarray(colormaps[palette].colors)  # pyright: ignore[reportAttributeAccessIssue]
     return colours[number % len(colours)]
