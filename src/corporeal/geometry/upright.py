@@ -27,6 +27,8 @@ LEVEL = np.radians(0.3)
 """Standard error of an up that knows better than a plane nearby."""
 NEARBY = np.radians(1.0)
 """Angle between that plane's normal and up."""
+MOST = 50_000
+"""Points that are looked at."""
 WITHIN = 2.0
 """Points farther from the middle are not looked at, in radii of what the cameras look at."""
 LOWEST = 0.5
@@ -91,6 +93,7 @@ def upright(
         stated: What somebody says is up, which goes before all else.
 
     """
+    points, things = _fewer(points), None if things is None else _fewer(things)
     around = _around(cameras, points if things is None else things)
     near = points[np.linalg.norm(points - around.centre, axis=1) < WITHIN * around.radius]
     if stated is not None:
@@ -105,6 +108,10 @@ def upright(
     if plane is not None:
         told = _corrected(told, plane)
     return _framed(told, plane, around, near if things is None else things)
+
+
+def _fewer(points: np.ndarray) -> np.ndarray:
+    return points[:: -(-len(points) // MOST) or 1].astype(np.float64)
 
 
 def turned_up(up: Float[np.ndarray, "3"]) -> Float[np.ndarray, "3 3"]:

@@ -11,8 +11,8 @@ from corporeal.geometry.region import region
 from corporeal.splats.raster import weights
 from corporeal.types import Camera, Gaussians
 
-CELL = 2
-"""Pixels along a cell in which contributions are summed."""
+CELL, WHOLE = 4, 16
+"""Pixels along a cell in which contributions are summed, with masks and without."""
 VISIBLE = 0.1
 """Least contribution to a picture, in pixels, for a view to count as having seen it."""
 INSIDE = 0.5
@@ -57,8 +57,9 @@ def shown(
         raise UserError(f"There are {len(masks)} masks for {len(cameras)} cameras. Give one each.")
     total, inside = np.zeros(gaussians.count), np.zeros(gaussians.count)
     views = np.zeros(gaussians.count, np.int64)
+    cell = WHOLE if masks is None else CELL
     for k, camera in enumerate(cameras):
-        shares = weights(gaussians, camera, CELL, threads)
+        shares = weights(gaussians, camera, cell, threads)
         own = np.asarray(shares.sum(axis=1)).ravel()
         total += own
         views += own > VISIBLE
