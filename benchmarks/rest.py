@@ -1,11 +1,14 @@
 """Simulate settled scenes on which nothing pushes, and say whether they stay at rest.
 
     python benchmarks/rest.py FOLDER [--out runs/rest] [--only S] [--processes 2] [--json FILE]
+                              [--settled said|yes|no]
 
 FOLDER holds one folder per scene with a ``scene.glb`` inside, as ``corporeal assemble`` and
 ``corporeal corpus assemble`` write them; forces of a ``scene.toml`` beside it are left out. Every
 scene is simulated for half a second. An object drifts as far as its centre of mass ever gets from
-where it started; a scene is at rest when none of its objects drifts by half a cell (dx). Every
+where it started; a scene is at rest when none of its objects drifts by half a cell (dx). Scenes
+that say they had settled find their balance before that; ``--settled no`` is the control without,
+``yes`` is for older files that don't say it. What moved meanwhile stands under "sank". Every
 process keeps to one core and one thread. Scenes that lie in ``--out`` already are not simulated
 again: remove it to measure anew.
 """
@@ -23,11 +26,13 @@ import numpy as np
 from rich.console import Console
 
 from corporeal.errors import UserError
+from corporeal.formats.scene_file import SceneFile, write_scene_file
 from corporeal.mpm.shape import rigid_fit
 from corporeal.mpm.treatment import Detail
 from corporeal.pipeline import Progress, Settings, opened
 from corporeal.stages.assemble import AssembleConfig
 from corporeal.stages.fill import FillConfig
+from corporeal.stages.simulate import SETTLING
 from corporeal.types import MaterialField, Particles, Parts, Scene, Trajectory
 
 STILL = 0.5
@@ -40,13 +45,19 @@ Told = tuple[Scene, Parts, MaterialField, Particles, Trajectory]
 FLOWS = ("assemble", "segment", "ground", "fill", "simulate")
 
 
-def measure(path: Path, out: Path, detail: Detail, seconds: float) -> dict:
+def measure(path: Path, out: Path, detail: Detail, seconds: float, settled: str = "said") -> dict:
     """Simulate one scene; return what became of its objects, as data."""
     settings = Settings(
         assemble=AssembleConfig(duration=seconds, fps=FPS), fill=FillConfig(detail=detail)
     )
     row: dict = {"scene": path.parent.name}
     start = time.process_time()
+    if settled != "said":
+        scene_file = out / f"{row['scene']}.toml"
+        out.mkdir(parents=True, exist_ok=True)
+        said = SceneFile(scene_file, file=path.resolve(), settled=settled == "yes")
+        write_scene_file(scene_file, said)
+        path = scene_file
     try:
         with opened([path], out / row["scene"], settings, _quietly, "simulate") as (made, _):
             told = tuple(made[verb] for verb in FLOWS)
@@ -63,8 +74,13 @@ def scene_row(told: Told) -> dict:
     """Measure a whole scene."""
     scene, _, _, particles, trajectory = told
     objects = [object_row(b, told) for b in range(len(scene.objects))]
-    ledger = trajectory.ledger
+    ledger, before = trajectory.ledger, trajectory.folder / SETTLING
+    settling = json.loads(before.read_text(encoding="utf-8")) if before.exists() else None
+    for k, row in enumerate(objects):
+        row["sank_dx"] = settling["objects"][k]["moved_dx"] if settling else 0.0
     return {
+        "settling_s": settling["seconds"] if settling else 0.0,
+        "settled": settling["found"] if settling else None,
         "cell_m": particles.cell,
         "particles": particles.count,
         "steps": int(ledger["steps"][-1]),
@@ -118,7 +134,9 @@ def measure_all(paths: list[Path], out: Path, asked: argparse.Namespace, console
         asked.processes, mp_context=context, initializer=keep_to_one_core, initargs=(free,)
     ) as pool:
         jobs = {
-            pool.submit(measure, path, out / "runs", asked.detail, asked.seconds): path
+            pool.submit(
+                measure, path, out / "runs", asked.detail, asked.seconds, asked.settled
+            ): path
             for path in missing
         }
         for job in as_completed(jobs):
@@ -137,21 +155,23 @@ def at_rest(row: dict) -> bool:
     return row.get("drift_dx", np.inf) < STILL
 
 
-HEADS = ("scene", "object", "materials", "laws", "treatments", "drift [dx]", "late [dx]")
-HEADS = (*HEADS, "turned [°]", "particles", "steps", "CPU [s]")
+HEADS = ("scene", "object", "materials", "laws", "treatments", "sank [dx]", "drift [dx]")
+HEADS = (*HEADS, "late [dx]", "turned [°]", "settled [s]", "particles", "steps", "CPU [s]")
 
 
 def lines(row: dict) -> list[str]:
     """Give the rows of the table for one scene."""
     if "error" in row:
         return [f"| {row['scene']} | {row['error']} |" + " |" * (len(HEADS) - 2)]
-    whole = [f"{row['particles']:,}", f"{row['steps']:,}", f"{row['cpu_s']:.0f}"]
+    settled = f"{row['settling_s']:.2f}" + (" **never**" if row["settled"] is False else "")
+    whole = [settled, f"{row['particles']:,}", f"{row['steps']:,}", f"{row['cpu_s']:.0f}"]
     found = []
     for k, o in enumerate(row["objects"]):
         words = [" + ".join(o[n]) for n in ("materials", "laws", "treatments")]
         drift = f"{o['drift_dx']:.2f}" + ("" if o["drift_dx"] < STILL else " **moves**")
-        cells = ["" if k else row["scene"], o["object"], *words, drift]
-        cells += [f"{o['late_dx']:.2f}", f"{o['turned_deg']:.1f}", *(["", "", ""] if k else whole)]
+        sank = f"{o['sank_dx']:.2f}"
+        cells = ["" if k else row["scene"], o["object"], *words, sank, drift]
+        cells += [f"{o['late_dx']:.2f}", f"{o['turned_deg']:.1f}", *([""] * 4 if k else whole)]
         found.append("| " + " | ".join(cells) + " |")
     return found
 
@@ -188,6 +208,7 @@ def main() -> None:
     parser.add_argument("--detail", choices=get_args(Detail), default="draft")
     parser.add_argument("--seconds", type=float, default=0.5, help="how long to watch")
     parser.add_argument("--processes", type=int, default=1)
+    parser.add_argument("--settled", choices=("said", "yes", "no"), default="said")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     asked = parser.parse_args()
     paths = sorted(asked.folder.rglob("scene.glb"))

@@ -64,3 +64,40 @@ def test_a_scene_that_cannot_be_simulated_is_named_with_its_reason(rest, tmp_pat
     assert "broken" in rest.summary([row])
     assert row["error"] in rest.summary([row])
     assert row["error"] in rest.lines(row)[0]
+
+
+def post_on_toy(folder):
+    """A post of wood on a stuffed toy of 20 cm, in a file that says they had settled."""
+    boxes = (((0.2, 0.2, 0.2), 0.1, "plush toy"), ((0.1, 0.1, 0.25), 0.3255, "wood"))
+    surfaces, things = [], []
+    for k, (size, height, name) in enumerate(boxes):
+        cube = trimesh.creation.box(size)
+        place = np.array([0.0, 0.0, height])
+        surfaces.append(Surface(name, k, k, cube.vertices + place, np.asarray(cube.faces)))
+        things.append(
+            SceneObject(name=f"cube_{k}", class_name=f"{name} cube", real_extent=max(size))
+        )
+    folder.mkdir(parents=True)
+    path = folder / "scene.glb"
+    finishes = tuple(Finish(name) for _, _, name in boxes)
+    write_glb(path, Scene("soft", "", tuple(things), tuple(surfaces), finishes, settled=True))
+    return path
+
+
+def test_a_settled_scene_with_something_soft_is_at_rest_and_without_settling_it_is_not(
+    rest, tmp_path
+):
+    path = post_on_toy(tmp_path / "soft")
+    row, control = (
+        rest.measure(path, tmp_path / said, "draft", 0.1, said) for said in ("said", "no")
+    )
+    assert row["objects"][0]["treatments"] == ["deformable"]
+    assert row["settled"] is True
+    assert row["objects"][1]["sank_dx"] > rest.STILL
+    assert row["drift_dx"] < 0.1
+    assert rest.at_rest(row)
+    assert control["settled"] is None
+    assert control["objects"][1]["sank_dx"] == 0.0
+    assert control["drift_dx"] > rest.STILL
+    assert not rest.at_rest(control)
+    assert "| 0.00 |" in rest.lines(control)[1]

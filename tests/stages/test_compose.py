@@ -63,6 +63,7 @@ def test_every_interaction_begins_from_a_certified_rest_and_free_of_overlap(pool
     assert certificate["objects"] == len(made.names) >= NEEDS[kind]
     assert made.action.kind == kind
     rest, start = read_glb(tmp_path / "scene.glb"), assemble([tmp_path / "scene.toml"])
+    assert rest.settled and start.settled
     assert [o.name for o in start.objects] == list(made.names)
     assert not intersecting(start) and not start.warnings
     still = np.abs(boxes_of(start) - boxes_of(rest)).max(axis=(1, 2)) < 1e-5
