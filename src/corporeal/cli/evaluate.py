@@ -1,4 +1,4 @@
-"""`corporeal evaluate mass | materials | parts`: what was predicted against what is known."""
+"""`corporeal evaluate WHAT`: what was predicted against what is known."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -13,7 +13,7 @@ from corporeal.terminal import show_table, told
 
 
 def verb_evaluate() -> None:
-    """Compare what was predicted with what is known: `evaluate mass | materials | parts FOLDER`.
+    """Compare what was predicted with what is known: mass, materials, parts or objects.
 
     FOLDER holds models, one object each; the CSV has columns object, mass_kg and, if you like, fill
     (solid, hollow, full: whose errors are told apart). Without --truth masses are predicted only.
@@ -22,15 +22,17 @@ def verb_evaluate() -> None:
     `evaluate parts` pictures each model from all sides, looks for its parts among the points that
     the pictures show, and compares with the file's own nodes and materials; without FOLDER it takes
     four models of the showcase. With --structural dinov2 --semantic clip models look at them.
+    `evaluate objects` pictures settled scenes (FOLDER: what `assemble` wrote) and tells their
+    things apart by points on what the pictures show, or by Gaussians: --points-from gaussians.
     """
-    from corporeal.evaluation import mass, parts
+    from corporeal.evaluation import mass, objects, parts
     from corporeal.regions.parts import PartsConfig
     from corporeal.stages.describe import DescribeConfig
     from corporeal.stages.ground import GroundConfig
 
     @dataclass(frozen=True)
     class Evaluate:
-        what: tyro.conf.Positional[Literal["mass", "materials", "parts"]]
+        what: tyro.conf.Positional[Literal["mass", "materials", "parts", "objects"]]
         folder: Annotated[Path | None, tyro.conf.Positional] = None
         truth: Path | None = None
         """Table of measured masses (CSV), or of what parts are made of (TOML)."""
@@ -41,20 +43,24 @@ def verb_evaluate() -> None:
         json: Path | None = None
         """Where rows and errors go, as data."""
         figure: Path | None = None
-        """Where a picture goes (PNG): of predicted against measured mass, or of parts."""
+        """Where a picture goes (PNG): of predicted against measured mass, of parts, of objects."""
         how: mass.MassConfig = field(default_factory=mass.MassConfig)
         look: parts.PartsEvaluationConfig = field(default_factory=parts.PartsEvaluationConfig)
         clusters: PartsConfig = field(default_factory=PartsConfig)
+        scenes: objects.ObjectsEvaluationConfig = field(
+            default_factory=objects.ObjectsEvaluationConfig
+        )
         describe: DescribeConfig = field(default_factory=DescribeConfig)
         ground: GroundConfig = field(default_factory=GroundConfig)
 
     asked = parse(Evaluate, "evaluate", verb_evaluate.__doc__)
-    {"mass": _masses, "materials": _materials, "parts": _parts}[asked.what](asked)
+    judges = {"mass": _masses, "materials": _materials, "parts": _parts, "objects": _objects}
+    judges[asked.what](asked)
 
 
 def _folder(asked: Any) -> Path:
     if asked.folder is None:
-        raise UserError(f"Name a folder of models: corporeal evaluate {asked.what} FOLDER.")
+        raise UserError(f"Name a folder: corporeal evaluate {asked.what} FOLDER.")
     return asked.folder
 
 
@@ -101,6 +107,19 @@ def _parts(asked: Any) -> None:
         store.write_json(asked.json, parts.record(rows))
     if asked.figure is not None:
         parts_figure.draw(found, asked.figure)
+
+
+def _objects(asked: Any) -> None:
+    from corporeal.evaluation import objects, objects_figure
+
+    with told() as tell:
+        found = objects.judge(_folder(asked), asked.scenes, tell("evaluate"))
+    rows = [row for row, _ in found]
+    _show(objects.tables(rows))
+    if asked.json is not None:
+        store.write_json(asked.json, objects.record(rows))
+    if asked.figure is not None:
+        objects_figure.draw(found, asked.figure)
 
 
 def _show(tables: list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]) -> None:

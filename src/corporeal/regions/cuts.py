@@ -23,6 +23,8 @@ VECTORS = 4
 """Eigenvectors that are tried beside the one that is the same everywhere."""
 ANOTHER = 0.7
 """Cuts that overlap less, in the mean of both sides, are quite another."""
+LEAST = 1e-3
+"""Variance of looks that is told from less: what looks all the same is not told apart by noise."""
 FEW = 60
 """Nodes of a graph for which all eigenvectors are found at once."""
 
@@ -82,9 +84,8 @@ def _scores(graph: Graph, family: Family, narrowest: float) -> Float[np.ndarray,
 def _explained(look: np.ndarray, part: np.ndarray, family: Family) -> np.ndarray:
     """Return A (1 - A) R², R² the share of the variance of looks that is between the sides."""
     away = look - part @ look
-    variance = float(np.sum(part[:, None] * away**2))
-    first = family.sums(part[:, None] * away)
-    return np.sum(first**2, axis=1) / variance if variance > 0 else np.zeros(len(first))
+    variance = max(float(np.sum(part[:, None] * away**2)), LEAST)
+    return np.sum(family.sums(part[:, None] * away) ** 2, axis=1) / variance
 
 
 def _alike(graph: Graph, family: Family, side: np.ndarray) -> Float[np.ndarray, " K"]:

@@ -1,0 +1,53 @@
+"""Scenes as points: what they look like, whose each point is, and whose it was taken for."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+import numpy as np
+from matplotlib.backends.backend_agg import FigureCanvasAgg
+from matplotlib.figure import Figure
+
+from corporeal.evaluation.objects import ObjectsRow, Told
+from corporeal.evaluation.overlap import iou
+from corporeal.evaluation.parts_figure import seen, tinted
+from corporeal.regions.match import match
+from corporeal.store import writing
+
+COLUMNS = ("points of photographs", "identity", "look and concavity", "components")
+
+
+def draw(found: Sequence[tuple[ObjectsRow, Told]], path: Path) -> None:
+    """Draw one row per scene."""
+    figure = Figure(figsize=(10, 2.6 * len(found)), dpi=100, layout="constrained")
+    grid = figure.subplots(len(found), len(COLUMNS), squeeze=False)
+    for (row, told), axes in zip(found, grid, strict=True):
+        truth = told.taken.object_of_point
+        place, order = seen(told.taken.cloud.position)
+        tints = (
+            np.clip(told.taken.cloud.colour, 0, 1),
+            tinted(truth, "tab10"),
+            tinted(_as(truth, told.ours.object_of_point), "tab10"),
+            tinted(_as(truth, told.components), "tab10"),
+        )
+        for axis, tint in zip(axes, tints, strict=True):
+            axis.scatter(*place[order].T, s=1.2, c=tint[order], lw=0)
+            axis.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
+        said = ("", *(f"mean IoU {v:.2f}" for v in (row.identity, row.ours, row.components)))
+        for axis, text in zip(axes, said, strict=True):
+            axis.set_xlabel(text, fontsize=8)
+        axes[0].set_ylabel(row.scene.replace("_", " "), fontsize=9)
+    for axis, title in zip(grid[0], COLUMNS, strict=True):
+        axis.set_title(title, fontsize=9)
+    FigureCanvasAgg(figure)
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        figure.savefig(path)
+
+
+def _as(truth: np.ndarray, found: np.ndarray) -> np.ndarray:
+    """Give what was found the number of what it fits best; what fits nothing comes after."""
+    count, known = int(found.max()) + 1, int(truth.max()) + 1
+    number = match(iou(truth, found, known, count).T)
+    left = number < 0
+    number[left] = known + np.arange(left.sum())
+    return number[found]
