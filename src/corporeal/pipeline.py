@@ -16,7 +16,8 @@ from typing import Any
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.formats.glb_writer import write_glb
-from corporeal.formats.sources import kind_of, sources
+from corporeal.formats.scene_file import read_scene_file, write_scene_file
+from corporeal.formats.sources import kind_of, pictured, sources
 from corporeal.formats.splat_ply import write_splat
 from corporeal.formats.words import safe
 from corporeal.geometry.followed import followed
@@ -306,12 +307,11 @@ class _Run:
     # ------------------------------------------------------------ the verbs
 
     def _reconstruct(self, folder: Path, progress: Progress) -> Reconstruction:
-        config, asked = self.settings.reconstruct, self.settings.describe
-        extents, viewer = (
-            self.settings.assemble.extent,
-            Viewer(safe(self.inputs[0].resolve().stem), asked.vlm, asked.record),
-        )
-        made, scene = reconstruct(self.inputs[0], config, extents, viewer, folder, progress)
+        source, asked = pictured(self.inputs), self.settings.describe
+        assert source is not None, "models need no reconstruction"
+        config, extents = self.settings.reconstruct, self.settings.assemble.extent
+        viewer = Viewer(safe(source.resolve().stem), asked.vlm, asked.record)
+        made, scene = reconstruct(source, config, extents, viewer, folder, progress)
         if viewer.asked().transcript:
             store.write_json(folder / "transcript.json", viewer.asked().transcript)
         write_splat(folder / GAUSSIANS, made.gaussians)
@@ -322,7 +322,7 @@ class _Run:
         progress(0.0, "reading the scene")
         inputs, config = self.inputs, self.settings.assemble
         if "reconstruct" in self.made:
-            inputs = list((self.folder / FOLDERS["reconstruct"]).glob("*.glb"))
+            inputs = [_modelled(self.inputs[0], self.folder / FOLDERS["reconstruct"])]
             config = replace(config, extent=())  # the reconstruction has its size from them
         return self._keep(folder, assemble(inputs, config))
 
@@ -374,6 +374,15 @@ class _Run:
         audit = store.read_json(self.folder / FOLDERS["simulate"] / "audit.json")
         settings = _spoken(self.settings)
         write_results(self.folder, self.made, audit, settings, self.seconds, progress)
+
+
+def _modelled(asked: Path, folder: Path) -> Path:
+    """Return the model that was reconstructed, with all that a scene file says beside it."""
+    model = next(folder.glob("*.glb"))
+    if asked.suffix.lower() != ".toml":
+        return model
+    write_scene_file(folder / "scene.toml", replace(read_scene_file(asked), file=model))
+    return folder / "scene.toml"
 
 
 def _spoken(settings: Settings) -> dict[str, str]:

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from corporeal.errors import UserError
-from corporeal.formats.sources import kind_of, sources
+from corporeal.formats.sources import kind_of, pictured, sources
 from glb_maker import cube
 
 
@@ -42,5 +42,10 @@ def test_names_tell_what_an_input_is(tmp_path):
     assert kind_of([splat]) == kind_of([tmp_path / "a.PLY"]) == "splat"
     assert kind_of([models]) == kind_of([models / "a.glb"]) == kind_of([tmp_path]) == "model"
     assert sources([posed / "transforms.json"]) == [posed] == sources([posed])
+    (tmp_path / "fall.toml").write_text('file = "posed"')
+    assert kind_of([tmp_path / "fall.toml"]) == "photographs"
+    assert pictured([tmp_path / "fall.toml"]) == posed
+    assert sources([tmp_path / "fall.toml"]) == [tmp_path / "fall.toml", posed]
+    assert pictured([models / "a.glb"]) is None
     with pytest.raises(UserError, match=r"a\.ply is a whole scene \(splat\), which stands alone"):
         kind_of([models / "a.glb", tmp_path / "a.ply"])

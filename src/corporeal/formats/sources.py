@@ -24,7 +24,7 @@ def kind_of(inputs: Sequence[Path]) -> Kind:
         UserError: Photographs or a splat are named beside something else.
 
     """
-    kinds = [_kind(Path(path)) for path in inputs]
+    kinds: list[Kind] = [_kind(Path(path)) for path in inputs]
     if len(kinds) > 1 and set(kinds) != {"model"}:
         strange = next(p for p, kind in zip(inputs, kinds, strict=True) if kind != "model")
         what = f"{strange} is a whole scene ({_kind(strange)}), which stands alone."
@@ -32,7 +32,30 @@ def kind_of(inputs: Sequence[Path]) -> Kind:
     return kinds[0] if kinds else "model"
 
 
+def pictured(inputs: Sequence[Path]) -> Path | None:
+    """Return the photographs or the splat that the input is, or that a scene file names.
+
+    None: the inputs are models.
+    """
+    if kind_of(inputs) == "model":
+        return None
+    return _file_of(inputs[0]) if inputs[0].suffix.lower() == ".toml" else inputs[0]
+
+
+def _file_of(scene: Path) -> Path | None:
+    """Return what a scene file names as its file; None where it cannot be read."""
+    try:
+        return read_scene_file(scene).file
+    except UserError:
+        return None  # whoever assembles it says why
+
+
 def _kind(path: Path) -> Kind:
+    if path.suffix.lower() == ".toml":
+        file = _file_of(path) if path.is_file() else None
+        if file is None or file.suffix.lower() == ".toml":
+            return "model"
+        return _kind(file)
     if path.is_dir():
         if models_in(path):
             return "model"
@@ -61,7 +84,7 @@ def models_in(folder: Path) -> list[Path]:
 
 
 def _named_by(path: Path) -> list[Path]:
-    if _kind(path) != "model":
+    if path.suffix.lower() != ".toml" and _kind(path) != "model":
         alone = path.is_dir() or path.suffix.lower() in SPLATS
         return [path if alone else path.parent]
     if path.is_dir():

@@ -320,7 +320,8 @@ def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: Assemble
         fps=config.fps or plan.fps or (own.fps if own else FPS),
         settled=(own or scene).settled if plan.settled is None else plan.settled,
     )
-    stated = config.duration or plan.duration or (own.duration if own else None)
+    known = own.duration if own and not config.drop else None  # what is dropped needs its time
+    stated = config.duration or plan.duration or known
     return replace(scene, duration=stated or _watched(scene))
 
 

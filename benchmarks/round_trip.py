@@ -1,0 +1,177 @@
+"""There and back: a scene's own run beside a run from photographs of it, with the mesh forgotten.
+
+    python benchmarks/round_trip.py ball-duck-armchair --out runs/round-trip [--docs]
+    python benchmarks/round_trip.py scenes/desk/scene.toml --out runs/round-trip
+
+Each scene is one of the showcase's by name, or a file. It is run; it is photographed from 48 sides
+with masks; of these photographs a second run is made, which is told what the things are called,
+what they are made of and how they start to move, and nothing of their shapes. Masses, the number of
+objects and where they end are compared. Aims: the whole mass within 10 %, as many objects, ends
+within 5 % of the scene's size.
+"""
+
+import argparse
+import json
+from dataclasses import replace
+from pathlib import Path
+from typing import Literal
+
+import numpy as np
+import yaml
+
+from corporeal import store
+from corporeal.formats.scene_file import ObjectEntry, SceneFile, write_scene_file
+from corporeal.formats.transforms import write_views
+from corporeal.geometry.arrangement import box_of, boxes_of
+from corporeal.pipeline import Settings, opened, write_showcase
+from corporeal.showcase.scenes import SCENES
+from corporeal.stages.capture import CaptureConfig, capture
+from corporeal.stages.describe import DescribeConfig
+from corporeal.stages.fill import FillConfig
+from corporeal.stages.reconstruct import ReconstructConfig
+from corporeal.terminal import show_table, told
+from corporeal.types import MaterialField, Scene
+
+Detail = Literal["draft", "normal", "fine"]
+Training = Literal["draft", "normal"]
+HEADS = ("scene", "objects", "found", "mass [kg]", "again [kg]", "off", "ends off", "quality [dB]")
+DOCS = Path(__file__).parents[1] / "docs" / "round-trip.md"
+
+
+def settings(detail: Detail) -> Settings:
+    """Return what both runs have in common."""
+    return Settings(fill=FillConfig(detail=detail))
+
+
+def masses(made: dict) -> np.ndarray:
+    """Return every object's mass [kg]."""
+    parts, heavy = made["segment"].catalogue, made["fill"].mass_real
+    total = np.zeros(len(made["assemble"].objects))
+    np.add.at(total, [p.object for p in parts], heavy)
+    return total
+
+
+def ends(made: dict) -> np.ndarray:
+    """Return where every object's centre of mass is at the end [m]."""
+    return made["simulate"].ledger["centre"][-1]
+
+
+def as_told(made: dict, path: Path) -> Path:
+    """Write what things are made of as a person would say it; return the file."""
+    said = {}
+    field, scene = made["ground"], made["assemble"]
+    for number, thing in enumerate(scene.objects):
+        mine = [k for k, p in enumerate(made["segment"].catalogue) if p.object == number]
+        rows = {made["segment"].catalogue[k].name: _said(field, k) for k in mine}
+        said[thing.name] = {"parts": rows} if len(rows) > 1 else next(iter(rows.values()))
+    path.write_text(yaml.safe_dump(said))
+    return path
+
+
+def as_begun(scene: Scene, folder: Path) -> Path:
+    """Write how the photographed things start to move, as a person would say it."""
+    entries = tuple(
+        ObjectEntry(name=o.name, velocity=o.velocity, push=o.push, wind=o.wind)
+        for o in scene.objects
+    )
+    path = folder / "scene.toml"
+    said = SceneFile(path, folder / "views", scene.duration, scene.fps, scene.gravity)
+    said = replace(said, settled=scene.settled, objects=entries, walls=scene.walls)
+    write_scene_file(path, said)
+    return path
+
+
+def _said(field: MaterialField, k: int) -> dict:
+    material, made = field.materials[k], field.structures[k]
+    row: dict = {"material": material.name, "structure": made.kind}
+    if made.thickness is not None:
+        row["thickness_mm"] = 1e3 * made.thickness
+    if made.contents is not None:
+        row |= {"contents": made.contents.name, "fill": made.fill or 1.0}
+    return row
+
+
+def round_trip(source: str, out: Path, detail: Detail, training: Training) -> dict:
+    """Run a scene twice and compare; what is there already is not done again."""
+    name = Path(source).resolve().parent.name if source.endswith(".toml") else Path(source).stem
+    folder = out / name
+    path = write_showcase(source, folder / "input") if source in SCENES else Path(source)
+    with told() as tell, opened([path], folder / "mesh", settings(detail), tell, "simulate") as of:
+        mesh = of[0]
+    scene = mesh["assemble"]
+    views = folder / "views"
+    if not (views / "transforms.json").exists():
+        write_views(views, capture(scene, CaptureConfig(views=48)))
+    size = [float(np.prod(np.ptp(box, axis=0))) for box in boxes_of(scene)]
+    order = np.argsort(size)[::-1]
+    names = tuple(scene.objects[k].name for k in order)
+    again = replace(
+        settings(detail),
+        reconstruct=ReconstructConfig(things=names, training=training),
+        describe=DescribeConfig(annotations=as_told(mesh, folder / "told.yaml")),
+    )
+    start = as_begun(scene, folder)
+    with told() as tell, opened([start], folder / "pictures", again, tell, "simulate") as of:
+        pictures = of[0]
+    return compared(name, mesh, pictures, order)
+
+
+def compared(name: str, mesh: dict, pictures: dict, order: np.ndarray) -> dict:
+    """Compare two runs; the second has its objects by size."""
+    scene, found = mesh["assemble"], pictures["reconstruct"]
+    whole = float(np.linalg.norm(np.ptp(box_of(scene.surfaces), axis=0)))
+    first, second = masses(mesh)[order], masses(pictures)
+    row = {"scene": name, "objects": len(first), "found": len(second)}
+    row |= {"mass": first.tolist(), "again": second.tolist(), "off": second.sum() / first.sum() - 1}
+    if len(first) == len(second):
+        off = np.linalg.norm(ends(mesh)[order] - ends(pictures), axis=1) / whole
+        row["ends_off"] = off.tolist()
+    quality = next((s for s in found.statements if " dB" in s), "")
+    return row | {"quality": quality, "warnings": list(found.warnings)}
+
+
+def cells(row: dict) -> tuple[str, ...]:
+    """Return a row of the table."""
+    far = f"{max(row['ends_off']):.1%}" if "ends_off" in row else "–"
+    return (
+        row["scene"],
+        str(row["objects"]),
+        str(row["found"]),
+        f"{sum(row['mass']):.3g}",
+        f"{sum(row['again']):.3g}",
+        f"{row['off']:+.1%}",
+        far,
+        row["quality"].split(" to ")[-1].removesuffix("."),
+    )
+
+
+def write_docs(rows: list[dict], said: str) -> None:
+    """Write the table as a page."""
+    lines = ["# There and back: a scene from photographs of itself", ""]
+    lines += [f"Written by `{said}`. {' '.join((__doc__ or '').split()[22:])}", ""]
+    lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
+    lines += ["| " + " | ".join(cells(row)) + " |" for row in rows]
+    DOCS.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def main() -> None:
+    """Compare all scenes asked for."""
+    parser = argparse.ArgumentParser(description=(__doc__ or "").splitlines()[0])
+    parser.add_argument("scenes", nargs="*", default=list(SCENES))
+    parser.add_argument("--out", type=Path, default=Path("runs/round-trip"))
+    parser.add_argument("--detail", default="draft")
+    parser.add_argument("--training", default="normal")
+    parser.add_argument("--docs", action="store_true", help="write docs/round-trip.md")
+    asked = parser.parse_args()
+    rows = []
+    for source in asked.scenes:
+        rows.append(round_trip(source, asked.out, asked.detail, asked.training))
+        show_table(HEADS, [cells(rows[-1])])
+        store.write_json(asked.out / "round-trip.json", rows)
+    if asked.docs:
+        write_docs(rows, f"python benchmarks/round_trip.py {' '.join(asked.scenes)} --docs")
+    print(json.dumps(rows[-1], indent=1)[:2000])
+
+
+if __name__ == "__main__":
+    main()
