@@ -156,7 +156,7 @@ def _swept(views: Views, training: TrainConfig) -> Points:
     """Find points on what photographs show, where nobody gave any."""
     count = training.gaussians or PRESETS[training.preset].gaussians
     with Crew(training.threads) as crew:
-        return swept(views, count, np.random.default_rng([training.seed, 0]), crew)
+        return swept(views, count, np.random.default_rng([training.seed, 0]), crew).points
 
 
 def _told(trained: Trained, photographs: int) -> tuple[str, ...]:
