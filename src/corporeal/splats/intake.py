@@ -106,7 +106,7 @@ def take_in(
         seen = seen or _swept(shown.views, training)
         masks = cut_out(shown.views, seen.position, shown.z_up, threads=training.threads)
         told = (NO_MASKS if masks is None else CUT_OUT,)
-    start = seen if masks is None or shown.masks is not None else None  # else the masks' hull
+    start = _points(shown) if masks is None or shown.masks is not None else None  # the masks' hull
     trained = train(shown.views, masks, start, training, checkpoint, progress)
     return Intake(
         trained.gaussians,
