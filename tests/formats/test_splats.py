@@ -533,6 +533,15 @@ def test_a_million_points_that_are_mostly_nan_are_refused_at_once(kept):
         read_splat(kept(ply(names, many)))
 
 
+def test_of_a_million_points_with_some_nan_the_rest_is_kept(kept):
+    names, table = columns_of(some_gaussians(1, degree=0))
+    many = np.repeat(table.astype(np.float32), 1_000_000, axis=0)
+    many[::100, 0] = np.nan
+    read = read_splat(kept(ply(names, many)))
+    assert read.count == 990_000
+    assert "10,000 of 1,000,000" in read.warnings[0] and "NaN" in read.warnings[0]
+
+
 GOOD = ply(*columns_of(some_gaussians(50, degree=1)))
 BAD = {
     "truncated ply": (GOOD[:-10], r"49 of the 50 rows"),
