@@ -18,7 +18,7 @@ COLUMNS = ("points of photographs", "identity", "look and concavity", "component
 
 def draw(found: Sequence[tuple[ObjectsRow, Told]], path: Path) -> None:
     """Draw one row per scene."""
-    figure = Figure(figsize=(10, 2.6 * len(found)), dpi=100, layout="constrained")
+    figure = Figure(figsize=(10, 2.6 * len(found)), dpi=72, layout="constrained")
     grid = figure.subplots(len(found), len(COLUMNS), squeeze=False)
     for (row, told), axes in zip(found, grid, strict=True):
         truth = told.taken.object_of_point
