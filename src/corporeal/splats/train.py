@@ -15,6 +15,7 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
+from corporeal.backends import load
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
 from corporeal.splats import exposure, growth, limits, saved
@@ -34,7 +35,7 @@ from corporeal.splats.parameters import (
     opacity,
 )
 from corporeal.splats.quality import Quality, quality
-from corporeal.splats.raster import back, draw, pinhole
+from corporeal.splats.raster import pinhole
 from corporeal.splats.start import Points, clearance, hull, joined, seeded
 from corporeal.splats.surfaces import Surfaces
 from corporeal.splats.sweep import swept
@@ -100,9 +101,13 @@ class TrainConfig:
     """Of everything that is left to chance."""
     threads: int | None = None
     """None: one per processor. Changes no result."""
+    rasteriser: Literal["numba", "gsplat"] = "numba"
+    """Where pictures are drawn while learning: on the processor, or on a card with CUDA."""
 
 
 DEFAULT = TrainConfig()
+RASTERISERS = {"numba": "corporeal.splats.raster", "gsplat": "corporeal.splats.gsplat"}
+"""Modules with the verbs draw and back."""
 
 
 @dataclass(frozen=True)
@@ -172,7 +177,11 @@ class Lesson:
             gaussians=config.gaussians or preset.gaussians,
             steps=config.steps or preset.steps,
         )
-        self.seed = config.seed
+        self.seed, self.rasteriser = config.seed, config.rasteriser
+        self.draw, self.back = (
+            load("rasteriser", self.rasteriser, {k: f"{m}:{do}" for k, m in RASTERISERS.items()})
+            for do in ("draw", "back")
+        )
         self.views, self.masks, self.points = views, masks, points
         count = len(views.cameras)
         every = config.held_out
@@ -191,7 +200,7 @@ class Lesson:
         cameras = [(c.K.tolist(), c.world_from_camera.tolist()) for c in self.views.cameras]
         p = self.points
         begin = () if p is None else vars(p).values()
-        rest = cameras, self.preset, self.seed, self.held_out
+        rest = cameras, self.preset, self.seed, self.held_out, self.rasteriser
         return saved.fingerprint(self.views.rgb, self.masks, *begin, *rest)
 
     def size(self, step: int) -> "_Size":
@@ -292,9 +301,9 @@ def _step(pupil: Pupil, lesson: Lesson, crew: Crew) -> float:
     place = lesson.learned.index(k)
     background = rng.random(3, np.float32)
     aim = goal(size.rgb[k], size.masks.get(k), background, pupil.gains[place])
-    drawing = draw(pupil.theta, size.cameras[k], background, crew)
+    drawing = lesson.draw(pupil.theta, size.cameras[k], background, crew)
     off = loss(drawing, aim, crew)
-    gradient = back(drawing, off.slope, crew)
+    gradient = lesson.back(drawing, off.slope, crew)
     rates = _rates(lesson, pupil)
     count = len(pupil.theta)
     decay = np.float32(PULL / count), np.float32(PULL / 3 / count / lesson.radius)
