@@ -107,3 +107,9 @@ def test_a_row_stands_heavy_first_broadside_on():
         still = Standing(things, poses)
         assert [int(k) for k in np.argsort(still.centres[:, 0])] == [1, 2, 0]
         assert np.allclose(np.ptp(still.boxes, axis=1)[:, 0], [0.2, 0.1, 0.1], atol=5e-3)
+
+
+def test_what_is_flat_stands_at_the_end_of_a_row_where_nothing_passes_over_it():
+    flat = replace(box(0.2, 0.2, 0.05, name="flat"), density=9e3)
+    poses = arrange([flat, box(0.1, 0.1, 0.3), ball(0.1)], "row", np.random.default_rng(0))
+    assert max(range(3), key=lambda k: poses[k].position[0]) == 0

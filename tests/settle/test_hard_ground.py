@@ -1,9 +1,13 @@
 """Settled things rest where hard things rest that nothing keeps from rolling."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from bodies import ball, box
 
+from corporeal.settle.body import Pose
+from corporeal.settle.mujoco import SettleConfig, settle
 from corporeal.settle.rest import at_rest
 
 
@@ -22,3 +26,12 @@ def test_what_is_stacked_hardly_sinks():
     things = [box(0.5, 0.4, 0.2), box(0.3, 0.3, 0.2)]
     _, certificate = at_rest(things, "stack", 0, 1e-5)
     assert certificate.penetration_m < 5e-6
+
+
+def test_what_chatters_when_time_is_up_is_left_to_the_certificate():
+    """Some things never lie quite still on hard ground; what moves for good is no such thing."""
+    thing = box(0.3, 0.2, 0.1)
+    start = [Pose((0.0, 0.0, 0.06))]
+    never = SettleConfig(shift=0.0, longest=1.0, roll=0.3, firm=0.3)
+    assert settle([thing], start, never).quiet
+    assert not settle([thing], start, replace(never, chatter=0.0)).quiet

@@ -26,6 +26,8 @@ STANDS = 0.1
 """A body starts upright where it takes at least this tilt to make it fall over [rad]."""
 STANDS_IN_A_STACK = 0.35
 """The same under and on other bodies [rad]."""
+LOW = 0.25
+"""What is lower than this share of the tallest is passed over: it comes last in a row."""
 STEPS = 40
 NEAR = 0.1
 """What comes stops when it could go on by less than this share of the gap."""
@@ -39,8 +41,8 @@ def arrange(
     Args:
         bodies: At least one.
         arrangement: ``scatter``: side by side; ``stack``: one above the other, below what carries
-            most; ``onto``: all above that one; ``row``: in a line along +x, heavy ones first,
-        broadside on.
+            most; ``onto``: all above that one; ``row``: in a line along +x, heavy ones first
+        and flat ones last, broadside on.
         rng: Source of what is left to chance.
 
     """
@@ -102,7 +104,9 @@ def _piled(
 
 
 def _row(bodies: Sequence[Body], rng: np.random.Generator) -> list[Pose]:
-    order = sorted(range(len(bodies)), key=lambda k: -bodies[k].mass)
+    heights = [float(np.ptp(b.hull.vertices @ _standing(b).down)) for b in bodies]
+    low = [h < LOW * max(heights) for h in heights]
+    order = sorted(range(len(bodies)), key=lambda k: (low[k], -bodies[k].mass))
     room, back = _Room(), np.array([-1.0, 0.0, 0.0])
     for k in order:
         body = bodies[k]

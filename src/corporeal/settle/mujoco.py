@@ -41,6 +41,8 @@ class SettleConfig:
     """How long things must stay where they are [s] …"""
     shift: float = 1e-4
     """… but for so much [m]. Contacts on many points chatter: speeds would tell less."""
+    chatter: float = 2e-4
+    """When time is up so much is let pass [m]: the certificate tells chatter from motion."""
     roll: float = 4.0
     """How long what is round may look for a better place [s]."""
     firm: float = 2.0
@@ -88,24 +90,25 @@ def settle(
     engine.let_roll()
     _wait(engine, config, config.roll, 0.0)
     engine.harden()
-    quiet = _wait(engine, config, config.firm, 0.0)
-    return Settled(engine.poses(), float(engine.data.time), quiet)
+    moved = _wait(engine, config, config.firm, 0.0)
+    return Settled(engine.poses(), float(engine.data.time), moved < config.chatter)
 
 
-def _wait(engine: "Engine", config: SettleConfig, longest: float, calm_after: float) -> bool:
-    """Step until nothing moves for a while; say whether that was before time was up."""
+def _wait(engine: "Engine", config: SettleConfig, longest: float, calm_after: float) -> float:
+    """Step until nothing moves for a while, or time is up; return how far things went last."""
     step = float(engine.model.opt.timestep)
     window, calm = round(config.hold / step), round(calm_after / step)
-    before = engine.data.qpos.copy()
+    before, moved = engine.data.qpos.copy(), np.inf
     for number in range(1, round(longest / step) + 1):
         engine.step()
         if number > calm:
             engine.data.qvel *= 1 - config.damping * step / config.step
         if number % window == 0:
-            if engine.moved(before) < config.shift:
-                return True
+            moved = engine.moved(before)
+            if moved < config.shift:
+                break
             before = engine.data.qpos.copy()
-    return False
+    return moved
 
 
 class Engine:
