@@ -216,6 +216,25 @@ def test_a_run_that_was_begun_again_is_not_taken_for_finished(tmp_path):
     assert collect(tmp_path).run == []
 
 
+def test_a_library_that_is_gone_is_missed_and_one_that_is_small_leaves_the_rest_to_ours(tmp_path):
+    made = a_corpus(tmp_path, [audit()])
+    own = tmp_path / "own.toml"
+    settings = SETTINGS | {"ground": {"library": str(own)}}
+    run = tmp_path / "runs" / made.scenes[0].name
+    store.write_json(run / "run.json", {"settings": settings})
+    with pytest.raises(UserError, match=rf"{made.scenes[0].name} was run with .*own\.toml.* back"):
+        collect(tmp_path)
+    own.write_text(
+        '[steel]\ngroup = "mineral"\nlaw = "von_mises"\n'
+        'young_GPa = { low = 200, typical = 207, high = 216, source = "kaye-laby" }\n'
+        'poisson = { low = 0.28, typical = 0.29, high = 0.3, source = "kaye-laby" }\n'
+        'density_kg_m3 = { low = 7800, typical = 7850, high = 7900, source = "kaye-laby" }\n'
+        'yield_MPa = { low = 250, typical = 300, high = 400, source = "kaye-laby" }\n'
+    )
+    (scene,) = collect(tmp_path).scenes
+    assert [p.group for p in scene.parts] == ["mineral", "elastomer"]
+
+
 def test_what_is_no_corpus_is_said_to_be_none(tmp_path):
     with pytest.raises(UserError, match="not a corpus"):
         report_corpus(Path(tmp_path), silent)

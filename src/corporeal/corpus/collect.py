@@ -11,7 +11,7 @@ from corporeal.corpus.plan import Plan, PlannedScene, read_plan
 from corporeal.corpus.run import RUNS, SCENE, SCENES, VIEWS
 from corporeal.errors import UserError
 from corporeal.formats.scene_file import read_scene_file
-from corporeal.materials import library
+from corporeal.materials import named
 from corporeal.mpm.audit import breaches
 from corporeal.render.colours import LAWS
 from corporeal.settle.interactions import Kind
@@ -20,7 +20,7 @@ from corporeal.types import Law
 
 SWAY = 1e-3
 """Least movement or deformation that counts as having been moved by the wind [m]."""
-RIGID, OTHER = "rigid body", "other"
+RIGID = "rigid body"
 
 Numbers = dict[str, Any]
 
@@ -233,13 +233,13 @@ def _parts(
     scene: str, audit: Mapping[str, Any], settings: Mapping[str, Any]
 ) -> tuple[PartRecord, ...]:
     things = audit["outcome"]["objects"]
-    known = _groups(settings["ground"]["library"])
+    source = settings["ground"]["library"]
     return tuple(
         PartRecord(
             scene=scene,
             object=p["object"],
             material=p["material"],
-            group=known.get(p["material"], OTHER),
+            group=_group(scene, p["material"], source),
             law=RIGID if p["treatment"] == "rigid" else LAWS[Law[p["law"].upper()]][0],
             mass=p["mass_kg"],
             at_rest=bool(things[p["object"]]["at_rest"]),
@@ -249,8 +249,11 @@ def _parts(
     )
 
 
-def _groups(name: str) -> dict[str, str]:
+def _group(scene: str, material: str, source: str) -> str:
     try:
-        return {m: entry.group for m, entry in library(name).items()}
-    except UserError:
-        return {}  # a library of one's own that has gone: its materials count as "other"
+        return named(material, source).group
+    except UserError as error:
+        raise UserError(
+            f"Scene {scene} was run with the materials of {source}, and the classes of these "
+            f"cannot be read: {error} Bring the library back, or ask from where the corpus was run."
+        ) from error

@@ -16,7 +16,7 @@ from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
-from corporeal.corpus.collect import OTHER, RIGID, Collected, SceneRecord
+from corporeal.corpus.collect import RIGID, Collected, SceneRecord
 from corporeal.mpm.audit import ALLOWED
 from corporeal.render.colours import LAWS
 from corporeal.settle.interactions import KINDS, Kind
@@ -195,7 +195,7 @@ def _values(scenes: Sequence[SceneRecord], kind: Kind, name: str, log: bool) -> 
 def _materials(axes: Axes, corpus: Collected) -> None:
     parts = [p for s in corpus.run for p in s.parts]
     total = Counter(p.group for p in parts)
-    names = sorted(total, key=lambda n: (n != OTHER, total[n], n))
+    names = sorted(total, key=lambda n: (total[n], n))
     left = np.zeros(len(names))
     for law, colour in LAW_COLOUR.items():
         count = Counter(p.group for p in parts if p.law == law)
