@@ -209,8 +209,8 @@ TAIL = (
     "carving mends that. With Gaussians on its true surface (clad) it comes out with all four "
     "legs, 4 pixels wide, and a seat closed from below, where no camera looked.",
     "- The wall of the bowl is 2 to 3 mm thick, about a pixel and half a cell: it stays open "
-    "above and closed below, but its wall is about three times as thick as in life. The picture of the "
-    "plain inside adds to that. Say how thick a wall is where its weight matters.",
+    "above and closed below, but its wall is about three times as thick as in life. "
+    "Its plain inside adds to that. Say how thick a wall is where its weight matters.",
     "",
     "## Films",
     "",
