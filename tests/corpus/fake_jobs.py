@@ -48,8 +48,8 @@ def die(folder, progress, times):
 
 def wait(folder, progress):
     """Wait; note an interrupt."""
-    (folder / "began").touch()
     try:
+        (folder / "began").touch()
         time.sleep(60)
     except KeyboardInterrupt:
         (folder / "kept").touch()
@@ -81,4 +81,6 @@ def do(folder, jobs, slots=2, say=silent):
 
 
 if __name__ == "__main__":
+    # It may have been started by what ignores interrupts, such as tests in the background.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     do(Path(sys.argv[1]), counting(Path(sys.argv[1]), sys.argv[2:]))

@@ -15,6 +15,7 @@ from fake_jobs import STEPS, counting, do, silent
 
 from corporeal import store
 from corporeal.corpus.jobs import Job, perform, sweep
+from corporeal.corpus.local import local
 from corporeal.corpus.manifest import Manifest, read_rows
 
 NAMES = ("a", "b", "c", "d", "e", "f")
@@ -179,6 +180,19 @@ def test_an_interrupt_lets_jobs_keep_what_they_have(tmp_path):
     assert process.wait(PATIENCE) != 0
     assert (tmp_path / "runs" / "wait" / "kept").exists()
     assert read_rows(tmp_path, "run")["wait"].status == "interrupted"
+
+
+def test_a_job_is_stopped_gently_by_one_who_ignores_interrupts(tmp_path):
+    before = signal.signal(signal.SIGINT, signal.SIG_IGN)
+    try:
+        with local(1, 1, tmp_path / "logs") as workers:
+            workers.start(counting(tmp_path, ["wait"])[0])
+            while not (tmp_path / "runs" / "wait" / "began").exists():
+                assert workers.process["wait"].poll() is None
+                time.sleep(0.01)
+    finally:
+        signal.signal(signal.SIGINT, before)
+    assert (tmp_path / "runs" / "wait" / "kept").exists()
 
 
 @pytest.mark.parametrize("verb", ["assemble", "run"])

@@ -8,6 +8,7 @@ is to tell goes out as lines of JSON. A first interrupt lets the job keep what i
 import json
 import os
 import pickle
+import signal
 import sys
 import threading
 import time
@@ -25,6 +26,8 @@ PAUSE = 0.2
 
 def main() -> int:
     """Do one job; return the exit code."""
+    # What a script starts in the background ignores interrupts, and so would what that starts.
+    signal.signal(signal.SIGINT, signal.default_int_handler)
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what anybody prints goes to the log, not among the lines of JSON
 
