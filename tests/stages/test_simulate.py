@@ -107,6 +107,13 @@ class Ballistic:
     def restore(self, saved):
         self.x, self.v, self.time = saved["x"], saved["v"], float(saved["time"])
 
+    def halt(self, bodies):
+        self.v[np.isin(self.owner, list(bodies))] = 0.0
+
+    def begin(self, saved, bodies):
+        mine = np.isin(self.owner, list(bodies))
+        self.x[mine] = saved["x"][mine]
+
 
 @pytest.fixture(autouse=True)
 def ballistic(monkeypatch):
