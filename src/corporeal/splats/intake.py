@@ -76,6 +76,7 @@ class Intake:
 def take_in(
     source: Path,
     training: TrainConfig,
+    up: Up = "auto",
     checkpoint: Path | None = None,
     progress: Progress = lambda fraction, words: None,
 ) -> Intake:
@@ -84,6 +85,7 @@ def take_in(
     Args:
         source: A folder of photographs with poses, or a splat.
         training: How to learn.
+        up: Which axis of the file points up; auto: what the file or the cameras say.
         checkpoint: Where a training that is cut off leaves what it has.
         progress: Told the fraction done and what is being done.
 
@@ -104,7 +106,7 @@ def take_in(
     if masks is None:
         progress(0.0, "telling things from the floor")
         seen = seen or _swept(shown.views, training)
-        masks = cut_out(shown.views, seen.position, shown.z_up, threads=training.threads)
+        masks = cut_out(shown.views, seen.position, shown.z_up, _stated(up), training.threads)
         told = (NO_MASKS if masks is None else CUT_OUT,)
     start = _points(shown) if masks is None or shown.masks is not None else None  # the masks' hull
     trained = train(shown.views, masks, start, training, checkpoint, progress)
@@ -128,14 +130,9 @@ def turned_upright(taken: Intake, up: Up = "auto") -> Intake:
         up: Which axis of the file points up; auto: what the file or the cameras say.
 
     """
-    stated = None
-    if up != "auto":
-        sign = -1.0 if up[0] == "-" else 1.0
-        x, y, z = AXES[up[-1]]
-        stated = sign * x, sign * y, sign * z
     of_things = None if taken.masks is None else taken.solid
     points = taken.solid if taken.seen is None else taken.seen
-    frame = upright(taken.cameras, points, taken.z_up, of_things, taken.usual, stated)
+    frame = upright(taken.cameras, points, taken.z_up, of_things, taken.usual, _stated(up))
     return replace(
         taken,
         gaussians=moved_gaussians(taken.gaussians, frame.world_from_file),
@@ -144,6 +141,14 @@ def turned_upright(taken: Intake, up: Up = "auto") -> Intake:
         statements=(*taken.statements, frame.reason),
         warnings=(*taken.warnings, *frame.warnings),
     )
+
+
+def _stated(up: Up) -> Vector | None:
+    if up == "auto":
+        return None
+    sign = -1.0 if up[0] == "-" else 1.0
+    x, y, z = AXES[up[-1]]
+    return sign * x, sign * y, sign * z
 
 
 def _points(shown: Photographs) -> Points | None:

@@ -142,7 +142,9 @@ def reconstruct(
     _check(config)
     training = TrainConfig(config.training, seed=config.training_seed)
     kept = None if folder is None else folder / "training.npz"
-    taken = take_in(source, training, kept, lambda f, words: progress(TRAINED * f, words))
+    taken = take_in(
+        source, training, config.up, kept, lambda f, words: progress(TRAINED * f, words)
+    )
     taken = turned_upright(taken, config.up)
     if not taken.cameras:
         taken = replace(taken, cameras=_own_cameras(taken))
