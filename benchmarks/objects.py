@@ -233,8 +233,9 @@ together):
 {gaussians}
 
 - **Teddy on couch** fails: both are off-white without texture, and the couch is made of loose
-  cushions. Nothing but knowing what a teddy is tells it from one. The warning says so, masks
-  solve it.
+  cushions. **Cat on table** hangs by a hair: the cat nearly covers the table's width, and whether
+  it or half the table is cut off depends on which points were drawn. Both warn, and masks settle
+  both.
 - **Normals** matter. Without them they are found from the points, outward being up where the
   scene is highest. That is as good for most pairs, and much worse for some (bottle beside box, cat
   on table): give normals where cameras say what is outside.

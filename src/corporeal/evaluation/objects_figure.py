@@ -15,6 +15,9 @@ from corporeal.store import writing
 
 COLUMNS = ("points of photographs", "identity", "look and concavity", "components")
 
+DRAWN = 5000
+"""Points of a scene that are drawn, about."""
+
 
 def draw(found: Sequence[tuple[ObjectsRow, Told]], path: Path) -> None:
     """Draw one row per scene."""
@@ -23,6 +26,7 @@ def draw(found: Sequence[tuple[ObjectsRow, Told]], path: Path) -> None:
     for (row, told), axes in zip(found, grid, strict=True):
         truth = told.taken.object_of_point
         place, order = seen(told.taken.cloud.position)
+        order = order[:: max(1, len(order) // DRAWN)]
         tints = (
             np.clip(told.taken.cloud.colour, 0, 1),
             tinted(truth, "tab10"),
@@ -30,7 +34,7 @@ def draw(found: Sequence[tuple[ObjectsRow, Told]], path: Path) -> None:
             tinted(_as(truth, told.components), "tab10"),
         )
         for axis, tint in zip(axes, tints, strict=True):
-            axis.scatter(*place[order].T, s=1.2, c=tint[order], lw=0)
+            axis.scatter(*place[order].T, s=2.0, c=tint[order], lw=0)
             axis.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
         said = ("", *(f"mean IoU {v:.2f}" for v in (row.identity, row.ours, row.components)))
         for axis, text in zip(axes, said, strict=True):
