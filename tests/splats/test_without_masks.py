@@ -186,3 +186,13 @@ def test_a_gain_is_told_from_what_is_covered_alone():
     found = exposure.gain(drawing, darker, np.where(masks[0], 255, 0).astype(np.uint8))
     np.testing.assert_allclose(found, 0.5, rtol=0.02)
     assert np.isnan(exposure.gain(drawing, darker, np.zeros(masks[0].shape, np.uint8))).all()
+
+
+def test_exposure_changes_things_and_not_the_grey_behind_them():
+    grey = (0.5, 0.5, 0.5)
+    views, masks = pictured(blobs(), around(6), grey)
+    dark = Views((0.6 * views.rgb).astype(np.uint8), views.cameras)
+    found = quality(blobs(), dark, [0, 1], masks, grey, apart=True)
+    even = quality(blobs(), views, [0, 1], masks, grey)
+    assert found.psnr > even.psnr - 2.5
+    assert quality(blobs(), dark, [0, 1], masks, grey).psnr < found.psnr - 3

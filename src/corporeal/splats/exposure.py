@@ -21,7 +21,7 @@ WIDEST = 4.0
 """Gains are at most that, or one over it."""
 PACE = 0.3
 """Share of what a step finds that enters the gain."""
-DIFFERS = 0.02
+DIFFERS = 0.04
 """Standard deviation of logarithms from which on exposures differ."""
 
 Gains = Float32[np.ndarray, "V 3"]

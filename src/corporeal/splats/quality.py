@@ -55,7 +55,9 @@ def quality(
             rgb, real = picture_of(made).rgb, views.rgb[k] / np.float32(255)
             if apart:
                 on_thing = None if masks is None else masks[k] * np.uint8(255)
-                rgb = rgb * np.nan_to_num(gain(made, views.rgb[k], on_thing), nan=1.0)
+                under = made.planes[3, ..., None] * behind
+                factor = np.nan_to_num(gain(made, views.rgb[k], on_thing), nan=1.0)
+                rgb = factor * (rgb - under) + under
             rgb = np.clip(rgb, 0, 1)
             if masks is not None and background is not None:
                 real = np.where(masks[k][..., None], real, behind)
