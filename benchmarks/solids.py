@@ -165,8 +165,7 @@ HEAD = (
     "1. **Look.** Every camera that pictures were taken with looks at the Gaussians again. A "
     "ray meets the first surface where 15 % of its light is lost, one standard deviation before "
     "the densest point of that Gaussian along the ray: what was learned with masks lies below the "
-    "outline by about that much. A pixel that lets more than half through shows nothing. A splat "
-    "without cameras is looked at from a dome.",
+    "outline by about that much. A pixel that lets more than half through shows nothing.",
     "2. **Carve.** Each cell of a grid of a million about the thing asks all views how far behind "
     "or before their surfaces it is. Of those that see it at all, four in ten may say it is "
     "emptier. What no view sees, inside and below, is filled in between with about the least area. "

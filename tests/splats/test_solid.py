@@ -162,14 +162,6 @@ def test_floor_and_background_are_no_things_but_hide_what_is_behind():
     assert np.abs(solid.vertices[:, :2]).max() < 0.4 + PIXEL
 
 
-@pytest.mark.slow
-def test_a_splat_without_cameras_is_looked_at_from_a_dome():
-    ball = trimesh.creation.icosphere(4, 0.5).apply_translation([3, -2, 0.5])
-    gaussians, owner = together(clad(ball))
-    (solid,) = solids(gaussians, owner, threads=1)
-    assert fits(solid, ball)
-
-
 def test_specks_in_the_air_are_left_out():
     ball = trimesh.creation.icosphere(4, 0.4).apply_translation([0, 0, 0.4])
     speck = trimesh.creation.icosphere(2, 0.05).apply_translation([0.5, 0.3, 0.9])

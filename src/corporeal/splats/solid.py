@@ -17,7 +17,7 @@ from skimage import measure
 from corporeal.errors import UserError
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.mesh import Mesh, signed_volume
-from corporeal.geometry.shape import Shape, sphere_directions
+from corporeal.geometry.shape import Shape
 from corporeal.splats.carve import Grid, carved, gridded
 from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_carve import paint
@@ -44,10 +44,6 @@ CHECKED = 4000
 """Places at which the winding number is compared."""
 ASTRAY = 0.01
 """Share of them that may differ."""
-OWN_VIEWS = 64
-"""Where a splat comes without cameras."""
-OWN_SIZE = 512
-"""[px]"""
 
 
 @dataclass(frozen=True)
@@ -75,7 +71,7 @@ class Solid:
 def solids(
     gaussians: Gaussians,
     object_of_gaussian: Int[np.ndarray, " N"],
-    cameras: tuple[Camera, ...] = (),
+    cameras: tuple[Camera, ...],
     floor: float = 0.0,
     threads: int | None = None,
     progress: Progress = lambda fraction, words: None,
@@ -85,8 +81,8 @@ def solids(
     Args:
         gaussians: Of things and, where there is one, of floor and background.
         object_of_gaussian: -1: floor or background, which hides things but is none.
-        cameras: From where the Gaussians were learned: only what these saw is known. Without any,
-            cameras on a dome look at them.
+        cameras: From where the Gaussians were learned, or are looked at: only what these see is
+            known.
         floor: Height that nothing is below [m].
         threads: None: one per core that this process may use.
         progress: Told the fraction done and what is going on.
@@ -103,7 +99,6 @@ def solids(
         raise UserError(f"No Gaussian belongs to object {lacking[0]}.")
     with Crew(threads) as crew:
         progress(0.0, "looking at the Gaussians")
-        cameras = cameras or dome(gaussians.mean[object_of_gaussian >= 0], floor)
         sight = looked(gaussians, cameras, crew)
         sight.met[object_of_gaussian[sight.met] < 0] = -1
         scene = _Scene(gaussians, object_of_gaussian, sight, floor)
@@ -112,30 +107,6 @@ def solids(
             progress((k + 0.5) / (count + 0.5), f"carving object {k + 1} of {count}")
             made.append(_solid(scene, k, survey, crew))
     return tuple(made)
-
-
-def dome(points: Float[np.ndarray, "N 3"], floor: float) -> tuple[Camera, ...]:
-    """Return cameras about some points, above the floor, that see all but a few of them."""
-    low, high = np.percentile(points, (0.5, 99.5), axis=0)
-    centre, radius = (low + high) / 2, max(float(np.linalg.norm(high - low)) / 2, 1e-9)
-    directions = sphere_directions(2 * OWN_VIEWS)
-    lifted = centre[2] - floor + 4 * radius * directions[:, 2] > 0.2 * radius
-    focal = 0.9 * OWN_SIZE / 2 * np.sqrt(4.0**2 - 1)
-    K = np.array([[focal, 0, OWN_SIZE / 2], [0, focal, OWN_SIZE / 2], [0, 0, 1]])
-    return tuple(
-        Camera(K, _towards(centre, centre + 4 * radius * d), OWN_SIZE, OWN_SIZE)
-        for d in directions[lifted]
-    )
-
-
-def _towards(target: np.ndarray, eye: np.ndarray) -> Float[np.ndarray, "4 4"]:
-    ahead = (target - eye) / np.linalg.norm(target - eye)
-    right = np.cross(ahead, [0.0, 0.0, 1.0])
-    right = right if np.linalg.norm(right) > 1e-6 else np.array([1.0, 0.0, 0.0])
-    right /= np.linalg.norm(right)
-    pose = np.eye(4)
-    pose[:3] = np.stack([right, np.cross(ahead, right), ahead, eye], axis=1)
-    return pose
 
 
 @dataclass(frozen=True)

@@ -4,13 +4,13 @@ What comes out is a scene of objects like any other, which ``assemble`` reads as
 Gaussians themselves, for the film and for telling parts apart.
 """
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import Float, Int, UInt8
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
@@ -19,12 +19,11 @@ from corporeal.features.descriptor import descriptor, seen_from
 from corporeal.features.lifting import LEAST, fill, uplift
 from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
-from corporeal.formats.typical_extents import typical_extent
 from corporeal.formats.words import safe, unique
 from corporeal.geometry.harmonics import DC
-from corporeal.geometry.metric import Extent, MetricScale, chosen, of_file
+from corporeal.geometry.local_shape import neighbours, normals
+from corporeal.geometry.metric import MetricScale
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
-from corporeal.geometry.sizes import said_extent
 from corporeal.regions.match import match
 from corporeal.regions.objects import Split, objects
 from corporeal.render.camera import around, camera_of
@@ -45,7 +44,7 @@ from corporeal.types import (
     SceneObject,
     Surface,
 )
-from corporeal.vlm.things import Thing, Viewer
+from corporeal.vlm.things import Thing, Viewer, metres, usual
 
 Progress = Callable[[float, str], None]
 
@@ -61,6 +60,8 @@ OUTLIERS = 1.0
 """Percent of a splat, at either end, that need not be in those pictures."""
 NEAR = 3.0
 """Distances between neighbours within which a Gaussian goes with a thing."""
+AROUND = 16
+"""Points that a normal is found from."""
 SHOWN = 4
 """Pictures that somebody is shown of the whole scene."""
 UNKNOWN = "object"
@@ -150,16 +151,17 @@ def reconstruct(
         taken = replace(taken, cameras=_own_cameras(taken))
     progress(TRAINED, "telling things from the background")
     of_things = _of_things(source, taken)
-    cloud = _cloud(taken, of_things, config, folder)
+    cloud, outside = _cloud(taken, of_things, config, folder)
     progress(LOOKED, "finding objects")
     wanted = _wanted(config, viewer, taken)
-    split = objects(cloud, config.count or len(wanted) or None)
+    normal = normals(cloud.position, neighbours(cloud.position, AROUND), outside)
+    split = objects(cloud, config.count or len(wanted) or None, normal)
     progress(FOUND, "closing surfaces")
     found = _solid(taken, cloud, split, of_things)
     things = _recognised(wanted, found, config, viewer)
     names = unique([safe(thing.class_name) or UNKNOWN for thing in things])
     sizes = dict(zip(names, map(_extent, found.solids), strict=True))
-    scale = _scale(config, extents, taken.z_up, sizes, things)
+    scale = metres(sizes, things, extents, config.metres_per_unit, taken.z_up)
     warnings = [*taken.warnings, *split.warnings, *viewer.asked().warnings, *scale.warnings]
     warnings += [f"{n}: {w}" for n, s in zip(names, found.solids, strict=True) for w in s.warnings]
     said = (*taken.statements, _told(split), scale.reason)
@@ -200,8 +202,8 @@ def _of_things(source: Path, taken: Intake) -> Int[np.ndarray, " M"]:
 
 def _cloud(
     taken: Intake, things: Int[np.ndarray, " M"], config: ReconstructConfig, folder: Path | None
-) -> Cloud:
-    """Return points on things with what they look like."""
+) -> tuple[Cloud, Float[np.ndarray, "N 3"]]:
+    """Return points on things with what they look like, and where the outside is of each."""
     gaussians, cameras = taken.gaussians, taken.cameras
     if len(things) > MOST_POINTS:
         random = np.random.default_rng(config.training_seed)
@@ -210,26 +212,19 @@ def _cloud(
     shown = np.stack([np.asarray(share.sum(axis=1)).ravel()[things] for share in shares])
     position = gaussians.mean[things].astype(np.float64)
     colour = np.clip(0.5 + DC * gaussians.sh[things, 0], 0, 1)
-    looks = {}
+    outside, looks = seen_from(position, cameras, list(shown)), {}
     for spec in dict.fromkeys((config.semantic, config.structural)):
         encoder = connect(spec, None if folder is None else folder / "maps")
         if encoder is None:
-            towards = seen_from(position, cameras, list(shown))
-            looks[spec] = descriptor(position, colour, towards)
+            looks[spec] = descriptor(position, colour, outside)
             continue
-        pictures = _pictures(taken)
         cells = -(-cameras[0].height // CELL), -(-cameras[0].width // CELL)
-        maps = [encoder.map(picture) for picture in pictures]
+        maps = [encoder.map(picture) for picture in _pictures(taken)]
         lifted = uplift(lambda v: shares[v][things], cells, maps, len(things))
         looks[spec] = fill(position, lifted).unit()
-    return Cloud(
-        position=position,
-        colour=colour,
-        semantic=looks[config.semantic],
-        structural=looks[config.structural],
-        seen=np.asarray((shown > LEAST).sum(axis=0), dtype=np.int64),
-        gaussian_of_point=things,
-    )
+    seen = np.asarray((shown > LEAST).sum(axis=0), dtype=np.int64)
+    what, where = looks[config.semantic], looks[config.structural]
+    return Cloud(position, colour, what, where, seen, things), outside
 
 
 def _pictures(taken: Intake) -> Sequence[np.ndarray]:
@@ -249,14 +244,10 @@ def _picture(gaussians: Gaussians, camera: Camera) -> UInt8[np.ndarray, "H W 3"]
 
 def _wanted(config: ReconstructConfig, viewer: Viewer, taken: Intake) -> list[Thing]:
     """Return what things there are: as the command line says, else as somebody sees; or nothing."""
-    if not config.things:
-        pictures = _pictures(taken)
-        return viewer.things([pictures[k] for k in _spread(len(pictures))])
-    known = {name: typical_extent(name) for name in config.things}
-    return [
-        Thing(name, extent=k.usual, sized_by="the table of typical extents") if k else Thing(name)
-        for name, k in ((name, known[name]) for name in config.things)
-    ]
+    if config.things:
+        return [usual(name) for name in config.things]
+    pictures = _pictures(taken)
+    return viewer.things([pictures[k] for k in _spread(len(pictures))])
 
 
 def _spread(count: int) -> list[int]:
@@ -286,13 +277,9 @@ def _by_words(wanted: Sequence[Thing], found: _Found, spec: str) -> list[int]:
     """Pair objects and things so that what CLIP sees fits best what they are called."""
     encoder = connect(spec)
     assert isinstance(encoder, Reader)
-    looks = np.stack(
-        [
-            found.cloud.semantic[found.object_of_point == k].astype(np.float64).mean(axis=0)
-            for k in range(found.count)
-        ]
-    )
-    words = encoder.words([f"{thing.class_name}" for thing in wanted])
+    of, seen = found.object_of_point, found.cloud.semantic
+    looks = np.stack([seen[of == k].mean(axis=0, dtype=np.float64) for k in range(found.count)])
+    words = encoder.words([thing.class_name for thing in wanted])
     return match(likeness(unit(looks), words)).tolist()
 
 
@@ -350,40 +337,6 @@ def _extent(solid: Solid) -> float:
 def _told(split: Split) -> str:
     count = int(split.object_of_point.max()) + 1
     return f"{count} object{'s' * (count != 1)}, told apart by {split.found_by}."
-
-
-def _scale(
-    config: ReconstructConfig,
-    extents: Sequence[str],
-    z_up: bool,
-    sizes: Mapping[str, float],
-    things: Sequence[Thing],
-) -> MetricScale:
-    """Decide what one unit of the file is in metres.
-
-    Args:
-        config: May state it.
-        extents: What a person stated, such as "duck=0.1" [m].
-        z_up: Whether the file's kind has +z up, and metres.
-        sizes: Name → largest extent in the file [its unit].
-        things: In the same order.
-
-    """
-    only = next(iter(sizes)) if len(sizes) == 1 else ""
-    wanted = [said_extent(text, only) for text in extents]
-    strange = [name for name, _ in wanted if name not in sizes]
-    if strange:
-        raise UserError(f"--extent: no object {strange[0]!r}. Choose one of: {', '.join(sizes)}.")
-    given = config.metres_per_unit
-    reason = f"One unit of the file is {given:.4g} m, the command line said." if given else ""
-    usual = zip(sizes.items(), things, strict=True)
-    return chosen(
-        MetricScale(given, "distance", reason) if given else None,
-        [Extent(name, sizes[name], metres, "the command line") for name, metres in wanted],
-        of_file("transforms.json") if z_up else None,
-        [Extent(name, size, t.extent, t.sized_by) for (name, size), t in usual if t.extent],
-        max(sizes.values()),
-    )
 
 
 def _in_metres(

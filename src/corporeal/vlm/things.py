@@ -1,16 +1,23 @@
 """Which things stand in a photographed scene, and which found region each of them is."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from importlib.resources import files
 from pathlib import Path
 
 import numpy as np
 
+from corporeal.errors import UserError
+from corporeal.formats.typical_extents import typical_extent
+from corporeal.geometry.metric import Extent, MetricScale, chosen, of_file
+from corporeal.geometry.sizes import said_extent
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.interview import Interview, Subject
-from corporeal.vlm.sizes import SAID
+from corporeal.vlm.sizes import SAID, TABLE
 from corporeal.vlm.words import usage
+
+PERSON = "the command line"
+"""Who said what a person typed, in words for the report."""
 
 
 @dataclass(frozen=True)
@@ -114,3 +121,48 @@ class Viewer:
         )
         self.interviews.append(Interview(model, model, {task: prompt}, subject))
         return self.interviews[-1]
+
+
+# ---------------------------------------------------------------- how large they are
+
+
+def usual(class_name: str) -> Thing:
+    """Return a thing that somebody named, as large as such things usually are."""
+    known = typical_extent(class_name)
+    return Thing(class_name, extent=known.usual, sized_by=TABLE) if known else Thing(class_name)
+
+
+def metres(
+    sizes: Mapping[str, float],
+    things: Sequence[Thing],
+    stated: Sequence[str] = (),
+    per_unit: float | None = None,
+    z_up: bool = False,
+) -> MetricScale:
+    """Decide what one unit of a reconstruction is in metres.
+
+    Args:
+        sizes: Name → largest extent in the file [its unit].
+        things: What they are, in the same order.
+        stated: What a person said of some, such as "duck=0.1" [m].
+        per_unit: What a person said of the unit [m].
+        z_up: Whether the file's kind has +z up, and metres.
+
+    Raises:
+        UserError: A size is stated of nothing that is there.
+
+    """
+    only = next(iter(sizes)) if len(sizes) == 1 else ""
+    wanted = [said_extent(text, only) for text in stated]
+    strange = [name for name, _ in wanted if name not in sizes]
+    if strange:
+        raise UserError(f"--extent: no object {strange[0]!r}. Choose one of: {', '.join(sizes)}.")
+    reason = f"One unit of the file is {per_unit:.4g} m, {PERSON} said." if per_unit else ""
+    known = zip(sizes.items(), things, strict=True)
+    return chosen(
+        MetricScale(per_unit, "distance", reason) if per_unit else None,
+        [Extent(name, sizes[name], extent, PERSON) for name, extent in wanted],
+        of_file("transforms.json") if z_up else None,
+        [Extent(name, size, t.extent, t.sized_by) for (name, size), t in known if t.extent],
+        max(sizes.values()),
+    )
