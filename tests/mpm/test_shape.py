@@ -62,6 +62,14 @@ def test_grains_that_flew_off_make_no_deeper_dent():
     assert mark.depth == pytest.approx(0.01, rel=0.2)
 
 
+def test_a_lump_that_flew_off_does_not_say_where_the_dent_goes():
+    thrown, below = pressed(CUBE), np.argsort(np.linalg.norm(CUBE - [0.0, 0.0, -0.04], axis=1))
+    thrown[below[:6]] += [0.0, 0.0, 0.5]
+    mark = dent(CUBE, [thrown], 0.002)
+    assert mark.depth == pytest.approx(0.01, rel=0.2)
+    np.testing.assert_allclose(mark.place[:2], [0.02, 0.01], atol=0.004)
+
+
 def test_a_vibration_is_no_dent():
     swing = [CUBE * (1 + 0.05 * np.sin(t) * np.array([1, -1, 0])) for t in np.arange(8) / 8 * 6.28]
     assert dent(CUBE, swing, 0.001).share == 0

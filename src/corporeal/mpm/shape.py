@@ -106,12 +106,13 @@ def dent(
     around = KDTree(start).query(start, k=min(PATCH, len(start)))[1].reshape(len(start), -1)
     size = np.linalg.norm(shift, axis=1)
     together = size <= THROWN * np.median(size[around], axis=1)
-    if not (size[together] > threshold).any():
+    moved = together & (size > threshold)
+    if not moved.any():
         return Dent(largest(size[together]), np.full(3, np.nan), 0.0)
-    smooth = np.median(shift[around[:, :8]], axis=1)
-    way = smooth[np.argmax(np.linalg.norm(smooth, axis=1))]
-    along = shift @ way / np.linalg.norm(way)
-    dented = together & (size > threshold) & (along > 0.5 * size)
+    smooth = np.linalg.norm(np.median(shift[around[:, :8]], axis=1), axis=1)
+    deepest = np.argmax(np.where(moved, smooth, -1.0))
+    along = shift @ shift[deepest] / size[deepest]
+    dented = moved & (along > 0.5 * size)
     place = np.average(start[dented], axis=0, weights=size[dented] ** 2)
     return Dent(largest(size[dented]), place, float(dented.mean()))
 
