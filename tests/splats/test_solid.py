@@ -17,7 +17,7 @@ from corporeal.types import Gaussians
 
 PIXEL = 3.5 / 168
 """Of the pictures, at the things [m]."""
-CELLS = {"CELLS": 60_000, "ROUGH": 20_000, "OWN_SIZE": 200, "OWN_VIEWS": 24}
+CELLS = {"CELLS": 60_000, "ROUGH": 20_000}
 
 
 @pytest.fixture(autouse=True)
