@@ -5,12 +5,12 @@ from math import sqrt
 
 import numpy as np
 import pytest
-from bodies import box
+from bodies import ball, box
 
 from corporeal.geometry.air import AIR_DENSITY, PLATE, drag_areas
 from corporeal.mpm import wind
 from corporeal.settle.body import FRICTION, Pose
-from corporeal.settle.breeze import wind_that_moves
+from corporeal.settle.breeze import FIRM, wind_that_moves
 from corporeal.settle.interactions import (
     BLOWS,
     FALL,
@@ -124,6 +124,15 @@ def test_a_box_moves_in_the_wind_that_friction_or_its_foot_cannot_hold(height, w
     assert pressure[way] == min(pressure.values())
     expected = sqrt(2 * pressure[way] / AIR_DENSITY)
     assert wind_that_moves(thing, pose, heading) == pytest.approx(expected, rel=1e-9)
+
+
+def test_a_ball_needs_a_wind_that_rolls_it_on_a_grid():
+    """Its drag at its middle, 0.47 of its cross-section, against a foot of a tenth of its size."""
+    thing, size = ball(0.25, name="ball"), 0.5
+    speed = wind_that_moves(thing, Pose((0, 0, 0.25)), np.array([1.0, 0.0]))
+    drag = 0.5 * AIR_DENSITY * speed**2 * 0.47 * np.pi * 0.25**2
+    rolls = thing.mass * GRAVITY * FIRM * size / 0.25
+    assert drag == pytest.approx(min(rolls, FRICTION * thing.mass * GRAVITY), rel=0.05)
 
 
 def test_the_air_presses_as_in_the_simulation():

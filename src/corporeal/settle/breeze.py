@@ -12,6 +12,9 @@ from corporeal.settle.body import Body, Pose
 from corporeal.settle.hull import FOOT
 
 GRAVITY = 9.81
+FIRM = 0.1
+"""What is round hardly rolls on a grid: it stands as on a foot that reaches this share of its size
+beyond its centre (two cells of a draft)."""
 BEARINGS = 8
 """Directions from which wind is tried."""
 
@@ -48,6 +51,7 @@ def wind_that_moves(body: Body, pose: Pose, heading: Float[np.ndarray, "2"]) -> 
     lee = float(foot.max())
     drag = drag_of(body, pose, heading, np.array([*(lee * heading), bottom]))
     held = lee - float(pose.world(body.centre[None])[0, :2] @ heading)
+    held = max(held, FIRM * body.extent) if held > 0 else held
     slide = _over(body.friction * weight, drag.along + body.friction * drag.lift)
     fall = _over(weight * held, drag.overturning) if held > 0 else inf
     return sqrt(2 * min(slide, fall) / AIR_DENSITY)
