@@ -61,8 +61,6 @@ FOLDERS = {
     "report": "10-report",
 }
 VERBS = tuple(FOLDERS)
-RESUMABLE = ("reconstruct", "simulate")
-"""Verbs that go on from what an interrupted run left in their folders."""
 RUN = "run.json"
 WRITTEN = ("record",)
 """Settings that name what is written, not what is read."""
@@ -284,14 +282,19 @@ class _Run:
         return sources(self.inputs)
 
     def _clear(self, verb: str, folder: Path) -> None:
-        """Remove results that no longer follow from the settings; keep an unfinished simulation."""
+        """Remove results that no longer follow from the settings.
+
+        An unfinished simulation is kept, and what a reconstruction learned: both go on from there,
+        a training only if it is of the same pictures.
+        """
         for name in RESULTS:
             (self.folder / name).unlink(missing_ok=True)
         for later in VERBS[VERBS.index(verb) + 1 :]:
             (self.folder / FOLDERS[later] / store.META).unlink(missing_ok=True)
         started = folder / "started.json"
         unfinished = started.exists() and store.read_json(started).get("key") == self.key
-        if not (verb in RESUMABLE and unfinished) and folder.exists():
+        kept = verb == "reconstruct" or (verb == "simulate" and unfinished)
+        if not kept and folder.exists():
             shutil.rmtree(folder)
         store.write_json(started, {"key": self.key})
 

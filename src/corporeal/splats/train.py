@@ -134,7 +134,8 @@ def train(
 
     masks: what belongs to the things; only that is learned then. points: where to start, too, or
     with masks instead of their visual hull; without masks a plane sweep finds where things are.
-    checkpoint: a file that is written now and then; a training that was cut off goes on from it.
+    checkpoint: a file that is written now and then; a training that was cut off goes on from it,
+    and one that was finished is not done again.
 
     Where exposures differ, Gaussians have the mean one, and held-out views are compared after the
     gain that suits each.
@@ -152,13 +153,13 @@ def train(
         for fraction, words in _learn(pupil, lesson, checkpoint, crew):
             pupil.seconds = spent + time.monotonic() - begun
             progress(fraction, words)
+    if checkpoint is not None:
+        saved.keep(checkpoint, lesson.name, vars(pupil))
     made = gaussians_of(pupil.theta[opacity(pupil.theta) > growth.DEAD])
     behind = None if masks is None else GREY
     apart = exposure.differ(pupil.gains)
     held = lesson.held_out
     out = quality(made, views, held, masks, behind, apart) if held else None
-    if checkpoint is not None:
-        checkpoint.unlink(missing_ok=True)
     exposures = np.ones((len(views.cameras), 3), np.float32)
     exposures[lesson.learned] = pupil.gains
     return Trained(made, out, spent + time.monotonic() - begun, exposures)

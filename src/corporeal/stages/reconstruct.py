@@ -87,6 +87,8 @@ class ReconstructConfig:
     """What one unit of the file is [m]; by default sizes of things say it."""
     training: Literal["draft", "normal"] = "normal"
     """How long Gaussians are learned from photographs: one minute or four on two cores."""
+    rasteriser: Literal["numba", "gsplat"] = "numba"
+    """Where pictures are drawn while learning: on the processor, or on a card with CUDA."""
     semantic: str = "descriptor"
     """What tells what a point is: "clip", "clip:FOLDER", or "descriptor", which needs no model."""
     structural: str = "descriptor"
@@ -141,7 +143,8 @@ def reconstruct(
 
     """
     _check(config)
-    training = TrainConfig(config.training, seed=config.training_seed)
+    seed, drawn_by = config.training_seed, config.rasteriser
+    training = TrainConfig(config.training, seed=seed, rasteriser=drawn_by)
     kept = None if folder is None else folder / "training.npz"
     taken = take_in(
         source, training, config.up, kept, lambda f, words: progress(TRAINED * f, words)
