@@ -23,6 +23,7 @@ from corporeal import store
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, write_scene_file
 from corporeal.formats.transforms import write_views
 from corporeal.geometry.arrangement import box_of, boxes_of
+from corporeal.geometry.mesh import Mesh
 from corporeal.pipeline import Settings, opened, write_showcase
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.capture import CaptureConfig, capture
@@ -32,6 +33,8 @@ from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.terminal import show_table, told
 from corporeal.types import MaterialField, Scene
 
+HOLLOW = ("vase", "bowl", "cup", "pot", "mug")
+"""What a person knows to have a wall, although its mesh, which models it, is solid."""
 Detail = Literal["draft", "normal", "fine"]
 Training = Literal["draft", "normal"]
 HEADS = ("scene", "objects", "found", "mass [kg]", "again [kg]", "off", "ends off", "quality [dB]")
@@ -63,9 +66,20 @@ def as_told(made: dict, path: Path) -> Path:
     for number, thing in enumerate(scene.objects):
         mine = [k for k, p in enumerate(made["segment"].catalogue) if p.object == number]
         rows = {made["segment"].catalogue[k].name: _said(field, k) for k in mine}
+        if thing.class_name in HOLLOW:
+            rows = {name: row | _hollow(made, mine) for name, row in rows.items()}
         said[thing.name] = {"parts": rows} if len(rows) > 1 else next(iter(rows.values()))
     path.write_text(yaml.safe_dump(said))
     return path
+
+
+def _hollow(made: dict, parts: list[int]) -> dict:
+    """Say how thick a wall is that a mesh has two sides of: 2 V / A."""
+    volume = sum(made["fill"].mass_real[k] / made["ground"].materials[k].density for k in parts)
+    thing = made["segment"].catalogue[parts[0]].object
+    own = [s for s in made["assemble"].surfaces if s.object == thing]
+    area = sum(float(Mesh(s.vertices, s.triangles).areas.sum()) for s in own)
+    return {"structure": "shell", "thickness_mm": 2e3 * volume / area}
 
 
 def as_begun(scene: Scene, folder: Path) -> Path:

@@ -1,0 +1,139 @@
+"""The whole way from photographs: written as other programs do, run, killed, gone on with."""
+
+import json
+import sys
+
+import numpy as np
+import pytest
+from PIL import Image
+from scipy.spatial.transform import Rotation
+
+from corporeal import cli
+from corporeal.formats.colmap import write_colmap
+from corporeal.formats.transforms import write_views
+from corporeal.geometry.similarity import moved_cameras, similarity
+from corporeal.render import figures
+from corporeal.splats import train
+from corporeal.stages.capture import CaptureConfig, capture
+from corporeal.types import Finish, Scene, SceneObject, Surface
+
+CORNERS = np.array([[x, y, z] for x in (-0.5, 0.5) for y in (-0.5, 0.5) for z in (0, 1)], float)
+QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
+FACES = np.array([t for a, b, c, d in QUADS for t in ([a, b, c], [a, c, d])])
+SIDES = ((0.3, 0.2, 0.15), (0.1, 0.1, 0.2))
+PLACES = ((0.0, 0.0, 0.0), (0.35, 0.05, 0.0))
+NAMES = ("crate", "brick")
+SMALL = ("--width", "128", "--height", "96", "--detail", "draft", "--training", "draft")
+pytestmark = pytest.mark.slow
+
+
+@pytest.fixture(scope="module")
+def views():
+    """Photographs of a red crate and a blue brick beside it."""
+    colours = ((0.6, 0.05, 0.04, 1.0), (0.05, 0.1, 0.6, 1.0))
+    surfaces = tuple(
+        Surface(name, k, k, CORNERS * SIDES[k] + PLACES[k], FACES) for k, name in enumerate(NAMES)
+    )
+    things = tuple(SceneObject(n, n, max(s)) for n, s in zip(NAMES, SIDES, strict=True))
+    finishes = tuple(Finish(n, c) for n, c in zip(NAMES, colours, strict=True))
+    scene = Scene("pair", "", things, surfaces, finishes)
+    return capture(scene, CaptureConfig(views=20, size=(128, 128)))
+
+
+@pytest.fixture
+def typed(monkeypatch, tmp_path, capsys):
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setattr(figures, "PANEL", (130, 98))
+    monkeypatch.setitem(train.PRESETS, "draft", train.Preset(4000, 1, 300, 128))
+
+    def type_(*words):
+        monkeypatch.setattr(sys, "argv", ["corporeal", *map(str, words)])
+        try:
+            cli.main()
+            code = 0
+        except SystemExit as stop:
+            code = stop.code or 0
+        return code, capsys.readouterr()
+
+    return type_
+
+
+def colmap(folder, views, matrix):
+    """Write photographs and masks with a COLMAP model, elsewhere, turned and in another unit."""
+    names = tuple(f"{k:03}.png" for k in range(len(views.rgb)))
+    for sub in ("images", "masks", "sparse"):
+        (folder / sub).mkdir(parents=True)
+    for name, rgb, owner in zip(names, views.rgb, views.object_of_pixel, strict=True):
+        Image.fromarray(rgb).save(folder / "images" / name)
+        Image.fromarray(np.uint8(255) * (owner >= 0)).save(folder / "masks" / name)
+    write_colmap(folder / "sparse", moved_cameras(views.cameras, matrix), names)
+    return folder
+
+
+def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
+    write_views(tmp_path / "photos", views)
+    code, said = typed("run", "photos", "--things", *NAMES, "--drop", "0.3", *SMALL)
+    assert code == 0, said.err
+    run = tmp_path / "runs" / "photos"
+    report, audit = (run / "report.html").read_text(), json.loads((run / "audit.json").read_text())
+    assert "Gaussians were learned from 20 photographs" in report
+    assert (run / "film.mp4").stat().st_size > 1000
+    assert (run / "0-reconstruct" / "gaussians.ply").stat().st_size > 10_000
+    moved = audit["outcome"]["objects"]
+    assert list(moved) == list(NAMES)
+    assert all(-0.2 < o["moved_m"][2] < -0.02 for o in moved.values()), "they fell, to the floor"
+    assert audit["nan_count"] == 0
+    _, said = typed("status", run)
+    assert "reconstruct" in said.out
+    code, said = typed("reconstruct", run, "--count", "1")
+    assert code == 2
+    assert "--things names 2" in said.err
+
+
+def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
+    turn = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
+    colmap(tmp_path / "scan", views, similarity(turn, 3.7, (5.0, -2.0, 1.0)))
+    words = ("--things", *NAMES, "--extent", "crate=0.3")
+    code, said = typed("run", "scan", *words, *SMALL)
+    assert code == 0, said.err
+    parts = json.loads((tmp_path / "runs/scan/audit.json").read_text())["outcome"]["objects"]
+    for name, sides in zip(NAMES, SIDES, strict=True):
+        # Pictures of 128 pixels: one is 4 mm wide.
+        assert parts[name]["length_m"] == pytest.approx(max(sides), abs=0.03), name
+        assert abs(parts[name]["moved_m"][2]) < 0.02, "it stood on the floor from the start"
+
+
+def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch):
+    write_views(tmp_path / "photos", views)
+    monkeypatch.setattr(train, "EVERY", 0.0)
+    steps, step = [], train._step
+
+    def stopping(pupil, *rest):
+        steps.append(pupil.step)
+        if len(steps) == 60:
+            raise KeyboardInterrupt
+        return step(pupil, *rest)
+
+    monkeypatch.setattr(train, "_step", stopping)
+    words = ("run", "photos", "--things", *NAMES, *SMALL)
+    code, _ = typed(*words)
+    assert code == 130
+    typed(*words)
+    assert steps[steps.index(59) + 1 :][0] in (58, 59)
+
+
+@pytest.mark.parametrize(
+    ("spoil", "words"),
+    [
+        (lambda folder: (folder / "transforms.json").write_text("{"), ("transforms.json",)),
+        (lambda folder: [p.unlink() for p in (folder / "rgb").glob("*.png")], ("20 of 20",)),
+    ],
+)
+def test_what_cannot_be_used_is_named(typed, views, tmp_path, spoil, words):
+    write_views(tmp_path / "photos", views)
+    spoil(tmp_path / "photos")
+    code, said = typed("run", "photos", *SMALL)
+    assert code == 2
+    assert "Traceback" not in said.err
+    for word in words:
+        assert word in said.err
