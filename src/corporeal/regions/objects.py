@@ -20,6 +20,7 @@ from corporeal.regions.families import Graph
 from corporeal.regions.masks import agreement
 from corporeal.regions.patches import Borders, Patches, concavity, difference, joined, patches
 from corporeal.regions.reduce import reduced
+from corporeal.regions.space import with_space_between
 from corporeal.regions.stacks import stacked
 from corporeal.types import Cloud
 
@@ -106,14 +107,31 @@ def objects(
         found.size.astype(np.float64),
         found.look.astype(np.float64),
     )
-    thing, cuts = _cut(graph, count, config)
+    start = _of_patches(with_space_between(cloud.position, count), found)
+    thing, cuts = _cut(graph, count, config, start)
+    spaces = int(start.max()) + 1
     thing = _by_size(thing, found.size)
     return Split(
         thing[found.of_point],
         _confidence(graph, thing)[found.of_point],
         (*_counted(count, int(thing.max()) + 1), *_doubts(found, thing, cuts)),
-        "look and concavity" + (" and instance masks" if masks is not None else ""),
+        _told_by(spaces, int(thing.max()) + 1, masks is not None),
     )
+
+
+def _told_by(spaces: int, things: int, masks: bool) -> str:
+    """Say what told things apart, in a clause."""
+    by = ["the space between them"] if spaces > 1 else []
+    if things > spaces or things == 1:
+        by += ["look and concavity", *(["instance masks"] if masks else [])]
+    return " and ".join(by)
+
+
+def _of_patches(of_point: Int[np.ndarray, " N"], found: Patches) -> Int[np.ndarray, " M"]:
+    """Return what most points of each patch are of, numbered without gaps."""
+    votes = np.zeros((len(found.size), int(of_point.max()) + 1))
+    np.add.at(votes, (found.of_point, of_point), 1)
+    return np.unique(votes.argmax(axis=1), return_inverse=True)[1]
 
 
 def components(position: Float[np.ndarray, "N 3"], k: int = 20) -> Int[np.ndarray, " N"]:
@@ -155,10 +173,13 @@ def _held(found: Patches, borders: Borders, config: ObjectsConfig) -> np.ndarray
     return np.exp(-((unlike / scale) ** 2) / 2 - (fold / config.concave) ** 2 / 2)
 
 
-def _cut(graph: Graph, count: int | None, config: ObjectsConfig) -> tuple[np.ndarray, list[Cut]]:
+def _cut(
+    graph: Graph, count: int | None, config: ObjectsConfig, start: Int[np.ndarray, " M"]
+) -> tuple[np.ndarray, list[Cut]]:
     """Cut where it costs least until there are ``count`` things, or until it costs too much."""
-    thing = np.zeros(len(graph.size), np.int64)
-    possible = {0: cut(graph, config.narrowest)}
+    thing = start.copy()
+    groups = (np.flatnonzero(thing == k) for k in range(int(thing.max()) + 1))
+    possible = {k: cut(graph.only(own), config.narrowest) for k, own in enumerate(groups)}
     made: list[Cut] = []
     while count is None or len(possible) < count:
         scores = {k: found.score for k, found in possible.items() if found is not None}
