@@ -16,8 +16,10 @@ def ball(middle, radius=0.1, count=1500):
 
 
 def test_things_apart_are_told_apart_whatever_they_look_like():
-    points = np.concatenate([ball((0, 0, 0), 0.3, 4000), ball((0.7, 0, 0)), ball((0.7, 0.3, 0))])
-    truth = np.repeat([0, 1, 2], [4000, 1500, 1500])
+    points = np.concatenate(
+        [ball((0, 0, 0), 0.3, 4000), ball((0.7, 0, 0)), ball((0.7, 0.3, 0), 0.1, 900)]
+    )
+    truth = np.repeat([0, 1, 2], [4000, 1500, 900])
     np.testing.assert_array_equal(with_space_between(points), truth)
     np.testing.assert_array_equal(with_space_between(points, most=3), truth)
     coarse = with_space_between(points, most=2)
