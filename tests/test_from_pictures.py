@@ -24,6 +24,7 @@ SIDES = ((0.3, 0.2, 0.15), (0.1, 0.1, 0.2))
 PLACES = ((0.0, 0.0, 0.0), (0.35, 0.05, 0.0))
 NAMES = ("crate", "brick")
 SMALL = ("--width", "128", "--height", "96", "--detail", "draft", "--training", "draft")
+BRIEF = ("--duration", "0.05", "--fps", "20")
 pytestmark = pytest.mark.slow
 
 
@@ -72,7 +73,7 @@ def colmap(folder, views, matrix):
 
 def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
     write_views(tmp_path / "photos", views)
-    code, said = typed("run", "photos", "--things", *NAMES, "--drop", "0.3", *SMALL)
+    code, said = typed("run", "photos", "--things", *NAMES, "--drop", "0.3", "--fps", "12", *SMALL)
     assert code == 0, said.err
     run = tmp_path / "runs" / "photos"
     report, audit = (run / "report.html").read_text(), json.loads((run / "audit.json").read_text())
@@ -93,7 +94,7 @@ def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
 def test_a_colmap_model_gets_up_and_metres(typed, views, tmp_path):
     turn = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
     colmap(tmp_path / "scan", views, similarity(turn, 3.7, (5.0, -2.0, 1.0)))
-    words = ("--things", *NAMES, "--extent", "crate=0.3")
+    words = ("--things", *NAMES, "--extent", "crate=0.3", *BRIEF)
     code, said = typed("run", "scan", *words, *SMALL)
     assert code == 0, said.err
     parts = json.loads((tmp_path / "runs/scan/audit.json").read_text())["outcome"]["objects"]
@@ -115,7 +116,7 @@ def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch)
         return step(pupil, *rest)
 
     monkeypatch.setattr(train, "_step", stopping)
-    words = ("run", "photos", "--things", *NAMES, *SMALL)
+    words = ("run", "photos", "--things", *NAMES, *BRIEF, *SMALL)
     code, _ = typed(*words)
     assert code == 130
     typed(*words)
