@@ -35,47 +35,6 @@ def weights(distance, out):
 
 
 @numba.njit(**JIT)
-def carry(rest, normals, near, weight, start, now, F, place, turned):
-    """X' = Σ w (x_p + F_p (X - X_p)); normals by the cofactor of Σ w F_p (Nanson's formula)."""
-    G = np.empty((3, 3))
-    C = np.empty((3, 3))
-    for v in range(len(rest)):
-        for a in range(3):
-            place[v, a] = 0.0
-            for b in range(3):
-                G[a, b] = 0.0
-        for k in range(near.shape[1]):
-            w = weight[v, k]
-            if w == 0:
-                continue
-            p = near[v, k]
-            for a in range(3):
-                moved = now[p, a]
-                for b in range(3):
-                    moved += F[p, a, b] * (rest[v, b] - start[p, b])
-                    G[a, b] += w * F[p, a, b]
-                place[v, a] += w * moved
-        for a in range(3):
-            a1, a2 = (a + 1) % 3, (a + 2) % 3
-            for b in range(3):
-                b1, b2 = (b + 1) % 3, (b + 2) % 3
-                C[a, b] = G[a1, b1] * G[a2, b2] - G[a1, b2] * G[a2, b1]
-        if weight[v].sum() == 0:
-            for a in range(3):
-                place[v, a] = rest[v, a]
-        length = 0.0
-        for a in range(3):
-            n = 0.0
-            for b in range(3):
-                n += C[a, b] * normals[v, b]
-            turned[v, a] = n
-            length += n * n
-        length = np.sqrt(length)
-        for a in range(3):
-            turned[v, a] = turned[v, a] / length if length > 1e-12 else normals[v, a]
-
-
-@numba.njit(**JIT)
 def stretch(rest, near, weight, start, now, F, place, gradient):
     """X' = Σ w (x_p + F_p (X - X_p)) and Σ w F_p; what has no particles stays as it is."""
     for v in range(len(rest)):
@@ -95,3 +54,28 @@ def stretch(rest, near, weight, start, now, F, place, gradient):
                     moved += F[p, a, b] * (rest[v, b] - start[p, b])
                     gradient[v, a, b] += w * F[p, a, b]
                 place[v, a] += w * moved
+
+
+@numba.njit(**JIT)
+def carry(rest, normals, near, weight, start, now, F, place, turned):
+    """Do as ``stretch``; normals turn by the cofactor of Σ w F_p (Nanson's formula)."""
+    gradient = np.empty((len(rest), 3, 3))
+    stretch(rest, near, weight, start, now, F, place, gradient)
+    C = np.empty((3, 3))
+    for v in range(len(rest)):
+        G = gradient[v]
+        for a in range(3):
+            a1, a2 = (a + 1) % 3, (a + 2) % 3
+            for b in range(3):
+                b1, b2 = (b + 1) % 3, (b + 2) % 3
+                C[a, b] = G[a1, b1] * G[a2, b2] - G[a1, b2] * G[a2, b1]
+        length = 0.0
+        for a in range(3):
+            n = 0.0
+            for b in range(3):
+                n += C[a, b] * normals[v, b]
+            turned[v, a] = n
+            length += n * n
+        length = np.sqrt(length)
+        for a in range(3):
+            turned[v, a] = turned[v, a] / length if length > 1e-12 else normals[v, a]

@@ -25,7 +25,7 @@ from corporeal.materials.placement import (
 from corporeal.render.portrait import DIRECTIONS, Portrait, colour_of_part, portraits
 from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
 from corporeal.vlm import Album, Vlm, connect
-from corporeal.vlm.annotation import Annotation, built, read_annotations
+from corporeal.vlm.annotation import Annotation, built, named_pieces, read_annotations
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Offer, Subject
@@ -82,6 +82,7 @@ class DescribeConfig:
 
 DEFAULT = DescribeConfig()
 CRITIC = "openai:gpt-5-mini"
+SHARES = ("volume_share", "surface_share")
 Progress = Callable[[float, str], None]
 
 
@@ -328,7 +329,6 @@ def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, 
 
 
 def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[PartWords]]:
-    """Return what the file tells of every part of every object."""
     words: list[list[PartWords]] = [[] for _ in scene.objects]
     for entry, seen in zip(identity.catalogue, evidence(scene, identity), strict=True):
         told = _stated(list(seen.surfaces), library) or recognise(seen)
@@ -380,11 +380,9 @@ def _told(
     config: DescribeConfig,
 ) -> list[PartWords]:
     own = [_annotated(told.get((thing, w.name)), w, config.annotations) for w in words]
-    named = [part for name, part in told if name == thing and part not in {w.name for w in own}]
-    if not named:
+    pieces = named_pieces(told, thing, [w.name for w in own])
+    if not pieces:
         return own
-    share = 1 / len(named)  # until they are found on the surface
-    pieces = [PartWords(n, None, volume_share=share, surface_share=share) for n in named]
     said = [_annotated(told[thing, p.name], p, config.annotations) for p in pieces]
     return [gathered(own[0].name, said)]
 
@@ -395,9 +393,8 @@ def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> 
         return words
     where = f"Stated in {Path(str(path)).name}."
     if said.material is not None:
-        shares = words.volume_share, words.surface_share
-        words = PartWords(words.name, said.material, None, None, "annotation", 1.0, where)
-        words = replace(words, volume_share=shares[0], surface_share=shares[1])
+        found = PartWords(words.name, said.material, None, None, "annotation", 1.0, where)
+        words = replace(found, **{s: getattr(words, s) for s in SHARES})
     known = ((*materials.si(key), value) for key, value in said.values.items())
     values = {field: value * factor for field, factor, value in known}
     return replace(built(said, words), values=values)

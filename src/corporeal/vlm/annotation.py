@@ -159,3 +159,15 @@ def built(said: Annotation, words: PartWords) -> PartWords:
     if structure == "shell":
         return replace(words, contents=None, fill=None)
     return replace(words, contents=said.contents or words.contents, fill=said.fill or words.fill)
+
+
+def named_pieces(
+    told: Mapping[tuple[str, str], Annotation], thing: str, parts: Sequence[str]
+) -> list[PartWords]:
+    """Return what a person names of a thing beside its parts: pieces that nobody told apart yet.
+
+    Until they are found on its surface each has an equal share.
+    """
+    names = [part for name, part in told if name == thing and part not in parts]
+    share = 1 / len(names) if names else 0.0
+    return [PartWords(name, None, volume_share=share, surface_share=share) for name in names]
