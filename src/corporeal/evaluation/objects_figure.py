@@ -4,14 +4,13 @@ from collections.abc import Sequence
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from corporeal.evaluation.figure import keep
 from corporeal.evaluation.objects import ObjectsRow, Told
 from corporeal.evaluation.overlap import iou
 from corporeal.evaluation.parts_figure import seen, tinted
 from corporeal.regions.match import match
-from corporeal.store import writing
 
 COLUMNS = ("points of photographs", "identity", "look and concavity", "components")
 
@@ -42,10 +41,7 @@ def draw(found: Sequence[tuple[ObjectsRow, Told]], path: Path) -> None:
         axes[0].set_ylabel(row.scene.replace("_", " "), fontsize=9)
     for axis, title in zip(grid[0], COLUMNS, strict=True):
         axis.set_title(title, fontsize=9)
-    FigureCanvasAgg(figure)
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path)
+    keep(figure, path)
 
 
 def _as(truth: np.ndarray, found: np.ndarray) -> np.ndarray:

@@ -6,11 +6,10 @@ from textwrap import fill
 
 import numpy as np
 from matplotlib import colormaps
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
+from corporeal.evaluation.figure import keep
 from corporeal.evaluation.parts import Judged, PartsRow
-from corporeal.store import writing
 
 FROM = (0.75, -0.55, 0.38)
 """Direction from the object to who looks at it."""
@@ -45,10 +44,7 @@ def draw(found: Sequence[tuple[PartsRow, Judged]], path: Path) -> None:
         axes[0].set_ylabel(row.object, fontsize=9)
     for axis, title in zip(grid[0], COLUMNS, strict=True):
         axis.set_title(title, fontsize=9)
-    FigureCanvasAgg(figure)
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path)
+    keep(figure, path)
 
 
 def seen(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -5,11 +5,10 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from corporeal.errors import UserError
-from corporeal.store import writing
+from corporeal.evaluation.figure import keep
 
 COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#7b5ea7", "#b08900", "#555555")
 INK = "#222222"
@@ -92,7 +91,4 @@ def mass_figure(rows: Sequence[dict[str, Any]], path: Path) -> None:
     axes.set_ylabel("predicted mass, with the interval of 90 % of the samples [kg]")
     axes.set_aspect("equal")
     axes.legend(frameon=False, loc="upper left")
-    FigureCanvasAgg(figure)
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        figure.savefig(path)
+    keep(figure, path)

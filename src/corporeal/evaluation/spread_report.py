@@ -3,11 +3,10 @@
 from pathlib import Path
 from typing import Any
 
-from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
 
 from corporeal.evaluation.ensemble import QUANTITIES
-from corporeal.store import writing
+from corporeal.evaluation.figure import keep
 
 HEADS = ("object", "quantity", "as chosen", "5 %", "median", "95 %", "members")
 STILL = 1e-9
@@ -63,9 +62,7 @@ def spread_figure(result: dict[str, Any], path: Path) -> None:
         axes.axis("off")
     panels[0].set_yticks(range(len(names)), [n.replace("_", " ") for n in names], fontsize=7)
     panels[0].set_ylim(len(names) - 0.5, -0.5)
-    FigureCanvasAgg(figure)
-    with writing(path):
-        figure.savefig(path)
+    keep(figure, path)
 
 
 def _varies(result: dict[str, Any], quantity: str) -> bool:

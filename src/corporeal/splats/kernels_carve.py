@@ -5,6 +5,7 @@ import numpy as np
 
 from corporeal.splats.kernels_basis import JIT
 from corporeal.splats.kernels_blend import CUTOFF, LAST, MOST, TILE, _decay, _rows
+from corporeal.splats.kernels_camera import from_camera, pixel
 from corporeal.splats.kernels_project import REACH, A, B, C, O, U, Z
 
 f4 = np.float32
@@ -79,7 +80,6 @@ def carve(first, last, grid, cameras, depths, rule, out):
     _, ny, nz = out.shape
     reach, share, need = rule[0], rule[1], int(rule[2])
     found = np.empty(views, np.float32)
-    p = np.empty(3)
     for i in range(first, last):
         x = grid[0] + i * grid[3]
         for j in range(ny):
@@ -89,14 +89,13 @@ def carve(first, last, grid, cameras, depths, rule, out):
                 n, free = 0, 0
                 for v in range(views):
                     c = cameras[v]
-                    for a in range(3):
-                        p[a] = c[4 * a] * x + c[4 * a + 1] * y + c[4 * a + 2] * z + c[4 * a + 3]
-                    if not p[2] > 0:
+                    right, down, ahead = from_camera(c, x, y, z)
+                    if not ahead > 0:
                         continue
-                    u, w = c[12] * p[0] / p[2] + c[14], c[13] * p[1] / p[2] + c[15]
+                    u, w = pixel(c, right, down, ahead)
                     if not (0 <= u < c[16] and 0 <= w < c[17]):
                         continue
-                    off = depths[v, int(w), int(u)] - p[2]
+                    off = depths[v, int(w), int(u)] - ahead
                     if off < -reach:
                         continue
                     found[n] = min(off, reach)
@@ -168,31 +167,25 @@ def paint(first, last, points, normals, cameras, depths, pictures, reach, out):
     A view counts by the square of the cosine at which it sees the surface, and only where nothing
     nearer than reach [m] is before the point.
     """
-    p = np.empty(3)
     for i in range(first, last):
         out[i] = 0
         for v in range(len(depths)):
             c = cameras[v]
-            for a in range(3):
-                p[a] = c[4 * a + 3]
-                for b in range(3):
-                    p[a] += c[4 * a + b] * points[i, b]
-            if not p[2] > 0:
+            right, down, ahead = from_camera(c, points[i, 0], points[i, 1], points[i, 2])
+            if not ahead > 0:
                 continue
-            u, w = c[12] * p[0] / p[2] + c[14], c[13] * p[1] / p[2] + c[15]
+            u, w = pixel(c, right, down, ahead)
             if not (0 <= u < c[16] and 0 <= w < c[17]):
                 continue
-            if abs(depths[v, int(w), int(u)] - p[2]) > reach:
+            if abs(depths[v, int(w), int(u)] - ahead) > reach:
                 continue
             towards = 0.0
-            for a in range(3):
-                turned = 0.0
-                for b in range(3):
-                    turned += c[4 * a + b] * normals[i, b]
-                towards -= turned * p[a]
+            for b in range(3):
+                back = c[b] * right + c[4 + b] * down + c[8 + b] * ahead
+                towards -= normals[i, b] * back
             if towards <= 0:
                 continue
-            weight = towards * towards / (p[0] * p[0] + p[1] * p[1] + p[2] * p[2])
+            weight = towards * towards / (right * right + down * down + ahead * ahead)
             out[i, 3] += weight
             for q in range(3):
                 out[i, q] += weight * pictures[v, int(w), int(u), q]

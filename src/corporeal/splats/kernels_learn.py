@@ -4,6 +4,7 @@ import numba
 import numpy as np
 
 from corporeal.splats.kernels_basis import JIT
+from corporeal.splats.kernels_camera import from_camera, pixel
 from corporeal.splats.parameters import OPACITY, SCALE
 
 f4 = np.float32
@@ -153,18 +154,14 @@ def witness(points, first, last, cameras, pictures, masks, patience, out):
     red, green and blue [0–1].
     """
     views, height, width, _ = pictures.shape
-    p = np.empty(3)
     for i in range(first, last):
         out[i] = 0
         for k in range(views):
             c = cameras[k]
-            for a in range(3):
-                p[a] = c[4 * a + 3]
-                for b in range(3):
-                    p[a] += c[4 * a + b] * points[i, b]
-            if not p[2] > 0:
+            right, down, ahead = from_camera(c, points[i, 0], points[i, 1], points[i, 2])
+            if not ahead > 0:
                 continue
-            u, v = c[12] * p[0] / p[2] + c[14], c[13] * p[1] / p[2] + c[15]
+            u, v = pixel(c, right, down, ahead)
             if not (0 <= u < width and 0 <= v < height):
                 continue
             if not masks[k, int(v), int(u)]:

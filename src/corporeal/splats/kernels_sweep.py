@@ -4,6 +4,7 @@ import numba
 import numpy as np
 
 from corporeal.splats.kernels_basis import JIT
+from corporeal.splats.kernels_camera import from_camera, pixel
 
 f4 = np.float32
 REACH = 2
@@ -150,27 +151,22 @@ def support(points, owners, first, last, cameras, depths, pace, near, votes):
     from, which is not asked; near: relative difference of depths that agree; votes (N, 2).
     """
     views, rows, columns = depths.shape
-    p = np.empty(3)
     for i in range(first, last):
         votes[i] = 0
         for k in range(views):
             if k == owners[i]:
                 continue
             c = cameras[k]
-            for a in range(3):
-                p[a] = c[4 * a + 3]
-                for b in range(3):
-                    p[a] += c[4 * a + b] * points[i, b]
-            if not p[2] > 0:
+            right, down, ahead = from_camera(c, points[i, 0], points[i, 1], points[i, 2])
+            if not ahead > 0:
                 continue
-            u = (c[12] * p[0] / p[2] + c[14]) / pace
-            v = (c[13] * p[1] / p[2] + c[15]) / pace
-            if not (0 <= u < columns and 0 <= v < rows):
+            u, v = pixel(c, right, down, ahead)
+            if not (0 <= u / pace < columns and 0 <= v / pace < rows):
                 continue
-            z = depths[k, int(v), int(u)]
-            if abs(p[2] - z) <= near * z:
+            z = depths[k, int(v / pace), int(u / pace)]
+            if abs(ahead - z) <= near * z:
                 votes[i, 0] += 1
-            elif p[2] < z and z < np.inf:
+            elif ahead < z and z < np.inf:
                 votes[i, 1] += 1
 
 
@@ -184,27 +180,22 @@ def before(points, widths, first, last, cameras, depths, behind, clear, pace, vo
     past, that may see past, in which it is wider than a pace, and the least depth.
     """
     views, rows, columns = depths.shape
-    p = np.empty(3)
     for i in range(first, last):
         votes[i] = 0
         votes[i, 4] = np.inf
         for k in range(views):
             c = cameras[k]
-            for a in range(3):
-                p[a] = c[4 * a + 3]
-                for b in range(3):
-                    p[a] += c[4 * a + b] * points[i, b]
-            if not p[2] > clear[k]:
+            right, down, ahead = from_camera(c, points[i, 0], points[i, 1], points[i, 2])
+            if not ahead > clear[k]:
                 continue
-            u = (c[12] * p[0] / p[2] + c[14]) / pace
-            v = (c[13] * p[1] / p[2] + c[15]) / pace
-            if not (0 <= u < columns and 0 <= v < rows):
+            u, v = pixel(c, right, down, ahead)
+            if not (0 <= u / pace < columns and 0 <= v / pace < rows):
                 continue
-            z = depths[k, int(v), int(u)]
+            z = depths[k, int(v / pace), int(u / pace)]
             if z < np.inf:
-                votes[i, 0] += abs(p[2] - z) <= MARGIN * z
-                votes[i, 1] += p[2] < (1 - MARGIN) * z
+                votes[i, 0] += abs(ahead - z) <= MARGIN * z
+                votes[i, 1] += ahead < (1 - MARGIN) * z
             else:
-                votes[i, 2] += p[2] < (1 - MARGIN) * behind[k, int(v), int(u)]
-            votes[i, 3] += widths[i] * c[12] > pace * p[2]
-            votes[i, 4] = min(votes[i, 4], p[2])
+                votes[i, 2] += ahead < (1 - MARGIN) * behind[k, int(v / pace), int(u / pace)]
+            votes[i, 3] += widths[i] * c[12] > pace * ahead
+            votes[i, 4] = min(votes[i, 4], ahead)

@@ -1,0 +1,22 @@
+"""Where a camera sees a point. Compiled by numba into the loops that ask.
+
+A camera is a row: camera from world (3 × 4), fx, fy, cx, cy, and whatever comes after.
+"""
+
+import numba
+
+from corporeal.splats.kernels_basis import JIT
+
+
+@numba.njit(**JIT)
+def from_camera(c, x, y, z):
+    """Return where a point is from the camera: to the right, down, ahead [m]."""
+    right = c[3] + c[0] * x + c[1] * y + c[2] * z
+    down = c[7] + c[4] * x + c[5] * y + c[6] * z
+    return right, down, c[11] + c[8] * x + c[9] * y + c[10] * z
+
+
+@numba.njit(**JIT)
+def pixel(c, right, down, ahead):
+    """Return u and v [px] of what is ahead."""
+    return c[12] * right / ahead + c[14], c[13] * down / ahead + c[15]
