@@ -137,8 +137,8 @@ def test_the_environment_says_where_answers_are_kept(monkeypatch, tmp_path):
 COUNT = 100
 PAUSE = 0.6
 """What the busy server asks for [s]."""
-FLIGHT = 0.3
-"""How long a request may have been on its way when it was asked for [s]."""
+AT_ONCE = 8
+"""Requests that may be on their way when it is asked for."""
 
 
 class Busy:
@@ -146,15 +146,15 @@ class Busy:
 
     def __init__(self, every):
         self.every = every
-        self.refused, self.too_early, self.good = 0, 0, Counter()
+        self.refused, self.too_early, self.good = 0, Counter(), Counter()
         self._closed_until, self._seen, self._one = 0.0, 0, threading.Lock()
 
     def __call__(self, request):
         with self._one:
             self._seen += 1
             now = time.monotonic()
-            if self._closed_until - PAUSE + FLIGHT < now < self._closed_until - 0.02:
-                self.too_early += 1
+            if now < self._closed_until - 0.02:
+                self.too_early[self.refused] += 1
             if self._seen % self.every == 0:
                 self.refused += 1
                 self._closed_until = now + PAUSE
@@ -173,7 +173,7 @@ def numbered(k):
 @pytest.mark.parametrize("count", [20, pytest.param(100, marks=pytest.mark.slow)])
 def test_many_estimations_against_a_slow_failing_server_lose_and_double_nothing(tmp_path, count):
     busy = Busy(every=max(count // 4, 12))
-    patience = Patience(tries=12, first_wait=0.01, longest_wait=1.0, at_once=8)
+    patience = Patience(tries=12, first_wait=0.01, longest_wait=1.0, at_once=AT_ONCE)
     with FakeServer(busy) as server:
         model = OpenAI(f"fake@{server.url}", patience)
         cached = Cached(model, "m", {}, tmp_path)
@@ -185,7 +185,7 @@ def test_many_estimations_against_a_slow_failing_server_lose_and_double_nothing(
     assert set(busy.good.values()) == {1}
     assert len(busy.good) == count
     assert busy.refused >= 2
-    assert busy.too_early == 0
+    assert max(busy.too_early.values(), default=0) < AT_ONCE, "only what was on its way may come"
     assert [r.answer.name for r in again] == [f"colour {k}" for k in range(count)]
     assert len(server.requests) == sent
     assert sum(r.spent.calls for r in replies) == sent
