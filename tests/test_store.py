@@ -101,6 +101,13 @@ def test_a_full_disk_is_one_clear_error_and_leaves_no_half_file(tmp_path, monkey
     assert list(tmp_path.iterdir()) == []
 
 
+def test_a_file_in_the_way_of_a_folder_is_one_clear_error(tmp_path):
+    (tmp_path / "runs").write_text("")
+    for folder in (tmp_path / "runs", tmp_path / "runs" / "scene"):
+        with pytest.raises(store.DiskError, match="a file is in its way"), store.alone(folder):
+            pass
+
+
 def test_a_range_knows_what_it_contains():
     assert 2.0 in Range(1.0, 2.0, 3.0, "book")
     assert 4.0 not in Range(1.0, 2.0, 3.0, "book")

@@ -57,6 +57,10 @@ def writing(path: Path) -> Iterator[None]:
             errno.EFBIG: "the file would exceed the allowed size. Raise the limit (ulimit -f)",
             errno.EROFS: "the disk is read-only. Choose another folder with --out",
             errno.EACCES: "permission denied. Choose another folder with --out",
+            errno.EPERM: "it is not permitted. Choose another folder with --out",
+            errno.ENOTDIR: "a file is in its way. Choose another folder with --out",
+            errno.EEXIST: "a file is in its way. Choose another folder with --out",
+            errno.ENAMETOOLONG: "its name is too long. Choose another with --name",
         }
         if error.errno not in reasons:
             raise

@@ -13,7 +13,7 @@ from PIL import Image
 from corporeal.errors import BadFileError
 from corporeal.formats.colmap import read_colmap, write_colmap
 from corporeal.formats.photographs import read_photographs
-from corporeal.formats.projections import parted
+from corporeal.formats.projections import check_focal, parted
 from corporeal.formats.transforms import write_views
 from corporeal.geometry.epipolar import projection
 from corporeal.geometry.rotation import matrix, quaternion
@@ -433,6 +433,22 @@ def test_what_is_no_description_of_photographs_is_refused(tmp_path):
         (tmp_path / "transforms.json").write_bytes(data)
         with pytest.raises(BadFileError, match=r"is no JSON .*transforms.json, or write"):
             read_photographs(tmp_path)
+
+
+def test_a_pose_that_is_not_finite_is_named(tmp_path):
+    whole = said(tmp_path)
+    whole["frames"][2]["transform_matrix"][1][2] = float("nan")
+    keep(tmp_path, whole)
+    with pytest.raises(BadFileError, match=r"frame 3: .* not finite.*leave the frame out"):
+        read_photographs(tmp_path)
+
+
+def test_a_principal_point_in_the_very_middle_is_let_pass(tmp_path):
+    K = np.array([[80.0, 0, 32], [0, 80, 32], [0, 0, 1]])
+    check_focal(tmp_path, K, 64, 64)
+    for far in ((-100, 0), (0, 130)):
+        with pytest.raises(BadFileError, match="middle at"):
+            check_focal(tmp_path, K + np.array([[0, 0, far[0]], [0, 0, far[1]], [0, 0, 0]]), 64, 64)
 
 
 def test_a_mask_that_is_named_and_missing_is_refused(tmp_path):

@@ -209,6 +209,8 @@ def test_objects_that_stand_in_each_other_are_told(models):
 
 def test_inputs_that_are_no_models_are_refused(tmp_path, models):
     (tmp_path / "empty").mkdir()
+    (tmp_path / "photos" / "images").mkdir(parents=True)
+    (tmp_path / "photos" / "images" / "a.JPG").write_bytes(b"")
     (tmp_path / "mesh.obj").write_text("v 0 0 0")
     (tmp_path / "zero.glb").write_bytes(b"")
     for inputs, said in (
@@ -216,6 +218,7 @@ def test_inputs_that_are_no_models_are_refused(tmp_path, models):
         ([tmp_path / "none.glb"], "no such file"),
         ([tmp_path / "none"], "no such file"),
         ([tmp_path / "empty"], "holds no .glb"),
+        ([tmp_path / "photos"], "holds 1 pictures, but nothing that says from where"),
         ([tmp_path / "mesh.obj"], "is not a .glb"),
         ([tmp_path / "zero.glb"], "0 bytes"),
         ([tmp_path / "none.toml"], "no such file"),

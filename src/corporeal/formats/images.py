@@ -6,7 +6,7 @@ from collections.abc import Callable
 
 import numpy as np
 from jaxtyping import UInt8, UInt16
-from PIL import Image, ImageFile
+from PIL import Image, ImageFile, UnidentifiedImageError
 
 FORMATS = ("PNG", "JPEG", "WEBP")
 MAX_PIXELS = 2**27
@@ -50,6 +50,8 @@ def _decoded(data: bytes, take: Callable[[ImageFile.ImageFile], np.ndarray]) -> 
         raise ValueError("the picture does not fit into memory") from None
     except ValueError:
         raise
+    except UnidentifiedImageError:
+        raise ValueError("the picture is no PNG, JPEG or WebP") from None
     except Exception as problem:  # Pillow's decoders raise almost anything on broken input
         raise ValueError(f"the picture is broken ({str(problem)[:80]})") from None
 

@@ -92,7 +92,8 @@ def check_focal(path: Path, K: Float[np.ndarray, "3 3"], width: int, height: int
     side = max(width, height)
     focal = K[0, 0] / side, K[1, 1] / side
     middle = K[0, 2] / width, K[1, 2] / height
-    if not (WIDEST < min(focal) and max(focal) < NARROWEST and -1 < min(middle) < max(middle) < 2):
+    plausible = WIDEST < min(focal) and max(focal) < NARROWEST
+    if not (plausible and min(middle) > -1 and max(middle) < 2):
         words = f"says a focal length of {K[0, 0]:.4g} and {K[1, 1]:.4g} pixels and a middle at "
         words += f"({K[0, 2]:.4g}, {K[1, 2]:.4g}) of a picture of {width} × {height}."
         raise BadFileError(path, words, STEP)

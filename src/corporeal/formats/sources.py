@@ -7,6 +7,7 @@ from typing import Literal
 from corporeal.errors import UserError
 from corporeal.formats.gltf_document import Document
 from corporeal.formats.photographs import holds_photographs
+from corporeal.formats.projections import SHOWN
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
 
@@ -81,6 +82,12 @@ def sources(inputs: Iterable[Path]) -> list[Path]:
 def models_in(folder: Path) -> list[Path]:
     """Return the models that lie in a folder, by name."""
     return sorted(p for p in folder.iterdir() if p.suffix.lower() in MODELS)
+
+
+def pictures_in(folder: Path) -> list[Path]:
+    """Return the pictures that lie in a folder or one below, by name."""
+    found = [*folder.glob("*"), *folder.glob("*/*")]
+    return sorted(p for p in found if p.suffix.lower() in SHOWN and p.is_file())
 
 
 def _named_by(path: Path) -> list[Path]:

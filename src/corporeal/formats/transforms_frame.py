@@ -94,8 +94,11 @@ class Frame:
             matrix = np.zeros(0)
         if matrix.shape == (3, 4):
             matrix = np.vstack([matrix, [0, 0, 0, 1]])
-        if matrix.shape != (4, 4) or not np.isfinite(matrix).all():
+        if matrix.shape != (4, 4):
             self.fail("'transform_matrix' is no 4 × 4 matrix.", "Give it row by row.")
+        if not np.isfinite(matrix).all():
+            step = "Pose it again, or leave the frame out of the file."
+            self.fail("'transform_matrix' holds numbers that are not finite.", step)
         turn = matrix[:3, :3]
         rigid = np.allclose(turn @ turn.T, np.eye(3), atol=1e-3) and np.linalg.det(turn) > 0
         if not rigid or not np.allclose(matrix[3], (0, 0, 0, 1)):

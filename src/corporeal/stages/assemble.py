@@ -11,7 +11,7 @@ import numpy as np
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.glb import read_model
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
-from corporeal.formats.sources import MODELS, models_in
+from corporeal.formats.sources import MODELS, models_in, pictures_in
 from corporeal.formats.typical_extents import doubt
 from corporeal.formats.words import safe, unique
 from corporeal.geometry import placing
@@ -113,10 +113,14 @@ def _plan(inputs: list[Path]) -> SceneFile:
 
 def _models_in(folder: Path) -> list[Path]:
     found = models_in(folder)
-    if not found:
-        step = "Name a .glb file, or a folder that holds some."
-        raise BadFileError(folder, "the folder holds no .glb or .gltf file.", step)
-    return found
+    if found:
+        return found
+    if pictures_in(folder):
+        what = f"the folder holds {len(pictures_in(folder))} pictures, but nothing that says from "
+        step = "Pose them, for example with COLMAP; transforms.json and 3 × 4 matrices do as well."
+        raise BadFileError(folder, f"{what}where they were taken.", step)
+    step = "Name a .glb file, or a folder that holds some, or photographs with poses."
+    raise BadFileError(folder, "the folder holds no .glb or .gltf file, and no pictures.", step)
 
 
 def _model(path: Path) -> Path:
