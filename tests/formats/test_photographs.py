@@ -451,6 +451,37 @@ def test_a_principal_point_in_the_very_middle_is_let_pass(tmp_path):
             check_focal(tmp_path, K + np.array([[0, 0, far[0]], [0, 0, far[1]], [0, 0, 0]]), 64, 64)
 
 
+def test_masks_that_show_nothing_are_left_out_unless_most_do(tmp_path):
+    said(tmp_path)
+    (tmp_path / "masks").mkdir()
+    for k in range(4):
+        mask = np.full((12, 16), 0 if k == 2 else 255, np.uint8)
+        mask[0] = 100
+        Image.fromarray(mask).save(tmp_path / "masks" / f"r_{k}.png")
+    read = read_photographs(tmp_path)
+    assert len(read.names) == 3
+    assert "./train/r_2 has a mask that shows nothing" in read.warnings[0]
+    for k in (0, 1, 3):
+        Image.fromarray(np.zeros((12, 16), np.uint8)).save(tmp_path / "masks" / f"r_{k}.png")
+    with pytest.raises(BadFileError, match=r"4 of 4 pictures cannot be used: .* shows nothing"):
+        read_photographs(tmp_path)
+
+
+def test_pictures_are_turned_as_they_ask_only_where_their_camera_says_so(tmp_path):
+    """Some are stored on their side; of others the note is ignored, as COLMAP does."""
+    whole = said(tmp_path, w=16, h=12, fl_x=20)
+    upright = np.arange(192, dtype=np.uint8).reshape(12, 16)
+    for k, (turn, note) in enumerate([(1, 6), (3, 8), (0, 6), (0, 1)]):
+        noted = Image.Exif()
+        noted[0x0112] = note
+        path = (tmp_path / whole["frames"][k]["file_path"]).with_suffix(".png")
+        Image.fromarray(np.ascontiguousarray(np.rot90(upright, turn))).save(path, exif=noted)
+    read = read_photographs(tmp_path)
+    for rgb in read.views.rgb:
+        np.testing.assert_array_equal(rgb[..., 0], upright)
+    assert [w[:21] for w in read.warnings if "EXIF" in w] == ["1 pictures note in th"]
+
+
 def test_a_mask_that_is_named_and_missing_is_refused(tmp_path):
     whole = said(tmp_path)
     whole["frames"][2]["mask_path"] = "gone.png"

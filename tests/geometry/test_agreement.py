@@ -150,6 +150,59 @@ def test_a_wrong_focal_length_is_named(shared_points, factor, named):
     assert f"if the focal lengths were {named} times as long" in doubt
 
 
+@pytest.fixture(scope="module")
+def centred():
+    """Return views of one point in the middle: whatever the focal length, most matches agree."""
+    rng = np.random.default_rng(4)
+    turns = np.arange(8) * 0.7
+    eyes = np.stack([2.2 * np.cos(turns), 2.2 * np.sin(turns), rng.uniform(0.2, 2.5, 8)], axis=1)
+    cameras = tuple(replace(looking(eye), K=looking(eye).K - MIDDLE) for eye in eyes)
+    points = np.c_[rng.uniform(-0.6, 0.6, (60, 3)) + np.array([0, 0, 0.3]), np.ones(60)]
+    seen = [(points @ projection(c).T) for c in cameras]
+    places = [s[:, :2] / s[:, 2:] + rng.normal(0, 0.2, (60, 2)) for s in seen]
+    pairs = [_Pair(k, k + 1, places[k], places[k + 1]) for k in range(7)]
+    return Views(np.zeros((8, HEIGHT, WIDTH, 3), np.uint8), cameras), pairs
+
+
+MIDDLE = np.array([[0, 0, 2.0], [0, 0, -1], [0, 0, 0]])
+"""What puts the principal point into the very middle."""
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda K: K * [[0.7, 0.7, 1], [1, 0.7, 1], [1, 1, 1]], "about 1.5 times as long"),
+        (lambda K: K * [[1.5, 1.5, 1], [1, 1.5, 1], [1, 1, 1]], "about 0.67 times as long"),
+        (
+            lambda K: K + np.array([[0, 0, 16], [0, 0, -12], [0, 0, 0]]),
+            "lay about -16 and +12 pixels",
+        ),
+        (lambda K: K, None),
+    ],
+)
+def test_a_lens_under_which_matches_meet_less_closely_is_told(centred, change, said, monkeypatch):
+    views, pairs = centred
+    monkeypatch.setattr("corporeal.geometry.agreement._pairs", lambda _: pairs)
+    cameras = tuple(replace(c, K=change(c.K)) for c in views.cameras)
+    found = agreement(replace(views, cameras=cameras))
+    assert not found.hopeless
+    assert found.doubt is None if said is None else said in found.doubt
+
+
+def test_masks_that_belong_to_other_pictures_are_told(near):
+    _, masks = pictures()
+    assert agreement(near, masks).doubt is None
+    elsewhere = np.stack([np.roll(m, 40 * (-1) ** k, axis=1) for k, m in enumerate(masks)])
+    assert "of the masks fit together" in agreement(near, elsewhere).doubt
+
+
+def test_poses_that_good_matches_contradict_are_hopeless(centred, monkeypatch):
+    views, pairs = centred
+    monkeypatch.setattr("corporeal.geometry.agreement._pairs", lambda _: pairs)
+    assert not agreement(views).hopeless
+    assert agreement(posed(views, lambda W: W @ FLIP)).hopeless
+
+
 def test_shuffled_poses_are_doubted(shared_points):
     cameras = tuple(shared_points.cameras[k] for k in (2, 4, 1, 0, 3, 7, 5, 6))
     doubt = pose_doubt(replace(shared_points, cameras=cameras))

@@ -30,6 +30,12 @@ NAMED = 5
 """So many bad pictures are named."""
 PROPORTION = 0.01
 """Pictures may differ that much in proportion from what the camera was said to take."""
+SHOWN = 128
+"""Of 255: a mask that nowhere has as much shows nothing."""
+ORIENTATION = 0x0112
+"""EXIF's tag of how a picture is to be turned; 1: not at all."""
+TURNS = {3: 2, 6: 3, 8: 1}
+"""Its values that turn → quarter turns to the left."""
 
 Bad = tuple[str, str]
 """The name of a picture, and why it cannot be used, in a clause."""
@@ -75,6 +81,8 @@ class _Print:
     masked: bool
     camera: Camera
     straightened: bool
+    asks: bool
+    """Whether it says that it is to be turned, and was not."""
 
 
 def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
@@ -134,25 +142,32 @@ def _size(shot: Shot, bad: list[Bad]) -> tuple[int, int] | None:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # Pillow's of large pictures; ours is the limit below
             with Image.open(shot.picture, formats=FORMATS) as picture:
-                width, height = picture.size
+                (width, height), asked = picture.size, _asked(picture)
     except Exception:  # Pillow's decoders raise almost anything on broken input
         bad.append((shot.name, "is no PNG, JPEG or WebP picture"))
         return None
     if width * height > MAX_PIXELS or not width or not height:
         bad.append((shot.name, f"claims {width} × {height} pixels"))
         return None
-    return width, height
+    return (height, width) if _turned(shot, width, height, asked) else (width, height)
 
 
 def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
     picture = _decoded(shot.picture)
     height, width = picture.shape[:2]
+    asked = _asked_of(shot.picture)
+    turned = _turned(shot, width, height, asked)
+    if turned:
+        picture = np.ascontiguousarray(np.rot90(picture, asked))
+        height, width = width, height
     lens = shot.lens(width, height)
-    if abs(width * lens.height / (height * lens.width) - 1) > PROPORTION:
+    if not _fits(width, height, lens):
         stated = f"{lens.width} × {lens.height}"
         raise _UnusableError(f"has {width} × {height} pixels, but its camera takes {stated}")
     masked = shot.mask is not None or picture.shape[2] == 4
     alpha = _alpha(shot, picture)
+    if masked and alpha.max() < SHOWN:
+        raise _UnusableError("has a mask that shows nothing")
     small = np.dstack([_resized(_on_white(picture[..., :3], alpha), size), _resized(alpha, size)])
     lens = lens.resized(*size)
     try:
@@ -160,7 +175,30 @@ def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
     except ValueError as problem:
         raise _UnusableError(f"cannot be straightened: {problem}") from None
     camera = Camera(K, shot.world_from_camera, *size)
-    return _Print(shot.name, straight, masked, camera, not lens.straight)
+    return _Print(shot.name, straight, masked, camera, not lens.straight, asked > 0 and not turned)
+
+
+def _fits(width: int, height: int, lens: Lens) -> bool:
+    return abs(width * lens.height / (height * lens.width) - 1) <= PROPORTION
+
+
+def _turned(shot: Shot, width: int, height: int, asked: int) -> bool:
+    """Tell whether a picture is to be turned: it asks for it, and only then fits its camera."""
+    if asked % 2 == 0 or not width or not height:
+        return False
+    lens = shot.lens(width, height)
+    return not _fits(width, height, lens) and _fits(height, width, lens)
+
+
+def _asked(picture: Image.Image) -> int:
+    """Return by how many quarter turns to the left a picture says that it is to be shown."""
+    return TURNS.get(picture.getexif().get(ORIENTATION, 1), 0)
+
+
+def _asked_of(path: Path | None) -> int:
+    assert path is not None
+    with Image.open(path, formats=FORMATS) as picture:
+        return _asked(picture)
 
 
 def _decoded(path: Path | None) -> np.ndarray:
@@ -250,6 +288,13 @@ def _changes(
     bent = sum(p.straightened for p in prints)
     if bent:
         changes.append(f"{bent} pictures were straightened: their lenses bend straight lines.")
+    asking = sum(p.asks for p in prints)
+    if asking:
+        changes.append(
+            f"{asking} pictures note in their EXIF data that they are to be turned. Their pixels "
+            "were taken as they are stored, as COLMAP takes them; if the poses belong to turned "
+            "pictures, turn the files."
+        )
     return changes
 
 

@@ -24,6 +24,9 @@ FEW, ENOUGH = 20, 40
 """Matches of a pair, and of all pairs, from which on something can be said."""
 AGREES = 0.2
 """Share of matches: right poses give 0.3 to 0.9, wrong ones 0 to 0.1."""
+HOPELESS = 0.1
+"""Share of good matches below which the poses are certainly wrong, whether or not it is known what
+would put them right."""
 BETTER = 1.4
 """A change must raise the share by this factor; right poses cannot be bettered by 1.1."""
 LIKELY = 0.45
@@ -34,6 +37,15 @@ COHERENT, INCOHERENT = 0.85, 0.7
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 FACTORS = (0.5, 2 / 3, 0.8, 1.25, 1.5, 2.0)
 """Of the focal length: what comes of pictures resized without their cameras."""
+SHIFTS = (-0.2, -0.15, -0.1, -0.05, 0.0, 0.05, 0.1, 0.15, 0.2)
+"""Of the principal point, in widths and heights of a picture: what comes of cropped pictures."""
+MANY = 100
+"""Good matches from which on single numbers of a lens can be told."""
+CLOSER_FOCAL, CLOSER_MIDDLE = 1.15, 1.25
+"""Factors by which matches must meet more closely under another lens; 1.3 and 2 for focal lengths
+off by a half and principal points off by a tenth, at most 0.93 and 1.0 for right ones."""
+CLOSE = 0.25
+"""Error at which a match counts half, in tolerances."""
 
 Change = Callable[[Camera], Camera]
 
@@ -53,6 +65,9 @@ class Agreement:
     NaN where there are none."""
     doubt: str | None
     """What seems wrong, in a sentence or two; None: nothing does."""
+    hopeless: bool = False
+    """Nothing can be learned under these poses: good matches do not agree, or all is seen from one
+    place."""
 
 
 @dataclass(frozen=True)
@@ -73,7 +88,7 @@ def agreement(views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None) -> 
     eyes = np.array([c.world_from_camera[:3, 3] for c in views.cameras])
     if np.ptp(eyes, axis=0).max(initial=0) == 0:
         words = "All cameras stand at one place: turning a camera shows no depth."
-        return Agreement("nothing", 0, 0.0, float("nan"), words)
+        return Agreement("nothing", 0, 0.0, float("nan"), words, hopeless=True)
     pairs = _pairs(views)
     proven = _proven(pairs, views.cameras)
     pairs = proven or pairs
@@ -83,8 +98,15 @@ def agreement(views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None) -> 
     change = _better(pairs, views, share) if count >= ENOUGH else None
     if proven or change or (count >= ENOUGH and share >= AGREES):
         found = f"{share:.0%} of {count} points agree with them"
-        wrong = share < AGREES or change is not None
-        doubt = _words(found, error, change) if wrong else _behind(pairs, views.cameras)
+        if share < AGREES or change is not None:
+            hopeless = share < HOPELESS or (share < AGREES and change is not None)
+            doubt = _words(found, error, change)
+            return Agreement("matches", count, share, error, doubt, bool(proven) and hopeless)
+        doubt = _behind(pairs, views.cameras)
+        if proven and count >= MANY:
+            doubt = doubt or _lens_doubt(pairs, views.cameras)
+        if masks is not None:
+            doubt = doubt or _masks_doubt(masks, views.cameras)
         return Agreement("matches", count, share, error, doubt)
     if masks is not None:
         return _by_silhouettes(views.cameras, masks, count, error)
@@ -130,8 +152,7 @@ def _changes() -> list[tuple[str, Change]]:
     ]
     for factor in FACTORS:
         words = f"the focal lengths were {factor:.2g} times as long (pictures of another size?)"
-        stretch = np.array([[factor, factor, 1], [1, factor, 1], [1, 1, 1.0]])
-        changes.append((words, lambda c, s=stretch: replace(c, K=c.K * s)))
+        changes.append((words, lambda c, f=factor: _lensed((c,), f)[0]))
     return changes
 
 
@@ -187,7 +208,63 @@ def _ahead(pairs: list[_Pair], cameras: tuple[Camera, ...]) -> float:
     return float(np.concatenate(signs).mean()) if signs else 1.0
 
 
+# ---------------------------------------------------------------- lenses
+
+
+def _lens_doubt(pairs: list[_Pair], cameras: tuple[Camera, ...]) -> str | None:
+    """Say under which other lens good matches would meet clearly more closely.
+
+    Cameras that look at one place nearly agree whatever their focal length: only how closely
+    matches meet tells, not how many do.
+    """
+    now = _closeness(pairs, cameras)
+    focal = {f: _closeness(pairs, _lensed(cameras, f)) / now for f in FACTORS}
+    middle = {
+        (x, y): _closeness(pairs, _lensed(cameras, 1.0, x, y)) / now for x in SHIFTS for y in SHIFTS
+    }
+    factor, shift = max(focal, key=focal.__getitem__), max(middle, key=middle.__getitem__)
+    if middle[shift] >= max(CLOSER_MIDDLE, focal[factor]):
+        width, height = cameras[0].width, cameras[0].height
+        found = f"the principal points lay about {shift[0] * width:+.0f} and "
+        found += f"{shift[1] * height:+.0f} pixels further right and down (cropped pictures?)"
+    elif focal[factor] >= CLOSER_FOCAL:
+        found = f"the focal lengths were about {factor:.2g} times as long (pictures of another "
+        found += "size?)"
+    else:
+        return None
+    return (
+        f"What the pictures share would meet more closely if {found}. Correct the file, or take "
+        "shapes and sizes for distorted."
+    )
+
+
+def _closeness(pairs: list[_Pair], cameras: tuple[Camera, ...]) -> float:
+    """Return how closely matches meet, from 0 to 1: the mean of 1 / (1 + (error / close)²)."""
+    off = _errors(pairs, cameras) / (CLOSE * _tolerance(cameras))
+    return max(float(np.mean(1 / (1 + off**2))), 1e-9)
+
+
+def _lensed(
+    cameras: tuple[Camera, ...], factor: float, x: float = 0.0, y: float = 0.0
+) -> tuple[Camera, ...]:
+    """Return cameras with a longer focal length, and the principal point elsewhere."""
+    stretch = np.array([[factor, factor, 1], [1, factor, 1], [1, 1, 1.0]])
+    shift = [np.array([[0, 0, x * c.width], [0, 0, y * c.height], [0, 0, 0]]) for c in cameras]
+    return tuple(replace(c, K=c.K * stretch + s) for c, s in zip(cameras, shift, strict=True))
+
+
 # ---------------------------------------------------------------- silhouettes
+
+
+def _masks_doubt(masks: np.ndarray, cameras: tuple[Camera, ...]) -> str | None:
+    """Say where masks do not belong to pictures that agree with their poses."""
+    share = coherence(masks, cameras)
+    if share >= INCOHERENT:
+        return None
+    return (
+        f"The poses agree with the pictures, but only {share:.0%} of the masks fit together. Look "
+        "whether they belong to these pictures, and are white where the things are."
+    )
 
 
 def _by_silhouettes(

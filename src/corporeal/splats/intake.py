@@ -8,10 +8,11 @@ from typing import Literal
 import numpy as np
 from jaxtyping import Bool, Float
 
+from corporeal.errors import UserError
 from corporeal.formats.photographs import Photographs, read_photographs
 from corporeal.formats.sources import kind_of
 from corporeal.formats.splats import read_splat
-from corporeal.geometry.agreement import pose_doubt
+from corporeal.geometry.agreement import agreement
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians
 from corporeal.geometry.upright import upright
 from corporeal.splats.crew import Crew
@@ -29,6 +30,8 @@ SOLID = 0.5
 """Opacity from which on a Gaussian says where something is."""
 ON = 128
 """Of 255: from here on a pixel of a mask belongs to things."""
+POOR = 20.0
+"""Held-out photographs agree worse than this only where something is wrong [dB]."""
 CUT_OUT = (
     "There were no masks: what looks other than the floor was taken for things. Things of the "
     "floor's own colour are lost; masks are better."
@@ -101,7 +104,7 @@ def take_in(
         return Intake(given, usual=usual, statements=said, warnings=given.warnings)
     shown = read_photographs(source, PRESETS[training.preset].longest)
     masks = None if shown.masks is None else shown.masks >= ON
-    doubt = pose_doubt(shown.views, shown.masks)
+    doubt = _doubt(source, shown)
     seen, told = _points(shown), ()
     if masks is None:
         progress(0.0, "telling things from the floor")
@@ -109,7 +112,10 @@ def take_in(
         masks = cut_out(shown.views, seen.position, shown.z_up, _stated(up), training.threads)
         told = (NO_MASKS if masks is None else CUT_OUT,)
     start = _points(shown) if masks is None or shown.masks is not None else None  # the masks' hull
-    trained = train(shown.views, masks, start, training, checkpoint, progress)
+    try:
+        trained = train(shown.views, masks, start, training, checkpoint, progress)
+    except UserError as problem:
+        raise UserError(" ".join([str(problem), *doubt])) from problem
     return Intake(
         trained.gaussians,
         shown.views.cameras,
@@ -118,7 +124,7 @@ def take_in(
         shown.z_up,
         seen=None if seen is None else seen.position,
         statements=_told(trained, len(shown.views.cameras)),
-        warnings=(*shown.warnings, *([doubt] if doubt else []), *told),
+        warnings=(*shown.warnings, *doubt, *told, *_badly_learned(trained, len(shown.names))),
     )
 
 
@@ -140,6 +146,35 @@ def turned_upright(taken: Intake, up: Up = "auto") -> Intake:
         floor=frame.floor_by == "plane",
         statements=(*taken.statements, frame.reason),
         warnings=(*taken.warnings, *frame.warnings),
+    )
+
+
+def _doubt(source: Path, shown: Photographs) -> tuple[str, ...]:
+    """Return what seems wrong with the poses, as warnings.
+
+    Raises:
+        UserError: They are certainly wrong.
+
+    """
+    found = agreement(shown.views, shown.masks)
+    if found.hopeless:
+        raise UserError(f"{source}: {found.doubt}")
+    return () if found.doubt is None else (found.doubt,)
+
+
+def _badly_learned(trained: Trained, photographs: int) -> tuple[str, ...]:
+    """Say where what was learned is not what photographs show, or where none was left to tell."""
+    if trained.quality is None:
+        return (
+            f"{photographs} photographs are so few that none was held back to compare with: what "
+            "they do not show is made up. Take 20 to 50, from all sides.",
+        )
+    if trained.quality.psnr >= POOR:
+        return ()
+    return (
+        f"Photographs that were not learned from look otherwise ({trained.quality.psnr:.1f} dB): "
+        "shapes are not to be trusted. Look at poses and lenses, at what moved, and take more "
+        "pictures.",
     )
 
 

@@ -1,0 +1,82 @@
+"""What is taken in from photographs, before anything is learned and after."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corporeal.errors import UserError
+from corporeal.formats.photographs import Photographs
+from corporeal.geometry.agreement import Agreement
+from corporeal.splats import intake
+from corporeal.splats.intake import take_in
+from corporeal.splats.quality import Quality
+from corporeal.splats.train import TrainConfig, Trained
+from corporeal.types import Camera, Gaussians, Views
+
+DOUBT = "The poses do not agree with the pictures."
+ONE = Gaussians(
+    np.zeros((1, 3), np.float32),
+    np.float32([[1, 0, 0, 0]]),
+    np.ones((1, 3), np.float32),
+    np.ones(1, np.float32),
+    np.zeros((1, 1, 3), np.float32),
+)
+GOOD = Quality(31.0, 28.0, 0.9, (1,))
+
+
+@pytest.fixture
+def taken(monkeypatch, tmp_path):
+    """Take three masked photographs in, of which this is thought and this is learned."""
+    camera = Camera(np.eye(3), np.eye(4), 4, 4)
+    views = Views(np.zeros((3, 4, 4, 3), np.uint8), (camera,) * 3)
+    shown = Photographs(views, ("a", "b", "c"), True, np.full((3, 4, 4), 255, np.uint8))
+    monkeypatch.setattr(intake, "read_photographs", lambda *_: shown)
+    monkeypatch.setattr(intake, "kind_of", lambda _: "photographs")
+
+    def take(said: Agreement, learned: Trained | UserError):
+        def train(*_):
+            if isinstance(learned, UserError):
+                raise learned
+            return learned
+
+        monkeypatch.setattr(intake, "agreement", lambda *_: said)
+        monkeypatch.setattr(intake, "train", train)
+        return take_in(Path("photos"), TrainConfig("draft"))
+
+    return take
+
+
+def learned(quality: Quality | None) -> Trained:
+    return Trained(ONE, quality, 1.0, np.ones((3, 3), np.float32))
+
+
+FINE = Agreement("matches", 500, 0.7, 0.5, None)
+
+
+def test_nothing_is_learned_under_poses_that_are_certainly_wrong(taken):
+    hopeless = replace(FINE, doubt=DOUBT, hopeless=True)
+    with pytest.raises(UserError, match=f"photos: {DOUBT}"):
+        taken(hopeless, UserError("It was learned all the same."))
+
+
+def test_doubts_stay_with_what_is_learned_and_with_why_nothing_can_be(taken):
+    doubtful = replace(FINE, doubt=DOUBT)
+    assert taken(doubtful, learned(GOOD)).warnings == (DOUBT,)
+    with pytest.raises(UserError, match=f"No place in space. {DOUBT}"):
+        taken(doubtful, UserError("No place in space."))
+
+
+@pytest.mark.parametrize(
+    ("quality", "said"),
+    [
+        (GOOD, ()),
+        (None, ("3 photographs are so few that none was held back",)),
+        (replace(GOOD, psnr=14.0), ("look otherwise (14.0 dB)",)),
+    ],
+)
+def test_what_was_badly_learned_or_not_checked_is_said(taken, quality, said):
+    told = taken(FINE, learned(quality)).warnings
+    assert len(told) == len(said)
+    assert all(words in warning for words, warning in zip(said, told, strict=True))
