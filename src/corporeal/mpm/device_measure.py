@@ -6,7 +6,7 @@ import numpy as np
 
 from corporeal.mpm import elasticity, rigid
 from corporeal.mpm.device_layout import PLASTIC, PUSHING, RUBBING, VISCOUS
-from corporeal.mpm.matter import PLASTIC_LAWS
+from corporeal.mpm.matter import PLASTIC_LAWS, strain_energy
 from corporeal.mpm.problem import Measure, Snapshot
 from corporeal.mpm.springs import stored
 
@@ -49,9 +49,8 @@ def measured(engine: "DeviceEngine") -> Measure:
     spread = 0.25 * engine.problem.cell**2
     turn = np.stack([gradient[:, i, j] - gradient[:, j, i] for i, j in ((2, 1), (0, 2), (1, 0))], 1)
     square = np.sum(state.velocity**2, axis=1)
-    soft = np.flatnonzero(~m.rigid)
-    strained = np.zeros(len(m.mass))
-    strained[soft] = elasticity.psi(m.law[soft], state.deformation[soft], m.mu[soft], m.lam[soft])
+    F = state.deformation
+    strained = strain_energy(m, F, _acting(engine, F, gradient))
 
     def per_body(values: np.ndarray) -> np.ndarray:
         out = np.zeros((len(engine.problem.bodies), *values.shape[1:]))
@@ -74,7 +73,7 @@ def measured(engine: "DeviceEngine") -> Measure:
         momentum=momentum,
         angular_momentum=angular,
         kinetic=kinetic,
-        elastic=per_body(m.volume * strained) + sprung,
+        elastic=per_body(strained) + sprung,
         potential=-m.total * (centre @ np.array(engine.problem.gravity)),
         speed=float(np.sqrt(square.max())),
         lost=engine.lost.copy(),
@@ -97,6 +96,17 @@ def _affine(engine: "DeviceEngine") -> np.ndarray:
     out = np.zeros((len(engine.matter.mass), 3, 3))
     out[p.number.numpy()[: p.count]] = p.affine.numpy()[: p.count] / engine.problem.cell
     return out
+
+
+def _acting(engine: "DeviceEngine", F: np.ndarray, gradient: np.ndarray) -> np.ndarray:
+    """Elastic Kirchhoff stress that acts on every particle [Pa]; 0 where rigid."""
+    m, p = engine.matter, engine.arrays.particles
+    at, rows = p.number.numpy()[: p.count], p.stress.numpy()[: p.count]
+    pull = np.zeros((len(m.mass), 3, 3))
+    pull[at] = rows[:, [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(-1, 3, 3)
+    thick = np.where(m.rigid, 0.0, m.viscosity) * np.maximum(elasticity.determinant(F), 0.0)
+    viscous = thick[:, None, None] * (gradient + elasticity.transpose(gradient))
+    return -0.25 * engine.problem.cell / m.volume[:, None, None] * pull - viscous
 
 
 def _enter_rigid(

@@ -232,6 +232,28 @@ def tau_relief(law: Int[np.ndarray, " P"], F: Matrices, lam: Scalars, relief: Sc
     return _isotropic(np.where(law == Law.COROTATED.value, corotated, other))
 
 
+def psi_pressed(law: Int[np.ndarray, " P"], F: Matrices, mu: Scalars, stress: Matrices) -> Scalars:
+    """Give the stored energy per rest volume [J/m³] where the pressure is a mean (decision 7).
+
+    Ψ = Ψ(F; λ = 0) + p θ/2, p = tr(τ - τ(F; λ = 0))/3, with θ = ln J, or 1 - 1/J of fixed
+    corotated: ``psi`` itself where p is one's own. A mean whose weights are masses is
+    self-adjoint, so the forces that p makes are the slope of Σ V p θ/2. Strain that only the own
+    J shows, and that no force resists, stores nothing.
+
+    Args:
+        law: ``types.Law`` values.
+        F: Deformation gradients.
+        mu: μ [Pa].
+        stress: Elastic Kirchhoff stress τ that acts, whose pressure is not one's own [Pa].
+
+    """
+    none = np.zeros(len(F))
+    more = stress - tau(law, F, mu, none)
+    pressure = np.trace(more, axis1=1, axis2=2) / 3.0
+    swollen = np.where(law == Law.COROTATED.value, 1.0 - 1.0 / determinant(F), _log_j(F))
+    return psi(law, F, mu, none) + 0.5 * pressure * swollen
+
+
 def _by_law(law: Int[np.ndarray, " P"]) -> list[tuple[Law, np.ndarray]]:
     return [(Law(value), np.flatnonzero(law == value)) for value in np.unique(law).tolist()]
 

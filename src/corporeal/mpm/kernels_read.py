@@ -6,6 +6,7 @@ import numpy as np
 import warp as wp
 
 from corporeal.mpm.kernels import OPTIONS, Memory, Program, native
+from corporeal.mpm.tables import swells
 from corporeal.mpm.window import Window
 
 wp.set_module_options(OPTIONS)
@@ -14,7 +15,7 @@ _POINTERS = "part history material block owner position velocity strain motion p
 READING = np.dtype(
     [(name, "u8") for name in _POINTERS.split()]
     + [("dx", "f8"), ("origin", "i4", 3)]
-    + [(name, "i4") for name in ("runs", "owners", "blocks")],
+    + [(name, "i4") for name in ("runs", "owners", "blocks", "swells")],
     align=True,
 )
 RUNS = 64
@@ -89,6 +90,7 @@ class Reader:
         for name, array in arrays.items():
             record[name] = 0 if array is None else array.ctypes.data
         record["origin"], record["blocks"] = window.origin, len(window.block)
+        record["swells"] = swells(material)
         hands = max(1, min(len(self.launches), window.count // SHARE))
         cuts = np.linspace(0, RUNS, hands + 1).astype(int).tolist()
         for launch, (low, high) in zip(self.launches, pairwise(cuts), strict=False):

@@ -226,6 +226,28 @@ class State:
         return {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
 
 
+def elastic_stress(matter: Matter, state: State) -> Float[np.ndarray, "P 3 3"]:
+    """Elastic Kirchhoff stress τ [Pa]; none in rigid bodies."""
+    m, s = matter, state
+    out = np.zeros_like(s.F)
+    soft = ~m.rigid
+    out[soft] = elasticity.tau(m.law[soft], s.F[soft], m.mu[soft], m.lam[soft])
+    k = m.swells
+    out[k] += elasticity.tau_relief(m.law[k], s.F[k], m.lam[k], s.relief[k])
+    return out
+
+
+def strain_energy(
+    matter: Matter, F: Float[np.ndarray, "P 3 3"], stress: Float[np.ndarray, "P 3 3"]
+) -> Float[np.ndarray, " P"]:
+    """Elastic energy of each particle [J] at F and the elastic Kirchhoff stress that acts [Pa]."""
+    m, out = matter, np.zeros(len(F))
+    k, own = m.swells, ~m.rigid & ~m.swells
+    out[own] = elasticity.psi(m.law[own], F[own], m.mu[own], m.lam[own])
+    out[k] = elasticity.psi_pressed(m.law[k], F[k], m.mu[k], stress[k])
+    return m.volume * out
+
+
 def flowed(matter: Matter, state: State) -> tuple[State, float]:
     """Bring granular and plastic matter back to what it can bear; give the energy lost [J]."""
     F, plastic, volume, loss = state.F.copy(), state.plastic.copy(), state.volume.copy(), 0.0

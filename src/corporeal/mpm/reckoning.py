@@ -3,9 +3,8 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from corporeal.mpm import elasticity
 from corporeal.mpm.ledger import Ledger
-from corporeal.mpm.matter import Matter, State
+from corporeal.mpm.matter import Matter, State, elastic_stress, strain_energy
 from corporeal.mpm.problem import Measure, Problem, Snapshot
 from corporeal.mpm.springs import stored
 
@@ -65,10 +64,8 @@ def per_body(matter: Matter, values: np.ndarray) -> np.ndarray:
 
 def _strained(problem: Problem, m: Matter, s: State) -> Float[np.ndarray, " B"]:
     """Energy in strained matter and in springs [J]."""
-    soft, strained = np.flatnonzero(~m.rigid), np.zeros(len(m.mass))
-    strained[soft] = elasticity.psi(m.law[soft], s.F[soft], m.mu[soft], m.lam[soft])
     sprung = stored(problem, s.position, s.centre, s.rotation, m.centre)
-    return per_body(m, m.volume * strained) + sprung
+    return per_body(m, strain_energy(m, s.F, elastic_stress(m, s))) + sprung
 
 
 def _square(v: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, " P"]:

@@ -17,7 +17,7 @@ from corporeal.mpm.driving import Drive
 from corporeal.mpm.encounter import Meeting, Scene, resolve
 from corporeal.mpm.grip import Grip, Hold, check, regripped, take_hold, take_hold_of_rigid
 from corporeal.mpm.ledger import Ledger
-from corporeal.mpm.matter import Matter, State, flowed
+from corporeal.mpm.matter import Matter, State, elastic_stress, flowed
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.mpm.reckoning import measured, shown
 from corporeal.mpm.springs import longest_step, struck
@@ -157,13 +157,7 @@ class ReferenceEngine:
 
     def _stress(self) -> Float[np.ndarray, "P 3 3"]:
         """Kirchhoff stress τ, elastic and viscous [Pa]; none in rigid bodies."""
-        m, s = self.matter, self.state
-        out = np.zeros_like(s.F)
-        soft = ~m.rigid
-        out[soft] = elasticity.tau(m.law[soft], s.F[soft], m.mu[soft], m.lam[soft])
-        k = m.swells
-        out[k] += elasticity.tau_relief(m.law[k], s.F[k], m.lam[k], s.relief[k])
-        return out + self._viscous_stress()
+        return elastic_stress(self.matter, self.state) + self._viscous_stress()
 
     def _viscous_stress(self) -> Float[np.ndarray, "P 3 3"]:
         """Kelvin–Voigt part τ_v = J η (C + Cᵀ) [Pa]."""

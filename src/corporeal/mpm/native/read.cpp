@@ -6,7 +6,7 @@ struct Reading {
   double *position, *velocity, *strain, *motion, *plastic;
   double *sum;                          // [runs][owners][12]
   double dx;
-  int origin[3], runs, owners, blocks;
+  int origin[3], runs, owners, blocks, swells;
 };
 const Reading &R = *(Reading *)memory.data;
 struct Read {
@@ -31,26 +31,38 @@ struct Read {
     l[2] = mean + 2 * s * cos(angle + 2.0943951023931953);
     l[1] = 3 * mean - l[0] - l[2];
   }
-  // Stored energy per rest volume: see elasticity.py.
-  static double stored(int law, double mu, double lambda, const double *H) {
+  // Stored energy per rest volume: see elasticity.py. The trace of the stress that acts tells the
+  // pressure where it is given, else one's own J does.
+  static double stored(int law, double mu, double lambda, const double *H, const double *pressed) {
     double F[9], l[3], sum = 0, trace = 0;
     if (law > 4) return 0;
     for (int i = 0; i < 9; i++) F[i] = H[i] + (i % 4 == 0);
     double J = determinant(F);
     if (law == 1) {
       for (int i = 0; i < 9; i++) sum += H[i] * H[i] + (i % 4 == 0 ? 2 * H[i] : 0);
-      double log_j = log(J);
-      return 0.5 * mu * (sum - 2 * log_j) + 0.5 * lambda * log_j * log_j;
+      double log_j = log(J), p = pressed ? (*pressed - mu * sum) / 3 : lambda * log_j;
+      return 0.5 * mu * (sum - 2 * log_j) + 0.5 * p * log_j;
     }
+    double pull = 0;
     values(H, l);
     for (int i = 0; i < 3; i++) {
       double square = 1 + l[i] > 1e-12 ? 1 + l[i] : 1e-12;
       double s = law == 0 ? sqrt(square) * (i == 2 && J < 0 ? -1 : 1) - 1 : 0.5 * log(square);
       sum += s * s;
       trace += s;
+      pull += 2 * mu * (law == 0 ? s * (1 + s) : s);
     }
+    if (pressed) return mu * sum + (*pressed - pull) / 6 * (law == 0 ? 1 - 1 / J : trace);
     if (law == 0) trace = J - 1;
     return mu * sum + 0.5 * lambda * trace * trace;
+  }
+  // Trace of the elastic stress that acts: what is kept, less its viscous part.
+  static double acting(const Reading &R, const float *q, int l, double visc, const double *H,
+                       const double *C) {
+    double F[9], pull = (double)q[8 * ST + l] + q[8 * (ST + 3) + l] + q[8 * (ST + 5) + l];
+    for (int i = 0; i < 9; i++) F[i] = H[i] + (i % 4 == 0);
+    double J = determinant(F), thick = visc * (J > 0 ? J : 0);
+    return -0.25 * R.dx / q[8 * VO + l] * pull - 2 * thick * (C[0] + C[4] + C[8]);
   }
   static void particle(const Reading &R, const float *q, const float *past, int l, double *row) {
     const float *t = R.material + NM * ((const int *)q)[8 * MT + l];
@@ -87,7 +99,8 @@ struct Read {
       row[6 + i] += m * (x[j] * v[k] - x[k] * v[j] + spread * (C[3 * k + j] - C[3 * j + k]));
     }
     row[9] += 0.5 * m * (v2 + spread * c2);
-    row[10] += q[8 * VO + l] * stored(law, t[MU], t[LAMBDA], H);
+    double trace = acting(R, q, l, t[VISC], H, C);
+    row[10] += q[8 * VO + l] * stored(law, t[MU], t[LAMBDA], H, R.swells ? &trace : 0);
     if (!(v2 <= row[11])) row[11] = v2;
   }
 };
