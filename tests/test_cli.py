@@ -5,8 +5,9 @@ import sys
 import numpy as np
 import pytest
 
-from corporeal import cli, store
+from corporeal import cli, pipeline, store
 from corporeal.formats.glb_writer import write_glb
+from corporeal.pipeline import Settings
 from corporeal.render import figures
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
@@ -176,3 +177,30 @@ def test_who_is_asked_is_said_in_one_word_and_what_is_missing_in_one_line(
     refused(typed(*ask, "openai:gpt-5.4"), "set the environment variable OPENAI_API_KEY")
     refused(typed(*ask, "oracle:1"), "Choose one of: anthropic, ask, google, metadata, ollama")
     refused(typed(*ask, "replay:nowhere"), "No folder of recordings")
+
+
+def test_what_cannot_be_asked_is_not_remembered(typed, tmp_path, monkeypatch):
+    monkeypatch.delenv("OPENAI_API_KEY", raising=False)
+    write_glb(tmp_path / "box.glb", a_box())
+    nobody = ("--vlm", "openai:gpt-5.4")
+    refused(typed("run", "box.glb", *nobody), "OPENAI_API_KEY")
+    assert not (tmp_path / "runs").exists()
+    pipeline.run([tmp_path / "box.glb"], tmp_path / "box", Settings(), quietly, "ground")
+    before = (tmp_path / "box" / "run.json").read_bytes()
+    wrong = [
+        ("run", "box.glb", "--out", ".", *nobody),
+        ("describe", "box", *nobody),
+        ("describe", "box", "--critic", "anthropic:x", "--views", 99),
+        ("describe", "box", "--annotations", "nowhere.yaml"),
+        ("ground", "box", "--library", "nowhere.toml"),
+        ("ground", "box", "--floor", "cheese"),
+    ]
+    for words in wrong:
+        refused(typed(*words))
+        assert (tmp_path / "box" / "run.json").read_bytes() == before, words
+    assert {state for _, state, _ in pipeline.status(tmp_path / "box")[:4]} == {"finished"}
+    assert typed("ground", "box")[0] == 0
+
+
+def quietly(verb):
+    return lambda fraction, words: None

@@ -139,7 +139,7 @@ def verb_doctor() -> None:
 
 def _again(verb: str) -> Callable[[], None]:
     def redo() -> None:
-        from corporeal.pipeline import Settings, outdate, reopen
+        from corporeal.pipeline import Settings, reopen
 
         known = verb in Settings.__dataclass_fields__
         kept = reopen(Path(sys.argv[2])) if _names_a_run() else ([], Settings())
@@ -162,8 +162,7 @@ def _again(verb: str) -> Callable[[], None]:
         inputs, settings = reopen(asked.run)
         if known:
             settings = replace(settings, **{verb: asked.config})
-        outdate(asked.run, verb)
-        _go(inputs, asked.run, settings, Where(), until=verb)
+        _go(inputs, asked.run, settings, Where(), verb, again=True)
 
     redo.__doc__ = f"Redo `{verb}` of a run with other settings."
     return redo
@@ -183,7 +182,7 @@ def verb_simulate() -> None:
     ranges and the stated alternatives, each is simulated, and ensemble.json and ensemble.png in the
     run's folder say how far rebounds, dents and displacements are known.
     """
-    from corporeal.pipeline import outdate, reopen
+    from corporeal.pipeline import reopen
     from corporeal.stages.simulate import SimulateConfig
 
     known = reopen(Path(sys.argv[2]))[1].simulate if _names_a_run() else SimulateConfig()
@@ -201,8 +200,8 @@ def verb_simulate() -> None:
     if asked.samples is not None:
         return _spread(asked)
     inputs, settings = reopen(asked.run)
-    outdate(asked.run, "simulate")
-    _go(inputs, asked.run, replace(settings, simulate=asked.config), Where(), until="simulate")
+    settings = replace(settings, simulate=asked.config)
+    _go(inputs, asked.run, settings, Where(), "simulate", again=True)
 
 
 def _spread(asked: Any) -> None:
@@ -252,10 +251,20 @@ def _called(path: Path) -> str:
 
 
 def _go(
-    inputs: list[Path], folder: Path, settings: Any, where: Where, until: str = "report"
+    inputs: list[Path],
+    folder: Path,
+    settings: Any,
+    where: Where,
+    until: str = "report",
+    again: bool = False,
 ) -> None:
-    from corporeal.pipeline import forget_simulation, run
+    """Do every verb up to ``until``, that one ``again`` even where its settings are the same."""
+    from corporeal.cli.accept import accept
+    from corporeal.pipeline import forget_simulation, outdate, run
 
+    accept(folder, settings)
+    if again:
+        outdate(folder, until)
     if not where.resume:
         forget_simulation(folder)
     with told() as tell:

@@ -24,7 +24,7 @@ from corporeal.materials.placement import (
 )
 from corporeal.render.portrait import DIRECTIONS, Portrait, colour_of_part, portraits
 from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
-from corporeal.vlm import Album, Vlm, connect
+from corporeal.vlm import Album, Vlm, connect, critic_of
 from corporeal.vlm.annotation import Annotation, built, named_pieces, read_annotations
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
 from corporeal.vlm.by_hand import all_answered, is_more
@@ -81,7 +81,6 @@ class DescribeConfig:
 
 
 DEFAULT = DescribeConfig()
-CRITIC = "openai:gpt-5-mini"
 SHARES = ("volume_share", "surface_share")
 Progress = Callable[[float, str], None]
 
@@ -110,7 +109,7 @@ def describe(
             questions wait for a person's answers.
 
     """
-    _check(config)
+    accept(config)
     identity = identify(scene, matter_hint)
     told = _annotations(scene, identity, config, library, from_pictures)
     file = _file_words(scene, identity, library)
@@ -121,12 +120,13 @@ def describe(
             for thing, words in zip(scene.objects, file, strict=True)
         ]
         return Inventory(tuple(objects))
-    critic = connect(_critic(config), config.record) or model
+    critic = connect(critic_of(config.vlm, config.critic), config.record) or model
     asking = _Asking(scene, identity, config, library, model, critic)
     return asking.inventory(file, told, progress)
 
 
-def _check(config: DescribeConfig) -> None:
+def accept(config: DescribeConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
     for name, value, low, high in (
         ("--views", config.views, 1, DIRECTIONS),
         ("--view-size", config.view_size, 16, 2048),
@@ -134,11 +134,6 @@ def _check(config: DescribeConfig) -> None:
     ):
         if not low <= value <= high:
             raise UserError(f"{name} is {value}. Give a number from {low} to {high}.")
-
-
-def _critic(config: DescribeConfig) -> str:
-    theirs = config.vlm.startswith("openai:") and "@" not in config.vlm
-    return config.critic or (CRITIC if theirs else config.vlm)
 
 
 # ---------------------------------------------------------------- a model's answers

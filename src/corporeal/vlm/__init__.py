@@ -31,6 +31,8 @@ WRAPPERS = {
 """What stands between a question and a model."""
 LIVE = ("openai", "anthropic", "google", "ollama")
 """Answered over a network, and so by a package that the core does without."""
+CRITIC = "openai:gpt-5-mini"
+"""Ranks where OpenAI answers and nobody else was asked for."""
 NOBODY = "metadata"
 """No model: names and materials in the file decide."""
 
@@ -135,6 +137,18 @@ class Vlm(Protocol):
 
         """
         ...
+
+
+def critic_of(spec: str, asked: str) -> str:
+    """Say who ranks ways of taking a thing apart: who is ``asked`` to, a cheaper one, or the same.
+
+    Args:
+        spec: Who answers, as a person types it.
+        asked: Who was asked for; "": nobody.
+
+    """
+    theirs = spec.startswith("openai:") and "@" not in spec
+    return asked or (CRITIC if theirs else spec)
 
 
 def connect(spec: str, record: Path | None = None) -> Vlm | None:

@@ -51,7 +51,7 @@ def read_annotations(
 
     """
     told: dict[tuple[str, str], Annotation] = {}
-    for name, said in _mapping(path).items():
+    for name, said in mapping_of(path).items():
         if name not in scene:
             raise _nobody(path, "object", name, scene)
         parts = said.pop("parts", {}) if isinstance(said, dict) else {}
@@ -67,7 +67,13 @@ def read_annotations(
     return told
 
 
-def _mapping(path: Path) -> dict:
+def mapping_of(path: Path) -> dict:
+    """Read what a file says of each object, as yet unchecked.
+
+    Raises:
+        BadFileError: It cannot be read, or is no such mapping.
+
+    """
     try:
         said = yaml.safe_load(path.read_text(encoding="utf-8"))
     except (OSError, UnicodeDecodeError) as error:
