@@ -18,6 +18,7 @@ from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
 from corporeal.features.vectors import batches, unit
+from corporeal.geometry.interpolation import between
 from corporeal.types import Camera
 
 LEAST = 0.1
@@ -145,7 +146,7 @@ def _resampled(weights: Weights, cells: tuple[int, int], maps: Sequence[np.ndarr
             return share
         y, x = np.divmod(np.arange(cells[0] * cells[1]), cells[1])
         place = np.stack([(x + 0.5) / cells[1], (y + 0.5) / cells[0]], axis=1)
-        return csr_array(share @ _between(place, np.ones(len(place), bool), size))
+        return csr_array(share @ between(place, np.ones(len(place), bool), size))
 
     return of
 
@@ -175,7 +176,7 @@ def back_projection(
         camera = cameras[view]
         place, z = _projected(position, camera)
         seen = _visible(place, z, depth[view], camera.K[0, 0], leeway)
-        return _between(place / [camera.width, camera.height], seen, maps[view].shape[:2])
+        return between(place / [camera.width, camera.height], seen, maps[view].shape[:2])
 
     return lift(weights, maps, len(position))
 
@@ -232,31 +233,6 @@ def _slope(depth: np.ndarray, axis: int) -> np.ndarray:
         np.pad(step, first, constant_values=np.inf), np.pad(step, last, constant_values=np.inf)
     )
     return np.where(np.isfinite(smaller), smaller, 0.0)
-
-
-def _between(place: np.ndarray, on: np.ndarray, size: tuple[int, int]) -> csr_array:
-    """Interpolate bilinearly in a map that covers the unit square.
-
-    Args:
-        place: x and y of each point, in [0, 1].
-        on: Which points take part.
-        size: Rows and columns of the map.
-
-    """
-    rows = np.flatnonzero(on)
-    high, wide = size
-    x = np.clip(place[rows, 0] * wide - 0.5, 0, wide - 1)
-    y = np.clip(place[rows, 1] * high - 0.5, 0, high - 1)
-    left, top = np.floor(x).astype(np.int64), np.floor(y).astype(np.int64)
-    entries = [
-        (np.minimum(top + j, high - 1) * wide + np.minimum(left + i, wide - 1), a * b)
-        for i, a in ((0, 1 - (x - left)), (1, x - left))
-        for j, b in ((0, 1 - (y - top)), (1, y - top))
-    ]
-    column, weight = (np.concatenate(part) for part in zip(*entries, strict=True))
-    made = csr_array((weight, (np.tile(rows, 4), column)), shape=(len(place), high * wide))
-    made.eliminate_zeros()
-    return made
 
 
 # ---------------------------------------------------------------- what nobody saw
