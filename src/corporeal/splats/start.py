@@ -88,17 +88,27 @@ def hull(
         UserError: Nothing is inside all masks.
 
     """
-    around = region(views.cameras)
-    middle, reach = np.array(around.centre), 1.5 * around.radius
-    rough = carved(middle - reach, middle + reach, views, masks, crew)
-    found = rough.cells[rough.inside]
-    low, high = found.min(axis=0) - 2 * rough.side, found.max(axis=0) + 2 * rough.side
-    fine = carved(low, high, views, masks, crew)
+    fine = tight(views, masks, crew)
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
     chosen = shell[rng.choice(len(shell), count, replace=len(shell) < count)]
     position = chosen + fine.side * rng.uniform(-0.5, 0.5, chosen.shape)
     seen = _witnessed(position, views, masks, crew)
     return Points(position, seen[:, 2:5] / np.maximum(seen[:, :1], 1))
+
+
+def tight(views: Views, masks: Bool[np.ndarray, "V H W"], crew: Crew) -> "Carved":
+    """Return the visual hull in a box that hardly holds more.
+
+    Raises:
+        UserError: Nothing is inside all masks.
+
+    """
+    around = region(views.cameras)
+    middle, reach = np.array(around.centre), 1.5 * around.radius
+    rough = carved(middle - reach, middle + reach, views, masks, crew)
+    found = rough.cells[rough.inside]
+    low, high = found.min(axis=0) - 2 * rough.side, found.max(axis=0) + 2 * rough.side
+    return carved(low, high, views, masks, crew)
 
 
 def seeded(points: Points, count: int, degree: int, rng: np.random.Generator) -> Parameters:
