@@ -252,7 +252,7 @@ class Reconstruction:
     object_of_gaussian: Int[np.ndarray, " N"]
     """Index into ``names``; -1: the floor, the background, or haze."""
     cloud: Cloud
-    """Of the Gaussians that belong to objects."""
+    """On the objects: means of Gaussians, or points of a radiance field."""
     object_of_point: Int[np.ndarray, " M"]
     """Of the cloud's points."""
     names: tuple[str, ...]

@@ -69,6 +69,12 @@ class Split:
     found_by: str
     """How things were told apart, in a clause."""
 
+    @property
+    def statement(self) -> str:
+        """What a reader of the report should know, in a sentence."""
+        count = int(self.object_of_point.max()) + 1
+        return f"{count} object{'s' * (count != 1)}, told apart by {self.found_by}."
+
 
 def objects(
     cloud: Cloud,

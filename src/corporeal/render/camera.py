@@ -14,6 +14,8 @@ FILL = 0.84
 """Share of the picture that the motion takes at most."""
 LOWEST, HIGHEST = 0.17, 0.96
 """Sines of the least and the greatest angle above the horizon, of cameras all around: 10°, 74°."""
+OUTLIERS = 1.0
+"""Percent of points, at either end, that need not be in pictures."""
 GOLDEN = np.pi * (3 - np.sqrt(5))
 """Turn from one of them to the next [rad]."""
 
@@ -89,6 +91,14 @@ def around(
 ) -> list[Aim]:
     """See every box of every frame from evenly about the upper half of a sphere."""
     return [place(boxes, size, view, fill) for view in directions(count)]
+
+
+def cameras_around(
+    points: Float[np.ndarray, "N 3"], count: int, size: tuple[int, int]
+) -> tuple[Camera, ...]:
+    """Return cameras that see nearly all of some points, from all sides above."""
+    box = np.percentile(points, (OUTLIERS, 100 - OUTLIERS), axis=0)
+    return tuple(camera_of(aim) for aim in around(box[None, None], count, size))
 
 
 def directions(count: int) -> list[Vector]:

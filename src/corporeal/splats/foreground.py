@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
+from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
@@ -27,6 +28,10 @@ COMMON = 0.2
 """Share of the views that must see it, where there are no masks."""
 WIDE = 0.5
 """Standard deviation of haze, in those radii."""
+HALF = 0.5
+"""Share of a pixel from which on it is a thing's."""
+NEAR = 3.0
+"""Distances between neighbours within which a Gaussian goes with a thing."""
 
 
 @dataclass(frozen=True)
@@ -100,6 +105,34 @@ def foreground(
     if floor:
         kept &= gaussians.mean[:, 2] > THICK * around.radius
     return kept
+
+
+def covered(
+    gaussians: Gaussians, cameras: Sequence[Camera], things: Int[np.ndarray, " M"]
+) -> Bool[np.ndarray, "V H W"]:
+    """Return the pixels that show mostly Gaussians of things."""
+    shares = [weights(gaussians, c, 1)[things].sum(axis=0) for c in cameras]
+    pairs = zip(shares, cameras, strict=True)
+    return np.stack([np.asarray(share).reshape(c.height, c.width) > HALF for share, c in pairs])
+
+
+def with_company(
+    gaussians: Gaussians, owner: Int[np.ndarray, " N"], floor: bool
+) -> Int[np.ndarray, " N"]:
+    """Let faint and hidden Gaussians go with the thing they are near, or they would stay behind.
+
+    Where a floor is among them, only those above it.
+    """
+    mean = gaussians.mean
+    own, rest = np.flatnonzero(owner >= 0), np.flatnonzero(owner < 0)
+    tree = KDTree(mean[own])
+    apart = float(np.median(np.asarray(tree.query(mean[own], k=2)[0])[:, 1]))
+    distance, nearest = map(np.asarray, tree.query(mean[rest]))
+    goes = (distance < NEAR * apart) & (mean[rest, 2] > NEAR * apart)
+    goes |= not floor
+    made = owner.copy()
+    made[rest[goes]] = owner[own[nearest[goes]]]
+    return made
 
 
 def _shrunk(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "h w"]:

@@ -10,13 +10,13 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int, UInt8
+from jaxtyping import Int, UInt8
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
 from corporeal.features import Reader, connect
-from corporeal.features.descriptor import descriptor, seen_from
-from corporeal.features.lifting import LEAST, fill, uplift
+from corporeal.features.clouds import Placed, looked_at, projected
+from corporeal.features.lifting import Lifted, uplift
 from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
 from corporeal.formats.words import safe, unique
@@ -26,12 +26,16 @@ from corporeal.geometry.metric import MetricScale
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.regions.match import match
 from corporeal.regions.objects import Split, objects
-from corporeal.render.camera import around, camera_of
+from corporeal.render.camera import cameras_around
 from corporeal.render.look import linear
 from corporeal.render.portrait import COLOURS, colour_of_part
-from corporeal.splats.foreground import foreground
+from corporeal.splats.channel import distilled
+from corporeal.splats.crew import Crew
+from corporeal.splats.foreground import covered, foreground, with_company
 from corporeal.splats.intake import Intake, Up, take_in, turned_upright
+from corporeal.splats.radiance import FieldConfig, learn, points
 from corporeal.splats.raster import render, weights
+from corporeal.splats.sight import looked
 from corporeal.splats.solid import Solid, solids
 from corporeal.splats.train import TrainConfig
 from corporeal.types import (
@@ -43,10 +47,12 @@ from corporeal.types import (
     Scene,
     SceneObject,
     Surface,
+    Views,
 )
 from corporeal.vlm.things import Thing, Viewer, metres, usual
 
 Progress = Callable[[float, str], None]
+Maps = Sequence[np.ndarray]
 
 MOST_POINTS = 100_000
 """Points that are looked at; other Gaussians do as their neighbours."""
@@ -56,10 +62,6 @@ ROUGHNESS = 0.8
 """Of surfaces: pictures do not tell it apart from light."""
 OWN_VIEWS, OWN_SIZE = 48, (384, 384)
 """Of a splat that comes without cameras."""
-OUTLIERS = 1.0
-"""Percent of a splat, at either end, that need not be in those pictures."""
-NEAR = 3.0
-"""Distances between neighbours within which a Gaussian goes with a thing."""
 AROUND = 16
 """Points that a normal is found from."""
 SHOWN = 4
@@ -93,6 +95,9 @@ class ReconstructConfig:
     """What tells what a point is: "clip", "clip:FOLDER", or "descriptor", which needs no model."""
     structural: str = "descriptor"
     """What tells which part a point is of: "dinov2", "dinov2:FOLDER", or "descriptor"."""
+    lifting: Literal["uplift", "back-projection", "radiance"] = "uplift"
+    """How what pictures look like comes onto points: onto Gaussians, by the weights that they are
+    drawn with, or by where they fall; or onto points of a radiance field that is learned, too."""
     training_seed: int = 0
     """Of everything that is left to chance."""
 
@@ -114,6 +119,11 @@ class _Found:
     @property
     def count(self) -> int:
         return len(self.solids)
+
+    @property
+    def extents(self) -> list[float]:
+        """Longest side of each one's box, in the file's unit."""
+        return [float(np.ptp(solid.vertices, axis=0).max()) for solid in self.solids]
 
 
 def reconstruct(
@@ -146,15 +156,15 @@ def reconstruct(
     seed, drawn_by = config.training_seed, config.rasteriser
     training = TrainConfig(config.training, seed=seed, rasteriser=drawn_by)
     kept = None if folder is None else folder / "training.npz"
-    taken = take_in(
-        source, training, config.up, kept, lambda f, words: progress(TRAINED * f, words)
-    )
+    taken = take_in(source, training, config.up, kept, _within(progress, 0.0, TRAINED))
     taken = turned_upright(taken, config.up)
     if not taken.cameras:
-        taken = replace(taken, cameras=_own_cameras(taken))
+        taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
     progress(TRAINED, "telling things from the background")
     of_things = _of_things(source, taken)
-    cloud, outside = _cloud(taken, of_things, config, folder)
+    placed = _placed(taken, of_things, config, folder, _within(progress, TRAINED, LOOKED))
+    specs, maps = (config.semantic, config.structural), None if folder is None else folder / "maps"
+    cloud, outside = looked_at(placed, taken.cameras, lambda: _pictures(taken), specs, maps)
     progress(LOOKED, "finding objects")
     wanted = _wanted(config, viewer, taken)
     normal = normals(cloud.position, neighbours(cloud.position, AROUND), outside)
@@ -163,13 +173,18 @@ def reconstruct(
     found = _solid(taken, cloud, split, of_things)
     things = _recognised(wanted, found, config, viewer)
     names = unique([safe(thing.class_name) or UNKNOWN for thing in things])
-    sizes = dict(zip(names, map(_extent, found.solids), strict=True))
+    sizes = dict(zip(names, found.extents, strict=True))
     scale = metres(sizes, things, extents, config.metres_per_unit, taken.z_up)
     warnings = [*taken.warnings, *split.warnings, *viewer.asked().warnings, *scale.warnings]
     warnings += [f"{n}: {w}" for n, s in zip(names, found.solids, strict=True) for w in s.warnings]
-    said = (*taken.statements, _told(split), scale.reason)
+    said = (*taken.statements, *placed.statements, split.statement, scale.reason)
     result = _in_metres(found, names, scale, said, tuple(dict.fromkeys(warnings)))
     return result, _scene(source, found, names, things, scale)
+
+
+def _within(progress: Progress, begin: float, end: float) -> Progress:
+    """Tell of a part of the work as of the whole."""
+    return lambda fraction, words: progress(begin + (end - begin) * fraction, words)
 
 
 def _check(config: ReconstructConfig) -> None:
@@ -188,12 +203,6 @@ def _check(config: ReconstructConfig) -> None:
 # ---------------------------------------------------------------- what is a thing
 
 
-def _own_cameras(taken: Intake) -> tuple[Camera, ...]:
-    """Place cameras around a splat that came without any."""
-    box = np.percentile(taken.solid, (OUTLIERS, 100 - OUTLIERS), axis=0)
-    return tuple(camera_of(aim) for aim in around(box[None, None], OWN_VIEWS, OWN_SIZE))
-
-
 def _of_things(source: Path, taken: Intake) -> Int[np.ndarray, " M"]:
     """Return which Gaussians belong to things."""
     found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, taken.masks, taken.floor))
@@ -203,31 +212,56 @@ def _of_things(source: Path, taken: Intake) -> Int[np.ndarray, " M"]:
     return found
 
 
-def _cloud(
-    taken: Intake, things: Int[np.ndarray, " M"], config: ReconstructConfig, folder: Path | None
-) -> tuple[Cloud, Float[np.ndarray, "N 3"]]:
-    """Return points on things with what they look like, and where the outside is of each."""
+def _placed(
+    taken: Intake,
+    things: Int[np.ndarray, " M"],
+    config: ReconstructConfig,
+    folder: Path | None,
+    progress: Progress,
+) -> Placed:
+    """Return points on things, and how what their pictures look like comes onto them."""
+    if config.lifting == "radiance":
+        return _of_field(taken, things, config, folder, progress)
     gaussians, cameras = taken.gaussians, taken.cameras
     if len(things) > MOST_POINTS:
         random = np.random.default_rng(config.training_seed)
         things = np.sort(random.choice(things, MOST_POINTS, replace=False))
-    shares = [weights(gaussians, camera, CELL) for camera in cameras]
-    shown = np.stack([np.asarray(share.sum(axis=1)).ravel()[things] for share in shares])
     position = gaussians.mean[things].astype(np.float64)
     colour = np.clip(0.5 + DC * gaussians.sh[things, 0], 0, 1)
-    outside, looks = seen_from(position, cameras, list(shown)), {}
-    for spec in dict.fromkeys((config.semantic, config.structural)):
-        encoder = connect(spec, None if folder is None else folder / "maps")
-        if encoder is None:
-            looks[spec] = descriptor(position, colour, outside)
-            continue
-        cells = -(-cameras[0].height // CELL), -(-cameras[0].width // CELL)
-        maps = [encoder.map(picture) for picture in _pictures(taken)]
-        lifted = uplift(lambda v: shares[v][things], cells, maps, len(things))
-        looks[spec] = fill(position, lifted).unit()
-    seen = np.asarray((shown > LEAST).sum(axis=0), dtype=np.int64)
-    what, where = looks[config.semantic], looks[config.structural]
-    return Cloud(position, colour, what, where, seen, things), outside
+    if config.lifting == "back-projection":
+        with Crew() as crew:
+            depth = looked(gaussians, cameras, crew).depth
+        return projected(position, colour, cameras, depth, things)
+    shares = [weights(gaussians, camera, CELL) for camera in cameras]
+    shown = np.stack([np.asarray(share.sum(axis=1)).ravel()[things] for share in shares])
+    cells = -(-cameras[0].height // CELL), -(-cameras[0].width // CELL)
+
+    def lift(maps: Maps) -> Lifted:
+        return uplift(lambda v: shares[v][things], cells, maps, len(things))
+
+    return Placed(position, colour, shown, lift, things)
+
+
+def _of_field(
+    taken: Intake,
+    things: Int[np.ndarray, " M"],
+    config: ReconstructConfig,
+    folder: Path | None,
+    progress: Progress,
+) -> Placed:
+    """Learn a radiance field of the things, and take points from where it is dense."""
+    views = Views(np.stack(_pictures(taken)), taken.cameras)
+    masks = covered(taken.gaussians, taken.cameras, things) if taken.masks is None else taken.masks
+    preset, kept = config.training, None if folder is None else folder / "radiance.npz"
+    learned = learn(views, masks, FieldConfig(preset, seed=config.training_seed), kept, progress)
+    found = points(learned.field, taken.cameras, MOST_POINTS, config.training_seed)
+    placed = projected(found.position, found.colour, taken.cameras, found.depth)
+
+    def lift(maps: Maps) -> Lifted:
+        mean = distilled(learned.field, taken.cameras, maps).at(found.position)
+        return Lifted(mean, np.any(mean, axis=1).astype(np.int64))
+
+    return replace(placed, lift=lift, statements=learned.statements)
 
 
 def _pictures(taken: Intake) -> Sequence[np.ndarray]:
@@ -309,37 +343,11 @@ def _solid(taken: Intake, cloud: Cloud, split: Split, of_things: Int[np.ndarray,
     nearest = KDTree(cloud.position).query(taken.gaussians.mean[of_things])[1]
     owner[of_things] = split.object_of_point[nearest]
     found = solids(taken.gaussians, owner, taken.cameras)
-    owner = _with_company(taken, owner)
+    owner = with_company(taken.gaussians, owner, taken.floor)
     order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
     place = np.append(np.argsort(order), -1)  # the last for what is nobody's
     ordered = tuple(found[k] for k in order)
     return _Found(taken, cloud, place[split.object_of_point], place[owner], ordered)
-
-
-def _with_company(taken: Intake, owner: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """Let faint and hidden Gaussians go with the thing they are near, or they would stay behind.
-
-    Where a floor is among them, only those above it.
-    """
-    mean = taken.gaussians.mean
-    own, rest = np.flatnonzero(owner >= 0), np.flatnonzero(owner < 0)
-    tree = KDTree(mean[own])
-    apart = float(np.median(np.asarray(tree.query(mean[own], k=2)[0])[:, 1]))
-    distance, nearest = map(np.asarray, tree.query(mean[rest]))
-    goes = (distance < NEAR * apart) & (mean[rest, 2] > NEAR * apart)
-    goes |= not taken.floor
-    made = owner.copy()
-    made[rest[goes]] = owner[own[nearest[goes]]]
-    return made
-
-
-def _extent(solid: Solid) -> float:
-    return float(np.ptp(solid.vertices, axis=0).max())
-
-
-def _told(split: Split) -> str:
-    count = int(split.object_of_point.max()) + 1
-    return f"{count} object{'s' * (count != 1)}, told apart by {split.found_by}."
 
 
 def _in_metres(
@@ -375,7 +383,7 @@ def _scene(
     factor = scale.metres_per_unit
     things, surfaces = [], []
     for k, (name, thing, solid) in enumerate(zip(names, named, found.solids, strict=True)):
-        extent, by = factor * _extent(solid), scale.reason
+        extent, by = factor * found.extents[k], scale.reason
         things.append(SceneObject(name, thing.class_name, extent, source=str(source), sized_by=by))
         colours, vertices = linear(solid.colours), factor * solid.vertices
         surfaces.append(Surface(name, k, 0, vertices, solid.triangles, colours=colours))
