@@ -178,6 +178,16 @@ def test_the_showcase_needs_no_pool():
     assert [s.name for s in made.scenes][:2] == ["duck-on-mud", "duck-on-can"]
     assert len(made.scenes) == 7 and {s.interaction for s in made.scenes} <= set(KINDS)
     assert made.scenes[2].classes == ("vase", "ball", "armchair")
+    assert made.messages == ()
+    fewer = plan([], CorpusConfig(preset="seven", scenes=2))
+    assert fewer.scenes == made.scenes
+    assert fewer.messages == ("The showcase has scenes of its own: --scenes 2 changes nothing.",)
+
+
+def test_a_corpus_is_called_a_preset_with_all_that_differs_from_it():
+    assert CorpusConfig().words == "--preset fortytwo --seed 0"
+    asked = CorpusConfig(scenes=2, count="1-2", repeat=True, seed=5)
+    assert asked.words == "--preset fortytwo --scenes 2 --count 1-2 --repeat --seed 5"
 
 
 def test_a_plan_comes_back_as_it_was(tmp_path):

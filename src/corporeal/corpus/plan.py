@@ -8,7 +8,7 @@ where it moves something. A plan follows from the pool and the seed alone; it is
 
 from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Literal
 
@@ -58,6 +58,22 @@ class CorpusConfig:
     seed: int = 0
     """Of everything that is drawn."""
 
+    @property
+    def words(self) -> str:
+        """As one would type it: the preset, the seed, and what differs from the preset."""
+        typed = [f"--preset {self.preset}", *self.changes]
+        return " ".join([*typed, f"--seed {self.seed}"])
+
+    @property
+    def changes(self) -> list[str]:
+        """What is not as the preset has it, as one would type it."""
+        given = ((f.name, getattr(self, f.name), f.default) for f in fields(self))
+        return [
+            f"--{name}" if value is True else f"--{name} {value}"
+            for name, value, usual in given
+            if value != usual and name not in ("preset", "seed")
+        ]
+
 
 @dataclass(frozen=True)
 class PlannedScene:
@@ -101,7 +117,9 @@ def plan(models: Sequence[Asset], config: CorpusConfig, windy: Windy | None = No
 
     """
     if config.preset == "seven":
-        return Plan(config, tuple(_showcase(name) for name in SCENES))
+        ignored = " ".join(config.changes)
+        said = (f"The showcase has scenes of its own: {ignored} changes nothing.",)
+        return Plan(config, tuple(_showcase(name) for name in SCENES), said if ignored else ())
     _check(config)
     if not models:
         raise UserError("The pool has no usable asset. See why: corporeal assets list --rejected.")

@@ -104,7 +104,7 @@ def _summary(corpus: Collected) -> str:
     of_assets = f" from {len(assets)} models" if assets else ""
     return (
         f"{_count(len(scenes), 'scene')} with {_count(objects, 'object')} of {len(classes)} "
-        f"classes{of_assets}, preset {config.preset}, seed {config.seed}. "
+        f"classes{of_assets}, planned by {config.words}. "
         f"{len(_assembled(corpus))} assembled, {len(corpus.run)} run, "
         f"{len(_failed(corpus))} failed."
     )
