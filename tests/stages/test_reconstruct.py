@@ -7,6 +7,7 @@ import pytest
 from scipy.spatial.transform import Rotation
 
 from corporeal.errors import UserError
+from corporeal.features import clouds
 from corporeal.formats.glb import read_glb
 from corporeal.formats.glb_writer import write_glb
 from corporeal.formats.splat_ply import write_splat
@@ -15,7 +16,7 @@ from corporeal.geometry.followed import followed
 from corporeal.geometry.gaussians import placed
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.mesh import Mesh, signed_volume
-from corporeal.splats import solid
+from corporeal.splats import radiance, solid, start
 from corporeal.stages import reconstruct as stage
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
 from corporeal.types import Gaussians
@@ -174,6 +175,46 @@ def test_somebody_who_sees_the_pictures_names_things_and_their_sizes(splat):
     found, scene = reconstruct(splat, viewer=Seer())
     assert [o.class_name for o in scene.objects] == ["crate", "pillar"]
     assert found.metres_per_unit == pytest.approx(0.5, rel=0.05)
+
+
+class Colours:
+    """An encoder: colours of patches of 8 pixels, about grey."""
+
+    def map(self, picture):
+        high, wide = (n // 8 for n in picture.shape[:2])
+        patches = picture[: 8 * high, : 8 * wide].reshape(high, 8, wide, 8, 3).mean(axis=(1, 3))
+        return (patches / 255 - 0.3).astype(np.float16)
+
+
+class Enough(Exception):  # noqa: N818
+    """All that a test wants to know."""
+
+
+@pytest.mark.parametrize(
+    "lifting", ["uplift", "back-projection", pytest.param("radiance", marks=pytest.mark.slow)]
+)
+def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, monkeypatch):
+    def stopped(cloud, *_):
+        raise Enough(cloud)
+
+    monkeypatch.setattr(stage, "objects", stopped)
+    monkeypatch.setattr(clouds, "connect", lambda spec, folder: Colours())
+    monkeypatch.setattr(start, "CELLS", 100_000)
+    monkeypatch.setitem(radiance.PRESETS, "draft", radiance.Preset(100, 160))
+    monkeypatch.setattr(radiance, "RAYS", 2048)
+    config = ReconstructConfig(things=("a", "b"), training="draft", lifting=lifting)
+    with pytest.raises(Enough) as caught:
+        reconstruct(splat, config)
+    (cloud,) = caught.value.args
+    assert cloud.count > 1000
+    assert (cloud.gaussian_of_point is None) == (lifting == "radiance")
+    red = cloud.colour[:, 0] > cloud.colour[:, 2]
+    assert np.mean((cloud.semantic[:, 0] > cloud.semantic[:, 2]) == red) > 0.97
+    assert 0.2 < red.mean() < 0.9
+    np.testing.assert_allclose(np.linalg.norm(cloud.semantic.astype(float), axis=1), 1, atol=2e-3)
+    assert np.mean(cloud.seen > 0) > 0.7
+    sides = np.percentile(cloud.position[red], (99, 1), axis=0)[:, :2]
+    np.testing.assert_allclose(sides[0] - sides[1], 2 * np.array(SIDES[0][:2]), atol=0.05)
 
 
 @pytest.mark.parametrize(

@@ -12,6 +12,10 @@ from corporeal.features.descriptor import descriptor, seen_from
 from corporeal.features.lifting import LEAST, Lifted, back_projection, fill, visible
 from corporeal.types import Camera, Cloud
 
+LEEWAY = 0.02
+"""A learned point this much deeper than what its pixel shows is still seen, as a share of its
+depth: learned points lie in a layer, not on a surface."""
+
 Pictures = Callable[[], Sequence[np.ndarray]]
 """Gives one picture per view."""
 
@@ -43,10 +47,10 @@ def projected(
 ) -> Placed:
     """Return points that take what they look like from where they fall, see ``back_projection``."""
     pairs = zip(cameras, depth, strict=True)
-    shown = np.stack([visible(position, camera, d) for camera, d in pairs]).astype(float)
+    shown = np.stack([visible(position, camera, d, LEEWAY) for camera, d in pairs]).astype(float)
 
     def lift(maps: Sequence[np.ndarray]) -> Lifted:
-        return back_projection(position, cameras, depth, maps)
+        return back_projection(position, cameras, depth, maps, LEEWAY)
 
     return Placed(position, colour, shown, lift, gaussian_of_point)
 
