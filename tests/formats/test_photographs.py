@@ -260,6 +260,66 @@ def test_opaque_pictures_are_not_masked(tmp_path):
     assert read_photographs(tmp_path).masks is None
 
 
+# ---------------------------------------------------------------- instances
+
+NUMBERS = np.zeros((12, 16), np.int32)
+NUMBERS[2:6, 3:9], NUMBERS[6:11, 9:15] = 7, 300
+
+
+def test_captured_views_say_which_object_is_where(tmp_path, views):
+    numbers = np.full(views.rgb.shape[:3], -1, np.int32)
+    numbers[:, 10:30, 20:40], numbers[:, 30:50, 20:40] = 0, 4
+    write_views(tmp_path, replace(views, object_of_pixel=numbers))
+    read = read_photographs(tmp_path)
+    np.testing.assert_array_equal(read.views.object_of_pixel, numbers)
+    np.testing.assert_array_equal(read.masks, np.uint8(255) * (numbers >= 0))
+    small = read_photographs(tmp_path, longest=40).views.object_of_pixel
+    np.testing.assert_array_equal(small, numbers[:, 1::2, 1::2])  # nothing lies between numbers
+
+
+@pytest.mark.parametrize("kind", ["grey", "colours", "palette"])
+@pytest.mark.parametrize("place", ["instances/r_{}.png", "train/objects/r_{}.png"])
+def test_instances_may_lie_in_a_folder(tmp_path, place, kind):
+    """Every kind tells the same; without masks, all instances are one."""
+    said(tmp_path)
+    (tmp_path / place).parent.mkdir(parents=True)
+    drawn = Image.fromarray(NUMBERS.astype(np.uint16))
+    if kind == "colours":
+        flat = np.stack([NUMBERS >> 8, NUMBERS & 255, np.zeros_like(NUMBERS)], axis=-1)
+        drawn = Image.fromarray(flat.astype(np.uint8))
+    if kind == "palette":
+        drawn = Image.fromarray((NUMBERS % 255).astype(np.uint8))
+        drawn.putpalette(bytes(range(0, 240, 5)) * 16)
+    for k in range(4):
+        drawn.save(tmp_path / place.format(k))
+    read = read_photographs(tmp_path)
+    assert len(np.unique(read.views.object_of_pixel)) == 3
+    for number in (0, 7, 300):
+        assert len(np.unique(read.views.object_of_pixel[0][NUMBERS == number])) == 1
+    np.testing.assert_array_equal(read.views.object_of_pixel >= 0, [NUMBERS > 0] * 4)
+    np.testing.assert_array_equal(read.masks, np.uint8(255) * np.stack([NUMBERS > 0] * 4))
+
+
+def test_instances_are_straightened_without_numbers_in_between(tmp_path):
+    said(tmp_path, camera_model="OPENCV", fl_x=20.0, k1=-0.1, k2=0.01)
+    (tmp_path / "instances").mkdir()
+    for k in range(4):
+        Image.fromarray(NUMBERS.astype(np.uint16)).save(tmp_path / "instances" / f"r_{k}.png")
+    read = read_photographs(tmp_path)
+    assert set(np.unique(read.views.object_of_pixel)) == {-1, 6, 299}
+    assert "straightened" in read.warnings[0]
+
+
+def test_instances_that_a_jpeg_blurred_are_not_believed(tmp_path):
+    said(tmp_path)
+    (tmp_path / "instances").mkdir()
+    for k in range(4):
+        shown = Image.fromarray(NUMBERS.astype(np.uint8))
+        shown.save(tmp_path / "instances" / f"r_{k}.{'jpg' if k == 1 else 'png'}")
+    told = read_photographs(tmp_path).warnings[0]
+    assert "r_1 has instances of which the picture is a JPEG, which blurs numbers" in told
+
+
 # ---------------------------------------------------------------- sizes and lenses
 
 

@@ -219,7 +219,7 @@ def test_a_mistake_in_the_file_is_named(tmp_path, spoil, told):
 def test_bad_pictures_are_named(tmp_path):
     folder = photographs(tmp_path)
     (folder / "train/r_1.png").write_bytes(b"not a picture")
-    with pytest.raises(BadFileError, match=r"frame 2: \./train/r_1\.png: the picture is broken"):
+    with pytest.raises(BadFileError, match=r"frame 2: \./train/r_1\.png: the picture is no PNG"):
         read_views(folder)
     Image.new("RGB", (20, 10)).save(folder / "train/r_1.png")
     with pytest.raises(BadFileError, match=r"frame 2: .* is of another size than that of frame 1"):

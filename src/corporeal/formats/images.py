@@ -5,7 +5,7 @@ import warnings
 from collections.abc import Callable
 
 import numpy as np
-from jaxtyping import UInt8, UInt16
+from jaxtyping import Int32, UInt8, UInt16
 from PIL import Image, ImageFile, UnidentifiedImageError
 
 FORMATS = ("PNG", "JPEG", "WEBP")
@@ -35,6 +35,18 @@ def decode_numbers(data: bytes) -> UInt16[np.ndarray, "H W"]:
 
     """
     return _decoded(data, _numbers)
+
+
+def decode_instances(data: bytes) -> Int32[np.ndarray, "H W"]:
+    """Return which instance each pixel of a PNG or WebP picture shows: a number per grey or colour.
+
+    Black, and the first colour of a palette, is 0.
+
+    Raises:
+        ValueError: The bytes are no such picture, or it is broken or absurdly large.
+
+    """
+    return _decoded(data, _instances)
 
 
 def _decoded(data: bytes, take: Callable[[ImageFile.ImageFile], np.ndarray]) -> np.ndarray:
@@ -69,6 +81,15 @@ def _numbers(picture: ImageFile.ImageFile) -> np.ndarray:
     if picture.mode != "L" and not picture.mode.startswith("I"):
         raise ValueError(f"the picture holds colours ({picture.mode}), not grey numbers")
     return np.asarray(picture).astype(np.uint16)
+
+
+def _instances(picture: ImageFile.ImageFile) -> np.ndarray:
+    if picture.format == "JPEG":
+        raise ValueError("the picture is a JPEG, which blurs numbers")
+    if picture.mode in ("L", "P", "1") or picture.mode.startswith("I"):
+        return np.asarray(picture).astype(np.int32)
+    red, green, blue = np.moveaxis(np.asarray(picture.convert("RGB"), np.int32), -1, 0)
+    return (red << 16) | (green << 8) | blue
 
 
 def _small(picture: ImageFile.ImageFile, side: int) -> Image.Image:

@@ -29,6 +29,7 @@ MODELS = (
 IMAGES = ("images", "", "input", "rgb", "images_2", "images_4", "images_8")
 SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".webp", ".PNG", ".JPG", ".JPEG")
 MASKS = ("masks", "mask")
+INSTANCES = ("instances", "objects")
 LONGEST = 1024
 """Of a picture's sides, unless more is asked for [px]."""
 KINDS = "Name a folder with transforms.json, a COLMAP model, or 3 × 4 projection matrices."
@@ -39,7 +40,8 @@ class Photographs:
     """Posed pictures, and what else the file says of the scene."""
 
     views: Views
-    """Where there is a mask, all outside it is white."""
+    """Where there is a mask, all outside it is white. ``object_of_pixel``: what instance masks say,
+    whose numbers need not mean the same from view to view; None: there are none."""
     names: tuple[str, ...]
     """Of the pictures, as the file has them."""
     z_up: bool
@@ -93,7 +95,7 @@ def _developed(
     done = develop(source, shots, longest)
     seen = model if model is not None and len(model.points) else None
     return Photographs(
-        views=Views(rgb=done.rgb, cameras=done.cameras),
+        views=Views(done.rgb, done.cameras, object_of_pixel=done.object_of_pixel),
         names=done.names,
         z_up=z_up,
         masks=done.masks,
@@ -120,8 +122,11 @@ def _shot(frame: Frame) -> Shot:
         if mask is None:
             frame.fail(f"its mask {frame.text('mask_path')[:60]!r} is not there.", "Correct it.")
     frame.lens(1, 1)  # refuse a bad lens even where the picture is bad too
-    mask = mask or _mask(picture, folder)
-    return Shot(name, picture, frame.lens, frame.pose(), mask)
+    mask = mask or _companion(picture, folder, MASKS)
+    instances = _companion(picture, folder, INSTANCES)
+    if frame.value.get("object_file_path") is not None:
+        instances = _found(folder, frame.text("object_file_path"))
+    return Shot(name, picture, frame.lens, frame.pose(), mask, instances)
 
 
 def _found(folder: Path, name: str) -> Path | None:
@@ -129,12 +134,12 @@ def _found(folder: Path, name: str) -> Path | None:
     return next((p for s in SUFFIXES if (p := beside(folder, name + s)) is not None), None)
 
 
-def _mask(picture: Path | None, folder: Path) -> Path | None:
-    """Return the mask of a picture: in ``masks`` beside it, above it, or in the whole's folder."""
+def _companion(picture: Path | None, folder: Path, names: tuple[str, ...]) -> Path | None:
+    """Return what goes with a picture, in a folder beside it, above it, or in the whole's."""
     if picture is None:
         return None
     for base in dict.fromkeys((picture.parent, picture.parent.parent, folder)):
-        for name in MASKS:
+        for name in names:
             for file in (picture.name, picture.stem, f"{picture.name}.png"):
                 found = _found(base / name, file) if (base / name).is_dir() else None
                 if found is not None and found != picture:
@@ -152,8 +157,8 @@ def _of_colmap(folder: Path, place: Path, longest: int) -> Photographs:
     for image in model.images:
         picture = beside(root, image.name)
         lens = partial(_as_stated, model.lens(image))
-        mask = _mask(picture, folder)
-        shots.append(Shot(image.name, picture, lens, image.world_from_camera, mask))
+        more = (_companion(picture, folder, names) for names in (MASKS, INSTANCES))
+        shots.append(Shot(image.name, picture, lens, image.world_from_camera, *more))
     shots.sort(key=lambda shot: shot.name)
     return _developed(folder, shots, longest, False, model)
 
@@ -177,8 +182,8 @@ def _of_projections(folder: Path, pairs: list[tuple[Path, Path]], longest: int) 
     shots = []
     for picture, file in pairs:
         K, pose = parted(file, read_projection(file))
-        mask = _mask(picture, folder)
-        shots.append(Shot(picture.name, picture, partial(_pinhole, file, K), pose, mask))
+        more = (_companion(picture, folder, names) for names in (MASKS, INSTANCES))
+        shots.append(Shot(picture.name, picture, partial(_pinhole, file, K), pose, *more))
     return _developed(folder, shots, longest, z_up=False)
 
 

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Int32, UInt8
 from PIL import Image
 
 from corporeal.errors import BadFileError
-from corporeal.formats.images import FORMATS, MAX_PIXELS, decode_image
+from corporeal.formats.images import FORMATS, MAX_PIXELS, decode_image, decode_instances
 from corporeal.geometry.lens import Lens, straightened
 from corporeal.types import Camera
 
@@ -54,6 +54,8 @@ class Shot:
     """(4, 4), the camera's axes as OpenCV has them."""
     mask: Path | None = None
     """A picture that is white where the objects are; None: the photograph's own alpha, if any."""
+    instances: Path | None = None
+    """A picture that has a number or colour for every object, and is black elsewhere."""
 
 
 @dataclass(frozen=True)
@@ -64,6 +66,8 @@ class Developed:
     cameras: tuple[Camera, ...]
     masks: UInt8[np.ndarray, "V H W"] | None
     """Share of each pixel that belongs to the objects, 255: all; None: nobody says."""
+    object_of_pixel: Int32[np.ndarray, "V H W"] | None
+    """What each view takes each pixel for; -1: nothing. Numbers may mean other things elsewhere."""
     names: tuple[str, ...]
     warnings: tuple[str, ...]
 
@@ -78,6 +82,8 @@ class _Print:
 
     name: str
     rgba: np.ndarray
+    numbers: np.ndarray | None
+    """Of instances; 0: none."""
     masked: bool
     camera: Camera
     straightened: bool
@@ -121,10 +127,14 @@ def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
 def _developed(prints: list[_Print], said: tuple[str, ...]) -> Developed:
     rgba = np.stack([p.rgba for p in prints])
     masked = bool(prints[0].masked and (rgba[..., 3] < 255).any())
+    nobody = np.zeros(rgba.shape[1:3], np.int32)
+    known = [p.numbers for p in prints if p.numbers is not None]
+    numbers = [nobody if p.numbers is None else p.numbers for p in prints]
     return Developed(
         rgb=np.ascontiguousarray(rgba[..., :3]),
         cameras=tuple(p.camera for p in prints),
         masks=np.ascontiguousarray(rgba[..., 3]) if masked else None,
+        object_of_pixel=np.stack(numbers) - 1 if known else None,
         names=tuple(p.name for p in prints),
         warnings=said,
     )
@@ -164,8 +174,9 @@ def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
     if not _fits(width, height, lens):
         stated = f"{lens.width} × {lens.height}"
         raise _UnusableError(f"has {width} × {height} pixels, but its camera takes {stated}")
-    masked = shot.mask is not None or picture.shape[2] == 4
-    alpha = _alpha(shot, picture)
+    numbers = _numbers(shot.instances, (width, height))
+    masked = shot.mask is not None or picture.shape[2] == 4 or numbers is not None
+    alpha = _alpha(shot, picture, numbers)
     if masked and alpha.max() < SHOWN:
         raise _UnusableError("has a mask that shows nothing")
     small = np.dstack([_resized(_on_white(picture[..., :3], alpha), size), _resized(alpha, size)])
@@ -175,7 +186,11 @@ def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
     except ValueError as problem:
         raise _UnusableError(f"cannot be straightened: {problem}") from None
     camera = Camera(K, shot.world_from_camera, *size)
-    return _Print(shot.name, straight, masked, camera, not lens.straight, asked > 0 and not turned)
+    if numbers is not None:
+        small = np.asarray(Image.fromarray(numbers).resize(size, Image.Resampling.NEAREST))
+        numbers = straightened(small[..., None], lens)[0][..., 0]
+    ignored = asked > 0 and not turned
+    return _Print(shot.name, straight, numbers, masked, camera, not lens.straight, ignored)
 
 
 def _fits(width: int, height: int, lens: Lens) -> bool:
@@ -204,19 +219,42 @@ def _asked_of(path: Path | None) -> int:
 def _decoded(path: Path | None) -> np.ndarray:
     assert path is not None
     try:
-        if path.stat().st_size > LARGEST_FILE:
-            raise _UnusableError(f"is larger than {LARGEST_FILE >> 20} MiB")
-        return decode_image(path.read_bytes(), side=2**20)
-    except OSError as problem:
-        raise _UnusableError(f"cannot be read ({problem.strerror})") from None
+        return decode_image(_read(path), side=2**20)
     except ValueError as problem:
         raise _UnusableError(str(problem).removeprefix("the picture ")) from None
 
 
-def _alpha(shot: Shot, picture: np.ndarray) -> np.ndarray:
-    """Return what of a photograph belongs to the objects (H, W): its mask, else its alpha."""
+def _numbers(path: Path | None, size: tuple[int, int]) -> np.ndarray | None:
+    """Return which instance each pixel shows (H, W); 0: none. None: nobody says."""
+    if path is None:
+        return None
+    try:
+        numbers = decode_instances(_read(path))
+    except ValueError as problem:
+        reason = str(problem).removeprefix("the picture ")
+        raise _UnusableError(f"has instances of which the picture {reason}") from None
+    if numbers.shape == size[::-1]:
+        return numbers
+    return np.asarray(Image.fromarray(numbers).resize(size, Image.Resampling.NEAREST))
+
+
+def _read(path: Path) -> bytes:
+    try:
+        if path.stat().st_size > LARGEST_FILE:
+            raise _UnusableError(f"is larger than {LARGEST_FILE >> 20} MiB")
+        return path.read_bytes()
+    except OSError as problem:
+        raise _UnusableError(f"cannot be read ({problem.strerror})") from None
+
+
+def _alpha(shot: Shot, picture: np.ndarray, numbers: np.ndarray | None) -> np.ndarray:
+    """Return what belongs to the objects (H, W): the mask, else the alpha, else all instances."""
+    if shot.mask is None and picture.shape[2] == 4:
+        return picture[..., 3]
+    if shot.mask is None and numbers is not None:
+        return np.uint8(255) * (numbers > 0)
     if shot.mask is None:
-        return picture[..., 3] if picture.shape[2] == 4 else np.full(picture.shape[:2], 255, "u1")
+        return np.full(picture.shape[:2], 255, np.uint8)
     try:
         mask = _decoded(shot.mask)[..., 0]
     except _UnusableError as problem:

@@ -9,7 +9,7 @@ Brown's model as OpenCV and COLMAP have it: at x, y = the direction over its dep
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Float, Int32, UInt8
 from scipy.ndimage import map_coordinates
 
 ZOOMS = (0.5, 4.0)
@@ -58,11 +58,12 @@ def bent(lens: Lens, xy: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2"]:
 
 
 def straightened(
-    picture: UInt8[np.ndarray, "H W C"], lens: Lens
-) -> tuple[UInt8[np.ndarray, "H W C"], Float[np.ndarray, "3 3"]]:
+    picture: UInt8[np.ndarray, "H W C"] | Int32[np.ndarray, "H W C"], lens: Lens
+) -> tuple[np.ndarray, Float[np.ndarray, "3 3"]]:
     """Return the picture as a pinhole camera would have taken it, and that camera's K.
 
     It has the same size and principal point, and shows as much as it can without an empty border.
+    Colours (8 bits) are interpolated, numbers (32 bits) are not.
 
     Raises:
         ValueError: The lens bends more than that allows.
@@ -72,12 +73,13 @@ def straightened(
         return picture, lens.K
     K = _without_border(lens)
     source = _seen_at(lens, K, _middles(lens.width, lens.height))
+    order = 1 if picture.dtype == np.uint8 else 0
     rows, columns = (source[:, k].reshape(lens.height, lens.width) - 0.5 for k in (1, 0))
     planes = [
-        map_coordinates(picture[..., c], [rows, columns], np.float32, order=1, mode="nearest")
+        map_coordinates(picture[..., c], [rows, columns], np.float64, order=order, mode="nearest")
         for c in range(picture.shape[2])
     ]
-    return np.round(np.stack(planes, axis=-1)).astype(np.uint8), K
+    return np.round(np.stack(planes, axis=-1)).astype(picture.dtype), K
 
 
 def _without_border(lens: Lens) -> np.ndarray:

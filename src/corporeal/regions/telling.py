@@ -1,0 +1,115 @@
+"""Whose each point is: by instance masks, by look and concavity, or by the published rule."""
+
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import KDTree
+
+from corporeal.errors import UserError
+from corporeal.regions.objects import MOST, Split, components, objects
+from corporeal.types import Cloud
+
+Rule = Literal["auto", "masks", "look", "components"]
+
+SAME = 0.9
+"""Share of what views say of points that must be one number each, for numbers to mean the same in
+all views; two things numbered at random in each view give 0.6."""
+CRUMB = 0.003
+"""Share of the points below which what masks or neighbours tell apart is no thing."""
+PUBLISHED = "the connected components of each point's 20 nearest, as published: a control"
+NUMBERED = "instance masks, whose numbers mean the same in all pictures"
+NO_MASKS = (
+    "There are no instance masks. Name them by object_file_path in transforms.json, or put them "
+    "into a folder 'instances' with the names of the pictures; or leave --apart out."
+)
+
+
+def told_apart(
+    cloud: Cloud,
+    rule: Rule = "auto",
+    count: int | None = None,
+    normals: Float[np.ndarray, "N 3"] | None = None,
+    masks: Int[np.ndarray, "V N"] | None = None,
+) -> Split:
+    """Tell things apart.
+
+    Args:
+        cloud: Points with features.
+        rule: auto: by instance masks where there are any, else by look and concavity.
+        count: How many things there are, if somebody said so.
+        normals: Unit, outward; None: found from the points.
+        masks: What each view takes each point for; -1: not said. None: nobody drew any.
+
+    Raises:
+        UserError: Masks are asked for and there are none, there are no points, or more things than
+            can be.
+
+    """
+    if rule == "components":
+        return _by_neighbours(cloud, count)
+    if rule == "masks" and masks is None:
+        raise UserError(NO_MASKS)
+    if masks is None or rule == "look":
+        return objects(cloud, count, normals)
+    return by_numbers(cloud, masks, count) or _by_masks(cloud, masks, count, normals)
+
+
+def by_numbers(
+    cloud: Cloud, masks: Int[np.ndarray, "V N"], count: int | None = None
+) -> Split | None:
+    """Give each point the number that most views give it; None: numbers differ between views.
+
+    What no view says anything of goes with the nearest that some view does.
+    """
+    known, number = np.unique(masks, return_inverse=True)
+    said = np.zeros((cloud.count, len(known)), np.int64)
+    for view in number.reshape(masks.shape):
+        said[np.arange(cloud.count), view] += 1
+    said = said[:, known >= 0]
+    best, total = said.max(axis=1, initial=0), said.sum(axis=1)
+    if not total.any() or best.sum() < SAME * total.sum():
+        return None
+    sure = np.where(total > 0, best / np.maximum(total, 1), 0.0)
+    owner = _without_crumbs(cloud, np.where(total > 0, said.argmax(axis=1), -1))
+    return Split(owner, sure, tuple(_otherwise(count, owner, "instance masks")), NUMBERED)
+
+
+def _by_masks(
+    cloud: Cloud,
+    masks: Int[np.ndarray, "V N"],
+    count: int | None,
+    normals: Float[np.ndarray, "N 3"] | None,
+) -> Split:
+    """Let masks whose numbers differ from view to view say where patches hold together."""
+    seen = max((len(np.unique(view[view >= 0])) for view in masks), default=0)
+    most = min(seen, MOST, cloud.count) or None
+    return objects(cloud, count or most, normals, masks)
+
+
+def _by_neighbours(cloud: Cloud, count: int | None) -> Split:
+    owner = _without_crumbs(cloud, components(cloud.position))
+    told = tuple(_otherwise(count, owner, "nearest neighbours"))
+    return Split(owner, np.ones(cloud.count), told, PUBLISHED)
+
+
+def _without_crumbs(cloud: Cloud, number: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
+    """Return things from 0, what has most points first; crumbs and -1 go with what is nearest."""
+    known, index, sizes = np.unique(number, return_inverse=True, return_counts=True)
+    sizes = np.where(known < 0, 0, sizes)
+    things = [k for k in np.argsort(-sizes, kind="stable") if sizes[k] >= CRUMB * cloud.count]
+    rank = np.full(len(known), -1, np.int64)
+    rank[things] = np.arange(len(things))
+    owner = rank[index]
+    own, rest = np.flatnonzero(owner >= 0), np.flatnonzero(owner < 0)
+    if len(rest):
+        nearest = np.asarray(KDTree(cloud.position[own]).query(cloud.position[rest])[1])
+        owner[rest] = owner[own[nearest]]
+    return owner
+
+
+def _otherwise(count: int | None, owner: Int[np.ndarray, " N"], who: str) -> list[str]:
+    found = int(owner.max()) + 1
+    if count is None or count == found:
+        return []
+    return [f"{count} things were named or counted, but {who} tell {found} apart: they were kept."]
