@@ -197,7 +197,7 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     def stopped(cloud, *_):
         raise Enough(cloud)
 
-    monkeypatch.setattr(stage, "objects", stopped)
+    monkeypatch.setattr(stage, "told_apart", stopped)
     monkeypatch.setattr(clouds, "connect", lambda spec, folder: Colours())
     monkeypatch.setattr(start, "CELLS", 100_000)
     monkeypatch.setitem(radiance.PRESETS, "draft", radiance.Preset(100, 160))

@@ -1,12 +1,12 @@
 """Gaussians from whatever a person has: photographs that they are learned from, or a splat."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, UInt8
 
 from corporeal.errors import UserError
 from corporeal.formats.photographs import Photographs, read_photographs
@@ -18,6 +18,7 @@ from corporeal.geometry.upright import upright
 from corporeal.splats.crew import Crew
 from corporeal.splats.cutout import cut_out
 from corporeal.splats.quality import Quality
+from corporeal.splats.raster import render
 from corporeal.splats.start import Points
 from corporeal.splats.sweep import swept
 from corporeal.splats.train import PRESETS, TrainConfig, Trained, train
@@ -74,6 +75,18 @@ class Intake:
         """Means of Gaussians that say where something is (M, 3)."""
         g = self.gaussians
         return g.mean[g.opacity > SOLID].astype(np.float64)
+
+    def pictures(self) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
+        """Return the photographs, or pictures of a splat that came without any."""
+        if self.views is not None:
+            return list(self.views.rgb)
+        return [picture(self.gaussians, camera) for camera in self.cameras]
+
+
+def picture(gaussians: Gaussians, camera: Camera) -> UInt8[np.ndarray, "H W 3"]:
+    """Return a picture of Gaussians before black."""
+    rgb = render(gaussians, camera).rgb
+    return np.round(255 * np.clip(rgb, 0, 1)).astype(np.uint8)
 
 
 def take_in(

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Int, UInt8
+from jaxtyping import Int
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
@@ -24,25 +24,25 @@ from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
 from corporeal.geometry.metric import MetricScale
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
+from corporeal.regions.masks import lifted
 from corporeal.regions.match import match
-from corporeal.regions.objects import Split, objects
+from corporeal.regions.objects import Split
+from corporeal.regions.telling import Rule, told_apart
 from corporeal.render.camera import cameras_around
 from corporeal.render.look import linear
 from corporeal.render.portrait import COLOURS, colour_of_part
 from corporeal.splats.channel import distilled
 from corporeal.splats.crew import Crew
 from corporeal.splats.foreground import covered, foreground, with_company
-from corporeal.splats.intake import Intake, Up, take_in, turned_upright
+from corporeal.splats.intake import Intake, Up, picture, take_in, turned_upright
 from corporeal.splats.radiance import FieldConfig, learn, points
-from corporeal.splats.raster import render, weights
+from corporeal.splats.raster import weights
 from corporeal.splats.sight import looked
 from corporeal.splats.solid import Solid, solids
 from corporeal.splats.train import TrainConfig
 from corporeal.types import (
-    Camera,
     Cloud,
     Finish,
-    Gaussians,
     Reconstruction,
     Scene,
     SceneObject,
@@ -83,6 +83,9 @@ class ReconstructConfig:
     """What the objects are, the largest first, such as "armchair" "soda can"."""
     count: int | None = None
     """How many objects there are; by default as many as --things names, else it is estimated."""
+    apart: Rule = "auto"
+    """What tells objects apart: instance masks (masks), look and concavity (look), the published
+    control (components); auto: masks where the input has some, else look."""
     up: Up = "auto"
     """Which axis of the file points up; auto: what the file or the cameras say."""
     metres_per_unit: float | None = None
@@ -164,11 +167,12 @@ def reconstruct(
     of_things = _of_things(source, taken)
     placed = _placed(taken, of_things, config, folder, _within(progress, TRAINED, LOOKED))
     specs, maps = (config.semantic, config.structural), None if folder is None else folder / "maps"
-    cloud, outside = looked_at(placed, taken.cameras, lambda: _pictures(taken), specs, maps)
+    cloud, outside = looked_at(placed, taken.cameras, taken.pictures, specs, maps)
     progress(LOOKED, "finding objects")
     wanted = _wanted(config, viewer, taken)
     normal = normals(cloud.position, neighbours(cloud.position, AROUND), outside)
-    split = objects(cloud, config.count or len(wanted) or None, normal)
+    count, drawn = config.count or len(wanted) or None, _drawn(taken, cloud, of_things)
+    split = told_apart(cloud, config.apart, count, normal, drawn)
     progress(FOUND, "closing surfaces")
     found = _solid(taken, cloud, split, of_things)
     things = _recognised(wanted, found, config, viewer)
@@ -250,7 +254,7 @@ def _of_field(
     progress: Progress,
 ) -> Placed:
     """Learn a radiance field of the things, and take points from where it is dense."""
-    views = Views(np.stack(_pictures(taken)), taken.cameras)
+    views = Views(np.stack(taken.pictures()), taken.cameras)
     masks = covered(taken.gaussians, taken.cameras, things) if taken.masks is None else taken.masks
     preset, kept = config.training, None if folder is None else folder / "radiance.npz"
     learned = learn(views, masks, FieldConfig(preset, seed=config.training_seed), kept, progress)
@@ -264,16 +268,15 @@ def _of_field(
     return replace(placed, lift=lift, statements=learned.statements)
 
 
-def _pictures(taken: Intake) -> Sequence[np.ndarray]:
-    """Return the photographs, or pictures of a splat that came without any."""
-    if taken.views is not None:
-        return list(taken.views.rgb)
-    return [_picture(taken.gaussians, camera) for camera in taken.cameras]
-
-
-def _picture(gaussians: Gaussians, camera: Camera) -> UInt8[np.ndarray, "H W 3"]:
-    rgb = render(gaussians, camera).rgb
-    return np.round(255 * np.clip(rgb, 0, 1)).astype(np.uint8)
+def _drawn(
+    taken: Intake, cloud: Cloud, of_things: Int[np.ndarray, " M"]
+) -> Int[np.ndarray, "V N"] | None:
+    """Return what instance masks take each point for in each view; None: there are none."""
+    if taken.views is None or taken.views.object_of_pixel is None:
+        return None
+    near = of_things[KDTree(taken.gaussians.mean[of_things]).query(cloud.position)[1]]
+    pixels = list(taken.views.object_of_pixel)
+    return lifted(lambda v: weights(taken.gaussians, taken.cameras[v])[near], pixels, cloud.count)
 
 
 # ---------------------------------------------------------------- which thing is it
@@ -283,7 +286,7 @@ def _wanted(config: ReconstructConfig, viewer: Viewer, taken: Intake) -> list[Th
     """Return what things there are: as the command line says, else as somebody sees; or nothing."""
     if config.things:
         return [usual(name) for name in config.things]
-    pictures = _pictures(taken)
+    pictures = taken.pictures()
     return viewer.things([pictures[k] for k in _spread(len(pictures))])
 
 
@@ -327,10 +330,10 @@ def _painted(found: _Found) -> list[np.ndarray]:
     ink = np.concatenate([paints[np.minimum(np.arange(found.count), len(paints) - 1)], [GREY]])
     flat = (np.sqrt(ink[found.owner]) - 0.5)[:, None] / DC
     dressed = replace(taken.gaussians, sh=flat.astype(np.float32))
-    pictures = _pictures(taken)
+    pictures = taken.pictures()
     shown = []
     for k in _spread(len(pictures)):
-        shown += [pictures[k], _picture(dressed, taken.cameras[k])]
+        shown += [pictures[k], picture(dressed, taken.cameras[k])]
     return shown
 
 
