@@ -15,9 +15,10 @@ from typing import Any
 
 from corporeal import store
 from corporeal.errors import UserError
+from corporeal.features import MENU as ENCODERS
 from corporeal.formats.glb_writer import write_glb
 from corporeal.formats.scene_file import read_scene_file, write_scene_file
-from corporeal.formats.sources import kind_of, pictured, sources
+from corporeal.formats.sources import called, kind_of, pictured, sources
 from corporeal.formats.splat_ply import write_splat
 from corporeal.formats.words import safe
 from corporeal.geometry.followed import followed
@@ -64,6 +65,8 @@ VERBS = tuple(FOLDERS)
 RUN = "run.json"
 WRITTEN = ("record",)
 """Settings that name what is written, not what is read."""
+BEFORE_PATHS = ("replay", *ENCODERS)
+"""What stands before a colon and a path."""
 GAUSSIANS = "gaussians.ply"
 
 
@@ -156,8 +159,13 @@ def files_read(config: Any) -> list[str]:
     """Name the content of every file that a configuration points to."""
     named = [f.name for f in fields(config) if f.name not in WRITTEN] if config else []
     values = [str(getattr(config, name)) for name in named]
-    paths = [Path(value.removeprefix("replay:")) for value in values if value]
+    paths = [_named(value) for value in values if value]
     return [store.digest(path) for path in paths if path.exists()]
+
+
+def _named(value: str) -> Path:
+    kind, colon, rest = value.partition(":")
+    return Path(rest if colon and kind in BEFORE_PATHS else value).expanduser()
 
 
 def status(folder: Path) -> list[tuple[str, str, float | None]]:
@@ -313,7 +321,9 @@ class _Run:
         source, asked = pictured(self.inputs), self.settings.describe
         assert source is not None, "models need no reconstruction"
         config, extents = self.settings.reconstruct, self.settings.assemble.extent
-        viewer = Viewer(safe(source.resolve().stem), asked.vlm, asked.record)
+        if self.settings.assemble.objects != "auto":
+            raise UserError("--objects is for models. Say what tells things apart with --apart.")
+        viewer = Viewer(safe(called(source)), asked.vlm, asked.record)
         made, scene = reconstruct(source, config, extents, viewer, folder, progress)
         if viewer.asked().transcript:
             store.write_json(folder / "transcript.json", viewer.asked().transcript)

@@ -3,7 +3,7 @@ import json
 import pytest
 
 from corporeal.errors import UserError
-from corporeal.formats.sources import kind_of, pictured, sources
+from corporeal.formats.sources import called, kind_of, pictured, sources
 from glb_maker import cube
 
 
@@ -29,6 +29,12 @@ def test_a_broken_file_still_counts_as_itself(tmp_path):
         (tmp_path / name).write_text("{ broken")
         assert sources([tmp_path / name]) == [tmp_path / name]
     assert sources([tmp_path / "none.glb"]) == []
+
+
+def test_a_folder_is_called_by_its_whole_name(tmp_path):
+    (tmp_path / "scan.2").mkdir()
+    assert called(tmp_path / "scan.2") == "scan.2"
+    assert called(tmp_path / "a.compressed.ply") == "a.compressed"
 
 
 def test_names_tell_what_an_input_is(tmp_path):

@@ -6,7 +6,16 @@ import numpy as np
 import pytest
 
 from corporeal.errors import UserError
-from corporeal.geometry.metric import Extent, chosen, of_distance, of_extent, of_extents, of_file
+from corporeal.geometry.metric import (
+    Extent,
+    chosen,
+    implausible,
+    measured,
+    of_distance,
+    of_extent,
+    of_extents,
+    of_file,
+)
 
 
 def test_a_scale_states_its_source():
@@ -17,6 +26,31 @@ def test_a_scale_states_its_source():
     large = of_extent((-1, -1, -2), (1, 1, 2), 0.2, "a model")
     assert (large.metres_per_unit, large.source) == (pytest.approx(0.05), "extent")
     assert "4 units" in large.reason and "0.2 m in reality, a model said" in large.reason
+
+
+def test_a_person_measures_the_unit_or_a_distance():
+    assert measured(None, None, "he") is None
+    unit = measured(0.5, None, "he")
+    assert (unit.metres_per_unit, unit.reason) == (0.5, "One unit of the file is 0.5 m, he said.")
+    far = measured(None, (1, 1, 1, 4, 1, 5, 0.5), "he")
+    assert far.metres_per_unit == pytest.approx(0.1)
+    assert far.reason == "Two points 5 units apart are 0.5 m apart, he said."
+    assert {unit.source, far.source} == {"distance"}
+    for per_unit, points, said in (
+        (0.5, (0, 0, 0, 1, 0, 0, 1), "Give one of them"),
+        (-1.0, None, "--metres-per-unit is -1 m"),
+        (math.nan, None, "--metres-per-unit is nan m"),
+        (None, (0, 0, 0, 1, 0, 0, 1e7), r"--known-distance: one unit is 1e\+07 m"),
+        (None, (0, 0, 0, 0, 0, 0, 1), "distance of the two points is 0 units"),
+    ):
+        with pytest.raises(UserError, match=said):
+            measured(per_unit, points, "he")
+
+
+def test_scenes_as_large_as_towns_or_as_small_as_dust_are_told():
+    assert implausible(0.01) is None is implausible(20.0)
+    assert "would be 1.5e+05 m large" in implausible(1.5e5)
+    assert "--extent" in implausible(1e-4)
 
 
 @pytest.mark.parametrize("metres", [0.0, -1.0, math.nan, math.inf])

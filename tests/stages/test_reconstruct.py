@@ -222,7 +222,12 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     [
         ({"count": 0}, (), "--count is 0"),
         ({"count": 3, "things": ("crate",)}, (), "--count says 3 objects, --things names 1"),
-        ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1.0"),
+        ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1 m"),
+        (
+            {"known_distance": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)},
+            (),
+            "distance of the two points is 0 units",
+        ),
     ],
 )
 def test_options_that_make_no_sense_are_refused(splat, config, extents, told):

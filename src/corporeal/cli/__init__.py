@@ -247,7 +247,9 @@ def _folder(where: Where, inputs: list[Path]) -> Path:
 
 def _called(path: Path) -> str:
     """Return a scene's name: a file's own, but of the many that are scene.toml their folder's."""
-    return path.resolve().parent.name if path.name == "scene.toml" else path.stem
+    from corporeal.formats.sources import called
+
+    return path.resolve().parent.name if path.name == "scene.toml" else called(path)
 
 
 def _go(

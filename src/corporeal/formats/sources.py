@@ -79,6 +79,12 @@ def sources(inputs: Iterable[Path]) -> list[Path]:
     return list(found)
 
 
+def called(path: Path) -> str:
+    """Return what a scene is called: a file's name without its suffix, a folder's name whole."""
+    path = path.resolve()
+    return path.name if path.is_dir() else path.stem
+
+
 def models_in(folder: Path) -> list[Path]:
     """Return the models that lie in a folder, by name."""
     return sorted(p for p in folder.iterdir() if p.suffix.lower() in MODELS)

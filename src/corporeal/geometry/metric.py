@@ -12,8 +12,16 @@ from corporeal.types import Vector
 
 DOUBT = 2.0
 """Factor between two scales from which on somebody must be told."""
+SMALLEST = 1e-6
+"""Metres that one unit of a file may be, and the inverse of the most."""
+PLAUSIBLE = (2e-3, 50.0)
+"""Extents of whole scenes [m]."""
 NEUTRAL = 0.5
 """Stands in for the size of a scene of which nobody knows it [m]."""
+
+
+TwoPoints = tuple[float, float, float, float, float, float, float]
+"""Two points of a file, x y z x y z, and how far apart they are in reality [m]."""
 
 
 @dataclass(frozen=True)
@@ -135,6 +143,49 @@ def of_distance(a: Vector, b: Vector, metres: float) -> MetricScale:
     scale = _ratio(metres, units, "The distance of the two points")
     words = f"Two points {units:.4g} units apart are {metres:.4g} m apart."
     return MetricScale(scale, "distance", words)
+
+
+def measured(per_unit: float | None, points: TwoPoints | None, who: str) -> MetricScale | None:
+    """Return what somebody measured of a file's unit; None: nobody did.
+
+    Args:
+        per_unit: What one unit is [m].
+        points: Whose distance is known.
+        who: Who said so, for the report.
+
+    Raises:
+        UserError: Both were said, or what was said makes no sense.
+
+    """
+    if per_unit is not None and points is not None:
+        raise UserError("--metres-per-unit and --known-distance say the same. Give one of them.")
+    if points is not None:
+        found = of_distance(points[:3], points[3:6], points[6])
+        per_unit, reason = found.metres_per_unit, f"{found.reason[:-1]}, {who} said."
+    elif per_unit is None:
+        return None
+    else:
+        reason = f"One unit of the file is {per_unit:.4g} m, {who} said."
+    if not SMALLEST <= per_unit <= 1 / SMALLEST:
+        said = "--metres-per-unit" if points is None else "--known-distance: one unit"
+        raise UserError(f"{said} is {per_unit:.4g} m. It must be from {SMALLEST:g} to 1e+06 m.")
+    return MetricScale(per_unit, "distance", reason)
+
+
+def implausible(extent: float) -> str | None:
+    """Say that a whole scene is too large or too small to be one that people stand things in.
+
+    Args:
+        extent: Of the whole [m].
+
+    """
+    low, high = PLAUSIBLE
+    if low <= extent <= high:
+        return None
+    return (
+        f"The whole would be {extent:.3g} m large, which is hardly meant. State the size of one "
+        "thing with --extent NAME=METRES, or what one unit is with --metres-per-unit."
+    )
 
 
 def of_extent(low: Vector, high: Vector, metres: float, who: str) -> MetricScale:

@@ -19,10 +19,11 @@ from corporeal.features.clouds import Placed, looked_at, projected
 from corporeal.features.lifting import Lifted, uplift
 from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
+from corporeal.formats.sources import called
 from corporeal.formats.words import safe, unique
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
-from corporeal.geometry.metric import MetricScale
+from corporeal.geometry.metric import MetricScale, TwoPoints, measured
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.regions.masks import lifted
 from corporeal.regions.match import match
@@ -49,7 +50,7 @@ from corporeal.types import (
     Surface,
     Views,
 )
-from corporeal.vlm.things import Thing, Viewer, metres, usual
+from corporeal.vlm.things import PERSON, Thing, Viewer, metres, usual
 
 Progress = Callable[[float, str], None]
 Maps = Sequence[np.ndarray]
@@ -84,12 +85,13 @@ class ReconstructConfig:
     count: int | None = None
     """How many objects there are; by default as many as --things names, else it is estimated."""
     apart: Rule = "auto"
-    """What tells objects apart: instance masks (masks), look and concavity (look), the published
-    control (components); auto: masks where the input has some, else look."""
+    """What tells objects apart; auto: instance masks where there are any, else look and folds."""
     up: Up = "auto"
     """Which axis of the file points up; auto: what the file or the cameras say."""
     metres_per_unit: float | None = None
     """What one unit of the file is [m]; by default sizes of things say it."""
+    known_distance: TwoPoints | None = None
+    """Two points of the file, x y z x y z, and their true distance [m]."""
     training: Literal["draft", "normal"] = "normal"
     """How long Gaussians are learned from photographs: one minute or four on two cores."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
@@ -155,7 +157,7 @@ def reconstruct(
             does not fit it.
 
     """
-    _check(config)
+    stated = _checked(config)
     seed, drawn_by = config.training_seed, config.rasteriser
     training = TrainConfig(config.training, seed=seed, rasteriser=drawn_by)
     kept = None if folder is None else folder / "training.npz"
@@ -178,7 +180,7 @@ def reconstruct(
     things = _recognised(wanted, found, config, viewer)
     names = unique([safe(thing.class_name) or UNKNOWN for thing in things])
     sizes = dict(zip(names, found.extents, strict=True))
-    scale = metres(sizes, things, extents, config.metres_per_unit, taken.z_up)
+    scale = metres(sizes, things, extents, stated, taken.z_up)
     warnings = [*taken.warnings, *split.warnings, *viewer.asked().warnings, *scale.warnings]
     warnings += [f"{n}: {w}" for n, s in zip(names, found.solids, strict=True) for w in s.warnings]
     said = (*taken.statements, *placed.statements, split.statement, scale.reason)
@@ -191,7 +193,8 @@ def _within(progress: Progress, begin: float, end: float) -> Progress:
     return lambda fraction, words: progress(begin + (end - begin) * fraction, words)
 
 
-def _check(config: ReconstructConfig) -> None:
+def _checked(config: ReconstructConfig) -> MetricScale | None:
+    """Refuse options that make no sense; return what somebody measured of the file's unit."""
     if config.count is not None and not 1 <= config.count <= 1000:
         raise UserError(f"--count is {config.count}. Give a number of objects from 1 to 1000.")
     if config.count and config.things and config.count != len(config.things):
@@ -199,9 +202,7 @@ def _check(config: ReconstructConfig) -> None:
             f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
             "--count out, or name all of them."
         )
-    scale = config.metres_per_unit
-    if scale is not None and not 1e-6 <= scale <= 1e6:
-        raise UserError(f"--metres-per-unit is {scale}. Give a number from 1e-6 to 1e6.")
+    return measured(config.metres_per_unit, config.known_distance, PERSON)
 
 
 # ---------------------------------------------------------------- what is a thing
@@ -391,7 +392,7 @@ def _scene(
         colours, vertices = linear(solid.colours), factor * solid.vertices
         surfaces.append(Surface(name, k, 0, vertices, solid.triangles, colours=colours))
     return Scene(
-        name=safe(source.resolve().stem) or "scene",
+        name=safe(called(source)) or "scene",
         source=str(source),
         objects=tuple(things),
         surfaces=tuple(surfaces),

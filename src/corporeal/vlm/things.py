@@ -1,7 +1,7 @@
 """Which things stand in a photographed scene, and which found region each of them is."""
 
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from importlib.resources import files
 from pathlib import Path
 
@@ -9,7 +9,7 @@ import numpy as np
 
 from corporeal.errors import UserError
 from corporeal.formats.typical_extents import typical_extent
-from corporeal.geometry.metric import Extent, MetricScale, chosen, of_file
+from corporeal.geometry.metric import Extent, MetricScale, chosen, implausible, of_file
 from corporeal.geometry.sizes import said_extent
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.interview import Interview, Subject
@@ -136,7 +136,7 @@ def metres(
     sizes: Mapping[str, float],
     things: Sequence[Thing],
     stated: Sequence[str] = (),
-    per_unit: float | None = None,
+    measured: MetricScale | None = None,
     z_up: bool = False,
 ) -> MetricScale:
     """Decide what one unit of a reconstruction is in metres.
@@ -145,7 +145,7 @@ def metres(
         sizes: Name → largest extent in the file [its unit].
         things: What they are, in the same order.
         stated: What a person said of some, such as "duck=0.1" [m].
-        per_unit: What a person said of the unit [m].
+        measured: What a person measured of the unit.
         z_up: Whether the file's kind has +z up, and metres.
 
     Raises:
@@ -157,12 +157,13 @@ def metres(
     strange = [name for name, _ in wanted if name not in sizes]
     if strange:
         raise UserError(f"--extent: no object {strange[0]!r}. Choose one of: {', '.join(sizes)}.")
-    reason = f"One unit of the file is {per_unit:.4g} m, {PERSON} said." if per_unit else ""
     known = zip(sizes.items(), things, strict=True)
-    return chosen(
-        MetricScale(per_unit, "distance", reason) if per_unit else None,
+    found = chosen(
+        measured,
         [Extent(name, sizes[name], extent, PERSON) for name, extent in wanted],
         of_file("transforms.json") if z_up else None,
         [Extent(name, size, t.extent, t.sized_by) for (name, size), t in known if t.extent],
         max(sizes.values()),
     )
+    doubt = implausible(found.metres_per_unit * max(sizes.values()))
+    return replace(found, warnings=(*found.warnings, doubt)) if doubt else found
