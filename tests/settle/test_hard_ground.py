@@ -4,9 +4,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from bodies import ball, box
 
-from corporeal.settle.body import Pose
+from corporeal.errors import UserError
+from corporeal.settle import mujoco
+from corporeal.settle.body import Body, Pose
+from corporeal.settle.hull import hull_of
 from corporeal.settle.mujoco import SettleConfig, settle
 from corporeal.settle.rest import at_rest
 
@@ -35,3 +39,26 @@ def test_what_chatters_when_time_is_up_is_left_to_the_certificate():
     never = SettleConfig(shift=0.0, longest=1.0, roll=0.3, firm=0.3)
     assert settle([thing], start, never).quiet
     assert not settle([thing], start, replace(never, chatter=0.0)).quiet
+
+
+def test_a_thing_of_many_pieces_has_room_for_all_its_contacts(monkeypatch):
+    """By itself the engine leaves all of them out and things fall through each other."""
+    side, plate = 0.05, box(0.6, 0.6, 0.1)
+    middle = (np.arange(9) - 4) * 0.06
+    studs = [
+        trimesh.creation.box([side] * 3, trimesh.transformations.translation_matrix((x, y, 0)))
+        for x in middle
+        for y in middle
+    ]
+    whole = trimesh.util.concatenate(studs)
+    pieces = tuple(hull_of(np.asarray(stud.vertices), 0.0) for stud in studs)
+    brush = Body("brush", np.asarray(whole.vertices), np.asarray(whole.faces), pieces)
+    poses = [Pose((0.0, 0.0, 0.05)), Pose((0.0, 0.0, 0.1249))]
+    engine = mujoco.Engine([plate, brush], poses, SettleConfig.step)
+    for _ in range(3):
+        engine.step()
+    assert engine.data.ncon > 300 and engine.data.nefc == 6 * engine.data.ncon
+    monkeypatch.setattr(mujoco, "MEMORY", 1 << 22)
+    cramped = mujoco.Engine([plate, brush], poses, SettleConfig.step)
+    with pytest.raises(UserError, match="more places"):
+        cramped.step()

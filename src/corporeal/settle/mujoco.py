@@ -20,6 +20,7 @@ import mujoco
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.errors import UserError
 from corporeal.settle.body import FRICTION, Body, Pose, unit_of
 from corporeal.settle.hull import Piece
 from corporeal.settle.matter import Matter
@@ -61,6 +62,11 @@ SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
 FLOOR_AND_HULLS, PIECES = 1, 2
 LEAST_INERTIA = 1e-6
 """Of a body's inertia, added about every axis."""
+MEMORY = 1 << 30
+"""Room for contacts [bytes]; what is not used costs nothing. By itself the engine takes room for
+about 200, and lets things fall through each other at more, or stops."""
+FULL = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
+"""Warnings of contacts that were left out."""
 
 
 @dataclass(frozen=True)
@@ -122,8 +128,22 @@ class Engine:
         self.data = mujoco.MjData(self.model)
 
     def step(self) -> None:
-        """Go one step ahead."""
-        mujoco.mj_step(self.model, self.data)
+        """Go one step ahead.
+
+        Raises:
+            UserError: More contacts than there is room for.
+
+        """
+        try:
+            mujoco.mj_step(self.model, self.data)
+            full = any(self.data.warning[kind].number for kind in FULL)
+        except mujoco.FatalError:
+            full = True
+        if full:
+            raise UserError(
+                f"Things touch in more places ({self.data.ncon}) than MuJoCo has room for. Take "
+                "fewer or simpler things, or another arrangement."
+            )
 
     def let_roll(self) -> None:
         """Resist nothing but sliding from now on."""
@@ -188,6 +208,7 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
     spec.option.iterations = 100
     spec.option.noslip_iterations = 4
     spec.option.tolerance = 1e-10
+    spec.memory = MEMORY
     surface = {"solref": SOLREF, "solimp": SOLIMP, "condim": 6}
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
