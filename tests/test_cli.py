@@ -194,6 +194,7 @@ def test_what_cannot_be_asked_is_not_remembered(typed, tmp_path, monkeypatch):
         ("describe", "box", "--annotations", "nowhere.yaml"),
         ("ground", "box", "--library", "nowhere.toml"),
         ("ground", "box", "--floor", "cheese"),
+        ("run", "box.glb", "--out", ".", "--semantic", "bert"),
     ]
     for words in wrong:
         refused(typed(*words))

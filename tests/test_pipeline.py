@@ -8,6 +8,7 @@ from corporeal.errors import UserError
 from corporeal.pipeline import Settings, reopen, run
 from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.fill import FillConfig
+from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.types import Inventory, ObjectWords
 from handmade import plain, scene
 
@@ -52,6 +53,14 @@ def test_recordings_that_a_run_writes_do_not_make_it_stale_and_those_it_reads_do
     (tmp_path / "two.json").write_text("{}")
     assert names(record=tmp_path) == written
     assert names(vlm=f"replay:{tmp_path}") != read
+
+
+def test_other_weights_in_a_folder_make_what_they_saw_stale(tmp_path):
+    (tmp_path / "model.safetensors").write_text("1")
+    config = ReconstructConfig(semantic=f"clip:{tmp_path}")
+    before = pipeline.files_read(config)
+    (tmp_path / "model.safetensors").write_text("2")
+    assert before and pipeline.files_read(config) != before
 
 
 def test_memory_is_counted_in_megabytes():

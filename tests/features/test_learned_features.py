@@ -204,7 +204,7 @@ def test_other_weights_have_another_name_and_so_other_files(tmp_path, dinov2):
 
 def test_a_folder_of_another_kind_or_without_weights_is_refused(clip, dinov2, tmp_path):
     with pytest.raises(BadFileError, match="holds a model of kind 'dinov2', not 'clip'"):
-        connect(f"clip:{dinov2}").map(photograph())
+        connect(f"clip:{dinov2}")
     bare = shutil.copytree(dinov2, tmp_path / "bare")
     (bare / "model.safetensors").unlink()
     with pytest.raises(UserError, match="cannot be loaded"):
@@ -217,7 +217,11 @@ def test_a_folder_of_another_kind_or_without_weights_is_refused(clip, dinov2, tm
     silent = shutil.copytree(dinov2, tmp_path / "silent")
     (silent / "preprocessor_config.json").unlink()
     with pytest.raises(UserError, match="there is no preprocessor_config"):
-        connect(f"dinov2:{silent}").map(photograph())
+        connect(f"dinov2:{silent}")
+    mute = shutil.copytree(clip, tmp_path / "mute")
+    (mute / "tokenizer.json").unlink()
+    with pytest.raises(UserError, match=r"there is no tokenizer\.json or vocab\.json"):
+        connect(f"clip:{mute}")
 
 
 def test_weights_that_do_not_fill_the_model_are_refused(dinov2, tmp_path):

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from corporeal import features
 from corporeal.materials.placement import entry_of
 from corporeal.pipeline import RUN, Settings, reopen
 from corporeal.stages import describe
@@ -25,6 +26,9 @@ def accept(folder: Path, settings: Settings) -> None:
         _answered(settings.describe)
     if known is None or known.ground != settings.ground:
         _listed(settings.ground)
+    if known is None or known.reconstruct != settings.reconstruct:
+        for spec in (settings.reconstruct.semantic, settings.reconstruct.structural):
+            features.connect(spec)
 
 
 def _answered(config: describe.DescribeConfig) -> None:

@@ -20,6 +20,8 @@ from corporeal.features.vectors import unit
 from corporeal.features.weights import PREPROCESSOR, find
 
 DEFAULT = "openai/clip-vit-large-patch14-336"
+TOKENIZER = ("tokenizer.json", "vocab.json")
+"""Files that words are cut into tokens by: one is enough."""
 TEMPLATES = (
     "a photo of a {}.",
     "itap of a {}.",
@@ -38,6 +40,7 @@ class Clip:
 
     def __init__(self, spec: str = "") -> None:
         self.weights = find("clip", spec, DEFAULT)
+        self.weights.holds(TOKENIZER)
 
     @cached_property
     def model(self) -> Any:
@@ -47,8 +50,7 @@ class Clip:
 
     @cached_property
     def _tokenizer(self) -> Any:
-        options: dict[str, Any] = {} if self.weights.local else {"revision": self.weights.revision}
-        return CLIPTokenizer.from_pretrained(self.weights.place, **options)
+        return self.weights.tokenizer(CLIPTokenizer)
 
     def name(self) -> str:
         """Name the kind of model, and which weights very exactly."""

@@ -1,5 +1,6 @@
 """Where weights are: in a folder, or on the Hugging Face hub and in its copy on this disk."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -49,14 +50,8 @@ class Weights:
             UserError: There is no such file, or it cannot be had.
 
         """
-        if self.local:
-            path = Path(self.place) / name
-            if not path.is_file():
-                raise BadFileError(
-                    self.place, f"there is no {name}.", "Save the model with save_pretrained."
-                )
-        else:
-            path = self._fetched(name, self.revision)
+        self.holds([name])
+        path = Path(self.place) / name if self.local else self._fetched(name, self.revision)
         return store.read_json(path)
 
     def check(self) -> None:
@@ -70,6 +65,18 @@ class Weights:
         if kind != self.kind:
             raise BadFileError(
                 self.place, f"holds a model of kind {kind!r}, not {self.kind!r}.", "Name another."
+            )
+
+    def holds(self, names: Sequence[str]) -> None:
+        """Refuse a folder that has none of some files; ``transformers`` would make something up.
+
+        Raises:
+            BadFileError: There is none of them.
+
+        """
+        if self.local and not any((Path(self.place) / name).is_file() for name in names):
+            raise BadFileError(
+                self.place, f"there is no {' or '.join(names)}.", "Save it with save_pretrained."
             )
 
     def load(self, cls: Any) -> Any:
@@ -93,6 +100,19 @@ class Weights:
                 "Fetch it again.",
             )
         return model.eval()
+
+    def tokenizer(self, cls: Any) -> Any:
+        """Load what cuts words into tokens, with the class that ``transformers`` has for it.
+
+        Raises:
+            UserError: It cannot be had, or is damaged.
+
+        """
+        options = {} if self.local else {"revision": self.revision}
+        try:
+            return cls.from_pretrained(self.place, **options)
+        except Exception as error:  # of the hub, the disk, JSON and the library
+            raise UserError(self._advice(error)) from error
 
     def _fetched(self, name: str, revision: str | None) -> Path:
         try:
@@ -121,12 +141,15 @@ def find(kind: str, spec: str, default: str) -> Weights:
         default: OWNER/NAME.
 
     Raises:
-        UserError: There is no such folder.
+        UserError: There is no such folder, or it holds something else.
 
     """
     spec = spec or default
     if Path(spec).expanduser().is_dir():
-        return Weights(kind, str(Path(spec).expanduser()))
+        here = Weights(kind, str(Path(spec).expanduser()))
+        here.check()
+        here.read(PREPROCESSOR)
+        return here
     place, _, wish = spec.partition("@")
     if place.count("/") != 1 or place[0] in "./~" or place.endswith("/"):
         raise UserError(
