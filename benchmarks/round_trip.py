@@ -5,8 +5,9 @@
 
 Each scene is one of the showcase's by name, or a file. It is run; it is photographed from 48 sides
 with masks; of these photographs a second run is made, which is told what the things are called,
-what they are made of and how they start to move, and nothing of their shapes. Masses, the number of
-objects and where they end are compared. Aims: the whole mass within 10 %, as many objects, ends
+what they are made of and how they start to move, and nothing of their shapes. It forgets which of
+them each pixel shows, which captured views say (--apart look). Masses, the number of objects and
+where they end are compared. Aims: the whole mass within 10 %, as many objects, ends
 within 5 % of the scene's size.
 """
 
@@ -121,7 +122,7 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
     names = tuple(scene.objects[k].name for k in order)
     again = replace(
         settings(detail),
-        reconstruct=ReconstructConfig(things=names, training=training),
+        reconstruct=ReconstructConfig(things=names, training=training, apart="look"),
         describe=DescribeConfig(annotations=as_told(mesh, folder / "told.yaml")),
     )
     start = as_begun(scene, folder)

@@ -2,6 +2,7 @@ import errno
 import os
 import threading
 import time
+from pathlib import Path
 from contextlib import ExitStack
 
 import numpy as np
@@ -106,6 +107,9 @@ def test_a_file_in_the_way_of_a_folder_is_one_clear_error(tmp_path):
     for folder in (tmp_path / "runs", tmp_path / "runs" / "scene"):
         with pytest.raises(store.DiskError, match="a file is in its way"), store.alone(folder):
             pass
+    nowhere = Path("/proc/nowhere")
+    with pytest.raises(store.DiskError, match="no folder can be made"), store.alone(nowhere):
+        pass
 
 
 def test_a_range_knows_what_it_contains():

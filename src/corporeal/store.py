@@ -101,9 +101,13 @@ def alone(folder: Path, patience: float = 0.0) -> Iterator[None]:
         UserError: Another process works in it.
 
     """
-    with writing(folder):
-        folder.mkdir(parents=True, exist_ok=True)
-        lock = (folder / LOCK).open("a+", encoding="utf-8")
+    try:
+        with writing(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            lock = (folder / LOCK).open("a+", encoding="utf-8")
+    except FileNotFoundError as error:
+        what = "no folder can be made there. Choose another one with --out"
+        raise DiskError(f"Cannot write {folder}: {what}.") from error
     with lock:
         if not _locked(lock, patience):
             lock.seek(0)
