@@ -85,6 +85,11 @@ def lift(weights: Weights, maps: Sequence[np.ndarray], count: int, least: float 
     return Lifted(mean, seen)
 
 
+def known(mean: Float32[np.ndarray, "N D"]) -> Lifted:
+    """Return features that came onto points otherwise; where they are 0 nobody knows them."""
+    return Lifted(mean, np.any(mean, axis=1).astype(np.int64))
+
+
 def _agreeing(share: csr_array, pixels: np.ndarray, mean: np.ndarray, view: int) -> csr_array:
     wanted = len(mean), pixels.shape[0] * pixels.shape[1]
     given = _size(share)

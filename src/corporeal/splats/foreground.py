@@ -31,7 +31,7 @@ WIDE = 0.5
 HALF = 0.5
 """Share of a pixel from which on it is a thing's."""
 NEAR = 3.0
-"""Distances between neighbours within which a Gaussian goes with a thing."""
+"""Distances between neighbours within which a Gaussian, or a place, goes with a thing."""
 
 
 @dataclass(frozen=True)
@@ -114,6 +114,17 @@ def covered(
     shares = [weights(gaussians, c, 1)[things].sum(axis=0) for c in cameras]
     pairs = zip(shares, cameras, strict=True)
     return np.stack([np.asarray(share).reshape(c.height, c.width) > HALF for share, c in pairs])
+
+
+def near(
+    gaussians: Gaussians, things: Int[np.ndarray, " M"], position: Float[np.ndarray, "N 3"]
+) -> Bool[np.ndarray, " N"]:
+    """Tell which places are at a Gaussian of things, within a few distances or widths of it."""
+    mean, widest = gaussians.mean[things], gaussians.scale[things].max(axis=1)
+    tree = KDTree(mean)
+    apart = float(np.median(np.asarray(tree.query(mean, k=2)[0])[:, 1]))
+    distance, nearest = map(np.asarray, tree.query(position))
+    return distance < NEAR * np.maximum(apart, widest[nearest])
 
 
 def with_company(

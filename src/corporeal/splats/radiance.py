@@ -179,11 +179,25 @@ class Points:
 
 
 def points(
-    field: Field, cameras: Sequence[Camera], most: int, seed: int = 0, threads: int | None = None
+    field: Field,
+    cameras: Sequence[Camera],
+    most: int,
+    seed: int = 0,
+    allowed: Callable[[np.ndarray], np.ndarray] | None = None,
+    threads: int | None = None,
 ) -> Points:
     """Return points on what is dense: where rays of the cameras lose half of their light.
 
-    One in each cube that rays of two views end in, their mean; no more than ``most`` of all.
+    One in each cube that rays of two views end in, their mean.
+
+    Args:
+        field: What was learned.
+        cameras: That it was learned from.
+        most: No more points than that, by chance.
+        seed: Of chance.
+        allowed: Tells places (N, 3) where things are from others. Where only few views see, nothing
+            tells them that it is empty, and something may float.
+        threads: None: one per processor.
 
     Raises:
         UserError: No view shows anything of the field.
@@ -203,6 +217,8 @@ def points(
         )
     ends = np.bincount(of)[kept, None]
     position = np.stack([np.bincount(of, x)[kept] for x in found.T], axis=1) / ends
+    if allowed is not None:
+        position = position[allowed(position)]
     if len(position) > most:
         chosen = np.random.default_rng(seed).choice(len(position), most, replace=False)
         position = position[np.sort(chosen)]

@@ -6,6 +6,7 @@ Gaussians themselves, for the film and for telling parts apart.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -16,7 +17,7 @@ from scipy.spatial import KDTree
 from corporeal.errors import UserError
 from corporeal.features import Reader, connect
 from corporeal.features.clouds import Placed, looked_at, projected
-from corporeal.features.lifting import Lifted, uplift
+from corporeal.features.lifting import Lifted, known, uplift
 from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
 from corporeal.formats.sources import called
@@ -34,7 +35,7 @@ from corporeal.render.look import linear
 from corporeal.render.portrait import COLOURS, colour_of_part
 from corporeal.splats.channel import distilled
 from corporeal.splats.crew import Crew
-from corporeal.splats.foreground import covered, foreground, with_company
+from corporeal.splats.foreground import covered, foreground, near, with_company
 from corporeal.splats.intake import Intake, Up, picture, take_in, turned_upright
 from corporeal.splats.radiance import FieldConfig, learn, points
 from corporeal.splats.raster import weights
@@ -53,7 +54,6 @@ from corporeal.types import (
 from corporeal.vlm.things import PERSON, Thing, Viewer, metres, usual
 
 Progress = Callable[[float, str], None]
-Maps = Sequence[np.ndarray]
 
 MOST_POINTS = 100_000
 """Points that are looked at; other Gaussians do as their neighbours."""
@@ -241,7 +241,7 @@ def _placed(
     shown = np.stack([np.asarray(share.sum(axis=1)).ravel()[things] for share in shares])
     cells = -(-cameras[0].height // CELL), -(-cameras[0].width // CELL)
 
-    def lift(maps: Maps) -> Lifted:
+    def lift(maps: Sequence[np.ndarray]) -> Lifted:
         return uplift(lambda v: shares[v][things], cells, maps, len(things))
 
     return Placed(position, colour, shown, lift, things)
@@ -259,12 +259,12 @@ def _of_field(
     masks = covered(taken.gaussians, taken.cameras, things) if taken.masks is None else taken.masks
     preset, kept = config.training, None if folder is None else folder / "radiance.npz"
     learned = learn(views, masks, FieldConfig(preset, seed=config.training_seed), kept, progress)
-    found = points(learned.field, taken.cameras, MOST_POINTS, config.training_seed)
+    at, seed = partial(near, taken.gaussians, things), config.training_seed
+    found = points(learned.field, taken.cameras, MOST_POINTS, seed, at)
     placed = projected(found.position, found.colour, taken.cameras, found.depth)
 
-    def lift(maps: Maps) -> Lifted:
-        mean = distilled(learned.field, taken.cameras, maps).at(found.position)
-        return Lifted(mean, np.any(mean, axis=1).astype(np.int64))
+    def lift(maps: Sequence[np.ndarray]) -> Lifted:
+        return known(distilled(learned.field, taken.cameras, maps).at(found.position))
 
     return replace(placed, lift=lift, statements=learned.statements)
 
