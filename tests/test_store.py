@@ -2,8 +2,8 @@ import errno
 import os
 import threading
 import time
-from pathlib import Path
 from contextlib import ExitStack
+from pathlib import Path
 
 import numpy as np
 import pytest

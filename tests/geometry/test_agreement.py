@@ -123,8 +123,8 @@ def shared_points(monkeypatch):
 
 WRONG = {
     "OpenGL's": (lambda W: W @ FLIP, "y and z axes were opposite .OpenGL's"),
-    "inverted": (np.linalg.inv, r"if the matrices were inverted .world-from-camera[^)]*\):"),
-    "both": (lambda W: np.linalg.inv(W @ FLIP), "inverted .* and the cameras' y and z axes"),
+    "inverted": (np.linalg.inv, "if the matrices were inverted .*, the cameras' axes OpenCV's:"),
+    "both": (lambda W: np.linalg.inv(W @ FLIP), "inverted .*, the cameras' axes OpenGL's:"),
     "negated": (lambda W: np.block([[W[:3, :3], -W[:3, 3:]], [W[3:]]]), "behind the cameras"),
 }
 

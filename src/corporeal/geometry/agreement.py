@@ -147,8 +147,8 @@ def _changes() -> list[tuple[str, Change]]:
     inverse = "the matrices were inverted (world-from-camera against camera-from-world)"
     changes: list[tuple[str, Change]] = [
         (opposite, posed(lambda W: W @ FLIP)),
-        (inverse, posed(np.linalg.inv)),
-        (f"{inverse} and {opposite}", posed(lambda W: np.linalg.inv(W) @ FLIP)),
+        (f"{inverse}, the cameras' axes OpenCV's", posed(np.linalg.inv)),
+        (f"{inverse}, the cameras' axes OpenGL's", posed(lambda W: np.linalg.inv(W) @ FLIP)),
     ]
     for factor in FACTORS:
         words = f"the focal lengths were {factor:.2g} times as long (pictures of another size?)"
