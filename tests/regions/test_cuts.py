@@ -57,6 +57,16 @@ def test_a_cut_that_has_a_rival_says_so():
     assert found.other / found.score > 5
 
 
+def test_many_chains_that_hang_by_next_to_nothing_are_cut_where_they_look_unlike():
+    weak = np.arange(1, 200) % 20 == 0
+    weight = np.where(weak, 1e-9, np.random.default_rng(0).uniform(0.5, 1.5, 199))
+    look = (np.arange(200) >= 120).astype(float)[:, None]
+    first = np.arange(199)
+    graph = Graph(first, first + 1, weight, np.ones(199), np.ones(200), look)
+    side = cut(graph, 0.003).side
+    assert (side == (look[:, 0] == side[-1])).all()
+
+
 def test_what_is_in_pieces_falls_into_them():
     graph, owner = clique([8, 5], [])
     assert halves(cut(graph, 0.003).side, owner) == {(0,), (1,)}

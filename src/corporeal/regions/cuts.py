@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.sparse import csr_array, diags_array
+from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
 from corporeal.regions.families import Family, Graph, Sweep, Tree
@@ -25,6 +25,8 @@ ANOTHER = 0.7
 """Cuts that overlap less, in the mean of both sides, are quite another."""
 LEAST = 1e-3
 """Variance of looks that is told from less: what looks all the same is not told apart by noise."""
+ABOVE = 2 + 1e-6
+"""A little more than the largest eigenvalue."""
 FEW = 60
 """Nodes of a graph for which all eigenvectors are found at once."""
 
@@ -67,7 +69,9 @@ def _fields(graph: Graph) -> np.ndarray:
         vectors = np.linalg.eigh(scaled.toarray())[1][:, ::-1][:, : VECTORS + 1]
     else:
         start = np.random.default_rng(0).uniform(0.5, 1.0, count)
-        values, vectors = eigsh(scaled, k=VECTORS + 1, which="LA", v0=start)
+        # Inverted about a place above all eigenvalues, which are 2 at most: those of pieces that
+        # hang by next to nothing are nearly the same, and are not found otherwise.
+        values, vectors = eigsh(csc_array(scaled), k=VECTORS + 1, sigma=ABOVE, v0=start)
         vectors = vectors[:, np.argsort(-values)]
     return (vectors[:, 1:] * root[:, None]).T
 
