@@ -1,26 +1,41 @@
-"""How long features take onto points, and how much memory: seconds, share of the time, peak.
+"""How long features take onto points, and how much memory: seconds and peak.
 
     python benchmarks/features.py [points] [channels] [views]
+    python benchmarks/features.py --fields SCENE ... [--preset draft | normal]
 
 Maps are random and points lie on a sphere: what is timed does not depend on what they show.
+
+With ``--fields`` radiance fields are learned from the posed pictures and masks of scenes that
+``corporeal assemble`` wrote, every eighth view held out. The pictures' own depth says how far from
+the surface the points are, and maps of which object each pixel shows, how many of them have the
+right features. Seconds are the processor's, divided by two: what it takes on two cores.
 """
 
+import argparse
 import resource
-import sys
 import time
 from collections.abc import Callable
+from pathlib import Path
 from typing import Any
 
 import numpy as np
+from scipy.spatial import KDTree
 
 from corporeal.features.descriptor import descriptor, seen_from
 from corporeal.features.lifting import back_projection, fill, uplift, visible
+from corporeal.formats.transforms import read_views
 from corporeal.geometry.shape import sphere_directions
-from corporeal.types import Camera
+from corporeal.machine import cores
+from corporeal.splats.channel import distilled
+from corporeal.splats.radiance import FieldConfig, learn, points
+from corporeal.types import Camera, Views
 
 SIDE, FOCAL, AWAY = 256, 300.0, 3.0
 GRID = 37
 """Patches along a picture's side, as DINOv2 has at 518 pixels."""
+CORES = 2
+PATCH = 8
+"""Pixels along a patch of maps of objects."""
 
 
 def around(count: int) -> list[Camera]:
@@ -54,9 +69,22 @@ def timed(what: str, work: Callable[[], Any]) -> Any:
 
 
 def main() -> None:
-    """Time every way that features come onto points."""
-    words = [int(word) for word in sys.argv[1:]]
-    points, channels, views = [*words, *(100_000, 768, 48)[len(words) :]]
+    """Time every way that features come onto points, or learn fields."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("sizes", nargs="*", type=int, help="points, channels, views")
+    parser.add_argument("--fields", nargs="+", type=Path, default=[], metavar="SCENE")
+    parser.add_argument("--preset", choices=["draft", "normal"], default="draft")
+    asked = parser.parse_args()
+    if asked.fields:
+        fields(asked.fields, asked.preset)
+    else:
+        lifted_onto_a_ball(*[*asked.sizes, *(100_000, 768, 48)[len(asked.sizes) :]])
+
+
+def lifted_onto_a_ball(points: int, channels: int, views: int) -> None:
+    """Time uplift and back-projection, and the descriptor."""
     rng = np.random.default_rng(0)
     position = sphere_directions(points)
     cameras = around(views)
@@ -73,6 +101,65 @@ def main() -> None:
     towards = seen_from(position, cameras, shown)
     colour = rng.random((points, 3))
     timed("descriptor", lambda: descriptor(position, colour, towards))
+
+
+def fields(scenes: list[Path], preset: str) -> None:
+    """Learn a field of each scene; print one row each."""
+    heads = "scene", "nodes", "whole [dB]", "things [dB]", "two cores [s]", "points"
+    heads = *heads, "off, median [px]", "off, 90 % [px]", "right", "768 channels [s]", "peak [GB]"
+    print(f"| {' | '.join(heads)} |")
+    print(f"|---|{'---:|' * (len(heads) - 1)}")
+    for scene in scenes:
+        print(f"| {' | '.join(_row(scene, preset))} |", flush=True)
+
+
+def _row(scene: Path, preset: str) -> list[str]:
+    seen = read_views(scene / "views")
+    which, depth = seen.object_of_pixel, seen.depth
+    if which is None or depth is None:
+        raise SystemExit(f"{scene}: its views do not say where things are, and how far away.")
+    config, start = FieldConfig(preset, threads=min(CORES, cores())), time.process_time()
+    made = learn(Views(seen.rgb, seen.cameras), which >= 0, config)
+    spent = time.process_time() - start
+    found = points(made.field, seen.cameras, 100_000)
+    both = (which >= 0) & np.isfinite(found.depth)
+    pixels = np.abs(found.depth[both] / depth[both] - 1) * seen.cameras[0].K[0, 0]
+    truth = _owners(seen, found.position)
+    labels = int(which.max()) + 2
+    maps = [_shares(picture, labels) for picture in which]
+    told = distilled(made.field, seen.cameras, maps).at(found.position)
+    right = np.mean(told[:, 1:].argmax(axis=1) == truth)
+    rng, start = np.random.default_rng(0), time.process_time()
+    one = rng.normal(size=(GRID, GRID, 768)).astype(np.float16)
+    distilled(made.field, seen.cameras, [one] * len(seen.cameras)).at(found.position)
+    wide = time.process_time() - start
+    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+    good = made.quality
+    assert good is not None and good.psnr_things is not None
+    numbers = f"{good.psnr:.1f} {good.psnr_things:.1f} {spent / CORES:.0f} {len(told)}"
+    off = np.quantile(pixels, (0.5, 0.9))
+    rest = f"{off[0]:.1f} {off[1]:.1f} {right:.4f} {wide / CORES:.0f} {peak:.1f}"
+    return [scene.name, str(len(made.field.values)), *numbers.split(), *rest.split()]
+
+
+def _owners(seen: Views, position: np.ndarray) -> np.ndarray:
+    """Return which object pictures show nearest to each point."""
+    assert seen.depth is not None and seen.object_of_pixel is not None
+    places, owners = [], []
+    for camera, depth, which in zip(seen.cameras, seen.depth, seen.object_of_pixel, strict=True):
+        v, u = np.nonzero(which >= 0)
+        flat = np.stack([u + 0.5, v + 0.5, np.ones(len(u))]) * depth[v, u]
+        pose = camera.world_from_camera
+        places.append((pose[:3, :3] @ np.linalg.solve(camera.K, flat)).T + pose[:3, 3])
+        owners.append(which[v, u])
+    return np.concatenate(owners)[KDTree(np.concatenate(places)).query(position)[1]]
+
+
+def _shares(which: np.ndarray, labels: int) -> np.ndarray:
+    """Return a map of how much of each patch is of nothing, and of each object."""
+    high, wide = (n // PATCH for n in which.shape)
+    hot = np.eye(labels, dtype=np.float32)[which[: high * PATCH, : wide * PATCH] + 1]
+    return hot.reshape(high, PATCH, wide, PATCH, labels).mean(axis=(1, 3)).astype(np.float16)
 
 
 def _weights(rng: np.random.Generator, points: int, views: int) -> list[Any]:

@@ -169,7 +169,7 @@ def learned(small):
     return views, masks, learn(views, masks, FieldConfig("draft", steps=60))
 
 
-def test_points_of_a_learned_field_lie_on_the_surface(learned):
+def test_points_of_a_learned_field_lie_on_the_surface(learned, monkeypatch):
     views, _, made = learned
     assert made.quality.psnr > 22
     found = points(made.field, views.cameras, 10_000)
@@ -180,6 +180,17 @@ def test_points_of_a_learned_field_lie_on_the_surface(learned):
     assert np.median(np.abs(found.colour - expected)) < 0.08
     few = points(made.field, views.cameras, 100)
     assert len(few.position) == 100
+    upper = points(made.field, views.cameras, 10_000, allowed=lambda at: at[:, 2] > 0)
+    assert 500 < len(upper.position) < len(found.position)
+    assert (upper.position[:, 2] > 0).all()
+    with pytest.raises(UserError, match="what one picture shows, no other does"):
+        points(made.field, views.cameras, 10, allowed=lambda at: at[:, 2] > 9)
+    with pytest.raises(UserError, match="what one picture shows, no other does"):
+        points(field(np.zeros(3), 0.1, np.ones((4, 4, 4), bool)), views.cameras, 10)
+    monkeypatch.setattr(radiance, "PIXELS", found.depth.size // 5)
+    every_third = points(made.field, views.cameras, 10_000).position
+    off = np.abs(np.linalg.norm(every_third, axis=1) - 0.3) / made.field.grid.cell
+    assert 100 < len(every_third) < len(found.position) and np.quantile(off, 0.95) < 2
     assert "nodes" in made.statements[0] and "dB on things" in made.statements[1]
 
 
