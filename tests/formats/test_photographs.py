@@ -440,6 +440,15 @@ def test_blurred_dark_and_grey_pictures_are_fine(tmp_path):
     assert (read_photographs(tmp_path).views.rgb[0] == 3).all()
 
 
+def test_grey_pictures_among_coloured_ones_are_told(tmp_path):
+    _, pictures = forty(tmp_path)
+    assert not read_photographs(tmp_path).warnings, "all are grey"
+    for path in pictures[3:]:
+        Image.fromarray(np.full((12, 16, 3), (200, 20, 30), np.uint8)).save(path)
+    told = read_photographs(tmp_path).warnings
+    assert told == ("3 of 40 pictures are grey: colours will be paler.",)
+
+
 def test_a_single_view_is_too_few(tmp_path):
     said(tmp_path, count=1)
     with pytest.raises(

@@ -30,6 +30,8 @@ NAMED = 5
 """So many bad pictures are named."""
 PROPORTION = 0.01
 """Pictures may differ that much in proportion from what the camera was said to take."""
+GREY = 2
+"""Largest difference between channels of a picture without colours."""
 SHOWN = 128
 """Of 255: a mask that nowhere has as much shows nothing."""
 ORIENTATION = 0x0112
@@ -326,6 +328,9 @@ def _changes(
     bent = sum(p.straightened for p in prints)
     if bent:
         changes.append(f"{bent} pictures were straightened: their lenses bend straight lines.")
+    grey = sum(int(np.ptp(p.rgba[..., :3], axis=-1).max()) <= GREY for p in prints)
+    if 0 < grey < len(prints):
+        changes.append(f"{grey} of {len(prints)} pictures are grey: colours will be paler.")
     asking = sum(p.asks for p in prints)
     if asking:
         changes.append(
