@@ -114,7 +114,9 @@ def judged(folder: Path, preset: str | None, out: Path) -> list[str]:
     gaussians = learned(folder, views, preset, out) if preset else clad(models)
     away = [m.closest(gaussians.mean.astype(np.float64))[0] for m in models]
     start = time.process_time()
-    made = solids(gaussians, np.argmin(away, axis=0), views.cameras, threads=CORES)
+    assert views.object_of_pixel is not None
+    masks, owner = views.object_of_pixel >= 0, np.argmin(away, axis=0)
+    made = solids(gaussians, owner, views.cameras, masks, threads=CORES)
     spent = (time.process_time() - start) / CORES
     rows, name = [], folder.name if preset else f"{folder.name}, clad"
     for k, (solid, model) in enumerate(zip(made, models, strict=True)):
@@ -160,7 +162,7 @@ HEAD = (
     "A splat is a cloud of soft ellipsoids, without inside or outside. To weigh, fill and simulate "
     "a thing, `corporeal.splats.solid` makes one closed surface of each:",
     "",
-    "    solids(gaussians, object_of_gaussian, cameras) -> tuple[Solid, ...]",
+    "    solids(gaussians, object_of_gaussian, cameras, masks) -> tuple[Solid, ...]",
     "",
     "1. **Look.** Every camera that pictures were taken with looks at the Gaussians again. A "
     "ray meets the first surface where 15 % of its light is lost, one standard deviation before "
@@ -179,9 +181,14 @@ HEAD = (
     "inside belongs to one thing. Floor and background (label -1) are no things, but hide what is "
     "behind them and keep what is theirs.",
     "5. **Surface.** Marching cubes; separate crumbs below 2 % are dropped, more than one piece is "
-    "said in a warning; smoothing without shrinking (Taubin). Vertices get the colour that the "
-    "cameras see there. Winding numbers of the surface are compared with the cells it was made of; "
-    "where more than 1 % disagree a warning says so.",
+    "said in a warning; smoothing without shrinking (Taubin).",
+    "6. **Fit.** Depths are off by a pixel or two where a thing is plain or shiny, mostly all to "
+    "one side; masks are not. Where there are masks, the surface is moved until its outlines are "
+    "theirs, and what lies between goes along. A patch that no view sees goes on with the least "
+    "bending where the surface about it nearly faces as it does, as below a ball; elsewhere it "
+    "stays as it was filled in. Vertices get the colour that the cameras see there. Winding "
+    "numbers of the surface are compared with the cells it was made of; where more than 1 % "
+    "disagree a warning says so.",
     "",
     "## How near to the truth",
     "",

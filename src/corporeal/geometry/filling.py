@@ -105,7 +105,7 @@ def fill_wall(face: Mesh, spacing: float, thickness: float, rng: np.random.Gener
     layers = max(1, round(thickness / spacing))
     depths = (np.arange(layers) + 0.5) * thickness / layers if thickness >= spacing else [0.0]
     shape, area = Shape(face), float(face.areas.sum())
-    smooth = _vertex_normals(face)
+    smooth = face.vertex_normals
     found = []
     for depth in depths:
         count = int(np.clip(10 * area / spacing**2, 50, 2_000_000))
@@ -123,13 +123,6 @@ def fill_wall(face: Mesh, spacing: float, thickness: float, rng: np.random.Gener
     return Filling(
         points, np.full(len(points), area * (thickness or spacing) / max(len(points), 1))
     )
-
-
-def _vertex_normals(mesh: Mesh) -> np.ndarray:
-    total = np.zeros_like(mesh.vertices)
-    for k in range(3):
-        np.add.at(total, mesh.triangles[:, k], mesh.area_vectors)
-    return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
 
 
 def match_moments(

@@ -38,6 +38,14 @@ class Mesh:
         return vectors / np.linalg.norm(vectors, axis=1, keepdims=True)
 
     @property
+    def vertex_normals(self) -> Float[np.ndarray, "V 3"]:
+        """Unit normals of vertices: means of the triangles around, by area."""
+        total = np.zeros_like(self.vertices)
+        for corner in range(3):
+            np.add.at(total, self.triangles[:, corner], self.area_vectors)
+        return total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
+
+    @property
     def extent(self) -> float:
         """Diagonal of the axis-aligned box [m]; 0 when there are no triangles."""
         if not len(self.triangles):

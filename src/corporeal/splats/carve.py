@@ -12,6 +12,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Float32
+from scipy.ndimage import binary_dilation
 
 from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_carve import carve, relax
@@ -26,6 +27,8 @@ WITNESSES = 0.04
 """Share of all views that must see a cell, and at least one."""
 PLATE = 1.5
 """How thick what lies flat on the floor is at least [cells]."""
+EDGE = 1.0
+"""Rays through pixels next to those that show a thing miss it by so little [px]."""
 ROUNDS = 100
 """Of filling in what nobody sees."""
 
@@ -89,7 +92,10 @@ def carved(grid: Grid, sight: Sight, floor: float, crew: Crew) -> Float32[np.nda
 
 
 def _on(sight: Sight, top: float, floor: float) -> Float32[np.ndarray, "V H W"]:
-    """Return depths with what things show below the floor lifted to a plate's upper side [m]."""
+    """Return depths with what things show below the floor lifted to a plate's upper side [m].
+
+    Where nothing is seen: minus the distance to what is [px], as far as that is near.
+    """
     lifted = sight.depth.copy()
     height, width = lifted.shape[1:]
     u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
@@ -101,4 +107,7 @@ def _on(sight: Sight, top: float, floor: float) -> Float32[np.ndarray, "V H W"]:
         with np.errstate(invalid="ignore"):
             below = (met >= 0) & (up < 0) & (eye + depth * up < floor)
         depth[below] = ((top - eye) / up[below]).astype(np.float32)
+        nothing = np.isinf(depth)
+        edge = nothing & binary_dilation(~nothing)
+        depth[nothing], depth[edge] = -np.inf, -EDGE
     return lifted

@@ -20,7 +20,9 @@ OVERTAKEN = 1.6
 
 @numba.njit(**JIT)
 def meet(tiles, first, ids, ellipses, slopes, depth, met):
-    """Find where the ray of each pixel has lost some of its light; ids -1 and inf where never.
+    """Find where the ray of each pixel has lost some of its light, and to whom half of it goes.
+
+    depth (H, W) stays inf and met (H, W) stays -1 where half of the light gets through.
 
     slopes (N, 4): how the depth of a Gaussian's densest point along a ray changes with the pixel,
     along u and v [m/px], by how much at most, and how far before it the Gaussian begins [m].
@@ -60,11 +62,12 @@ def meet(tiles, first, ids, ellipses, slopes, depth, met):
                         off = s_[0] * dx + s_[1] * dy
                         off = min(max(off, -s_[2]), s_[2])
                         depth[y0 + y, x0 + x] = e[Z] + off - s_[3]
+                    if T[y, x] <= HALF:
                         met[y0 + y, x0 + x] = i
         for y in range(min(TILE, height - y0)):
             for x in range(min(TILE, width - x0)):
                 if T[y, x] > HALF:
-                    depth[y0 + y, x0 + x], met[y0 + y, x0 + x] = np.inf, -1
+                    depth[y0 + y, x0 + x] = np.inf
 
 
 @numba.njit(**JIT)
@@ -72,9 +75,9 @@ def carve(first, last, grid, cameras, depths, rule, out):
     """Fill out[first:last] of a grid (X, Y, Z): signed distance to what is seen [m], + outside.
 
     grid: low corner's middle (3) and cell (1) [m]; cameras (V, 18): ``Sight.rows``;
-    depths (V, H, W), inf where there is nothing. rule: reach of distances [m], share
-    of the views that see a cell which may take it for emptier than the others do, and how
-    many must. A cell that too few see is nan.
+    depths (V, H, W) [m], where there is nothing minus the pixels to where there is. rule: reach of
+    distances [m], share of the views that see a cell which may take it for emptier than the
+    others do, and how many must. A cell that too few see is nan.
     """
     views = len(depths)
     _, ny, nz = out.shape
@@ -95,7 +98,8 @@ def carve(first, last, grid, cameras, depths, rule, out):
                     u, w = pixel(c, right, down, ahead)
                     if not (0 <= u < c[16] and 0 <= w < c[17]):
                         continue
-                    off = depths[v, int(w), int(u)] - ahead
+                    depth = depths[v, int(w), int(u)]
+                    off = depth - ahead if depth > 0 else -depth * ahead / c[12]
                     if off < -reach:
                         continue
                     found[n] = min(off, reach)

@@ -27,7 +27,7 @@ class Sight:
     depth: Float32[np.ndarray, "V H W"]
     """Along the camera's z, to where the first surface begins [m]; inf where there is nothing."""
     met: Int[np.ndarray, "V H W"]
-    """Which Gaussian it is of; -1: none."""
+    """Which Gaussian takes the middle of the light; -1: none."""
     rows: Float[np.ndarray, "V 18"]
     """Cameras as kernels read them: camera from world (3 × 4), fx, fy, cx, cy, width, height."""
 

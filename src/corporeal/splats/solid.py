@@ -5,12 +5,11 @@ and where things touch every place inside belongs to the nearer one's Gaussians.
 (Lewiner et al. 2003) make a surface of what is left.
 """
 
-from collections.abc import Callable
 from dataclasses import dataclass, field
 
 import numpy as np
-from jaxtyping import Float, Int
-from scipy.sparse import csr_array
+from jaxtyping import Bool, Float, Int
+from scipy.ndimage import distance_transform_edt
 from scipy.spatial import KDTree
 from skimage import measure
 
@@ -20,11 +19,11 @@ from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.shape import Shape
 from corporeal.splats.carve import Grid, carved, gridded
 from corporeal.splats.crew import Crew
+from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
+from corporeal.splats.outline import fitted, outlined
 from corporeal.splats.sight import Sight, looked
 from corporeal.types import Camera, Gaussians
-
-Progress = Callable[[float, str], None]
 
 CELLS = 1_000_000
 """Of the grid about each thing, about."""
@@ -38,10 +37,14 @@ CRUMB = 0.02
 """A separate piece with less of the volume is no piece of the thing."""
 AWAY = 0.02
 """Vertices stay so many cells away from the middles of cells, so that no triangle is degenerate."""
-PASSES, PULLS = 8, (0.5, -0.53)
-"""How often the surface is smoothed, and how far vertices go to their neighbours' mean and back."""
+PASSES = 8
+"""How often the surface is smoothed."""
+SEEN = 1e-3
+"""Weight of views from which on a vertex is seen."""
 CHECKED = 4000
 """Places at which the winding number is compared."""
+MOVED = 2.0
+"""Cells by which a surface may be moved after carving."""
 ASTRAY = 0.01
 """Share of them that may differ."""
 
@@ -72,9 +75,9 @@ def solids(
     gaussians: Gaussians,
     object_of_gaussian: Int[np.ndarray, " N"],
     cameras: tuple[Camera, ...],
+    masks: Bool[np.ndarray, "V H W"] | None = None,
     floor: float = 0.0,
     threads: int | None = None,
-    progress: Progress = lambda fraction, words: None,
 ) -> tuple[Solid, ...]:
     """Make a solid of each object, 0 to the largest label.
 
@@ -83,9 +86,10 @@ def solids(
         object_of_gaussian: -1: floor or background, which hides things but is none.
         cameras: From where the Gaussians were learned, or are looked at: only what these see is
             known.
+        masks: Pixels of the cameras' pictures that show things, where somebody knows: outlines
+            are made to fit them. What Gaussians cover is too coarse for that.
         floor: Height that nothing is below [m].
         threads: None: one per core that this process may use.
-        progress: Told the fraction done and what is going on.
 
     Raises:
         UserError: An object has no Gaussians, or no camera sees any of it.
@@ -98,13 +102,12 @@ def solids(
     if len(lacking):
         raise UserError(f"No Gaussian belongs to object {lacking[0]}.")
     with Crew(threads) as crew:
-        progress(0.0, "looking at the Gaussians")
         sight = looked(gaussians, cameras, crew)
         sight.met[object_of_gaussian[sight.met] < 0] = -1
-        scene = _Scene(gaussians, object_of_gaussian, sight, floor)
+        shown = None if masks is None else _shown(sight, object_of_gaussian, masks)
+        scene = _Scene(gaussians, object_of_gaussian, sight, shown, floor)
         survey, made = _surveyed(scene, count, crew), []
         for k in range(count):
-            progress((k + 0.5) / (count + 0.5), f"carving object {k + 1} of {count}")
             made.append(_solid(scene, k, survey, crew))
     return tuple(made)
 
@@ -114,11 +117,31 @@ class _Scene:
     gaussians: Gaussians
     object_of_gaussian: Int[np.ndarray, " N"]
     sight: Sight
+    shown: Int[np.ndarray, "V H W"] | None
+    """Whose each pixel is; -1: no thing's; None: no masks say it."""
     floor: float
 
     def owner(self, places: Float[np.ndarray, "M 3"]) -> Int[np.ndarray, " M"]:
         """Whose the nearest Gaussian is."""
         return self.object_of_gaussian[KDTree(self.gaussians.mean).query(places)[1]]
+
+
+def _shown(
+    sight: Sight, object_of_gaussian: np.ndarray, masks: Bool[np.ndarray, "V H W"]
+) -> Int[np.ndarray, "V H W"]:
+    """Return whose each pixel is, and see no thing where masks have none.
+
+    What only a mask gives to things goes with what is next to it.
+    """
+    spilt = (sight.met >= 0) & ~masks
+    sight.depth[spilt], sight.met[spilt] = np.inf, -1
+    shown = np.where(sight.met >= 0, object_of_gaussian[sight.met], -1)
+    for own, mask in zip(shown, masks, strict=True):
+        if (own >= 0).any():
+            nearest = distance_transform_edt(own < 0, return_distances=False, return_indices=True)
+            y, x = np.asarray(nearest)
+            own[:] = np.where(mask, own[y, x], -1)
+    return shown
 
 
 @dataclass(frozen=True)
@@ -162,18 +185,20 @@ def _missing(k: int) -> UserError:
 def _solid(scene: _Scene, k: int, survey: _Survey, crew: Crew) -> Solid:
     grid = survey.grids[k]
     distance = carved(grid, scene.sight, scene.floor, crew)
-    _share(distance, grid, scene, k, survey)
+    cut = _share(distance, grid, scene, k, survey)
     warnings = _cleaned(distance)
     if not (distance < 0).any():
         raise _missing(k)
-    mesh = _smoothed(_surface(distance, grid), scene.floor)
+    mesh = _surface(distance, grid)
+    contact = cut[*(np.round((mesh.vertices - grid.low) / grid.cell).astype(int).T)]
+    mesh = _fitted(mesh, scene, k, contact, grid.cell, crew)
     mine = np.flatnonzero(scene.object_of_gaussian == k)
     _, nearest = KDTree(scene.gaussians.mean[mine]).query(mesh.vertices)
     gaussian = mine[np.asarray(nearest)]
     return Solid(
         vertices=mesh.vertices,
         triangles=mesh.triangles,
-        colours=_coloured(mesh, scene, gaussian, grid.cell, crew),
+        colours=_coloured(mesh, scene, gaussian, _painted(mesh, scene.sight, grid.cell, crew)),
         gaussian_of_vertex=gaussian,
         cell=grid.cell,
         warnings=(*warnings, *_checked(mesh, distance, grid)),
@@ -192,29 +217,10 @@ def _surface(distance: Float[np.ndarray, "X Y Z"], grid: Grid) -> Mesh:
     return Mesh(vertices, triangles.astype(np.int64))
 
 
-def _smoothed(mesh: Mesh, floor: float) -> Mesh:
-    """Take the noise of single views off a surface without shrinking it (Taubin 1995).
-
-    What lies on the floor stays on it.
-    """
-    count, f = len(mesh.vertices), mesh.triangles
-    ends = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]]).T
-    edges = csr_array((np.ones(ends.shape[1]), (ends[0], ends[1])), shape=(count, count))
-    mean = edges.multiply(1 / edges.sum(axis=1)[:, None]).tocsr()
-    v = mesh.vertices.copy()
-    low = v[:, 2] < floor + 1e-9
-    for _ in range(PASSES):
-        for step in PULLS:
-            v += step * (mean @ v - v)
-            v[low, 2] = floor
-    v[:, 2] = np.maximum(v[:, 2], floor)
-    return Mesh(v, f)
-
-
 def _share(
     distance: Float[np.ndarray, "X Y Z"], grid: Grid, scene: _Scene, k: int, survey: _Survey
-) -> None:
-    """Leave to others what is theirs.
+) -> Bool[np.ndarray, "X Y Z"]:
+    """Leave to others what is theirs, and return where that is.
 
     Near Gaussians a place belongs to the nearer ones. Deep inside, below the rim of a contact, all
     are as near; there it belongs to whose share of the common surface encloses it more (generalised
@@ -222,8 +228,9 @@ def _share(
     """
     mean, others = scene.gaussians.mean, scene.object_of_gaussian != k
     low, high = np.array(grid.low), np.array(grid.low) + grid.cell * np.array(grid.shape)
+    cut = np.zeros(distance.shape, bool)
     if not np.all((mean[others] > low) & (mean[others] < high), axis=1).any():
-        return
+        return cut
     asked = distance < 2 * grid.cell
     places = grid.points(asked)
     own, other = (_apart(mean[who], places) for who in (~others, others))
@@ -232,7 +239,9 @@ def _share(
     patches = (Shape(survey.mesh.only(who)) for who in (survey.owner == k, survey.owner != k))
     inner, outer = (patch.winding(places[deep]) for patch in patches)
     excess[deep] = grid.cell * (outer - inner)
+    cut[asked] = distance[asked] < excess
     distance[asked] = np.maximum(distance[asked], excess)
+    return cut
 
 
 def _apart(mean: Float[np.ndarray, "N 3"], places: Float[np.ndarray, "M 3"]) -> np.ndarray:
@@ -253,21 +262,35 @@ def _cleaned(distance: Float[np.ndarray, "X Y Z"]) -> tuple[str, ...]:
     return (f"It was reconstructed in {left} separate pieces.",) if left > 1 else ()
 
 
+def _fitted(
+    mesh: Mesh, scene: _Scene, k: int, contact: Bool[np.ndarray, " V"], cell: float, crew: Crew
+) -> Mesh:
+    """Take noise off a surface, give it the outlines that masks show, and close it where unseen."""
+    sight, mean = scene.sight, means(mesh)
+    mesh = smoothed(mesh, scene.floor, PASSES, mean)
+    seen = _painted(mesh, sight, cell, crew)[:, 3] > SEEN
+    if scene.shown is not None:
+        lines = outlined(scene.shown == k, sight, cell, crew)
+        mesh = fitted(mesh, lines, seen, contact, scene.floor, crew)
+    lies = mesh.vertices[:, 2] < scene.floor + ON
+    return continued(mesh, ~(seen | lies | contact), scene.floor, mean)
+
+
+def _painted(mesh: Mesh, sight: Sight, cell: float, crew: Crew) -> Float[np.ndarray, "V 4"]:
+    """Return the sum of what cameras see of each vertex: red, green, blue, and its weight."""
+    out = np.empty((len(mesh.vertices), 4))
+    rest = mesh.vertices, mesh.vertex_normals, sight.rows, sight.depth, sight.rgb, 2 * cell, out
+    crew.each(paint, [(*span, *rest) for span in crew.spans(len(out))])
+    return out
+
+
 def _coloured(
-    mesh: Mesh, scene: _Scene, gaussian: np.ndarray, cell: float, crew: Crew
+    mesh: Mesh, scene: _Scene, gaussian: np.ndarray, painted: Float[np.ndarray, "V 4"]
 ) -> Float[np.ndarray, "V 3"]:
     """Return what the cameras see of each vertex; where none does, its neighbour's colour."""
-    total = np.zeros_like(mesh.vertices)
-    for corner in range(3):
-        np.add.at(total, mesh.triangles[:, corner], mesh.area_vectors)
-    normals = total / np.maximum(np.linalg.norm(total, axis=1, keepdims=True), 1e-300)
-    out = np.empty((len(normals), 4))
-    sight = scene.sight
-    rest = mesh.vertices, normals, sight.rows, sight.depth, sight.rgb, 2 * cell, out
-    crew.each(paint, [(*span, *rest) for span in crew.spans(len(out))])
-    seen = out[:, 3] > 1e-3
+    seen = painted[:, 3] > SEEN
     colour = np.clip(0.5 + DC * scene.gaussians.sh[gaussian, 0].astype(np.float64), 0, 1)
-    colour[seen] = out[seen, :3] / out[seen, 3:]
+    colour[seen] = painted[seen, :3] / painted[seen, 3:]
     if seen.any():
         _, near = KDTree(mesh.vertices[seen]).query(mesh.vertices[~seen])
         colour[~seen] = colour[seen][near]
@@ -279,6 +302,7 @@ def _checked(mesh: Mesh, distance: Float[np.ndarray, "X Y Z"], grid: Grid) -> tu
     step = max(1, round(np.cbrt(distance.size / CHECKED)))
     some = np.zeros(distance.shape, bool)
     some[::step, ::step, ::step] = True
+    some &= np.abs(distance) > MOVED * grid.cell  # nearer, the surface was smoothed and fitted
     inside = Shape(mesh).winding(grid.points(some)) > 0.5
     astray = np.mean(inside != (distance[some] < 0))
     if astray <= ASTRAY:
