@@ -261,6 +261,8 @@ class Reconstruction:
     """Of the objects' surfaces: low and high corners [m]."""
     metres_per_unit: float
     """What one unit of the file was taken to be [m]."""
+    world_from_file: Float[np.ndarray, "4 4"]
+    """Takes places in the file's frame and unit to the scene's [m]."""
     statements: tuple[str, ...] = ()
     """How it was made and how sure that is, in sentences, for the report."""
     warnings: tuple[str, ...] = ()

@@ -7,7 +7,7 @@ import pytest
 
 from corporeal.geometry.rotation import matrix
 from corporeal.geometry.similarity import moved_cameras, moved_points, similarity
-from corporeal.geometry.upright import turned_up, upright
+from corporeal.geometry.upright import Stated, turned_up, upright
 from corporeal.types import Camera
 
 
@@ -189,12 +189,15 @@ def test_astray_points_do_not_change_how_things_rest(rng):
 def test_what_somebody_states_goes_before_cameras_and_file(rng):
     points, box = room(rng)
     cameras = cameras_at(ring())
-    found = upright(cameras, box, z_up=True, things=box, stated=(0.0, -2.0, 0.0))
+    found = upright(cameras, box, z_up=True, things=box, stated=Stated((0.0, -2.0, 0.0)))
     np.testing.assert_allclose(found.world_from_file[2, :3], [0, -1, 0], atol=1e-12)
     assert (found.found_by, found.confidence) == ("person", 1.0)
     made = similarity(matrix(np.array([1, 0.03, -0.05, 0.02])))
-    found = upright((), moved_points(points, made), stated=(0, 0, 1))
+    found = upright((), moved_points(points, made), stated=Stated((0, 0, 1)))
     assert off(found, made)[0] < 0.5
+    found = upright(cameras, box, z_up=True, things=box, stated=Stated(floor=-0.3))
+    assert found.world_from_file[2, 3] == pytest.approx(0.3)
+    assert (found.floor_by, found.warnings) == ("person", ())
 
 
 def test_any_direction_can_be_turned_up(rng):

@@ -16,6 +16,7 @@ from corporeal.geometry.followed import followed
 from corporeal.geometry.gaussians import placed
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.mesh import Mesh, signed_volume
+from corporeal.geometry.similarity import moved_points
 from corporeal.splats import radiance, solid, start
 from corporeal.stages import reconstruct as stage
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
@@ -100,6 +101,10 @@ def test_things_come_out_in_metres_on_the_floor(made):
         volume = signed_volume(Mesh(surface.vertices, surface.triangles))
         assert volume == pytest.approx(np.prod(sides), rel=0.15)  # their edges are cut off
         assert surface.vertices[:, 2].min() == pytest.approx(0, abs=0.01)
+    back = moved_points(found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file))
+    down = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
+    expected = 2 * np.array(MIDDLES) @ down.T + (0.3, -0.2, 5.0)
+    np.testing.assert_allclose(back, expected, atol=0.04)
     between = found.boxes.mean(axis=1)
     np.testing.assert_allclose(
         np.linalg.norm(between[1] - between[0]), np.linalg.norm(np.subtract(*MIDDLES)), atol=0.02

@@ -77,7 +77,8 @@ def seen(made, green):
     empty = np.zeros((0, 3), np.float32)
     splat = Gaussians(empty, np.zeros((0, 4)), empty, np.zeros(0), np.zeros((0, 1, 3)))
     boxes = np.zeros((2, 2, 3))
-    return Reconstruction(splat, np.zeros(0, int), cloud, owner, ("plant", "vase"), boxes, 1.0)
+    names, whole = ("plant", "vase"), np.zeros(0, int)
+    return Reconstruction(splat, whole, cloud, owner, names, boxes, 1.0, np.eye(4))
 
 
 def told(*pieces):

@@ -55,12 +55,25 @@ class Upright:
     confidence: float
     """In up: 0 (a guess) to 1."""
     floor_by: str
-    """"plane": it is in the pictures; "things": their lowest points; "nothing": there are none."""
+    """"plane": it is in the pictures; "person": somebody said it; "things": their lowest points;
+    "nothing": there are none."""
     radius: float
     """Of the scene, in the file's unit."""
     reason: str
     """In a sentence or two, for the report."""
     warnings: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Stated:
+    """What somebody says of the frame; it goes before all else."""
+
+    up: Vector | None = None
+    floor: float | None = None
+    """Its height along up, in the file's frame and unit."""
+
+
+NOTHING = Stated()
 
 
 @dataclass(frozen=True)
@@ -79,7 +92,7 @@ def upright(
     z_up: bool = False,
     things: Float[np.ndarray, "M 3"] | None = None,
     usual: Vector | None = None,
-    stated: Vector | None = None,
+    stated: Stated = NOTHING,
 ) -> Upright:
     """Find the frame of a reconstruction.
 
@@ -90,14 +103,14 @@ def upright(
         z_up: Whether the file says that its +z is up.
         things: Points that are on things for sure, as masks tell; None: nobody knows.
         usual: What is up in such files as a rule; for want of cameras.
-        stated: What somebody says is up, which goes before all else.
+        stated: What somebody says.
 
     """
     points, things = _fewer(points), None if things is None else _fewer(things)
     around = _around(cameras, points if things is None else things)
     near = points[np.linalg.norm(points - around.centre, axis=1) < WITHIN * around.radius]
-    if stated is not None:
-        told = _Up(_unit(stated), "person", 1.0, 0.0, "Up is what was stated.", ())
+    if stated.up is not None:
+        told = _Up(_unit(stated.up), "person", 1.0, 0.0, "Up is what was stated.", ())
     elif z_up or cameras:
         told = _told(cameras, z_up)
     else:
@@ -107,7 +120,8 @@ def upright(
         told = _rested(told, near)
     if plane is not None:
         told = _corrected(told, plane)
-    return _framed(told, plane, around, near if things is None else things)
+    floor = plane if stated.floor is None else stated.floor
+    return _framed(told, floor, around, near if things is None else things)
 
 
 def _fewer(points: np.ndarray) -> np.ndarray:
@@ -223,15 +237,17 @@ def _around(cameras: tuple[Camera, ...], points: np.ndarray) -> Region:
     return Region((x, y, z), float(np.linalg.norm(high - low)) / 2)
 
 
-def _framed(told: _Up, plane: Plane | None, around: Region, lowest: np.ndarray) -> Upright:
+def _framed(told: _Up, floor: Plane | float | None, around: Region, lowest: np.ndarray) -> Upright:
     rotation = turned_up(told.up)
     centre = rotation @ np.array(around.centre)
     warnings = list(told.warnings)
-    if plane is not None:
+    if isinstance(floor, Plane):
         # Where the plane is below the middle: it may be tilted against up by a little.
-        below = (plane.offset - plane.normal @ np.array(around.centre)) / (plane.normal @ told.up)
+        below = (floor.offset - floor.normal @ np.array(around.centre)) / (floor.normal @ told.up)
         height, by = float(centre[2] + below), "plane"
-        reason = f"The floor is a plane with {plane.share:.0%} of the points."
+        reason = f"The floor is a plane with {floor.share:.0%} of the points."
+    elif floor is not None:
+        height, by, reason = floor, "person", "The floor is where it was stated to be."
     elif len(lowest):
         heights = moved_points(together(lowest), similarity(rotation))[:, 2]
         height, by = float(np.percentile(heights, LOWEST)), "things"

@@ -23,7 +23,7 @@ from scipy.ndimage import (
 from corporeal.errors import UserError
 from corporeal.geometry.region import Region, region
 from corporeal.geometry.similarity import moved_cameras
-from corporeal.geometry.upright import upright
+from corporeal.geometry.upright import Stated, upright
 from corporeal.splats.crew import Crew
 from corporeal.splats.start import Carved, carved
 from corporeal.types import Camera, Vector, Views
@@ -89,7 +89,7 @@ def cut_out(
         threads: None: one per processor.
 
     """
-    frame = upright(views.cameras, points, z_up, stated=stated)
+    frame = upright(views.cameras, points, z_up, stated=Stated(stated))
     if frame.floor_by != "plane":
         return None
     cameras = moved_cameras(views.cameras, frame.world_from_file)

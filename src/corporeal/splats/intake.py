@@ -1,7 +1,7 @@
 """Gaussians from whatever a person has: photographs that they are learned from, or a splat."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
@@ -14,7 +14,7 @@ from corporeal.formats.sources import kind_of
 from corporeal.formats.splats import read_splat
 from corporeal.geometry.agreement import agreement
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians
-from corporeal.geometry.upright import upright
+from corporeal.geometry.upright import Stated, upright
 from corporeal.splats.crew import Crew
 from corporeal.splats.cutout import cut_out
 from corporeal.splats.quality import Quality
@@ -63,6 +63,8 @@ class Intake:
     """What is up in such files as a rule."""
     floor: bool = False
     """Whether the floor is among the Gaussians."""
+    world_from_file: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
+    """How it was turned and shifted since it was read."""
     seen: Float[np.ndarray, "N 3"] | None = None
     """Points on all that the photographs show, the floor too; None: there are none but Gaussians.
     """
@@ -141,22 +143,25 @@ def take_in(
     )
 
 
-def turned_upright(taken: Intake, up: Up = "auto") -> Intake:
+def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -> Intake:
     """Return the same with +z up, the floor at z = 0, and what is looked at above the origin.
 
     Args:
         taken: In the file's own frame.
         up: Which axis of the file points up; auto: what the file or the cameras say.
+        floor: Its height along up, in the file's unit; None: it is looked for.
 
     """
     of_things = None if taken.masks is None else taken.solid
     points = taken.solid if taken.seen is None else taken.seen
-    frame = upright(taken.cameras, points, taken.z_up, of_things, taken.usual, _stated(up))
+    stated = Stated(_stated(up), floor)
+    frame = upright(taken.cameras, points, taken.z_up, of_things, taken.usual, stated)
     return replace(
         taken,
         gaussians=moved_gaussians(taken.gaussians, frame.world_from_file),
         cameras=moved_cameras(taken.cameras, frame.world_from_file),
-        floor=frame.floor_by == "plane",
+        floor=frame.floor_by == "plane" or (floor is not None and taken.masks is None),
+        world_from_file=frame.world_from_file,
         statements=(*taken.statements, frame.reason),
         warnings=(*taken.warnings, *frame.warnings),
     )

@@ -88,6 +88,9 @@ class ReconstructConfig:
     """What tells objects apart; auto: instance masks where there are any, else look and folds."""
     up: Up = "auto"
     """Which axis of the file points up; auto: what the file or the cameras say."""
+    floor_at: float | None = None
+    """Height of the floor along up, in the file's unit; by default a plane is looked for, and where
+    there is none things are put onto the floor."""
     metres_per_unit: float | None = None
     """What one unit of the file is [m]; by default sizes of things say it."""
     known_distance: TwoPoints | None = None
@@ -162,7 +165,7 @@ def reconstruct(
     training = TrainConfig(config.training, seed=seed, rasteriser=drawn_by)
     kept = None if folder is None else folder / "training.npz"
     taken = take_in(source, training, config.up, kept, _within(progress, 0.0, TRAINED))
-    taken = turned_upright(taken, config.up)
+    taken = turned_upright(taken, config.up, config.floor_at)
     if not taken.cameras:
         taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
     progress(TRAINED, "telling things from the background")
@@ -371,6 +374,7 @@ def _in_metres(
         names=tuple(names),
         boxes=scale.metres_per_unit * np.array(boxes),
         metres_per_unit=scale.metres_per_unit,
+        world_from_file=made @ found.taken.world_from_file,
         statements=statements,
         warnings=warnings,
     )
