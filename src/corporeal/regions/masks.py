@@ -11,9 +11,15 @@ from typing import cast
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from corporeal.errors import UserError
 from corporeal.regions.patches import Borders, Patches
+
+COMPARED = 10_000
+"""Points by which masks of two views are compared, about."""
+MOSTLY = 0.5
+"""Share of points from which on masks of two views show one instance."""
 
 
 def lifted(
@@ -44,6 +50,47 @@ def lifted(
         votes = share @ np.eye(len(known))[number.ravel()]
         made[view] = np.where(votes.any(axis=1), known[votes.argmax(axis=1)], -1)
     return made
+
+
+def renumbered(label_of_point: Int[np.ndarray, "V N"]) -> Int[np.ndarray, "V N"]:
+    """Return labels that mean the same in all views, where masks of two views show one instance.
+
+    Two masks do where they share more than half of the points that either has, of those that both
+    views see: then no third shares as many with either. What is matched in that way, directly or
+    through others, gets one number.
+    """
+    known, node = np.unique(_apart(label_of_point), return_inverse=True)
+    nodes = node.reshape(label_of_point.shape)
+    nodes, first = nodes - (known[0] < 0), int(known[0] < 0)
+    few = nodes[:, :: max(1, nodes.shape[1] // COMPARED)]
+    pairs: list[np.ndarray] = []
+    for v in range(len(nodes)):
+        for w in range(v):
+            pairs += _same(few[v], few[w])
+    count = len(known) - first
+    i, j = np.concatenate([np.zeros((0, 2), np.int64), *pairs]).T
+    graph = csr_array((np.ones(len(i), np.int8), (i, j)), shape=(count, count))
+    number = connected_components(graph, directed=False)[1]
+    return np.where(nodes < 0, -1, number[nodes])
+
+
+def _apart(label_of_point: np.ndarray) -> np.ndarray:
+    """Return labels of which no two views share one; -1 stays."""
+    most = int(label_of_point.max(initial=0)) + 1
+    own = np.arange(len(label_of_point), dtype=np.int64)[:, None] * most
+    return np.where(label_of_point < 0, -1, label_of_point + own)
+
+
+def _same(a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
+    """Return pairs of labels (K, 2) that share most of their points; labels from 0, -1: none."""
+    both = (a >= 0) & (b >= 0)
+    first, i = np.unique(a[both], return_inverse=True)
+    second, j = np.unique(b[both], return_inverse=True)
+    shared = np.zeros((len(first), len(second)))
+    np.add.at(shared, (i, j), 1)
+    either = shared.sum(axis=1, keepdims=True) + shared.sum(axis=0) - shared
+    x, y = np.nonzero(shared > MOSTLY * np.maximum(either, 1))
+    return [np.stack([first[x], second[y]], axis=1)] if len(x) else []
 
 
 def agreement(

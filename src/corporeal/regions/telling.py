@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
+from corporeal.regions.masks import renumbered
 from corporeal.regions.objects import MOST, Split, components, objects
 from corporeal.types import Cloud
 
@@ -19,6 +20,7 @@ CRUMB = 0.003
 """Share of the points below which what masks or neighbours tell apart is no thing."""
 PUBLISHED = "the connected components of each point's 20 nearest, as published: a control"
 NUMBERED = "instance masks, whose numbers mean the same in all pictures"
+MATCHED = "instance masks, matched from picture to picture by the points that they share"
 NO_MASKS = (
     "There are no instance masks. Name them by object_file_path in transforms.json, or put them "
     "into a folder 'instances' with the names of the pictures; or leave --apart out."
@@ -52,15 +54,24 @@ def told_apart(
         raise UserError(NO_MASKS)
     if masks is None or rule == "look":
         return objects(cloud, count, normals)
-    return by_numbers(cloud, masks, count) or _by_masks(cloud, masks, count, normals)
+    named = by_numbers(cloud, masks, count, NUMBERED)
+    named = named or by_numbers(cloud, renumbered(masks), count, MATCHED)
+    return named or _by_masks(cloud, masks, count, normals)
 
 
 def by_numbers(
-    cloud: Cloud, masks: Int[np.ndarray, "V N"], count: int | None = None
+    cloud: Cloud, masks: Int[np.ndarray, "V N"], count: int | None, found_by: str
 ) -> Split | None:
     """Give each point the number that most views give it; None: numbers differ between views.
 
     What no view says anything of goes with the nearest that some view does.
+
+    Args:
+        cloud: Points.
+        masks: What each view takes each point for; -1: not said.
+        count: How many things there are, if somebody said so.
+        found_by: What the numbers are, in a clause.
+
     """
     known, number = np.unique(masks, return_inverse=True)
     said = np.zeros((cloud.count, len(known)), np.int64)
@@ -72,7 +83,7 @@ def by_numbers(
         return None
     sure = np.where(total > 0, best / np.maximum(total, 1), 0.0)
     owner = _without_crumbs(cloud, np.where(total > 0, said.argmax(axis=1), -1))
-    return Split(owner, sure, tuple(_otherwise(count, owner, "instance masks")), NUMBERED)
+    return Split(owner, sure, tuple(_otherwise(count, owner, "instance masks")), found_by)
 
 
 def _by_masks(
