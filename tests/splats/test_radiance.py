@@ -66,7 +66,7 @@ def plain(values, made, cameras, pictures, masks, rays, jitter, behind):
         cover = masks[view, pixel] / 255
         real = cover * pictures[view, pixel] / 255 + (1 - cover) * behind
         total = total + ((colour + light * behind - real) ** 2).sum()
-        total = total + 0.1 * (1 - light - cover) ** 2 - 3e-4 * np.log(light)
+        total = total + 0.1 * (1 - light - cover) ** 2
     return total
 
 

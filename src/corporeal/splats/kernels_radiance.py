@@ -21,8 +21,6 @@ STEEPEST = f4(20)
 """Numbers beyond which exp is not asked."""
 COVER = f4(0.1)
 """How much an error of coverage counts beside one of a colour."""
-PULL = f4(3e-4)
-"""How much the optical depth of a ray counts, so that haze fades that nobody needs."""
 HALF = f4(0.5)
 BETA1, BETA2, TINY = f4(0.9), f4(0.99), f4(1e-12)
 
@@ -105,7 +103,7 @@ def _walked(ray, length, jitter, stride, row, gap, values, samples, rows, shares
 def learn(rays, jitter, background, width, cameras, pictures, masks, grid, gradient, sums):
     """Add the loss's gradient (N, 4) for some rays; sums: Σ of the loss, of Δ², and of samples.
 
-    L = Σ_rays |C - Y|² + COVER (α - M)² + PULL Σ τ, Y the pixel before the background.
+    L = Σ_rays |C - Y|² + COVER (α - M)², Y the pixel before the background.
 
     rays (R, 2): view and pixel; jitter (R,) in [0, 1); pictures (V, H W, 3) and masks (V, H W) in
     0 … 255; grid: row, gap, values, stride, and the most samples along a ray.
@@ -132,7 +130,7 @@ def learn(rays, jitter, background, width, cameras, pictures, masks, grid, gradi
             sums[0] += d * d
             sums[1] += d * d
         d = f4(1) - light - cover
-        sums[0] += COVER * d * d - PULL * np.log(light)
+        sums[0] += COVER * d * d
         sums[2] += n
         uncover = f4(2) * COVER * d * light
         for m in range(n):
@@ -143,7 +141,7 @@ def learn(rays, jitter, background, width, cameras, pictures, masks, grid, gradi
                 own += c * off[q]
                 slope[1 + q] = w * off[q] * c * (f4(1) - c)
             total -= w * own  # what is left is of all that is behind
-            slope[0] = (samples[m, BEHIND] * own - total + uncover + PULL) * samples[m, SLOPE]
+            slope[0] = (samples[m, BEHIND] * own - total + uncover) * samples[m, SLOPE]
             for corner in range(8):
                 for q in range(4):
                     gradient[rows[m, corner], q] += shares[m, corner] * slope[q]
