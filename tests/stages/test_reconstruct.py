@@ -226,6 +226,7 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     ("config", "extents", "told"),
     [
         ({"count": 0}, (), "--count is 0"),
+        ({"semantic": "bert"}, (), "Unknown picture encoder 'bert'"),
         ({"count": 3, "things": ("crate",)}, (), "--count says 3 objects, --things names 1"),
         ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1 m"),
         (

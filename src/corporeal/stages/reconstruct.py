@@ -6,7 +6,6 @@ Gaussians themselves, for the film and for telling parts apart.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import partial
 from pathlib import Path
 from typing import Literal
 
@@ -35,9 +34,10 @@ from corporeal.render.look import linear
 from corporeal.render.portrait import COLOURS, colour_of_part
 from corporeal.splats.channel import distilled
 from corporeal.splats.crew import Crew
-from corporeal.splats.foreground import covered, foreground, near, with_company
+from corporeal.splats.field_points import field_points
+from corporeal.splats.foreground import foreground, with_company
 from corporeal.splats.intake import Intake, Up, picture, take_in, turned_upright
-from corporeal.splats.radiance import FieldConfig, learn, points
+from corporeal.splats.radiance import FieldConfig
 from corporeal.splats.raster import weights
 from corporeal.splats.sight import looked
 from corporeal.splats.solid import Solid, solids
@@ -49,7 +49,6 @@ from corporeal.types import (
     Scene,
     SceneObject,
     Surface,
-    Views,
 )
 from corporeal.vlm.things import PERSON, Thing, Viewer, metres, usual
 
@@ -205,6 +204,8 @@ def _checked(config: ReconstructConfig) -> MetricScale | None:
             f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
             "--count out, or name all of them."
         )
+    for spec in (config.semantic, config.structural):
+        connect(spec)  # who is to look must be there before anything is learned
     return measured(config.metres_per_unit, config.known_distance, PERSON)
 
 
@@ -258,12 +259,9 @@ def _of_field(
     progress: Progress,
 ) -> Placed:
     """Learn a radiance field of the things, and take points from where it is dense."""
-    views = Views(np.stack(taken.pictures()), taken.cameras)
-    masks = covered(taken.gaussians, taken.cameras, things) if taken.masks is None else taken.masks
-    preset, kept = config.training, None if folder is None else folder / "radiance.npz"
-    learned = learn(views, masks, FieldConfig(preset, seed=config.training_seed), kept, progress)
-    at, seed = partial(near, taken.gaussians, things), config.training_seed
-    found = points(learned.field, taken.cameras, MOST_POINTS, seed, at)
+    how = FieldConfig(config.training, seed=config.training_seed)
+    kept = None if folder is None else folder / "radiance.npz"
+    learned, found = field_points(taken, things, MOST_POINTS, how, kept, progress)
     placed = projected(found.position, found.colour, taken.cameras, found.depth)
 
     def lift(maps: Sequence[np.ndarray]) -> Lifted:
@@ -335,10 +333,8 @@ def _painted(found: _Found) -> list[np.ndarray]:
     flat = (np.sqrt(ink[found.owner]) - 0.5)[:, None] / DC
     dressed = replace(taken.gaussians, sh=flat.astype(np.float32))
     pictures = taken.pictures()
-    shown = []
-    for k in _spread(len(pictures)):
-        shown += [pictures[k], picture(dressed, taken.cameras[k])]
-    return shown
+    both = [(pictures[k], picture(dressed, taken.cameras[k])) for k in _spread(len(pictures))]
+    return [one for pair in both for one in pair]
 
 
 # ---------------------------------------------------------------- what comes out
