@@ -345,8 +345,8 @@ def _solid(taken: Intake, cloud: Cloud, split: Split, of_things: Int[np.ndarray,
     owner = np.full(taken.gaussians.count, -1, np.int64)
     nearest = KDTree(cloud.position).query(taken.gaussians.mean[of_things])[1]
     owner[of_things] = split.object_of_point[nearest]
-    found = solids(taken.gaussians, owner, taken.cameras, taken.masks)
     owner = with_company(taken.gaussians, owner, taken.floor)
+    found = solids(taken.gaussians, owner, taken.cameras, taken.masks)
     order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
     place = np.append(np.argsort(order), -1)  # the last for what is nobody's
     ordered = tuple(found[k] for k in order)
