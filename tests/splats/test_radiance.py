@@ -165,7 +165,7 @@ def small():
 
 @pytest.fixture(scope="module")
 def learned(small):
-    views, masks = painted(around(16, (64, 64), focal=200.0))
+    views, masks = painted(around(12, (64, 64), focal=200.0))
     return views, masks, learn(views, masks, FieldConfig("draft", steps=60))
 
 
@@ -249,9 +249,9 @@ def test_a_second_round_brings_features_nearer_to_sharp_maps(learned):
 def test_rays_take_from_nodes_what_the_first_round_gives_back(learned):
     """One map of one feature everywhere is that feature everywhere, after any number of rounds."""
     views, _, made = learned
-    maps = [np.full((3, 3, 70), 0.25, np.float16)] * len(views.cameras)
-    for rounds in (1, 5):
-        values = distilled(made.field, views.cameras, maps, rounds).values
+    maps = [np.full((3, 3, 70), 0.25, np.float16)] * 3
+    for rounds in (1, 4):
+        values = distilled(made.field, views.cameras[:3], maps, rounds).values
         np.testing.assert_allclose(values.astype(float), 0.25, atol=2e-3)
 
 
@@ -271,7 +271,7 @@ def test_what_cannot_be_learned_from_is_refused(small, spoil, told):
 def test_maps_that_do_not_fit_are_refused(learned):
     views, _, made = learned
     one = np.zeros((2, 2, 4), np.float16)
-    with pytest.raises(UserError, match="1 maps for 16 cameras"):
+    with pytest.raises(UserError, match="1 maps for 12 cameras"):
         distilled(made.field, views.cameras, [one])
     with pytest.raises(UserError, match="4 and 5 channels"):
         distilled(made.field, views.cameras[:2], [one, np.zeros((2, 2, 5), np.float16)])
