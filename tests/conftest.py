@@ -2,6 +2,7 @@
 
 import os
 import socket
+import sys
 from pathlib import Path
 
 import pytest
@@ -40,6 +41,23 @@ def no_network(monkeypatch):
         return connect(self, address)
 
     monkeypatch.setattr(socket.socket, "connect", guarded)
+
+
+@pytest.fixture
+def command(monkeypatch, capsys):
+    """Type a command; returns its exit code and what it printed."""
+
+    def type_(*words):
+        from corporeal import cli
+
+        monkeypatch.setattr(sys, "argv", ["corporeal", *map(str, words)])
+        try:
+            cli.main()
+        except SystemExit as stop:
+            return stop.code or 0, capsys.readouterr()
+        return 0, capsys.readouterr()
+
+    return type_
 
 
 @pytest.fixture(scope="session")

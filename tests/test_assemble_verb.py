@@ -7,26 +7,21 @@ import pytest
 import trimesh
 
 from glb_maker import Maker
-from test_cli import corporeal, refused
+from test_cli import refused
 
 VIEWS = ("--views", "2", "--size", "32", "32")
 
 
 @pytest.fixture
-def typed(monkeypatch, tmp_path, capsys):
+def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
-
-    def type_(*words):
-        code = corporeal(monkeypatch, *words)
-        return code, capsys.readouterr()
-
     for name, sides in {"box": (1, 1, 1), "plank": (4, 0.5, 1)}.items():
         fine = trimesh.creation.box(sides).subdivide().subdivide()
         maker = Maker()
         maker.node(mesh=maker.mesh(fine.vertices, fine.faces.astype(np.uint16)))
         (tmp_path / "models" / name).mkdir(parents=True)
         maker.save(tmp_path / "models" / name / f"{name}.glb")
-    return type_
+    return command
 
 
 def test_a_folder_of_models_becomes_a_certified_scene_with_views(typed, tmp_path):

@@ -1,6 +1,5 @@
 import json
 import resource
-import sys
 
 import numpy as np
 import pytest
@@ -24,26 +23,11 @@ def a_box(size=0.1, substance="rubber", height=0.05, **said):
     return Scene("box", "", (thing,), (surface,), (Finish("red"),), duration=0.2, fps=30, **said)
 
 
-def corporeal(monkeypatch, *words):
-    """Type a command; return its exit code."""
-    monkeypatch.setattr(sys, "argv", ["corporeal", *map(str, words)])
-    try:
-        cli.main()
-    except SystemExit as stop:
-        return stop.code or 0
-    return 0
-
-
 @pytest.fixture
-def typed(monkeypatch, tmp_path, capsys):
+def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "PANEL", (130, 98))
-
-    def type_(*words):
-        code = corporeal(monkeypatch, *words)
-        return code, capsys.readouterr()
-
-    return type_
+    return command
 
 
 def refused(said, *words):

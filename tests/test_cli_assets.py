@@ -1,19 +1,18 @@
 """What a person types to make a pool and to look at it."""
 
-import sys
+from functools import partial
 
 import numpy as np
 import pytest
 from PIL import Image
 
-from corporeal import cli
 from corporeal.pool.index import read_pool
 from corporeal.render.sheet import Tile, sheet
 from pool_models import plain_ball
 
 
 @pytest.fixture
-def typed(monkeypatch, tmp_path, capsys):
+def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setenv("COLUMNS", "160")
     (tmp_path / "in" / "ball").mkdir(parents=True)
@@ -21,17 +20,7 @@ def typed(monkeypatch, tmp_path, capsys):
         data = plain_ball(0.1 + 0.01 * k, copyright="CC0, by Ada" if k else "")
         (tmp_path / "in" / "ball" / f"ball{k}.glb").write_bytes(data)
     (tmp_path / "in" / "ball" / "broken.glb").write_bytes(b"glTF")
-
-    def type_(*words):
-        monkeypatch.setattr(sys, "argv", ["corporeal", "assets", *map(str, words)])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as stop:
-            code = stop.code or 0
-        return code, capsys.readouterr()
-
-    return type_
+    return partial(command, "assets")
 
 
 def test_a_pool_is_made_listed_and_drawn(typed, tmp_path):

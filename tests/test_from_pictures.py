@@ -1,14 +1,12 @@
 """The whole way from photographs: written as other programs do, run, killed, gone on with."""
 
 import json
-import sys
 
 import numpy as np
 import pytest
 from PIL import Image
 from scipy.spatial.transform import Rotation
 
-from corporeal import cli
 from corporeal.formats.colmap import write_colmap
 from corporeal.formats.transforms import write_views
 from corporeal.geometry.similarity import moved_cameras, similarity
@@ -42,21 +40,11 @@ def views():
 
 
 @pytest.fixture
-def typed(monkeypatch, tmp_path, capsys):
+def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "PANEL", (130, 98))
     monkeypatch.setitem(train.PRESETS, "draft", train.Preset(4000, 1, 300, 128))
-
-    def type_(*words):
-        monkeypatch.setattr(sys, "argv", ["corporeal", *map(str, words)])
-        try:
-            cli.main()
-            code = 0
-        except SystemExit as stop:
-            code = stop.code or 0
-        return code, capsys.readouterr()
-
-    return type_
+    return command
 
 
 def colmap(folder, views, matrix):

@@ -10,20 +10,19 @@ import trimesh
 
 from corporeal.render import figures
 from pool_models import glb
-from test_cli import corporeal
 
 BY_TABLE = "CC-BY-4.0; Ada <ada@example.org>"
 BY_FILE = "(c) Bo, CC-BY-SA-3.0"
 
 
 @pytest.fixture
-def typed(monkeypatch, tmp_path, capsys):
+def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "PANEL", (130, 98))
 
     def type_(*words):
-        code = corporeal(monkeypatch, *words)
-        assert code == 0, capsys.readouterr().err
+        code, said = command(*words)
+        assert code == 0, said.err
 
     return type_
 

@@ -4,14 +4,12 @@ import csv
 import json
 import math
 import shutil
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
-from corporeal import cli
 from corporeal.errors import BadFileError, UserError
 from corporeal.evaluation import mass
 from corporeal.evaluation.baselines import constant, hull_fit, solid_water
@@ -279,22 +277,11 @@ def test_a_guessed_mass_is_above_zero():
 # ---------------------------------------------------------------- the verb
 
 
-@pytest.fixture
-def typed(monkeypatch, capsys):
-    def type_(*words):
-        monkeypatch.setattr(sys, "argv", ["corporeal", *map(str, words)])
-        with pytest.raises(SystemExit) as stop:
-            cli.main()
-        return stop.value.code, capsys.readouterr()
-
-    return type_
-
-
-def test_the_verb_prints_tables_and_writes_data_and_figure(weighed, typed, tmp_path):
+def test_the_verb_prints_tables_and_writes_data_and_figure(weighed, command, tmp_path):
     folder = weighed[0][0].file.parent
     written = ("--json", tmp_path / "m.json", "--figure", tmp_path / "m.png")
     table = ("--truth", folder / "truth.csv", "--samples", "20")
-    code, said = typed("evaluate", "mass", folder, *table, *written)
+    code, said = command("evaluate", "mass", folder, *table, *written)
     assert code == 0, said.err
     for words in ("ALDE", "solid water", "as built, placed values", "measured [kg]"):
         assert words in said.out
@@ -305,9 +292,9 @@ def test_the_verb_prints_tables_and_writes_data_and_figure(weighed, typed, tmp_p
     assert (tmp_path / "m.png").exists()
 
 
-def test_masses_can_be_predicted_without_any_truth(weighed, typed, tmp_path):
+def test_masses_can_be_predicted_without_any_truth(weighed, command, tmp_path):
     shutil.copy(weighed[0][0].file, tmp_path / "alone.glb")
-    code, said = typed("evaluate", "mass", tmp_path, "--samples", "5")
+    code, said = command("evaluate", "mass", tmp_path, "--samples", "5")
     assert code == 0, said.err
     assert "alone" in said.out
     assert "ALDE" not in said.out
@@ -321,10 +308,10 @@ def test_masses_can_be_predicted_without_any_truth(weighed, typed, tmp_path):
         ((".", "--vlm", "replay:nowhere"), "No folder of recordings at 'nowhere'"),
     ],
 )
-def test_the_verb_says_what_is_missing(weighed, typed, tmp_path, monkeypatch, words, said):
+def test_the_verb_says_what_is_missing(weighed, command, tmp_path, monkeypatch, words, said):
     shutil.copy(weighed[0][0].file, tmp_path / "alone.glb")
     monkeypatch.chdir(tmp_path)
-    code, told = typed("evaluate", "mass", *words)
+    code, told = command("evaluate", "mass", *words)
     assert code == 2
     assert said in told.err
     assert "Traceback" not in told.err

@@ -1,23 +1,16 @@
 """`corporeal materials` as a person types it."""
 
-import sys
-
 import pytest
 from test_lint import PLANTED, SOUND  # type: ignore[import-not-found]
 
-from corporeal import cli
-
 
 @pytest.fixture
-def typed(monkeypatch, capsys, tmp_path):
+def typed(monkeypatch, command, tmp_path):
     monkeypatch.chdir(tmp_path)
 
     def run(*words):
-        monkeypatch.setattr(sys, "argv", ["corporeal", "materials", *words])
-        with pytest.raises(SystemExit) as ended:
-            cli.main()
-        said = capsys.readouterr()
-        return ended.value.code, said.out, said.err
+        code, said = command("materials", *words)
+        return code, said.out, said.err
 
     return run
 

@@ -1,13 +1,11 @@
 """Posed views: pictures, depths, normals and numbers must agree with the cameras."""
 
-import sys
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
 
-from corporeal.cli import main
 from corporeal.errors import UserError
 from corporeal.formats.glb_writer import write_glb
 from corporeal.formats.transforms import read_views
@@ -266,24 +264,18 @@ def test_a_scene_of_nothing_has_no_views():
 # ---------------------------------------------------------------- the verb
 
 
-def typed(monkeypatch, *words):
-    monkeypatch.setattr(sys, "argv", ["corporeal", *map(str, words)])
-    with pytest.raises(SystemExit) as stopped:
-        main()
-    return stopped.value.code
-
-
-def test_a_person_can_take_views_of_a_file(monkeypatch, tmp_path, capsys):
+def test_a_person_can_take_views_of_a_file(command, tmp_path):
     write_glb(tmp_path / "scene.glb", scene(box(), ball()))
     out = tmp_path / "views"
     words = ("capture", tmp_path / "scene.glb", "--out", out, "--views", 2, "--size", 24, 16)
-    assert typed(monkeypatch, *words) == 0
-    assert capsys.readouterr().out.strip() == str(out / "transforms.json")
+    code, said = command(*words)
+    assert (code, said.out.strip()) == (0, str(out / "transforms.json"))
     made = read_views(out)
     assert made.rgb.shape == (2, 16, 24, 3)
     assert {-1, 0, 1} == set(np.unique(made.object_of_pixel))
 
 
-def test_a_scene_that_is_not_there_is_one_line(monkeypatch, tmp_path, capsys):
-    assert typed(monkeypatch, "capture", tmp_path / "no.glb") == 2
-    assert "no.glb: there is no such file" in capsys.readouterr().err
+def test_a_scene_that_is_not_there_is_one_line(command, tmp_path):
+    code, said = command("capture", tmp_path / "no.glb")
+    assert code == 2
+    assert "no.glb: there is no such file" in said.err
