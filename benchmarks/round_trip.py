@@ -19,6 +19,8 @@ from typing import Literal
 
 import numpy as np
 import yaml
+from scipy.optimize import linear_sum_assignment
+from scipy.spatial.distance import cdist
 
 from corporeal import store
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, write_scene_file
@@ -33,7 +35,7 @@ from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.fill import FillConfig
 from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.terminal import show_table, told
-from corporeal.types import MaterialField, Scene
+from corporeal.types import MaterialField, Reconstruction, Scene
 
 HOLLOW = ("vase", "bowl", "cup", "pot", "mug")
 """What a person knows to have a wall, although its mesh, which models it, is solid."""
@@ -121,18 +123,31 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
     views = folder / "views"
     if not (views / "transforms.json").exists():
         write_views(views, capture(scene, CaptureConfig(views=48)))
+    said, start = as_told(mesh, folder / "told.yaml"), as_begun(scene, folder)
     size = [float(np.prod(np.ptp(box, axis=0))) for box in boxes_of(scene)]
     order = np.argsort(size)[::-1]
-    names = tuple(scene.objects[k].name for k in order)
-    again = replace(
-        settings(detail),
-        reconstruct=ReconstructConfig(things=names, training=training, apart="look"),
-        describe=DescribeConfig(annotations=as_told(mesh, folder / "told.yaml")),
-    )
-    start = as_begun(scene, folder)
-    with told() as tell, opened([start], folder / "pictures", again, tell, "simulate") as of:
-        pictures = of[0]
+    for until in ("reconstruct", "simulate"):
+        names = tuple(scene.objects[k].name for k in order)
+        again = replace(
+            settings(detail),
+            reconstruct=ReconstructConfig(
+                things=names, training=training, apart="look", floor_at=0.0
+            ),
+            describe=DescribeConfig(annotations=said),
+        )
+        with told() as tell, opened([start], folder / "pictures", again, tell, until) as of:
+            pictures = of[0]
+        order = ordered(scene, pictures["reconstruct"], order)
     return compared(name, mesh, pictures, order)
+
+
+def ordered(scene: Scene, found: Reconstruction, order: np.ndarray) -> np.ndarray:
+    """Return which object is which, as a person sees it who names things of nearly one size."""
+    if len(found.boxes) != len(order):
+        return order
+    middles = moved_points(found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file))
+    apart = cdist(middles, [box.mean(axis=0) for box in boxes_of(scene)])
+    return linear_sum_assignment(apart)[1]
 
 
 def compared(name: str, mesh: dict, pictures: dict, order: np.ndarray) -> dict:

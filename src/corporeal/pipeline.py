@@ -34,15 +34,7 @@ from corporeal.stages.ground import GroundConfig, ground
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
 from corporeal.stages.segment import SegmentConfig, segment
 from corporeal.stages.simulate import SimulateConfig, simulate
-from corporeal.types import (
-    Film,
-    MaterialField,
-    Particles,
-    Parts,
-    Reconstruction,
-    Scene,
-    Trajectory,
-)
+from corporeal.types import Film, MaterialField, Particles, Parts, Reconstruction, Scene, Trajectory
 from corporeal.vlm.things import Viewer
 
 Progress = Callable[[float, str], None]
