@@ -11,7 +11,7 @@ least area.
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, Int
 from scipy.ndimage import binary_dilation
 
 from corporeal.splats.crew import Crew
@@ -52,6 +52,11 @@ class Grid:
     def points(self, chosen: Bool[np.ndarray, "X Y Z"]) -> Float[np.ndarray, "N 3"]:
         """Middles of the chosen cells [m]."""
         return np.array(self.low) + self.cell * np.argwhere(chosen)
+
+    def at(self, places: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, "N 3"]:
+        """Which cells places are in; beside the grid, the nearest ones."""
+        found = np.round((places - np.array(self.low)) / self.cell).astype(int)
+        return np.clip(found, 0, np.array(self.shape) - 1)
 
 
 def gridded(

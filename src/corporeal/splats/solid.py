@@ -190,7 +190,7 @@ def _solid(scene: _Scene, k: int, survey: _Survey, crew: Crew) -> Solid:
     if not (distance < 0).any():
         raise _missing(k)
     mesh = _surface(distance, grid)
-    contact = cut[*(np.round((mesh.vertices - grid.low) / grid.cell).astype(int).T)]
+    contact = cut[*grid.at(mesh.vertices).T]
     mesh = _fitted(mesh, scene, k, contact, grid.cell, crew)
     mine = np.flatnonzero(scene.object_of_gaussian == k)
     _, nearest = KDTree(scene.gaussians.mean[mine]).query(mesh.vertices)
