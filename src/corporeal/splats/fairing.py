@@ -10,8 +10,8 @@ from corporeal.geometry.mesh import Mesh
 
 PULLS = (0.5, -0.53)
 """How far vertices go to their neighbours' mean, and back."""
-ONWARD = 0.85
-"""Cosine between a patch and the surface about it from which on it goes on as that does: 32°."""
+ONWARD = 0.7
+"""Cosine between a patch and the surface about it from which on it goes on as that does: 45°."""
 ON = 1e-9
 """What is no higher lies on the floor [m]."""
 
