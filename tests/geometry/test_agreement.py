@@ -5,11 +5,13 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from PIL import Image, ImageDraw
 from scipy.ndimage import gaussian_filter
 
 from corporeal.formats.photographs import read_photographs
-from corporeal.geometry.agreement import FLIP, _Pair, agreement, pose_doubt
+from corporeal.geometry.agreement import FLIP, INCOHERENT, _Pair, agreement, pose_doubt
 from corporeal.geometry.epipolar import consensus, depths, fundamental, projection, sampson
+from corporeal.geometry.silhouettes import coherence
 from corporeal.types import Camera, Views
 
 WIDTH, HEIGHT = 160, 120
@@ -221,6 +223,26 @@ def test_silhouettes_tell_where_smooth_things_are_seen_from_afar():
     assert (right.by, right.doubt) == ("silhouettes", None)
     assert right.share > 0.9
     assert "y and z axes were opposite" in pose_doubt(posed(views, lambda W: W @ FLIP), masks)
+
+
+def test_thin_legs_are_no_reason_for_doubt():
+    """A ball beside a stool whose legs are four pixels wide, from twenty sides."""
+    angles = np.linspace(0, 2 * np.pi, 20, endpoint=False)
+    cameras = [looking((3 * np.cos(a), 3 * np.sin(a), 1.2 + np.sin(a))) for a in angles]
+    legs = [np.array([[x, y, 0], [x, y, 0.6]]) for x in (-0.5, 0.1) for y in (-0.3, 0.3)]
+    masks = []
+    for camera in cameras:
+        P = projection(camera)
+        seen = [line @ P[:, :3].T + P[:, 3] for line in (*legs, np.array([[0.6, 0, 0.2]]))]
+        seen = [line[:, :2] / line[:, 2:] for line in seen]
+        picture = Image.new("L", (camera.width, camera.height))
+        draw = ImageDraw.Draw(picture)
+        for line in seen[:-1]:
+            draw.line([tuple(end) for end in line], fill=255, width=4)
+        draw.circle(tuple(seen[-1][0]), 9, fill=255)
+        masks.append(np.asarray(picture))
+    assert coherence(np.stack(masks), tuple(cameras)) > 0.9
+    assert coherence(np.stack(masks[5:] + masks[:5]), tuple(cameras)) < INCOHERENT
 
 
 def test_cameras_that_only_turn_are_doubted(near):

@@ -32,7 +32,7 @@ BETTER = 1.4
 LIKELY = 0.45
 """Share of a pair's matches that some cameras explain: then they are good matches, whatever the
 poses. Of random ones some cameras explain 0.1 to 0.4."""
-COHERENT, INCOHERENT = 0.85, 0.7
+COHERENT, INCOHERENT = 0.9, 0.8
 """Shares of silhouettes that their hull fills."""
 FLIP = np.diag([1.0, -1.0, -1.0, 1.0])
 FACTORS = (0.5, 2 / 3, 0.8, 1.25, 1.5, 2.0)

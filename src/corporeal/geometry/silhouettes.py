@@ -8,13 +8,14 @@ Hernández, Schmitt & Cipolla, "Silhouette coherence for camera calibration unde
 import numpy as np
 from jaxtyping import UInt8
 from PIL import Image
+from scipy.ndimage import binary_dilation
 
 from corporeal.geometry.epipolar import projection
 from corporeal.types import Camera
 
-SIDE = 24
+SIDE = 48
 """Longer side at which silhouettes are compared [px]."""
-GRID = 40
+GRID = 64
 """Points along each edge of the cube that is searched."""
 MARGIN = 1.3
 """Half edge of that cube, in radii of the thing as the cameras see it."""
@@ -35,7 +36,8 @@ def coherence(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) ->
     for mask, camera in zip(small, cameras, strict=True):
         cell = _cells(points, camera, mask.shape)
         cells.append(cell)
-        allowed &= (cell < 0) | mask.ravel()[cell]
+        near = np.asarray(binary_dilation(mask), bool)  # nothing is lost for being thin
+        allowed &= (cell < 0) | near.ravel()[cell]
     return float(np.median([_filled(m, c[allowed]) for m, c in zip(small, cells, strict=True)]))
 
 
