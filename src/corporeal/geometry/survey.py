@@ -195,11 +195,10 @@ def label(
     points: np.ndarray, shape: Shape, part_of_triangle: np.ndarray, closed: list[Member]
 ) -> np.ndarray:
     """Part of each point: the smallest closed part around it, else that of the nearest face."""
+    if (part_of_triangle == part_of_triangle[0]).all():
+        return np.full(len(points), part_of_triangle[0], dtype=np.int64)
     names = {m.part for m in closed}
     rest = np.flatnonzero(~np.isin(part_of_triangle, list(names)))
-    if len(names) + (len(rest) > 0) == 1:
-        only = part_of_triangle[0]
-        return np.full(len(points), only, dtype=np.int64)
     result = np.full(len(points), -1, dtype=np.int64)
     for member in sorted(closed, key=lambda m: -abs(signed_volume(m.body))):
         used = member.body.vertices[np.unique(member.body.triangles)]
