@@ -116,3 +116,22 @@ def test_a_small_part_that_overlaps_itself_or_holds_another_is_not_counted_twice
     for member, volume in zip(anatomy.members, exact, strict=True):
         assert member.volume == pytest.approx(volume, rel=0.05)
     assert np.bincount(anatomy.part_of_probe, minlength=5)[1:].max() < 100
+
+
+def test_of_the_shade_of_a_lamp_only_the_outside_counts(rng):
+    """Read as one thing, as it is where parts were found on one surface, the lamp is a body."""
+    lift = trimesh.transformations.translation_matrix
+    drum = trimesh.creation.annulus(0.195, 0.2, 0.4, transform=lift((0, 0, 0.9)), sections=96)
+    pole = trimesh.creation.cylinder(0.006, 1.1, transform=lift((0, 0, 0.55)))
+    lamp = trimesh.util.concatenate([drum, pole])
+    label = (lamp.triangles_center[:, 2] > 0.7).astype(int)
+    shade = survey(np.asarray(lamp.vertices), np.asarray(lamp.faces), label, rng).members[1]
+    assert shade.build is Build.BODY
+    outer = 2 * np.pi * 0.2 * 0.4
+    assert shade.body_area > 1.97 * outer
+    assert outer < shade.face_area < 1.2 * outer  # at the rims the inside sees the open, too
+
+
+def test_both_sides_of_a_flat_box_are_its_outside(rng):
+    box = examined(trimesh.creation.box((0.4, 0.3, 0.02)), rng=rng).members[0]
+    assert box.face_area == box.body_area

@@ -119,6 +119,46 @@ def wall_behind(
     return shape.reach(points + step * inward, inward) + step
 
 
+def inner_share(
+    shape: Shape, part: Mesh, width: float, rng: np.random.Generator, count: int = 2000
+) -> float:
+    """Share of a part's surface that is the inner face of a wall whose outer face is there, too.
+
+    What has another face close behind it that sees more than twice as much of the open: the inside
+    of a shade, or of a vase as far down as pictures show it.
+
+    Args:
+        shape: All that encloses something.
+        part: Some of its triangles, all wound with their normals to the outside.
+        width: Shortest side of the part [m].
+        rng: Source of the points that are asked.
+        count: How many are.
+
+    """
+    points, triangle = sample_surface(part, count, rng)
+    normals, step = part.normals[triangle], 1e-5 * shape.mesh.extent
+    behind = shape.hit(points - step * normals, -normals)
+    depth = shape.reach(points - step * normals, -normals) + step
+    near = (behind >= 0) & (depth < 2 * THIN * width)
+    points, normals, back = points[near], normals[near], shape.mesh.normals[behind[near]]
+    own = open_to(shape, points + step * normals, normals)
+    other = open_to(shape, points - depth[near, None] * normals + step * back, back)
+    return float((2 * own < other).sum() / count)
+
+
+def open_to(
+    shape: Shape, points: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"]
+) -> Float[np.ndarray, " N"]:
+    """Tell how much of the open faces see: the sum of cosines over free directions."""
+    seen = np.zeros(len(points))
+    for direction in sphere_directions(48):
+        facing = normals @ direction
+        some = np.flatnonzero(facing > 0.05)
+        free = shape.reach(points[some], np.tile(direction, (len(some), 1)))
+        seen[some] += facing[some] * ~np.isfinite(free)
+    return seen
+
+
 @dataclass(frozen=True)
 class Skin:
     """The triangles between inside and outside, wound so that their normals point outside."""
@@ -154,12 +194,7 @@ def convex_side(skin: Shape) -> np.ndarray:
     mesh = skin.mesh
     centres, normals = mesh.corners.mean(axis=1), mesh.normals
     step = 1e-5 * mesh.extent
-    open_to = np.zeros(len(centres))
-    for direction in sphere_directions(48):
-        facing = normals @ direction
-        seen = np.flatnonzero(facing > 0.05)
-        free = skin.reach(centres[seen] + step * normals[seen], np.tile(direction, (len(seen), 1)))
-        open_to[seen] += facing[seen] * ~np.isfinite(free)
+    seen = open_to(skin, centres + step * normals, normals)
     behind = skin.hit(centres - step * normals, -normals)
-    other = np.where(behind >= 0, open_to[behind], 0.0)
-    return open_to >= other
+    other = np.where(behind >= 0, seen[behind], 0.0)
+    return seen >= other

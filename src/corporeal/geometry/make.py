@@ -192,9 +192,9 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
     """Say how thick a part's walls are and what they weigh.
 
     Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ min(A t, V) with the area A of one
-    face. A wall whose mesh shows both faces is 2 V / A thick unless somebody stated or judged
-    otherwise: thin walls are drawn too thick, in scans as in models. Open sheets weigh ρ A t. Of a
-    piece, its shares of V and A count.
+    face: not of the inside of a shade, whose outside counts. A wall whose mesh shows both faces is
+    2 V / A thick unless somebody stated or judged otherwise: thin walls are drawn too thick, in
+    scans as in models. Open sheets weigh ρ A t. Of a piece, its shares of V and A count.
     """
     wall = member.build is Build.WALL
     shown = 2 * member.volume / member.body_area if wall else 0.0
@@ -207,7 +207,7 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
         thickness, whose = wall_of(structure, words, shown, stated or 0.0, guess)
     elif wall:
         thickness, whose = shown, DRAWN
-    face = member.body_area * (0.5 if wall else 1.0) * words.surface_share
+    face = (member.face_area if walled or wall else member.body_area) * words.surface_share
     volume = member.volume * words.volume_share if not only_sheet else face * sheet
     sheets = member.sheet_area * words.surface_share
     if walled and not only_sheet:

@@ -55,7 +55,7 @@ def room_of(anatomy: Anatomy, member: Member, thickness: float, rng: np.random.G
         return Room(points, float(box) * len(points) / COUNT)
     probes = anatomy.probes[anatomy.part_of_probe == member.part]
     deep = member.shape.closest(probes)[0] > thickness
-    wall = min(member.body_area * thickness, member.volume)
+    wall = min(member.face_area * thickness, member.volume)
     return Room(probes[deep] if deep.any() else probes, member.volume - wall)
 
 

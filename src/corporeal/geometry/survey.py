@@ -9,7 +9,15 @@ from jaxtyping import Float, Int
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from corporeal.geometry.anatomy import Build, Skin, build_of, outer_skin, pieces, sheets
+from corporeal.geometry.anatomy import (
+    Build,
+    Skin,
+    build_of,
+    inner_share,
+    outer_skin,
+    pieces,
+    sheets,
+)
 from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.mesh import Mesh, openness, orient, signed_volume, weld
 from corporeal.geometry.shape import Shape
@@ -40,6 +48,8 @@ class Member:
     """Enclosed by the object and belonging to this part [m³]."""
     size: tuple[float, float, float]
     """Extents of its smallest box, shortest first [m]."""
+    whole: Shape | None = None
+    """All that encloses something, of the object."""
 
     @cached_property
     def shape(self) -> Shape:
@@ -50,6 +60,14 @@ class Member:
     def body_area(self) -> float:
         """Of every face that encloses something [m²]."""
         return float(self.body.areas.sum())
+
+    @cached_property
+    def face_area(self) -> float:
+        """Of one face of its wall, if it has one [m²]."""
+        if self.build is Build.WALL or self.whole is None or not len(self.body.triangles):
+            return 0.5 * self.body_area
+        rng = np.random.default_rng(self.part)
+        return self.body_area * (1 - inner_share(self.whole, self.body, self.size[0], rng))
 
     @cached_property
     def sheet_area(self) -> float:
@@ -132,7 +150,7 @@ def survey(
     alone = [
         Member(int(k), mesh.only(solid & (part == k)), mesh.only(~solid & (part == k)), closed[k],
                Build(int(build[part == k].min())), 0.0,
-               oriented_size(mesh.corners[part == k].reshape(-1, 3)))
+               oriented_size(mesh.corners[part == k].reshape(-1, 3)), shape)
         for k in np.unique(part)
     ]  # fmt: skip
 
