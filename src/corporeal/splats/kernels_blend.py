@@ -231,18 +231,27 @@ def shares(tiles, first, ids, ellipses, size, cell, out):
         y0, x0 = t // across * TILE, t % across * TILE
         T[:] = 1
         out[first[t] : first[t + 1]] = 0
+        left = min(TILE, height - y0) * min(TILE, width - x0)
         for k in range(first[t], first[t + 1]):
+            if left == 0:
+                break
             e = ellipses[ids[k]]
             mx = e[U] - f4(x0) - f4(0.5)
             my, low, high = _rows(e, y0)
             a, b, c = f4(0.5) * e[A], e[B], f4(0.5) * e[C]
+            begin = max(0, int(np.ceil(mx - e[REACH])))
+            end = min(TILE, width - x0, int(np.floor(mx + e[REACH])) + 1)
             for y in range(low, min(high, height - y0)):
                 dy = f4(y) - my
-                for x in range(min(TILE, width - x0)):
+                for x in range(begin, end):
+                    before = T[y, x]
+                    if before <= SHUT:
+                        continue
                     dx = f4(x) - mx
                     s = c * dy * dy + dx * (b * dy + a * dx)
                     alpha = e[O] * _decay(s if s < LAST else LAST)
                     alpha = alpha if alpha < MOST else MOST
-                    if alpha >= CUTOFF and T[y, x] > SHUT:
-                        out[k, y // cell, x // cell] += T[y, x] * alpha
-                        T[y, x] *= f4(1) - alpha
+                    if alpha >= CUTOFF:
+                        out[k, y // cell, x // cell] += before * alpha
+                        T[y, x] = before * (f4(1) - alpha)
+                        left -= T[y, x] <= SHUT

@@ -6,7 +6,7 @@ import numpy as np
 from corporeal.splats.kernels_basis import JIT
 from corporeal.splats.kernels_blend import CUTOFF, LAST, MOST, TILE, _decay, _rows
 from corporeal.splats.kernels_camera import from_camera, pixel
-from corporeal.splats.kernels_project import REACH, A, B, C, O, U, Z
+from corporeal.splats.kernels_project import DILATION, REACH, A, B, C, O, U, Z
 
 f4 = np.float32
 MET = f4(0.85)
@@ -14,8 +14,53 @@ MET = f4(0.85)
 of the light is lost is already below what is seen."""
 HALF = f4(0.5)
 """A pixel that lets more light through shows no thing."""
+FAR = 3.0
+"""Nothing of a Gaussian is met farther from its mean, in standard deviations along the view."""
 OVERTAKEN = 1.6
 """Factor of successive overrelaxation."""
+
+
+@numba.njit(**JIT)
+def slopes(first, last, mean, spread, ellipses, camera, out):
+    """Fill out[first:last] (N, 4): how the depth of a Gaussian's densest point changes with pixels.
+
+    In the affine approximation of the projection (u, v, z) is Gaussian, and z given (u, v) has the
+    mean z_0 + Σ_z,uv Σ_uv^-1 (u - u_0, v - v_0): two slopes. Then how far from z_0 that may be, and
+    how far before it the Gaussian begins: one standard deviation of z given (u, v).
+
+    mean (N, 3) and covariance (N, 3, 3) [m], ellipses as drawn: of others nothing is filled in.
+    """
+    W = camera.turn
+    T, S, half = np.empty((3, 3)), np.empty((3, 3)), np.empty(3)
+    for i in range(first, last):
+        if not ellipses[i, REACH] > 0:
+            continue
+        x, y, z = camera.shift
+        for k in range(3):
+            x += W[0, k] * mean[i, k]
+            y += W[1, k] * mean[i, k]
+            z += W[2, k] * mean[i, k]
+        for k in range(3):
+            T[0, k] = camera.fx / z * (W[0, k] - x / z * W[2, k])
+            T[1, k] = camera.fy / z * (W[1, k] - y / z * W[2, k])
+            T[2, k] = W[2, k]
+        for r in range(3):
+            for k in range(3):
+                half[k] = 0.0
+                for q in range(3):
+                    half[k] += T[r, q] * spread[i, q, k]
+            for c in range(3):
+                S[r, c] = half[0] * T[c, 0] + half[1] * T[c, 1] + half[2] * T[c, 2]
+        flat = S[0, 0] * S[1, 1] - S[0, 1] * S[0, 1]
+        whole = S[2, 2] * flat - S[1, 2] * (S[0, 0] * S[1, 2] - S[0, 1] * S[0, 2])
+        whole += S[0, 2] * (S[0, 1] * S[1, 2] - S[1, 1] * S[0, 2])
+        a, b, c = S[0, 0] + DILATION, S[0, 1], S[1, 1] + DILATION
+        det = a * c - b * b
+        out[i, 0] = (c * S[0, 2] - b * S[1, 2]) / det
+        out[i, 1] = (a * S[1, 2] - b * S[0, 2]) / det
+        out[i, 2] = FAR * np.sqrt(S[2, 2])
+        # The dilation of pictures makes nothing thicker.
+        out[i, 3] = np.sqrt(max(whole / max(flat, 1e-30), 0.0))
 
 
 @numba.njit(**JIT)

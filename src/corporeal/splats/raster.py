@@ -3,7 +3,7 @@
 Tiles of 16 × 16 pixels, front to back (Kerbl et al. 2023); ``reference`` says the same plainly.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Float32, Int
@@ -13,7 +13,7 @@ from corporeal.errors import UserError
 from corporeal.splats import kernels_blend, kernels_project
 from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_blend import PLANES, TILE
-from corporeal.splats.kernels_project import GRADIENTS, REACH, WIDTH, Pinhole, Z
+from corporeal.splats.kernels_project import GRADIENTS, REACH, WIDTH, A, B, C, O, Pinhole, Z
 from corporeal.splats.parameters import Parameters, parameters
 from corporeal.types import Camera, Gaussians, Vector
 
@@ -88,18 +88,23 @@ def draw(
     theta: Parameters, camera: Pinhole, background: Float[np.ndarray, "3"], crew: Crew
 ) -> Drawing:
     """Draw Gaussians from front to back."""
+    ellipses, first, ids, places, spans = _in_tiles(theta, camera, crew)
+    planes = np.empty((PLANES, camera.height, camera.width), np.float32)
+    background = background.astype(np.float32)
+    shares = [(t, first, ids, ellipses, background, planes) for t in dealt(first, crew)]
+    crew.each(kernels_blend.blend, shares)
+    return Drawing(theta, camera, ellipses, first, ids, places, spans, planes)
+
+
+def _in_tiles(theta: Parameters, camera: Pinhole, crew: Crew) -> tuple[np.ndarray, ...]:
+    """Return a drawing's ellipses and their entries, tile by tile, front to back in each."""
     ellipses = np.zeros((len(theta), WIDTH), np.float32)
     shares = [(theta, *span, camera, ellipses) for span in crew.spans(len(theta))]
     crew.each(kernels_project.project, shares)
     seen = np.flatnonzero(ellipses[:, REACH] > 0)
     order = seen[np.argsort(ellipses[seen, Z], kind="stable")]
     across, down = -(-camera.width // TILE), -(-camera.height // TILE)
-    first, ids, places, spans = kernels_blend.deal(order, ellipses, across, down)
-    planes = np.empty((PLANES, camera.height, camera.width), np.float32)
-    background = background.astype(np.float32)
-    shares = [(t, first, ids, ellipses, background, planes) for t in dealt(first, crew)]
-    crew.each(kernels_blend.blend, shares)
-    return Drawing(theta, camera, ellipses, first, ids, places, spans, planes)
+    return ellipses, *kernels_blend.deal(order, ellipses, across, down)
 
 
 def back(
@@ -126,22 +131,40 @@ def weights(
     cell: pixels along a cell: 1, 2, 4, 8 or 16. Row: Gaussian; column: row of cells times cells in
     a row plus column of cells; value: sum of the weights T α over the cell's pixels.
     """
+    return contributions(gaussians, camera, cell, threads)[0]
+
+
+def contributions(
+    gaussians: Gaussians, camera: Camera, cell: int = 1, threads: int | None = None
+) -> tuple[csr_array, Float[np.ndarray, " N"]]:
+    """Return the same, and what each would contribute to an endless picture if nothing hid it [px].
+
+    That is the sum of α over all pixels, 2π o / √(A C - B²); 0 where it is not in the picture.
+    """
     if cell not in (1, 2, 4, 8, TILE):
         raise UserError(f"A cell of {cell} pixels does not divide a tile. Take 1, 2, 4, 8 or 16.")
+    colourless = replace(gaussians, sh=gaussians.sh[:, :1])
+    within, size = TILE // cell, (camera.height, camera.width)
     with Crew(threads) as crew:
-        d = draw(parameters(gaussians), pinhole(camera), np.zeros(3), crew)
-        within = TILE // cell
-        sums = np.empty((len(d.ids), within, within), np.float32)
-        size = camera.height, camera.width
-        rest = d.first, d.ids, d.ellipses, size, cell, sums
-        crew.each(kernels_blend.shares, [(t, *rest) for t in dealt(d.first, crew)])
+        ellipses, first, ids, *_ = _in_tiles(parameters(colourless), pinhole(camera), crew)
+        sums = np.empty((len(ids), within, within), np.float32)
+        rest = first, ids, ellipses, size, cell, sums
+        crew.each(kernels_blend.shares, [(t, *rest) for t in dealt(first, crew)])
     entry, y, x = np.nonzero(sums)
-    tile = np.repeat(np.arange(len(d.first) - 1), np.diff(d.first))[entry]
+    tile = np.repeat(np.arange(len(first) - 1), np.diff(first))[entry]
     across = -(-camera.width // TILE)
     columns = -(-camera.width // cell)
     column = (tile // across * within + y) * columns + tile % across * within + x
     shape = gaussians.count, -(-camera.height // cell) * columns
-    return csr_array((sums[entry, y, x], (d.ids[entry], column)), shape=shape)
+    found = csr_array((sums[entry, y, x], (ids[entry], column)), shape=shape)
+    return found, _unhidden(ellipses)
+
+
+def _unhidden(ellipses: Float32[np.ndarray, "N 12"]) -> Float[np.ndarray, " N"]:
+    whole, drawn = np.zeros(len(ellipses)), ellipses[:, REACH] > 0
+    a, b, c, o = ellipses[drawn][:, [A, B, C, O]].T.astype(np.float64)
+    whole[drawn] = 2 * np.pi * o / np.sqrt(a * c - b * b)
+    return whole
 
 
 def pinhole(camera: Camera, scale: float = 1.0, near: float = NEAR) -> Pinhole:

@@ -7,15 +7,12 @@ from jaxtyping import Float, Float32, Int
 from scipy.spatial.transform import Rotation
 
 from corporeal.splats.crew import Crew
-from corporeal.splats.kernels_carve import meet
-from corporeal.splats.kernels_project import DILATION, Pinhole
+from corporeal.splats.kernels_carve import meet, slopes
+from corporeal.splats.kernels_project import Pinhole
 from corporeal.splats.parameters import parameters
 from corporeal.splats.raster import dealt, draw, picture_of, pinhole
 from corporeal.splats.start import clearance
 from corporeal.types import Camera, Gaussians
-
-REACH = 3.0
-"""Nothing of a Gaussian is met farther from its mean, in standard deviations along the view."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +43,9 @@ def looked(gaussians: Gaussians, cameras: tuple[Camera, ...], crew: Crew) -> Sig
         picture = picture_of(drawing)
         own = k, slice(eye.height), slice(eye.width)
         rgb[own] = np.clip(picture.rgb / np.maximum(picture.alpha, 1e-3)[..., None], 0, 1)
-        slope = slopes(gaussians.mean, spread, eye)
+        slope = np.empty((gaussians.count, 4), np.float32)
+        seen = gaussians.mean, spread, drawing.ellipses, eye, slope
+        crew.each(slopes, [(*span, *seen) for span in crew.spans(gaussians.count)])
         rest = drawing.first, drawing.ids, drawing.ellipses, slope, depth[own], met[own]
         crew.each(meet, [(t, *rest) for t in dealt(drawing.first, crew)])
     return Sight(rgb, depth, met, np.stack([_row(eye) for eye in eyes]))
@@ -57,33 +56,6 @@ def covariances(gaussians: Gaussians) -> Float[np.ndarray, "N 3 3"]:
     turn = Rotation.from_quat(gaussians.rotation, scalar_first=True).as_matrix()
     half = turn * gaussians.scale[:, None, :]
     return half @ half.transpose(0, 2, 1)
-
-
-def slopes(
-    mean: Float[np.ndarray, "N 3"], spread: Float[np.ndarray, "N 3 3"], eye: Pinhole
-) -> Float32[np.ndarray, "N 4"]:
-    """Return how the depth of each Gaussian's densest point changes with the pixel, along u and v.
-
-    In the affine approximation of the projection (u, v, z) is Gaussian, and z given (u, v) has the
-    mean z_0 + Σ_z,uv Σ_uv^-1 (u - u_0, v - v_0). Also how far from z_0 that may be, and how far
-    before it the Gaussian begins: one standard deviation of z given (u, v).
-    """
-    p = mean.astype(np.float64) @ eye.turn.T + eye.shift
-    z = np.maximum(p[:, 2], eye.near)
-    J = np.zeros((len(p), 3, 3))
-    J[:, 0, 0], J[:, 0, 2] = eye.fx / z, -eye.fx * p[:, 0] / z**2
-    J[:, 1, 1], J[:, 1, 2] = eye.fy / z, -eye.fy * p[:, 1] / z**2
-    J[:, 2, 2] = 1
-    T = J @ eye.turn
-    S = T @ spread @ T.transpose(0, 2, 1)
-    a, b, c = S[:, 0, 0] + DILATION, S[:, 0, 1], S[:, 1, 1] + DILATION
-    det = a * c - b * b
-    along_u = (c * S[:, 0, 2] - b * S[:, 1, 2]) / det
-    along_v = (a * S[:, 1, 2] - b * S[:, 0, 2]) / det
-    # The dilation of pictures makes nothing thicker.
-    left = np.linalg.det(S) / np.maximum(S[:, 0, 0] * S[:, 1, 1] - S[:, 0, 1] ** 2, 1e-30)
-    columns = [along_u, along_v, REACH * np.sqrt(S[:, 2, 2]), np.sqrt(np.maximum(left, 0))]
-    return np.stack(columns, axis=1).astype(np.float32)
 
 
 def _row(eye: Pinhole) -> Float[np.ndarray, "18"]:
