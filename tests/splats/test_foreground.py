@@ -7,6 +7,8 @@ import pytest
 from splat_scenes import around, blobs, pictured
 
 from corporeal.errors import UserError
+from corporeal.features.descriptor import LET_THROUGH, seen_from
+from corporeal.geometry.local_shape import neighbours, normals
 from corporeal.splats.foreground import foreground, shown
 from corporeal.types import Gaussians
 
@@ -44,7 +46,7 @@ def scene():
 
 def test_without_masks_things_are_above_the_floor_and_in_the_middle(scene):
     gaussians, kind = scene
-    found = foreground(gaussians, CAMERAS, threads=1)
+    found = foreground(gaussians, CAMERAS, shown(gaussians, CAMERAS, threads=1))
     assert found[kind == 0].mean() > 0.95
     assert not found[kind == 1].any()
     assert not found[kind == 2].any()
@@ -55,7 +57,7 @@ def test_with_masks_what_shows_outside_them_is_not_of_the_things(scene):
     gaussians, kind = scene
     alone = replace(gaussians, opacity=np.where(kind == 0, gaussians.opacity, 0))
     _, masks = pictured(alone, CAMERAS)
-    found = foreground(gaussians, CAMERAS, masks, threads=1)
+    found = foreground(gaussians, CAMERAS, shown(gaussians, CAMERAS, masks, threads=1))
     assert found[kind == 0].mean() > 0.95
     assert found[kind != 0].mean() < 0.02
 
@@ -77,4 +79,31 @@ def test_what_shows_is_summed_over_pictures(scene):
 
 def test_a_mask_is_needed_for_each_camera(scene):
     with pytest.raises(UserError, match="3 masks for"):
-        foreground(scene[0], CAMERAS, np.ones((3, 64, 64), bool))
+        shown(scene[0], CAMERAS, np.ones((3, 64, 64), bool))
+
+
+def ball(count, scale, opacity=0.9):
+    """Return Gaussians on a sphere of radius 0.3 that stands on the floor; and where they face."""
+    k = np.arange(count) + 0.5
+    z, turn = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
+    flat = np.sqrt(1 - z * z)
+    out = np.stack([flat * np.cos(turn), flat * np.sin(turn), z], axis=1)
+    return like(0.3 * out + [0, 0, 0.3], scale, opacity), out
+
+
+@pytest.mark.parametrize("opacity", [0.8, 0.95])
+def test_undersides_face_down_though_light_comes_through_from_above(opacity):
+    gaussians, out = ball(800, 0.018, opacity)
+    seen = shown(gaussians, CAMERAS, threads=1)
+    below = out[:, 2] < -0.8
+    assert (seen.share[:, below].max(axis=0) > 0.01).mean() > 0.9
+    assert 0.3 < np.median(seen.share[:, out[:, 2] > 0.5].max(axis=0)) < 0.95
+    towards = seen_from(gaussians.mean, CAMERAS, list(seen.share), LET_THROUGH)
+    normal = normals(gaussians.mean, neighbours(gaussians.mean, 16), towards)
+    assert ((normal * out).sum(axis=1) > 0).mean() > 0.995
+
+
+def test_gaussians_that_are_more_than_pixels_belong_to_things_too():
+    gaussians, out = ball(20_000, 0.002)
+    found = foreground(gaussians, CAMERAS, shown(gaussians, CAMERAS, threads=1), floor=False)
+    assert found[out[:, 2] > -0.2].mean() > 0.9

@@ -20,7 +20,7 @@ from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
 from corporeal.evaluation.overlap import matched_iou
-from corporeal.features.descriptor import descriptor, seen_from
+from corporeal.features.descriptor import LET_THROUGH, descriptor, seen_from
 from corporeal.features.lifting import back_projection, visible
 from corporeal.formats.splat_ply import write_splat
 from corporeal.formats.splats import read_splat
@@ -31,7 +31,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.spread import sample_surface
 from corporeal.regions.masks import lifted
 from corporeal.regions.objects import Split, components, objects
-from corporeal.splats.foreground import foreground
+from corporeal.splats.foreground import foreground, shown
 from corporeal.splats.raster import weights
 from corporeal.splats.train import TrainConfig, train
 from corporeal.stages.assemble import assemble
@@ -226,12 +226,12 @@ def _of_surface(scene: Scene, views: Views, config: ObjectsEvaluationConfig) -> 
     rng = np.random.default_rng(0)
     position, triangle = sample_surface(mesh, 3 * config.surface_points, rng)
     pairs = list(zip(views.cameras, views.depth, strict=True))
-    shown = np.stack([visible(position, camera, depth) for camera, depth in pairs])
-    kept = rng.permutation(np.flatnonzero(shown.any(axis=0)))[: config.surface_points]
-    position, shown, truth = position[kept], shown[:, kept], owner[triangle[kept]]
+    sights = np.stack([visible(position, camera, depth) for camera, depth in pairs])
+    kept = rng.permutation(np.flatnonzero(sights.any(axis=0)))[: config.surface_points]
+    position, sights, truth = position[kept], sights[:, kept], owner[triangle[kept]]
     lift = back_projection(position, views.cameras, views.depth, list(views.rgb / 255))
-    towards = seen_from(position, views.cameras, list(shown))
-    shares = [_falls(position, c, s) for c, s in zip(views.cameras, shown, strict=True)]
+    towards = seen_from(position, views.cameras, list(sights))
+    shares = [_falls(position, c, s) for c, s in zip(views.cameras, sights, strict=True)]
     seen = _Seen(position, np.clip(lift.mean, 0, 1), towards, truth, shares)
     return _taken(scene, views, seen)
 
@@ -264,11 +264,11 @@ def _learned(name: str, views: Views, config: ObjectsEvaluationConfig) -> Gaussi
 
 def _of_gaussians(scene: Scene, views: Views, gaussians: Gaussians) -> Touching:
     assert views.object_of_pixel is not None
-    things = foreground(gaussians, views.cameras, views.object_of_pixel >= 0)
-    kept = np.flatnonzero(things)
+    shows = shown(gaussians, views.cameras, views.object_of_pixel >= 0)
+    kept = np.flatnonzero(foreground(gaussians, views.cameras, shows))
     position = gaussians.mean[kept].astype(np.float64)
     shares = [csr_array(weights(gaussians, camera)[kept]) for camera in views.cameras]
-    towards = seen_from(position, views.cameras, [s.sum(axis=1) for s in shares])
+    towards = seen_from(position, views.cameras, list(shows.share[:, kept]), LET_THROUGH)
     colour = np.clip(0.5 + DC * gaussians.sh[kept, 0], 0, 1)
     surface = [_on(scene, k) for k in range(len(scene.objects))]
     nearest = KDTree(np.concatenate(surface)).query(position)[1]

@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from corporeal.features import connect
 from corporeal.features.descriptor import descriptor, seen_from
-from corporeal.features.lifting import LEAST, Lifted, back_projection, fill, visible
+from corporeal.features.lifting import Lifted, back_projection, fill, visible
 from corporeal.types import Camera, Cloud
 
 LEEWAY = 0.02
@@ -28,8 +28,10 @@ class Placed:
     """World [m]."""
     colour: Float[np.ndarray, "N 3"]
     """sRGB in [0, 1]."""
-    shown: Float[np.ndarray, "V N"]
-    """How much of each point each view shows [px]; or 0 and 1."""
+    outside: Float[np.ndarray, "N 3"]
+    """Roughly where the outside is of each, of any length."""
+    seen: Int[np.ndarray, " N"]
+    """In how many views."""
     lift: Callable[[Sequence[np.ndarray]], Lifted]
     """Maps, one per view → features on points."""
     gaussian_of_point: Int[np.ndarray, " N"] | None = None
@@ -47,26 +49,22 @@ def projected(
 ) -> Placed:
     """Return points that take what they look like from where they fall, see ``back_projection``."""
     pairs = zip(cameras, depth, strict=True)
-    shown = np.stack([visible(position, camera, d, LEEWAY) for camera, d in pairs]).astype(float)
+    shown = np.stack([visible(position, camera, d, LEEWAY) for camera, d in pairs])
+    outside, seen = seen_from(position, cameras, list(shown)), shown.sum(axis=0)
 
     def lift(maps: Sequence[np.ndarray]) -> Lifted:
         return back_projection(position, cameras, depth, maps, LEEWAY)
 
-    return Placed(position, colour, shown, lift, gaussian_of_point)
+    return Placed(position, colour, outside, seen, lift, gaussian_of_point)
 
 
 def looked_at(
-    placed: Placed,
-    cameras: Sequence[Camera],
-    pictures: Pictures,
-    specs: tuple[str, str],
-    folder: Path | None = None,
-) -> tuple[Cloud, Float[np.ndarray, "N 3"]]:
-    """Return points with what they look like, and where the outside is of each.
+    placed: Placed, pictures: Pictures, specs: tuple[str, str], folder: Path | None = None
+) -> Cloud:
+    """Return points with what they look like.
 
     Args:
         placed: The points.
-        cameras: One per view.
         pictures: Asked for only where a model looks.
         specs: What looks, for semantic and for structural features, as for ``features.connect``.
         folder: Where maps that were made once are kept.
@@ -75,15 +73,14 @@ def looked_at(
         UserError: A model cannot be had, or no view shows any point.
 
     """
-    outside, looks = seen_from(placed.position, cameras, list(placed.shown)), {}
+    looks = {}
     for spec in dict.fromkeys(specs):
         encoder = connect(spec, folder)
         if encoder is None:
-            looks[spec] = descriptor(placed.position, placed.colour, outside)
+            looks[spec] = descriptor(placed.position, placed.colour, placed.outside)
             continue
         maps = [encoder.map(picture) for picture in pictures()]
         looks[spec] = fill(placed.position, placed.lift(maps)).unit()
-    seen = np.asarray((placed.shown > LEAST).sum(axis=0), dtype=np.int64)
     what, where = (looks[spec] for spec in specs)
-    cloud = Cloud(placed.position, placed.colour, what, where, seen, placed.gaussian_of_point)
-    return cloud, outside
+    rest = placed.seen, placed.gaussian_of_point
+    return Cloud(placed.position, placed.colour, what, where, *rest)

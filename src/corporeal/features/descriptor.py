@@ -22,6 +22,8 @@ ROUGH = 0.5
 """Largest local spread of colours that is told from larger ones, in hundreds of CIELAB."""
 THINNEST = 1e-3
 """Smallest thickness that is told from smaller ones, as a share of the whole cloud's extent."""
+LET_THROUGH = 0.12
+"""Share of a Gaussian that may show through others that hide it."""
 CHANNELS = 11
 """Colour 3, spread 1, normal 3, roughness and metallic 2, thickness 1, and what makes it unit."""
 
@@ -102,6 +104,7 @@ def seen_from(
     position: Float[np.ndarray, "N 3"],
     cameras: Sequence[Camera],
     shares: Sequence[np.ndarray],
+    least: float = 0.0,
 ) -> Float[np.ndarray, "N 3"]:
     """Return the mean direction that points are seen from; its length says nothing.
 
@@ -112,13 +115,15 @@ def seen_from(
         cameras: One per view.
         shares: Of each view, how much each point has to show in it: 0 or 1 from
             ``lifting.visible``, or a Gaussian's weight.
+        least: Views with a smaller share speak for the other side. Gaussians let some light
+            through, so that all views see a little of what is behind others.
 
     """
     seen, ahead = np.zeros(position.shape), np.zeros(position.shape)
     for camera, share in zip(cameras, shares, strict=True):
         to = camera.world_from_camera[:3, 3] - position
         to = to / np.maximum(np.linalg.norm(to, axis=1, keepdims=True), 1e-300)
-        seen += np.asarray(share, float)[:, None] * to
+        seen += (np.asarray(share, float)[:, None] - least) * to
         ahead += to
     unseen = ~seen.any(axis=1)
     seen[unseen] = -ahead[unseen]

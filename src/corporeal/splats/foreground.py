@@ -4,18 +4,19 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Float16, Int
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
-from corporeal.splats.raster import weights
+from corporeal.splats.raster import contributions, weights
 from corporeal.types import Camera, Gaussians
 
 CELL, WHOLE = 4, 16
 """Pixels along a cell in which contributions are summed, with masks and without."""
 VISIBLE = 0.1
-"""Least contribution to a picture, in pixels, for a view to count as having seen it."""
+"""Least contribution to a picture, in pixels, for a view to count as having seen it. Where there
+are more Gaussians than pixels, this share of what those that show contribute in the mean."""
 INSIDE = 0.5
 """Share of what shows of a Gaussian that must be inside masks."""
 FAINT = 0.05
@@ -30,6 +31,8 @@ WIDE = 0.5
 """Standard deviation of haze, in those radii."""
 HALF = 0.5
 """Share of a pixel from which on it is a thing's."""
+TINY = 1e-12
+"""Contribution that can be divided by [px]."""
 NEAR = 3.0
 """Distances between neighbours within which a Gaussian, or a place, goes with a thing."""
 
@@ -40,10 +43,14 @@ class Shown:
 
     weight: Float[np.ndarray, " N"]
     """Sum of its blending weights T α over all pictures [px]."""
-    inside: Float[np.ndarray, " N"]
-    """The part of that inside masks [px]; all of it where there are none."""
+    inside: Float[np.ndarray, " N"] | None
+    """The part of that inside masks [px]; None: there are none."""
     views: Int[np.ndarray, " N"]
     """In how many pictures it shows."""
+    share: Float16[np.ndarray, "V N"]
+    """Of what each picture would show of it if nothing hid it."""
+    least: float
+    """What it must contribute to a picture for that to count, in the mean [px]."""
 
 
 def shown(
@@ -61,23 +68,24 @@ def shown(
     if masks is not None and len(masks) != len(cameras):
         raise UserError(f"There are {len(masks)} masks for {len(cameras)} cameras. Give one each.")
     total, inside = np.zeros(gaussians.count), np.zeros(gaussians.count)
-    views = np.zeros(gaussians.count, np.int64)
+    views, least = np.zeros(gaussians.count, np.int64), []
+    share = np.zeros((len(cameras), gaussians.count), np.float16)
     cell = WHOLE if masks is None else CELL
     for k, camera in enumerate(cameras):
-        shares = weights(gaussians, camera, cell, threads)
+        shares, unhidden = contributions(gaussians, camera, cell, threads)
         own = np.asarray(shares.sum(axis=1)).ravel()
+        least.append(VISIBLE * min(1.0, own.sum() / max(np.count_nonzero(own), 1)))
         total += own
-        views += own > VISIBLE
-        inside += own if masks is None else shares @ _shrunk(masks[k]).ravel()
-    return Shown(total, inside, views)
+        views += own > least[-1]
+        share[k] = np.minimum(own / np.maximum(unhidden, TINY), 1)
+        if masks is not None:
+            inside += shares @ _shrunk(masks[k]).ravel()
+    within = None if masks is None else inside
+    return Shown(total, within, views, share, float(np.mean(least)))
 
 
 def foreground(
-    gaussians: Gaussians,
-    cameras: Sequence[Camera],
-    masks: Bool[np.ndarray, "V H W"] | None = None,
-    floor: bool = True,
-    threads: int | None = None,
+    gaussians: Gaussians, cameras: Sequence[Camera], seen: Shown, floor: bool = True
 ) -> Bool[np.ndarray, " N"]:
     """Tell which Gaussians belong to the things.
 
@@ -88,14 +96,12 @@ def foreground(
     Args:
         gaussians: In the world's frame: +z up, the floor at z = 0.
         cameras: In the same frame.
-        masks: Which pixels are on things.
+        seen: What they see of the Gaussians, and what of that is inside masks.
         floor: Whether a floor is among the Gaussians; masks leave none.
-        threads: None: one per processor.
 
     """
-    seen = shown(gaussians, cameras, masks, threads)
-    kept = (seen.weight > VISIBLE) & (gaussians.opacity > FAINT)
-    if masks is not None:
+    kept = (seen.weight > seen.least) & (gaussians.opacity > FAINT)
+    if seen.inside is not None:
         return kept & (seen.inside > INSIDE * seen.weight)
     around = region(tuple(cameras), gaussians.mean)
     distance = np.linalg.norm(gaussians.mean - np.array(around.centre), axis=1)

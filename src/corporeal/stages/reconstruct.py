@@ -6,6 +6,7 @@ Gaussians themselves, for the film and for telling parts apart.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Literal
 
@@ -16,6 +17,7 @@ from scipy.spatial import KDTree
 from corporeal.errors import UserError
 from corporeal.features import Reader, connect
 from corporeal.features.clouds import Placed, looked_at, projected
+from corporeal.features.descriptor import LET_THROUGH, seen_from
 from corporeal.features.lifting import Lifted, known, uplift
 from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
@@ -27,20 +29,20 @@ from corporeal.geometry.metric import MetricScale, TwoPoints, measured
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.regions.masks import lifted
 from corporeal.regions.match import match
-from corporeal.regions.objects import Split
 from corporeal.regions.telling import Rule, told_apart
 from corporeal.render.camera import cameras_around
 from corporeal.render.look import linear
 from corporeal.render.portrait import COLOURS, colour_of_part
 from corporeal.splats.channel import distilled
+from corporeal.splats.closed import Closed, closed
 from corporeal.splats.crew import Crew
 from corporeal.splats.field_points import field_points
-from corporeal.splats.foreground import foreground, with_company
+from corporeal.splats.foreground import Shown, foreground, shown
 from corporeal.splats.intake import Intake, Up, picture, take_in, turned_upright
 from corporeal.splats.radiance import FieldConfig
 from corporeal.splats.raster import weights
 from corporeal.splats.sight import looked
-from corporeal.splats.solid import Solid, solids
+from corporeal.splats.solid import Solid
 from corporeal.splats.train import TrainConfig
 from corporeal.types import (
     Cloud,
@@ -118,10 +120,11 @@ class _Found:
 
     taken: Intake
     cloud: Cloud
-    object_of_point: Int[np.ndarray, " M"]
-    owner: Int[np.ndarray, " N"]
-    """Whose each Gaussian is."""
-    solids: tuple[Solid, ...]
+    closed: Closed
+
+    @property
+    def solids(self) -> tuple[Solid, ...]:
+        return self.closed.solids
 
     @property
     def count(self) -> int:
@@ -168,17 +171,18 @@ def reconstruct(
     if not taken.cameras:
         taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
     progress(TRAINED, "telling things from the background")
-    of_things = _of_things(source, taken)
-    placed = _placed(taken, of_things, config, folder, _within(progress, TRAINED, LOOKED))
+    seen = shown(taken.gaussians, taken.cameras, taken.masks)
+    of_things = _of_things(source, taken, seen)
+    placed = _placed(taken, seen, of_things, config, folder, _within(progress, TRAINED, LOOKED))
     specs, maps = (config.semantic, config.structural), None if folder is None else folder / "maps"
-    cloud, outside = looked_at(placed, taken.cameras, taken.pictures, specs, maps)
+    cloud = looked_at(placed, taken.pictures, specs, maps)
     progress(LOOKED, "finding objects")
     wanted = _wanted(config, viewer, taken)
-    normal = normals(cloud.position, neighbours(cloud.position, AROUND), outside)
+    normal = normals(cloud.position, neighbours(cloud.position, AROUND), placed.outside)
     count, drawn = config.count or len(wanted) or None, _drawn(taken, cloud, of_things)
     split = told_apart(cloud, config.apart, count, normal, drawn)
     progress(FOUND, "closing surfaces")
-    found = _solid(taken, cloud, split, of_things)
+    found = _Found(taken, cloud, closed(taken, of_things, cloud.position, split.object_of_point))
     things = _recognised(wanted, found, config, viewer)
     names = unique([safe(thing.class_name) or UNKNOWN for thing in things])
     sizes = dict(zip(names, found.extents, strict=True))
@@ -212,9 +216,9 @@ def _checked(config: ReconstructConfig) -> MetricScale | None:
 # ---------------------------------------------------------------- what is a thing
 
 
-def _of_things(source: Path, taken: Intake) -> Int[np.ndarray, " M"]:
+def _of_things(source: Path, taken: Intake, seen: Shown) -> Int[np.ndarray, " M"]:
     """Return which Gaussians belong to things."""
-    found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, taken.masks, taken.floor))
+    found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, seen, taken.floor))
     if not len(found):
         what = "shows nothing but floor and background"
         raise UserError(f"{source} {what}. Masks would say what belongs to things.")
@@ -223,6 +227,7 @@ def _of_things(source: Path, taken: Intake) -> Int[np.ndarray, " M"]:
 
 def _placed(
     taken: Intake,
+    seen: Shown,
     things: Int[np.ndarray, " M"],
     config: ReconstructConfig,
     folder: Path | None,
@@ -241,14 +246,14 @@ def _placed(
         with Crew() as crew:
             depth = looked(gaussians, cameras, crew).depth
         return projected(position, colour, cameras, depth, things)
-    shares = [weights(gaussians, camera, CELL) for camera in cameras]
-    shown = np.stack([np.asarray(share.sum(axis=1)).ravel()[things] for share in shares])
+    outside = seen_from(position, cameras, list(seen.share[:, things]), LET_THROUGH)
+    shares = cache(lambda v: weights(gaussians, cameras[v], CELL)[things])
     cells = -(-cameras[0].height // CELL), -(-cameras[0].width // CELL)
 
     def lift(maps: Sequence[np.ndarray]) -> Lifted:
-        return uplift(lambda v: shares[v][things], cells, maps, len(things))
+        return uplift(shares, cells, maps, len(things), seen.least)
 
-    return Placed(position, colour, shown, lift, things)
+    return Placed(position, colour, outside, seen.views[things], lift, things)
 
 
 def _of_field(
@@ -319,7 +324,7 @@ def _by_words(wanted: Sequence[Thing], found: _Found, spec: str) -> list[int]:
     """Pair objects and things so that what CLIP sees fits best what they are called."""
     encoder = connect(spec)
     assert isinstance(encoder, Reader)
-    of, seen = found.object_of_point, found.cloud.semantic
+    of, seen = found.closed.object_of_point, found.cloud.semantic
     looks = np.stack([seen[of == k].mean(axis=0, dtype=np.float64) for k in range(found.count)])
     words = encoder.words([thing.class_name for thing in wanted])
     return match(likeness(unit(looks), words)).tolist()
@@ -330,7 +335,7 @@ def _painted(found: _Found) -> list[np.ndarray]:
     taken = found.taken
     paints = np.array([*COLOURS.values()])
     ink = np.concatenate([paints[np.minimum(np.arange(found.count), len(paints) - 1)], [GREY]])
-    flat = (np.sqrt(ink[found.owner]) - 0.5)[:, None] / DC
+    flat = (np.sqrt(ink[found.closed.owner]) - 0.5)[:, None] / DC
     dressed = replace(taken.gaussians, sh=flat.astype(np.float32))
     pictures = taken.pictures()
     both = [(pictures[k], picture(dressed, taken.cameras[k])) for k in _spread(len(pictures))]
@@ -338,19 +343,6 @@ def _painted(found: _Found) -> list[np.ndarray]:
 
 
 # ---------------------------------------------------------------- what comes out
-
-
-def _solid(taken: Intake, cloud: Cloud, split: Split, of_things: Int[np.ndarray, " M"]) -> _Found:
-    """Give every object a surface, and number them by size: the one with the largest box first."""
-    owner = np.full(taken.gaussians.count, -1, np.int64)
-    nearest = KDTree(cloud.position).query(taken.gaussians.mean[of_things])[1]
-    owner[of_things] = split.object_of_point[nearest]
-    owner = with_company(taken.gaussians, owner, taken.floor)
-    found = solids(taken.gaussians, owner, taken.cameras, taken.masks)
-    order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
-    place = np.append(np.argsort(order), -1)  # the last for what is nobody's
-    ordered = tuple(found[k] for k in order)
-    return _Found(taken, cloud, place[split.object_of_point], place[owner], ordered)
 
 
 def _in_metres(
@@ -364,9 +356,9 @@ def _in_metres(
     boxes = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in found.solids]
     return Reconstruction(
         gaussians=moved_gaussians(found.taken.gaussians, made),
-        object_of_gaussian=found.owner,
+        object_of_gaussian=found.closed.owner,
         cloud=replace(found.cloud, position=moved_points(found.cloud.position, made)),
-        object_of_point=found.object_of_point,
+        object_of_point=found.closed.object_of_point,
         names=tuple(names),
         boxes=scale.metres_per_unit * np.array(boxes),
         metres_per_unit=scale.metres_per_unit,

@@ -1,0 +1,50 @@
+"""From points that somebody told apart to closed surfaces, the largest first."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import KDTree
+
+from corporeal.splats.foreground import with_company
+from corporeal.splats.intake import Intake
+from corporeal.splats.solid import Solid, solids
+
+
+@dataclass(frozen=True)
+class Closed:
+    """Things by size: the one with the largest box first."""
+
+    solids: tuple[Solid, ...]
+    owner: Int[np.ndarray, " N"]
+    """Whose each Gaussian is; -1: nobody's."""
+    object_of_point: Int[np.ndarray, " M"]
+    """Of the points that were told apart."""
+
+
+def closed(
+    taken: Intake,
+    things: Int[np.ndarray, " T"],
+    position: Float[np.ndarray, "M 3"],
+    object_of_point: Int[np.ndarray, " M"],
+) -> Closed:
+    """Give every object a surface, and number them by size.
+
+    Args:
+        taken: The Gaussians, upright, and the cameras that they are looked at by.
+        things: Which of them belong to things.
+        position: Points that were told apart, in the same frame.
+        object_of_point: Whose each point is.
+
+    Raises:
+        UserError: No camera sees anything of an object.
+
+    """
+    owner = np.full(taken.gaussians.count, -1, np.int64)
+    nearest = KDTree(position).query(taken.gaussians.mean[things])[1]
+    owner[things] = object_of_point[nearest]
+    owner = with_company(taken.gaussians, owner, taken.floor)
+    found = solids(taken.gaussians, owner, taken.cameras, taken.masks)
+    order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
+    place = np.append(np.argsort(order), -1)  # the last for what is nobody's
+    return Closed(tuple(found[k] for k in order), place[owner], place[object_of_point])
