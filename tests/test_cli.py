@@ -119,6 +119,26 @@ def test_an_unknown_material_in_an_annotation_shows_the_menu(typed, tmp_path):
     refused(typed("run", "box.glb", "--annotations", "a.yaml"), "unobtainium", "steel")
 
 
+@pytest.mark.parametrize(
+    ("words", "told"),
+    [
+        (("--speed", "nan"), "--speed is nan"),
+        (("--width", "100000"), "100000 × 480"),
+        (("--view", "0", "0", "0"), "no direction"),
+        (("--seed", "-1"), "--seed is -1"),
+        (("--position-weight", "nan"), "--position-weight is nan"),
+        (("--extent", "box"), "NAME=METRES"),
+        (("--neutral", "water"), "liquid"),
+    ],
+)
+def test_settings_that_cannot_be_right_are_refused_before_anything_is_done(
+    typed, tmp_path, words, told
+):
+    write_glb(tmp_path / "box.glb", a_box())
+    refused(typed("run", "box.glb", *words), told)
+    assert not (tmp_path / "runs").exists()
+
+
 def test_a_full_disk_is_said_and_the_run_is_not_taken_for_finished(typed, tmp_path):
     write_glb(tmp_path / "box.glb", a_box())
     soft, hard = resource.getrlimit(resource.RLIMIT_FSIZE)

@@ -22,6 +22,17 @@ class OutOfRangeError(UserError):
         )
 
 
+def check_range(name: str, value: float | None, low: float, high: float) -> None:
+    """Refuse a setting that somebody typed and that cannot be right; None: nobody typed any.
+
+    Raises:
+        UserError: It is not from low to high, or no number.
+
+    """
+    if value is not None and not low <= value <= high:
+        raise UserError(f"{name} is {value}. Give a number from {low:g} to {high:g}.")
+
+
 class BadFileError(UserError):
     """An input file that cannot be used: what is wrong in it, and what to do."""
 

@@ -35,7 +35,7 @@ def taken(monkeypatch, tmp_path):
     monkeypatch.setattr(intake, "read_photographs", lambda *_: shown)
     monkeypatch.setattr(intake, "kind_of", lambda _: "photographs")
 
-    def take(said: Agreement, learned: Trained | UserError):
+    def take(said: Agreement, learned: Trained | UserError, instances: bool = False):
         def train(*_):
             if isinstance(learned, UserError):
                 raise learned
@@ -43,7 +43,7 @@ def taken(monkeypatch, tmp_path):
 
         monkeypatch.setattr(intake, "agreement", lambda *_: said)
         monkeypatch.setattr(intake, "train", train)
-        return take_in(Path("photos"), TrainConfig("draft"))
+        return take_in(Path("photos"), TrainConfig("draft"), instances=instances)
 
     return take
 
@@ -59,6 +59,11 @@ def test_nothing_is_learned_under_poses_that_are_certainly_wrong(taken):
     hopeless = replace(FINE, doubt=DOUBT, hopeless=True)
     with pytest.raises(UserError, match=f"photos: {DOUBT}"):
         taken(hopeless, UserError("It was learned all the same."))
+
+
+def test_nothing_is_learned_where_instance_masks_are_wanted_and_there_are_none(taken):
+    with pytest.raises(UserError, match="photos: There are no instance masks"):
+        taken(FINE, UserError("It was learned all the same."), instances=True)
 
 
 def test_doubts_stay_with_what_is_learned_and_with_why_nothing_can_be(taken):

@@ -229,6 +229,11 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
         ({"semantic": "bert"}, (), "Unknown picture encoder 'bert'"),
         ({"count": 3, "things": ("crate",)}, (), "--count says 3 objects, --things names 1"),
         ({"metres_per_unit": -1.0}, (), "--metres-per-unit is -1 m"),
+        ({"floor_at": float("nan")}, (), "--floor-at is nan"),
+        ({"training_seed": -1}, (), "--training-seed is -1"),
+        ({"apart": "masks"}, (), "is a splat, which has no instance masks"),
+        ({"things": ("crate", "pillar")}, ("box=1",), "no object 'box'. Choose one of: crate, pil"),
+        ({}, ("box=1",), "no object 'box'. Name it with --things"),
         (
             {"known_distance": (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)},
             (),
@@ -236,6 +241,9 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
         ),
     ],
 )
-def test_options_that_make_no_sense_are_refused(splat, config, extents, told):
+def test_options_that_make_no_sense_are_refused_before_anything_is_done(
+    splat, config, extents, told, monkeypatch
+):
+    monkeypatch.setattr(stage, "turned_upright", None)
     with pytest.raises(UserError, match=told):
         reconstruct(splat, ReconstructConfig(**config), extents)

@@ -2,11 +2,8 @@
 
 from pathlib import Path
 
-from corporeal import features
-from corporeal.materials.placement import entry_of
 from corporeal.pipeline import RUN, Settings, reopen
-from corporeal.stages import describe
-from corporeal.stages.ground import GroundConfig
+from corporeal.stages import assemble, describe, fill, film, ground, reconstruct, segment, simulate
 from corporeal.vlm import connect, critic_of
 from corporeal.vlm.annotation import mapping_of
 
@@ -22,13 +19,14 @@ def accept(folder: Path, settings: Settings) -> None:
 
     """
     known = reopen(folder)[1] if (folder / RUN).exists() else None
+    for room in (assemble, segment, fill, simulate, film):
+        room.accept(getattr(settings, room.__name__.rpartition(".")[2]))
     if known is None or known.describe != settings.describe:
         _answered(settings.describe)
     if known is None or known.ground != settings.ground:
-        _listed(settings.ground)
+        ground.accept(settings.ground)
     if known is None or known.reconstruct != settings.reconstruct:
-        for spec in (settings.reconstruct.semantic, settings.reconstruct.structural):
-            features.connect(spec)
+        reconstruct.accept(settings.reconstruct)
 
 
 def _answered(config: describe.DescribeConfig) -> None:
@@ -37,8 +35,3 @@ def _answered(config: describe.DescribeConfig) -> None:
         mapping_of(config.annotations)
     for spec in (config.vlm, critic_of(config.vlm, config.critic)):
         connect(spec)
-
-
-def _listed(config: GroundConfig) -> None:
-    for name in (config.floor, config.neutral):
-        entry_of(name, config.library)

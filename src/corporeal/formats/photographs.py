@@ -32,6 +32,10 @@ MASKS = ("masks", "mask")
 INSTANCES = ("instances", "objects")
 LONGEST = 1024
 """Of a picture's sides, unless more is asked for [px]."""
+NO_INSTANCES = (
+    "There are no instance masks. Name them by object_file_path in transforms.json, or put them "
+    "into a folder 'instances' with the names of the pictures; or leave --apart out."
+)
 KINDS = "Name a folder with transforms.json, a COLMAP model, or 3 × 4 projection matrices."
 
 

@@ -52,7 +52,7 @@ class DeviceEngine:
             UserError: There is no such card, or the problem asks for what only other engines do.
 
         """
-        self.device = _present(device)
+        self.device = present(device)
         _refuse_unknown(problem)
         self.problem = problem
         self.steps = Steps()
@@ -244,7 +244,7 @@ class DeviceEngine:
         self._arrange()
 
 
-def _present(device: str) -> str:
+def present(device: str) -> str:
     """Name of a device that is there.
 
     Raises:

@@ -7,6 +7,7 @@ from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
+from corporeal.formats.photographs import NO_INSTANCES
 from corporeal.regions.masks import renumbered
 from corporeal.regions.objects import MOST, Split, components, objects
 from corporeal.types import Cloud
@@ -21,10 +22,6 @@ CRUMB = 0.003
 PUBLISHED = "the connected components of each point's 20 nearest, as published: a control"
 NUMBERED = "instance masks, whose numbers mean the same in all pictures"
 MATCHED = "instance masks, matched from picture to picture by the points that they share"
-NO_MASKS = (
-    "There are no instance masks. Name them by object_file_path in transforms.json, or put them "
-    "into a folder 'instances' with the names of the pictures; or leave --apart out."
-)
 
 
 def told_apart(
@@ -51,7 +48,7 @@ def told_apart(
     if rule == "components":
         return _by_neighbours(cloud, count)
     if rule == "masks" and masks is None:
-        raise UserError(NO_MASKS)
+        raise UserError(NO_INSTANCES)
     if masks is None or rule == "look":
         return objects(cloud, count, normals)
     named = by_numbers(cloud, masks, count, NUMBERED)

@@ -17,6 +17,8 @@ from corporeal.store import DiskError, writing
 COMPRESSION = 17
 """x264's constant rate factor: 0 is lossless, 23 its default."""
 
+SMALLEST, LARGEST = 16, 4096
+"""Sides of a film [px]."""
 MOST_CREDIT = 20_000
 """Of a film [characters]: a command line takes no more than 128 KiB at a time."""
 
@@ -64,6 +66,15 @@ class Reel:
         )
 
 
+def check_size(width: int, height: int) -> None:
+    """Raise UserError where a film cannot have such a size."""
+    if width % 2 or height % 2 or min(width, height) < SMALLEST or max(width, height) > LARGEST:
+        raise UserError(
+            f"A film cannot be {width} × {height} pixels. Both must be even, from {SMALLEST} to "
+            f"{LARGEST}."
+        )
+
+
 @contextmanager
 def reel(path: Path, fps: int, size: tuple[int, int], credit: str = "") -> Iterator[Reel]:
     """Write H.264 that any browser plays to ``path``, which appears only when it is finished.
@@ -78,11 +89,7 @@ def reel(path: Path, fps: int, size: tuple[int, int], credit: str = "") -> Itera
         UserError: The size is odd, the disk is full, or the encoder is missing or fails.
 
     """
-    width, height = size
-    if width % 2 or height % 2 or min(size) < 16:
-        raise UserError(
-            f"A film cannot be {width} × {height} pixels. Both must be even and at least 16."
-        )
+    check_size(*size)
     partial = path.with_name(f".{path.stem}.part{path.suffix}")
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)

@@ -28,6 +28,15 @@ class Graph(Drawing):
     """Red, green, blue and transmittance (4, H, W)."""
 
 
+def present() -> None:
+    """Raise UserError where there is no card."""
+    if not torch.cuda.is_available():
+        raise UserError(
+            "The rasteriser 'gsplat' needs a graphics card with CUDA, and torch finds none. "
+            "Choose the rasteriser 'numba'."
+        )
+
+
 def draw(theta: Parameters, camera: Pinhole, background: np.ndarray, crew: Crew) -> Graph:
     """Draw Gaussians before a background; the card shares the work itself.
 
@@ -35,11 +44,7 @@ def draw(theta: Parameters, camera: Pinhole, background: np.ndarray, crew: Crew)
         UserError: There is no CUDA.
 
     """
-    if not torch.cuda.is_available():
-        raise UserError(
-            "The rasteriser 'gsplat' needs a graphics card with CUDA, and torch finds none. "
-            "Choose the rasteriser 'numba'."
-        )
+    present()
     leaf = torch.from_numpy(np.ascontiguousarray(theta)).cuda().requires_grad_()
     behind = torch.from_numpy(background.astype(np.float32)).cuda()
     view, K = (torch.from_numpy(m).cuda() for m in matrices(camera))

@@ -9,10 +9,11 @@ import numpy as np
 from jaxtyping import Bool, Float, UInt8
 
 from corporeal.errors import UserError
-from corporeal.formats.photographs import Photographs, read_photographs
+from corporeal.formats.photographs import NO_INSTANCES, Photographs, read_photographs
 from corporeal.formats.sources import kind_of
 from corporeal.formats.splats import read_splat
 from corporeal.geometry.agreement import agreement
+from corporeal.geometry.harmonics import DC
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians
 from corporeal.geometry.upright import Stated, upright
 from corporeal.splats.crew import Crew
@@ -41,6 +42,8 @@ NO_MASKS = (
     "There were no masks, and no floor that things could be told from: whole photographs were "
     "learned, which is much coarser. Give masks."
 )
+SHOWN = 4
+"""Pictures that somebody is shown of the whole scene."""
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
 USUAL: dict[str, Vector] = {".spz": (0.0, 1.0, 0.0)}
 """What is up in files of a kind as a rule; in others it is -y."""
@@ -84,6 +87,20 @@ class Intake:
             return list(self.views.rgb)
         return [picture(self.gaussians, camera) for camera in self.cameras]
 
+    def some(self) -> dict[int, UInt8[np.ndarray, "H W 3"]]:
+        """Return a few pictures from all sides, each with the number of its camera."""
+        count = len(self.cameras)
+        which = np.unique(np.linspace(0, count - 1, min(count, SHOWN)).round().astype(int))
+        own = None if self.views is None else self.views.rgb
+        pairs = ((k, self.cameras[k]) for k in which.tolist())
+        return {k: picture(self.gaussians, c) if own is None else own[k] for k, c in pairs}
+
+    def painted(self, rgb: Float[np.ndarray, "N 3"]) -> list[UInt8[np.ndarray, "H W 3"]]:
+        """Return the same pictures, each followed by itself with Gaussians in flat sRGB."""
+        flat = replace(self.gaussians, sh=((rgb - 0.5)[:, None] / DC).astype(np.float32))
+        pairs = ((shown, picture(flat, self.cameras[k])) for k, shown in self.some().items())
+        return [one for pair in pairs for one in pair]
+
 
 def picture(gaussians: Gaussians, camera: Camera) -> UInt8[np.ndarray, "H W 3"]:
     """Return a picture of Gaussians before black."""
@@ -97,6 +114,7 @@ def take_in(
     up: Up = "auto",
     checkpoint: Path | None = None,
     progress: Progress = lambda fraction, words: None,
+    instances: bool = False,
 ) -> Intake:
     """Read a splat, or photographs and learn Gaussians from them, in the file's own frame and unit.
 
@@ -106,18 +124,24 @@ def take_in(
         up: Which axis of the file points up; auto: what the file or the cameras say.
         checkpoint: Where a training that is cut off leaves what it has.
         progress: Told the fraction done and what is being done.
+        instances: Whether masks must tell things apart.
 
     Raises:
         UserError: The input cannot be used.
 
     """
     progress(0.0, f"reading {source.name}")
-    if kind_of([source]) == "splat":
+    splat = kind_of([source]) == "splat"
+    if splat and instances:
+        raise UserError(f"{source} is a splat, which has no instance masks. Leave --apart out.")
+    if splat:
         given = read_splat(source)
         usual = USUAL.get(source.suffix.lower(), (0.0, -1.0, 0.0))
         said = (f"{given.count:,} Gaussians were read from {source.name}.",)
         return Intake(given, usual=usual, statements=said, warnings=given.warnings)
     shown = read_photographs(source, PRESETS[training.preset].longest)
+    if instances and shown.views.object_of_pixel is None:
+        raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
     doubt = _doubt(source, shown)
     seen, told = _points(shown), ()

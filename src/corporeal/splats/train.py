@@ -110,6 +110,12 @@ RASTERISERS = {"numba": "corporeal.splats.raster", "gsplat": "corporeal.splats.g
 """Modules with the verbs draw and back."""
 
 
+def accept(rasteriser: str) -> None:
+    """Raise UserError where there is no such rasteriser here."""
+    if rasteriser == "gsplat":
+        load("rasteriser", rasteriser, {"gsplat": "corporeal.splats.gsplat:present"})()
+
+
 @dataclass(frozen=True)
 class Trained:
     """What came of it."""

@@ -8,7 +8,7 @@ from typing import Literal
 
 import numpy as np
 
-from corporeal.errors import BadFileError, UserError
+from corporeal.errors import BadFileError, UserError, check_range
 from corporeal.formats.glb import read_model
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
 from corporeal.formats.sources import MODELS, models_in, pictures_in
@@ -73,7 +73,7 @@ def assemble(inputs: Sequence[Path], config: AssembleConfig = DEFAULT) -> Scene:
         UserError: A file cannot be used, or the options don't fit what the files hold.
 
     """
-    _check(config)
+    accept(config)
     plan = _plan([Path(p) for p in inputs])
     blocks = _sized(_named(_read(plan, config)), config.extent)
     scene = _merged(plan, _placed(blocks, plan, config.stack))
@@ -82,15 +82,14 @@ def assemble(inputs: Sequence[Path], config: AssembleConfig = DEFAULT) -> Scene:
     return _timed(_with_overlaps_told(scene), blocks, plan, config)
 
 
-def _check(config: AssembleConfig) -> None:
-    for name, value, low, high in (
-        ("drop", config.drop, 0.0, 100.0),
-        ("working extent", config.working_extent, 1e-3, 1e3),
-        ("duration", config.duration, 0.01, 60.0),
-        ("fps", config.fps, 1, 1000),
-    ):
-        if value is not None and not low <= value <= high:
-            raise UserError(f"The {name} is {value}. Give a number from {low:g} to {high:g}.")
+def accept(config: AssembleConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    check_range("The drop", config.drop, 0.0, 100.0)
+    check_range("The working extent", config.working_extent, 1e-3, 1e3)
+    check_range("The duration", config.duration, 0.01, 60.0)
+    check_range("The fps", config.fps, 1, 1000)
+    for text in config.extent:
+        said_extent(text, "it")
 
 
 # ---------------------------------------------------------------- what the files hold

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Literal
 
 from corporeal import materials
-from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.errors import UnknownChoiceError, check_range
 from corporeal.geometry.identity import Identity, identify
 from corporeal.geometry.identity import words as telling
 from corporeal.materials.offer import Choice, contents_offered, substances_offered
@@ -132,8 +132,7 @@ def accept(config: DescribeConfig) -> None:
         ("--view-size", config.view_size, 16, 2048),
         ("--parallel", config.parallel, 1, 64),
     ):
-        if not low <= value <= high:
-            raise UserError(f"{name} is {value}. Give a number from {low} to {high}.")
+        check_range(name, value, low, high)
 
 
 # ---------------------------------------------------------------- a model's answers

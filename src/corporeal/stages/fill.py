@@ -5,7 +5,7 @@ from typing import Literal
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.errors import UserError, check_range
 from corporeal.geometry.contact_points import contact_points
 from corporeal.geometry.exposure import cross_section, faces
 from corporeal.geometry.falls import drop_heights
@@ -35,6 +35,11 @@ class FillConfig:
 
 
 DEFAULT = FillConfig()
+
+
+def accept(config: FillConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    check_range("--seed", config.seed, 0, 2**63)
 
 
 def fill(

@@ -19,7 +19,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from PIL import Image
 
-from corporeal.errors import UserError
+from corporeal.errors import UserError, check_range
 from corporeal.geometry.harmonics import DC
 from corporeal.render import colours, key, video
 from corporeal.render.camera import Aim, camera_of, place
@@ -80,6 +80,16 @@ class FilmConfig:
 
 
 DEFAULT = FilmConfig()
+SLOWEST, FASTEST = 0.01, 100.0
+
+
+def accept(config: FilmConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    video.check_size(config.width, config.height)
+    check_range("--speed", config.speed, SLOWEST, FASTEST)
+    if config.view is not None and not 0 < float(np.linalg.norm(config.view)) < np.inf:
+        told = " ".join(f"{x:g}" for x in config.view)
+        raise UserError(f"--view is {told}, which is no direction. Give one, for example 1 -1 0.5.")
 
 
 def film(  # noqa: PLR0913

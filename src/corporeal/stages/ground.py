@@ -120,6 +120,13 @@ def _words(inventory: Inventory, number: int, name: str) -> PartWords:
     raise UserError(f"The description has no part {name!r}. Describe the scene again.")
 
 
+def accept(config: GroundConfig) -> None:
+    """Raise UserError where a material is unknown, or cannot be what it is to be."""
+    entry_of(config.floor, config.library)
+    if entry_of(config.neutral, config.library).group == "liquid":
+        raise UserError(f"--neutral {config.neutral} is a liquid, of which no part can be made.")
+
+
 def _entry(words: PartWords, config: GroundConfig) -> Entry:
     entry = entry_of(words.material or config.neutral, config.library)
     if entry.group == "liquid":

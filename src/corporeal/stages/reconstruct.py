@@ -14,7 +14,7 @@ import numpy as np
 from jaxtyping import Int
 from scipy.spatial import KDTree
 
-from corporeal.errors import UserError
+from corporeal.errors import UserError, check_range
 from corporeal.features import Reader, connect
 from corporeal.features.clouds import Placed, looked_at, projected
 from corporeal.features.descriptor import LET_THROUGH, seen_from
@@ -22,7 +22,8 @@ from corporeal.features.lifting import Lifted, known, uplift
 from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
 from corporeal.formats.sources import called
-from corporeal.formats.words import safe, unique
+from corporeal.formats.words import safe
+from corporeal.geometry.gaussians import LARGEST
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
 from corporeal.geometry.metric import MetricScale, TwoPoints, measured
@@ -33,12 +34,13 @@ from corporeal.regions.telling import Rule, told_apart
 from corporeal.render.camera import cameras_around
 from corporeal.render.look import linear
 from corporeal.render.portrait import COLOURS, colour_of_part
+from corporeal.splats import train
 from corporeal.splats.channel import distilled
 from corporeal.splats.closed import Closed, closed
 from corporeal.splats.crew import Crew
 from corporeal.splats.field_points import field_points
 from corporeal.splats.foreground import Shown, foreground, shown
-from corporeal.splats.intake import Intake, Up, picture, take_in, turned_upright
+from corporeal.splats.intake import Intake, Up, take_in, turned_upright
 from corporeal.splats.radiance import FieldConfig
 from corporeal.splats.raster import weights
 from corporeal.splats.sight import looked
@@ -52,7 +54,16 @@ from corporeal.types import (
     SceneObject,
     Surface,
 )
-from corporeal.vlm.things import PERSON, Thing, Viewer, metres, usual
+from corporeal.vlm.things import (
+    PERSON,
+    UNKNOWN,
+    Thing,
+    Viewer,
+    check_extents,
+    metres,
+    names_of,
+    usual,
+)
 
 Progress = Callable[[float, str], None]
 
@@ -66,10 +77,6 @@ OWN_VIEWS, OWN_SIZE = 48, (384, 384)
 """Of a splat that comes without cameras."""
 AROUND = 16
 """Points that a normal is found from."""
-SHOWN = 4
-"""Pictures that somebody is shown of the whole scene."""
-UNKNOWN = "object"
-"""What nobody has a name for."""
 GREY = (0.2, 0.2, 0.2)
 """Linear RGB of what is nobody's, in painted pictures."""
 NOBODY = Viewer("", "metadata")
@@ -162,17 +169,16 @@ def reconstruct(
             does not fit it.
 
     """
-    stated = _checked(config)
-    seed, drawn_by = config.training_seed, config.rasteriser
-    training = TrainConfig(config.training, seed=seed, rasteriser=drawn_by)
+    accept(config, extents, asked=viewer.model is not None)
+    training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
     kept = None if folder is None else folder / "training.npz"
-    taken = take_in(source, training, config.up, kept, _within(progress, 0.0, TRAINED))
+    learning = _within(progress, 0.0, TRAINED)
+    taken = take_in(source, training, config.up, kept, learning, config.apart == "masks")
     taken = turned_upright(taken, config.up, config.floor_at)
     if not taken.cameras:
         taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
     progress(TRAINED, "telling things from the background")
-    seen = shown(taken.gaussians, taken.cameras, taken.masks)
-    of_things = _of_things(source, taken, seen)
+    seen, of_things = _of_things(source, taken)
     placed = _placed(taken, seen, of_things, config, folder, _within(progress, TRAINED, LOOKED))
     specs, maps = (config.semantic, config.structural), None if folder is None else folder / "maps"
     cloud = looked_at(placed, taken.pictures, specs, maps)
@@ -184,9 +190,9 @@ def reconstruct(
     progress(FOUND, "closing surfaces")
     found = _Found(taken, cloud, closed(taken, of_things, cloud.position, split.object_of_point))
     things = _recognised(wanted, found, config, viewer)
-    names = unique([safe(thing.class_name) or UNKNOWN for thing in things])
+    names = names_of(things)
     sizes = dict(zip(names, found.extents, strict=True))
-    scale = metres(sizes, things, extents, stated, taken.z_up)
+    scale = metres(sizes, things, extents, _measured(config), taken.z_up)
     warnings = [*taken.warnings, *split.warnings, *viewer.asked().warnings, *scale.warnings]
     warnings += [f"{n}: {w}" for n, s in zip(names, found.solids, strict=True) for w in s.warnings]
     said = (*taken.statements, *placed.statements, split.statement, scale.reason)
@@ -199,30 +205,42 @@ def _within(progress: Progress, begin: float, end: float) -> Progress:
     return lambda fraction, words: progress(begin + (end - begin) * fraction, words)
 
 
-def _checked(config: ReconstructConfig) -> MetricScale | None:
-    """Refuse options that make no sense; return what somebody measured of the file's unit."""
-    if config.count is not None and not 1 <= config.count <= 1000:
-        raise UserError(f"--count is {config.count}. Give a number of objects from 1 to 1000.")
+def accept(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool = False) -> None:
+    """Raise UserError where a setting cannot be right, whatever the pictures.
+
+    asked: whether somebody will be asked what there is.
+    """
+    check_range("--count", config.count, 1, 1000)
+    check_range("--training-seed", config.training_seed, 0, 2**63)
+    check_range("--floor-at", config.floor_at, -LARGEST, LARGEST)
     if config.count and config.things and config.count != len(config.things):
         raise UserError(
             f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
             "--count out, or name all of them."
         )
+    if config.things or not asked:
+        check_extents(extents, [usual(name) for name in config.things])
     for spec in (config.semantic, config.structural):
         connect(spec)  # who is to look must be there before anything is learned
+    train.accept(config.rasteriser)
+    _measured(config)
+
+
+def _measured(config: ReconstructConfig) -> MetricScale | None:
     return measured(config.metres_per_unit, config.known_distance, PERSON)
 
 
 # ---------------------------------------------------------------- what is a thing
 
 
-def _of_things(source: Path, taken: Intake, seen: Shown) -> Int[np.ndarray, " M"]:
-    """Return which Gaussians belong to things."""
+def _of_things(source: Path, taken: Intake) -> tuple[Shown, Int[np.ndarray, " M"]]:
+    """Return what shows of all Gaussians, and which of them belong to things."""
+    seen = shown(taken.gaussians, taken.cameras, taken.masks)
     found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, seen, taken.floor))
     if not len(found):
         what = "shows nothing but floor and background"
         raise UserError(f"{source} {what}. Masks would say what belongs to things.")
-    return found
+    return seen, found
 
 
 def _placed(
@@ -293,12 +311,7 @@ def _wanted(config: ReconstructConfig, viewer: Viewer, taken: Intake) -> list[Th
     """Return what things there are: as the command line says, else as somebody sees; or nothing."""
     if config.things:
         return [usual(name) for name in config.things]
-    pictures = taken.pictures()
-    return viewer.things([pictures[k] for k in _spread(len(pictures))])
-
-
-def _spread(count: int) -> list[int]:
-    return np.unique(np.linspace(0, count - 1, min(count, SHOWN)).round().astype(int)).tolist()
+    return viewer.things([*taken.some().values()])
 
 
 def _recognised(
@@ -332,14 +345,9 @@ def _by_words(wanted: Sequence[Thing], found: _Found, spec: str) -> list[int]:
 
 def _painted(found: _Found) -> list[np.ndarray]:
     """Return pictures, each followed by itself with the objects in colours of their own."""
-    taken = found.taken
     paints = np.array([*COLOURS.values()])
     ink = np.concatenate([paints[np.minimum(np.arange(found.count), len(paints) - 1)], [GREY]])
-    flat = (np.sqrt(ink[found.closed.owner]) - 0.5)[:, None] / DC
-    dressed = replace(taken.gaussians, sh=flat.astype(np.float32))
-    pictures = taken.pictures()
-    both = [(pictures[k], picture(dressed, taken.cameras[k])) for k in _spread(len(pictures))]
-    return [one for pair in both for one in pair]
+    return found.taken.painted(np.sqrt(ink[found.closed.owner]))
 
 
 # ---------------------------------------------------------------- what comes out

@@ -47,6 +47,12 @@ class SimulateConfig:
 DEFAULT = SimulateConfig()
 
 
+def accept(config: SimulateConfig) -> None:
+    """Raise UserError where there is no engine as asked for, whatever the scene."""
+    if config.engine == "cuda":
+        backends.load("engine", "cuda", {"cuda": "corporeal.mpm.device:present"})("cuda")
+
+
 def simulate(
     scene: Scene,
     particles: Particles,

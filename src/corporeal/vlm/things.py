@@ -9,6 +9,7 @@ import numpy as np
 
 from corporeal.errors import UserError
 from corporeal.formats.typical_extents import typical_extent
+from corporeal.formats.words import safe, unique
 from corporeal.geometry.metric import Extent, MetricScale, chosen, implausible, of_file
 from corporeal.geometry.sizes import said_extent
 from corporeal.vlm import Vlm, connect
@@ -18,6 +19,10 @@ from corporeal.vlm.words import usage
 
 PERSON = "the command line"
 """Who said what a person typed, in words for the report."""
+
+
+UNKNOWN = "object"
+"""What nobody has a name for."""
 
 
 @dataclass(frozen=True)
@@ -130,6 +135,27 @@ def usual(class_name: str) -> Thing:
     """Return a thing that somebody named, as large as such things usually are."""
     known = typical_extent(class_name)
     return Thing(class_name, extent=known.usual, sized_by=TABLE) if known else Thing(class_name)
+
+
+def names_of(things: Sequence[Thing]) -> list[str]:
+    """Return what objects are called."""
+    return unique([safe(thing.class_name) or UNKNOWN for thing in things])
+
+
+def check_extents(stated: Sequence[str], things: Sequence[Thing]) -> None:
+    """Raise UserError where a size is stated of what no object can be called.
+
+    Args:
+        stated: What a person said of some, such as "duck=0.1" [m].
+        things: What there is, as far as anybody will say; others are objects.
+
+    """
+    known = names_of(things)
+    for text in stated:
+        name, _ = said_extent(text, (known or [UNKNOWN])[0])
+        if name not in known and not name.startswith(UNKNOWN):
+            step = f"Choose one of: {', '.join(known)}." if known else "Name it with --things."
+            raise UserError(f"--extent: no object {name!r}. {step}")
 
 
 def metres(
