@@ -63,15 +63,17 @@ def continued(mesh: Mesh, unknown: Bool[np.ndarray, " N"], floor: float, mean: c
     v, normals = mesh.vertices.copy(), mesh.vertex_normals
     pull = csr_array(eye_array(len(v)) - mean)
     some = np.flatnonzero(unknown)
-    count, patch = connected_components(csr_array(mean[some][:, some]), directed=False)
-    for k in range(count):
-        own = some[patch == k]
+    count, found = connected_components(csr_array(mean[some][:, some]), directed=False)
+    patch = np.full(len(v), -1)
+    patch[some] = found
+    touched = patch[mesh.triangles].max(axis=1)  # what a triangle connects is one patch
+    facing = np.zeros((count, 3))
+    np.add.at(facing, touched[touched >= 0], mesh.area_vectors[touched >= 0])
+    facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+    order = np.argsort(found, kind="stable")
+    for k, own in enumerate(np.split(some[order], np.cumsum(np.bincount(found))[:-1])):
         near = np.setdiff1d(mean[own].indices, own)
-        if not len(near):
-            continue
-        facing = mesh.area_vectors[np.isin(mesh.triangles, own).any(axis=1)].sum(axis=0)
-        facing /= max(float(np.linalg.norm(facing)), 1e-300)
-        if np.mean(normals[near] @ facing) > ONWARD:
+        if len(near) and np.mean(normals[near] @ facing[k]) > ONWARD:
             v[own] = _solved(pull[np.concatenate([own, near])], v, own)
     v[:, 2] = np.maximum(v[:, 2], floor)
     return Mesh(v, mesh.triangles)
