@@ -27,6 +27,10 @@ from corporeal.types import Camera, Gaussians
 
 CELLS = 1_000_000
 """Of the grid about each thing, about."""
+MOST_CELLS = 4_000_000
+"""Where a thing is thin."""
+THICK = 6.0
+"""Cells that its mean wall has then, if so many suffice."""
 ROUGH = 200_000
 """Of the grid about everything, where each thing is looked for."""
 VOTERS = 4
@@ -184,12 +188,13 @@ def _missing(k: int) -> UserError:
 
 def _solid(scene: _Scene, k: int, survey: _Survey, crew: Crew) -> Solid:
     grid = survey.grids[k]
-    distance = carved(grid, scene.sight, scene.floor, crew)
-    cut = _share(distance, grid, scene, k, survey)
-    warnings = _cleaned(distance)
-    if not (distance < 0).any():
-        raise _missing(k)
+    distance, cut, warnings = _emptied(grid, scene, k, survey, crew)
     mesh = _surface(distance, grid)
+    finer = _finer(mesh, grid, scene)
+    if finer is not None:
+        grid = finer
+        distance, cut, warnings = _emptied(grid, scene, k, survey, crew)
+        mesh = _surface(distance, grid)
     contact = cut[*grid.at(mesh.vertices).T]
     mesh = _fitted(mesh, scene, k, contact, grid.cell, crew)
     mine = np.flatnonzero(scene.object_of_gaussian == k)
@@ -203,6 +208,31 @@ def _solid(scene: _Scene, k: int, survey: _Survey, crew: Crew) -> Solid:
         cell=grid.cell,
         warnings=(*warnings, *_checked(mesh, distance, grid)),
     )
+
+
+def _emptied(
+    grid: Grid, scene: _Scene, k: int, survey: _Survey, crew: Crew
+) -> tuple[Float[np.ndarray, "X Y Z"], Bool[np.ndarray, "X Y Z"], tuple[str, ...]]:
+    """Carve a thing; return its distance [m], where it meets others, and warnings."""
+    distance = carved(grid, scene.sight, scene.floor, crew)
+    cut = _share(distance, grid, scene, k, survey)
+    warnings = _cleaned(distance)
+    if not (distance < 0).any():
+        raise _missing(k)
+    return distance, cut, warnings
+
+
+def _finer(mesh: Mesh, grid: Grid, scene: _Scene) -> Grid | None:
+    """Lay a finer grid close about a thing whose walls or legs are few cells thick; None: is none.
+
+    2 V / A is a plate's thickness, half that of a rod and a third of a ball's diameter.
+    """
+    thick = 2 * signed_volume(mesh) / float(mesh.areas.sum())
+    if thick > THICK * grid.cell:
+        return None
+    low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
+    margin = MOVED * grid.cell
+    return gridded(low - margin, high + margin, MOST_CELLS, scene.floor, finest=thick / THICK)
 
 
 def _surface(distance: Float[np.ndarray, "X Y Z"], grid: Grid) -> Mesh:
