@@ -4,7 +4,6 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from scipy.spatial.transform import Rotation
 
 from corporeal.errors import UserError
 from corporeal.features import clouds
@@ -14,53 +13,18 @@ from corporeal.formats.splat_ply import write_splat
 from corporeal.geometry.arrangement import moved
 from corporeal.geometry.followed import followed
 from corporeal.geometry.gaussians import placed
-from corporeal.geometry.harmonics import DC
 from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.similarity import moved_points
 from corporeal.splats import radiance, solid, start
 from corporeal.stages import reconstruct as stage
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
-from corporeal.types import Gaussians
 from corporeal.vlm.things import Thing, Viewer
+from gaussian_boxes import DOWN, box, together
 
 RED, BLUE = (0.8, 0.1, 0.1), (0.1, 0.2, 0.8)
 SIDES = ((0.4, 0.3, 0.2), (0.16, 0.16, 0.3))
 MIDDLES = ((0.0, 0.0, 0.1), (0.45, 0.1, 0.15))
 """Of two boxes that stand on the floor."""
-SPACING = 0.014
-"""Of Gaussians on their faces [m]."""
-
-
-def box(sides, middle, colour):
-    """Flat Gaussians all over the faces of a box."""
-    mean, rotation = [], []
-    for axis in range(3):
-        u, v = (a for a in range(3) if a != axis)
-        inner = (sides[u] / 2 - SPACING, sides[v] / 2 - SPACING)  # their edges are soft
-        grid = [np.linspace(-half, half, round(2 * half / SPACING) + 1) for half in inner]
-        a, b = (x.ravel() for x in np.meshgrid(*grid))
-        turn = Rotation.align_vectors([np.eye(3)[axis]], [[0, 0, 1]])[0].as_quat(scalar_first=True)
-        for side in (-1, 1):
-            place = np.zeros((len(a), 3))
-            place[:, u], place[:, v], place[:, axis] = a, b, side * sides[axis] / 2
-            mean.append(place + middle)
-            rotation.append(np.tile(turn, (len(a), 1)))
-    mean, rotation = np.concatenate(mean), np.concatenate(rotation)
-    count = len(mean)
-    return Gaussians(
-        mean=mean.astype(np.float32),
-        rotation=rotation.astype(np.float32),
-        scale=np.tile(np.float32([0.6, 0.6, 0.1]) * np.float32(SPACING), (count, 1)),
-        opacity=np.full(count, 0.98, np.float32),
-        sh=np.tile(((np.float32(colour) - np.float32(0.5)) / np.float32(DC)), (count, 1, 1)),
-    )
-
-
-def both(first, second):
-    names = ("mean", "rotation", "scale", "opacity", "sh")
-    return replace(
-        first, **{n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in names}
-    )
 
 
 @pytest.fixture(scope="module", autouse=True)
@@ -77,9 +41,8 @@ def fewer_cameras():
 def splat(tmp_path_factory):
     """Two boxes in a file whose -y is up and whose unit is half a metre."""
     path = tmp_path_factory.mktemp("splat") / "boxes.ply"
-    scene = both(box(SIDES[0], MIDDLES[0], RED), box(SIDES[1], MIDDLES[1], BLUE))
-    down = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])  # +z to -y
-    write_splat(path, placed(scene, down, 2.0, (0.3, -0.2, 5.0)))
+    scene = together(box(SIDES[0], MIDDLES[0], RED), box(SIDES[1], MIDDLES[1], BLUE))
+    write_splat(path, placed(scene, DOWN, 2.0, (0.3, -0.2, 5.0)))
     return path
 
 
@@ -102,8 +65,7 @@ def test_things_come_out_in_metres_on_the_floor(made):
         assert volume == pytest.approx(np.prod(sides), rel=0.15)  # their edges are cut off
         assert surface.vertices[:, 2].min() == pytest.approx(0, abs=0.01)
     back = moved_points(found.boxes.mean(axis=1), np.linalg.inv(found.world_from_file))
-    down = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-    expected = 2 * np.array(MIDDLES) @ down.T + (0.3, -0.2, 5.0)
+    expected = 2 * np.array(MIDDLES) @ DOWN.T + (0.3, -0.2, 5.0)
     np.testing.assert_allclose(back, expected, atol=0.04)
     between = found.boxes.mean(axis=1)
     np.testing.assert_allclose(
