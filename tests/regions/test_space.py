@@ -45,6 +45,19 @@ def test_a_thing_with_holes_is_one():
     assert not with_space_between(points[holes]).any()
 
 
+def test_a_thing_with_a_plain_neck_of_few_large_gaussians_is_one():
+    rng = np.random.default_rng(2)
+
+    def tube(count, radius, low, high):
+        turn = rng.uniform(0, 2 * np.pi, count)
+        height = rng.uniform(low, high, count)
+        return np.column_stack([radius * np.cos(turn), radius * np.sin(turn), height])
+
+    plain = tube(60, 0.05, 0.31, 0.53)
+    vase = np.concatenate([ball((0, 0, 0), 0.3, 4000), plain, tube(400, 0.05, 0.56, 0.63)])
+    assert not with_space_between(vase).any()
+
+
 @pytest.mark.parametrize("count", [1, 4])
 def test_few_points_are_one_thing(count):
     assert not with_space_between(RNG.normal(size=(count, 3))).any()

@@ -53,10 +53,9 @@ def _finest(tree: Float[np.ndarray, "J 4"], count: int, most: int | None) -> Int
     # Where two groups that both are things join, the number of things changes.
     size = np.concatenate([np.ones(count), tree[:, 3]])
     joins = np.minimum(size[tree[:, 0].astype(int)], size[tree[:, 1].astype(int)]) >= least
-    heights = np.sort(tree[joins, 2])
-    widest = heights[::-1]
+    widest, usual = np.sort(tree[joins, 2])[::-1], _usual(tree)
     for k in range(min(len(widest), (most or len(widest) + 1) - 1), 0, -1):
-        below = widest[k] if k < len(widest) else _usual(tree)
+        below = max(widest[k], usual) if k < len(widest) else usual
         if widest[k - 1] >= CLEAR * below:
             middle = np.sqrt(widest[k - 1] * below)
             return _large(fcluster(tree, middle, "distance") - 1, least)
@@ -64,7 +63,10 @@ def _finest(tree: Float[np.ndarray, "J 4"], count: int, most: int | None) -> Int
 
 
 def _usual(tree: np.ndarray) -> float:
-    """Return the distance at which nearly all has been joined."""
+    """Return the distance at which nearly all has been joined: within things there are such gaps.
+
+    Where a thing is plain, its Gaussians are large and few, and their means far apart.
+    """
     return float(np.percentile(tree[:, 2], 99))
 
 
