@@ -2,11 +2,12 @@
 
     python benchmarks/frame.py SCENE ...
 
-SCENE is a folder that ``corporeal assemble`` wrote: its ``views`` are posed pictures. Their cameras
-are turned, scaled and moved at random, masks and meshes are forgotten. Printed are the angle
-between up as found and as it was; the same with cameras held as people do; the height of the floor
-as found over the diameter of what the cameras look at; and how well masks that were cut out agree
-with the true ones (intersection over union).
+SCENE is a folder with ``views``, as ``corporeal assemble`` and ``as_photographed.py`` write them.
+Their cameras are turned, scaled and moved at random, masks and meshes are forgotten, and Gaussians
+are learned (draft). Printed are the angle between up as found and as it was; the same with cameras
+held as people do; the height of the floor as found over the diameter of what the cameras look at;
+how well masks that were cut out agree with the true ones (intersection over union); and the floor's
+height again where true masks hide it, and things alone are learned.
 """
 
 import argparse
@@ -20,13 +21,11 @@ from corporeal.formats.transforms import read_views
 from corporeal.geometry.region import region
 from corporeal.geometry.rotation import matrix
 from corporeal.geometry.similarity import moved_cameras, similarity
-from corporeal.geometry.upright import Upright, upright
-from corporeal.splats.crew import Crew
-from corporeal.splats.cutout import cut_out
-from corporeal.splats.sweep import swept
+from corporeal.geometry.upright import upright
+from corporeal.splats.intake import Intake, turned_upright
+from corporeal.splats.train import TrainConfig, train
 from corporeal.types import Camera, Views
 
-POINTS = 20_000
 TWO = 2
 """Threads."""
 ROLL = 3.0
@@ -43,32 +42,41 @@ def measured(scene: Path) -> dict:
     scale = float(np.exp(rng.normal()))
     made = similarity(matrix(rng.normal(size=4)), scale, rng.normal(size=3))
     moved = Views(views.rgb, moved_cameras(views.cameras, made))
-    with Crew(TWO) as crew:
-        points = swept(moved, POINTS, rng, crew).points.position
     start = time.process_time()
-    frame = upright(moved.cameras, points)
-    rolled = upright(_rolled(moved.cameras, rng), points)
-    masks = cut_out(moved, points, threads=TWO)
+    whole = turned_upright(_taken(moved, None))
     spent = time.process_time() - start
-    whole = frame.world_from_file @ made
-    around = region(views.cameras)
-    foot = whole @ np.array([around.centre[0], around.centre[1], 0.0, 1.0])
-    found = np.zeros_like(true) if masks is None else masks
-    agreed = (found & true).sum(axis=(1, 2)) / np.maximum((found | true).sum(axis=(1, 2)), 1)
+    alone = turned_upright(_taken(moved, true))
+    rolled = moved_cameras(_rolled(moved.cameras, rng), whole.world_from_file)
+    way = upright(rolled, whole.solid).world_from_file @ whole.world_from_file
+    assert whole.masks is not None
+    both, either = (m.sum(axis=(1, 2)) for m in (whole.masks & true, whole.masks | true))
     return {
         "scene": scene.name,
-        "up": _off(frame, made, scale),
-        "rolled": _off(rolled, made, scale),
-        "floor": float(foot[2] / scale / (2 * around.radius)),
-        "floor_by": frame.floor_by,
-        "masks": float(agreed.mean()),
+        "up": _off(whole.world_from_file, made, scale),
+        "rolled": _off(way, made, scale),
+        "floor": _height(whole, made, scale, views.cameras),
+        "floor_found": whole.floor,
+        "masks": float((both / np.maximum(either, 1)).mean()),
+        "alone": _height(alone, made, scale, views.cameras),
         "seconds": spent,
     }
 
 
-def _off(frame: Upright, made: np.ndarray, scale: float) -> float:
+def _taken(views: Views, masks: np.ndarray | None) -> Intake:
+    learned = train(views, masks, config=TrainConfig("draft", threads=TWO))
+    return Intake(learned.gaussians, views.cameras, views, masks)
+
+
+def _height(taken: Intake, made: np.ndarray, scale: float, cameras: tuple[Camera, ...]) -> float:
+    """Return how high the true floor is in the frame as found, over the scene's diameter."""
+    around = region(cameras)
+    foot = made @ np.array([around.centre[0], around.centre[1], 0.0, 1.0])
+    return float((taken.world_from_file @ foot)[2] / scale / (2 * around.radius))
+
+
+def _off(world_from_file: np.ndarray, made: np.ndarray, scale: float) -> float:
     """Return the angle between up as found and as it was [deg]."""
-    up = (frame.world_from_file @ made)[2, 2] / scale
+    up = (world_from_file @ made)[2, 2] / scale
     return float(np.degrees(np.arccos(np.clip(up, -1, 1))))
 
 
@@ -86,12 +94,13 @@ def main() -> None:
     """Measure scenes and print a table."""
     parser = argparse.ArgumentParser(description="Find up, floor and things in composed scenes.")
     parser.add_argument("scenes", nargs="+", type=Path)
-    print("scene | up [deg] | rolled | floor [% of scene] | by | IoU | processor [s]")
+    print("scene | up [deg] | rolled | floor [% of scene] | IoU | floor, masks | processor [s]")
     for scene in parser.parse_args().scenes:
         m = measured(scene)
-        floor = f"{m['floor']:+.2%} | {m['floor_by']}"
+        floor = f"{m['floor']:+.2%}" + ("" if m["floor_found"] else " (none found)")
         ups = f"{m['up']:.2f} | {m['rolled']:.2f}"
-        print(f"{m['scene']} | {ups} | {floor} | {m['masks']:.3f} | {m['seconds']:.0f}", flush=True)
+        masks = f"{m['masks']:.3f} | {m['alone']:+.2%}"
+        print(f"{m['scene']} | {ups} | {floor} | {masks} | {m['seconds']:.0f}", flush=True)
 
 
 if __name__ == "__main__":

@@ -52,6 +52,12 @@ def placed(
     )
 
 
+def only(gaussians: Gaussians, which: Bool[np.ndarray, " N"]) -> Gaussians:
+    """Return some of the Gaussians."""
+    fields = ("mean", "rotation", "scale", "opacity", "sh")
+    return replace(gaussians, **{name: getattr(gaussians, name)[which] for name in fields})
+
+
 def sound(raw: Gaussians) -> tuple[Gaussians, dict[str, int]]:
     """Return what can be used, with unit quaternions, and how many were left out for what."""
     length = np.linalg.norm(raw.rotation.astype(np.float64), axis=1)

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
+from corporeal.geometry.gaussians import only
 from corporeal.splats.foreground import with_company
 from corporeal.splats.intake import Intake
 from corporeal.splats.solid import Solid, solids
@@ -44,7 +45,9 @@ def closed(
     nearest = KDTree(position).query(taken.gaussians.mean[things])[1]
     owner[things] = object_of_point[nearest]
     owner = with_company(taken.gaussians, owner, taken.floor)
-    found = solids(taken.gaussians, owner, taken.cameras, taken.masks)
+    # Masks say what is a thing's: what is nobody's then takes no space from things.
+    kept = np.ones(len(owner), bool) if taken.masks is None else owner >= 0
+    found = solids(only(taken.gaussians, kept), owner[kept], taken.cameras, taken.masks)
     order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
     place = np.append(np.argsort(order), -1)  # the last for what is nobody's
     return Closed(tuple(found[k] for k in order), place[owner], place[object_of_point])

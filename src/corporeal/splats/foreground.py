@@ -21,7 +21,7 @@ INSIDE = 0.5
 """Share of what shows of a Gaussian that must be inside masks."""
 FAINT = 0.05
 """Opacity below which it is haze."""
-THICK = 0.015
+THICK = 0.01
 """Height of the layer that is the floor, in radii of what the cameras look at."""
 AROUND = 1.1
 """Radius of what may be a thing, in those."""

@@ -16,12 +16,10 @@ from corporeal.geometry.agreement import agreement
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians
 from corporeal.geometry.upright import Stated, upright
-from corporeal.splats.crew import Crew
 from corporeal.splats.cutout import cut_out
 from corporeal.splats.quality import Quality
 from corporeal.splats.raster import render
 from corporeal.splats.start import Points
-from corporeal.splats.sweep import swept
 from corporeal.splats.train import PRESETS, TrainConfig, Trained, train
 from corporeal.types import Camera, Gaussians, Vector, Views
 
@@ -35,12 +33,12 @@ ON = 128
 POOR = 20.0
 """Held-out photographs agree worse than this only where something is wrong [dB]."""
 CUT_OUT = (
-    "There were no masks: what looks other than the floor was taken for things. Things of the "
-    "floor's own colour are lost; masks are better."
+    "There were no masks: what is above the floor was taken for things. What lies on it and is "
+    "thinner than 0.5 % of the scene is lost."
 )
-NO_MASKS = (
-    "There were no masks, and no floor that things could be told from: whole photographs were "
-    "learned, which is much coarser. Give masks."
+NO_FLOOR = (
+    "There were no masks, and no floor that things could be told from: all that most photographs "
+    "show was taken for things. Give masks, or say where the floor is with --floor-at."
 )
 SHOWN = 4
 """Pictures that somebody is shown of the whole scene."""
@@ -69,8 +67,8 @@ class Intake:
     world_from_file: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
     """How it was turned and shifted since it was read."""
     seen: Float[np.ndarray, "N 3"] | None = None
-    """Points on all that the photographs show, the floor too; None: there are none but Gaussians.
-    """
+    """Points on all that the photographs show, the floor too, where Gaussians are on things alone;
+    None: there are none but Gaussians."""
     statements: tuple[str, ...] = ()
     """How it came about, in sentences, for the report."""
     warnings: tuple[str, ...] = ()
@@ -111,7 +109,6 @@ def picture(gaussians: Gaussians, camera: Camera) -> UInt8[np.ndarray, "H W 3"]:
 def take_in(
     source: Path,
     training: TrainConfig,
-    up: Up = "auto",
     checkpoint: Path | None = None,
     progress: Progress = lambda fraction, words: None,
     instances: bool = False,
@@ -121,7 +118,6 @@ def take_in(
     Args:
         source: A folder of photographs with poses, or a splat.
         training: How to learn.
-        up: Which axis of the file points up; auto: what the file or the cameras say.
         checkpoint: Where a training that is cut off leaves what it has.
         progress: Told the fraction done and what is being done.
         instances: Whether masks must tell things apart.
@@ -143,16 +139,9 @@ def take_in(
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
-    doubt = _doubt(source, shown)
-    seen, told = _points(shown), ()
-    if masks is None:
-        progress(0.0, "telling things from the floor")
-        seen = seen or _swept(shown.views, training)
-        masks = cut_out(shown.views, seen.position, shown.z_up, _stated(up), training.threads)
-        told = (NO_MASKS if masks is None else CUT_OUT,)
-    start = _points(shown) if masks is None or shown.masks is not None else None  # the masks' hull
+    doubt, points = _doubt(source, shown), _points(shown)
     try:
-        trained = train(shown.views, masks, start, training, checkpoint, progress)
+        trained = train(shown.views, masks, points, training, checkpoint, progress)
     except UserError as problem:
         raise UserError(" ".join([str(problem), *doubt])) from problem
     return Intake(
@@ -161,14 +150,16 @@ def take_in(
         shown.views,
         masks,
         shown.z_up,
-        seen=None if seen is None else seen.position,
+        seen=None if masks is None or points is None else points.position,
         statements=_told(trained, len(shown.views.cameras)),
-        warnings=(*shown.warnings, *doubt, *told, *_badly_learned(trained, len(shown.names))),
+        warnings=(*shown.warnings, *doubt, *_badly_learned(trained, len(shown.names))),
     )
 
 
 def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -> Intake:
     """Return the same with +z up, the floor at z = 0, and what is looked at above the origin.
+
+    Photographs without masks get some.
 
     Args:
         taken: In the file's own frame.
@@ -180,7 +171,7 @@ def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -
     points = taken.solid if taken.seen is None else taken.seen
     stated = Stated(_stated(up), floor)
     frame = upright(taken.cameras, points, taken.z_up, of_things, taken.usual, stated)
-    return replace(
+    made = replace(
         taken,
         gaussians=moved_gaussians(taken.gaussians, frame.world_from_file),
         cameras=moved_cameras(taken.cameras, frame.world_from_file),
@@ -189,6 +180,14 @@ def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -
         statements=(*taken.statements, frame.reason),
         warnings=(*taken.warnings, *frame.warnings),
     )
+    return made if made.views is None or made.masks is not None else _with_masks(made)
+
+
+def _with_masks(taken: Intake) -> Intake:
+    """Return the same with masks of what is above the floor, where nobody gave any."""
+    told = CUT_OUT if taken.floor else NO_FLOOR
+    masks = cut_out(taken.gaussians, taken.cameras, taken.floor)
+    return replace(taken, masks=masks, warnings=(*taken.warnings, told))
 
 
 def _doubt(source: Path, shown: Photographs) -> tuple[str, ...]:
@@ -232,13 +231,6 @@ def _points(shown: Photographs) -> Points | None:
     if shown.points is None or shown.colours is None:
         return None
     return Points(shown.points, shown.colours / 255)
-
-
-def _swept(views: Views, training: TrainConfig) -> Points:
-    """Find points on what photographs show, where nobody gave any."""
-    count = training.gaussians or PRESETS[training.preset].gaussians
-    with Crew(training.threads) as crew:
-        return swept(views, count, np.random.default_rng([training.seed, 0]), crew).points
 
 
 def _told(trained: Trained, photographs: int) -> tuple[str, ...]:

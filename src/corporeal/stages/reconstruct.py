@@ -173,7 +173,7 @@ def reconstruct(
     training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
     kept = None if folder is None else folder / "training.npz"
     learning = _within(progress, 0.0, TRAINED)
-    taken = take_in(source, training, config.up, kept, learning, config.apart == "masks")
+    taken = take_in(source, training, kept, learning, config.apart == "masks")
     taken = turned_upright(taken, config.up, config.floor_at)
     if not taken.cameras:
         taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
