@@ -5,7 +5,7 @@ and where things touch every place inside belongs to the nearer one's Gaussians.
 (Lewiner et al. 2003) make a surface of what is left.
 """
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -107,8 +107,8 @@ def solids(
         raise UserError(f"No Gaussian belongs to object {lacking[0]}.")
     with Crew(threads) as crew:
         sight = looked(gaussians, cameras, crew)
-        sight.met[object_of_gaussian[sight.met] < 0] = -1
-        shown = None if masks is None else _shown(sight, object_of_gaussian, masks)
+        own = np.where(object_of_gaussian[sight.met] < 0, -1, sight.met)
+        sight, shown = _shown(replace(sight, met=own), object_of_gaussian, masks)
         scene = _Scene(gaussians, object_of_gaussian, sight, shown, floor)
         survey, made = _surveyed(scene, count, crew), []
         for k in range(count):
@@ -131,21 +131,24 @@ class _Scene:
 
 
 def _shown(
-    sight: Sight, object_of_gaussian: np.ndarray, masks: Bool[np.ndarray, "V H W"]
-) -> Int[np.ndarray, "V H W"]:
-    """Return whose each pixel is, and see no thing where masks have none.
+    sight: Sight, object_of_gaussian: np.ndarray, masks: Bool[np.ndarray, "V H W"] | None
+) -> tuple[Sight, Int[np.ndarray, "V H W"] | None]:
+    """Return what is seen but for things where masks have none, and whose each pixel is.
 
     What only a mask gives to things goes with what is next to it.
     """
+    if masks is None:
+        return sight, None
     spilt = (sight.met >= 0) & ~masks
-    sight.depth[spilt], sight.met[spilt] = np.inf, -1
-    shown = np.where(sight.met >= 0, object_of_gaussian[sight.met], -1)
+    met = np.where(spilt, -1, sight.met)
+    sight = replace(sight, depth=np.where(spilt, np.float32(np.inf), sight.depth), met=met)
+    shown = np.where(met >= 0, object_of_gaussian[met], -1)
     for own, mask in zip(shown, masks, strict=True):
         if (own >= 0).any():
             nearest = distance_transform_edt(own < 0, return_distances=False, return_indices=True)
             y, x = np.asarray(nearest)
             own[:] = np.where(mask, own[y, x], -1)
-    return shown
+    return sight, shown
 
 
 @dataclass(frozen=True)
