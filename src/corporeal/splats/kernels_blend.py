@@ -100,6 +100,21 @@ def _rows(e, y0):
     return my, low, min(TILE, int(np.floor(my + e[REACH + 1])) + 1)
 
 
+@numba.njit(inline="always", **JIT)
+def _columns(e, x0, width):
+    """Middle column within the tile, and the columns that the ellipse reaches in the picture."""
+    mx = e[U] - f4(x0) - f4(0.5)
+    low = max(0, int(np.ceil(mx - e[REACH])))
+    return mx, low, min(TILE, width - x0, int(np.floor(mx + e[REACH])) + 1)
+
+
+@numba.njit(inline="always", **JIT)
+def _covers(o, s):
+    """α = min(o exp(-s), 0.99), for s ≥ 0."""
+    alpha = o * _decay(s if s < LAST else LAST)
+    return alpha if alpha < MOST else MOST
+
+
 @numba.njit(**JIT)
 def blend(tiles, first, ids, ellipses, background, picture):
     """Fill in the picture (5, H, W) in these tiles."""
@@ -236,11 +251,9 @@ def shares(tiles, first, ids, ellipses, size, cell, out):
             if left == 0:
                 break
             e = ellipses[ids[k]]
-            mx = e[U] - f4(x0) - f4(0.5)
+            mx, begin, end = _columns(e, x0, width)
             my, low, high = _rows(e, y0)
             a, b, c = f4(0.5) * e[A], e[B], f4(0.5) * e[C]
-            begin = max(0, int(np.ceil(mx - e[REACH])))
-            end = min(TILE, width - x0, int(np.floor(mx + e[REACH])) + 1)
             for y in range(low, min(high, height - y0)):
                 dy = f4(y) - my
                 for x in range(begin, end):
@@ -248,9 +261,7 @@ def shares(tiles, first, ids, ellipses, size, cell, out):
                     if before <= SHUT:
                         continue
                     dx = f4(x) - mx
-                    s = c * dy * dy + dx * (b * dy + a * dx)
-                    alpha = e[O] * _decay(s if s < LAST else LAST)
-                    alpha = alpha if alpha < MOST else MOST
+                    alpha = _covers(e[O], c * dy * dy + dx * (b * dy + a * dx))
                     if alpha >= CUTOFF:
                         out[k, y // cell, x // cell] += before * alpha
                         T[y, x] = before * (f4(1) - alpha)

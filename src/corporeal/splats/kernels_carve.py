@@ -4,9 +4,9 @@ import numba
 import numpy as np
 
 from corporeal.splats.kernels_basis import JIT
-from corporeal.splats.kernels_blend import CUTOFF, LAST, MOST, TILE, _decay, _rows
+from corporeal.splats.kernels_blend import CUTOFF, TILE, _columns, _covers, _rows
 from corporeal.splats.kernels_camera import from_camera, pixel
-from corporeal.splats.kernels_project import DILATION, REACH, A, B, C, O, U, Z
+from corporeal.splats.kernels_project import DILATION, REACH, A, B, C, O, Z
 
 f4 = np.float32
 MET = f4(0.85)
@@ -84,11 +84,9 @@ def meet(tiles, first, ids, ellipses, slopes, depth, met):
                 break
             i = ids[k]
             e, s_ = ellipses[i], slopes[i]
-            mx = e[U] - f4(x0) - f4(0.5)
+            mx, begin, end = _columns(e, x0, width)
             my, low, high = _rows(e, y0)
             a, b, c = f4(0.5) * e[A], e[B], f4(0.5) * e[C]
-            begin = max(0, int(np.ceil(mx - e[REACH])))
-            end = min(TILE, width - x0, int(np.floor(mx + e[REACH])) + 1)
             for y in range(low, min(high, height - y0)):
                 dy = f4(y) - my
                 for x in range(begin, end):
@@ -96,9 +94,7 @@ def meet(tiles, first, ids, ellipses, slopes, depth, met):
                     if before <= HALF:
                         continue
                     dx = f4(x) - mx
-                    s = c * dy * dy + dx * (b * dy + a * dx)
-                    alpha = e[O] * _decay(s if s < LAST else LAST)
-                    alpha = alpha if alpha < MOST else MOST
+                    alpha = _covers(e[O], c * dy * dy + dx * (b * dy + a * dx))
                     if alpha < CUTOFF:
                         continue
                     T[y, x] = before * (f4(1) - alpha)
