@@ -31,12 +31,14 @@ def taken(monkeypatch, tmp_path):
     """Take three masked photographs in, of which this is thought and this is learned."""
     camera = Camera(np.eye(3), np.eye(4), 4, 4)
     views = Views(np.zeros((3, 4, 4, 3), np.uint8), (camera,) * 3)
-    shown = Photographs(views, ("a", "b", "c"), True, np.full((3, 4, 4), 255, np.uint8))
+    whole, sparse = np.full((3, 4, 4), 255, np.uint8), np.zeros((5, 3))
+    shown = Photographs(views, ("a", "b", "c"), True, whole, sparse, sparse.astype(np.uint8))
     monkeypatch.setattr(intake, "read_photographs", lambda *_: shown)
     monkeypatch.setattr(intake, "kind_of", lambda _: "photographs")
 
     def take(said: Agreement, learned: Trained | UserError, instances: bool = False):
-        def train(*_):
+        def train(views, masks, points, *_):
+            assert points is None, "sparse points are no start where masks carve a better one"
             if isinstance(learned, UserError):
                 raise learned
             return learned

@@ -140,8 +140,9 @@ def take_in(
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
     doubt, points = _doubt(source, shown), _points(shown)
+    start = points if masks is None else None  # sparse points are worse than what masks carve
     try:
-        trained = train(shown.views, masks, points, training, checkpoint, progress)
+        trained = train(shown.views, masks, start, training, checkpoint, progress)
     except UserError as problem:
         raise UserError(" ".join([str(problem), *doubt])) from problem
     return Intake(
