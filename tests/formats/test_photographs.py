@@ -532,7 +532,17 @@ def test_masks_that_show_nothing_are_left_out_unless_most_do(tmp_path):
     assert "./train/r_2 has a mask that shows nothing" in read.warnings[0]
     for k in (0, 1, 3):
         Image.fromarray(np.zeros((12, 16), np.uint8)).save(tmp_path / "masks" / f"r_{k}.png")
-    with pytest.raises(BadFileError, match=r"4 of 4 pictures cannot be used: .* shows nothing"):
+    with pytest.raises(
+        BadFileError, match=r"4 of 4 pictures cannot be used: .* shows nothing .*instances"
+    ):
+        read_photographs(tmp_path)
+
+
+def test_pictures_of_telephones_are_named_as_what_they_are(tmp_path):
+    said(tmp_path)
+    for file in tmp_path.rglob("*.png"):
+        file.write_bytes(b"\0\0\0\x18ftypheic\0\0\0\0mif1heic")
+    with pytest.raises(BadFileError, match="is a HEIC picture: convert it to JPEG"):
         read_photographs(tmp_path)
 
 

@@ -6,6 +6,7 @@ A few bad ones among many are left out and named.
 import warnings
 from collections import Counter
 from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -34,6 +35,9 @@ GREY = 2
 """Largest difference between channels of a picture without colours."""
 SHOWN = 128
 """Of 255: a mask that nowhere has as much shows nothing."""
+NUMBERS = " (white is what counts; numbers of instances go into a folder 'instances')"
+HEIC = (b"ftypheic", b"ftypheix", b"ftypmif1", b"ftyphevc")
+"""Bytes 4 to 11 of pictures that telephones take."""
 ORIENTATION = 0x0112
 """EXIF's tag of how a picture is to be turned; 1: not at all."""
 TURNS = {3: 2, 6: 3, 8: 1}
@@ -156,12 +160,19 @@ def _size(shot: Shot, bad: list[Bad]) -> tuple[int, int] | None:
             with Image.open(shot.picture, formats=FORMATS) as picture:
                 (width, height), asked = picture.size, _asked(picture)
     except Exception:  # Pillow's decoders raise almost anything on broken input
-        bad.append((shot.name, "is no PNG, JPEG or WebP picture"))
+        bad.append((shot.name, _unreadable(shot.picture)))
         return None
     if width * height > MAX_PIXELS or not width or not height:
         bad.append((shot.name, f"claims {width} × {height} pixels"))
         return None
     return (height, width) if _turned(shot, width, height, asked) else (width, height)
+
+
+def _unreadable(path: Path) -> str:
+    with suppress(OSError), path.open("rb") as file:
+        if file.read(12)[4:] in HEIC:
+            return "is a HEIC picture: convert it to JPEG"
+    return "is no PNG, JPEG or WebP picture"
 
 
 def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
@@ -180,7 +191,7 @@ def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
     masked = shot.mask is not None or picture.shape[2] == 4 or numbers is not None
     alpha = _alpha(shot, picture, numbers)
     if masked and alpha.max() < SHOWN:
-        raise _UnusableError("has a mask that shows nothing")
+        raise _UnusableError("has a mask that shows nothing" + (NUMBERS if shot.mask else ""))
     small = np.dstack([_resized(_on_white(picture[..., :3], alpha), size), _resized(alpha, size)])
     lens = lens.resized(*size)
     try:
