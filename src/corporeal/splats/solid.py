@@ -30,7 +30,7 @@ CELLS = 1_000_000
 MOST_CELLS = 4_000_000
 """Where a thing is thin."""
 THICK = 6.0
-"""Cells that its mean wall has then, if so many suffice."""
+"""Cells that its mean wall has then, if so many suffice and none is finer than a pixel."""
 ROUGH = 200_000
 """Of the grid about everything, where each thing is looked for."""
 VOTERS = 4
@@ -193,7 +193,7 @@ def _solid(scene: _Scene, k: int, survey: _Survey, crew: Crew) -> Solid:
     grid = survey.grids[k]
     distance, cut, warnings = _emptied(grid, scene, k, survey, crew)
     mesh = _surface(distance, grid)
-    finer = _finer(mesh, grid, scene)
+    finer = _finer(mesh, grid, scene, k)
     if finer is not None:
         grid = finer
         distance, cut, warnings = _emptied(grid, scene, k, survey, crew)
@@ -225,17 +225,27 @@ def _emptied(
     return distance, cut, warnings
 
 
-def _finer(mesh: Mesh, grid: Grid, scene: _Scene) -> Grid | None:
+def _finer(mesh: Mesh, grid: Grid, scene: _Scene, k: int) -> Grid | None:
     """Lay a finer grid close about a thing whose walls or legs are few cells thick; None: is none.
 
-    2 V / A is a plate's thickness, half that of a rod and a third of a ball's diameter.
+    2 V / A is a plate's thickness, half that of a rod and a third of a ball's diameter. Of what is
+    finer than a pixel pictures say nothing: there the surface would only be rough.
     """
     thick = 2 * signed_volume(mesh) / float(mesh.areas.sum())
-    if thick > THICK * grid.cell:
+    finest = max(thick / THICK, _pixel(scene, k))
+    if finest >= grid.cell:
         return None
     low, high = mesh.vertices.min(axis=0), mesh.vertices.max(axis=0)
     margin = MOVED * grid.cell
-    return gridded(low - margin, high + margin, MOST_CELLS, scene.floor, finest=thick / THICK)
+    return gridded(low - margin, high + margin, MOST_CELLS, scene.floor, finest=finest)
+
+
+def _pixel(scene: _Scene, k: int) -> float:
+    """Return how wide a pixel is at a thing, in the mean [m]."""
+    met, rows = scene.sight.met, scene.sight.rows
+    wide = scene.sight.depth / rows[:, 12, None, None]
+    mine = wide[(met >= 0) & (scene.object_of_gaussian[met] == k)]
+    return float(mine.mean()) if len(mine) else np.inf
 
 
 def _surface(distance: Float[np.ndarray, "X Y Z"], grid: Grid) -> Mesh:
