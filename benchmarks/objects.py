@@ -182,19 +182,25 @@ ways:
 
 ## How
 
-1. Features become unit vectors, and those their first 64 principal components. Half precision is
+1. Points are parted where there is clear space between them: where single linkage by mutual
+   reachability joins groups over gaps 1.8 times as wide as is usual within them.
+2. Features become unit vectors, and those their first 64 principal components. Half precision is
    widened in batches only.
-2. Points become about 2000 superpoints: k-means of place, look and normal in which a point only
+3. Points become about 2000 superpoints: k-means of place, look and normal in which a point only
    goes to patches that began near it (SLIC).
-3. Superpoints that meet hold together by exp(-(difference / δ)² / 2 - (concavity / c)² / 2) times
+4. Superpoints that meet hold together by exp(-(difference / δ)² / 2 - (concavity / c)² / 2) times
    the length of their border. δ is 1.5 times the scene's own root mean square difference between
    neighbours; concavity is positive where the surface folds inwards. Where there are instance
-   masks, the share of views that take the two for different things counts in the same way.
-4. The graph is cut in two, and the piece that is cheapest to cut again, until there are as many
+   masks whose numbers cannot be matched from view to view, the share of views that take the two for
+   different things counts in the same way.
+5. The graph is cut in two, and the piece that is cheapest to cut again, until there are as many
    things as somebody counted. A cut costs (cut + 0.003) (1/A + 1/(1-A)) (1 - R²)²: its share of
    all borders, how unequal the sides are, and how little they explain of the differences in look.
    The 0.003 keeps crumbs that hang by nothing from being things. Candidates are the sweeps of a
    normalised cut, and all that merging neighbours passes through.
+
+Instance masks whose numbers agree between views, or can be matched by the points that they share,
+need none of this: a point is what most views say.
 
 Nobody counted: cuts are made up to a cost of 0.018, and a warning says so. That is a guess. It
 counts rightly where things are plain, and takes legs, flowers and cushions for things of their
@@ -234,8 +240,9 @@ together):
 
 - **Teddy on couch** fails: both are off-white without texture, and the couch is made of loose
   cushions. **Cat on table** hangs by a hair: the cat nearly covers the table's width, and whether
-  it or half the table is cut off depends on which points were drawn. Both warn, and masks settle
-  both.
+  it or half the table is cut off depends on which points were drawn. **Duck on armchair**: cushions
+  and frame look less alike than cushion and duck. **Lamp beside armchair** loses a leg to it, and
+  does not warn. The first three warn, and masks settle all.
 - **Normals** matter. Without them they are found from the points, outward being up where the
   scene is highest. That is as good for most pairs, and much worse for some (bottle beside box, cat
   on table): give normals where cameras say what is outside.

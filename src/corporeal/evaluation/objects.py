@@ -31,6 +31,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.spread import sample_surface
 from corporeal.regions.masks import lifted
 from corporeal.regions.objects import Split, components, objects
+from corporeal.regions.telling import told_apart
 from corporeal.splats.foreground import foreground, shown
 from corporeal.splats.raster import weights
 from corporeal.splats.train import TrainConfig, train
@@ -150,7 +151,7 @@ def judged(name: str, taken: Touching) -> tuple[ObjectsRow, Told]:
     start = time.process_time()
     ours = objects(cloud, count, taken.normals)
     seconds = time.process_time() - start
-    masked = objects(cloud, count, taken.normals, taken.masks)
+    masked = told_apart(cloud, "masks", count, taken.normals, taken.masks)
     uncounted = objects(cloud, None, taken.normals)
     published = components(cloud.position)
     row = ObjectsRow(
