@@ -9,7 +9,7 @@ from splat_scenes import around, blobs, pictured
 from corporeal.errors import UserError
 from corporeal.features.descriptor import LET_THROUGH, seen_from
 from corporeal.geometry.local_shape import neighbours, normals
-from corporeal.splats.foreground import foreground, shown
+from corporeal.splats.foreground import foreground, shown, with_company
 from corporeal.types import Gaussians
 
 CAMERAS = around(24, (64, 64), focal=80.0, centre=(0, 0, 0.4))[:14]
@@ -107,3 +107,16 @@ def test_gaussians_that_are_more_than_pixels_belong_to_things_too():
     gaussians, out = ball(20_000, 0.002)
     found = foreground(gaussians, CAMERAS, shown(gaussians, CAMERAS, threads=1), floor=False)
     assert found[out[:, 2] > -0.2].mean() > 0.9
+
+
+def test_what_is_faint_goes_with_the_thing_that_it_reaches_and_the_floor_stays():
+    rng = np.random.default_rng(0)
+    thing = like(rng.normal(size=(200, 3)) * 0.02 + [0, 0, 0.4], 0.01)
+    rim = like([[0.3, 0, 0.4], [0.2, 0.2, 0.4]], 0.13, 0.03)
+    wall = like([[0.3, 0, 0.4]], 0.13, 0.9)
+    haze = like([[0.9, 0, 0.4]], 0.13, 0.03)
+    floor = like([[0, 0, 0.0]], 0.3, 0.03)
+    whole, kind = joined(thing, rim, wall, haze, floor)
+    made = with_company(whole, np.where(kind == 0, 7, -1), floor=True)
+    assert (made == np.where(kind < 2, 7, -1)).all()
+    assert (with_company(whole, np.where(kind == 0, 7, -1), floor=False) == 7).all()

@@ -33,6 +33,8 @@ HALF = 0.5
 """Share of a pixel from which on it is a thing's."""
 TINY = 1e-12
 """Contribution that can be divided by [px]."""
+REACH = 2.0
+"""Standard deviations to which a faint Gaussian reaches."""
 NEAR = 3.0
 """Distances between neighbours within which a Gaussian, or a place, goes with a thing."""
 
@@ -138,14 +140,15 @@ def with_company(
 ) -> Int[np.ndarray, " N"]:
     """Let faint and hidden Gaussians go with the thing they are near, or they would stay behind.
 
-    Where a floor is among them, only those above it.
+    Faint ones are near what they reach. Where a floor is among them, only those above it go.
     """
     mean = gaussians.mean
     own, rest = np.flatnonzero(owner >= 0), np.flatnonzero(owner < 0)
     tree = KDTree(mean[own])
     apart = float(np.median(np.asarray(tree.query(mean[own], k=2)[0])[:, 1]))
     distance, nearest = map(np.asarray, tree.query(mean[rest]))
-    goes = (distance < NEAR * apart) & (mean[rest, 2] > NEAR * apart)
+    reach = REACH * gaussians.scale[rest].max(axis=1) * (gaussians.opacity[rest] < HALF)
+    goes = (distance < np.maximum(NEAR * apart, reach)) & (mean[rest, 2] > NEAR * apart)
     goes |= not floor
     made = owner.copy()
     made[rest[goes]] = owner[own[nearest[goes]]]
