@@ -48,8 +48,8 @@ RATES = {MEAN: 3e-4, ROTATION: 2e-3, SCALE: 8e-3, OPACITY: 0.05, COLOUR: 0.012, 
 """Adam's, from each column on; of means in radii of what the cameras look at."""
 FALL = {MEAN: 0.02, SCALE: 0.15, COLOUR: 0.15}
 """What is left of them at the end."""
-COARSE = 0.4
-"""Share of the steps that look at pictures of half the size."""
+COARSE, COARSE_WHOLE = 0.4, 0.55
+"""Share of the steps that look at pictures of half the size, with masks and without."""
 COARSE_COST = 0.4
 """Time that such a step takes, in steps."""
 SMALLEST = 64
@@ -199,6 +199,7 @@ class Lesson:
         factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
         halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
         self.surfaces: Surfaces | None = None
+        self.coarse = (COARSE_WHOLE if masks is None else COARSE) * self.preset.steps
         self.sizes = [_Size(self, factor)] + ([_Size(self, 2 * factor)] if halves else [])
 
     @property
@@ -212,11 +213,11 @@ class Lesson:
 
     def size(self, step: int) -> "_Size":
         """Return the pictures that a step looks at."""
-        return self.sizes[-1] if step < COARSE * self.preset.steps else self.sizes[0]
+        return self.sizes[-1] if step < self.coarse else self.sizes[0]
 
     def cost(self, step: int) -> float:
         """Return the time that the steps before this one take, in steps."""
-        coarse = COARSE * self.preset.steps if len(self.sizes) > 1 else 0.0
+        coarse = self.coarse if len(self.sizes) > 1 else 0.0
         return min(step, coarse) * COARSE_COST + max(0.0, step - coarse)
 
 
