@@ -100,6 +100,7 @@ def test_parts_that_close_only_together_share_the_volume_between_them(rng):
     volumes = [m.volume for m in anatomy.members]
     assert sum(volumes) == pytest.approx(1, rel=0.01)
     assert volumes[0] == pytest.approx(1 / 6, rel=0.05)  # a place belongs to the nearest face
+    assert all(m.encloses and not m.closed for m in anatomy.members)
 
 
 def test_a_small_part_that_overlaps_itself_or_holds_another_is_not_counted_twice(rng):
@@ -127,6 +128,7 @@ def test_of_the_shade_of_a_lamp_only_the_outside_counts(rng):
     label = (lamp.triangles_center[:, 2] > 0.7).astype(int)
     shade = survey(np.asarray(lamp.vertices), np.asarray(lamp.faces), label, rng).members[1]
     assert shade.build is Build.BODY
+    assert not shade.encloses
     outer = 2 * np.pi * 0.2 * 0.4
     assert shade.body_area > 1.97 * outer
     assert outer < shade.face_area < 1.2 * outer  # at the rims the inside sees the open, too

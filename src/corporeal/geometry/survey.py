@@ -26,6 +26,8 @@ from corporeal.geometry.spread import scatter
 PROBES = 20_000
 """Points that measure an object's volume; the error of a ball's is about 0.2 %."""
 
+ONE_FACE = 2 / 3
+"""What has less of its surface outside is a wall with both faces."""
 FEW = 1000
 """Fewer of the object's probes say too little of a part."""
 OWN, ACROSS = 5000, 64
@@ -68,6 +70,12 @@ class Member:
             return 0.5 * self.body_area
         rng = np.random.default_rng(self.part)
         return self.body_area * (1 - inner_share(self.whole, self.body, self.size[0], rng))
+
+    @cached_property
+    def encloses(self) -> bool:
+        """Whether its wall closes about something, alone or with the object's other parts."""
+        closed = self.closed or (self.whole is not None and closes(self.whole.mesh))
+        return closed and self.face_area > ONE_FACE * self.body_area
 
     @cached_property
     def sheet_area(self) -> float:

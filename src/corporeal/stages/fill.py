@@ -183,7 +183,7 @@ def resolve(
             size=(max(m.size[0], makes[m.part].sheet), m.size[1], m.size[2]),
             volume=makes[m.part].volume,
             area=makes[m.part].area,
-            closed=m.closed and not makes[m.part].modelled,
+            closed=closes_about(m, makes[m.part]),
             leaves=leaves_of(m, field.materials[m.part]),
             diameter=rods[m.part].diameter if m.part in rods else 0.0,
             burden=burden(m, anatomy, makes, field),
@@ -196,6 +196,13 @@ def resolve(
     masses = [sum(makes[m.part].mass for m in a.members) for a in anatomies]
     moved = motions(scene, anatomies, masses, config.seed)
     return plan(ordered, moved, config.detail, config.stiffness)
+
+
+def closes_about(member: Member, made: Make) -> bool:
+    """Whether a part cannot bend without stretching, as what closes about something cannot."""
+    if made.modelled:
+        return False
+    return member.encloses if made.thickness else member.closed
 
 
 def burden(member: Member, anatomy: Anatomy, makes: dict[int, Make], field: MaterialField) -> float:
