@@ -172,7 +172,8 @@ HEAD = (
     "or before their surfaces it is. Of those that see it at all, four in ten may say it is "
     "emptier. What no view sees, inside and below, is filled in between with about the least area. "
     "Only what the pictures saw is known: below a seat, where no camera looked, and deep in a "
-    "vase, the surface is a guess.",
+    "vase, the surface is a guess. What is thinner than six cells in the mean is carved again on a "
+    "grid of up to four million close about it, whose cells are no finer than pixels are.",
     "3. **Close.** Nothing is below the floor, and what stands on it is cut off flat there. What "
     "seems to be below the floor is a plate that lies on it, at least 1.5 cells thick.",
     "4. **Share.** Where things touch, a place belongs to the one whose Gaussians are nearer; deep "
@@ -216,9 +217,13 @@ TAIL = (
     "the arms, so that the learned Gaussians themselves are off by centimetres there, and no "
     "carving mends that. With Gaussians on its true surface (clad) it comes out with all four "
     "legs, 4 pixels wide, and a seat closed from below, where no camera looked.",
-    "- The wall of the bowl is 2 to 3 mm thick, about a pixel and half a cell. With Gaussians on "
-    "its true surface its volume is right. Learned, its plain inside lies too high, and the wall "
-    "comes out three times as thick as in life. Say how thick a wall is where its weight matters.",
+    "- The wall of the bowl is 2 to 3 mm thick, about a pixel and a cell. With Gaussians on its "
+    "true surface half of what either encloses is common, two fifths on a grid of a million. "
+    "Learned, its plain inside lies too high, and the wall comes out three times as thick as in "
+    "life, whatever the grid. Say how thick a wall is where its weight matters.",
+    "- Legs and boards gain most from the second grid: the wooden armchair of the round trip, "
+    "boards of 16 mm where a pixel shows 8, came out a quarter too heavy on cells of 12 mm and a "
+    "seventh on cells of 7.",
     "",
     "## Films",
     "",
