@@ -14,8 +14,9 @@ from corporeal.formats.sources import kind_of
 from corporeal.formats.splats import read_splat
 from corporeal.geometry.agreement import agreement
 from corporeal.geometry.harmonics import DC
-from corporeal.geometry.similarity import moved_cameras, moved_gaussians
-from corporeal.geometry.upright import Stated, upright
+from corporeal.geometry.similarity import moved_cameras, moved_gaussians, similarity
+from corporeal.geometry.upright import Stated, Upright, upright
+from corporeal.splats.contact import lowest
 from corporeal.splats.cutout import cut_out
 from corporeal.splats.quality import Quality
 from corporeal.splats.raster import render
@@ -168,10 +169,14 @@ def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -
         floor: Its height along up, in the file's unit; None: it is looked for.
 
     """
-    of_things = None if taken.masks is None else taken.solid
+    alone = taken.masks is not None and taken.seen is None  # nothing but things is known
     points = taken.solid if taken.seen is None else taken.seen
+    of_things = None if taken.masks is None else taken.solid
     stated = Stated(_stated(up), floor)
-    frame = upright(taken.cameras, points, taken.z_up, of_things, taken.usual, stated)
+    seen = points[:0] if alone else points
+    frame = upright(taken.cameras, seen, taken.z_up, of_things, taken.usual, stated)
+    if frame.floor_by == "things" and taken.views is not None and taken.masks is not None:
+        frame = _lowered(frame, taken.views, taken.masks)
     made = replace(
         taken,
         gaussians=moved_gaussians(taken.gaussians, frame.world_from_file),
@@ -182,6 +187,20 @@ def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -
         warnings=(*taken.warnings, *frame.warnings),
     )
     return made if made.views is None or made.masks is not None else _with_masks(made)
+
+
+def _lowered(frame: Upright, views: Views, masks: Bool[np.ndarray, "V H W"]) -> Upright:
+    """Put the floor where the outlines in masks say that things touch it."""
+    cameras = moved_cameras(views.cameras, frame.world_from_file)
+    try:
+        height = lowest(Views(views.rgb, cameras), masks)
+    except UserError:  # masks agree nowhere: Gaussians are all there is
+        return frame
+    if height is None:
+        return frame
+    reason = f"{frame.reason} How low these are, outlines in masks say."
+    way = similarity(shift=(0.0, 0.0, -height)) @ frame.world_from_file
+    return replace(frame, world_from_file=way, reason=reason)
 
 
 def _with_masks(taken: Intake) -> Intake:

@@ -1,0 +1,72 @@
+"""How low things reach, as their outlines tell: the height of a floor that masks hide.
+
+Gaussians say it badly: nobody sees undersides, and what all masks allow bulges below them. But
+where a thing touches the floor its lower outlines all meet: a ray through an outline touches what
+all masks allow in a short stretch there, and that lies on the thing.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import shift
+
+from corporeal.geometry.region import region
+from corporeal.splats.crew import Crew
+from corporeal.splats.start import Carved, tight
+from corporeal.types import Camera, Views
+
+STEEP = 0.3
+"""Length of a unit vector down in a picture, below which the view is too steep to show it."""
+SHORT = 0.04
+"""Longest stretch in height that still says where a thing is, in radii of the region."""
+LOWEST = 5
+"""Percentile of heights that is the floor's: of rays through rims that touch it, all but a few."""
+FEWEST = 20
+"""Rays that must say it."""
+
+
+def lowest(
+    views: Views, masks: Bool[np.ndarray, "V H W"], threads: int | None = None
+) -> float | None:
+    """Return the height that things stand on [m], +z up; None: outlines do not tell.
+
+    Raises:
+        UserError: Nothing is inside all masks.
+
+    """
+    with Crew(threads) as crew:
+        hull = tight(views, masks, crew)
+    around = region(views.cameras)
+    pairs = zip(views.cameras, masks, strict=True)
+    found = [_touched(hull, c, m, np.array(around.centre), around.radius) for c, m in pairs]
+    low, high = np.concatenate(found).T
+    good = high - low < SHORT * around.radius
+    if np.count_nonzero(good) < FEWEST:
+        return None
+    return float(np.percentile((low + high)[good] / 2, LOWEST))
+
+
+def _touched(
+    hull: Carved, camera: Camera, mask: np.ndarray, centre: np.ndarray, radius: float
+) -> Float[np.ndarray, "N 2"]:
+    """Return between which heights rays through the lower outline are within the hull [m]."""
+    pose = camera.world_from_camera
+    down = -pose[2, :2]
+    if np.linalg.norm(down) < STEEP:
+        return np.empty((0, 2))
+    right, below = np.round(down / np.linalg.norm(down)).astype(int)
+    rim = mask & np.logical_not(shift(mask, (-below, -right), order=0, mode="nearest"))
+    y, x = np.nonzero(rim)
+    local = np.linalg.solve(camera.K, np.stack([x + 0.5, y + 0.5, np.ones(len(x))]))
+    rays = local.T @ pose[:3, :3].T
+    rays /= np.linalg.norm(rays, axis=1, keepdims=True)
+    middle = np.linalg.norm(centre - pose[:3, 3])
+    far = np.arange(middle - 2 * radius, middle + 2 * radius, hull.side / 2)
+    places = pose[:3, 3] + far[:, None] * rays[:, None]
+    at = np.round((places - hull.cells[0, 0, 0]) / hull.side).astype(int)
+    fits = ((at >= 0) & (at < hull.inside.shape)).all(axis=-1)
+    at[~fits] = 0
+    within = fits & hull.inside[tuple(np.moveaxis(at, -1, 0))]
+    low = np.where(within, places[..., 2], np.inf).min(axis=1)
+    high = np.where(within, places[..., 2], -np.inf).max(axis=1)
+    met = within.any(axis=1)
+    return np.stack([low[met], high[met]], axis=1)
