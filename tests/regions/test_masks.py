@@ -3,7 +3,7 @@ import pytest
 from scipy.sparse import csr_array
 
 from corporeal.errors import UserError
-from corporeal.regions.masks import lifted
+from corporeal.regions.masks import lifted, renumbered
 from corporeal.regions.objects import objects
 from corporeal.types import Cloud
 
@@ -57,3 +57,17 @@ def test_masks_that_show_nothing_change_nothing():
     nothing = np.full((3, cloud.count), -1)
     a, b = objects(cloud, 2, normal), objects(cloud, 2, normal, nothing)
     np.testing.assert_array_equal(a.object_of_point, b.object_of_point)
+
+
+def test_masks_that_share_a_rim_join_nothing_that_other_views_tell_apart():
+    first, second, rim = slice(0, 100), slice(100, 200), slice(100, 105)
+    label = np.full((4, 200), -1)
+    label[0, first], label[0, second] = 0, 1
+    label[1, first], label[1, second] = 1, 0
+    label[2, second] = 0  # these two see nothing in common but the rim of the second
+    label[3, first] = label[3, rim] = 0
+    number = renumbered(label)
+    assert len(np.unique(number[number >= 0])) == 2
+    np.testing.assert_array_equal(number[0], number[1])
+    np.testing.assert_array_equal(number[2, second], number[0, second])
+    np.testing.assert_array_equal(number[3, first], number[0, first])

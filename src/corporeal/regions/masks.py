@@ -11,7 +11,6 @@ from typing import cast
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse import csr_array
-from scipy.sparse.csgraph import connected_components
 
 from corporeal.errors import UserError
 from corporeal.regions.patches import Borders, Patches
@@ -57,20 +56,23 @@ def renumbered(label_of_point: Int[np.ndarray, "V N"]) -> Int[np.ndarray, "V N"]
 
     Two masks do where they share more than half of the points that either has, of those that both
     views see: then no third shares as many with either. What is matched in that way, directly or
-    through others, gets one number.
+    through others, gets one number, pairs that share most points first; but no two masks of one
+    view, whose drawer says that they are two things. So a false match, where two views see only a
+    rim in common, joins nothing that other views tell apart.
     """
     known, node = np.unique(_apart(label_of_point), return_inverse=True)
     nodes = node.reshape(label_of_point.shape)
     nodes, first = nodes - (known[0] < 0), int(known[0] < 0)
     few = nodes[:, :: max(1, nodes.shape[1] // COMPARED)]
-    pairs: list[np.ndarray] = []
-    for v in range(len(nodes)):
-        for w in range(v):
-            pairs += _same(few[v], few[w])
-    count = len(known) - first
-    i, j = np.concatenate([np.zeros((0, 2), np.int64), *pairs]).T
-    graph = csr_array((np.ones(len(i), np.int8), (i, j)), shape=(count, count))
-    number = connected_components(graph, directed=False)[1]
+    pairs = [_same(few[v], few[w]) for v in range(len(nodes)) for w in range(v)]
+    number = np.arange(len(known) - first)
+    seen_in = {int(k): {v} for v, view in enumerate(nodes) for k in np.unique(view[view >= 0])}
+    found = np.concatenate([np.zeros((0, 3), np.int64), *pairs])
+    for i, j, _ in found[np.argsort(-found[:, 2], kind="stable")]:
+        one, other = int(number[i]), int(number[j])
+        if one != other and not seen_in[one] & seen_in[other]:
+            number[number == other] = one
+            seen_in[one] |= seen_in.pop(other)
     return np.where(nodes < 0, -1, number[nodes])
 
 
@@ -81,8 +83,8 @@ def _apart(label_of_point: np.ndarray) -> np.ndarray:
     return np.where(label_of_point < 0, -1, label_of_point + own)
 
 
-def _same(a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
-    """Return pairs of labels (K, 2) that share most of their points; labels from 0, -1: none."""
+def _same(a: np.ndarray, b: np.ndarray) -> Int[np.ndarray, "K 3"]:
+    """Return pairs of labels that share most of their points, and how many; -1 is no label."""
     both = (a >= 0) & (b >= 0)
     first, i = np.unique(a[both], return_inverse=True)
     second, j = np.unique(b[both], return_inverse=True)
@@ -90,7 +92,7 @@ def _same(a: np.ndarray, b: np.ndarray) -> list[np.ndarray]:
     np.add.at(shared, (i, j), 1)
     either = shared.sum(axis=1, keepdims=True) + shared.sum(axis=0) - shared
     x, y = np.nonzero(shared > MOSTLY * np.maximum(either, 1))
-    return [np.stack([first[x], second[y]], axis=1)] if len(x) else []
+    return np.stack([first[x], second[y], shared[x, y].astype(np.int64)], axis=1)
 
 
 def agreement(
