@@ -205,9 +205,9 @@ TAIL = (
     "from farther away than today. Without masks at preset "
     "normal only the helmet scene was measured, before that too: 30.9 dB, 26.6 dB on things, in "
     "170 s.",
-    "- Without masks 55 % of the steps look at pictures of half the size, with masks 40 %. Drafts of "
-    "two scenes took 51 and 52 s with it and 65 and 61 s without, for 0.1 dB less; the rows without "
-    "masks were measured before that.",
+    "- Without masks 55 % of the steps look at pictures of half the size, with masks 40 %. Drafts "
+    "of two scenes took 51 and 52 s with it and 65 and 61 s without, for 0.1 dB less; the rows "
+    "without masks were measured before that.",
     '- `train(config=TrainConfig(rasteriser="gsplat"))` learns on a graphics card, through gsplat '
     "1.5. It has never run on one here: tests hold it against a plain stand-in with gsplat's "
     "signature, so that numbers, shapes and gradients are right if gsplat does what it says.",
