@@ -23,6 +23,7 @@ from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
 from corporeal.formats.sources import called
 from corporeal.formats.words import safe
+from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.gaussians import LARGEST
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
@@ -46,14 +47,7 @@ from corporeal.splats.raster import weights
 from corporeal.splats.sight import looked
 from corporeal.splats.solid import Solid
 from corporeal.splats.train import TrainConfig
-from corporeal.types import (
-    Cloud,
-    Finish,
-    Reconstruction,
-    Scene,
-    SceneObject,
-    Surface,
-)
+from corporeal.types import Cloud, Finish, Reconstruction, Scene, SceneObject, Surface
 from corporeal.vlm.things import (
     PERSON,
     UNKNOWN,
@@ -139,8 +133,8 @@ class _Found:
 
     @property
     def extents(self) -> list[float]:
-        """Longest side of each one's box, in the file's unit."""
-        return [float(np.ptp(solid.vertices, axis=0).max()) for solid in self.solids]
+        """Longest side of each one's box, in the file's unit, whichever way the thing is turned."""
+        return [oriented_size(solid.vertices)[2] for solid in self.solids]
 
 
 def reconstruct(
