@@ -81,9 +81,9 @@ def seen(made, green):
     return Reconstruction(splat, whole, cloud, owner, names, boxes, 1.0, np.eye(4))
 
 
-def told(*pieces):
+def told(*pieces, vase_by="annotation"):
     words = PartWords("plant", "ceramic", pieces=tuple(PartWords(n, m) for n, m in pieces))
-    vase = ObjectWords("vase", "vase", (PartWords("vase", "ceramic"),))
+    vase = ObjectWords("vase", "vase", (PartWords("vase", "ceramic", answered_by=vase_by),))
     return Inventory((ObjectWords("plant", "plant", (words,)), vase))
 
 
@@ -121,3 +121,11 @@ def test_a_piece_that_shows_nowhere_is_left_out_and_told():
         parts = segment(made, words, found=seen(made, green))
     assert [p.name for p in parts.catalogue] == ["red pot", "vase"]
     assert parts.warnings == ("plant: None.",)
+
+
+def test_what_nobody_looked_at_is_said_to_be_one_material():
+    made, green = potted()
+    words = told(("red pot", "ceramic"), ("green leaves", "leaves-flowers"), vase_by="metadata")
+    (warning,) = segment(made, words, found=seen(made, green)).warnings
+    assert warning.startswith("vase: nobody looked what it is made up of.")
+    assert segment(made, words).warnings == (), "a model's own nodes are its parts"

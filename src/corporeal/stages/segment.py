@@ -28,6 +28,8 @@ class SegmentConfig:
 
 
 DEFAULT = SegmentConfig()
+UNSEEN = ("metadata", "unknown")
+"""Who says of parts what words say, and has seen none."""
 
 
 def accept(config: SegmentConfig) -> None:
@@ -80,7 +82,7 @@ def segment(
             vectors = _vectors(semantic, thing)
             named = name_parts(cloud, thing, vectors, PartsConfig(config.position_weight))
             parts = _taken_apart(parts, number, thing, named, cloud, middle)
-    return parts
+    return replace(parts, warnings=(*parts.warnings, *_unparted(inventory)))
 
 
 def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
@@ -93,6 +95,23 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 
 
 # ---------------------------------------------------------------- objects from pictures
+
+
+def _unparted(inventory: Inventory) -> list[str]:
+    """Say of which objects nobody told the pieces: a chair from pictures may be all foam."""
+    names = [
+        thing.name
+        for thing in inventory.objects
+        if not any(p.pieces or p.answered_by not in UNSEEN for p in thing.parts)
+    ]
+    if not names:
+        return []
+    several = len(names) > 1
+    return [
+        f"{', '.join(names)}: nobody looked what {'these are' if several else 'it is'} made up of. "
+        f"{'Each is' if several else 'It is'} one material throughout; --vlm or --annotations "
+        "name pieces."
+    ]
 
 
 def _of_object(cloud: Cloud, mine: Bool[np.ndarray, " N"]) -> Cloud:
