@@ -6,7 +6,7 @@ Gaussians themselves, for the film and for telling parts apart.
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from functools import cache
+from functools import cache, cached_property
 from pathlib import Path
 from typing import Literal
 
@@ -131,7 +131,7 @@ class _Found:
     def count(self) -> int:
         return len(self.solids)
 
-    @property
+    @cached_property
     def extents(self) -> list[float]:
         """Longest side of each one's box, in the file's unit, whichever way the thing is turned."""
         return [oriented_size(solid.vertices)[2] for solid in self.solids]
