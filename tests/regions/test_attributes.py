@@ -8,6 +8,7 @@ from corporeal.regions.attributes import (
     Observed,
     _table,
     described,
+    fitted,
     log_likelihood,
     observed,
 )
@@ -104,9 +105,37 @@ def test_a_wire_is_thin_and_a_plate_is_not():
     colour = np.repeat([[1.0, 0, 0], [0, 0, 1.0]], (1000, 3000), axis=0)
     cloud = Cloud(points, colour, nothing, nothing, np.ones(4000, int))
     found = observed(cloud, np.repeat([0, 1], (1000, 3000)), 2)
-    assert found.thin[0] > 0.95 > 0.5 > found.thin[1]
+    assert found.thin[0] > 0.95 > 0.35 > found.thin[1]
     np.testing.assert_allclose(found.colour, rgb2lab(np.array([[[1.0, 0, 0], [0, 0, 1]]]))[0])
     np.testing.assert_allclose(found.height, [0.5, 0.0], atol=0.02)
+
+
+NAMES = ("grey pedestal", "grey column", "white lampshade")
+TOLD = [described(PartWords(name, None)) for name in NAMES]
+FALLEN = np.array([[0.0, 0, 1], [0, 1, 0], [-1, 0, 0]])
+
+
+def lamp(turn, across):
+    """Points of a lamp: a plate, a pole and a shade; and which of these each is of."""
+    bit = np.repeat([0, 1, 2], 2000)
+    points = np.random.default_rng(0).random((6000, 3)) - [0.5, 0.5, 0.0]
+    points *= (np.array([[0.2, 0.2, 0], [0, 0, 0.8], [0.2, 0.2, 0.2]]) * [across, across, 1])[bit]
+    points[bit == 2] += [0, 0, 0.8]
+    nothing = np.zeros((6000, 0), np.float16)
+    colour = np.array([0.5, 0.5, 0.95])[bit, None] * np.ones(3)
+    return Cloud(points @ turn.T, colour, nothing, nothing, np.ones(6000, int)), bit
+
+
+@pytest.mark.parametrize("turn", [np.eye(3), FALLEN, FALLEN.T, FALLEN @ FALLEN.T[[1, 2, 0]]])
+def test_a_lamp_is_told_as_well_when_it_has_fallen_over(turn):
+    cloud, bit = lamp(turn, across=1.0)
+    assert fitted(cloud, bit, 3, TOLD).argmax(axis=1).tolist() == [0, 1, 2]
+
+
+def test_a_wide_thing_has_not_fallen_over():
+    cloud, bit = lamp(np.eye(3), across=20.0)
+    upright = log_likelihood(observed(cloud, bit, 3), TOLD)
+    np.testing.assert_array_equal(fitted(cloud, bit, 3, TOLD), upright)
 
 
 def test_the_table_of_words_is_sound():

@@ -8,7 +8,7 @@ is green, and a name that says nothing of colour gets what no other name explain
 import re
 import tomllib
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 
@@ -20,6 +20,7 @@ from skimage.color import rgb2lab
 
 from corporeal.types import Cloud, PartWords
 
+UP = np.array([0.0, 0.0, 1.0])
 COLOUR = 15.0
 """Standard deviation of what is seen of a named colour in full light [CIELAB]."""
 BLACK = np.array([16.0, 0.0, 0.0])
@@ -38,11 +39,15 @@ OPEN = 1.5
 """What a word does not say counts as so many standard deviations off."""
 FARTHEST = 4.0
 """Nothing counts as further off: words are as often wrong as that."""
+LYING = 0.7
+"""Least sine of the angle between a thing's longest axis and the vertical where it may lie."""
+LAID = 0.2
+"""Words must be so much likelier of a thing that lies, in the mean over its points."""
 SMALL = 1.5
 """How much less likely any patch is a small part's."""
 SAMPLE = 8000
 """Points that thinness is measured on."""
-REACH = 0.03
+REACH = 0.05
 """Radius of what is looked at for it, as a share of the object's diagonal."""
 DARKER, LIGHTER = 0.6, 1.3
 """What "dark" and "light" do to lightness."""
@@ -69,7 +74,7 @@ class Observed:
     colour: Float[np.ndarray, "C 3"]
     """Median, CIELAB."""
     height: Float[np.ndarray, " C"]
-    """Mean share of the object's height."""
+    """Mean share of the object's height, from its foot to its top."""
     thin: Float[np.ndarray, " C"]
     """Mean of 1 - λ₂/λ₁ of what is near each point."""
 
@@ -88,15 +93,50 @@ def described(part: PartWords) -> Described:
 def observed(cloud: Cloud, cluster_of_point: Int[np.ndarray, " N"], count: int) -> Observed:
     """Measure clusters; each must have points."""
     seen = rgb2lab(np.clip(cloud.colour, 0, 1)[None])[0]
-    z = cloud.position[:, 2]
-    height = (z - z.min()) / (np.ptp(z) or 1.0)
     thin = _thinness(cloud.position)
     rows = [np.flatnonzero(cluster_of_point == c) for c in range(count)]
     return Observed(
         colour=np.array([np.median(seen[r], axis=0) for r in rows]).reshape(-1, 3),
-        height=np.array([height[r].mean() for r in rows]),
+        height=_heights_along(UP, cloud.position, cluster_of_point, count),
         thin=np.array([thin[r].mean() for r in rows]),
     )
+
+
+def fitted(
+    cloud: Cloud, cluster_of_point: Int[np.ndarray, " N"], count: int, told: Sequence[Described]
+) -> Float[np.ndarray, "C K"]:
+    """Return how well each cluster fits each description, as ``log_likelihood`` does.
+
+    Heights are measured from the ground up, but in a long thing that has fallen over along its
+    longest axis, from the end that words fit better.
+    """
+    seen = observed(cloud, cluster_of_point, count)
+    share = np.bincount(cluster_of_point, minlength=count) / cloud.count
+    best = log_likelihood(seen, told)
+    most = share @ best.max(axis=1) + LAID
+    for up in _fallen(cloud.position):
+        height = _heights_along(up, cloud.position, cluster_of_point, count)
+        likely = log_likelihood(replace(seen, height=height), told)
+        total = share @ likely.max(axis=1)
+        if total > most:
+            best, most = likely, total
+    return best
+
+
+def _heights_along(
+    up: np.ndarray, position: np.ndarray, cluster_of_point: np.ndarray, count: int
+) -> Float[np.ndarray, " C"]:
+    z = position @ up
+    height = (z - z.min()) / (np.ptp(z) or 1.0)
+    points = np.bincount(cluster_of_point, minlength=count)
+    return np.bincount(cluster_of_point, height, minlength=count) / points
+
+
+def _fallen(position: Float[np.ndarray, "N 3"]) -> tuple[np.ndarray, ...]:
+    """Return where the top of a thing may be if it lies."""
+    local = position - position.mean(axis=0)
+    axis = np.linalg.eigh(local.T @ local)[1][:, 2]
+    return (axis, -axis) if np.hypot(*axis[:2]) > LYING else ()
 
 
 def log_likelihood(seen: Observed, told: Sequence[Described]) -> Float[np.ndarray, "C K"]:
@@ -156,7 +196,10 @@ def _thinness(position: np.ndarray) -> np.ndarray:
     size = near.sum(axis=1)
     mean = (near @ local) / size[:, None]
     squares = (local[:, :, None] * local[:, None]).reshape(-1, 9)
-    spread = ((near @ squares) / size[:, None]).reshape(-1, 3, 3) - mean[:, :, None] * mean[:, None]
+    spread = ((near @ squares) / size[:, None]).reshape(-1, 3, 3)
+    # About the point itself: about the mean, the rim of a plate would look like a wire.
+    mixed = mean[:, :, None] * local[:, None]
+    spread += local[:, :, None] * local[:, None] - mixed - mixed.swapaxes(1, 2)
     values = np.linalg.eigvalsh(spread)
     thin = 1 - values[:, 1] / np.maximum(values[:, 2], 1e-300)
     return np.where(size > 3, thin, 0.0)[tree.query(position)[1]]

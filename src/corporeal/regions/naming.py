@@ -15,7 +15,7 @@ from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 from scipy.special import log_softmax, softmax
 
-from corporeal.regions.attributes import described, log_likelihood, observed
+from corporeal.regions.attributes import described, fitted
 from corporeal.regions.match import match
 from corporeal.regions.parts import DEFAULT, Clusters, PartsConfig, parts
 from corporeal.regions.reduce import BATCH
@@ -124,8 +124,8 @@ def _claimed(score: Float[np.ndarray, "C K"]) -> Int[np.ndarray, " C"]:
 
 
 def _by_attributes(clusters: Clusters, cloud: Cloud, told: Sequence[PartWords]) -> np.ndarray:
-    seen = observed(cloud, clusters.cluster_of_point, clusters.count)
-    return log_likelihood(seen, [described(part) for part in told])
+    said = [described(part) for part in told]
+    return fitted(cloud, clusters.cluster_of_point, clusters.count, said)
 
 
 # ---------------------------------------------------------------- with words' vectors
