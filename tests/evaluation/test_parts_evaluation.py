@@ -130,6 +130,15 @@ def test_what_is_called_the_same_is_one_part(folder, tmp_path):
         judge(tmp_path, {"three": dict.fromkeys(apart.parts, "thing")}, CHEAP)
 
 
+def test_models_are_laid_on_their_side(folder, judged_boxes):
+    look = replace(CHEAP.look, lying=True)
+    ((row, judged),) = judge(folder, {}, replace(CHEAP, look=look))
+    place = judged.taken.cloud.position
+    middle = [place[judged.truth == k].mean(axis=0) for k in range(2)]
+    assert place[:, 2].min() > -1e-6 and abs(middle[1][2] - middle[0][2]) < 0.1
+    assert middle[1][0] - middle[0][0] > 0.4 and row.points != judged_boxes[0].points
+
+
 def test_only_what_pictures_show_is_asked_for(judged_boxes):
     row, judged = judged_boxes
     assert (judged.taken.cloud.seen > 0).all()

@@ -21,6 +21,7 @@ from corporeal.evaluation.overlap import best_names, matched_iou, named_iou, roc
 from corporeal.features.descriptor import descriptor, seen_from
 from corporeal.features.lifting import back_projection, visible
 from corporeal.formats.sources import models_in
+from corporeal.geometry.arrangement import box_of, moved
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.spread import sample_surface
 from corporeal.regions.naming import named, phrases
@@ -52,6 +53,8 @@ class PartsEvaluationConfig:
     """Height and width [px]."""
     point_seed: int = 0
     """Chooses the points."""
+    lying: bool = False
+    """Whether each model lies on its side when it is pictured."""
     structural: str = "descriptor"
     """What tells parts apart: "descriptor" needs no model; or "dinov2", or "dinov2:FOLDER"."""
     semantic: str = ""
@@ -201,6 +204,7 @@ def photographed(
     scene: Scene, how: PartsEvaluationConfig, look: Lookers, words: DescribeConfig
 ) -> Photographed:
     """Picture a scene of one object, and take its points from the pictures."""
+    scene = _laid(scene) if how.lying else scene
     inventory = describe(scene, words)
     truth = segment(scene, inventory)
     size = (how.photograph_size, how.photograph_size)
@@ -212,6 +216,12 @@ def photographed(
     shown = colour.seen > 0
     cloud = _cloud(position[shown], colour.mean[shown], colour.seen[shown], views, look)
     return Photographed(cloud, truth.part_of_point[triangle[shown]], inventory)
+
+
+def _laid(scene: Scene) -> Scene:
+    """Turn a scene about y by a quarter, and put it on the floor."""
+    turned = tuple(replace(s, vertices=s.vertices[:, ::-1] * [1, 1, -1]) for s in scene.surfaces)
+    return moved(replace(scene, surfaces=turned), (0.0, 0.0, -float(box_of(turned)[0, 2])))
 
 
 def _mesh(scene: Scene) -> Mesh:
