@@ -157,7 +157,7 @@ def test_features_in_half_precision_are_not_widened_all_at_once():
 
 def test_more_names_than_clusters_are_told():
     one = Clusters(np.zeros(10, np.int64), np.ones(10))
-    x = np.random.default_rng(2).random((10, 3))
+    x = np.random.default_rng(2).random((10, 3)) * [1, 1, 0]
     brown = np.tile([0.42, 0.28, 0.17], (10, 1))
     nothing = np.zeros((10, 0), np.float16)
     cloud = Cloud(x, brown, nothing, np.ones((10, 4), np.float16), np.ones(10, int))
@@ -176,6 +176,17 @@ def test_words_find_what_points_at_them(pile):
     assert found.found_by == "words"
 
 
+def test_one_cluster_from_foot_to_top_is_named_by_layers():
+    rng = np.random.default_rng(5)
+    place, nothing = rng.random((2000, 3)), np.zeros((2000, 0))
+    cloud = Cloud(place, np.full((2000, 3), 0.5), nothing, nothing, np.ones(2000, int))
+    one = Clusters(np.zeros(2000, np.int64), np.full(2000, 0.5))
+    found = named(one, cloud, None, thing("grey pedestal", "grey lid").parts)
+    high = place[:, 2] > 0.5
+    far = abs(place[:, 2] - 0.5) > 0.11  # the middle layer may go either way
+    assert (found.part_of_point[far] == high[far]).all() and len(found.confidence) == 2000
+
+
 def test_what_is_not_typical_of_a_cluster_does_not_decide_its_name():
     """A third of a cluster's points look like something else, and shout another name."""
     rng = np.random.default_rng(4)
@@ -188,7 +199,7 @@ def test_what_is_not_typical_of_a_cluster_does_not_decide_its_name():
     one = Clusters(np.zeros(90, np.int64), np.ones(90))
     plain = semantic.mean(axis=0) @ words.T
     found = named(one, cloud, words, thing("first", "second").parts)
-    assert plain.argmax() == 1 and found.part_of_cluster.tolist() == [0]
+    assert plain.argmax() == 1 and set(found.part_of_point) == {0}
 
 
 def test_a_cluster_that_looks_like_those_of_another_name_goes_over_to_them():

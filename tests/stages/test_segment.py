@@ -112,9 +112,7 @@ def test_without_a_reconstruction_pieces_share_a_surface():
 
 def test_a_piece_that_shows_nowhere_is_left_out_and_told():
     made, green = potted()
-    named = Named(
-        np.zeros(len(green), int), np.ones(len(green)), np.zeros(1, int), "attributes", ("None.",)
-    )
+    named = Named(np.zeros(len(green), int), np.ones(len(green)), "attributes", ("None.",))
     with pytest.MonkeyPatch.context() as patch:
         patch.setattr("corporeal.stages.segment.name_parts", lambda *_: named)
         words = told(("red pot", "ceramic"), ("root", "wood"))

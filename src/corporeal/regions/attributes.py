@@ -90,53 +90,51 @@ def described(part: PartWords) -> Described:
     return Described(_colours(name, material), _heights(name), _thin(name), small)
 
 
-def observed(cloud: Cloud, cluster_of_point: Int[np.ndarray, " N"], count: int) -> Observed:
+def observed(
+    cloud: Cloud, cluster_of_point: Int[np.ndarray, " N"], count: int, up: np.ndarray = UP
+) -> Observed:
     """Measure clusters; each must have points."""
     seen = rgb2lab(np.clip(cloud.colour, 0, 1)[None])[0]
     thin = _thinness(cloud.position)
     rows = [np.flatnonzero(cluster_of_point == c) for c in range(count)]
     return Observed(
         colour=np.array([np.median(seen[r], axis=0) for r in rows]).reshape(-1, 3),
-        height=_heights_along(UP, cloud.position, cluster_of_point, count),
+        height=_means(heights(cloud.position, up), cluster_of_point, count),
         thin=np.array([thin[r].mean() for r in rows]),
     )
 
 
-def fitted(
-    cloud: Cloud, cluster_of_point: Int[np.ndarray, " N"], count: int, told: Sequence[Described]
-) -> Float[np.ndarray, "C K"]:
-    """Return how well each cluster fits each description, as ``log_likelihood`` does.
+def heights(position: Float[np.ndarray, "N 3"], up: np.ndarray = UP) -> Float[np.ndarray, " N"]:
+    """Return how high each point is, as a share of the object's height."""
+    z = position @ up
+    return (z - z.min()) / (np.ptp(z) or 1.0)
 
-    Heights are measured from the ground up, but in a long thing that has fallen over along its
-    longest axis, from the end that words fit better.
+
+def _means(rows: np.ndarray, group: np.ndarray, count: int) -> np.ndarray:
+    return np.bincount(group, rows, minlength=count) / np.bincount(group, minlength=count)
+
+
+def top_of(
+    cloud: Cloud, cluster_of_point: Int[np.ndarray, " N"], count: int, told: Sequence[Described]
+) -> Float[np.ndarray, "3"]:
+    """Return where an object's top is: up, but in a long thing that lies, where words fit better.
+
+    Of something that has fallen over along its longest axis they say most when heights are measured
+    along it. They have to be likelier by ``LAID`` in the mean over points.
     """
     seen = observed(cloud, cluster_of_point, count)
     share = np.bincount(cluster_of_point, minlength=count) / cloud.count
-    best = log_likelihood(seen, told)
-    most = share @ best.max(axis=1) + LAID
-    for up in _fallen(cloud.position):
-        height = _heights_along(up, cloud.position, cluster_of_point, count)
-        likely = log_likelihood(replace(seen, height=height), told)
-        total = share @ likely.max(axis=1)
-        if total > most:
-            best, most = likely, total
-    return best
 
+    def fit(up: np.ndarray) -> float:
+        along = _means(heights(cloud.position, up), cluster_of_point, count)
+        return float(share @ log_likelihood(replace(seen, height=along), told).max(axis=1))
 
-def _heights_along(
-    up: np.ndarray, position: np.ndarray, cluster_of_point: np.ndarray, count: int
-) -> Float[np.ndarray, " C"]:
-    z = position @ up
-    height = (z - z.min()) / (np.ptp(z) or 1.0)
-    points = np.bincount(cluster_of_point, minlength=count)
-    return np.bincount(cluster_of_point, height, minlength=count) / points
-
-
-def _fallen(position: Float[np.ndarray, "N 3"]) -> tuple[np.ndarray, ...]:
-    """Return where the top of a thing may be if it lies."""
-    local = position - position.mean(axis=0)
+    local = cloud.position - cloud.position.mean(axis=0)
     axis = np.linalg.eigh(local.T @ local)[1][:, 2]
-    return (axis, -axis) if np.hypot(*axis[:2]) > LYING else ()
+    if np.hypot(*axis[:2]) < LYING:
+        return UP
+    best = max((axis, -axis), key=fit)
+    return best if fit(best) > fit(UP) + LAID else UP
 
 
 def log_likelihood(seen: Observed, told: Sequence[Described]) -> Float[np.ndarray, "C K"]:

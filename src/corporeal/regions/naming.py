@@ -8,14 +8,20 @@ against colour, height and shape (``regions.attributes``).
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.sparse import csr_array
 from scipy.special import log_softmax, softmax
 
-from corporeal.regions.attributes import described, fitted
+from corporeal.regions.attributes import (
+    described,
+    heights,
+    log_likelihood,
+    observed,
+    top_of,
+)
 from corporeal.regions.match import match
 from corporeal.regions.parts import DEFAULT, Clusters, PartsConfig, parts
 from corporeal.regions.reduce import BATCH
@@ -23,17 +29,18 @@ from corporeal.types import Cloud, ObjectWords, PartWords
 
 TEMPERATURE = 0.01
 """Of cosines between CLIP's pictures and words, as it was trained (Radford et al. 2021)."""
+LAYERS = 5
+"""Of the object's height, that a name without a model is given in."""
 
 
 @dataclass(frozen=True)
 class Named:
-    """Which of an object's parts every point belongs to; N points, C clusters, K parts."""
+    """Which of an object's parts every point belongs to; N points."""
 
     part_of_point: Int[np.ndarray, " N"]
     """Index into the object's parts."""
     confidence: Float[np.ndarray, " N"]
     """In [0, 1]: how probable the name is for the cluster, times how surely the point is of it."""
-    part_of_cluster: Int[np.ndarray, " C"]
     found_by: str
     """"words", "attributes", "one part" or "no points"."""
     warnings: tuple[str, ...] = ()
@@ -62,9 +69,9 @@ def name_parts(
     """
     none = np.zeros(cloud.count, np.int64)
     if not cloud.count:
-        return Named(none, np.ones(0), none, "no points", _missing(none, thing.parts))
+        return Named(none, np.ones(0), "no points", _missing(none, thing.parts))
     if len(thing.parts) == 1:
-        return Named(none, np.ones(cloud.count), np.zeros(1, np.int64), "one part")
+        return Named(none, np.ones(cloud.count), "one part")
     return named(parts(cloud, config), cloud, words, thing.parts)
 
 
@@ -76,6 +83,9 @@ def named(
 ) -> Named:
     """Give every cluster a part's name; each part gets a cluster where there are enough.
 
+    Without a model every layer of a cluster gets its own: what words say of place is the surest of
+    what they say, and a cluster may reach from foot to top.
+
     Args:
         clusters: Of the cloud's points.
         cloud: Points of one object, the world's z up.
@@ -84,7 +94,7 @@ def named(
 
     """
     if words is None:
-        score = _by_attributes(clusters, cloud, told)
+        clusters, score = _by_attributes(clusters, cloud, told)
         part = _claimed(score)
     else:
         score = _by_words(clusters, cloud, words)
@@ -95,7 +105,6 @@ def named(
     return Named(
         of_point,
         sure[clusters.cluster_of_point] * clusters.confidence,
-        part,
         "attributes" if words is None else "words",
         _missing(of_point, told),
     )
@@ -123,9 +132,17 @@ def _claimed(score: Float[np.ndarray, "C K"]) -> Int[np.ndarray, " C"]:
 # ---------------------------------------------------------------- without a model
 
 
-def _by_attributes(clusters: Clusters, cloud: Cloud, told: Sequence[PartWords]) -> np.ndarray:
+def _by_attributes(
+    clusters: Clusters, cloud: Cloud, told: Sequence[PartWords]
+) -> tuple[Clusters, Float[np.ndarray, "C K"]]:
+    """Cut clusters into layers of the object's height, and hold what is said against each."""
     said = [described(part) for part in told]
-    return fitted(cloud, clusters.cluster_of_point, clusters.count, said)
+    up = top_of(cloud, clusters.cluster_of_point, clusters.count, said)
+    layer = np.minimum(heights(cloud.position, up) * LAYERS, LAYERS - 1).astype(int)
+    cut = clusters.cluster_of_point * LAYERS + layer
+    clusters = replace(clusters, cluster_of_point=np.unique(cut, return_inverse=True)[1])
+    seen = observed(cloud, clusters.cluster_of_point, clusters.count, up)
+    return clusters, log_likelihood(seen, said)
 
 
 # ---------------------------------------------------------------- with words' vectors
