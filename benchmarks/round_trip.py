@@ -39,6 +39,7 @@ from corporeal.formats.scene_file import (
 from corporeal.formats.transforms import read_views, write_views
 from corporeal.geometry.anatomy import inner_share
 from corporeal.geometry.arrangement import box_of, boxes_of
+from corporeal.geometry.foliage import is_leafy
 from corporeal.geometry.similarity import moved_points
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.pipeline import Settings, opened, write_showcase
@@ -145,12 +146,16 @@ def _examined(made: dict) -> list[Anatomy]:
 
 
 def _piece(made: dict, views: Views, member: Member) -> Piece:
-    """Say what a piece is, how it looks, and how thick a wall is that its mesh has two sides of."""
+    """Say what a piece is, how it looks, and how thick a wall is that its mesh has two sides of.
+
+    Leaves are such walls, whatever their mesh.
+    """
     field, k = made["ground"], member.part
     said = _said(field, k)
     if said["structure"] == "solid" and member.volume:
         rng = np.random.default_rng(0)
-        if inner_share(member.shape, member.body, member.size[0], rng) > WALLED:
+        shared = inner_share(member.shape, member.body, member.size[0], rng)
+        if is_leafy(field.materials[k]) or shared > WALLED:
             thickness = 2e3 * member.volume / member.body_area
             said |= {"structure": "shell", "thickness_mm": thickness}
     triangles = [len(s.triangles) for s in made["assemble"].surfaces]

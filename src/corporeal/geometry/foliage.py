@@ -1,15 +1,26 @@
-"""Leaves and roots: how fast a leaf swings, how large a crown is, where wood meets its soil."""
+"""Leaves and roots: how many leaves there are, how fast they swing, where wood meets its soil."""
 
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
 from corporeal.geometry.anatomy import pieces
+from corporeal.geometry.make import Make
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.survey import Anatomy, Member
-from corporeal.types import Law, Material, Root, Vector
+from corporeal.types import (
+    Law,
+    Material,
+    MaterialField,
+    Particles,
+    Root,
+    Scene,
+    Structure,
+    Vector,
+)
 
 Inertia = Callable[[int, Vector], float]
 
@@ -17,6 +28,15 @@ LEAFY = ("leaves-flowers", "leaf_tissue")
 """Materials that leaves are made of."""
 LONGEST_LEAF = 0.15
 """A longer piece stands for many leaves [m]."""
+USUAL_LEAF = 0.08
+"""Length of a leaf on the border of Webb's (1959) microphylls and notophylls, 20 cm² [m]."""
+THICKEST_LEAF = 3e-3
+"""What is thicker in the mean is more than one leaf, even as leaves are drawn [m]."""
+SHOWN = 0.75
+"""Area of leaves over that of the surface that pictures make of a crown: half where a leaf shows
+both its faces, all where it covers others."""
+FASTEST = 300.0
+"""Springs are no stiffer [rad/s]: a leaf's own weight moves them by a tenth of a millimetre."""
 CENTROID = 0.4
 """Shift of a leaf's centre over that of its tip."""
 ROCKING = 0.34
@@ -25,11 +45,82 @@ PIVOT = 0.4
 """Height above its foot about which a stem rocks, over its depth in the soil."""
 
 
-def leaves_of(member: Member, material: Material) -> int:
-    """How many separate leaves a part is; 0: it is no foliage."""
-    if material.name not in LEAFY:
+def is_leafy(material: Material) -> bool:
+    """Whether leaves are made of it."""
+    return material.name in LEAFY
+
+
+def leaves_of(member: Member, material: Material, made: Make, scale: float) -> int:
+    """How many leaves a part is; 0: it is no foliage.
+
+    Pieces of its mesh; of a crown in bulk, leaves of the usual size, L²/3, that have its area.
+    """
+    if not is_leafy(material):
         return 0
+    if made.leaves:
+        return round(made.leaves / ((USUAL_LEAF * scale) ** 2 / 3))
     return sum(int(pieces(m).max()) + 1 for m in (member.body, member.sheet) if len(m.triangles))
+
+
+def in_bulk(member: Member, scale: float) -> bool:
+    """Whether foliage's surface does not show one leaf from another.
+
+    Pictures, and coarse models, show a crown as a thing of thickened and joined leaves: most of
+    its surface is in pieces longer than a leaf is, and thicker.
+    """
+    if not len(member.body.triangles):
+        return False
+    if 2 * member.volume < THICKEST_LEAF * scale * member.body_area:
+        return False
+    long = lengths_of_pieces(member.body) > LONGEST_LEAF * scale
+    return float(member.body.areas @ long) > 0.5 * member.body_area
+
+
+def in_leaves(
+    made: Make,
+    at: tuple[Anatomy, Member],
+    field: MaterialField,
+    tissue: Material,
+    scale: float,
+) -> Make:
+    """Weigh a crown in bulk by the area of its leaves, m = ρ t A, and not by its volume.
+
+    A is three quarters of its surface: half of it where every leaf shows both its faces, all where
+    each covers others. Thickness and density are those that were told for its walls, else a usual
+    leaf's. What nothing bears is no crown.
+
+    Args:
+        made: How the part is made otherwise.
+        at: The plant and the part.
+        field: What it is made of.
+        tissue: What leaves are made of, as thick as in life.
+        scale: Scene size over real size.
+
+    """
+    anatomy, member = at
+    material, k = field.materials[member.part], member.part
+    borne = not all(is_leafy(field.materials[m.part]) for m in anatomy.members)
+    alone = borne and is_leafy(material) and not made.pieces and not made.held
+    if not alone or not in_bulk(member, scale):
+        return made
+    assert tissue.shell_thickness is not None
+    thick = field.words[k].thickness or field.structures[k].thickness or material.shell_thickness
+    density = material.density if thick else tissue.density
+    thick = thick or tissue.shell_thickness * scale
+    area = SHOWN * member.body_area
+    mass, open_mass = density * thick * area, density * thick * member.sheet_area
+    return replace(
+        made,
+        structure=Structure("solid"),
+        modelled=False,
+        thickness=0.0,
+        sheet=thick,
+        body_mass=mass,
+        sheet_mass=open_mass,
+        volume=member.volume,
+        density=(mass + open_mass) / member.volume,
+        leaves=area + member.sheet_area,
+    )
 
 
 def swinging(
@@ -38,7 +129,8 @@ def swinging(
     """Natural angular frequency of the leaf that each point belongs to [rad/s].
 
     A cantilever of length L and thickness t under its own weight: its centre shifts by
-    C a = .4 · 1.5 ρ L⁴/(E t²) a in an acceleration a, and ω = 1/√C.
+    C a = .4 · 1.5 ρ L⁴/(E t²) a in an acceleration a, and ω = 1/√C. In a crown in bulk all are of
+    the usual length.
 
     Args:
         member: The foliage.
@@ -55,8 +147,11 @@ def swinging(
             lengths.append(lengths_of_pieces(mesh))
     nearest = KDTree(np.concatenate(middles)).query(points)[1]
     length = np.minimum(np.concatenate(lengths)[nearest], LONGEST_LEAF * scale)
+    if in_bulk(member, scale):
+        length[:] = USUAL_LEAF * scale
     stiffness = tissue.young * (tissue.shell_thickness * scale) ** 2
-    return np.sqrt(stiffness / (1.5 * CENTROID * tissue.density)) / length**2
+    rate = np.sqrt(stiffness / (1.5 * CENTROID * tissue.density)) / length**2
+    return np.minimum(rate, FASTEST)
 
 
 def lengths_of_pieces(mesh: Mesh) -> Float[np.ndarray, " T"]:
@@ -126,3 +221,43 @@ def root_of(
     stiffness = ROCKING * materials[soil].young * depth**3
     damping = materials[soil].loss * float(np.sqrt(stiffness * inertia_about(wood, point)))
     return Root(number, wood, point, stiffness, damping)
+
+
+def planted(
+    scene: Scene,
+    particles: Particles,
+    anatomies: list[Anatomy],
+    field: MaterialField,
+    tissue: Material,
+) -> Particles:
+    """Put leaves on springs, and what bears them into its soil."""
+    leafy = [k for k, t in enumerate(particles.treatments) if t.kind == "foliage"]
+    if not leafy:
+        return particles
+    rate, roots = np.zeros(particles.count), []
+    for number, anatomy in enumerate(anatomies):
+        crowns = [m for m in anatomy.members if m.part in leafy]
+        for member in crowns:
+            own = particles.part == member.part
+            scale = scene.objects[number].scale
+            rate[own] = swinging(member, particles.position[own], tissue, scale)
+        if crowns:
+            swing = Swing(particles, [m.part for m in crowns])
+            root = root_of(anatomy, number, field.materials, swing)
+            roots += [] if root is None else [root]
+    return replace(particles, rate=rate, roots=tuple(roots))
+
+
+@dataclass(frozen=True)
+class Swing:
+    """What rocks on a root: the wood and the leaves."""
+
+    particles: Particles
+    crowns: list[int]
+
+    def __call__(self, wood: int, point: Vector) -> float:
+        """Moment of inertia about a level axis through a point [kg m²]."""
+        mine = np.isin(self.particles.part, [wood, *self.crowns])
+        arm = self.particles.position[mine] - np.array(point)
+        level = 0.5 * (arm[:, 0] ** 2 + arm[:, 1] ** 2) + arm[:, 2] ** 2
+        return float(self.particles.mass[mine] @ level)

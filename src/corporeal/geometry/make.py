@@ -76,6 +76,8 @@ class Make:
     """Thickness that its mesh draws [m]; 0: it draws no wall with two faces."""
     whose: str = ""
     """Where its wall's thickness comes from, in a clause."""
+    leaves: float = 0.0
+    """Of a crown in bulk: area of one side of its leaves [m²], by which it is weighed; else 0."""
 
     @property
     def mass(self) -> float:
@@ -313,8 +315,12 @@ def how_walled(made: Make) -> str:
 
 def how_filled(member: Member, made: Make, treatment: Treatment, cell: float) -> str:
     """Say in words what the fill is."""
-    if treatment.kind == "foliage":
-        return "leaves on springs"
+    springs = "leaves on springs" if treatment.kind == "foliage" else ""
+    if made.leaves:
+        shown = f"about {made.leaves:.2g} m² of leaves {made.sheet * 1e3:.3g} mm thick"
+        return f"{springs or 'a crown'}, {shown}: its surface does not show one from another"
+    if springs:
+        return springs
     if made.held:
         return f"{how_walled(made)}{how_held(made)}"
     if member.volume == 0:

@@ -9,7 +9,7 @@ from corporeal.errors import UserError, check_range
 from corporeal.geometry.contact_points import contact_points
 from corporeal.geometry.exposure import cross_section, faces
 from corporeal.geometry.falls import drop_heights
-from corporeal.geometry.foliage import leaves_of, root_of, swinging
+from corporeal.geometry.foliage import in_leaves, is_leafy, leaves_of, planted
 from corporeal.geometry.make import Make, compose, how_filled, recipe
 from corporeal.geometry.packing import Packing, Recipe, pack
 from corporeal.geometry.rods import Rod, rod_of
@@ -20,7 +20,7 @@ from corporeal.materials import find
 from corporeal.mpm.part import Motion, PartGeometry
 from corporeal.mpm.treatment import Plan, plan
 from corporeal.mpm.wind import greatest_acceleration
-from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject, Treatment, Vector
+from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject, Treatment
 
 
 @dataclass(frozen=True)
@@ -51,9 +51,17 @@ def fill(
     """
     field = in_scene(field, scale_of_part(scene, parts))
     anatomies = examine(scene, parts, config.seed)
+    leaf = find("leaf_tissue")
+    tissue = leaf.pick(leaf.typical())
     makes = {
-        m.part: compose(a, m, field, np.random.default_rng([config.seed, m.part, 5]))
-        for a in anatomies
+        m.part: in_leaves(
+            compose(a, m, field, np.random.default_rng([config.seed, m.part, 5])),
+            (a, m),
+            field,
+            tissue,
+            thing.scale,
+        )
+        for thing, a in zip(scene.objects, anatomies, strict=True)
         for m in a.members
     }
     refuse_flat(scene, anatomies)
@@ -81,7 +89,7 @@ def fill(
         packings.append(pack(anatomy, recipes, chosen.cell / 2, rng, coarse=coarse))
     packings = keep_apart(packings, chosen.cell)
     particles = gather(scene, parts, anatomies, makes, chosen, packings)
-    return with_plants(scene, particles, anatomies, field)
+    return planted(scene, particles, anatomies, field, tissue)
 
 
 # ------------------------------------------------------------------ what is there
@@ -184,7 +192,9 @@ def resolve(
             volume=makes[m.part].volume,
             area=makes[m.part].area,
             closed=closes_about(m, makes[m.part]),
-            leaves=leaves_of(m, field.materials[m.part]),
+            leaves=leaves_of(
+                m, field.materials[m.part], makes[m.part], scene.objects[number].scale
+            ),
             diameter=rods[m.part].diameter if m.part in rods else 0.0,
             burden=burden(m, anatomy, makes, field),
             scale=scene.objects[number].scale,
@@ -207,7 +217,7 @@ def closes_about(member: Member, made: Make) -> bool:
 
 def burden(member: Member, anatomy: Anatomy, makes: dict[int, Make], field: MaterialField) -> float:
     """Mass of the foliage of an object over that of one of its other parts [-]."""
-    leafy = [m.part for m in anatomy.members if leaves_of(m, field.materials[m.part])]
+    leafy = [m.part for m in anatomy.members if is_leafy(field.materials[m.part])]
     if member.part in leafy:
         return 0.0
     return sum(makes[k].mass for k in leafy) / max(makes[member.part].mass, 1e-30)
@@ -327,44 +337,6 @@ def gather(
         walls=tuple((makes[k].thickness, makes[k].sheet) for k in range(len(parts.catalogue))),
         warnings=chosen.warnings,
     )
-
-
-def with_plants(
-    scene: Scene, particles: Particles, anatomies: list[Anatomy], field: MaterialField
-) -> Particles:
-    """Put leaves on springs, and what bears them into its soil."""
-    leafy = [k for k, t in enumerate(particles.treatments) if t.kind == "foliage"]
-    if not leafy:
-        return particles
-    leaf = find("leaf_tissue")
-    tissue = leaf.pick(leaf.typical())
-    rate, roots = np.zeros(particles.count), []
-    for number, anatomy in enumerate(anatomies):
-        crowns = [m for m in anatomy.members if m.part in leafy]
-        for member in crowns:
-            own = particles.part == member.part
-            scale = scene.objects[number].scale
-            rate[own] = swinging(member, particles.position[own], tissue, scale)
-        if crowns:
-            swing = Swing(particles, [m.part for m in crowns])
-            root = root_of(anatomy, number, field.materials, swing)
-            roots += [] if root is None else [root]
-    return replace(particles, rate=rate, roots=tuple(roots))
-
-
-@dataclass(frozen=True)
-class Swing:
-    """What rocks on a root: the wood and the leaves."""
-
-    particles: Particles
-    crowns: list[int]
-
-    def __call__(self, wood: int, point: Vector) -> float:
-        """Moment of inertia about a level axis through a point [kg m²]."""
-        mine = np.isin(self.particles.part, [wood, *self.crowns])
-        arm = self.particles.position[mine] - np.array(point)
-        level = 0.5 * (arm[:, 0] ** 2 + arm[:, 1] ** 2) + arm[:, 2] ** 2
-        return float(self.particles.mass[mine] @ level)
 
 
 def describe(
