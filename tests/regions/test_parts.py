@@ -157,7 +157,7 @@ def test_features_in_half_precision_are_not_widened_all_at_once():
 
 def test_more_names_than_clusters_are_told():
     one = Clusters(np.zeros(10, np.int64), np.ones(10))
-    x = np.random.default_rng(2).random((10, 3)) * [1, 1, 0]
+    x = np.zeros((10, 3))
     brown = np.tile([0.42, 0.28, 0.17], (10, 1))
     nothing = np.zeros((10, 0), np.float16)
     cloud = Cloud(x, brown, nothing, np.ones((10, 4), np.float16), np.ones(10, int))
