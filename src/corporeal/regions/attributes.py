@@ -41,7 +41,7 @@ FARTHEST = 4.0
 """Nothing counts as further off: words are as often wrong as that."""
 LYING = 0.7
 """Least sine of the angle between a thing's longest axis and the vertical where it may lie."""
-LAID = 0.2
+LAID = 0.1
 """Words must be so much likelier of a thing that lies, in the mean over its points."""
 SMALL = 1.5
 """How much less likely any patch is a small part's."""
