@@ -178,7 +178,7 @@ def test_words_find_what_points_at_them(pile):
 
 def test_one_cluster_from_foot_to_top_is_named_by_layers():
     rng = np.random.default_rng(5)
-    place, nothing = rng.random((2000, 3)), np.zeros((2000, 0))
+    place, nothing = rng.random((2000, 3)) * [0.5, 0.5, 1], np.zeros((2000, 0))
     cloud = Cloud(place, np.full((2000, 3), 0.5), nothing, nothing, np.ones(2000, int))
     one = Clusters(np.zeros(2000, np.int64), np.full(2000, 0.5))
     found = named(one, cloud, None, thing("grey pedestal", "grey lid").parts)
