@@ -14,6 +14,8 @@ from corporeal.geometry.spread import sample_surface
 
 THIN = 0.1
 """Walls are thinner than this share of the shortest side."""
+OPENER = 1.5
+"""The outside of a wall sees so many times as much of the open as the inside, or more."""
 
 
 class Build(IntEnum):
@@ -124,8 +126,8 @@ def inner_share(
 ) -> float:
     """Share of a part's surface that is the inner face of a wall whose outer face is there, too.
 
-    What has another face close behind it that sees more than twice as much of the open: the inside
-    of a shade, or of a vase as far down as pictures show it.
+    What has another face close behind it that sees at least half as much again of the open: the
+    inside of a shade, or of a vase as far down as pictures show it.
 
     Args:
         shape: All that encloses something.
@@ -143,7 +145,7 @@ def inner_share(
     points, normals, back = points[near], normals[near], shape.mesh.normals[behind[near]]
     own = open_to(shape, points + step * normals, normals)
     other = open_to(shape, points - depth[near, None] * normals + step * back, back)
-    return float((2 * own < other).sum() / count)
+    return float((OPENER * own < other).sum() / count)
 
 
 def open_to(
