@@ -13,6 +13,7 @@ from corporeal.geometry.foliage import in_leaves, is_leafy, leaves_of, planted
 from corporeal.geometry.make import Make, compose, how_filled, recipe
 from corporeal.geometry.packing import Packing, Recipe, pack
 from corporeal.geometry.rods import Rod, rod_of
+from corporeal.geometry.rooting import drawn_into_ground
 from corporeal.geometry.sizes import in_scene, is_scaled, scale_of_part
 from corporeal.geometry.survey import Anatomy, Member, survey
 from corporeal.geometry.weights import keep_apart, weigh
@@ -50,6 +51,7 @@ def fill(
     Walls are as thick as their thing is large in the scene: real thickness times its scale.
     """
     field = in_scene(field, scale_of_part(scene, parts))
+    scene, drawn = drawn_into_ground(scene, parts, field)
     anatomies = examine(scene, parts, config.seed)
     leaf = find("leaf_tissue")
     tissue = leaf.pick(leaf.typical())
@@ -89,6 +91,7 @@ def fill(
         packings.append(pack(anatomy, recipes, chosen.cell / 2, rng, coarse=coarse))
     packings = keep_apart(packings, chosen.cell)
     particles = gather(scene, parts, anatomies, makes, chosen, packings)
+    particles = replace(particles, warnings=(*particles.warnings, *drawn))
     return planted(scene, particles, anatomies, field, tissue)
 
 
