@@ -162,9 +162,16 @@ def _piece(made: dict, views: Views, member: Member) -> Piece:
     part_of_surface = made["segment"].part_of_point[np.cumsum([0, *triangles[:-1]])]
     assert views.part_of_pixel is not None
     shown = np.isin(views.part_of_pixel, np.flatnonzero(part_of_surface == k))
-    colour = _called(np.median(views.rgb[shown], axis=0)) if shown.any() else ""
+    colour = _colour(views.rgb[shown]) if shown.any() else ""
     name, area = made["segment"].catalogue[k].name, member.body_area + member.sheet_area
     return Piece(name, int(shown.sum()), colour, said, area)
+
+
+def _colour(rgb: np.ndarray) -> str:
+    """Call what N pixels show; what seems black may be in the shade: its brighter half tells."""
+    name = _called(np.median(rgb, axis=0))
+    light = rgb.mean(axis=1)
+    return _called(np.median(rgb[light >= np.median(light)], axis=0)) if name == "black" else name
 
 
 def _called(rgb: np.ndarray) -> str:
