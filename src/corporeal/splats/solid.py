@@ -2,7 +2,8 @@
 
 Cameras look at the Gaussians, space is carved by what they see, the floor closes what stands on it,
 and where things touch every place inside belongs to the nearer one's Gaussians. Marching cubes
-(Lewiner et al. 2003) make a surface of what is left.
+(Lewiner et al. 2003) make a surface of what is left. Where surfaces of two things still overlap,
+both are drawn back to a common face.
 """
 
 from dataclasses import dataclass, field, replace
@@ -19,6 +20,7 @@ from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.shape import Shape
 from corporeal.splats.carve import Grid, carved, gridded
 from corporeal.splats.crew import Crew
+from corporeal.splats.disjoint import disjoint
 from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
 from corporeal.splats.outline import fitted, outlined
@@ -113,7 +115,9 @@ def solids(
         survey, made = _surveyed(scene, count, crew), []
         for k in range(count):
             made.append(_solid(scene, k, survey, crew))
-    return tuple(made)
+    meshes = [Mesh(one.vertices, one.triangles) for one in made]
+    meshes = disjoint(meshes, [one.cell for one in made], floor)
+    return tuple(replace(s, vertices=m.vertices) for s, m in zip(made, meshes, strict=True))
 
 
 @dataclass(frozen=True)
