@@ -1,5 +1,6 @@
 """A crown as pictures show it, one surface of thickened leaves: what it weighs, how it swings."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -7,10 +8,11 @@ import pytest
 import trimesh
 from scipy.ndimage import distance_transform_edt
 from skimage.measure import marching_cubes
-from test_fill import LEAVES, SOLID, WOOD, inputs, put, thing
+from test_fill import LEAVES, SOLID, WOOD, a_potted_plant, inputs, put, thing
 
-from corporeal.geometry.foliage import in_leaves, swinging
+from corporeal.geometry.foliage import in_leaves, root_of, rooted, swinging
 from corporeal.geometry.make import compose
+from corporeal.geometry.mesh import Mesh
 from corporeal.materials import find
 from corporeal.stages.fill import examine, fill
 from corporeal.types import Structure
@@ -92,3 +94,29 @@ def test_a_scrap_of_leaf_swings_no_faster_than_can_be_seen():
     scene, parts, _ = inputs(thing((stem, WOOD), (scrap, LEAVES)))
     member = examine(scene, parts, 0)[0].members[1]
     np.testing.assert_allclose(swinging(member, np.zeros((1, 3)), TISSUE, 1.0), 300.0)
+
+
+def above(stem, height):
+    """What shows of a stem."""
+    shown = np.maximum(stem.body.vertices, [-np.inf, -np.inf, height])
+    return replace(stem, body=Mesh(shown, stem.body.triangles), closed=False)
+
+
+def test_a_potted_stem_whose_foot_nobody_saw_reaches_halfway_down():
+    scene, parts, field = a_potted_plant()
+    whole = examine(scene, parts, 0)[0]
+    pot, soil, stem, leaves = whole.members
+    seen = rooted(whole, field.materials)
+    assert (seen.wood, seen.soil) == (2, 1)
+    assert (seen.foot, seen.top) == pytest.approx((0.11, 0.19))
+    top = replace(soil, body=soil.body.only(soil.body.normals[:, 2] > 0.9), closed=False)
+    pictured = replace(whole, members=(pot, top, above(stem, 0.19), leaves))
+    found = rooted(pictured, field.materials)
+    assert (found.wood, found.soil) == (2, 1)
+    assert (found.foot, found.top) == pytest.approx((0.095, 0.19))
+    assert seen.seen and not found.seen and "0.095 m, halfway down" in found.doubt
+    root = root_of(found, (pictured, 0), field.materials, lambda wood, point: 1.0)
+    assert root.stiffness == pytest.approx(0.34 * 3e5 * 0.095**3)
+    assert root.point[2] == pytest.approx(0.095 + 0.4 * 0.095)
+    hung = replace(whole, members=(pot, top, above(stem, 0.4), leaves))
+    assert rooted(hung, field.materials) is None

@@ -26,6 +26,8 @@ Inertia = Callable[[int, Vector], float]
 
 LEAFY = ("leaves-flowers", "leaf_tissue")
 """Materials that leaves are made of."""
+WOODY = ("wood", "hardwood", "softwood", "bamboo")
+"""Materials that trunks and stems are made of."""
 LONGEST_LEAF = 0.15
 """A longer piece stands for many leaves [m]."""
 USUAL_LEAF = 0.08
@@ -41,6 +43,8 @@ CENTROID = 0.4
 """Shift of a leaf's centre over that of its tip."""
 ROCKING = 0.34
 """k_θ/(E h³) of a stem in soil to a depth h (measured on resolved soil, at one geometry)."""
+FAR = 0.1
+"""Wood begins no farther above its soil, of its height above it."""
 PIVOT = 0.4
 """Height above its foot about which a stem rocks, over its depth in the soil."""
 
@@ -173,18 +177,63 @@ def crown_volume(points: Float[np.ndarray, "N 3"], cell: float) -> float:
     return len(np.unique(np.floor(points / cell).astype(np.int64), axis=0)) * cell**3
 
 
-def rooted(anatomy: Anatomy, materials: tuple[Material, ...]) -> tuple[int, int] | None:
-    """Wood and the soil it stands in, as numbers of parts; None: nothing stands in soil.
+@dataclass(frozen=True)
+class Rooted:
+    """Wood that stands in soil of its own object."""
 
-    The wood's foot is in the soil, and it rises above it.
+    wood: int
+    """Of the parts."""
+    soil: int
+    foot: float
+    """Height of the wood's lowest point [m]."""
+    top: float
+    """Height of the soil's surface [m]."""
+    seen: bool
+    """Whether the mesh has the foot."""
+
+    @property
+    def doubt(self) -> str:
+        """What is guessed where the foot was not seen, in words."""
+        deep = self.top - self.foot
+        return (
+            f"how deep it is rooted in its soil was not seen and is taken as {deep:.2g} m, halfway "
+            "down; how far it sways depends on that."
+        )
+
+
+def rooted(anatomy: Anatomy, materials: tuple[Material, ...]) -> Rooted | None:
+    """Return which wood stands in which soil; None: nothing stands in soil.
+
+    The wood's foot is in the soil, and it rises above it. Where the surface of either ends, as what
+    pictures show does, the foot is taken to reach halfway down from where most of the soil shows to
+    the object's lowest point.
     """
-    spans = {m.part: span(m) for m in anatomy.members}
-    for soil in (k for k in spans if materials[k].law is Law.DRUCKER_PRAGER):
-        low, high = spans[soil]
-        for wood, (foot, top) in spans.items():
-            if wood != soil and low < foot < high < top and materials[wood].name not in LEAFY:
-                return wood, soil
+    soils = [m for m in anatomy.members if materials[m.part].law is Law.DRUCKER_PRAGER]
+    for soil in soils:
+        low, high = span(soil)
+        for member in anatomy.members:
+            foot, top = span(member)
+            wood = member is not soil and not is_leafy(materials[member.part])
+            if wood and member.closed and low < foot < high < top:
+                return Rooted(member.part, soil.part, foot, high, seen=True)
+    for soil in (m for m in soils if not m.closed):
+        level = _level(soil)
+        for member in anatomy.members:
+            low, high = span(member)
+            open_wood = materials[member.part].name in WOODY and not member.closed
+            if open_wood and low < level + FAR * (high - level):
+                foot = 0.5 * (level + float(anatomy.vertices[:, 2].min()))
+                return Rooted(member.part, soil.part, foot, level, seen=False)
     return None
+
+
+def _level(soil: Member) -> float:
+    """Height below and above which half of a surface lies [m]."""
+    mesh = soil.body if len(soil.body.triangles) else soil.sheet
+    middle, areas = mesh.corners.mean(axis=1)[:, 2], mesh.areas
+    order = np.argsort(middle)
+    half = np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())
+    return float(middle[order[half]])
 
 
 def span(member: Member) -> tuple[float, float]:
@@ -194,33 +243,34 @@ def span(member: Member) -> tuple[float, float]:
 
 
 def root_of(
-    anatomy: Anatomy, number: int, materials: tuple[Material, ...], inertia_about: Inertia
-) -> Root | None:
-    """Return the sprung joint of a plant in its soil; None where it stands in none.
+    found: Rooted,
+    at: tuple[Anatomy, int],
+    materials: tuple[Material, ...],
+    inertia_about: Inertia,
+) -> Root:
+    """Return the sprung joint of a plant in its soil.
 
     k_θ = .34 E h³ with the depth h of the foot in the soil; the damper takes the soil's loss
     factor at the swing's own frequency, c = η √(k I).
 
     Args:
-        anatomy: The plant.
-        number: Of the object.
+        found: How it stands there.
+        at: The plant, and the number of the object.
         materials: Of all parts.
         inertia_about: Gives the moment of inertia of all that swings about a point [kg m²].
 
     """
-    found = rooted(anatomy, materials)
-    if found is None:
-        return None
-    wood, soil = found
-    member = next(m for m in anatomy.members if m.part == wood)
-    foot = span(member)[0]
-    depth = span(next(m for m in anatomy.members if m.part == soil))[1] - foot
+    anatomy, number = at
+    member = next(m for m in anatomy.members if m.part == found.wood)
+    depth = found.top - found.foot
     corner = np.concatenate([member.body.corners, member.sheet.corners]).reshape(-1, 3)
-    x, y = corner[corner[:, 2] < foot + depth, :2].mean(axis=0)
-    point = (float(x), float(y), foot + PIVOT * depth)
-    stiffness = ROCKING * materials[soil].young * depth**3
-    damping = materials[soil].loss * float(np.sqrt(stiffness * inertia_about(wood, point)))
-    return Root(number, wood, point, stiffness, damping)
+    low = corner[:, 2] < max(found.top, corner[:, 2].min() + depth)
+    x, y = corner[low, :2].mean(axis=0)
+    point = (float(x), float(y), found.foot + PIVOT * depth)
+    soil = materials[found.soil]
+    stiffness = ROCKING * soil.young * depth**3
+    damping = soil.loss * float(np.sqrt(stiffness * inertia_about(found.wood, point)))
+    return Root(number, found.wood, point, stiffness, damping)
 
 
 def planted(
@@ -234,18 +284,20 @@ def planted(
     leafy = [k for k, t in enumerate(particles.treatments) if t.kind == "foliage"]
     if not leafy:
         return particles
-    rate, roots = np.zeros(particles.count), []
+    rate, roots, said = np.zeros(particles.count), [], []
     for number, anatomy in enumerate(anatomies):
         crowns = [m for m in anatomy.members if m.part in leafy]
         for member in crowns:
             own = particles.part == member.part
             scale = scene.objects[number].scale
             rate[own] = swinging(member, particles.position[own], tissue, scale)
-        if crowns:
+        found = rooted(anatomy, field.materials) if crowns else None
+        if found is not None:
             swing = Swing(particles, [m.part for m in crowns])
-            root = root_of(anatomy, number, field.materials, swing)
-            roots += [] if root is None else [root]
-    return replace(particles, rate=rate, roots=tuple(roots))
+            roots.append(root_of(found, (anatomy, number), field.materials, swing))
+            said += [] if found.seen else [f"{scene.objects[number].name}: {found.doubt}"]
+    warnings = (*particles.warnings, *said)
+    return replace(particles, rate=rate, roots=tuple(roots), warnings=warnings)
 
 
 @dataclass(frozen=True)

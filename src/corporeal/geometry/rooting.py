@@ -8,13 +8,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.geometry.foliage import is_leafy
+from corporeal.geometry.foliage import WOODY, is_leafy
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.shape import Shape
 from corporeal.types import Law, MaterialField, Parts, Scene
 
-WOODY = ("wood", "hardwood", "softwood", "bamboo")
-"""Materials that trunks and stems are made of."""
 BURIED = 0.2
 """Depth of a plant's foot in the ground over its height above it, where nobody sees it: a guess."""
 FOOT = 0.05
