@@ -48,7 +48,7 @@ def bench(monkeypatch):
 
 def row(line):
     cells = [c.strip() for c in line.strip("|").split("|")]
-    assert len(cells) == 10
+    assert len(cells) == 12
     return {
         "closed": cells[3] == "yes",
         "volume": float(cells[4].rstrip("%")) / 100,
