@@ -9,7 +9,6 @@ their surface, as what is pushed back far would fold otherwise.
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
-from itertools import combinations
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -17,6 +16,7 @@ from scipy.sparse import csr_array
 from scipy.spatial import KDTree
 
 from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.placing import overlapping
 from corporeal.geometry.shape import Shape
 from corporeal.splats.fairing import ON, means
 
@@ -116,7 +116,8 @@ class _Seam:
 
 def _seams(meshes: Sequence[Mesh], cells: Sequence[float], floor: float) -> list[_Seam]:
     shapes, found = [Shape(_mirrored(m, m.triangles, floor)) for m in meshes], []
-    for pair in combinations(range(len(meshes)), 2):
+    boxes = np.stack([[m.vertices.min(axis=0), m.vertices.max(axis=0)] for m in meshes])
+    for pair in overlapping(boxes):
         sides = [_held(meshes[k], shapes[j]) for k, j in (pair, pair[::-1])]
         points, depth, area = (np.concatenate(part) for part in zip(*sides, strict=True))
         finer, coarser = sorted(cells[k] for k in pair)
@@ -129,8 +130,8 @@ def _held(mesh: Mesh, other: Shape) -> tuple[np.ndarray, np.ndarray, np.ndarray]
     """Points of a surface inside another (P, 3), how deep they are, and areas of triangles."""
     points = np.concatenate([mesh.vertices, mesh.corners.mean(axis=1)])
     area = np.concatenate([np.zeros(len(mesh.vertices)), mesh.areas])
-    corners = other.mesh.corners.reshape(-1, 3)
-    inside = np.all((points > corners.min(axis=0)) & (points < corners.max(axis=0)), axis=1)
+    low, high = other.mesh.vertices.min(axis=0), other.mesh.vertices.max(axis=0)
+    inside = np.all((points > low) & (points < high), axis=1)
     inside[inside] = other.inside(points[inside])
     return points[inside], other.closest(points[inside])[0], area[inside]
 
