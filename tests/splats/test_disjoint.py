@@ -27,7 +27,8 @@ def box(low, high):
 
 
 def ball(radius, at):
-    return welded(trimesh.creation.icosphere(2, radius).apply_translation(at))
+    made = trimesh.creation.icosphere(3, radius).apply_translation(at)
+    return Mesh(np.array(made.vertices), np.array(made.faces))
 
 
 def parted(*meshes):
