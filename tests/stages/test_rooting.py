@@ -14,7 +14,7 @@ TOP, HEIGHT = 0.15, 0.5
 
 
 def planted(bottom=TOP, wood=WOOD, *more):
-    heap = put(trimesh.creation.cylinder(0.3, TOP, sections=24), 0.0)
+    heap = put(trimesh.creation.cylinder(0.1, TOP, sections=24), 0.0)
     stem = put(trimesh.creation.cylinder(0.012, HEIGHT, sections=12), bottom)
     stem = stem.subdivide().subdivide().subdivide()
     leaves = leaf_blades(40, bottom + 0.15)
