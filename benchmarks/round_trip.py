@@ -4,14 +4,14 @@
     python benchmarks/round_trip.py scenes/desk/scene.toml --out runs/round-trip
 
 Each scene is one of the showcase's by name, or a file. It is run; it is photographed from 48 sides
-with masks; of these photographs a second run is made, which is told what the things are called,
-what they are made of, how they start to move and where the floor is, but nothing of their shapes.
-It forgets which of them each pixel shows, which captured views say (--apart look). Of each thing,
-pieces of one material that are built alike are told as one, with the colour that they have in the
-photographs; what takes less than a hundredth of its pixels is not told. Masses, the number of
-objects and where they end are compared. How much ends depend on chance says the own spread: the
-model's own run again, twice, with each thing put aside by 1 % of its size to a random side. Aims:
-the whole mass within 10 %, as many objects, ends within 5 % of the scene's size.
+with masks at 512 × 512 pixels; of these photographs a second run is made, which is told what the
+things are called, what they are made of, how they start to move and where the floor is, but nothing
+of their shapes. It forgets which of them each pixel shows, which captured views say (--apart look).
+Of each thing, pieces of one material that are built alike are told as one, with the colour that
+they have in the photographs; what takes less than a hundredth of its pixels is not told. Masses,
+the number of objects and where they end are compared. How much ends depend on chance says the own
+spread: the model's own run again, twice, with each thing put aside by 1 % of its size to a random
+side. Aims: the whole mass within 10 %, as many objects, ends within 5 % of the scene's size.
 """
 
 import argparse
@@ -51,6 +51,8 @@ from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.terminal import show_table, told
 from corporeal.types import MaterialField, Reconstruction, Scene, Views
 
+SIZE = (512, 512)
+"""Of the photographs [px]."""
 WALLED = 1 / 3
 """Share of its surface that is the inner face of a wall, from which on a person calls it walled."""
 NOTICED = 0.01
@@ -262,7 +264,7 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
             spread.append(apart(ends(mesh), ends(of[0]), scene))
     views = folder / "views"
     if not (views / "transforms.json").exists():
-        write_views(views, capture(scene, CaptureConfig(views=48)))
+        write_views(views, capture(scene, CaptureConfig(views=48, size=SIZE)))
     said, start = as_told(mesh, read_views(views), folder / "told.yaml"), as_begun(scene, folder)
     size = [float(np.prod(np.ptp(box, axis=0))) for box in boxes_of(scene)]
     kept = folder / "order.json"
