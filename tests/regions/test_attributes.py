@@ -69,6 +69,11 @@ def test_heights_are_shares_of_the_object():
     assert likely(high, *names).argmax() == 1 and likely(low, *names).argmax() == 0
 
 
+def test_a_part_of_two_names_is_where_either_is():
+    told = described(PartWords("grey seat and back", None))
+    assert told.heights == (0.25, 0.95)
+
+
 def test_what_is_long_and_thin_is_a_pole_and_not_a_lid():
     assert likely(seen((0.5,) * 3, 0.7, 0.95), "pole", "shade").argmax() == 0
     assert likely(seen((0.5,) * 3, 0.7, 0.05), "pole", "shade").argmax() == 1

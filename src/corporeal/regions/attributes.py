@@ -232,8 +232,9 @@ def _colours(name: list[str], material: list[str]) -> np.ndarray:
 
 
 def _heights(name: list[str]) -> tuple[float, float] | None:
+    """Return where parts of all these names are together, from and to."""
     rows = [row for w in name for row in _table()["place"] if w in row["words"]]
-    return (rows[0]["low"], rows[0]["high"]) if rows else None
+    return (min(r["low"] for r in rows), max(r["high"] for r in rows)) if rows else None
 
 
 def _thin(name: list[str]) -> float | None:
