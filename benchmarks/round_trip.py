@@ -7,11 +7,12 @@ Each scene is one of the showcase's by name, or a file. It is run; it is photogr
 with masks at 512 × 512 pixels; of these photographs a second run is made, which is told what the
 things are called, what they are made of, how they start to move and where the floor is, but nothing
 of their shapes. It forgets which of them each pixel shows, which captured views say (--apart look).
-Of each thing, pieces of one material that are built alike are told as one, with the colour that
-they have in the photographs; what takes less than a hundredth of its pixels is not told. Masses,
-the number of objects and where they end are compared. How much ends depend on chance says the own
-spread: the model's own run again, twice, with each thing put aside by 1 % of its size to a random
-side. Aims: the whole mass within 10 %, as many objects, ends within 5 % of the scene's size.
+Of each thing, pieces of one material that are built alike are told as one, by the names of those
+that show most and the colour that they have in the photographs; what takes less than a hundredth of
+its pixels is not told. Masses, the number of objects and where they end are compared. How much ends
+depend on chance says the own spread: the model's own run again, twice, with each thing put aside by
+1 % of its size to a random side. Aims: the whole mass within 10 %, as many objects, ends within 5 %
+of the scene's size.
 """
 
 import argparse
@@ -57,6 +58,8 @@ WALLED = 1 / 3
 """Share of its surface that is the inner face of a wall, from which on a person calls it walled."""
 NOTICED = 0.01
 """Share of a thing's pixels below which nobody speaks of a piece."""
+LARGE = 1 / 3
+"""Pixels of a piece over those of the largest, from which on its name is said, too."""
 BASIC = "black white grey red orange yellow green blue purple pink brown".split()
 ASIDE = 0.01
 """How far things are put aside to see what that changes, over their sizes."""
@@ -202,7 +205,9 @@ def _merged(pieces: list[Piece]) -> dict[str, dict]:
             thick = [p.said["thickness_mm"] for p in group]
             mean = float(np.average(thick, weights=[p.area for p in group]))
             row["thickness_mm"] = round(mean, 2)
-        rows[f"{first.colour} {first.name}"] = row
+        seen = sorted(group, key=lambda p: -p.pixels)
+        names = [p.name for p in seen if p.pixels > LARGE * first.pixels]
+        rows[f"{first.colour} {' and '.join(names)}"] = row
     return rows
 
 

@@ -30,6 +30,15 @@ def test_pieces_built_alike_are_told_as_one_and_what_nobody_notices_is_not_told(
     assert told["white shade"] == {"material": "steel", **shell, "thickness_mm": 1.75}
 
 
+def test_large_pieces_that_are_told_as_one_are_all_named():
+    foam = [
+        piece("cushion", 400, "grey", "foam", 0.1),
+        piece("body", 900, "grey", "foam", 0.1),
+        piece("button", 200, "grey", "foam", 0.1),
+    ]
+    assert list(_merged(foam)) == ["grey body and cushion"]
+
+
 @pytest.mark.parametrize(
     ("rgb", "term"), [((200, 30, 30), "red"), ((10, 10, 10), "black"), ((200, 200, 195), "white")]
 )
