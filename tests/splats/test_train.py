@@ -11,9 +11,7 @@ from corporeal.splats import start, sweep
 from corporeal.splats import train as module
 from corporeal.splats.start import Points
 from corporeal.splats.train import TrainConfig, shrunk, train
-from corporeal.stages.capture import CaptureConfig, capture
-from corporeal.types import Finish, Scene, SceneObject, Surface, Views
-from glb_maker import CUBE, CUBE_TRIANGLES
+from corporeal.types import Views
 
 SMALL = TrainConfig(preset="draft", gaussians=400, steps=160, threads=1)
 
@@ -40,35 +38,6 @@ def test_things_are_learned_from_pictures_and_masks(scene):
     assert len(told) == 160 and fractions == sorted(fractions) and fractions[-1] == 1
     assert "dB" in told[80][1] and "s left" in told[80][1]
     assert np.linalg.norm(out.gaussians.mean, axis=1).max() < 3
-
-
-def bench():
-    """A plain bench, seat, back and arms, from all sides."""
-    boxes = (
-        ((-0.6, -0.4, 0.0), (1.2, 0.8, 0.2)),
-        ((-0.8, 0.4, 0.0), (1.6, 0.15, 0.7)),
-        ((-0.8, -0.4, 0.0), (0.2, 0.8, 0.6)),
-        ((0.6, -0.4, 0.0), (0.2, 0.8, 0.6)),
-    )
-    faces = CUBE_TRIANGLES.astype(np.int64)
-    surfaces = tuple(Surface("wood", 0, 0, np.add(a, CUBE * e), faces) for a, e in boxes)
-    thing, beige = SceneObject("bench", "bench", 1.6), Finish("beige", (0.4, 0.38, 0.33, 1.0))
-    scene = Scene("bench", "by hand", (thing,), surfaces, (beige,))
-    views = capture(scene, CaptureConfig(20, (64, 64), threads=1))
-    assert views.object_of_pixel is not None
-    return views, views.object_of_pixel >= 0
-
-
-@pytest.mark.slow
-def test_the_plain_seat_of_a_bench_is_found_below_the_hull(monkeypatch):
-    """Gaussians that all begin on the hull, above the seat, do not get there."""
-    views, masks = bench()
-    monkeypatch.setattr(start, "CELLS", 300_000)
-    config = TrainConfig(gaussians=2000, steps=400, threads=1)
-    made = train(views, masks, config=config).quality.psnr_things
-    monkeypatch.setattr(start, "WITHIN", 0.0)
-    control = train(views, masks, config=config).quality.psnr_things
-    assert made > control + 2 and made > 25
 
 
 def test_a_scene_without_masks_starts_from_a_sweep(scene):

@@ -19,12 +19,7 @@ CELLS = 2_000_000
 """Of the grid that the visual hull is carved from."""
 ASTRAY = 0.05
 """Share of the views that may see a point of the hull beside things: masks err at edges."""
-OPAQUE = 0.5
-"""Opacity of most Gaussians, where they begin."""
-WITHIN, FAINT = 0.2, 0.3
-"""Share of the points that begin inside the hull, and their opacity. A seat between its arms lies
-below the hull: what begins only on that would have to sink there, and what shines through instead
-looks right as long as the seat is plain."""
+
 
 FLAT = 0.1
 """Scale along known normals over that across, at first."""
@@ -40,7 +35,7 @@ class Points:
     """[m]"""
     colour: Float[np.ndarray, "N 3"]
     """sRGB in [0, 1]."""
-    opacity: float | Float[np.ndarray, " N"] = OPAQUE
+    opacity: float | Float[np.ndarray, " N"] = 0.5
     """Of the Gaussians that begin there."""
     normal: Float[np.ndarray, "N 3"] | None = None
     """Unit, of surfaces, along which Gaussians begin flat; 0: nobody knows."""
@@ -87,7 +82,7 @@ def clearance(cameras: tuple[Camera, ...]) -> Float[np.ndarray, " V"]:
 def hull(
     views: Views, masks: Bool[np.ndarray, "V H W"], count: int, rng: np.random.Generator, crew: Crew
 ) -> Points:
-    """Return points on the visual hull, the surface of what all masks allow, and some inside.
+    """Return points on the visual hull: the surface of what all masks allow.
 
     Raises:
         UserError: Nothing is inside all masks.
@@ -95,17 +90,10 @@ def hull(
     """
     fine = tight(views, masks, crew)
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
-    within = round(WITHIN * count)
-    some = _drawn(fine.cells[fine.inside], within, rng), _drawn(shell, count - within, rng)
-    position = np.concatenate(some)
-    position += fine.side * rng.uniform(-0.5, 0.5, position.shape)
+    chosen = shell[rng.choice(len(shell), count, replace=len(shell) < count)]
+    position = chosen + fine.side * rng.uniform(-0.5, 0.5, chosen.shape)
     seen = _witnessed(position, views, masks, crew)
-    opacity = np.repeat([FAINT, OPAQUE], [within, count - within])
-    return Points(position, seen[:, 2:5] / np.maximum(seen[:, :1], 1), opacity)
-
-
-def _drawn(cells: np.ndarray, count: int, rng: np.random.Generator) -> np.ndarray:
-    return cells[rng.choice(len(cells), count, replace=len(cells) < count)]
+    return Points(position, seen[:, 2:5] / np.maximum(seen[:, :1], 1))
 
 
 def tight(views: Views, masks: Bool[np.ndarray, "V H W"], crew: Crew) -> "Carved":
