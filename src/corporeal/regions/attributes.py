@@ -21,6 +21,7 @@ from skimage.color import rgb2lab
 from corporeal.types import Cloud, PartWords
 
 UP = np.array([0.0, 0.0, 1.0])
+"""Where the top is of what stands."""
 COLOUR = 15.0
 """Standard deviation of what is seen of a named colour in full light [CIELAB]."""
 BLACK = np.array([16.0, 0.0, 0.0])
@@ -122,6 +123,10 @@ def top_of(
     Of something that has fallen over along its longest axis they say most when heights are measured
     along it. They have to be likelier by ``LAID`` in the mean over points.
     """
+    local = cloud.position - cloud.position.mean(axis=0)
+    axis = np.linalg.eigh(local.T @ local)[1][:, 2]
+    if np.hypot(*axis[:2]) < LYING:
+        return UP
     seen = observed(cloud, cluster_of_point, count)
     share = np.bincount(cluster_of_point, minlength=count) / cloud.count
 
@@ -129,10 +134,6 @@ def top_of(
         along = _means(heights(cloud.position, up), cluster_of_point, count)
         return float(share @ log_likelihood(replace(seen, height=along), told).max(axis=1))
 
-    local = cloud.position - cloud.position.mean(axis=0)
-    axis = np.linalg.eigh(local.T @ local)[1][:, 2]
-    if np.hypot(*axis[:2]) < LYING:
-        return UP
     best = max((axis, -axis), key=fit)
     return best if fit(best) > fit(UP) + LAID else UP
 
