@@ -7,11 +7,16 @@ import pytest
 from splat_scenes import around, blobs, pictured
 
 from corporeal.errors import UserError
-from corporeal.splats import start, sweep
+from corporeal.splats import limits, start, sweep
 from corporeal.splats import train as module
-from corporeal.splats.start import Points
+from corporeal.splats.crew import Crew
+from corporeal.splats.limits import even
+from corporeal.splats.sight import looked
+from corporeal.splats.start import Points, hull
 from corporeal.splats.train import TrainConfig, shrunk, train
-from corporeal.types import Views
+from corporeal.stages.capture import CaptureConfig, capture
+from corporeal.types import Finish, Scene, SceneObject, Surface, Views
+from glb_maker import CUBE, CUBE_TRIANGLES
 
 SMALL = TrainConfig(preset="draft", gaussians=400, steps=160, threads=1)
 
@@ -38,6 +43,56 @@ def test_things_are_learned_from_pictures_and_masks(scene):
     assert len(told) == 160 and fractions == sorted(fractions) and fractions[-1] == 1
     assert "dB" in told[80][1] and "s left" in told[80][1]
     assert np.linalg.norm(out.gaussians.mean, axis=1).max() < 3
+
+
+def bench():
+    """A plain bench, seat, back and arms, from all sides."""
+    boxes = (
+        ((-0.6, -0.4, 0.0), (1.2, 0.8, 0.2)),
+        ((-0.8, 0.4, 0.0), (1.6, 0.15, 0.7)),
+        ((-0.8, -0.4, 0.0), (0.2, 0.8, 0.6)),
+        ((0.6, -0.4, 0.0), (0.2, 0.8, 0.6)),
+    )
+    faces = CUBE_TRIANGLES.astype(np.int64)
+    surfaces = tuple(Surface("wood", 0, 0, np.add(a, CUBE * e), faces) for a, e in boxes)
+    thing, beige = SceneObject("bench", "bench", 1.6), Finish("beige", (0.4, 0.38, 0.33, 1.0))
+    scene = Scene("bench", "by hand", (thing,), surfaces, (beige,))
+    views = capture(scene, CaptureConfig(20, (64, 64), threads=1))
+    assert views.object_of_pixel is not None
+    return views, views.object_of_pixel >= 0
+
+
+LEARNING = TrainConfig(gaussians=2000, steps=400, threads=1)
+
+
+@pytest.mark.slow
+def test_the_plain_seat_of_a_bench_is_found_below_the_hull(monkeypatch):
+    """Gaussians that all begin on the hull, above the seat, do not get there."""
+    views, masks = bench()
+    monkeypatch.setattr(start, "CELLS", 300_000)
+    made = train(views, masks, config=LEARNING).quality.psnr_things
+    monkeypatch.setattr(start, "WITHIN", 0.0)
+    control = train(views, masks, config=LEARNING).quality.psnr_things
+    assert made > control + 2 and made > 25
+
+
+@pytest.mark.slow
+def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_through(monkeypatch):
+    views, masks = bench()
+    monkeypatch.setattr(start, "CELLS", 300_000)
+
+    def deep() -> float:
+        """Return how far below the faces what is seen lies, in the mean [m]."""
+        made = train(views, masks, config=LEARNING).gaussians
+        with Crew(1) as crew:
+            seen = looked(made, views.cameras, crew).depth
+        shown = masks & np.isfinite(seen)
+        return float((seen[shown] - views.depth[shown]).clip(0).mean())
+
+    small = deep()
+    monkeypatch.setattr(limits, "even", lambda theta, widest: even(theta, 10.0))
+    monkeypatch.setattr(module, "hull", lambda *what: replace(hull(*what), width=None))
+    assert small < deep() / 1.2
 
 
 def test_a_scene_without_masks_starts_from_a_sweep(scene):

@@ -126,7 +126,7 @@ def test_what_is_wide_is_flat_and_what_few_see_has_one_colour(wall):
 def test_what_is_out_of_the_picture_stays_or_fades():
     theta = parameters(blobs(2))
     zeros, rates = np.zeros_like(theta), np.full(theta.shape[1], 0.1, np.float32)
-    bounds = limits.free(theta, 1.0)
+    bounds = limits.even(theta, 10.0)
     bounds[0, 3] = 1
     before, spans = theta[:, 10].copy(), np.zeros((2, 2), int)
     pull = np.float32(0.1), np.float32(0)

@@ -1,6 +1,7 @@
-"""How large Gaussians may grow, and which of their numbers move, where no masks forbid haze.
+"""How large Gaussians may grow, and which of their numbers move.
 
-What is wide is flat, and small in every picture; what few views see has one colour for all sides.
+Where masks forbid haze, none grows wider than enough of them are apart. Where there are none, what
+is wide is flat, and small in every picture; what few views see has one colour for all sides.
 """
 
 import numpy as np
@@ -23,9 +24,9 @@ have; how many of its numbers move; whether it stays as it is, moments too, whil
 (1), or fades (0)."""
 
 
-def free(theta: Parameters, radius: float) -> Limits:
-    """Return limits that hardly bind."""
-    limits = np.full((len(theta), 4), np.log(REACH * radius), np.float32)
+def even(theta: Parameters, widest: float) -> Limits:
+    """Return limits that are the same for all: no scale is more than this [m]."""
+    limits = np.full((len(theta), 4), np.log(widest), np.float32)
     limits[:, 2], limits[:, 3] = theta.shape[1], 0
     return limits
 
@@ -36,7 +37,7 @@ def strict(
     """Return the limits of Gaussians that views judge, and which of them are haze."""
     widths = np.exp(theta[:, SCALE:OPACITY]).max(axis=1)
     said = surfaces.judge(theta[:, MEAN:ROTATION], widths, crew)
-    limits = free(theta, radius)
+    limits = even(theta, REACH * radius)
     near = np.minimum(said.nearest, REACH * radius / WIDEST)
     limits[:, 0] = np.log(WIDEST * near)
     limits[:, 1] = np.log(THICKEST * near)

@@ -19,7 +19,12 @@ CELLS = 2_000_000
 """Of the grid that the visual hull is carved from."""
 ASTRAY = 0.05
 """Share of the views that may see a point of the hull beside things: masks err at edges."""
-
+OPAQUE = 0.5
+"""Opacity of most Gaussians, where they begin."""
+WITHIN, FAINT = 0.2, 0.3
+"""Share of the points that begin inside the hull, and their opacity. A seat between its arms lies
+below the hull: what begins only on that would have to sink there, and what shines through instead
+looks right as long as the seat is plain."""
 
 FLAT = 0.1
 """Scale along known normals over that across, at first."""
@@ -35,7 +40,7 @@ class Points:
     """[m]"""
     colour: Float[np.ndarray, "N 3"]
     """sRGB in [0, 1]."""
-    opacity: float | Float[np.ndarray, " N"] = 0.5
+    opacity: float | Float[np.ndarray, " N"] = OPAQUE
     """Of the Gaussians that begin there."""
     normal: Float[np.ndarray, "N 3"] | None = None
     """Unit, of surfaces, along which Gaussians begin flat; 0: nobody knows."""
@@ -82,7 +87,9 @@ def clearance(cameras: tuple[Camera, ...]) -> Float[np.ndarray, " V"]:
 def hull(
     views: Views, masks: Bool[np.ndarray, "V H W"], count: int, rng: np.random.Generator, crew: Crew
 ) -> Points:
-    """Return points on the visual hull: the surface of what all masks allow.
+    """Return points on the visual hull, the surface of what all masks allow, and some inside.
+
+    Those inside are as small as those on the hull: wide ones would show through plain faces.
 
     Raises:
         UserError: Nothing is inside all masks.
@@ -90,10 +97,22 @@ def hull(
     """
     fine = tight(views, masks, crew)
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
-    chosen = shell[rng.choice(len(shell), count, replace=len(shell) < count)]
-    position = chosen + fine.side * rng.uniform(-0.5, 0.5, chosen.shape)
+    within = round(WITHIN * count)
+    on = count - within
+    position = np.concatenate([_some(fine.cells[fine.inside], within, rng), _some(shell, on, rng)])
+    position += fine.side * rng.uniform(-0.5, 0.5, position.shape)
     seen = _witnessed(position, views, masks, crew)
-    return Points(position, seen[:, 2:5] / np.maximum(seen[:, :1], 1))
+    apart = fine.side * np.sqrt(len(shell) / on)
+    return Points(
+        position,
+        seen[:, 2:5] / np.maximum(seen[:, :1], 1),
+        np.repeat([FAINT, OPAQUE], [within, on]),
+        width=np.repeat([apart, np.nan], [within, on]),
+    )
+
+
+def _some(cells: Float[np.ndarray, "N 3"], count: int, rng: np.random.Generator) -> np.ndarray:
+    return cells[rng.choice(len(cells), count, replace=len(cells) < count)]
 
 
 def tight(views: Views, masks: Bool[np.ndarray, "V H W"], crew: Crew) -> "Carved":

@@ -195,6 +195,9 @@ class Lesson:
         self.held_out = tuple(range(every // 2, count, every)) if every and count > every else ()
         self.learned = [k for k in range(count) if k not in self.held_out]
         self.radius = region(views.cameras).radius
+        # As far as so many are apart on a sphere. One that is wider shows all of a plain face from
+        # below it, and costs less of PULL than those that lie on it.
+        self.widest = float(self.radius * np.sqrt(4 * np.pi / self.preset.gaussians))
         self.clear = clearance(views.cameras)
         factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
         halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
@@ -346,7 +349,7 @@ def _stir(pupil: Pupil, lesson: Lesson, rate: float, rng: np.random.Generator, c
 def _bounds(theta: Parameters, lesson: Lesson, crew: Crew) -> tuple[Limits, Bool[np.ndarray, " N"]]:
     """Return what Gaussians may do, and which of them are haze; masks leave no room for any."""
     if lesson.surfaces is None:
-        return limits.free(theta, lesson.radius), np.zeros(len(theta), np.bool_)
+        return limits.even(theta, lesson.widest), np.zeros(len(theta), np.bool_)
     return limits.strict(theta, lesson.radius, lesson.surfaces, crew)
 
 
