@@ -22,7 +22,7 @@ from corporeal.formats.splat_ply import write_splat
 from corporeal.formats.splats import read_splat
 from corporeal.formats.transforms import read_views
 from corporeal.geometry.filling import sample_surface
-from corporeal.geometry.mesh import Mesh, weld
+from corporeal.geometry.mesh import Mesh, joined, weld
 from corporeal.geometry.shape import Shape
 from corporeal.splats.solid import Solid, solids
 from corporeal.splats.train import TrainConfig, train
@@ -70,19 +70,12 @@ def clad(models: list[Shape]) -> Gaussians:
     )
 
 
-def joined(meshes: list[Mesh]) -> Mesh:
-    """Return all meshes as one."""
-    first = np.cumsum([0, *(len(m.vertices) for m in meshes)])
-    triangles = [m.triangles + n for m, n in zip(meshes, first, strict=False)]
-    return Mesh(np.concatenate([m.vertices for m in meshes]), np.concatenate(triangles))
-
-
 def truth(scene: Scene) -> list[Shape]:
     """Return every object's model."""
     shapes = []
     for k in range(len(scene.objects)):
         mine = [s for s in scene.surfaces if s.object == k]
-        whole = joined([Mesh(s.vertices, s.triangles) for s in mine])
+        whole = joined(mine)
         shapes.append(Shape(weld(whole.vertices, whole.triangles)[0]))
     return shapes
 

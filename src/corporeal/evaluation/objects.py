@@ -27,7 +27,7 @@ from corporeal.formats.splats import read_splat
 from corporeal.geometry.arrangement import moved
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
-from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.mesh import joined
 from corporeal.geometry.spread import sample_surface
 from corporeal.regions.masks import lifted
 from corporeal.regions.objects import Split, components, objects
@@ -210,20 +210,13 @@ def closed_up(scene: Scene) -> Scene:
 
 
 def _on(scene: Scene, thing: int) -> np.ndarray:
-    mesh, owner = _mesh(scene)
+    mesh, owner = joined(scene.surfaces), scene.object_of_triangle
     return sample_surface(mesh.only(owner == thing), DENSE, np.random.default_rng(thing))[0]
-
-
-def _mesh(scene: Scene) -> tuple[Mesh, np.ndarray]:
-    starts = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
-    triangles = [s.triangles + k for s, k in zip(scene.surfaces, starts, strict=False)]
-    vertices = np.concatenate([s.vertices for s in scene.surfaces]).astype(np.float64)
-    return Mesh(vertices, np.concatenate(triangles)), scene.object_of_triangle
 
 
 def _of_surface(scene: Scene, views: Views, config: ObjectsEvaluationConfig) -> Touching:
     assert views.depth is not None
-    mesh, owner = _mesh(scene)
+    mesh, owner = joined(scene.surfaces), scene.object_of_triangle
     rng = np.random.default_rng(0)
     position, triangle = sample_surface(mesh, 3 * config.surface_points, rng)
     pairs = list(zip(views.cameras, views.depth, strict=True))

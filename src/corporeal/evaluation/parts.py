@@ -22,7 +22,7 @@ from corporeal.features.descriptor import descriptor, seen_from
 from corporeal.features.lifting import back_projection, visible
 from corporeal.formats.sources import models_in
 from corporeal.geometry.arrangement import box_of, moved
-from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.mesh import joined
 from corporeal.geometry.spread import sample_surface
 from corporeal.regions.naming import named, phrases
 from corporeal.regions.parts import PartsConfig, parts
@@ -210,7 +210,7 @@ def photographed(
     size = (how.photograph_size, how.photograph_size)
     views = capture(scene, CaptureConfig(how.photographs, size))
     rng = np.random.default_rng(how.point_seed)
-    position, triangle = sample_surface(_mesh(scene), how.points, rng)
+    position, triangle = sample_surface(joined(scene.surfaces), how.points, rng)
     assert views.depth is not None
     colour = back_projection(position, views.cameras, views.depth, list(views.rgb / 255))
     shown = colour.seen > 0
@@ -222,12 +222,6 @@ def _laid(scene: Scene) -> Scene:
     """Turn a scene about y by a quarter, and put it on the floor."""
     turned = tuple(replace(s, vertices=s.vertices[:, ::-1] * [1, 1, -1]) for s in scene.surfaces)
     return moved(replace(scene, surfaces=turned), (0.0, 0.0, -float(box_of(turned)[0, 2])))
-
-
-def _mesh(scene: Scene) -> Mesh:
-    starts = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
-    triangles = [s.triangles + k for s, k in zip(scene.surfaces, starts, strict=False)]
-    return Mesh(np.concatenate([s.vertices for s in scene.surfaces]), np.concatenate(triangles))
 
 
 def _cloud(

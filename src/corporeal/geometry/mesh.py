@@ -1,6 +1,8 @@
 """A welded triangle mesh and its measures: areas, volumes, consistent winding."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
 import igl
 import numpy as np
@@ -56,6 +58,31 @@ class Mesh:
     def only(self, chosen: np.ndarray) -> "Mesh":
         """Return the chosen triangles, on the same vertices."""
         return Mesh(self.vertices, np.ascontiguousarray(self.triangles[chosen]))
+
+
+class Triangles(Protocol):
+    """A surface, a mesh, or a piece of one."""
+
+    @property
+    def vertices(self) -> Float[np.ndarray, "V 3"]:
+        """In metres."""
+        ...
+
+    @property
+    def triangles(self) -> Int[np.ndarray, "T 3"]:
+        """Vertex numbers."""
+        ...
+
+
+def joined(pieces: Sequence[Triangles]) -> Mesh:
+    """Return all triangles as one mesh, in their order; nothing is welded."""
+    starts = np.cumsum([0, *(len(p.vertices) for p in pieces)])
+    triangles = [p.triangles + k for p, k in zip(pieces, starts, strict=False)]
+    none = np.zeros((0, 3))
+    return Mesh(
+        np.concatenate([none, *(p.vertices for p in pieces)]),
+        np.concatenate([none.astype(np.int64), *triangles]),
+    )
 
 
 def weld(

@@ -6,10 +6,10 @@ Photographs end where the ground begins. A sapling that ended there, too, would 
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 
 from corporeal.geometry.foliage import WOODY, is_leafy
-from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.mesh import Mesh, joined
 from corporeal.geometry.shape import Shape
 from corporeal.types import Law, MaterialField, Parts, Scene
 
@@ -88,19 +88,11 @@ def _depth(scene: Scene, parts: Parts, field: MaterialField, plant: _Plant) -> f
     for k, part in enumerate(parts.catalogue):
         if part.object == plant.number or field.materials[k].law is not Law.DRUCKER_PRAGER:
             continue
-        ground = _mesh_of(scene, parts, k)
+        ground = joined(scene.surfaces).only(parts.part_of_point == k)
         if len(foot) and abs(_height(ground, foot) - low) < FOOT * (high - low):
             bottom = float(ground.corners[..., 2].min())
             return max(min(BURIED * (high - low), BOTTOM * (low - bottom)), 0.0)
     return 0.0
-
-
-def _mesh_of(scene: Scene, parts: Parts, k: int) -> Mesh:
-    count = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
-    every = [s.triangles + c for s, c in zip(scene.surfaces, count, strict=False)]
-    vertices = np.concatenate([s.vertices for s in scene.surfaces])
-    chosen: Int[np.ndarray, "T 3"] = np.concatenate(every)[parts.part_of_point == k]
-    return Mesh(vertices, np.ascontiguousarray(chosen))
 
 
 def _height(ground: Mesh, foot: Float[np.ndarray, "N 3"]) -> float:

@@ -5,12 +5,12 @@ from collections.abc import Iterator
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float
 from scipy.ndimage import label
 from scipy.sparse import coo_matrix
 from scipy.sparse.csgraph import connected_components
 
-from corporeal.geometry.mesh import Mesh, weld
+from corporeal.geometry.mesh import Mesh, joined, weld
 from corporeal.geometry.spread import sample_surface
 from corporeal.pool.decimate import decimated
 from corporeal.types import Scene, Surface
@@ -266,11 +266,8 @@ def _is_palette(picture: np.ndarray) -> bool:
 
 
 def _welded(scene: Scene) -> Mesh:
-    starts = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
-    triangles: Int[np.ndarray, "T 3"] = np.concatenate(
-        [s.triangles + n for s, n in zip(scene.surfaces, starts, strict=False)]
-    )
-    return weld(np.concatenate([s.vertices for s in scene.surfaces]), triangles)[0]
+    whole = joined(scene.surfaces)
+    return weld(whole.vertices, whole.triangles)[0]
 
 
 def _check_components(mesh: Mesh) -> None:

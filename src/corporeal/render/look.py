@@ -5,6 +5,7 @@ from typing import NamedTuple
 import numpy as np
 from PIL import Image
 
+from corporeal.geometry.mesh import joined
 from corporeal.types import Finish, Scene, Surface
 
 TEXTURE_LIMIT = 2048
@@ -40,14 +41,12 @@ class Look(NamedTuple):
 def pack(scene: Scene) -> Look:
     """Gather what does not move."""
     surfaces = scene.surfaces
-    start = np.cumsum([0, *(len(s.vertices) for s in surfaces)])
-    triangles = [s.triangles + k for s, k in zip(surfaces, start, strict=False)]
     finish = np.array([_row(f) for f in scene.finishes], dtype=np.float32).reshape(-1, 12)
     texels, levels = _pyramids(scene.finishes, finish)
     counts = [len(s.triangles) for s in surfaces]
     own = [np.full(n, s.normals is not None) for s, n in zip(surfaces, counts, strict=True)]
     return Look(
-        triangles=_join(triangles, (0, 3), np.int32),
+        triangles=joined(surfaces).triangles.astype(np.int32),
         uv=_join([_uv(s) for s in surfaces], (0, 2), np.float32),
         colours=_join([_colours(s) for s in surfaces], (0, 4), np.float32),
         finish_of_triangle=np.repeat([s.finish for s in surfaces], counts).astype(np.int32),

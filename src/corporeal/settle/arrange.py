@@ -14,6 +14,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from corporeal.errors import UnknownChoiceError
+from corporeal.geometry.mesh import joined
 from corporeal.geometry.shape import random_rotation
 from corporeal.settle.body import Body, Pose, unit_of
 from corporeal.settle.hull import Piece, Stance
@@ -185,9 +186,8 @@ def quaternion_of(rotation: np.ndarray) -> tuple[float, float, float, float]:
 
 def _whole(body: Body) -> Piece:
     """All pieces as one surface."""
-    first = np.cumsum([0, *(len(p.vertices) for p in body.pieces[:-1])])
-    triangles = [p.triangles + k for p, k in zip(body.pieces, first, strict=True)]
-    return Piece(np.concatenate([p.vertices for p in body.pieces]), np.concatenate(triangles))
+    whole = joined(body.pieces)
+    return Piece(whole.vertices, whole.triangles)
 
 
 class _Room:

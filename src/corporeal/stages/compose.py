@@ -18,6 +18,7 @@ from corporeal.formats.glb import read_model
 from corporeal.formats.glb_merge import Member, merge
 from corporeal.formats.scene_file import SceneFile, write_scene_file
 from corporeal.formats.words import numbered
+from corporeal.geometry.mesh import joined
 from corporeal.geometry.sizes import Sizing, scene_extents
 from corporeal.pool.asset import UNKNOWN, Asset, Pool
 from corporeal.pool.draw import counts, draw
@@ -257,12 +258,9 @@ def _weighed(things: list[_Thing], weigh: Weigh | None) -> list[_Thing]:
 
 def _shape(asset: Asset, extent: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Return vertices about the middle of the box [m], triangles, and that middle in the file."""
-    scene = read_model(asset.file, "one").scene
-    start = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
-    vertices = np.concatenate([s.vertices for s in scene.surfaces]).astype(np.float64)
-    triangles = [s.triangles + k for s, k in zip(scene.surfaces, start, strict=False)]
-    centre = (vertices.min(axis=0) + vertices.max(axis=0)) / 2
-    return (vertices - centre) * (extent / asset.extent), np.concatenate(triangles), centre
+    mesh = joined(read_model(asset.file, "one").scene.surfaces)
+    centre = (mesh.vertices.min(axis=0) + mesh.vertices.max(axis=0)) / 2
+    return (mesh.vertices - centre) * (extent / asset.extent), mesh.triangles, centre
 
 
 # ---------------------------------------------------------------- written down

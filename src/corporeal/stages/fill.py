@@ -11,6 +11,7 @@ from corporeal.geometry.exposure import cross_section, faces
 from corporeal.geometry.falls import drop_heights
 from corporeal.geometry.foliage import in_leaves, is_leafy, leaves_of, planted
 from corporeal.geometry.make import Make, compose, how_filled, recipe
+from corporeal.geometry.mesh import joined
 from corporeal.geometry.packing import Packing, Recipe, pack
 from corporeal.geometry.rods import Rod, rod_of
 from corporeal.geometry.rooting import drawn_into_ground
@@ -105,18 +106,14 @@ def examine(scene: Scene, parts: Parts, seed: int) -> list[Anatomy]:
         UserError: A part has no surface.
 
     """
-    count = np.cumsum([0, *(len(s.vertices) for s in scene.surfaces)])
-    corners = np.concatenate([s.vertices for s in scene.surfaces])
-    triangles = np.concatenate(
-        [s.triangles + c for s, c in zip(scene.surfaces, count, strict=False)]
-    )
+    whole = joined(scene.surfaces)
     anatomies = []
     for number in range(len(scene.objects)):
         own = np.flatnonzero(parts.object_of_point == number)
         label = _whole(parts.part_of_point[own])
         rng = np.random.default_rng([seed, number, 0])
-        used, joined = np.unique(triangles[own], return_inverse=True)
-        anatomies.append(survey(corners[used], joined.reshape(-1, 3), label, rng))
+        used, triangles = np.unique(whole.triangles[own], return_inverse=True)
+        anatomies.append(survey(whole.vertices[used], triangles.reshape(-1, 3), label, rng))
     found = {m.part for a in anatomies for m in a.members}
     for k, part in enumerate(parts.catalogue):
         if k not in found:
