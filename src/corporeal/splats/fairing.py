@@ -1,8 +1,9 @@
 """Closed surfaces made fair: noise taken off, and what nobody saw put where it is likely."""
 
+import igl
 import numpy as np
-from jaxtyping import Bool
-from scipy.sparse import csr_array, eye_array
+from jaxtyping import Bool, Float, Int
+from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.csgraph import connected_components
 from scipy.sparse.linalg import splu
 
@@ -12,6 +13,10 @@ PULLS = (0.5, -0.53)
 """How far vertices go to their neighbours' mean, and back."""
 ONWARD = 0.7
 """Cosine between a patch and the surface about it from which on it goes on as that does: 45°."""
+FINE = 0.1
+"""What is finer than this share of a patch's radius is noise beside it."""
+AGAIN = 2
+"""How often a patch is bent, each time on the shape that it got before."""
 ON = 1e-9
 """What is no higher lies on the floor [m]."""
 
@@ -46,22 +51,29 @@ def smoothed(mesh: Mesh, floor: float, passes: int, mean: csr_array) -> Mesh:
     return Mesh(v, mesh.triangles)
 
 
-def continued(mesh: Mesh, unknown: Bool[np.ndarray, " N"], floor: float, mean: csr_array) -> Mesh:
+def continued(
+    mesh: Mesh,
+    unknown: Bool[np.ndarray, " N"],
+    still: Bool[np.ndarray, " N"],
+    floor: float,
+    mean: csr_array,
+) -> Mesh:
     """Round off the patches of a surface that nobody knows, where that is likely.
 
     Where the surface about a patch nearly faces as the patch does, as about the underside of a
-    ball, it goes on with the least bending (Botsch and Kobbelt 2004: Δ²x = 0). Elsewhere, as below
-    a table, it stays.
+    ball, it goes on with the least bending. What is about it is known but for noise, which would
+    tilt the patch: within a band as wide as the patch it may move, too, so that noise finer than
+    a tenth of that goes. Elsewhere, as below a table, all stays.
 
     Args:
         mesh: Closed.
         unknown: Vertices that may be moved.
+        still: Vertices that may not, though they are near.
         floor: Nothing is moved below it [m].
         mean: As ``means`` returns it.
 
     """
     v, normals = mesh.vertices.copy(), mesh.vertex_normals
-    pull = csr_array(eye_array(len(v)) - mean)
     some = np.flatnonzero(unknown)
     count, found = connected_components(csr_array(mean[some][:, some]), directed=False)
     patch = np.full(len(v), -1)
@@ -70,18 +82,62 @@ def continued(mesh: Mesh, unknown: Bool[np.ndarray, " N"], floor: float, mean: c
     facing = np.zeros((count, 3))
     np.add.at(facing, touched[touched >= 0], mesh.area_vectors[touched >= 0])
     facing /= np.maximum(np.linalg.norm(facing, axis=1, keepdims=True), 1e-300)
+    areas = np.bincount(touched[touched >= 0], mesh.areas[touched >= 0], count)
     order = np.argsort(found, kind="stable")
     for k, own in enumerate(np.split(some[order], np.cumsum(np.bincount(found))[:-1])):
         near = np.setdiff1d(mean[own].indices, own)
         if len(near) and np.mean(normals[near] @ facing[k]) > ONWARD:
-            v[own] = _solved(pull[np.concatenate([own, near])], v, own)
+            radius = float(np.sqrt(areas[k] / np.pi))
+            band = _about(own, round(np.sqrt(len(own) / np.pi)), mean)
+            band = band[~(still | unknown)[band]]
+            v = _bent(Mesh(v, mesh.triangles), own, band, FINE * radius)
     v[:, 2] = np.maximum(v[:, 2], floor)
     return Mesh(v, mesh.triangles)
 
 
-def _solved(pull: csr_array, v: np.ndarray, own: np.ndarray) -> np.ndarray:
-    """Return where own vertices make |pull v|² least, the others given."""
-    rest = v.copy()
-    rest[own] = 0
-    mine = pull[:, own]
-    return splu((mine.T @ mine).tocsc()).solve(-mine.T @ (pull @ rest))
+def _about(own: Int[np.ndarray, " n"], rings: int, mean: csr_array) -> Int[np.ndarray, " m"]:
+    """Return the vertices that are so many edges from some, or fewer."""
+    found = own
+    for _ in range(rings):
+        found = np.union1d(found, mean[found].indices)
+    return np.setdiff1d(found, own)
+
+
+def _bent(
+    mesh: Mesh, own: Int[np.ndarray, " n"], band: Int[np.ndarray, " m"], fine: float
+) -> Float[np.ndarray, "N 3"]:
+    """Return a mesh's vertices after some were moved so that it bends least.
+
+    That is where ∫ |Δx|² + |x - x₀|² / fine⁴ is least, the second over the band only (Botsch and
+    Kobbelt 2004; the Laplacian of Bobenko and Springborn 2007, which slivers do not spoil). The
+    patch's own shape is what areas and angles are measured on, so it is done again on the result.
+    """
+    free = np.concatenate([own, band])
+    bent = _touched(mesh, free)  # their Laplacian changes
+    local = mesh.triangles[np.isin(mesh.triangles, bent).any(axis=1)]
+    used, corners = np.unique(local, return_inverse=True)
+    triangles = np.ascontiguousarray(corners.reshape(-1, 3))
+    rows, moving, soft = (np.searchsorted(used, which) for which in (bent, free, band))
+    given = x = mesh.vertices[used]
+    for _ in range(AGAIN):
+        laplacian = csc_array(igl.intrinsic_delaunay_cotmatrix(x, triangles)[0])
+        area = igl.massmatrix(x, triangles, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
+        area = np.maximum(area, 1e-3 * np.median(area))
+        pull = laplacian[rows]
+        bending = pull.T @ (diags_array(1 / area[rows]) @ pull)
+        hold = np.zeros(len(x))
+        hold[soft] = area[soft] / fine**4
+        whole = csc_array(bending + diags_array(hold))
+        rest = given.copy()
+        rest[moving] = 0
+        goal = hold[moving, None] * given[moving] - (whole @ rest)[moving]
+        x = given.copy()
+        x[moving] = splu(csc_array(whole[moving][:, moving])).solve(goal)
+    vertices = mesh.vertices.copy()
+    vertices[used] = x
+    return vertices
+
+
+def _touched(mesh: Mesh, some: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:
+    """Return some vertices and their neighbours."""
+    return np.unique(mesh.triangles[np.isin(mesh.triangles, some).any(axis=1)])

@@ -320,7 +320,8 @@ def _fitted(
         lines = outlined(scene.shown == k, sight, cell, crew)
         mesh = fitted(mesh, lines, seen, contact, scene.floor, crew)
     lies = mesh.vertices[:, 2] < scene.floor + ON
-    return continued(mesh, ~(seen | lies | contact), scene.floor, mean)
+    still = lies | contact
+    return continued(mesh, ~(seen | still), still, scene.floor, mean)
 
 
 def _painted(mesh: Mesh, sight: Sight, cell: float, crew: Crew) -> Float[np.ndarray, "V 4"]:
