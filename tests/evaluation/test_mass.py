@@ -143,10 +143,12 @@ def weighed(tmp_path_factory):
     save(folder, "two", large, "brass")
     save(folder, "three", large, "soft_PVC", shell_thickness_m=0.002)
     save(folder, "four", ball)
+    deep = 3 * large.volume / large.area  # the radius of a ball
+    wall = large.volume * (1 - (1 - 2e-3 / deep) ** 3)
     rows = [
         {"object": "one", "mass_kg": steel * ball.volume, "fill": "solid"},
         {"object": "two", "mass_kg": brass * large.volume, "fill": "solid"},
-        {"object": "three", "mass_kg": rubber * large.area * 2e-3, "fill": "hollow"},
+        {"object": "three", "mass_kg": rubber * wall, "fill": "hollow"},
         {"object": "four", "mass_kg": 0.1, "fill": "solid"},
     ]
     write_table(folder / "truth.csv", rows)
@@ -157,11 +159,12 @@ def weighed(tmp_path_factory):
 def test_what_is_known_is_weighed_and_a_hollow_ball_is_a_shell(weighed):
     _, found = weighed
     for prediction in found[:3]:
-        assert prediction.mass == pytest.approx(prediction.mass_true, rel=1e-6)
+        assert prediction.mass == pytest.approx(prediction.mass_true, rel=1e-4)
         assert prediction.low < prediction.mass < prediction.high
     hollow = found[2]
     large = a_ball(0.05)
-    assert hollow.solid_usual == pytest.approx(hollow.mass * large.volume / large.area / 2e-3)
+    share = 1 - (1 - 2e-3 * large.area / (3 * large.volume)) ** 3
+    assert hollow.solid_usual == pytest.approx(hollow.mass / share, rel=1e-4)
     assert hollow.solid_water == pytest.approx(1000 * large.volume, rel=1e-6)
     assert hollow.hull_m3 == pytest.approx(large.volume, rel=1e-6)
 
@@ -175,7 +178,7 @@ def test_what_nobody_recognised_may_weigh_anything(weighed):
 def test_the_comparison_has_every_method_and_every_group(weighed, tmp_path):
     result = compare(weighed[1])
     assert set(result["metrics"]) == {"all", "hollow", "solid"}
-    assert result["metrics"]["hollow"]["mass"]["alde"] == pytest.approx(0, abs=1e-6)
+    assert result["metrics"]["hollow"]["mass"]["alde"] == pytest.approx(0, abs=1e-4)
     every = result["metrics"]["all"]
     assert set(every) == {
         "solid_water", "constant", "hull_fit", "solid_usual", "built_usual", "mass"

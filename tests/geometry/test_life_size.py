@@ -93,7 +93,8 @@ def test_pieces_that_share_a_mesh_are_scaled_too():
     pieces = tuple(Piece(w, STEEL, Structure("shell", w.thickness)) for w in halves)
     field = field_of(Structure("shell", 9e-4), SAID, (pieces,))
     life, here = (made(CAN, field, scale)[0] for scale in (1.0, 0.37))
-    assert life.mass == pytest.approx(CAN.area * 7850 * (1.1e-3 / 2), rel=1e-9)
+    inside = [CAN.volume * (1 - t / 0.03) ** 2 * (1 - t / 0.05) for t in (2e-4, 9e-4)]
+    assert life.mass == pytest.approx(7850 * (CAN.volume - np.mean(inside)), rel=5e-3)
     assert here.mass == pytest.approx(0.37**3 * life.mass, rel=1e-9)
 
 

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from corporeal.geometry.extent import oriented_size
-from corporeal.geometry.mesh import Mesh, openness, orient, signed_volume, weld
+from corporeal.geometry.mesh import Mesh, convergence, openness, orient, signed_volume, weld
 
 
 def welded(mesh):
@@ -28,6 +28,17 @@ def test_welding_is_the_same_anywhere_in_the_world():
     faces = np.arange(len(soup)).reshape(-1, 3)
     here, there = weld(soup, faces)[0], weld(soup + 1000.0, faces)[0]
     assert len(here.vertices) == len(there.vertices) == len(ball.vertices)
+
+
+def test_a_surface_loses_area_as_it_moves_inward():
+    """A ball by 4πR, a box by four times the sum of its sides; what is hollow gains as much."""
+    ball = welded(trimesh.creation.icosphere(4, 0.5))
+    assert convergence(ball) == pytest.approx(2 * np.pi, rel=2e-3)
+    hollow = Mesh(ball.vertices, ball.triangles[:, ::-1])
+    assert convergence(hollow) == pytest.approx(-2 * np.pi, rel=2e-3)
+    assert convergence(welded(trimesh.creation.box((1, 2, 3)))) == pytest.approx(4 * 6)
+    rod = welded(trimesh.creation.cylinder(0.5, 200, 64))
+    assert convergence(rod) == pytest.approx(np.pi * 200, rel=0.02)
 
 
 def test_triangles_without_area_are_dropped():

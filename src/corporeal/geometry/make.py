@@ -193,9 +193,10 @@ def behind(member: Member, made: Make, said: Said, room: float) -> float:
 def decide(member: Member, structure: Structure, material: Material, words: PartWords) -> Make:
     """Say how thick a part's walls are and what they weigh.
 
-    Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ min(A t, V) with the area A of one
-    face: not of the inside of a shade, whose outside counts. A wall whose mesh shows both faces is
-    2 V / A thick unless somebody stated or judged otherwise: thin walls are drawn too thick, in
+    Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ V (1 - (1 - A t / (n V))^n) with the
+    area A of one face: not of the inside of a shade, whose outside counts; about ρ A t where it is
+    thin. n says how its outside closes in (``Member.closing``). A wall whose mesh shows both faces
+    is 2 V / A thick unless somebody stated or judged otherwise: thin walls are drawn too thick, in
     scans as in models. Open sheets weigh ρ A t. Of a piece, its shares of V and A count.
     """
     wall = member.build is Build.WALL
@@ -213,7 +214,7 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
     volume = member.volume * words.volume_share if not only_sheet else face * sheet
     sheets = member.sheet_area * words.surface_share
     if walled and not only_sheet:
-        matter = min(face * thickness, volume)
+        matter = min(face * thickness * member.narrowing(thickness), volume)
     else:
         matter = volume
     if thickness > 0 or only_sheet:

@@ -19,7 +19,7 @@ from corporeal.geometry.anatomy import (
     sheets,
 )
 from corporeal.geometry.extent import oriented_size
-from corporeal.geometry.mesh import Mesh, openness, orient, signed_volume, weld
+from corporeal.geometry.mesh import Mesh, convergence, openness, orient, signed_volume, weld
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import scatter
 
@@ -70,6 +70,30 @@ class Member:
             return 0.5 * self.body_area
         rng = np.random.default_rng(self.part)
         return self.body_area * (1 - inner_share(self.whole, self.body, self.size[0], rng))
+
+    @cached_property
+    def closing(self) -> float:
+        """How its outside closes in on its middle [-]: 1 a plate, 2 a rod, 3 a ball or a cube.
+
+        That is n where (1 - A t / (n V))^n of the volume is deeper than t, to the second order.
+        """
+        if self.build is Build.WALL or not self.volume > 0:
+            return 1.0
+        inward = 2 * convergence(self.body) * self.volume / self.face_area**2
+        return float(1 / (1 - np.clip(inward, 0, 2 / 3)))
+
+    def narrowing(self, thickness: float) -> float:
+        """Mean area of a wall's layers over its outside's [-]; its inside is smaller.
+
+        Args:
+            thickness: Of the wall [m].
+
+        """
+        n = self.closing
+        if n == 1.0 or not thickness > 0:
+            return 1.0
+        depth = min(self.face_area * thickness / (n * self.volume), 1.0)
+        return (1 - (1 - depth) ** n) * self.volume / (self.face_area * thickness)
 
     @cached_property
     def encloses(self) -> bool:
