@@ -10,8 +10,8 @@ import pytest
 from corporeal.formats.transforms import write_views
 
 HERE = Path(__file__).parent
-ROW = {"scene", "preset", "masked", "views", "size", "psnr", "psnr_things", "ssim", "gaussians",
-       "two_cores_s", "clock_s"}  # fmt: skip
+ROW = {"scene", "preset", "masked", "views", "size", "psnr", "psnr_things", "ssim", "deep", "near",
+       "gaussians", "two_cores_s", "clock_s"}  # fmt: skip
 
 
 @pytest.fixture
@@ -32,7 +32,8 @@ def test_rows_and_page_are_made_from_one_run(bench, tmp_path, monkeypatch, capsy
     from splat_scenes import around, blobs, pictured
 
     views, masks = pictured(blobs(), around(16, (40, 40)), (0.5, 0.5, 0.5))
-    views = replace(views, object_of_pixel=masks.astype(np.int32) - 1)
+    depth = np.where(masks, np.float32(3), np.float32(np.inf))
+    views = replace(views, object_of_pixel=masks.astype(np.int32) - 1, depth=depth)
     write_views(tmp_path / "tiny" / "views", views)
     monkeypatch.setattr(bench, "PAGE", tmp_path / "page.md")
     out = tmp_path / "out"
@@ -43,4 +44,5 @@ def test_rows_and_page_are_made_from_one_run(bench, tmp_path, monkeypatch, capsy
     assert "| tiny | draft | pictures, masks |" in page and "0k Gaussians of degree 3" in page
     row = bench.kept(out, "tiny-draft-masks", lambda: pytest.fail("measured twice"))
     assert set(row) == ROW and row["views"] == 16 and row["psnr_things"] < row["psnr"]
+    assert 0 <= row["deep"] <= 1 and 0 <= row["near"] <= 1
     capsys.readouterr()
