@@ -183,9 +183,9 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
     masks = np.stack([disc] * 40)
     views, _ = pictured(blobs(), cameras)
     with Crew(1) as crew:
-        points = hull(views, masks, 3000, RNG(0), crew)
+        points = hull(views, masks, 3000, RNG(0), crew, 0.2)
         distance, faint = np.linalg.norm(points.position, axis=1), points.opacity < start.OPAQUE
-        assert len(distance) == 3000 and faint.sum() == start.WITHIN * 3000
+        assert len(distance) == 3000 and faint.sum() == 600
         on, within = distance[~faint], distance[faint]
         np.testing.assert_allclose(np.quantile(on, [0.1, 0.5, 0.9]), 0.5, atol=0.04)
         # Evenly: the share within a radius grows as its cube.

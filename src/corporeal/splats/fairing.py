@@ -13,8 +13,10 @@ PULLS = (0.5, -0.53)
 """How far vertices go to their neighbours' mean, and back."""
 ONWARD = 0.7
 """Cosine between a patch and the surface about it from which on it goes on as that does: 45°."""
-FINE = 0.1
-"""What is finer than this share of a patch's radius is noise beside it."""
+FINE, ROUGH = 0.1, 2.0
+"""What is finer than this share of a patch's radius, and than so many cells, is noise beside it."""
+SLIVER = 1e-4
+"""Shortest excess of two sides over the third, in mean sides."""
 AGAIN = 2
 """How often a patch is bent, each time on the shape that it got before."""
 ON = 1e-9
@@ -55,6 +57,7 @@ def continued(
     mesh: Mesh,
     unknown: Bool[np.ndarray, " N"],
     still: Bool[np.ndarray, " N"],
+    cell: float,
     floor: float,
     mean: csr_array,
 ) -> Mesh:
@@ -62,13 +65,14 @@ def continued(
 
     Where the surface about a patch nearly faces as the patch does, as about the underside of a
     ball, it goes on with the least bending. What is about it is known but for noise, which would
-    tilt the patch: within a band as wide as the patch it may move, too, so that noise finer than
-    a tenth of that goes. Elsewhere, as below a table, all stays.
+    tilt the patch: within a band of ten times that the noise goes. Elsewhere, as below a table, all
+    stays.
 
     Args:
         mesh: Closed.
         unknown: Vertices that may be moved.
         still: Vertices that may not, though they are near.
+        cell: Of the grid that the surface was carved from [m].
         floor: Nothing is moved below it [m].
         mean: As ``means`` returns it.
 
@@ -88,9 +92,11 @@ def continued(
         near = np.setdiff1d(mean[own].indices, own)
         if len(near) and np.mean(normals[near] @ facing[k]) > ONWARD:
             radius = float(np.sqrt(areas[k] / np.pi))
-            band = _about(own, round(np.sqrt(len(own) / np.pi)), mean)
+            noise = min(FINE * radius, ROUGH * cell)
+            rings = np.sqrt(len(own) / np.pi) * noise / (FINE * radius)
+            band = _about(own, round(rings), mean)
             band = band[~(still | unknown)[band]]
-            v = _bent(Mesh(v, mesh.triangles), own, band, FINE * radius)
+            v = _bent(Mesh(v, mesh.triangles), own, band, noise)
     v[:, 2] = np.maximum(v[:, 2], floor)
     return Mesh(v, mesh.triangles)
 
@@ -120,9 +126,7 @@ def _bent(
     rows, moving, soft = (np.searchsorted(used, which) for which in (bent, free, band))
     given = x = mesh.vertices[used]
     for _ in range(AGAIN):
-        laplacian = csc_array(igl.intrinsic_delaunay_cotmatrix(x, triangles)[0])
-        area = igl.massmatrix(x, triangles, igl.MASSMATRIX_TYPE_VORONOI).diagonal()
-        area = np.maximum(area, 1e-3 * np.median(area))
+        laplacian, area = _measured(x, triangles)
         pull = laplacian[rows]
         bending = pull.T @ (diags_array(1 / area[rows]) @ pull)
         hold = np.zeros(len(x))
@@ -136,6 +140,22 @@ def _bent(
     vertices = mesh.vertices.copy()
     vertices[used] = x
     return vertices
+
+
+def _measured(
+    x: Float[np.ndarray, "N 3"], triangles: Int[np.ndarray, "T 3"]
+) -> tuple[csc_array, Float[np.ndarray, " N"]]:
+    """Return the integrated Laplacian by cotangents, and the area about each vertex [m²].
+
+    All edges are made longer by as little as it takes for no triangle to be degenerate (Sharp and
+    Crane 2020), and flipped until no angle's cotangent spoils the sum.
+    """
+    a, b, c = np.swapaxes(x[triangles], 0, 1)
+    sides = np.stack([np.linalg.norm(p - q, axis=1) for p, q in ((b, c), (c, a), (a, b))], axis=1)
+    lack = 2 * sides.max(axis=1) - sides.sum(axis=1) + SLIVER * sides.mean()
+    sides, flipped = igl.intrinsic_delaunay_triangulation(sides + max(lack.max(), 0), triangles)[:2]
+    area = igl.massmatrix_intrinsic(sides, flipped, igl.MASSMATRIX_TYPE_BARYCENTRIC).diagonal()
+    return csc_array(igl.cotmatrix_intrinsic(sides, flipped)), area
 
 
 def _touched(mesh: Mesh, some: Int[np.ndarray, " n"]) -> Int[np.ndarray, " m"]:

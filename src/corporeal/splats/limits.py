@@ -1,7 +1,7 @@
 """How large Gaussians may grow, and which of their numbers move.
 
-Where masks forbid haze, none grows wider than enough of them are apart. Where there are none, what
-is wide is flat, and small in every picture; what few views see has one colour for all sides.
+Where masks forbid haze, there is one limit for all, if any. Where there are none, what is wide is
+flat, and small in every picture; what few views see has one colour for all sides.
 """
 
 import numpy as np

@@ -321,7 +321,7 @@ def _fitted(
         mesh = fitted(mesh, lines, seen, contact, scene.floor, crew)
     lies = mesh.vertices[:, 2] < scene.floor + ON
     still = lies | contact
-    return continued(mesh, ~(seen | still), still, scene.floor, mean)
+    return continued(mesh, ~(seen | still), still, cell, scene.floor, mean)
 
 
 def _painted(mesh: Mesh, sight: Sight, cell: float, crew: Crew) -> Float[np.ndarray, "V 4"]:

@@ -19,12 +19,8 @@ CELLS = 2_000_000
 """Of the grid that the visual hull is carved from."""
 ASTRAY = 0.05
 """Share of the views that may see a point of the hull beside things: masks err at edges."""
-OPAQUE = 0.5
-"""Opacity of most Gaussians, where they begin."""
-WITHIN, FAINT = 0.2, 0.3
-"""Share of the points that begin inside the hull, and their opacity. A seat between its arms lies
-below the hull: what begins only on that would have to sink there, and what shines through instead
-looks right as long as the seat is plain."""
+OPAQUE, FAINT = 0.5, 0.3
+"""Opacity of Gaussians where they begin, on the hull and inside."""
 
 FLAT = 0.1
 """Scale along known normals over that across, at first."""
@@ -85,11 +81,17 @@ def clearance(cameras: tuple[Camera, ...]) -> Float[np.ndarray, " V"]:
 
 
 def hull(
-    views: Views, masks: Bool[np.ndarray, "V H W"], count: int, rng: np.random.Generator, crew: Crew
+    views: Views,
+    masks: Bool[np.ndarray, "V H W"],
+    count: int,
+    rng: np.random.Generator,
+    crew: Crew,
+    within: float = 0.0,
 ) -> Points:
-    """Return points on the visual hull, the surface of what all masks allow, and some inside.
+    """Return points on the visual hull, the surface of what all masks allow.
 
-    Those inside are as small as those on the hull: wide ones would show through plain faces.
+    within: share of them that is inside, as small as those on the hull: wide ones would show
+    through plain faces.
 
     Raises:
         UserError: Nothing is inside all masks.
@@ -97,17 +99,17 @@ def hull(
     """
     fine = tight(views, masks, crew)
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
-    within = round(WITHIN * count)
-    on = count - within
-    position = np.concatenate([_some(fine.cells[fine.inside], within, rng), _some(shell, on, rng)])
+    deep = round(within * count)
+    on = count - deep
+    position = np.concatenate([_some(fine.cells[fine.inside], deep, rng), _some(shell, on, rng)])
     position += fine.side * rng.uniform(-0.5, 0.5, position.shape)
     seen = _witnessed(position, views, masks, crew)
     apart = fine.side * np.sqrt(len(shell) / on)
     return Points(
         position,
         seen[:, 2:5] / np.maximum(seen[:, :1], 1),
-        np.repeat([FAINT, OPAQUE], [within, on]),
-        width=np.repeat([apart, np.nan], [within, on]),
+        np.repeat([FAINT, OPAQUE], [deep, on]),
+        width=np.repeat([apart, np.nan], [deep, on]),
     )
 
 

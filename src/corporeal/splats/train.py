@@ -66,6 +66,12 @@ STIR = 1e3
 """Reach of the random steps that faint ones take [standard deviations], per rate of the means."""
 EVERY = 15.0
 """Seconds between checkpoints."""
+WITHIN = 0.2
+"""Share of the Gaussians that begin inside the visual hull, where some do."""
+TRIAL = {"gaussians": 5000, "steps": 300, "longest": 128, "held_out": 4}
+"""A small training that tells whether some should."""
+GAIN = 0.5
+"""Held-out views must agree better with it by so much on things [dB]."""
 GREY: Vector = (0.5, 0.5, 0.5)
 """Behind things when pictures are compared."""
 
@@ -95,6 +101,13 @@ class TrainConfig:
     """How many at most; None: as the preset says."""
     steps: int | None = None
     """None: as the preset says."""
+    longest: int | None = None
+    """Larger pictures are shrunk until no side is longer [px]; None: as the preset says."""
+    begin: Literal["auto", "hull", "inside"] = "auto"
+    """With masks: on their visual hull, or some Gaussians inside it, too. A seat between its arms
+    lies below the hull, and what begins on that would have to sink there; in an open bowl what
+    begins inside stays there, if that is plain. auto: what a small training finds the better; the
+    hull where views are too few to tell."""
     held_out: int = 8
     """Every so-many-th view is not learned from but compared with; 0: none is."""
     seed: int = 0
@@ -154,7 +167,7 @@ def train(
     begun = time.monotonic()
     lesson = Lesson(views, masks, points, config)
     with Crew(config.threads) as crew:
-        pupil = _begun(lesson, checkpoint, crew)
+        pupil = _begun(lesson, checkpoint, crew, progress)
         spent = pupil.seconds
         for fraction, words in _learn(pupil, lesson, checkpoint, crew):
             pupil.seconds = spent + time.monotonic() - begun
@@ -183,7 +196,9 @@ class Lesson:
             preset,
             gaussians=config.gaussians or preset.gaussians,
             steps=config.steps or preset.steps,
+            longest=config.longest or preset.longest,
         )
+        self.config = config
         self.seed, self.rasteriser = config.seed, config.rasteriser
         self.draw, self.back = (
             load("rasteriser", self.rasteriser, {k: f"{m}:{do}" for k, m in RASTERISERS.items()})
@@ -195,9 +210,6 @@ class Lesson:
         self.held_out = tuple(range(every // 2, count, every)) if every and count > every else ()
         self.learned = [k for k in range(count) if k not in self.held_out]
         self.radius = region(views.cameras).radius
-        # As far as so many are apart on a sphere. One that is wider shows all of a plain face from
-        # below it, and costs less of PULL than those that lie on it.
-        self.widest = float(self.radius * np.sqrt(4 * np.pi / self.preset.gaussians))
         self.clear = clearance(views.cameras)
         factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
         halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
@@ -211,7 +223,8 @@ class Lesson:
         cameras = [(c.K.tolist(), c.world_from_camera.tolist()) for c in self.views.cameras]
         p = self.points
         begin = () if p is None else vars(p).values()
-        rest = cameras, self.preset, self.seed, self.held_out, self.rasteriser
+        how = self.seed, self.held_out, self.rasteriser, self.config.begin
+        rest = cameras, self.preset, *how
         return saved.fingerprint(self.views.rgb, self.masks, *begin, *rest)
 
     def size(self, step: int) -> "_Size":
@@ -258,12 +271,14 @@ class Pupil:
     limits: Limits
     gains: exposure.Gains
     """Of the views that are learned from."""
+    widest: float
+    """Scale that no Gaussian may have more of [m]."""
     step: int = 0
     seconds: float = 0.0
     """Spent so far."""
 
 
-def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew) -> Pupil:
+def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew, progress: Progress) -> Pupil:
     """Return the state to go on from: a checkpoint's, or that of a beginner."""
     rng = np.random.default_rng([lesson.seed, 0])
     preset, points = lesson.preset, lesson.points
@@ -275,15 +290,38 @@ def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew) -> Pupil:
     state = saved.kept(checkpoint, lesson.name) if checkpoint is not None else {}
     if state:
         learned = state["theta"], state["first"], state["second"]
-        rest = state["limits"], state["gains"], int(state["step"]), float(state["seconds"])
-        return Pupil(*learned, *rest)
+        numbers = float(state["widest"]), int(state["step"]), float(state["seconds"])
+        return Pupil(*learned, state["limits"], state["gains"], *numbers)
+    widest = limits.REACH * lesson.radius
     if points is None and masks is not None:
-        points = hull(views, masks, preset.gaussians, rng, crew)
+        inside = _begins_inside(lesson, views, masks, progress)
+        if inside:
+            # As far as so many are apart on a sphere. One that is wider shows all of a plain face
+            # from below it, and costs less of PULL than those that lie on it.
+            widest = lesson.radius * np.sqrt(4 * np.pi / preset.gaussians)
+        points = hull(views, masks, preset.gaussians, rng, crew, WITHIN * inside)
     assert points is not None
     theta = seeded(points, preset.gaussians, preset.degree, rng)
-    bounds, _ = _bounds(theta, lesson, crew)
+    bounds, _ = _bounds(theta, widest, lesson, crew)
     gains = np.ones((len(lesson.learned), 3), np.float32)
-    return Pupil(theta, np.zeros_like(theta), np.zeros_like(theta), bounds, gains)
+    moments = np.zeros_like(theta), np.zeros_like(theta)
+    return Pupil(theta, *moments, bounds, gains, float(widest))
+
+
+def _begins_inside(lesson: Lesson, views: Views, masks: Masks, progress: Progress) -> bool:
+    """Tell whether some Gaussians should begin inside the visual hull."""
+    config = lesson.config
+    if config.begin != "auto":
+        return config.begin == "inside"
+    if lesson.preset.steps <= TRIAL["steps"]:
+        return False  # it is no larger itself
+    progress(0.0, "finding where to begin")
+    small = replace(config, **TRIAL)
+    tries = [replace(small, begin=begin) for begin in ("hull", "inside")]
+    hull_alone, inside = (train(views, masks, config=c).quality for c in tries)
+    if hull_alone is None or inside is None:
+        return False  # too few views to tell
+    return (inside.psnr_things or 0.0) > (hull_alone.psnr_things or 0.0) + GAIN
 
 
 def _learn(pupil: Pupil, lesson: Lesson, checkpoint: Path | None, crew: Crew):
@@ -333,23 +371,25 @@ def _stir(pupil: Pupil, lesson: Lesson, rate: float, rng: np.random.Generator, c
     begin, end = SETTLED
     growing = begin < pupil.step < end * lesson.preset.steps
     if pupil.step % ROUND == 0 and growing:
-        _, haze = _bounds(pupil.theta, lesson, crew)
+        _, haze = _bounds(pupil.theta, pupil.widest, lesson, crew)
         pupil.theta[haze, OPACITY] = GONE
         moments = [pupil.first, pupil.second]
         most = lesson.preset.gaussians
         pupil.theta, moments = growth.moved(pupil.theta, moments, most, rng)
         pupil.first, pupil.second = moments
     if pupil.step % ROUND == 0:
-        pupil.limits, _ = _bounds(pupil.theta, lesson, crew)
+        pupil.limits, _ = _bounds(pupil.theta, pupil.widest, lesson, crew)
     faint = np.flatnonzero(opacity(pupil.theta) < 0.1)
     reach = STIR * rate / lesson.radius
     pupil.theta[faint, MEAN:ROTATION] += growth.jitter(pupil.theta[faint], reach, rng)
 
 
-def _bounds(theta: Parameters, lesson: Lesson, crew: Crew) -> tuple[Limits, Bool[np.ndarray, " N"]]:
+def _bounds(
+    theta: Parameters, widest: float, lesson: Lesson, crew: Crew
+) -> tuple[Limits, Bool[np.ndarray, " N"]]:
     """Return what Gaussians may do, and which of them are haze; masks leave no room for any."""
     if lesson.surfaces is None:
-        return limits.even(theta, lesson.widest), np.zeros(len(theta), np.bool_)
+        return limits.even(theta, widest), np.zeros(len(theta), np.bool_)
     return limits.strict(theta, lesson.radius, lesson.surfaces, crew)
 
 
