@@ -212,11 +212,9 @@ TAIL = (
     "30 dB, against 32 to 36 dB from above. The backdrop of these scenes belongs to each picture "
     "and not to the room, which no Gaussians can follow.",
     "- With masks, learning begins on their visual hull, also where a COLMAP model brings points: "
-    "a few hundred sparse points grow too slowly. A fifth begins inside: a seat between its arms "
-    "lies below the hull, and Gaussians on that alone did not get there but let through what lay "
-    "below the couch. Those inside are as small as those on the hull, and none grows wider than so "
-    "many are apart on a sphere about everything: a few wide ones would show all of a plain face "
-    "from below it, and cost less of the pull on opacities than many on it.",
+    "a few hundred sparse points grow too slowly. Where a small training finds it better, a fifth "
+    "begins inside (decision 15): a seat between its arms lies below the hull. None of these three "
+    "scenes wants it.",
     "- Exposures (`splats/exposure.py`) are learned as one gain for each photograph and channel. "
     "Where they differ, Gaussians have the mean one, and held-out views are compared after the "
     "gain that suits each.",

@@ -68,6 +68,13 @@ def test_nothing_is_learned_where_instance_masks_are_wanted_and_there_are_none(t
         taken(FINE, UserError("It was learned all the same."), instances=True)
 
 
+@pytest.mark.parametrize(("ahead", "where"), [(2.3, "and inside of it"), (-0.6, "alone")])
+def test_it_is_said_where_gaussians_began(taken, ahead, where):
+    said = " ".join(taken(FINE, replace(learned(GOOD), ahead=ahead)).statements)
+    assert f"hull of the masks {where}: to begin inside, too, made {ahead:+} dB on things" in said
+    assert "visual hull" not in " ".join(taken(FINE, learned(GOOD)).statements)
+
+
 def test_doubts_stay_with_what_is_learned_and_with_why_nothing_can_be(taken):
     doubtful = replace(FINE, doubt=DOUBT)
     assert taken(doubtful, learned(GOOD)).warnings == (DOUBT,)

@@ -21,7 +21,7 @@ from corporeal.splats.cutout import cut_out
 from corporeal.splats.quality import Quality
 from corporeal.splats.raster import render
 from corporeal.splats.start import Points
-from corporeal.splats.train import PRESETS, TrainConfig, Trained, train
+from corporeal.splats.train import GAIN, PRESETS, TrainConfig, Trained, train
 from corporeal.types import Camera, Gaussians, Vector, Views
 
 Progress = Callable[[float, str], None]
@@ -255,8 +255,15 @@ def _points(shown: Photographs) -> Points | None:
 
 def _told(trained: Trained, photographs: int) -> tuple[str, ...]:
     count = f"{trained.gaussians.count:,}"
-    said = f"{count} Gaussians were learned from {photographs} photographs."
-    return (said,) if trained.quality is None else (said, _agreed(trained.quality))
+    said = [f"{count} Gaussians were learned from {photographs} photographs."]
+    if np.isfinite(trained.ahead):
+        inside, better = trained.ahead > GAIN, f"{trained.ahead:+.1f} dB on things"
+        where = "and inside of it" if inside else "alone"
+        said.append(
+            f"They began on the visual hull of the masks {where}: to begin inside, too, made "
+            f"{better} in a small training."
+        )
+    return (*said, *(() if trained.quality is None else (_agreed(trained.quality),)))
 
 
 def _agreed(quality: Quality) -> str:

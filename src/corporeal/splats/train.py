@@ -139,6 +139,9 @@ class Trained:
     seconds: float
     exposures: Float32[np.ndarray, "V 3"]
     """How much brighter than on average each photograph is, by channel; 1 where held out."""
+    ahead: float = np.nan
+    """How much better a small training was on things that began inside the visual hull, too [dB];
+    nan: there was none."""
 
 
 def train(
@@ -181,7 +184,7 @@ def train(
     out = quality(made, views, held, masks, behind, apart) if held else None
     exposures = np.ones((len(views.cameras), 3), np.float32)
     exposures[lesson.learned] = pupil.gains
-    return Trained(made, out, spent + time.monotonic() - begun, exposures)
+    return Trained(made, out, spent + time.monotonic() - begun, exposures, pupil.ahead)
 
 
 class Lesson:
@@ -273,6 +276,8 @@ class Pupil:
     """Of the views that are learned from."""
     widest: float
     """Scale that no Gaussian may have more of [m]."""
+    ahead: float
+    """As in ``Trained``."""
     step: int = 0
     seconds: float = 0.0
     """Spent so far."""
@@ -290,11 +295,12 @@ def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew, progress: Progre
     state = saved.kept(checkpoint, lesson.name) if checkpoint is not None else {}
     if state:
         learned = state["theta"], state["first"], state["second"]
-        numbers = float(state["widest"]), int(state["step"]), float(state["seconds"])
-        return Pupil(*learned, state["limits"], state["gains"], *numbers)
-    widest = limits.REACH * lesson.radius
+        rest = state["limits"], state["gains"], float(state["widest"]), float(state["ahead"])
+        return Pupil(*learned, *rest, int(state["step"]), float(state["seconds"]))
+    widest, ahead, begin = limits.REACH * lesson.radius, np.nan, lesson.config.begin
     if points is None and masks is not None:
-        inside = _begins_inside(lesson, views, masks, progress)
+        ahead = _tried(lesson, views, masks, progress) if begin == "auto" else np.nan
+        inside = begin == "inside" or ahead > GAIN
         if inside:
             # As far as so many are apart on a sphere. One that is wider shows all of a plain face
             # from below it, and costs less of PULL than those that lie on it.
@@ -305,23 +311,21 @@ def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew, progress: Progre
     bounds, _ = _bounds(theta, widest, lesson, crew)
     gains = np.ones((len(lesson.learned), 3), np.float32)
     moments = np.zeros_like(theta), np.zeros_like(theta)
-    return Pupil(theta, *moments, bounds, gains, float(widest))
+    return Pupil(theta, *moments, bounds, gains, float(widest), ahead)
 
 
-def _begins_inside(lesson: Lesson, views: Views, masks: Masks, progress: Progress) -> bool:
-    """Tell whether some Gaussians should begin inside the visual hull."""
-    config = lesson.config
-    if config.begin != "auto":
-        return config.begin == "inside"
+def _tried(lesson: Lesson, views: Views, masks: Masks, progress: Progress) -> float:
+    """Return how much better a small training is that begins inside the hull [dB]; nan: unknown."""
     if lesson.preset.steps <= TRIAL["steps"]:
-        return False  # it is no larger itself
+        return np.nan  # it is no larger itself
     progress(0.0, "finding where to begin")
-    small = replace(config, **TRIAL)
-    tries = [replace(small, begin=begin) for begin in ("hull", "inside")]
-    hull_alone, inside = (train(views, masks, config=c).quality for c in tries)
-    if hull_alone is None or inside is None:
-        return False  # too few views to tell
-    return (inside.psnr_things or 0.0) > (hull_alone.psnr_things or 0.0) + GAIN
+    small = replace(lesson.config, **TRIAL)
+    tries = [replace(small, begin=begin) for begin in ("inside", "hull")]
+    inside, hull_alone = (train(views, masks, config=c).quality for c in tries)
+    if inside is None or hull_alone is None:
+        return np.nan  # too few views to tell
+    assert inside.psnr_things is not None and hull_alone.psnr_things is not None
+    return inside.psnr_things - hull_alone.psnr_things
 
 
 def _learn(pupil: Pupil, lesson: Lesson, checkpoint: Path | None, crew: Crew):
