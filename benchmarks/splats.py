@@ -132,8 +132,8 @@ def lines(rows: list[dict], raster: dict) -> list[str]:
         source = "pictures, masks" if r["masked"] else "pictures"
         text.append(
             f"| {r['scene']} | {r['preset']} | {source} | {r['psnr']:.1f} | "
-            f"{r['psnr_things']:.1f} | {r['ssim']:.3f} | {100 * r['deep']:.1f} | "
-            f"{100 * r['near']:.1f} | {r['two_cores_s']:.0f} | {r['clock_s']:.0f} |"
+            f"{r['psnr_things']:.1f} | {r['ssim']:.3f} | {share(r, 'deep')} | "
+            f"{share(r, 'near')} | {r['two_cores_s']:.0f} | {r['clock_s']:.0f} |"
         )
     count, side = LARGE
     return [
@@ -142,6 +142,11 @@ def lines(rows: list[dict], raster: dict) -> list[str]:
         f"{count // 1000}k Gaussians of degree 3 at {side} × {side} are drawn in "
         f"{raster['draw_s']:.2f} s on two cores; their gradients take {raster['back_s']:.2f} s.",
     ]
+
+
+def share(row: dict, key: str) -> str:
+    """Return a share in percent; rows that were kept from before it was measured have none."""
+    return f"{100 * row[key]:.1f}" if key in row else "–"
 
 
 def main() -> None:
