@@ -10,9 +10,9 @@ of their shapes. It forgets which of them each pixel shows, which captured views
 Of each thing, pieces of one material that are built alike are told as one, by the names of those
 that show most and the colour that they have in the photographs; what takes less than a hundredth of
 its pixels is not told. Masses, the number of objects and where they end are compared. How much ends
-depend on chance says the own spread: the model's own run again, twice, with each thing put aside by
-1 % of its size to a random side. Aims: the whole mass within 10 %, as many objects, ends within 5 %
-of the scene's size.
+depend on chance says the own spread: the model's own run again, twice, with each thing filled with
+other particles and put aside by 1 % of its size to a random side. Aims: the whole mass within 10 %,
+as many objects, ends within 5 % of the scene's size.
 """
 
 import argparse
@@ -104,9 +104,9 @@ HEADS = (
 DOCS = Path(__file__).parents[1] / "docs" / "round-trip.md"
 
 
-def settings(detail: Detail) -> Settings:
-    """Return what both runs have in common."""
-    return Settings(fill=FillConfig(detail=detail))
+def settings(detail: Detail, seed: int = 0) -> Settings:
+    """Return what both runs have in common; seed: of the particles."""
+    return Settings(fill=FillConfig(detail=detail, seed=seed))
 
 
 def masses(made: dict) -> np.ndarray:
@@ -268,7 +268,8 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
     for seed in (1, 2):
         aside = put_aside(mesh, path, folder, seed)
         work = folder / aside.stem
-        with told() as tell, opened([aside], work, settings(detail), tell, "simulate") as of:
+        other = settings(detail, seed)
+        with told() as tell, opened([aside], work, other, tell, "simulate") as of:
             spread.append(apart(ends(mesh), ends(of[0]), scene))
     views = folder / "views"
     if not (views / "transforms.json").exists():
