@@ -317,7 +317,7 @@ def compared(name: str, mesh: dict, pictures: dict, order: np.ndarray) -> dict:
     row |= {"mass": first.tolist(), "again": second.tolist(), "off": second.sum() / first.sum() - 1}
     if len(first) == len(second):
         row["ends_off"] = apart(ends(mesh)[order], ends(pictures), scene).tolist()
-    quality = next((s for s in found.statements if " dB" in s), "")
+    quality = next((s for s in found.statements if "agree with" in s), "")
     return row | {"quality": quality, "warnings": list(found.warnings)}
 
 

@@ -198,8 +198,8 @@ HEAD = (
     "one side; masks are not. Where there are masks, the surface is moved until its outlines are "
     "theirs, and what lies between goes along. A patch that no view sees goes on with the least "
     "bending where the surface about it nearly faces as it does, as below a ball; noise about it, "
-    "finer than a tenth of the patch, gives way, which would tilt it. Elsewhere it "
-    "stays as it was filled in. Vertices get the colour that the cameras see there. Winding "
+    "finer than a tenth of the patch and than two cells, gives way, which would tilt it. Elsewhere "
+    "it stays as it was filled in. Vertices get the colour that the cameras see there. Winding "
     "numbers of the surface are compared with the cells it was made of; where more than 1 % "
     "disagree a warning says so.",
     "7. **Draw back.** Each thing was carved on its own grid and moved on its own, so that things "
