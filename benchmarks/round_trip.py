@@ -68,27 +68,24 @@ Training = Literal["draft", "normal"]
 FOUND = (
     "- Compact things keep their mass to a percent, and a duck on mud lands, sinks in and stays "
     "as its model does. Plants stand and sway.",
-    "- Where the own spread is as large as the ends are off, a row cannot say more: where a duck "
-    "goes that hits a can at 6 m/s and jumps off depends on where exactly it hits, in the model's"
-    " own run, too.",
-    "- The rubber ball is in the air at the end. Its underside, which only the lowest cameras "
-    "see, comes out up to .9 mm flat and tilted by 1.6 degrees; it jumps 3 % less high, and "
-    "aside.",
-    "- The duck on the can weighs 8 % too much, its beak being solid and large; the can too "
+    "- Where things fly, bounce or topple, ends are as far off as the model's own run is from "
+    "itself once its things are filled with other particles: at this detail a rubber ball is eight "
+    "cells wide, and every bounce turns it by up to a degree. A row cannot say more than that. The "
+    "duck that hits a can at 6 m/s goes anywhere.",
+    "- What nobody sees of a ball from below comes out a tenth or two of a millimetre from round, "
+    "and tilted by up to half a degree; a pixel shows .6 mm.",
+    "- The duck on the can weighs 10 % too much, its beak being solid and large; the can too "
     "little: its tab, 7 % of it, is not told.",
-    "- Boards of 16 mm come out 9 % too heavy. Nobody sees how deep the vase is hollow: it is "
-    "closed below its neck, so that its wall is counted across the mouth; and its outside, times "
-    "the wall's thickness, is more than the wall. It weighs an eighth too much.",
-    "- The middle of the couch's seat, plain and in the lamp's shadow, is lost: what is drawn "
-    "there lies below the couch. Beginning with some Gaussians inside the visual hull brings it "
-    "back, and 3 dB with it, but cost a heap of sand a third of its volume; it was not kept. "
-    "Where the couch's plywood ends and its foam begins no colour says, only words, by height.",
-    "- The lamp's foot comes out dented by 5 mm of its 15, and the inside of its shade lumpy: its"
-    " centre of mass lies a tenth of a metre nearer the shade.",
-    "- Pot and soil of the plant are told apart badly in the shade. A crown is weighed by the "
-    "area of its leaves, within a factor of two; feet in sand or a pot, which no picture shows, "
-    "are guessed.",
-    "- Gaussians, and the models' own runs, were kept from a day of changes to what comes after.",
+    "- Boards of 16 mm come out a tenth too heavy. Nobody sees how deep the vase is hollow: it is "
+    "closed below its neck, so that its wall is counted across the mouth.",
+    "- The couch's own volume is right to 5 %, but the panels of its plywood base that lie below "
+    "the cushions are in no picture, and where plywood ends and foam begins no colour says, only "
+    "words, by height. Its seat is plain, and found only because some Gaussians begin inside the "
+    "visual hull ([decision 15](decisions/0015-a-small-training-tells-where-to-begin.md)).",
+    "- The lamp's foot comes out dented by 5 mm of its 15, and the inside of its shade lumpy.",
+    "- Pot and soil of the plant are told apart badly in the shade, and of its trunk a third is "
+    "found. A crown is weighed by the area of its leaves, within a factor of two; "
+    "feet in sand or a pot, which no picture shows, are guessed.",
 )
 HEADS = (
     "scene",
