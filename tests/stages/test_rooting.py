@@ -37,6 +37,18 @@ def test_a_stem_that_ends_on_sand_is_drawn_out_into_it():
     assert scene.surfaces[0] is drawn.surfaces[0]
 
 
+def test_a_stump_that_was_taken_for_sand_is_ground_as_well():
+    scene, parts, field = planted(bottom=TOP + 0.05)
+    assert drawn_into_ground(scene, parts, field) == (scene, ())
+    stump = put(trimesh.creation.cylinder(0.012, 0.05, sections=24), TOP)
+    heap = trimesh.util.concatenate([put(trimesh.creation.cylinder(0.1, TOP), 0.0), stump])
+    stem = put(trimesh.creation.cylinder(0.012, HEIGHT, sections=12), TOP + 0.05)
+    stem = stem.subdivide().subdivide().subdivide()
+    things = thing((heap, SAND)), thing((stem, WOOD), (leaf_blades(40, TOP + 0.2), LEAVES))
+    drawn, said = drawn_into_ground(*inputs(*things))
+    assert lowest(drawn)[1] == pytest.approx(TOP + 0.05 - 0.2 * HEIGHT) and len(said) == 1
+
+
 def test_no_foot_goes_through_the_bottom_of_its_ground():
     scene, parts, field = planted()
     thin = scene.surfaces[0].vertices

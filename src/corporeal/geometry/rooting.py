@@ -96,17 +96,22 @@ def _depth(scene: Scene, parts: Parts, field: MaterialField, plant: _Plant) -> f
 
 
 def _height(ground: Mesh, foot: Float[np.ndarray, "N 3"]) -> float:
-    """Return how high the ground is about a foot [m]; nan: there is none."""
+    """Return how high the ground is about a foot, or below it if higher [m]; nan: there is none.
+
+    Below it is a stump where the lowest end of a trunk was taken for ground.
+    """
     middle = foot[:, :2].mean(axis=0)
-    radius = 1.5 * np.linalg.norm(foot[:, :2] - middle, axis=1).max()
+    radius = np.linalg.norm(foot[:, :2] - middle, axis=1).max()
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
+    around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     top = float(ground.corners[..., 2].max()) + 0.1 * ground.extent
-    start = np.column_stack(
-        [middle + radius * np.stack([np.cos(turn), np.sin(turn)], axis=1), np.full(AROUND, top)]
-    )
-    fall = Shape(ground).reach(start, np.tile([0.0, 0.0, -1.0], (AROUND, 1)))
-    fall = fall[np.isfinite(fall)]
-    return top - float(np.median(fall)) if len(fall) > AROUND / 2 else np.nan
+    heights = []
+    for reach in (0.25 * radius, 1.5 * radius):
+        start = np.column_stack([middle + reach * around, np.full(AROUND, top)])
+        fall = Shape(ground).reach(start, np.tile([0.0, 0.0, -1.0], (AROUND, 1)))
+        fall = fall[np.isfinite(fall)]
+        heights.append(top - float(np.median(fall)) if len(fall) > AROUND / 2 else np.nan)
+    return max(heights) if np.isfinite(heights).all() else np.nan
 
 
 def _drawn_out(scene: Scene, plant: _Plant, depth: float) -> Scene:
