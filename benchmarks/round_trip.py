@@ -71,7 +71,7 @@ FOUND = (
     "- Where things fly, bounce or topple, ends are as far off as the model's own run is from "
     "itself once its things are filled with other particles: at this detail a rubber ball is eight "
     "cells wide, and every bounce turns it by up to a degree. A row cannot say more than that. The "
-    "duck that hits a can at 6 m/s goes anywhere.",
+    "duck that hits a can at 6 m/s goes anywhere, and from pictures twice as far.",
     "- What nobody sees of a ball from below comes out a tenth or two of a millimetre from round, "
     "and tilted by up to half a degree; a pixel shows .6 mm.",
     "- The duck on the can weighs 10 % too much, its beak being solid and large; the can too "
