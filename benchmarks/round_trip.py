@@ -74,9 +74,9 @@ FOUND = (
     "duck that hits a can at 6 m/s goes anywhere, and from pictures twice as far.",
     "- What nobody sees of a ball from below comes out a tenth or two of a millimetre from round, "
     "and tilted by up to half a degree; a pixel shows .6 mm.",
-    "- The duck on the can weighs 10 % too much, its beak being solid and large; the can too "
+    "- The duck on the can weighs 11 % too much, its beak being solid and large; the can too "
     "little: its tab, 7 % of it, is not told.",
-    "- Boards of 16 mm come out a tenth too heavy. Nobody sees how deep the vase is hollow: it is "
+    "- Boards of 16 mm come out 7 % too heavy. Nobody sees how deep the vase is hollow: it is "
     "closed below its neck, so that its wall is counted across the mouth.",
     "- The couch's own volume is right to 5 %, but the panels of its plywood base that lie below "
     "the cushions are in no picture, and where plywood ends and foam begins no colour says, only "

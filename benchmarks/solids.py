@@ -24,8 +24,9 @@ from corporeal.formats.transforms import read_views
 from corporeal.geometry.filling import sample_surface
 from corporeal.geometry.mesh import Mesh, joined, weld
 from corporeal.geometry.shape import Shape
+from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.solid import Solid, solids
-from corporeal.splats.train import TrainConfig, train
+from corporeal.splats.train import train
 from corporeal.stages.assemble import assemble
 from corporeal.types import Gaussians, Scene, Views
 

@@ -27,11 +27,12 @@ from corporeal.geometry.region import region
 from corporeal.machine import cores
 from corporeal.splats.crew import Crew
 from corporeal.splats.exposure import differ
+from corporeal.splats.lesson import PRESETS, TrainConfig
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE
 from corporeal.splats.quality import quality
 from corporeal.splats.raster import back, draw, pinhole
 from corporeal.splats.sight import looked
-from corporeal.splats.train import PRESETS, TrainConfig, train
+from corporeal.splats.train import train
 from corporeal.types import Camera, Gaussians, Views
 
 PAGE = Path(__file__).parents[1] / "docs" / "splats.md"

@@ -12,7 +12,7 @@ from corporeal.formats.colmap import write_colmap
 from corporeal.formats.transforms import write_views
 from corporeal.geometry.similarity import moved_cameras, similarity
 from corporeal.render import figures
-from corporeal.splats import train
+from corporeal.splats import lesson, train
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
@@ -44,7 +44,7 @@ def views():
 def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "PANEL", (130, 98))
-    monkeypatch.setitem(train.PRESETS, "draft", train.Preset(4000, 1, 300, 128))
+    monkeypatch.setitem(lesson.PRESETS, "draft", lesson.Preset(4000, 1, 300, 128))
     return command
 
 

@@ -14,9 +14,10 @@ from splat_scenes import around, blobs
 from corporeal.errors import UserError
 from corporeal.splats import raster
 from corporeal.splats.crew import Crew
+from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.parameters import parameters
 from corporeal.splats.raster import pinhole
-from corporeal.splats.train import TrainConfig, train
+from corporeal.splats.train import train
 from corporeal.types import Views
 
 

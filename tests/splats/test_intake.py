@@ -11,8 +11,9 @@ from corporeal.formats.photographs import Photographs
 from corporeal.geometry.agreement import Agreement
 from corporeal.splats import intake
 from corporeal.splats.intake import take_in
+from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.quality import Quality
-from corporeal.splats.train import TrainConfig, Trained
+from corporeal.splats.train import Trained
 from corporeal.types import Camera, Gaussians, Views
 
 DOUBT = "The poses do not agree with the pictures."

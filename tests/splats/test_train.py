@@ -10,10 +10,11 @@ from corporeal.errors import UserError
 from corporeal.splats import limits, start, sweep
 from corporeal.splats import train as module
 from corporeal.splats.crew import Crew
+from corporeal.splats.lesson import TrainConfig, shrunk
 from corporeal.splats.limits import even
 from corporeal.splats.sight import looked
 from corporeal.splats.start import Points, hull
-from corporeal.splats.train import TrainConfig, shrunk, train
+from corporeal.splats.train import train
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.types import Finish, Scene, SceneObject, Surface, Views
 from glb_maker import CUBE, CUBE_TRIANGLES

@@ -33,8 +33,9 @@ from corporeal.regions.masks import lifted
 from corporeal.regions.objects import Split, components, objects
 from corporeal.regions.telling import told_apart
 from corporeal.splats.foreground import foreground, shown
+from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.raster import weights
-from corporeal.splats.train import TrainConfig, train
+from corporeal.splats.train import train
 from corporeal.stages.assemble import assemble
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.types import Camera, Cloud, Gaussians, Scene, Views

@@ -161,7 +161,7 @@ def contain(
 ) -> Held | None:
     """Say what is behind a wall; None: nothing but air.
 
-    m = ρ f (V - A t), with the share f of the room that the contents take up.
+    m = ρ f (V - V_wall), with the share f of the room that the contents take up.
     """
     structure = said[0]
     if structure.contents is None:

@@ -18,10 +18,11 @@ from corporeal.geometry.similarity import moved_cameras, moved_gaussians, simila
 from corporeal.geometry.upright import Stated, Upright, upright
 from corporeal.splats.contact import lowest
 from corporeal.splats.cutout import cut_out
+from corporeal.splats.lesson import PRESETS, TrainConfig
 from corporeal.splats.quality import Quality
 from corporeal.splats.raster import render
 from corporeal.splats.start import Points
-from corporeal.splats.train import GAIN, PRESETS, TrainConfig, Trained, train
+from corporeal.splats.train import GAIN, Trained, train
 from corporeal.types import Camera, Gaussians, Vector, Views
 
 Progress = Callable[[float, str], None]

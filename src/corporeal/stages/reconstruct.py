@@ -35,18 +35,18 @@ from corporeal.regions.telling import Rule, told_apart
 from corporeal.render.camera import cameras_around
 from corporeal.render.look import linear
 from corporeal.render.portrait import COLOURS, colour_of_part
-from corporeal.splats import train
+from corporeal.splats import lesson
 from corporeal.splats.channel import distilled
 from corporeal.splats.closed import Closed, closed
 from corporeal.splats.crew import Crew
 from corporeal.splats.field_points import field_points
 from corporeal.splats.foreground import Shown, foreground, shown
 from corporeal.splats.intake import Intake, Up, take_in, turned_upright
+from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.radiance import FieldConfig
 from corporeal.splats.raster import weights
 from corporeal.splats.sight import looked
 from corporeal.splats.solid import Solid
-from corporeal.splats.train import TrainConfig
 from corporeal.types import Cloud, Finish, Reconstruction, Scene, SceneObject, Surface
 from corporeal.vlm.things import (
     PERSON,
@@ -216,7 +216,7 @@ def accept(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool =
         check_extents(extents, [usual(name) for name in config.things])
     for spec in (config.semantic, config.structural):
         connect(spec)  # who is to look must be there before anything is learned
-    train.accept(config.rasteriser)
+    lesson.accept(config.rasteriser)
     _measured(config)
 
 
