@@ -11,7 +11,7 @@ from splat_scenes import around, blobs, pictured
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
 from corporeal.geometry.rotation import matrix
-from corporeal.splats import limits, start, sweep
+from corporeal.splats import hull, limits, start, sweep
 from corporeal.splats.crew import Crew
 from corporeal.splats.growth import CROWD, jitter, moved, shared, turn
 from corporeal.splats.kernels_learn import WINDOW, adam
@@ -19,7 +19,7 @@ from corporeal.splats.loss import Goal, goal, loss
 from corporeal.splats.parameters import gaussians_of, opacity, parameters
 from corporeal.splats.quality import psnr, quality, ssim
 from corporeal.splats.raster import draw, pinhole
-from corporeal.splats.start import Points, clearance, hull, seeded
+from corporeal.splats.start import Points, clearance, on_hull, seeded
 from corporeal.splats.sweep import neighbours, swept
 from corporeal.types import Views
 
@@ -176,14 +176,14 @@ def test_parallel_cameras_have_a_region():
 
 
 def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
-    monkeypatch.setattr(start, "CELLS", 50_000)
+    monkeypatch.setattr(hull, "CELLS", 50_000)
     cameras = around(40, (64, 64), focal=80.0)
     u, v = np.meshgrid(np.arange(64) + 0.5, np.arange(64) + 0.5)
     disc = np.hypot(u - 32, v - 32) < 80 * 0.5 / np.sqrt(9 - 0.25)
     masks = np.stack([disc] * 40)
     views, _ = pictured(blobs(), cameras)
     with Crew(1) as crew:
-        points = hull(views, masks, 3000, RNG(0), crew, 0.2)
+        points = on_hull(views, masks, 3000, RNG(0), crew, 0.2)
         distance, faint = np.linalg.norm(points.position, axis=1), points.opacity < start.OPAQUE
         assert len(distance) == 3000 and faint.sum() == 600
         on, within = distance[~faint], distance[faint]
@@ -191,7 +191,7 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
         # Evenly: the share within a radius grows as its cube.
         np.testing.assert_allclose(np.median(within), 0.5 * 0.5 ** (1 / 3), atol=0.02)
         with pytest.raises(UserError, match="inside all masks"):
-            hull(views, np.zeros_like(masks), 10, RNG(0), crew)
+            on_hull(views, np.zeros_like(masks), 10, RNG(0), crew)
 
 
 @pytest.fixture(scope="module")

@@ -6,7 +6,7 @@ from splat_scenes import around
 
 from corporeal.geometry.rotation import matrix
 from corporeal.geometry.similarity import moved_cameras, similarity
-from corporeal.splats import start
+from corporeal.splats import hull
 from corporeal.splats.contact import lowest
 from corporeal.types import Views
 
@@ -34,7 +34,7 @@ def pictures(cameras):
 
 @pytest.fixture(autouse=True)
 def coarse(monkeypatch):
-    monkeypatch.setattr(start, "CELLS", 200_000)
+    monkeypatch.setattr(hull, "CELLS", 200_000)
 
 
 @pytest.mark.parametrize("turn", [0.0, 0.6])

@@ -5,7 +5,7 @@ import pytest
 from splat_scenes import around
 
 from corporeal.errors import UserError
-from corporeal.splats import kernels_radiance, radiance, start
+from corporeal.splats import hull, kernels_radiance, radiance
 from corporeal.splats.channel import distilled
 from corporeal.splats.radiance import FieldConfig, camera_rows, field, learn, look, parted, points
 from corporeal.types import Views
@@ -158,7 +158,7 @@ def painted(cameras, radius=0.3):
 @pytest.fixture(scope="module")
 def small():
     with pytest.MonkeyPatch.context() as patch:
-        patch.setattr(start, "CELLS", 60_000)
+        patch.setattr(hull, "CELLS", 60_000)
         patch.setattr(radiance, "RAYS", 2048)
         yield
 

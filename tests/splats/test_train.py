@@ -7,13 +7,13 @@ import pytest
 from splat_scenes import around, blobs, pictured
 
 from corporeal.errors import UserError
-from corporeal.splats import limits, start, sweep
+from corporeal.splats import hull, limits, sweep
 from corporeal.splats import train as module
 from corporeal.splats.crew import Crew
 from corporeal.splats.lesson import TrainConfig, shrunk
 from corporeal.splats.limits import even
 from corporeal.splats.sight import looked
-from corporeal.splats.start import Points, hull
+from corporeal.splats.start import Points, on_hull
 from corporeal.splats.train import train
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.types import Finish, Scene, SceneObject, Surface, Views
@@ -30,7 +30,7 @@ def scene():
 
 @pytest.fixture(autouse=True)
 def coarse_beginnings(monkeypatch):
-    monkeypatch.setattr(start, "CELLS", 30_000)
+    monkeypatch.setattr(hull, "CELLS", 30_000)
     monkeypatch.setattr(sweep, "PIXELS", 4_000)
 
 
@@ -73,7 +73,7 @@ LEARNING = TrainConfig(gaussians=2000, steps=400, threads=1)
 def test_the_plain_seat_of_a_bench_is_found_below_the_hull(monkeypatch):
     """Gaussians that all begin on the hull, above the seat, do not get there."""
     views, masks = plain(BENCH)
-    monkeypatch.setattr(start, "CELLS", 300_000)
+    monkeypatch.setattr(hull, "CELLS", 300_000)
     made = train(views, masks, config=LEARNING).quality.psnr_things
     control = train(views, masks, config=replace(LEARNING, begin="hull")).quality.psnr_things
     assert made > control + 2 and made > 25
@@ -90,7 +90,7 @@ def test_nothing_begins_inside_a_box():
 @pytest.mark.slow
 def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_through(monkeypatch):
     views, masks = plain(BENCH)
-    monkeypatch.setattr(start, "CELLS", 300_000)
+    monkeypatch.setattr(hull, "CELLS", 300_000)
 
     def deep() -> float:
         """Return how far below the faces what is seen lies, in the mean [m]."""
@@ -102,7 +102,7 @@ def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_thro
 
     small = deep()
     monkeypatch.setattr(limits, "even", lambda theta, widest: even(theta, 10.0))
-    monkeypatch.setattr(module, "hull", lambda *what: replace(hull(*what), width=None))
+    monkeypatch.setattr(module, "on_hull", lambda *what: replace(on_hull(*what), width=None))
     assert small < deep() / 1.2
 
 

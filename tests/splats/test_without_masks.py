@@ -8,12 +8,13 @@ from corporeal.geometry.ground_plane import Plane
 from corporeal.splats import exposure, limits, sweep
 from corporeal.splats.crew import Crew
 from corporeal.splats.enclosure import Enclosure, cover, directions, enclosure
+from corporeal.splats.hull import camera_rows
 from corporeal.splats.kernels_learn import adam
 from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.parameters import parameters
 from corporeal.splats.quality import quality
 from corporeal.splats.raster import draw, pinhole
-from corporeal.splats.start import Points, camera_rows, chosen, joined, seeded
+from corporeal.splats.start import Points, chosen, joined, seeded
 from corporeal.splats.surfaces import Surfaces
 from corporeal.splats.sweep import swept
 from corporeal.splats.train import train

@@ -15,7 +15,7 @@ from corporeal.geometry.followed import followed
 from corporeal.geometry.gaussians import placed
 from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.similarity import moved_points
-from corporeal.splats import radiance, solid, start
+from corporeal.splats import hull, radiance, solid
 from corporeal.stages import reconstruct as stage
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
 from corporeal.vlm.things import Thing, Viewer
@@ -166,7 +166,7 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
 
     monkeypatch.setattr(stage, "told_apart", stopped)
     monkeypatch.setattr(clouds, "connect", lambda spec, folder: Colours())
-    monkeypatch.setattr(start, "CELLS", 100_000)
+    monkeypatch.setattr(hull, "CELLS", 100_000)
     monkeypatch.setitem(radiance.PRESETS, "draft", radiance.Preset(100, 160))
     monkeypatch.setattr(radiance, "RAYS", 2048)
     config = ReconstructConfig(things=("a", "b"), training="draft", lifting=lifting)

@@ -6,7 +6,7 @@ Hernández, Schmitt & Cipolla, "Silhouette coherence for camera calibration unde
 """
 
 import numpy as np
-from jaxtyping import UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 from PIL import Image
 from scipy.ndimage import binary_dilation
 
@@ -30,24 +30,20 @@ def coherence(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) ->
     radius = float(np.median([np.linalg.norm(centre - eye) * size for eye, _, size in aims]))
     line = np.linspace(-1, 1, GRID) * radius * MARGIN
     points = centre + np.stack(np.meshgrid(line, line, line), axis=-1).reshape(-1, 3)
-    small = [_small(mask) for mask in masks]
+    coarse = [small(mask) for mask in masks]
     allowed = np.ones(len(points), bool)
     cells = []
-    for mask, camera in zip(small, cameras, strict=True):
-        cell = _cells(points, camera, mask.shape)
+    for mask, camera in zip(coarse, cameras, strict=True):
+        cell = cells_of(points, camera, mask.shape)
         cells.append(cell)
         near = np.asarray(binary_dilation(mask), bool)  # nothing is lost for being thin
         allowed &= (cell < 0) | near.ravel()[cell]
-    return float(np.median([_filled(m, c[allowed]) for m, c in zip(small, cells, strict=True)]))
+    return float(np.median([_filled(m, c[allowed]) for m, c in zip(coarse, cells, strict=True)]))
 
 
-def _filled(mask: np.ndarray, cells: np.ndarray) -> float:
-    covered = np.zeros(mask.size, bool)
-    covered[cells[cells >= 0]] = True
-    return float((covered & mask.ravel()).sum() / max(mask.sum(), 1))
-
-
-def _cells(points: np.ndarray, camera: Camera, shape: tuple[int, ...]) -> np.ndarray:
+def cells_of(
+    points: Float[np.ndarray, "N 3"], camera: Camera, shape: tuple[int, ...]
+) -> Int[np.ndarray, " N"]:
     """Return which pixel of a small picture shows each point; -1: none."""
     P = projection(camera)
     u, v, depth = (points @ P[:, :3].T + P[:, 3]).T
@@ -56,6 +52,19 @@ def _cells(points: np.ndarray, camera: Camera, shape: tuple[int, ...]) -> np.nda
         row = np.floor(v / depth * shape[0] / camera.height)
     seen = (depth > 0) & (column >= 0) & (column < shape[1]) & (row >= 0) & (row < shape[0])
     return np.where(seen, row * shape[1] + column, -1).astype(np.int64)
+
+
+def small(mask: UInt8[np.ndarray, "H W"]) -> Bool[np.ndarray, "h w"]:
+    """Return a mask as silhouettes are compared, no side longer than SIDE."""
+    share = min(1.0, SIDE / max(mask.shape))
+    size = (max(1, round(mask.shape[1] * share)), max(1, round(mask.shape[0] * share)))
+    return np.asarray(Image.fromarray(mask).resize(size, Image.Resampling.BOX)) > INSIDE
+
+
+def _filled(mask: np.ndarray, cells: np.ndarray) -> float:
+    covered = np.zeros(mask.size, bool)
+    covered[cells[cells >= 0]] = True
+    return float((covered & mask.ravel()).sum() / max(mask.sum(), 1))
 
 
 def _aim(mask: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray, float]:
@@ -74,9 +83,3 @@ def _nearest(rays: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
     across = [np.eye(3) - np.outer(ray, ray) for _, ray in rays]
     right = np.sum([a @ eye for a, (eye, _) in zip(across, rays, strict=True)], axis=0)
     return np.linalg.lstsq(np.sum(across, axis=0), right, rcond=None)[0]
-
-
-def _small(mask: np.ndarray) -> np.ndarray:
-    share = min(1.0, SIDE / max(mask.shape))
-    size = (max(1, round(mask.shape[1] * share)), max(1, round(mask.shape[0] * share)))
-    return np.asarray(Image.fromarray(mask).resize(size, Image.Resampling.BOX)) > INSIDE

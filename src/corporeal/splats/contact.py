@@ -11,7 +11,7 @@ from scipy.ndimage import shift
 
 from corporeal.geometry.region import region
 from corporeal.splats.crew import Crew
-from corporeal.splats.start import Carved, tight
+from corporeal.splats.hull import Carved, tight
 from corporeal.types import Camera, Views
 
 STEEP = 0.3

@@ -21,10 +21,10 @@ from corporeal.geometry.interpolation import within
 from corporeal.splats import kernels_radiance, saved
 from corporeal.splats.carve import Grid
 from corporeal.splats.crew import Crew
+from corporeal.splats.hull import tight
 from corporeal.splats.lesson import shrunk
 from corporeal.splats.quality import Quality, psnr, ssim
 from corporeal.splats.raster import Picture
-from corporeal.splats.start import tight
 from corporeal.splats.train import GREY
 from corporeal.types import Camera, Views
 

@@ -7,18 +7,13 @@ from jaxtyping import Bool, Float, Int
 from scipy.ndimage import binary_erosion
 from scipy.spatial import KDTree
 
-from corporeal.errors import UserError
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.region import region
 from corporeal.splats.crew import Crew
-from corporeal.splats.kernels_learn import witness
+from corporeal.splats.hull import tight, witnessed
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE, Parameters
 from corporeal.types import Camera, Views
 
-CELLS = 2_000_000
-"""Of the grid that the visual hull is carved from."""
-ASTRAY = 0.05
-"""Share of the views that may see a point of the hull beside things: masks err at edges."""
 OPAQUE, FAINT = 0.5, 0.3
 """Opacity of Gaussians where they begin, on the hull and inside."""
 
@@ -80,7 +75,7 @@ def clearance(cameras: tuple[Camera, ...]) -> Float[np.ndarray, " V"]:
     return ROOM * np.linalg.norm(eyes - region(cameras).centre, axis=1)
 
 
-def hull(
+def on_hull(
     views: Views,
     masks: Bool[np.ndarray, "V H W"],
     count: int,
@@ -103,7 +98,7 @@ def hull(
     on = count - deep
     position = np.concatenate([_some(fine.cells[fine.inside], deep, rng), _some(shell, on, rng)])
     position += fine.side * rng.uniform(-0.5, 0.5, position.shape)
-    seen = _witnessed(position, views, masks, crew)
+    seen = witnessed(position, views, masks, crew)
     apart = fine.side * np.sqrt(len(shell) / on)
     return Points(
         position,
@@ -115,21 +110,6 @@ def hull(
 
 def _some(cells: Float[np.ndarray, "N 3"], count: int, rng: np.random.Generator) -> np.ndarray:
     return cells[rng.choice(len(cells), count, replace=len(cells) < count)]
-
-
-def tight(views: Views, masks: Bool[np.ndarray, "V H W"], crew: Crew) -> "Carved":
-    """Return the visual hull in a box that hardly holds more.
-
-    Raises:
-        UserError: Nothing is inside all masks.
-
-    """
-    around = region(views.cameras)
-    middle, reach = np.array(around.centre), 1.5 * around.radius
-    rough = carved(middle - reach, middle + reach, views, masks, crew)
-    found = rough.cells[rough.inside]
-    low, high = found.min(axis=0) - 2 * rough.side, found.max(axis=0) + 2 * rough.side
-    return carved(low, high, views, masks, crew)
 
 
 def seeded(points: Points, count: int, degree: int, rng: np.random.Generator) -> Parameters:
@@ -166,65 +146,3 @@ def _facing(normal: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 4"]:
     q = np.stack([1 + z, -y, x, np.zeros(len(normal))], axis=1)
     q[z < -1 + 1e-9] = 0, 1, 0, 0
     return q / np.linalg.norm(q, axis=1, keepdims=True)
-
-
-@dataclass(frozen=True)
-class Carved:
-    """Cubes that fill a box, and which of them are inside all masks."""
-
-    cells: Float[np.ndarray, "X Y Z 3"]
-    """Their middles [m]."""
-    side: float
-    """[m]"""
-    inside: Bool[np.ndarray, "X Y Z"]
-
-
-def carved(
-    low: np.ndarray,
-    high: np.ndarray,
-    views: Views,
-    masks: np.ndarray,
-    crew: Crew,
-    astray: float = ASTRAY,
-) -> Carved:
-    """Carve a box: what is left is on things in all views that see it, but for a few.
-
-    astray: the share of the views that these may be.
-
-    Raises:
-        UserError: Nothing is left.
-
-    """
-    side = float(np.cbrt(np.prod(high - low) / CELLS))
-    axes = [np.arange(a + side / 2, b, side) for a, b in zip(low, high, strict=True)]
-    cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    seen = _witnessed(cells.reshape(-1, 3), views, masks, crew, astray)
-    count = len(views.cameras)
-    inside = (seen[:, 1] <= astray * count) & (seen[:, 0] >= max(1, count / 4))
-    if not inside.any():
-        raise UserError(
-            "No place in space is inside all masks. Check that cameras, pictures and masks "
-            "belong together, and the convention of the camera poses."
-        )
-    return Carved(cells, side, inside.reshape(cells.shape[:3]))
-
-
-def _witnessed(
-    points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew, astray: float = ASTRAY
-) -> np.ndarray:
-    out = np.empty((len(points), 5))
-    patience = astray * len(views.cameras)
-    rest = camera_rows(views.cameras), views.rgb, masks, patience, out
-    points = np.ascontiguousarray(points, dtype=np.float64)
-    crew.each(witness, [(points, *span, *rest) for span in crew.spans(len(points))])
-    return out
-
-
-def camera_rows(cameras: tuple[Camera, ...]) -> Float[np.ndarray, "V 16"]:
-    """Return cameras as kernels read many: camera from world (3 × 4), then fx, fy, cx, cy."""
-    rows = np.empty((len(cameras), 16))
-    for row, camera in zip(rows, cameras, strict=True):
-        row[:12] = np.linalg.inv(camera.world_from_camera)[:3].ravel()
-        K = camera.K
-        row[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
-    return rows

@@ -29,7 +29,7 @@ class Surfaces:
     """What each view sees how far away; V views, h × w looks from each."""
 
     cameras: Float[np.ndarray, "V 16"]
-    """As ``start.camera_rows``."""
+    """As ``hull.camera_rows``."""
     pace: float
     """Pixels of these cameras from one look to the next."""
     clear: Float[np.ndarray, " V"]

@@ -14,8 +14,9 @@ from corporeal.errors import UserError
 from corporeal.geometry.region import region
 from corporeal.splats.crew import Crew
 from corporeal.splats.enclosure import cover, enclosure
+from corporeal.splats.hull import camera_rows
 from corporeal.splats.kernels_sweep import prefer, support, sweep
-from corporeal.splats.start import Points, camera_rows, clearance, joined
+from corporeal.splats.start import Points, clearance, joined
 from corporeal.splats.surfaces import Surfaces
 from corporeal.types import Camera, Views
 

@@ -31,7 +31,7 @@ from corporeal.splats.parameters import (
     opacity,
 )
 from corporeal.splats.quality import Quality, quality
-from corporeal.splats.start import Points, hull, joined, seeded
+from corporeal.splats.start import Points, joined, on_hull, seeded
 from corporeal.splats.sweep import swept
 from corporeal.types import Gaussians, Vector, Views
 
@@ -163,7 +163,7 @@ def _begun(lesson: Lesson, checkpoint: Path | None, crew: Crew, progress: Progre
             # As far as so many are apart on a sphere. One that is wider shows all of a plain face
             # from below it, and costs less of PULL than those that lie on it.
             widest = lesson.radius * np.sqrt(4 * np.pi / preset.gaussians)
-        points = hull(views, masks, preset.gaussians, rng, crew, WITHIN * inside)
+        points = on_hull(views, masks, preset.gaussians, rng, crew, WITHIN * inside)
     assert points is not None
     theta = seeded(points, preset.gaussians, preset.degree, rng)
     bounds, _ = _bounds(theta, widest, lesson, crew)

@@ -1,0 +1,144 @@
+"""The visual hull: the part of space that all masks allow."""
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import label, maximum
+
+from corporeal.errors import UserError
+from corporeal.geometry.region import region
+from corporeal.geometry.silhouettes import cells_of, small
+from corporeal.splats.crew import Crew
+from corporeal.splats.kernels_learn import witness
+from corporeal.types import Camera, Views
+
+CELLS = 2_000_000
+"""Of the grid that the visual hull is carved from."""
+ASTRAY = 0.05
+"""Share of the views that may see a point of the hull beside things: masks err at edges."""
+FEW = 7
+"""Where no more views look, silhouettes may cross by chance where there is nothing."""
+NEEDED = 0.2
+"""Share of the pixels of a piece of the hull that only it must fill for it to stand there."""
+
+
+@dataclass(frozen=True)
+class Carved:
+    """Cubes that fill a box, and which of them are inside all masks."""
+
+    cells: Float[np.ndarray, "X Y Z 3"]
+    """Their middles [m]."""
+    side: float
+    """[m]"""
+    inside: Bool[np.ndarray, "X Y Z"]
+
+
+def tight(views: Views, masks: Bool[np.ndarray, "V H W"], crew: Crew) -> Carved:
+    """Return the visual hull in a box that hardly holds more.
+
+    Raises:
+        UserError: Nothing is inside all masks.
+
+    """
+    around = region(views.cameras)
+    middle, reach = np.array(around.centre), 1.5 * around.radius
+    rough = carved(middle - reach, middle + reach, views, masks, crew)
+    found = rough.cells[rough.inside]
+    low, high = found.min(axis=0) - 2 * rough.side, found.max(axis=0) + 2 * rough.side
+    return carved(low, high, views, masks, crew)
+
+
+def carved(
+    low: np.ndarray,
+    high: np.ndarray,
+    views: Views,
+    masks: np.ndarray,
+    crew: Crew,
+    astray: float = ASTRAY,
+) -> Carved:
+    """Carve a box: what is left is on things in all views that see it, but for a few.
+
+    astray: the share of the views that these may be.
+
+    Raises:
+        UserError: Nothing is left.
+
+    """
+    side = float(np.cbrt(np.prod(high - low) / CELLS))
+    axes = [np.arange(a + side / 2, b, side) for a, b in zip(low, high, strict=True)]
+    cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
+    seen = witnessed(cells.reshape(-1, 3), views, masks, crew, astray)
+    count = len(views.cameras)
+    inside = (seen[:, 1] <= astray * count) & (seen[:, 0] >= max(1, count / 4))
+    if not inside.any():
+        raise UserError(
+            "No place in space is inside all masks. Check that cameras, pictures and masks "
+            "belong together, and the convention of the camera poses."
+        )
+    found = Carved(cells, side, inside.reshape(cells.shape[:3]))
+    return _without_phantoms(found, seen[:, 0].reshape(cells.shape[:3]), views, masks)
+
+
+def _without_phantoms(
+    hull: Carved, seen: Float[np.ndarray, "X Y Z"], views: Views, masks: np.ndarray
+) -> Carved:
+    """Drop pieces that few views see and that fill little of the masks that others do not fill.
+
+    A piece that stands for a thing fills all of its silhouettes, one where silhouettes cross by
+    chance only what they share: those that fill most are taken first.
+    """
+    piece = np.empty(hull.inside.shape, np.int32)
+    label(hull.inside, np.ones((3, 3, 3)), piece)
+    count = int(piece.max())
+    most = np.asarray(maximum(seen, piece, np.arange(1, count + 1)))
+    sure = np.concatenate([[True], most > FEW])
+    if count < 2 or sure.all():
+        return hull
+    pixel, owner = _shown(hull.cells[hull.inside], piece[hull.inside], views.cameras, masks)
+    own = np.bincount(owner, minlength=count + 1)
+    bare = ~np.isin(pixel, pixel[sure[owner]])
+    kept = sure
+    while True:
+        gain = np.bincount(owner[bare], minlength=count + 1)
+        best = np.argmax(np.where(gain >= NEEDED * own, gain, 0))
+        if gain[best] == 0:
+            return replace(hull, inside=hull.inside & kept[piece])
+        kept[best] = True
+        bare &= ~np.isin(pixel, pixel[owner == best])
+
+
+def _shown(
+    places: np.ndarray, owner: np.ndarray, cameras: tuple[Camera, ...], masks: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Return which pixels of all small pictures show whom; each pair once."""
+    pairs = []
+    for k, (camera, mask) in enumerate(zip(cameras, masks, strict=True)):
+        on = small(255 * mask.astype(np.uint8))
+        pixel = cells_of(places, camera, on.shape)
+        good = (pixel >= 0) & on.ravel()[pixel]
+        pairs.append(np.stack([pixel[good] + k * on.size, owner[good]], axis=1))
+    pixel, who = np.unique(np.concatenate(pairs), axis=0).T
+    return pixel, who
+
+
+def witnessed(
+    points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew, astray: float = ASTRAY
+) -> Float[np.ndarray, "N 5"]:
+    """Return what views say of points, as ``kernels_learn.witness`` has it."""
+    out = np.empty((len(points), 5))
+    patience = astray * len(views.cameras)
+    rest = camera_rows(views.cameras), views.rgb, masks, patience, out
+    points = np.ascontiguousarray(points, dtype=np.float64)
+    crew.each(witness, [(points, *span, *rest) for span in crew.spans(len(points))])
+    return out
+
+
+def camera_rows(cameras: tuple[Camera, ...]) -> Float[np.ndarray, "V 16"]:
+    """Return cameras as kernels read many: camera from world (3 × 4), then fx, fy, cx, cy."""
+    rows = np.empty((len(cameras), 16))
+    for row, camera in zip(rows, cameras, strict=True):
+        row[:12] = np.linalg.inv(camera.world_from_camera)[:3].ravel()
+        K = camera.K
+        row[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
+    return rows
