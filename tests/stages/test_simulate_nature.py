@@ -5,7 +5,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 
+from corporeal.geometry.filling import fill_body
+from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.shape import Shape
 from corporeal.mpm import checkpoint
 from corporeal.mpm.audit import outcome
 from corporeal.mpm.frames import read_trajectory
@@ -23,6 +27,7 @@ from corporeal.types import (
 )
 
 JELLY = Material("jelly", Law.NEO_HOOKEAN, 1e5, 0.4, 1000.0)
+RUBBER = Material("rubber", Law.NEO_HOOKEAN, 3e6, 0.48, 1100.0)
 STEEL = Material("steel", Law.HENCKY, 200e9, 0.3, 7850.0)
 SIZE, FALL = 0.1, 0.05
 
@@ -123,6 +128,34 @@ def test_a_steel_ball_rebounds_by_its_coefficient_of_restitution(tmp_path):
     assert particles.treatments[0].kind == "rigid"
     assert row["objects"]["ball_0"]["rebound_ratio"] == pytest.approx(0.36, abs=0.04)
     assert row["objects"]["ball_0"]["shape_error_max"] < 1e-6
+
+
+def test_a_ball_dropped_upright_bounces_upright(tmp_path):
+    """Its middle is where its mass is; with points that all weigh alike it goes aside."""
+    sphere = trimesh.creation.icosphere(4, SIZE / 2)
+    shape = Shape(Mesh(np.asarray(sphere.vertices), np.asarray(sphere.faces)))
+    aside = {"cells": [], "alike": []}
+    for seed in range(3):
+        scene, particles, field = balls([RUBBER], [3 * FALL], duration=0.4)
+        spacing, rng = particles.cell / 2, np.random.default_rng(seed)
+        made = fill_body(shape, shape, spacing, lambda p: np.full(len(p), np.inf), rng)
+        for way, volumes in (("cells", made.volumes), ("alike", np.ones(len(made.points)))):
+            dropped = replace(
+                particles,
+                position=made.points + np.array([0, 0, 3 * FALL + SIZE / 2]),
+                velocity=np.zeros_like(made.points),
+                volume=volumes * (np.pi / 6 * SIZE**3 / volumes.sum()),
+                density=np.full(len(volumes), RUBBER.density),
+                object=np.zeros(len(volumes), np.int64),
+                part=np.zeros(len(volumes), np.int64),
+            )
+            out = tmp_path / f"{way}{seed}"
+            middle = simulate(scene, dropped, field, SimulateConfig(), out).ledger["centre"][:, 0]
+            low = np.argmin(middle[:, 2])
+            risen = middle[low:][np.argmax(middle[low:, 2])] - middle[low]
+            aside[way].append(np.hypot(*risen[:2]) / risen[2])
+    assert np.mean(aside["cells"]) < 0.01
+    assert np.mean(aside["alike"]) > 2 * np.mean(aside["cells"])
 
 
 def test_two_balls_that_meet_part_again_and_one_field_glues_them(tmp_path):

@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.quadrature import centred
 from corporeal.geometry.settle import settle
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import sample_surface, scatter, thin_out
@@ -37,7 +38,7 @@ def fill_body(
     """Fill a body, or the wall below its surface.
 
     Where it is thinner than ``spacing``, one layer of points in its middle replaces the fill, so
-    that stalks and slats have no gaps.
+    that stalks and slats have no gaps. What has matter all through is divided among its points.
 
     Args:
         shape: The body.
@@ -67,15 +68,17 @@ def fill_body(
     each = lost / max(len(middle), 1)
     if each < SLIVER * spacing**3 and len(points):  # only sharp edges: nothing to speak of
         middle = middle[:0]
-    if not len(middle):
-        return Filling(
-            settle(points, shape, skin, spacing, limit), np.full(len(points), spacing**3)
-        )
     everything = np.concatenate([points, middle])
     held = np.arange(len(everything)) >= len(points)
     limit = np.concatenate([limit, np.full(len(middle), np.inf)])
-    volumes = np.where(held, max(each, SLIVER * spacing**3), spacing**3)
-    return Filling(settle(everything, shape, skin, spacing, limit, held), volumes)
+    settled = settle(everything, shape, skin, spacing, limit, held)
+    least = SLIVER * spacing**3
+    if np.isfinite(limit).any():
+        return Filling(settled, np.where(held, max(each, least), spacing**3))
+    settled, volumes = centred(settled, shape, spacing, held)
+    if held.any():
+        volumes[held] = volumes[held].mean()  # of what is this thin, samples are few
+    return Filling(settled, np.maximum(volumes, least))
 
 
 def _pick(mask: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import repel
@@ -78,7 +78,7 @@ def settle(
         distance, skin = _feel(points, near, outer, spacing)
         _press(points, skin, spacing, limit, draw=False)
         near = near[(distance < spacing) | (distance > limit[near] - spacing)]
-    return _stay_inside(points, start, shape, near)
+    return stay_inside(points, start, shape, near)
 
 
 def _feel(
@@ -105,10 +105,16 @@ def _press(
     points[skin.which] += (wanted - depth)[:, None] * skin.inward
 
 
-def _stay_inside(
-    points: np.ndarray, start: np.ndarray, shape: Shape, lost: np.ndarray
-) -> np.ndarray:
-    """Take back, by halves and then wholly, what ended outside: gaps narrower than a spacing."""
+def stay_inside(
+    points: Float[np.ndarray, "N 3"],
+    start: Float[np.ndarray, "N 3"],
+    shape: Shape,
+    lost: Int[np.ndarray, " M"],
+) -> Float[np.ndarray, "N 3"]:
+    """Take back, by halves and then wholly, which of some points ended outside; in place.
+
+    Gaps may be narrower than points are apart.
+    """
     for share in (0.5, 0.25, 0.0):
         lost = lost[~shape.inside(points[lost])]
         if not len(lost):

@@ -1,6 +1,7 @@
 """Points spread evenly and without a lattice: jittered starts, dart throwing, repulsion."""
 
-from dataclasses import dataclass
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -9,6 +10,9 @@ from numba import njit
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.shape import Shape, random_rotation
 
+SLAB = 4_000_000
+"""Cubes that are looked at together."""
+
 
 def scatter(shape: Shape, spacing: float, rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
     """One jittered point per cube of ``spacing``, where it falls inside the shape.
@@ -16,6 +20,13 @@ def scatter(shape: Shape, spacing: float, rng: np.random.Generator) -> Float[np.
     The cubes stand in a random frame, so that no row of them follows a face. Each point stands
     for spacing³.
     """
+    return np.concatenate(list(scattered(shape, spacing, rng)))
+
+
+def scattered(
+    shape: Shape, spacing: float, rng: np.random.Generator
+) -> Iterator[Float[np.ndarray, "N 3"]]:
+    """Return as ``scatter`` does, slab by slab: of many points, not all need room at once."""
     used = shape.mesh.vertices[np.unique(shape.mesh.triangles)]
     frame, centre = random_rotation(rng), used.mean(axis=0)
     turned = (used - centre) @ frame
@@ -23,7 +34,8 @@ def scatter(shape: Shape, spacing: float, rng: np.random.Generator) -> Float[np.
     low = turned.min(axis=0) - rng.uniform(0, 1, 3) * spacing
     counts = np.ceil((turned.max(axis=0) - low) / spacing).astype(int) + 1
     way = _by_columns if shape.closed else _by_blocks
-    return way(shape, Lattice(frame, centre, low, counts, spacing), rng)
+    for slab in Lattice(frame, centre, low, counts, spacing).slabs():
+        yield way(shape, slab, rng)
 
 
 @dataclass(frozen=True)
@@ -42,6 +54,14 @@ class Lattice:
     def world(self, inner: np.ndarray) -> np.ndarray:
         """World position of points that are given in cubes from the first corner."""
         return (self.low + inner * self.spacing) @ self.frame.T + self.centre
+
+    def slabs(self) -> "Iterator[Lattice]":
+        """Cut it along its first axis into lattices of at most SLAB cubes or of four layers."""
+        thick = max(4, SLAB // int(self.counts[1] * self.counts[2]) // 4 * 4)
+        for first in range(0, self.counts[0], thick):
+            low = self.low + np.array([first * self.spacing, 0, 0])
+            counts = np.array([min(thick, self.counts[0] - first), *self.counts[1:]])
+            yield replace(self, low=low, counts=counts)
 
 
 def _by_columns(shape: Shape, lattice: Lattice, rng: np.random.Generator) -> np.ndarray:

@@ -1,0 +1,52 @@
+"""Points that stand for the space around them, as the nodes of a quadrature do.
+
+Points spread evenly stand for unequal shares of a body all the same. If all weigh alike, a ball
+of some thousand points has its mass beside its middle and is softer here than there: dropped
+upright it bounces off to a side. Each point at the centroid of its Voronoi cell and with the cell's
+volume is the midpoint rule: exact for whatever is linear within cells, so for mass and its centre.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial import KDTree
+
+from corporeal.geometry.settle import stay_inside
+from corporeal.geometry.shape import Shape
+from corporeal.geometry.spread import scattered
+from corporeal.machine import cores
+
+FINER = 5
+"""Samples per spacing. With 3 a rubber ball bounces to a side by as much as with equal volumes."""
+
+
+def centred(
+    points: Float[np.ndarray, "N 3"],
+    shape: Shape,
+    spacing: float,
+    held: Bool[np.ndarray, " N"],
+) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, " N"]]:
+    """Move points to the centroids of their Voronoi cells within a shape, and measure these.
+
+    Args:
+        points: Inside the shape, about ``spacing`` apart [m].
+        shape: What is divided among them.
+        spacing: [m]
+        held: Points that stay: layers in the middle of what is thin.
+
+    Returns:
+        Positions [m] and volumes of the cells [m³].
+
+    """
+    if not len(points):
+        return points, np.zeros(0)
+    tree = KDTree(points)
+    count, total = np.zeros(len(points)), np.zeros_like(points)
+    for samples in scattered(shape, spacing / FINER, np.random.default_rng(5)):
+        _, owner = tree.query(samples, workers=cores())
+        count += np.bincount(owner, minlength=len(points))
+        for axis in range(3):
+            total[:, axis] += np.bincount(owner, samples[:, axis], len(points))
+    moved = np.flatnonzero((count > 0) & ~held)
+    centre = points.copy()
+    centre[moved] = total[moved] / count[moved, None]
+    return stay_inside(centre, points, shape, moved), count * (spacing / FINER) ** 3

@@ -1,0 +1,104 @@
+"""Points that stand for the space around them."""
+
+import numpy as np
+import pytest
+import trimesh
+
+from corporeal.geometry import filling
+from corporeal.geometry.filling import Filling, fill_body
+from corporeal.geometry.mesh import weld
+from corporeal.geometry.quadrature import centred
+from corporeal.geometry.shape import Shape
+from corporeal.mpm.contact import half_space_mean
+
+SPACING, CELL = 0.05, 0.1
+TILT = trimesh.transformations.rotation_matrix(0.4, (1, 2, 3))
+
+
+def shaped(mesh):
+    return Shape(weld(np.asarray(mesh.vertices), np.asarray(mesh.faces))[0])
+
+
+def filled(shape, seed=0):
+    rng = np.random.default_rng(seed)
+    return fill_body(shape, shape, SPACING, lambda p: np.full(len(p), np.inf), rng)
+
+
+def equal(points, *_):
+    return points, np.full(len(points), SPACING**3)
+
+
+@pytest.fixture
+def alike(monkeypatch):
+    """Fill as if every point stood for spacing³: the control."""
+
+    def fill(shape, seed=0):
+        with monkeypatch.context() as patch:
+            patch.setattr(filling, "centred", equal)
+            return filled(shape, seed)
+
+    return fill
+
+
+def centre(made: Filling):
+    return np.average(made.points, axis=0, weights=made.volumes)
+
+
+def test_a_ball_has_its_volume_and_its_mass_in_the_middle(alike):
+    sphere = trimesh.creation.icosphere(4, 0.4)
+    ball, volume, inertia = shaped(sphere), sphere.volume, 0.4 * sphere.volume * 0.4**2
+    far, off = [], []
+    for seed in range(4):
+        made = filled(ball, seed)
+        assert made.volumes.sum() == pytest.approx(volume, rel=2e-3)
+        about = made.volumes @ (made.points[:, :2] ** 2).sum(axis=1)
+        assert about == pytest.approx(inertia, rel=0.02)
+        far.append(np.linalg.norm(centre(made)))
+        off.append(np.linalg.norm(centre(alike(ball, seed))))
+    assert np.mean(far) < 0.01 * SPACING
+    assert np.mean(off) > 3 * np.mean(far)
+
+
+def face_as_nodes_see_it(made: Filling, above: float):
+    """Mean offset of a tilted cube's matter from nodes near its top face, and its share [dx]."""
+    rng, offset, share = np.random.default_rng(3), [], []
+    for across in rng.uniform(-0.3, 0.3, (200, 2)):
+        node = TILT[:3, :3] @ [*across, 0.5 + above * CELL]
+        away = np.abs(made.points - node) / CELL
+        weight = np.where(away < 0.5, 0.75 - away**2, 0.5 * np.maximum(1.5 - away, 0) ** 2)
+        weight = made.volumes * weight.prod(axis=1)
+        offset.append(weight @ ((made.points - node) @ TILT[:3, 2]) / weight.sum() / CELL)
+        share.append(weight.sum() / CELL**3)
+    return np.array(offset), np.array(share)
+
+
+@pytest.mark.parametrize(("above", "half"), [(-0.5, 0.8438), (0.0, 0.5), (0.5, 0.1562)])
+def test_a_tilted_face_is_plain_and_where_it_is(alike, above, half):
+    """Contact reads where a face is from mean offsets on nodes: they must not depend on chance."""
+    cube = trimesh.creation.box((1, 1, 1))
+    cube.apply_transform(TILT)
+    shape = shaped(cube)
+    offset, share = face_as_nodes_see_it(filled(shape), above)
+    control, _ = face_as_nodes_see_it(alike(shape), above)
+    assert offset.std() < 0.004
+    assert control.std() > 2 * offset.std()
+    assert share.mean() == pytest.approx(half, abs=0.003)  # what a half space takes of a node
+    exact = float(half_space_mean(np.array([-above]))[0])
+    assert abs(offset.mean() - exact) < abs(control.mean() - exact)
+
+
+def test_points_whose_centroid_is_in_the_open_stay():
+    """Of long cells in a bent wall they lie beside it."""
+    wall = trimesh.creation.annulus(0.98, 1.0, 0.3, sections=256)
+    ring = shaped(wall)
+    turn = np.linspace(0, 2 * np.pi, 6, endpoint=False)
+    points = 0.99 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    moved, volumes = centred(points, ring, 0.1, np.zeros(6, bool))
+    assert ring.inside(moved).all()
+    assert volumes.sum() == pytest.approx(wall.volume, rel=0.03)
+
+
+def test_nothing_is_divided_among_nobody():
+    ball = shaped(trimesh.creation.icosphere(1))
+    points, volumes = centred(np.zeros((0, 3)), ball, 0.1, np.zeros(0, bool))
+    assert points.shape == (0, 3) and volumes.shape == (0,)
