@@ -68,12 +68,11 @@ Training = Literal["draft", "normal"]
 FOUND = (
     "- Compact things keep their mass to a percent, and a duck on mud lands, sinks in and stays "
     "as its model does. Plants stand and sway.",
-    "- Where things fly, bounce or topple, ends are as far off as the model's own run is from "
-    "itself once its things are filled with other particles: at this detail a rubber ball is eight "
-    "cells wide, and every bounce turns it by up to a degree. A row cannot say more than that. The "
-    "duck that hits a can at 6 m/s goes anywhere, and from pictures twice as far.",
-    "- What nobody sees of a ball from below comes out a tenth or two of a millimetre from round, "
-    "and tilted by up to half a degree; a pixel shows .6 mm.",
+    "- Where things fly, bounce or topple, small differences grow. A model's balls, lamp and vase "
+    "end where they end whatever particles they are filled with, to within the own spread. The "
+    "rubber ball from pictures leaves its bounces askew: an offset of a tenth of a millimetre does "
+    "that, where a pixel shows .6 mm, and what nobody sees of it from below is rounded by guess. "
+    "The duck that hits a can at 6 m/s goes anywhere, and from pictures twice as far.",
     "- The duck on the can weighs 11 % too much, its beak being solid and large; the can too "
     "little: its tab, 7 % of it, is not told.",
     "- Boards of 16 mm come out 7 % too heavy. Nobody sees how deep the vase is hollow: it is "
@@ -82,7 +81,9 @@ FOUND = (
     "the cushions are in no picture, and where plywood ends and foam begins no colour says, only "
     "words, by height. Its seat is plain, and found only because some Gaussians begin inside the "
     "visual hull ([decision 15](decisions/0015-a-small-training-tells-where-to-begin.md)).",
-    "- The lamp's foot comes out dented by 5 mm of its 15, and the inside of its shade lumpy.",
+    "- The lamp falls to another side than its model: its mass is right as a whole, but its foot, "
+    "dented by 5 mm of its 15, is too light, and its shade, lumpy inside and with bulb and wires "
+    "that nobody told from it, too heavy.",
     "- Pot and soil of the plant are told apart badly in the shade, and of its trunk a third is "
     "found. A crown is weighed by the area of its leaves, within a factor of two; "
     "feet in sand or a pot, which no picture shows, are guessed.",
