@@ -89,7 +89,7 @@ def test_a_settled_scene_with_something_soft_is_at_rest_and_without_settling_it_
 ):
     path = post_on_toy(tmp_path / "soft")
     row, control = (
-        rest.measure(path, tmp_path / said, "draft", 0.1, said) for said in ("said", "no")
+        rest.measure(path, tmp_path / said, "draft", 0.15, said) for said in ("said", "no")
     )
     assert row["objects"][0]["treatments"] == ["deformable"]
     assert row["settled"] is True
