@@ -10,9 +10,9 @@ from splat_scenes import around
 
 from corporeal.errors import UserError
 from corporeal.geometry.harmonics import DC
-from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.shape import Shape
-from corporeal.splats.solid import solids
+from corporeal.splats.solid import _without_specks, solids
 from corporeal.types import Gaussians
 
 PIXEL = 3.5 / 168
@@ -186,6 +186,19 @@ def test_specks_in_the_air_are_left_out():
 
 
 @pytest.mark.slow
+def test_hollows_that_nobody_sees_and_crumbs_are_no_surface():
+    whole = trimesh.creation.box((1, 1, 1))
+    hollow = trimesh.creation.box((0.1, 0.1, 0.1))
+    hollow.invert()
+    crumb, beside = (trimesh.creation.box((side,) * 3) for side in (0.1, 0.5))
+    crumb.apply_translation((2, 0, 0))
+    beside.apply_translation((0, 2, 0))
+    parts = trimesh.util.concatenate([hollow, whole, crumb, beside])
+    kept = _without_specks(Mesh(np.asarray(parts.vertices), np.asarray(parts.faces)))
+    assert len(kept.vertices) == 16 and len(kept.triangles) == 24
+    assert signed_volume(kept) == pytest.approx(1.125)
+
+
 def test_the_number_of_threads_changes_nothing():
     gaussians, owner = together(
         clad(trimesh.creation.icosphere(3, 0.5).apply_translation([0, 0, 0.5]))

@@ -15,6 +15,7 @@ from scipy.spatial import KDTree
 from skimage import measure
 
 from corporeal.errors import UserError
+from corporeal.geometry.anatomy import pieces
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.shape import Shape
@@ -202,6 +203,7 @@ def _solid(scene: _Scene, k: int, survey: _Survey, crew: Crew) -> Solid:
         grid = finer
         distance, cut, warnings = _emptied(grid, scene, k, survey, crew)
         mesh = _surface(distance, grid)
+    mesh = _without_specks(mesh)
     contact = cut[*grid.at(mesh.vertices).T]
     mesh = _fitted(mesh, scene, k, contact, grid.cell, crew)
     mine = np.flatnonzero(scene.object_of_gaussian == k)
@@ -262,6 +264,16 @@ def _surface(distance: Float[np.ndarray, "X Y Z"], grid: Grid) -> Mesh:
     )
     vertices = vertices.astype(np.float64) + np.array(grid.low) - grid.cell
     return Mesh(vertices, triangles.astype(np.int64))
+
+
+def _without_specks(mesh: Mesh) -> Mesh:
+    """Leave out what is small and apart: hollows that no camera can see into, and crumbs."""
+    piece = pieces(mesh)
+    a, b, c = np.swapaxes(mesh.corners - mesh.vertices.mean(axis=0), 0, 1)
+    volume = np.abs(np.bincount(piece, np.einsum("ij,ij->i", a, np.cross(b, c))))
+    kept = mesh.only((volume >= CRUMB * volume.sum())[piece])
+    used, triangles = np.unique(kept.triangles, return_inverse=True)
+    return Mesh(kept.vertices[used], triangles.reshape(-1, 3))
 
 
 def _share(
