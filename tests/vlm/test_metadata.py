@@ -1,3 +1,5 @@
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -46,6 +48,9 @@ def test_no_phrase_means_two_things():
         ("mesh", "soda can", "aluminium_can_sheet"),
         ("mesh", "tomato soup can", "steel"),
         ("mesh", "trash can", "plastics-PP"),
+        ("mesh", "steel trash can", "steel"),
+        ("mesh", "plastic trash can", "plastics-PP"),
+        ("mesh", "metal soda can", "aluminium_can_sheet"),
         ("mesh", "can", None),
         ("mesh", "vase", "ceramic"),
         ("mesh", "rubber duck", "soft_PVC"),
@@ -58,6 +63,15 @@ def test_no_phrase_means_two_things():
 )
 def test_longer_phrases_say_more_and_ambiguous_words_say_nothing(surface, thing, material):
     assert seen(surface, thing).material == material
+
+
+def test_a_thing_of_another_material_is_built_as_such_things_are():
+    plain, other = (seen("mesh", f"{word} gelatin box") for word in ("cardboard", "steel"))
+    usual = seen("mesh", "gelatin box")
+    assert replace(plain, reason="", margin=0.0) == replace(usual, reason="", margin=0.0)
+    assert other.material != usual.material
+    assert (other.structure, other.contents, other.fill) == ("filled", "powder", usual.fill)
+    assert other.thickness is None
 
 
 def test_two_materials_in_one_name_make_neither():

@@ -34,6 +34,8 @@ class Saying:
     metallic: str = ""
     contents: str | None = None
     fill: float | None = None
+    before: int = 0
+    """Words of the thing that a substance stands right before."""
 
 
 @dataclass(frozen=True)
@@ -56,6 +58,11 @@ class Name:
 
     text: str
     words: tuple[str, ...]
+
+    def says(self, phrase: tuple[str, ...]) -> bool:
+        """Tell whether these words follow one another in it."""
+        n = len(phrase)
+        return any(self.words[k : k + n] == phrase for k in range(len(self.words) - n + 1))
 
 
 def heads(tokens: tuple[str, ...]) -> list[Saying]:
@@ -125,7 +132,7 @@ def _as_seen(light: float) -> float:
 def metals() -> frozenset[str]:
     """Materials whose surface is metallic."""
     general = next(s for s in lexicon() if s.phrase == ("metal",))
-    others = ("aluminium_can_sheet", "hardened_steel", "magnesium", "zinc", "lead")
+    others = ("hardened_steel", "magnesium", "zinc", "lead")
     return frozenset((general.material, *others, *general.gives_way))
 
 

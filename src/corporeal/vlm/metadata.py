@@ -265,16 +265,16 @@ def _told(
     """Find the strongest sayings in any of the names, and the name they stand in.
 
     Longest phrase first, then substance before piece before thing; a piece's phrase is never more
-    telling than a substance ("oak table top"). Several are returned when equally strong ones
-    stand in the names.
+    telling than a substance ("oak table top"), nor is a thing's than the one right before it
+    ("steel trash can"). Several are returned when equally strong ones stand in the names.
     """
     found: list[tuple[tuple[int, int, int], Saying, str]] = []
     around = {w for name in thing for w in name.words}
     for name in names:
-        for saying in heads(name.words):
+        for saying in _adjectives(name):
             if saying.kind in kinds and _fits(saying, finishes, around | set(name.words)):
                 length = len(saying.phrase)
-                said = 1 if saying.kind == "piece" else length
+                said = 1 if saying.kind == "piece" else max(length, saying.before)
                 found.append(((said, -KINDS.index(saying.kind), length), saying, name.text))
     if not found:
         return [], ""
@@ -284,6 +284,31 @@ def _told(
     kept = [(s, n) for s, n in strongest if not materials & set(s.gives_way)]
     kept.sort(key=lambda told: -told[0].margin)
     return _particular([s for s, _ in kept]), kept[0][1]
+
+
+def _adjectives(name: Name) -> list[Saying]:
+    """Find what stands in a name; a substance right before a thing is that of such a thing."""
+    standing = heads(name.words)
+    things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
+    for k, saying in enumerate(standing):
+        behind = next((t for t in things if name.says(saying.phrase + t.phrase)), None)
+        if saying.kind == "substance" and behind and behind.material not in saying.gives_way:
+            standing[k] = _made_as(saying, behind)
+    return standing
+
+
+def _made_as(substance: Saying, thing: Saying) -> Saying:
+    """Return a substance built as a thing is; how thick depends on what it is usually made of."""
+    same = substance.material == thing.material
+    return replace(
+        substance,
+        before=len(thing.phrase),
+        structure=thing.structure,
+        contents=thing.contents,
+        fill=thing.fill,
+        thickness=thing.thickness if same else None,
+        every=same and thing.every,
+    )
 
 
 def _particular(sayings: list[Saying]) -> list[Saying]:
