@@ -78,7 +78,7 @@ def test_the_best_witness_is_believed_and_the_others_are_heard():
     assert (all_of_them.metres_per_unit, all_of_them.source) == (0.5, "distance")
     assert len(all_of_them.warnings) == 2, "the file is off by a factor of 2 only"
     assert "4 units, 0.2 m (the command line)" in all_of_them.warnings[0]
-    assert "factor of 10" in all_of_them.warnings[0]
+    assert "0.1 times as large" in all_of_them.warnings[0]
     assert chosen(None, STATED, FILE, USUAL).metres_per_unit == pytest.approx(0.05)
     assert chosen(None, (), FILE, USUAL).source == "file"
     assert chosen(None, (), None, USUAL).metres_per_unit == pytest.approx(0.11)

@@ -116,8 +116,12 @@ def _stand_in(size: float) -> MetricScale:
 def _against(believed: MetricScale, other: MetricScale) -> str:
     if not _differ(believed.metres_per_unit, other.metres_per_unit):
         return ""
-    ratio = believed.metres_per_unit / other.metres_per_unit
-    return f"{other.reason} That differs by a factor of {ratio:.3g} from what was believed."
+    ratio = other.metres_per_unit / believed.metres_per_unit
+    return (
+        f"The scale may be wrong. Otherwise told: {other.reason} By that everything would be "
+        f"{ratio:.3g} times as large. Say which is right with --metres-per-unit, or with --extent "
+        "NAME=METRES."
+    )
 
 
 def _differ(a: float, b: float) -> bool:

@@ -16,7 +16,7 @@ from corporeal.geometry.spread import scattered
 from corporeal.machine import cores
 
 FINER = 5
-"""Samples per spacing. With 3 a rubber ball bounces to a side by as much as with equal volumes."""
+"""Samples per spacing. With 3 a rubber ball bounces off to a side four times as far."""
 
 
 def centred(
