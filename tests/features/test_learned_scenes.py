@@ -6,7 +6,7 @@ from box_scenes import on_faces
 from tiny_models import needs_models, save_clip, save_dinov2
 
 from corporeal.formats.splat_ply import write_splat
-from corporeal.splats import radiance, solid, start
+from corporeal.splats import hull, radiance, solid
 from corporeal.stages import reconstruct as stage
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
 from corporeal.stages.segment import segment
@@ -31,7 +31,7 @@ def splat(tmp_path, monkeypatch):
     monkeypatch.setattr(stage, "OWN_VIEWS", 12)
     monkeypatch.setattr(stage, "OWN_SIZE", (96, 96))
     monkeypatch.setattr(solid, "CELLS", 60_000)
-    monkeypatch.setattr(start, "CELLS", 60_000)
+    monkeypatch.setattr(hull, "CELLS", 60_000)
     monkeypatch.setattr(radiance, "RAYS", 2048)
     monkeypatch.setitem(radiance.PRESETS, "draft", radiance.Preset(60, 96))
     position, normal, owner = on_faces(BOXES, 2500, np.random.default_rng(0))
