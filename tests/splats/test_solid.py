@@ -185,7 +185,6 @@ def test_specks_in_the_air_are_left_out():
     assert solid.vertices[:, 2].max() < 0.82 and not solid.warnings
 
 
-@pytest.mark.slow
 def test_hollows_that_nobody_sees_and_crumbs_are_no_surface():
     whole = trimesh.creation.box((1, 1, 1))
     hollow = trimesh.creation.box((0.1, 0.1, 0.1))
@@ -199,6 +198,7 @@ def test_hollows_that_nobody_sees_and_crumbs_are_no_surface():
     assert signed_volume(kept) == pytest.approx(1.125)
 
 
+@pytest.mark.slow
 def test_the_number_of_threads_changes_nothing():
     gaussians, owner = together(
         clad(trimesh.creation.icosphere(3, 0.5).apply_translation([0, 0, 0.5]))

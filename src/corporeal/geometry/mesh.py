@@ -128,9 +128,14 @@ def weld(
 
 def signed_volume(mesh: Mesh) -> float:
     """Volume [m³] by the divergence theorem; exact when the mesh is closed, negative inside out."""
+    return float(volumes_under(mesh).sum())
+
+
+def volumes_under(mesh: Mesh) -> Float[np.ndarray, " T"]:
+    """Volume [m³] between each triangle and the middle of all; of a closed piece they add up."""
     centre = mesh.vertices[mesh.triangles].mean(axis=(0, 1))
     a, b, c = np.swapaxes(mesh.corners - centre, 0, 1)
-    return float(np.einsum("ij,ij->", a, np.cross(b, c)) / 6)
+    return np.einsum("ij,ij->i", a, np.cross(b, c)) / 6
 
 
 def convergence(mesh: Mesh) -> float:

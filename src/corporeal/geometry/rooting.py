@@ -105,10 +105,10 @@ def _height(ground: Mesh, foot: Float[np.ndarray, "N 3"]) -> float:
     turn = 2 * np.pi * np.arange(AROUND) / AROUND
     around = np.stack([np.cos(turn), np.sin(turn)], axis=1)
     top = float(ground.corners[..., 2].max()) + 0.1 * ground.extent
-    heights = []
+    shape, heights = Shape(ground), []
     for reach in (0.25 * radius, 1.5 * radius):
         start = np.column_stack([middle + reach * around, np.full(AROUND, top)])
-        fall = Shape(ground).reach(start, np.tile([0.0, 0.0, -1.0], (AROUND, 1)))
+        fall = shape.reach(start, np.tile([0.0, 0.0, -1.0], (AROUND, 1)))
         fall = fall[np.isfinite(fall)]
         heights.append(top - float(np.median(fall)) if len(fall) > AROUND / 2 else np.nan)
     return max(heights) if np.isfinite(heights).all() else np.nan

@@ -50,16 +50,9 @@ def tight(views: Views, masks: Bool[np.ndarray, "V H W"], crew: Crew) -> Carved:
 
 
 def carved(
-    low: np.ndarray,
-    high: np.ndarray,
-    views: Views,
-    masks: np.ndarray,
-    crew: Crew,
-    astray: float = ASTRAY,
+    low: np.ndarray, high: np.ndarray, views: Views, masks: np.ndarray, crew: Crew
 ) -> Carved:
     """Carve a box: what is left is on things in all views that see it, but for a few.
-
-    astray: the share of the views that these may be.
 
     Raises:
         UserError: Nothing is left.
@@ -68,9 +61,9 @@ def carved(
     side = float(np.cbrt(np.prod(high - low) / CELLS))
     axes = [np.arange(a + side / 2, b, side) for a, b in zip(low, high, strict=True)]
     cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    seen = witnessed(cells.reshape(-1, 3), views, masks, crew, astray)
+    seen = witnessed(cells.reshape(-1, 3), views, masks, crew)
     count = len(views.cameras)
-    inside = (seen[:, 1] <= astray * count) & (seen[:, 0] >= max(1, count / 4))
+    inside = (seen[:, 1] <= ASTRAY * count) & (seen[:, 0] >= max(1, count / 4))
     if not inside.any():
         raise UserError(
             "No place in space is inside all masks. Check that cameras, pictures and masks "
@@ -92,13 +85,12 @@ def _without_phantoms(
     label(hull.inside, np.ones((3, 3, 3)), piece)
     count = int(piece.max())
     most = np.asarray(maximum(seen, piece, np.arange(1, count + 1)))
-    sure = np.concatenate([[True], most > FEW])
-    if count < 2 or sure.all():
+    kept = np.concatenate([[True], most > FEW])
+    if count < 2 or kept.all():
         return hull
     pixel, owner = _shown(hull.cells[hull.inside], piece[hull.inside], views.cameras, masks)
     own = np.bincount(owner, minlength=count + 1)
-    bare = ~np.isin(pixel, pixel[sure[owner]])
-    kept = sure
+    bare = ~np.isin(pixel, pixel[kept[owner]])
     while True:
         gain = np.bincount(owner[bare], minlength=count + 1)
         best = np.argmax(np.where(gain >= NEEDED * own, gain, 0))
@@ -123,11 +115,11 @@ def _shown(
 
 
 def witnessed(
-    points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew, astray: float = ASTRAY
+    points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew
 ) -> Float[np.ndarray, "N 5"]:
     """Return what views say of points, as ``kernels_learn.witness`` has it."""
     out = np.empty((len(points), 5))
-    patience = astray * len(views.cameras)
+    patience = ASTRAY * len(views.cameras)
     rest = camera_rows(views.cameras), views.rgb, masks, patience, out
     points = np.ascontiguousarray(points, dtype=np.float64)
     crew.each(witness, [(points, *span, *rest) for span in crew.spans(len(points))])

@@ -85,7 +85,7 @@ class Lesson:
     def __init__(
         self, views: Views, masks: Masks | None, points: Points | None, config: TrainConfig
     ) -> None:
-        _check(views, masks)
+        check(views, masks)
         preset = PRESETS[config.preset]
         self.preset = replace(
             preset,
@@ -155,7 +155,8 @@ def shrunk(picture: UInt8[np.ndarray, "H W C"], factor: int) -> UInt8[np.ndarray
     return np.round(cut.mean(axis=(1, 3), dtype=np.float32)).astype(np.uint8)
 
 
-def _check(views: Views, masks: Masks | None) -> None:
+def check(views: Views, masks: Masks | None) -> None:
+    """Raise UserError where views cannot be learned from."""
     if len(views.cameras) < 2:
         raise UserError("One picture shows no depth. Give at least two, from several sides.")
     if masks is not None and masks.shape != views.rgb.shape[:3]:

@@ -22,14 +22,13 @@ from corporeal.splats import kernels_radiance, saved
 from corporeal.splats.carve import Grid
 from corporeal.splats.crew import Crew
 from corporeal.splats.hull import tight
-from corporeal.splats.lesson import shrunk
+from corporeal.splats.lesson import Masks, check, shrunk
 from corporeal.splats.quality import Quality, psnr, ssim
 from corporeal.splats.raster import Picture
 from corporeal.splats.train import GREY
 from corporeal.types import Camera, Views
 
 Progress = Callable[[float, str], None]
-Masks = Bool[np.ndarray, "V H W"]
 
 STRIDE = 1.0
 """Between samples along a ray [cubes]."""
@@ -295,7 +294,7 @@ def learn(
 
     """
     begun = time.monotonic()
-    _check(views, masks)
+    check(views, masks)
     preset = PRESETS[config.preset]
     steps = config.steps or preset.steps
     count, every = len(views.cameras), config.held_out
@@ -315,13 +314,6 @@ def learn(
         saved.keep(checkpoint, name, _state(made))
     out = _quality(made, views, masks, held) if held else None
     return Learned(made, out, time.monotonic() - begun)
-
-
-def _check(views: Views, masks: Masks) -> None:
-    if len(views.cameras) < 2:
-        raise UserError("One picture shows no depth. Give at least two, from several sides.")
-    if masks.shape != views.rgb.shape[:3]:
-        raise UserError(f"Masks are {masks.shape}, but pictures {views.rgb.shape[:3]}.")
 
 
 def _state(made: Field) -> dict[str, Any]:

@@ -17,7 +17,7 @@ from skimage import measure
 from corporeal.errors import UserError
 from corporeal.geometry.anatomy import pieces
 from corporeal.geometry.harmonics import DC
-from corporeal.geometry.mesh import Mesh, signed_volume
+from corporeal.geometry.mesh import Mesh, signed_volume, volumes_under
 from corporeal.geometry.shape import Shape
 from corporeal.splats.carve import Grid, carved, gridded
 from corporeal.splats.crew import Crew
@@ -269,8 +269,7 @@ def _surface(distance: Float[np.ndarray, "X Y Z"], grid: Grid) -> Mesh:
 def _without_specks(mesh: Mesh) -> Mesh:
     """Leave out what is small and apart: hollows that no camera can see into, and crumbs."""
     piece = pieces(mesh)
-    a, b, c = np.swapaxes(mesh.corners - mesh.vertices.mean(axis=0), 0, 1)
-    volume = np.abs(np.bincount(piece, np.einsum("ij,ij->i", a, np.cross(b, c))))
+    volume = np.abs(np.bincount(piece, volumes_under(mesh)))
     kept = mesh.only((volume >= CRUMB * volume.sum())[piece])
     used, triangles = np.unique(kept.triangles, return_inverse=True)
     return Mesh(kept.vertices[used], triangles.reshape(-1, 3))
