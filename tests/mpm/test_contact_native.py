@@ -2,10 +2,10 @@
 
 import numpy as np
 import pytest
-from test_warp import CELL, ball, body, problem, side_by_side
+from test_cpu import CELL, ball, body, problem, side_by_side
 
+from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import FLOOR, Plane
-from corporeal.mpm.warp import WarpEngine
 
 WALL = Plane((1.0, 0.0, 0.0), -0.053)
 SLOPE = Plane((0.6, 0.0, 0.8), -0.009)
@@ -43,7 +43,7 @@ def test_three_bodies_and_the_floor_meet_as_in_the_reference(stiff):
 
 
 def test_lists_that_are_too_short_are_lengthened_and_nothing_changes():
-    short, roomy = WarpEngine(three(), threads=1), WarpEngine(three(), threads=1)
+    short, roomy = CpuEngine(three(), threads=1), CpuEngine(three(), threads=1)
     short.contact.stage["most_touches"] = 8
     for engine in (short, roomy):
         engine.advance(0.03)
@@ -54,7 +54,7 @@ def test_lists_that_are_too_short_are_lengthened_and_nothing_changes():
 
 @pytest.mark.parametrize("stiff", [False, True])
 def test_contact_does_not_depend_on_the_number_of_threads(stiff):
-    one, many = WarpEngine(three(stiff), threads=1), WarpEngine(three(stiff), threads=3)
+    one, many = CpuEngine(three(stiff), threads=1), CpuEngine(three(stiff), threads=3)
     many.program.smallest_share = 10
     many.connect()
     for engine in (one, many):
@@ -81,7 +81,7 @@ def tower(count):
 
 def test_a_tower_of_rigid_cubes_creeps_by_less_than_a_hundredth_of_a_cell():
     given, centres = tower(5)
-    engine = WarpEngine(given, threads=1)
+    engine = CpuEngine(given, threads=1)
     engine.advance(0.4)
     moved = np.abs(engine.measure().centre - centres) / CELL
     assert moved[:, :2].max() < 0.01
@@ -90,7 +90,7 @@ def test_a_tower_of_rigid_cubes_creeps_by_less_than_a_hundredth_of_a_cell():
 
 def test_at_rest_rigid_contacts_begin_with_what_they_bore_before():
     """A stack that stands needs a few sweeps, not the hundred of the first touch."""
-    engine = WarpEngine(tower(3)[0], threads=1)
+    engine = CpuEngine(tower(3)[0], threads=1)
     engine.advance(0.2)
     assert engine.contact.stage["pasts"][0] > 50
     assert engine.contact.stage["sweeps"][0] < 10
@@ -103,7 +103,7 @@ def test_bodies_more_than_a_cell_and_a_quarter_apart_are_not_looked_at():
     given = problem(
         body(low), body(high, velocity=(0, 0, -0.5)), planes=(), gravity=(0.0, 0.0, 0.0)
     )
-    engine = WarpEngine(given, threads=1)
+    engine = CpuEngine(given, threads=1)
     engine.advance(0.1 * CELL / 0.5)
     assert engine.contact.stage["touches"][0] == 0
     assert engine.measure().pair_impulse[0, 1] == 0

@@ -7,11 +7,11 @@ import pytest
 from laws.bodies import Stuff, box, box_surface, floor, problem
 
 from corporeal.backends import load
-from corporeal.mpm.bond import join
-from corporeal.mpm.ledger_row import ledger_row
-from corporeal.mpm.pose import clusters, frames_of
+from corporeal.mpm.physics.rigid import mass_of
 from corporeal.mpm.problem import MENU
-from corporeal.mpm.rigid import mass_of
+from corporeal.mpm.reference.inclusions import join
+from corporeal.trajectory.ledger_row import ledger_row
+from corporeal.treatment.problem_from_scene import clusters, frames_of
 
 CELL = 0.05
 FOAM = Stuff(young=2.5e5, poisson=0.35, density=30.0)
@@ -37,10 +37,10 @@ def block(cell=CELL, offset=0.3, velocity=(0.0, 0.0, -1.0), gap=0.5):
                name="block")  # fmt: skip
 
 
-@pytest.fixture(params=["reference", "warp"])
+@pytest.fixture(params=["reference", "cpu"])
 def engine(request):
     chosen = load("engine", request.param, MENU)
-    chosen.round_off = {"reference": 1e-12, "warp": 1e-5}[request.param]
+    chosen.round_off = {"reference": 1e-12, "cpu": 1e-5}[request.param]
     return chosen
 
 
@@ -149,16 +149,16 @@ def test_a_frame_as_thin_as_foil_holds_what_is_soft_around_it(engine):
 def test_the_ledger_adds_up_what_belongs_to_one_object():
     frame, cushion = chair()
     given = problem(cushion, frame, block(), cell=CELL, bonds=((1, 0),), planes=[floor()])
-    run = load("engine", "warp", MENU)(given)
+    run = load("engine", "cpu", MENU)(given)
     run.advance(0.03)
     row = ledger_row(given, run.snapshot(), run.measure(), run.steps)
     whole = run.measure()
-    assert row["mass"] == pytest.approx([whole.mass[:2].sum(), whole.mass[2]])
-    assert row["momentum"].sum(axis=0) == pytest.approx(whole.momentum.sum(axis=0))
-    assert row["plane_impulse"].sum(axis=1) == pytest.approx(whole.plane_impulse.sum(axis=1))
-    assert row["pair_impulse"][0, 1] == pytest.approx(whole.pair_impulse[:2, 2].sum())
-    assert row["first_contact"][0, 1] == np.nanmin(whole.first_contact[:2, 2])
-    assert row["gap"].shape == row["overlap"].shape == (2, 2)
+    assert row.mass == pytest.approx([whole.mass[:2].sum(), whole.mass[2]])
+    assert row.momentum.sum(axis=0) == pytest.approx(whole.momentum.sum(axis=0))
+    assert row.plane_impulse.sum(axis=1) == pytest.approx(whole.plane_impulse.sum(axis=1))
+    assert row.pair_impulse[0, 1] == pytest.approx(whole.pair_impulse[:2, 2].sum())
+    assert row.first_contact[0, 1] == np.nanmin(whole.first_contact[:2, 2])
+    assert row.gap.shape == row.overlap.shape == (2, 2)
 
 
 def test_particles_that_hang_together_make_one_frame():
@@ -173,9 +173,10 @@ def test_a_wire_with_few_particles_is_still_one_frame():
     particles = np.array([[0.0, 0, 0], [1.0, 0, 0], [5.0, 0, 0]])
     wire = np.stack([np.linspace(0, 1, 21), np.zeros(21), np.zeros(21)], 1)
     bare = np.array([[9.0, 0, 0]])
-    joined, owner = frames_of(particles, np.concatenate([wire, bare]), 0.1)
-    assert joined.tolist() == [0, 0, 1]
-    assert owner.tolist() == [0] * 21 + [1], "a surface without matter goes with the nearest"
+    found = frames_of(particles, np.concatenate([wire, bare]), 0.1)
+    assert found.of_particle.tolist() == [0, 0, 1]
+    owner = found.of_point.tolist()
+    assert owner == [0] * 21 + [1], "a surface without matter goes with the nearest"
 
 
 @pytest.mark.slow
@@ -189,7 +190,7 @@ def test_a_block_sinks_into_a_cushion_on_a_frame_as_into_one_on_a_fine_grid(offs
         frame, cushion, load_, cell=cell, bonds=((0, 1),), friction=0.5,
         planes=[floor(offset * cell)], gravity=(0.0, 0.0, -9.81),
     )  # fmt: skip
-    run = load("engine", "warp", MENU)(given)
+    run = load("engine", "cpu", MENU)(given)
     start, deepest = run.measure().centre, 0.0
     for k in range(40):
         run.advance(0.06 + 0.0005 * k)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corporeal.mpm import rigid
+from corporeal.mpm.physics import rigid
 
 
 def bricks(size, counts):

@@ -8,7 +8,7 @@ from laws.suite import CASES
 from corporeal.backends import load
 from corporeal.mpm.problem import MENU
 
-ROUND_OFF = {"reference": 1e-12, "warp": 1e-5, "cuda": 1e-5}
+ROUND_OFF = {"reference": 1e-12, "cpu": 1e-5, "cuda": 1e-5}
 SLOWLY = {name: pytest.param(name, marks=pytest.mark.slow) for name in ROUND_OFF}
 
 
@@ -24,13 +24,13 @@ def built(name):
     return here
 
 
-@pytest.fixture(params=["reference", "warp", SLOWLY["cuda"]])
+@pytest.fixture(params=["reference", "cpu", SLOWLY["cuda"]])
 def engine(request):
     """Give a function that builds an engine from a problem."""
     return built(request.param)
 
 
-@pytest.fixture(params=["warp", SLOWLY["reference"], SLOWLY["cuda"]])
+@pytest.fixture(params=["cpu", SLOWLY["reference"], SLOWLY["cuda"]])
 def patient_engine(request):
     """Give any engine, most only in slow runs: for experiments of many steps."""
     return built(request.param)
@@ -39,7 +39,7 @@ def patient_engine(request):
 @pytest.fixture
 def fast_engine():
     """Only the production engine: for experiments of many steps."""
-    return load("engine", "warp", MENU)
+    return load("engine", "cpu", MENU)
 
 
 @pytest.fixture

@@ -6,9 +6,9 @@ import numpy as np
 import pytest
 from laws.bodies import Stuff, box, box_surface, floor, problem
 
-from corporeal.mpm import settling
 from corporeal.mpm.problem import Plane
-from corporeal.mpm.settling import WATCH, Settling, before
+from corporeal.trajectory import static_equilibrium
+from corporeal.trajectory.static_equilibrium import WATCH, Relaxation, before
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)
@@ -32,7 +32,7 @@ def column():
 
 def rested(build, given, hung=frozenset()):
     posed = before(given, set(hung))
-    return Settling(build(posed), posed, set(hung)).run(lambda time: None)
+    return Relaxation(build(posed), posed, set(hung)).run(lambda time: None)
 
 
 def drift(run, seconds):
@@ -54,7 +54,7 @@ def test_a_column_sinks_to_the_balance_of_statics_and_stays_there(fast_engine):
     assert sag > 0.2 * CELL, "too little to be seen"
     assert -balance.moved[0, 2] == pytest.approx(sag, rel=0.1)
     film = fast_engine(given)
-    film.begin(balance.state, [0])
+    film.start_from(balance.state, [0])
     assert drift(film, 0.3) < 0.01
     assert drift(fast_engine(given), 0.3) > 1.5 * sag / CELL, "the control must move"
 
@@ -68,7 +68,7 @@ def test_the_books_begin_at_time_0_with_the_velocities_of_the_problem(engine):
     other = engine(posed)
     other.advance(0.02)
     film = engine(given)
-    film.begin(other.save(), [0])
+    film.start_from(other.save(), [0])
     m, start = film.measure(), engine(given).measure()
     assert m.time == 0.0
     assert film.steps.count == 0
@@ -85,13 +85,13 @@ def test_the_books_begin_at_time_0_with_the_velocities_of_the_problem(engine):
     assert film.measure().momentum[0, 0] == pytest.approx(m.mass[0], rel=0.2)
 
 
-def test_only_what_is_halted_stops(engine):
+def test_only_what_is_stopped_stops(engine):
     size = (0.06, 0.06, 0.06)
     here, there = (box((x, 0.05, 0.2), size, CELL / 2, stuff=FOAM) for x in (0.0, 0.3))
     stone = box((0.6, 0.05, 0.2), size, CELL / 2, rigid=True)
     run = engine(problem(here, there, stone, cell=CELL, gravity=DOWN))
     run.advance(0.02)
-    run.halt([0, 2])
+    run.stop([0, 2])
     m = run.measure()
     assert m.kinetic[0] == m.kinetic[2] == 0.0
     assert m.momentum[1, 2] == pytest.approx(-m.mass[1] * G * 0.02, rel=1e-4)
@@ -121,7 +121,7 @@ def test_what_falls_over_is_not_held_up(fast_engine):
 
 def test_what_never_rests_is_said_to(fast_engine, monkeypatch):
     """A block without friction slides down a slope for ever."""
-    monkeypatch.setattr(settling, "LONGEST", 0.5)
+    monkeypatch.setattr(static_equilibrium, "LONGEST", 0.5)
     slope = Plane((np.sin(0.3), 0.0, np.cos(0.3)), 0.0)
     block = box((0.0, 0.0, 0.06), (0.1, 0.1, 0.1), CELL / 2, stuff=FOAM)
     balance = rested(fast_engine, problem(block, cell=CELL, planes=[slope], gravity=DOWN))
@@ -133,10 +133,10 @@ def test_settling_goes_on_from_where_it_was_left_to_the_last_bit(fast_engine):
     given = column()
     posed = before(given, set())
     kept = []
-    whole = Settling(fast_engine(posed), posed, set())
+    whole = Relaxation(fast_engine(posed), posed, set())
     first = whole.run(lambda time: kept.append(whole.saved()))
     for state in (kept[2], kept[-1]):
-        again = Settling(fast_engine(posed), posed, set())
+        again = Relaxation(fast_engine(posed), posed, set())
         again.restore(state)
         second = again.run(lambda time: None)
         assert second.seconds == first.seconds

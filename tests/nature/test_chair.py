@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 
 from corporeal import pipeline
-from corporeal.mpm import treatment
-from corporeal.mpm.frames import read_trajectory
-from corporeal.mpm.shape import diagonal, largest, rigid_fit
+from corporeal.geometry.rigid_fit import rigid_fit
 from corporeal.pipeline import FOLDERS, Settings
 from corporeal.showcase import scenes
 from corporeal.stages.fill import FillConfig
 from corporeal.store import DATA, load
+from corporeal.trajectory.frames import read_trajectory
+from corporeal.trajectory.residual_shape import diagonal, largest
+from corporeal.treatment import plan
 
 SCENE = "ball-on-armchair"
 FEW = 5_000
@@ -34,8 +35,8 @@ def thrown(tmp_path_factory):
 
     @cache
     def shapes(stiffness, particles=FEW):
-        coarse = replace(treatment.QUALITIES["draft"], particles=particles)
-        patch.setitem(treatment.QUALITIES, "draft", coarse)
+        coarse = replace(plan.QUALITIES["draft"], particles=particles)
+        patch.setitem(plan.QUALITIES, "draft", coarse)
         folder = tmp_path_factory.mktemp(stiffness)
         file = pipeline.write_showcase(SCENE, folder / "input")
         settings = Settings(fill=FillConfig(stiffness=stiffness))

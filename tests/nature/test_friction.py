@@ -59,7 +59,7 @@ def test_what_sticks_loses_nothing_to_friction(patient_engine, rigid):
 
 def test_a_soft_ball_that_settles_loses_little_to_friction(fast_engine):
     """It widens a little on the floor: a few per cent of what it fell, not a third."""
-    soft = Stuff(young=2e4, density=900.0, viscosity=2.0)
+    soft = Stuff(young=2e4, density=900.0, loss=0.3)
     falling = ball((0.003, 0.002, 0.07), 0.05, 0.00625, stuff=soft)
     run = fast_engine(
         problem(falling, cell=0.0125, friction=0.5, planes=[floor()], gravity=(0.0, 0.0, -G))

@@ -15,7 +15,7 @@ CENTRE, SIZE = (0.103, 0.052, 0.05), (0.1, 0.1, 0.1)
 
 @pytest.mark.parametrize("rigid", [False, True])
 def test_a_block_at_rest_on_the_floor_stays(patient_engine, rigid):
-    stuff = Stuff(young=2e5, viscosity=20.0)
+    stuff = Stuff(young=2e5, loss=1.0)
     surface = box_surface(CENTRE, SIZE) if rigid else None
     block = box(CENTRE, SIZE, CELL / 2, stuff=stuff, rigid=rigid, surface=surface)
     run = patient_engine(
@@ -33,8 +33,8 @@ def test_a_block_at_rest_on_the_floor_stays(patient_engine, rigid):
 
 
 def test_a_stack_of_two_stands(patient_engine):
-    low = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young=2e5, viscosity=20.0))
-    high = box(np.add(CENTRE, (0, 0, 0.1)), SIZE, CELL / 2, stuff=Stuff(young=2e5, viscosity=20.0))
+    low = box(CENTRE, SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
+    high = box(np.add(CENTRE, (0, 0, 0.1)), SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
     run = patient_engine(
         problem(
             low, high, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.1
@@ -64,7 +64,7 @@ def test_a_rigid_stack_stands(patient_engine):
 def test_every_elastic_law_is_hookes_where_strains_are_small(patient_engine, law):
     """The top sinks by ρ g L² / 2 (λ + 2μ); smooth walls keep the sides."""
     length, width, cell = 0.2, 0.04, 0.02
-    stuff = Stuff(law=law, young=2e5, poisson=0.3, viscosity=300.0)
+    stuff = Stuff(law=law, young=2e5, poisson=0.3, loss=1.0)
     column = box((width / 2, width / 2, length / 2), (width, width, length), cell / 2, stuff=stuff)
     walls = [
         floor(),
@@ -90,7 +90,7 @@ def test_a_wall_holds_whichever_way_it_faces(patient_engine):
     """The same rest on a wall that faces sideways, with gravity turned along."""
     wall = Plane((1.0, 0.0, 0.0), 0.0)
     centre = (0.05, 0.103, 0.052)
-    block = box(centre, SIZE, CELL / 2, stuff=Stuff(young=2e5, viscosity=20.0))
+    block = box(centre, SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
     run = patient_engine(
         problem(
             block, cell=CELL, friction=0.5, planes=[wall], gravity=(-G, 0.0, 0.0), gravity_ramp=0.05

@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from laws.bodies import Stuff, ball, ball_surface, floor, problem
+from laws import touching
+from laws.bodies import Stuff, ball, ball_surface, box, box_surface, floor, problem
 
 G = 9.81
 DOWN = (0.0, 0.0, -G)
@@ -60,6 +61,71 @@ def test_two_rigid_balls_rebound_as_newton_says(patient_engine):
     assert before.kinetic.sum() - after.kinetic.sum() == pytest.approx(lost, rel=0.1)
 
 
+def last_of_a_row(engine, gap, restitution):
+    """Let a steel ball hit four others in a row, ``gap`` [cells] apart; velocities over its own."""
+    given, until = touching.cradle(gap, restitution)
+    run = engine(given)
+    before = run.measure()
+    run.advance(until)
+    after = run.measure()
+    drift = np.abs(after.momentum.sum(0) - before.momentum.sum(0)).max()
+    assert drift < run.round_off * before.momentum.max()
+    assert after.kinetic.sum() <= before.kinetic.sum() * (1.0 + 1e-9)
+    return after.momentum[:, 0] / after.mass
+
+
+@pytest.mark.parametrize("gap", [0.0, 0.02, 0.1, 0.5])
+def test_newtons_cradle_passes_a_blow_on_to_the_last_ball(patient_engine, gap):
+    u = last_of_a_row(patient_engine, gap, restitution=1.0)
+    assert u[-1] == pytest.approx(1.0, abs=0.05)
+    assert np.abs(u[:-1]).max() < 0.05
+
+
+def test_in_a_cradle_that_loses_energy_the_last_ball_is_slower(patient_engine):
+    """Each blow hands on (1 + e)/2 of the speed."""
+    u = last_of_a_row(patient_engine, 0.0, restitution=0.8)
+    assert u[-1] == pytest.approx(0.9**4, rel=0.03)
+
+
+def test_a_marble_lies_on_a_slab_though_it_is_smaller_than_a_cell(patient_engine):
+    """Its radius is a quarter of a cell; taken for half spaces the two stayed .4 cells apart."""
+    run = patient_engine(touching.marble_on(rigid=True))
+    run.advance(0.3)
+    m = run.measure()
+    gap = m.centre[1, 2] - touching.MARBLE - touching.COUCH[2]
+    assert abs(gap) < 1e-4
+    assert abs(m.centre[0, 2] - touching.COUCH[2] / 2) < 1e-4 / 32
+    assert np.abs(m.momentum[1] / m.mass[1]).max() < 1e-3
+
+
+def test_a_marble_sinks_into_foam_by_no_more_than_a_part_of_its_radius(fast_engine):
+    run = fast_engine(touching.marble_on(rigid=False))
+    run.advance(0.6)
+    gap = run.measure().centre[1, 2] - touching.MARBLE - touching.COUCH[2]
+    assert abs(gap) < 0.4 * touching.MARBLE
+
+
+@pytest.mark.parametrize("speed", [10.0, 100.0])
+def test_a_ball_rebounds_at_the_face_of_a_plate_thinner_than_a_cell(patient_engine, speed):
+    cell, radius, thick = 0.00625, 0.02, 0.001
+    at = np.array([0.13, 0.31, 0.3]) * cell
+    size = (0.3, 0.3, thick)
+    plate = box(at, size, cell / 2, stuff=STEEL, rigid=True, surface=box_surface(at, size, 41))
+    above = at + np.array([0.003, 0.001, radius + thick / 2 + 1.5 * cell])
+    surface = ball_surface(above, radius, 2000)
+    fast = (0.0, 0.0, -speed)
+    shot = ball(above, radius, cell / 2, stuff=STEEL, rigid=True, velocity=fast, surface=surface)
+    run = patient_engine(problem(plate, shot, cell=cell, restitution=0.5, friction=0.3))
+    gaps = []
+    for k in range(60):
+        run.advance((1.0 + 0.05 * k) * cell / speed)
+        m = run.measure()
+        gaps.append(m.centre[1, 2] - m.centre[0, 2] - radius - thick / 2)
+    assert abs(min(gaps)) < 0.15 * cell
+    u = m.momentum[:, 2] / m.mass
+    assert u[1] - u[0] == pytest.approx(0.5 * speed, rel=0.05)
+
+
 def test_a_rigid_ball_rolls_down_a_slope_without_slipping(patient_engine):
     """x = 5/14 g sin θ t² where μ ≥ 2/7 tan θ, and ω = v/R."""
     angle, time = np.radians(20), 0.25
@@ -82,6 +148,32 @@ def test_a_rigid_ball_rolls_down_a_slope_without_slipping(patient_engine):
     spin = m.angular_momentum[0] - np.cross(m.centre[0], m.momentum[0])
     inertia = 0.4 * m.mass[0] * RADIUS**2
     assert spin[1] / inertia * RADIUS == pytest.approx(m.momentum[0, 0] / m.mass[0], rel=0.05)
+
+
+def test_a_rigid_ball_that_rolls_fast_does_not_hop_from_point_to_point(fast_engine):
+    """Its facets would bounce: at 20° and e = .5 by half a cell within .6 s."""
+    angle, radius = np.radians(20), 0.1
+    cell = radius / 5
+    start = (0.13 * cell, 0.31 * cell, radius)
+    surface = ball_surface(start, radius, 5000)
+    rolling = ball(start, radius, cell / 2, stuff=STEEL, rigid=True, surface=surface)
+    run = fast_engine(
+        problem(
+            rolling,
+            cell=cell,
+            friction=0.5,
+            restitution=0.5,
+            planes=[floor()],
+            gravity=(G * np.sin(angle), 0.0, -G * np.cos(angle)),
+        )
+    )
+    highest = 0.0
+    for time in np.linspace(0.01, 0.6, 60):
+        run.advance(time)
+        highest = max(highest, run.measure().centre[0, 2] - radius)
+    assert highest < 0.05 * cell
+    rolled = run.measure().centre[0, 0] - start[0]
+    assert rolled == pytest.approx(5 / 14 * G * np.sin(angle) * 0.6**2, rel=0.1)
 
 
 def test_a_rigid_body_keeps_its_shape_to_the_last_digit(patient_engine):

@@ -7,9 +7,9 @@ import pytest
 from laws.bodies import Stuff, ball, box, box_surface, floor, problem
 
 from corporeal.errors import UserError
+from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import Joint, Tether
-from corporeal.mpm.reference import ReferenceEngine
-from corporeal.mpm.warp import WarpEngine
+from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.types import Push
 
 CELL = 0.02
@@ -129,7 +129,7 @@ def test_springs_act_as_in_the_reference():
         joints=(Joint(0, 1, (0.0, 0.0, 0.0), 20.0, 0.1),),
         apart=((0, 1), (0, 2), (1, 2)),
     )
-    fast, sure = WarpEngine(given, threads=1), ReferenceEngine(given)
+    fast, sure = CpuEngine(given, threads=1), ReferenceEngine(given)
     for _ in range(30):
         dt = min(fast.stable_step(), sure.stable_step())
         fast.step(dt)
@@ -145,11 +145,11 @@ def test_springs_act_as_in_the_reference():
 
 
 @pytest.mark.parametrize("rigid", [False, True])
-def test_a_poke_gives_exactly_its_impulse(engine, rigid):
+def test_an_applied_impulse_gives_exactly_its_momentum(engine, rigid):
     body = ball((0, 0, 0), 0.06, CELL / 2, rigid=rigid)
     run = engine(problem(body, cell=CELL))
     run.advance(0.002)
-    run.poke(0, (0.0, 0.06, 0.0), (0.3, 0.0, 0.1))
+    run.apply_impulse(0, (0.0, 0.06, 0.0), (0.3, 0.0, 0.1))
     run.advance(0.004)
     measure = run.measure()
     assert measure.momentum[0] == pytest.approx([0.3, 0, 0.1], rel=1e-4, abs=1e-6)
@@ -162,10 +162,10 @@ def test_a_poke_gives_exactly_its_impulse(engine, rigid):
         assert np.all(np.abs(measure.angular_momentum[0]) <= np.abs(turned) + 1e-6)
 
 
-def test_a_poke_moves_what_is_near_and_nothing_beyond_two_cells(engine):
+def test_an_applied_impulse_moves_what_is_near_and_nothing_beyond_two_cells(engine):
     body = ball((0, 0, 0), 0.08, CELL / 2)
     run = engine(problem(body, cell=CELL))
-    run.poke(0, (0.0, 0.0, 0.07), (0.1, 0.0, 0.0))
+    run.apply_impulse(0, (0.0, 0.0, 0.07), (0.1, 0.0, 0.0))
     now = run.snapshot()
     away = np.linalg.norm(now.position - [0, 0, 0.07], axis=1)
     speed = now.velocity[:, 0]
@@ -175,19 +175,19 @@ def test_a_poke_moves_what_is_near_and_nothing_beyond_two_cells(engine):
 
 
 @pytest.mark.parametrize("rigid", [False, True])
-def test_what_is_dragged_hangs_below_the_hand_by_its_weight_over_the_spring(fast_engine, rigid):
+def test_what_is_pulled_hangs_below_the_hand_by_its_weight_over_the_spring(fast_engine, rigid):
     body = ball((0, 0, 0), 0.06, CELL / 2, stuff=Stuff(young=2e5), rigid=rigid)
     weight = float(body.volume @ body.density) * 9.81
     run = fast_engine(problem(body, cell=CELL, gravity=FALL))
-    run.drag(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 500.0)
+    run.pull(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), 500.0)
     run.advance(0.7)
     sunk = run.measure().centre[0, 2]
     assert sunk == pytest.approx(-weight / 500.0, rel=0.02)
-    run.drag(0, None, (0.1, 0.0, 0.0), 500.0)
+    run.pull(0, None, (0.1, 0.0, 0.0), 500.0)
     run.advance(1.4)
     measure = run.measure()
     assert measure.centre[0] == pytest.approx([0.1, 0.0, -weight / 500.0], abs=1.5e-3)
-    run.drag(0, None, (0.1, 0.0, 0.0), 0.0)
+    run.pull(0, None, (0.1, 0.0, 0.0), 0.0)
     run.advance(1.5)
     assert run.measure().momentum[0, 2] == pytest.approx(-weight * 0.1, rel=0.05)
 
@@ -195,10 +195,10 @@ def test_what_is_dragged_hangs_below_the_hand_by_its_weight_over_the_spring(fast
 @pytest.mark.parametrize("rigid", [False, True])
 def test_hands_act_as_in_the_reference(rigid):
     given = problem(ball((0, 0, 0), 0.06, CELL / 2, rigid=rigid), cell=CELL, gravity=FALL)
-    fast, sure = WarpEngine(given, threads=1), ReferenceEngine(given)
+    fast, sure = CpuEngine(given, threads=1), ReferenceEngine(given)
     for run in (fast, sure):
-        run.poke(0, (0.0, 0.05, 0.0), (0.1, 0.0, 0.1))
-        run.drag(0, (0.0, 0.0, 0.05), (0.1, 0.0, 0.2), 300.0)
+        run.apply_impulse(0, (0.0, 0.05, 0.0), (0.1, 0.0, 0.1))
+        run.pull(0, (0.0, 0.0, 0.05), (0.1, 0.0, 0.2), 300.0)
     for _ in range(30):
         dt = min(fast.stable_step(), sure.stable_step())
         fast.step(dt)
@@ -212,10 +212,10 @@ def test_hands_act_as_in_the_reference(rigid):
 def test_a_hand_that_grasps_nothing_is_told(fast_engine):
     run = fast_engine(problem(ball((0, 0, 0), 0.06, CELL / 2), cell=CELL))
     with pytest.raises(UserError, match="no body 3"):
-        run.poke(3, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
+        run.apply_impulse(3, (0.0, 0.0, 0.0), (1.0, 0.0, 0.0))
     with pytest.raises(UserError, match="not finite"):
-        run.poke(0, (0.0, 0.0, np.nan), (1.0, 0.0, 0.0))
+        run.apply_impulse(0, (0.0, 0.0, np.nan), (1.0, 0.0, 0.0))
     with pytest.raises(UserError, match="not held yet"):
-        run.drag(0, None, (0.0, 0.0, 0.0), 10.0)
+        run.pull(0, None, (0.0, 0.0, 0.0), 10.0)
     with pytest.raises(UserError, match="stiffness is -1"):
-        run.drag(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), -1.0)
+        run.pull(0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0), -1.0)

@@ -3,7 +3,7 @@
 import pytest
 from laws import waves
 
-from corporeal.mpm.reference import ReferenceEngine
+from corporeal.mpm.reference.engine import ReferenceEngine
 
 
 def test_a_free_bar_rings_with_the_period_of_its_sound(holds):

@@ -7,10 +7,11 @@ import pytest
 from laws.bodies import Stuff, ball, ball_surface, box, problem
 from scipy.spatial import cKDTree
 
-from corporeal.mpm import wind
+from corporeal.mpm.constants import AIR_DENSITY, PLATE
+from corporeal.mpm.cpu.engine import CpuEngine
+from corporeal.mpm.physics import wind
 from corporeal.mpm.problem import Faces
-from corporeal.mpm.reference import ReferenceEngine
-from corporeal.mpm.warp import WarpEngine
+from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.types import Wind
 
 CELL, R = 0.02, 0.05
@@ -57,12 +58,12 @@ def test_a_sphere_falls_through_air_as_its_drag_coefficient_says(fast_engine, ri
     run.advance(0.5)
     measure = run.measure()
     speed = -measure.momentum[0, 2] / measure.mass[0]
-    terminal = np.sqrt(8 * 30.0 * R * 9.81 / (3 * wind.AIR_DENSITY * 0.47))
+    terminal = np.sqrt(8 * 30.0 * R * 9.81 / (3 * AIR_DENSITY * 0.47))
     assert speed == pytest.approx(falling(terminal, 0.5), rel=0.003)
 
 
 def test_a_sphere_in_its_terminal_fall_keeps_its_speed(fast_engine):
-    terminal = np.sqrt(8 * 30.0 * R * 9.81 / (3 * wind.AIR_DENSITY * 0.47))
+    terminal = np.sqrt(8 * 30.0 * R * 9.81 / (3 * AIR_DENSITY * 0.47))
     body = a_sphere(STILL_AIR, rigid=True, stuff=LIGHT, velocity=(0, 0, -terminal))
     run = fast_engine(problem(body, cell=CELL, gravity=FALL))
     run.advance(1.0)
@@ -74,7 +75,7 @@ def test_a_plate_falls_slower_than_a_sphere_as_its_drag_coefficient_says(fast_en
     run = fast_engine(problem(a_plate(STILL_AIR, rigid=True, stuff=LIGHT), cell=CELL, gravity=FALL))
     run.advance(1.0)
     measure = run.measure()
-    terminal = np.sqrt(2 * 30.0 * 0.02 * 9.81 / (wind.AIR_DENSITY * 1.17))
+    terminal = np.sqrt(2 * 30.0 * 0.02 * 9.81 / (AIR_DENSITY * 1.17))
     speed = -measure.momentum[0, 2] / measure.mass[0]
     assert speed == pytest.approx(falling(terminal, 1.0), rel=0.003)
 
@@ -109,7 +110,7 @@ def test_a_face_in_the_lee_feels_nothing_and_an_oblique_one_less():
     area = np.array([[0, 0, -1.0], [0, 0, 1.0], [0, 1.0, -1.0]])
     seen = np.tile([0.0, 0.0, 2.0], (3, 1))
     given = wind.pressed(area, seen, np.full(3, 1e9), 1.0)
-    whole = 0.5 * wind.AIR_DENSITY * wind.PLATE * 4.0
+    whole = 0.5 * AIR_DENSITY * PLATE * 4.0
     assert given[0] == pytest.approx([0, 0, whole])
     assert np.all(given[1] == 0.0)
     assert np.linalg.norm(given[2]) == pytest.approx(np.sqrt(2) * whole * 0.5**1.5)
@@ -134,7 +135,7 @@ def test_the_production_engine_is_blown_as_the_reference(stiff, contact, spin):
     second = a_plate(air, size=(0.06, 0.06, 0.02), stuff=Stuff(density=50.0), spin=(0, 9, 0))
     second = replace(second, position=second.position + np.array([0.0, 0.2, 0.0]))
     given = problem(first, second, cell=CELL, contact=contact)
-    fast, sure = WarpEngine(given, threads=1), ReferenceEngine(given)
+    fast, sure = CpuEngine(given, threads=1), ReferenceEngine(given)
     for _ in range(40):
         dt = min(fast.stable_step(), sure.stable_step())
         fast.step(dt)

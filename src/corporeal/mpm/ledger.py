@@ -5,8 +5,6 @@ from dataclasses import dataclass, fields
 import numpy as np
 from jaxtyping import Float, Int
 
-from corporeal.mpm import contact
-
 
 @dataclass
 class Ledger:
@@ -22,10 +20,13 @@ class Ledger:
     """[J]"""
     friction_loss: Float[np.ndarray, ""]
     """[J]"""
+    impact_loss: Float[np.ndarray, ""]
+    """Taken by normal contact: by restitution of what is rigid, by nodes of what is soft [J]."""
     plastic_loss: Float[np.ndarray, ""]
     """[J]"""
     viscous_loss: Float[np.ndarray, ""]
-    """[J]"""
+    """Taken by joints' dampers, and the work on Maxwell branches: what they hold now is no loss
+    [J]."""
     first_contact: Float[np.ndarray, "N N"]
     """[s]; nan: none yet."""
     last_contact: Float[np.ndarray, "N N"]
@@ -43,6 +44,7 @@ class Ledger:
             pair_impulse=np.zeros((bodies, bodies)),
             push_work=np.zeros(()),
             friction_loss=np.zeros(()),
+            impact_loss=np.zeros(()),
             plastic_loss=np.zeros(()),
             viscous_loss=np.zeros(()),
             first_contact=np.full((everything, everything), np.nan),
@@ -62,7 +64,8 @@ class Ledger:
         self,
         pair: Int[np.ndarray, "E 2"],
         impulse: Float[np.ndarray, "E 3"],
-        contacts: contact.Contacts,
+        normal: Float[np.ndarray, "E 3"],
+        point: Float[np.ndarray, "E 3"],
         time: float,
     ) -> None:
         """Enter one step's contact impulses.
@@ -70,12 +73,13 @@ class Ledger:
         Args:
             pair: The two partners of every contact: bodies, or B + plane in second place.
             impulse: J [N s], -J on the first and +J on the second.
-            contacts: Where they act.
+            normal: Of every contact, from the first partner to the second.
+            point: Where it acts [m].
             time: Now [s].
 
         """
         bodies = len(self.external_impulse)
-        size = np.sum(impulse * contacts.normal, axis=1)
+        size = np.sum(impulse * normal, axis=1)
         for a, c in np.unique(pair[size > 0.0], axis=0):
             mine = np.flatnonzero((pair[:, 0] == a) & (pair[:, 1] == c))
             if c >= bodies:
@@ -84,7 +88,7 @@ class Ledger:
                 self.pair_impulse[a, c] += size[mine].sum()
                 self.pair_impulse[c, a] = self.pair_impulse[a, c]
             if np.isnan(self.first_contact[a, c]):
-                place = np.average(contacts.point[mine], axis=0, weights=size[mine])
+                place = np.average(point[mine], axis=0, weights=size[mine])
                 self.first_contact[[a, c], [c, a]] = time
                 self.contact_point[[a, c], [c, a]] = place
             self.last_contact[[a, c], [c, a]] = time

@@ -2,12 +2,14 @@
 
 from collections.abc import Collection
 from dataclasses import dataclass, field
+from itertools import combinations
 from typing import Literal, Protocol, runtime_checkable
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.types import Push, Vector, Wind
+from corporeal.mpm.constants import COURANT, GRAVITY
+from corporeal.types import Keyframes, Push, Vector, Wind
 
 
 @dataclass(frozen=True)
@@ -78,8 +80,14 @@ class Body:
     """Drucker–Prager friction angle φ [rad]."""
     cohesion: Float[np.ndarray, " P"]
     """Drucker–Prager cohesion c [Pa]."""
-    viscosity: Float[np.ndarray, " P"]
-    """Kelvin–Voigt damping: τ gains J η (∇v + ∇vᵀ) [Pa s]."""
+    loss: Float[np.ndarray, " P"]
+    """Loss factor tan δ [-] around ``vibration``; E is what is resisted slowly."""
+    vibration: Float[np.ndarray, " P"]
+    """Angular frequency of the slowest vibration [rad/s]; unused without loss."""
+    consistency: Float[np.ndarray, " P"] | None = None
+    """K_c of a liquid, its viscosity where n is 1 [Pa sⁿ]; None: it is no liquid."""
+    flow_index: Float[np.ndarray, " P"] | None = None
+    """n of a liquid [-]; None: 1."""
     rigid: bool = False
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
@@ -89,6 +97,10 @@ class Body:
     faces: Faces = NO_FACES
     """What the wind blows on."""
     tether: Tether | None = None
+    path: Keyframes | None = None
+    """Prescribed motion, of a rigid body: nothing that it meets can move it."""
+    pivot: Vector = (0.0, 0.0, 0.0)
+    """Where the point that the path tells of, and about which it turns, is at the start [m]."""
 
 
 @dataclass(frozen=True)
@@ -119,7 +131,7 @@ class Problem:
     restitution: Float[np.ndarray, "BW BW"]
     """Newton's e, used only where rigid meets rigid or a plane. Symmetric."""
     planes: tuple[Plane, ...] = (FLOOR,)
-    gravity: tuple[float, float, float] = (0.0, 0.0, -9.81)
+    gravity: tuple[float, float, float] = (0.0, 0.0, -GRAVITY)
     """[m/s²]"""
     gravity_ramp: float = 0.0
     """Gravity grows linearly to its full value over this time [s]."""
@@ -127,7 +139,7 @@ class Problem:
     """One velocity field per body, or the control: one for all, which glues what touches."""
     transfer: Literal["apic", "flip"] = "flip"
     """APIC, or affine FLIP that forgets at each body's own wave speed."""
-    courant: float = 0.4
+    courant: float = COURANT
     """Largest fraction of a cell that a wave may cross in one step."""
     bonds: tuple[tuple[int, int], ...] = ()
     """Rigid inclusions: (frame, soft), a rigid and a deformable body of one object. The frame holds
@@ -136,6 +148,12 @@ class Problem:
     """Between rigid bodies."""
     apart: tuple[tuple[int, int], ...] = ()
     """Bodies of one object that are never in contact with each other."""
+
+    @property
+    def never_touch(self) -> tuple[tuple[int, int], ...]:
+        """Pairs without contact: what is bonded or apart, and bodies that both move as told."""
+        told = [b for b, body in enumerate(self.bodies) if body.path is not None]
+        return (*self.bonds, *self.apart, *combinations(told, 2))
 
 
 @dataclass(frozen=True)
@@ -179,15 +197,18 @@ class Measure:
     speed: float
     """Largest particle speed [m/s]."""
     external_impulse: Float[np.ndarray, "B 3"]
-    """Of gravity, pushes and wind [N s]."""
+    """Of gravity, pushes, wind and what moves a body along a path [N s]."""
     plane_impulse: Float[np.ndarray, "W B 3"]
     """Of plane w on body b [N s]."""
     pair_impulse: Float[np.ndarray, "B B"]
     """Sum of normal impulse magnitudes between two bodies [N s]. Symmetric."""
     push_work: float
-    """Of pushes and wind [J]; gravity's work is in ``potential``."""
+    """Of pushes, wind and what moves a body along a path [J]; gravity's is in ``potential``."""
     friction_loss: float
     """[J]"""
+    impact_loss: float
+    """Taken by normal contact: by restitution of what is rigid, and of what is soft by the nodes of
+    the grid, whose mass stops at once [J]."""
     plastic_loss: float
     """[J]"""
     viscous_loss: float
@@ -250,15 +271,15 @@ class Engine(Protocol):
         """Go on from what ``save`` returned, on an engine built from the same problem."""
         ...
 
-    def halt(self, bodies: Collection[int]) -> None:
+    def stop(self, bodies: Collection[int]) -> None:
         """Take all motion out of some bodies; nothing of it is booked."""
         ...
 
-    def begin(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
-        """Put some bodies, before the first step, where they were in what another engine saved.
+    def start_from(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+        """Put some bodies, before the first step, where they were in another engine's ``save``.
 
-        Place, strain and history are taken over; how they move is what the problem says. Both
-        engines' problems have the same bodies but for velocities and forces.
+        A warm start: place, strain and history are taken over; how they move is what the problem
+        says. Both engines' problems have the same bodies but for velocities and forces.
         """
         ...
 
@@ -272,7 +293,7 @@ class Interactive(Engine, Protocol):
     keeps.
     """
 
-    def poke(self, body: int, point: Vector, impulse: Vector) -> None:
+    def apply_impulse(self, body: int, point: Vector, impulse: Vector) -> None:
         """Give a body an impulse [N s] at a point [m] at once.
 
         Raises:
@@ -281,7 +302,7 @@ class Interactive(Engine, Protocol):
         """
         ...
 
-    def drag(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
+    def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
         """Pull on a body by a damped spring until told otherwise.
 
         Args:
@@ -296,9 +317,28 @@ class Interactive(Engine, Protocol):
         """
         ...
 
+    def weigh(self, gravity: Vector) -> None:
+        """Let gravity be another from now on [m/s²]; what that adds to the potential is work.
+
+        Raises:
+            UserError: It is not finite, or the engine cannot change it.
+
+        """
+        ...
+
+    def blow(self, body: int, wind: Vector) -> None:
+        """Let the air about a body move with a velocity from now on [m/s].
+
+        Raises:
+            UserError: There is no such body, it was given no faces for the wind, the velocity is
+                not finite, or the engine cannot change it.
+
+        """
+        ...
+
 
 MENU = {
-    "warp": "corporeal.mpm.warp:WarpEngine",
-    "cuda": "corporeal.mpm.device:DeviceEngine",
-    "reference": "corporeal.mpm.reference:ReferenceEngine",
+    "cpu": "corporeal.mpm.cpu.engine:CpuEngine",
+    "cuda": "corporeal.mpm.cuda.engine:CudaEngine",
+    "reference": "corporeal.mpm.reference.engine:ReferenceEngine",
 }

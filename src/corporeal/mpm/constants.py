@@ -1,0 +1,230 @@
+"""Every number of the method, once.
+
+NumPy code imports them, kernels on cards take them as they compile, and C++ text finds them in
+``namespace mpm``: ``text`` writes it. What is chosen here is chosen for all engines. Numbers of one
+constitutive law stand with the law, coefficients of a formula in the formula. A cell is dx long.
+"""
+
+# ---------------------------------------------------------------- how long a step may be
+
+COURANT = 0.4
+"""Largest fraction of a cell that a wave may cross in one step [-]; the default of a problem."""
+RIGID_COURANT = 0.05
+"""Largest fraction of a cell that a rigid body may cross in one step [-]."""
+FALL = 0.1
+"""Largest step as a fraction of the time √(dx/g) in which a body at rest falls half a cell [-]."""
+LONGEST_STEP = 1.0
+"""[s]; where nothing else limits the step."""
+STEP_ROUNDING = 1e-9
+"""Share of a step by which a time may be missed before one more step is taken [-]."""
+TETHER_STEP = 0.05
+"""Longest step as a fraction of 1/ω of a tether [-]: its energy swings by ω dt/2."""
+JOINT_STEP = 0.2
+"""Longest step as a fraction of 1/ω of a joint [-], which is implicit."""
+
+# ---------------------------------------------------------------- what left the domain
+
+SUNK = 8.0
+"""A particle, or all of a rigid body, deeper than this in a wall [cells] has left the domain."""
+FARTHEST = 1e5
+"""A particle farther than this from the origin [cells] has left the domain."""
+FARTHEST_STEP = 1e4
+"""A particle that goes farther than this in one step [cells] is lost; checked on cards, where a
+larger number of cells would not fit the integer that counts them."""
+FASTEST = 1e9
+"""A larger velocity [m/s], velocity gradient or strain is as good as infinite where a lost particle
+is looked for."""
+
+# ---------------------------------------------------------------- as good as nothing, or infinite
+
+TINY = 1e-30
+"""Single precision: what is smaller counts as zero, and divisors are at least this [any unit]."""
+VAST = 1e30
+"""Single precision: what is larger counts as infinite; where a search for a least one begins."""
+TINY_DOUBLE = 1e-300
+"""The same of divisors in double precision."""
+VAST_DOUBLE = 1e300
+"""The same of what counts as infinite there."""
+SMALLEST_MASS = 1e-30
+"""Nodes with less mass [kg] are empty."""
+SMALLEST_SLIP = 1e-14
+"""Slower slip [m/s] has no direction."""
+SMALLEST_SINE = 1e-12
+"""Rotations whose sine is smaller have no axis: half their antisymmetric part is the vector."""
+SMALL_TURN = 1e-6
+"""Rotations by less [rad] follow the series of sine and cosine, exact to their last digit there."""
+SMALLEST_WEIGHT = 1e-12
+"""Of a half space in a node's spline, whose mean offset is then where its face lies."""
+RANK_CUTOFF = 1e-12
+"""Principal moments of inertia below this share of the largest are none: a line has no spin."""
+
+# ---------------------------------------------------------------- what a grid cannot see
+
+FORGETTING = 0.1
+"""κ [-]: a body forgets what its grid cannot see at this fraction of its wave speed per cell."""
+SETTLING = 0.5
+"""How often granular matter forgets while it falls half a cell, in √(dx/g) [-] (decision 6)."""
+OWN_BULK = 4.0
+"""λ/μ [-], at ν = 0.4: of nearly incompressible matter what λ exceeds it by acts on the mean
+dilatation of a cluster of particles, not on each one's own volume (decision 23)."""
+BULK_ROUNDING = 1e-6
+"""Share by which λ must exceed that for matter to be so at all: ν of 0.4 in single precision is
+not [-]."""
+SMALLEST_VOLUME = 1e-3
+"""J of what is pressed flat or turned inside out, where pressure is a mean [-]."""
+POISSON_LIMIT = 0.49
+"""Nearly incompressible bodies are simulated at this Poisson's ratio [-], with their true μ."""
+POISSON_FLOOR = 0.41
+"""Where steps do not suffice the bulk gives way first, down to this Poisson's ratio [-]: pressure
+is still a mean there (``OWN_BULK``), waves run at 0.37 of the speed that they have at 0.49."""
+BASELINE_COURANT, BASELINE_STEP = 0.5, 1e-4
+"""Of the published cap on stiffness: its Courant number [-] and its step [s]."""
+
+# ---------------------------------------------------------------- contact: where, and which way
+
+DEEPEST = 1.25
+"""Faces farther than this from the node [cells] are treated as if they were here."""
+WALL_REACH = 0.51
+"""Nodes higher than this above a wall [cells] ignore it: its infinite mass would grip the inside.
+Half a cell, and a hundredth so that rounding does not decide about nodes at exactly half a cell."""
+POINT_REACH = 0.3
+"""Surface points of rigid bodies are watched this far above a wall [cells]."""
+LATTICE_GAP = 0.05
+"""What two particles per cell and axis add to the continuous touching distance [cells] …"""
+LATTICE_SLOPE = 0.25
+"""… and what they add per cell once the face is farther than … [-]"""
+LATTICE_START = 0.7
+"""… this from the node [cells]; all three fitted to flat faces at that density."""
+THIN = 2.0
+"""A rigid body thinner than this [cells] fills no half space around a node: its surface points say
+where it begins."""
+SHOWN_AROUND = 1.0
+"""They are looked at this far from the normal through the node [cells]."""
+FACE_STEPS = 4096
+"""Intervals of the table that says where the face of a half space lies, from 1½ cells to none."""
+FIRST_BIAS, OTHER_BIAS = 0.10, 0.05
+"""Head start of the candidate normals g_a - g_c, and g_a or -g_c [cells]."""
+FIELDS_AT_NODE = 6
+"""Fields that may meet at one node on a card."""
+DENSE_REACH, LOOSE_REACH = 1.25, 1.5
+"""Particles of two bodies farther apart than this along an axis [cells] are not in contact. Those
+of a solid are less than a cell from one another and touch from 1.14 on, lone grains from 1.5 on."""
+REACH_MARGIN = 1.00001
+"""How much a bound on what a particle reaches exceeds it [-]: rounding leaves nobody out."""
+
+# ---------------------------------------------------------------- contact: what it transmits
+
+PATCH = 0.1
+"""Contacts of a hit pair nearer than this [cells] rebound with it: one impact is one event."""
+SLOWEST_BOUNCE = 0.05
+"""Slower approaches [m/s] don't rebound, as in other rigid-body engines."""
+SWEEPS, SWEEPS_OF_A_HIT = 10, 100
+"""Gauss–Seidel sweeps of a step, and of one in which something rigid rebounds or is stacked."""
+SCATTER = 0.6180339887498949
+"""Contacts are swept in strides of this share of their number [-], the golden section: in the order
+in which they lie next to one another the first would carry more, and what rests would tilt."""
+IMPACTS = 50
+"""Most impacts that follow one another within a step, as along a row of touching balls."""
+SWEEPS_REMEMBERED = 2
+"""Fewest sweeps where contacts begin with the forces of the last step."""
+STILL, STILL_OF_A_HIT = 2e-3, 2e-5
+"""Sweeps end when no contact changes its velocity by more than this [cells/s]: stacks that creep
+slower stand. An impact is one event, whose error stays in the motion."""
+JACOBI_SWEEPS, JACOBI_SWEEPS_OF_A_HIT = 100, 400
+"""The same of Jacobi sweeps on cards, which converge more slowly …"""
+JACOBI_STILL = 1e-4
+"""… and end where they change less [cells/s]."""
+
+# ---------------------------------------------------------------- what is lost inside of matter
+
+BRANCHES = 2
+"""Maxwell branches of lossy matter."""
+SLOWEST_LOSS, FASTEST_LOSS = 0.2, 2.0
+"""Frequencies between which their loss factor is flat, over that of the slowest vibration [-]: an
+impact lasts two to three of its half periods."""
+LEAST_LOSS = 0.02
+"""A smaller loss factor takes less than the grid does, and gets no branches [-]."""
+GRID_LOSS = 3.2
+"""Loss factor of contact and transfers themselves in a blow, times the square of the number of
+cells across what is struck [-]; measured on balls of 8 to 12 cells (decision 26)."""
+FEWEST_CELLS = 8.0
+"""Where there are fewer cells across, it is taken as with so many [-]."""
+
+# ---------------------------------------------------------------- liquids
+
+SOUND_OVER_SPEED = 10.0
+"""Of a liquid's waves over its largest expected speed [-]: its density changes by 1 %."""
+LIQUID_SHEAR = 0.125
+"""G/K of a liquid's Maxwell branch [-]."""
+
+# ---------------------------------------------------------------- what bodies are tied to
+
+HELD_SHARE = 0.15
+"""A node of a soft field is a rigid frame's where the frame has this share of the volume [-]. Never
+a half: a face on a grid plane would be a tie."""
+HELD_LAYER = 2.0
+"""Soft matter this near to a frame [cells] says how dense what it holds is."""
+HELD_REACH = 6.0
+"""Particles of a frame farther than this from what it holds [cells] never share a node with it."""
+PARTICLES_PER_CELL = 8
+"""Of matter at rest."""
+CLOSING = 0.2
+"""Share of a joint's gap that is closed in a step [-]."""
+GRIP_REACH = 2.0
+"""Radius of what a grip holds [cells]."""
+GRIP_STIFFNESS, GRIP_DAMPING = 0.25, 0.5
+"""Most that a step can follow of a grip's k dt²/m and c dt/m [-]."""
+
+# ---------------------------------------------------------------- prescribed motion
+
+KEY_START, KEY_SPAN, KEY_PLACE, KEY_TURN, KEY_FRAME, KEY_ROW = 0, 1, 2, 14, 26, 35
+"""Columns of a row of a path, one for each interval: when it begins and how long it lasts [s]; its
+place [m] and its turn since then [rad] as cubics in the time since then (3 components, 4
+coefficients from the constant on); the rotation as it begins (9); and how many there are."""
+
+# ---------------------------------------------------------------- air and gravity
+
+GRAVITY = 9.81
+"""[m/s²]"""
+AIR_DENSITY = 1.2
+"""ρ_air at 20 °C and sea level [kg/m³]."""
+PLATE = 1.17
+"""C: pressure on a plate that faces the wind, over ½ ρ u² [-] (Hoerner 1965, ch. 3)."""
+GUST_PARTS = 8
+"""Sines that a gust is made of, half an octave apart …"""
+SLOWEST_GUST = 0.25
+"""… from this frequency on [Hz]."""
+
+# ---------------------------------------------------------------- how far bodies are apart
+
+PARTICLE_RADIUS = 0.25
+"""Of the ball that a particle stands for where distances are measured [cells]."""
+OVERLAP_REACH = 1.5
+"""Radius in which neighbours are counted [cells]; deeper overlap reads as this plus a radius."""
+BOXES_APART = 4.0
+"""Bodies farther apart than this [cells] are measured by their bounding boxes."""
+DEEPEST_PARTICLES = 8
+"""The depth is the mean over so many deepest particles: one cell's worth, against jitter."""
+
+# ---------------------------------------------------------------- how the processor is kept busy
+
+OUT_OF_BLOCK_SHARE = 0.1
+"""Share of a field's particles outside of their blocks from which it is sorted with others [-]."""
+POLL_INTERVAL = 0.2
+"""Computing time after which Python looks whether somebody wants to stop [s]."""
+
+
+def numbers() -> dict[str, int | float]:
+    """All of them by name."""
+    return {name: value for name, value in globals().items() if name.isupper()}
+
+
+def text() -> str:
+    """Define all of them in C++, in ``namespace mpm``: whole ones as int, others as double."""
+    lines = [f"constexpr {type_of(v)} {name} = {v!r};" for name, v in numbers().items()]
+    return "\n".join(["namespace mpm {", *lines, "}", ""])
+
+
+def type_of(value: int | float) -> str:
+    """Give the C++ type of a number."""
+    return "int" if isinstance(value, int) else "double"

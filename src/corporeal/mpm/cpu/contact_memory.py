@@ -1,0 +1,196 @@
+"""Memory that the native contact piece works in, and what it is told of the problem."""
+
+import numpy as np
+
+from corporeal.mpm.constants import WALL_REACH
+from corporeal.mpm.cpu import layout
+from corporeal.mpm.cpu.layout import BOX, CENTRE, PAIR, RADIUS
+from corporeal.mpm.ledger import Ledger
+from corporeal.mpm.physics import rigid
+from corporeal.mpm.physics.contact import face_table
+from corporeal.mpm.problem import Body, Problem
+
+LISTS = {
+    "junction": layout.JUNCTION,
+    "meet": layout.MEET,
+    "side": layout.SIDE,
+    "touch": layout.TOUCH,
+    "aim": layout.AIM,
+    "lean": layout.LEAN,
+    "entry": layout.ENTRY,
+    "line": layout.LINE,
+    "past": layout.PAST,
+}
+"""What the native pieces list."""
+BYTES = {name: record.dtype.itemsize for name, record in LISTS.items()}
+BONDED = -1
+"""Friction of a pair that is never in contact, to the native piece."""
+BOOKS = (
+    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point impact_loss"
+)
+
+
+def point(record: np.ndarray, **arrays: np.ndarray) -> None:
+    """Write the addresses of arrays, which must stay alive, into a native struct."""
+    for name, array in arrays.items():
+        record[name] = array.ctypes.data
+
+
+def rigid_grid(
+    record: np.ndarray, body: Body, state: np.ndarray, points: np.ndarray, cell: float
+) -> dict[str, np.ndarray]:
+    """Give a rigid body a grid that holds it however it turns; memory is used where it is touched.
+
+    Args:
+        record: The native struct to fill.
+        body: The body.
+        state: Its rigid state, see ``layout``.
+        points: Its particles in its own frame, see ``tables``.
+        cell: dx [m].
+
+    """
+    across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
+    surface = body.surface - state[CENTRE : CENTRE + 3]
+    if body.path is not None:
+        # It never meets a plane, neither on nodes nor on points of its own.
+        surface = np.zeros((1, 3))
+    points, clumps = _clumped(points, cell)
+    state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
+    arrays = {
+        "node": np.zeros((across**3, 64, 8), np.float32),
+        "table": np.full(across**3, -1, np.int32),
+        "where": np.zeros((across**3, 4), np.int32),
+        "near": np.zeros(2 * across**3, np.uint64),
+        "block": np.zeros(len(points), np.int32),
+        "point": points,
+        "clump": clumps,
+        "surface": np.ascontiguousarray(surface),
+        "rigid": state,
+    }
+    point(record, **arrays)
+    record["dim"], record["rigids"], record["floor"] = across, 1, -1
+    record["points"], record["surfaces"] = len(points), len(surface)
+    record["clumps"] = len(clumps)
+    record["spacing"] = rigid.spacing(body.surface)
+    record["thin"] = rigid.thinness(body.surface, cell)
+    return arrays
+
+
+def _clumped(points: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """Sort a rigid body's particles into cubes of 4 cells, which are passed over where all is far.
+
+    Returns:
+        The particles, and for each cube the first and last of them, its middle and its radius [m].
+
+    """
+    cube = np.floor(points[:, :3] / (4.0 * cell)).astype(np.int64)
+    order = np.lexsort(cube.T)
+    points, cube = np.ascontiguousarray(points[order]), cube[order]
+    starts = np.flatnonzero(np.any(np.diff(cube, axis=0, prepend=cube[:1] - 1) != 0, axis=1))
+    clumps = np.zeros((len(starts), 6))
+    clumps[:, 0], clumps[:, 1] = starts, np.append(starts[1:], len(points))
+    for clump in clumps:
+        mine = points[int(clump[0]) : int(clump[1]), :3]
+        clump[2:5] = 0.5 * (mine.min(axis=0) + mine.max(axis=0))
+        clump[5] = np.linalg.norm(mine - clump[2:5], axis=1).max()
+    return points, clumps
+
+
+class ContactMemory:
+    """Lists of nodes, contacts and particles near them, and tables that never change."""
+
+    def __init__(self, world: np.ndarray, problem: Problem, ledger: Ledger) -> None:
+        self.world, self.cell = world, problem.cell
+        walls = [[*plane.normal, plane.offset] for plane in problem.planes]
+        self.plane = np.array(walls, float).reshape(-1, 4)
+        self.friction, self.restitution = _pair_tables(problem)
+        self.face = face_table()
+        self.stage = np.zeros(1, layout.STAGE.dtype)
+        self.pair = np.zeros(self.friction.size * PAIR)
+        point(self.stage, pair=self.pair)
+        point(
+            world,
+            plane=self.plane,
+            friction=self.friction,
+            restitution=self.restitution,
+            contact_memory=self.stage,
+            face=self.face,
+        )
+        point(world, **{name: getattr(ledger, name) for name in BOOKS.split()})
+        world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
+        moves = problem.contact == "multi" and any(body.rigid for body in problem.bodies)
+        self.lines = 8 if moves else 0
+        self.room, self.lists = 256, {"past": np.zeros(0, np.uint8)}
+        self.lengthen()
+
+    def watched(self, origin: np.ndarray, dim: np.ndarray) -> tuple[int, np.ndarray]:
+        """Give the plane that a window reaches, and its normal; -1 and 0 if none or several.
+
+        Args:
+            origin: The window's first block.
+            dim: How many blocks it has along each axis.
+
+        """
+        ends = 4.0 * self.cell * np.stack([origin, origin + dim])
+        normal = self.plane[:, :3]
+        lowest = np.where(normal > 0.0, normal * ends[0], normal * ends[1]).sum(axis=1)
+        near = np.flatnonzero(lowest - self.plane[:, 3] <= WALL_REACH * self.cell)
+        if len(near) != 1:
+            return -1, np.zeros(3)
+        return int(near[0]), normal[near[0]]
+
+    def stand(self, floor: np.ndarray, tasks: int) -> int:
+        """Make room for the books of tasks on nodes; how many of them there are, if any stands."""
+        self.stands = np.zeros(tasks * BYTES["entry"], np.uint8)
+        point(self.stage, stand=self.stands)
+        return tasks if (floor >= 0).any() else 0
+
+    @property
+    def past(self) -> np.ndarray:
+        """Forces of the contacts in the last step, as bytes: where the next one begins to look."""
+        return self.lists["past"][: int(self.stage["pasts"][0]) * BYTES["past"]].copy()
+
+    @past.setter
+    def past(self, bytes_: np.ndarray) -> None:
+        while len(bytes_) > len(self.lists["past"]):
+            self.lengthen()
+        self.lists["past"][: len(bytes_)] = bytes_
+        self.stage["pasts"] = len(bytes_) // BYTES["past"]
+
+    def lengthen(self) -> None:
+        """Make every list half as long again."""
+        self.room += self.room // 2
+        room = {
+            "junction": self.room // 2,
+            "meet": 4 * self.room,
+            "side": 8 * self.room,
+            "touch": 8 * self.room,
+            "aim": 8 * self.room,
+            "lean": 8 * self.room,
+            "entry": 8 * self.room,
+            "line": self.lines * self.room,
+            "past": self.lines * self.room,
+        }
+        past = self.past
+        self.lists = {name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()}
+        self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
+        self.slot = np.zeros(1 << (4 * room["past"]).bit_length(), np.int32)
+        self.stage["slots"] = len(self.slot)
+        point(self.stage, order=self.order, slot=self.slot, **self.lists)
+        self.past = past
+        self.stage["most_junctions"], self.stage["most_meets"] = room["junction"], room["meet"]
+        self.stage["most_sides"], self.stage["most_touches"] = room["side"], room["touch"]
+
+
+def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """Friction and restitution of fields and planes; one shared field has its bodies' mean."""
+    friction = np.array(problem.friction, float)
+    restitution = np.array(problem.restitution, float)
+    if problem.contact == "multi":
+        for frame, soft in problem.never_touch:
+            friction[frame, soft] = friction[soft, frame] = BONDED
+        return friction, restitution
+    bodies, walls = len(problem.bodies), len(problem.planes)
+    shared = np.zeros((1 + walls, 1 + walls))
+    shared[0, 1:] = shared[1:, 0] = friction[:bodies, bodies:].mean(axis=0)
+    return shared, np.zeros_like(shared)

@@ -1,0 +1,487 @@
+"""The production engine: float32 particles in sorted batches, one sparse grid per body.
+
+Moving-least-squares MPM (Hu et al. 2018) with quadratic B-splines and affine FLIP; the loops over
+particles, nodes and contacts are the native pieces of ``cpu.program``, launched by Warp.
+"""
+
+from collections.abc import Collection
+
+import numpy as np
+
+from corporeal.errors import SimulationError
+from corporeal.machine import cores
+from corporeal.mpm.constants import (
+    FALL,
+    FARTHEST,
+    FASTEST,
+    OUT_OF_BLOCK_SHARE,
+    POLL_INTERVAL,
+    RIGID_COURANT,
+    SUNK,
+    TINY,
+)
+from corporeal.mpm.cpu import clock as pacing
+from corporeal.mpm.cpu import tables
+from corporeal.mpm.cpu.contact_memory import ContactMemory, point, rigid_grid
+from corporeal.mpm.cpu.layout import (
+    ASTRAY,
+    CLOCK,
+    FIELD,
+    INFINITE,
+    LAMBDA,
+    MT,
+    MU,
+    PLASTIC,
+    REPORT,
+    RHO,
+    ST,
+    STRAYED,
+    SUMS,
+    VE,
+    VISCOUS,
+    WORK,
+    WORLD,
+)
+from corporeal.mpm.cpu.program import Program
+from corporeal.mpm.cpu.read import Reader
+from corporeal.mpm.cpu.shared_field import Carried
+from corporeal.mpm.cpu.sort import Sorter
+from corporeal.mpm.cpu.spring_records import Springs
+from corporeal.mpm.cpu.wind_records import Blows
+from corporeal.mpm.cpu.window import POINTED, Window, node_tasks, particle_tasks, too_wide
+from corporeal.mpm.interaction import Interaction
+from corporeal.mpm.ledger import Ledger
+from corporeal.mpm.measure import Sums
+from corporeal.mpm.physics import prescribed
+from corporeal.mpm.physics.grips import Grip
+from corporeal.mpm.physics.rigid import RigidBody
+from corporeal.mpm.physics.springs import longest_step
+from corporeal.mpm.problem import Problem, Snapshot, Steps
+from corporeal.mpm.state import Motion
+from corporeal.mpm.substance import Substances
+
+DEFAULT_THREADS = 4
+KEPT = ("count", "smallest", "largest", "speed", "wave")
+"""What the clock remembers from step to step."""
+
+
+class CpuEngine(Interaction):
+    """Steps one problem on the CPU."""
+
+    def __init__(self, problem: Problem, threads: int | None = None) -> None:
+        """Lay out memory.
+
+        Args:
+            problem: What to simulate.
+            threads: How many threads share the loops; None: as many as there are cores, up to 4.
+                The result does not depend on it.
+
+        """
+        self.problem = problem
+        self.threads = threads or min(DEFAULT_THREADS, cores())
+        self.steps = Steps()
+        self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
+        counts = [len(b.position) for b in problem.bodies]
+        self.first = [0, *np.cumsum(counts).tolist()]
+        self.lost = np.zeros(self.first[-1], bool)
+        everything = list(range(len(problem.bodies)))
+        single = problem.contact == "single"
+        self.members = [everything] if single else [[b] for b in everything]
+        self.rigid = {
+            b: tables.rigid_state(body) for b, body in enumerate(problem.bodies) if body.rigid
+        }
+        self.paths = prescribed.guides(problem)
+        self.points = {
+            b: tables.rigid_points(problem.bodies[b], state) for b, state in self.rigid.items()
+        }
+        self._lay_out()
+
+    def _is_rigid(self, field: int) -> bool:
+        return self.problem.contact == "multi" and field in self.rigid
+
+    # ------------------------------------------------------------ memory
+
+    def _lay_out(self) -> None:
+        problem = self.problem
+        self.world = np.zeros(1, WORLD.dtype)
+        self.program = Program(self.world, self.threads)
+        self.field = np.zeros(len(self.members), FIELD.dtype)
+        self.window: dict[int, Window] = {}
+        walls = [[*plane.normal, plane.offset / problem.cell] for plane in problem.planes]
+        sorter = Sorter(np.reshape(walls, (-1, 4)), (SUNK, FARTHEST), self.program)
+        self.reader = Reader(problem.cell, self.program)
+        self._fill_fields(sorter)
+        separate = [b for b in self.rigid if self._is_rigid(b)]
+        self.grids = [
+            rigid_grid(
+                self.field[b : b + 1],
+                problem.bodies[b],
+                self.rigid[b],
+                self.points[b],
+                problem.cell,
+            )
+            for b in separate
+        ]
+        self.carried = [
+            Carried(problem.bodies[b], state, self.first[b], problem.cell)
+            for b, state in self.rigid.items()
+            if b not in separate
+        ]
+        self.contact = ContactMemory(self.world, problem, self.ledger)
+        self.blows = Blows(
+            problem, self.first, self.ledger.external_impulse, self.rigid, self.points
+        )
+        self.springs = Springs(problem, self.first, self.ledger.external_impulse, self.rigid)
+        self.grips: dict[int, Grip] = {}
+        self.bond, self.bonded = tables.bonds(problem)
+        self._wind_clock()
+        self.connect()
+
+    def _fill_fields(self, sorter: Sorter) -> None:
+        """Give every field that deforms its materials and its particles."""
+        problem = self.problem
+        substances, row_of_particle = Substances.of(problem)
+        self.material: dict[int, tables.Materials] = {}
+        for f, bodies in enumerate(self.members):
+            if self._is_rigid(f):
+                continue
+            self.material[f] = tables.Materials.of(substances.of_bodies(bodies))
+            kind = row_of_particle[self.first[bodies[0]] : self.first[bodies[-1] + 1]]
+            kind = (kind - kind.min()).astype(np.int32)
+            rows = tables.particle_rows(problem, bodies, self.first, kind)
+            place = np.concatenate([problem.bodies[b].position for b in bodies]) / problem.cell
+            self._refuse_far(place, bodies)
+            self.window[f] = Window(place, rows, self.material[f], sorter)
+            if not self.window[f].fits:
+                raise SimulationError(too_wide(problem, bodies, 0.0))
+
+    def _wind_clock(self) -> None:
+        problem, clock = self.problem, np.zeros(1, CLOCK.dtype)
+        self.clock = clock
+        self.body_loads = pacing.body_loads(
+            problem,
+            self.rigid,
+            {f: material.body for f, material in self.material.items()},
+            self.paths,
+        )
+        clock["gravity"], clock["ramp"] = problem.gravity, problem.gravity_ramp
+        clock["courant"], clock["rigid_courant"] = problem.courant, RIGID_COURANT
+        clock["fall"] = self._longest_fall()
+        clock["speed"] = max(np.linalg.norm(b.velocity, axis=1).max() for b in problem.bodies)
+        clock["wave"] = max([self._rest_speed(f) for f in self.window] + [0.0])
+        clock["smallest"] = np.inf
+        clock["body_loads"] = len(self.body_loads)
+        # Carried bodies are moved between steps.
+        clock["fuse"] = not self.carried
+        point(
+            clock,
+            body_load=self.body_loads,
+            external_impulse=self.ledger.external_impulse,
+            push_work=self.ledger.push_work,
+        )
+        point(self.world, clock=clock)
+
+    def _longest_fall(self) -> float:
+        """Longest step in which nothing falls far from rest, and springs are followed [s]."""
+        pulls = (self.problem.gravity, *self.body_loads["push"].tolist())
+        pull = max(float(np.linalg.norm(a)) for a in pulls)
+        fall = FALL * np.sqrt(self.problem.cell / max(pull, TINY))
+        return float(min(fall, longest_step(self.problem), prescribed.longest_step(self.problem)))
+
+    def _refuse_far(self, place: np.ndarray, bodies: list[int]) -> None:
+        if not np.isfinite(place).all():
+            raise SimulationError(
+                f"{self.problem.bodies[bodies[0]].name!r} starts with positions that are not "
+                "finite. Look at the mesh it was filled from."
+            )
+
+    def _rest_speed(self, field: int) -> float:
+        """Fastest wave of a field at rest [m/s]."""
+        table, stiffening = self.material[field].table, self.material[field].stiffening
+        self.field["stiffening"][field] = stiffening
+        modulus = table[:, LAMBDA].astype(np.float64) + 2.0 * table[:, MU]
+        return float(np.sqrt(modulus / table[:, RHO]).max()) * stiffening
+
+    def connect(self) -> None:
+        """List the tasks and point the native structs to where everything is."""
+        self.task, counts = particle_tasks(self.window)
+        self.node_task = node_tasks(self.window)
+        self.report = np.zeros((len(self.task), REPORT))
+        for f, window in self.window.items():
+            self._connect_field(f, window)
+        for body in self.carried:
+            body.find(self.window[0])
+        world = self.world
+        point(
+            world,
+            field=self.field,
+            task=self.task,
+            list=self.node_task,
+            report=self.report,
+            blow=self.blows.record,
+            bond=self.bond,
+        )
+        self._connect_bonds()
+        self.springs.connect(world)
+        world["blows"] = len(self.blows.record)
+        world["blown"] = len(self.field) if len(self.blows.record) else 0
+        world["fields"], world["dx"] = len(self.field), self.problem.cell
+        world["tasks"], world["nodes"] = len(self.task), len(self.node_task)
+        world["colour"] = counts
+        world["stands"] = self.contact.stand(self.field["floor"], len(self.node_task))
+        world["rigids"] = len(self.field) if self.field["rigids"].any() else 0
+        self.clock["laid"] = 0
+        particles = sum(window.count for window in self.window.values())
+        self.program.divide((np.cumsum(counts) - counts).tolist(), len(self.task), particles)
+
+    def _connect_bonds(self) -> None:
+        """Make room for every node that a frame could hold."""
+        self.held = []
+        for row in self.bond:
+            room = 64 * len(self.window[int(row["soft"])].where)
+            held = np.zeros(room, np.int32), np.zeros(room, np.float32), np.zeros(room, np.float32)
+            self.held += held
+            row["slot"], row["mass"], row["volume"] = (array.ctypes.data for array in held)
+        self.world["bonds"] = len(self.bond)
+
+    def _connect_field(self, f: int, window: Window) -> None:
+        record = self.field[f : f + 1]
+        for name in POINTED:
+            record[name] = getattr(window, name).ctypes.data
+        record["material"] = self.material[f].table.ctypes.data
+        record["origin"], record["dim"] = window.origin, window.dim
+        record["blocks"], record["pool"] = len(window.block), len(window.where)
+        record["flows"], record["relaxes"] = self.material[f].flows, len(window.branch) > 0
+        record["swells"] = self.material[f].swells
+        # One lane of a node says how high mass lies over a floor.
+        record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
+
+    # ------------------------------------------------------------ time
+
+    @property
+    def time(self) -> float:
+        """Simulated time so far [s]."""
+        return float(self.world["time"][0])
+
+    def advance(self, until: float) -> None:
+        """Step until exactly ``until`` [s], choosing steps by stability."""
+        good = self.save()
+        try:
+            self.clock["until"], self.clock["given"] = until, 0.0
+            batch = pacing.StepBatch(POLL_INTERVAL)
+            while self.time < until:
+                with batch:
+                    self.clock["budget"] = 1 if self.carried else batch.steps
+                    self._run()
+        except SimulationError:
+            lost = self.lost.copy()
+            self.restore(good)
+            self.lost = lost
+            raise
+
+    def stable_step(self) -> float:
+        """Largest stable step now [s]: dt = s dx/(c + |v|), and the falls of what is rigid."""
+        self.clock["budget"] = 0
+        self.program.run()
+        return float(self.clock["stable"][0])
+
+    def step(self, dt: float) -> None:
+        """Take one step of dt [s]."""
+        self.clock["given"], self.clock["budget"] = dt, 1
+        self._run()
+
+    def _run(self) -> None:
+        """Step until something is up; where a list was too short, lengthen it and go on."""
+        world = self.world
+        self.program.run()
+        while world["full"][0]:
+            self.contact.lengthen()
+            world["again"] = 1
+            self.program.run(resume=True)
+        self._note_steps()
+        strayed = [body.carry(self.window[0], float(world["dt"][0])) for body in self.carried]
+        if world["stop"][0] == INFINITE:
+            self._find_lost()
+        if world["stop"][0] == STRAYED or any(strayed):
+            astray = (self.report[:, ASTRAY] > 0) | any(strayed)
+            self._sort({int(f) for f in self.task[astray, 0]})
+
+    def _note_steps(self) -> None:
+        clock = self.clock[0]
+        self.steps = Steps(int(clock["count"]), float(clock["smallest"]), float(clock["largest"]))
+
+    def book(self) -> None:
+        """Move what the tasks added up into the ledger."""
+        total = self.report[:, [PLASTIC, VISCOUS, WORK]].sum(axis=0)
+        self.ledger.plastic_loss += total[0]
+        self.ledger.viscous_loss += total[1] + self.springs.take_loss()
+        self.ledger.push_work += total[2] + self.blows.take_work() + self.springs.take_work()
+        self.report[:, [PLASTIC, VISCOUS, WORK]] = 0.0
+
+    def _sort(self, fields: set[int]) -> None:
+        self.book()
+        lost = [window.survey() for window in self.window.values()]
+        if any(lost):
+            self._find_lost()
+        # Who would be next soon is sorted now: all particles must lie down again after every sort.
+        out = {f: window.out_of_block for f, window in self.window.items()}
+        fields |= {f for f, share in out.items() if share > OUT_OF_BLOCK_SHARE}
+        wide = [f for f in sorted(fields) if not self.window[f].sort()]
+        self.connect()
+        if wide:
+            raise SimulationError(too_wide(self.problem, self.members[wide[0]], self.time))
+
+    def _find_lost(self) -> None:
+        """Raise when a particle is not finite or left the domain."""
+        cell = self.problem.cell
+        self.lost[:] = False
+        for window in self.window.values():
+            place = window.position()
+            rows = window.channel(VE, ST - VE)
+            good = (np.abs(rows) < FASTEST).all(axis=1) & (np.abs(place) < FARTHEST).all(axis=1)
+            for plane in self.problem.planes:
+                height = place @ np.array(plane.normal) - plane.offset / cell
+                good &= height > -SUNK
+            self.lost[window.number[~good]] = True
+        if self.lost.any():
+            first = int(np.argmax(self.lost))
+            body = int(np.searchsorted(self.first, first, side="right")) - 1
+            raise SimulationError(
+                f"At t = {self.time:.4g} s {int(self.lost.sum())} particles of "
+                f"{self.problem.bodies[body].name!r} were lost: they are not finite or left the "
+                "domain. What was computed before is kept. Use more detail, or look for parts "
+                "that overlap at the start."
+            )
+
+    # ------------------------------------------------------------ reading and keeping
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Everything needed to go on later exactly as if nothing had happened."""
+        self.book()
+        saved = {f"ledger.{k}": v for k, v in self.ledger.as_arrays().items()}
+        for f, window in self.window.items():
+            saved |= {f"field{f}.{k}": v for k, v in window.saved().items()}
+        saved |= {f"rigid{b}": state.copy() for b, state in self.rigid.items()}
+        saved["contact"] = self.contact.past
+        saved["clock"] = np.array([self.time, *(float(self.clock[k][0]) for k in KEPT)])
+        return saved
+
+    def restore(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from what ``save`` returned, on an engine built from the same problem."""
+        for name in self.ledger.as_arrays():
+            getattr(self.ledger, name)[...] = saved[f"ledger.{name}"]
+        for f, window in self.window.items():
+            window.restore(_of(f"field{f}.", saved))
+        for b, state in self.rigid.items():
+            state[:] = saved[f"rigid{b}"]
+        self.contact.past = saved["contact"]
+        time, *kept = saved["clock"].tolist()
+        self.world["time"] = time
+        for name, value in zip(KEPT, kept, strict=True):
+            self.clock[name] = value
+        self._note_steps()
+        self.lost[:] = False
+        self.connect()
+
+    # ------------------------------------------------------------ accessors of what is common
+
+    def _particles(self) -> Snapshot:
+        count = self.first[-1]
+        now = Snapshot(
+            time=self.time,
+            position=np.zeros((count, 3)),
+            velocity=np.zeros((count, 3)),
+            deformation=np.zeros((count, 3, 3)),
+            motion=np.zeros((count, 3, 3)),
+            plastic_strain=np.zeros(count),
+        )
+        for f, window in self.window.items():
+            self.reader.spread(window, self.material[f], now)
+        return now
+
+    def _sums(self) -> Sums:
+        rows = np.zeros((len(self.problem.bodies), SUMS))
+        for f, window in self.window.items():
+            rows[self.members[f]] = self.reader.total(window, self.material[f])
+        return Sums(
+            mass=self.body_loads["mass"].copy(),
+            first_moment=rows[:, :3],
+            momentum=rows[:, 3:6],
+            angular_momentum=rows[:, 6:9],
+            kinetic=rows[:, 9],
+            elastic=rows[:, 10],
+            relaxing=rows[:, 11],
+            fastest=rows[:, 12],
+        )
+
+    def _rigid_bodies(self) -> dict[int, RigidBody]:
+        start = self.springs.start
+        return {
+            b: tables.rigid_body(state, start[b], self.points[b]) for b, state in self.rigid.items()
+        }
+
+    def _booked(self) -> Ledger:
+        self.book()
+        return self.ledger
+
+    def _enter(self, body: int, impulse: np.ndarray, work: float) -> None:
+        self.ledger.external_impulse[body] += impulse
+        self.ledger.push_work += work
+
+    def _add_velocity(self, body: int, particle: np.ndarray, gained: np.ndarray) -> None:
+        window = self.window[0 if self.problem.contact == "single" else body]
+        every = np.zeros((self.first[-1], 3))
+        every[self.first[body] + particle] = gained
+        fastest = window.add_velocity(every[window.number])
+        self.clock["speed"] = max(float(self.clock["speed"][0]), fastest)
+        self._forget_nodes()
+
+    def _add_momentum(self, body: int, momentum: np.ndarray, angular: np.ndarray) -> None:
+        state = self.rigid[body]
+        moving = tables.rigid_body(state, self.springs.start[body], self.points[body])
+        speed = moving.velocity + momentum / moving.mass
+        tables.set_rigid_motion(state, speed, moving.angular_momentum + angular)
+        self._forget_nodes()
+
+    def _take_grips(self) -> None:
+        self.book()
+        self.springs.grasp(self.grips)
+        self.springs.connect(self.world)
+
+    def _take_loads(self) -> None:
+        self.book()
+        self.clock["gravity"], self.clock["ramp"] = self.problem.gravity, self.problem.gravity_ramp
+        self.clock["fall"] = self._longest_fall()
+        self.blows.blow(self.problem)
+
+    def _set_motion(self, bodies: Collection[int], motion: Motion) -> None:
+        for f, window in self.window.items():
+            own = np.isin(self.material[f].body, list(bodies))
+            chosen = own[window.channel(MT, 1)[:, 0].view(np.int32)]
+            window.set_motion(chosen, motion.velocity[window.number[chosen]])
+        for b in self.rigid.keys() & set(bodies):
+            tables.set_rigid_motion(self.rigid[b], motion.speed[b], motion.spin_momentum[b])
+        self._forget_nodes()
+
+    def _forget_nodes(self) -> None:
+        """Void nodes that were laid with other velocities."""
+        self.clock["laid"] = 0
+
+    def _place_as(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+        """Take bodies over with their fields: in one that all share, every particle comes along."""
+        for f, window in self.window.items():
+            if not set(bodies).isdisjoint(self.members[f]):
+                window.restore(_of(f"field{f}.", saved))
+                # What it was strained by there was long ago: branches have forgotten it.
+                window.relax(self.material[f])
+        for b in self.rigid.keys() & set(bodies):
+            self.rigid[b][:] = saved[f"rigid{b}"]
+        self.contact.past = saved["contact"]
+        wave = float(saved["clock"][-1])
+        self.clock["wave"] = max(float(self.clock["wave"][0]), wave)
+        self.connect()
+
+
+def _of(head: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
+    """Choose what stands under names with that head, and take it off."""
+    return {k.removeprefix(head): v for k, v in saved.items() if k.startswith(head)}

@@ -1,0 +1,354 @@
+"""Memory that Python and the native loops share: channels, columns, codes and structs.
+
+``numbers`` and the texts of the records stand in front of the loops that read them; no number and
+no struct of this layout is written in ``loops``.
+"""
+
+from corporeal.mpm.constants import BRANCHES
+from corporeal.mpm.records import Record
+
+# ---------------------------------------------------------------- particles
+
+PLACE = 22
+"""Places are fixed point, relative to the field's window: 2**PLACE units per cell."""
+UNIT, HALF = 1 << PLACE, 1 << (PLACE - 1)
+"""A cell and half a cell [units]."""
+XI, VE, AF, DE, ST, MA, VO, MT, ID = 0, 3, 6, 15, 24, 30, 31, 32, 33
+"""First channels of a particle in its batch, [channel][8]: place (3), velocity (3), affine part (9,
+per cell: dx times the usual), F - 1 (9), stress (6), mass, volume, material and number."""
+CHANNELS = 34
+"""Channels of a particle."""
+EP, VC, TM = 0, 1, 2
+"""First channels of what matter that flows remembers besides: plastic strain, volume correction,
+whole motion - 1 (9)."""
+RELIEF, PRESSURE, GROWN, CLUSTER, BOUND = 1, 2, 3, 4, 5
+"""The same of nearly incompressible matter: ln of the mean volume over its own and the Kirchhoff
+pressure of the mean [Pa]; within a step, its own dilatation, its cluster and the wave bound so far.
+Its plastic strain, in the channel before, stays 0."""
+HISTORY = 11
+"""Channels of that."""
+CONFORMATION, SWOLLEN = 0, 6
+"""First channels of a Maxwell branch: its strain (6) and θ."""
+BRANCH = 7
+"""Channels of a branch."""
+MEMORY = BRANCHES * BRANCH
+"""Channels of what all branches of a particle remember."""
+LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, KEEP, RHO, RIGID = range(12)
+"""Columns of the table of materials: the law's number, μ, λ, σ_y, H [Pa], cone slope α, apex strain
+p₀/K, of a liquid K_c/dtⁿ in this step [Pa] and n, forgetting rate [1/s], ρ [kg/m³], 1 where
+rigid."""
+SHEAR, BULK, KEPT, FRESH, TIME, PUSH, CONSISTENCY = 12, 14, 16, 18, 20, 22, 25
+"""And of each Maxwell branch G, K [Pa], what this step leaves of old and of new strain, T [s]; this
+step's push [m/s] (3); K_c of a liquid [Pa sⁿ]."""
+MATERIAL = 32
+"""Columns with room to spare: a row is two cache lines."""
+
+# ---------------------------------------------------------------- blocks and tasks
+
+BLOCK = 32
+"""Integers of a block's record: start, end, coordinates 3, neighbours 27."""
+NEIGHBOURS = 5
+"""The first of the node blocks around it, and …"""
+OWN_BLOCK = NEIGHBOURS + 13
+"""… its own."""
+RUN = 5
+"""Integers of a run of slots before a sort: the first of them."""
+LAYER = 66
+"""Nodes from one layer of an arena of 8 x 8 x 8 to the next: with 64, what is read in the third
+layer would wait for what was just written in the first, 4096 bytes before."""
+ARENA = 8 * LAYER
+COLOURS = 8
+"""Tasks on particles are pieces of columns of blocks. Those of one colour, the parities of their x,
+y and number in the column, never overlap."""
+SPEED2, WAVE2, PLASTIC, VISCOUS, ASTRAY, WORK = range(6)
+"""Columns of a task's report."""
+REPORT = 8
+"""Columns with room to spare: a row is a cache line."""
+REACHED, STRAYED, PAUSED, INFINITE = 1, 2, 3, 4
+"""Why steps ended: time is up; a particle left its block; enough for now; something overflowed."""
+MOST_THREADS = 64
+"""That may share tasks."""
+SURVEY, COUNT, RANK, COPY = range(4)
+"""Stages of a sort."""
+RUNS = 64
+"""Runs of blocks that are added up on their own where particles are read."""
+SUMS = 13
+"""Of a body: m x (3), m v (3), angular momentum about the origin (3), kinetic and elastic energy,
+the energy in Maxwell branches, and the largest |v|²."""
+
+# ---------------------------------------------------------------- rigid bodies
+
+CENTRE, TURN, REST, SPEED, MOMENT, INERTIA, SPIN, RADIUS, KICK, OWN, BOX = (
+    *(1, 4, 13, 22, 25, 28, 37, 40, 41),
+    *(44, 48),
+)
+LIGHT, HEAVY, NEXT = 54, 55, 64
+"""First columns of a rigid state, after its mass: centre (3), rotation (9), inverse inertia at rest
+(9), velocity (3), angular momentum (3), inverse inertia now (9), spin (3), radius, kick (3); while
+a frame holds soft nodes its own mass and centre (4); lowest and highest corner of the box around
+its particles in its own frame (6). Then 1/M in contact (0: it moves as told), and of what does its
+inertia at rest (9) and its rotation at the end of the step (9)."""
+RIGID_STATE = 80
+"""Columns with room to spare."""
+
+# ---------------------------------------------------------------- contact
+
+PARTS = 16
+"""Parts that a list is cut into, whoever works on them."""
+FIELDS_IN_BLOCK = 12
+"""Fields that may meet in one block of nodes."""
+PAIR = 8
+"""Columns of a pair of fields in a step: hit, normal sum, weighted place (3), spare."""
+
+
+def numbers() -> str:
+    """C++ text of all numbers of the layout."""
+    found = {k: v for k, v in globals().items() if k.isupper() and isinstance(v, int)}
+    return "".join(f"const int {name} = {value};\n" for name, value in found.items())
+
+
+# ---------------------------------------------------------------- structs of a step
+
+POST = Record(  # one thread's, on a cache line of its own
+    "Post",
+    ("unsigned long long", "share"),  # its tasks of this phase: epoch 24 bits, next 20, end 20
+    ("unsigned long long", "busy"),
+    ("unsigned long long[6]", "spare"),
+)
+THREAD_POOL = Record(
+    "ThreadPool",
+    ("void *", "yield_core"),  # the system's sched_yield, or null
+    ("int *", "phase"),  # [phases][4]: piece, first task, how many, or where in World that stands
+    ("int", "phases threads now piece first count started spare"),
+    ("unsigned long long[2]", "fill0"),
+    ("int", "epoch stopped"),  # a line of their own
+    ("unsigned long long[7]", "fill1"),
+    ("int", "done spare2"),
+    ("unsigned long long[7]", "fill2"),
+    (f"Post[{MOST_THREADS}]", "post"),
+    within=(POST,),
+)
+BOND = Record(  # a frame and the soft nodes it holds in this step: see physics/inclusions.py
+    "Bond",
+    ("int *", "slot"),
+    ("float *", "mass volume"),
+    ("double *", "point"),  # [points][4] near the soft body: place in the frame's frame, volume
+    ("double", "per_soft"),  # volume per mass [m³/kg]
+    ("int", "frame soft points count"),
+)
+BODY_LOAD = Record(  # uniform accelerations of a body
+    "BodyLoad",
+    ("double", "mass"),
+    ("double[3]", "push"),
+    ("double", "start end"),
+    ("double *", "rigid"),
+    ("double *", "path"),  # prescribed motion: see physics/prescribed.py
+    ("double[3]", "arm"),  # of the centre at the start from the path's first place
+    ("int", "field first last"),  # first and last row of the field's materials
+    ("int", "paths"),  # rows of the path; 0: it moves freely
+)
+CLOCK = Record(
+    "Clock",
+    ("BodyLoad *", "body_load"),
+    ("double *", "external_impulse push_work"),
+    ("double", "until given stable speed wave smallest largest"),
+    ("double[3]", "gravity"),
+    ("double", "ramp courant rigid_courant fall"),
+    ("long long", "count budget"),
+    ("int", "body_loads started last laid fuse fused pushed spare"),
+)
+# Nodes: mass, momentum 3, force of stress 3, mass times height over the node [cells] along "level";
+# after the forces mass, velocity 3, velocity as it was 3, mean height. While a step reads its
+# nodes, the next one's are laid.
+FIELD = Record(
+    "Field",
+    ("float *", "part node next history branch material"),
+    ("int *", "table block where"),
+    ("int *", "used"),  # which of the two sets of nodes hold anything in a node block: bits
+    ("unsigned long long *", "near"),
+    ("int *", "home box"),  # block of particles at a node block, -1: none; lowest, highest place
+    ("unsigned long long *", "have"),  # nodes with mass of each node block, once forces have acted
+    ("double *", "point"),  # rigid: [points][5] place in the body's frame, mass, volume
+    ("double *", "rigid"),  # rigid: its state
+    ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
+    ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
+    ("double", "spacing"),  # rigid: of its surface points
+    ("double", "mass stiffening"),  # stiffening: how much faster waves run with Maxwell branches
+    ("int[3]", "origin dim"),  # in blocks; the window's corner and size
+    ("int", "blocks pool rigids points surfaces pushed swells flows relaxes"),
+    ("int", "floor"),  # the only plane that the window reaches, or -1
+    ("float[3]", "level"),  # its normal, or 0
+    ("int", "thin spare"),  # thin: of a rigid body, see physics/rigid.py thinness
+    ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
+)
+BLOW = Record(  # a body in the wind: see wind_records.py
+    "Blow",
+    ("double *", "area point rigid impulse signal"),
+    ("int *", "face"),
+    ("double[3]", "wind"),
+    ("double", "gust start end half_rho_c work"),
+    ("int", "field first count free"),
+)
+TETHER = Record(  # particles of a field on springs to a rigid body: see physics/springs.py
+    "Tether",
+    ("double *", "anchor rate holder"),
+    ("double", "damping lost"),
+    ("int", "field first count"),
+)
+JOINT = Record(  # two rigid bodies: arms in their own frames
+    "Joint",
+    ("double *", "first second"),
+    ("double[3]", "arm_first arm_second"),
+    ("double", "stiffness damping lost"),
+)
+GRIP = Record(  # a spring from a body to a point outside: see physics/grips.py
+    "Grip",
+    ("double *", "share rigid impulse"),
+    ("double[3]", "arm target"),
+    ("double", "stiffness damping mass work"),
+    ("int", "field first count"),
+)
+WORLD = Record(
+    "World",
+    ("ThreadPool *", "thread_pool"),
+    ("Clock *", "clock"),
+    ("Field *", "field"),
+    ("int *", "task list contact_memory"),
+    ("double *", "report plane friction restitution"),
+    ("double *", "plane_impulse pair_impulse friction_loss first_contact last_contact"),
+    ("double *", "contact_point face impact_loss"),
+    ("Blow *", "blow"),
+    ("Bond *", "bond"),
+    ("Tether *", "tether"),
+    ("Joint *", "joint"),
+    ("Grip *", "grip"),
+    ("double", "dx dt time"),
+    ("double[3]", "kick"),
+    ("int", "fields planes tasks full"),
+    ("int", "names again"),  # bodies and planes in the books; a repeated call after more memory
+    ("int", "blows blown bonds"),  # bodies in the wind; tasks on them
+    ("int", "tethers joints grips sprung"),  # sprung: whether there is any of them
+    ("int", "stop"),  # why the steps end after this phase; 0: they go on
+    ("int", "nodes"),  # tasks on nodes …
+    (f"int[{COLOURS}]", "colour"),  # … and on particles of each colour
+    ("int", "bare_nodes"),  # the same where this step's nodes are still to be laid
+    (f"int[{COLOURS}]", "bare"),
+    ("int", "stands parts"),  # tasks on nodes that may stand on a plane; on contacts
+    (f"int[{COLOURS}]", "looks"),  # tasks on particles for contact; 0 without any
+    ("int", "rigids turns"),  # fields, where some are rigid; tasks to look at those
+)
+STEP = (POST, THREAD_POOL, BOND, BODY_LOAD, CLOCK, FIELD, BLOW, TETHER, JOINT, GRIP, WORLD)
+
+# ---------------------------------------------------------------- structs of contact
+
+JUNCTION = Record(  # a block of nodes where fields meet each other or a plane
+    "Junction",
+    ("int[3]", "at"),
+    ("int", "fields meet side touch last"),
+    (f"int[{FIELDS_IN_BLOCK}]", "field block"),
+    ("unsigned long long", "mask several"),
+    (f"unsigned long long[{FIELDS_IN_BLOCK}]", "have"),
+    (f"int[{FIELDS_IN_BLOCK}]", "met"),  # of the fields here, those that each may meet: bits
+)
+MEET = Record(  # one such node
+    "Meet", ("int[3]", "at"), ("int", "side sides touch touches stiff")
+)
+SIDE = Record(  # one field there
+    "Side",
+    ("int", "field slot"),
+    ("float", "m"),
+    ("float[3]", "mean out"),
+    ("double[3]", "v"),
+    ("double", "inverse"),
+)
+AIM = Record(  # candidate normals of a possible contact of two fields
+    "Aim",
+    ("float[3][4]", "n"),  # component by component
+    ("float[2][4]", "far"),  # how far the first reaches along them, and the second against them
+    ("int", "fa fc"),  # the fields; -1 for a plane
+    ("float[3]", "chosen"),
+    ("float", "weight"),
+)
+LEAN = (
+    Record(  # of a possible contact, what its neighbours read: weighted normal, node in its block,
+        "Lean",  # and which of the fields there; c: 255 for a plane
+        ("float[3]", "u"),
+        ("unsigned char", "a c node spare"),
+    )
+)
+TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - c
+    "Touch",
+    ("int", "meet a c fa fc active"),
+    ("double[3]", "x normal"),
+    ("double", "gap target inverse mu"),
+    ("double[3]", "J before"),
+)
+ENTRY = Record(  # what some contacts of one pair add to the books
+    "Entry",
+    ("int", "a c"),
+    ("double", "normal"),
+    ("double[3]", "place J"),
+    ("double", "loss impact"),
+)
+PAST = Record(  # force of a contact in the last step
+    "Past", ("unsigned long long", "key"), ("double[3]", "force")
+)
+LINE = Record(  # a contact in the list of those that move rigid bodies
+    "Line",
+    ("double *", "a c"),  # velocity of a node or state of a rigid body; 0: a plane
+    ("double", "ma mc"),  # inverse masses of nodes; negative: a rigid body
+    ("double[3]", "n ra rc"),
+    ("double[6]", "K"),
+    ("double", "inverse target mu e"),  # e: of restitution
+    ("double[3]", "J"),
+    ("unsigned long long", "key"),
+    ("int", "touch group waits spare"),  # waits: not in this round of impacts
+)
+STAGE = Record(
+    "Stage",
+    ("Junction *", "junction"),
+    ("Meet *", "meet"),
+    ("Side *", "side"),
+    ("Touch *", "touch"),
+    ("Aim *", "aim"),
+    ("Entry *", "entry stand"),
+    ("Line *", "line"),
+    ("Past *", "past"),
+    ("int *", "slot"),  # where each past contact stands, by its key; slots: a power of two
+    ("double *", "pair"),  # [fields and planes][fields and planes][PAIR]
+    ("int *", "order"),
+    ("Lean *", "lean"),
+    ("int", "most_junctions most_meets most_sides most_touches"),
+    ("int", "slots pasts sweeps"),
+    ("int", "junctions meets sides touches points"),
+    (f"int[{PARTS}]", "entries"),
+)
+CONTACT = (JUNCTION, MEET, SIDE, AIM, LEAN, TOUCH, ENTRY, PAST, LINE, STAGE)
+
+# ---------------------------------------------------------------- sorting and reading
+
+SORTING = Record(
+    "Sorting",
+    ("float *", "part history branch to past_to branch_to"),
+    ("int *", "old"),  # [olds][RUN]: runs of slots in use before, and the blocks they were
+    ("int *", "line inner"),  # [slots before]: a particle's block, its material and cell
+    ("int *", "count bin"),  # [lines], [bins]: how many there are
+    ("int *", "edge"),  # [lines]: neighbours that particles may reach before the next sort
+    ("int *", "middle order"),  # particles by material and cell; source of every slot, -1: none
+    ("int *", "block table where"),
+    ("double *", "plane"),  # [planes][4]
+    ("double", "deepest farthest"),
+    ("int[3]", "low high"),  # of blocks, in the old window
+    ("int[3]", "dim origin"),  # of the new one
+    ("int", "olds bins planes lost blocks slots pool flows relaxes out_of_block"),
+)
+READING = Record(
+    "Reading",
+    ("float *", "part history branch material"),
+    ("int *", "block owner"),  # owner of each row of materials
+    ("double *", "position velocity strain motion plastic"),
+    ("double *", "sum"),  # [runs][owners][SUMS]
+    ("double", "dx"),
+    ("int[3]", "origin"),
+    ("int", "runs owners blocks swells"),
+)

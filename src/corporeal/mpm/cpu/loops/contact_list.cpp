@@ -1,0 +1,110 @@
+// Write down the nodes of some blocks, the fields there and their possible contacts; mark the cells
+// whose particles reach them.
+struct Near {
+  // Cells whose particles reach the nodes of a mask, one axis at a time: two steps down, the
+  // second word for the neighbour below. A step moves by 1, 4 or 16 bits.
+  static inline void spread(u64 m, int step, u64 first, u64 &here, u64 &below) {
+    // first: bits whose coordinate along the axis is 0
+    u64 second = first << step;
+    here = m | ((m & ~first) >> step) | ((m & ~(first | second)) >> (2 * step));
+    below = ((m & first) << (3 * step)) | ((m & first) << (2 * step)) | ((m & second) << (2 * step));
+  }
+  static inline void mark(const Field &F, int block, u64 mask, int kind) {
+    const u64 X = 0xffffull, Y = 0x000f000f000f000full, Z = 0x1111111111111111ull;
+    const int *w = F.where + 4 * block;
+    u64 x[2], y[2], z[2];
+    spread(mask, 16, X, x[0], x[1]);
+    for (int i = 0; i < 2; i++) {
+      if (!x[i]) continue;
+      spread(x[i], 4, Y, y[0], y[1]);
+      for (int j = 0; j < 2; j++) {
+        if (!y[j]) continue;
+        spread(y[j], 1, Z, z[0], z[1]);
+        for (int k = 0; k < 2; k++) {
+          if (!z[k]) continue;
+          int at[3] = {w[0] + F.origin[0] - i, w[1] + F.origin[1] - j, w[2] + F.origin[2] - k};
+          int b = Grid::block(F, at);
+          if (b >= 0) __atomic_fetch_or(F.near + 2 * b + kind, z[k], __ATOMIC_RELAXED);
+        }
+      }
+    }
+  }
+};
+int from = (int)((long long)stage->junctions * index / PARTS),
+    to = (int)((long long)stage->junctions * (index + 1) / PARTS);
+for (int j = from; j < to; j++) {
+  const Junction &J = junctions[j];
+  int k = J.meet, s = J.side, t = J.touch;
+  u64 wall[WALLS];
+  int walls[WALLS], near = 0;
+  for (int w = 0; w < planes && near < WALLS; w++) {
+    const double *P = world->plane + 4 * w;
+    if (Grid::over(P, J.at, dx)) continue;
+    walls[near] = w;
+    wall[near++] = Grid::wall(P, J.at, dx);
+  }
+  for (u64 left = J.mask; left; left &= left - 1) {
+    int i = __builtin_ctzll(left);
+    Meet &M = meets[k];
+    M.at[0] = 4 * J.at[0] + (i >> 4);
+    M.at[1] = 4 * J.at[1] + (i >> 2 & 3);
+    M.at[2] = 4 * J.at[2] + (i & 3);
+    M.side = s;
+    M.touch = t;
+    M.stiff = 0;
+    int here[FIELDS_IN_BLOCK];           // which of the block's fields each side is
+    for (int q = 0; q < J.fields; q++) {
+      if (!(J.have[q] >> i & 1)) continue;
+      here[s - M.side] = q;
+      Side &S = sides[s++];
+      const Field &F = world->field[J.field[q]];
+      S.field = J.field[q];
+      S.slot = J.block[q] * 64 + i;
+      const float *node = F.node + (size_t)S.slot * 8;
+      S.m = node[0];
+      S.inverse = 1.0 / node[0];
+      for (int d = 0; d < 3; d++) {
+        S.v[d] = node[1 + d];
+        S.mean[d] = F.rigids ? node[1 + d] : 0.0f;
+        S.out[d] = F.rigids ? node[4 + d] : 0.0f;
+      }
+      M.stiff |= F.rigids;
+    }
+    M.sides = s - M.side;
+    for (int a = 0; a < M.sides; a++) {
+      const Side &A = sides[M.side + a];
+      const Field &F = world->field[A.field];
+      for (int c = a + 1; c < M.sides + near; c++) {
+        int w = c - M.sides;
+        Touch &T = touches[t];
+        if (w >= 0) {
+          if (!(wall[w] >> i & 1) || (F.rigids && F.surfaces)) continue;
+          T.c = -1 - walls[w];
+          T.fc = fields + walls[w];
+        } else {
+          T.c = M.side + c;
+          T.fc = sides[T.c].field;
+          if (!(J.met[here[a]] >> here[c] & 1)) continue;
+        }
+        leans[t] = Lean{{0, 0, 0}, (unsigned char)here[a], (unsigned char)(w >= 0 ? 255 : here[c]), (unsigned char)i, 0};
+        T.meet = k;
+        T.a = M.side + a;
+        T.fa = A.field;
+        t++;
+      }
+    }
+    M.touches = t - M.touch;
+    // A rigid body's nodes know their contacts: its particles are in no order that others share.
+    for (int q = M.side; q < s && M.sides > 1; q++)
+      if (world->field[sides[q].field].rigids)
+        ((int *)world->field[sides[q].field].node)[(size_t)sides[q].slot * 8 + 7] =
+            (M.touch + 1) | M.touches << 24;
+    k++;
+  }
+  for (int q = 0; q < J.fields; q++) {
+    const Field &F = world->field[J.field[q]];
+    if (F.rigids) continue;
+    Near::mark(F, J.block[q], J.mask & J.have[q], 0);
+    if (J.several & J.have[q]) Near::mark(F, J.block[q], J.several & J.have[q], 1);
+  }
+}

@@ -1,0 +1,410 @@
+// What moves rigid bodies, in one list: contacts on nodes and, against planes, on their surface
+// points. Then the books, and rigid bodies move.
+struct List {
+  // K gains 1/M + [r]ᵀ I⁻¹ [r] of a rigid body: K e·e is its inverse mass along e.
+  static inline void soften(double *K, const double *s, const double *r) {
+    double A[3][3], B[3][3];
+    for (int i = 0; i < 3; i++) {
+      double e[3] = {i == 0, i == 1, i == 2};
+      Vec::cross(r, e, A[i]);
+      Vec::apply(s + INERTIA, A[i], B[i]);
+    }
+    const int at[6][2] = {{0, 0}, {0, 1}, {0, 2}, {1, 1}, {1, 2}, {2, 2}};
+    for (int k = 0; k < 6; k++)
+      K[k] += Vec::dot(A[at[k][0]], B[at[k][1]]) + (at[k][0] == at[k][1]) * s[LIGHT];
+  }
+  static inline double along(const double *K, const double *e) {
+    return K[0] * e[0] * e[0] + K[3] * e[1] * e[1] + K[5] * e[2] * e[2] +
+           2 * (K[1] * e[0] * e[1] + K[2] * e[0] * e[2] + K[4] * e[1] * e[2]);
+  }
+  static inline void velocity(const double *s, double m, const double *r, double *u, double sign) {
+    if (!s) return;
+    double v[3] = {0, 0, 0};
+    if (m < 0) {
+      Vec::cross(s + SPIN, r, v);
+      s += SPEED;
+    }
+    for (int i = 0; i < 3; i++) u[i] += sign * (s[i] + v[i]);
+  }
+  static inline void slip(const Line &R, double *u) {
+    for (int i = 0; i < 3; i++) u[i] = 0;
+    velocity(R.a, R.ma, R.ra, u, 1.0);
+    velocity(R.c, R.mc, R.rc, u, -1.0);
+  }
+  static inline void hit(double *s, double m, const double *r, const double *J, double sign) {
+    if (!s) return;
+    if (m >= 0) {
+      for (int i = 0; i < 3; i++) s[i] += sign * m * J[i];
+      return;
+    }
+    if (s[LIGHT] == 0) return;
+    double t[3], u[3], each = sign * s[LIGHT];
+    Vec::cross(r, J, t);
+    Vec::apply(s + INERTIA, t, u);
+    for (int i = 0; i < 3; i++) {
+      s[SPEED + i] += each * J[i];
+      s[MOMENT + i] += sign * t[i];
+      s[SPIN + i] += sign * u[i];
+    }
+  }
+  // One projection of one contact onto its Coulomb cone; by how much it changed the velocity.
+  static inline double relax(Line &R, double *u) {
+    slip(R, u);
+    double un = Vec::dot(u, R.n), old = Vec::dot(R.J, R.n), d[3], t[3];
+    double jn = Coulomb::push(old, un, R.target, R.inverse), next[3];
+    if (jn == 0 && old == 0) return 0;
+    for (int i = 0; i < 3; i++) {
+      d[i] = u[i] - un * R.n[i];
+      t[i] = R.J[i] - old * R.n[i];
+    }
+    double size = sqrt(Vec::dot(d, d));
+    if (size > mpm::SMALLEST_SLIP) {
+      double e[3] = {d[0] / size, d[1] / size, d[2] / size}, soft = along(R.K, e);
+      for (int i = 0; i < 3; i++) t[i] += d[i] / soft;
+    }
+    Coulomb::limit(R.mu, jn, R.n, t, next);
+    for (int i = 0; i < 3; i++) {
+      d[i] = next[i] - R.J[i];
+      R.J[i] = next[i];
+    }
+    hit(R.a, R.ma, R.ra, d, -1.0);
+    hit(R.c, R.mc, R.rc, d, 1.0);
+    return sqrt(Vec::dot(d, d)) * R.inverse;
+  }
+  // Begin with the force of the last step, as far as it still pushes.
+  static inline void remember(Line &R, const double *force, double dt) {
+    double jn = Vec::dot(force, R.n) * dt, t[3];
+    if (jn <= 0) return;
+    for (int i = 0; i < 3; i++) t[i] = force[i] * dt - jn * R.n[i];
+    Coulomb::limit(R.mu, jn, R.n, t, R.J);
+    hit(R.a, R.ma, R.ra, R.J, -1.0);
+    hit(R.c, R.mc, R.rc, R.J, 1.0);
+  }
+  // By place, whatever order they were found in (Shell's method).
+  static inline void sort(const Line *lines, int *order, int n) {
+    for (int gap = n / 2; gap > 0; gap /= 2)
+      for (int i = gap; i < n; i++) {
+        const int moved = order[i];
+        int j = i;
+        for (; j >= gap && lines[order[j - gap]].key > lines[moved].key; j -= gap) order[j] = order[j - gap];
+        order[j] = moved;
+      }
+  }
+  // Projections of contacts in order, until they change little; how many sweeps that took. Contacts
+  // of two rigid bodies go forwards, then backwards: with one order for all sweeps the first would
+  // carry more, and stacks creep to one side. So do the planes below a stack; a lone block on a
+  // plane, which has few sweeps, would creep if they turned about.
+  static inline int sweep(Line *lines, const int *order, int n, int most_sweeps, int least, double still,
+                          bool stacked) {
+    double u[3];
+    for (int s = 0; s < most_sweeps; s++) {
+      double most = 0;
+      for (int first = 0, last; first < n; first = last) {
+        const Line &F = lines[order[first]];
+        const bool turned = s & 1 && F.ma < 0 && (F.c ? F.mc < 0 : stacked);
+        for (last = first; last < n && lines[order[last]].group == F.group; last++) {}
+        if (F.waits) continue;
+        const int count = last - first, stride = Scatter::stride(count);
+        for (int i = 0; i < count; i++) {
+          const long long k = turned ? count - 1 - i : i;
+          double change = relax(lines[order[first + (int)(k * stride % count)]], u);
+          if (change > most) most = change;
+        }
+      }
+      if (most == 0 || (s >= least && most < still)) return s + 1;
+    }
+    return most_sweeps;
+  }
+  // Along n: how fast a contact closes, and how fast without what forces added in this step.
+  static inline double closing(const Line &R, const Field *body, double &approach) {
+    double u[3], kick = 0;
+    slip(R, u);
+    const double speed = Vec::dot(u, R.n);
+    if (R.ma < 0) kick += Vec::dot(R.a + KICK, R.n);
+    if (R.c && R.mc < 0) kick -= Vec::dot(R.c + KICK, R.n);
+    const double *w = R.a + SPIN, turns = body ? sqrt(Vec::dot(w, w)) : 0.0;
+    approach = Impact::approach(speed, kick, body ? turns * body->spacing : 0.0);
+    return speed;
+  }
+  static inline int first_slot(u64 key, int slots) {
+    return (int)((key * 0x9e3779b97f4a7c15ull) >> 32) & (slots - 1);
+  }
+  static inline void side(const World *w, Side *sides, int f, int s, const double *x, double *&at,
+                          double &m, double *r, double *K) {
+    at = 0;
+    m = 0;
+    if (f >= w->fields) return;
+    if (w->field[f].rigids) {
+      at = w->field[f].rigid;
+      m = -1;
+      for (int i = 0; i < 3; i++) r[i] = x[i] - at[CENTRE + i];
+      soften(K, at, r);
+    } else {
+      at = sides[s].v;
+      m = sides[s].inverse;
+      K[0] += m;
+      K[3] += m;
+      K[5] += m;
+    }
+  }
+};
+Line *lines = stage->line;
+int nt = stage->touches, n = 0, stacked = 0;
+double *pair = stage->pair;   // [all][all][PAIR]
+// Surface points of rigid bodies on planes.
+for (int f = 0; f < fields; f++) {
+  const Field &F = world->field[f];
+  if (!F.rigids || !F.surfaces || F.rigid[LIGHT] == 0) continue;
+  const double *s = F.rigid;
+  for (int w = 0; w < planes; w++) {
+    const double *P = world->plane + 4 * w;
+    double centre = Vec::dot(P, s + CENTRE) - P[3];
+    if (centre > s[RADIUS] + mpm::POINT_REACH * dx) continue;
+    double down[3];             // the plane's normal in the body's frame
+    for (int i = 0; i < 3; i++)
+      down[i] = P[0] * s[TURN + i] + P[1] * s[TURN + 3 + i] + P[2] * s[TURN + 6 + i];
+    for (int p = 0; p < F.surfaces; p++) {
+      double gap = centre + Vec::dot(down, F.surface + 3 * p);
+      if (gap >= mpm::POINT_REACH * dx) continue;
+      Touch &T = touches[nt++];
+      T.meet = -1;
+      T.a = p;
+      T.c = -1 - w;
+      T.fa = f;
+      T.fc = fields + w;
+      T.gap = gap;
+      T.active = 1;
+      T.mu = world->friction[T.fa * all + T.fc];
+      T.target = Impact::closing(gap, dt);
+      for (int d = 0; d < 3; d++) {
+        T.x[d] = s[CENTRE + d] + Vec::dot(s + TURN + 3 * d, F.surface + 3 * p);
+        T.normal[d] = -P[d];
+        T.J[d] = 0;
+      }
+    }
+  }
+}
+stage->points = nt - stage->touches;
+Bonds::join(world);
+for (int t = 0; t < nt; t++) {
+  Touch &T = touches[t];
+  if (!T.active || (T.meet >= 0 && !meets[T.meet].stiff)) continue;
+  int kind = T.meet < 0 ? 2 : T.fc >= fields ? 1 : 0;
+  Line &R = lines[n++];
+  R.touch = t;
+  R.group = (kind * all + T.fa) * all + T.fc;
+  R.key = (u64)R.group << 48;
+  if (T.meet < 0)
+    R.key |= (u64)T.a;
+  else
+    for (int i = 0; i < 3; i++) R.key |= (u64)((meets[T.meet].at[i] + 0x8000) & 0xffff) << (32 - 16 * i);
+  R.mu = T.mu;
+  for (int i = 0; i < 6; i++) R.K[i] = 0;
+  for (int i = 0; i < 3; i++) {
+    R.n[i] = T.normal[i];
+    R.J[i] = 0;
+  }
+  List::side(world, sides, T.fa, T.a, T.x, R.a, R.ma, R.ra, R.K);
+  List::side(world, sides, T.fc, T.c, T.x, R.c, R.mc, R.rc, R.K);
+  R.inverse = List::along(R.K, R.n);
+  double u[3];
+  List::slip(R, u);
+  R.target = T.target;
+  R.e = R.ma < 0 && (R.mc < 0 || !R.c) ? world->restitution[T.fa * all + T.fc] : 0.0;
+  R.waits = 0;
+  stacked |= R.ma < 0 && R.mc < 0;
+  for (int i = 0; i < 3; i++) T.before[i] = u[i];
+  const double *ka = R.ma < 0 ? R.a + KICK : 0, *kc = R.mc < 0 ? R.c + KICK : 0;
+  double kick[3];
+  for (int i = 0; i < 3; i++) {
+    kick[i] = (ka ? ka[i] : 0.0) - (kc ? kc[i] : 0.0);
+    T.before[i] -= kick[i];
+  }
+  for (int side = 0; side < 2; side++) {   // a node's velocity before this step's forces
+    if ((side ? R.mc : R.ma) <= 0) continue;
+    const Side &S = sides[side ? T.c : T.a];
+    const float *node = world->field[S.field].node + (size_t)S.slot * 8;
+    for (int i = 0; i < 3; i++) T.before[i] -= (side ? -1.0 : 1.0) * (S.v[i] - node[4 + i]);
+  }
+}
+if (!n) stage->pasts = 0;
+if (n) {
+  // Pairs of bodies, then bodies on planes, then their surface points.
+  int *order = stage->order, *place = order + n;
+  const int groups = 3 * all * all;
+  for (int i = 0; i <= groups; i++) place[i] = 0;
+  for (int i = 0; i < n; i++) place[lines[i].group + 1]++;
+  for (int i = 0; i < groups; i++) place[i + 1] += place[i];
+  for (int i = 0; i < n; i++) order[place[lines[i].group]++] = i;
+  List::sort(lines, order, n);
+  // Impacts of rigid bodies, one after the other: what is hit passes the blow on to what it touches.
+  // In every round the pairs that approach now rebound together, and all others wait.
+  int impacts = 0;
+  for (; impacts < mpm::IMPACTS; impacts++) {
+    bool hit = false;
+    double approach;
+    for (int i = 0; i < all * all; i++) pair[PAIR * i] = 0;
+    for (int i = 0; i < n; i++) {
+      const Touch &T = touches[lines[i].touch];
+      if (lines[i].e <= 0) continue;
+      const double speed = List::closing(lines[i], T.meet < 0 ? &world->field[T.fa] : 0, approach);
+      if (!Impact::begins(approach, speed, T.gap, dt)) continue;
+      pair[PAIR * (T.fa * all + T.fc)] = hit = true;
+    }
+    if (!hit) break;
+    for (int i = 0; i < n; i++) {
+      Line &R = lines[i];
+      const Touch &T = touches[R.touch];
+      R.waits = pair[PAIR * (T.fa * all + T.fc)] == 0;
+      if (R.waits) continue;
+      const double speed = List::closing(R, T.meet < 0 ? &world->field[T.fa] : 0, approach);
+      R.target = Impact::target(R.e, approach, speed, T.gap, dt, dx);
+      for (int d = 0; d < 3; d++) R.J[d] = 0;
+    }
+    List::sweep(lines, order, n, mpm::SWEEPS_OF_A_HIT, mpm::SWEEPS, mpm::STILL_OF_A_HIT * dx, stacked);
+    for (int i = 0; i < n; i++)
+      for (int d = 0; d < 3 && !lines[i].waits; d++) touches[lines[i].touch].J[d] += lines[i].J[d];
+  }
+  for (int i = 0; i < n && impacts; i++) {
+    lines[i].waits = 0;
+    lines[i].target = touches[lines[i].touch].target;
+    for (int d = 0; d < 3; d++) lines[i].J[d] = 0;
+  }
+  // Then all contacts together. Rigid bodies on one another have only each other to yield: with few
+  // sweeps stacks creep. So contacts begin with the forces of the last step, and sweeps end when what
+  // they change would creep by less than a few thousandths of a cell per second.
+  const int sweeps = impacts || stacked ? mpm::SWEEPS_OF_A_HIT : mpm::SWEEPS;
+  const bool known = stage->pasts > 0;
+  if (known) {
+    int *slot = stage->slot, last = stage->slots - 1;
+    for (int i = 0; i <= last; i++) slot[i] = 0;
+    for (int p = 0; p < stage->pasts; p++) {
+      int at = List::first_slot(stage->past[p].key, stage->slots);
+      while (slot[at]) at = (at + 1) & last;
+      slot[at] = p + 1;
+    }
+    for (int i = 0; i < n; i++) {
+      int at = List::first_slot(lines[i].key, stage->slots);
+      while (slot[at] && stage->past[slot[at] - 1].key != lines[i].key) at = (at + 1) & last;
+      if (slot[at]) List::remember(lines[i], stage->past[slot[at] - 1].force, dt);
+    }
+  }
+  const int least = known && !impacts ? mpm::SWEEPS_REMEMBERED : mpm::SWEEPS;
+  const double still = (impacts ? mpm::STILL_OF_A_HIT : mpm::STILL) * dx;
+  stage->sweeps = List::sweep(lines, order, n, sweeps, least, still, stacked);
+  stage->pasts = 0;
+  for (int i = 0; i < n; i++) {
+    Touch &T = touches[lines[i].touch];
+    for (int d = 0; d < 3; d++) T.J[d] += lines[i].J[d];
+    if (lines[i].J[0] != 0 || lines[i].J[1] != 0 || lines[i].J[2] != 0) {
+      Past &past = stage->past[stage->pasts++];
+      past.key = lines[i].key;
+      for (int d = 0; d < 3; d++) past.force[d] = lines[i].J[d] / dt;
+    }
+    for (int side = 0; side < 2; side++) {
+      if ((side ? lines[i].mc : lines[i].ma) <= 0) continue;
+      const Side &S = sides[side ? T.c : T.a];
+      float *node = world->field[S.field].node + (size_t)S.slot * 8;
+      for (int d = 0; d < 3; d++) node[1 + d] = (float)S.v[d];
+    }
+  }
+}
+struct Books {
+  // What a contact's impulse J on a body that moves as told takes of its mover.
+  static inline void react(World *w, const double *s, int body, const double *x, const double *J,
+                           double sign) {
+    if (s[LIGHT] != 0) return;
+    double v[3];
+    Body6::velocity(s, x, v);
+    *w->clock->push_work -= sign * Vec::dot(J, v);
+    for (int i = 0; i < 3; i++) w->clock->external_impulse[3 * body + i] -= sign * J[i];
+  }
+  static inline void enter(World *w, double *pair, int all, const Entry &e) {
+    double *row = pair + (e.a * all + e.c) * PAIR;
+    row[1] += e.normal;
+    for (int i = 0; i < 3; i++) row[2 + i] += e.place[i];
+    *w->friction_loss += e.loss;
+    *w->impact_loss += e.impact;
+    int bodies = w->names - w->planes;
+    if (e.c >= w->fields)
+      for (int i = 0; i < 3; i++)
+        w->plane_impulse[((e.c - w->fields) * bodies + e.a) * 3 + i] -= e.J[i];
+  }
+};
+for (int i = 0; i < all * all; i++)
+  for (int d = 1; d < 5; d++) pair[PAIR * i + d] = 0;
+for (int i = 0; i < world->stands; i++)
+  if (stage->stand[i].normal > 0) Books::enter(world, pair, all, stage->stand[i]);
+for (int p = 0; p < world->parts; p++) {
+  int from = (int)((long long)stage->junctions * p / PARTS);
+  for (int e = 0; e < stage->entries[p]; e++)
+    Books::enter(world, pair, all, stage->entry[junctions[from].touch + e]);
+}
+for (int i = 0; i < n; i++) {
+  const Touch &T = touches[lines[i].touch];
+  double jn = Vec::dot(T.J, T.normal), u[3];
+  if (jn <= 0) continue;
+  List::slip(lines[i], u);
+  Entry e{T.fa, T.fc, jn, {jn * T.x[0], jn * T.x[1], jn * T.x[2]}, {T.J[0], T.J[1], T.J[2]}, 0};
+  for (int d = 0; d < 3; d++) e.loss += (T.J[d] - jn * T.normal[d]) * 0.5 * (T.before[d] + u[d]);
+  for (int d = 0; d < 3; d++) e.impact += jn * T.normal[d] * 0.5 * (T.before[d] + u[d]);
+  Books::enter(world, pair, all, e);
+  if (lines[i].ma < 0) Books::react(world, lines[i].a, T.fa, T.x, T.J, -1.0);
+  if (lines[i].mc < 0) Books::react(world, lines[i].c, T.fc, T.x, T.J, 1.0);
+}
+const int bodies = world->names - planes;
+for (int a = 0; a < fields; a++)
+  for (int c = a + 1; c < all; c++) {
+    const double *row = pair + (a * all + c) * PAIR;
+    if (row[1] <= 0) continue;
+    if (c < fields) {
+      world->pair_impulse[a * bodies + c] += row[1];
+      world->pair_impulse[c * bodies + a] = world->pair_impulse[a * bodies + c];
+    }
+    // In the books planes come after the bodies, which share one field in the control.
+    int name = c < fields ? c : bodies + c - fields;
+    for (int side = 0; side < 2; side++) {
+      int i = side ? name * world->names + a : a * world->names + name;
+      if (!(world->first_contact[i] >= 0)) {
+        world->first_contact[i] = world->time;
+        for (int d = 0; d < 3; d++) world->contact_point[3 * i + d] = row[2 + d] / row[1];
+      }
+      world->last_contact[i] = world->time;
+    }
+  }
+// Wipe the marks for the next step.
+for (int j = 0; j < stage->junctions; j++)
+  for (int q = 0; q < junctions[j].fields; q++) {
+    const Field &F = world->field[junctions[j].field[q]];
+    F.where[4 * junctions[j].block[q] + 3] = 0;
+    for (int i = 0; i < 8 && !F.rigids; i++) {
+      int at[3] = {junctions[j].at[0] - (i >> 2), junctions[j].at[1] - (i >> 1 & 1),
+                   junctions[j].at[2] - (i & 1)};
+      int b = Grid::block(F, at);
+      if (b >= 0) F.near[2 * b] = F.near[2 * b + 1] = 0;
+    }
+  }
+Bonds::part(world);
+// Rigid bodies move; the angular momentum is exact, the turn follows it at mid-step.
+for (int f = 0; f < fields; f++) {
+  const Field &F = world->field[f];
+  if (!F.rigids) continue;
+  double *s = F.rigid, Q[9];
+  if (s[LIGHT] == 0) {
+    double inertia[9], moment[3], work = 0;
+    mpm::Body::inverse_inertia(s + NEXT, s + HEAVY, inertia);
+    Vec::apply(inertia, s + SPIN, moment);
+    for (int i = 0; i < 3; i++) {
+      work += 0.5 * s[SPIN + i] * (moment[i] - s[MOMENT + i]);
+      s[MOMENT + i] = moment[i];
+      s[CENTRE + i] += dt * s[SPEED + i];
+    }
+    for (int i = 0; i < 9; i++) s[TURN + i] = s[NEXT + i];
+    *world->clock->push_work += work;
+    continue;
+  }
+  mpm::Body::advance(s + TURN, s + REST, s + MOMENT, s + SPIN, dt, Q);
+  for (int i = 0; i < 9; i++) s[TURN + i] = Q[i];
+  Body6::spin_up(s);
+  for (int i = 0; i < 3; i++) s[CENTRE + i] += dt * s[SPEED + i];
+}

@@ -1,0 +1,139 @@
+// What the contact pieces share. Their order: start, mark, find, stand, list, look, face, reach, choose,
+// solve, resolve. Same formulas as contact.py and reference/contact.py; design: physics, section 2 C to G.
+// Offsets, gaps and normals' supports are in cells; velocities, masses and impulses SI.
+const int WALLS = 32;     // planes that a block of nodes may reach
+const int ENTRIES = 8;    // entries looked back at
+
+typedef float f4 __attribute__((vector_size(16), aligned(4)));
+
+typedef mpm::Face<double> Face;
+using mpm::Coulomb;
+using mpm::Impact;
+using mpm::Scatter;
+struct Body6 {            // a rigid body's state
+  // What moves as told keeps the spin that it was given.
+  static inline void spin_up(double *s) {
+    if (s[LIGHT] == 0) return;
+    mpm::Body::inverse_inertia(s + TURN, s + REST, s + INERTIA);
+    Vec::apply(s + INERTIA, s + MOMENT, s + SPIN);
+  }
+  static inline void velocity(const double *s, const double *x, double *v) {
+    double r[3] = {x[0] - s[CENTRE], x[1] - s[CENTRE + 1], x[2] - s[CENTRE + 2]};
+    mpm::Body::velocity(s + SPEED, s + SPIN, r, v);
+  }
+};
+struct Grid {
+  static inline int floor_int(double a) {
+    int i = (int)a;
+    return i - (a < i);
+  }
+  static inline int block(const Field &f, const int *at) {         // block of the world to its slot
+    int x = at[0] - f.origin[0], y = at[1] - f.origin[1], z = at[2] - f.origin[2];
+    if (x < 0 || y < 0 || z < 0 || x >= f.dim[0] || y >= f.dim[1] || z >= f.dim[2]) return -1;
+    return f.table[(x * f.dim[1] + y) * f.dim[2] + z];
+  }
+  static inline u64 below(int i) { return (1ull << i) - 1; }
+  static inline int count(u64 m) { return __builtin_popcountll(m); }
+  static inline int meet(const Junction &J, int i) { return J.meet + count(J.mask & below(i)); }
+  // Nodes of neighbour n of 27 that lie in a block's arena, which has one node before it and three
+  // after it; or, with a margin, in the block and one layer around it.
+  static inline u64 arena(int n) {
+    const u64 x[3] = {0xffff000000000000ull, ~0ull, 0x0000ffffffffffffull},
+              y[3] = {0xf000f000f000f000ull, ~0ull, 0x0fff0fff0fff0fffull},
+              z[3] = {0x8888888888888888ull, ~0ull, 0x7777777777777777ull};
+    return x[n / 9] & y[n / 3 % 3] & z[n % 3];
+  }
+  static inline u64 margin(int n) {
+    const u64 x[3] = {0xffff000000000000ull, ~0ull, 0x000000000000ffffull},
+              y[3] = {0xf000f000f000f000ull, ~0ull, 0x000f000f000f000full},
+              z[3] = {0x8888888888888888ull, ~0ull, 0x1111111111111111ull};
+    return x[n / 9] & y[n / 3 % 3] & z[n % 3];
+  }
+  // Whether a block lies so high over a plane that none of its nodes can touch it.
+  static inline bool over(const double *P, const int *at, double dx) {
+    double h = -P[3];
+    for (int d = 0; d < 3; d++) h += P[d] * (4.0 * at[d] + (P[d] > 0 ? 0 : 3)) * dx;
+    return h > mpm::WALL_REACH * dx;
+  }
+  // Nodes of a block that a plane may touch.
+  static inline u64 wall(const double *P, const int *at, double dx) {
+    double h[3][4];
+    for (int d = 0; d < 3; d++)
+      for (int k = 0; k < 4; k++) h[d][k] = P[d] * (4 * at[d] + k) * dx;
+    const double top = P[3] + mpm::WALL_REACH * dx;
+    u64 mask = 0;
+    for (int i = 0; i < 4; i++)
+      for (int j = 0; j < 4; j++) {
+        double left = top - h[0][i] - h[1][j];
+        u64 row = (h[2][0] <= left) | (h[2][1] <= left) << 1 | (h[2][2] <= left) << 2 |
+                  (h[2][3] <= left) << 3;
+        mask |= row << (16 * i + 4 * j);
+      }
+    return mask;
+  }
+};
+
+// A batch's particles and the nodes that they reach: low to high + 2.
+struct Nearby {
+  u64 box;                  // of nodes, in one layer
+  i8 lanes, in[3][8];       // in: whose splines reach each layer of nodes
+  f8 at[3];                 // places in their block's arena
+  int low[3], high[3];      // cells in it
+  // Cells of a batch in their block's arena.
+  static inline i8 cells(const int *record, const float *q, int d) {
+    return ((*(const i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE) - (4 * record[2 + d] - 1);
+  }
+  // Layers: nodes of the arena that are asked for, a bit for each.
+  inline bool find(const int *record, const float *q, int s, const u64 *layers) {
+    lanes = i8{0, 1, 2, 3, 4, 5, 6, 7} < record[1] - s;
+    i8 cell[3];
+    for (int d = 0; d < 3; d++) {
+      cell[d] = cells(record, q, d);
+      low[d] = __builtin_reduce_min(lanes ? cell[d] : i8{} + 8);
+      high[d] = __builtin_reduce_max(lanes ? cell[d] : i8{} - 8);
+    }
+    const u64 row = (255ull >> (5 - high[2] + low[2])) << low[2], rows = row * 0x0101010101010101ull;
+    box = rows & (~0ull >> (8 * (5 - high[1]))) & (~0ull << (8 * low[1]));
+    u64 some = 0;
+    for (int i = low[0]; i <= high[0] + 2; i++) some |= layers[i];
+    if (!(some & box)) return false;
+    for (int d = 0; d < 3; d++) {
+      at[d] = Simd::flo(*(const i8u *)(q + 8 * (XI + d)) - ((4 * record[2 + d] - 1) << PLACE)) * PER_UNIT;
+      for (int i = low[d]; i <= high[d] + 2; i++) {
+        const i8 from = i - cell[d];
+        in[d][i] = lanes & (from >= 0) & (from <= 2);
+      }
+    }
+    return true;
+  }
+};
+
+// Nodes of a block's arena that its particles reach, neighbour by neighbour.
+struct Reached {
+  u64 axis[3][3];
+  Reached(const Field &field, const int *record) {
+    const int *box = field.box + 6 * ((record - field.block) / BLOCK);
+    const u64 layer[3] = {0xffffull, 0x000f000f000f000full, 0x1111111111111111ull};
+    const int step[3] = {16, 4, 1};
+    for (int d = 0; d < 3; d++) {
+      const int first = 4 * (record[2 + d] - 1);   // of the neighbour below
+      const int low = ((box[d] - HALF) >> PLACE) - first, high = ((box[3 + d] - HALF) >> PLACE) - first + 2;
+      for (int n = 0; n < 3; n++) {
+        axis[d][n] = 0;
+        for (int k = 0; k < 4; k++)
+          if (4 * n + k >= low && 4 * n + k <= high) axis[d][n] |= layer[d] << (step[d] * k);
+      }
+    }
+  }
+  inline u64 nodes(int n) const { return axis[0][n / 9] & axis[1][n / 3 % 3] & axis[2][n % 3]; }
+};
+
+Stage *stage = (Stage *)world->contact_memory;
+const double dx = world->dx, dt = world->dt, inv = 1.0 / dx;
+const int fields = world->fields, planes = world->planes, all = fields + planes;
+Junction *junctions = stage->junction;
+Meet *meets = stage->meet;
+Side *sides = stage->side;
+Touch *touches = stage->touch;
+Aim *aims = stage->aim;
+Lean *leans = stage->lean;

@@ -1,0 +1,254 @@
+// Normals smoothed over neighbours, gaps, and the impulses of nodes that move no rigid body; those
+// are independent of one another. A part: some blocks of nodes.
+struct Solver {
+  static inline double gap(const World *w, const Side *sides, const Touch &T, double inv) {
+    const double *n = T.normal;
+    const Side &A = sides[T.a];
+    double pa = A.mean[0] * n[0] + A.mean[1] * n[1] + A.mean[2] * n[2];
+    if (T.c < 0) {
+      const double *P = w->plane + 4 * (-1 - T.c);
+      double h = (Vec::dot(P, T.x) - P[3]) * inv;
+      return Face::gap_to_plane(pa, h);
+    }
+    const Side &C = sides[T.c];
+    const Field &F = w->field[A.field], &G = w->field[C.field];
+    double pc = C.mean[0] * n[0] + C.mean[1] * n[1] + C.mean[2] * n[2];
+    if (!F.thin && !G.thin) return Face::gap(w->face, pa, pc);
+    const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
+    if (!F.surfaces) return Face::gap_to_surface(pa, sc);
+    return G.surfaces ? sc - sa : Face::gap_to_surface(-pc, -sa);
+  }
+  // Where a thin rigid body begins along n, or against it for a negative scale; in cells.
+  static inline double begins(const World *w, const Field &F, const double *x, const double *n,
+                              double scale) {
+    const double *s = F.rigid;
+    double r[3], q[3], d[3];
+    for (int i = 0; i < 3; i++) r[i] = x[i] - s[CENTRE + i];
+    for (int i = 0; i < 3; i++) {
+      q[i] = s[TURN + i] * r[0] + s[TURN + 3 + i] * r[1] + s[TURN + 6 + i] * r[2];
+      d[i] = s[TURN + i] * n[0] + s[TURN + 3 + i] * n[1] + s[TURN + 6 + i] * n[2];
+      if (scale < 0) d[i] = -d[i];
+    }
+    const double at = mpm::Surface::begins(F.surface, F.surfaces, q, d, mpm::SHOWN_AROUND * w->dx);
+    return at * (scale < 0 ? -scale : scale);
+  }
+  // Relative velocity as the step began, before its forces: what friction's work is booked with.
+  static inline void before(const World *w, const Side *sides, const Touch &T, double *u) {
+    for (int i = 0; i < 3; i++) u[i] = 0;
+    for (int side = 0; side < (T.c < 0 ? 1 : 2); side++) {
+      const Side &S = sides[side ? T.c : T.a];
+      const Field &F = w->field[S.field];
+      double v[3], sign = side ? -1.0 : 1.0;
+      if (F.rigids) {
+        Body6::velocity(F.rigid, T.x, v);
+        for (int i = 0; i < 3; i++) v[i] -= F.rigid[KICK + i];
+      } else {
+        for (int i = 0; i < 3; i++) v[i] = F.node[(size_t)S.slot * 8 + 4 + i];
+      }
+      for (int i = 0; i < 3; i++) u[i] += sign * v[i];
+    }
+  }
+  static inline void slip(const Side *sides, const Touch &T, double *u) {
+    for (int i = 0; i < 3; i++) u[i] = sides[T.a].v[i] - (T.c < 0 ? 0.0 : sides[T.c].v[i]);
+  }
+  // One projection of one contact onto its Coulomb cone; whether it changed anything.
+  static inline bool relax(Side *sides, Touch &T) {
+    double u[3], d[3], t[3], next[3];
+    slip(sides, T, u);
+    double un = Vec::dot(u, T.normal), old = Vec::dot(T.J, T.normal);
+    double jn = Coulomb::push(old, un, T.target, T.inverse);
+    if (jn == 0 && old == 0) return false;
+    for (int i = 0; i < 3; i++) {
+      d[i] = u[i] - un * T.normal[i];
+      t[i] = T.J[i] - old * T.normal[i] + d[i] / T.inverse;
+    }
+    Coulomb::limit(T.mu, jn, T.normal, t, next);
+    bool moved = false;
+    for (int i = 0; i < 3; i++) {
+      d[i] = next[i] - T.J[i];
+      moved |= d[i] != 0;
+      T.J[i] = next[i];
+      sides[T.a].v[i] -= sides[T.a].inverse * d[i];
+      if (T.c >= 0) sides[T.c].v[i] += sides[T.c].inverse * d[i];
+    }
+    return moved;
+  }
+};
+// Normals of some pairs of fields, weighted by their masses, added up over the 27 nodes around each
+// node of a block: one axis after the other; node by node for a pair that meets at few.
+struct Smooth {
+  enum { MOST = 24, FEW = 10, NONE = 255 };
+  f4 grid[MOST][216];        // of the block and one layer around; then sums, of the block
+  unsigned char pair[FIELDS_IN_BLOCK][FIELDS_IN_BLOCK];   // number of a pair of the block's fields
+  int count[FIELDS_IN_BLOCK * (FIELDS_IN_BLOCK - 1) / 2], pairs;
+  static inline void sum(const f4 *from, f4 *to, int rows, int step, int inner) {
+    for (int r = 0; r < rows; r++)
+      for (int k = 0; k < 4; k++)
+        for (int i = 0; i < inner; i++) {
+          const f4 *g = from + (r * step + k) * inner + i;
+          to[(r * 4 + k) * inner + i] = g[0] + g[inner] + g[2 * inner];
+        }
+  }
+  inline void begin(const Junction &J, const Lean *leans) {
+    for (int a = 0; a < J.fields; a++)
+      for (int c = 0; c < J.fields; c++) pair[a][c] = NONE;
+    pairs = 0;
+    for (int t = J.touch; t < J.last; t++) {
+      const Lean &L = leans[t];
+      if (L.c == NONE) continue;
+      unsigned char &p = pair[L.a][L.c];
+      if (p == NONE) count[p = (unsigned char)pairs++] = 0;
+      count[p]++;
+    }
+  }
+  inline void empty(int many) {
+    for (int p = 0; p < many; p++)
+      for (int i = 0; i < 216; i++) grid[p][i] = f4{0, 0, 0, 0};
+  }
+  // What another block's contacts add to some pairs, from low on.
+  inline void add(const Junction &J, const Junction &O, int n, int low, int many, const Meet *meets,
+                  const Lean *leans) {
+    unsigned char mine[FIELDS_IN_BLOCK];   // which field of J is each of O's: both are in order
+    for (int q = 0, k = 0; q < O.fields; q++) {
+      while (k < J.fields && J.field[k] < O.field[q]) k++;
+      mine[q] = k < J.fields && J.field[k] == O.field[q] ? (unsigned char)k : NONE;
+    }
+    const int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
+    for (u64 left = O.several & Grid::margin(n); left; left &= left - 1) {
+      const int i = __builtin_ctzll(left);
+      const Meet &M = meets[Grid::meet(O, i)];
+      const int place = ((x + (i >> 4)) * 6 + y + (i >> 2 & 3)) * 6 + z + (i & 3);
+      for (const Lean *L = leans + M.touch, *end = L + M.touches; L < end; L++) {
+        if (L->c == NONE) continue;
+        const unsigned char a = mine[L->a], c = mine[L->c];
+        if (a == NONE || c == NONE) continue;
+        const unsigned p = (unsigned)pair[a][c] - (unsigned)low;
+        if (p < (unsigned)many) grid[p][place] = f4{L->u[0], L->u[1], L->u[2], 0};
+      }
+    }
+  }
+  inline void up(int low, int many) {
+    f4 z[144], y[96];
+    for (int p = 0; p < many; p++) {
+      if (count[low + p] < FEW) continue;
+      sum(grid[p], z, 36, 6, 1);
+      sum(z, y, 6, 6, 4);
+      sum(y, grid[p], 1, 6, 16);
+    }
+  }
+  inline f4 around(int p, int few, int i) const {
+    if (!few) return grid[p][i];
+    const f4 *g = grid[p] + ((i >> 4) * 6 + (i >> 2 & 3)) * 6 + (i & 3);
+    f4 x[3];
+    for (int k = 0; k < 3; k++, g += 36)
+      x[k] = (g[0] + g[1] + g[2]) + (g[6] + g[7] + g[8]) + (g[12] + g[13] + g[14]);
+    return x[0] + x[1] + x[2];
+  }
+};
+const int from = (int)((long long)stage->junctions * index / PARTS),
+          to = (int)((long long)stage->junctions * (index + 1) / PARTS);
+int entries = 0;
+Smooth smooth;
+if (from < to) {
+  Entry *book = stage->entry + junctions[from].touch;
+  for (int j = from; j < to; j++) {
+    const Junction &J = junctions[j];
+    const int end = J.meet + Grid::count(J.mask);
+    if (J.several) {
+      smooth.begin(J, leans);
+      const Junction *around[27];
+      for (int n = 0; n < 27; n++) {
+        int at[3] = {J.at[0] + n / 9 - 1, J.at[1] + n / 3 % 3 - 1, J.at[2] + n % 3 - 1}, other = 0;
+        for (int q = 0; q < J.fields && !other; q++) {
+          int b = Grid::block(world->field[J.field[q]], at);
+          if (b >= 0) other = world->field[J.field[q]].where[4 * b + 3];
+        }
+        around[n] = other && junctions[other - 1].several ? &junctions[other - 1] : 0;
+      }
+      for (int low = 0; low < smooth.pairs; low += Smooth::MOST) {
+        const int many = smooth.pairs - low < Smooth::MOST ? smooth.pairs - low : Smooth::MOST;
+        smooth.empty(many);
+        for (int n = 0; n < 27; n++)
+          if (around[n]) smooth.add(J, *around[n], n, low, many, meets, leans);
+        smooth.up(low, many);
+        for (int t = J.touch; t < J.last; t++) {
+          const Lean &L = leans[t];
+          const unsigned p = L.c == Smooth::NONE ? ~0u : (unsigned)smooth.pair[L.a][L.c] - (unsigned)low;
+          if (p >= (unsigned)many) continue;
+          const f4 sum = smooth.around(p, smooth.count[low + p] < Smooth::FEW, L.node);
+          for (int d = 0; d < 3; d++) touches[t].normal[d] = sum[d];
+        }
+      }
+    }
+    for (int k = J.meet; k < end; k++) {
+      Meet &M = meets[k];
+      int active = 0, nears = M.stiff;
+      for (int t = M.touch; t < M.touch + M.touches; t++) {
+        Touch &T = touches[t];
+        for (int d = 0; d < 3; d++) {
+          T.x[d] = M.at[d] * dx;
+          T.J[d] = 0;
+        }
+        T.active = 0;
+        if (T.c < 0) {
+          for (int d = 0; d < 3; d++) T.normal[d] = -world->plane[4 * (-1 - T.c) + d];
+        } else if (Vec::unit(T.normal) <= mpm::TINY) {
+          continue;
+        }
+        double u[3];
+        Solver::slip(sides, T, u);
+        T.active = 1;
+        nears |= Vec::dot(u, T.normal) > 0;
+      }
+      // Where nobody comes nearer nobody pushes, and then nobody is pushed.
+      for (int t = M.touch; t < M.touch + M.touches; t++) {
+        Touch &T = touches[t];
+        if (!nears) T.active = 0;
+        if (!T.active) continue;
+        double u[3];
+        Solver::slip(sides, T, u);
+        T.gap = Solver::gap(world, sides, T, inv) * dx;
+        T.target = Impact::closing(T.gap, dt);
+        T.mu = world->friction[T.fa * all + T.fc];
+        T.active = 1;
+        if (M.stiff) continue;
+        T.inverse = sides[T.a].inverse + (T.c < 0 ? 0.0 : sides[T.c].inverse);
+        if (M.touches == 1) T.active = Vec::dot(u, T.normal) > T.target;
+        active += T.active;
+      }
+      if (!active) continue;
+      for (int s = 0; s < (M.touches == 1 ? 1 : mpm::SWEEPS); s++) {
+        bool moved = false;
+        for (int t = M.touch; t < M.touch + M.touches; t++)
+          if (touches[t].active && Solver::relax(sides, touches[t])) moved = true;
+        if (!moved) break;
+      }
+      for (int s = M.side; s < M.side + M.sides; s++) {
+        float *node = world->field[sides[s].field].node + (size_t)sides[s].slot * 8;
+        for (int i = 0; i < 3; i++) node[1 + i] = (float)sides[s].v[i];
+      }
+      for (int t = M.touch; t < M.touch + M.touches; t++) {
+        const Touch &T = touches[t];
+        double jn = T.active ? Vec::dot(T.J, T.normal) : 0.0;
+        if (jn <= 0) continue;
+        int e = entries - 1, last = entries > ENTRIES ? entries - ENTRIES : 0;
+        while (e >= last && (book[e].a != T.fa || book[e].c != T.fc)) e--;
+        if (e < last) {
+          e = entries++;
+          book[e] = Entry{T.fa, T.fc, 0, {0, 0, 0}, {0, 0, 0}, 0};
+        }
+        double u[3], was[3];
+        Solver::slip(sides, T, u);
+        Solver::before(world, sides, T, was);
+        book[e].normal += jn;
+        for (int i = 0; i < 3; i++) {
+          book[e].place[i] += jn * T.x[i];
+          book[e].J[i] += T.J[i];
+          book[e].loss += (T.J[i] - jn * T.normal[i]) * 0.5 * (was[i] + u[i]);
+          book[e].impact += jn * T.normal[i] * 0.5 * (was[i] + u[i]);
+        }
+      }
+    }
+  }
+}
+stage->entries[index] = entries;

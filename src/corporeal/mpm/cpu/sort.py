@@ -1,0 +1,143 @@
+"""The native sort of one field's particles, and the memory it works in."""
+
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+
+from corporeal.mpm.cpu.layout import (
+    BLOCK,
+    CHANNELS,
+    COPY,
+    COUNT,
+    HISTORY,
+    MEMORY,
+    RANK,
+    SORTING,
+    SURVEY,
+)
+from corporeal.mpm.cpu.program import OPTIONS, SMALLEST_PASS, Memory, Program, aligned, native
+from corporeal.mpm.warp_start import wp
+
+wp.set_module_options(OPTIONS)
+
+
+@wp.func_native(native("sort"))
+def sort_native(memory: Memory, stage: int, low: int, high: int): ...
+
+
+@wp.kernel
+def sort(memory: Memory, stage: int, low: int, high: int):
+    sort_native(memory, stage, low, high)
+
+
+class Sortable(Protocol):
+    """What a sort reads and replaces of a window; see ``window.Window``."""
+
+    part: np.ndarray
+    history: np.ndarray
+    branch: np.ndarray
+    block: np.ndarray
+    table: np.ndarray
+    where: np.ndarray
+    origin: np.ndarray
+    dim: np.ndarray
+    count: int
+    kinds: int
+    """Rows of the table of materials."""
+
+
+class Sorter:
+    """Sorts windows one after the other, in memory of its own."""
+
+    def __init__(self, planes: np.ndarray, domain: tuple[float, float], program: Program) -> None:
+        """Prepare.
+
+        Args:
+            planes: Normals and offsets [cells], (W, 4).
+            domain: How deep in a plane and how far from the origin [cells] a particle is lost.
+            program: Whose threads share the copying.
+
+        """
+        self.record = np.zeros(1, SORTING.dtype)
+        self.plane = np.ascontiguousarray(planes, float)
+        self.record["plane"], self.record["planes"] = self.plane.ctypes.data, len(planes)
+        self.record["deepest"], self.record["farthest"] = domain
+        memory = wp.array(
+            ptr=self.record.ctypes.data,
+            dtype=wp.uint64,
+            shape=self.record.nbytes // 8,
+            device="cpu",
+        )
+        self.launches = [
+            wp.launch(
+                sort, dim=1, inputs=[memory, min(k, COPY), 0, 0], device="cpu", record_cmd=True
+            )
+            for k in range(COPY + program.threads)
+        ]
+        self.share = program.share
+
+    def survey(self, window: Sortable) -> tuple[bool, float]:
+        """See where a window's particles are.
+
+        Returns:
+            Whether one is lost, and which share of them is outside of the block it was sorted into.
+
+        """
+        self.old = np.ascontiguousarray(window.block[:, :5])
+        self._point(part=window.part, history=window.history, branch=window.branch, old=self.old)
+        record = self.record[0]
+        record["olds"], record["flows"] = len(self.old), len(window.history) > 0
+        record["origin"], record["relaxes"] = window.origin, len(window.branch) > 0
+        self.launches[SURVEY].launch()
+        return bool(record["lost"]), int(record["out_of_block"]) / window.count
+
+    def arrange(self, window: Sortable, longest: int) -> bool:
+        """Sort what was surveyed; False, and nothing done, where it spans too many blocks."""
+        record = self.record[0]
+        shift = record["low"] - 1
+        dim = (record["high"] - shift + 2).astype(np.int32)
+        if (dim >= longest).any():
+            return False
+        record["dim"], record["bins"] = dim, 64 * window.kinds
+        lines, slots = int(np.prod(dim, dtype=np.int64)), 8 * len(window.part)
+        scratch = {
+            "line": np.empty(slots, np.int32),
+            "inner": np.empty(slots, np.int32),
+            "middle": np.empty(window.count, np.int32),
+            "count": np.zeros(lines, np.int32),
+            "edge": np.zeros(lines, np.int32),
+            "bin": np.zeros(64 * window.kinds, np.int32),
+        }
+        self._point(**scratch)
+        self.launches[COUNT].launch()
+        blocks = int(record["blocks"])
+        scratch["order"] = np.empty(record["slots"], np.int32)
+        window.block = np.zeros((blocks, BLOCK), np.int32)
+        window.table = np.full(tuple(dim), -1, np.int32)
+        where = np.empty((min(lines, 27 * blocks) + 1, 4), np.int32)
+        self._point(order=scratch["order"], block=window.block, table=window.table, where=where)
+        self.launches[RANK].launch()
+        window.where = where[: record["pool"]].copy()
+        window.dim, window.origin = dim, (window.origin + shift).astype(np.int32)
+        self._copy(window)
+        return True
+
+    def _copy(self, window: Sortable) -> None:
+        batches = int(self.record["slots"][0]) // 8
+        part = aligned((batches, CHANNELS, 8), np.float32)
+        history = aligned((batches if len(window.history) else 0, HISTORY, 8), np.float32)
+        branch = aligned((batches if len(window.branch) else 0, MEMORY, 8), np.float32)
+        self._point(to=part, past_to=history, branch_to=branch)
+        copies = self.launches[COPY:][: max(1, 8 * batches // SMALLEST_PASS)]
+        end = window.block[:, 1]
+        cuts = np.searchsorted(end, np.linspace(0, end[-1], len(copies) + 1)[1:-1])
+        for launch, (low, high) in zip(copies, pairwise([0, *cuts, len(end)]), strict=True):
+            launch.set_param_at_index(2, int(low))
+            launch.set_param_at_index(3, int(high))
+        self.share(copies)
+        window.part, window.history, window.branch = part, history, branch
+
+    def _point(self, **arrays: np.ndarray) -> None:
+        for name, array in arrays.items():
+            self.record[name] = array.ctypes.data

@@ -1,0 +1,287 @@
+"""How fields look where they meet, on the device: surfaces, normals, gaps.
+
+Same formulas as ``physics.contact`` and ``reference.contact``, in float32 and relative to the node.
+"""
+
+from corporeal.mpm import formulas
+from corporeal.mpm.constants import (
+    FIELDS_AT_NODE,
+    FIRST_BIAS,
+    OTHER_BIAS,
+    SHOWN_AROUND,
+    TINY,
+    VAST,
+)
+from corporeal.mpm.cuda.contact_nodes import height_of
+from corporeal.mpm.cuda.grid import block_of, find, node_of
+from corporeal.mpm.cuda.layout import (
+    FULL,
+    MEETS,
+    TOUCHES,
+    Contacts,
+    Grid,
+    Particles,
+    Rigid,
+    Sheet,
+    wp,
+)
+from corporeal.mpm.formulas.one_lane import (
+    gap_between,
+    gap_to_plane,
+    gap_to_surface,
+    reach_of,
+    slopes,
+    splines,
+    surface_begins,
+)
+
+wp.set_module_options(formulas.options(max_unroll=0))
+
+
+# ---------------------------------------------------------------- surfaces
+
+
+@wp.func
+def show(
+    g: Grid,
+    c: Contacts,
+    s: Sheet,
+    home: int,
+    cell: wp.vec3i,
+    f: wp.vec3,
+    m: wp.float32,
+    volume: wp.float32,
+):
+    """Add a particle to how its field looks from the nodes around it."""
+    w = splines(f)
+    d = slopes(f) / s.cell
+    for x in range(3):
+        for y in range(3):
+            for z in range(3):
+                e = g.meet[node_of(g, home, cell, x, y, z)] - 1
+                if e >= 0:
+                    offset = s.cell * (f - wp.vec3(float(x), float(y), float(z)))
+                    n = w[0, x] * w[1, y] * w[2, z]
+                    wp.atomic_add(c.mean, e, m * n * offset)
+                    slope = wp.vec3(
+                        d[0, x] * w[1, y] * w[2, z],
+                        w[0, x] * d[1, y] * w[2, z],
+                        w[0, x] * w[1, y] * d[2, z],
+                    )
+                    wp.atomic_add(c.outward, e, volume * slope)
+    return 0
+
+
+@wp.kernel
+def show_particles(p: Particles, g: Grid, c: Contacts, s: Sheet, stride: int):
+    """Second look at the particles around those nodes, and only them."""
+    if s.flag[FULL] == 2 or s.flag[MEETS] == 0:
+        return
+    for i in range(wp.tid(), p.count, stride):
+        if g.aware[p.home[i]] > 0:
+            J = wp.determinant(wp.identity(n=3, dtype=wp.float32) + p.strain[i])
+            show(g, c, s, p.home[i], p.cell[i], p.place[i], p.mass[i], J * p.volume[i])
+
+
+@wp.kernel
+def show_rigid(r: Rigid, g: Grid, c: Contacts, s: Sheet, stride: int):
+    """Likewise at the particles of rigid bodies."""
+    if s.flag[FULL] == 2 or s.flag[MEETS] == 0:
+        return
+    for i in range(wp.tid(), r.count, stride):
+        if g.aware[r.home[i]] > 0:
+            show(g, c, s, r.home[i], r.cell[i], r.place[i], r.mass[i], r.volume[i])
+
+
+@wp.func
+def unit(v: wp.vec3):
+    """v/|v|; zero stays zero."""
+    size = wp.length(v)
+    if size > TINY:
+        return v / size
+    return wp.vec3(0.0)
+
+
+@wp.kernel
+def propose(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Candidates n1 = g_a - g_c, n2 = g_a, n3 = -g_c, normalised.
+
+    What is small against the cell has no face of its own.
+    """
+    if s.flag[FULL] == 2:
+        return
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if c.c[t] >= 0:
+            a = unit(c.outward[c.a[t]])
+            b = unit(c.outward[c.c[t]])
+            both = unit(c.outward[c.a[t]] - c.outward[c.c[t]])
+            if r.thin[c.fa[t]] == 2 and r.thin[c.fc[t]] != 2:
+                both = wp.vec3(0.0)
+                a = wp.vec3(0.0)
+            if r.thin[c.fc[t]] == 2 and r.thin[c.fa[t]] != 2:
+                both = wp.vec3(0.0)
+                b = wp.vec3(0.0)
+            c.candidate[t] = wp.matrix_from_rows(both, a, -b)
+
+
+@wp.func
+def reach_from(c: Contacts, e: int, field: int, r: wp.vec3, F: wp.mat33, radius: wp.float32):
+    """Let a particle at r [m] from a node push its field's support there outwards."""
+    k = e // FIELDS_AT_NODE
+    for t in range(c.first[k], c.last[k]):
+        if c.c[t] >= 0 and (c.fa[t] == field or c.fc[t] == field):
+            for q in range(3):
+                n = wp.vec3(c.candidate[t][q, 0], c.candidate[t][q, 1], c.candidate[t][q, 2])
+                along = wp.dot(r, n)
+                extent = reach_of(F, n, radius)
+                if c.fa[t] == field:
+                    if along + extent > c.far_a[3 * t + q]:
+                        wp.atomic_max(c.far_a, 3 * t + q, along + extent)
+                elif along - extent < c.far_c[3 * t + q]:
+                    wp.atomic_min(c.far_c, 3 * t + q, along - extent)
+    return 0
+
+
+@wp.func
+def reach(
+    g: Grid,
+    c: Contacts,
+    s: Sheet,
+    home: int,
+    cell: wp.vec3i,
+    f: wp.vec3,
+    F: wp.mat33,
+    volume: wp.float32,
+):
+    """Supports of one particle at all its nodes: R = r0 ‖Fᵀn‖ with r0 half the spacing."""
+    radius = 0.5 * wp.cbrt(volume)
+    for x in range(3):
+        for y in range(3):
+            for z in range(3):
+                e = g.meet[node_of(g, home, cell, x, y, z)] - 1
+                if e >= 0:
+                    r = s.cell * (f - wp.vec3(float(x), float(y), float(z)))
+                    reach_from(c, e, c.field[e], r, F, radius)
+    return 0
+
+
+@wp.kernel
+def reach_particles(p: Particles, g: Grid, c: Contacts, s: Sheet, stride: int):
+    """Supports of what can deform."""
+    if s.flag[FULL] == 2 or s.flag[MEETS] == 0:
+        return
+    for i in range(wp.tid(), p.count, stride):
+        if g.aware[p.home[i]] == 2:
+            F = wp.identity(n=3, dtype=wp.float32) + p.strain[i]
+            reach(g, c, s, p.home[i], p.cell[i], p.place[i], F, p.volume[i])
+
+
+@wp.kernel
+def reach_rigid(r: Rigid, g: Grid, c: Contacts, s: Sheet, stride: int):
+    """Supports of rigid bodies."""
+    if s.flag[FULL] == 2 or s.flag[MEETS] == 0:
+        return
+    for i in range(wp.tid(), r.count, stride):
+        if g.aware[r.home[i]] == 2:
+            F = wp.identity(n=3, dtype=wp.float32)
+            reach(g, c, s, r.home[i], r.cell[i], r.place[i], F, r.volume[i])
+
+
+# ---------------------------------------------------------------- normals and gaps
+
+
+@wp.kernel
+def choose(c: Contacts, s: Sheet, stride: int):
+    """Take the candidate along which the two fields are farthest apart."""
+    if s.flag[FULL] == 2:
+        return
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if c.c[t] >= 0:
+            best = float(-2.0 * VAST)
+            for q in range(3):
+                n = wp.vec3(c.candidate[t][q, 0], c.candidate[t][q, 1], c.candidate[t][q, 2])
+                bias = OTHER_BIAS
+                if q == 0:
+                    bias = FIRST_BIAS
+                wide = c.far_c[3 * t + q] - c.far_a[3 * t + q] + bias * s.cell
+                if wp.length_sq(n) > 0.0 and wide > best:
+                    best = wide
+                    c.chosen[t] = n
+            if best < -VAST:
+                c.chosen[t] = wp.vec3(0.0)
+
+
+@wp.func
+def smoothed(g: Grid, c: Contacts, t: int):
+    """Mean normal of the same pair over 27 nodes, weighted with min(m_a, m_c)."""
+    at = c.at[c.meet[t]]
+    total = wp.vec3(0.0)
+    for x in range(-1, 2):
+        for y in range(-1, 2):
+            for z in range(-1, 2):
+                node = at + wp.vec3i(x, y, z)
+                slot = find(g, c.fa[t], block_of(node))
+                if slot >= 0:
+                    place = 16 * (node[0] & 3) + 4 * (node[1] & 3) + (node[2] & 3)
+                    e = g.meet[64 * slot + place] - 1
+                    if e >= 0:
+                        k = e // FIELDS_AT_NODE
+                        for o in range(c.first[k], c.last[k]):
+                            if c.fa[o] == c.fa[t] and c.fc[o] == c.fc[t]:
+                                a = g.node[c.slot[c.a[o]]][0]
+                                b = g.node[c.slot[c.c[o]]][0]
+                                total += wp.min(a, b) * c.chosen[o]
+    return unit(total)
+
+
+@wp.func
+def begins(r: Rigid, s: Sheet, b: int, x: wp.vec3d, n: wp.vec3):
+    """Where a rigid body's surface begins along n, seen from x [cells]."""
+    R = wp.transpose(r.turn[b])
+    around = wp.float64(SHOWN_AROUND) * s.dx
+    y = R * (x - r.centre[b])
+    m = R * wp.vec3d(n)
+    at = surface_begins(r.surface, r.first[b], r.points[b], y, m, around)
+    return wp.float32(at / s.dx)
+
+
+@wp.func
+def gap_of(c: Contacts, r: Rigid, s: Sheet, t: int, xa: wp.float32, xc: wp.float32):
+    """Open distance of two fields along n [cells], of which one may be a thin rigid body."""
+    a = c.fa[t]
+    b = c.fc[t]
+    gap = float(0.0)
+    if r.thin[a] == 0 and r.thin[b] == 0:
+        gap = gap_between(c.face, xa, xc)
+    elif r.points[a] == 0:
+        gap = gap_to_surface(xa, begins(r, s, b, c.point[t], c.normal[t]))
+    elif r.points[b] == 0:
+        gap = gap_to_surface(-xc, begins(r, s, a, c.point[t], -c.normal[t]))
+    else:
+        n = c.normal[t]
+        gap = begins(r, s, b, c.point[t], n) + begins(r, s, a, c.point[t], -n)
+    return gap
+
+
+@wp.kernel
+def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Smooth normals, and measure the open distance along them."""
+    if s.flag[FULL] == 2:
+        return
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        a = c.a[t]
+        other = c.c[t]
+        if other < 0:
+            n = c.normal[t]
+            h = height_of(s, -1 - other, c.at[c.meet[t]])
+            xi = wp.dot(c.mean[a], n) / (g.node[c.slot[a]][0] * s.cell)
+            c.gap[t] = gap_to_plane(xi, h) * s.cell
+        else:
+            n = smoothed(g, c, t)
+            c.normal[t] = n
+            if wp.length_sq(n) > 0.0:
+                xa = wp.dot(c.mean[a], n) / (g.node[c.slot[a]][0] * s.cell)
+                xc = wp.dot(c.mean[other], n) / (g.node[c.slot[other]][0] * s.cell)
+                gap = gap_of(c, r, s, t, xa, xc)
+                if gap < VAST:
+                    c.gap[t] = gap * s.cell

@@ -1,0 +1,498 @@
+"""What contacts transmit on the device: impulses, and the books.
+
+Nodes of deformable fields are independent of one another: each is solved by its own thread with
+projected Gauss–Seidel. Rigid bodies couple many nodes. There every sweep is a Jacobi sweep in which
+a body with n busy contacts lends each of them an n-th of its mass (mass splitting, Tonge et al.
+2012, "Mass splitting for jitter-free parallel rigid body simulation"): it converges whatever the
+order of threads, and each impulse moves the whole body, so momentum is exact. Impacts of rigid
+bodies come first, in rounds of such sweeps: see ``physics.contact.solve_impacts``.
+"""
+
+from corporeal.mpm import constants, formulas
+from corporeal.mpm.constants import (
+    FIELDS_AT_NODE,
+    IMPACTS,
+    JACOBI_STILL,
+    JACOBI_SWEEPS,
+    JACOBI_SWEEPS_OF_A_HIT,
+    SWEEPS,
+    VAST,
+)
+from corporeal.mpm.cuda.layout import (
+    DT,
+    FULL,
+    HITS,
+    IMPACTING,
+    LANES,
+    LAST_ROUND,
+    MEETS,
+    PUSHING,
+    ROUND,
+    RUBBING,
+    STIFF,
+    STRIKING,
+    STRUCK,
+    SWEEPING,
+    SWEPT,
+    SWEPT_NOW,
+    TIME,
+    TOUCHES,
+    WAITING,
+    Contacts,
+    D,
+    Grid,
+    Rigid,
+    Sheet,
+    wp,
+)
+from corporeal.mpm.cuda.rigid import softness_at, speed_at
+from corporeal.mpm.formulas.one_lane import (
+    approach_of,
+    closing_speed,
+    impact_begins,
+    impact_target,
+    push_of,
+    within_cone,
+)
+
+wp.set_module_options(formulas.options(max_unroll=0))
+
+SMALLEST_SLIP = wp.constant(D(constants.SMALLEST_SLIP))
+
+
+@wp.func
+def side_speed(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int):
+    """Velocity of one side of a contact [m/s]."""
+    if field >= s.bodies:
+        return wp.vec3d(D(0.0))
+    if r.stiff[field] == 1:
+        return speed_at(r, field, c.point[t])
+    return c.velocity[entry]
+
+
+@wp.func
+def slip_of(c: Contacts, r: Rigid, s: Sheet, t: int):
+    """Slip and approach together: u = v_a - v_c [m/s]."""
+    a = side_speed(c, r, s, t, c.a[t], c.fa[t])
+    return a - side_speed(c, r, s, t, c.c[t], c.fc[t])
+
+
+@wp.func
+def side_before(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int, entry: int, field: int):
+    """Velocity of one side as the step began, before its forces [m/s]."""
+    if field >= s.bodies:
+        return wp.vec3d(D(0.0))
+    if r.stiff[field] == 1:
+        return speed_at(r, field, c.point[t]) - s.kick[field]
+    v = g.old[c.slot[entry]]
+    return wp.vec3d(D(v[0]), D(v[1]), D(v[2]))
+
+
+@wp.func
+def side_softness(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int, n: wp.vec3d):
+    """1/m_eff of one side; a rigid body is shared among its busy contacts."""
+    if field >= s.bodies:
+        return D(0.0)
+    if r.stiff[field] == 1:
+        return softness_at(r, field, c.point[t], n) * D(wp.max(r.busy[field], 1))
+    return c.light[entry]
+
+
+@wp.func
+def softness_of(c: Contacts, r: Rigid, s: Sheet, t: int, n: wp.vec3d):
+    """1/m_eff of a contact along n [1/kg]."""
+    a = side_softness(c, r, s, t, c.a[t], c.fa[t], n)
+    return a + side_softness(c, r, s, t, c.c[t], c.fc[t], n)
+
+
+@wp.func
+def give(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int, J: wp.vec3d):
+    """Give an impulse to one side: nodes at once, rigid bodies at the end of the sweep."""
+    if field < s.bodies:
+        if r.path_count[field] > 0:
+            return 0
+        if r.stiff[field] == 1:
+            wp.atomic_add(r.speed_change, field, J * r.light[field])
+            moment = wp.cross(c.point[t] - r.centre[field], J)
+            wp.atomic_add(r.moment_change, field, moment)
+        else:
+            c.velocity[entry] = c.velocity[entry] + J * c.light[entry]
+    return 0
+
+
+@wp.func
+def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
+    """One projection of one contact onto its Coulomb cone; by how much it changed [m/s]."""
+    u = slip_of(c, r, s, t)
+    n = wp.vec3d(c.normal[t])
+    un = wp.dot(u, n)
+    J = c.impulse[t]
+    old = wp.dot(J, n)
+    soft = softness_of(c, r, s, t, n)
+    new = push_of(old, un, c.target[t], soft)
+    c.turn[t] = D(0.0)
+    if new == D(0.0) and wp.length_sq(J) == D(0.0):
+        return float(0.0)
+    slide = u - un * n
+    rub = J - old * n
+    size = wp.length(slide)
+    if size > SMALLEST_SLIP:
+        rub = rub + slide / softness_of(c, r, s, t, slide / size)
+    given = within_cone(c.friction[c.fa[t], c.fc[t]], new, n, rub)
+    change = given - J
+    c.impulse[t] = given
+    c.turn[t] = -wp.dot(change, given - c.last_impulse[t]) * soft
+    give(c, r, s, t, c.a[t], c.fa[t], -change)
+    give(c, r, s, t, c.c[t], c.fc[t], change)
+    return float(wp.length(change) * soft)
+
+
+# ---------------------------------------------------------------- before
+
+
+@wp.func
+def is_stiff(r: Rigid, s: Sheet, field: int):
+    """Whether a side is a rigid body or a plane."""
+    if field >= s.bodies:
+        return True
+    return r.stiff[field] == 1
+
+
+@wp.kernel
+def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, stride: int):
+    """Normal speed that each contact may keep, and which rigid pairs are hit."""
+    if s.flag[FULL] == 2:
+        return
+    dt = s.clock[DT]
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if c.gap[t] >= VAST:
+            continue
+        gap = D(c.gap[t])
+        fa = c.fa[t]
+        fc = c.fc[t]
+        c.active[t] = 1
+        c.before[t] = side_before(c, r, g, s, t, c.a[t], fa) - side_before(
+            c, r, g, s, t, c.c[t], fc
+        )
+        c.target[t] = closing_speed(gap, dt)
+        c.struck[t] = wp.vec3d(D(0.0))
+        if r.stiff[fa] == 1 and fc < s.bodies:
+            if r.stiff[fc] == 1:
+                wp.atomic_max(s.flag, HITS, 1)
+    if wp.tid() == 0:
+        s.flag[IMPACTING] = 0
+        if s.flag[STIFF] > 0:
+            s.flag[IMPACTING] = 1
+
+
+# ---------------------------------------------------------------- impacts, one after the other
+
+
+@wp.func
+def of_rigid(c: Contacts, t: int):
+    """Whether a contact is solved with those of rigid bodies."""
+    alone = c.meet[t] < 0
+    if not alone:
+        alone = c.stiff[c.meet[t]] == 1
+    return alone
+
+
+@wp.func
+def rebounds(c: Contacts, r: Rigid, s: Sheet, t: int):
+    """Whether a contact has a restitution: of rigid bodies with one another and with planes."""
+    stiff = False
+    if c.active[t] > 0:
+        if r.stiff[c.fa[t]] == 1 and is_stiff(r, s, c.fc[t]):
+            stiff = c.restitution[c.fa[t], c.fc[t]] > D(0.0)
+    return stiff
+
+
+@wp.func
+def kick_of(c: Contacts, s: Sheet, t: int):
+    """Approach speed of two rigid sides that forces added in this step [m/s]."""
+    kick = s.kick[c.fa[t]]
+    if c.fc[t] < s.bodies:
+        kick = kick - s.kick[c.fc[t]]
+    return wp.dot(kick, wp.vec3d(c.normal[t]))
+
+
+@wp.func
+def feigned(c: Contacts, r: Rigid, t: int):
+    """Speed at which a body that rolls on its surface points meets the next one [m/s]."""
+    speed = D(0.0)
+    if c.meet[t] < 0:
+        b = c.fa[t]
+        speed = wp.length(r.spin[b]) * r.spacing[b]
+    return speed
+
+
+@wp.kernel
+def strike(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Find the rigid pairs that are hit as things move now."""
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if rebounds(c, r, s, t):
+            un = wp.dot(slip_of(c, r, s, t), wp.vec3d(c.normal[t]))
+            approach = approach_of(un, kick_of(c, s, t), feigned(c, r, t))
+            if impact_begins(approach, un, D(c.gap[t]), s.clock[DT]):
+                c.hit[c.fa[t], c.fc[t]] = 1
+                s.flag[STRUCK] = 1
+
+
+@wp.kernel
+def begin_round(r: Rigid, s: Sheet):
+    """Begin the sweeps of a round; the last one is of all contacts together."""
+    s.flag[LAST_ROUND] = 1
+    if s.flag[STRUCK] == 1 and s.flag[ROUND] < IMPACTS:
+        s.flag[LAST_ROUND] = 0
+        s.flag[HITS] = 1
+    s.flag[SWEEPING] = 1
+    s.flag[SWEPT] = 0
+    s.change[0] = 0.0
+    s.pace[0] = D(1.0)
+    s.pace[1] = D(0.0)
+    s.pace[2] = D(0.0)
+    for b in range(s.bodies):
+        r.last_speed[b] = r.speed[b]
+        r.last_moment[b] = r.moment[b]
+
+
+@wp.kernel
+def aim(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Say which contacts take part in a round, and what speed each may keep."""
+    dt = s.clock[DT]
+    for k in range(wp.tid(), s.flag[MEETS], stride):
+        if c.stiff[k] == 1:
+            for q in range(c.number[k]):
+                c.last_velocity[k * FIELDS_AT_NODE + q] = c.velocity[k * FIELDS_AT_NODE + q]
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if c.active[t] > 0 and of_rigid(c, t):
+            fa = c.fa[t]
+            fc = c.fc[t]
+            gap = D(c.gap[t])
+            c.target[t] = closing_speed(gap, dt)
+            c.active[t] = SWEPT_NOW
+            if s.flag[LAST_ROUND] == 0:
+                if c.hit[fa, fc] == 0:
+                    c.active[t] = WAITING
+                elif rebounds(c, r, s, t):
+                    un = wp.dot(slip_of(c, r, s, t), wp.vec3d(c.normal[t]))
+                    approach = approach_of(un, kick_of(c, s, t), feigned(c, r, t))
+                    e = c.restitution[fa, fc]
+                    c.target[t] = impact_target(e, approach, un, gap, dt, s.dx)
+
+
+@wp.kernel
+def bank(c: Contacts, s: Sheet, stride: int):
+    """Keep a round's impulses, and go on to the next."""
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if c.active[t] > 0 and of_rigid(c, t):
+            c.struck[t] = c.struck[t] + c.impulse[t]
+            c.impulse[t] = wp.vec3d(D(0.0))
+            c.last_impulse[t] = wp.vec3d(D(0.0))
+
+
+@wp.kernel
+def end_round(c: Contacts, s: Sheet):
+    """Forget who was hit; end where all contacts took part."""
+    everything = c.hit.shape[0]
+    for a in range(everything):
+        for b in range(everything):
+            c.hit[a, b] = 0
+    s.flag[ROUND] = s.flag[ROUND] + 1
+    s.flag[STRUCK] = 0
+    if s.flag[LAST_ROUND] == 1:
+        s.flag[IMPACTING] = 0
+
+
+# ---------------------------------------------------------------- the sweeps
+
+
+@wp.kernel
+def solve_nodes(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Solve every node that no rigid body takes part in."""
+    if s.flag[FULL] == 2:
+        return
+    for k in range(wp.tid(), s.flag[MEETS], stride):
+        if c.stiff[k] == 0:
+            for _ in range(SWEEPS):
+                moved = float(0.0)
+                for t in range(c.first[k], c.last[k]):
+                    if c.active[t] > 0:
+                        moved += relax(c, r, s, t)
+                if moved == 0.0 or c.last[k] - c.first[k] == 1:
+                    break
+
+
+@wp.func
+def count(c: Contacts, r: Rigid, s: Sheet, t: int):
+    """Note whether a contact wants something of its bodies in this sweep."""
+    if c.active[t] == SWEPT_NOW:
+        fa = c.fa[t]
+        fc = c.fc[t]
+        n = wp.vec3d(c.normal[t])
+        busy = wp.length_sq(c.impulse[t]) > D(0.0)
+        busy = busy or wp.dot(slip_of(c, r, s, t), n) > c.target[t]
+        if busy and r.stiff[fa] == 1:
+            wp.atomic_add(r.busy, fa, 1)
+        if busy and fc < s.bodies:
+            if r.stiff[fc] == 1:
+                wp.atomic_add(r.busy, fc, 1)
+    return 0
+
+
+@wp.func
+def hasten(c: Contacts, t: int, more: wp.float64):
+    """Carry an impulse on in the direction that it took in the last sweep."""
+    J = c.impulse[t]
+    c.impulse[t] = J + more * (J - c.last_impulse[t])
+    c.last_impulse[t] = J
+    return 0
+
+
+@wp.kernel
+def count_busy(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Carry everything on, and count the contacts that share each rigid body in this sweep."""
+    more = s.pace[1]
+    for k in range(wp.tid(), s.flag[MEETS], stride):
+        if c.stiff[k] == 1:
+            for q in range(c.number[k]):
+                e = k * FIELDS_AT_NODE + q
+                v = c.velocity[e]
+                c.velocity[e] = v + more * (v - c.last_velocity[e])
+                c.last_velocity[e] = v
+            for t in range(c.first[k], c.last[k]):
+                hasten(c, t, more)
+                count(c, r, s, t)
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if c.meet[t] < 0:
+            hasten(c, t, more)
+            count(c, r, s, t)
+
+
+@wp.kernel
+def sweep(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """One sweep over the nodes and points that rigid bodies take part in."""
+    for k in range(wp.tid(), s.flag[MEETS], stride):
+        if c.stiff[k] == 1:
+            for t in range(c.first[k], c.last[k]):
+                if c.active[t] == SWEPT_NOW:
+                    wp.atomic_max(s.change, 0, relax(c, r, s, t))
+                    wp.atomic_add(s.pace, 2, c.turn[t])
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if c.meet[t] < 0 and c.active[t] == SWEPT_NOW:
+            wp.atomic_max(s.change, 0, relax(c, r, s, t))
+            wp.atomic_add(s.pace, 2, c.turn[t])
+
+
+@wp.func
+def quicken(s: Sheet):
+    """Nesterov's pace; from the start again where the last sweep went back on its way."""
+    t = s.pace[0]
+    s.pace[1] = D(0.0)
+    s.pace[0] = D(1.0)
+    if s.pace[2] <= D(0.0):
+        s.pace[0] = D(0.5) * (D(1.0) + wp.sqrt(D(1.0) + D(4.0) * t * t))
+        s.pace[1] = (t - D(1.0)) / s.pace[0]
+    s.pace[2] = D(0.0)
+    return s.pace[1]
+
+
+@wp.kernel
+def apply(r: Rigid, s: Sheet):
+    """Let rigid bodies have what they were given; go on while it was much."""
+    n = s.flag[SWEPT] + 1
+    s.flag[SWEPT] = n
+    limit = JACOBI_SWEEPS
+    if s.flag[HITS] > 0:
+        limit = JACOBI_SWEEPS_OF_A_HIT
+    moved = s.change[0]
+    s.change[0] = 0.0
+    more = quicken(s)
+    if moved == 0.0 or n >= limit or (n >= SWEEPS and moved < JACOBI_STILL * s.cell):
+        s.flag[SWEEPING] = 0
+        more = D(0.0)
+    for b in range(s.bodies):
+        if r.stiff[b] == 1 and r.path_count[b] == 0:
+            speed = r.speed[b] + r.speed_change[b]
+            moment = r.moment[b] + r.moment_change[b]
+            r.speed[b] = speed + more * (speed - r.last_speed[b])
+            r.moment[b] = moment + more * (moment - r.last_moment[b])
+            r.spin[b] = r.inertia[b] * r.moment[b]
+            r.last_speed[b] = speed
+            r.last_moment[b] = moment
+            r.speed_change[b] = wp.vec3d(D(0.0))
+            r.moment_change[b] = wp.vec3d(D(0.0))
+            r.busy[b] = 0
+
+
+# ---------------------------------------------------------------- after
+
+
+@wp.kernel
+def hand_back(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Give nodes their velocities after contact."""
+    if s.flag[FULL] == 2:
+        return
+    for k in range(wp.tid(), s.flag[MEETS], stride):
+        for q in range(c.number[k]):
+            e = k * FIELDS_AT_NODE + q
+            if r.stiff[c.field[e]] == 0:
+                v = wp.vec3(c.velocity[e])
+                g.node[c.slot[e]] = wp.vec4(g.node[c.slot[e]][0], v[0], v[1], v[2])
+
+
+@wp.func
+def react(c: Contacts, r: Rigid, s: Sheet, t: int, field: int, J: wp.vec3d):
+    """Book what a contact's impulse on a body that moves as told takes of its mover."""
+    if r.path_count[field] > 0:
+        work = wp.dot(J, speed_at(r, field, c.point[t]))
+        wp.atomic_add(s.loss, PUSHING, t % LANES, -work)
+        wp.atomic_sub(s.external, field, J)
+    return 0
+
+
+@wp.kernel
+def note(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Add up what every pair exchanged."""
+    if s.flag[FULL] == 2:
+        return
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        n = wp.vec3d(c.normal[t])
+        J = c.impulse[t] + c.struck[t]
+        size = wp.dot(J, n)
+        if c.active[t] > 0 and size > D(0.0):
+            fa = c.fa[t]
+            fc = c.fc[t]
+            mean = D(0.5) * (c.before[t] + slip_of(c, r, s, t))
+            wp.atomic_add(s.loss, RUBBING, t % LANES, wp.dot(J - size * n, mean))
+            wp.atomic_add(s.loss, STRIKING, t % LANES, size * wp.dot(n, mean))
+            wp.atomic_add(s.step_impulse, fa, fc, size)
+            wp.atomic_add(s.step_place, fa, fc, size * c.point[t])
+            react(c, r, s, t, fa, -J)
+            if fc >= s.bodies:
+                wp.atomic_sub(s.plane_impulse, fc - s.bodies, fa, J)
+            else:
+                react(c, r, s, t, fc, J)
+
+
+@wp.kernel
+def enter_books(c: Contacts, s: Sheet):
+    """Enter the step: who touched whom, how much, when and where."""
+    a, b = wp.tid()
+    if s.flag[FULL] == 2:
+        return
+    size = s.step_impulse[a, b]
+    if size > D(0.0):
+        if b < s.bodies:
+            s.pair_impulse[a, b] = s.pair_impulse[a, b] + size
+            s.pair_impulse[b, a] = s.pair_impulse[a, b]
+        if not (s.first_contact[a, b] >= D(0.0)):
+            place = s.step_place[a, b] / size
+            s.first_contact[a, b] = s.clock[TIME]
+            s.first_contact[b, a] = s.clock[TIME]
+            s.contact_point[a, b] = place
+            s.contact_point[b, a] = place
+        s.last_contact[a, b] = s.clock[TIME]
+        s.last_contact[b, a] = s.clock[TIME]
+        s.step_impulse[a, b] = D(0.0)
+        s.step_place[a, b] = wp.vec3d(D(0.0))

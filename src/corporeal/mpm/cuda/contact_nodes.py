@@ -1,0 +1,200 @@
+"""Where fields meet on the device: nodes with several fields or near a plane, and surface points.
+
+Same rules as ``reference.contact.find``.
+"""
+
+from corporeal.mpm import constants
+from corporeal.mpm.constants import FIELDS_AT_NODE, VAST, WALL_REACH
+from corporeal.mpm.cuda.layout import (
+    BLOCKS,
+    FULL,
+    MEETS,
+    STIFF,
+    TOUCHES,
+    Contacts,
+    D,
+    Grid,
+    Rigid,
+    Sheet,
+    wp,
+)
+
+wp.set_module_options({"enable_backward": False, "max_unroll": 0})
+
+POINT_REACH = wp.constant(D(constants.POINT_REACH))
+
+
+@wp.func
+def height_of(s: Sheet, w: int, at: wp.vec3i):
+    """Height of a node above a plane [cells]."""
+    n = wp.vec3(s.plane[w])
+    x = wp.vec3(float(at[0]), float(at[1]), float(at[2]))
+    return wp.dot(n, x) - wp.float32(s.offset[w] / s.dx)
+
+
+@wp.func
+def enter(c: Contacts, g: Grid, r: Rigid, k: int, node: int):
+    """Enter one field's node into a meeting."""
+    n = c.number[k]
+    e = k * FIELDS_AT_NODE + n
+    f = g.field[node // 64]
+    a = g.node[node]
+    c.field[e] = f
+    c.slot[e] = node
+    c.mean[e] = wp.vec3(0.0)
+    c.outward[e] = wp.vec3(0.0)
+    c.velocity[e] = wp.vec3d(D(a[1]), D(a[2]), D(a[3]))
+    c.light[e] = D(1.0) / D(a[0])
+    c.number[k] = n + 1
+    g.meet[node] = e + 1
+    if r.stiff[f] == 1:
+        c.stiff[k] = 1
+    return 0
+
+
+@wp.func
+def there(g: Grid, node: int):
+    """Whether a field is felt at a node: a held one is its frame's."""
+    return g.node[node][0] > 0.0 and g.held[node] == 0
+
+
+@wp.func
+def walls_near(s: Sheet, r: Rigid, field: int, at: wp.vec3i):
+    """How many planes a field meets at a node."""
+    n = int(0)
+    if r.pointed[field] == 0:
+        for w in range(s.planes):
+            if height_of(s, w, at) <= WALL_REACH:
+                n += 1
+    return n
+
+
+@wp.func
+def add_touch(c: Contacts, t: int, k: int, a: int, other: int):
+    """Enter a possible contact."""
+    c.meet[t] = k
+    c.a[t] = a
+    c.c[t] = other
+    c.active[t] = 0
+    c.gap[t] = VAST
+    c.impulse[t] = wp.vec3d(D(0.0))
+    c.last_impulse[t] = wp.vec3d(D(0.0))
+    for q in range(3):
+        c.far_a[3 * t + q] = -VAST
+        c.far_c[3 * t + q] = VAST
+    return 0
+
+
+@wp.func
+def add_touches(c: Contacts, s: Sheet, r: Rigid, k: int, room: int):
+    """Enter all pairs of a meeting, and its planes."""
+    n = c.number[k]
+    total = n * (n - 1) // 2
+    for a in range(n):
+        total += walls_near(s, r, c.field[k * FIELDS_AT_NODE + a], c.at[k])
+    t = wp.atomic_add(s.flag, TOUCHES, total)
+    c.first[k] = t
+    c.last[k] = t
+    if t + total > room:
+        s.flag[FULL] = 2
+        return 0
+    dx = s.dx
+    x = wp.vec3d(D(c.at[k][0]) * dx, D(c.at[k][1]) * dx, D(c.at[k][2]) * dx)
+    for a in range(n):
+        f = c.field[k * FIELDS_AT_NODE + a]
+        for b in range(a + 1, n):
+            if c.apart[f, c.field[k * FIELDS_AT_NODE + b]] == 1:
+                continue
+            add_touch(c, t, k, k * FIELDS_AT_NODE + a, k * FIELDS_AT_NODE + b)
+            c.point[t] = x
+            c.fa[t] = f
+            c.fc[t] = c.field[k * FIELDS_AT_NODE + b]
+            t += 1
+        for w in range(s.planes):
+            if r.pointed[f] == 0 and height_of(s, w, c.at[k]) <= WALL_REACH:
+                add_touch(c, t, k, k * FIELDS_AT_NODE + a, -1 - w)
+                c.point[t] = x
+                c.fa[t] = f
+                c.fc[t] = s.bodies + w
+                c.normal[t] = -wp.vec3(s.plane[w])
+                t += 1
+    c.last[k] = t
+    if c.stiff[k] == 1:
+        wp.atomic_add(s.flag, STIFF, total)
+    return 0
+
+
+@wp.kernel
+def list_meets(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """List nodes where fields meet each other or a plane; the lowest field enters them."""
+    for i in range(wp.tid(), 64 * s.flag[BLOCKS], stride):
+        if not there(g, i):
+            continue
+        b = i // 64
+        o = i % 64
+        at = 4 * g.where[b] + wp.vec3i(o >> 4, (o >> 2) & 3, o & 3)
+        several = int(0)
+        for q in range(FIELDS_AT_NODE):
+            other = g.partner[FIELDS_AT_NODE * b + q]
+            if other < 0:
+                break
+            if there(g, 64 * other + o):
+                several = 1
+                if g.field[other] < g.field[b]:
+                    several = -1
+                    break
+        if several < 0 or (several == 0 and walls_near(s, r, g.field[b], at) == 0):
+            continue
+        k = wp.atomic_add(s.flag, MEETS, 1)
+        if k >= c.room:
+            s.flag[FULL] = 2
+            continue
+        c.at[k] = at
+        c.number[k] = 0
+        c.stiff[k] = 0
+        enter(c, g, r, k, i)
+        wp.atomic_max(g.seen, b, 1 + several)
+        for q in range(FIELDS_AT_NODE):
+            other = g.partner[FIELDS_AT_NODE * b + q]
+            if other < 0 or c.number[k] == FIELDS_AT_NODE:
+                break
+            if there(g, 64 * other + o):
+                enter(c, g, r, k, 64 * other + o)
+                wp.atomic_max(g.seen, other, 2)
+        add_touches(c, s, r, k, 2 * c.room)
+
+
+@wp.kernel
+def look_around(g: Grid, s: Sheet, stride: int):
+    """Tell blocks whether particles in them reach nodes where fields meet."""
+    for b in range(wp.tid(), s.flag[BLOCKS], stride):
+        aware = int(0)
+        for o in range(8):
+            other = g.near[8 * b + o]
+            if other >= 0:
+                aware = wp.max(aware, g.seen[other])
+        g.aware[b] = aware
+
+
+@wp.kernel
+def list_points(r: Rigid, c: Contacts, s: Sheet, stride: int):
+    """Contacts of rigid bodies with planes, on the bodies' surface points."""
+    if s.flag[FULL] == 2:
+        return
+    for i in range(wp.tid(), r.surfaces * s.planes, stride):
+        w = i % s.planes
+        b = r.surface_body[i // s.planes]
+        x = r.centre[b] + r.turn[b] * r.surface[i // s.planes]
+        gap = wp.dot(s.plane[w], x) - s.offset[w]
+        if gap < POINT_REACH * s.dx:
+            t = wp.atomic_add(s.flag, TOUCHES, 1)
+            wp.atomic_add(s.flag, STIFF, 1)
+            if t >= 2 * c.room:
+                s.flag[FULL] = 2
+            else:
+                add_touch(c, t, -1, -1, -1 - w)
+                c.fa[t] = b
+                c.fc[t] = s.bodies + w
+                c.point[t] = x
+                c.normal[t] = -wp.vec3(s.plane[w])
+                c.gap[t] = wp.float32(gap)

@@ -1,0 +1,412 @@
+"""The engine for CUDA cards: all steps of a frame in one graph, no word to the host inside.
+
+The same method as ``reference``, in plain Warp: particles in float32 with their places relative
+to the grid, rigid bodies and impulses in double precision. ``device="cpu"`` runs the very same
+graph on the processor, one thread, which is how it is tested where there is no card.
+"""
+
+from collections.abc import Collection
+from dataclasses import MISSING, fields
+from typing import Any
+
+import numpy as np
+
+from corporeal.errors import SimulationError, UserError
+from corporeal.mpm.cuda import layout, memory
+from corporeal.mpm.cuda import load_memory as extras
+from corporeal.mpm.cuda.layout import wp
+from corporeal.mpm.cuda.memory import Memory, split
+from corporeal.mpm.cuda.program import MODULES, PARTICLE_STATE, Arrays, Program
+from corporeal.mpm.interaction import Interaction
+from corporeal.mpm.ledger import Ledger
+from corporeal.mpm.measure import Energy, Sums
+from corporeal.mpm.physics import branches
+from corporeal.mpm.physics.grips import Grip
+from corporeal.mpm.physics.rigid import RigidBody, world_inverse_inertia
+from corporeal.mpm.problem import Body, Problem, Snapshot, Steps
+from corporeal.mpm.state import Matter, Motion, branch_energy, strain_energy
+
+KNOWN = {
+    Body: "name position velocity volume density law young poisson yield_stress hardening "
+    "friction_angle cohesion loss vibration consistency flow_index "
+    "rigid surface push wind faces tether path pivot",
+    Problem: "bodies cell friction restitution planes gravity gravity_ramp contact transfer "
+    "courant bonds joints apart",
+}
+"""What this engine knows of a problem; anything else must be at its default."""
+CONTACT_ROOM = 4096
+PLACED = tuple("cell place strain motion stress plastic opened relief pressure".split())
+"""What a warm start takes over of particles."""
+RIGID_STATE = "centre turn speed moment inertia spin cell place"
+SHEET_STATE = (
+    "clock fast loss external plane_impulse pair_impulse first_contact last_contact contact_point"
+)
+
+
+class CudaEngine(Interaction):
+    """Steps one problem on a CUDA card."""
+
+    def __init__(self, problem: Problem, device: str = "cuda") -> None:
+        """Lay out memory.
+
+        Args:
+            problem: What to simulate.
+            device: A Warp device: "cuda", "cuda:1", …; "cpu" for tests.
+
+        Raises:
+            UserError: There is no such card, or the problem asks for what only other engines do.
+
+        """
+        self.device = present(device)
+        _refuse_unknown(problem)
+        self.problem = problem
+        self.steps = Steps()
+        self.matter = Matter.of(problem)
+        room = self.memory = Memory(self.device)
+        apart = self.matter.rigid & (problem.contact == "multi")
+        particles = room.particles(problem, self.matter, np.flatnonzero(~apart))
+        self.arrays = Arrays(
+            sheet=room.sheet(problem, self.matter),
+            particles=particles,
+            rigid=room.rigid(problem, self.matter),
+            grid=room.grid(problem, self._blocks_needed()),
+            contacts=room.contacts(problem, CONTACT_ROOM),
+            loads=extras.loads(room, problem, self.matter),
+            bonds=extras.bonds(room, problem),
+        )
+        self.program = Program(problem, self.arrays, self.device)
+        self.kept = self._kept()
+        self.spare = {name: wp.empty_like(array) for name, array in self.kept.items()}
+        self.lost = np.zeros(len(self.matter.mass), bool)
+        self.grips: dict[int, Grip] = {}
+        for module in MODULES:
+            wp.load_module(module, device=self.device)
+        self._start()
+
+    def _blocks_needed(self) -> int:
+        """Blocks that particles reach now, and half as many again."""
+        position = np.concatenate([b.position for b in self.problem.bodies]) / self.problem.cell
+        if not np.isfinite(position).all():
+            raise SimulationError(
+                "There are positions that are not finite. Look at the mesh that was filled."
+            )
+        low = split(position)[0] >> 2
+        single = self.problem.contact == "single"
+        field = self.matter.body * (not single)
+        homes = np.unique(np.column_stack([field, low]), axis=0)
+        around = homes[:, None, :] + np.pad(np.array(list(np.ndindex(2, 2, 2))), ((0, 0), (1, 0)))
+        return 64 + len(np.unique(around.reshape(-1, 4), axis=0)) * 3 // 2
+
+    def _kept(self) -> dict[str, Any]:
+        """Everything that the next step depends on, and the books."""
+        groups = (
+            ("particle", self.arrays.particles, PARTICLE_STATE),
+            ("rigid", self.arrays.rigid, RIGID_STATE),
+            ("sheet", self.arrays.sheet, SHEET_STATE),
+        )
+        return {
+            f"{group}.{name}": getattr(struct, name)
+            for group, struct, names in groups
+            for name in names.split()
+        }
+
+    def _start(self) -> None:
+        """Say how fast things are at the start, and find their blocks."""
+        m = self.matter
+        soft = self.arrays.particles.number.numpy()[: self.arrays.particles.count]
+        speed = wave = 0.0
+        if len(soft):
+            velocity = np.concatenate([b.velocity for b in self.problem.bodies])[soft]
+            speed = float(np.linalg.norm(velocity, axis=1).max())
+            kinds, s = np.unique(m.kind[soft]), m.substances
+            wave = float(s.wave_speed[kinds].max())
+        self.arrays.sheet.fast.assign(np.array([0, 0, speed, wave], np.float32))
+        self._arrange()
+
+    # ------------------------------------------------------------ time
+
+    @property
+    def time(self) -> float:
+        """Simulated time so far [s]."""
+        return float(self.arrays.sheet.clock.numpy()[layout.TIME])
+
+    def stable_step(self) -> float:
+        """Largest stable step now [s]."""
+        self._set(layout.UNTIL, self.time)
+        self.program.look_ahead()
+        return float(self.arrays.sheet.clock.numpy()[layout.STABLE])
+
+    def advance(self, until: float) -> None:
+        """Step until exactly ``until`` [s], choosing steps by stability."""
+        self._set(layout.FORCED, 0.0)
+        self._go(until)
+
+    def step(self, dt: float) -> None:
+        """Take one step of dt [s]."""
+        self._set(layout.FORCED, 1.0)
+        self._go(self.time + dt)
+
+    def _set(self, what: Any, value: float) -> None:
+        self.arrays.sheet.clock[int(what) : int(what) + 1].fill_(value)
+
+    def _go(self, until: float) -> None:
+        for name, array in self.kept.items():
+            wp.copy(self.spare[name], array)
+        self._set(layout.UNTIL, until)
+        self._arrange()
+        while True:
+            self.program.run()
+            flag = self.arrays.sheet.flag.numpy()
+            if flag[layout.LOST]:
+                self._give_up()
+            if not flag[layout.FULL]:
+                break
+            self._enlarge(int(flag[layout.FULL]))
+            self._arrange()
+        self._read_steps()
+
+    def _read_steps(self) -> None:
+        clock = self.arrays.sheet.clock.numpy()
+        self.steps.count = int(clock[layout.COUNT])
+        self.steps.smallest = float(clock[layout.SMALLEST])
+        self.steps.largest = float(clock[layout.LARGEST])
+
+    def _enlarge(self, what: int) -> None:
+        """Double what was too small; the program is recorded anew."""
+        self.program.forget()
+        if what == 1:
+            self.arrays.grid = self.memory.grid(self.problem, 2 * self.arrays.grid.room)
+        else:
+            self.arrays.contacts = self.memory.contacts(self.problem, 2 * self.arrays.contacts.room)
+
+    def _arrange(self) -> None:
+        """Sort particles, and give every block that they reach a slot."""
+        self.program.arrange()
+        while self.arrays.sheet.flag.numpy()[layout.FULL]:
+            self._enlarge(1)
+            self.program.arrange()
+
+    def _give_up(self) -> None:
+        """Go back to where this began, and say what was lost."""
+        count, time = self.arrays.particles.count, self.time
+        lost = self.arrays.particles.lost.numpy()[:count] > 0
+        self.lost[:] = False
+        self.lost[self.arrays.particles.number.numpy()[:count][lost]] = True
+        for b in np.flatnonzero(self.arrays.rigid.lost.numpy()):
+            self.lost |= self.matter.body == b
+        for name, array in self.kept.items():
+            wp.copy(array, self.spare[name])
+        self.arrays.particles.lost.zero_()
+        self.arrays.rigid.lost.zero_()
+        self.arrays.sheet.flag.zero_()
+        self._arrange()
+        body = self.problem.bodies[int(self.matter.body[np.argmax(self.lost)])].name
+        raise SimulationError(
+            f"At t = {time:.4g} s {int(self.lost.sum())} particles of {body!r} were lost: they "
+            "are not finite or left the domain. What was computed before is kept. Use more "
+            "detail, or look for parts that overlap at the start."
+        )
+
+    # ------------------------------------------------------------ reading and keeping
+
+    def save(self) -> dict[str, np.ndarray]:
+        """Everything needed to go on later exactly as if nothing had happened."""
+        return {name: array.numpy().copy() for name, array in self.kept.items()}
+
+    def restore(self, saved: dict[str, np.ndarray]) -> None:
+        """Go on from what ``save`` returned, on an engine built from the same problem."""
+        for name, array in self.kept.items():
+            array.assign(saved[name])
+        self.lost[:] = False
+        self.arrays.sheet.flag.zero_()
+        self._arrange()
+        self._read_steps()
+
+    # ------------------------------------------------------------ accessors of what is common
+
+    def _particles(self) -> Snapshot:
+        p, m, cell = self.arrays.particles, self.matter, self.problem.cell
+        F, motion = self._placed(p.strain) + np.eye(3), self._placed(p.motion) + np.eye(3)
+        place = p.cell.numpy() + p.place.numpy().astype(np.float64)
+        return Snapshot(
+            time=self.time,
+            position=self._in_order(place) * cell,
+            velocity=self._placed(p.velocity),
+            deformation=F,
+            motion=np.where(m.flows[:, None, None], motion, F),
+            plastic_strain=self._placed(p.plastic),
+        )
+
+    def _sums(self) -> Sums:
+        now, cell = self._particles(), self.problem.cell
+        affine = self._placed(self.arrays.particles.affine) / cell
+        relief = self._placed(self.arrays.particles.relief)
+        elastic = strain_energy(self.matter, now.deformation, relief)
+        energy = Energy(elastic, branch_energy(self.matter, self._memory()))
+        return Sums.of(self.matter, now, affine, energy, cell)
+
+    def _memory(self) -> branches.Memory:
+        """Read what the Maxwell branches of the particles that have any remember."""
+        rows = self._placed(self.arrays.particles.branch)[self.matter.relaxing]
+        rows = rows.reshape(-1, int(layout.BRANCHES), int(layout.BRANCH))
+        return branches.Memory(_full(rows[..., :6]), rows[..., 6])
+
+    def _placed(self, array: wp.array) -> np.ndarray:
+        """Copy an array of particles to the host, in the problem's order; 0 where rigid."""
+        return self._in_order(array.numpy())
+
+    def _in_order(self, values: np.ndarray) -> np.ndarray:
+        p = self.arrays.particles
+        out = np.zeros((len(self.matter.mass), *values.shape[1:]))
+        out[p.number.numpy()[: p.count]] = values[: p.count]
+        return out
+
+    def _rigid_bodies(self) -> dict[int, RigidBody]:
+        r, m = self.arrays.rigid, self.matter
+        centre, turn = r.centre.numpy(), r.turn.numpy()
+        speed, moment = r.speed.numpy(), r.moment.numpy()
+        return {
+            int(b): RigidBody(
+                mass=float(m.total[b]),
+                centre=centre[b],
+                rotation=turn[b],
+                velocity=speed[b],
+                angular_momentum=moment[b],
+                spin=world_inverse_inertia(turn[b], m.inertia[b]) @ moment[b],
+                start=m.centre[b],
+                arm=m.arm[m.body == b],
+            )
+            for b in np.flatnonzero(r.stiff.numpy())
+        }
+
+    def _booked(self) -> Ledger:
+        s = self.arrays.sheet
+        loss = s.loss.numpy().sum(axis=1)
+        return Ledger(
+            external_impulse=s.external.numpy(),
+            plane_impulse=s.plane_impulse.numpy()[: len(self.problem.planes)],
+            pair_impulse=s.pair_impulse.numpy(),
+            push_work=np.array(loss[layout.PUSHING]),
+            friction_loss=np.array(loss[layout.RUBBING]),
+            impact_loss=np.array(loss[layout.STRIKING]),
+            plastic_loss=np.array(loss[layout.PLASTIC]),
+            viscous_loss=np.array(loss[layout.VISCOUS]),
+            first_contact=s.first_contact.numpy(),
+            last_contact=s.last_contact.numpy(),
+            contact_point=s.contact_point.numpy(),
+        )
+
+    def _enter(self, body: int, impulse: np.ndarray, work: float) -> None:
+        s = self.arrays.sheet
+        memory.add(s.external, body, impulse)
+        memory.add(s.loss, (int(layout.PUSHING), 0), work)
+
+    def _add_velocity(self, body: int, particle: np.ndarray, gained: np.ndarray) -> None:
+        p, m = self.arrays.particles, self.matter
+        every = np.zeros((len(m.mass), 3))
+        every[np.flatnonzero(m.body == body)[particle]] = gained
+        velocity = p.velocity.numpy()
+        velocity[: p.count] += every[p.number.numpy()[: p.count]]
+        p.velocity.assign(velocity)
+        self._note_fast(2, np.linalg.norm(velocity[: p.count], axis=1).max())
+
+    def _note_fast(self, what: int, speed: float) -> None:
+        """Raise the largest speed (2) or wave speed (3) of the last step [m/s]."""
+        fast = self.arrays.sheet.fast.numpy()
+        fast[what] = max(fast[what], speed)
+        self.arrays.sheet.fast.assign(fast)
+
+    def _add_momentum(self, body: int, momentum: np.ndarray, angular: np.ndarray) -> None:
+        r = self.arrays.rigid
+        memory.add(r.speed, body, momentum / self.matter.total[body])
+        memory.add(r.moment, body, angular)
+        memory.add(r.spin, body, r.inertia.numpy()[body] @ angular)
+
+    def _take_grips(self) -> None:
+        extras.put_grips(self.arrays.loads, self.problem, self.matter, self.grips)
+        self.program.hold(bool(self.grips))
+
+    def _set_motion(self, bodies: Collection[int], motion: Motion) -> None:
+        p, r = self.arrays.particles, self.arrays.rigid
+        number, which = p.number.numpy(), np.array(list(bodies), int)
+        mine = np.flatnonzero(np.isin(self.matter.body[number], which))
+        memory.change(p.velocity, mine, motion.velocity[number[mine]])
+        memory.change(p.affine, mine, 0.0)
+        moment = motion.spin_momentum[which]
+        memory.change(r.speed, which, motion.speed[which])
+        memory.change(r.moment, which, moment)
+        spin = np.einsum("bij,bj->bi", r.inertia.numpy()[which], moment)
+        memory.change(r.spin, which, spin)
+
+    def _place_as(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+        p, r, owner = self.arrays.particles, self.arrays.rigid, self.matter.body
+        which = np.array(list(bodies), int)
+        there = np.empty(len(owner), int)
+        there[saved["particle.number"][: p.count]] = np.arange(p.count)
+        number = p.number.numpy()[: p.count]
+        mine = np.flatnonzero(np.isin(owner[number], which))
+        for name in PLACED:
+            memory.change(getattr(p, name), mine, saved[f"particle.{name}"][there[number[mine]]])
+        # Whatever it was strained by there was long ago: branches have forgotten it.
+        memory.change(p.branch, mine, 0.0)
+        for name in ("centre", "turn", "inertia"):
+            memory.change(getattr(r, name), which, saved[f"rigid.{name}"][which])
+        riding = np.flatnonzero(np.isin(r.body.numpy(), which))
+        for name in ("cell", "place"):
+            memory.change(getattr(r, name), riding, saved[f"rigid.{name}"][riding])
+        self._note_fast(3, saved["sheet.fast"][3])
+        self._arrange()
+
+
+def _full(rows: np.ndarray) -> np.ndarray:
+    """Symmetric tensors of their six numbers 00 01 02 11 12 22, which stand in the last axis."""
+    return rows[..., [0, 1, 2, 1, 3, 4, 2, 4, 5]].reshape(*rows.shape[:-1], 3, 3)
+
+
+def present(device: str) -> str:
+    """Name of a device that is there.
+
+    Raises:
+        UserError: It is not, or its driver is too old for a whole frame in one graph.
+
+    """
+    known = [found.alias for found in wp.get_devices()]
+    cards = [found.alias for found in wp.get_cuda_devices()]
+    chosen = cards[0] if device == "cuda" and cards else device
+    if chosen not in known:
+        raise UserError(
+            f"The engine 'cuda' needs a CUDA card, and Warp finds no {device!r} here "
+            f"(found: {', '.join(known)}). Install NVIDIA's driver (CUDA 12.4 or later), or "
+            "simulate on the processor: --engine cpu."
+        )
+    if chosen in cards and not wp.is_conditional_graph_supported():
+        raise UserError(
+            f"The driver of {chosen!r} is too old for the engine 'cuda'. Install one for CUDA 12.4 "
+            "or later, or simulate on the processor: --engine cpu."
+        )
+    return chosen
+
+
+def _refuse_unknown(problem: Problem) -> None:
+    """Raise when a problem asks for something that this engine would leave out."""
+    if problem.contact == "single" and any(b.rigid for b in problem.bodies):
+        raise UserError(_cannot("rigid bodies in one shared field (contact='single')"))
+    for thing in (problem, *problem.bodies):
+        known = KNOWN[Problem if thing is problem else Body].split()
+        for f in fields(thing):
+            if f.name not in known and not _default(getattr(thing, f.name), f):
+                raise UserError(_cannot(f"{f.name} (of {getattr(thing, 'name', 'the problem')!r})"))
+
+
+def _cannot(what: str) -> str:
+    return f"The engine 'cuda' does not simulate {what} yet. Use --engine cpu."
+
+
+def _default(value: Any, declared: Any) -> bool:
+    """Whether a field says nothing."""
+    usual = declared.default
+    if usual is MISSING and declared.default_factory is not MISSING:
+        usual = declared.default_factory()
+    if isinstance(value, np.ndarray):
+        return np.array_equal(value, np.asarray(usual))
+    return bool(value == usual)

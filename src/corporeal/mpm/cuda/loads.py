@@ -1,0 +1,224 @@
+"""Wind, springs and grips on the device: ``loads``, ``wind``, ``springs`` and ``driving``."""
+
+import math
+
+from corporeal.mpm import constants, formulas
+from corporeal.mpm.cuda.layout import (
+    BODY,
+    DT,
+    FULL,
+    PUSHING,
+    TIME,
+    D,
+    Loads,
+    Particles,
+    Rigid,
+    Sheet,
+    wp,
+)
+from corporeal.mpm.cuda.rigid import speed_at
+from corporeal.mpm.formulas.one_lane import pressed, pulled, turn_of, turned_area
+from corporeal.mpm.physics.wind import HALF_RHO_C
+
+wp.set_module_options(formulas.options(max_unroll=0))
+
+CLOSING = wp.constant(D(constants.CLOSING))
+TURN = wp.constant(D(2.0 * math.pi))
+
+
+@wp.kernel
+def calm(p: Particles, l: Loads, s: Sheet, stride: int):
+    """Take all loads away, and say where particles are."""
+    for i in range(wp.tid(), p.count, stride):
+        l.blown[i] = wp.vec3(0.0)
+        l.pulled[i] = wp.vec3(0.0)
+        l.at[p.number[i]] = i
+    for b in range(wp.tid(), s.bodies, stride):
+        l.wind_force[b] = wp.vec3d(D(0.0))
+        l.wind_moment[b] = wp.vec3d(D(0.0))
+        l.force[b] = wp.vec3d(D(0.0))
+        l.moment[b] = wp.vec3d(D(0.0))
+        l.external[b] = wp.vec3d(D(0.0))
+        l.hand[b] = wp.vec3d(D(0.0))
+        l.hand_speed[b] = wp.vec3d(D(0.0))
+    if wp.tid() == 0:
+        l.loss[0] = D(0.0)
+
+
+# ---------------------------------------------------------------- wind
+
+
+@wp.func
+def swell(l: Loads, time: wp.float64):
+    """Σ a_k sin(2π f_k t + φ_k)."""
+    total = D(0.0)
+    for k in range(l.octave.shape[0]):
+        part = l.octave[k]
+        total += part[0] * wp.sin(TURN * part[1] * time + part[2])
+    return total
+
+
+@wp.kernel
+def blow(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
+    """Let the wind press on faces."""
+    dt = wp.float32(s.clock[DT])
+    time = s.clock[TIME] + D(0.5) * s.clock[DT]
+    for k in range(wp.tid(), l.faces, stride):
+        b = l.face_body[k]
+        if time < l.start[b] or time >= l.end[b]:
+            continue
+        air = l.air[b] * (D(1.0) + l.gust[b] * swell(l, time))
+        if r.stiff[b] == 1:
+            arm = r.turn[b] * l.arm[k]
+            seen = air - speed_at(r, b, r.centre[b] + arm)
+            area = r.turn[b] * wp.vec3d(l.area[k])
+            J = wp.vec3d(pressed(HALF_RHO_C, wp.vec3(area), wp.vec3(seen), l.weight[k], dt))
+            wp.atomic_add(l.wind_force, b, J)
+            wp.atomic_add(l.wind_moment, b, wp.cross(arm, J))
+            wp.atomic_add(l.external, b, J)
+        else:
+            i = l.at[l.face[k]]
+            F = wp.identity(n=3, dtype=wp.float32) + p.strain[i]
+            if p.table[p.kind[i], 0] > 2.5:
+                F = wp.identity(n=3, dtype=wp.float32) + p.motion[i]
+            seen_here = wp.vec3(air) - p.velocity[i]
+            given = pressed(HALF_RHO_C, turned_area(F, l.area[k]), seen_here, l.weight[k], dt)
+            wp.atomic_add(l.blown, i, given)
+            wp.atomic_add(l.external, b, wp.vec3d(given))
+
+
+# ---------------------------------------------------------------- tethers
+
+
+@wp.func
+def position_of(p: Particles, s: Sheet, i: int):
+    """Where a particle is [m]."""
+    cell = p.cell[i]
+    return (wp.vec3d(D(cell[0]), D(cell[1]), D(cell[2])) + wp.vec3d(p.place[i])) * s.dx
+
+
+@wp.kernel
+def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
+    """Pull tethered particles back; the holder gets the reaction where the particle is."""
+    dt = s.clock[DT]
+    for k in range(wp.tid(), l.tethers, stride):
+        i = l.at[l.tied[k]]
+        h = l.holder[k]
+        place = position_of(p, s, i) - r.centre[h]
+        arm = r.turn[h] * l.anchor[k]
+        v = wp.vec3d(p.velocity[i]) - r.speed[h] - wp.cross(r.spin[h], arm)
+        rate = l.rate[k]
+        mass = D(p.mass[i])
+        pull = (rate * rate * (place - arm) + l.damping[k] * v) * (-dt)
+        wp.atomic_add(l.loss, 0, mass * dt * l.damping[k] * wp.dot(v, v + D(0.5) * pull))
+        # Springs bear the weight from the start, so that nothing sags.
+        J = mass * (pull - (s.kick[h] - s.pushed[h]))
+        l.pulled[i] = wp.vec3(J)
+        wp.atomic_sub(l.force, h, J)
+        wp.atomic_sub(l.moment, h, wp.cross(place, J))
+
+
+# ---------------------------------------------------------------- rigid bodies
+
+
+@wp.kernel
+def load_rigid(r: Rigid, l: Loads, s: Sheet):
+    """Give rigid bodies their loads, and book the wind's work at their mean velocity."""
+    b = wp.tid()
+    if r.stiff[b] == 1 and s.flag[FULL] != 2:
+        speed = r.speed[b] + D(0.5) * l.wind_force[b] * r.light[b]
+        spin = r.inertia[b] * (r.moment[b] + D(0.5) * l.wind_moment[b])
+        work = wp.dot(l.wind_force[b], speed + s.kick[b]) + wp.dot(l.wind_moment[b], spin)
+        wp.atomic_add(s.loss, PUSHING, b % 256, work)
+        r.speed[b] = r.speed[b] + (l.wind_force[b] + l.force[b]) * r.light[b]
+        r.moment[b] = r.moment[b] + l.wind_moment[b] + l.moment[b]
+        r.spin[b] = r.inertia[b] * r.moment[b]
+
+
+@wp.func
+def strike(r: Rigid, b: int, impulse: wp.vec3d, moment: wp.vec3d):
+    """Give a rigid body an impulse, and an angular one about its centre."""
+    r.speed[b] = r.speed[b] + impulse * r.light[b]
+    r.moment[b] = r.moment[b] + moment
+    r.spin[b] = r.inertia[b] * r.moment[b]
+    return 0
+
+
+@wp.kernel
+def join(r: Rigid, l: Loads, s: Sheet):
+    """Keep joints together and spring their turns, one joint after the other."""
+    if s.flag[FULL] == 2:
+        return
+    dt = s.clock[DT]
+    one = wp.identity(n=3, dtype=wp.float64)
+    for k in range(l.joints):
+        a = l.first[k]
+        c = l.second[k]
+        arm_a = r.turn[a] * l.first_arm[k]
+        arm_c = r.turn[c] * l.second_arm[k]
+        gap = r.centre[c] + arm_c - r.centre[a] - arm_a
+        v = r.speed[c] + wp.cross(r.spin[c], arm_c) - r.speed[a] - wp.cross(r.spin[a], arm_a)
+        turn = turn_of(r.turn[c] * wp.transpose(r.turn[a]))
+        X = wp.skew(arm_a)
+        Y = wp.skew(arm_c)
+        stiff = l.friction[k] + D(0.5) * l.stiffness[k] * dt
+        A = (r.light[a] + r.light[c]) * one - X * r.inertia[a] * X - Y * r.inertia[c] * Y
+        B = -(X * r.inertia[a]) - Y * r.inertia[c]
+        G = r.inertia[a] + r.inertia[c] + one * (D(1.0) / (dt * stiff))
+        pulled = -v - gap * (CLOSING / dt)
+        twisted = r.spin[a] - r.spin[c] - turn * (l.stiffness[k] / stiff)
+        # Two blocks at once: T from the second row, J from what is left of the first.
+        inverse = wp.inverse(G)
+        J = wp.inverse(A - B * inverse * wp.transpose(B)) * (pulled - B * inverse * twisted)
+        T = inverse * (twisted - wp.transpose(B) * J)
+        strike(r, a, -J, -wp.cross(arm_a, J) - T)
+        strike(r, c, J, wp.cross(arm_c, J) + T)
+        relative = r.spin[c] - r.spin[a]
+        l.loss[0] = l.loss[0] + l.friction[k] * dt * wp.length_sq(relative)
+
+
+# ---------------------------------------------------------------- grips
+
+
+@wp.func
+def pull_at(l: Loads, b: int, place: wp.vec3d, velocity: wp.vec3d, dt: wp.float64):
+    """Impulse of a grip's spring in a step [N s]."""
+    away = l.target[b] - place
+    return pulled(l.spring[b], l.brake[b], l.grip_mass[b], away, velocity, dt)
+
+
+@wp.kernel
+def feel(p: Particles, l: Loads, s: Sheet, stride: int):
+    """Work out where bodies that bend are held, and how fast that moves."""
+    for i in range(wp.tid(), p.count, stride):
+        share = D(l.share[p.number[i]])
+        if share > D(0.0):
+            b = int(p.table[p.kind[i], BODY])
+            wp.atomic_add(l.hand, b, share * position_of(p, s, i))
+            wp.atomic_add(l.hand_speed, b, share * wp.vec3d(p.velocity[i]))
+
+
+@wp.kernel
+def grasp(p: Particles, l: Loads, s: Sheet, stride: int):
+    """Let grips pull on bodies that bend."""
+    for i in range(wp.tid(), p.count, stride):
+        share = D(l.share[p.number[i]])
+        if share > D(0.0):
+            b = int(p.table[p.kind[i], BODY])
+            J = share * pull_at(l, b, l.hand[b], l.hand_speed[b], s.clock[DT])
+            l.blown[i] = l.blown[i] + wp.vec3(J)
+            wp.atomic_add(l.external, b, J)
+
+
+@wp.kernel
+def grasp_rigid(r: Rigid, l: Loads, s: Sheet):
+    """Let grips pull on rigid bodies, and book their work at the mean velocity."""
+    b = wp.tid()
+    if l.gripped[b] == 1 and r.stiff[b] == 1 and s.flag[FULL] != 2:
+        arm = r.turn[b] * l.grip_arm[b]
+        before = speed_at(r, b, r.centre[b] + arm) - s.kick[b]
+        J = pull_at(l, b, r.centre[b] + arm, before, s.clock[DT])
+        strike(r, b, J, wp.cross(arm, J))
+        moving = speed_at(r, b, r.centre[b] + arm) - s.kick[b]
+        wp.atomic_add(s.loss, PUSHING, b % 256, wp.dot(J, D(0.5) * (before + moving) + s.kick[b]))
+        l.external[b] = l.external[b] + J

@@ -1,0 +1,299 @@
+"""Memory of the device engine: what a problem puts into the structs of ``layout``."""
+
+from typing import Any
+
+import numpy as np
+
+from corporeal.mpm.constants import FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP
+from corporeal.mpm.cuda import layout
+from corporeal.mpm.cuda.layout import Contacts, Grid, Particles, Rigid, Sheet, wp
+from corporeal.mpm.physics import prescribed
+from corporeal.mpm.physics.contact import face_table
+from corporeal.mpm.physics.rigid import thinness
+from corporeal.mpm.physics.springs import longest_step
+from corporeal.mpm.problem import Problem
+from corporeal.mpm.state import Matter, State
+
+Struct = Any
+"""A Warp struct: pyright cannot read them."""
+
+
+class Memory:
+    """Arrays on one device."""
+
+    def __init__(self, device: str) -> None:
+        self.device = device
+
+    def put(self, values: np.ndarray, kind: Any) -> wp.array:
+        """Copy values to the device; never an empty array."""
+        values = np.asarray(values)
+        if len(values) == 0:
+            values = np.zeros((1, *values.shape[1:]), values.dtype)
+        return wp.array(values, dtype=kind, device=self.device)
+
+    def zeros(self, count: int | tuple[int, ...], kind: Any) -> wp.array:
+        """Make an array of zeros; never an empty one."""
+        shape = tuple(max(1, n) for n in (count if isinstance(count, tuple) else (count,)))
+        return wp.zeros(shape, dtype=kind, device=self.device)
+
+    # ------------------------------------------------------------ particles
+
+    def particles(self, problem: Problem, matter: Matter, chosen: np.ndarray) -> Struct:
+        """Lay out the particles that move with a grid of their own."""
+        count = len(chosen)
+        position = np.concatenate([b.position for b in problem.bodies])[chosen]
+        velocity = np.concatenate([b.velocity for b in problem.bodies])[chosen]
+        cell, place = split(position / problem.cell)
+        single = problem.contact == "single"
+        p = Particles()
+        p.count = count
+        p.cell, p.place = self.put(cell, wp.vec3i), self.put(place, wp.vec3)
+        p.velocity = self.put(velocity, wp.vec3)
+        for name in ("affine", "strain", "motion"):
+            setattr(p, name, self.zeros(count, wp.mat33))
+        p.stress = self.zeros(count, layout.vec6)
+        p.mass = self.put(matter.mass[chosen], wp.float32)
+        p.volume = self.put(matter.volume[chosen], wp.float32)
+        p.plastic, p.opened = self.zeros(count, wp.float32), self.zeros(count, wp.float32)
+        p.branch = self.zeros(count, layout.vec14)
+        for name in ("relief", "pressure", "grown", "bound"):
+            setattr(p, name, self.zeros(count, wp.float32))
+        p.cluster = self.zeros(count, wp.int32)
+        p.kind = self.put(matter.kind[chosen], wp.int32)
+        p.field = self.put(matter.body[chosen] * (not single), wp.int32)
+        p.number = self.put(chosen, wp.int32)
+        p.home, p.lost = self.zeros(count, wp.int32), self.zeros(count, wp.int32)
+        p.table = self.put(_materials(matter), wp.float32)
+        return p
+
+    # ------------------------------------------------------------ grid
+
+    def grid(self, problem: Problem, room: int) -> Struct:
+        """Make room for some node blocks."""
+        g = Grid()
+        size = 1 << int(np.ceil(np.log2(4 * room)))
+        g.keys = wp.full(size, -1, dtype=wp.int64, device=self.device)
+        g.slots = self.zeros(size, wp.int32)
+        g.mask, g.room = size - 1, room
+        g.fields = 1 if problem.contact == "single" else len(problem.bodies)
+        g.where, g.field = self.zeros(room, wp.vec3i), self.zeros(room, wp.int32)
+        g.near = self.zeros(8 * room, wp.int32)
+        g.partner = self.zeros(FIELDS_AT_NODE * room, wp.int32)
+        g.seen, g.aware = self.zeros(room, wp.int32), self.zeros(room, wp.int32)
+        g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec4)
+        g.pool = self.zeros(8 * room, wp.vec3)
+        g.meet, g.held = self.zeros(64 * room, wp.int32), self.zeros(64 * room, wp.int32)
+        return g
+
+    # ------------------------------------------------------------ rigid bodies
+
+    def rigid(self, problem: Problem, matter: Matter) -> Struct:
+        """Lay out rigid bodies that have a grid of their own."""
+        start = State.start(problem, matter)
+        apart = problem.contact == "multi"
+        stiff = np.array([b.rigid and apart for b in problem.bodies])
+        inverse = np.linalg.inv(matter.inertia)
+        r = Rigid()
+        r.stiff = self.put(stiff, wp.int32)
+        told = np.array([b.path is not None for b in problem.bodies])
+        surfaces = [len(b.surface) > 0 for b in problem.bodies]
+        r.pointed = self.put(stiff & (told | surfaces), wp.int32)
+        r.light = self.put(np.where(told, 0.0, 1.0 / matter.total), wp.float64)
+        r.centre = self.put(matter.centre, wp.vec3d)
+        r.turn = self.put(np.tile(np.eye(3), (len(stiff), 1, 1)), wp.mat33d)
+        acting = np.where(told[:, None, None], 0.0, inverse)
+        r.rest, r.inertia = self.put(acting, wp.mat33d), self.put(acting, wp.mat33d)
+        r.speed = self.put(start.speed, wp.vec3d)
+        r.moment = self.put(start.spin_momentum, wp.vec3d)
+        r.spin = self.put(start.spin(matter), wp.vec3d)
+        r.radius = self.put(_radii(matter), wp.float64)
+        r.speed_change = self.zeros(len(stiff), wp.vec3d)
+        r.moment_change = self.zeros(len(stiff), wp.vec3d)
+        r.last_speed = self.zeros(len(stiff), wp.vec3d)
+        r.last_moment = self.zeros(len(stiff), wp.vec3d)
+        r.busy, r.lost = self.zeros(len(stiff), wp.int32), self.zeros(len(stiff), wp.int32)
+        self._rigid_particles(r, problem, matter, np.flatnonzero(stiff[matter.body]))
+        self._surfaces(r, matter, np.flatnonzero(stiff & ~told), problem.cell)
+        self._paths(r, problem, matter)
+        return r
+
+    def _paths(self, r: Struct, problem: Problem, matter: Matter) -> None:
+        """Lay out prescribed motion."""
+        bodies, paths = len(problem.bodies), prescribed.guides(problem)
+        count, arm = np.zeros(bodies, int), np.zeros((bodies, 3))
+        for b, guide in paths.items():
+            count[b], arm[b] = len(guide.rows), guide.arm
+        rows = [np.zeros((1, KEY_ROW)), *(guide.rows for guide in paths.values())]
+        r.path = self.put(np.concatenate(rows), wp.float64)
+        r.path_first = self.put(1 + np.cumsum(count) - count, wp.int32)
+        r.path_count, r.path_arm = self.put(count, wp.int32), self.put(arm, wp.vec3d)
+        r.heavy = self.put(matter.inertia, wp.mat33d)
+        r.heading = self.put(np.tile(np.eye(3), (bodies, 1, 1)), wp.mat33d)
+
+    def _rigid_particles(
+        self, r: Struct, problem: Problem, matter: Matter, chosen: np.ndarray
+    ) -> None:
+        position = np.concatenate([b.position for b in problem.bodies])[chosen]
+        cell, place = split(position / problem.cell)
+        order = np.lexsort((*(cell >> 2).T, matter.body[chosen]))
+        chosen = chosen[order]
+        r.count = len(chosen)
+        r.body = self.put(matter.body[chosen], wp.int32)
+        r.arm = self.put(matter.arm[chosen], wp.vec3d)
+        r.mass = self.put(matter.mass[chosen], wp.float32)
+        r.volume = self.put(matter.volume[chosen], wp.float32)
+        r.cell, r.place = self.put(cell[order], wp.vec3i), self.put(place[order], wp.vec3)
+        r.home = self.zeros(r.count, wp.int32)
+
+    def _surfaces(self, r: Struct, matter: Matter, stiff: np.ndarray, cell: float) -> None:
+        body = [np.full(len(matter.surface[b]), b) for b in stiff]
+        points = [matter.surface[b] for b in stiff]
+        r.surfaces = sum(len(p) for p in points)
+        r.surface_body = self.put(np.concatenate([np.zeros(0, int), *body]), wp.int32)
+        r.surface = self.put(np.concatenate([np.zeros((0, 3)), *points]), wp.vec3d)
+        count, thin = np.zeros((2, len(matter.surface)), int)
+        count[stiff] = [len(p) for p in points]
+        thin[stiff] = [thinness(p, cell) for p in points]
+        r.spacing = self.put(matter.spacing, wp.float64)
+        r.first = self.put(np.cumsum(count) - count, wp.int32)
+        r.points, r.thin = self.put(count, wp.int32), self.put(thin, wp.int32)
+
+    # ------------------------------------------------------------ contacts
+
+    def contacts(self, problem: Problem, room: int) -> Struct:
+        """Make room for some nodes where fields meet, and twice as many touches."""
+        c = Contacts()
+        c.room = room
+        c.at = self.zeros(room, wp.vec3i)
+        for name in ("number", "first", "last", "stiff"):
+            setattr(c, name, self.zeros(room, wp.int32))
+        entries, touches = FIELDS_AT_NODE * room, 2 * room
+        c.field, c.slot = self.zeros(entries, wp.int32), self.zeros(entries, wp.int32)
+        c.mean, c.outward = self.zeros(entries, wp.vec3), self.zeros(entries, wp.vec3)
+        c.velocity, c.light = self.zeros(entries, wp.vec3d), self.zeros(entries, wp.float64)
+        for name in ("meet", "a", "c", "fa", "fc", "active"):
+            setattr(c, name, self.zeros(touches, wp.int32))
+        c.candidate = self.zeros(touches, wp.mat33)
+        c.far_a, c.far_c = self.zeros(3 * touches, wp.float32), self.zeros(3 * touches, wp.float32)
+        c.chosen, c.normal = self.zeros(touches, wp.vec3), self.zeros(touches, wp.vec3)
+        c.gap = self.zeros(touches, wp.float32)
+        c.target = self.zeros(touches, wp.float64)
+        c.last_velocity, c.turn = self.zeros(entries, wp.vec3d), self.zeros(touches, wp.float64)
+        for name in ("point", "before", "impulse", "last_impulse", "struck"):
+            setattr(c, name, self.zeros(touches, wp.vec3d))
+        friction, restitution = _pair_tables(problem)
+        c.friction, c.restitution = (
+            self.put(friction, wp.float64),
+            self.put(restitution, wp.float64),
+        )
+        c.hit = self.zeros(friction.shape, wp.int32)
+        apart = np.zeros((len(problem.bodies), len(problem.bodies)), int)
+        for a, b in problem.never_touch:
+            apart[a, b] = apart[b, a] = 1
+        c.apart = self.put(apart, wp.int32)
+        c.face = self.put(face_table(), wp.float32)
+        return c
+
+    # ------------------------------------------------------------ what a step shares
+
+    def sheet(self, problem: Problem, matter: Matter) -> Struct:
+        """Clock, flags, forces and books at time 0."""
+        bodies, planes = len(problem.bodies), len(problem.planes)
+        everything = bodies + planes
+        s = Sheet()
+        s.clock, s.flag = self.zeros(layout.CLOCK, wp.float64), self.zeros(layout.FLAGS, wp.int32)
+        s.clock[int(layout.SMALLEST) : int(layout.SMALLEST) + 1].fill_(np.inf)
+        s.fast, s.change = self.zeros(4, wp.float32), self.zeros(1, wp.float32)
+        s.pace = self.zeros(3, wp.float64)
+        s.loss = self.zeros((5, int(layout.LANES)), wp.float64)
+        s.gravity, s.ramp = wp.vec3d(*problem.gravity), problem.gravity_ramp
+        s.courant, s.dx, s.cell = problem.courant, problem.cell, problem.cell
+        s.longest = min(LONGEST_STEP, longest_step(problem), prescribed.longest_step(problem))
+        self._forces(s, problem)
+        s.mass = self.put(matter.total, wp.float64)
+        s.bodies, s.planes = bodies, planes
+        normals = np.array([p.normal for p in problem.planes], float).reshape(-1, 3)
+        s.plane = self.put(normals, wp.vec3d)
+        s.offset = self.put(np.array([p.offset for p in problem.planes], float), wp.float64)
+        s.external = self.zeros(bodies, wp.vec3d)
+        s.plane_impulse = self.zeros((planes, bodies), wp.vec3d)
+        s.pair_impulse = self.zeros((bodies, bodies), wp.float64)
+        never = np.full((everything, everything), np.nan)
+        s.first_contact, s.last_contact = self.put(never, wp.float64), self.put(never, wp.float64)
+        s.contact_point = self.put(np.stack([never] * 3, axis=2), wp.vec3d)
+        s.step_impulse = self.zeros((everything, everything), wp.float64)
+        s.step_place = self.zeros((everything, everything), wp.vec3d)
+        return s
+
+    def _forces(self, s: Struct, problem: Problem) -> None:
+        push, start, end = [], [], []
+        for body in problem.bodies:
+            given = body.push
+            push.append(given.acceleration if given else (0.0, 0.0, 0.0))
+            start.append(given.start if given else 0.0)
+            end.append(given.end if given else 0.0)
+        s.push = self.put(np.array(push, float), wp.vec3d)
+        s.start = self.put(np.array(start, float), wp.float64)
+        s.end = self.put(np.array(end, float), wp.float64)
+        s.kick = self.zeros(len(push), wp.vec3d)
+        s.pushed = self.zeros(len(push), wp.vec3d)
+        s.pull = max(float(np.linalg.norm(a)) for a in [problem.gravity, *push])
+
+
+def add(array: wp.array, at: int | tuple[int, int], values: np.ndarray | float) -> None:
+    """Add to one row, or one number, on the device."""
+    there = array.numpy()
+    there[at] += values
+    array.assign(there)
+
+
+def change(array: wp.array, rows: np.ndarray, values: np.ndarray | float) -> None:
+    """Overwrite some rows on the device."""
+    there = array.numpy()
+    there[rows] = values
+    array.assign(there)
+
+
+def split(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Lowest of each particle's 27 nodes, and its offset from it [cells]."""
+    low = np.floor(place - 0.5)
+    return low.astype(np.int64), place - low
+
+
+def _materials(matter: Matter) -> np.ndarray:
+    """Write the rows that kernels read: see ``layout`` for the columns."""
+    s = matter.substances
+    table = np.zeros((len(s.body), layout.COLUMNS))
+    table[:, layout.LAW], table[:, layout.MU], table[:, layout.LAMBDA] = s.law, s.mu, s.lam
+    table[:, layout.YIELD], table[:, layout.HARD] = s.yield_stress, s.hardening
+    table[:, layout.CONE], table[:, layout.APEX] = s.cone, s.apex
+    table[:, layout.DENSITY], table[:, layout.FORGET] = s.density, s.forgetting
+    table[:, layout.STIFFENING] = s.stiffening
+    table[:, layout.CONSISTENCY], table[:, layout.INDEX] = s.consistency, s.flow_index
+    named = {layout.SHEAR: "shear", layout.BULK: "bulk", layout.RELAXATION: "time"}
+    for first, name in named.items():
+        column = getattr(s.branches, name)
+        table[:, int(first) : int(first) + column.shape[1]] = column
+    table[:, layout.BODY], table[:, layout.RIGID] = s.body, s.rigid
+    table[:, layout.SWELLS] = s.swells
+    return table
+
+
+def _radii(matter: Matter) -> np.ndarray:
+    """How far each body reaches from its centre of mass [m]."""
+    out = []
+    for b, surface in enumerate(matter.surface):
+        points = np.concatenate([matter.arm[matter.body == b], surface.reshape(-1, 3)])
+        out.append(np.linalg.norm(points, axis=1).max())
+    return np.array(out)
+
+
+def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:
+    """Friction and restitution; one shared field, which goes by the name 0, has the mean."""
+    friction = np.array(problem.friction, float)
+    restitution = np.array(problem.restitution, float)
+    if problem.contact == "single":
+        bodies = len(problem.bodies)
+        friction[0, bodies:] = friction[:bodies, bodies:].mean(axis=0)
+        restitution[:] = 0.0
+    return friction, restitution

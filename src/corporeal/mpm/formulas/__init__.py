@@ -1,0 +1,70 @@
+"""The formulas of the fast engines in C++, each once: eight lanes on processors, one on cards.
+
+The headers beside this file are templates on the number type (``lanes.h``). Warp includes them in
+every module that was given ``options``, whatever the module is compiled for.
+"""
+
+import re
+from pathlib import Path
+from typing import Any
+
+from corporeal.mpm import constants, laws
+from corporeal.mpm.warp_start import wp
+from corporeal.types import Law
+
+HERE = Path(__file__).parent.resolve()
+HEADERS = tuple(sorted(path.name for path in HERE.glob("*.h")))
+
+
+def preamble() -> str:
+    """C++ text in front of a module: the numbers of laws and method, then all formulas."""
+    numbers = ", ".join(f"{law.name} = {law.value}" for law in Law)
+    kinds = f"namespace mpm {{ enum Law {{ {numbers} }}; }}"
+    lines = [kinds, *law_lists(), *(f'#include "{name}"' for name in HEADERS)]
+    return constants.text() + "".join(f"{line}\n" for line in lines)
+
+
+def law_lists() -> list[str]:
+    """C++ lists of laws, X(NUMBER) for each, from which ``laws.h`` chooses: written from the menu.
+
+    Raises:
+        ImportError: A law of the menu is not in ``laws.h``.
+
+    """
+    written = set(re.findall(r"struct Rule<(\w+), R>", (HERE / "laws.h").read_text()))
+    for law in Law:
+        if law.name not in written:
+            raise ImportError(
+                f"types.Law has {law.name}, but formulas/laws.h has no struct Rule<{law.name}, R>. "
+                "Write its formulas there: docs/extend.md says how."
+            )
+    menu = laws.MENU
+    groups = {
+        # Hencky's stress is shared with all that flow, and so is not on the first list.
+        "MPM_ELASTIC": [k for k in Law if not menu[k].flows and k is not Law.HENCKY],
+        "MPM_PLASTIC": [k for k in Law if menu[k].flows],
+        "MPM_LIQUID": [k for k in Law if menu[k].liquid],
+        "MPM_BULKY": [k for k in Law if menu[k].volumetric],
+    }
+    return [
+        f"#define {name}(X) " + " ".join(f"X(mpm::{k.name})" for k in members)
+        for name, members in groups.items()
+    ]
+
+
+def options(**others: Any) -> dict[str, Any]:
+    """Options of a Warp module that uses the formulas.
+
+    Args:
+        others: More options of ``wp.set_module_options``.
+
+    """
+    folder, text = [str(HERE)], preamble()
+    build = wp.ModuleBuildOptions(
+        extra_cpu_include_dirs=folder,
+        extra_cuda_include_dirs=folder,
+        extra_cpu_preamble=text,
+        extra_cuda_preamble=text,
+        extra_build_dependencies=[str(HERE / name) for name in HEADERS],
+    )
+    return {"enable_backward": False, "extra_build_options": build, **others}

@@ -1,0 +1,132 @@
+// Contact: where faces lie around a node, and what contacts transmit. Twins of physics/contact.py.
+// Lengths are in cells. Numbers in capitals are those of mpm/constants.py, in every header.
+#pragma once
+#include "lanes.h"
+namespace mpm {
+namespace {
+// Half spaces as a node sees them through its quadratic spline; R: double or float.
+template <class R> struct Face {
+  // Mean offset e(s) of the half space u < s.
+  CUDA_CALLABLE static inline R mean(R s) {
+    s = s < R(-1.5) ? R(-1.5) : s > R(1.5) ? R(1.5) : s;
+    R n = s > 0 ? -s : s, w = n + R(1.5), weight, moment;
+    if (n < R(-0.5)) {
+      weight = w * w * w / R(6.0);
+      moment = w * w * w * w / R(8.0) - w * w * w / R(4.0);
+    } else {
+      weight = R(0.5) + R(0.75) * n - n * n * n / R(3.0);
+      moment = R(-13.0 / 64.0) + R(0.375) * n * n - R(0.25) * n * n * n * n;
+    }
+    if (s > 0) weight = R(1.0) - weight;
+    return weight > R(SMALLEST_WEIGHT) ? moment / weight : n;
+  }
+  // Where the face lies: the inverse of mean, from a table of FACE_STEPS + 1 values over [-1.5, 0].
+  CUDA_CALLABLE static inline R place(const R *table, R p) {
+    R f = ((p < R(-1.5) ? R(-1.5) : p > R(0.0) ? R(0.0) : p) + R(1.5)) * R(FACE_STEPS / 1.5);
+    int i = f < R(FACE_STEPS - 1) ? (int)f : FACE_STEPS - 1;
+    return table[i] + (table[i + 1] - table[i]) * (f - i);
+  }
+  // Distance t(s) of the mean offsets of two half spaces that touch.
+  CUDA_CALLABLE static inline R touching(R s) {
+    s = s < 0 ? -s : s;
+    if (s > R(DEEPEST)) s = R(DEEPEST);
+    R over = s - R(LATTICE_START);
+    return -mean(s) - mean(-s) + R(LATTICE_GAP) + R(LATTICE_SLOPE) * (over > 0 ? over : R(0.0));
+  }
+  // Open distance along n, from a to c, of two fields whose mean offsets along it are a and c.
+  CUDA_CALLABLE static inline R gap(const R *table, R a, R c) {
+    return c - a - touching(R(0.5) * (place(table, a) - place(table, -c)));
+  }
+  // The same to a plane, h below the node.
+  CUDA_CALLABLE static inline R gap_to_plane(R a, R h) { return -mean(-h) - a - touching(h); }
+  // The same to a surface; what is deep inside of a field does not feel it.
+  CUDA_CALLABLE static inline R gap_to_surface(R a, R h) {
+    return h > R(WALL_REACH) ? R(VAST) : gap_to_plane(a, h);
+  }
+};
+// Where the surface of a thin rigid body begins along n, seen from x: the least (p - x) . n of its points
+// around that line; of none, that of the point nearest to the line. Points three by three, in its frame.
+struct Surface {
+  CUDA_CALLABLE static inline double begins(const double *points, int count, const double *x,
+                                            const double *n, double around) {
+    double least = VAST, nearest = VAST, there = VAST;
+    for (int i = 0; i < count; i++) {
+      const double *p = points + 3 * i;
+      const double d[3] = {p[0] - x[0], p[1] - x[1], p[2] - x[2]};
+      const double along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
+      const double aside = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along;
+      if (aside < around * around && along < least) least = along;
+      if (aside < nearest) nearest = aside, there = along;
+    }
+    return least < VAST ? least : there;
+  }
+};
+// How far a particle reaches along n: r0 |Ft n|.
+template <class R> struct Support {
+  CUDA_CALLABLE static inline R reach(const R *F, float x, float y, float z, R r0) {
+    const R a = F[0] * x + F[3] * y + F[6] * z, b = F[1] * x + F[4] * y + F[7] * z,
+            c = F[2] * x + F[5] * y + F[8] * z;
+    return r0 * Lanes<R>::root(a * a + b * b + c * c);
+  }
+};
+// In which order contacts are swept: number k is k times the stride, modulo their number.
+struct Scatter {
+  CUDA_CALLABLE static inline int stride(int count) {
+    int step = (int)(SCATTER * count);
+    while (step > 1 && shared(step, count)) step--;
+    return step > 1 ? step : 1;
+  }
+  // Whether two numbers have a common divisor.
+  CUDA_CALLABLE static inline bool shared(int a, int b) {
+    while (b) {
+      const int rest = a % b;
+      a = b;
+      b = rest;
+    }
+    return a > 1;
+  }
+};
+// Newton's law of restitution where a rigid body meets another or a plane. Speeds along n [m/s], the
+// one that may rebound leaves out what forces added in this step and is never more than there is. A body
+// that rolls on its surface points meets the next one at up to its spin times their distance: feigned.
+struct Impact {
+  CUDA_CALLABLE static inline double approach(double speed, double kick, double feigned) {
+    const double all = kick > 0 ? speed - kick : speed;
+    return all > SLOWEST_BOUNCE + feigned ? all : 0.0;
+  }
+  // Whether a contact closes fast enough to begin an impact of its pair.
+  CUDA_CALLABLE static inline bool begins(double approach, double speed, double gap, double dt) {
+    return approach > SLOWEST_BOUNCE && speed * dt > gap;
+  }
+  // Speed that a contact of a pair in an impact may keep: all near ones rebound.
+  CUDA_CALLABLE static inline double target(double e, double approach, double speed, double gap,
+                                            double dt, double dx) {
+    const bool rebounds = approach > SLOWEST_BOUNCE && (speed * dt > gap || gap < PATCH * dx);
+    return rebounds ? -e * approach : closing(gap, dt);
+  }
+  // Speed at which a gap may close within a step.
+  CUDA_CALLABLE static inline double closing(double gap, double dt) {
+    return (gap > 0 ? gap : 0.0) / dt;
+  }
+};
+// One projection of one contact onto its Coulomb cone; n points from a to c, and so does what a
+// gives to c. Impulses J [N s], velocities u = v_a - v_c [m/s], softness 1/m_eff [1/kg].
+struct Coulomb {
+  // Normal impulse that leaves the approach speed its target; contacts only push.
+  CUDA_CALLABLE static inline double push(double old, double speed, double target, double softness) {
+    double jn = old + (speed - target) / softness;
+    return jn <= 0 ? 0.0 : jn;
+  }
+  // Share of a tangential impulse that the cone leaves: |J_t| <= mu J_n.
+  CUDA_CALLABLE static inline double share(double size, double limit) {
+    return size > limit ? limit / size : 1.0;
+  }
+  // J = J_n n + J_t, from a tangential impulse that may be too large.
+  CUDA_CALLABLE static inline void limit(double mu, double jn, const double *n, const double *t,
+                                         double *J) {
+    double scale = share(sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]), mu * jn);
+    for (int i = 0; i < 3; i++) J[i] = jn * n[i] + scale * t[i];
+  }
+};
+}  // namespace
+}  // namespace mpm

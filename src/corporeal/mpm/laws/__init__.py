@@ -1,0 +1,119 @@
+"""Constitutive laws, one a file, and the menu: whoever has to choose by a law asks here.
+
+A law stands in the file that has its name in ``types.Law``, in lower case, under the name ``LAW``.
+The functions below answer for particles of different laws at once.
+"""
+
+from importlib import import_module
+
+import numpy as np
+from jaxtyping import Bool, Int
+
+from corporeal.mpm.constants import BULK_ROUNDING, OWN_BULK
+from corporeal.mpm.laws.kinematics import Matrices, Scalars
+from corporeal.mpm.laws.law import ConstitutiveLaw, Flow, Numbers
+from corporeal.types import Law
+
+
+def _written(law: Law) -> ConstitutiveLaw:
+    name = law.name.lower()
+    try:
+        return import_module(f"{__name__}.{name}").LAW
+    except ModuleNotFoundError as error:
+        raise ImportError(
+            f"types.Law has {law.name}, but there is no mpm/laws/{name}.py. Write the law there: "
+            "docs/extend.md says how."
+        ) from error
+
+
+MENU: dict[Law, ConstitutiveLaw] = {law: _written(law) for law in Law}
+FLOWING = tuple(law.value for law in Law if MENU[law].flows)
+"""Numbers of laws with a return map: shape is then not only elastic deformation."""
+GRANULAR = tuple(law.value for law in Law if MENU[law].granular)
+"""Numbers of laws of grains."""
+LIQUID = tuple(law.value for law in Law if MENU[law].liquid)
+"""Numbers of laws of what takes any shape."""
+_BULKY = tuple(law.value for law in Law if MENU[law].volumetric)
+
+Laws = Int[np.ndarray, " P"]
+"""``types.Law`` values."""
+
+
+def psi(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+    """Give the stored energy per rest volume Ψ [J/m³] of particles with different laws."""
+    out = np.empty(len(F))
+    for rule, k in _by_law(law):
+        out[k] = rule.psi(F[k], mu[k], lam[k])
+    return out
+
+
+def tau(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """Give the Kirchhoff stress τ [Pa] of particles with different laws."""
+    out = np.empty_like(F)
+    for rule, k in _by_law(law):
+        out[k] = rule.tau(F[k], mu[k], lam[k])
+    return out
+
+
+def wave_modulus(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+    """Bound ρ₀ c² [Pa] of the waves in particles with different laws."""
+    out = np.empty(len(F))
+    for rule, k in _by_law(law):
+        out[k] = rule.wave_modulus(F[k], mu[k], lam[k])
+    return out
+
+
+def flow(law: Laws, F: Matrices, numbers: Numbers, plastic: Scalars, volume: Scalars) -> Flow:
+    """Bring granular and plastic matter back to what it can bear.
+
+    Args:
+        law: ``types.Law`` values.
+        F: Trial elastic deformation gradients.
+        numbers: Of the materials.
+        plastic: Equivalent plastic strain so far.
+        volume: Volume correction so far.
+
+    """
+    out = Flow(F.copy(), np.zeros(len(F)), volume.copy(), np.zeros(len(F)))
+    for rule, k in _by_law(law):
+        if rule.flow is not None:
+            here = rule.flow(F[k], numbers.of(k), plastic[k], volume[k])
+            for whole, part in zip(out, here, strict=True):
+                whole[k] = part
+    return out
+
+
+def is_stiff_in_bulk(law: Laws, mu: Scalars, lam: Scalars) -> Bool[np.ndarray, " P"]:
+    """Whether matter is elastic and its ν above 0.4: splines lock unless pressure is a mean.
+
+    Where ν is 0.4 to within rounding it is not above.
+    """
+    return np.isin(law, _BULKY) & (lam > OWN_BULK * (1.0 + BULK_ROUNDING) * mu)
+
+
+def mean_pressure(law: Laws, J: Scalars, bulk: Scalars) -> Scalars:
+    """Kirchhoff pressure [Pa] of a mean volume J̄; bulk: the part of λ that acts on it [Pa]."""
+    return bulk * _of_volume("pressure", law, J)
+
+
+def psi_mean(law: Laws, J: Scalars, bulk: Scalars) -> Scalars:
+    """Give the stored energy [J/m³] of a mean volume J̄: ``mean_pressure`` is its slope."""
+    return bulk * _of_volume("psi", law, J)
+
+
+def mean_modulus(law: Laws, J: Scalars, bulk: Scalars) -> Scalars:
+    """Give what a mean volume J̄ adds to the bound on ρ₀ c² [Pa]."""
+    return bulk * _of_volume("modulus", law, J)
+
+
+def _of_volume(measure: str, law: Laws, J: Scalars) -> Scalars:
+    out = np.zeros(len(J))
+    for rule, k in _by_law(law):
+        if rule.volumetric is not None:
+            out[k] = getattr(rule.volumetric, measure)(J[k])
+    return out
+
+
+def _by_law(law: Laws) -> list[tuple[ConstitutiveLaw, np.ndarray]]:
+    """List the laws that occur, each with the particles that follow it."""
+    return [(MENU[Law(value)], np.flatnonzero(law == value)) for value in np.unique(law).tolist()]

@@ -1,0 +1,50 @@
+"""Compressible Neo-Hookean elasticity: Ψ = μ/2 (‖F‖² - 3 - 2 ln J) + λ/2 (ln J)²."""
+
+import numpy as np
+
+from corporeal.mpm.laws.kinematics import (
+    Matrices,
+    Scalars,
+    inverse_transpose,
+    isotropic,
+    log_j,
+    per,
+    stretches,
+    transpose,
+)
+from corporeal.mpm.laws.law import ConstitutiveLaw
+from corporeal.mpm.laws.volumetric import LOGARITHMIC
+
+
+def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+    """Ψ = μ/2 (‖F‖² - 3 - 2 ln J) + λ/2 (ln J)²; not a number where matter is inside out."""
+    swelling = log_j(F)
+    square = np.sum(F * F, axis=(1, 2))
+    return 0.5 * mu * (square - 3.0 - 2.0 * swelling) + 0.5 * lam * swelling**2
+
+
+def tau(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """τ = μ (F Fᵀ - 1) + λ ln J 1."""
+    return per(mu) * (F @ transpose(F)) + isotropic(lam * log_j(F) - mu)
+
+
+def pk1(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
+    """P = μ (F - F⁻ᵀ) + λ ln J F⁻ᵀ."""
+    inverse = inverse_transpose(F)
+    return per(mu) * (F - inverse) + per(lam * log_j(F)) * inverse
+
+
+def wave_modulus(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
+    """2μ σ² + λ of the largest stretch σ, which is taken as 1 at least."""
+    return lam + 2.0 * mu * np.maximum(stretches(F)[:, 0], 1.0) ** 2
+
+
+LAW = ConstitutiveLaw(
+    name="Neo-Hookean",
+    source="Bonet and Wood 2008, Nonlinear Continuum Mechanics for Finite Element Analysis, ch. 6",
+    psi=psi,
+    tau=tau,
+    pk1=pk1,
+    wave_modulus=wave_modulus,
+    volumetric=LOGARITHMIC,
+)

@@ -1,0 +1,161 @@
+"""Rigid bodies: six degrees of freedom made from particles."""
+
+from dataclasses import dataclass
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Float
+from scipy.spatial import KDTree
+
+from corporeal.mpm.constants import RANK_CUTOFF, SMALL_TURN, THIN
+
+Vector3 = Float[np.ndarray, "3"]
+Matrix3 = Float[np.ndarray, "3 3"]
+
+
+class Mass(NamedTuple):
+    """How a body resists being moved and turned."""
+
+    total: float
+    """[kg]"""
+    centre: Vector3
+    """Centre of mass [m]."""
+    inertia: Matrix3
+    """Moment of inertia about the centre [kg m²]."""
+
+
+@dataclass(frozen=True)
+class RigidBody:
+    """A rigid body at one instant; P particles."""
+
+    mass: float
+    """[kg]"""
+    centre: Vector3
+    """Centre of mass [m]."""
+    rotation: Matrix3
+    """How far it has turned since the start."""
+    velocity: Vector3
+    """Of the centre [m/s]."""
+    angular_momentum: Vector3
+    """About the centre [kg m²/s]."""
+    spin: Vector3
+    """ω [rad/s]."""
+    start: Vector3
+    """Where the centre was at the start [m]."""
+    arm: Float[np.ndarray, "P 3"]
+    """Particles at the start, from the centre [m]."""
+
+    @property
+    def kinetic(self) -> float:
+        """Kinetic energy ½ M |v|² + ½ ω · L [J]."""
+        v, spin = self.velocity, self.spin
+        return float(0.5 * self.mass * v @ v + 0.5 * spin @ self.angular_momentum)
+
+    def particle_position(self) -> Float[np.ndarray, "P 3"]:
+        """X = X + R r₀ [m]."""
+        return self.centre + self.arm @ self.rotation.T
+
+    def particle_velocity(self) -> Float[np.ndarray, "P 3"]:
+        """V = V + ω × R r₀ [m/s]."""
+        return self.velocity + np.cross(self.spin, self.arm @ self.rotation.T)
+
+
+def mass_of(
+    position: Float[np.ndarray, "P 3"],
+    mass: Float[np.ndarray, " P"],
+    volume: Float[np.ndarray, " P"],
+) -> Mass:
+    """Mass, centre and inertia of particles, each a small cube of edge h = V^(1/3).
+
+    I = Σ m (|r|² 1 - r rᵀ) + Σ m h²/6 1; without the cubes' own inertia a coarse body would spin
+    up too easily.
+    """
+    total = float(mass.sum())
+    centre = mass @ position / total
+    r = position - centre
+    own = np.sum(mass * volume ** (2.0 / 3.0)) / 6.0
+    spread = (r * mass[:, None]).T @ r
+    return Mass(total, centre, (np.trace(spread) + own) * np.eye(3) - spread)
+
+
+def fit_motion(
+    mass: Mass,
+    position: Float[np.ndarray, "P 3"],
+    particle_mass: Float[np.ndarray, " P"],
+    velocity: Float[np.ndarray, "P 3"],
+) -> tuple[Vector3, Vector3]:
+    """Velocity of the centre [m/s] and angular momentum about it [kg m²/s] of moving particles."""
+    r = position - mass.centre
+    linear = particle_mass @ velocity / mass.total
+    about = np.sum(particle_mass[:, None] * np.cross(r, velocity - linear), axis=0)
+    points = mass_of(position, particle_mass, np.zeros(len(position)))
+    spin = np.linalg.lstsq(points.inertia, about, rcond=RANK_CUTOFF)[0]
+    return linear, mass.inertia @ spin
+
+
+def rotation(turn: Vector3) -> Matrix3:
+    """Give the rotation matrix of a rotation vector [rad] (Rodrigues' formula)."""
+    angle = float(np.linalg.norm(turn))
+    K = cross_matrix(turn)
+    if angle < SMALL_TURN:
+        return np.eye(3) + (1.0 - angle**2 / 6.0) * K + (0.5 - angle**2 / 24.0) * K @ K
+    return np.eye(3) + np.sin(angle) / angle * K + (1.0 - np.cos(angle)) / angle**2 * K @ K
+
+
+def turned(R: Matrix3, inertia: Matrix3, momentum: Vector3, dt: float) -> Matrix3:
+    """Give R after a free turn of dt [s] with constant angular momentum L, in the middle's ω.
+
+    R ← exp(ω_½ dt) R with ω_½ = I⁻¹ L half a step ahead: second order, and the energy of a spin
+    about any axis stays; with the ω of the step's start it would grow or fade.
+    """
+    now = world_inverse_inertia(R, inertia) @ momentum
+    middle = world_inverse_inertia(rotation(0.5 * dt * now) @ R, inertia) @ momentum
+    U, _, Vt = np.linalg.svd(rotation(middle * dt) @ R)
+    return U @ Vt
+
+
+def cross_matrix(a: Vector3) -> Matrix3:
+    """Give [a]×, the matrix for which [a]× b = a × b."""
+    return np.array([[0.0, -a[2], a[1]], [a[2], 0.0, -a[0]], [-a[1], a[0], 0.0]])
+
+
+def world_inverse_inertia(R: Matrix3, inertia: Matrix3) -> Matrix3:
+    """I⁻¹ in the world frame of a body turned by R: R I₀⁻¹ Rᵀ."""
+    return R @ np.linalg.inv(inertia) @ R.T
+
+
+def effective_inverse_mass(
+    inverse_mass: float, inverse_inertia: Matrix3, arm: Vector3, direction: Vector3
+) -> float:
+    """How much a unit impulse at ``arm`` from the centre changes the speed there [1/kg].
+
+    1/m_eff = 1/M + (r × d)ᵀ I⁻¹ (r × d)
+    """
+    lever = np.cross(arm, direction)
+    return inverse_mass + float(lever @ inverse_inertia @ lever)
+
+
+def thinness(surface: Float[np.ndarray, "S 3"], cell: float) -> int:
+    """How many of its principal extents are below ``THIN`` cells: 0 none, 1 some, 2 all.
+
+    Args:
+        surface: Points on the body's surface [m]; without any it is 0.
+        cell: dx [m].
+
+    """
+    if len(surface) == 0:
+        return 0
+    arm = surface - surface.mean(axis=0)
+    axes = np.linalg.svd(arm, full_matrices=False)[2]
+    below = np.ptp(arm @ axes.T, axis=0) < THIN * cell
+    return int(below.any()) + int(below.all())
+
+
+def spacing(surface: Float[np.ndarray, "S 3"]) -> float:
+    """Distance of a surface point from its neighbours [m]: from the sixth nearest, in the mean.
+
+    Without seven points it is 0.
+    """
+    if len(surface) < 7:
+        return 0.0
+    return float(KDTree(surface).query(surface, 7)[0][:, 6].mean())

@@ -1,0 +1,413 @@
+"""Which fields meet where in one step, and what comes of it: the reference engine's contact.
+
+Order: list the nodes; look at the surfaces there; choose normals; measure gaps; solve all
+impulses together, rigid bodies and walls included.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from corporeal.mpm.constants import (
+    POINT_REACH,
+    SHOWN_AROUND,
+    SWEEPS,
+    SWEEPS_OF_A_HIT,
+    TINY_DOUBLE,
+    WALL_REACH,
+)
+from corporeal.mpm.laws.kinematics import determinant
+from corporeal.mpm.physics import contact, rigid
+from corporeal.mpm.physics.spline import Stencil
+from corporeal.mpm.problem import Problem
+from corporeal.mpm.state import Matter, State
+
+
+class Stand(Protocol):
+    """Something that moves in a rigid body's stead."""
+
+    def act(self, movers: contact.Movers) -> None:
+        """Take the body's place among what contact can move."""
+        ...
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One step's stage."""
+
+    problem: Problem
+    matter: Matter
+    state: State
+    grid: Stencil
+    mass: Float[np.ndarray, " A"]
+    """Of every slot [kg]."""
+    kick: Float[np.ndarray, "B 3"]
+    """Velocity that gravity and push gave each body in this step [m/s]."""
+    old: Float[np.ndarray, "A 3"]
+    """Velocity of every slot before this step's forces [m/s]."""
+    composites: tuple["Stand", ...] = ()
+    """Rigid bodies that move as one with what they hold."""
+
+    @property
+    def single(self) -> bool:
+        """Whether all bodies share one field."""
+        return self.problem.contact == "single"
+
+    def is_rigid(self, field: int) -> bool:
+        """Whether a field moves with six degrees of freedom."""
+        return not self.single and self.problem.bodies[field].rigid
+
+    @property
+    def feigned(self) -> Float[np.ndarray, " B"]:
+        """Spin of each rigid body times the distance of its surface points [m/s]."""
+        return np.linalg.norm(self.state.spin(self.matter), axis=1) * self.matter.spacing
+
+    def surface(self, body: int) -> Float[np.ndarray, "S 3"]:
+        """Surface points of a rigid body now [m]."""
+        turned = self.matter.surface[body] @ self.state.rotation[body].T
+        return self.state.centre[body] + turned
+
+    def thinness(self, field: int) -> int:
+        """How thin a rigid body is against the cell; 0 for what deforms."""
+        if not self.is_rigid(field):
+            return 0
+        return rigid.thinness(self.matter.surface[field], self.problem.cell)
+
+    @property
+    def wall_mover(self) -> int:
+        """Movers are the bodies, then the slots, then the planes, of which this is the first."""
+        return len(self.problem.bodies) + self.grid.count
+
+    def mover_of_slot(self, slot: Int[np.ndarray, " E"]) -> Int[np.ndarray, " E"]:
+        """Give the rigid body that owns the slot, or the slot itself."""
+        bodies = len(self.problem.bodies)
+        stiff = np.array([self.is_rigid(f) for f in range(bodies)])
+        field = self.grid.field[slot]
+        return np.where(stiff[field], field, bodies + slot)
+
+    def movers(self, velocity: Float[np.ndarray, "A 3"]) -> contact.Movers:
+        """Everything that an impulse can move, with its velocity after forces."""
+        bodies = len(self.problem.bodies)
+        still = np.zeros((len(self.problem.planes), 3))
+        stiff = np.array([self.is_rigid(b) for b in range(bodies)])
+        # What moves as told is as heavy as a wall.
+        free = stiff & [body.path is None for body in self.problem.bodies]
+        inertia = np.zeros((self.wall_mover + len(still), 3, 3))
+        inertia[:bodies] = np.where(
+            free[:, None, None], self.state.inverse_inertia(self.matter), 0.0
+        )
+        spin = np.zeros((self.wall_mover + len(still), 3))
+        spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
+        light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, TINY_DOUBLE), 0.0)
+        movers = contact.Movers(
+            np.concatenate([np.where(free, 1.0 / self.matter.total, 0.0), light, still[:, 0]]),
+            inertia,
+            np.concatenate([self.state.centre, self.grid.index * self.problem.cell, still]),
+            np.concatenate([self.state.speed, velocity, still]),
+            spin,
+        )
+        for composite in self.composites:
+            composite.act(movers)
+        return movers
+
+    def movers_before_forces(self) -> contact.Movers:
+        """Everything that an impulse can move, with the velocity it had as the step began."""
+        movers = self.movers(self.old)
+        for b in filter(self.is_rigid, range(len(self.problem.bodies))):
+            movers.velocity[b] -= self.kick[b]
+        return movers
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Some possible contacts of one pair; E of them."""
+
+    pair: tuple[int, int]
+    """Two bodies, or a body and B + plane."""
+    a: Int[np.ndarray, " E"]
+    c: Int[np.ndarray, " E"]
+    point: Float[np.ndarray, "E 3"]
+    normal: Float[np.ndarray, "E 3"]
+    gap: Float[np.ndarray, " E"]
+
+
+@dataclass(frozen=True)
+class Meeting:
+    """What came of it."""
+
+    velocity: Float[np.ndarray, "A 3"]
+    """Of every slot after contact [m/s]."""
+    speed: Float[np.ndarray, "B 3"]
+    """Of rigid bodies [m/s]."""
+    spin: Float[np.ndarray, "B 3"]
+    """Of rigid bodies [rad/s]."""
+    pair: Int[np.ndarray, "E 2"]
+    contacts: contact.Contacts
+    impulse: Float[np.ndarray, "E 3"]
+    """-J on the first and +J on the second of each pair [N s]."""
+    friction_loss: float
+    """[J]"""
+    impact_loss: float
+    """[J]"""
+
+
+def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meeting:
+    """Let everything that touches exchange impulses."""
+    touches = [_possible(touch) for touch in find(scene)]
+    problem = scene.problem
+    pair = np.array([t.pair for t in touches for _ in range(len(t.gap))], dtype=np.int64)
+    pair = pair.reshape(-1, 2)
+    contacts = contact.Contacts(
+        *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _COLUMNS),
+        friction=_friction(problem)[pair[:, 0], pair[:, 1]],
+        group=np.repeat(np.arange(len(touches)), [len(t.gap) for t in touches]),
+    )
+    movers = scene.movers(velocity)
+    # Impacts of rigid bodies first, one after the other; then all that touches, together.
+    rebound = _rebound(scene, pair, contacts)
+    struck = contact.solve_impacts(contacts, movers, rebound, problem.cell, dt)
+    target = np.maximum(contacts.gap, 0.0) / dt
+    sweeps = _sweeps(scene, contacts, bool(struck.any()))
+    impulse = struck + contact.solve(contacts, movers, target, sweeps)
+    before, after = contacts.approach(scene.movers_before_forces()), contacts.approach(movers)
+    bodies = len(problem.bodies)
+    return Meeting(
+        velocity=movers.velocity[bodies : scene.wall_mover],
+        speed=movers.velocity[:bodies],
+        spin=movers.spin[:bodies],
+        pair=pair,
+        contacts=contacts,
+        impulse=impulse,
+        friction_loss=contact.friction_loss(impulse, contacts.normal, before, after),
+        impact_loss=contact.impact_loss(impulse, contacts.normal, before, after),
+    )
+
+
+def _sweeps(scene: Scene, contacts: contact.Contacts, hit: bool) -> int:
+    """One sweep is exact where nothing that can move has more than one contact.
+
+    Rigid bodies on one another have only each other to yield: with few sweeps stacks creep.
+    """
+    movers = np.concatenate([contacts.a, contacts.c])
+    shared = np.bincount(movers[movers < scene.wall_mover], minlength=1).max() > 1
+    bodies = len(scene.problem.bodies)
+    stacked = bool(np.any((contacts.a < bodies) & (contacts.c < bodies)))
+    if hit or stacked:
+        return SWEEPS_OF_A_HIT
+    return SWEEPS if shared else 1
+
+
+def _possible(touch: Touch) -> Touch:
+    """Leave out what is no contact at all."""
+    real = np.isfinite(touch.gap)
+    columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
+    return Touch(touch.pair, **columns)
+
+
+_COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
+
+
+def _joined(columns: list[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
+    if not columns:
+        return np.zeros(empty, dtype=np.int64 if empty == (0,) else np.float64)
+    return np.concatenate(columns)
+
+
+def _friction(problem: Problem) -> Float[np.ndarray, "N N"]:
+    """μ of every pair; a single field has the mean of its bodies against a plane."""
+    friction = np.array(problem.friction, dtype=np.float64)
+    if problem.contact == "single":
+        bodies = len(problem.bodies)
+        friction[:bodies, bodies:] = friction[:bodies, bodies:].mean(axis=0, keepdims=True)
+    return friction
+
+
+def _rebound(
+    scene: Scene, pair: Int[np.ndarray, "E 2"], contacts: contact.Contacts
+) -> contact.Rebound:
+    problem = scene.problem
+    bodies, planes = len(problem.bodies), len(problem.planes)
+    stiff = np.array([scene.is_rigid(b) for b in range(bodies)] + [True] * planes)
+    kick = np.concatenate([scene.kick, np.zeros((planes, 3))])
+    first, second = pair.T
+    both = stiff[first] & stiff[second]
+    return contact.Rebound(
+        pair=first * (bodies + planes) + second,
+        restitution=np.where(both, np.asarray(problem.restitution)[first, second], 0.0),
+        kick=np.sum((kick[first] - kick[second]) * contacts.normal, axis=1),
+        feigned=np.where(second >= bodies, scene.feigned[first], 0.0),
+    )
+
+
+# ---------------------------------------------------------------- finding contacts
+
+
+def find(scene: Scene) -> list[Touch]:
+    """List everything that touches or may touch in this step."""
+    fields = np.unique(scene.grid.field).tolist()
+    rows = {f: np.flatnonzero((scene.grid.field == f) & (scene.mass > 0.0)) for f in fields}
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
+    apart = [p for p in combinations(fields, 2) if p not in bonded]
+    pairs = {p: _common(scene.grid, rows, p) for p in apart}
+    walls = {(f, w): _near(scene, rows[f], w) for f in fields for w in _walls(scene, f)}
+    shown = [slot for both in pairs.values() for slot in both] + list(walls.values())
+    look = Look.at(scene, np.concatenate([np.zeros(0, np.int64), *shown]))
+    touches = [_between(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])]
+    touches += [_on_wall(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
+    return touches + _points_on_walls(scene)
+
+
+def _common(
+    grid: Stencil, rows: dict[int, np.ndarray], pair: tuple[int, int]
+) -> tuple[np.ndarray, np.ndarray]:
+    """Slots of two fields at the nodes where both have mass."""
+    a, c = rows[pair[0]], rows[pair[1]]
+    _, in_a, in_c = np.intersect1d(
+        grid.key[a], grid.key[c], assume_unique=True, return_indices=True
+    )
+    return a[in_a], c[in_c]
+
+
+def _walls(scene: Scene, field: int) -> range:
+    """Planes that a field meets on nodes: none when it has surface points or moves as told."""
+    body = scene.problem.bodies[field]
+    spared = scene.is_rigid(field) and (len(body.surface) > 0 or body.path is not None)
+    return range(0 if spared else len(scene.problem.planes))
+
+
+def _near(scene: Scene, slot: np.ndarray, wall: int) -> np.ndarray:
+    reach = WALL_REACH * scene.problem.cell
+    return slot[_height(scene, slot, wall) <= reach]
+
+
+def _height(scene: Scene, slot: np.ndarray, wall: int) -> np.ndarray:
+    plane = scene.problem.planes[wall]
+    return scene.grid.index[slot] @ np.array(plane.normal) * scene.problem.cell - plane.offset
+
+
+@dataclass(frozen=True)
+class Look:
+    """How fields look from some slots. M links, each one particle seen from one slot."""
+
+    mean: Float[np.ndarray, "A 3"]
+    """X̄: mean offset of the field's matter from the node [m]; 0 where nobody looks."""
+    outward: Float[np.ndarray, "A 3"]
+    """g = Σ J V₀ ∇N [m²]."""
+    slot: Int[np.ndarray, " M"]
+    particle: Int[np.ndarray, " M"]
+    offset: Float[np.ndarray, "M 3"]
+    """x_p - x_i [m]."""
+
+    @classmethod
+    def at(cls, scene: Scene, slots: Int[np.ndarray, " S"]) -> "Look":
+        """Visit once more the particles around the slots, and only them."""
+        grid, matter = scene.grid, scene.matter
+        wanted = np.zeros(grid.count, dtype=bool)
+        wanted[slots] = True
+        particle, near = np.nonzero(wanted[grid.slot])
+        slot, offset = grid.slot[particle, near], -grid.arm[particle, near]
+        weight = grid.weight[particle, near] * matter.mass[particle]
+        volume = matter.volume * determinant(scene.state.F)
+        gradient = volume[particle][:, None] * grid.gradient(particle, near)
+
+        def total(values: np.ndarray) -> np.ndarray:
+            return np.stack([np.bincount(slot, v, grid.count) for v in values.T], axis=1)
+
+        full = np.where(scene.mass > 0.0, scene.mass, 1.0)[:, None]
+        mean = total(weight[:, None] * offset) / full
+        return cls(mean, total(gradient), slot, particle, offset)
+
+    def reach(
+        self, scene: Scene, slots: Int[np.ndarray, " E"], normals: Float[np.ndarray, "E 3 3"]
+    ) -> Float[np.ndarray, "E 3"]:
+        """How far the fields at some slots reach along candidate normals [m]: max x·n + R."""
+        order = np.argsort(slots)
+        low = np.searchsorted(slots[order], self.slot, "left")
+        seen = np.flatnonzero(np.searchsorted(slots[order], self.slot, "right") > low)
+        row, particle = order[low[seen]], self.particle[seen]
+        n = normals[row]
+        along = np.einsum("mqd,md->mq", n, self.offset[seen])
+        stretched = np.linalg.norm(n @ scene.state.F[particle], axis=2)
+        out = np.full((len(slots), 3), -np.inf)
+        extent = scene.matter.half_spacing[particle][:, None] * stretched
+        np.maximum.at(out, row, along + extent)
+        return out
+
+
+def _between(
+    scene: Scene, look: Look, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
+) -> Touch:
+    """Contacts of two fields on their common nodes, with separating-axis normals, smoothed."""
+    a, c = slots
+    cell, index = scene.problem.cell, scene.grid.index[a]
+    candidates = contact.candidate_normals(look.outward[a], look.outward[c])
+    thin = [scene.thinness(body) for body in pair]
+    if (thin[0] == 2) != (thin[1] == 2):  # what is small against the cell has no face of its own
+        candidates[:, [0, 1 if thin[0] == 2 else 2]] = 0.0
+    reach_a = look.reach(scene, a, candidates)
+    reach_c = -look.reach(scene, c, -candidates)
+    normal = contact.separating_normal(candidates, reach_a, reach_c, cell)
+    normal = contact.smooth_normals(normal, np.minimum(scene.mass[a], scene.mass[c]), index)
+    if max(thin) > 0:
+        gap = _between_surfaces(scene, look, pair, slots, normal)
+    else:
+        gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
+    gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
+    movers = scene.mover_of_slot(a), scene.mover_of_slot(c)
+    return Touch(pair, *movers, index * cell, normal, gap)
+
+
+def _between_surfaces(
+    scene: Scene,
+    look: Look,
+    pair: tuple[int, int],
+    slots: tuple[np.ndarray, np.ndarray],
+    normal: Float[np.ndarray, "E 3"],
+) -> Float[np.ndarray, " E"]:
+    """Open distance where a thin rigid body takes part [m]: surface points say where it begins."""
+    cell, node = scene.problem.cell, scene.grid.index[slots[0]] * scene.problem.cell
+    found: list[np.ndarray | None] = []
+    for body, way in zip(pair, (-normal, normal), strict=True):
+        points = scene.surface(body) if scene.is_rigid(body) else np.zeros((0, 3))
+        around = SHOWN_AROUND * cell
+        shown = len(points) > 0
+        found.append(contact.surface_begins(points, node, way, around) if shown else None)
+    first, second = found
+    if first is None and second is not None:
+        return contact.gap_to_surface(look.mean[slots[0]], second, normal, cell)
+    if first is not None and second is None:
+        return contact.gap_to_surface(look.mean[slots[1]], first, -normal, cell)
+    return np.asarray(first) + np.asarray(second)
+
+
+def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) -> Touch:
+    """Contacts of a field with a plane, on nodes."""
+    field, wall = pair
+    cell, bodies = scene.problem.cell, len(scene.problem.bodies)
+    normal = np.tile(-np.array(scene.problem.planes[wall].normal), (len(slot), 1))
+    gap = contact.gap_to_wall(look.mean[slot], _height(scene, slot, wall), normal, cell)
+    point = scene.grid.index[slot] * cell
+    there = np.full(len(slot), scene.wall_mover + wall)
+    return Touch((field, bodies + wall), scene.mover_of_slot(slot), there, point, normal, gap)
+
+
+def _points_on_walls(scene: Scene) -> list[Touch]:
+    """Contacts of rigid bodies with planes, on the bodies' surface points."""
+    problem, bodies = scene.problem, len(scene.problem.bodies)
+    touches = []
+    for b in filter(scene.is_rigid, range(bodies)):
+        if problem.bodies[b].path is not None:
+            continue
+        point = scene.surface(b)
+        for w, plane in enumerate(problem.planes):
+            height = point @ np.array(plane.normal) - plane.offset
+            near = np.flatnonzero(height < POINT_REACH * problem.cell)
+            if len(near) == 0:
+                continue
+            normal = np.tile(-np.array(plane.normal), (len(near), 1))
+            mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover + w)
+            touches.append(Touch((b, bodies + w), mover, wall, point[near], normal, height[near]))
+    return touches

@@ -1,0 +1,380 @@
+"""All particles of a problem in one list: what never changes of them, and what does."""
+
+from collections.abc import Collection
+from dataclasses import dataclass, fields, replace
+from functools import cached_property
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from corporeal.mpm import laws
+from corporeal.mpm.constants import SMALLEST_VOLUME
+from corporeal.mpm.laws.kinematics import determinant
+from corporeal.mpm.physics import branches, rigid
+from corporeal.mpm.physics.branches import Branches, Memory
+from corporeal.mpm.problem import Problem
+from corporeal.mpm.substance import Substances
+
+
+@dataclass(frozen=True)
+class Matter:
+    """What never changes; all bodies' particles in one list."""
+
+    body: Int[np.ndarray, " P"]
+    mass: Float[np.ndarray, " P"]
+    volume: Float[np.ndarray, " P"]
+    substances: Substances
+    """What they are made of, and …"""
+    kind: Int[np.ndarray, " P"]
+    """… the row of each in it."""
+    total: Float[np.ndarray, " B"]
+    """Mass of each body [kg]."""
+    centre: Float[np.ndarray, "B 3"]
+    """Where each body's centre of mass starts [m]."""
+    inertia: Float[np.ndarray, "B 3 3"]
+    """Of each body at the start, about its centre [kg m²]; used where rigid."""
+    arm: Float[np.ndarray, "P 3"]
+    """Position at the start, from the body's centre [m]."""
+    surface: tuple[Float[np.ndarray, "S 3"], ...]
+    """Surface points of each body at the start, from its centre [m]."""
+
+    @classmethod
+    def of(cls, problem: Problem) -> "Matter":
+        """Gather what the bodies say of their particles."""
+        bodies = problem.bodies
+        substances, kind = Substances.of(problem)
+        volume = np.concatenate([np.asarray(b.volume, np.float64) for b in bodies])
+        masses = [rigid.mass_of(b.position, b.volume * b.density, b.volume) for b in bodies]
+        centre = np.stack([m.centre for m in masses])
+        return cls(
+            body=substances.body[kind],
+            mass=volume * substances.density[kind],
+            volume=volume,
+            substances=substances,
+            kind=kind,
+            total=np.array([m.total for m in masses]),
+            centre=centre,
+            inertia=np.stack([m.inertia for m in masses]),
+            arm=np.concatenate(
+                [b.position - m.centre for b, m in zip(bodies, masses, strict=True)]
+            ),
+            surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
+        )
+
+    @cached_property
+    def spacing(self) -> Float[np.ndarray, " B"]:
+        """Distance of each body's surface points [m]; 0 without any."""
+        return np.array([rigid.spacing(points) for points in self.surface])
+
+    @cached_property
+    def law(self) -> Int[np.ndarray, " P"]:
+        """``types.Law`` values; 0 where rigid."""
+        return self.substances.law[self.kind]
+
+    @cached_property
+    def mu(self) -> Float[np.ndarray, " P"]:
+        """μ [Pa]; 0 where rigid."""
+        return self.substances.mu[self.kind]
+
+    @cached_property
+    def lam(self) -> Float[np.ndarray, " P"]:
+        """λ [Pa]; 0 where rigid."""
+        return self.substances.lam[self.kind]
+
+    @cached_property
+    def relaxing(self) -> Int[np.ndarray, " K"]:
+        """Numbers of the particles with Maxwell branches."""
+        return np.flatnonzero(self.substances.relaxes[self.kind])
+
+    @cached_property
+    def branches(self) -> Branches:
+        """Branches of those particles."""
+        table, rows = self.substances.branches, self.kind[self.relaxing]
+        return Branches(table.shear[rows], table.bulk[rows], table.time[rows])
+
+    @cached_property
+    def density(self) -> Float[np.ndarray, " P"]:
+        """ρ [kg/m³]."""
+        return self.substances.density[self.kind]
+
+    @cached_property
+    def rigid(self) -> Bool[np.ndarray, " P"]:
+        """Whether the particle's body is."""
+        return self.substances.rigid[self.kind]
+
+    @cached_property
+    def wave_speed(self) -> Float[np.ndarray, " P"]:
+        """Longitudinal wave speed at rest [m/s]; 0 where rigid."""
+        return self.substances.wave_speed[self.kind]
+
+    @cached_property
+    def forgetting(self) -> Float[np.ndarray, " P"]:
+        """Rate at which what the grid cannot see is forgotten [1/s]: see ``Substances``."""
+        return self.substances.forgetting[self.kind]
+
+    @cached_property
+    def swells(self) -> Bool[np.ndarray, " P"]:
+        """Whether pressure comes from a mean dilatation."""
+        return self.substances.swells[self.kind]
+
+    @cached_property
+    def mean_bulk(self) -> Float[np.ndarray, " P"]:
+        """Part of λ that acts on the mean dilatation [Pa]; 0 where none does."""
+        return self.substances.mean_bulk[self.kind]
+
+    @cached_property
+    def own_lam(self) -> Float[np.ndarray, " P"]:
+        """The rest of λ, which acts on a particle's own volume [Pa]."""
+        return self.lam - self.mean_bulk
+
+    @cached_property
+    def flows(self) -> Bool[np.ndarray, " P"]:
+        """Whether a return map acts: shape is then not only elastic deformation."""
+        return self.substances.flows[self.kind]
+
+    @cached_property
+    def half_spacing(self) -> Float[np.ndarray, " P"]:
+        """r0: half the distance between particles at rest [m]."""
+        return 0.5 * np.cbrt(self.volume)
+
+    def fit(
+        self, body: int, position: Float[np.ndarray, "P 3"], velocity: Float[np.ndarray, "P 3"]
+    ) -> tuple[Float[np.ndarray, "3"], Float[np.ndarray, "3"]]:
+        """Rigid motion of one body closest to its particles': velocity, angular momentum."""
+        mine = self.body == body
+        whole = rigid.mass_of(position[mine], self.mass[mine], self.volume[mine])
+        return rigid.fit_motion(whole, position[mine], self.mass[mine], velocity[mine])
+
+
+@dataclass(frozen=True)
+class Motion:
+    """How particles and rigid bodies move; P particles, B bodies."""
+
+    velocity: Float[np.ndarray, "P 3"]
+    """[m/s]"""
+    speed: Float[np.ndarray, "B 3"]
+    """Velocity of rigid bodies' centres [m/s]; 0 for others."""
+    spin_momentum: Float[np.ndarray, "B 3"]
+    """Their angular momentum about it [kg m²/s]."""
+
+    @classmethod
+    def none(cls, problem: Problem) -> "Motion":
+        """Rest: nothing moves."""
+        particles = sum(len(body.position) for body in problem.bodies)
+        bodies = len(problem.bodies)
+        return cls(np.zeros((particles, 3)), np.zeros((bodies, 3)), np.zeros((bodies, 3)))
+
+    @classmethod
+    def at_start(cls, problem: Problem) -> "Motion":
+        """Move as the problem says."""
+        motion = cls.none(problem)
+        motion.velocity[:] = np.concatenate([body.velocity for body in problem.bodies])
+        for b, body in enumerate(problem.bodies):
+            if body.rigid:
+                mass = body.volume * body.density
+                whole = rigid.mass_of(body.position, mass, body.volume)
+                fitted = rigid.fit_motion(whole, body.position, mass, body.velocity)
+                motion.speed[b], motion.spin_momentum[b] = fitted
+        return motion
+
+
+@dataclass(frozen=True)
+class State:
+    """What changes. Arrays are replaced, never written to, so an old state stays good."""
+
+    time: Float[np.ndarray, ""]
+    position: Float[np.ndarray, "P 3"]
+    velocity: Float[np.ndarray, "P 3"]
+    affine: Float[np.ndarray, "P 3 3"]
+    """C: velocity gradient a particle carries [1/s]."""
+    F: Float[np.ndarray, "P 3 3"]
+    """Elastic deformation gradient."""
+    motion: Float[np.ndarray, "P 3 3"]
+    plastic: Float[np.ndarray, " P"]
+    volume: Float[np.ndarray, " P"]
+    """v_c of granular matter."""
+    relief: Float[np.ndarray, " P"]
+    """ln of the mean volume J̄ that a particle's pressure follows over its own J; see
+    ``Matter.swells``."""
+    branch_strain: Float[np.ndarray, "K 2 3 3"]
+    """What Maxwell branches remember, of the particles that have any (``Matter.relaxing``) …"""
+    branch_volume: Float[np.ndarray, "K 2"]
+    """… see ``physics.branches.Memory``."""
+    centre: Float[np.ndarray, "B 3"]
+    """The rest is used for rigid bodies: centre of mass [m] …"""
+    speed: Float[np.ndarray, "B 3"]
+    """… its velocity [m/s] …"""
+    spin_momentum: Float[np.ndarray, "B 3"]
+    """… angular momentum about it [kg m²/s] …"""
+    rotation: Float[np.ndarray, "B 3 3"]
+    """… and how far the body has turned."""
+
+    @classmethod
+    def start(cls, problem: Problem, matter: Matter) -> "State":
+        """Bodies as the problem has them: undeformed, with their particles' velocities."""
+        position = np.concatenate([np.asarray(b.position, np.float64) for b in problem.bodies])
+        velocity = np.concatenate([np.asarray(b.velocity, np.float64) for b in problem.bodies])
+        count, bodies = len(position), len(problem.bodies)
+        identity = np.broadcast_to(np.eye(3), (count, 3, 3))
+        fits = [matter.fit(b, position, velocity) for b in range(bodies)]
+        state = cls(
+            time=np.zeros(()),
+            position=position,
+            velocity=velocity,
+            affine=np.zeros((count, 3, 3)),
+            F=identity,
+            motion=identity,
+            plastic=np.zeros(count),
+            volume=np.zeros(count),
+            relief=np.zeros(count),
+            branch_strain=np.zeros((len(matter.relaxing), 2, 3, 3)),
+            branch_volume=np.zeros((len(matter.relaxing), 2)),
+            centre=matter.centre,
+            speed=np.stack([linear for linear, _ in fits]),
+            spin_momentum=np.stack([angular for _, angular in fits]),
+            rotation=np.tile(np.eye(3), (bodies, 1, 1)),
+        )
+        return state.follow_rigid(matter)
+
+    @property
+    def memory(self) -> Memory:
+        """What Maxwell branches remember."""
+        return Memory(self.branch_strain, self.branch_volume)
+
+    def spin(self, matter: Matter) -> Float[np.ndarray, "B 3"]:
+        """ω of every body [rad/s]; meaningful where rigid."""
+        return np.einsum("bij,bj->bi", self.inverse_inertia(matter), self.spin_momentum)
+
+    def inverse_inertia(self, matter: Matter) -> Float[np.ndarray, "B 3 3"]:
+        """I⁻¹ of every body in the world frame [1/(kg m²)]; meaningful where rigid."""
+        return np.stack(
+            [
+                rigid.world_inverse_inertia(R, inertia)
+                for R, inertia in zip(self.rotation, matter.inertia, strict=True)
+            ]
+        )
+
+    def follow_rigid(self, matter: Matter) -> "State":
+        """Put the particles of rigid bodies where the bodies are: x = X + R r₀, v = V + ω × r."""
+        if not matter.rigid.any():
+            return self
+        body, stiff = matter.body, matter.rigid[:, None]
+        spin = self.spin(matter)[body]
+        arm = np.einsum("pij,pj->pi", self.rotation[body], matter.arm)
+        affine = np.stack([rigid.cross_matrix(w) for w in self.spin(matter)])[body]
+        still = np.eye(3)
+        return replace(
+            self,
+            position=np.where(stiff, self.centre[body] + arm, self.position),
+            velocity=np.where(stiff, self.speed[body] + np.cross(spin, arm), self.velocity),
+            affine=np.where(stiff[:, None], affine, self.affine),
+            F=np.where(stiff[:, None], still, self.F),
+            motion=np.where(stiff[:, None], still, self.motion),
+        )
+
+    def moving(self, motion: Motion, matter: Matter, bodies: Collection[int]) -> "State":
+        """Return the same place with other motion of some bodies."""
+        mine, body = self._of(matter, bodies)
+        return replace(
+            self,
+            velocity=np.where(mine[:, None], motion.velocity, self.velocity),
+            affine=np.where(mine[:, None, None], 0.0, self.affine),
+            speed=np.where(body[:, None], motion.speed, self.speed),
+            spin_momentum=np.where(body[:, None], motion.spin_momentum, self.spin_momentum),
+        ).follow_rigid(matter)
+
+    def placed_as(self, there: "State", matter: Matter, bodies: Collection[int]) -> "State":
+        """Return the same motion with some bodies where, and as strained as, they are there.
+
+        Whatever they were strained by there was long ago: their branches have forgotten it.
+        """
+        mine, body = self._of(matter, bodies)
+        taken = {name: mine for name in ("position", "F", "motion", "plastic", "volume", "relief")}
+        taken |= {name: body for name in ("centre", "rotation")}
+        found = {}
+        for name, chosen in taken.items():
+            here = getattr(self, name)
+            which = chosen.reshape(-1, *(1,) * (here.ndim - 1))
+            found[name] = np.where(which, getattr(there, name), here)
+        fresh = mine[matter.relaxing]
+        found["branch_strain"] = np.where(fresh[:, None, None, None], 0.0, self.branch_strain)
+        found["branch_volume"] = np.where(fresh[:, None], 0.0, self.branch_volume)
+        return replace(self, **found).follow_rigid(matter)
+
+    def _of(self, matter: Matter, bodies: Collection[int]) -> tuple[np.ndarray, np.ndarray]:
+        """Which particles and which bodies are meant."""
+        body = np.isin(np.arange(len(self.centre)), list(bodies))
+        return body[matter.body], body
+
+    def as_arrays(self) -> dict[str, np.ndarray]:
+        """Copy everything into a dict."""
+        return {f.name: np.array(getattr(self, f.name)) for f in fields(self)}
+
+
+def elastic_stress(matter: Matter, state: State) -> Float[np.ndarray, "P 3 3"]:
+    """Kirchhoff stress τ of each particle's own strain [Pa]; none in rigid bodies.
+
+    Without what ``mean_pressure`` adds where matter is nearly incompressible.
+    """
+    m, s = matter, state
+    out = np.zeros_like(s.F)
+    soft = ~m.rigid
+    out[soft] = laws.tau(m.law[soft], s.F[soft], m.mu[soft], m.own_lam[soft])
+    return out
+
+
+def branch_stress(matter: Matter, memory: Memory) -> Float[np.ndarray, "P 3 3"]:
+    """Kirchhoff stress of the Maxwell branches [Pa]."""
+    out = np.zeros((len(matter.mass), 3, 3))
+    out[matter.relaxing] = branches.stress(matter.branches, memory)
+    return out
+
+
+def branch_energy(matter: Matter, memory: Memory) -> Float[np.ndarray, " P"]:
+    """Energy that the branches of each particle hold [J]."""
+    out, k = np.zeros(len(matter.mass)), matter.relaxing
+    out[k] = matter.volume[k] * branches.free_energy(matter.branches, memory)
+    return out
+
+
+def mean_pressure(matter: Matter, state: State) -> Float[np.ndarray, " P"]:
+    """Kirchhoff pressure of the mean dilatation [Pa]; 0 where pressure is one's own."""
+    m, k, out = matter, matter.swells, np.zeros(len(state.F))
+    mean = np.maximum(mean_volume(state.F[k], state.relief[k]), SMALLEST_VOLUME)
+    out[k] = laws.mean_pressure(m.law[k], mean, m.mean_bulk[k])
+    return out
+
+
+def mean_volume(
+    F: Float[np.ndarray, "P 3 3"], relief: Float[np.ndarray, " P"]
+) -> Float[np.ndarray, " P"]:
+    """J̄ = J exp(relief) [-]."""
+    return determinant(F) * np.exp(relief)
+
+
+def strain_energy(
+    matter: Matter, F: Float[np.ndarray, "P 3 3"], relief: Float[np.ndarray, " P"]
+) -> Float[np.ndarray, " P"]:
+    """Elastic energy of each particle [J] at F and the relief of its mean dilatation."""
+    m, out = matter, np.zeros(len(F))
+    soft, k = ~m.rigid, m.swells
+    out[soft] = laws.psi(m.law[soft], F[soft], m.mu[soft], m.own_lam[soft])
+    out[k] += laws.psi_mean(m.law[k], mean_volume(F[k], relief[k]), m.mean_bulk[k])
+    return m.volume * out
+
+
+def flowed(matter: Matter, state: State, dt: float) -> tuple[State, float]:
+    """Bring what flows back to what it can bear after a step of dt [s]; give the energy lost [J].
+
+    What takes any shape keeps no other motion than its elastic one.
+    """
+    k = np.flatnonzero(matter.flows)
+    F, plastic, volume = state.F.copy(), state.plastic.copy(), state.volume.copy()
+    numbers = matter.substances.numbers(matter.kind[k], dt)
+    flow = laws.flow(matter.law[k], F[k], numbers, plastic[k], volume[k])
+    F[k], volume[k] = flow.F, flow.volume
+    plastic[k] += flow.plastic_strain
+    loss = float(np.sum(matter.volume[k] * flow.loss))
+    pours = np.isin(matter.law, laws.LIQUID)[:, None, None] & ~matter.rigid[:, None, None]
+    motion = np.where(pours, F, state.motion)
+    return replace(state, F=F, motion=motion, plastic=plastic, volume=volume), loss

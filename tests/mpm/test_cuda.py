@@ -1,0 +1,293 @@
+"""The engine for CUDA cards, run on the processor: it follows the reference and keeps its word."""
+
+from dataclasses import dataclass, fields
+
+import numpy as np
+import pytest
+
+from corporeal.errors import SimulationError, UserError
+from corporeal.mpm.cuda import program
+from corporeal.mpm.cuda.engine import CudaEngine
+from corporeal.mpm.problem import FLOOR, MENU, Body, Problem
+from corporeal.mpm.reference.engine import ReferenceEngine
+from corporeal.types import Law, Push
+
+CELL = 0.02
+ARCHITECTURES = [86, 90, 120]
+
+
+def on_processor(given):
+    return CudaEngine(given, device="cpu")
+
+
+def ball(centre, radius=0.05, spacing=CELL / 2):
+    axis = np.arange(-radius + spacing / 2, radius, spacing)
+    points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    return points[np.linalg.norm(points, axis=1) < radius] + centre
+
+
+def body(points, law=Law.NEO_HOOKEAN, velocity=(0, 0, 0), spacing=CELL / 2, **given):
+    one = np.ones(len(points))
+    numbers = {
+        "density": 1000.0,
+        "young": 1e5,
+        "poisson": 0.3,
+        "yield_stress": 2e3,
+        "hardening": 1e4,
+        "friction_angle": np.radians(30.0),
+        "cohesion": 200.0,
+        "loss": 0.2,
+        "vibration": 300.0,
+    }
+    extra = {k: given.pop(k) for k in list(given) if k not in numbers}
+    return Body(
+        name=extra.pop("name", "ball"),
+        position=points,
+        velocity=np.tile(np.array(velocity, float), (len(points), 1)),
+        volume=one * spacing**3,
+        law=np.full(len(points), law.value),
+        **{k: one * v for k, v in (numbers | given).items()},
+        **extra,
+    )
+
+
+def problem(*bodies, planes=(FLOOR,), friction=0.4, restitution=0.5, **given):
+    count = len(bodies) + len(planes)
+    return Problem(
+        bodies,
+        CELL,
+        friction=np.full((count, count), friction),
+        restitution=np.full((count, count), restitution),
+        planes=planes,
+        **given,
+    )
+
+
+def side_by_side(given, steps):
+    ours, sure = on_processor(given), ReferenceEngine(given)
+    for _ in range(steps):
+        dt = min(ours.stable_step(), sure.stable_step())
+        ours.step(dt)
+        sure.step(dt)
+    return ours, sure
+
+
+def fall(law=Law.DRUCKER_PRAGER):
+    stone = ball((0, 0, 0.17))
+    return problem(
+        body(ball((0, 0, 0.06)), law, (1.0, 0, -1.0)),
+        body(stone, velocity=(0, 0, -2.0), rigid=True, surface=stone, name="stone"),
+    )
+
+
+def same(here, there):
+    for name, value in vars(here).items():
+        assert np.array_equal(value, getattr(there, name), equal_nan=True), name
+
+
+# ---------------------------------------------------------------- the reference
+
+
+@pytest.mark.parametrize("law", list(Law))
+def test_every_law_moves_as_in_the_reference_through_impact_and_friction(law):
+    low = body(ball((0, 0, 0.055)), law, (0, 0, -0.5))
+    high = body(ball((0.02, 0.01, 0.155)), law, (0, 0, -1.5))
+    ours, sure = side_by_side(problem(low, high), 20)
+    here, there = ours.snapshot(), sure.snapshot()
+    assert np.abs(here.position - there.position).max() < 2e-6 * CELL
+    assert np.abs(here.velocity - there.velocity).max() < 2e-5
+    assert np.abs(here.deformation - there.deformation).max() < 2e-6
+    assert np.abs(here.motion - there.motion).max() < 2e-6
+    assert np.abs(here.plastic_strain - there.plastic_strain).max() < 2e-6
+    mine, theirs = ours.measure(), sure.measure()
+    assert theirs.pair_impulse[0, 1] > 0 and theirs.plane_impulse[0, 0, 2] > 0
+    for name in ("mass", "centre", "momentum", "kinetic", "elastic", "potential", "speed"):
+        assert getattr(mine, name) == pytest.approx(getattr(theirs, name), rel=2e-5, abs=1e-7)
+    for name in ("pair_impulse", "plane_impulse", "external_impulse", "angular_momentum"):
+        assert getattr(mine, name) == pytest.approx(getattr(theirs, name), rel=2e-5, abs=1e-6)
+    for name in ("friction_loss", "plastic_loss", "viscous_loss"):
+        assert getattr(mine, name) == pytest.approx(getattr(theirs, name), rel=1e-4, abs=1e-8)
+    for name in ("first_contact", "last_contact", "contact_point"):
+        assert getattr(mine, name) == pytest.approx(getattr(theirs, name), abs=1e-9, nan_ok=True)
+
+
+@pytest.mark.parametrize("law", [Law.COROTATED, Law.NEO_HOOKEAN, Law.HENCKY])
+def test_what_is_stiff_in_bulk_takes_its_pressure_from_around_as_in_the_reference(law):
+    soft = body(ball((0, 0, 0.055)), law, (0.3, 0, -1.0), poisson=0.47, young=5e4)
+    ours, sure = side_by_side(problem(soft), 20)
+    assert sure.matter.swells.all()
+    assert np.abs(ours.snapshot().position - sure.snapshot().position).max() < 2e-6 * CELL
+    assert ours.measure().elastic == pytest.approx(sure.measure().elastic, rel=1e-4)
+
+
+@pytest.mark.parametrize("pointed", [True, False])
+def test_a_rigid_ball_on_a_soft_one_moves_as_in_the_reference(pointed):
+    low, high = ball((0, 0, 0.055)), ball((0.02, 0.01, 0.155))
+    given = problem(
+        body(low, velocity=(0, 0, -0.5)),
+        body(
+            high,
+            velocity=(0.3, 0, -1.5),
+            rigid=True,
+            density=3000.0,
+            surface=high if pointed else np.zeros((0, 3)),
+        ),
+    )
+    ours, sure = side_by_side(given, 30)
+    assert np.abs(ours.snapshot().position - sure.snapshot().position).max() < 2e-6 * CELL
+    mine, theirs = ours.measure(), sure.measure()
+    assert theirs.pair_impulse[0, 1] > 0 and theirs.plane_impulse[0, 0, 2] > 0
+    assert mine.momentum == pytest.approx(theirs.momentum, rel=1e-5, abs=1e-6)
+    assert mine.angular_momentum == pytest.approx(theirs.angular_momentum, rel=1e-5, abs=1e-6)
+    assert mine.friction_loss == pytest.approx(theirs.friction_loss, rel=1e-4)
+
+
+def test_one_shared_field_moves_as_in_the_reference():
+    low = body(ball((0, 0, 0.055)), velocity=(0, 0, -0.5))
+    high = body(ball((0.02, 0.01, 0.155)), velocity=(0, 0, -1.5), young=2e5)
+    ours, sure = side_by_side(problem(low, high, contact="single"), 24)
+    assert np.abs(ours.snapshot().position - sure.snapshot().position).max() < 2e-6 * CELL
+    assert np.isfinite(ours.measure().first_contact[0, 2])
+    assert np.isnan(ours.measure().first_contact[0, 1])
+
+
+def test_pushes_and_ramped_gravity_enter_as_in_the_reference():
+    push = Push((2.0, 0.0, 1.0), 0.0031, 0.0117)
+    given = problem(
+        body(ball((0, 0, 0.3)), push=push),
+        body(ball((0.3, 0, 0.3)), push=push, rigid=True),
+        gravity_ramp=0.01,
+    )
+    ours, sure = on_processor(given), ReferenceEngine(given)
+    for engine in (ours, sure):
+        engine.advance(0.02)
+    mine, theirs = ours.measure(), sure.measure()
+    assert mine.external_impulse == pytest.approx(theirs.external_impulse, rel=1e-12)
+    assert mine.momentum == pytest.approx(mine.external_impulse, rel=1e-5, abs=1e-7)
+    assert mine.push_work == pytest.approx(theirs.push_work, rel=0.02)
+
+
+# ---------------------------------------------------------------- time and memory
+
+
+def test_a_frame_ends_exactly_where_it_should():
+    engine = on_processor(fall())
+    engine.advance(1 / 60)
+    assert engine.time == 1 / 60
+    assert engine.steps.count > 3
+    assert 0 < engine.steps.smallest <= engine.steps.largest <= 1 / 60
+
+
+def test_going_on_from_a_saved_state_changes_nothing():
+    straight, broken = on_processor(fall()), on_processor(fall())
+    for engine in (straight, broken):
+        engine.advance(0.03)
+    again = on_processor(fall())
+    again.restore(broken.save())
+    for engine in (straight, again):
+        engine.advance(0.06)
+    assert straight.steps == again.steps
+    same(straight.snapshot(), again.snapshot())
+    same(straight.measure(), again.measure())
+
+
+def test_too_little_room_is_enlarged_and_nothing_is_lost_or_done_twice():
+    given = fall(Law.NEO_HOOKEAN)
+    ample, cramped = on_processor(given), on_processor(given)
+    cramped.arrays.contacts = cramped.memory.contacts(given, 2)
+    cramped.arrays.grid = cramped.memory.grid(given, 4)
+    for engine in (ample, cramped):
+        engine.advance(0.04)
+    assert cramped.arrays.contacts.room > 2 and cramped.arrays.grid.room > 4
+    assert ample.steps == cramped.steps
+    assert ample.measure().pair_impulse[0, 1] > 0
+    apart = np.abs(ample.snapshot().position - cramped.snapshot().position).max()
+    assert apart < 1e-5 * CELL
+    mine, theirs = ample.measure(), cramped.measure()
+    assert mine.external_impulse == pytest.approx(theirs.external_impulse, rel=1e-14)
+    assert mine.viscous_loss == pytest.approx(theirs.viscous_loss, rel=1e-4)
+
+
+def test_a_body_may_travel_as_far_as_it_likes():
+    engine = on_processor(problem(body(ball((0, 0, 0), 0.03), velocity=(30, 0, 0)), planes=()))
+    engine.advance(0.5)
+    assert engine.measure().centre[0] == pytest.approx([15.0, 0, -0.5 * 9.81 * 0.25], abs=2e-3)
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_a_body_that_flies_apart_is_an_error_a_person_can_read(rigid):
+    given = problem(body(ball((0, 0, 0.1)), name="duck", rigid=rigid))
+    engine = on_processor(given)
+    engine.advance(0.01)
+    good = engine.save()
+    broken = {k: v.copy() for k, v in good.items()}
+    broken["rigid.speed" if rigid else "particle.velocity"][0, 0] = np.inf
+    engine.restore(broken)
+    with pytest.raises(SimulationError, match="'duck'"):
+        engine.advance(0.1)
+    assert engine.lost.any()
+    assert engine.time == 0.01
+    engine.restore(good)
+    engine.advance(0.02)
+    assert not engine.measure().lost.any()
+
+
+# ---------------------------------------------------------------- what it refuses
+
+
+def test_without_a_card_it_says_what_to_do():
+    if program.wp.get_cuda_devices():
+        pytest.skip("there is a card")
+    with pytest.raises(UserError, match="--engine cpu"):
+        CudaEngine(problem(body(ball((0, 0, 0.1)))))
+    assert MENU["cuda"] == "corporeal.mpm.cuda.engine:CudaEngine"
+
+
+def test_what_it_cannot_do_it_names():
+    rigid = problem(body(ball((0, 0, 0.1)), rigid=True), contact="single")
+    with pytest.raises(UserError, match="shared field"):
+        on_processor(rigid)
+
+
+def test_what_a_later_contract_asks_for_is_refused_and_not_left_out():
+    @dataclass(frozen=True)
+    class Charged(Problem):
+        charge: tuple[float, ...] = ()
+
+    told = {
+        f.name: getattr(problem(body(ball((0, 0, 0.1), 0.02))), f.name) for f in fields(Problem)
+    }
+    on_processor(Charged(**told))
+    with pytest.raises(UserError, match="charge"):
+        on_processor(Charged(**told, charge=(1.0,)))
+
+
+# ---------------------------------------------------------------- cards
+
+
+def compiled(module, folder):
+    made = program.wp.compile_aot_module(module, arch=ARCHITECTURES, module_dir=folder)
+    return [path.suffixes[-2:] for path in made if path.stat().st_size > 10_000]
+
+
+def test_rigid_inclusions_compile_for_cards_without_one(tmp_path):
+    expected = [[f".sm{arch}", ".cubin"] for arch in ARCHITECTURES]
+    assert compiled(program.bonds, tmp_path) == expected
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("module", program.MODULES, ids=lambda m: m.__name__.split(".")[-1])
+def test_every_kernel_compiles_for_cards_without_one(module, tmp_path):
+    expected = [[f".sm{arch}", ".cubin"] for arch in ARCHITECTURES]
+    assert compiled(module, tmp_path) == expected
+
+
+@pytest.mark.gpu
+@pytest.mark.skipif(not program.wp.get_cuda_devices(), reason="needs a CUDA device")
+@pytest.mark.parametrize("law", list(Law))
+def test_a_card_moves_things_as_the_processor_does(law):
+    card, here = CudaEngine(fall(law)), on_processor(fall(law))
+    for engine in (card, here):
+        engine.advance(0.05)
+    apart = np.abs(card.snapshot().position - here.snapshot().position).max()
+    assert apart < 1e-3 * CELL
