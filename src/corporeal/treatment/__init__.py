@@ -1,0 +1,1 @@
+"""How every part is treated: rigid or deformable, and with which numbers."""
