@@ -1,0 +1,1 @@
+"""What a simulation leaves: frames, checkpoints, the audit and what happened."""

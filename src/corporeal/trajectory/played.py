@@ -1,0 +1,45 @@
+"""A scene made ready to simulate, and the same scene with how it moved."""
+
+from dataclasses import dataclass
+from functools import cached_property
+
+from corporeal.findings import Outcome
+from corporeal.trajectory.outcome import outcome
+from corporeal.types import (
+    Inventory,
+    MaterialField,
+    Particles,
+    Parts,
+    Reconstruction,
+    Scene,
+    Trajectory,
+)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A scene with its materials and material points, ready to be simulated."""
+
+    scene: Scene
+    inventory: Inventory
+    """What is in it, in words."""
+    parts: Parts
+    field: MaterialField
+    """What every part is made of, with ranges and sources."""
+    particles: Particles
+
+
+@dataclass(frozen=True)
+class Played:
+    """A prepared scene, and how it moved."""
+
+    prepared: Prepared
+    trajectory: Trajectory
+    """Frames are read from disk when asked for."""
+    reconstruction: Reconstruction | None = None
+    """What the scene was made of, where its objects stand now; None: it was made of surfaces."""
+
+    @cached_property
+    def outcome(self) -> Outcome:
+        """What happened to every object and pair: falls, rebounds, dents, distances."""
+        return outcome(self.prepared.scene, self.prepared.particles, self.trajectory)
