@@ -6,8 +6,9 @@ import numpy as np
 import pytest
 
 from corporeal import materials
-from corporeal.materials.ensemble import otherwise, sample, triangle
+from corporeal.materials.ensemble import _shares, otherwise, sample, triangle
 from corporeal.types import (
+    Hypothesis,
     Inventory,
     MaterialField,
     ObjectWords,
@@ -15,6 +16,7 @@ from corporeal.types import (
     Piece,
     Placement,
     Structure,
+    in_way,
 )
 
 
@@ -161,24 +163,68 @@ def names(words, count=2000):
 
 
 def test_alternatives_come_as_often_as_they_were_stated():
-    words = PartWords("cup", "porcelain", alternatives=(("glass", 0.25), ("ABS", 0.1)))
+    others = (Hypothesis("glass", None, 0.25), Hypothesis("ABS", None, 0.1))
+    words = PartWords("cup", "porcelain", hypotheses=(Hypothesis("porcelain", None, 0.65), *others))
     found = names(words)
     assert found.count("glass") / len(found) == pytest.approx(0.25, abs=0.03)
     assert found.count("ABS") / len(found) == pytest.approx(0.1, abs=0.02)
     assert set(found) == {"porcelain", "glass", "ABS"}
 
 
-def test_an_alternative_keeps_the_walls_place_and_needs_walls():
-    place = {"shell_thickness": Placement(0.9, "model", ""), "young": Placement(0.1, "model", "")}
-    words = PartWords("cup", "porcelain", "shell", placements=place, alternatives=(("glass", 1.0),))
-    drawn = otherwise(inventory(words), np.random.default_rng(0), "default").objects[0].parts[0]
-    assert set(drawn.placements) == {"shell_thickness"}
-    assert "instead of porcelain" in drawn.reason
+def test_a_way_is_drawn_as_a_whole_and_needs_walls():
+    place = {"shell_thickness": Placement(0.9, "model", "")}
+    real = Hypothesis("apple", "solid", 0.5)
+    toy = Hypothesis("polystyrene", "hollow", 0.5, placements=place, reason="Too shiny.")
+    fruit = replace(in_way(PartWords("fruit", None), real), hypotheses=(real, toy))
+    drawn = [
+        otherwise(inventory(fruit), np.random.default_rng(k), "default").objects[0].parts[0]
+        for k in range(40)
+    ]
+    assert {(p.material, p.structure, tuple(p.placements)) for p in drawn} == {
+        ("apple", "solid", ()),
+        ("polystyrene", "hollow", ("shell_thickness",)),
+    }
     wall_less = next(
         e.name for e in materials.library().values() if "shell_thickness" not in e.ranges
     )
-    kept = PartWords("cup", "porcelain", "shell", alternatives=((wall_less, 1.0),))
-    assert set(names(kept, 20)) == {"porcelain"}
+    odd = Hypothesis(wall_less, "hollow", 1.0)
+    assert set(names(PartWords("cup", "porcelain", "shell", hypotheses=(odd,)), 20)) == {
+        "porcelain"
+    }
+
+
+def test_ways_of_one_reading_are_drawn_together():
+    def piece(name, real, toy):
+        ways = (
+            Hypothesis(real, "solid", 0.5, reading="real"),
+            Hypothesis(toy, "hollow", 0.5, reading="toy"),
+        )
+        return replace(in_way(PartWords(name, None), ways[0]), hypotheses=ways)
+
+    parts = (piece("peel", "leather", "soft_PVC"), piece("flesh", "apple", "polystyrene"))
+    whole = replace(parts[0], name="fruit", pieces=parts)
+    met = {
+        tuple(
+            p.material
+            for p in otherwise(inventory(whole), np.random.default_rng(k), "default")
+            .objects[0]
+            .parts[0]
+            .pieces
+        )
+        for k in range(40)
+    }
+    assert met == {("leather", "apple"), ("soft_PVC", "polystyrene")}
+
+
+def test_shares_of_what_is_nested_stay_possible():
+    cover = PartWords("cover", "leather", "sheet", volume_share=1.0, surface_share=1.0)
+    core = PartWords("core", "cork", volume_share=0.95, surface_share=0.9, inside="cover")
+    words = PartWords("ball", "cork", pieces=(replace(cover, inner_share=0.95), core))
+    for k in range(50):
+        drawn = _shares(words, np.random.default_rng(k)).pieces
+        assert drawn[0].inner_share == drawn[1].volume_share
+        assert drawn[1].volume_share <= 0.99 * drawn[0].volume_share
+        assert drawn[0].volume_share == pytest.approx(1.0)
 
 
 def test_what_is_unknown_may_be_anything():
@@ -194,6 +240,6 @@ def test_a_small_library_can_be_drawn_from_too():
     drawn = sample(field, [0], np.random.default_rng(1), "reference", "concrete")
     assert drawn.structures[0].contents.density != can.contents.density
     assert drawn.materials[0].density in entry.ranges["density"]
-    odd = PartWords("cup", "steel", alternatives=(("phlogiston", 1.0),))
+    odd = PartWords("cup", "steel", hypotheses=(Hypothesis("phlogiston", None, 1.0),))
     kept = otherwise(inventory(odd), np.random.default_rng(0), "reference")
     assert kept.objects[0].parts[0].material == "steel"

@@ -95,6 +95,52 @@ def test_stiffness_comes_in_the_order_everybody_knows():
     assert stiffness == sorted(stiffness)
 
 
+def test_what_a_ball_of_it_loses_is_in_the_order_everybody_knows():
+    order = "natural_rubber rubber EVA_foam baseball_core softball_core memory_foam"
+    loss = [materials.find(n).ranges["loss"].typical for n in order.split()]
+    assert loss == sorted(loss)
+
+
+def test_what_breaks_before_it_yields_has_a_strength_and_nothing_else_has():
+    brittle = {e.name for e in materials.library().values() if "strength" in e.ranges}
+    minerals = {e.name for e in materials.library().values() if e.group == "mineral"}
+    assert minerals < brittle
+    assert brittle - minerals == {"cast-iron", "phenolic", "melamine", "circuit_board"}
+    for name in brittle:
+        entry = materials.find(name)
+        assert entry.law is Law.HENCKY
+        strain = entry.ranges["strength"].typical / entry.ranges["young"].typical
+        assert 5e-5 < strain < 0.02, name
+    assert materials.find("glass").pick(materials.find("glass").typical()).strength == 60e6
+    assert materials.find("steel").pick(materials.find("steel").typical()).strength is None
+
+
+def test_a_kind_of_plastic_that_nobody_can_tell_spans_the_kinds_that_it_may_be():
+    hard, soft = materials.find("plastic"), materials.find("soft plastic, kind unknown")
+    for name in "PP HDPE polystyrene ABS PVC PET polycarbonate nylon".split():
+        for field in ("density", "young"):
+            assert materials.find(name).ranges[field].typical in hard.ranges[field], (name, field)
+    for name in "LDPE soft_PVC TPU".split():
+        for field in ("density", "young"):
+            assert materials.find(name).ranges[field].typical in soft.ranges[field], (name, field)
+
+
+def test_balls_weigh_what_their_rules_say():
+    for name, diameter, low, high in (
+        ("baseball", 0.074, 0.142, 0.149),
+        ("softball", 0.097, 0.177, 0.198),
+    ):
+        mass = materials.find(name).ranges["density"].typical * np.pi / 6 * diameter**3
+        assert low < mass < high, name
+    cell = materials.find("battery").ranges["density"].typical * np.pi / 4 * 0.0145**2 * 0.0505
+    assert cell == pytest.approx(0.023, rel=0.05)
+
+
+def test_a_note_on_a_number_is_shown_under_it():
+    shown = materials.show("cork")
+    assert "cells buckle" in shown.split("Restitution")[1].split("Loss")[0]
+
+
 def test_a_light_thing_dropped_on_mud_leaves_an_imprint():
     """Energy of a 70 g toy falling .13 m against the bearing capacity of a flat 6 cm footprint."""
     mud = materials.find("mud").pick(materials.find("mud").typical())

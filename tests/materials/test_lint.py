@@ -80,6 +80,7 @@ PLANTED = {
         ("[lamp_steel]", "[other]\nlaw = 'hencky'\naliases = ['Lamp_Steel']\n[lamp_steel]"),
         "'lamp_steel' also names other.",
     ),
+    "an empty note": (("low = 0.28", 'note = " ", low = 0.28'), "poisson: has the note ' '. Write"),
     "broken": (("[lamp_steel]", "[lamp_steel"), "This is not TOML:"),
     "empty": ((SOUND, ""), "There is no material in the file."),
 }
@@ -125,6 +126,49 @@ def test_what_is_true_but_unusual_can_be_said_to_be():
     said = SOUND.replace("high = 210,", "high = 1050, unusual = true,")
     assert found(said) == []
     assert "any metal" in found(said.replace("unusual = true,", ""))[0]
+
+
+SOFT = """
+[sources.bench]
+cite = "Our own bench"
+
+[squashy]
+law = "neo_hookean"
+group = "foam"
+young_kPa = { low = 20, typical = 50, high = 100, source = "bench" }
+poisson = { low = 0, typical = 0.1, high = 0.2, source = "bench" }
+density_kg_m3 = { low = 20, typical = 30, high = 40, source = "bench" }
+restitution = { low = 0.1, typical = 0.3, high = 0.5, source = "bench" }
+loss = { low = 0.1, typical = 0.2, high = 0.3, source = "bench" }
+"""
+
+
+def test_a_restitution_that_contradicts_the_loss_factor_is_told_with_what_would_fit():
+    assert found(SOFT) == [
+        "line 11, [squashy] restitution: 0.1 to 0.5 contradicts the loss factor: with 0.1 to 0.3 a "
+        "ball keeps 0.67 to 0.87 of its speed. Correct one of the two, or say with note = '...' "
+        "what else takes the energy."
+    ]
+
+
+@pytest.mark.parametrize(
+    ("before", "after"),
+    [
+        ("high = 0.5,", "high = 0.7,"),
+        ("high = 0.3,", "high = 0.6,"),
+        ('high = 0.5, source = "bench"', 'high = 0.5, source = "bench", note = "It creases."'),
+        ('"foam"', '"mineral"'),
+    ],
+)
+def test_ranges_that_meet_a_note_or_another_group_part_loss_and_restitution(before, after):
+    """Of minerals nothing is lost in the bulk, so that one does not tell of the other."""
+    assert before in SOFT
+    assert not [said for said in found(SOFT.replace(before, after, 1)) if "contradicts" in said]
+
+
+def test_a_wrong_range_is_told_before_it_is_compared():
+    swapped = SOFT.replace("typical = 0.3, high = 0.5", "typical = 0.5, high = 0.3")
+    assert len(found(swapped)) == 1
 
 
 def test_the_default_library_is_sound():

@@ -7,6 +7,7 @@ from corporeal.materials.consistency import contradictions
 from corporeal.materials.offer import choice, contents_offered, substances_offered
 from corporeal.materials.placement import (
     CONTENTS,
+    Judgement,
     choices,
     from_values,
     odd,
@@ -91,7 +92,7 @@ def test_a_name_is_spelt_as_the_library_does_or_is_none():
 def test_a_value_on_a_printed_bound_is_inside():
     offered = choices(PartWords("x", "soft_PVC", "solid"))
     low, _ = offered["young"].bounds
-    placed = from_values({"young": (low * (1 - 1e-9), "why")}, "model", offered)
+    placed = from_values({"young": Judgement(low * (1 - 1e-9), "why")}, "model", offered)
     assert placed["young"] == Placement(0.0, "model", "why")
     fallback = usual(offered, "nobody")["young"]
     typical = offered["young"].range.typical

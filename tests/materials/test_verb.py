@@ -1,7 +1,7 @@
 """`corporeal materials` as a person types it."""
 
 import pytest
-from test_lint import PLANTED, SOUND  # type: ignore[import-not-found]
+from test_lint import PLANTED, SOFT, SOUND  # type: ignore[import-not-found]
 
 
 @pytest.fixture
@@ -17,7 +17,7 @@ def typed(monkeypatch, command, tmp_path):
 
 def test_a_sound_library_passes_and_is_shown(typed, tmp_path):
     (tmp_path / "mine.toml").write_text(SOUND)
-    assert typed("check", "mine.toml")[:2] == (0, "mine.toml: nothing to complain about.\n")
+    assert typed("check", "mine.toml")[:2] == (0, "mine.toml: no mistakes found.\n")
     code, out, _ = typed("--library", "mine.toml")
     assert code == 0
     assert "lamp_steel" in out
@@ -41,6 +41,15 @@ def test_a_mistake_ends_with_code_2_and_says_where_and_what_to_do(typed, tmp_pat
     assert told in err
     assert "line " in err
     assert typed("--library", "mine.toml")[0] == 2, "and it is not used"
+
+
+def test_a_loss_factor_that_contradicts_the_restitution_ends_with_code_2(typed, tmp_path):
+    (tmp_path / "mine.toml").write_text(SOFT)
+    code, _, err = typed("check", "mine.toml")
+    assert code == 2
+    assert "[squashy] restitution: 0.1 to 0.5 contradicts the loss factor" in err
+    (tmp_path / "mine.toml").write_text(SOFT.replace("high = 0.5,", "high = 0.7,"))
+    assert typed("check", "mine.toml")[0] == 0
 
 
 def test_what_cannot_be_read_is_said(typed, tmp_path):

@@ -13,10 +13,10 @@ from corporeal.materials.library import (
     substances,
 )
 from corporeal.materials.lint import Problem
-from corporeal.materials.page import markdown
+from corporeal.materials.listing import materials_json, menu, show
 from corporeal.materials.quantities import QUANTITIES, Quantity, si
+from corporeal.materials.reference_page import markdown
 from corporeal.materials.shipped import citation, estimated, sources
-from corporeal.materials.tables import materials_json, menu, show
 
 __all__ = [
     "QUANTITIES",

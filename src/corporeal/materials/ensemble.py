@@ -19,14 +19,18 @@ from corporeal.materials.library import find, library, substances
 from corporeal.materials.placement import CONTENTS, entry_of
 from corporeal.materials.scale import fraction_of, place
 from corporeal.types import (
+    WALLED,
     Ground,
+    Hypothesis,
     Inventory,
     Material,
     MaterialField,
+    ObjectWords,
     PartWords,
     Piece,
     Range,
     Structure,
+    in_way,
 )
 
 SPAN = {"typical": 1.0, "fallback": 1.0, "model": 0.5, "recording": 0.5, "annotation": 0.0}
@@ -39,8 +43,12 @@ POROUS = ("foam", "fibrous", "granular", "bulk", "food")
 """Groups in which the denser is also the stiffer (Gibson and Ashby 1997: E ∝ ρ²)."""
 FULLER = 0.1
 """How far from the truth a stated share of a container's room may be [-]."""
+LOOSER = 0.25
+"""Standard deviation of the logarithm of a solidity that was judged by eye [-]."""
 SHARES = 0.2
 """Standard deviation of the logarithm of a share that was judged by eye [-]."""
+MOST_INSIDE = 0.99
+"""Of what encloses them, all that lies inside takes up at most [-]."""
 
 
 def triangle(quantile: float, low: float, peak: float, high: float) -> float:
@@ -53,44 +61,66 @@ def triangle(quantile: float, low: float, peak: float, high: float) -> float:
 
 
 def otherwise(inventory: Inventory, rng: np.random.Generator, library: str) -> Inventory:
-    """Draw the material of every part among its alternatives, by their stated probabilities.
+    """Draw for every part one of the ways it may be, as a whole, by their probabilities.
 
-    What nobody recognised may be any of the library's materials.
+    Ways that share a reading of the object ("imitation") are drawn together. What nobody recognised
+    may be of any of the library's materials.
     """
     return replace(
         inventory,
-        objects=tuple(
-            replace(thing, parts=tuple(_otherwise(p, rng, library) for p in thing.parts))
-            for thing in inventory.objects
-        ),
+        objects=tuple(_object(thing, rng, library) for thing in inventory.objects),
     )
 
 
-def _otherwise(words: PartWords, rng: np.random.Generator, library: str) -> PartWords:
-    pieces = tuple(_otherwise(p, rng, library) for p in words.pieces)
-    words = replace(words, pieces=pieces)
-    at, drawn = 0.0, float(rng.uniform())
-    if words.material is None:
-        every = substances(library)
-        return _instead(words, every[int(drawn * len(every))], library)
-    for name, probability in words.alternatives:
-        at += probability
-        if drawn < at:
-            return _instead(words, name, library)
-    return words
+def _object(thing: ObjectWords, rng: np.random.Generator, library: str) -> ObjectWords:
+    read = ""  # the reading that the first part of the object to have any was drawn with
+
+    def drawn(words: PartWords) -> PartWords:
+        nonlocal read
+        pieces = tuple(drawn(p) for p in words.pieces)
+        if pieces:
+            return replace(words, pieces=pieces)
+        at = float(rng.uniform())
+        ways = [w for w in words.hypotheses if w.reading == read] if read else []
+        way = _drawn_way(ways or words.hypotheses, at)
+        read = read or (way.reading if way else "")
+        chosen = in_way(words, way) if way and _can_be(way, library) else words
+        if chosen.material is None:
+            every = substances(library)
+            return _instead(chosen, every[int(rng.uniform() * len(every))], library)
+        return chosen
+
+    return replace(thing, parts=tuple(drawn(p) for p in thing.parts))
+
+
+def _drawn_way(ways: Sequence[Hypothesis], at: float) -> Hypothesis | None:
+    """Return the way at a quantile; None where there are none."""
+    left = at * sum(way.probability for way in ways)
+    for way in ways:
+        left -= way.probability
+        if left < 0:
+            return way
+    return ways[-1] if ways else None
+
+
+def _can_be(way: Hypothesis, library: str) -> bool:
+    """Tell whether the library in use has the material, with walls where it is to have some."""
+    if way.material is None:
+        return True
+    try:
+        entry = entry_of(way.material, library)
+    except UserError:
+        return False
+    return way.structure not in WALLED or "shell_thickness" in entry.ranges
 
 
 def _instead(words: PartWords, name: str, library: str) -> PartWords:
-    """Let another material stand in a part's place, unless it makes no such walls."""
-    try:
-        entry = entry_of(name, library)
-    except UserError:
-        return words
-    walled = words.structure in ("shell", "filled") and words.thickness is None
-    if walled and "shell_thickness" not in entry.ranges:
+    """Let some material stand in for an unknown one, unless it makes no such walls."""
+    walled = words.structure in WALLED and words.thickness is None
+    if walled and "shell_thickness" not in entry_of(name, library).ranges:
         return words
     kept = {f: p for f, p in words.placements.items() if f in ("shell_thickness", CONTENTS)}
-    reason = f"It may be {name} instead of {words.material or 'something unknown'}."
+    reason = f"It may be {name} instead of something unknown."
     return replace(words, material=name, placements=kept, values={}, reason=reason)
 
 
@@ -206,7 +236,11 @@ def _structure(
     if structure.kind != "solid" and words.thickness is None:
         thickness = material.shell_thickness
     if structure.contents is None:
-        return replace(structure, thickness=thickness)
+        solidity = structure.solidity
+        if solidity < 1.0 and words.answered_by != "annotation":
+            wide = np.exp(LOOSER * grades.normal(owner, words.name, "solidity"))
+            solidity = float(min(solidity * wide, 1.0))
+        return replace(structure, thickness=thickness, solidity=solidity)
     fill = structure.fill
     if words.answered_by != "annotation":
         quantile = grades.quantile(owner, words.name, "fill", False)
@@ -226,13 +260,26 @@ def _shares(words: PartWords, rng: np.random.Generator) -> PartWords:
     if not words.pieces:
         return words
     found = {}
+    outside = np.array([not (p.inside or p.missing) for p in words.pieces])
     for what in ("volume_share", "surface_share"):
         shares = np.array([getattr(p, what) for p in words.pieces])
         drawn = shares * np.exp(SHARES * rng.normal(size=len(shares)))
-        found[what] = drawn * shares.sum() / max(drawn.sum(), 1e-300)
+        drawn[outside] *= shares[outside].sum() / max(drawn[outside].sum(), 1e-300)
+        found[what] = drawn
+    volume = dict(zip((p.name for p in words.pieces), found["volume_share"], strict=True))
+    for p in words.pieces:  # what is inside never outgrows what encloses it
+        own = [q.name for q in words.pieces if q.inside == p.name]
+        room, taken = volume[p.name], sum(volume[name] for name in own)
+        for name in own:
+            volume[name] *= min(1.0, MOST_INSIDE * room / max(taken, 1e-300))
     pieces = tuple(
-        replace(p, volume_share=float(v), surface_share=float(s))
-        for p, v, s in zip(words.pieces, found["volume_share"], found["surface_share"], strict=True)
+        replace(
+            p,
+            volume_share=float(volume[p.name]),
+            surface_share=float(s),
+            inner_share=float(sum(volume[q.name] for q in words.pieces if q.inside == p.name)),
+        )
+        for p, s in zip(words.pieces, found["surface_share"], strict=True)
     )
     return replace(words, pieces=pieces)
 

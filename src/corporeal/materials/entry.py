@@ -31,6 +31,8 @@ class Entry:
     """The nearest name of the 22-material vocabulary, where its own is not one."""
     aliases: tuple[str, ...] = ()
     note: str = ""
+    notes: Mapping[str, str] = field(default_factory=dict)
+    """Field name → what is to be known of one of its numbers."""
     number: int = field(default=0, compare=False)
     """Its number in the published vocabulary; 0: not in it."""
 
@@ -61,9 +63,11 @@ class Entry:
                     f"{self.name} has no {quantity.words.lower()} in the library, so none can be "
                     f"chosen. It has: {', '.join(self.ranges)}."
                 )
-            if ground.value not in allowed:
+            # A scene's file may name a range of its own, with its source.
+            span = ground.range
+            if ground.value not in span:
                 what = f"{quantity.words} of {self.name}"
-                raise OutOfRangeError(what, ground.value, allowed.low, allowed.high, quantity.unit)
+                raise OutOfRangeError(what, ground.value, span.low, span.high, quantity.unit)
         values = {name: ground.value for name, ground in grounds.items()}
         if values.get("poisson", 0.0) >= POISSON_LIMIT:
             raise UserError(
@@ -85,12 +89,13 @@ def plain(name: str) -> str:
 
 
 def _entry(name: str, row: dict) -> Entry:
-    ranges = {}
+    ranges, notes = {}, {}
     for key, cell in row.items():
         if key not in ABOUT:
             quantity, factor = si(key)
             low, typical, high = (cell[k] * factor for k in ("low", "typical", "high"))
             ranges[quantity] = Range(low, typical, high, cell["source"])
+            notes |= {quantity: cell["note"]} if "note" in cell else {}
     return Entry(
         name=name,
         law=Law[row["law"].upper()],
@@ -100,5 +105,6 @@ def _entry(name: str, row: dict) -> Entry:
         published=row.get("published", ""),
         aliases=tuple(row.get("aliases", ())),
         note=row.get("note", ""),
+        notes=notes,
         number=row.get("id", 0),
     )

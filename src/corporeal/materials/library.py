@@ -14,7 +14,7 @@ from corporeal.materials.lint import RESERVED, Problem, inspect
 from corporeal.materials.shipped import SHIPPED, shipped, source_table
 
 HELD = ("liquid", "bulk", "granular", "foam", "food")
-"""Groups of what is found inside things."""
+"""Groups of what is found inside objects."""
 ONLY_HELD = ("liquid", "bulk")
 """Groups of what is nothing without a container."""
 A_FILE = "Give the path of a TOML file."
@@ -40,7 +40,7 @@ def substances(library_name: str = "default") -> list[str]:
 
 
 def contents(library_name: str = "default") -> list[str]:
-    """Names of what a thing may be filled with: liquids, loose matter and soft stuffing."""
+    """Names of what an object may be filled with: liquids, loose matter and soft stuffing."""
     return [e.name for e in library(library_name).values() if e.group in HELD]
 
 

@@ -15,25 +15,24 @@ from corporeal.errors import UserError
 from corporeal.materials.entry import ABOUT, POISSON_LIMIT
 from corporeal.materials.plausible import doubt, namesake, strain_doubt
 from corporeal.materials.quantities import QUANTITIES, UNITS, examples, si
+from corporeal.materials.rebound import rebound_range
+from corporeal.mpm.laws import MENU
 from corporeal.types import Law
 
 ALWAYS = ("young", "poisson", "density")
-NEEDED = {
-    Law.VON_MISES: (*ALWAYS, "yield_stress"),
-    Law.DRUCKER_PRAGER: (*ALWAYS, "friction_angle", "cohesion"),
-}
-MEANINGLESS = {
-    "yield_stress": {Law.VON_MISES},
-    "hardening": {Law.VON_MISES},
-    "friction_angle": {Law.DRUCKER_PRAGER},
-    "cohesion": {Law.DRUCKER_PRAGER},
+PARTICULAR = {
+    field: {law for law in Law if field in MENU[law].fields}
+    for asked in MENU.values()
+    for field in asked.fields
 }
 """Fields that only these laws read."""
 GROUPS = ("metal", "mineral", "granular", "soft", "fibrous", "polymer", "elastomer", "foam")
 GROUPS += ("food", "liquid", "bulk")
+SOFT = ("soft", "fibrous", "polymer", "elastomer", "foam", "food")
+"""Groups whose blows are lost in the bulk: loss and restitution tell of the same."""
 RESERVED = ("extends", "sources")
 """Keys at the top of a user's library that are no materials."""
-CELL = ("low", "typical", "high", "source", "unusual")
+CELL = ("low", "typical", "high", "source", "unusual", "note")
 HEADER = re.compile(r"^\s*\[\s*([^\]]+?)\s*\]")
 KEY = re.compile(r"""^\s*["']?([\w-]+)["']?\s*=""")
 
@@ -81,6 +80,36 @@ def inspect(text: str, sources: Mapping[str, Any], bases: tuple[str, ...]) -> li
             found.tell(name, "", "is not a table.", f"Write a material as [{name}] with its keys.")
     _look_at_names(found, {n: r for n, r in rows.items() if isinstance(r, dict)})
     return sorted(found.problems, key=lambda p: p.line)
+
+
+@dataclass(frozen=True)
+class _Place:
+    """Where a number stands in the file."""
+
+    table: str
+    key: str
+
+
+@dataclass(frozen=True)
+class _Cell:
+    """A number's key, and the entries of its range."""
+
+    key: str
+    entries: dict
+
+    @property
+    def unusual(self) -> bool:
+        """Whether the file says that it is true all the same."""
+        return bool(self.entries.get("unusual"))
+
+
+@dataclass(frozen=True)
+class _Row:
+    """One material of the file."""
+
+    name: str
+    group: str
+    law: Law | None
 
 
 class _Finder:
@@ -142,7 +171,7 @@ def _look_at_names(found: _Finder, rows: dict[str, dict]) -> None:
 def _look_at_material(found: _Finder, name: str, row: dict, known: set[str]) -> None:
     law = _law(found, name, row)
     _look_at_words(found, name, row)
-    fields: dict[str, tuple[str, dict]] = {}
+    fields: dict[str, _Cell] = {}
     for key, cell in row.items():
         if key in ABOUT:
             continue
@@ -151,11 +180,11 @@ def _look_at_material(found: _Finder, name: str, row: dict, known: set[str]) -> 
             continue
         if field in fields:
             what = f"says {QUANTITIES[field].words.lower()} a second time."
-            found.tell(name, key, what, f"Keep {fields[field][0]} or {key}.")
-        elif _look_at_cell(found, (name, key), cell, known):
-            fields[field] = (key, cell)
+            found.tell(name, key, what, f"Keep {fields[field].key} or {key}.")
+        elif _look_at_cell(found, _Place(name, key), cell, known):
+            fields[field] = _Cell(key, cell)
     _look_at_needs(found, name, law, {f for f in map(_quietly, row) if f})
-    _look_at_sizes(found, name, (law, row), fields)
+    _look_at_sizes(found, _Row(name, row.get("group", ""), law), fields)
 
 
 def _law(found: _Finder, name: str, row: dict) -> Law | None:
@@ -207,14 +236,18 @@ def _spellings() -> Iterator[str]:
 
 
 def _look_at_needs(found: _Finder, name: str, law: Law | None, fields: set[str]) -> None:
-    needs = ALWAYS if law is None else NEEDED.get(law, ALWAYS)
+    needs = ALWAYS if law is None else (*ALWAYS, *MENU[law].needs)
     spelt = {si(key)[0]: key for key in examples()}
     for field in needs:
         if field not in fields:
             because = f" ({law.name.lower()} reads it)" if law and field not in ALWAYS else ""
             what = f"has no {QUANTITIES[field].words.lower()}{because}."
             found.tell(name, "", what, f"Add {spelt[field]}.")
-    for field, laws in MEANINGLESS.items():
+    some = () if law is None else MENU[law].needs_one_of
+    if some and not fields & set(some):
+        words = " or ".join(QUANTITIES[field].words.lower() for field in some)
+        found.tell(name, "", f"has no {words}.", f"Add {' or '.join(spelt[f] for f in some)}.")
+    for field, laws in PARTICULAR.items():
         if law and field in fields and law not in laws:
             right = _list(sorted(one.name.lower() for one in laws))
             what = f"{law.name.lower()} never reads {QUANTITIES[field].words.lower()}."
@@ -224,56 +257,80 @@ def _look_at_needs(found: _Finder, name: str, law: Law | None, fields: set[str])
 # ---------------------------------------------------------------- one number
 
 
-def _look_at_cell(found: _Finder, at: tuple[str, str], cell: Any, known: set[str]) -> bool:
+def _look_at_cell(found: _Finder, at: _Place, cell: Any, known: set[str]) -> bool:
     """Tell what is wrong with the form of a cell; return whether its numbers can be read."""
     form = "Write { low = 1, typical = 2, high = 3, source = 'key' }."
     if not isinstance(cell, dict):
-        found.tell(*at, f"is {cell!r}, not a range.", form)
+        found.tell(at.table, at.key, f"is {cell!r}, not a range.", form)
         return False
     for key in set(cell) - set(CELL):
-        found.tell(*at, f"has an unknown entry {key!r}.", f"A range has: {_list(CELL)}.")
+        found.tell(
+            at.table, at.key, f"has an unknown entry {key!r}.", f"A range has: {_list(CELL)}."
+        )
     _look_at_source(found, at, cell.get("source"), known)
+    if "note" in cell and not (isinstance(cell["note"], str) and cell["note"].strip()):
+        found.tell(at.table, at.key, f"has the note {cell['note']!r}.", "Write it in words.")
     missing = [k for k in CELL[:3] if not _is_number(cell.get(k))]
     if missing:
-        found.tell(*at, f"{missing[0]!r} is missing or no number.", form)
+        found.tell(at.table, at.key, f"{missing[0]!r} is missing or no number.", form)
     return not missing
 
 
-def _look_at_source(found: _Finder, at: tuple[str, str], source: Any, known: set[str]) -> None:
+def _look_at_source(found: _Finder, at: _Place, source: Any, known: set[str]) -> None:
     if not isinstance(source, str) or not source.strip():
         advice = "Say who measured it: source = 'key', and [sources.key] with cite = '...'."
-        found.tell(*at, "has no source.", advice)
+        found.tell(at.table, at.key, "has no source.", advice)
         return
     for key in source.split("+"):
         if key not in known:
             advice = f"Add [sources.{key}] with cite = '...', or use a key of ours."
-            found.tell(*at, f"cites {key!r}, which nothing explains.", advice)
+            found.tell(at.table, at.key, f"cites {key!r}, which nothing explains.", advice)
 
 
-def _look_at_sizes(
-    found: _Finder, name: str, about: tuple[Law | None, dict], fields: dict[str, tuple[str, dict]]
-) -> None:
-    law, row = about
-    for field, (key, cell) in fields.items():
-        low, typical, high = (cell[k] for k in CELL[:3])
+def _look_at_sizes(found: _Finder, row: _Row, fields: dict[str, _Cell]) -> None:
+    for field, cell in fields.items():
+        low, typical, high = (cell.entries[k] for k in CELL[:3])
         if not low <= typical <= high:
             advice = "Swap low and high." if low > typical > high else "Put them in order."
-            found.tell(name, key, f"is out of order: {low:g}, {typical:g}, {high:g}.", advice)
+            what = f"is out of order: {low:g}, {typical:g}, {high:g}."
+            found.tell(row.name, cell.key, what, advice)
         elif field == "poisson" and high >= POISSON_LIMIT:
-            advice = "For what hardly changes its volume write 0.49 to 0.499."
-            found.tell(name, key, f"reaches {high:g}: at 0.5 no volume can change at all.", advice)
-        elif not cell.get("unusual"):
-            said = doubt(key, (low, high), name, row.get("group", ""), law)
-            if said:
-                found.tell(name, key, *said)
-    said = strain_doubt({f: c["typical"] * si(k)[1] for f, (k, c) in fields.items()})
-    unusual = any(c.get("unusual") for f, (_, c) in fields.items() if f in said[0]) if said else 0
-    if said and not unusual and not any(p.table == name for p in found.problems):
-        found.tell(name, fields[said[0][0]][0], *said[1])
+            what = f"reaches {high:g}: at 0.5 no volume can change at all."
+            found.tell(
+                row.name, cell.key, what, "For what hardly changes its volume write 0.49 to 0.499."
+            )
+        elif not cell.unusual:
+            doubted = doubt(cell.key, (low, high), row.name, row.group, row.law)
+            if doubted:
+                found.tell(row.name, cell.key, doubted.what, doubted.advice)
+    _look_at_rebound(found, row, fields)
+    doubted = strain_doubt({f: c.entries["typical"] * si(c.key)[1] for f, c in fields.items()})
+    if doubted and not any(p.table == row.name for p in found.problems):
+        strength, stiffness = fields["yield_stress"], fields["young"]
+        if not (strength.unusual or stiffness.unusual):
+            found.tell(row.name, strength.key, doubted.what, doubted.advice)
 
 
-def _is_number(said: Any) -> bool:
-    return isinstance(said, int | float) and not isinstance(said, bool) and isfinite(said)
+def _look_at_rebound(found: _Finder, row: _Row, fields: dict[str, _Cell]) -> None:
+    """Hold the loss factor of what is soft against its restitution, unless a note parts them."""
+    if row.group not in SOFT or not {"loss", "restitution"} <= set(fields):
+        return
+    if any(p.table == row.name and p.key in ("loss", "restitution") for p in found.problems):
+        return  # what is wrong in itself comes first
+    said, loss = fields["restitution"].entries, fields["loss"].entries
+    low, high = rebound_range(loss["low"], loss["high"])
+    if said.get("note") or (low <= said["high"] and said["low"] <= high):
+        return
+    what = (
+        f"{said['low']:g} to {said['high']:g} contradicts the loss factor: with "
+        f"{loss['low']:g} to {loss['high']:g} a ball keeps {low:.2f} to {high:.2f} of its speed."
+    )
+    advice = "Correct one of the two, or say with note = '...' what else takes the energy."
+    found.tell(row.name, "restitution", what, advice)
+
+
+def _is_number(x: Any) -> bool:
+    return isinstance(x, int | float) and not isinstance(x, bool) and isfinite(x)
 
 
 def _list(words: Any) -> str:

@@ -1,6 +1,7 @@
 """Which values of a part can be placed in their ranges, and what a placement comes to."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Literal
 
 from corporeal.errors import UnknownChoiceError
@@ -9,7 +10,7 @@ from corporeal.materials.entry import Entry
 from corporeal.materials.library import counterpart, find, library
 from corporeal.materials.offer import Choice, choice
 from corporeal.materials.scale import fraction_of, place
-from corporeal.types import PartWords, Placement
+from corporeal.types import WALLED, PartWords, Placement
 
 PLACED = (
     "young",
@@ -21,6 +22,8 @@ PLACED = (
     "shell_thickness",
 )
 """Fields of ``Material`` that use and treatment decide; the others keep their usual value."""
+WEIGHING = ("density", "shell_thickness")
+"""Those of them that a mass hangs on."""
 By = Literal["model", "recording"]
 CONTENTS = "contents_density"
 """The density of what is inside: of the contents' material, placed with the wall's values."""
@@ -47,13 +50,23 @@ def spelling(name: str, library_name: str, offered: list[str]) -> str | None:
     return found if found in offered else None
 
 
-def choices(words: PartWords, library_name: str = "default") -> dict[str, Choice]:
-    """Offer the quantities of a part that somebody may place; nothing where none is open."""
+def choices(
+    words: PartWords, library_name: str = "default", weighing: bool = False
+) -> dict[str, Choice]:
+    """Offer the quantities of a part that somebody may place; nothing where none is open.
+
+    Args:
+        words: What is said of the part.
+        library_name: Where its material is looked up.
+        weighing: Offer only what its mass hangs on.
+
+    """
     if words.material is None:
         return {}
     entry = entry_of(words.material, library_name)
-    walled = words.structure in ("shell", "filled") and words.thickness is None
-    fields = [f for f in PLACED if f in entry.ranges and (walled or f != "shell_thickness")]
+    walled = words.structure in WALLED and words.thickness is None
+    placed = WEIGHING if weighing else PLACED
+    fields = [f for f in placed if f in entry.ranges and (walled or f != "shell_thickness")]
     offered = {f: choice(entry.name, f, entry.ranges[f]) for f in fields if f not in words.values}
     if words.contents is not None:
         inside = held(words.contents, library_name)
@@ -61,22 +74,31 @@ def choices(words: PartWords, library_name: str = "default") -> dict[str, Choice
     return {f: c for f, c in offered.items() if c.range.low < c.range.high}
 
 
+@dataclass(frozen=True)
+class Judgement:
+    """Where somebody puts a quantity, and why."""
+
+    number: float
+    """A fraction of the range, or a value in the unit that was offered."""
+    reason: str
+
+
 def from_fractions(
-    said: Mapping[str, tuple[float, str]], by: By, offered: Mapping[str, Choice]
+    judged: Mapping[str, Judgement], by: By, offered: Mapping[str, Choice]
 ) -> dict[str, Placement]:
     """Take fractions, each with its reason, as they are."""
-    return {f: Placement(x, by, why) for f, (x, why) in said.items() if f in offered}
+    return {f: Placement(j.number, by, j.reason) for f, j in judged.items() if f in offered}
 
 
 def from_values(
-    said: Mapping[str, tuple[float, str]], by: By, offered: Mapping[str, Choice]
+    judged: Mapping[str, Judgement], by: By, offered: Mapping[str, Choice]
 ) -> dict[str, Placement]:
     """Find the place of values, each in the unit that was offered and with its reason."""
     placed = {}
-    for field, (value, why) in said.items():
-        r = offered[field].range
-        inside = min(max(value * offered[field].factor, r.low), r.high)  # a bound's last digit
-        placed[field] = Placement(fraction_of(r, inside), by, why)
+    for field, judgement in judged.items():
+        r, value = offered[field].range, judgement.number * offered[field].factor
+        inside = min(max(value, r.low), r.high)  # a bound's last digit
+        placed[field] = Placement(fraction_of(r, inside), by, judgement.reason)
     return placed
 
 
@@ -89,7 +111,7 @@ def usual(offered: Mapping[str, Choice], why: str) -> dict[str, Placement]:
 
 
 def wall_put(words: PartWords, library_name: str = "default") -> float | None:
-    """How thick a part's wall was put inside the measured range [m]; None: nobody placed it."""
+    """How thick a part's wall was put inside the measured range [m]; None: not placed."""
     placed = words.placements.get("shell_thickness")
     if words.material is None or placed is None or placed.chosen_by == "fallback":
         return None

@@ -1,6 +1,7 @@
-"""Can a number be true? Measured against what the default library says of things alike."""
+"""Can a number be true? Measured against what the default library says of objects alike."""
 
 from collections.abc import Mapping
+from dataclasses import dataclass
 
 from corporeal.materials.entry import Entry, plain
 from corporeal.materials.quantities import QUANTITIES, UNITS, si
@@ -15,9 +16,17 @@ YIELD_STRAIN = (5e-5, 0.3)
 """Yield stress over Young's modulus: from annealed pure metals to modelling clay."""
 
 
+@dataclass(frozen=True)
+class Doubt:
+    """What is implausible about numbers."""
+
+    what: str
+    advice: str
+
+
 def doubt(
     key: str, span: tuple[float, float], name: str, group: str, law: Law | None
-) -> tuple[str, str] | None:
+) -> Doubt | None:
     """Say what is implausible about a range and what to do, or None.
 
     Args:
@@ -40,19 +49,19 @@ def doubt(
     )
     other = _other_unit(key, span, bounds)
     if other:
-        return what, f"In {other} it would fit: check the unit."
-    return what, "Check the number; if it is true, add unusual = true to the range."
+        return Doubt(what, f"In {other} it would fit: check the unit.")
+    return Doubt(what, "Check the number; if it is true, add unusual = true to the range.")
 
 
-def strain_doubt(values: Mapping[str, float]) -> tuple[list[str], tuple[str, str]] | None:
-    """Say that stiffness and strength [Pa] do not go together: the fields, what, what to do."""
+def strain_doubt(values: Mapping[str, float]) -> Doubt | None:
+    """Say that ``yield_stress`` and ``young`` [Pa] do not go together, or None."""
     if "yield_stress" not in values or not values.get("young"):
         return None
     strain = values["yield_stress"] / values["young"]
     if YIELD_STRAIN[0] <= strain <= YIELD_STRAIN[1]:
         return None
     what = f"yields at a strain of {strain:.2g}; solids yield between 5e-05 and 0.3."
-    return ["yield_stress", "young"], (what, "Check the units of yield stress and modulus.")
+    return Doubt(what, "Check the units of yield stress and modulus.")
 
 
 def namesake(name: str) -> Entry | None:

@@ -28,6 +28,7 @@ QUANTITIES = {
         Quantity("poisson", "Poisson's ratio", "-", -0.99, 0.5),
         Quantity("density", "Density", "kg/m³", 1.0, 2.3e4),
         Quantity("yield_stress", "Yield stress", "Pa", 1e2, 5e9),
+        Quantity("strength", "Strength", "Pa", 1e3, 1e10),
         Quantity("hardening", "Hardening modulus", "Pa", 0.0, 1e10),
         Quantity("friction_angle", "Friction angle", "rad", 0.0, pi / 3),
         Quantity("cohesion", "Cohesion", "Pa", 0.0, 1e6),
@@ -35,6 +36,11 @@ QUANTITIES = {
         Quantity("restitution", "Restitution", "-", 0.0, 1.0),
         Quantity("loss", "Loss factor", "-", 0.0, 2.0),
         Quantity("shell_thickness", "Wall thickness", "m", 1e-6, 0.2),
+        Quantity("viscosity", "Viscosity", "Pa·s", 1e-4, 1e4),
+        Quantity("consistency", "Consistency", "Pa·sⁿ", 1e-4, 1e4),
+        Quantity("flow_index", "Flow index", "-", 0.1, 2.0),
+        Quantity("yield_shear", "Yield shear stress", "Pa", 1e-3, 1e5),
+        Quantity("strength_local", "Local strength", "Pa", 1e5, 1e10),
     )
 }
 
@@ -48,6 +54,9 @@ UNITS = {
     "g_cm3": ("kg/m³", 1e3),
     "deg": ("rad", pi / 180.0),
     "mm": ("m", 1e-3),
+    "Pa_s": ("Pa·s", 1.0),
+    "mPa_s": ("Pa·s", 1e-3),
+    "Pa_sn": ("Pa·sⁿ", 1.0),
 }
 
 
@@ -75,6 +84,7 @@ def examples() -> list[str]:
         "poisson",
         "density_kg_m3",
         "yield_MPa",
+        "strength_MPa",
         "hardening_GPa",
         "friction_angle_deg",
         "cohesion_kPa",
@@ -82,4 +92,9 @@ def examples() -> list[str]:
         "restitution",
         "loss",
         "shell_thickness_mm",
+        "viscosity_Pa_s",
+        "consistency_Pa_sn",
+        "flow_index",
+        "yield_shear_Pa",
+        "strength_local_MPa",
     ]

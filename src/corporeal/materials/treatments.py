@@ -1,4 +1,4 @@
-"""How a thing's use or treatment narrows its material's range, in words and bands."""
+"""How an object's use or treatment narrows its material's range, in words and bands."""
 
 import tomllib
 from collections.abc import Mapping
@@ -12,7 +12,7 @@ from corporeal.types import Range
 
 @dataclass(frozen=True)
 class Treatment:
-    """One way in which things of a material are used or made."""
+    """One way in which objects of a material are used or made."""
 
     words: str
     bands: Mapping[str, tuple[float, float]]

@@ -1,6 +1,7 @@
 """The library as text for the terminal, and what a scene is made of as data."""
 
 from collections.abc import Sequence
+from dataclasses import asdict
 from math import degrees
 
 from corporeal.materials.contact import pairs
@@ -12,6 +13,7 @@ from corporeal.materials.shipped import citation, source_table
 from corporeal.materials.treatments import inside, treatments
 from corporeal.types import (
     Ground,
+    Hypothesis,
     Material,
     MaterialField,
     Part,
@@ -46,6 +48,7 @@ def show(name: str, library_name: str = "default") -> str:
     for field, r in entry.ranges.items():
         words = QUANTITIES[field].words
         lines.append(f"  {words:<18} {span(field, r.low, r.typical, r.high):<26} {r.source}")
+        lines += [f"    {entry.notes[field]}"] if field in entry.notes else []
     lines += _uses(entry)
     lines += _measured_friction(entry)
     keys = sorted({key for r in entry.ranges.values() for key in _keys(r.source)})
@@ -99,9 +102,9 @@ def materials_json(
 ) -> dict:
     """Return what every part is made of as plain data, with the grounds of every value [SI].
 
-    A part whose mesh several things share has ``pieces``; its own values, with which it moves, are
+    A part whose mesh several objects share has ``pieces``; its own values, with which it moves, are
     those of the piece that matters most, and it weighs what its pieces weigh together. Lengths are
-    those of the real thing, whatever its scale in the scene.
+    those of the real object, whatever its scale in the scene.
 
     Args:
         field: What they are made of.
@@ -115,7 +118,8 @@ def materials_json(
     weighed = zip(masses, scales, strict=True)
     heavy = [{"scale": s, "mass_kg": m, "real_mass_kg": m / s**3} for m, s in weighed]
     told = [_part_json(*row) for row in rows]
-    return {
+    mixtures = {"masses": [asdict(m) for m in field.mixtures]} if field.mixtures else {}
+    return mixtures | {
         "units": {q.field: q.unit for q in QUANTITIES.values()},
         "parts": [part | own for part, own in zip(told, heavy or [{}] * len(told), strict=True)],
         "friction": field.friction.round(4).tolist(),
@@ -146,14 +150,32 @@ def _made_json(material: Material, made: Structure, words: PartWords) -> dict:
         "margin": words.margin,
         "reason": words.reason,
         "alternatives": [{"material": m, "probability": p} for m, p in words.alternatives],
+        "ways": [_way_json(way) for way in words.hypotheses],
         "law": material.law.name.lower(),
         "structure": _structure_json(made),
         "values": {name: _ground_json(name, g) for name, g in material.grounds.items()},
     }
 
 
+def _way_json(way: Hypothesis) -> dict:
+    said = {
+        "material": way.material,
+        "built": way.structure,
+        "contents": way.contents,
+        "fill": way.fill,
+        "solidity": way.solidity,
+        "reading": way.reading,
+    }
+    return {k: v for k, v in said.items() if v not in (None, "")} | {
+        "probability": way.probability,
+        "reason": way.reason,
+    }
+
+
 def _structure_json(made: Structure) -> dict:
     said: dict = {"kind": made.kind, "thickness": made.thickness, "reason": made.reason}
+    if made.solidity < 1:
+        said["solidity"] = made.solidity
     if made.contents is not None:
         inner = made.contents
         said |= {"contents": inner.name, "fill": made.fill}

@@ -5,18 +5,33 @@ from collections.abc import Sequence
 from corporeal.materials.contact import pairs
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import library
+from corporeal.materials.listing import COLUMNS, HEADS, span
+from corporeal.materials.quantities import QUANTITIES
 from corporeal.materials.shipped import source_table
-from corporeal.materials.tables import COLUMNS, HEADS, span
+from corporeal.mpm.laws import MENU
+from corporeal.types import Law
 
-OTHER = ("friction", "restitution", "loss", "hardening", "shell_thickness")
-OTHER_HEADS = ("material", "group", "μ", "e", "η", "H", "wall")
+OTHER = (
+    "friction",
+    "restitution",
+    "loss",
+    "strength",
+    "strength_local",
+    "hardening",
+    "shell_thickness",
+)
+FLOWING = ("density", "viscosity", "consistency", "flow_index", "yield_shear")
+OTHER_HEADS = ("material", "group", "μ", "e", "η", "S", "S_loc", "H", "wall")
+FLOWING_HEADS = ("material", "ρ", "viscosity", "consistency K_c", "n", "τ_y")
 INTRODUCTION = """# Materials
 
 Generated from the tables in `src/corporeal/materials` by `corporeal.materials.markdown()`; a test
 holds this page equal to them. Each cell is the measured range with the usual value in brackets: E
 Young's modulus, ν Poisson's ratio, ρ density, σ_y yield stress, φ friction angle and c cohesion of
-what is granular; μ the surface's own sliding friction, e restitution, η loss factor, H hardening
-modulus, wall the usual thickness of things made as shells.
+what is granular; μ the surface's own sliding friction, e restitution, η loss factor, S strength of
+what breaks before it yields (a whole bar's, in bending or tension), S_loc what it bears over a
+square millimetre in tension, H hardening modulus, wall the usual thickness of objects made as
+shells.
 
 `corporeal materials` lists them, `corporeal materials show NAME` tells all of one with its sources.
 """
@@ -29,7 +44,7 @@ extends = "default"              # leave it out, and the file stands alone
 cite = "Our tensile test of 2026-03-14, five specimens"
 
 [lamp_steel]
-law = "von_mises"                # corotated, neo_hookean, hencky, drucker_prager, von_mises
+law = "von_mises"                # %(laws)s
 group = "metal"
 young_GPa = { low = 195, typical = 205, high = 210, source = "my-bench" }
 poisson = { low = 0.28, typical = 0.29, high = 0.30, source = "kaye-laby" }
@@ -46,10 +61,20 @@ scene is found to be made of, the floor (`--floor`) and what stands for the unkn
 a Poisson's ratio of 0.5, a number without a source, a source that nothing explains, a key or law
 that does not exist, a law without the numbers that it reads, and numbers that lie three times
 beyond those of the material's namesake or of all that share its group and law, which is how a
-wrong unit shows. What is true all the same is said to be: `{ low = …, unusual = true }`. A library
-with a mistake is not used. Every law needs E, ν and ρ; `von_mises` also yield stress,
-`drucker_prager` friction angle and cohesion. Without friction or restitution of its own a material
-gets 0.5.
+wrong unit shows. Of what is soft (groups soft, fibrous, polymer, elastomer, foam, food) it holds
+the loss factor against the restitution, which a ball's rebound ties together (see below): ranges
+that cannot both be true are a mistake, unless the restitution has a note on what else takes the
+energy. What is true all the same is said to be: `{ low = …, unusual = true }`. A library
+with a mistake is not used. Every law needs E, ν and ρ; %(needs)s.
+Without friction or restitution of its own a material gets 0.5.
+"""
+REBOUND = """## Loss and rebound
+
+The loss factor is that of a blow: what a ball of the material loses in its bulk when it meets
+something hard, at 10 to 1000 Hz and the strains of an impact. It ties down the restitution,
+e = exp(-1.385 η + 0.133 η²): hereditary Hertz contact (Lee and Radok 1960) with a loss factor that
+is flat around the impact. Where the two disagree something else takes energy, and a note says what:
+
 """
 RULE = """## Friction between two surfaces
 
@@ -75,9 +100,17 @@ def markdown() -> str:
     return "\n".join(
         [
             INTRODUCTION,
-            OWN,
+            OWN % {"laws": ", ".join(law.name.lower() for law in Law), "needs": _needs()},
             *("## Library `default`", "", counts, "", *_table(HEADS, default, _core), ""),
             *("### Surface, damping, hardening, walls", "", *_table(OTHER_HEADS, default, _other)),
+            *(
+                "",
+                "### Liquids and pastes",
+                "",
+                *_table(FLOWING_HEADS, _liquids(default), _flowing),
+            ),
+            "",
+            REBOUND + "\n".join(_notes()),
             "",
             *("## Library `reference`: the vocabulary as first published", ""),
             *("`--library reference`: 22 materials, errors included; a baseline only.", ""),
@@ -88,6 +121,15 @@ def markdown() -> str:
             *(f"- **{k}** ({row['check']}): {row['cite']}" for k, row in source_table().items()),
             "",
         ]
+    )
+
+
+def _needs() -> str:
+    """Say what some laws cannot do without."""
+    asked = {law.name.lower(): MENU[law].needs for law in Law if MENU[law].needs}
+    return ",\n".join(
+        f"`{name}` also {' and '.join(QUANTITIES[f].words.lower() for f in fields)}"
+        for name, fields in asked.items()
     )
 
 
@@ -121,9 +163,26 @@ def _other(entry: Entry) -> tuple[str, ...]:
     return (entry.name, entry.group, *_cells(entry, OTHER))
 
 
+def _liquids(known: Sequence[Entry]) -> list[Entry]:
+    return [entry for entry in known if MENU[entry.law].liquid]
+
+
+def _flowing(entry: Entry) -> tuple[str, ...]:
+    return (entry.name, *_cells(entry, FLOWING))
+
+
 def _cells(entry: Entry, fields: Sequence[str]) -> list[str]:
     ranges = [(f, entry.ranges.get(f)) for f in fields]
     return [span(f, r.low, r.typical, r.high) if r else "" for f, r in ranges]
+
+
+def _notes() -> list[str]:
+    """Collect what else takes the energy of a blow, and of which materials."""
+    said: dict[str, list[str]] = {}
+    for entry in library().values():
+        if "restitution" in entry.notes:
+            said.setdefault(entry.notes["restitution"], []).append(entry.name)
+    return [f"- {', '.join(names)}: {note}" for note, names in said.items()]
 
 
 def _friction() -> list[str]:

@@ -1,0 +1,79 @@
+"""Sealed air: a soft solid that presses and bounces as a limp ball full of it does."""
+
+from math import pi, sqrt
+
+import numpy as np
+import pytest
+
+from corporeal.materials import find
+from corporeal.materials.inflated import SQUEEZE, air_bears, pressed, sealed_air
+from corporeal.materials.rebound import rebound
+
+
+def limp_force(gauge, radius, depth):
+    """F = p A of a limp ball pressed flat, with its air compressed adiabatically."""
+    volume = 4 / 3 * pi * radius**3
+    left = volume - pi * depth**2 * (radius - depth / 3)
+    pressure = (101_325 + gauge) * (volume / left) ** 1.4 - 101_325
+    return pressure * pi * (2 * radius * depth - depth**2)
+
+
+def contact_time(force, mass, speed):
+    """Time of a bounce against a rigid plane [s], by stepping m x'' = -F(x)."""
+    x, t, dt = 0.0, 0.0, 2e-6
+    while x >= 0.0:
+        speed -= dt * force(x) / mass
+        x, t = x + dt * speed, t + dt
+    return t
+
+
+def hertz(material, radius):
+    plane = material.young / (1 - material.poisson**2)
+    return lambda x: 4 / 3 * plane * sqrt(radius) * max(x, 0.0) ** 1.5
+
+
+@pytest.mark.parametrize("gauge", [0.0, 3e3, 30e3, 80e3])
+def test_solid_and_limp_ball_press_alike_at_a_fifth_of_the_radius(gauge):
+    air, radius = sealed_air(gauge), 0.11
+    depth = SQUEEZE * radius
+    assert hertz(air, radius)(depth) == pytest.approx(limp_force(gauge, radius, depth), rel=0.05)
+
+
+@pytest.mark.parametrize("speed", [6.0, 10.0, 19.0])
+def test_a_football_touches_as_long_as_a_limp_one(speed):
+    air, radius, mass = sealed_air(80e3), 0.11, 0.43
+    limp = contact_time(lambda x: limp_force(80e3, radius, max(x, 0.0)), mass, speed)
+    solid = contact_time(hertz(air, radius), mass, speed)
+    assert solid == pytest.approx(limp, rel=0.15)
+    stiff = contact_time(lambda x: 3 * hertz(air, radius)(x), mass, speed)
+    assert stiff != pytest.approx(limp, rel=0.15)
+
+
+def test_air_without_gauge_pressure_resists_and_what_is_inflated_resists_more():
+    pressures = [pressed(p) for p in (0.0, 1e3, 1e4, 1e5)]
+    assert pressures[0] > 3e3
+    assert np.all(np.diff(pressures) > 0)
+
+
+@pytest.mark.parametrize(
+    ("skin", "thickness", "radius", "gauge", "bears"),
+    [
+        ("rubber", 0.003, 0.11, 80e3, True),  # football
+        ("rubber", 0.004, 0.033, 80e3, True),  # tennis ball
+        ("soft_PVC", 0.0003, 0.2, 0.0, True),  # beach ball, as good as empty
+        ("soft_PVC", 0.002, 0.04, 0.0, False),  # duck, were it sealed
+        ("ABS", 0.0004, 0.02, 0.0, False),  # table tennis ball
+        ("steel", 0.003, 0.11, 80e3, False),
+    ],
+)
+def test_air_carries_where_it_is_stiffer_than_the_skin(skin, thickness, radius, gauge, bears):
+    material = find(skin).pick(find(skin).typical())
+    assert air_bears(gauge, material, thickness, radius) is bears
+
+
+def test_the_loss_is_that_of_the_restitution_and_every_number_has_its_range():
+    air = sealed_air(55e3)
+    assert rebound(air.loss) == pytest.approx(air.restitution)
+    for name, ground in air.grounds.items():
+        assert ground.value in ground.range
+        assert getattr(air, name) == ground.value
