@@ -12,6 +12,8 @@ from corporeal.stages.ground import UNFIT, ground
 from corporeal.stages.segment import segment
 
 FOLDER = Path(__file__).parent / "recordings"
+KINDS = {"sheet": "shell", "hollow": "shell", "filled": "filled", "solid": "solid", None: "solid"}
+KINDS["packed"] = "solid"
 
 
 def rows(folder):
@@ -39,8 +41,10 @@ def check_answered(scene, inventory):
     }
     asked = {(r["task"], r["scene"]) for r in inventory.transcript}
     assert {("materials", f"{scene.name}/{o.name}") for o in scene.objects} <= asked
+    assert {("mass", f"{scene.name}/{o.name}") for o in scene.objects} <= asked
+    assert all(o.evidence is not None for o in inventory.objects)
     assert ("extents", scene.name) in asked
-    assert inventory.usage["calls"] == 0
+    assert inventory.usage.calls == 0
     assert not [w for w in inventory.warnings if "no usable answer" in w]
 
 
@@ -54,12 +58,14 @@ def check_chosen(scene, field, parts, folder):
         for leaf in leaves or [(words, field.materials[k], field.structures[k])]:
             _check_part(leaf, made[leaf[0].name], placed.get(leaf[0].name))
         if leaves:
-            assert sum(w.volume_share for w, _, _ in leaves) == pytest.approx(1.0, abs=1e-12)
+            outside = [w for w, _, _ in leaves if not (w.inside or w.missing)]
+            assert sum(w.volume_share for w in outside) == pytest.approx(1.0, abs=1e-12)
             assert {w.name for w, _, _ in leaves} == set(made)
 
 
-def _check_part(leaf, made, placed):
+def _check_part(leaf, said, placed):
     words, material, structure = leaf
+    made = max(said["ways"], key=lambda way: way["probability"])
     if made["material"] is None:
         assert words.answered_by in ("metadata", "unknown")
         by = "typical" if words.material else "fallback"
@@ -68,9 +74,10 @@ def _check_part(leaf, made, placed):
         assert (words.material, material.name) == (made["material"], made["material"])
         assert (words.answered_by, words.margin) == ("recording", made["probability"])
         assert words.reason == made["reason"]
-        assert structure.kind == (made["structure"] or "solid")
-        assert dict(words.alternatives) == {
-            a["material"]: a["probability"] for a in made["alternatives"]
+        assert structure.kind == KINDS[made["built"]]
+        assert structure.solidity == (made["solidity"] or 1.0)
+        assert {h.probability for h in words.hypotheses} == {
+            way["probability"] for way in said["ways"]
         }
         assert placed is not None
         places = {v["quantity"]: v for v in placed["values"]}

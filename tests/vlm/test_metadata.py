@@ -6,8 +6,8 @@ import pytest
 from corporeal import materials
 from corporeal.geometry.identity import identify
 from corporeal.types import Finish, SceneObject
-from corporeal.vlm.lexicon import lexicon, metals
-from corporeal.vlm.metadata import Evidence, evidence, matter_hint, recognise
+from corporeal.vlm.lexicon import lexicon, metals, tokens_of
+from corporeal.vlm.metadata import Evidence, evidence, hollowed, matter_hint, recognise
 from handmade import plain, scene
 
 
@@ -16,16 +16,18 @@ class Named:
         self.name, self.extras = name, {}
 
 
-def seen(surface, thing, finish=None, alone=True, metallic=False):
-    return recognise(
-        Evidence(
-            surfaces=[Named(surface)],  # type: ignore[list-item]
-            finishes=[finish or plain()],
-            thing=SceneObject(f"{thing}_0", thing, 1.0),
-            alone=alone,
-            metallic_means_something=metallic,
-        )
+def about(surface, thing, finish=None, alone=True, metallic=False):
+    return Evidence(
+        surfaces=[Named(surface)],  # type: ignore[list-item]
+        finishes=[finish or plain()],
+        thing=SceneObject(f"{thing}_0", thing, 1.0),
+        alone=alone,
+        metallic_means_something=metallic,
     )
+
+
+def seen(surface, thing, finish=None, alone=True, metallic=False):
+    return recognise(about(surface, thing, finish, alone, metallic))
 
 
 def test_every_material_of_the_lexicon_is_in_the_library():
@@ -207,3 +209,71 @@ def test_a_name_without_words_spoils_no_prefix():
     said = told("lamp", ("lamp_shade", "a"), ("Material.001", "b"), ("lamp_glass", "c"))
     assert said["lamp_glass"].material == "glass"
     assert said["lamp_shade"].material == "cotton"
+
+
+# -------------------------------------------- compounds, hollow things, unknown ones
+
+
+@pytest.mark.parametrize(
+    ("thing", "material"),
+    [
+        ("golfball", "TPU"),
+        ("trashcan", "plastics-PP"),
+        ("TrashCan_01", "plastics-PP"),
+        ("steelbucket", "steel"),
+        ("woodentable", "wood"),
+        ("carpet", "cotton"),
+        ("keyboard", "ABS"),
+        ("motherboard", "circuit_board"),
+    ],
+)
+def test_a_compound_says_what_its_words_say(thing, material):
+    assert seen("mesh", thing).material == material
+
+
+@pytest.mark.parametrize("name", ["golfish", "carp", "glassine", "steelworks", "balls", "oakum"])
+def test_what_is_no_compound_of_known_words_stays_whole(name):
+    assert len(tokens_of(name)) == 1
+
+
+def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
+    painted = Finish("texture", texture=np.zeros((2, 2, 3), dtype=np.uint8))
+    head = seen("mesh", "bronze axe head", painted)
+    assert head.material == "bronze"
+    assert head.margin < seen("mesh", "axe head", Finish("bronze", metallic=1.0)).margin
+    assert seen("mesh", "gold axe head", painted).material is None, "gold is as often a colour"
+    assert seen("mesh", "bronze car", painted).material == "steel", "here it is a colour"
+    assert seen("mesh", "plush doll").material == "fibre_fill"
+    assert seen("mesh", "doll").material == "PVC"
+
+
+@pytest.mark.parametrize(
+    ("thing", "structure"),
+    [
+        ("trash can", "shell"),
+        ("storage box", "shell"),
+        ("wooden crate", "shell"),
+        ("dumpster", "shell"),
+        ("refrigerator", "shell"),
+        ("kitchen cabinet", "shell"),
+        ("container", "shell"),
+        ("box spring", None),
+        ("wooden chair", None),
+        ("thing", None),
+    ],
+)
+def test_what_is_hollow_by_what_it_is_has_a_wall(thing, structure):
+    known = about("mesh", thing)
+    assert hollowed(recognise(known), known, lambda _: True).structure == structure
+
+
+def test_a_hollow_thing_of_what_has_no_walls_is_left_alone():
+    known = about("mesh", "sand box")
+    assert recognise(known).material == "sand"
+    assert hollowed(recognise(known), known, lambda name: name != "sand").structure is None
+
+
+def test_what_is_said_of_how_it_is_built_outranks_what_it_is():
+    known = about("mesh", "box")
+    solid = replace(recognise(known), structure="solid")
+    assert hollowed(solid, known, lambda _: True) == solid

@@ -2,6 +2,7 @@ import datetime
 
 import pytest
 
+from corporeal.types import NOTHING_ASKED
 from corporeal.vlm import prices
 from corporeal.vlm.words import usage
 
@@ -27,8 +28,8 @@ def row(model, calls=1):
 
 def test_a_total_is_known_only_where_every_price_is():
     total = usage([row("openai:gpt-5.4"), row("openai:gpt-5-mini"), {"answer": None}])
-    assert total["dollars"] == pytest.approx(0.004 + 0.00045)
-    assert (total["questions"], total["calls"], total["seconds"]) == (3, 2, 4.0)
-    assert usage([row("openai:gpt-5.4"), row("oracle:1")])["dollars"] is None
-    assert usage([row("oracle:1", calls=0)])["dollars"] == 0.0
-    assert usage([]) == {}
+    assert total.dollars == pytest.approx(0.004 + 0.00045)
+    assert (total.questions, total.calls, total.seconds) == (3, 2, 4.0)
+    assert usage([row("openai:gpt-5.4"), row("oracle:1")]).dollars is None
+    assert usage([row("oracle:1", calls=0)]).dollars == 0.0
+    assert usage([]) == NOTHING_ASKED

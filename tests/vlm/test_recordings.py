@@ -1,5 +1,6 @@
 import json
 from dataclasses import replace
+from pathlib import Path
 
 import pytest
 from pydantic import BaseModel
@@ -47,6 +48,17 @@ def test_a_new_shape_of_answer_never_replays_an_old_one(tmp_path):
     record(tmp_path, ASKED, Colour(name="red"), "some-model")
     with pytest.raises(UserError, match="differs in 'schema'"):
         connect(f"replay:{tmp_path}").ask(ASKED, Wider)
+
+
+def test_answers_to_an_older_wording_are_refused_in_one_sentence(tmp_path):
+    old = (Path(__file__).parent / "wording_2026_11" / "materials.md").read_text(encoding="utf-8")
+    record(tmp_path, replace(ASKED, prompt=old), Colour(name="red"), "some-model")
+    new = old.replace("What is each of its parts made of", "What may each of its parts be made of")
+    with pytest.raises(UserError) as refused:
+        connect(f"replay:{tmp_path}").ask(replace(ASKED, prompt=new), Colour)
+    said = str(refused.value).replace(str(tmp_path), "FOLDER")
+    assert said.startswith("The answers in FOLDER are to another wording of the questions (")
+    assert said.endswith("): record them again, or use --vlm metadata.")
 
 
 def test_what_is_not_a_recording_is_named(tmp_path):

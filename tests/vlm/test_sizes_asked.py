@@ -10,6 +10,7 @@ from fake_server import FakeServer
 
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.typical_extents import typical_extent
+from corporeal.types import NOTHING_ASKED
 from corporeal.vlm.answers import SizeAnswer, size_complaints
 from corporeal.vlm.by_hand import WaitingError
 from corporeal.vlm.recordings import schema_digest
@@ -40,7 +41,7 @@ def test_without_a_model_the_table_says_it():
     assert list(sizes.usual) == ["soda can"]
     can = sizes.usual["soda can"]
     assert (can.low, can.usual, can.high, can.said_by) == (0.08, 0.12, 0.16, "table")
-    assert (sizes.transcript, sizes.usage, sizes.warnings) == ((), {}, ())
+    assert (sizes.transcript, sizes.usage, sizes.warnings) == ((), NOTHING_ASKED, ())
 
 
 def test_a_model_is_asked_about_each_class_once_in_words_alone():
@@ -56,7 +57,7 @@ def test_a_model_is_asked_about_each_class_once_in_words_alone():
     assert (couch.low, couch.usual, couch.high) == (1.3, 2.1, 3.2)
     assert (couch.said_by, couch.reason) == ("model", COUCH["reason"])
     assert couch.who.startswith("openai:fake-model@")
-    assert sizes.usage["calls"] == 2
+    assert sizes.usage.calls == 2
     assert [row["task"] for row in sizes.transcript] == ["sizes", "sizes"]
 
 
@@ -99,7 +100,7 @@ def test_a_model_that_differs_from_the_table_is_believed_and_told():
         sizes = ask(server, "couch")
     assert sizes.usual["couch"].usual == 0.5
     (warning,) = sizes.warnings
-    assert ", 50 cm is usual for things like this: couch; the table" in warning
+    assert ", 50 cm is usual for objects like this: couch; the table" in warning
     assert "knows 1 m to 4 m. The former was believed." in warning
 
 
@@ -128,7 +129,7 @@ def test_a_slip_of_the_unit_is_put_right_by_the_model_itself():
     with FakeServer(slip, answer()) as server:
         sizes = ask(server, "couch")
     assert "Answer in metres" in server.requests[1].text
-    assert (sizes.usual["couch"].usual, sizes.usage["calls"]) == (2.1, 2)
+    assert (sizes.usual["couch"].usual, sizes.usage.calls) == (2.1, 2)
 
 
 def test_a_recording_is_checked_like_a_model(tmp_path):
@@ -156,7 +157,7 @@ def test_a_file_in_metres_is_doubted_and_yet_believed():
     assert (real.extent, real.said_by) == (1.65, "file")
     (warning,) = real.warnings
     assert "duck_khronos is 1.65 m large in its file" in warning
-    assert "a recorded answer (by hand) knows such things (duck) from 5 cm to 60 cm" in warning
+    assert "a recorded answer (by hand) knows such objects (duck) from 5 cm to 60 cm" in warning
 
 
 def test_a_file_in_other_units_says_nothing_of_its_size():

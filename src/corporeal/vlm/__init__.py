@@ -140,7 +140,7 @@ class Vlm(Protocol):
 
 
 def critic_of(spec: str, asked: str) -> str:
-    """Say who ranks ways of taking a thing apart: who is ``asked`` to, a cheaper one, or the same.
+    """Say who ranks partitions of an object: who is ``asked`` to, a cheaper one, or the same.
 
     Args:
         spec: Who answers, as a person types it.

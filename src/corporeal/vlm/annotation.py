@@ -10,8 +10,19 @@ import yaml
 
 from corporeal.errors import BadFileError
 from corporeal.types import PartWords
+from corporeal.vlm.metadata import HIGHEST_INFLATION, SEALABLE
 
-KEYS = ("material", "structure", "thickness_mm", "contents", "fill", "values")
+KEYS = (
+    "material",
+    "structure",
+    "thickness_mm",
+    "contents",
+    "fill",
+    "solidity",
+    "inflation_kPa",
+    "values",
+)
+BUILDS = ("solid", "shell", "sheet", "hollow", "filled", "packed")
 EXAMPLE = "For example: 'duck_0: soft_PVC', or 'duck_0: { material: soft_PVC, thickness_mm: 2 }'."
 
 
@@ -21,13 +32,17 @@ class Annotation:
 
     material: str | None = None
     structure: str | None = None
-    """"solid", "shell" or "filled"."""
+    """One of ``BUILDS``."""
     thickness: float | None = None
     """[m]"""
     contents: str | None = None
     """What is behind the wall."""
     fill: float | None = None
     """Share of the room there that it takes up, above 0 and up to 1."""
+    inflation: float | None = None
+    """Gauge pressure of the air sealed behind the wall [Pa]."""
+    solidity: float | None = None
+    """Of what is packed: share of its shape that is matter, above 0 and up to 1."""
     values: dict[str, float] = field(default_factory=dict)
     """Spelt as in the library, unit in the key: ``{"young_MPa": 5}``."""
 
@@ -40,7 +55,7 @@ def read_annotations(
     Args:
         path: The YAML file.
         scene: Every object's name with its parts' names.
-        free: Objects whose parts nobody has told apart yet: the file may name them.
+        free: Objects whose parts nobody has segmented yet: the file may name them.
 
     Returns:
         (object, part) → what is said of it. What is said of an object holds for all its parts that
@@ -95,8 +110,8 @@ def _annotation(path: Path, where: str, said: Any) -> Annotation:
     if strange:
         raise BadFileError(path, f"{where}: unknown key {strange[0]!r}.", f"Keys: {_list(KEYS)}.")
     structure = said.get("structure")
-    if structure not in (None, "solid", "shell", "filled"):
-        options = "Say solid, shell or filled."
+    if structure not in (None, *BUILDS):
+        options = f"Say one of: {', '.join(BUILDS)}."
         raise BadFileError(path, f"{where}: structure is {structure!r}.", options)
     for key in ("material", "contents"):
         if said.get(key) is not None and not isinstance(said[key], str):
@@ -107,7 +122,9 @@ def _annotation(path: Path, where: str, said: Any) -> Annotation:
         structure=structure,
         thickness=thickness,
         contents=said.get("contents"),
-        fill=_fill(path, where, said.get("fill")),
+        fill=_share(path, where, "fill", said.get("fill")),
+        solidity=_share(path, where, "solidity", said.get("solidity")),
+        inflation=_inflation(path, where, said),
         values=_values(path, where, said.get("values")),
     )
 
@@ -121,13 +138,32 @@ def _thickness(path: Path, where: str, said: Any) -> float | None:
     return thickness
 
 
-def _fill(path: Path, where: str, said: Any) -> float | None:
+def _share(path: Path, where: str, what: str, said: Any) -> float | None:
     if said is None:
         return None
-    fill = _number(path, f"{where}: fill", said)
-    if not 0 < fill <= 1:
-        raise BadFileError(path, f"{where}: fill is a share: above 0 and up to 1, not {said!r}.")
-    return fill
+    share = _number(path, f"{where}: {what}", said)
+    if not 0 < share <= 1:
+        raise BadFileError(path, f"{where}: {what} is a share: above 0 and up to 1, not {said!r}.")
+    return share
+
+
+def _inflation(path: Path, where: str, said: dict) -> float | None:
+    if said.get("inflation_kPa") is None:
+        return None
+    pressure = _number(path, f"{where}: inflation_kPa", said["inflation_kPa"])
+    if not 0 <= 1e3 * pressure <= HIGHEST_INFLATION:
+        raise BadFileError(
+            path,
+            f"{where}: inflation_kPa is {pressure:g}.",
+            f"Give the gauge pressure, from 0 (sealed) to {1e-3 * HIGHEST_INFLATION:g} kPa.",
+        )
+    if (said.get("structure") or "shell") not in SEALABLE or said.get("contents"):
+        raise BadFileError(
+            path,
+            f"{where}: what is inflated is a wall with air behind it.",
+            "Say structure: shell, and no contents; or leave inflation_kPa out.",
+        )
+    return 1e3 * pressure
 
 
 def _values(path: Path, where: str, said: Any) -> dict[str, float]:
@@ -154,15 +190,21 @@ def _list(names: Any) -> str:
 
 def built(said: Annotation, words: PartWords) -> PartWords:
     """Take over how a person says that a part is built."""
-    implied = "filled" if said.contents else "shell" if said.thickness is not None else None
+    walled = said.thickness is not None or said.inflation is not None
+    packed = "packed" if said.solidity else "shell" if walled else None
+    implied = "filled" if said.contents else packed
     structure = said.structure or implied
     if structure is None:
         return words
     words = replace(words, built_by="annotation")
-    if structure == "solid":
-        return replace(words, structure="solid", thickness=None, contents=None, fill=None)
+    if structure in ("solid", "packed"):
+        bare = replace(words, structure=structure, thickness=None, contents=None, fill=None)
+        solidity = said.solidity if structure == "packed" else None
+        return replace(bare, solidity=solidity, inflation=None)
     words = replace(words, structure=structure, thickness=said.thickness or words.thickness)
-    if structure == "shell":
+    pressure = words.inflation if said.inflation is None else said.inflation
+    words = replace(words, inflation=pressure if structure in SEALABLE else None)
+    if structure != "filled":
         return replace(words, contents=None, fill=None)
     return replace(words, contents=said.contents or words.contents, fill=said.fill or words.fill)
 
@@ -170,7 +212,7 @@ def built(said: Annotation, words: PartWords) -> PartWords:
 def named_pieces(
     told: Mapping[tuple[str, str], Annotation], thing: str, parts: Sequence[str]
 ) -> list[PartWords]:
-    """Return what a person names of a thing beside its parts: pieces that nobody told apart yet.
+    """Return what a person names of an object beside its parts: pieces that nobody segmented yet.
 
     Until they are found on its surface each has an equal share.
     """

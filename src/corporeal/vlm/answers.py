@@ -31,6 +31,15 @@ class Vocabulary:
 
 MOST_PARTS = 6
 MOST_THINGS = 12
+MOST_WAYS = 6
+SOLIDITY = (0.1, 0.95)
+"""Between these is packed what is packed of parts and air."""
+DENSITIES = (0.3, 25_000.0)
+"""Mass of an object over the volume of its smallest box [kg/m³]: from a paper lampshade to gold."""
+KILOGRAMS = {"g": 1e-3, "kg": 1.0, "oz": 0.028349523, "lb": 0.45359237}
+CUBIC_METRES = {"ml": 1e-6, "l": 1e-3, "fl oz": 2.9573530e-5}
+METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
+"""Units of what is printed (NIST Handbook 44, Appendix C; fluid ounces are those of the US)."""
 SLACK = 0.05
 """By how much shares may miss 1."""
 SMALLEST_THING, LARGEST_THING = 1e-3, 100.0
@@ -45,7 +54,8 @@ class SeenPart(BaseModel):
     name: str = Field(min_length=1, max_length=60)
     look: str
     """Colour, what it seems to be made of, shape."""
-    visible: bool
+    seen: Literal["yes", "hidden", "missing"]
+    """Whether the pictures show it; "missing": the model lacks it, as a scan lacks glass."""
 
 
 class Decomposition(BaseModel):
@@ -75,26 +85,28 @@ class RankingAnswer(BaseModel):
     ranking: list[Rank]
 
 
-class OtherMaterial(BaseModel):
-    """What a part may be made of instead."""
+class Way(BaseModel):
+    """One way a part may be."""
 
-    material: str
+    material: str | None
+    built: Literal["solid", "sheet", "hollow", "filled", "packed"] | None
+    contents: str | None = None
+    fill: Share | None = None
+    solidity: Share | None = None
+    reading: str = ""
     probability: Share
+    reason: str
 
 
 class PartAnswer(BaseModel):
-    """What one part is made of, and how it is built."""
+    """The ways one part may be, and what it takes up."""
 
     part: str
-    material: str | None
-    probability: Share
-    alternatives: list[OtherMaterial] = []
-    structure: Literal["solid", "shell", "filled"] | None
-    contents: str | None = None
-    fill: Share | None = None
+    ways: list[Way]
+    inside: str | None = None
+    missing: bool = False
     volume_share: Share | None = None
     surface_share: Share | None = None
-    reason: str
 
 
 class MaterialsAnswer(BaseModel):
@@ -155,6 +167,25 @@ class ValueAnswer(BaseModel):
     parts: list[ValuePart]
 
 
+class Printed(BaseModel):
+    """Something printed on an object that says how much of it there is."""
+
+    kind: Literal["net weight", "total weight", "volume", "size", "count", "other"]
+    number: float | None = Field(default=None, ge=0, allow_inf_nan=False)
+    unit: Literal["g", "kg", "oz", "lb", "ml", "l", "fl oz", "mm", "cm", "m", "in", ""] = ""
+    words: str
+
+
+class MassAnswer(BaseModel):
+    """What is printed on an object, and what it weighs, judged without any library."""
+
+    printed: list[Printed] = []
+    low_kg: float = Field(gt=0, lt=1e9, allow_inf_nan=False)
+    likely_kg: float = Field(gt=0, lt=1e9, allow_inf_nan=False)
+    high_kg: float = Field(gt=0, lt=1e9, allow_inf_nan=False)
+    reason: str
+
+
 class Extent(BaseModel):
     """How large one class of things usually is."""
 
@@ -209,19 +240,18 @@ class RegionsAnswer(BaseModel):
 
 
 def parts_complaints(answer: PartsAnswer) -> list[str]:
-    """Check that the alternatives are real ones and that names tell parts apart."""
-    counts = [len(d.parts) for d in answer.decompositions]
+    """Check that there are parts, and that names tell them apart."""
     found = []
-    if not counts:
+    if not answer.decompositions:
         found.append("Give at least one decomposition.")
-    if len(set(counts)) < len(counts):
-        found.append("Decompositions must differ in their number of parts.")
-    if any(not 1 <= count <= MOST_PARTS for count in counts):
+    if any(not 1 <= len(d.parts) <= MOST_PARTS for d in answer.decompositions):
         found.append(f"A decomposition has 1 to {MOST_PARTS} parts.")
     for decomposition in answer.decompositions:
         names = [p.name for p in decomposition.parts]
         if len({n.lower() for n in names}) < len(names):
             found.append(f"Part names must differ within a decomposition: {', '.join(names)}.")
+        if names and all(p.seen == "missing" for p in decomposition.parts):
+            found.append("At least one part of a decomposition must be in the pictures.")
     return found
 
 
@@ -238,10 +268,11 @@ def materials_complaints(
     names: Vocabulary,
     shared: bool,
 ) -> list[str]:
-    """Check names, structure, probabilities and, where parts share one mesh, shares."""
+    """Check names, builds, probabilities and, where parts share one mesh, what they take up."""
     found = name_complaints([p.part for p in answer.parts], parts)
     for part in answer.parts:
         found += [f"{part.part}: {problem}" for problem in _part_problems(part, names)]
+    found = found or _held_problems(answer, names)
     return found if found or not shared else _share_problems(answer)
 
 
@@ -256,42 +287,129 @@ def name_complaints(got: Sequence[str], wanted: Sequence[str]) -> list[str]:
 
 
 def _part_problems(part: PartAnswer, names: Vocabulary) -> list[str]:
-    said = [part.material, *(a.material for a in part.alternatives)]
+    if not 1 <= len(part.ways) <= MOST_WAYS:
+        return [f"Give 1 to {MOST_WAYS} ways it may be; you gave {len(part.ways)}."]
     found = [
-        f"{name!r} is not in the list of materials."
-        for name in said
-        if name is not None and names.material(name) is None
+        f"{way.material!r} is not in the list of materials."
+        for way in part.ways
+        if way.material is not None and names.material(way.material) is None
     ]
-    if sum(a.probability for a in part.alternatives) + part.probability > 1 + SLACK:
-        found.append("The probabilities of the material and its alternatives exceed 1.")
-    return found or _structure_problems(part, names)
+    if sum(way.probability for way in part.ways) <= 0:
+        found.append("The probabilities of its ways must be above 0 and add up to 1.")
+    return found or [problem for way in part.ways for problem in _build_problems(way, names)]
 
 
-def _structure_problems(part: PartAnswer, names: Vocabulary) -> list[str]:
+def _build_problems(way: Way, names: Vocabulary) -> list[str]:
     found = []
-    walled = part.structure in ("shell", "filled")
-    made = names.material(part.material) if part.material is not None else None
+    walled = way.built in ("sheet", "hollow", "filled")
+    made = names.material(way.material) if way.material is not None else None
     if walled and made is not None and not names.walled(made):
-        found.append(f"Nobody makes walls of {part.material}: the structure must be solid.")
-    if part.structure != "filled":
-        if part.contents is not None:
-            found.append("Only a part whose structure is 'filled' has contents.")
-    elif part.contents is None or not part.fill:
+        found.append(
+            f"Nobody makes walls of {way.material}: it is built 'solid' or 'packed', never "
+            f"{way.built!r}."
+        )
+    if way.built != "filled":
+        if way.contents is not None:
+            found.append("Only what is built 'filled' has contents.")
+    elif way.contents is None or not way.fill:
         found.append("What is filled needs contents, and a fill above 0.")
-    elif names.contents(part.contents) is None:
-        found.append(f"{part.contents!r} is not in the list of contents.")
+    elif names.contents(way.contents) is None:
+        found.append(f"{way.contents!r} is not in the list of contents.")
+    low, high = SOLIDITY
+    if way.built == "packed" and not low <= (way.solidity or 0.0) <= high:
+        found.append(f"What is packed needs a solidity, from {low:g} to {high:g}.")
+    return found
+
+
+def _held_problems(answer: MaterialsAnswer, names: Vocabulary) -> list[str]:
+    """Find what a container holds among the parts, where it would weigh twice."""
+    found = []
+    for box in answer.parts:
+        held = {names.contents(w.contents) for w in box.ways if w.contents} - {None}
+        for part in answer.parts:
+            made = {names.contents(w.material) for w in part.ways if w.material}
+            if part is not box and held & made:
+                found.append(
+                    f"{part.part} is what {box.part} holds, and would weigh twice: as the contents "
+                    f"of {box.part}, and as a part. Build {box.part} 'sheet' or 'hollow'."
+                )
     return found
 
 
 def _share_problems(answer: MaterialsAnswer) -> list[str]:
+    found = [problem for part in answer.parts for problem in _own_shares(part, answer)]
+    outside = [p for p in answer.parts if p.inside is None and not p.missing]
+    if not found and not outside:
+        return ["At least one part must lie at the surface: inside null, missing false."]
+    return found or [*_sums(outside), *_nested(answer)]
+
+
+def _own_shares(part: PartAnswer, answer: MaterialsAnswer) -> list[str]:
     found = []
     for what in ("volume_share", "surface_share"):
-        shares = [getattr(p, what) for p in answer.parts]
-        if None in shares:
-            found.append(f"Give {what} for every part: they share one mesh.")
-        elif not isclose(sum(shares), 1.0, abs_tol=SLACK):
-            found.append(f"{what} must add up to 1, not {sum(shares):.2f}.")
+        if not getattr(part, what) and not (part.missing and what == "volume_share"):
+            found.append(f"{part.part}: give {what}, above 0: of its own shape, wherever it lies.")
+    others = [p.part for p in answer.parts if p is not part]
+    if part.inside is not None and part.inside not in others:
+        found.append(f"{part.part}: there is no other part {part.inside!r} for it to lie in.")
     return found
+
+
+def _sums(outside: Sequence[PartAnswer]) -> list[str]:
+    found = []
+    for what in ("volume_share", "surface_share"):
+        total = sum(getattr(p, what) for p in outside)
+        if not isclose(total, 1.0, abs_tol=SLACK):
+            found.append(
+                f"{what} of the parts that lie at the surface must add up to 1, not {total:.2f}."
+            )
+    return found
+
+
+def _nested(answer: MaterialsAnswer) -> list[str]:
+    found = []
+    for part in answer.parts:
+        within = sum(p.volume_share or 0.0 for p in answer.parts if p.inside == part.part)
+        if within >= (part.volume_share or 0.0) > 0:
+            found.append(f"What lies inside {part.part} must take up less volume than it does.")
+    return found
+
+
+def shaky(answer: MaterialsAnswer) -> list[str]:
+    """Say what was mended in an answer, or makes it weak, in clauses."""
+    found = []
+    for part in answer.parts:
+        total = sum(way.probability for way in part.ways)
+        if total > 1 + SLACK:
+            found.append(
+                f"the probabilities of {part.part} add up to {total:.3g} and were divided by it"
+            )
+    if all(len(p.ways) == 1 and p.ways[0].probability > 1 - SLACK for p in answer.parts):
+        found.append(
+            "one way only was given for every part, as certain: the interval of its mass covers "
+            "measured ranges and no other build"
+        )
+    return found
+
+
+def mass_complaints(answer: MassAnswer, box: float) -> list[str]:
+    """Check the order, and that masses are in kilograms.
+
+    Args:
+        answer: What was answered.
+        box: Volume of the smallest box around the object [m³]; 0: not known.
+
+    """
+    if not answer.low_kg <= answer.likely_kg <= answer.high_kg:
+        return ["low_kg, likely_kg and high_kg must be in this order."]
+    low, high = DENSITIES
+    mean = answer.likely_kg / box if box > 0 else low
+    if low <= mean <= high:
+        return []
+    return [
+        f"{answer.likely_kg:g} kg in a box of {1e6 * box:.4g} cm³ would be {mean:.3g} kg/m³, which "
+        f"no object has ({low:g} to {high:g}). Answer in kilograms."
+    ]
 
 
 def placement_complaints(

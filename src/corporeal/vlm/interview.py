@@ -14,32 +14,44 @@ from corporeal.vlm.answers import (
     Decomposition,
     ExtentsAnswer,
     FractionAnswer,
+    MassAnswer,
     MaterialsAnswer,
     PartsAnswer,
     RankingAnswer,
     RegionsAnswer,
+    SeenPart,
     SizeAnswer,
     ThingsAnswer,
     ValueAnswer,
     Vocabulary,
     extents_complaints,
+    mass_complaints,
     materials_complaints,
     parts_complaints,
     placement_complaints,
     ranking_complaints,
     regions_complaints,
+    shaky,
     size_complaints,
     things_complaints,
 )
 from corporeal.vlm.words import Asked
 
 SHARES = (
-    "- volume_share: the share of the whole object's volume that lies within the part's outer "
-    "shape (of a shell: the volume it encloses); over all parts they add up to 1;\n"
-    "- surface_share: the share of the whole object's outer surface that belongs to the part, 0 "
-    "for what lies inside; over all parts they add up to 1;"
+    "The parts share one model, so say for each what it takes up of the object as the pictures "
+    "show it, thickened or not:\n"
+    "- inside: the part that encloses it, where it is hidden within another (a core within its "
+    "cover), otherwise null;\n"
+    "- missing: true only for what the real object has and the model lacks, as a scanner does not "
+    "see glass;\n"
+    "- volume_share: what lies within the part's own outer shape, with all that is inside it, over "
+    "what lies within the whole object's; a part is stated so whether others enclose it or not. "
+    "Over the parts with inside null (what is missing apart) they add up to 1;\n"
+    "- surface_share: the area of the part's own outer face over that of the whole object's outer "
+    "surface, never 0, also for what lies inside. Over the parts with inside null (what is missing "
+    "apart) they add up to 1."
 )
-NO_SHARES = "- volume_share and surface_share: null;"
+NO_SHARES = "- inside, volume_share and surface_share: null; missing: false."
 FRACTION = (
     "Answer with a fraction for each quantity: 0 is the low end of its range, 1 the high end, 0.5 "
     "the middle; on a logarithmic scale, where one is named, 0.5 is the geometric middle."
@@ -59,8 +71,10 @@ class Subject:
     """The scene's name and the object's."""
     name: str
     class_name: str
-    extent: str
-    """Longest side, in words."""
+    sides: str
+    """The three sides of its smallest box, in words."""
+    box: float = 0.0
+    """Their product [m³]; 0: not known."""
     views: str = "none"
     count: int = 0
     """Pictures that are shown, or were when the answers were recorded."""
@@ -88,6 +102,10 @@ class Interview:
     prompts: Mapping[str, str]
     """Task → wording, with $facts and {lists}."""
     subject: Subject
+    seen: str = ""
+    """What question 1 found it to be; "": it was not asked."""
+    looks: dict[str, str] = field(default_factory=dict)
+    """Part → how question 1 found it to look."""
     transcript: list[dict] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
 
@@ -103,7 +121,10 @@ class Interview:
         if reply is None:
             return None
         options = reply.answer.decompositions
-        return options[self._best(options) if len(options) > 1 else 0], reply.answer
+        self.seen = reply.answer.object
+        best = options[self._best(options) if len(options) > 1 else 0]
+        self.looks = {p.name: _look(p) for p in best.parts}
+        return best, reply.answer
 
     def _best(self, options: Sequence[Decomposition]) -> int:
         lines = (
@@ -146,6 +167,16 @@ class Interview:
             MaterialsAnswer,
             lambda a: materials_complaints(a, list(parts), names, shared),
         )
+        if reply is None:
+            return None
+        self.warnings += [f"{self.subject.name}: {clause}." for clause in shaky(reply.answer)]
+        return reply.answer, reply.by
+
+    def mass(self) -> tuple[MassAnswer, Asked] | None:
+        """Ask what is printed on it and what it weighs, no library in sight; None: no answer."""
+        box = self.subject.box
+        asked = self._question("mass")
+        reply = self._ask(self.model, asked, MassAnswer, lambda a: mass_complaints(a, box))
         return (reply.answer, reply.by) if reply else None
 
     def placement(
@@ -187,8 +218,6 @@ class Interview:
             asked,
             prompt=asked.prompt + again,
             lists={"ranges": _ranges(offers)},
-            views="none",
-            pictures=(),
         )
         wanted: dict[str, Collection[str]] = {part: list(o.ranges) for part, o in offers.items()}
         bounds = {(p, q): b for p, o in offers.items() for q, b in o.bounds.items()}
@@ -206,18 +235,18 @@ class Interview:
         return {c.class_name: c.metres for c in reply.answer.classes} if reply else {}
 
     def size(self) -> Reply[SizeAnswer] | None:
-        """Ask how large the real thing is, in words alone; None where nobody answers."""
+        """Ask how large the real object is, in words alone; None where nobody answers."""
         kind = self.subject.class_name
         asked = self._question("sizes")
         return self._ask(self.model, asked, SizeAnswer, lambda a: size_complaints(a, kind))
 
     def things(self) -> Reply[ThingsAnswer] | None:
-        """Ask which things stand in a scene; None where nobody answers."""
+        """Ask which objects stand in a scene; None where nobody answers."""
         asked = self._question("things", most=str(MOST_THINGS))
         return self._ask(self.model, asked, ThingsAnswer, things_complaints)
 
     def regions(self, colours: Sequence[str], things: Sequence[str]) -> Reply[RegionsAnswer] | None:
-        """Ask which thing each painted region is; None where nobody answers.
+        """Ask which object each painted region is; None where nobody answers.
 
         Args:
             colours: Names of the regions' colours.
@@ -239,7 +268,8 @@ class Interview:
             "count": str(about.count),
             "name": about.name,
             "class_name": about.class_name,
-            "extent": about.extent,
+            "sides": about.sides,
+            "seen": f"It was found to be: {self.seen}." if self.seen else "",
         }
         prompt = Template(self.prompts[task]).substitute(common | facts).strip()
         return Question(task, prompt, about.scene, about.views, about.pictures)
@@ -258,6 +288,12 @@ class Interview:
             return None
         self.transcript.append(_row(question) | _answered(reply))
         return reply
+
+
+def _look(part: SeenPart) -> str:
+    """Say how a part looks, and where it cannot be seen."""
+    where = {"yes": "", "hidden": "; hidden", "missing": "; the model lacks it"}
+    return f"{part.look}{where[part.seen]}"
 
 
 def _ranges(offers: Mapping[str, Offer]) -> str:

@@ -10,6 +10,8 @@ from importlib.resources import files
 from corporeal.geometry.identity import words
 from corporeal.types import Finish
 
+SHORTEST = 3
+"""Letters of the shortest word that a compound is taken apart into."""
 KINDS = ("substance", "piece", "thing")
 """The most telling first: "oak", "table leg", "table"."""
 
@@ -28,19 +30,23 @@ class Saying:
     gives_way: tuple[str, ...] = ()
     of: tuple[str, ...] = ()
     colour: bool = False
+    seldom: bool = False
+    """It is rarely meant as a colour."""
     every: bool = False
     plant: bool = False
     alpha: str = ""
     metallic: str = ""
     contents: str | None = None
     fill: float | None = None
+    inflation: float | None = None
+    """Gauge pressure of the air sealed in it [Pa]."""
     before: int = 0
-    """Words of the thing that a substance stands right before."""
+    """Words of the object that a substance stands right before."""
 
 
 @dataclass(frozen=True)
 class Look:
-    """What a part's colour tells in certain things."""
+    """What a part's colour tells in certain objects."""
 
     hue: tuple[float, float]
     """[degrees]"""
@@ -66,7 +72,7 @@ class Name:
 
 
 def heads(tokens: tuple[str, ...]) -> list[Saying]:
-    """Find what stands in a name; of compound nouns the last one is the thing.
+    """Find what stands in a name; of compound nouns the last one is the object.
 
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
@@ -105,7 +111,46 @@ def _by_first_word() -> dict[str, list[Saying]]:
 @lru_cache(maxsize=10_000)
 def tokens_of(name: str) -> tuple[str, ...]:
     """Return the words of a name in the singular, without what exporters write."""
-    return tuple(singular(w) for w in words(name))
+    return tuple(singular(part) for w in words(name) for part in _apart(singular(w)))
+
+
+def _apart(word: str) -> tuple[str, ...]:
+    """Take a compound apart: "golfball" is a golf ball, a "steelbucket" a bucket of steel."""
+    if word in _known() or len(word) < 2 * SHORTEST:
+        return (word,)
+    if word in _joined():
+        return _joined()[word]
+    made, things = _single("substance"), _single("thing")
+    cuts = range(SHORTEST, len(word) - SHORTEST + 1)
+    found = ((word[:k], word[k:]) for k in cuts if word[:k] in made and word[k:] in things)
+    return next(found, (word,))
+
+
+@cache
+def _known() -> frozenset[str]:
+    """Return every word that stands in the lexicon by itself or in a phrase."""
+    return frozenset(w for saying in lexicon() for w in saying.phrase) | _holders()
+
+
+@cache
+def _joined() -> dict[str, tuple[str, ...]]:
+    """Return every phrase by how it looks when it is written as one word."""
+    return {"".join(s.phrase): s.phrase for s in lexicon() if len(s.phrase) > 1}
+
+
+@cache
+def _single(kind: str) -> frozenset[str]:
+    return frozenset(s.phrase[0] for s in lexicon() if s.kind == kind and len(s.phrase) == 1)
+
+
+def hollow(tokens: tuple[str, ...]) -> bool:
+    """Tell whether a name is that of something hollow: its last noun is what it names."""
+    return any(tokens[-len(phrase) :] == phrase for phrase in _hollow())
+
+
+@cache
+def _hollow() -> frozenset[tuple[str, ...]]:
+    return frozenset(tuple(singular(w) for w in said.split()) for said in _table()["hollow"])
 
 
 def singular(word: str) -> str:
@@ -149,7 +194,7 @@ def lexicon() -> tuple[Saying, ...]:
 
 @cache
 def lookbook() -> tuple[Look, ...]:
-    """Every plain colour that tells of a part, with the things it tells it of."""
+    """Every plain colour that tells of a part, with the objects it tells it of."""
     return tuple(
         Look(
             hue=tuple(row["hue"]),
@@ -184,7 +229,7 @@ def _table() -> dict[str, list]:
 
 
 def _saying(kind: str, phrase: str, row: dict) -> Saying:
-    thickness = row.get("thickness_mm")
+    thickness, pressure = row.get("thickness_mm"), row.get("inflation_kPa")
     return Saying(
         phrase=tuple(singular(w) for w in phrase.split()),
         kind=kind,
@@ -195,10 +240,12 @@ def _saying(kind: str, phrase: str, row: dict) -> Saying:
         gives_way=tuple(row.get("gives_way", ())),
         of=tuple(row.get("of", ())),
         colour=row.get("colour", False),
+        seldom=row.get("seldom", False),
         every=row.get("every", False),
         plant=row.get("plant", False),
         alpha=row.get("alpha", ""),
         metallic=row.get("metallic", ""),
         contents=row.get("contents"),
         fill=row.get("fill"),
+        inflation=None if pressure is None else pressure * 1e3,
     )

@@ -1,18 +1,30 @@
 """Recognition without a model: what the file's own names and surface values tell."""
 
 from collections import Counter
-from collections.abc import Iterable, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from math import isfinite
+from typing import Any
 
 from corporeal.geometry.identity import Identity
-from corporeal.types import Finish, PartWords, Scene, SceneObject, Surface
+from corporeal.types import (
+    MATTER,
+    SUBSTANCE,
+    Finish,
+    Ground,
+    PartWords,
+    Range,
+    Scene,
+    SceneObject,
+    Surface,
+)
 from corporeal.vlm.lexicon import (
     KINDS,
     Name,
     Saying,
     emptied,
     heads,
+    hollow,
     lookbook,
     metals,
     seen_as,
@@ -25,7 +37,7 @@ WEAKER = 0.6
 METALLIC = 0.5
 """Metallic value from which most of a surface is metal: a picture's value is its mean."""
 LONGEST_WALL = 10.0
-"""No wall of a thing is thicker [m]."""
+"""No wall of an object is thicker [m]."""
 UNKNOWN = PartWords("", None, reason="No name in the file says what this is made of.")
 
 
@@ -122,14 +134,93 @@ def _prefix(names: Sequence[str]) -> tuple[str, ...]:
 
 def stated_substance(surfaces: Iterable[Surface]) -> str | None:
     """Return what the nodes state outright in their extras, or None."""
-    said = {str(s.extras["substance"]) for s in surfaces if s.extras.get("substance")}
+    said = {str(s.extras[SUBSTANCE]) for s in surfaces if s.extras.get(SUBSTANCE)}
     return said.pop() if len(said) == 1 else None
 
 
 def stated_thickness(surfaces: Iterable[Surface]) -> float | None:
-    """Return the wall thickness [m] that the nodes state; 0: stated solid; None: not said."""
+    """Return the wall thickness [m] that the nodes state; 0: stated solid; None: unknown."""
     said = {_length(s.extras.get("shell_thickness_m")) for s in surfaces}
     return said.pop() if len(said) == 1 else None
+
+
+def stated_inflation(surfaces: Iterable[Surface]) -> float | None:
+    """Return the gauge pressure [Pa] of the air that the nodes say is sealed in; None: none is."""
+    said = {_pressure(s.extras.get("inflation_kPa")) for s in surfaces}
+    return said.pop() if len(said) == 1 else None
+
+
+def usual_inflation(evidence: Evidence) -> float | None:
+    """Gauge pressure [Pa] in a thing of such a name, which is one part; None: it is not sealed."""
+    told = [s for name in evidence.general for s in heads(name.words) if s.kind == "thing"]
+    longest = max((len(s.phrase) for s in told), default=0)
+    said = {s.inflation for s in told if len(s.phrase) == longest}
+    return said.pop() if evidence.alone and len(said) == 1 else None
+
+
+SEALABLE = ("shell", "hollow")
+"""Structures that air can be sealed in."""
+HIGHEST_INFLATION = 1e6
+"""No ball or tyre is inflated to more [Pa]."""
+
+
+def _pressure(said: object) -> float | None:
+    """Return a foreign file's number where it can be a gauge pressure in kPa, in Pa."""
+    if isinstance(said, bool) or not isinstance(said, int | float):
+        return None
+    return 1e3 * float(said) if isfinite(said) and 0 <= 1e3 * said <= HIGHEST_INFLATION else None
+
+
+def stated_values(surfaces: Iterable[Surface]) -> dict[str, Ground]:
+    """Return the numbers that a file states of a part's matter, with who says so.
+
+    Field of ``Material`` → value; where the file names no range it is the value alone. What cannot
+    be such a number is left out, and where surfaces of a part differ, the first counts.
+    """
+    for surface in surfaces:
+        rows = _mapping(_mapping(surface.extras.get(MATTER)).get("values"))
+        found = {str(name): _ground(_mapping(row)) for name, row in rows.items()}
+        if found:
+            return {name: ground for name, ground in found.items() if ground}
+    return {}
+
+
+def _mapping(said: object) -> Mapping[str, Any]:
+    return said if isinstance(said, Mapping) else {}
+
+
+def _ground(row: Mapping[str, Any]) -> Ground | None:
+    value, source = row.get("value"), str(row.get("source", ""))[:500]
+    interval = row.get("range") or (value, value)
+    numbers = [value, *interval] if isinstance(interval, list | tuple) else []
+    good = all(isinstance(x, int | float) and not isinstance(x, bool) for x in numbers)
+    if len(numbers) != 3 or not good or not all(map(isfinite, numbers)):
+        return None
+    value, low, high = (float(x) for x in numbers)
+    if not low <= value <= high:
+        return None
+    reason = str(row.get("reason") or source)[:500]
+    sure = row.get("margin", 1.0)
+    margin = float(sure) if isinstance(sure, int | float) and 0 <= sure <= 1 else 1.0
+    by = str(row.get("chosen_by", "annotation"))
+    return Ground(value, Range(low, value, high, source), by, reason, margin)
+
+
+def as_stated(words: PartWords, surfaces: Iterable[Surface]) -> PartWords:
+    """Take over how a file of ours says that a part is built."""
+    said = next((s.extras[MATTER] for s in surfaces if MATTER in s.extras), None)
+    row = _mapping(_mapping(said).get("words"))
+    structure, contents = row.get("structure"), row.get("contents")
+    if structure not in ("solid", "shell", "filled"):
+        return words
+    fill = row.get("fill")
+    return replace(
+        words,
+        structure=structure,
+        thickness=_length(row.get("thickness")) or None,
+        contents=contents if isinstance(contents, str) else None,
+        fill=float(fill) if isinstance(fill, int | float) and 0 < fill <= 1 else None,
+    )
 
 
 def _length(said: object) -> float | None:
@@ -147,6 +238,35 @@ def walled(words: PartWords, thickness: float | None) -> PartWords:
         return replace(words, structure="solid", thickness=None, contents=None, fill=None)
     filled = words.structure == "filled"
     return replace(words, structure="filled" if filled else "shell", thickness=thickness)
+
+
+def sealed(words: PartWords, stated: float | None, usual: float | None) -> PartWords:
+    """Put air behind the wall of what is a shell.
+
+    Args:
+        words: Of one part.
+        stated: Gauge pressure that somebody states [Pa]; None: nobody.
+        usual: That such things have [Pa]; None: they are not sealed.
+
+    """
+    if words.structure not in SEALABLE:
+        return words
+    return replace(words, inflation=usual if stated is None else stated)
+
+
+def hollowed(words: PartWords, evidence: Evidence, walled: Callable[[str], bool]) -> PartWords:
+    """Let what is hollow by what it is have a wall, where nobody says how it is built.
+
+    Args:
+        words: What was recognised of a part.
+        evidence: All that the file says about it.
+        walled: Tells whether walls of a material were ever measured.
+
+    """
+    said = words.structure is None and any(hollow(name.words) for name in evidence.general)
+    if not said or not (words.material is None or walled(words.material)):
+        return words
+    return replace(words, structure="shell")
 
 
 def matter_hint(surface: Surface, finish: Finish) -> str:
@@ -174,7 +294,8 @@ def _own_names(evidence: Evidence) -> PartWords | None:
 
 
 def _general_names(evidence: Evidence) -> PartWords | None:
-    sayings, name = _told(evidence.general, evidence.finishes, ("substance", "thing"), ())
+    kinds, names = ("substance", "thing"), evidence.general
+    sayings, name = _told(names, evidence.finishes, kinds, names)
     if not sayings:
         return None
     if evidence.alone or sayings[0].every:
@@ -186,7 +307,7 @@ def _general_names(evidence: Evidence) -> PartWords | None:
 
 
 def _looks(evidence: Evidence) -> PartWords | None:
-    """Tell a part by its plain colour where the thing has a part that looks so."""
+    """Tell a part by its plain colour where the object has a part that looks so."""
     if evidence.alone or any(f.texture is not None for f in evidence.finishes):
         return None
     around = {w for name in evidence.general for w in name.words}
@@ -232,7 +353,7 @@ def _emptied(answer: PartWords, evidence: Evidence) -> PartWords:
 
 
 def _of_metal(sayings: list[Saying], evidence: Evidence) -> list[Saying]:
-    """Let a thing that looks metallic be of the metal that such things are made of."""
+    """Let an object that looks metallic be of the metal that such objects are made of."""
     if not _metallic(evidence):
         return sayings
     return [replace(s, material=s.metallic or s.material) for s in sayings]
@@ -256,6 +377,7 @@ def _answer(sayings: list[Saying], name: str, factor: float) -> PartWords:
         reason=reason,
         contents=said.contents,
         fill=said.fill,
+        inflation=said.inflation,
     )
 
 
@@ -264,14 +386,20 @@ def _told(
 ) -> tuple[list[Saying], str]:
     """Find the strongest sayings in any of the names, and the name they stand in.
 
-    Longest phrase first, then substance before piece before thing; a piece's phrase is never more
-    telling than a substance ("oak table top"), nor is a thing's than the one right before it
+    Longest phrase first, then substance before piece before object; a piece's phrase is never more
+    telling than a substance ("oak table top"), nor is an object's than the one right before it
     ("steel trash can"). Several are returned when equally strong ones stand in the names.
     """
     found: list[tuple[tuple[int, int, int], Saying, str]] = []
     around = {w for name in thing for w in name.words}
+    nameless = thing and not any(_names_a_thing(name) for name in (*names, *thing))
+    shiny = any(f.metallic > METALLIC for f in finishes)
     for name in names:
         for saying in _adjectives(name):
+            if saying.colour and not shiny:
+                if not (saying.seldom and nameless):
+                    continue
+                saying = replace(saying, margin=saying.margin * WEAKER)
             if saying.kind in kinds and _fits(saying, finishes, around | set(name.words)):
                 length = len(saying.phrase)
                 said = 1 if saying.kind == "piece" else max(length, saying.before)
@@ -286,8 +414,13 @@ def _told(
     return _particular([s for s, _ in kept]), kept[0][1]
 
 
+def _names_a_thing(name: Name) -> bool:
+    """Tell whether a name has a word for a thing, or a piece of one."""
+    return any(s.kind != "substance" for s in heads(name.words))
+
+
 def _adjectives(name: Name) -> list[Saying]:
-    """Find what stands in a name; a substance right before a thing is that of such a thing."""
+    """Find what stands in a name; a substance right before an object is that of such an object."""
     standing = heads(name.words)
     things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
     for k, saying in enumerate(standing):
@@ -298,7 +431,7 @@ def _adjectives(name: Name) -> list[Saying]:
 
 
 def _made_as(substance: Saying, thing: Saying) -> Saying:
-    """Return a substance built as a thing is; how thick depends on what it is usually made of."""
+    """Return a substance built as an object is; how thick depends on what it is usually made of."""
     same = substance.material == thing.material
     return replace(
         substance,
@@ -306,6 +439,7 @@ def _made_as(substance: Saying, thing: Saying) -> Saying:
         structure=thing.structure,
         contents=thing.contents,
         fill=thing.fill,
+        inflation=thing.inflation,
         thickness=thing.thickness if same else None,
         every=same and thing.every,
     )
@@ -317,8 +451,6 @@ def _particular(sayings: list[Saying]) -> list[Saying]:
 
 
 def _fits(saying: Saying, finishes: Sequence[Finish], around: set[str]) -> bool:
-    if saying.colour and not any(f.metallic > 0.5 for f in finishes):
-        return False
     if saying.alpha and not all(f.alpha_mode == saying.alpha for f in finishes):
         return False
     return not saying.of or bool(around & {singular(w) for w in saying.of})

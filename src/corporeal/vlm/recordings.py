@@ -62,6 +62,14 @@ class Recordings:
             return f"No recording in {self.folder}: nothing answers {about}."
         nearest = max(self.rows, key=lambda row: [row[f] == wanted[f] for f in FIELDS])
         differs = next(f for f in FIELDS if nearest[f] != wanted[f])
+        if differs in ("prompt", "schema"):
+            return (
+                f"The answers in {self.folder} are to another wording of the questions "
+                f"({nearest['file']} differs in {differs!r}: recorded "
+                f"{_short(nearest[differs], wanted[differs])}, asked "
+                f"{_short(wanted[differs], nearest[differs])}): record them again, or use "
+                "--vlm metadata."
+            )
         return (
             f"No recording in {self.folder} answers {about}. The nearest, {nearest['file']}, "
             f"differs in {differs!r}: recorded {_short(nearest[differs], wanted[differs])}, asked "

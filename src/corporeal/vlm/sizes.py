@@ -1,17 +1,18 @@
-"""How large real things are: asked of a model in words, or read in a table, never computed.
+"""How large real objects are: asked of a model in words, or read in a table, never computed.
 
 Each class is a question of its own, so that its answer is recorded, replayed and paid for once,
 whatever else stands in a scene.
 """
 
 from collections.abc import Iterable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
 from corporeal.formats.typical_extents import MARGIN, typical_extent
+from corporeal.types import NOTHING_ASKED, Usage
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Subject
@@ -30,7 +31,7 @@ SAID = {"model": "a model", "recording": "a recorded answer"}
 
 @dataclass(frozen=True)
 class UsualSize:
-    """How large one class of things usually is along its longest side."""
+    """How large one class of objects usually is along its longest side."""
 
     class_name: str
     low: float
@@ -53,15 +54,15 @@ class Sizes:
     """Class → its usual size; a class that nobody knows is not in it."""
     transcript: tuple[dict, ...] = ()
     """Every question put to a model with its answer, as data."""
-    usage: dict = field(default_factory=dict)
-    """What the questions took: calls, tokens, US dollars where the price is known, seconds."""
+    usage: Usage = NOTHING_ASKED
+    """What the questions took."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the answers, in sentences."""
 
 
 @dataclass(frozen=True)
 class RealExtent:
-    """How large one real thing is, and who said so."""
+    """How large one real object is, and who said so."""
 
     extent: float
     """Largest extent [m]."""
@@ -75,10 +76,10 @@ class RealExtent:
 
 
 def usual_sizes(classes: Iterable[str], vlm: str = "metadata", record: Path | None = None) -> Sizes:
-    """Find out how large things of each class usually are: a model first, then the table.
+    """Find out how large objects of each class usually are: a model first, then the table.
 
     Args:
-        classes: What things are, in words; doubles are asked about once.
+        classes: What objects are, in words; doubles are asked about once.
         vlm: Whom to ask, as a person types it; "metadata": nobody.
         record: Folder where every answer is kept for "replay:FOLDER".
 
@@ -105,7 +106,7 @@ def usual_sizes(classes: Iterable[str], vlm: str = "metadata", record: Path | No
 def real_extent(
     name: str, class_name: str, extent: float, metric: bool, sizes: Sizes
 ) -> RealExtent:
-    """Say how large the real thing is of which a file holds a model.
+    """Say how large the real object is of which a file holds a model.
 
     A file in metres is the truth, and what is said of its class can only doubt it. Otherwise the
     usual size of its class counts, and where nobody knows that, a neutral stand-in.
@@ -164,7 +165,7 @@ def _tabled(class_name: str) -> UsualSize | None:
     found = typical_extent(class_name)
     if found is None:
         return None
-    reason = f"{length(found.usual)} is usual for such things: {found.words}."
+    reason = f"{length(found.usual)} is usual for such objects: {found.words}."
     return UsualSize(class_name, found.low, found.usual, found.high, "table", TABLE, reason)
 
 
@@ -178,7 +179,7 @@ def _against(said: UsualSize, known: UsualSize | None) -> str:
     if known is None or known.low / MARGIN <= said.usual <= known.high * MARGIN:
         return ""
     return (
-        f"According to {_whose(said)}, {length(said.usual)} is usual for things like this: "
+        f"According to {_whose(said)}, {length(said.usual)} is usual for objects like this: "
         f"{said.class_name}; {TABLE} knows {length(known.low)} to {length(known.high)}. "
         "The former was believed."
     )
@@ -190,6 +191,6 @@ def _beyond(name: str, extent: float, known: UsualSize | None) -> str:
         return ""
     return (
         f"{name} is {length(extent)} large in its file, which is in metres; {_whose(known)} knows "
-        f"such things ({known.class_name}) from {length(known.low)} to {length(known.high)}. The "
+        f"such objects ({known.class_name}) from {length(known.low)} to {length(known.high)}. The "
         "file was believed."
     )

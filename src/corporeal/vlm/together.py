@@ -1,11 +1,21 @@
-"""Do several things at once that mostly wait for somebody else."""
+"""Do several jobs at once that mostly wait for somebody else."""
 
 from collections.abc import Callable, Sequence
+from dataclasses import dataclass
 from queue import Empty, SimpleQueue
 from threading import Thread
-from typing import TypeVar
+from typing import Any, TypeVar
 
 Result = TypeVar("Result")
+
+
+@dataclass(frozen=True)
+class _Done:
+    """A job that ended."""
+
+    number: int
+    result: Any
+    """What it returned, or the exception that it raised."""
 
 
 def together(
@@ -21,7 +31,7 @@ def together(
     Args:
         jobs: What is to be done.
         at_once: How many threads.
-        done: Told after each job how many are finished.
+        done: Called after each job how many are finished.
         fatal: Tells which errors make the rest not worth waiting for.
 
     Raises:
@@ -29,18 +39,19 @@ def together(
 
     """
     waiting: SimpleQueue[int] = SimpleQueue()
-    finished: SimpleQueue[tuple[int, Result | Exception]] = SimpleQueue()
+    finished: SimpleQueue[_Done] = SimpleQueue()
     for number in range(len(jobs)):
         waiting.put(number)
     for _ in range(min(max(at_once, 1), len(jobs))):
         Thread(target=_work, args=(jobs, waiting, finished), daemon=True).start()
     results = {}
     for count in range(1, len(jobs) + 1):
-        number, result = finished.get()
+        ended = finished.get()
+        result = ended.result
         if isinstance(result, Exception) and fatal(result):
             _drop(waiting)
             raise result
-        results[number] = result
+        results[ended.number] = result
         done(count)
     return [results[number] for number in range(len(jobs))]
 
@@ -56,7 +67,7 @@ def _drop(waiting: SimpleQueue[int]) -> None:
 def _work(
     jobs: Sequence[Callable[[], Result]],
     waiting: SimpleQueue[int],
-    finished: SimpleQueue[tuple[int, Result | Exception]],
+    finished: SimpleQueue[_Done],
 ) -> None:
     while True:
         try:
@@ -64,6 +75,6 @@ def _work(
         except Empty:
             return
         try:
-            finished.put((number, jobs[number]()))
+            finished.put(_Done(number, jobs[number]()))
         except Exception as error:  # whoever asked for the result decides
-            finished.put((number, error))
+            finished.put(_Done(number, error))

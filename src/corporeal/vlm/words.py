@@ -4,8 +4,27 @@ from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
 from typing import Literal
 
-from corporeal.types import ObjectWords, PartWords, Placement, SceneObject
-from corporeal.vlm.answers import MaterialsAnswer, PartAnswer, Vocabulary
+from corporeal.types import (
+    NOTHING_ASKED,
+    Evidence,
+    Hypothesis,
+    ObjectWords,
+    PartWords,
+    Placement,
+    PrintedFact,
+    SceneObject,
+    Usage,
+    in_way,
+)
+from corporeal.vlm.answers import (
+    CUBIC_METRES,
+    KILOGRAMS,
+    METRES,
+    MassAnswer,
+    MaterialsAnswer,
+    PartAnswer,
+    Vocabulary,
+)
 from corporeal.vlm.prices import date, dollars
 
 Asked = Literal["model", "recording"]
@@ -19,28 +38,54 @@ FAR = 2.5
 
 def part_words(answer: MaterialsAnswer, by: Asked, names: Vocabulary) -> list[PartWords]:
     """Turn an answer that was checked into words, one per part; unknown parts have no material."""
+    outside = [p for p in answer.parts if p.inside is None and not p.missing]
     total = [
-        sum(getattr(p, what) or 0.0 for p in answer.parts)
-        for what in ("volume_share", "surface_share")
+        sum(getattr(p, what) or 0.0 for p in outside) for what in ("volume_share", "surface_share")
     ]
-    return [_words(part, by, names, (total[0], total[1])) for part in answer.parts]
+    within = {
+        part.part: sum(p.volume_share or 0.0 for p in answer.parts if p.inside == part.part)
+        for part in answer.parts
+    }
+    return [
+        replace(
+            as_said(PartWords(part.part, None), ways_of(part, names), by),
+            volume_share=_share(part.volume_share, total[0]),
+            surface_share=_share(part.surface_share, total[1]),
+            inside=part.inside or "",
+            inner_share=_share(within[part.part], total[0]) if within[part.part] else 0.0,
+            missing=part.missing,
+        )
+        for part in answer.parts
+    ]
 
 
-def _words(said: PartAnswer, by: Asked, names: Vocabulary, total: tuple[float, float]) -> PartWords:
-    made = None if said.material is None else names.material(said.material)
-    others = [(names.material(a.material) or "", a.probability) for a in said.alternatives]
-    return PartWords(
-        name=said.part,
-        material=made,
-        structure=said.structure,
-        answered_by=by if made else "unknown",
-        margin=said.probability if made else 0.0,
-        reason=said.reason,
-        contents=names.contents(said.contents) if said.contents else None,
-        fill=said.fill if said.structure == "filled" else None,
-        alternatives=tuple((n, p) for n, p in others if n != made and p > 0),
-        volume_share=_share(said.volume_share, total[0]),
-        surface_share=_share(said.surface_share, total[1]),
+def ways_of(said: PartAnswer, names: Vocabulary) -> tuple[Hypothesis, ...]:
+    """Return the ways a part may be, likeliest first; probabilities add up to 1 at most."""
+    total = max(sum(way.probability for way in said.ways), 1.0)
+    ways = [
+        Hypothesis(
+            material=None if way.material is None else names.material(way.material),
+            structure=way.built,
+            probability=way.probability / total,
+            contents=names.contents(way.contents) if way.contents else None,
+            fill=way.fill if way.built == "filled" else None,
+            solidity=way.solidity if way.built == "packed" else None,
+            reading=way.reading.strip().lower(),
+            reason=way.reason,
+        )
+        for way in said.ways
+        if way.probability > 0
+    ]
+    return tuple(sorted(ways, key=lambda way: -way.probability))
+
+
+def as_said(words: PartWords, ways: tuple[Hypothesis, ...], by: Asked) -> PartWords:
+    """Let the likeliest way speak for a part, and keep all of them."""
+    return replace(
+        in_way(words, ways[0]),
+        answered_by=by if ways[0].material else "unknown",
+        margin=ways[0].probability if ways[0].material else 0.0,
+        hypotheses=ways,
         built_by=by,
     )
 
@@ -55,16 +100,24 @@ def gathered(name: str, pieces: Sequence[PartWords]) -> PartWords:
     if len(pieces) == 1:
         return replace(pieces[0], name=name)
     known = [p for p in pieces if p.material is not None] or list(pieces)
-    main = max(known, key=lambda p: (p.volume_share, p.surface_share))
+    main = max(known, key=lambda p: (p.volume_share - p.inner_share, p.surface_share))
     share = main.volume_share
     others = ", ".join(p.name for p in pieces if p is not main)
     reason = f"{main.name}, {share:.0%} of the volume, beside {others}. {main.reason}"
     return replace(
-        main, name=name, reason=reason, volume_share=1.0, surface_share=1.0, pieces=tuple(pieces)
+        main,
+        name=name,
+        reason=reason,
+        volume_share=1.0,
+        surface_share=1.0,
+        inside="",
+        inner_share=0.0,
+        missing=False,
+        pieces=tuple(pieces),
     )
 
 
-def settled(said: PartWords, file: PartWords, walled: Callable[[str], bool]) -> PartWords:
+def resolved(said: PartWords, file: PartWords, walled: Callable[[str], bool]) -> PartWords:
     """Let the file name the material that a model could not, and keep all else that it said.
 
     Args:
@@ -87,11 +140,43 @@ def settled(said: PartWords, file: PartWords, walled: Callable[[str], bool]) -> 
         own,
         name=said.name,
         reason=f"The pictures do not show what it is made of: {why}{file.reason}",
-        alternatives=tuple((n, p) for n, p in said.alternatives if n != file.material),
+        hypotheses=_completed(said.hypotheses, own),
         volume_share=said.volume_share,
         surface_share=said.surface_share,
-        pieces=tuple(settled(piece, file, walled) for piece in said.pieces),
+        inside=said.inside,
+        inner_share=said.inner_share,
+        missing=said.missing,
+        pieces=tuple(resolved(piece, file, walled) for piece in said.pieces),
     )
+
+
+def _completed(ways: Sequence[Hypothesis], file: PartWords) -> tuple[Hypothesis, ...]:
+    """Let the file's material stand in the ways that name none."""
+    return tuple(
+        replace(
+            way,
+            material=file.material,
+            structure=file.structure,
+            contents=file.contents,
+            fill=file.fill,
+        )
+        if way.material is None
+        else way
+        for way in ways
+    )
+
+
+def evidence_of(said: MassAnswer, by: Asked) -> Evidence:
+    """Turn what was said of an object's mass into SI."""
+    printed = tuple(
+        PrintedFact(fact.kind, _si(fact.number, fact.unit), fact.words) for fact in said.printed
+    )
+    return Evidence(said.low_kg, said.likely_kg, said.high_kg, said.reason, printed, by)
+
+
+def _si(number: float | None, unit: str) -> float | None:
+    factor = (KILOGRAMS | CUBIC_METRES | METRES).get(unit)
+    return None if number is None or factor is None else number * factor
 
 
 def against(words: PartWords, material: str | None, wall: float | None, put: float | None) -> str:
@@ -100,7 +185,7 @@ def against(words: PartWords, material: str | None, wall: float | None, put: flo
     Args:
         words: What is believed of a part.
         material: What the file states it is made of.
-        wall: How thick the file states its wall is [m]; 0: stated solid; None: not said.
+        wall: How thick the file states its wall is [m]; 0: stated solid; None: unknown.
         put: How thick the model put its wall [m].
 
     """
@@ -118,9 +203,19 @@ def against(words: PartWords, material: str | None, wall: float | None, put: flo
     return f"the file states {', '.join(stated)} for {words.name}, {who} said {', '.join(said)}"
 
 
+def another(name: str, number: int) -> str:
+    """Name one of the ways of a part that placement is asked about; the first is the part."""
+    return name if number == 0 else f"{name}, way {number + 1}"
+
+
 def placed(words: PartWords, placements: Mapping[str, Mapping[str, Placement]]) -> PartWords:
-    """Give a part, and each of its pieces, the places that were chosen under its name."""
+    """Give a part, its ways and its pieces the places that were chosen under their names."""
     own = dict(placements.get(words.name, {}))
+    ways = tuple(
+        replace(way, placements=dict(placements.get(another(words.name, k), {})))
+        for k, way in enumerate(words.hypotheses)
+    )
+    words = replace(words, hypotheses=ways)
     pieces = tuple(placed(piece, placements) for piece in words.pieces)
     if pieces:
         main = max(pieces, key=lambda p: (p.material == words.material, p.volume_share))
@@ -133,6 +228,13 @@ def leaves(words: Sequence[PartWords]) -> list[PartWords]:
     return [leaf for part in words for leaf in (part.pieces or (part,))]
 
 
+def sides(lengths: Sequence[float]) -> str:
+    """Write the sides of a box, longest first, as a person would."""
+    ordered = sorted(lengths, reverse=True)
+    unit, factor = ("m", 1.0) if ordered[0] >= 1 else ("cm", 100.0)
+    return " × ".join(f"{factor * side:.3g}" for side in ordered) + f" {unit}"
+
+
 def length(metres: float) -> str:
     """Write a length as a person would."""
     if metres >= 1000:
@@ -143,7 +245,7 @@ def length(metres: float) -> str:
 def with_extents(
     things: Sequence[SceneObject], objects: Sequence[ObjectWords], usual: Mapping[str, float]
 ) -> tuple[list[ObjectWords], list[str]]:
-    """Keep how large things usually are [m], and say which of them are far from it."""
+    """Keep how large objects usually are [m], and say which of them are far from it."""
     sized, doubts = [], []
     for thing, words in zip(things, objects, strict=True):
         kind = thing.class_name or thing.name
@@ -151,31 +253,30 @@ def with_extents(
         sized.append(replace(words, usual_extent=usually))
         if usually and not 1 / FAR <= size / usually <= FAR:
             doubts.append(
-                f"{thing.name} is {length(size)} large, but the model says that a thing like that "
-                f"({kind}) is usually about {length(usually)}. Set its size with --extent "
+                f"{thing.name} is {length(size)} large, but the model says that an object like "
+                f"that ({kind}) is usually about {length(usually)}. Set its size with --extent "
                 f"{thing.name}={float(f'{usually:.3g}'):g}."
             )
     return sized, doubts
 
 
-def usage(transcript: Sequence[Mapping]) -> dict:
+def usage(transcript: Sequence[Mapping]) -> Usage:
     """Add up what the questions took; no price is given where one model's price is not known."""
     rows = [r for r in transcript if r.get("answer") is not None]
     if not rows:
-        return {}
+        return NOTHING_ASKED
     costs = [
         dollars(r["model"], r["input_tokens"], r["output_tokens"]) if r["calls"] else 0.0
         for r in rows
     ]
     known = None if None in costs else round(sum(c or 0.0 for c in costs), 6)
-    total = {
-        what: sum(r[what] for r in rows)
-        for what in ("calls", "input_tokens", "output_tokens", "seconds")
-    }
-    return {
-        "models": sorted({r["model"] for r in rows}),
-        "questions": len(transcript),
-        **total,
-        "dollars": known,
-        "prices_of": date(),
-    }
+    return Usage(
+        models=tuple(sorted({r["model"] for r in rows})),
+        questions=len(transcript),
+        calls=sum(r["calls"] for r in rows),
+        input_tokens=sum(r["input_tokens"] for r in rows),
+        output_tokens=sum(r["output_tokens"] for r in rows),
+        seconds=sum(r["seconds"] for r in rows),
+        dollars=known,
+        prices_of=date(),
+    )

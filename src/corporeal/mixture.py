@@ -1,0 +1,410 @@
+"""What objects may weigh: over all ways they may be, all ranges, and what their meshes leave open.
+
+Draws of the whole scene are weighed; what was said of an object's mass without the library
+(``Evidence``) gives each draw a weight, and sets no value: whatever is chosen was drawn, lies
+inside measured ranges, and its parts fit each other.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from math import log
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.geometry.arrangement import life_sized
+from corporeal.geometry.make import weight
+from corporeal.geometry.room import is_vessel, room_of
+from corporeal.geometry.survey import Anatomy, Member
+from corporeal.materials.ensemble import otherwise, sample
+from corporeal.materials.placement import CONTENTS, WEIGHING
+from corporeal.materials.scale import fraction_of
+from corporeal.stages.fill import examine
+from corporeal.stages.ground import GroundConfig, ground
+from corporeal.types import (
+    Evidence,
+    Inventory,
+    MassMixture,
+    Material,
+    MaterialField,
+    ObjectWords,
+    Parts,
+    PartWords,
+    Placement,
+    Scene,
+    Structure,
+    WeighedHypothesis,
+)
+
+DRAWS = 400
+"""Of the whole scene, where nobody says how many."""
+LOW, HIGH = 0.05, 0.95
+"""Quantiles of the draws that bound an interval."""
+NINE_IN_TEN = 3.29
+"""Width of the interval that holds 90 % of a normal distribution, in standard deviations."""
+JUDGED = 0.25
+"""Standard deviation of the logarithm of a judged mass, at least [-]: direct answers on things that
+no data set publishes are off by a fifth (ALDE .20)."""
+PACKAGING = 1.12
+"""Usual mass of packaged goods over their printed net weight [-]."""
+PRINTED = 0.12
+"""Standard deviation of the logarithm of a mass that follows from a printed weight [-]."""
+WRONG = 0.02
+"""How likely outside evidence is about something else altogether [-]."""
+FAR = 3.0
+"""Evidence that is further from every draw than this many of its widths contradicts them."""
+SCANNED, EVEN = 3000, 0.6
+"""A mesh of more triangles than this, whose edges' logarithms spread less than that, is a scan."""
+MOST_DOUBT = log(2.0)
+TRIES = 200
+"""Draws of an object, until one is as likely as outside evidence leaves it."""
+OPEN = 0.3
+"""Standard deviation of the logarithm of the volume of what is not closed [-]."""
+SAID_BY = "What was said of the object's mass fits best here, of all draws from this range."
+
+
+@dataclass(frozen=True)
+class Believed:
+    """What is believed of a scene once its masses have been weighed."""
+
+    inventory: Inventory
+    """With the way that each part is taken to be."""
+    mixtures: tuple[MassMixture, ...]
+    """One per object."""
+
+
+@dataclass(frozen=True)
+class Draw:
+    """One consistent set of ways and values."""
+
+    inventory: Inventory
+    field: MaterialField
+    masses: Float[np.ndarray, " B"]
+    """Of each object, at its real size [kg]."""
+
+
+class Scale:
+    """Weighs one scene as it is described; measures its meshes once."""
+
+    def __init__(self, scene: Scene, parts: Parts, grounding: GroundConfig, seed: int) -> None:
+        self.scene, self.parts, self.grounding, self.seed = scene, parts, grounding, seed
+        self.anatomies: list[Anatomy] = examine(scene, parts, seed)
+        members = [(a, m) for a in self.anatomies for m in a.members]
+        self.members = [m for _, m in members]
+        self.rooms = [
+            room_of(a, m, 0.0, np.random.default_rng([seed, m.part, 5])).volume
+            if is_vessel(m)
+            else 0.0
+            for a, m in members
+        ]
+        self.owner = [p.object for p in parts.catalogue]
+        self.doubts = [doubt(m) for m in self.members]
+        self.volume = sum(m.volume for m in self.members)
+        """Of everything that is enclosed [m³]."""
+
+    def mass(self, inventory: Inventory) -> float:
+        """Return the mass of the whole scene, described so [kg]."""
+        return float(self.of(ground(self.scene, self.parts, inventory, self.grounding)).sum())
+
+    def of(
+        self, field: MaterialField, factors: Sequence[float] | None = None
+    ) -> Float[np.ndarray, " B"]:
+        """Return the mass of each object [kg].
+
+        Args:
+            field: What it is made of.
+            factors: Of the volume of each member that has no wall; None: as its mesh says.
+
+        """
+        found = np.zeros(len(self.scene.objects))
+        for k, (member, room) in enumerate(zip(self.members, self.rooms, strict=True)):
+            solid = field.structures[member.part].kind == "solid"
+            factor = 1.0 if factors is None or not solid else factors[k]
+            found[self.owner[member.part]] += factor * weight(member, field, room)
+        return found
+
+    def draw(self, inventory: Inventory, number: int) -> Draw:
+        """Draw a way for each part, values from their ranges, and what the meshes leave open."""
+        rng = np.random.default_rng([self.seed, number])
+        library, floor = self.grounding.library, self.grounding.floor
+        words = otherwise(inventory, rng, library)
+        field = ground(self.scene, self.parts, words, self.grounding)
+        field = sample(field, self.owner, rng, library, floor)
+        factors = [float(np.exp(rng.normal(-d / 2, d))) if d else 1.0 for d in self.doubts]
+        return Draw(words, field, self.of(field, factors))
+
+
+def doubt(member: Member) -> float:
+    """Return how far the mesh leaves a solid's volume open: deviation of its logarithm [-].
+
+    The surface of a scan lies within half an edge of the real one, so its volume is open by
+    A (h/2) / V = h / τ, with the median edge h and the mean thickness τ = 2 V / A; and it is more
+    often too large than too small, by half of that: fusing views thickens what is thin.
+    """
+    mesh = member.body
+    found = 0.0 if member.closed else OPEN
+    if len(mesh.triangles) > SCANNED and member.volume > 0:
+        corners = mesh.corners
+        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
+        edges = edges[edges > 0]
+        if np.std(np.log(edges)) < EVEN:
+            thickness = 2 * member.volume / member.body_area
+            found = float(np.hypot(found, np.median(edges) / thickness))
+    return min(found, MOST_DOUBT)
+
+
+def ground_weighed(
+    scene: Scene, parts: Parts, inventory: Inventory, grounding: GroundConfig
+) -> MaterialField:
+    """Choose every value, as ``ground`` does; where a model was asked, weigh what it said first.
+
+    Raises:
+        UserError: As ``ground``.
+
+    """
+    if not inventory.transcript:  # nothing but ranges is open
+        return ground(scene, parts, inventory, grounding)
+    believed = weighed(Scale(life_sized(scene), parts, grounding, 0), inventory, DRAWS)
+    found = ground(scene, parts, believed.inventory, grounding)
+    return replace(found, mixtures=believed.mixtures)
+
+
+def weighed(scale: Scale, inventory: Inventory, samples: int) -> Believed:
+    """Draw what each object may be and weigh, and choose among the ways by outside evidence."""
+    draws = [scale.draw(inventory, number) for number in range(samples)]
+    placed = scale.of(ground(scale.scene, scale.parts, inventory, scale.grounding))
+    objects, mixtures = [], []
+    for k, words in enumerate(inventory.objects):
+        doubted = any(len(p.hypotheses) > 1 or p.material is None for p in _leaves(words))
+        doubted |= any(
+            d for m, d in zip(scale.members, scale.doubts, strict=True) if scale.owner[m.part] == k
+        )
+        known = None if doubted else float(placed[k])
+        own = _Own(words, k, draws)
+        mixture = own.mixture(known)
+        objects.append(own.chosen(mixture, scale) if words.evidence else words)
+        mixtures.append(mixture)
+    return Believed(replace(inventory, objects=tuple(objects)), tuple(mixtures))
+
+
+def drawn_given(
+    inventory: Inventory,
+    mixtures: Sequence[MassMixture],
+    rng: np.random.Generator,
+    library: str,
+) -> Inventory:
+    """Draw a way for every part, as often as outside evidence leaves it likely.
+
+    Args:
+        inventory: What was described.
+        mixtures: What its objects may weigh, in their order; empty: nobody was asked.
+        rng: Source of the draw.
+        library: Where materials are looked up.
+
+    """
+    words = otherwise(inventory, rng, library)
+    if not mixtures:
+        return words
+    found = []
+    for described, drawn, mixture in zip(inventory.objects, words.objects, mixtures, strict=True):
+        favour = {h.words: h.probability / h.prior for h in mixture.hypotheses if h.prior > 0}
+        most = max(favour.values())
+        alone = replace(inventory, objects=(described,))
+        for _ in range(TRIES):
+            if rng.uniform() * most < favour.get(label(described, drawn), 0.0):
+                break
+            (drawn,) = otherwise(alone, rng, library).objects
+        found.append(drawn)
+    return replace(inventory, objects=tuple(found))
+
+
+class _Own:
+    """One object's share of all draws."""
+
+    def __init__(self, words: ObjectWords, number: int, draws: Sequence[Draw]) -> None:
+        self.words, self.number, self.draws = words, number, draws
+        self.masses = np.array([d.masses[number] for d in draws])
+        self.labels = [label(words, d.inventory.objects[number]) for d in draws]
+        even = np.full(len(draws), 1 / len(draws))
+        self.even = even
+        self.weights = even * likelihood(self.masses, words.evidence)
+        self.weights /= self.weights.sum()
+
+    def mixture(self, known: float | None) -> MassMixture:
+        """Sum up; ``known`` is the mass where only ranges are open, and stays as it is [kg]."""
+        low0, mass0, high0 = quantiles(self.masses, self.even)
+        low, mass, high = quantiles(self.masses, self.weights)
+        if known is not None:
+            mass0 = known
+            mass = mass if self.words.evidence else known
+        return MassMixture(
+            object=self.words.name,
+            mass=mass,
+            low=min(low, mass),
+            high=max(high, mass),
+            mass_without=mass0,
+            low_without=min(low0, mass0),
+            high_without=max(high0, mass0),
+            hypotheses=self._hypotheses(),
+            evidence=self.words.evidence,
+            warning=contradiction(self.words, self.masses),
+        )
+
+    def _hypotheses(self) -> tuple[WeighedHypothesis, ...]:
+        labels = np.array(self.labels)
+        rows = []
+        for name in dict.fromkeys(self.labels):
+            own = labels == name
+            weights = self.weights[own] / max(float(self.weights[own].sum()), 1e-300)
+            rows.append(
+                WeighedHypothesis(
+                    words=name,
+                    probability=float(self.weights[own].sum()),
+                    prior=float(self.even[own].sum()),
+                    mass=quantiles(self.masses[own], weights)[1],
+                )
+            )
+        return tuple(sorted(rows, key=lambda row: -row.probability))
+
+    def chosen(self, mixture: MassMixture, scale: Scale) -> ObjectWords:
+        """Take the likeliest way, and of its draws the one that weighs most nearly the median."""
+        best = mixture.hypotheses[0].words
+        far = np.abs(np.log(self.masses / mixture.mass))
+        far[[name != best for name in self.labels]] = np.inf
+        draw = self.draws[int(np.argmin(far))]
+        names = {(p.object, p.name): k for k, p in enumerate(scale.parts.catalogue)}
+        parts = []
+        for words, drawn in zip(
+            self.words.parts, draw.inventory.objects[self.number].parts, strict=True
+        ):
+            k = names.get((self.number, words.name))
+            if k is None:
+                parts.append(words)
+            elif words.pieces:
+                rows = zip(words.pieces, drawn.pieces, draw.field.pieces[k], strict=True)
+                pieces = [_taken(p, q, r.material, r.structure) for p, q, r in rows]
+                main = max(pieces, key=lambda p: p.volume_share - p.inner_share)
+                kept = {
+                    name: getattr(words, name) for name in ("name", "volume_share", "surface_share")
+                }
+                parts.append(
+                    replace(
+                        main, **kept, inside="", inner_share=0.0, missing=False,
+                        reason=words.reason, pieces=tuple(pieces),
+                    )
+                )  # fmt: skip
+            else:
+                parts.append(
+                    _taken(words, drawn, draw.field.materials[k], draw.field.structures[k])
+                )
+        return replace(self.words, parts=tuple(parts))
+
+
+def _taken(words: PartWords, drawn: PartWords, made: Material, built: Structure) -> PartWords:
+    """Let a part be as it was drawn; what its mass hangs on stands where it was drawn."""
+    if not words.hypotheses or drawn.material is None or words.material is None:
+        return words
+    places = dict(drawn.placements)
+    for name in WEIGHING:
+        if name in made.grounds and (name == "density" or built.kind != "solid"):
+            ground = made.grounds[name]
+            places[name] = Placement(fraction_of(ground.range, ground.value), "evidence", SAID_BY)
+    if built.contents is not None:
+        ground = built.contents.grounds["density"]
+        places[CONTENTS] = Placement(fraction_of(ground.range, ground.value), "evidence", SAID_BY)
+    probability = {(h.material, h.structure, h.contents): h.probability for h in words.hypotheses}
+    return replace(
+        drawn,
+        placements=places,
+        margin=probability.get((drawn.material, drawn.structure, drawn.contents), words.margin),
+        fill=built.fill if built.contents is not None else drawn.fill,
+        solidity=built.solidity if drawn.structure == "packed" else drawn.solidity,
+    )
+
+
+# ---------------------------------------------------------------- evidence
+
+
+def likelihood(masses: Float[np.ndarray, " N"], said: Evidence | None) -> Float[np.ndarray, " N"]:
+    """Return how well each mass [kg] agrees with what was said: log-normal, or about nothing."""
+    found = np.ones(len(masses))
+    for centre, width in readings(said):
+        away = np.log(masses / centre) / width
+        found *= (1 - WRONG) * np.exp(-0.5 * away**2) + WRONG
+    return found
+
+
+def readings(said: Evidence | None) -> list[tuple[float, float]]:
+    """Return what was said as masses: centre [kg] and standard deviation of the logarithm."""
+    if said is None:
+        return []
+    width = log(said.high / said.low) / NINE_IN_TEN
+    found = [(said.likely, max(width, JUDGED))]
+    for kind, factor in (("net weight", PACKAGING), ("total weight", 1.0)):
+        values = [f.value for f in said.printed if f.kind == kind and f.value]
+        if values:  # the same in ounces and in grams is one statement
+            found.append((factor * float(np.median(values)), PRINTED))
+    return found
+
+
+def contradiction(words: ObjectWords, masses: Float[np.ndarray, " N"]) -> str:
+    """Say where evidence is far from every draw, and what would reconcile them; "": nowhere."""
+    clauses = []
+    for centre, width in readings(words.evidence):
+        away = np.log(masses / centre) / width
+        nearest = float(away[np.argmin(np.abs(away))])
+        if abs(nearest) > FAR:
+            clauses.append((centre, nearest))
+    if not clauses:
+        return ""
+    said, _ = max(clauses, key=lambda row: abs(row[1]))
+    low, high = float(masses.min()), float(masses.max())
+    return (
+        f"{words.name}: everything that it was taken for weighs {low:.3g} to {high:.3g} kg, but "
+        f"what was said of its mass is {said:.3g} kg. {_reconciled(words, masses, said)} "
+        "--annotations decides."
+    )
+
+
+def _reconciled(words: ObjectWords, masses: np.ndarray, said: float) -> str:
+    """Name what would make the likeliest description weigh what was said."""
+    ratio = said / float(np.median(masses))
+    main = max(_leaves(words), key=lambda p: p.volume_share - p.inner_share)
+    size = f"an object {ratio ** (1 / 3):.2f} times as large"
+    if main.structure == "filled":
+        wanted = f"{main.name} filled to {min((main.fill or 1.0) * ratio, 1.0):.0%}"
+    elif main.structure in ("shell", "sheet", "hollow"):
+        wanted = f"a wall of {main.name} {ratio:.2g} times as thick"
+    elif ratio < 1:
+        share = (main.solidity or 1.0) * ratio
+        wanted = f"{main.name} hollow, or {share:.0%} of its shape matter"
+    else:
+        wanted = f"a material of {main.name} {ratio:.2g} times as dense"
+    return f"To reconcile them it would take {wanted}, or {size}."
+
+
+# ---------------------------------------------------------------- small functions
+
+
+def label(words: ObjectWords, drawn: ObjectWords) -> str:
+    """Say in words which of its ways each part in doubt was drawn in."""
+    told = [
+        f"{p.name}: {q.material}, {q.structure}{f' of {q.contents}' if q.contents else ''}"
+        for p, q in zip(_leaves(words), _leaves(drawn), strict=True)
+        if len(p.hypotheses) > 1
+    ]
+    return "; ".join(told) or "as described"
+
+
+def _leaves(words: ObjectWords) -> list[PartWords]:
+    return [leaf for part in words.parts for leaf in (part.pieces or (part,))]
+
+
+def quantiles(
+    values: Float[np.ndarray, " N"], weights: Float[np.ndarray, " N"]
+) -> tuple[float, float, float]:
+    """Return the 5 %, 50 % and 95 % points of weighted values; weights add up to 1."""
+    order = np.argsort(values)
+    at = np.cumsum(weights[order]) - 0.5 * weights[order]
+    low, middle, high = np.interp([LOW, 0.5, HIGH], at, values[order])
+    return float(low), float(middle), float(high)

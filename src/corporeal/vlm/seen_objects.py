@@ -1,0 +1,200 @@
+"""Which objects stand in a photographed scene, and which found region each of them is."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from importlib.resources import files
+from pathlib import Path
+
+import numpy as np
+
+from corporeal.errors import UserError
+from corporeal.formats.typical_extents import typical_extent
+from corporeal.formats.words import safe, unique
+from corporeal.geometry.metric import Extent, MetricScale, chosen, implausible, of_file
+from corporeal.geometry.sizes import said_extent
+from corporeal.types import NOTHING_ASKED, Usage
+from corporeal.vlm import Vlm, connect
+from corporeal.vlm.interview import Interview, Subject
+from corporeal.vlm.sizes import SAID, TABLE
+from corporeal.vlm.words import usage
+
+PERSON = "the command line"
+"""Who said what a person typed, in words for the report."""
+
+
+UNKNOWN = "object"
+"""What nobody has a name for."""
+
+
+@dataclass(frozen=True)
+class SeenObject:
+    """An object that pictures of a scene show."""
+
+    class_name: str
+    look: str = ""
+    """In words that tell it from the others."""
+    extent: float | None = None
+    """Largest extent of the real object [m]; None: unknown."""
+    sized_by: str = ""
+    """Who said that, in words for the report."""
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What was put to a model about one scene, as data, and what went wrong."""
+
+    transcript: tuple[dict, ...] = ()
+    usage: Usage = NOTHING_ASKED
+    warnings: tuple[str, ...] = ()
+
+
+class Viewer:
+    """Somebody who is shown pictures of one scene."""
+
+    def __init__(self, scene: str, vlm: str, record: Path | None = None) -> None:
+        """Connect to whoever answers; ``looks`` is False where nobody does.
+
+        Args:
+            scene: Its name.
+            vlm: Whom to ask, as a person types it; "metadata": nobody.
+            record: Folder where every answer is kept for "replay:FOLDER".
+
+        Raises:
+            UserError: Nobody can be asked.
+
+        """
+        self.scene = scene
+        self.model = connect(vlm, record)
+        self.interviews: list[Interview] = []
+
+    def objects(self, pictures: Sequence[np.ndarray]) -> list[SeenObject]:
+        """Ask which objects there are; empty where nobody answers.
+
+        Args:
+            pictures: Of the scene, H x W x 3, uint8, sRGB.
+
+        """
+        if self.model is None:
+            return []
+        reply = self._interview(self.model, "things", pictures, len(pictures)).things()
+        seen = reply.answer.things if reply else []
+        who = "" if reply is None else f"{SAID[reply.by]} ({reply.model})"
+        return [SeenObject(t.class_name, t.look, t.metres, who) for t in seen]
+
+    def regions(
+        self, pictures: Sequence[np.ndarray], colours: Sequence[str], objects: Sequence[SeenObject]
+    ) -> list[int | None] | None:
+        """Ask which object each painted region is.
+
+        Args:
+            pictures: Each one followed by itself with painted regions.
+            colours: Of the regions.
+            objects: What there is.
+
+        Returns:
+            Per region the place of its object, or None where it is none of them; None where nobody
+            answers.
+
+        """
+        if self.model is None:
+            return None
+        interview = self._interview(self.model, "regions", pictures, len(pictures) // 2)
+        reply = interview.regions(colours, [f"{t.class_name}: {t.look}" for t in objects])
+        if reply is None:
+            return None
+        said = {r.colour: r.thing for r in reply.answer.regions}
+        return [None if (n := said[colour]) is None else n - 1 for colour in colours]
+
+    def asked(self) -> Asked:
+        """Return all that was asked so far."""
+        rows = tuple(row for interview in self.interviews for row in interview.transcript)
+        said = tuple(w for interview in self.interviews for w in interview.warnings)
+        return Asked(rows, usage(rows), said)
+
+    def _interview(
+        self, model: Vlm, task: str, pictures: Sequence[np.ndarray], count: int
+    ) -> Interview:
+        prompt = files("corporeal.vlm").joinpath(f"{task}.md").read_text(encoding="utf-8")
+        views = f"{count} of its photographs"
+        subject = Subject(
+            scene=self.scene,
+            name=self.scene,
+            class_name="",
+            sides="",
+            views=views,
+            count=count,
+            pictures=pictures if model.looks else (),
+        )
+        self.interviews.append(Interview(model, model, {task: prompt}, subject))
+        return self.interviews[-1]
+
+
+# ---------------------------------------------------------------- how large they are
+
+
+def usual(class_name: str) -> SeenObject:
+    """Return an object that somebody named, as large as such objects usually are."""
+    known = typical_extent(class_name)
+    return (
+        SeenObject(class_name, extent=known.usual, sized_by=TABLE)
+        if known
+        else SeenObject(class_name)
+    )
+
+
+def names_of(objects: Sequence[SeenObject]) -> list[str]:
+    """Return what objects are called."""
+    return unique([safe(one.class_name) or UNKNOWN for one in objects])
+
+
+def check_extents(stated: Sequence[str], objects: Sequence[SeenObject]) -> None:
+    """Raise UserError where a size is stated of what no object can be called.
+
+    Args:
+        stated: What a person said of some, such as "duck=0.1" [m].
+        objects: What there is, as far as anybody will say; others are objects.
+
+    """
+    known = names_of(objects)
+    for text in stated:
+        name, _ = said_extent(text, (known or [UNKNOWN])[0])
+        if name not in known and not name.startswith(UNKNOWN):
+            step = f"Choose one of: {', '.join(known)}." if known else "Name it with --things."
+            raise UserError(f"--extent: no object {name!r}. {step}")
+
+
+def metres(
+    sizes: Mapping[str, float],
+    objects: Sequence[SeenObject],
+    stated: Sequence[str] = (),
+    measured: MetricScale | None = None,
+    z_up: bool = False,
+) -> MetricScale:
+    """Decide what one unit of a reconstruction is in metres.
+
+    Args:
+        sizes: Name → largest extent in the file [its unit].
+        objects: What they are, in the same order.
+        stated: What a person said of some, such as "duck=0.1" [m].
+        measured: What a person measured of the unit.
+        z_up: Whether the file's kind has +z up, and metres.
+
+    Raises:
+        UserError: A size is stated of nothing that is there.
+
+    """
+    only = next(iter(sizes)) if len(sizes) == 1 else ""
+    wanted = [said_extent(text, only) for text in stated]
+    strange = [name for name, _ in wanted if name not in sizes]
+    if strange:
+        raise UserError(f"--extent: no object {strange[0]!r}. Choose one of: {', '.join(sizes)}.")
+    known = zip(sizes.items(), objects, strict=True)
+    found = chosen(
+        measured,
+        [Extent(name, sizes[name], extent, PERSON) for name, extent in wanted],
+        of_file("transforms.json") if z_up else None,
+        [Extent(name, size, t.extent, t.sized_by) for (name, size), t in known if t.extent],
+        max(sizes.values()),
+    )
+    doubt = implausible(found.metres_per_unit * max(sizes.values()))
+    return replace(found, warnings=(*found.warnings, doubt)) if doubt else found

@@ -1,0 +1,249 @@
+"""Masses over all the ways objects may be: medians, what evidence does, and what it never does."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+import trimesh
+
+from corporeal import materials
+from corporeal.materials.scale import place
+from corporeal.mixture import (
+    PACKAGING,
+    Scale,
+    contradiction,
+    doubt,
+    drawn_given,
+    likelihood,
+    quantiles,
+    weighed,
+)
+from corporeal.stages.describe import describe
+from corporeal.stages.ground import GroundConfig, ground
+from corporeal.stages.segment import segment
+from corporeal.types import (
+    Evidence,
+    Finish,
+    Hypothesis,
+    ObjectWords,
+    PartWords,
+    PrintedFact,
+    Scene,
+    SceneObject,
+    Surface,
+    in_way,
+)
+
+RADIUS = 0.05
+VOLUME = 4 / 3 * np.pi * RADIUS**3
+MESH = trimesh.creation.icosphere(3, RADIUS)
+
+
+def a_ball(*ways, evidence=None, **said):
+    """A ball of 10 cm that may be several things: (scale, inventory)."""
+    points, triangles = np.asarray(MESH.vertices), np.asarray(MESH.faces, dtype=np.int64)
+    scene = Scene(
+        "one", "", (SceneObject("ball_0", "ball", 0.1),),
+        (Surface("ball", 0, 0, points, triangles),), (Finish("plain"),),
+    )  # fmt: skip
+    inventory = describe(scene)
+    (part,) = inventory.objects[0].parts
+    words = replace(in_way(PartWords(part.name, None), ways[0]), hypotheses=ways, **said)
+    words = replace(words, answered_by="model", built_by="model")
+    objects = (ObjectWords("ball_0", "ball", (words,), evidence=evidence),)
+    inventory = replace(inventory, objects=objects)
+    return Scale(scene, segment(scene, inventory), GroundConfig(), 0), inventory
+
+
+def weigh(*ways, evidence=None, samples=300, **said):
+    return weighed(*a_ball(*ways, evidence=evidence, **said), samples)
+
+
+STEEL = Hypothesis("steel", "solid", 0.6)
+SHELL = Hypothesis("steel", "hollow", 0.4)
+SOLID_MASS = materials.find("steel").ranges["density"].typical * MESH.volume
+
+
+def judged(mass, factor=1.2):
+    return Evidence(mass / factor, mass, mass * factor, "It looks so.")
+
+
+def test_the_prediction_is_the_median_of_the_mixture_and_its_interval_spans_the_ways():
+    (m,) = weigh(STEEL, SHELL).mixtures
+    solid, hollow = m.hypotheses
+    assert (solid.probability, hollow.probability) == (solid.prior, hollow.prior)
+    assert solid.prior == pytest.approx(0.6, abs=0.08)
+    assert solid.mass == pytest.approx(SOLID_MASS, rel=0.01)
+    assert hollow.mass < 0.3 * solid.mass
+    assert m.mass == pytest.approx(SOLID_MASS, rel=0.02)
+    assert m.low < hollow.mass < m.mass <= m.high
+    (other,) = weigh(replace(STEEL, probability=0.3), replace(SHELL, probability=0.7)).mixtures
+    assert other.mass < 0.3 * solid.mass
+
+
+def test_evidence_chooses_among_ways_and_every_value_stays_inside_its_range():
+    (without,) = weigh(STEEL, SHELL).mixtures
+    said = judged(without.hypotheses[1].mass)
+    believed = weigh(STEEL, SHELL, evidence=said)
+    (m,) = believed.mixtures
+    assert m.mass_without == pytest.approx(without.mass)
+    assert m.hypotheses[0].words.endswith("steel, hollow")
+    assert m.hypotheses[0].probability > 0.9 > m.hypotheses[0].prior
+    (words,) = believed.inventory.objects[0].parts
+    assert words.structure == "hollow"
+    wall = words.placements["shell_thickness"]
+    assert (wall.chosen_by, 0 <= wall.fraction <= 1) == ("evidence", True)
+    # It is weighed as it was chosen: what stands in the field is a draw, not a number set.
+    scale, _ = a_ball(STEEL, SHELL)
+    field = ground(scale.scene, scale.parts, believed.inventory, GroundConfig())
+    r = materials.find("steel").ranges["shell_thickness"]
+    assert field.structures[0].thickness == pytest.approx(place(r, wall.fraction))
+    assert float(scale.of(field)[0]) == pytest.approx(m.mass, rel=0.05)
+
+
+def test_evidence_sets_no_value_and_beyond_three_widths_it_warns_what_would_reconcile():
+    far = judged(SOLID_MASS / 100)
+    (m,) = weigh(replace(STEEL, probability=1.0), evidence=far).mixtures
+    assert m.mass == pytest.approx(m.mass_without, rel=0.01)
+    assert "everything that it was taken for weighs 4.0" in m.warning or "weighs 4." in m.warning
+    assert "1% of its shape matter" in m.warning
+    assert "0.22 times as large" in m.warning
+    (wall,) = weigh(replace(SHELL, probability=1.0), evidence=judged(SOLID_MASS / 1000)).mixtures
+    assert "a wall of ball" in wall.warning
+    assert "times as thick" in wall.warning
+    (near,) = weigh(replace(STEEL, probability=1.0), evidence=judged(SOLID_MASS)).mixtures
+    assert near.warning == ""
+
+
+def test_evidence_that_is_plainly_wrong_moves_nothing_by_a_silent_factor():
+    masses = np.array([1.0, 1.1, 0.9])
+    for mass in (1e-6, 1e6):
+        weights = likelihood(masses, judged(mass))
+        assert weights / weights.sum() == pytest.approx(np.full(3, 1 / 3), rel=1e-6)
+
+
+def test_a_printed_net_weight_counts_once_however_often_it_is_printed():
+    ounce = 0.028349523125
+    facts = (
+        PrintedFact("net weight", 0.305, "305 g"),
+        PrintedFact("net weight", 10.75 * ounce, "10 3/4 OZ"),
+    )
+    masses = np.geomspace(0.1, 1.0, 200)
+    wide = Evidence(0.01, 0.3, 9.0, "Who knows.")
+    once = likelihood(masses, replace(wide, printed=facts[:1]))
+    twice = likelihood(masses, replace(wide, printed=facts))
+    assert masses[np.argmax(once)] == pytest.approx(PACKAGING * 0.305, rel=0.02)
+    assert twice == pytest.approx(once, rel=0.05)
+    volume = replace(wide, printed=(PrintedFact("volume", 5e-4, "500 ml"),))
+    assert likelihood(masses, volume) == pytest.approx(likelihood(masses, wide))
+
+
+def test_without_evidence_and_doubt_the_placed_values_stand():
+    believed = weigh(replace(STEEL, probability=1.0))
+    assert believed.mixtures[0].mass == pytest.approx(SOLID_MASS, rel=1e-6)
+    assert believed.mixtures[0].low < SOLID_MASS < believed.mixtures[0].high
+
+
+def test_what_is_packed_weighs_its_share_of_matter():
+    packed = Hypothesis("steel", "packed", 1.0, solidity=0.4)
+    (m,) = weigh(packed).mixtures
+    assert m.mass == pytest.approx(0.4 * SOLID_MASS, rel=1e-6)
+    assert m.low < 0.33 * SOLID_MASS
+    assert m.high > 0.47 * SOLID_MASS
+
+
+def test_a_cover_with_a_core_weighs_both():
+    """The fault of the first round: a share of 0 for what lies inside erased a shell there."""
+    scale, inventory = a_ball(STEEL)
+    cover = PartWords("cover", "leather", "sheet", volume_share=1.0, surface_share=1.0)
+    shell = PartWords(
+        "shell", "steel", "hollow", volume_share=0.9, surface_share=0.9, inside="cover"
+    )
+    whole = replace(inventory.objects[0].parts[0], pieces=(replace(cover, inner_share=0.9), shell))
+    inventory = replace(
+        inventory, objects=(replace(inventory.objects[0], parts=(replace(whole, hypotheses=()),)),)
+    )
+    both = scale.mass(inventory)
+    area, leather, steel = MESH.area, materials.find("leather"), materials.find("steel")
+    skin = leather.ranges["density"].typical * area * leather.ranges["shell_thickness"].typical
+    wall = steel.ranges["density"].typical * 0.9 * area * steel.ranges["shell_thickness"].typical
+    assert both == pytest.approx(skin + wall, rel=0.05)
+
+
+def test_a_solid_weighs_less_by_what_lies_inside_it():
+    scale, inventory = a_ball(STEEL)
+    body = PartWords("body", "ABS", "solid", volume_share=1.0, surface_share=1.0, inner_share=0.3)
+    core = PartWords("core", "steel", "solid", volume_share=0.3, surface_share=0.4, inside="body")
+    whole = replace(inventory.objects[0].parts[0], pieces=(body, core), hypotheses=())
+    inventory = replace(inventory, objects=(replace(inventory.objects[0], parts=(whole,)),))
+    abs_, steel = (materials.find(n).ranges["density"].typical for n in ("ABS", "steel"))
+    expected = (0.7 * abs_ + 0.3 * steel) * MESH.volume
+    assert scale.mass(inventory) == pytest.approx(expected, rel=1e-6)
+
+
+def test_a_plate_drawn_with_both_faces_has_one_wall():
+    plate = trimesh.creation.cylinder(0.1, 0.006, sections=64)
+    points, triangles = np.asarray(plate.vertices), np.asarray(plate.faces, dtype=np.int64)
+    scene = Scene(
+        "one", "", (SceneObject("plate_0", "plate", 0.2),),
+        (Surface("plate", 0, 0, points, triangles),), (Finish("plain"),),
+    )  # fmt: skip
+    inventory = describe(scene)
+    (part,) = inventory.objects[0].parts
+    words = PartWords(part.name, "porcelain", "sheet", thickness=0.004)
+    inventory = replace(inventory, objects=(ObjectWords("plate_0", "plate", (words,)),))
+    scale = Scale(scene, segment(scene, inventory), GroundConfig(), 0)
+    density = materials.find("porcelain").ranges["density"].typical
+    assert scale.mass(inventory) == pytest.approx(density * np.pi * 0.1**2 * 0.004, rel=0.08)
+
+
+def test_a_thin_scan_leaves_its_volume_open_and_a_model_does_not():
+    model, _ = a_ball(STEEL)
+    assert model.doubts == [0.0]
+    blade = trimesh.creation.icosphere(4, 0.05).apply_scale((1, 1, 0.1))
+    points, triangles = np.asarray(blade.vertices), np.asarray(blade.faces, dtype=np.int64)
+    scene = Scene(
+        "one", "", (SceneObject("blade_0", "blade", 0.1),),
+        (Surface("blade", 0, 0, points, triangles),), (Finish("plain"),),
+    )  # fmt: skip
+    scale = Scale(scene, segment(scene, describe(scene)), GroundConfig(), 0)
+    (member,) = scale.members
+    edges = np.median(blade.edges_unique_length)
+    assert doubt(member) == pytest.approx(edges / (2 * blade.volume / blade.area), rel=0.2)
+    words = replace(describe(scene).objects[0].parts[0], material="steel", structure="solid")
+    inventory = replace(describe(scene), objects=(ObjectWords("blade_0", "blade", (words,)),))
+    (m,) = weighed(scale, inventory, 200).mixtures
+    assert m.high / m.low > 1.5
+
+
+def test_an_ensemble_draws_ways_as_often_as_the_evidence_leaves_them_likely():
+    _, inventory = a_ball(STEEL, SHELL)
+    light = weigh(STEEL, SHELL).mixtures[0].hypotheses[1].mass
+    believed = weigh(STEEL, SHELL, evidence=judged(light))
+
+    def hollow(mixtures):
+        made = [
+            drawn_given(inventory, mixtures, np.random.default_rng(k), "default")
+            for k in range(300)
+        ]
+        return np.mean([m.objects[0].parts[0].structure == "hollow" for m in made])
+
+    assert hollow(()) == pytest.approx(0.4, abs=0.08)
+    assert hollow(believed.mixtures) == pytest.approx(
+        believed.mixtures[0].hypotheses[0].probability, abs=0.04
+    )
+
+
+def test_weighted_quantiles():
+    values = np.array([3.0, 1.0, 2.0])
+    assert quantiles(values, np.array([0.0, 0.0, 1.0]))[1] == pytest.approx(2.0)
+    even = np.full(1001, 1 / 1001)
+    low, middle, high = quantiles(np.linspace(0, 1, 1001), even)
+    assert (low, middle, high) == (
+        pytest.approx(0.05, abs=0.001), pytest.approx(0.5), pytest.approx(0.95, abs=0.001)
+    )  # fmt: skip
+
+
+def test_no_evidence_contradicts_nothing():
+    _, inventory = a_ball(STEEL)
+    assert contradiction(inventory.objects[0], np.array([1.0, 2.0])) == ""
