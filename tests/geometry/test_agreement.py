@@ -95,6 +95,18 @@ def test_blurred_and_noisy_pictures_are_let_pass(near):
     assert pose_doubt(replace(near, rgb=rgb.clip(0, 255).astype(np.uint8))) is None
 
 
+def test_matrices_for_larger_pictures_are_told_at_which_scale_they_would_agree(near):
+    larger = [replace(c, K=np.diag([4.0, 4.0, 1.0]) @ c.K) for c in near.cameras]
+    found = agreement(replace(near, cameras=tuple(larger)))
+    assert found.hopeless
+    assert found.doubt is not None
+    assert "principal point (328, 236) lies outside pictures of 160 x 120" in found.doubt
+    scale = float(re.search(r"at a scale of ([\d.]+):", found.doubt)[1])
+    assert scale == pytest.approx(0.25, rel=0.03)
+    scaled = [replace(c, K=np.diag([scale, scale, 1.0]) @ c.K) for c in larger]
+    assert agreement(replace(near, cameras=tuple(scaled))).doubt is None
+
+
 def test_opposite_axes_are_named(near):
     doubt = pose_doubt(posed(near, lambda W: W @ FLIP))
     assert re.match(

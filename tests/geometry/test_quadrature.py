@@ -9,7 +9,7 @@ from corporeal.geometry.filling import Filling, fill_body
 from corporeal.geometry.mesh import weld
 from corporeal.geometry.quadrature import centred
 from corporeal.geometry.shape import Shape
-from corporeal.mpm.contact import half_space_mean
+from corporeal.mpm.physics.contact import half_space_mean
 
 SPACING, CELL = 0.05, 0.1
 TILT = trimesh.transformations.rotation_matrix(0.4, (1, 2, 3))

@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from corporeal.geometry.level import level
 from corporeal.geometry.rotation import matrix
 from corporeal.geometry.similarity import moved_cameras, moved_points, similarity
 from corporeal.geometry.upright import Stated, turned_up, upright
@@ -83,11 +84,11 @@ def test_things_without_a_floor_stand_on_their_lowest_points(rng):
     made = somewhere(rng)
     cameras = moved_cameras(cameras_at(ring()), made)
     things = moved_points(box, made)
-    found = upright(cameras, things, things=things)
+    found = upright(cameras, things, of_objects=things)
     angle, floor = off(found, made)
     assert angle < 1e-6
     assert abs(floor) < 0.01
-    assert found.floor_by == "things"
+    assert found.floor_by == "objects"
     assert "below the lowest points" in found.warnings[0]
     middle = moved_points(np.zeros((1, 3)), found.world_from_file @ made)[0]
     np.testing.assert_allclose(middle[:2], 0, atol=0.01 * found.radius)
@@ -115,7 +116,7 @@ def test_cameras_that_were_held_upright_do_not_count(rng):
     quarter = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
     for k in range(0, 24, 4):
         cameras[k] = replace(cameras[k], world_from_camera=cameras[k].world_from_camera @ quarter)
-    found = upright(tuple(cameras), points, things=points)
+    found = upright(tuple(cameras), points, of_objects=points)
     assert off(found, np.eye(4))[0] < 2
 
 
@@ -177,7 +178,7 @@ def test_the_top_of_a_table_is_no_floor(rng):
     found = upright((), np.concatenate([board, *legs]), usual=(0, 0, 1))
     assert off(found, np.eye(4))[0] < 0.5
     assert abs(off(found, np.eye(4))[1]) < 0.03
-    assert found.floor_by == "things"
+    assert found.floor_by == "objects"
 
 
 def test_astray_points_do_not_change_how_things_rest(rng):
@@ -189,13 +190,13 @@ def test_astray_points_do_not_change_how_things_rest(rng):
 def test_what_somebody_states_goes_before_cameras_and_file(rng):
     points, box = room(rng)
     cameras = cameras_at(ring())
-    found = upright(cameras, box, z_up=True, things=box, stated=Stated((0.0, -2.0, 0.0)))
+    found = upright(cameras, box, z_up=True, of_objects=box, stated=Stated((0.0, -2.0, 0.0)))
     np.testing.assert_allclose(found.world_from_file[2, :3], [0, -1, 0], atol=1e-12)
     assert (found.found_by, found.confidence) == ("person", 1.0)
     made = similarity(matrix(np.array([1, 0.03, -0.05, 0.02])))
     found = upright((), moved_points(points, made), stated=Stated((0, 0, 1)))
     assert off(found, made)[0] < 0.5
-    found = upright(cameras, box, z_up=True, things=box, stated=Stated(floor=-0.3))
+    found = upright(cameras, box, z_up=True, of_objects=box, stated=Stated(floor=-0.3))
     assert found.world_from_file[2, 3] == pytest.approx(0.3)
     assert (found.floor_by, found.warnings) == ("person", ())
 
@@ -206,3 +207,63 @@ def test_any_direction_can_be_turned_up(rng):
         np.testing.assert_allclose(turn @ turn.T, np.eye(3), atol=1e-6)
         assert np.linalg.det(turn) == pytest.approx(1)
         np.testing.assert_allclose(turn @ up / np.linalg.norm(up), [0, 0, 1], atol=1e-6)
+
+
+# ---------------------------------------------------------------- cameras on their sides
+
+QUARTER = np.array([[0.0, -1, 0, 0], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
+
+
+def some_on_their_sides(cameras, share, rng):
+    """Turn a share of the cameras by a quarter about their axis, to one side or the other."""
+    made = list(cameras)
+    for k in rng.permutation(len(made))[: round(share * len(made))]:
+        quarter = QUARTER if rng.random() < 0.5 else QUARTER.T
+        made[k] = replace(made[k], world_from_camera=made[k].world_from_camera @ quarter)
+    return tuple(made)
+
+
+def angle_from_z(found):
+    return np.degrees(np.arccos(np.clip(found.up[2], -1, 1)))
+
+
+@pytest.mark.parametrize("heights", [(0, 0), (0, 20), (15, 60), (50, 70), (75, 80)])
+@pytest.mark.parametrize("share", [0.0, 0.25, 0.5, 0.75, 1.0])
+def test_up_is_known_however_many_cameras_were_held_upright(rng, heights, share):
+    exact = level(some_on_their_sides(cameras_at(ring(24, 2.0, *heights)), share, rng))
+    held = cameras_at(ring(24, 2.0, *heights), roll=3, rng=rng)
+    by_hand = level(some_on_their_sides(held, share, rng))
+    if share == 1.0 and heights == (0, 0):
+        assert exact.sure <= 0.5, "nobody stands above, and no picture shows up"
+        assert min(angle_from_z(exact), 180 - angle_from_z(exact)) < 0.1
+        return
+    assert angle_from_z(exact) < 0.1
+    assert angle_from_z(by_hand) < 5
+    assert (by_hand.sure > 0.8) == (share < 1.0)
+    assert any("held upright" in w for w in by_hand.warnings) == (share == 1.0)
+
+
+def test_how_far_up_is_known_is_true(rng):
+    """The stated standard error is what up is off by, over many folders of photographs."""
+    off_by, stated = [], []
+    for _ in range(60):
+        count = int(rng.integers(12, 48))
+        held = cameras_at(ring(count), roll=3, rng=rng)
+        found = level(some_on_their_sides(held, 0.5, rng))
+        off_by.append(angle_from_z(found))
+        stated.append(np.degrees(found.error))
+    ratio = np.sqrt(np.mean(np.square(off_by)) / np.mean(np.square(stated)))
+    assert 0.7 < ratio < 1.4
+
+
+def test_cameras_that_agree_on_nothing_are_not_sure(rng):
+    for _ in range(5):
+        made = cameras_at(ring(24), roll=40, rng=rng)
+        assert level(made).sure < 0.5
+
+
+def test_an_arm_that_swings_up_does_not_know_its_side(rng):
+    rise = np.radians(np.linspace(10, 70, 12))
+    eyes = 2.0 * np.stack([np.cos(rise), 0 * rise, np.sin(rise)], axis=1)
+    found = level(cameras_at(eyes))
+    assert found.sure <= 0.2 and "side by side" in found.warnings[0]

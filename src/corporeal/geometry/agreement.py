@@ -1,8 +1,8 @@
 """Whether camera poses agree with the pictures, and under which convention they would.
 
 Points that pictures share, found without the poses, must meet under them (epipolar geometry). Where
-pictures share too few, because they were taken far apart or of smooth things, silhouettes must
-belong to one thing. Where there are none either, nothing can be said.
+pictures share too few, because they were taken far apart or of smooth objects, silhouettes must
+belong to one object. Where there are none either, nothing can be said.
 """
 
 from collections.abc import Callable
@@ -89,6 +89,8 @@ def agreement(views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None) -> 
     if np.ptp(eyes, axis=0).max(initial=0) == 0:
         words = "All cameras stand at one place: turning a camera shows no depth."
         return Agreement("nothing", 0, 0.0, float("nan"), words, hopeless=True)
+    if words := _other_size(views.cameras):
+        return Agreement("nothing", 0, 0.0, float("nan"), words, hopeless=True)
     pairs = _pairs(views)
     proven = _proven(pairs, views.cameras)
     pairs = proven or pairs
@@ -111,6 +113,25 @@ def agreement(views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None) -> 
     if masks is not None:
         return _by_silhouettes(views.cameras, masks, count, error)
     return Agreement("nothing", count, share, error, None)
+
+
+def _other_size(cameras: tuple[Camera, ...]) -> str | None:
+    """Say at which scale matrices would agree that were made for larger pictures.
+
+    A lens's axis meets its picture near the middle: where it misses every picture, the numbers
+    were measured in pixels of another size.
+    """
+    middle = np.array([[c.K[0, 2] / c.width, c.K[1, 2] / c.height] for c in cameras])
+    if not (middle >= 1.0).any(axis=1).all():
+        return None
+    scale, first = float(0.5 / np.median(middle)), cameras[0]
+    return (
+        f"The matrices are for pictures of another size: the principal point "
+        f"({first.K[0, 2]:.0f}, {first.K[1, 2]:.0f}) lies outside pictures of {first.width} x "
+        f"{first.height}. They would agree at a scale of {scale:.3g}: multiply the focal lengths "
+        "and the principal point by it, or give the pictures that they were made for, about "
+        f"{first.width / scale:.0f} x {first.height / scale:.0f}."
+    )
 
 
 # ---------------------------------------------------------------- matches
@@ -263,7 +284,7 @@ def _masks_doubt(masks: np.ndarray, cameras: tuple[Camera, ...]) -> str | None:
         return None
     return (
         f"The poses agree with the pictures, but only {share:.0%} of the masks fit together. Look "
-        "whether they belong to these pictures, and are white where the things are."
+        "whether they belong to these pictures, and are white where the objects are."
     )
 
 

@@ -1,4 +1,4 @@
-"""What wind does to things at rest: the rule by which the simulation lets air press on faces.
+"""What wind does to objects at rest: the rule by which the simulation lets air press on faces.
 
 With u the velocity of the air and θ the angle between u and a face's inward normal, the pressure is
 ½ ρ_air C u² cos³θ where cos θ > 0, and nothing in the lee (Hoerner 1965; see ``mpm/wind.py``, which

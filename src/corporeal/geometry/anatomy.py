@@ -76,7 +76,7 @@ def build_of(shape: Shape, size: tuple[float, float, float], rng: np.random.Gene
 
     Two opinions on what is inside: the winding number, and whether at least 24 of 26 directions
     are blocked (what it stands on blocks too). Where they share less than 0.9 of their union, the
-    thing is a wall if it is thin (2 V / A) and most of its surface has another surface close
+    object is a wall if it is thin (2 V / A) and most of its surface has another surface close
     behind it; an open sheet or vessel if they share less than 0.6 and it has an opening as long as
     it is wide; and a body with holes otherwise.
     """

@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.geometry import placing
-from corporeal.types import Scene, Surface, Vector
+from corporeal.types import Scene, SceneObject, Surface, Vector
 
 SAMPLES = 2000
 """Vertices of an object that are looked up in another."""
@@ -29,6 +29,13 @@ def boxes_of(scene: Scene) -> Float[np.ndarray, "N 2 3"]:
     return np.stack([box_of(_surfaces(scene, k)) for k in range(len(scene.objects))])
 
 
+def underside(scene: Scene, k: int) -> Vector:
+    """Middle of the underside of an object's box [m]."""
+    low, high = box_of(_surfaces(scene, k))
+    x, y = (low + high)[:2] / 2
+    return (float(x), float(y), float(low[2]))
+
+
 def moved(scene: Scene, shift: Vector | Float[np.ndarray, "3"], k: int | None = None) -> Scene:
     """Return the scene with object ``k``, or with everything, shifted [m]."""
     return _reshaped(scene, k, lambda x: x + np.asarray(shift))
@@ -37,11 +44,21 @@ def moved(scene: Scene, shift: Vector | Float[np.ndarray, "3"], k: int | None = 
 def resized(scene: Scene, k: int, extent: float) -> Scene:
     """Scale one object about the middle of its underside to its real extent [m]."""
     low, high = box_of(_surfaces(scene, k))
-    foot = np.array([*(low + high)[:2] / 2, low[2]])
+    foot = np.array(underside(scene, k))
     factor = extent / max(float((high - low).max()), 1e-12)
     thing = replace(scene.objects[k], real_extent=extent, scale=1.0)
     scene = replace(scene, objects=(*scene.objects[:k], thing, *scene.objects[k + 1 :]))
     return _reshaped(scene, k, lambda x: foot + (x - foot) * factor)
+
+
+def in_unit(scene: Scene, metres: float) -> Scene:
+    """Return a scene whose file is in another unit: all lengths, real ones too, times ``metres``.
+
+    About the origin; objects keep their arrangement.
+    """
+    things = (replace(o, real_extent=o.real_extent * metres) for o in scene.objects)
+    scene = replace(scene, objects=tuple(things), metres_per_unit=scene.metres_per_unit * metres)
+    return _reshaped(scene, None, lambda x: x * metres)
 
 
 def scaled(scene: Scene, factor: float) -> Scene:
@@ -49,7 +66,7 @@ def scaled(scene: Scene, factor: float) -> Scene:
     scene = replace(
         scene,
         metres_per_unit=scene.metres_per_unit * factor,
-        objects=tuple(replace(o, scale=o.scale * factor) for o in scene.objects),
+        objects=tuple(_enlarged(o, factor) for o in scene.objects),
         walls=tuple(replace(w, point=_scaled(w.point, factor)) for w in scene.walls),
     )
     return _reshaped(scene, None, lambda x: x * factor)
@@ -59,12 +76,18 @@ def life_sized(scene: Scene) -> Scene:
     """Return the scene with each object at its real size, about the middle of its underside."""
     for k, thing in enumerate(scene.objects):
         if thing.scale != 1:
-            low, high = box_of(_surfaces(scene, k))
-            foot = np.array([*(low + high)[:2] / 2, low[2]])
+            foot = np.array(underside(scene, k))
             scene = _reshaped(
                 scene, k, lambda x, foot=foot, thing=thing: foot + (x - foot) / thing.scale
             )
     return replace(scene, objects=tuple(replace(o, scale=1.0) for o in scene.objects))
+
+
+def _enlarged(thing: SceneObject, factor: float) -> SceneObject:
+    path = thing.path
+    if path is not None:
+        path = replace(path, shift=tuple(_scaled(shift, factor) for shift in path.shift))
+    return replace(thing, scale=thing.scale * factor, path=path)
 
 
 def _scaled(point: Vector, factor: float) -> Vector:

@@ -1,4 +1,4 @@
-"""How large a thing is, whichever way it lies."""
+"""How large an object is, whichever way it lies."""
 
 import numpy as np
 from jaxtyping import Float

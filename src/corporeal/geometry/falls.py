@@ -1,4 +1,4 @@
-"""How far things are from what they may hit."""
+"""How far objects are from what they may hit."""
 
 import numpy as np
 from jaxtyping import Float

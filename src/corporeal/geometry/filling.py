@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.quadrature import centred
-from corporeal.geometry.settle import settle
+from corporeal.geometry.relaxation import relax
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import sample_surface, scatter, thin_out
 
@@ -71,14 +71,14 @@ def fill_body(
     everything = np.concatenate([points, middle])
     held = np.arange(len(everything)) >= len(points)
     limit = np.concatenate([limit, np.full(len(middle), np.inf)])
-    settled = settle(everything, shape, skin, spacing, limit, held)
+    relaxed = relax(everything, shape, skin, spacing, limit, held)
     least = SLIVER * spacing**3
     if np.isfinite(limit).any():
-        return Filling(settled, np.where(held, max(each, least), spacing**3))
-    settled, volumes = centred(settled, shape, spacing, held)
+        return Filling(relaxed, np.where(held, max(each, least), spacing**3))
+    relaxed, volumes = centred(relaxed, shape, spacing, held)
     if held.any():
         volumes[held] = volumes[held].mean()  # of what is this thin, samples are few
-    return Filling(settled, np.maximum(volumes, least))
+    return Filling(relaxed, np.maximum(volumes, least))
 
 
 def _pick(mask: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:

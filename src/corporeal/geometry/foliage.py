@@ -11,8 +11,8 @@ from corporeal.geometry.anatomy import pieces
 from corporeal.geometry.make import Make
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.survey import Anatomy, Member
+from corporeal.mpm.laws import MENU
 from corporeal.types import (
-    Law,
     Material,
     MaterialField,
     Particles,
@@ -69,7 +69,7 @@ def leaves_of(member: Member, material: Material, made: Make, scale: float) -> i
 def in_bulk(member: Member, scale: float) -> bool:
     """Whether foliage's surface does not show one leaf from another.
 
-    Pictures, and coarse models, show a crown as a thing of thickened and joined leaves: most of
+    Pictures, and coarse models, show a crown as one body of thickened and joined leaves: most of
     its surface is in pieces longer than a leaf is, and thicker.
     """
     if not len(member.body.triangles):
@@ -82,7 +82,8 @@ def in_bulk(member: Member, scale: float) -> bool:
 
 def in_leaves(
     made: Make,
-    at: tuple[Anatomy, Member],
+    anatomy: Anatomy,
+    member: Member,
     field: MaterialField,
     tissue: Material,
     scale: float,
@@ -95,13 +96,13 @@ def in_leaves(
 
     Args:
         made: How the part is made otherwise.
-        at: The plant and the part.
+        anatomy: The plant.
+        member: The part.
         field: What it is made of.
         tissue: What leaves are made of, as thick as in life.
         scale: Scene size over real size.
 
     """
-    anatomy, member = at
     material, k = field.materials[member.part], member.part
     borne = not all(is_leafy(field.materials[m.part]) for m in anatomy.members)
     alone = borne and is_leafy(material) and not made.pieces and not made.held
@@ -208,7 +209,7 @@ def rooted(anatomy: Anatomy, materials: tuple[Material, ...]) -> Rooted | None:
     pictures show does, the foot is taken to reach halfway down from where most of the soil shows to
     the object's lowest point.
     """
-    soils = [m for m in anatomy.members if materials[m.part].law is Law.DRUCKER_PRAGER]
+    soils = [m for m in anatomy.members if MENU[materials[m.part].law].granular]
     for soil in soils:
         low, high = span(soil)
         for member in anatomy.members:
@@ -244,7 +245,8 @@ def span(member: Member) -> tuple[float, float]:
 
 def root_of(
     found: Rooted,
-    at: tuple[Anatomy, int],
+    anatomy: Anatomy,
+    number: int,
     materials: tuple[Material, ...],
     inertia_about: Inertia,
 ) -> Root:
@@ -255,12 +257,12 @@ def root_of(
 
     Args:
         found: How it stands there.
-        at: The plant, and the number of the object.
+        anatomy: The plant.
+        number: Of the object.
         materials: Of all parts.
         inertia_about: Gives the moment of inertia of all that swings about a point [kg m²].
 
     """
-    anatomy, number = at
     member = next(m for m in anatomy.members if m.part == found.wood)
     depth = found.top - found.foot
     corner = np.concatenate([member.body.corners, member.sheet.corners]).reshape(-1, 3)
@@ -294,7 +296,7 @@ def planted(
         found = rooted(anatomy, field.materials) if crowns else None
         if found is not None:
             swing = Swing(particles, [m.part for m in crowns])
-            roots.append(root_of(found, (anatomy, number), field.materials, swing))
+            roots.append(root_of(found, anatomy, number, field.materials, swing))
             said += [] if found.seen else [f"{scene.objects[number].name}: {found.doubt}"]
     warnings = (*particles.warnings, *said)
     return replace(particles, rate=rate, roots=tuple(roots), warnings=warnings)

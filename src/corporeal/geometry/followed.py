@@ -27,7 +27,7 @@ def followed(found: Reconstruction, scene: Scene) -> Reconstruction:
     before, after = found.boxes, boxes_of(scene)
     factor = np.ptp(after, axis=1).max(axis=1) / np.ptp(before, axis=1).max(axis=1)
     shift = after[:, 0] - factor[:, None] * before[:, 0]
-    # The last row is for what is nobody's: -1.
+    # The last row is for what is no object's: -1.
     factor, shift = np.append(factor, 1.0), np.concatenate([shift, np.zeros((1, 3))])
     gaussians, cloud = found.gaussians, found.cloud
     of_gaussian, of_point = found.object_of_gaussian, found.object_of_point

@@ -12,6 +12,8 @@ from corporeal.types import Gaussians, Vector
 
 Up = Literal["+x", "-x", "+y", "-y", "+z", "-z"]
 """Which of a file's axes points up."""
+AskedUp = Literal["auto", "x", "-x", "y", "-y", "z", "-z"]
+"""What a person says of that."""
 LARGEST = 1e6
 """Nothing is as far away or as large as this, in the file's unit."""
 THINNEST = 1e-9
@@ -32,6 +34,12 @@ def upright(up: Up) -> Float[np.ndarray, "3 3"]:
         "z": [[1, 0, 0], [0, sign, 0], [0, 0, sign]],
     }
     return np.array(rotations[up[1]], dtype=float)
+
+
+def axis(asked: AskedUp) -> Up | None:
+    """Return the axis that a person named; None: they leave it to the file."""
+    names: dict[AskedUp, Up] = {"x": "+x", "y": "+y", "z": "+z", "-x": "-x", "-y": "-y", "-z": "-z"}
+    return names.get(asked)
 
 
 def placed(

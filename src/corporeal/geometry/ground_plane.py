@@ -1,4 +1,4 @@
-"""The plane that things stand on, found among points of which half may be anywhere.
+"""The plane that objects stand on, found among points of which half may be anywhere.
 
 RANSAC (Fischler & Bolles 1981) with the truncated loss of MSAC (Torr & Zisserman 2000), refined by
 reweighted least squares. Points below a plane speak against it: nothing is under a floor.
@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
-from corporeal.geometry.rest import together
+from corporeal.geometry.resting_pose import together
 
 SAMPLES = 3000
 """Planes through three points that are tried."""
@@ -41,7 +41,7 @@ class Plane:
     """A plane n · x = offset."""
 
     normal: Float[np.ndarray, "3"]
-    """Unit, to the side where things are."""
+    """Unit, to the side where objects are."""
     offset: float
     """[m], or the file's unit."""
     share: float
@@ -155,7 +155,7 @@ def _stands_out(points: np.ndarray, plane: Plane, search: Search) -> bool:
 
 
 def _carries(points: np.ndarray, plane: Plane, search: Search) -> bool:
-    """Tell whether things are above it, and most of them above the patch that was seen of it."""
+    """Tell whether objects are above it, and most of them above the patch that was seen of it."""
     heights = points @ plane.normal - plane.offset
     half = max(3 * plane.thickness, FINEST * search.radius)
     flat = points @ np.linalg.svd(plane.normal[None])[2][1:].T

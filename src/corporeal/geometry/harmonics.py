@@ -34,7 +34,7 @@ def basis(directions: Float[np.ndarray, "N 3"], degree: int) -> Float[np.ndarray
 def turned(
     sh: Float[np.ndarray, "N K 3"], rotation: Float[np.ndarray, "3 3"]
 ) -> Float[np.ndarray, "N K 3"]:
-    """Return the coefficients of the same colours after the thing they belong to was rotated.
+    """Return the coefficients of the same colours after the object they belong to was rotated.
 
     The new function is f'(d) = f(R^T d). Each band turns within itself: its matrix is found from
     more directions than it has functions, which is exact to rounding.

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Int
 
-from corporeal.types import Finish, Part, Scene, Surface
+from corporeal.types import SUBSTANCE, Finish, Part, Scene, Surface
 
 NOISE = frozenset(
     "a aws blinn camera circle collada common cone001 cube curve cylinder default defaultmaterial "
@@ -18,7 +18,7 @@ NOISE = frozenset(
     "root rootnode scene shader shape sketchfab sp sphere standard surface textured texture "
     "textures untitled uv vert visual collision wire x y z".split()
 )
-"""Words that exporters write whatever the thing is."""
+"""Words that exporters write whatever the object is."""
 SPLIT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+")
 
 Hint = Callable[[Surface, Finish], str]
@@ -26,7 +26,7 @@ Hint = Callable[[Surface, Finish], str]
 
 @dataclass(frozen=True)
 class Identity:
-    """The parts of a scene, told apart by identity."""
+    """The parts of a scene, segmented by identity."""
 
     catalogue: tuple[Part, ...]
     """Object by object, in the scene's order."""
@@ -79,7 +79,7 @@ def _groups(
     groups: dict[tuple[Hashable, ...], list[int]] = {}
     for k in members:
         surface = scene.surfaces[k]
-        stated = surface.extras.get("substance")
+        stated = surface.extras.get(SUBSTANCE)
         key = (
             ("node", surface.name, str(stated))
             if stated
@@ -107,11 +107,11 @@ def _names(scene: Scene, number: int, groups: dict) -> list[str]:
     for surfaces in groups.values():
         first = scene.surfaces[surfaces[0]]
         finish = scene.finishes[first.finish].name
-        own = (first.name,) if first.extras.get("substance") else _order(first, finish, surfaces)
+        own = (first.name,) if first.extras.get(SUBSTANCE) else _order(first, finish, surfaces)
         told = next((n for n in own if words(n)), "")
         whole = thing.class_name or thing.name
         if len(groups) == 1:
-            told = told if first.extras.get("substance") and told else whole
+            told = told if first.extras.get(SUBSTANCE) and told else whole
         names.append(told or f"{whole} part")
     return _distinct(names)
 

@@ -1,4 +1,4 @@
-"""The shape of a surface known by points alone: which way it faces, and how thick things are."""
+"""The shape of a surface known by points alone: which way it faces, and how thick objects are."""
 
 import numpy as np
 from jaxtyping import Float, Int

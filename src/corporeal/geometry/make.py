@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.geometry.anatomy import Build
+from corporeal.geometry.anatomy import THIN, Build, wall_behind
 from corporeal.geometry.packing import Recipe
 from corporeal.geometry.room import is_vessel, room_of
 from corporeal.geometry.survey import Anatomy, Member
@@ -14,20 +14,31 @@ from corporeal.types import Material, MaterialField, PartWords, Structure, Treat
 
 SHEET_SHARE = 0.01
 """Thickness of an open sheet, of its middle extent, where nobody states it."""
-Said = tuple[Structure, Material, PartWords]
-"""How one piece is built, of what, and in whose words."""
 DRAWN = "as its mesh shows"
 JUDGED = {
     "annotation": "as your annotation says",
     "recording": "as a recorded answer says",
     "model": "as a model says",
     "metadata": "as the file's own words say",
+    "evidence": "as fits what was said of its mass",
 }
 """Who said how thick a wall is."""
 ALIKE = 0.05
 """Relative difference of two thicknesses that needs no telling."""
+BOTH_FACES = 4.0
+"""A sheet drawn less than this many times as thick as it is shows both its faces: a plate, a blade.
+What is drawn thicker shows its outside only: a cup that a scan has filled."""
 POROUS_CELLS = 6
 """A shell narrower than this many cells is filled through, with the shell's mass."""
+
+
+@dataclass(frozen=True)
+class Specified:
+    """How one piece is built, of what, and in whose words."""
+
+    structure: Structure
+    material: Material
+    words: PartWords
 
 
 @dataclass(frozen=True)
@@ -85,6 +96,22 @@ class Make:
         return self.body_mass + self.sheet_mass + (self.held.mass if self.held else 0.0)
 
 
+def heavier(made: Make, factor: float) -> Make:
+    """Return the same part with all of its masses, and what it holds, times a factor."""
+    held = made.held and replace(made.held, mass=made.held.mass * factor)
+    inner = made.structure.contents
+    if inner is not None:
+        inner = replace(inner, density=inner.density * factor)
+    return replace(
+        made,
+        structure=replace(made.structure, contents=inner),
+        body_mass=made.body_mass * factor,
+        sheet_mass=made.sheet_mass * factor,
+        density=made.density * factor,
+        held=held,
+    )
+
+
 def compose(
     anatomy: Anatomy, member: Member, field: MaterialField, rng: np.random.Generator
 ) -> Make:
@@ -93,20 +120,21 @@ def compose(
     Pieces share the mesh by their stated shares of its volume and surface; the part then weighs
     what they weigh together, and is otherwise as the piece that matters most.
     """
-    structure, material, words = said_of(member.part, field)
-    made = decide(member, structure, material, words)
+    whole = specified(member.part, field)
+    made = decide(member, whole)
     every = pieces_of(member.part, field)
-    makes = [decide(member, *row) for row in every]
+    makes = [decide(member, row) for row in every]
     holds = [contain(anatomy, member, m, row, rng) for m, row in zip(makes, every, strict=True)]
     body, sheet = sum(m.body_mass for m in makes), sum(m.sheet_mass for m in makes)
     alone = made.body_mass + made.sheet_mass
-    mean = material.density * (body + sheet) / alone if alone > 0 else material.density
-    told = tuple(
-        f"{words.name} of {material.name}, {m.mass + (h.mass if h else 0.0):.3g} kg"
-        for m, h, (_, material, words) in zip(makes, holds, every, strict=True)
+    density = made.density
+    mean = density * (body + sheet) / alone if alone > 0 else density
+    pieces = tuple(
+        f"{p.words.name} of {p.material.name}, {m.mass + (h.mass if h else 0.0):.3g} kg"
+        for m, h, p in zip(makes, holds, every, strict=True)
     )
     made = replace(made, body_mass=body, sheet_mass=sheet, density=mean)
-    made = replace(made, pieces=told if len(every) > 1 else ())
+    made = replace(made, pieces=pieces if len(every) > 1 else ())
     return with_contents(made, member, [h for h in holds if h])
 
 
@@ -120,25 +148,25 @@ def weight(member: Member, field: MaterialField, room: float) -> float:
 
     """
     total = 0.0
-    for said in pieces_of(member.part, field):
-        made = decide(member, *said)
-        structure = said[0]
+    for piece in pieces_of(member.part, field):
+        made = decide(member, piece)
+        structure = piece.structure
         total += made.mass
         if structure.contents is not None:
-            inner = behind(member, made, said, room)
+            inner = behind(member, made, piece, room)
             total += structure.contents.density * structure.fill * inner
     return total
 
 
-def said_of(part: int, field: MaterialField) -> Said:
-    """Return what is said of a part as a whole."""
-    return field.structures[part], field.materials[part], field.words[part]
+def specified(part: int, field: MaterialField) -> Specified:
+    """Return how a part as a whole is built."""
+    return Specified(field.structures[part], field.materials[part], field.words[part])
 
 
-def pieces_of(part: int, field: MaterialField) -> list[Said]:
-    """Return what is said of each thing that shares a part's mesh: mostly of the part alone."""
+def pieces_of(part: int, field: MaterialField) -> list[Specified]:
+    """Return how each piece that shares a part's mesh is built: mostly the part alone."""
     pieces = field.pieces[part] if field.pieces else ()
-    return [(p.structure, p.material, p.words) for p in pieces] or [said_of(part, field)]
+    return [Specified(p.structure, p.material, p.words) for p in pieces] or [specified(part, field)]
 
 
 def with_contents(made: Make, member: Member, holds: Sequence[Held]) -> Make:
@@ -157,48 +185,52 @@ def with_contents(made: Make, member: Member, holds: Sequence[Held]) -> Make:
 
 
 def contain(
-    anatomy: Anatomy, member: Member, made: Make, said: Said, rng: np.random.Generator
+    anatomy: Anatomy, member: Member, made: Make, piece: Specified, rng: np.random.Generator
 ) -> Held | None:
     """Say what is behind a wall; None: nothing but air.
 
     m = ρ f (V - V_wall), with the share f of the room that the contents take up.
     """
-    structure = said[0]
+    structure = piece.structure
     if structure.contents is None:
         return None
     room = room_of(anatomy, member, made.thickness or made.sheet, rng)
-    inner = behind(member, made, said, room.volume)
+    inner = behind(member, made, piece, room.volume)
     level = room.level(structure.fill) if structure.loose else np.inf
     lies = room.points[room.points[:, 2] <= level]
     mass = structure.contents.density * structure.fill * inner
     return Held(mass, inner, structure.fill if structure.loose else 1.0, lies, level)
 
 
-def behind(member: Member, made: Make, said: Said, room: float) -> float:
+def behind(member: Member, made: Make, piece: Specified, room: float) -> float:
     """Volume of the room behind a wall [m³]: all that its outer surface encloses, less the wall.
 
     Args:
         member: The part.
         made: How its wall is made.
-        said: What is said of it.
+        piece: How it is built.
         room: What goes into it, if it is a vessel [m³].
 
     """
-    _, material, words = said
+    material, words = piece.material, piece.words
+    own = words.volume_share - words.inner_share
     if is_vessel(member):
-        return room * words.volume_share
-    return max(member.volume * words.volume_share - made.body_mass / material.density, 0.0)
+        return room * own
+    return max(member.volume * own - made.body_mass / material.density, 0.0)
 
 
-def decide(member: Member, structure: Structure, material: Material, words: PartWords) -> Make:
+def decide(member: Member, piece: Specified) -> Make:
     """Say how thick a part's walls are and what they weigh.
 
     Solid: m = ρ V. Shell, or the wall of what is filled: m = ρ V (1 - (1 - A t / (n V))^n) with the
     area A of one face: not of the inside of a shade, whose outside counts; about ρ A t where it is
     thin. n says how its outside closes in (``Member.closing``). A wall whose mesh shows both faces
     is 2 V / A thick unless somebody stated or judged otherwise: thin walls are drawn too thick, in
-    scans as in models. Open sheets weigh ρ A t. Of a piece, its shares of V and A count.
+    scans as in models. Open sheets weigh ρ A t. Of a piece, its shares of V and A count, less the
+    volume of what lies inside it; a piece that the mesh lacks is not bounded by the mesh. Of what
+    is packed of parts and air, the share that is matter counts.
     """
+    structure, material, words = piece.structure, piece.material, piece.words
     wall = member.build is Build.WALL
     shown = 2 * member.volume / member.body_area if wall else 0.0
     stated = structure.thickness or material.shell_thickness
@@ -212,16 +244,20 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
         thickness, whose = shown, DRAWN
     face = (member.face_area if walled or wall else member.body_area) * words.surface_share
     volume = member.volume * words.volume_share if not only_sheet else face * sheet
+    narrowing = member.narrowing(thickness) if walled else 1.0
+    if not wall and _both_faces(words, volume, thickness * face):
+        face, narrowing = 0.5 * face, 1.0
     sheets = member.sheet_area * words.surface_share
     if walled and not only_sheet:
-        matter = min(face * thickness * member.narrowing(thickness), volume)
+        most = np.inf if words.missing else volume
+        matter = min(face * thickness * narrowing, most)
     else:
-        matter = volume
+        matter = structure.solidity * max(volume - member.volume * words.inner_share, 0.0)
     if thickness > 0 or only_sheet:
         kind = "filled" if structure.kind == "filled" else "shell"
         simulated = replace(structure, kind=kind, thickness=thickness or sheet)
     else:
-        simulated = Structure("solid")
+        simulated = Structure("solid", solidity=structure.solidity)
     return Make(
         structure=simulated,
         modelled=wall,
@@ -231,10 +267,55 @@ def decide(member: Member, structure: Structure, material: Material, words: Part
         sheet_mass=material.density * sheets * sheet,
         area=face + sheets,
         volume=volume + sheets * sheet,
-        density=material.density,
+        density=material.density * (1.0 if walled else structure.solidity),
         shown=shown,
         whose=whose,
     )
+
+
+PLATE_BEHIND = 1.5
+"""Half of a plate's surface has its other face nearer behind it than this, over 2 V/A; a rod's has
+it twice as far."""
+
+
+def plate_thickness(member: Member, made: Make, rng: np.random.Generator) -> float:
+    """Thickness 2 V/A of a solid part that is a plate, flat or bent [m]; 0: it is none.
+
+    Args:
+        member: The part.
+        made: How it is made.
+        rng: Source of the points of its surface that are asked.
+
+    """
+    solid = made.structure.kind == "solid" and member.closed and member.volume > 0
+    thickness = 2 * member.volume / member.body_area if solid else 0.0
+    if not 0 < thickness < THIN * member.size[1]:
+        return 0.0
+    behind = float(np.median(wall_behind(member.shape, rng)))
+    return thickness if behind < PLATE_BEHIND * thickness else 0.0
+
+
+def as_plate(made: Make, thickness: float) -> Make:
+    """Take a solid plate of some thickness [m] for the wall that it is: its mesh shows both faces.
+
+    It weighs the same. On a grid of cells wider than half its thickness only a wall keeps its
+    bending stiffness and is felt by what touches it.
+    """
+    return replace(
+        made,
+        structure=replace(made.structure, kind="shell", thickness=thickness),
+        modelled=True,
+        thickness=thickness,
+        area=made.volume / thickness,
+        shown=thickness,
+        whose=DRAWN,
+    )
+
+
+def _both_faces(words: PartWords, volume: float, wall: float) -> bool:
+    """Tell whether the mesh draws both faces of an open sheet, whose wall along all would be so."""
+    covers = words.inner_share > 0 or words.missing
+    return words.structure == "sheet" and not covers and 2 * volume < BOTH_FACES * wall
 
 
 def wall_of(
@@ -261,7 +342,7 @@ def wall_of(
 
 
 def judge(words: PartWords) -> str:
-    """Tell who said how thick such a wall is, having looked at the thing; "" for nobody."""
+    """Tell who said how thick such a wall is, having looked at the object; "" for nobody."""
     if "shell_thickness" in words.values:
         return "annotation"
     placed = words.placements.get("shell_thickness")

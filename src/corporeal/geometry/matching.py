@@ -17,7 +17,7 @@ THUMB = 16
 MOST = 800
 """Features per picture."""
 CONTRAST = 0.02
-"""Least difference of a corner from its surroundings, of white: matte things have no more."""
+"""Least difference of a corner from its surroundings, of white: matte objects have no more."""
 RATIO = 0.85
 """A match must be so much better than the next best (Lowe)."""
 

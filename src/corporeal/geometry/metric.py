@@ -31,7 +31,7 @@ class MetricScale:
     metres_per_unit: float
     """[m]"""
     source: Literal["file", "distance", "extent", "nobody"]
-    """The file's kind is in metres; two points whose distance is known; how large such a thing is
+    """The file's kind is in metres; two points whose distance is known; how large such an object is
     as a rule, which somebody or a model said; a neutral stand-in."""
     reason: str
     """In one sentence."""
@@ -41,7 +41,7 @@ class MetricScale:
 
 @dataclass(frozen=True)
 class Extent:
-    """How large one thing is, in the file and in reality."""
+    """How large one object is, in the file and in reality."""
 
     name: str
     units: float
@@ -61,14 +61,14 @@ def chosen(
 ) -> MetricScale:
     """Return the scale that the best witness names, and what the others say against it.
 
-    In this order: a distance that somebody measured, sizes of things that somebody stated, a file
-    in metres, how large such things usually are, and for want of all a neutral stand-in.
+    In this order: a distance that somebody measured, sizes of objects that somebody stated, a file
+    in metres, how large such objects usually are, and for want of all a neutral stand-in.
 
     Args:
         distance: Of two points, or of cameras.
-        stated: What a person said of single things.
+        stated: What a person said of single objects.
         file: Where the file's kind is in metres.
-        usual: What a model or a table says of things of these classes.
+        usual: What a model or a table says of objects of these classes.
         size: Of the whole in the file, for the stand-in [its unit].
 
     Raises:
@@ -85,7 +85,7 @@ def chosen(
 
 
 def of_extents(extents: Sequence[Extent]) -> MetricScale | None:
-    """Return the scale at which most things have their sizes: the median of their ratios.
+    """Return the scale at which most objects have their sizes: the median of their ratios.
 
     Raises:
         UserError: A size is not positive and finite.
@@ -101,7 +101,7 @@ def of_extents(extents: Sequence[Extent]) -> MetricScale | None:
     if odd:
         warnings = (
             f"At one unit = {scale:.4g} m the sizes of {', '.join(odd)} are off by more than a "
-            f"factor of {DOUBT:g}. State the size of one thing with --extent NAME=METRES.",
+            f"factor of {DOUBT:g}. State the size of one object with --extent NAME=METRES.",
         )
     return MetricScale(scale, "extent", f"One unit is {scale:.4g} m: {told}.", warnings)
 
@@ -109,7 +109,7 @@ def of_extents(extents: Sequence[Extent]) -> MetricScale | None:
 def _stand_in(size: float) -> MetricScale:
     scale = _ratio(NEUTRAL, size, "The whole")
     words = f"Nobody knows how large it is: the whole was taken as {NEUTRAL:g} m."
-    warning = f"{words} State the size of one thing with --extent NAME=METRES."
+    warning = f"{words} State the size of one object with --extent NAME=METRES."
     return MetricScale(scale, "nobody", words, (warning,))
 
 
@@ -177,7 +177,7 @@ def measured(per_unit: float | None, points: TwoPoints | None, who: str) -> Metr
 
 
 def implausible(extent: float) -> str | None:
-    """Say that a whole scene is too large or too small to be one that people stand things in.
+    """Say that a whole scene is too large or too small to be one that people stand objects in.
 
     Args:
         extent: Of the whole [m].
@@ -188,7 +188,7 @@ def implausible(extent: float) -> str | None:
         return None
     return (
         f"The whole would be {extent:.3g} m large, which is hardly meant. State the size of one "
-        "thing with --extent NAME=METRES, or what one unit is with --metres-per-unit."
+        "object with --extent NAME=METRES, or what one unit is with --metres-per-unit."
     )
 
 
@@ -206,7 +206,7 @@ def of_extent(low: Vector, high: Vector, metres: float, who: str) -> MetricScale
 
     """
     units = float(np.ptp([low, high], axis=0).max())
-    scale = _ratio(metres, units, "The extent of the thing")
+    scale = _ratio(metres, units, "The extent of the object")
     words = f"It is {units:.4g} units large in the file and {metres:.4g} m in reality, {who} said."
     return MetricScale(scale, "extent", words)
 

@@ -6,7 +6,7 @@ from jaxtyping import Float
 GAP = 0.05
 """Between neighbours on the floor, over the sum of their widths: they must not touch."""
 STACK_GAP = 0.01
-"""Between a thing and the one below it, over its height."""
+"""Between an object and the one below it, over its height."""
 SAME_BASE = 1e-3
 """Bases whose heights differ by less, over the larger height, stand on one support."""
 

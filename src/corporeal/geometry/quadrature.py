@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import KDTree
 
-from corporeal.geometry.settle import stay_inside
+from corporeal.geometry.relaxation import stay_inside
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import scattered
 from corporeal.machine import cores

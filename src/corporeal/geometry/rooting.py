@@ -1,4 +1,4 @@
-"""Plants that grow from another thing, a heap of sand: what of their foot nobody sees.
+"""Plants that grow from another object, a heap of sand: what of their foot nobody sees.
 
 Photographs end where the ground begins. A sapling that ended there, too, would fall over.
 """
@@ -11,7 +11,8 @@ from jaxtyping import Bool, Float
 from corporeal.geometry.foliage import WOODY, is_leafy
 from corporeal.geometry.mesh import Mesh, joined
 from corporeal.geometry.shape import Shape
-from corporeal.types import Law, MaterialField, Parts, Scene
+from corporeal.mpm.laws import MENU
+from corporeal.types import MaterialField, Parts, Scene
 
 BURIED = 0.2
 """Depth of a plant's foot in the ground over its height above it, where nobody sees it: a guess."""
@@ -34,7 +35,7 @@ class _Plant:
 def drawn_into_ground(
     scene: Scene, parts: Parts, field: MaterialField
 ) -> tuple[Scene, tuple[str, ...]]:
-    """Let plants whose foot ends on another thing's sand or soil reach down into it.
+    """Let plants whose foot ends on another object's sand or soil reach down into it.
 
     Returns:
         The scene, and what was done to whom, in words.
@@ -86,7 +87,7 @@ def _depth(scene: Scene, parts: Parts, field: MaterialField, plant: _Plant) -> f
     foot = np.concatenate(wood)
     foot = foot[foot[:, 2] < low + FOOT * (high - low)]
     for k, part in enumerate(parts.catalogue):
-        if part.object == plant.number or field.materials[k].law is not Law.DRUCKER_PRAGER:
+        if part.object == plant.number or not MENU[field.materials[k].law].granular:
             continue
         ground = joined(scene.surfaces).only(parts.part_of_point == k)
         if len(foot) and abs(_height(ground, foot) - low) < FOOT * (high - low):

@@ -1,9 +1,11 @@
-"""Whether silhouettes can be those of one thing: the coherence of their visual hull.
+"""Whether silhouettes can be those of one object: the coherence of their visual hull.
 
 Under the right poses the part of space that all silhouettes allow fills each of them. After
 Hernández, Schmitt & Cipolla, "Silhouette coherence for camera calibration under circular motion"
 (2007).
 """
+
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
@@ -18,7 +20,7 @@ SIDE = 48
 GRID = 64
 """Points along each edge of the cube that is searched."""
 MARGIN = 1.3
-"""Half edge of that cube, in radii of the thing as the cameras see it."""
+"""Half edge of that cube, in radii of the object as the cameras see it."""
 INSIDE = 127
 """What a mask must exceed."""
 
@@ -26,8 +28,8 @@ INSIDE = 127
 def coherence(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> float:
     """Return which share of a silhouette the visual hull fills, the median of all views."""
     aims = [_aim(mask, camera) for mask, camera in zip(masks, cameras, strict=True)]
-    centre = _nearest([(eye, ray) for eye, ray, _ in aims])
-    radius = float(np.median([np.linalg.norm(centre - eye) * size for eye, _, size in aims]))
+    centre = _nearest(aims)
+    radius = float(np.median([np.linalg.norm(centre - a.eye) * a.half_angle for a in aims]))
     line = np.linspace(-1, 1, GRID) * radius * MARGIN
     points = centre + np.stack(np.meshgrid(line, line, line), axis=-1).reshape(-1, 3)
     coarse = [small(mask) for mask in masks]
@@ -67,19 +69,30 @@ def _filled(mask: np.ndarray, cells: np.ndarray) -> float:
     return float((covered & mask.ravel()).sum() / max(mask.sum(), 1))
 
 
-def _aim(mask: np.ndarray, camera: Camera) -> tuple[np.ndarray, np.ndarray, float]:
-    """Return where the camera is, the ray to the middle of its silhouette, and its half angle."""
+@dataclass(frozen=True)
+class _Aim:
+    """From a camera to the middle of its silhouette."""
+
+    eye: Float[np.ndarray, "3"]
+    """[m]"""
+    ray: Float[np.ndarray, "3"]
+    """Unit."""
+    half_angle: float
+    """Of the silhouette [rad]."""
+
+
+def _aim(mask: np.ndarray, camera: Camera) -> _Aim:
     rows, columns = np.nonzero(mask > INSIDE)
     if not len(rows):
         rows, columns = np.indices(mask.shape).reshape(2, -1)
     middle = np.array([(columns.min() + columns.max() + 1) / 2, (rows.min() + rows.max() + 1) / 2])
     size = max(np.ptp(columns), np.ptp(rows)) / 2 / min(camera.K[0, 0], camera.K[1, 1])
     ray = camera.world_from_camera[:3, :3] @ np.linalg.solve(camera.K, [*middle, 1.0])
-    return camera.world_from_camera[:3, 3], ray / np.linalg.norm(ray), float(size)
+    return _Aim(camera.world_from_camera[:3, 3], ray / np.linalg.norm(ray), float(size))
 
 
-def _nearest(rays: list[tuple[np.ndarray, np.ndarray]]) -> np.ndarray:
+def _nearest(aims: list[_Aim]) -> np.ndarray:
     """Return the point nearest to all rays, in least squares."""
-    across = [np.eye(3) - np.outer(ray, ray) for _, ray in rays]
-    right = np.sum([a @ eye for a, (eye, _) in zip(across, rays, strict=True)], axis=0)
+    across = [np.eye(3) - np.outer(a.ray, a.ray) for a in aims]
+    right = np.sum([m @ a.eye for m, a in zip(across, aims, strict=True)], axis=0)
     return np.linalg.lstsq(np.sum(across, axis=0), right, rcond=None)[0]

@@ -1,9 +1,9 @@
-"""How large things stand in a scene together, and what that makes of their walls.
+"""How large objects stand in a scene together, and what that makes of their walls.
 
 A duck beside a couch is a dot. A power law between 0 (all of one size) and 1 (true relative sizes)
-brings things nearer to each other and keeps their order. A thing that is not life-size is the real
-one with all its lengths scaled, walls included: made of the same matter, it weighs scale³ times as
-much.
+brings objects nearer to each other and keeps their order. An object that is not life-size is the
+real one with all its lengths scaled, walls included: made of the same matter, it weighs scale³
+times as much.
 """
 
 import math
@@ -34,7 +34,7 @@ class Sizing:
     """How real sizes become sizes in a scene."""
 
     gamma: float = 0.35
-    """Exponent of relative sizes: 0 makes all things equally large, 1 keeps true proportions."""
+    """Exponent of relative sizes: 0 makes all objects equally large, 1 keeps true proportions."""
     metric: bool = False
     """Keep true metres; gamma, working extent and fraction then say nothing."""
     working_extent: float = 1.0
@@ -52,7 +52,7 @@ def scene_extents(real: Sequence[float], sizing: Sizing = DEFAULT) -> Float[np.n
     e_i = s_i^γ / max_j s_j^γ · f L
 
     Args:
-        real: Largest extent s_i of each real thing [m].
+        real: Largest extent s_i of each real object [m].
         sizing: γ, L and f, or true metres.
 
     Raises:
@@ -79,11 +79,11 @@ def _check(sizing: Sizing) -> None:
 
 
 def said_extent(text: str, only: str = "") -> tuple[str, float]:
-    """Return name and metres of "duck=0.1", or of "0.1" where there is only one thing.
+    """Return name and metres of "duck=0.1", or of "0.1" where there is only one object.
 
     Args:
         text: What a person typed after --extent.
-        only: Name of the only thing there is; "": there are several.
+        only: Name of the only object there is; "": there are several.
 
     Raises:
         UserError: It says something else.
@@ -109,13 +109,13 @@ def scale_of_part(scene: Scene, parts: Parts) -> tuple[float, ...]:
 
 
 def is_scaled(scale: float) -> bool:
-    """Tell whether a thing is noticeably not life-size."""
+    """Tell whether an object is noticeably not life-size."""
     return abs(scale - 1) > LIFE_SIZE
 
 
-def how_scaled(things: Sequence[SceneObject]) -> str:
+def how_scaled(objects: Sequence[SceneObject]) -> str:
     """Say in a sentence or two what is not life-size, and what follows; "" where all is."""
-    odd = [thing for thing in things if is_scaled(thing.scale)]
+    odd = [own for own in objects if is_scaled(own.scale)]
     if not odd:
         return ""
     told = "; ".join(
@@ -124,13 +124,13 @@ def how_scaled(things: Sequence[SceneObject]) -> str:
         for o in odd
     )
     return (
-        f"Not life-size: {told}. Walls are scaled with their thing; lengths, masses and all that "
+        f"Not life-size: {told}. Walls are scaled with their object; lengths, masses and all that "
         "follows from them are those of the scene, and the real masses stand in brackets."
     )
 
 
 def how_heavy(mass: float, scale: float) -> str:
-    """Write a mass in the scene [kg], and in brackets that of the real thing where it differs."""
+    """Write a mass in the scene [kg], and in brackets that of the real object where it differs."""
     return f"{mass:.3g} ({mass / scale**3:.3g} in life)" if is_scaled(scale) else f"{mass:.3g}"
 
 

@@ -97,7 +97,7 @@ def _by_blocks(shape: Shape, lattice: Lattice, rng: np.random.Generator) -> np.n
     distance = shape.closest(middles)[0]
     mixed = distance < 2 * np.sqrt(3) * lattice.spacing
     # A surface of area A at least d away fills at most A / d² of the 4π seen from a point: beyond
-    # this the winding number is below a half, and thin things leave most of their box beyond it.
+    # this the winding number is below a half, and thin objects leave most of their box beyond it.
     whole = ~mixed & (distance**2 < shape.mesh.areas.sum() / (2 * np.pi))
     whole[whole] = shape.inside(middles[whole])
     offsets = np.indices((4, 4, 4)).reshape(3, -1).T

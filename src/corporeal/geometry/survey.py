@@ -205,7 +205,7 @@ def survey(
 
 
 def groups(piece: np.ndarray, part: np.ndarray, among: np.ndarray) -> list[np.ndarray]:
-    """Masks of the triangles that share pieces or parts, and so are read as one thing."""
+    """Masks of the triangles that share pieces or parts, and so are read as one object."""
     if not among.any():
         return []
     _, p = np.unique(piece[among], return_inverse=True)

@@ -1,8 +1,8 @@
 """The frame of a reconstruction: +z up, the floor at z = 0, what the cameras look at above it.
 
 Poses from pictures have no up, and trained splats neither. It is taken from what the file says,
-else from the cameras, which people hold level, else from what programs usually write and how things
-would rest; a plane that things stand on corrects it.
+else from the cameras, which people hold level, else from what programs usually write and how
+objects would rest; a plane that objects stand on corrects it.
 """
 
 from dataclasses import dataclass, replace
@@ -13,7 +13,7 @@ from jaxtyping import Float
 from corporeal.geometry.ground_plane import Plane, Search, ground_plane
 from corporeal.geometry.level import Level, level
 from corporeal.geometry.region import Region, region
-from corporeal.geometry.rest import rest, together
+from corporeal.geometry.resting_pose import rest, together
 from corporeal.geometry.similarity import moved_points, similarity
 from corporeal.types import Camera, Vector
 
@@ -32,11 +32,11 @@ MOST = 50_000
 WITHIN = 2.0
 """Points farther from the middle are not looked at, in radii of what the cameras look at."""
 LOWEST = 0.5
-"""Percentile of heights that is the underside of things, where no point is astray."""
+"""Percentile of heights that is the underside of objects, where no point is astray."""
 UNUSUAL = np.radians(10)
-"""How much farther things may roll from the usual axis than from another to be believed there."""
+"""How much farther objects may roll from the usual axis than from another to be believed there."""
 STANDS = np.radians(12)
-"""Things that roll less were, and their frame was a little tilted."""
+"""Objects that roll less were, and their frame was a little tilted."""
 WEAK = 0.3
 """An up less sure than this says nothing of where a floor is, if there are cameras above it."""
 Z: Vector = (0.0, 0.0, 1.0)
@@ -55,7 +55,7 @@ class Upright:
     confidence: float
     """In up: 0 (a guess) to 1."""
     floor_by: str
-    """"plane": it is in the pictures; "person": somebody said it; "things": their lowest points;
+    """"plane": it is in the pictures; "person": somebody said it; "objects": their lowest points;
     "nothing": there are none."""
     radius: float
     """Of the scene, in the file's unit."""
@@ -90,7 +90,7 @@ def upright(
     cameras: tuple[Camera, ...],
     points: Float[np.ndarray, "N 3"],
     z_up: bool = False,
-    things: Float[np.ndarray, "M 3"] | None = None,
+    of_objects: Float[np.ndarray, "M 3"] | None = None,
     usual: Vector | None = None,
     stated: Stated = NOTHING,
 ) -> Upright:
@@ -101,13 +101,13 @@ def upright(
         points: On all that is in the pictures, in the file's frame and unit; a floor is looked for
             among them.
         z_up: Whether the file says that its +z is up.
-        things: Points that are on things for sure, as masks tell; None: nobody knows.
+        of_objects: Points that are on objects for sure, as masks tell; None: unknown.
         usual: What is up in such files as a rule; for want of cameras.
         stated: What somebody says.
 
     """
-    points, things = _fewer(points), None if things is None else _fewer(things)
-    around = _around(cameras, points if things is None else things)
+    points, of_objects = _fewer(points), None if of_objects is None else _fewer(of_objects)
+    around = _around(cameras, points if of_objects is None else of_objects)
     near = points[np.linalg.norm(points - around.centre, axis=1) < WITHIN * around.radius]
     if stated.up is not None:
         told = _Up(_unit(stated.up), "person", 1.0, 0.0, "Up is what was stated.", ())
@@ -121,7 +121,7 @@ def upright(
     if plane is not None:
         told = _corrected(told, plane)
     floor = plane if stated.floor is None else stated.floor
-    return _framed(told, floor, around, near if things is None else things)
+    return _framed(told, floor, around, near if of_objects is None else of_objects)
 
 
 def _fewer(points: np.ndarray) -> np.ndarray:
@@ -153,7 +153,7 @@ def _told(cameras: tuple[Camera, ...], z_up: bool) -> _Up:
 
 
 def _rested(told: _Up, points: np.ndarray) -> _Up:
-    """Return what is up as things would rest, for want of cameras and of a floor.
+    """Return what is up as objects would rest, for want of cameras and of a floor.
 
     Near the usual axis, unless they would fall over, and there is another along which they stand.
     """
@@ -165,8 +165,8 @@ def _rested(told: _Up, points: np.ndarray) -> _Up:
     axis, stood = min(found, key=lambda f: f[1].tilt + (f[0] is not usual) * UNUSUAL)
     if stood.tilt > STANDS:
         return told
-    fell = "" if axis is usual else f" Up is not {AXIS}: the things would fall over."
-    reason = f"Up is as the things would rest on a floor, {_degrees(stood.tilt)} from an axis."
+    fell = "" if axis is usual else f" Up is not {AXIS}: the objects would fall over."
+    reason = f"Up is as the objects would rest on a floor, {_degrees(stood.tilt)} from an axis."
     return _Up(stood.up, "rest", 0.5, np.inf, reason + fell, (LOOK + fell,))
 
 
@@ -203,7 +203,7 @@ def _floor(
 
 
 def _corrected(told: _Up, plane: Plane) -> _Up:
-    """Let a plane that things stand on correct what is up."""
+    """Let a plane that objects stand on correct what is up."""
     angle = _angle(told.up, plane.normal)
     if told.sure >= STRONG and told.error < LEVEL and angle < NEARBY:
         return told
@@ -250,7 +250,7 @@ def _framed(told: _Up, floor: Plane | float | None, around: Region, lowest: np.n
         height, by, reason = floor, "person", "The floor is where it was stated to be."
     elif len(lowest):
         heights = moved_points(together(lowest), similarity(rotation))[:, 2]
-        height, by = float(np.percentile(heights, LOWEST)), "things"
+        height, by = float(np.percentile(heights, LOWEST)), "objects"
         reason = "No floor was found: it is put below the lowest points."
         warnings.append(f"{reason} Things that float above it will fall.")
     else:

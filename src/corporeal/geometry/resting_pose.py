@@ -1,4 +1,4 @@
-"""How a thing would come to rest on a level floor, were it put down some way up."""
+"""How an object would come to rest on a level floor, were it put down some way up."""
 
 from dataclasses import dataclass
 
@@ -24,11 +24,11 @@ class Rest:
     up: Float[np.ndarray, "3"]
     """What is up then, in the points' frame: unit."""
     tilt: float
-    """How far the thing rolled [rad]."""
+    """How far the object rolled [rad]."""
 
 
 def rest(points: Float[np.ndarray, "N 3"], up: Float[np.ndarray, "3"]) -> Rest | None:
-    """Return how a rigid thing would lie after rolling slowly down from where it was put.
+    """Return how a rigid object would lie after rolling slowly down from where it was put.
 
     The height of the centre of mass over the lowest point, c · u − min_i v_i · u, falls along its
     steepest slope to the nearest minimum over directions u: there the lowest points support it. The

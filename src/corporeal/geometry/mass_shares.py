@@ -1,9 +1,10 @@
 """Every point's share of its part's mass, and no point of one object among another's."""
 
 from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.spatial import KDTree
 
 from corporeal.geometry.filling import match_moments
@@ -101,7 +102,8 @@ def _with_held(
     """Mass [kg] and volume [m³] of a filled part's points: wall and contents apart.
 
     Behind a closed surface the outermost points bear the wall, at least half a cell deep, and all
-    below the level what lies there; of a vessel those between its faces do.
+    below the level what lies there; of a vessel those between its faces do. What is inflated is one
+    solid.
     """
     assert made.held is not None
     points, volumes = packing.points, packing.volumes
@@ -113,21 +115,33 @@ def _with_held(
         low, room = ~wall, made.held.room
         parts = [(wall, made.volume - room), (low, room * made.held.fill)]
         least = 1e-9 * made.volume
-        whole = _spread(volumes, [(m, max(v, least)) for m, v in parts if m.any()])
+        whole = _spread(volumes, [_Total(m, max(v, least)) for m, v in parts if m.any()])
     else:
         depth = member.shape.closest(points)[0]
         wall = depth <= max(made.thickness, 0.5 * cell, depth.min())
-        whole = _spread(volumes, [(np.ones(len(points), dtype=bool), made.volume)])
+        whole = _spread(volumes, [_Total(np.ones(len(points), dtype=bool), made.volume)])
+    if made.structure.inflated:
+        return _spread(volumes, [_Total(np.ones(len(points), dtype=bool), made.mass)]), whole
     loads = [(wall, made.body_mass + made.sheet_mass), (low, made.held.mass)]
-    mass = _spread(volumes, [(m if m.any() else ~m, load) for m, load in loads])
+    mass = _spread(volumes, [_Total(m if m.any() else ~m, load) for m, load in loads])
     return np.maximum(mass, 1e-6 * made.mass / len(mass)), whole
 
 
-def _spread(volumes: np.ndarray, totals: list[tuple[np.ndarray, float]]) -> np.ndarray:
+@dataclass(frozen=True)
+class _Total:
+    """What some points bear together."""
+
+    mask: Bool[np.ndarray, " N"]
+    value: float
+    """Mass [kg] or volume [m³]."""
+
+
+def _spread(volumes: np.ndarray, totals: list[_Total]) -> np.ndarray:
     """Spread each total over the points of its mask, in proportion to their volumes."""
     found = np.zeros(len(volumes))
-    for mask, total in totals:
-        found[mask] += total * volumes[mask] / volumes[mask].sum()
+    for total in totals:
+        own = volumes[total.mask]
+        found[total.mask] += total.value * own / own.sum()
     return found
 
 

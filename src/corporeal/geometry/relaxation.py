@@ -29,7 +29,7 @@ class Skin:
         return np.einsum("md,md->m", points[self.which] - self.foot, self.inward)
 
 
-def settle(
+def relax(
     points: Float[np.ndarray, "N 3"],
     shape: Shape,
     outer: Shape,
@@ -65,6 +65,7 @@ def settle(
         free & (np.isfinite(limit) | outer.may_be_within(4 * spacing, points))
     )
     near = candidates
+    # Repulsion in rounds; the surface is looked up once a round, and draws from the third on.
     for turn in range(ROUNDS):
         asked = candidates if turn % 3 == 0 else near
         distance, skin = _feel(points, asked, outer, spacing)
@@ -74,6 +75,7 @@ def settle(
             move *= np.minimum(1, 0.3 * spacing / (np.linalg.norm(move, axis=1) + 1e-300))[:, None]
             points[free] += move[free]
             _press(points, skin, spacing, limit, draw=turn >= 2)
+    # Last, only the surface: nothing may be left shallower than half a spacing.
     for _ in range(3):
         distance, skin = _feel(points, near, outer, spacing)
         _press(points, skin, spacing, limit, draw=False)
