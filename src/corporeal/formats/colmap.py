@@ -88,14 +88,18 @@ def read_colmap(folder: Path) -> ColmapModel:
     binary = (folder / "images.bin").is_file() and (folder / "cameras.bin").is_file()
     if not is_colmap(folder):
         raise BadFileError(folder, "holds no cameras and images of a COLMAP model.", AGAIN)
-    cameras, images, points = _from_bytes(folder) if binary else _from_text(folder)
-    if not images:
+    rows = _from_bytes(folder) if binary else _from_text(folder)
+    if not rows.images:
         raise BadFileError(folder, "the COLMAP model holds no images.", AGAIN)
-    places = np.array([p[:3] for p in points], np.float64).reshape(-1, 3)
-    colours = np.array([p[3:] for p in points], np.float64).reshape(-1, 3)
+    places = np.array([p[:3] for p in rows.points], np.float64).reshape(-1, 3)
+    colours = np.array([p[3:] for p in rows.points], np.float64).reshape(-1, 3)
     good = np.isfinite(places).all(axis=1)
     return ColmapModel(
-        folder, cameras, tuple(images), places[good], np.clip(colours[good], 0, 255).astype("u1")
+        folder,
+        rows.cameras,
+        tuple(rows.images),
+        places[good],
+        np.clip(colours[good], 0, 255).astype("u1"),
     )
 
 
@@ -142,10 +146,18 @@ def world_from_camera(
 
 # ---------------------------------------------------------------- reading
 
-Rows = tuple[dict[int, ColmapCamera], list[ColmapImage], list[tuple[float, ...]]]
+
+@dataclass(frozen=True)
+class _Rows:
+    """What the three files of a model list."""
+
+    cameras: dict[int, ColmapCamera]
+    images: list[ColmapImage]
+    points: list[tuple[float, ...]]
+    """x, y, z [the model's unit], red, green, blue [0–255]."""
 
 
-def _from_bytes(folder: Path) -> Rows:
+def _from_bytes(folder: Path) -> _Rows:
     path = folder / "images.bin"
     cameras = {k: ColmapCamera(*row) for k, row in camera_rows(Reader(folder / "cameras.bin"))}
     images = [
@@ -153,10 +165,10 @@ def _from_bytes(folder: Path) -> Rows:
         for name, camera, turn, shift in image_rows(Reader(path))
     ]
     points = folder / "points3D.bin"
-    return cameras, images, point_rows(Reader(points)) if points.is_file() else []
+    return _Rows(cameras, images, point_rows(Reader(points)) if points.is_file() else [])
 
 
-def _from_text(folder: Path) -> Rows:
+def _from_text(folder: Path) -> _Rows:
     path = folder / "cameras.txt"
     cameras = {}
     for words in _lines(path):
@@ -167,7 +179,7 @@ def _from_text(folder: Path) -> Rows:
     path = folder / "points3D.txt"
     lines = _lines(path) if path.is_file() else iter(())
     points = [tuple(_numbers(path, w, range(1, 7), least=7)) for w in lines if w]
-    return cameras, list(_images(folder / "images.txt")), points
+    return _Rows(cameras, list(_images(folder / "images.txt")), points)
 
 
 def _images(path: Path) -> Iterator[ColmapImage]:

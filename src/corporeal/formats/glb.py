@@ -7,7 +7,6 @@ file gives a scene or one ``BadFileError`` that names the place in the file.
 from collections import Counter
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
@@ -18,9 +17,8 @@ from corporeal.formats.gltf_nodes import Placed, walk
 from corporeal.formats.gltf_pose import Skeletons, posed
 from corporeal.formats.gltf_primitives import Piece, read_primitive
 from corporeal.formats.words import everyday, numbered, safe, unique
-from corporeal.types import Scene, Surface
+from corporeal.types import Objects, Scene, Surface
 
-Objects = Literal["auto", "one", "nodes"]
 READABLE = (
     "KHR_materials_",
     "KHR_texture_",
@@ -46,12 +44,22 @@ class _Shape:
 
 
 @dataclass(frozen=True)
+class _Dressed:
+    """One primitive of a mesh, wherever it is shown."""
+
+    finish: int
+    piece: Piece
+
+
+@dataclass(frozen=True)
 class Model:
     """A scene as read, and whether its motion is the file's own word or a default."""
 
     scene: Scene
     ours: bool
     """Our writer made the file: gravity, duration, velocities and pushes are stated in it."""
+    metric: bool = True
+    """Whether the scene is in metres; else it is in the file's unit, which nobody states."""
 
 
 def read_glb(path: Path, objects: Objects = "auto") -> Scene:
@@ -111,34 +119,35 @@ def _shapes(document: Document, tree: list[Placed], wardrobe: Wardrobe) -> list[
     for placed, mesh in shown:
         name, bones = _name(placed.node, mesh), skeletons.bones(placed)
         extras = placed.node.value.get("extras")
-        for finish, piece in pieces[mesh.pointer]:
-            there = posed(piece, placed, bones)
+        for dressed in pieces[mesh.pointer]:
+            there = posed(dressed.piece, placed, bones)
             if not np.ptp(there.vertices, axis=0).any():
                 document.warn(f"surface {name!r} has no size; it is left out.")
                 continue
             kept = dict(extras) if isinstance(extras, dict) else {}
-            shapes.append(_Shape(placed.number, name, finish, there, kept))
+            shapes.append(_Shape(placed.number, name, dressed.finish, there, kept))
     return shapes
 
 
-def _check_total(document: Document, shown: list[list[tuple[int, Piece]]]) -> None:
+def _check_total(document: Document, shown: list[list[_Dressed]]) -> None:
     """Refuse a small file that shows its meshes at a million places, before any is placed."""
     if sum(map(len, shown)) > MAX_SURFACES:
         what = f"the scene has more than {MAX_SURFACES} pieces."
         document.root.fail(what, "Join its meshes first.")
     for pieces in shown:
-        for _, piece in pieces:
+        for dressed in pieces:
+            piece = dressed.piece
             document.spend(document.root, len(piece.vertices) + len(piece.triangles))
 
 
-def _pieces(mesh: Entry, wardrobe: Wardrobe) -> list[tuple[int, Piece]]:
+def _pieces(mesh: Entry, wardrobe: Wardrobe) -> list[_Dressed]:
     name = mesh.text("name")[:80] or mesh.pointer
     pieces = []
     for primitive in mesh.children("primitives"):
         finish, dress = wardrobe.dress(primitive)
         piece = read_primitive(primitive, name, dress)
         if piece is not None:
-            pieces.append((finish, piece))
+            pieces.append(_Dressed(finish, piece))
     return pieces
 
 

@@ -1,12 +1,13 @@
 """What a glTF file says in ``extras``: anybody's class and size, and our own files' motion."""
 
 import math
+from itertools import pairwise
 
 from corporeal.formats.credits import Credit, credit_in
 from corporeal.formats.glb_writer import GENERATOR
 from corporeal.formats.gltf_document import Document, Entry
 from corporeal.formats.words import everyday, safe
-from corporeal.types import Push, SceneObject, Wind
+from corporeal.types import Keyframes, Push, SceneObject, Wind
 
 NO_MOTION = (0.0, 0.0, 0.0)
 SMALLEST_SCALE = 1e-6
@@ -50,6 +51,7 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
         velocity=_vector(extras.numbers("velocity_m_s", NO_MOTION)) if ours else NO_MOTION,
         push=_push(extras) if ours else None,
         wind=_wind(extras) if ours else None,
+        path=_path(extras) if ours else None,
         source=extras.text("source") or str(document.path),
         credit=(credit(extras.value) or whole)[:500],
         sized_by=extras.text("sized_by")[:500] if ours else "",
@@ -124,6 +126,18 @@ def _wind(extras: Entry) -> Wind | None:
         return None
     velocity = _vector(wind.numbers("velocity_m_s", NO_MOTION))
     return Wind(velocity, wind.number("gust", 0.0), *_window(wind))
+
+
+def _path(extras: Entry) -> Keyframes | None:
+    path = extras.child("path")
+    if path is None:
+        return None
+    time = path.numbers("time_s", (0.0,) * len(path.sequence("time_s")))
+    columns = [path.numbers(key, (0.0,) * (3 * len(time))) for key in ("shift_m", "turn_rad")]
+    if not time or any(b <= a for a, b in pairwise(time)):
+        path.fail("'time_s' does not rise.")
+    shift, turn = (tuple(_vector(c[k : k + 3]) for k in range(0, len(c), 3)) for c in columns)
+    return Keyframes(time, shift, turn)
 
 
 def _window(force: Entry) -> tuple[float, float]:

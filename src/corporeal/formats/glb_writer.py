@@ -35,13 +35,13 @@ def write_glb(path: Path, scene: Scene) -> None:
 
 def encode_glb(scene: Scene) -> bytes:
     """Return the bytes of the GLB file."""
-    document = _Document(scene)
+    document = GlbDocument(scene)
     objects = [document.object_node(k, o) for k, o in enumerate(scene.objects)]
     document.close(objects)
     return document.bytes()
 
 
-class _Document:
+class GlbDocument:
     """The JSON and the binary chunk, growing together."""
 
     def __init__(self, scene: Scene) -> None:
@@ -57,6 +57,7 @@ class _Document:
         return len(self.json[group]) - 1
 
     def object_node(self, k: int, thing: SceneObject) -> int:
+        """Add an object with its surfaces below it; return its node."""
         children = [self.surface_node(s) for s in self.scene.surfaces if s.object == k]
         node: dict = {"name": thing.name, "extras": _object_extras(thing)}
         if children:
@@ -64,6 +65,7 @@ class _Document:
         return self.add("nodes", node)
 
     def surface_node(self, surface: Surface) -> int:
+        """Add a surface with its mesh; return its node."""
         node: dict = {"name": surface.name}
         if len(surface.triangles):
             mesh = {"name": surface.name, "primitives": [self.primitive(surface)]}
@@ -73,6 +75,7 @@ class _Document:
         return self.add("nodes", node)
 
     def primitive(self, s: Surface) -> dict:
+        """Add a surface's arrays and return what draws them."""
         attributes = {"POSITION": self.array(s.vertices, bounds=True)}
         for name, values in (
             ("NORMAL", s.normals),
@@ -88,6 +91,7 @@ class _Document:
         }
 
     def array(self, values: np.ndarray, bounds: bool = False) -> int:
+        """Add floats, one row a vertex."""
         data = np.ascontiguousarray(values, "<f4")
         if not np.isfinite(data).all():
             raise ValueError("a surface holds NaN or infinite numbers")
@@ -102,6 +106,7 @@ class _Document:
         return self.add("accessors", item)
 
     def indices(self, triangles: np.ndarray, vertices: int) -> int:
+        """Add triangles."""
         # The largest value of each type is reserved (glTF 2.0, 3.7.2.1).
         small = vertices < 2**16
         data = np.ascontiguousarray(triangles, "<u2" if small else "<u4").reshape(-1)
@@ -114,18 +119,21 @@ class _Document:
         return self.add("accessors", item)
 
     def view(self, data: bytes, target: int | None = None) -> int:
+        """Add bytes, on a boundary of four."""
         self.binary += b"\0" * (-len(self.binary) % 4)
         view = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
         self.binary += data
         return self.add("bufferViews", view | ({"target": target} if target else {}))
 
     def material(self, finish: int) -> int:
+        """Return the place of a finish, added once."""
         if finish not in self.materials:
             item = self.material_item(self.scene.finishes[finish])
             self.materials[finish] = self.add("materials", item)
         return self.materials[finish]
 
     def material_item(self, f: Finish) -> dict:
+        """Return a finish as glTF says it."""
         pbr: dict = {
             "baseColorFactor": list(f.colour),
             "metallicFactor": f.metallic,
@@ -152,6 +160,7 @@ class _Document:
         return item
 
     def texture(self, f: Finish) -> int:
+        """Add a finish's picture."""
         png = io.BytesIO()
         Image.fromarray(np.asarray(f.texture)).save(png, "PNG")
         image = {
@@ -184,6 +193,7 @@ class _Document:
             self.json["extensionsUsed"] = sorted(self.extensions)
 
     def bytes(self) -> bytes:
+        """Return the file."""
         return pack_glb(self.json, self.binary)
 
 
@@ -207,6 +217,13 @@ def _object_extras(thing: SceneObject) -> dict:
     if thing.wind is not None:
         blown = {"velocity_m_s": list(thing.wind.velocity), "gust": thing.wind.gust}
         extras["wind"] = blown | _window(thing.wind)
+    if thing.path is not None:
+        path = thing.path
+        extras["path"] = {
+            "time_s": list(path.time),
+            "shift_m": [x for row in path.shift for x in row],
+            "turn_rad": [x for row in path.turn for x in row],
+        }
     said = {"source": thing.source, "credit": thing.credit, "sized_by": thing.sized_by}
     for key, words in said.items():
         if words:

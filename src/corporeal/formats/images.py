@@ -24,7 +24,20 @@ def decode_image(data: bytes, side: int = MAX_SIDE) -> UInt8[np.ndarray, "H W C"
         ValueError: The bytes are no such picture, or it is broken or absurdly large.
 
     """
-    return _decoded(data, lambda picture: np.array(_eight_bit(_small(picture, side)), np.uint8))
+    return _decoded(data, lambda picture: shrunk(picture, side))
+
+
+def shrunk(picture: Image.Image, side: int = MAX_SIDE) -> UInt8[np.ndarray, "H W C"]:
+    """Return an opened picture as ``decode_image`` returns its bytes.
+
+    Raises:
+        ValueError: It claims to be absurdly large.
+
+    """
+    if picture.width * picture.height > MAX_PIXELS:
+        size = f"{picture.width} × {picture.height}"
+        raise ValueError(f"the picture claims {size} pixels, too many to unpack")
+    return np.array(_eight_bit(_small(picture, side)), np.uint8)
 
 
 def decode_numbers(data: bytes) -> UInt16[np.ndarray, "H W"]:
@@ -92,7 +105,7 @@ def _instances(picture: ImageFile.ImageFile) -> np.ndarray:
     return (red << 16) | (green << 8) | blue
 
 
-def _small(picture: ImageFile.ImageFile, side: int) -> Image.Image:
+def _small(picture: Image.Image, side: int) -> Image.Image:
     factor = 1
     while max(picture.size) > factor * side:
         factor *= 2

@@ -51,7 +51,7 @@ class Photographs:
     z_up: bool
     """Whether the file's kind says that the world's +z is up."""
     masks: UInt8[np.ndarray, "V H W"] | None = None
-    """Share of each pixel that belongs to the objects, 255: all; None: nobody says."""
+    """Share of each pixel that belongs to the objects, 255: all; None: unknown."""
     points: Float[np.ndarray, "N 3"] | None = None
     """Sparse points of the scene, where the file holds some, in the unit of the poses."""
     colours: UInt8[np.ndarray, "N 3"] | None = None
@@ -126,8 +126,8 @@ def _shot(frame: Frame) -> Shot:
         if mask is None:
             frame.fail(f"its mask {frame.text('mask_path')[:60]!r} is not there.", "Correct it.")
     frame.lens(1, 1)  # refuse a bad lens even where the picture is bad too
-    mask = mask or _companion(picture, folder, MASKS)
-    instances = _companion(picture, folder, INSTANCES)
+    mask = mask or companion(picture, folder, MASKS)
+    instances = companion(picture, folder, INSTANCES)
     if frame.value.get("object_file_path") is not None:
         instances = _found(folder, frame.text("object_file_path"))
     return Shot(name, picture, frame.lens, frame.pose(), mask, instances)
@@ -138,7 +138,7 @@ def _found(folder: Path, name: str) -> Path | None:
     return next((p for s in SUFFIXES if (p := beside(folder, name + s)) is not None), None)
 
 
-def _companion(picture: Path | None, folder: Path, names: tuple[str, ...]) -> Path | None:
+def companion(picture: Path | None, folder: Path, names: tuple[str, ...]) -> Path | None:
     """Return what goes with a picture, in a folder beside it, above it, or in the whole's."""
     if picture is None:
         return None
@@ -161,7 +161,7 @@ def _of_colmap(folder: Path, place: Path, longest: int) -> Photographs:
     for image in model.images:
         picture = beside(root, image.name)
         lens = partial(_as_stated, model.lens(image))
-        more = (_companion(picture, folder, names) for names in (MASKS, INSTANCES))
+        more = (companion(picture, folder, names) for names in (MASKS, INSTANCES))
         shots.append(Shot(image.name, picture, lens, image.world_from_camera, *more))
     shots.sort(key=lambda shot: shot.name)
     return _developed(folder, shots, longest, False, model)
@@ -186,7 +186,7 @@ def _of_projections(folder: Path, pairs: list[tuple[Path, Path]], longest: int) 
     shots = []
     for picture, file in pairs:
         K, pose = parted(file, read_projection(file))
-        more = (_companion(picture, folder, names) for names in (MASKS, INSTANCES))
+        more = (companion(picture, folder, names) for names in (MASKS, INSTANCES))
         shots.append(Shot(picture.name, picture, partial(_pinhole, file, K), pose, *more))
     return _developed(folder, shots, longest, z_up=False)
 

@@ -18,6 +18,10 @@ There is nothing numerical to tune in it: quality is one word on the command lin
     class = "rubber duck"
     push = { acceleration = [3, 0, 0], from = 0.0, to = 0.5 }
     wind = { velocity = [8, 0, 0], gust = 0.3, from = 0.0, to = 1.5 }
+    [[object]]
+    file = "hand.glb"             # moves as told, as one rigid body, whatever it meets
+    path = [[0, 0, 0, 0.2], [0.5, 0, 0, 0.1]]    # rows of t, x, y, z: see ``keyframes``
+    # or follows = "hand.csv", a file of such rows
     [[wall]]
     point = [1, 0, 0]             # any point of it
     normal = [-1, 0, 0]           # out of the wall into the room
@@ -34,11 +38,17 @@ from typing import Any, NoReturn
 
 from corporeal import store
 from corporeal.errors import BadFileError
-from corporeal.types import Push, Vector, Wall, Wind
+from corporeal.formats import keyframes
+from corporeal.types import Keyframes, Push, Vector, Wall, Wind
 
 SCENE_KEYS = ("file", "duration", "fps", "gravity", "settled", "object", "wall")
 WALL_KEYS = ("point", "normal")
-OBJECT_KEYS = ("name", "file", "class", "extent", "position", "velocity", "push", "wind")
+OBJECT_KEYS = (
+    *("name", "file", "class", "extent", "position", "velocity", "push", "wind"),
+    *("path", "follows"),
+)
+ALONE = ("position", "velocity", "push", "wind")
+"""What nobody says of an object whose path says it."""
 PUSH_KEYS = ("acceleration", "from", "to")
 WIND_KEYS = ("velocity", "gust", "from", "to")
 LONGEST = 60.0
@@ -66,6 +76,8 @@ class ObjectEntry:
     """[m/s]"""
     push: Push | None = None
     wind: Wind | None = None
+    path: Keyframes | None = None
+    """From ``position``, which the file says as the path's first row."""
 
 
 @dataclass(frozen=True)
@@ -132,6 +144,8 @@ def _said_of(entry: ObjectEntry) -> dict[str, Any]:
         "position": entry.position,
         "velocity": entry.velocity,
     }
+    if entry.path is not None:
+        said["path"] = keyframes.rows_of(said.pop("position") or (0.0, 0.0, 0.0), entry.path)
     if entry.push is not None:
         said["push"] = {"acceleration": entry.push.acceleration} | _when(entry.push)
     if entry.wind is not None:
@@ -193,16 +207,39 @@ def _checked(path: Path, said: dict[str, Any]) -> SceneFile:
 
 def _object(table: "_Table") -> ObjectEntry:
     table.only(OBJECT_KEYS)
+    start, path = _path(table)
     return ObjectEntry(
         name=table.text("name"),
         file=table.file("file"),
         class_name=table.text("class"),
         extent=table.number("extent", 1e-4, FARTHEST),
-        position=table.vector("position", FARTHEST),
+        position=start or table.vector("position", FARTHEST),
         velocity=table.vector("velocity", FASTEST),
         push=_push(table),
         wind=_wind(table),
+        path=path,
     )
+
+
+def _path(table: "_Table") -> tuple[Vector | None, Keyframes | None]:
+    """Return where an object's path begins [m], and the path; None where it has none."""
+    rows, follows = table.value.get("path"), table.file("follows")
+    if rows is None and follows is None:
+        return None, None
+    if rows is not None and follows is not None:
+        table.fail("it has a path and follows a file.", "Say only one of them.")
+    for key in ALONE:
+        if key in table.value:
+            table.fail(f"it follows a path and has a {key!r}.", "Leave one of them out.")
+    if follows is not None:
+        return keyframes.read_path_file(follows, table.fail)
+    if not isinstance(rows, list):
+        table.fail(f"'path' is {_shown(rows)}, not a list of rows.", keyframes.WAY)
+
+    def fail(what: str, step: str) -> NoReturn:
+        table.fail(f"path: {what}", step)
+
+    return keyframes.path_of(rows, fail)
 
 
 def _wall(table: "_Table") -> Wall:

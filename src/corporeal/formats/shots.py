@@ -71,9 +71,10 @@ class Developed:
     rgb: UInt8[np.ndarray, "V H W 3"]
     cameras: tuple[Camera, ...]
     masks: UInt8[np.ndarray, "V H W"] | None
-    """Share of each pixel that belongs to the objects, 255: all; None: nobody says."""
+    """Share of each pixel that belongs to the objects, 255: all; None: unknown."""
     object_of_pixel: Int32[np.ndarray, "V H W"] | None
-    """What each view takes each pixel for; -1: nothing. Numbers may mean other things elsewhere."""
+    """What each view takes each pixel for; -1: nothing. Numbers may mean other objects
+    elsewhere."""
     names: tuple[str, ...]
     warnings: tuple[str, ...]
 
@@ -126,7 +127,7 @@ def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
                 bad.append((shot.name, str(problem)))
     prints = _masked_alike(prints, bad)
     _refuse_most(source, len(shots), bad)
-    said = [*_left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
+    said = [*left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
     return _developed(prints, tuple(said))
 
 
@@ -160,7 +161,7 @@ def _size(shot: Shot, bad: list[Bad]) -> tuple[int, int] | None:
             with Image.open(shot.picture, formats=FORMATS) as picture:
                 (width, height), asked = picture.size, _asked(picture)
     except Exception:  # Pillow's decoders raise almost anything on broken input
-        bad.append((shot.name, _unreadable(shot.picture)))
+        bad.append((shot.name, unreadable(shot.picture)))
         return None
     if width * height > MAX_PIXELS or not width or not height:
         bad.append((shot.name, f"claims {width} × {height} pixels"))
@@ -168,7 +169,8 @@ def _size(shot: Shot, bad: list[Bad]) -> tuple[int, int] | None:
     return (height, width) if _turned(shot, width, height, asked) else (width, height)
 
 
-def _unreadable(path: Path) -> str:
+def unreadable(path: Path) -> str:
+    """Say in a clause why a file is no picture that can be read."""
     with suppress(OSError), path.open("rb") as file:
         if file.read(12)[4:] in HEIC:
             return "is a HEIC picture: convert it to JPEG"
@@ -238,7 +240,7 @@ def _decoded(path: Path | None) -> np.ndarray:
 
 
 def _numbers(path: Path | None, size: tuple[int, int]) -> np.ndarray | None:
-    """Return which instance each pixel shows (H, W); 0: none. None: nobody says."""
+    """Return which instance each pixel shows (H, W); 0: none. None: unknown."""
     if path is None:
         return None
     try:
@@ -316,7 +318,8 @@ def _refuse_most(source: Path, total: int, bad: list[Bad]) -> None:
         raise BadFileError(source, what, step)
 
 
-def _left_out(total: int, bad: list[Bad]) -> list[str]:
+def left_out(total: int, bad: list[Bad]) -> list[str]:
+    """Say which of so many pictures were left out, and why; nothing where all are used."""
     return [f"{len(bad)} of {total} pictures were left out: {_listed(bad)}."] * bool(bad)
 
 

@@ -6,13 +6,18 @@ from typing import Literal
 
 from corporeal.errors import UserError
 from corporeal.formats.gltf_document import Document
-from corporeal.formats.photographs import holds_photographs
+from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
+from corporeal.formats.meshes import companions
+from corporeal.formats.photographs import IMAGES, holds_photographs
 from corporeal.formats.projections import SHOWN
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
 
-MODELS = (".glb", ".gltf")
+GLTF = (".glb", ".gltf")
 SPLATS = (".ply", ".spz", ".sog", ".splat", ".ksplat")
+FILMS = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
+HEIC = (".heic", ".heif")
+"""Photographs that telephones take; they are not read, but known for what they are."""
 SOG = "meta.json"
 """Of an unpacked SOG."""
 Kind = Literal["model", "photographs", "splat"]
@@ -58,12 +63,22 @@ def _kind(path: Path) -> Kind:
             return "model"
         return _kind(file)
     if path.is_dir():
-        if models_in(path):
-            return "model"
-        return "splat" if _is_sog(path) else "photographs" if holds_photographs(path) else "model"
+        return _kind_of_folder(path)
+    if path.suffix.lower() == ".ply":
+        return "splat" if kind_of_ply(path) == "splat" else "model"
     if path.suffix.lower() in SPLATS or path.name == SOG:
         return "splat"
-    return "photographs" if path.suffix.lower() == ".json" else "model"
+    return "photographs" if path.suffix.lower() in (".json", *FILMS) else "model"
+
+
+def _kind_of_folder(folder: Path) -> Kind:
+    if _gltf_in(folder):
+        return "model"
+    if _is_sog(folder):
+        return "splat"
+    if holds_photographs(folder):
+        return "photographs"
+    return "photographs" if photographs_in(folder) and not models_in(folder) else "model"
 
 
 def _is_sog(folder: Path) -> bool:
@@ -86,8 +101,12 @@ def called(path: Path) -> str:
 
 
 def models_in(folder: Path) -> list[Path]:
-    """Return the models that lie in a folder, by name."""
-    return sorted(p for p in folder.iterdir() if p.suffix.lower() in MODELS)
+    """Return the models that lie in a folder, by name: glTF, or where there is none, meshes."""
+    return _gltf_in(folder) or sorted(p for p in folder.iterdir() if is_mesh(p))
+
+
+def _gltf_in(folder: Path) -> list[Path]:
+    return sorted(p for p in folder.iterdir() if p.suffix.lower() in GLTF)
 
 
 def pictures_in(folder: Path) -> list[Path]:
@@ -96,9 +115,23 @@ def pictures_in(folder: Path) -> list[Path]:
     return sorted(p for p in found if p.suffix.lower() in SHOWN and p.is_file())
 
 
+def photographs_in(folder: Path) -> list[Path]:
+    """Return the photographs of a folder, by name: its own, or where it has none, of ``images``."""
+    for place in (folder / name for name in ("", *IMAGES) if (folder / name).is_dir()):
+        found = sorted(p for p in place.iterdir() if p.suffix.lower() in (*SHOWN, *HEIC))
+        if found:
+            return found
+    return []
+
+
+def unposed(path: Path) -> bool:
+    """Whether pictures come without the places that they were taken from."""
+    return path.suffix.lower() in FILMS or (path.is_dir() and not holds_photographs(path))
+
+
 def _named_by(path: Path) -> list[Path]:
     if path.suffix.lower() != ".toml" and _kind(path) != "model":
-        alone = path.is_dir() or path.suffix.lower() in SPLATS
+        alone = path.is_dir() or path.suffix.lower() in (*SPLATS, *FILMS)
         return [path if alone else path.parent]
     if path.is_dir():
         return [f for model in models_in(path) for f in _named_by(model)]
@@ -115,6 +148,8 @@ def _named_by(path: Path) -> list[Path]:
 
 
 def _companions(path: Path) -> list[Path]:
+    if is_mesh(path):
+        return companions(path)
     if path.suffix.lower() != ".gltf":
         return []
     document = Document(path)

@@ -30,9 +30,9 @@ from corporeal.types import Camera, Views
 MOST = 2**16 - 1
 """Largest number in a picture of 16 bits."""
 UNIT = 1e-3
-"""Of depth, as these tools take it by default [m]; finer where things are nearer."""
+"""Of depth, as these tools take it by default [m]; finer where objects are nearer."""
 STEPS = 1000
-"""Units of depth to the nearest thing, at least."""
+"""Units of depth to the nearest object, at least."""
 LARGEST_FILE = 2**28
 """Of one picture [bytes]."""
 LARGEST = 2**30

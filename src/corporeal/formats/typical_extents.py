@@ -1,20 +1,25 @@
-"""How large everyday things are, to notice a file that is not in metres."""
+"""How large everyday objects are, to notice a file that is not in metres."""
 
 import re
 import tomllib
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
 MARGIN = 1.5
-"""How far beyond the table a thing may be before anybody is told."""
+"""How far beyond the table an object may be before anybody is told."""
 SMALLEST, LARGEST = 0.005, 20.0
 """Extents that would be remarkable for anything in a scene [m]."""
+UNITS = {"metres": 1.0, "centimetres": 1e-2, "millimetres": 1e-3, "inches": 0.0254}
+"""What programs usually model in [m]."""
+PRINTED = ("millimetres", "metres", "centimetres", "inches")
+"""In which order they are likely in files that are made for printing."""
 
 
 @dataclass(frozen=True)
 class TypicalExtent:
-    """Largest extent of one class of things [m]."""
+    """Largest extent of one class of objects [m]."""
 
     words: str
     low: float
@@ -27,13 +32,31 @@ def typical_extent(class_name: str) -> TypicalExtent | None:
 
     "soda can" for "soda can crushed", "cup" for "tea set cup": English puts the noun last.
     """
-    words = [_singular(w) for w in re.findall(r"[a-zà-ÿ]+", class_name.lower())]
+    words = nouns(class_name, _compounds())
     found = [e for e in _table() if set(e.words.split()) <= set(words)]
     return max(found, key=lambda e: _fit(e, words), default=None)
 
 
+def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str]:
+    """Return a name's words in the singular; a compound that is known counts as its words.
+
+    Args:
+        class_name: What somebody calls a thing: "golfball".
+        compounds: A known compound → the words that it is made of.
+
+    """
+    said = (_singular(w) for w in re.findall(r"[a-zà-ÿ]+", class_name.lower()))
+    return [part for word in said for part in compounds.get(word, (word,))]
+
+
+def joined(phrases: Iterable[str]) -> dict[str, tuple[str, ...]]:
+    """Return phrases of several words, by how they look when they are written as one."""
+    told = (tuple(phrase.split()) for phrase in phrases)
+    return {"".join(words): words for words in told if len(words) > 1}
+
+
 def doubt(name: str, class_name: str, extent: float) -> str | None:
-    """Return a sentence for the user where a thing is implausibly large or small [m]."""
+    """Return a sentence for the user where an object is implausibly large or small [m]."""
     known = typical_extent(class_name)
     low, high = (known.low / MARGIN, known.high * MARGIN) if known else (SMALLEST, LARGEST)
     if low <= extent <= high and not _normalised(extent, known):
@@ -46,6 +69,38 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
     return f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}."
 
 
+@dataclass(frozen=True)
+class LikelyUnit:
+    """What one unit of a file that states none was taken to be."""
+
+    metres: float
+    reason: str
+    """In a clause about "it", the file."""
+
+
+def likely_unit(class_name: str, extent: float, printed: bool = False) -> LikelyUnit | None:
+    """Return the first usual unit in which a thing is as large as such things are.
+
+    Where there is none, a thing of the table gets its usual size; else None.
+
+    Args:
+        class_name: What it is.
+        extent: Its largest extent, in the file's unit.
+        printed: Whether the file is of a kind that is made for printing.
+
+    """
+    for name in PRINTED if printed else UNITS:
+        size = extent * UNITS[name]
+        if doubt("it", class_name, size) is None:
+            reason = f"it was taken to be in {name}, so that it is {_length(size)} large"
+            return LikelyUnit(UNITS[name], reason)
+    known = typical_extent(class_name)
+    if known is None:
+        return None
+    reason = f"it was made as large as a {known.words} usually is, {_length(known.usual)}"
+    return LikelyUnit(known.usual / extent, reason)
+
+
 def _normalised(extent: float, known: TypicalExtent | None) -> bool:
     """Tell whether a program seems to have fitted the model into a box of 1 or 2 units."""
     exact = min(abs(extent - 1), abs(extent - 2)) < 1e-5
@@ -56,6 +111,11 @@ def _normalised(extent: float, known: TypicalExtent | None) -> bool:
 def _table() -> tuple[TypicalExtent, ...]:
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
     return tuple(TypicalExtent(words, *sizes) for words, sizes in tomllib.loads(text).items())
+
+
+@cache
+def _compounds() -> dict[str, tuple[str, ...]]:
+    return joined(e.words for e in _table())
 
 
 def _fit(entry: TypicalExtent, words: list[str]) -> tuple[int, int]:

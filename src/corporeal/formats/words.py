@@ -15,7 +15,7 @@ FILLERS = frozenset(
 
 
 def everyday(name: str) -> str:
-    """Return the words of a name that say what a thing is: "soda can coke"; may be empty."""
+    """Return the words of a name that say what an object is: "soda can coke"; may be empty."""
     name = re.sub(r"\.[A-Za-z0-9]{2,4}$", "", name)
     name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
     words = [w.lower() for w in re.split(r"[^A-Za-zÀ-ÿ]+", name)]

@@ -1,0 +1,79 @@
+"""Read a model of any kind: glTF, or a mesh file in a child process."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from corporeal.errors import BadFileError
+from corporeal.formats import glb
+from corporeal.formats.glb import Model
+from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
+from corporeal.formats.meshes import read_mesh
+from corporeal.formats.sources import GLTF
+from corporeal.geometry.arrangement import in_unit
+from corporeal.geometry.gaussians import Up
+from corporeal.types import Objects
+
+Unit = Literal["auto", "m", "cm", "mm", "in", "ft"]
+METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
+"""Of each unit [m]."""
+READ = ".glb, .gltf, .obj, .ply, .stl, .off, .3mf, .dae, .usd"
+BLENDER = {
+    ".fbx": "import bpy; bpy.ops.wm.read_factory_settings(use_empty=True); "
+    "bpy.ops.import_scene.fbx(filepath={0!r}); bpy.ops.export_scene.gltf(filepath={1!r})",
+    ".blend": "import bpy; bpy.ops.wm.open_mainfile(filepath={0!r}); "
+    "bpy.ops.export_scene.gltf(filepath={1!r})",
+}
+"""What Blender does to write a GLB of what nothing else reads."""
+
+
+@dataclass(frozen=True)
+class Frame:
+    """What a person says of the axes and the unit of a mesh file."""
+
+    up: Up | None = None
+    """Axis of the file that points up; None: as the file states, or as its kind usually has it."""
+    unit: Unit = "auto"
+    """What one unit is; auto: what the file states, else what its size makes likely."""
+
+
+AS_STATED = Frame()
+
+
+def read_model(path: Path, objects: Objects = "auto", frame: Frame = AS_STATED) -> Model:
+    """Read one file, +Z up.
+
+    Args:
+        path: A model; its companions must lie beside it.
+        objects: As ``glb.read_glb`` has it; of mesh files only USD states bodies for "auto".
+        frame: Of mesh files; glTF states both.
+
+    Raises:
+        BadFileError: The file cannot be used, or is a glTF and ``frame`` says something.
+
+    """
+    path = Path(path)
+    if path.suffix.lower() in GLTF or not path.exists():
+        if frame != AS_STATED:
+            step = "Leave --up and --unit out; --extent gives things another size."
+            raise BadFileError(path, "glTF has +Y up and is in metres.", step)
+        return glb.read_model(path, objects)
+    if not is_mesh(path):
+        raise _not_read(path)
+    mesh = read_mesh(path, objects, frame.up)
+    if frame.unit == "auto":
+        return Model(mesh.scene, mesh.ours, mesh.metric)
+    return Model(in_unit(mesh.scene, METRES[frame.unit] / mesh.scene.metres_per_unit), ours=False)
+
+
+def _not_read(path: Path) -> BadFileError:
+    kind = path.suffix.lower()
+    if kind == ".ply":
+        held = "a Gaussian splat" if kind_of_ply(path) == "splat" else "points without triangles"
+        return BadFileError(path, f"holds {held}, not a mesh.", "Name a mesh.")
+    if kind in BLENDER:
+        made = path.with_suffix(".glb")
+        words = BLENDER[kind].format(str(path), str(made))
+        command = f'blender --background --python-expr "{words}"'
+        return BadFileError(path, f"{kind} is read by Blender only.", f"Convert it: {command}")
+    return BadFileError(path, f"is no model ({READ} are read).", "Convert it to .glb.")

@@ -1,0 +1,117 @@
+"""What is implausible of a thing of its class: how large it is, how heavy for its room."""
+
+import numpy as np
+import pytest
+
+from corporeal.formats.typical_bulk import doubt_mass, typical_bulk
+from corporeal.formats.typical_extents import doubt, typical_extent
+
+
+@pytest.mark.parametrize(
+    ("said", "words"),
+    [
+        ("golfball", "golf ball"),
+        ("golf ball", "golf ball"),
+        ("trashcan", "trash can"),
+        ("old trashcans", "trash can"),
+        ("teddybear", "teddy bear"),
+        ("cardboardbox", "cardboard box"),
+        ("football", "football"),
+        ("carpet", None),
+        ("canister", None),
+    ],
+)
+def test_a_compound_is_found_by_its_words(said, words):
+    found = typical_extent(said)
+    assert (found and found.words) == words
+
+
+def test_a_file_in_artists_units_is_said_to_be_implausible():
+    """The two that went through without a word."""
+    golf = doubt("golfball_0", "golfball", 1.8)
+    assert golf is not None
+    assert "1.8 m large" in golf
+    assert "--extent golfball_0=0.043" in golf
+    assert doubt("dumpster_0", "dumpster", 190.0) is not None
+    assert doubt("golfball_0", "golfball", 0.0427) is None
+    assert doubt("dumpster_0", "dumpster", 1.9) is None
+
+
+SOLID = [
+    ("dumpster", 36.7e3, (1.6, 1.6, 1.9)),
+    ("refrigerator", 5.5e3, (0.6, 0.65, 1.8)),
+    ("wooden cabinet", 540.0, (0.5, 1.0, 1.8)),
+    ("trashcan", 50.0, (0.3, 0.3, 0.6)),
+    ("car", 90e3, (4.3, 1.8, 1.5)),
+    ("bed", 1510.0, (1.26, 2.0, 2.04)),
+    ("traffic cone", 57.0, (0.5, 0.5, 1.09)),
+    ("water bottle", 14.0, (0.109, 0.109, 0.26)),
+    ("thingamajig", 36.7e3, (1.6, 1.6, 1.9)),
+]
+TRUE = [
+    ("golf ball", 0.046, (0.043, 0.043, 0.043)),
+    ("tennis ball", 0.058, (0.067, 0.067, 0.067)),
+    ("baseball", 0.145, (0.074, 0.074, 0.074)),
+    ("basketball", 0.62, (0.24, 0.24, 0.24)),
+    ("bowling ball", 6.5, (0.216, 0.216, 0.216)),
+    ("soda can", 0.37, (0.066, 0.066, 0.122)),
+    ("soda can", 0.014, (0.066, 0.066, 0.122)),
+    ("chair", 6.0, (0.5, 0.5, 0.9)),
+    ("couch", 70.0, (0.85, 0.9, 2.0)),
+    ("refrigerator", 80.0, (0.6, 0.65, 1.8)),
+    ("washing machine", 70.0, (0.6, 0.6, 0.85)),
+    ("bed", 70.0, (0.6, 1.5, 2.0)),
+    ("traffic cone", 4.0, (0.4, 0.4, 0.75)),
+    ("water bottle", 0.35, (0.07, 0.07, 0.26)),
+    ("water bottle", 1.0, (0.075, 0.075, 0.28)),
+    ("dumpster", 400.0, (1.2, 1.3, 1.8)),
+    ("trash can", 3.0, (0.3, 0.3, 0.6)),
+    ("car", 1300.0, (1.5, 1.8, 4.3)),
+    ("bicycle", 12.0, (0.6, 1.0, 1.7)),
+    ("book", 0.4, (0.025, 0.15, 0.22)),
+    ("mug", 0.35, (0.08, 0.095, 0.12)),
+    ("guitar", 2.5, (0.11, 0.4, 1.0)),
+    ("brick", 2.5, (0.065, 0.1, 0.215)),
+    ("anvil", 45.0, (0.12, 0.25, 0.45)),
+    ("thingamajig", 7.0, (0.1, 0.1, 0.1)),
+    ("thingamajig", 900.0, (1.0, 1.0, 1.0)),
+]
+
+
+@pytest.mark.parametrize(("what", "mass", "sides"), SOLID)
+def test_what_is_solid_where_such_things_are_hollow_is_doubted(what, mass, sides):
+    said = doubt_mass("it_0", what, mass, sides)
+    assert said is not None
+    assert said.startswith("it_0 weighs")
+    assert "--extent" in said
+
+
+@pytest.mark.parametrize(("what", "mass", "sides"), TRUE)
+def test_nothing_that_is_true_is_doubted(what, mass, sides):
+    assert doubt_mass("it_0", what, mass, sides) is None
+
+
+def test_a_sheet_has_no_box_to_weigh_it_by():
+    assert doubt_mass("it_0", "book", 1.0, (0.0, 0.2, 0.3)) is None
+
+
+def test_a_thing_that_is_too_light_is_doubted_too():
+    said = doubt_mass("it_0", "bowling ball", 0.1, (0.216, 0.216, 0.216))
+    assert said is not None
+    assert "a bowling ball has 250 to 800" in said
+
+
+def test_the_doubt_does_not_depend_on_the_size_that_a_scene_shows_things_in():
+    """Masses follow the cube of the size, and so does the box."""
+    for factor in (0.01, 1.0, 100.0):
+        sides = (0.3 * factor, 0.3 * factor, 0.6 * factor)
+        assert doubt_mass("it_0", "trash can", 50.0 * factor**3, sides) is not None
+        assert doubt_mass("it_0", "trash can", 3.0 * factor**3, sides) is None
+
+
+def test_every_row_is_a_range_of_this_world():
+    for words in ("ball", "car", "anvil", "pillow"):
+        known = typical_bulk(words)
+        assert known is not None
+        assert 0.5 < known.low < known.high < 1e4
+    assert np.isfinite(typical_bulk("statue").high)  # pyright: ignore[reportOptionalMemberAccess]
