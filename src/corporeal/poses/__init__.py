@@ -1,0 +1,1 @@
+"""From photographs without poses, or a film, to a COLMAP model."""

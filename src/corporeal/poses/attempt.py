@@ -1,0 +1,245 @@
+"""One attempt at the poses of photographs by COLMAP, through pycolmap, on the processor.
+
+SIFT, matching, and incremental mapping (Schönberger & Frahm, "Structure-from-Motion Revisited",
+CVPR 2016). Nothing that would be fetched over the network is asked for: no learned features, and
+no vocabulary tree (loop detection).
+"""
+
+import shutil
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
+from dataclasses import dataclass
+from functools import partial
+from itertools import count
+from pathlib import Path
+from typing import Any
+
+from corporeal.errors import UserError
+from corporeal.machine import cores
+from corporeal.poses.gather import IMAGES, LONGEST, Gathered
+
+Progress = Callable[[float, str], None]
+
+EXHAUSTIVE = 80
+"""Pictures up to which all pairs are matched; beyond, each with its neighbours by name."""
+OVERLAP = (*range(1, 11), 16, 32, 64)
+"""Distances by name at which they are then matched."""
+BATCH, BLOCK = 4, 100
+"""Pictures and pairs that are worked on before progress is told."""
+DATABASE = "database.db"
+FEATURES, MATCHES = 0.2, 0.6
+"""Share of the work that is done after each step."""
+LOOK = 0.5
+"""How often Ctrl-C is looked for [s]."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of one attempt."""
+
+    thorough: bool
+    pictures: int
+    registered: int = 0
+    points: int = 0
+    reprojection: float = 0.0
+    """Mean reprojection error [px]."""
+    others: tuple[int, ...] = ()
+    """Pictures in the other groups, which share nothing with the first."""
+    focal: float = 0.0
+    """Focal length over the longer side, of the camera that is furthest from one [-]."""
+    bent: float = 0.0
+    """Largest |k1| of its lens [-]."""
+    left_out: tuple[str, ...] = ()
+
+
+def require() -> Any:
+    """Return pycolmap.
+
+    Raises:
+        UserError: It is not installed.
+
+    """
+    try:
+        import pycolmap
+    except ImportError as missing:
+        raise UserError(
+            "Photographs without poses need pycolmap. Install it with: pip install "
+            "'corporeal[poses]'; or pose them, for example with COLMAP."
+        ) from missing
+    pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
+    return pycolmap
+
+
+def attempt(
+    folder: Path, out: Path, gathered: Gathered, thorough: bool, progress: Progress
+) -> Attempt:
+    """Find poses, and write the largest model as text to ``out / "sparse" / "0"``.
+
+    What an interrupted attempt left in the database is not done again.
+
+    Args:
+        folder: Holds ``images``.
+        out: Gets the database and the model.
+        gathered: What lies there.
+        thorough: Affine shapes, pooling over scales, guided matching, lower minima, and points that
+            two pictures alone share: for pictures that are far apart.
+        progress: Told the fraction done and what is being done.
+
+    """
+    pycolmap = require()
+    out.mkdir(parents=True, exist_ok=True)
+    pycolmap.set_random_seed(0)
+    words = "second attempt: " if thorough else ""
+    work = _Work(pycolmap, folder / IMAGES, out, gathered, thorough)
+    steps = (
+        (work.extract, 0.0, FEATURES, "looking for points"),
+        (work.match, FEATURES, MATCHES, "matching pictures"),
+        (work.place, MATCHES, 1.0, "placing cameras"),
+    )
+    for step, begin, end, what in steps:
+
+        def told(share: float, begin: float = begin, end: float = end, what: str = what) -> None:
+            progress(begin + (end - begin) * share, words + what)
+
+        _watched(pycolmap, partial(step, told))
+    return _judged(work.models, out, gathered, thorough)
+
+
+def _watched(pycolmap: Any, work: Callable[[Any], None]) -> None:
+    """Do some work in a thread, so that Ctrl-C ends it at once."""
+    token = pycolmap.CancellationToken()
+    with ThreadPoolExecutor(1) as pool:
+        doing = pool.submit(work, token)
+        try:
+            while wait([doing], LOOK).not_done:
+                pass
+        except BaseException:
+            token.cancel()
+            raise
+        doing.result()
+
+
+def pairs_of(total: int) -> list[tuple[int, int]]:
+    """Return which of so many pictures, in order of their names, are matched with one another."""
+    apart = range(1, total) if total <= EXHAUSTIVE else OVERLAP
+    return [(k, k + d) for k in range(total) for d in apart if k + d < total]
+
+
+class _Work:
+    """The steps of one attempt; each takes whom to tell the share that is done, and a token.
+
+    Nobody else opens the database meanwhile: a second library of SQLite in one process breaks the
+    locks of the first (sqlite.org/howtocorrupt.html, 2.2.1).
+    """
+
+    def __init__(
+        self, pycolmap: Any, images: Path, out: Path, gathered: Gathered, thorough: bool
+    ) -> None:
+        self.pycolmap, self.images, self.out = pycolmap, images, out
+        self.gathered, self.thorough = gathered, thorough
+        self.database = out / DATABASE
+        self.models: Any = {}
+
+    def extract(self, told: Callable[[float], None], token: Any) -> None:
+        """Find points; pictures of one size share a camera."""
+        reading = self.pycolmap.ImageReaderOptions()
+        reading.camera_model = "SIMPLE_RADIAL"
+        sift = self.pycolmap.FeatureExtractionOptions()
+        sift.num_threads, sift.use_gpu, sift.max_image_size = cores(), False, LONGEST
+        sift.sift.estimate_affine_shape = sift.sift.domain_size_pooling = self.thorough
+        done = 0
+        for camera, size in enumerate(dict.fromkeys(self.gathered.sizes)):
+            both = zip(self.gathered.names, self.gathered.sizes, strict=True)
+            names = [name for name, own in both if own == size]
+            for first in range(0, len(names), BATCH):
+                if token.is_cancelled:
+                    return
+                # The first batch makes the camera; cameras are numbered from 1.
+                reading.existing_camera_id = camera + 1 if first else -1
+                self.pycolmap.extract_features(
+                    self.database,
+                    self.images,
+                    image_names=names[first : first + BATCH],
+                    camera_mode=self.pycolmap.CameraMode.SINGLE,
+                    reader_options=reading,
+                    extraction_options=sift,
+                    device=self.pycolmap.Device.cpu,
+                    cancellation_token=token,
+                )
+                done += len(names[first : first + BATCH])
+                told(done / len(self.gathered.names))
+
+    def match(self, told: Callable[[float], None], token: Any) -> None:
+        """Find which points of two pictures are one, and check that by epipolar geometry."""
+        matching = self.pycolmap.FeatureMatchingOptions()
+        matching.num_threads, matching.use_gpu = cores(), False
+        matching.guided_matching = self.thorough
+        names, pairs = self.gathered.names, pairs_of(len(self.gathered.names))
+        pairing = self.pycolmap.ImportedPairingOptions()
+        pairing.match_list_path = str(self.out / "pairs.txt")
+        for first in range(0, len(pairs), BLOCK):
+            if token.is_cancelled:
+                return
+            rows = [f"{names[a]} {names[b]}\n" for a, b in pairs[first : first + BLOCK]]
+            (self.out / "pairs.txt").write_text("".join(rows), encoding="utf-8")
+            self.pycolmap.match_image_pairs(
+                self.database,
+                matching_options=matching,
+                pairing_options=pairing,
+                device=self.pycolmap.Device.cpu,
+                cancellation_token=token,
+            )
+            told(min((first + BLOCK) / len(pairs), 1.0))
+
+    def place(self, told: Callable[[float], None], token: Any) -> None:
+        """Place cameras one after the other, in groups that share points."""
+        options = self.pycolmap.IncrementalPipelineOptions()
+        options.num_threads, options.random_seed, options.min_model_size = cores(), 0, 3
+        if self.thorough:  # believe less: pictures are far apart; the whole is judged afterwards
+            options.min_num_matches = 10
+            options.mapper.init_min_num_inliers = 40
+            options.mapper.abs_pose_min_num_inliers = 12
+            options.mapper.abs_pose_min_inlier_ratio = 0.15
+            options.triangulation.ignore_two_view_tracks = False
+        placed = count(1)
+        total = len(self.gathered.names)
+        shutil.rmtree(self.out / "models", ignore_errors=True)
+        (self.out / "models").mkdir()
+        self.models = self.pycolmap.incremental_mapping(
+            self.database,
+            self.images,
+            self.out / "models",
+            options,
+            next_image_callback=lambda: told(min(next(placed) / total, 1.0)),
+            cancellation_token=token,
+        )
+
+
+def _judged(models: Any, out: Path, gathered: Gathered, thorough: bool) -> Attempt:
+    total = len(gathered.names)
+    best = max(models.values(), key=lambda m: m.num_reg_images(), default=None)
+    if best is None:
+        return Attempt(thorough, total, left_out=gathered.names)
+    place = out / "sparse" / "0"
+    place.mkdir(parents=True, exist_ok=True)
+    best.write_text(str(place))
+    placed = {image.name for image in best.images.values() if image.has_pose}
+    focal, bent = _lens([c for c in best.cameras.values()])
+    return Attempt(
+        thorough,
+        total,
+        registered=best.num_reg_images(),
+        points=best.num_points3D(),
+        reprojection=round(best.compute_mean_reprojection_error(), 3),
+        others=tuple(sorted((m.num_reg_images() for m in models.values()), reverse=True)[1:]),
+        focal=focal,
+        bent=bent,
+        left_out=tuple(n for n in gathered.names if n not in placed),
+    )
+
+
+def _lens(cameras: Sequence[Any]) -> tuple[float, float]:
+    """Return the strangest focal length over the longer side, and the largest |k1|."""
+    ratios = [c.params[0] / max(c.width, c.height) for c in cameras]
+    strange = max(ratios, key=lambda r: max(r, 1 / max(r, 1e-9)))
+    return round(float(strange), 3), round(float(max(abs(c.params[3]) for c in cameras)), 3)

@@ -1,0 +1,164 @@
+"""Photographs made ready to be posed: upright, of moderate size, each once, and their masks."""
+
+import re
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from PIL import Image, ImageOps
+
+from corporeal import store
+from corporeal.errors import BadFileError
+from corporeal.formats.images import FORMATS, MAX_PIXELS
+from corporeal.formats.photographs import INSTANCES, MASKS, companion
+from corporeal.formats.shots import FEWEST, Bad, left_out, unreadable
+from corporeal.formats.sources import photographs_in
+from corporeal.formats.words import safe
+
+Progress = Callable[[float, str], None]
+
+LONGEST = 1600
+"""Longer side of what points are looked for in [px]."""
+MOST = 120
+"""Photographs; of more, some are taken at equal steps."""
+THUMBNAIL = (24, 24)
+SAME = 0.5
+"""Mean difference of thumbnails, of 255, below which two show the same from the same place."""
+BLANK = 2.0
+"""Standard deviation of a thumbnail, of 255, below which there is nothing on it."""
+QUALITY = 95
+"""Of JPEG copies."""
+IMAGES = "images"
+TAKE = "Take 40 to 80 photographs of the thing from all around."
+
+
+@dataclass(frozen=True)
+class Gathered:
+    """Photographs as they lie in the folder ``images``."""
+
+    names: tuple[str, ...]
+    sizes: tuple[tuple[int, int], ...]
+    """Width and height of each [px]."""
+    said: tuple[str, ...]
+    """What was left out, and why, in sentences."""
+
+
+def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
+    """Copy the photographs of a folder, turned as their EXIF says, with their masks.
+
+    Args:
+        source: The folder.
+        folder: Gets ``images``, and ``masks`` and ``instances`` where there are some.
+        progress: Told the fraction done and what is being done.
+
+    Raises:
+        BadFileError: Too few can be used.
+
+    """
+    found = photographs_in(source)
+    step = max(1, -(-len(found) // MOST))
+    taken, bad = found[::step], []
+    names: dict[str, tuple[int, int]] = {}
+    known = np.zeros((0, *THUMBNAIL))
+    for number, file in enumerate(taken):
+        progress(number / len(taken), "reading photographs")
+        try:
+            picture = _upright(file)
+            thumbnail = _thumbnail(picture)
+            _check(thumbnail, known, list(names))
+        except _UnusableError as problem:
+            bad.append((file.name, str(problem)))
+            continue
+        known = np.concatenate([known, thumbnail[None]])
+        name = _name(file, set(names))
+        names[name] = picture.size
+        _write(picture, folder / IMAGES / name)
+        for kinds in (MASKS, INSTANCES):
+            _copy_mask(file, source, kinds, folder, name)
+    said = [f"Every {step}. of {len(found)} photographs was used."] if step > 1 else []
+    said += left_out(len(taken), bad)
+    _refuse_few(source, len(names), len(taken), bad)
+    return Gathered(tuple(names), tuple(names.values()), tuple(said))
+
+
+def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad]) -> None:
+    if good >= max(FEWEST, asked / 2):
+        return
+    why = f" The first of the others, {bad[0][0]}, {bad[0][1]}." if bad else ""
+    what = f"only {good} of {asked} photographs can be used.{why}"
+    raise BadFileError(source, what, TAKE)
+
+
+class _UnusableError(Exception):
+    """Why one photograph cannot be used, in a clause."""
+
+
+def _upright(file: Path) -> Image.Image:
+    """Return a photograph turned as it says, reduced, with what it says of its lens."""
+    try:
+        with Image.open(file, formats=FORMATS) as opened:
+            if opened.width * opened.height > MAX_PIXELS:
+                raise _UnusableError(f"claims {opened.width} × {opened.height} pixels")
+            opened.draft("RGB", (LONGEST, LONGEST))
+            turned = ImageOps.exif_transpose(opened)
+            exif = turned.getexif()
+            picture = turned.convert("RGB")
+    except _UnusableError:
+        raise
+    except Exception as problem:  # Pillow's decoders raise almost anything on broken input
+        raise _UnusableError(unreadable(file)) from problem
+    picture.thumbnail((LONGEST, LONGEST), Image.Resampling.LANCZOS)
+    picture.info["exif"] = exif.tobytes() if exif else b""
+    return picture
+
+
+def _thumbnail(picture: Image.Image) -> np.ndarray:
+    small = picture.convert("L").resize(THUMBNAIL, Image.Resampling.BOX)
+    return np.asarray(small, float)
+
+
+def _check(thumbnail: np.ndarray, known: np.ndarray, names: list[str]) -> None:
+    if thumbnail.std() < BLANK:
+        raise _UnusableError("shows nothing but one colour")
+    apart = np.abs(known - thumbnail).mean(axis=(1, 2))
+    if len(apart) and apart.min() < SAME:
+        raise _UnusableError(f"shows the same as {names[int(apart.argmin())]}")
+
+
+def _name(file: Path, taken: set[str]) -> str:
+    """Return a name that occurs once and holds no blanks, which end names in COLMAP's lists."""
+    stem, k = re.sub(r"\s", "_", safe(file.stem)) or "photograph", 1
+    name = f"{stem}.jpg"
+    while name in taken:
+        name, k = f"{stem}_{k}.jpg", k + 1
+    return name
+
+
+def _write(picture: Image.Image, path: Path) -> None:
+    with store.writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        exif = picture.info["exif"]
+        more = {"exif": exif} if exif else {}
+        picture.save(path, "JPEG", quality=QUALITY, subsampling=0, **more)
+
+
+def _copy_mask(file: Path, source: Path, kinds: tuple[str, ...], folder: Path, name: str) -> None:
+    """Copy what goes with a photograph, turned with it where it is as the camera stored it."""
+    mask = companion(file, source, kinds)
+    if mask is None:
+        return
+    try:
+        with Image.open(file, formats=FORMATS) as stored, Image.open(mask, formats=FORMATS) as own:
+            wide = stored.width > stored.height
+            same = (own.width > own.height) == wide
+            turn = stored.getexif() if same else Image.Exif()
+            copy = own.copy()
+        copy.getexif().clear()
+        copy.getexif().update({0x0112: turn.get(0x0112, 1)})
+        place = folder / kinds[0] / f"{Path(name).stem}.png"
+        with store.writing(place):
+            place.parent.mkdir(parents=True, exist_ok=True)
+            ImageOps.exif_transpose(copy).save(place, "PNG")
+    except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+        return  # a photograph without its mask is left out where the others have one

@@ -1,0 +1,89 @@
+"""Whether a model that COLMAP found can be believed, and what to photograph next time.
+
+A wrong model looks like a model: low reprojection error says nothing. What speaks against one was
+found on right and wrong models of the same pictures, docs/inputs.md, "Photographs without poses".
+"""
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.geometry.level import level
+from corporeal.geometry.region import region
+from corporeal.poses.attempt import Attempt
+from corporeal.types import Camera
+
+SHARE = 0.7
+"""Of the pictures that must be registered."""
+POINTS = 30
+"""Points per registered picture, at least."""
+FOCAL = 0.45, 3.0
+"""Focal lengths over the longer side that lenses have."""
+BENT = 0.25
+"""Largest |k1| of a lens that is no fisheye."""
+RIVAL = 1 / 3
+"""Share of the first group from which on a second one rivals it."""
+NAMED = 8
+GAP = 60.0
+"""Angle between neighbouring cameras, about what they look at, that leaves a side unseen [deg]."""
+WHAT_TO_DO = (
+    "Neighbouring pictures share too few points. Put the thing on something with a pattern, such "
+    "as a newspaper; take 40 to 80 pictures at most 15° apart; move neither thing nor light."
+)
+
+
+def doubts(told: Attempt) -> list[str]:
+    """Return what speaks against a model, in clauses; nothing: it can be believed."""
+    if not told.registered:
+        return ["no two pictures share enough points"]
+    found = []
+    if told.registered < SHARE * told.pictures:
+        found.append(f"only {told.registered} of {told.pictures} pictures fit together")
+    if told.points < POINTS * told.registered:
+        each = told.points / told.registered
+        found.append(f"there are {each:.0f} points per picture, too few to trust")
+    if not FOCAL[0] < told.focal < FOCAL[1] or told.bent > BENT:
+        found.append(
+            f"it takes a lens that nobody has (focal length {told.focal:g} × the longer side, "
+            f"k1 {told.bent:g})"
+        )
+    if told.others and told.others[0] > RIVAL * told.registered:
+        groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])
+        found.append(f"the pictures fall into groups of {groups} that share nothing")
+    return found
+
+
+def names_of(left_out: tuple[str, ...]) -> str:
+    """Return up to eight names and how many more there are."""
+    more = f" and {len(left_out) - NAMED} more" if len(left_out) > NAMED else ""
+    return ", ".join(left_out[:NAMED]) + more
+
+
+def unseen_side(cameras: tuple[Camera, ...], names: tuple[str, ...]) -> str | None:
+    """Say between which pictures a side was not photographed, if there is a wide gap.
+
+    Args:
+        cameras: That were found.
+        names: Of their pictures.
+
+    """
+    angle, order = _around(cameras)
+    gaps = np.degrees(np.diff(np.append(angle[order], angle[order[0]] + 2 * np.pi)))
+    widest = int(gaps.argmax())
+    if gaps[widest] < GAP:
+        return None
+    ends = names[order[widest]], names[order[(widest + 1) % len(order)]]
+    return (
+        f"Between {ends[0]} and {ends[1]} lie {gaps[widest]:.0f}° from which nobody looked: what "
+        "faces there is made up. Photograph that side next time."
+    )
+
+
+def _around(cameras: tuple[Camera, ...]) -> tuple[Float[np.ndarray, " V"], np.ndarray]:
+    """Return the angle of each camera about the axis that is up [rad], and their order."""
+    up = level(cameras).up
+    ahead = np.cross(up, np.eye(3)[np.abs(up).argmin()])
+    ahead /= np.linalg.norm(ahead)
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
+    away = eyes - np.array(region(cameras).centre)
+    angle = np.arctan2(away @ np.cross(up, ahead), away @ ahead)
+    return angle, np.argsort(angle)

@@ -1,0 +1,134 @@
+"""Find where photographs were taken from, in one or two attempts, or say why that cannot be."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from corporeal import store
+from corporeal.errors import BadFileError
+from corporeal.formats.photographs import read_photographs
+from corporeal.formats.sources import FILMS
+from corporeal.poses.attempt import Attempt, attempt, require
+from corporeal.poses.cameras_figure import cameras_figure
+from corporeal.poses.film_frames import write_frames
+from corporeal.poses.gather import Gathered, gather
+from corporeal.poses.judge import WHAT_TO_DO, doubts, names_of, unseen_side
+from corporeal.typed import typed
+
+Progress = Callable[[float, str], None]
+
+POSES = "poses"
+"""Folder of a reconstruction in which they are kept."""
+FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
+GATHERED = 0.1
+"""Share of the work that is done when photographs are read."""
+FIRST = 0.6
+"""The same, after the first attempt."""
+
+
+@dataclass(frozen=True)
+class Posed:
+    """Photographs whose poses are known now."""
+
+    folder: Path
+    """Holds ``images`` and a COLMAP model, ``sparse/0``."""
+    statements: tuple[str, ...]
+    warnings: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class _Kept:
+    """What ``poses.json`` holds."""
+
+    statements: tuple[str, ...]
+    warnings: tuple[str, ...]
+    refused: str
+    """Why there are no poses; "": there are."""
+    attempts: tuple[Attempt, ...]
+
+
+def pose(source: Path, folder: Path, progress: Progress) -> Posed:
+    """Find the poses of photographs, or of frames of a film.
+
+    Args:
+        source: A folder of photographs, or a film.
+        folder: Gets pictures and model. What is there of the same source is not done again.
+        progress: Told the fraction done and what is being done.
+
+    Raises:
+        UserError: pycolmap is not installed, or the poses cannot be found or not be believed.
+
+    """
+    require()
+    begun = {"source": store.digest(source)}
+    if not (folder / BEGUN).exists() or store.read_json(folder / BEGUN) != begun:
+        shutil.rmtree(folder, ignore_errors=True)
+        store.write_json(folder / BEGUN, begun)
+    if (folder / FOUND).exists():
+        kept = typed(_Kept, store.read_json(folder / FOUND))
+    else:
+        kept = _found(source, folder, progress)
+        store.write_json(folder / FOUND, kept)
+    if kept.refused:
+        raise BadFileError(source, kept.refused, WHAT_TO_DO)
+    return Posed(folder, kept.statements, kept.warnings)
+
+
+def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
+    said, gathered = _gathered(source, folder, _within(progress, 0.0, GATHERED))
+    tried: list[Attempt] = []
+    for thorough in (False, True):
+        out = folder / ("second" if thorough else "first")
+        share = (FIRST, 1.0) if thorough else (GATHERED, FIRST)
+        tried.append(attempt(folder, out, gathered, thorough, _within(progress, *share)))
+        if not doubts(tried[-1]):
+            _accept(out, folder)
+            return _told(folder, gathered, tuple(said), tuple(tried))
+    best = max(tried, key=lambda told: told.registered)
+    why = f"where the pictures were taken from cannot be found: {'; '.join(doubts(best))}."
+    return _Kept((), (), why, tuple(tried))
+
+
+def _gathered(source: Path, folder: Path, progress: Progress) -> tuple[list[str], Gathered]:
+    if source.suffix.lower() not in FILMS:
+        return [], gather(source, folder, progress)
+    frames = folder / "frames"
+    said = write_frames(source, frames, _within(progress, 0.0, 0.7))
+    gathered = gather(frames, folder, _within(progress, 0.7, 1.0))
+    shutil.rmtree(frames)
+    return said, gathered
+
+
+def _within(progress: Progress, begin: float, end: float) -> Progress:
+    return lambda fraction, words: progress(begin + (end - begin) * fraction, words)
+
+
+def _accept(out: Path, folder: Path) -> None:
+    """Put the model where it is looked for, and drop what it was made of."""
+    shutil.rmtree(folder / "sparse", ignore_errors=True)
+    shutil.move(out / "sparse", folder / "sparse")
+    for name in ("first", "second"):
+        shutil.rmtree(folder / name, ignore_errors=True)
+
+
+def _told(
+    folder: Path, gathered: Gathered, said: tuple[str, ...], tried: tuple[Attempt, ...]
+) -> _Kept:
+    last = tried[-1]
+    statement = (
+        f"Where {last.registered} of {last.pictures} photographs were taken from was found by "
+        f"COLMAP{', at the second attempt' if last.thorough else ''}: {last.points:,} points, "
+        f"{last.reprojection:.2f} px reprojection error, focal length {last.focal:.2f} × the "
+        "longer side."
+    )
+    warnings = list(gathered.said)
+    if last.left_out:
+        warnings.append(
+            f"{len(last.left_out)} of {last.pictures} photographs do not fit the others and were "
+            f"left out: {names_of(last.left_out)}."
+        )
+    seen = read_photographs(folder, longest=64)
+    cameras_figure(seen, folder / FIGURE)
+    unseen = unseen_side(seen.views.cameras, seen.names)
+    return _Kept((*said, statement), (*warnings, *filter(None, [unseen])), "", tried)

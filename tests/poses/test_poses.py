@@ -1,0 +1,301 @@
+"""Where photographs, or frames of a film, were taken from."""
+
+import shutil
+import subprocess
+import sys
+from dataclasses import replace
+
+import imageio_ffmpeg
+import numpy as np
+import pytest
+from PIL import Image
+
+from corporeal.errors import BadFileError, UserError
+from corporeal.formats.photographs import read_photographs
+from corporeal.formats.sources import kind_of, photographs_in, sources, unposed
+from corporeal.poses import film_frames
+from corporeal.poses import pose as posing
+from corporeal.poses.attempt import Attempt
+from corporeal.poses.film_frames import choose, write_frames
+from corporeal.poses.gather import gather
+from corporeal.poses.judge import doubts, names_of, unseen_side
+from corporeal.poses.pose import FIGURE, pose
+from corporeal.render.camera import camera_of
+from corporeal.render.video import reel
+from patterned_scene import blots, on_its_side, photographs, pose_errors, ring
+
+COUNT = 14
+TURN_RIGHT = 6
+"""EXIF: the picture is to be turned by a quarter to the right."""
+
+
+def silent(fraction, words):
+    pass
+
+
+# ---------------------------------------------------------------- photographs
+
+
+@pytest.fixture(scope="module")
+def taken(tmp_path_factory):
+    """A folder of photographs around a patterned block, and their cameras."""
+    folder = tmp_path_factory.mktemp("taken") / "photos"
+    return folder, photographs(folder, ring(np.arange(COUNT) * 360 / COUNT, (320, 240)))
+
+
+@pytest.fixture(scope="module")
+def spoilt(taken, tmp_path_factory):
+    """The same with a picture held upright, and with all that goes wrong in folders."""
+    folder = tmp_path_factory.mktemp("spoilt") / "photos"
+    shutil.copytree(taken[0], folder)
+    with Image.open(folder / "photo_003.jpg") as picture:
+        exif = Image.Exif()
+        exif[0x0112] = TURN_RIGHT
+        turned = picture.transpose(Image.Transpose.ROTATE_90)
+        turned.save(folder / "photo_003.jpg", quality=95, exif=exif)
+    shutil.copy(folder / "photo_001.jpg", folder / "photo_001 (copy).jpg")
+    (folder / "broken.jpg").write_bytes((folder / "photo_002.jpg").read_bytes()[:900])
+    (folder / "phone.heic").write_bytes(b"\0\0\0\x18ftypheic" + bytes(100))
+    Image.new("RGB", (320, 240), (3, 3, 3)).save(folder / "lens cap.jpg")
+    return folder
+
+
+def test_cameras_are_found_where_they_were(taken, spoilt, tmp_path):
+    pytest.importorskip("pycolmap")
+    found = pose(spoilt, tmp_path / "poses", silent)
+    seen = read_photographs(found.folder)
+    true = [taken[1][int(name[6:9])] for name in seen.names]
+    assert len(seen.names) == COUNT, "also the one that was held upright"
+    angle, place = pose_errors(seen.views.cameras, true)
+    assert angle.max() < 0.5 and place.max() < 0.01
+    assert f"{COUNT} of {COUNT} photographs" in found.statements[0]
+    (told,) = found.warnings
+    for name in ("broken.jpg", "phone.heic is a HEIC picture", "lens cap.jpg shows nothing"):
+        assert name in told
+    assert "photo_001.jpg shows the same as photo_001_(copy).jpg" in told
+    assert (found.folder / FIGURE).stat().st_size > 10_000
+    assert (found.folder / "sparse" / "0" / "images.txt").exists()
+
+
+def test_what_was_found_is_not_looked_for_again(taken, tmp_path, monkeypatch):
+    pytest.importorskip("pycolmap")
+    tried = []
+
+    def attempt(folder, out, gathered, thorough, progress):
+        tried.append(thorough)
+        return Attempt(thorough, COUNT, registered=5, points=20)
+
+    monkeypatch.setattr(posing, "attempt", attempt)
+    said = []
+    for _ in range(2):
+        with pytest.raises(BadFileError, match=r"only 5 of 14 pictures fit together; there are 4 "):
+            said.append(1)
+            pose(taken[0], tmp_path / "poses", silent)
+    assert tried == [False, True], "both attempts once"
+    shutil.copytree(taken[0], tmp_path / "other")
+    (tmp_path / "other" / "photo_000.jpg").unlink()
+    with pytest.raises(BadFileError, match="Put the thing on something with a pattern"):
+        pose(tmp_path / "other", tmp_path / "poses", silent)
+    assert len(tried) == 4, "other pictures are looked at anew"
+
+
+def test_pycolmap_is_asked_for_where_it_is_absent(taken, tmp_path, monkeypatch):
+    monkeypatch.setitem(sys.modules, "pycolmap", None)
+    with pytest.raises(UserError, match=r"pip install 'corporeal\[poses\]'"):
+        pose(taken[0], tmp_path / "poses", silent)
+
+
+@pytest.mark.parametrize("kind", ["black", "same", "broken", "heic"])
+def test_folders_that_show_nothing_are_refused_in_one_sentence(taken, tmp_path, kind):
+    folder = tmp_path / "photos"
+    folder.mkdir()
+    for k in range(30):
+        if kind == "black":
+            noise = np.random.default_rng(k).integers(0, 3, (240, 320, 3)).astype(np.uint8)
+            Image.fromarray(noise).save(folder / f"{k}.jpg")
+        elif kind == "same":
+            shutil.copy(taken[0] / "photo_000.jpg", folder / f"{k}.jpg")
+        else:
+            data = b"\0\0\0\x18ftypheic" if kind == "heic" else b"\xff\xd8\xff"
+            (folder / f"{k}.{kind if kind == 'heic' else 'jpg'}").write_bytes(data + bytes(50))
+    said = {
+        "black": "only 0 of 30 photographs can be used.*shows nothing but one colour",
+        "same": "only 1 of 30 photographs can be used.*shows the same as 0.jpg",
+        "broken": "only 0 of 30 photographs can be used.*is no PNG, JPEG or WebP",
+        "heic": "only 0 of 30 photographs can be used.*is a HEIC picture: convert it to JPEG",
+    }
+    assert kind_of([folder]) == "photographs" and unposed(folder)
+    with pytest.raises(BadFileError, match=said[kind]) as error:
+        gather(folder, tmp_path / "poses", silent)
+    assert "\n" not in str(error.value)
+
+
+def test_of_very_many_photographs_some_are_used(tmp_path):
+    rng = np.random.default_rng(0)
+    (tmp_path / "photos").mkdir()
+    for k in range(250):
+        picture = rng.integers(0, 255, (12, 16, 3)).astype(np.uint8)
+        Image.fromarray(picture).resize((64, 48)).save(tmp_path / "photos" / f"{k:03d}.png")
+    found = gather(tmp_path / "photos", tmp_path / "poses", silent)
+    assert len(found.names) == 84
+    assert "Every 3. of 250 photographs was used." in found.said
+
+
+def test_masks_are_turned_with_their_photographs(tmp_path):
+    (tmp_path / "photos" / "masks").mkdir(parents=True)
+    rng = np.random.default_rng(0)
+    exif = Image.Exif()
+    exif[0x0112] = TURN_RIGHT
+    for k in range(4):
+        picture = Image.fromarray(rng.integers(0, 255, (6, 8, 3)).astype(np.uint8))
+        picture.resize((64, 48), Image.Resampling.NEAREST).save(
+            tmp_path / "photos" / f"{k}.png", exif=exif
+        )
+        mask = np.zeros((48, 64), np.uint8)
+        mask[:, :10] = 255  # the left in the file is the top as it is shown
+        if k % 2:
+            mask = np.rot90(mask, -1)  # drawn on the picture as it is shown
+        Image.fromarray(mask).save(tmp_path / "photos" / "masks" / f"{k}.png")
+    gather(tmp_path / "photos", tmp_path / "poses", silent)
+    for k in range(4):
+        with Image.open(tmp_path / "poses" / "masks" / f"{k}.png") as mask:
+            white = np.asarray(mask) > 128
+        assert white.shape == (64, 48) and white[:10].all() and not white[10:].any()
+
+
+def test_photographs_lie_in_a_folder_or_in_its_images(tmp_path):
+    (tmp_path / "scan" / "images").mkdir(parents=True)
+    (tmp_path / "scan" / "masks").mkdir()
+    for name in ("images/b.JPG", "images/a.png", "masks/a.png", "notes.txt"):
+        (tmp_path / "scan" / name).touch()
+    assert [p.name for p in photographs_in(tmp_path / "scan")] == ["a.png", "b.JPG"]
+    assert kind_of([tmp_path / "scan"]) == "photographs"
+    (tmp_path / "a.MOV").touch()
+    assert kind_of([tmp_path / "a.MOV"]) == "photographs" and unposed(tmp_path / "a.MOV")
+    assert sources([tmp_path / "a.MOV"]) == [tmp_path / "a.MOV"]
+
+
+# ---------------------------------------------------------------- what is believed
+
+RIGHT = {
+    "a patterned slab": Attempt(False, 48, 48, 13_999, 0.21, (), 1.0, 0.01),
+    "a plain floor": Attempt(True, 48, 47, 2403, 0.98, (), 1.0, 0.05),
+    "real": Attempt(True, 13, 12, 2092, 0.43, (), 0.99, 0.1),
+    "a film": Attempt(False, 30, 30, 9705, 0.3, (), 1.0, 0.0),
+}
+WRONG = {
+    "nothing": (Attempt(True, 20), "no two pictures"),
+    "groups": (Attempt(False, 48, 34, 2000, 0.5, (18,), 1.0, 0.0), "groups of 34 and 18"),
+    "few": (Attempt(True, 24, 11, 541, 0.9, (), 0.85, 0.1), "only 11 of 24"),
+    "a lens": (Attempt(True, 24, 20, 1541, 0.9, (), 0.85, 0.55), "k1 0.55"),
+    "a vase": (Attempt(True, 48, 40, 380, 1.1, (), 1.0, 0.0), "10 points per picture"),
+    "a lens of a vase": (Attempt(True, 48, 40, 4000, 1.1, (), 0.14, 0.0), "focal length 0.14"),
+}
+
+
+@pytest.mark.parametrize("name", RIGHT)
+def test_models_that_were_right_are_believed(name):
+    """Measured against known poses, docs/inputs.md."""
+    assert doubts(RIGHT[name]) == []
+
+
+@pytest.mark.parametrize("name", WRONG)
+def test_models_that_were_wrong_are_not(name):
+    told, said = WRONG[name]
+    assert any(said in clause for clause in doubts(told))
+    cured = replace(told, pictures=40, registered=40, points=4000, others=(), focal=1.0, bent=0.0)
+    assert doubts(cured) == [], "each has one thing wrong, or several, and nothing else"
+
+
+def test_a_side_that_nobody_photographed_is_named_by_its_neighbours():
+    names = tuple(f"{k:02d}.jpg" for k in range(25))
+    half = tuple(camera_of(a) for a in ring(np.linspace(0, 240, 25)))
+    said = unseen_side(half, names)
+    assert said is not None and "Between 24.jpg and 00.jpg lie 120°" in said
+    upside_down = tuple(on_its_side(on_its_side(c)) for c in half)
+    assert "lie 120°" in (unseen_side(upside_down, names) or "")
+    around = tuple(camera_of(a) for a in ring(np.arange(25) * 360 / 25))
+    assert unseen_side(around, names) is None
+
+
+def test_eight_names_are_enough():
+    assert names_of(("a", "b")) == "a, b"
+    assert names_of(tuple("abcdefghijk")) == "a, b, c, d, e, f, g, h and 3 more"
+
+
+# ---------------------------------------------------------------- films
+
+
+def test_frames_are_sharp_and_equally_far_apart():
+    change = np.concatenate([np.full(50, 1.0), np.zeros(100), np.full(50, 1.0)])
+    sharp = np.full(200, 10.0)
+    sharp[[10, 160]] = 20.0
+    sharp[20:24] = 1.0
+    chosen = choose(change, sharp, 10)
+    assert 10 in chosen and 160 in chosen
+    assert sum(50 <= k < 150 for k in chosen) <= 1, "a hand that rests gives no frames"
+    assert not set(chosen) & set(range(20, 24)), "smeared"
+    assert choose(np.zeros(30), np.ones(30), 10) == []
+    # A stretch that is smeared as a whole gives none.
+    sharp[:] = 10.0
+    sharp[20:30] = 1.0
+    assert not set(choose(np.full(200, 1.0), sharp, 20)) & set(range(20, 30))
+
+
+def film(path, count, smeared=lambda k: False, size=(320, 240)):
+    """A camera that passes over a newspaper; some frames are smeared."""
+    paper = np.kron(blots(0, 512), np.ones((2, 2, 1), np.uint8))
+    with reel(path, 30, size) as made:
+        for k in range(count):
+            y, x = 2 * k, 4 * k % (paper.shape[1] - size[0])
+            picture = paper[y : y + size[1], x : x + size[0]]
+            if smeared(k):
+                shifted = [np.roll(picture.astype(float), s, axis=1) for s in range(12)]
+                picture = np.mean(shifted, axis=0).astype(np.uint8)
+            made.add(np.ascontiguousarray(picture))
+    return path
+
+
+def test_a_film_gives_sharp_frames(tmp_path):
+    path = film(tmp_path / "a.mp4", 120, lambda k: k % 12 < 4)
+    said = write_frames(path, tmp_path / "frames", silent)
+    numbers = [int(p.stem[6:]) for p in sorted((tmp_path / "frames").iterdir())]
+    assert 40 <= len(numbers) <= 60 and "120 that were looked at" in said[0]
+    assert np.mean([k % 12 < 4 for k in numbers]) <= 0.1
+    with Image.open(tmp_path / "frames" / f"frame_{numbers[5]:05d}.png") as picture:
+        shown = np.asarray(picture, float)
+    paper = np.kron(blots(0, 512), np.ones((2, 2, 1), np.uint8))
+    y, x = 2 * numbers[5], 4 * numbers[5]
+    assert np.abs(shown - paper[y : y + 240, x : x + 320]).mean() < 12, "and not another frame"
+
+
+def test_a_film_that_was_held_upright_is_turned(tmp_path):
+    film(tmp_path / "a.mp4", 60)
+    program = imageio_ffmpeg.get_ffmpeg_exe()
+    command = [program, "-v", "error", "-display_rotation", "90", "-i", str(tmp_path / "a.mp4")]
+    subprocess.run([*command, "-c", "copy", str(tmp_path / "b.mp4")], check=True)
+    write_frames(tmp_path / "b.mp4", tmp_path / "frames", silent)
+    with Image.open(next((tmp_path / "frames").iterdir())) as picture:
+        assert picture.size == (240, 320)
+
+
+@pytest.mark.parametrize("kind", ["ten frames", "still", "noise", "empty", "text", "long"])
+def test_films_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, monkeypatch):
+    path, said = tmp_path / "a.mp4", "cannot be read as a film"
+    if kind == "ten frames":
+        said = "holds 10 frames; at least 20"
+        film(path, 10)
+    elif kind == "still":
+        said = "only 0 of 40 frames are sharp and differ"
+        with reel(path, 30, (320, 240)) as made:
+            for _ in range(40):
+                made.add(np.full((240, 320, 3), 90, np.uint8))
+    elif kind == "long":
+        said = "is 0 minutes long; at most"
+        monkeypatch.setattr(film_frames, "LONGEST", 0.5)
+        film(path, 30)
+    else:
+        path.write_bytes({"noise": bytes(range(256)) * 50, "empty": b"", "text": b"film"}[kind])
+    with pytest.raises(BadFileError, match=said) as error:
+        write_frames(path, tmp_path / "frames", silent)
+    assert "\n" not in str(error.value)
