@@ -4,7 +4,7 @@ import pytest
 from corporeal import features
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.features import connect
-from corporeal.features.saved import Kept
+from corporeal.features.saved_maps import Kept
 
 
 class Counting:

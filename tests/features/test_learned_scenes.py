@@ -11,7 +11,7 @@ from corporeal.stages import reconstruct as stage
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
 from corporeal.stages.segment import segment
 from corporeal.types import Gaussians, Inventory, ObjectWords, PartWords
-from corporeal.vlm.things import Thing, Viewer
+from corporeal.vlm.seen_objects import SeenObject, Viewer
 
 pytestmark = [needs_models(), pytest.mark.slow]
 BOXES = (((-0.5, -0.25, 0.0), (-0.1, 0.25, 0.5)), ((0.2, -0.2, 0.0), (0.5, 0.2, 0.3)))
@@ -54,8 +54,8 @@ class Seer(Viewer):
     def __init__(self):
         super().__init__("boxes", "metadata")
 
-    def things(self, pictures):
-        return [Thing("brick", "red", 0.5, "a model (x)"), Thing("crate", "blue", 0.4)]
+    def objects(self, pictures):
+        return [SeenObject("brick", "red", 0.5, "a model (x)"), SeenObject("crate", "blue", 0.4)]
 
     def regions(self, *_):
         pytest.fail("CLIP tells which is which")
@@ -65,7 +65,8 @@ def test_models_that_were_saved_here_see_things_and_name_parts(
     models, splat, tmp_path, monkeypatch
 ):
     config = ReconstructConfig(up="z", training="draft", lifting="radiance", **models)
-    found, scene = reconstruct(splat, config, viewer=Seer(), folder=tmp_path / "kept")
+    result = reconstruct(splat, config, viewer=Seer(), folder=tmp_path / "kept")
+    found, scene = result.found, result.scene
     assert {o.class_name for o in scene.objects} == {"brick", "crate"}
     assert found.cloud.semantic.shape == (found.cloud.count, 24)
     assert found.cloud.structural.shape == (found.cloud.count, 48)
@@ -88,6 +89,6 @@ def test_models_that_were_saved_here_see_things_and_name_parts(
         raise StopIteration
 
     monkeypatch.setattr("corporeal.features.clip.dense", looked)
-    monkeypatch.setattr(stage, "told_apart", enough)
+    monkeypatch.setattr(stage, "assign_instances", enough)
     with pytest.raises(StopIteration):
         reconstruct(splat, config, viewer=Seer(), folder=tmp_path / "kept")

@@ -1,13 +1,13 @@
 import numpy as np
 import pytest
 
+from corporeal.regions.cut_proposals import Graph, Sweep, Tree
 from corporeal.regions.cuts import cut
-from corporeal.regions.families import Graph, Sweep, Tree
 from corporeal.regions.patches import Patches
 from corporeal.regions.stacks import stacked
 
 
-def clique(sizes, bridges, look=None):
+def clique(sizes, bridges, appearance=None):
     """Groups of nodes that hold fully, and weak bridges between groups (group, group, weight)."""
     start = np.cumsum([0, *sizes])
     pairs = [
@@ -20,7 +20,7 @@ def clique(sizes, bridges, look=None):
     i, j, w = (np.array(part) for part in zip(*pairs, strict=True))
     count = int(start[-1])
     owner = np.repeat(np.arange(len(sizes)), sizes)
-    looks = np.zeros((count, 1)) if look is None else np.array(look, float)[owner, None]
+    looks = np.zeros((count, 1)) if appearance is None else np.array(appearance, float)[owner, None]
     return Graph(i, j, w, np.ones(len(w)), np.ones(count), looks), owner
 
 
@@ -60,11 +60,11 @@ def test_a_cut_that_has_a_rival_says_so():
 def test_many_chains_that_hang_by_next_to_nothing_are_cut_where_they_look_unlike():
     weak = np.arange(1, 200) % 20 == 0
     weight = np.where(weak, 1e-9, np.random.default_rng(0).uniform(0.5, 1.5, 199))
-    look = (np.arange(200) >= 120).astype(float)[:, None]
+    appearance = (np.arange(200) >= 120).astype(float)[:, None]
     first = np.arange(199)
-    graph = Graph(first, first + 1, weight, np.ones(199), np.ones(200), look)
+    graph = Graph(first, first + 1, weight, np.ones(199), np.ones(200), appearance)
     side = cut(graph, 0.003).side
-    assert (side == (look[:, 0] == side[-1])).all()
+    assert (side == (appearance[:, 0] == side[-1])).all()
 
 
 def test_what_is_in_pieces_falls_into_them():
@@ -81,12 +81,12 @@ def test_candidates_know_their_sums_and_what_they_are_held_by(kind):
     i, j = i[kept], j[kept]
     weight = rng.random(len(i))
     graph = Graph(i, j, weight, np.ones(len(i)), rng.random(17), rng.random((17, 2)))
-    family = Tree(graph) if kind == "tree" else Sweep(graph, rng.permutation(17))
-    sums, across = family.sums(graph.look), family.across()
+    proposals = Tree(graph) if kind == "tree" else Sweep(graph, rng.permutation(17))
+    sums, across = proposals.sums(graph.appearance), proposals.across()
     assert len(across) >= 15
     for k in range(len(across)):
-        side = family.side(k)
-        np.testing.assert_allclose(sums[k], graph.look[side].sum(0), rtol=1e-9)
+        side = proposals.side(k)
+        np.testing.assert_allclose(sums[k], graph.appearance[side].sum(0), rtol=1e-9)
         np.testing.assert_allclose(across[k], weight[side[i] != side[j]].sum(), atol=1e-9)
 
 

@@ -12,8 +12,8 @@ def plate(count=4000, seed=0):
     """Points of one flat plate that looks the same everywhere; its halves are two things."""
     rng = np.random.default_rng(seed)
     position = np.column_stack([2 * rng.random(count), rng.random(count), np.zeros(count)])
-    look = np.tile([0.6, 0.8], (count, 1))
-    cloud = Cloud(position, 0 * position, look, look, np.ones(count, int))
+    appearance = np.tile([0.6, 0.8], (count, 1))
+    cloud = Cloud(position, 0 * position, appearance, appearance, np.ones(count, int))
     return cloud, np.tile([0.0, 0, 1], (count, 1)), (position[:, 0] > 1.6).astype(int)
 
 

@@ -18,10 +18,10 @@ def scene(spheres, looks, count=3000, seed=0):
     made = [ball(count, np.array(c), r, rng) for c, r in spheres]
     position, normal = (np.concatenate(part) for part in zip(*made, strict=True))
     owner = np.repeat(np.arange(len(spheres)), count)
-    look = np.array(looks, float)[owner] + 0.02 * rng.normal(size=(len(owner), len(looks[0])))
-    look = (look / np.linalg.norm(look, axis=1, keepdims=True)).astype(np.float16)
+    appearance = np.array(looks, float)[owner] + 0.02 * rng.normal(size=(len(owner), len(looks[0])))
+    appearance = (appearance / np.linalg.norm(appearance, axis=1, keepdims=True)).astype(np.float16)
     grey = np.full(position.shape, 0.5)
-    return Cloud(position, grey, look, look, np.ones(len(owner), int)), normal, owner
+    return Cloud(position, grey, appearance, appearance, np.ones(len(owner), int)), normal, owner
 
 
 def agreement(owner, found):
@@ -91,9 +91,13 @@ def test_no_points_are_refused():
 @pytest.mark.parametrize("points", [1, 2, 7, 40])
 def test_few_points_are_few_things(points):
     rng = np.random.default_rng(3)
-    look = np.ones((points, 2)) / np.sqrt(2)
+    appearance = np.ones((points, 2)) / np.sqrt(2)
     cloud = Cloud(
-        rng.random((points, 3)), look[:, :1] * [1, 1, 1], look, look, np.ones(points, int)
+        rng.random((points, 3)),
+        appearance[:, :1] * [1, 1, 1],
+        appearance,
+        appearance,
+        np.ones(points, int),
     )
     split = objects(cloud, min(points, 3))
     assert len(split.object_of_point) == points == len(split.confidence)

@@ -39,9 +39,9 @@ def thing(*names):
 @pytest.fixture(scope="module")
 def pile():
     position, normal, colour, truth = boxes(np.random.default_rng(0))
-    look = descriptor(position, colour, normal)
+    appearance = descriptor(position, colour, normal)
     nothing = np.zeros((len(position), 0), np.float16)
-    return Cloud(position, colour, nothing, look, np.ones(len(position), int)), truth
+    return Cloud(position, colour, nothing, appearance, np.ones(len(position), int)), truth
 
 
 def with_words(truth, rng, noise=0.3, channels=32):
@@ -97,9 +97,9 @@ def test_place_tells_apart_what_looks_the_same():
 @pytest.mark.parametrize("count", [0, 1, 5])
 def test_a_handful_of_points_is_one_cluster(count):
     nothing = np.zeros((count, 0), np.float16)
-    look = np.ones((count, 4), np.float16)
+    appearance = np.ones((count, 4), np.float16)
     x = np.arange(3.0 * count).reshape(count, 3)
-    found = parts(Cloud(x, np.zeros((count, 3)), nothing, look, np.ones(count, int)))
+    found = parts(Cloud(x, np.zeros((count, 3)), nothing, appearance, np.ones(count, int)))
     np.testing.assert_array_equal(found.cluster_of_point, np.zeros(count))
 
 

@@ -66,9 +66,9 @@ def test_few_points_are_one_thing(count):
 def test_what_space_tells_is_cut_no_further_than_asked():
     points = np.concatenate([ball((0, 0, 0), 0.3, 4000), ball((0.6, 0, 0), 0.1)])
     colour = np.where(points[:, :1] > 0, (0.8, 0.1, 0.1), (0.1, 0.1, 0.8))  # half a ball is blue
-    look = np.column_stack([colour, np.full(len(points), 0.3)])
-    look /= np.linalg.norm(look, axis=1, keepdims=True)
-    cloud = Cloud(points, colour, look, look, np.ones(len(points), int))
+    appearance = np.column_stack([colour, np.full(len(points), 0.3)])
+    appearance /= np.linalg.norm(appearance, axis=1, keepdims=True)
+    cloud = Cloud(points, colour, appearance, appearance, np.ones(len(points), int))
     split = objects(cloud, 2)
     assert split.found_by == "the space between them"
     np.testing.assert_array_equal(split.object_of_point, np.repeat([0, 1], [4000, 1500]))

@@ -28,8 +28,8 @@ def test_patches_are_about_as_many_as_asked_small_and_not_empty():
 def test_patches_keep_to_one_look_where_looks_meet():
     position = plane(20_000)
     side = (position[:, 0] + 0.3 * position[:, 1] > 0.6).astype(int)
-    look = np.eye(2)[side] + 0.03 * np.random.default_rng(1).normal(size=(20_000, 2))
-    patch = superpoints(position, look, 100)
+    appearance = np.eye(2)[side] + 0.03 * np.random.default_rng(1).normal(size=(20_000, 2))
+    patch = superpoints(position, appearance, 100)
     inside = np.bincount(patch, side) / np.bincount(patch)
     mixed = np.minimum(inside, 1 - inside)[patch].mean()
     assert mixed < 0.002
@@ -39,9 +39,9 @@ def test_patches_keep_to_one_look_where_looks_meet():
 
 
 def test_patches_do_not_depend_on_where_the_scene_stands_or_how_large_it_is():
-    position, look = plane(3000), np.random.default_rng(2).normal(size=(3000, 4)) * 0.1
-    first = superpoints(position, look, 60)
-    moved = superpoints(position * 1024 + [2048.0, -512.0, 64.0], look, 60)
+    position, appearance = plane(3000), np.random.default_rng(2).normal(size=(3000, 4)) * 0.1
+    first = superpoints(position, appearance, 60)
+    moved = superpoints(position * 1024 + [2048.0, -512.0, 64.0], appearance, 60)
     np.testing.assert_array_equal(first, moved)
 
 

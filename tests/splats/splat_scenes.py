@@ -2,9 +2,9 @@
 
 import numpy as np
 
-from corporeal.splats.crew import Crew
 from corporeal.splats.parameters import parameters
 from corporeal.splats.raster import draw, picture_of, pinhole
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Gaussians, Views
 
 
@@ -41,9 +41,9 @@ def blobs(count=60, seed=0, degree=0):
 def pictured(gaussians, cameras, background=(0.0, 0.0, 0.0)):
     """Views of some Gaussians, and masks of where they are."""
     made = []
-    with Crew(1) as crew:
+    with ThreadPool(1) as pool:
         for camera in cameras:
-            drawing = draw(parameters(gaussians), pinhole(camera), np.array(background), crew)
+            drawing = draw(parameters(gaussians), pinhole(camera), np.array(background), pool)
             made.append(picture_of(drawing))
     rgb = np.stack([np.round(np.clip(p.rgb, 0, 1) * 255).astype(np.uint8) for p in made])
     return Views(rgb, cameras), np.stack([p.alpha > 0.5 for p in made])

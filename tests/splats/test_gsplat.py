@@ -13,11 +13,11 @@ from splat_scenes import around, blobs
 
 from corporeal.errors import UserError
 from corporeal.splats import raster
-from corporeal.splats.crew import Crew
-from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.parameters import parameters
 from corporeal.splats.raster import pinhole
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.splats.train import train
+from corporeal.splats.training_schedule import TrainConfig
 from corporeal.types import Views
 
 
@@ -103,11 +103,11 @@ def test_drawings_and_gradients_are_those_of_the_processor(stand_in):
     theta, camera = parameters(blobs(30)), pinhole(around(1)[0], near=0.5)
     background = np.array([0.2, 0.5, 0.9], np.float32)
     slope = np.random.default_rng(0).normal(size=(4, 40, 48)).astype(np.float32)
-    with Crew(1) as crew:
-        ours, theirs = (room.draw(theta, camera, background, crew) for room in (raster, gsplat))
+    with ThreadPool(1) as pool:
+        ours, theirs = (room.draw(theta, camera, background, pool) for room in (raster, gsplat))
         np.testing.assert_allclose(theirs.planes, ours.planes, atol=2e-3)
-        exact = raster.back(ours, slope, crew)
-        found = gsplat.back(theirs, slope, crew)
+        exact = raster.back(ours, slope, pool)
+        found = gsplat.back(theirs, slope, pool)
     for columns in (slice(0, 3), slice(3, 7), slice(7, 10), slice(10, 11), slice(11, 14)):
         size = np.abs(exact[:, columns]).max()
         np.testing.assert_allclose(found[:, columns], exact[:, columns], atol=0.02 * size)
@@ -132,8 +132,8 @@ def test_without_a_card_it_says_so(stand_in, monkeypatch):
     from corporeal.splats import gsplat
 
     monkeypatch.setattr(stand_in.cuda, "is_available", lambda: False)
-    with Crew(1) as crew, pytest.raises(UserError, match="CUDA, and torch finds none"):
-        gsplat.draw(parameters(blobs(3)), pinhole(around(1)[0]), np.zeros(3), crew)
+    with ThreadPool(1) as pool, pytest.raises(UserError, match="CUDA, and torch finds none"):
+        gsplat.draw(parameters(blobs(3)), pinhole(around(1)[0]), np.zeros(3), pool)
 
 
 def test_without_gsplat_it_says_what_to_install(monkeypatch):

@@ -6,7 +6,7 @@ from scipy.ndimage import label
 from splat_scenes import around
 
 from corporeal.splats import hull
-from corporeal.splats.crew import Crew
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Views
 
 CAMERAS = around(5, (64, 64), focal=80.0)
@@ -35,8 +35,8 @@ def pieces(seed, cameras=CAMERAS):
     centres, radii = balls(seed)
     masks = masks_of(centres, radii, cameras)
     views = Views(np.zeros((*masks.shape, 3), np.uint8), cameras)
-    with Crew(1) as crew:
-        found = hull.tight(views, masks, crew)
+    with ThreadPool(1) as pool:
+        found = hull.tight(views, masks, pool)
     piece, count = label(found.inside, np.ones((3, 3, 3)))
     middles = np.stack([found.cells[piece == k + 1].mean(axis=0) for k in range(count)])
     inside = np.linalg.norm(middles[:, None] - centres, axis=-1) < radii

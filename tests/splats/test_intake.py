@@ -11,9 +11,9 @@ from corporeal.formats.photographs import Photographs
 from corporeal.geometry.agreement import Agreement
 from corporeal.splats import intake
 from corporeal.splats.intake import take_in
-from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.quality import Quality
 from corporeal.splats.train import Trained
+from corporeal.splats.training_schedule import TrainConfig
 from corporeal.types import Camera, Gaussians, Views
 
 DOUBT = "The poses do not agree with the pictures."
@@ -72,7 +72,7 @@ def test_nothing_is_learned_where_instance_masks_are_wanted_and_there_are_none(t
 @pytest.mark.parametrize(("ahead", "where"), [(2.3, "and inside of it"), (-0.6, "alone")])
 def test_it_is_said_where_gaussians_began(taken, ahead, where):
     said = " ".join(taken(FINE, replace(learned(GOOD), ahead=ahead)).statements)
-    assert f"hull of the masks {where}: to begin inside, too, made {ahead:+} dB on things" in said
+    assert f"hull of the masks {where}: to begin inside, too, made {ahead:+} dB on objects" in said
     assert "visual hull" not in " ".join(taken(FINE, learned(GOOD)).statements)
 
 

@@ -12,8 +12,7 @@ from corporeal.errors import UserError
 from corporeal.geometry.region import region
 from corporeal.geometry.rotation import matrix
 from corporeal.splats import hull, limits, start, sweep
-from corporeal.splats.crew import Crew
-from corporeal.splats.growth import CROWD, jitter, moved, shared, turn
+from corporeal.splats.densification import CROWD, jitter, moved, shared, turn
 from corporeal.splats.kernels_learn import WINDOW, adam
 from corporeal.splats.loss import Goal, goal, loss
 from corporeal.splats.parameters import gaussians_of, opacity, parameters
@@ -21,6 +20,7 @@ from corporeal.splats.quality import psnr, quality, ssim
 from corporeal.splats.raster import draw, pinhole
 from corporeal.splats.start import Points, clearance, on_hull, seeded
 from corporeal.splats.sweep import neighbours, swept
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Views
 
 RNG = np.random.default_rng
@@ -69,9 +69,9 @@ def test_the_loss_and_its_slope():
     aim = Goal(rng.random((3, 15, 17), np.float32), rng.random((15, 17), np.float32))
     drawings = {}
     for threads in (1, 3):
-        with Crew(threads) as crew:
-            drawing = draw(parameters(blobs()), pinhole(camera), np.full(3, 0.3), crew)
-            drawings[threads] = drawing, loss(drawing, aim, crew)
+        with ThreadPool(threads) as pool:
+            drawing = draw(parameters(blobs()), pinhole(camera), np.full(3, 0.3), pool)
+            drawings[threads] = drawing, loss(drawing, aim, pool)
     drawing, off = drawings[1]
     planes, target = drawing.planes[:4].astype(complex), aim.planes.astype(float)
     assert off.value == pytest.approx(true_loss(planes, target, aim.mask).real, rel=1e-5)
@@ -182,8 +182,8 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
     disc = np.hypot(u - 32, v - 32) < 80 * 0.5 / np.sqrt(9 - 0.25)
     masks = np.stack([disc] * 40)
     views, _ = pictured(blobs(), cameras)
-    with Crew(1) as crew:
-        points = on_hull(views, masks, 3000, RNG(0), crew, 0.2)
+    with ThreadPool(1) as pool:
+        points = on_hull(views, masks, 3000, RNG(0), pool, 0.2)
         distance, faint = np.linalg.norm(points.position, axis=1), points.opacity < start.OPAQUE
         assert len(distance) == 3000 and faint.sum() == 600
         on, within = distance[~faint], distance[faint]
@@ -191,7 +191,7 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
         # Evenly: the share within a radius grows as its cube.
         np.testing.assert_allclose(np.median(within), 0.5 * 0.5 ** (1 / 3), atol=0.02)
         with pytest.raises(UserError, match="inside all masks"):
-            on_hull(views, np.zeros_like(masks), 10, RNG(0), crew)
+            on_hull(views, np.zeros_like(masks), 10, RNG(0), pool)
 
 
 @pytest.fixture(scope="module")
@@ -213,8 +213,8 @@ def ball():
 
 def test_a_sweep_finds_the_surface(ball, monkeypatch):
     monkeypatch.setattr(sweep, "PIXELS", 8_000)
-    with Crew(1) as crew:
-        points = swept(ball, 20_000, RNG(0), crew).points
+    with ThreadPool(1) as pool:
+        points = swept(ball, 20_000, RNG(0), pool).points
     distance = np.linalg.norm(points.position - [0.5, 0, 0], axis=1)
     near = distance < 1
     assert near.sum() > 200
@@ -228,8 +228,8 @@ def test_the_number_of_threads_changes_no_sweep(ball, monkeypatch):
     monkeypatch.setattr(sweep, "PIXELS", 3_000)
     found = []
     for threads in (1, 3):
-        with Crew(threads) as crew:
-            found.append(swept(ball, 500, RNG(0), crew).points.position)
+        with ThreadPool(threads) as pool:
+            found.append(swept(ball, 500, RNG(0), pool).points.position)
     np.testing.assert_array_equal(*found)
 
 
@@ -240,8 +240,8 @@ def test_cameras_that_look_past_each_other_agree_nowhere(ball, monkeypatch):
         pose = camera.world_from_camera.copy()
         pose[:3, 3] += [100 * k, 0, 0]
         away.append(replace(camera, world_from_camera=pose))
-    with Crew(1) as crew, pytest.raises(UserError, match="agree on no place"):
-        swept(Views(ball.rgb[:6], tuple(away)), 500, RNG(0), crew)
+    with ThreadPool(1) as pool, pytest.raises(UserError, match="agree on no place"):
+        swept(Views(ball.rgb[:6], tuple(away)), 500, RNG(0), pool)
 
 
 def test_neighbours_are_beside_but_not_on_the_spot():

@@ -7,7 +7,7 @@ from splat_scenes import around
 from corporeal.geometry.rotation import matrix
 from corporeal.geometry.similarity import moved_cameras, similarity
 from corporeal.splats import hull
-from corporeal.splats.contact import lowest
+from corporeal.splats.lowest import lowest
 from corporeal.types import Views
 
 CAMERAS = around(30, (96, 80), focal=100.0, centre=(0, 0, 0.3))[:16]

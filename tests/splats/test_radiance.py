@@ -6,7 +6,7 @@ from splat_scenes import around
 
 from corporeal.errors import UserError
 from corporeal.splats import hull, kernels_radiance, radiance
-from corporeal.splats.channel import distilled
+from corporeal.splats.feature_distillation import distilled
 from corporeal.splats.radiance import FieldConfig, camera_rows, field, learn, look, parted, points
 from corporeal.types import Views
 
@@ -191,7 +191,7 @@ def test_points_of_a_learned_field_lie_on_the_surface(learned, monkeypatch):
     every_third = points(made.field, views.cameras, 10_000).position
     off = np.abs(np.linalg.norm(every_third, axis=1) - 0.3) / made.field.grid.cell
     assert 100 < len(every_third) < len(found.position) and np.quantile(off, 0.95) < 2
-    assert "nodes" in made.statements[0] and "dB on things" in made.statements[1]
+    assert "nodes" in made.statements[0] and "dB on objects" in made.statements[1]
 
 
 def test_what_was_learned_is_kept_and_threads_change_nothing(small, tmp_path, monkeypatch):
@@ -200,7 +200,7 @@ def test_what_was_learned_is_kept_and_threads_change_nothing(small, tmp_path, mo
     first = learn(views, masks, config, tmp_path / "field.npz").field
     other = learn(views, masks, FieldConfig("draft", steps=3, threads=3)).field
     np.testing.assert_array_equal(first.values, other.values)
-    monkeypatch.setattr(radiance, "_taught", lambda *_: pytest.fail("learned twice"))
+    monkeypatch.setattr(radiance, "_optimised", lambda *_: pytest.fail("learned twice"))
     again = learn(views, masks, config, tmp_path / "field.npz").field
     np.testing.assert_array_equal(first.values, again.values)
     np.testing.assert_array_equal(first.row, again.row)

@@ -6,10 +6,10 @@ import pytest
 from corporeal.errors import UserError
 from corporeal.geometry.harmonics import basis
 from corporeal.splats import kernels_basis
-from corporeal.splats.crew import Crew
 from corporeal.splats.parameters import gaussians_of, parameters
 from corporeal.splats.raster import back, draw, pinhole, render, weights
 from corporeal.splats.reference import reference
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera
 
 GROUPS = {
@@ -48,8 +48,8 @@ def camera(width=37, height=29, focal=40.0, distance=2.5):
 @pytest.mark.parametrize("degree", [0, 1, 2, 3])
 def test_a_picture_equals_the_reference(degree):
     theta, eye = cloud(40, degree), pinhole(camera())
-    with Crew(2) as crew:
-        planes = draw(theta, eye, BACKGROUND, crew).planes
+    with ThreadPool(2) as pool:
+        planes = draw(theta, eye, BACKGROUND, pool).planes
     truth = reference(theta.astype(float), eye, BACKGROUND)
     assert np.abs(truth[3]).min() < 0.2, "hardly anything is in the picture"
     np.testing.assert_allclose(planes, truth, atol=3e-6)
@@ -60,8 +60,8 @@ def test_gradients_equal_those_of_the_reference(degree):
     """A complex step through the dense reference is exact: no difference is taken."""
     theta, eye = cloud(5, degree, seed=degree), pinhole(camera(18, 16, 22.0))
     slope = np.random.default_rng(1).normal(size=(4, 16, 18)).astype(np.float32)
-    with Crew(2) as crew:
-        gradient = back(draw(theta, eye, BACKGROUND, crew), slope, crew)
+    with ThreadPool(2) as pool:
+        gradient = back(draw(theta, eye, BACKGROUND, pool), slope, pool)
     exact = np.empty(theta.shape)
     for i, j in np.ndindex(theta.shape):
         moved = theta.astype(complex)
@@ -76,9 +76,9 @@ def test_gradients_equal_dense_autograd():
     torch = pytest.importorskip("torch", reason="torch is not installed: pip install torch")
     theta, eye = cloud(60, 1), pinhole(camera(48, 40, 50.0))
     slope = np.random.default_rng(1).normal(size=(4, 40, 48)).astype(np.float32)
-    with Crew(2) as crew:
-        drawing = draw(theta, eye, BACKGROUND, crew)
-        gradient = back(drawing, slope, crew)
+    with ThreadPool(2) as pool:
+        drawing = draw(theta, eye, BACKGROUND, pool)
+        gradient = back(drawing, slope, pool)
     x = torch.tensor(theta.astype(float), requires_grad=True)
     picture = dense(torch, x, eye)
     (picture * torch.tensor(slope)).sum().backward()
@@ -138,9 +138,9 @@ def test_the_number_of_threads_changes_nothing():
     slope = np.random.default_rng(1).normal(size=(4, 70, 100)).astype(np.float32)
     results = []
     for threads in (1, 2, 3):
-        with Crew(threads) as crew:
-            drawing = draw(theta, eye, BACKGROUND, crew)
-            results.append((drawing.planes, back(drawing, slope, crew)))
+        with ThreadPool(threads) as pool:
+            drawing = draw(theta, eye, BACKGROUND, pool)
+            results.append((drawing.planes, back(drawing, slope, pool)))
     for planes, gradient in results[1:]:
         np.testing.assert_array_equal(planes, results[0][0])
         np.testing.assert_array_equal(gradient, results[0][1])
@@ -153,12 +153,12 @@ def test_what_cannot_be_drawn_is_left_out():
     bad[4, :3] = camera().world_from_camera[:3, 3]  # in the eye
     bad[5, 7:10], bad[6, 7:10], bad[7, 0], bad[8, 10] = 300, np.inf, np.inf, -50
     slope = np.ones((4, eye.height, eye.width), np.float32)
-    with Crew(1) as crew:
-        alone = draw(good, eye, BACKGROUND, crew)
-        mixed = draw(np.concatenate([good, bad]), eye, BACKGROUND, crew)
-        gradient = back(mixed, slope, crew)
+    with ThreadPool(1) as pool:
+        alone = draw(good, eye, BACKGROUND, pool)
+        mixed = draw(np.concatenate([good, bad]), eye, BACKGROUND, pool)
+        gradient = back(mixed, slope, pool)
         np.testing.assert_array_equal(mixed.planes, alone.planes)
-        np.testing.assert_array_equal(gradient[:30], back(alone, slope, crew))
+        np.testing.assert_array_equal(gradient[:30], back(alone, slope, pool))
     assert not gradient[30:].any()
 
 

@@ -9,12 +9,12 @@ from splat_scenes import around, blobs, pictured
 from corporeal.errors import UserError
 from corporeal.splats import hull, limits, sweep
 from corporeal.splats import train as module
-from corporeal.splats.crew import Crew
-from corporeal.splats.lesson import TrainConfig, shrunk
+from corporeal.splats.depth_rendering import render_depth
 from corporeal.splats.limits import even
-from corporeal.splats.sight import looked
 from corporeal.splats.start import Points, on_hull
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.splats.train import train
+from corporeal.splats.training_schedule import TrainConfig, shrunk
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.types import Finish, Scene, SceneObject, Surface, Views
 from glb_maker import CUBE, CUBE_TRIANGLES
@@ -95,8 +95,8 @@ def test_plain_faces_are_seen_where_they_are_and_wide_gaussians_inside_show_thro
     def deep() -> float:
         """Return how far below the faces what is seen lies, in the mean [m]."""
         made = train(views, masks, config=replace(LEARNING, begin="inside")).gaussians
-        with Crew(1) as crew:
-            seen = looked(made, views.cameras, crew).depth
+        with ThreadPool(1) as pool:
+            seen = render_depth(made, views.cameras, pool).depth
         shown = masks & np.isfinite(seen)
         return float((seen[shown] - views.depth[shown]).clip(0).mean())
 
@@ -140,7 +140,7 @@ class KilledError(Exception):
 
 def test_a_training_that_was_cut_off_goes_on_as_if_it_had_not_been(scene, tmp_path, monkeypatch):
     monkeypatch.setattr(module, "EVERY", 0.0)
-    monkeypatch.setattr(module, "SETTLED", (10, 0.8))
+    monkeypatch.setattr(module, "DENSIFIED", (10, 0.8))
     monkeypatch.setattr(module, "ROUND", 7)
     views, masks = scene
     path = tmp_path / "training.npz"

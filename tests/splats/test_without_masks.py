@@ -6,23 +6,23 @@ from splat_scenes import around, blobs, pictured
 
 from corporeal.geometry.ground_plane import Plane
 from corporeal.splats import exposure, limits, sweep
-from corporeal.splats.crew import Crew
-from corporeal.splats.enclosure import Enclosure, cover, directions, enclosure
+from corporeal.splats.background_model import BackgroundModel, background_model, cover, directions
 from corporeal.splats.hull import camera_rows
 from corporeal.splats.kernels_learn import adam
-from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.parameters import parameters
 from corporeal.splats.quality import quality
 from corporeal.splats.raster import draw, pinhole
 from corporeal.splats.start import Points, chosen, joined, seeded
 from corporeal.splats.surfaces import Surfaces
 from corporeal.splats.sweep import swept
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.splats.train import train
+from corporeal.splats.training_schedule import TrainConfig
 from corporeal.types import Gaussians, Views
 
 RNG = np.random.default_rng
 FLOOR = Plane(np.array([0.0, 0.0, 1.0]), -0.5, 0.5, 0.001)
-ROOM = Enclosure(np.zeros(3), 10.0, FLOOR, 0.02)
+ROOM = BackgroundModel(np.zeros(3), 10.0, FLOOR, 0.02)
 
 
 def above(count=12, **lens):
@@ -46,11 +46,11 @@ def test_the_floor_is_found_whichever_way_is_up():
     flat = np.concatenate([rng.uniform(-1, 1, (800, 2)), np.full((800, 1), -0.5)], axis=1)
     points = np.concatenate([flat, rng.normal(size=(400, 3)) * [0.2, 0.2, 0.1]])
     cameras = above()
-    found = enclosure(points, cameras, rng).ground
+    found = background_model(points, cameras, rng).ground
     assert found is not None
     np.testing.assert_allclose(found.normal, [0, 0, 1], atol=0.01)
     assert found.offset == pytest.approx(-0.5, abs=0.005)
-    assert enclosure(rng.normal(size=(500, 3)), cameras, rng).ground is None
+    assert background_model(rng.normal(size=(500, 3)), cameras, rng).ground is None
 
 
 def test_a_cover_leaves_no_gap():
@@ -60,8 +60,8 @@ def test_a_cover_leaves_no_gap():
     np.testing.assert_allclose(points.colour, 1)
     made = seeded(points, 2000, 0, RNG(0))
     low = around(24, centre=(0.0, 0.0, 0.7), distance=2.0)
-    with Crew(1) as crew:
-        through = [draw(made, pinhole(c), np.zeros(3), crew).planes[3].max() for c in low]
+    with ThreadPool(1) as pool:
+        through = [draw(made, pinhole(c), np.zeros(3), pool).planes[3].max() for c in low]
     assert max(through) < 0.3 and np.mean(through) < 0.1
 
 
@@ -102,8 +102,8 @@ def test_what_views_see_past_is_haze_if_it_is_wide(wall):
     cameras, surfaces = wall
     eye = cameras[0].world_from_camera[:3, 3]
     position = np.stack([np.zeros(3), 0.6 * eye, 0.6 * eye])
-    with Crew(1) as crew:
-        said = surfaces.judge(position, np.array([0.5, 0.5, 0.001]), crew)
+    with ThreadPool(1) as pool:
+        said = surfaces.judge(position, np.array([0.5, 0.5, 0.001]), pool)
     assert said.haze.tolist() == [False, True, False]
     assert said.few.tolist() == [False, True, True]
     assert said.nearest[0] == pytest.approx(3) and said.nearest[1] == pytest.approx(1.2, rel=1e-6)
@@ -114,8 +114,8 @@ def test_what_is_wide_is_flat_and_what_few_see_has_one_colour(wall):
     theta = parameters(blobs(2, degree=1))
     theta[:, :3] = [[0, 0, 0], 0.6 * cameras[0].world_from_camera[:3, 3]]
     theta[:, 7:10] = np.log([0.5, 0.4, 0.2])
-    with Crew(1) as crew:
-        bounds, _ = limits.strict(theta, 1.0, surfaces, crew)
+    with ThreadPool(1) as pool:
+        bounds, _ = limits.strict(theta, 1.0, surfaces, pool)
     before, zeros = theta.copy(), np.zeros_like(theta)
     spans, rates = np.array([[0, 1], [0, 1]]), np.full(theta.shape[1], 0.01, np.float32)
     adam(theta, zeros + 1, zeros, zeros + 1, rates, 1, (0, 0), bounds, spans, 0, 2)
@@ -154,8 +154,8 @@ def test_smooth_pictures_are_laid_on_the_floor(monkeypatch):
         sh,
     )
     views, _ = pictured(made, above(16, size=(96, 96), focal=120.0), (0.5, 0.5, 0.5))
-    with Crew(1) as crew:
-        points = swept(views, 3000, RNG(0), crew).points
+    with ThreadPool(1) as pool:
+        points = swept(views, 3000, RNG(0), pool).points
     on = np.abs(points.position[:, 2] + 0.49) < 0.04
     wide = np.linalg.norm(points.position[:, :2], axis=1)
     around_it = (wide > 0.7) & (wide < 2) & (points.position[:, 2] < 1)
@@ -183,8 +183,8 @@ def test_a_gain_is_told_from_what_is_covered_alone():
     truth, cameras = blobs(), around(1)
     views, masks = pictured(truth, cameras)
     darker = (0.5 * views.rgb[0]).astype(np.uint8)
-    with Crew(1) as crew:
-        drawing = draw(parameters(truth), pinhole(cameras[0]), np.ones(3), crew)
+    with ThreadPool(1) as pool:
+        drawing = draw(parameters(truth), pinhole(cameras[0]), np.ones(3), pool)
     found = exposure.gain(drawing, darker, np.where(masks[0], 255, 0).astype(np.uint8))
     np.testing.assert_allclose(found, 0.5, rtol=0.02)
     assert np.isnan(exposure.gain(drawing, darker, np.zeros(masks[0].shape, np.uint8))).all()

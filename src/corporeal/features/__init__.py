@@ -71,6 +71,6 @@ def connect(spec: str, folder: Path | None = None) -> Encoder | None:
     encoder = backends.load("picture encoder", name, MENU)(rest)
     if folder is None:
         return encoder
-    return backends.load("wrapper", "kept", {"kept": "corporeal.features.saved:Kept"})(
+    return backends.load("wrapper", "kept", {"kept": "corporeal.features.saved_maps:Kept"})(
         encoder, folder
     )

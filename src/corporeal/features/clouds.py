@@ -58,7 +58,7 @@ def projected(
     return Placed(position, colour, outside, seen, lift, gaussian_of_point)
 
 
-def looked_at(
+def with_features(
     placed: Placed, pictures: Pictures, specs: tuple[str, str], folder: Path | None = None
 ) -> Cloud:
     """Return points with what they look like.
@@ -73,14 +73,14 @@ def looked_at(
         UserError: A model cannot be had, or no view shows any point.
 
     """
-    looks = {}
+    of_spec = {}
     for spec in dict.fromkeys(specs):
         encoder = connect(spec, folder)
         if encoder is None:
-            looks[spec] = descriptor(placed.position, placed.colour, placed.outside)
+            of_spec[spec] = descriptor(placed.position, placed.colour, placed.outside)
             continue
         maps = [encoder.map(picture) for picture in pictures()]
-        looks[spec] = fill(placed.position, placed.lift(maps)).unit()
-    what, where = (looks[spec] for spec in specs)
+        of_spec[spec] = fill(placed.position, placed.lift(maps)).unit()
+    what, where = (of_spec[spec] for spec in specs)
     rest = placed.seen, placed.gaussian_of_point
     return Cloud(placed.position, placed.colour, what, where, *rest)

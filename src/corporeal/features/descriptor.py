@@ -1,7 +1,7 @@
 """What points look like to no model: colour, texture, orientation, finish, thickness.
 
-Needs no weights, and so is what parts are told apart by where there are none. It knows nothing of
-what things are: two parts of one colour and one thickness are one to it.
+Needs no weights, and so is what segments parts where there are none. It knows nothing of
+what objects are: two parts of one colour and one thickness are one to it.
 """
 
 from collections.abc import Sequence
@@ -73,15 +73,15 @@ def descriptor(
     hue = (rgb2lab(np.clip(colour, 0, 1)[None])[0] - GREY) / 100
     normal = normals(position, near, towards)
     known = np.full((len(position), 2), 0.5) if finish is None else finish
-    looks = (
+    features = (
         (config.colour, GAMUT, hue),
         (config.spread, ROUGH, _spread(hue, near)[:, None]),
         (config.normal, 1.0, normal),
         (config.finish, np.sqrt(0.5), known - 0.5),
         (config.thickness, 0.5, _share(thickness(position, normal), position)[:, None]),
     )
-    radius = np.sqrt(sum((weight * bound) ** 2 for weight, bound, _ in looks))
-    x = np.concatenate([weight * look for weight, _, look in looks], axis=1)
+    radius = np.sqrt(sum((weight * bound) ** 2 for weight, bound, _ in features))
+    x = np.concatenate([weight * feature for weight, _, feature in features], axis=1)
     rest = np.sqrt(np.maximum(radius**2 - np.sum(x**2, axis=1), 0))
     return (np.column_stack([x, rest]) / radius).astype(np.float16)
 

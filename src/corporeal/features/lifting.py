@@ -23,7 +23,7 @@ from corporeal.types import Camera
 
 LEAST = 0.1
 """A Gaussian that has less weight in a view is not seen in it [px]: what little shows of those
-behind shows through others' soft edges, at outlines, where the map is another thing's."""
+behind shows through others' soft edges, at outlines, where the map is another object's."""
 LEEWAY = 0.005
 """A point this much deeper than what its pixel shows is still seen, as a share of its depth."""
 HALF_WAY = 0.75
@@ -240,7 +240,7 @@ def _slope(depth: np.ndarray, axis: int) -> np.ndarray:
     return np.where(np.isfinite(smaller), smaller, 0.0)
 
 
-# ---------------------------------------------------------------- what nobody saw
+# ---------------------------------------------------------------- unobserved surface
 
 
 def fill(position: Float[np.ndarray, "N 3"], lifted: Lifted, neighbours: int = 8) -> Lifted:

@@ -89,11 +89,11 @@ class Weights:
         self.check()
         options = {} if self.local else {"revision": self.revision}
         try:
-            model, said = cls.from_pretrained(self.place, output_loading_info=True, **options)
+            model, report = cls.from_pretrained(self.place, output_loading_info=True, **options)
         except Exception as error:  # of the hub, the disk, safetensors, pickle and the library
             raise UserError(self._advice(error)) from error
-        if said["missing_keys"] or said["mismatched_keys"]:
-            lacking = sorted(map(str, [*said["missing_keys"], *said["mismatched_keys"]]))
+        if report["missing_keys"] or report["mismatched_keys"]:
+            lacking = sorted(map(str, [*report["missing_keys"], *report["mismatched_keys"]]))
             raise BadFileError(
                 self.place,
                 f"lacks {len(lacking)} of the model's arrays ({lacking[0]} …).",

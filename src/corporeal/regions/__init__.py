@@ -1,1 +1,1 @@
-"""Which points belong together: things, and parts of things."""
+"""Which points belong together: objects, and parts of objects."""

@@ -1,8 +1,8 @@
 """What a part's words say about its look, against what its points look like; no model is asked.
 
-Three things that words say and points show: colour, height, and whether it is long and thin. What
-words leave open counts against no cluster, but neither for it: a name that says "green" gets what
-is green, and a name that says nothing of colour gets what no other name explains.
+Three properties that words say and points show: colour, height, and whether it is long and thin.
+What words leave open counts against no cluster, but neither for it: a name that says "green" gets
+what is green, and a name that says nothing of colour gets what no other name explains.
 """
 
 import re
@@ -41,9 +41,9 @@ OPEN = 1.5
 FARTHEST = 4.0
 """Nothing counts as further off: words are as often wrong as that."""
 LYING = 0.7
-"""Least sine of the angle between a thing's longest axis and the vertical where it may lie."""
+"""Least sine of the angle between an object's longest axis and the vertical where it may lie."""
 LAID = 0.1
-"""Words must be so much likelier of a thing that lies, in the mean over its points."""
+"""Words must be so much likelier of an object that lies, in the mean over its points."""
 SMALL = 1.5
 """How much less likely any patch is a small part's."""
 SAMPLE = 8000
@@ -65,7 +65,7 @@ class Described:
     thin: float | None
     """1: long and thin, 0: not."""
     small: bool = False
-    """Whether it is a small thing: a bulb, a button."""
+    """Whether it is a small object: a bulb, a button."""
 
 
 @dataclass(frozen=True)
@@ -116,9 +116,9 @@ def _means(rows: np.ndarray, group: np.ndarray, count: int) -> np.ndarray:
 
 
 def top_of(
-    cloud: Cloud, cluster_of_point: Int[np.ndarray, " N"], count: int, told: Sequence[Described]
+    cloud: Cloud, cluster_of_point: Int[np.ndarray, " N"], count: int, parsed: Sequence[Described]
 ) -> Float[np.ndarray, "3"]:
-    """Return where an object's top is: up, but in a long thing that lies, where words fit better.
+    """Return where an object's top is: up, but in a long object that lies, where words fit better.
 
     Of something that has fallen over along its longest axis they say most when heights are measured
     along it. They have to be likelier by ``LAID`` in the mean over points.
@@ -132,20 +132,20 @@ def top_of(
 
     def fit(up: np.ndarray) -> float:
         along = _means(heights(cloud.position, up), cluster_of_point, count)
-        return float(share @ log_likelihood(replace(seen, height=along), told).max(axis=1))
+        return float(share @ log_likelihood(replace(seen, height=along), parsed).max(axis=1))
 
     best = max((axis, -axis), key=fit)
     return best if fit(best) > fit(UP) + LAID else UP
 
 
-def log_likelihood(seen: Observed, told: Sequence[Described]) -> Float[np.ndarray, "C K"]:
+def log_likelihood(seen: Observed, parsed: Sequence[Described]) -> Float[np.ndarray, "C K"]:
     """Return how well each cluster fits each description, up to a constant.
 
     -½ Σ (deviation / σ)² over colour, height and thinness, each at most ``FARTHEST`` σ, and
     ``OPEN`` σ where words do not say; less ``SMALL`` for what is small.
     """
-    made = np.empty((len(seen.height), len(told)))
-    for k, part in enumerate(told):
+    made = np.empty((len(seen.height), len(parsed)))
+    for k, part in enumerate(parsed):
         off = np.stack([_hue_off(seen, part), _height_off(seen, part), _thin_off(seen, part)])
         made[:, k] = -0.5 * np.sum(np.minimum(off, FARTHEST) ** 2, axis=0) - SMALL * part.small
     return made

@@ -3,11 +3,11 @@
     score = (cut / all + narrowest) (1 / A + 1 / (1 - A)) (1 - R²)²
 
 cut: the weight of what is cut; all: the weight that nothing would have taken from; A: the share of
-one side; R²: the share of the variance of looks that the sides explain. With the weights' degrees
-for sizes and the first two factors' ``cut`` alone it is the normalised cut of Shi and Malik
-("Normalized cuts and image segmentation", 2000), which would rather cut off a crumb that hangs by
-nothing, and does not know that a table is brown and a cat is black. Sides are looked for as they
-do, sorted by the first eigenvectors of the normalised weights, and among what merges first.
+one side; R²: the share of the variance of appearance features that the sides explain. With the
+weights' degrees for sizes and the first two factors' ``cut`` alone it is the normalised cut of Shi
+and Malik ("Normalized cuts and image segmentation", 2000), which would rather cut off a crumb that
+hangs by nothing, and does not know that a table is brown and a cat is black. Sides are looked for
+as they do, sorted by the first eigenvectors of the normalised weights, and among what merges first.
 """
 
 from dataclasses import dataclass
@@ -17,14 +17,14 @@ from jaxtyping import Bool, Float
 from scipy.sparse import csc_array, csr_array, diags_array
 from scipy.sparse.linalg import eigsh
 
-from corporeal.regions.families import Family, Graph, Sweep, Tree
+from corporeal.regions.cut_proposals import Graph, Proposals, Sweep, Tree
 
 VECTORS = 4
 """Eigenvectors that are tried beside the one that is the same everywhere."""
 ANOTHER = 0.7
 """Cuts that overlap less, in the mean of both sides, are quite another."""
 LEAST = 1e-3
-"""Variance of looks that is told from less: what looks all the same is not told apart by noise."""
+"""Least variance of appearance features that counts: uniform points are not segmented by noise."""
 ABOVE = 2 + 1e-6
 """A little more than the largest eigenvalue."""
 FEW = 60
@@ -45,9 +45,9 @@ def cut(graph: Graph, narrowest: float) -> Cut | None:
     """Return the best cut in two; None where there is nothing to cut."""
     if len(graph.size) < 2:
         return None
-    families: list[Family] = [Sweep(graph, np.argsort(f, kind="stable")) for f in _fields(graph)]
+    families: list[Proposals] = [Sweep(graph, np.argsort(f, kind="stable")) for f in _fields(graph)]
     families.append(Tree(graph))
-    scores = [_scores(graph, family, narrowest) for family in families]
+    scores = [_scores(graph, proposals, narrowest) for proposals in families]
     best = int(np.argmin([s.min(initial=np.inf) for s in scores]))
     last = int(np.argmin(scores[best]))
     side = families[best].side(last)
@@ -76,29 +76,29 @@ def _fields(graph: Graph) -> np.ndarray:
     return (vectors[:, 1:] * root[:, None]).T
 
 
-def _scores(graph: Graph, family: Family, narrowest: float) -> Float[np.ndarray, " K"]:
+def _scores(graph: Graph, proposals: Proposals, narrowest: float) -> Float[np.ndarray, " K"]:
     part = graph.size / graph.size.sum()
-    share = np.clip(family.sums(part[:, None])[:, 0], 1e-9, 1 - 1e-9)
+    share = np.clip(proposals.sums(part[:, None])[:, 0], 1e-9, 1 - 1e-9)
     unequal = 1 / share + 1 / (1 - share)
-    across = family.across() / max(graph.whole.sum(), 1e-300)
-    explained = _explained(graph.look, part, family) * unequal
+    across = proposals.across() / max(graph.whole.sum(), 1e-300)
+    explained = _explained(graph.appearance, part, proposals) * unequal
     return (across + narrowest) * unequal * (1 - np.minimum(explained, 1)) ** 2
 
 
-def _explained(look: np.ndarray, part: np.ndarray, family: Family) -> np.ndarray:
-    """Return A (1 - A) R², R² the share of the variance of looks that is between the sides."""
-    away = look - part @ look
+def _explained(appearance: np.ndarray, part: np.ndarray, proposals: Proposals) -> np.ndarray:
+    """Return A (1 - A) R², R² the share of the variance of appearance between the sides."""
+    away = appearance - part @ appearance
     variance = max(float(np.sum(part[:, None] * away**2)), LEAST)
-    return np.sum(family.sums(part[:, None] * away) ** 2, axis=1) / variance
+    return np.sum(proposals.sums(part[:, None] * away) ** 2, axis=1) / variance
 
 
-def _alike(graph: Graph, family: Family, side: np.ndarray) -> Float[np.ndarray, " K"]:
+def _alike(graph: Graph, proposals: Proposals, side: np.ndarray) -> Float[np.ndarray, " K"]:
     """Return how much each candidate is the cut given.
 
     Mean over the sides of the intersection over the union with the side that fits.
     """
     total, inside = graph.size.sum(), graph.size[side].sum()
-    before, within = family.sums(np.stack([graph.size, graph.size * side], axis=1)).T
+    before, within = proposals.sums(np.stack([graph.size, graph.size * side], axis=1)).T
 
     def overlap(other: float, both: np.ndarray) -> np.ndarray:
         first = both / (before + other - both)

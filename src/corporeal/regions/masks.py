@@ -1,7 +1,7 @@
 """Instance masks on views, brought to points: what each view takes each point for.
 
 Numbers need not mean the same from view to view: what counts is whether two points have one number
-where both are seen. Some views take two things for one, some take one for several; over all views,
+where both are seen. Some views take two objects for one, some take one for several; over all views,
 what belongs together mostly has one number.
 """
 
@@ -57,7 +57,7 @@ def renumbered(label_of_point: Int[np.ndarray, "V N"]) -> Int[np.ndarray, "V N"]
     Two masks do where they share more than half of the points that either has, of those that both
     views see: then no third shares as many with either. What is matched in that way, directly or
     through others, gets one number, pairs that share most points first; but no two masks of one
-    view, whose drawer says that they are two things. So a false match, where two views see only a
+    view, whose drawer says that they are two objects. So a false match, where two views see only a
     rim in common, joins nothing that other views tell apart.
     """
     known, node = np.unique(_apart(label_of_point), return_inverse=True)
@@ -100,7 +100,7 @@ def agreement(
 ) -> Float[np.ndarray, " E"]:
     """Return how often two patches that meet have one label where both are seen, in [0, 1].
 
-    1 where no view shows both: nobody says that they are not one.
+    1 where no view shows both: none says that they are not one.
     """
     same, both = np.zeros(len(borders.first)), np.zeros(len(borders.first))
     for labels in label_of_point:

@@ -47,14 +47,14 @@ class Named:
     """What a reader of the report should know, in sentences."""
 
 
-def phrases(thing: ObjectWords) -> list[str]:
+def phrases(described_object: ObjectWords) -> list[str]:
     """Return what a model that knows words is asked for, part by part."""
-    return [f"{part.name} of a {thing.class_name}" for part in thing.parts]
+    return [f"{part.name} of a {described_object.class_name}" for part in described_object.parts]
 
 
 def name_parts(
     cloud: Cloud,
-    thing: ObjectWords,
+    described_object: ObjectWords,
     words: Float[np.ndarray, "K S"] | None = None,
     config: PartsConfig = DEFAULT,
 ) -> Named:
@@ -62,24 +62,24 @@ def name_parts(
 
     Args:
         cloud: Points of one object, the world's z up.
-        thing: Its parts, at least one.
+        described_object: Its parts, at least one.
         words: One unit vector per part in the space of ``cloud.semantic``; None: no model.
         config: How finely the object is taken apart first.
 
     """
     none = np.zeros(cloud.count, np.int64)
     if not cloud.count:
-        return Named(none, np.ones(0), "no points", _missing(none, thing.parts))
-    if len(thing.parts) == 1:
+        return Named(none, np.ones(0), "no points", _missing(none, described_object.parts))
+    if len(described_object.parts) == 1:
         return Named(none, np.ones(cloud.count), "one part")
-    return named(parts(cloud, config), cloud, words, thing.parts)
+    return named(parts(cloud, config), cloud, words, described_object.parts)
 
 
 def named(
     clusters: Clusters,
     cloud: Cloud,
     words: Float[np.ndarray, "K S"] | None,
-    told: Sequence[PartWords],
+    parsed: Sequence[PartWords],
 ) -> Named:
     """Give every cluster a part's name; each part gets a cluster where there are enough.
 
@@ -90,29 +90,29 @@ def named(
         clusters: Of the cloud's points.
         cloud: Points of one object, the world's z up.
         words: One unit vector per part in the space of ``cloud.semantic``; None: no model.
-        told: The parts.
+        parsed: The parts.
 
     """
     if words is None:
-        clusters, score = _by_attributes(clusters, cloud, told)
+        clusters, score = _by_attributes(clusters, cloud, parsed)
         part = _claimed(score)
     else:
         score = _by_words(clusters, cloud, words)
-        look = _sums(cloud.structural, clusters.cluster_of_point, clusters.count)
-        part = _agreed(look, score, _claimed(score))
+        appearance = _sums(cloud.structural, clusters.cluster_of_point, clusters.count)
+        part = _agreed(appearance, score, _claimed(score))
     sure = softmax(score, axis=1)[np.arange(len(part)), part]
     of_point = part[clusters.cluster_of_point]
     return Named(
         of_point,
         sure[clusters.cluster_of_point] * clusters.confidence,
         "attributes" if words is None else "words",
-        _missing(of_point, told),
+        _missing(of_point, parsed),
     )
 
 
-def _missing(part_of_point: np.ndarray, told: Sequence[PartWords]) -> tuple[str, ...]:
-    points = np.bincount(part_of_point, minlength=len(told))
-    lost = [f"'{part.name}'" for part, n in zip(told, points, strict=True) if not n]
+def _missing(part_of_point: np.ndarray, parsed: Sequence[PartWords]) -> tuple[str, ...]:
+    points = np.bincount(part_of_point, minlength=len(parsed))
+    lost = [f"'{part.name}'" for part, n in zip(parsed, points, strict=True) if not n]
     return (f"No points were found for {', '.join(lost)}.",) if lost else ()
 
 
@@ -133,16 +133,16 @@ def _claimed(score: Float[np.ndarray, "C K"]) -> Int[np.ndarray, " C"]:
 
 
 def _by_attributes(
-    clusters: Clusters, cloud: Cloud, told: Sequence[PartWords]
+    clusters: Clusters, cloud: Cloud, parsed: Sequence[PartWords]
 ) -> tuple[Clusters, Float[np.ndarray, "C K"]]:
     """Cut clusters into layers of the object's height, and hold what is said against each."""
-    said = [described(part) for part in told]
-    up = top_of(cloud, clusters.cluster_of_point, clusters.count, said)
+    attributes = [described(part) for part in parsed]
+    up = top_of(cloud, clusters.cluster_of_point, clusters.count, attributes)
     layer = np.minimum(heights(cloud.position, up) * LAYERS, LAYERS - 1).astype(int)
     cut = clusters.cluster_of_point * LAYERS + layer
     clusters = replace(clusters, cluster_of_point=np.unique(cut, return_inverse=True)[1])
     seen = observed(cloud, clusters.cluster_of_point, clusters.count, up)
-    return clusters, log_likelihood(seen, said)
+    return clusters, log_likelihood(seen, attributes)
 
 
 # ---------------------------------------------------------------- with words' vectors
@@ -176,21 +176,21 @@ def _batches(count: int) -> list[slice]:
     return [slice(k, k + BATCH) for k in range(0, count, BATCH)]
 
 
-def _agreed(look: np.ndarray, score: np.ndarray, part: np.ndarray) -> Int[np.ndarray, " C"]:
+def _agreed(appearance: np.ndarray, score: np.ndarray, part: np.ndarray) -> Int[np.ndarray, " C"]:
     """Let each cluster go over to the name whose other clusters it looks most like.
 
     Once, all by what the first pass said. The last cluster of a name stays, and nobody takes a name
     that words find less probable than one in a hundred of their own.
     """
-    total = np.stack([look[part == k].sum(axis=0) for k in range(score.shape[1])])
+    total = np.stack([appearance[part == k].sum(axis=0) for k in range(score.shape[1])])
     left = np.bincount(part, minlength=score.shape[1])
     made = part.copy()
     for c, own in enumerate(part):
         if left[own] == 1:
             continue
         others = total.copy()
-        others[own] -= look[c]
-        alike = _unit(others) @ _unit(look[c])
+        others[own] -= appearance[c]
+        alike = _unit(others) @ _unit(appearance[c])
         alike[score[c] < score[c, own] - np.log(100)] = -np.inf
         made[c] = int(np.argmax(alike))
         left[own] -= made[c] != own

@@ -2,7 +2,7 @@
 
 Place and look in one vector, z_i = [ĝ_i ; w x_i]: ĝ unit, x over the object's diagonal, so that
 |z_i - z_j|² = |ĝ_i - ĝ_j|² + w² |x_i - x_j|². A few thousand superpoints stand for all points, and
-density parts them (``regions.density``). Too many clusters do no harm, too few do: names join what
+density parts them (``regions.hdbscan``). Too many clusters do no harm, too few do: names join what
 belongs together (``regions.naming``).
 """
 
@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
-from corporeal.regions.density import NOISE, Dense, Selection, hdbscan
+from corporeal.regions.hdbscan import NOISE, Dense, Selection, hdbscan
 from corporeal.regions.reduce import reduced
 from corporeal.regions.superpoints import superpoints
 from corporeal.types import Cloud
@@ -27,7 +27,7 @@ class PartsConfig:
     superpoints: int = 2000
     """Patches that stand for all points, about."""
     alike: float = 0.1
-    """Difference of looks that parts patches as much as one patch's width does."""
+    """Difference of appearance that parts patches as much as one patch's width does."""
     smallest: int = 10
     """Superpoints that make a cluster."""
     dense: int = 5
@@ -70,9 +70,9 @@ def parts(cloud: Cloud, config: PartsConfig = DEFAULT) -> Clusters:
     """
     if not cloud.count:
         return Clusters(np.zeros(0, np.int64), np.zeros(0))
-    look = reduced(cloud.structural)
-    patch = superpoints(cloud.position, look, config.superpoints, config.alike)
-    g, x = _means(look, patch), _means(_place(cloud), patch)
+    appearance = reduced(cloud.structural)
+    patch = superpoints(cloud.position, appearance, config.superpoints, config.alike)
+    g, x = _means(appearance, patch), _means(_place(cloud), patch)
     z = np.concatenate([g, config.position_weight * x], axis=1)
     found = hdbscan(z, config.smallest, config.dense, config.selection)
     whole = _attached(np.concatenate([g, NEAR * x], axis=1), found)

@@ -21,8 +21,8 @@ AROUND = 16
 MEETING = 12
 """Nearest points of a point: where two patches have such a pair, they meet."""
 ALIKE, TURNED = 0.15, 0.15
-"""Difference of looks that keeps points out of a patch as one patch's width does; what a unit of
-normal counts as difference of looks."""
+"""Difference of appearance that keeps points out of a patch as one patch's width does; what a unit
+of normal counts as difference of appearance."""
 POINTS = 10
 """To a patch, at least."""
 
@@ -36,7 +36,7 @@ class Patches:
     """Points."""
     centre: Float[np.ndarray, "M 3"]
     """World [m]."""
-    look: Float[np.ndarray, "M C"]
+    appearance: Float[np.ndarray, "M C"]
     """Mean of the points'."""
     normal: Float[np.ndarray, "M 3"]
     """Unit, outward."""
@@ -55,7 +55,7 @@ class Borders:
 
 def patches(
     position: Float[np.ndarray, "N 3"],
-    look: Float[np.ndarray, "N C"],
+    appearance: Float[np.ndarray, "N C"],
     normal: Float[np.ndarray, "N 3"] | None,
     count: int,
 ) -> tuple[Patches, Borders]:
@@ -63,7 +63,7 @@ def patches(
 
     Args:
         position: World [m].
-        look: Short vectors, see ``reduce``.
+        appearance: Short vectors, see ``reduce``.
         normal: Unit, outward; None: found from the points, outward being up where it is highest
             and the same on either side of every fold.
         count: How many patches, about; fewer where there are too few points.
@@ -76,12 +76,12 @@ def patches(
     facing = normal if known else _unsigned(normal)
     patch = superpoints(
         position,
-        np.concatenate([look, TURNED * facing], axis=1),
+        np.concatenate([appearance, TURNED * facing], axis=1),
         max(1, min(count, len(position) // POINTS)),
         ALIKE,
     )
     size = np.bincount(patch)
-    centre, mean = _mean(position, patch, size), _mean(look, patch, size)
+    centre, mean = _mean(position, patch, size), _mean(appearance, patch, size)
     borders = _borders(position, patch)
     turned = _unit(_mean(normal, patch, size))
     if not known:
@@ -98,13 +98,15 @@ def concavity(found: Patches, borders: Borders) -> Float[np.ndarray, " E"]:
 
 def difference(found: Patches, borders: Borders) -> Float[np.ndarray, " E"]:
     """Return how unlike two patches look: the distance of their mean looks."""
-    return np.linalg.norm(found.look[borders.first] - found.look[borders.second], axis=1)
+    return np.linalg.norm(
+        found.appearance[borders.first] - found.appearance[borders.second], axis=1
+    )
 
 
 def joined(found: Patches, borders: Borders) -> Borders:
     """Add a border between what is in several pieces: from each to the nearest patch of the rest.
 
-    A gap may be a true one, or where nobody looked. The new borders are as long as most are.
+    A gap may be a true one, or where no view looked. The new borders are as long as most are.
     """
     first, second = [borders.first], [borders.second]
     while True:

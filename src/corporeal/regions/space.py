@@ -1,8 +1,8 @@
-"""Things with space between them: what single linkage joins last.
+"""Objects with space between them: what single linkage joins last.
 
 Distances are those of mutual reachability (Campello et al. 2013), so that stray points build no
-bridges. A number of things is believed where it holds over a range of distances: gaps within a
-thing are where nobody looked, and narrow; gaps between things are wider.
+bridges. A number of objects is believed where it holds over a range of distances: gaps within an
+object are where no view looked, and narrow; gaps between objects are wider.
 """
 
 import numpy as np
@@ -16,19 +16,19 @@ ASKED = 5000
 MATES = 5
 """A place is as dense as the distance to so many neighbours says."""
 LEAST = 0.01
-"""Share of the points that make a thing."""
+"""Share of the points that make an object."""
 CLEAR = 1.8
-"""Factor between the widest gap within things and the narrowest between them."""
+"""Factor between the widest gap within objects and the narrowest between them."""
 
 
 def with_space_between(
     position: Float[np.ndarray, "N 3"], most: int | None = None, seed: int = 0
 ) -> Int[np.ndarray, " N"]:
-    """Return which points are of one thing, as far as space alone tells; most points first.
+    """Return which points are of one object, as far as space alone tells; most points first.
 
     Args:
-        position: Points on things.
-        most: How many things there are at most; None: nobody said.
+        position: Points on objects.
+        most: How many objects there are at most; None: not given.
         seed: Of the points that are looked at.
 
     """
@@ -50,7 +50,7 @@ def with_space_between(
 def _finest(tree: Float[np.ndarray, "J 4"], count: int, most: int | None) -> Int[np.ndarray, " n"]:
     """Return the finest groups that hold over a clear range of distances."""
     least = max(LEAST * count, MATES)
-    # Where two groups that both are things join, the number of things changes.
+    # Where two groups that both are objects join, the number of objects changes.
     size = np.concatenate([np.ones(count), tree[:, 3]])
     joins = np.minimum(size[tree[:, 0].astype(int)], size[tree[:, 1].astype(int)]) >= least
     widest, usual = np.sort(tree[joins, 2])[::-1], _usual(tree)
@@ -63,15 +63,15 @@ def _finest(tree: Float[np.ndarray, "J 4"], count: int, most: int | None) -> Int
 
 
 def _usual(tree: np.ndarray) -> float:
-    """Return the distance at which nearly all has been joined: within things there are such gaps.
+    """Return the distance at which nearly all has been joined: within objects there are such gaps.
 
-    Where a thing is plain, its Gaussians are large and few, and their means far apart.
+    Where an object is plain, its Gaussians are large and few, and their means far apart.
     """
     return float(np.percentile(tree[:, 2], 99))
 
 
 def _large(group: Int[np.ndarray, " n"], least: float) -> Int[np.ndarray, " n"]:
-    """Return groups that are things by number, most points first; -1: stray."""
+    """Return groups that are objects by number, most points first; -1: stray."""
     sizes = np.bincount(group)
     order = [g for g in np.argsort(-sizes, kind="stable") if sizes[g] >= least]
     rank = np.full(len(sizes), -1, np.int64)

@@ -1,4 +1,4 @@
-"""Thin things that lie on each other: where little is seen of where one ends."""
+"""Thin objects that lie on each other: where little is seen of where one ends."""
 
 import numpy as np
 from jaxtyping import Int
@@ -13,15 +13,15 @@ NEAR = 0.5
 """Distance of one's top and the other's bottom, over the thin one's height [-]."""
 
 
-def stacked(found: Patches, thing: Int[np.ndarray, " M"]) -> int:
-    """Return how many things are thin and lie on or under another.
+def stacked(found: Patches, instance: Int[np.ndarray, " M"]) -> int:
+    """Return how many objects are thin and lie on or under another.
 
-    A thing's box stands upright, turned about the vertical as its patches lie. It is thin where it
-    is less than a third as high as wide; the other lies on it, or under it, where their outlines
+    An object's box stands upright, turned about the vertical as its patches lie. It is thin where
+    it is less than a third as high as wide; the other lies on it, or under it, where their outlines
     overlap by half of the smaller and one begins where the other ends.
     """
-    count = int(thing.max()) + 1
-    rows = [found.centre[thing == k] for k in range(count)]
+    count = int(instance.max()) + 1
+    rows = [found.centre[instance == k] for k in range(count)]
     height = np.array([np.ptp(r[:, 2]) for r in rows])
     width = np.array([_width(r[:, :2]) for r in rows])
     thin = (height < THIN * width) & (width > 0)

@@ -19,12 +19,12 @@ HALVINGS = 24
 NEARLY = 0.9
 """This share of the patches asked for is enough."""
 ALIKE = 0.3
-"""Difference of looks that counts as much as one patch's width."""
+"""Difference of appearance that counts as much as one patch's width."""
 
 
 def superpoints(
     position: Float[np.ndarray, "N 3"],
-    look: Float[np.ndarray, "N D"] | None,
+    appearance: Float[np.ndarray, "N D"] | None,
     count: int = 2000,
     alike: float = ALIKE,
 ) -> Int[np.ndarray, " N"]:
@@ -34,17 +34,18 @@ def superpoints(
 
     Args:
         position: World [m].
-        look: What points look like, unit vectors or shorter ones (``regions.reduce``); None: place
+        appearance: What points look like, unit vectors or shorter ones (``regions.reduce``);
+            None: place
             alone decides.
         count: How many patches, about.
-        alike: Difference of looks that counts as much as one patch's width.
+        alike: Difference of appearance that counts as much as one patch's width.
 
     """
     place = np.asarray(position, np.float64)
     first, width = _cells(place, count)
     z = (place - place.mean(axis=0)) / width
-    if look is not None:
-        z = np.concatenate([z, np.asarray(look, np.float64) / alike], axis=1)
+    if appearance is not None:
+        z = np.concatenate([z, np.asarray(appearance, np.float64) / alike], axis=1)
     z = z.astype(np.float32)
     patches = int(first.max()) + 1
     near = min(CANDIDATES, patches)

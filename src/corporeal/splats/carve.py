@@ -1,11 +1,11 @@
 """Space carved by what cameras see (Kutulakos and Seitz 2000): a signed distance on a grid.
 
 A place is free where views see past it. One view may err, and all do along outlines; so a cell's
-distance is not the largest that any view allows, but the one that four in ten of those views
-exceed that see the cell at all. Both sides of a thin wall are seen by about as many, and each
-side's views agree among themselves, so that the wall stays. What nobody sees, inside things and
-below them, is filled in smoothly between (∇²f = 0), which closes a seat from below with about the
-least area.
+distance is not the largest that any view allows, but the one that four in ten of those views exceed
+that see the cell at all. Both sides of a thin wall are seen by about as many, and each side's views
+agree among themselves, so that the wall stays. What no view observes, inside objects and below
+them, is filled in smoothly between (∇²f = 0), which closes a seat from below with about the least
+area.
 """
 
 from dataclasses import dataclass
@@ -14,9 +14,9 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32, Int
 from scipy.ndimage import binary_dilation
 
-from corporeal.splats.crew import Crew
+from corporeal.splats.depth_rendering import DepthRendering
 from corporeal.splats.kernels_carve import carve, relax
-from corporeal.splats.sight import Sight
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Vector
 
 TRUST = 3.0
@@ -28,9 +28,9 @@ WITNESSES = 0.04
 PLATE = 1.5
 """How thick what lies flat on the floor is at least [cells]."""
 EDGE = 1.0
-"""Rays through pixels next to those that show a thing miss it by so little [px]."""
+"""Rays through pixels next to those that show an object miss it by so little [px]."""
 ROUNDS = 100
-"""Of filling in what nobody sees."""
+"""Of filling in what no view observes."""
 
 
 @dataclass(frozen=True)
@@ -74,7 +74,9 @@ def gridded(
     return Grid((float(start[0]), float(start[1]), float(start[2])), cell, (x, y, z))
 
 
-def carved(grid: Grid, sight: Sight, floor: float, crew: Crew) -> Float32[np.ndarray, "X Y Z"]:
+def carved(
+    grid: Grid, rendering: DepthRendering, floor: float, pool: ThreadPool
+) -> Float32[np.ndarray, "X Y Z"]:
     """Return the signed distance to what is seen, cut off at a few cells [m]; positive outside.
 
     Nothing is below the floor: what is seen there is a plate that lies on it.
@@ -82,9 +84,9 @@ def carved(grid: Grid, sight: Sight, floor: float, crew: Crew) -> Float32[np.nda
     field = np.empty(grid.shape, np.float32)
     place = np.array([*grid.low, grid.cell])
     reach = TRUST * grid.cell
-    rule = np.array([reach, EMPTIER, max(1, round(WITNESSES * len(sight.depth)))])
-    rest = place, sight.rows, _on(sight, floor + PLATE * grid.cell, floor), rule, field
-    crew.each(carve, [(*span, *rest) for span in crew.spans(grid.shape[0])])
+    rule = np.array([reach, EMPTIER, max(1, round(WITNESSES * len(rendering.depth)))])
+    rest = place, rendering.rows, _on(rendering, floor + PLATE * grid.cell, floor), rule, field
+    pool.each(carve, [(*span, *rest) for span in pool.spans(grid.shape[0])])
     above = grid.axes[2] > floor
     room = field[:, :, above]  # the floor is no witness: below it everything is unknown
     unseen = np.isnan(room)
@@ -96,15 +98,15 @@ def carved(grid: Grid, sight: Sight, floor: float, crew: Crew) -> Float32[np.nda
     return field
 
 
-def _on(sight: Sight, top: float, floor: float) -> Float32[np.ndarray, "V H W"]:
-    """Return depths with what things show below the floor lifted to a plate's upper side [m].
+def _on(rendering: DepthRendering, top: float, floor: float) -> Float32[np.ndarray, "V H W"]:
+    """Return depths with what objects show below the floor lifted to a plate's upper side [m].
 
     Where nothing is seen: minus the distance to what is [px], as far as that is near.
     """
-    lifted = sight.depth.copy()
+    lifted = rendering.depth.copy()
     height, width = lifted.shape[1:]
     u, v = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    for depth, met, row in zip(lifted, sight.met, sight.rows, strict=True):
+    for depth, met, row in zip(lifted, rendering.met, rendering.rows, strict=True):
         turn, shift = row[:12].reshape(3, 4)[:, :3], row[:12].reshape(3, 4)[:, 3]
         fx, fy, cx, cy = row[12:16]
         up = turn[0, 2] * (u - cx) / fx + turn[1, 2] * (v - cy) / fy + turn[2, 2]

@@ -1,4 +1,4 @@
-"""From points that somebody told apart to closed surfaces, the largest first."""
+"""From points of segmented objects to closed surfaces, the largest first."""
 
 from dataclasses import dataclass
 
@@ -14,18 +14,18 @@ from corporeal.splats.solid import Solid, solids
 
 @dataclass(frozen=True)
 class Closed:
-    """Things by size: the one with the largest box first."""
+    """Objects by size: the one with the largest box first."""
 
     solids: tuple[Solid, ...]
     owner: Int[np.ndarray, " N"]
-    """Whose each Gaussian is; -1: nobody's."""
+    """Whose each Gaussian is; -1: no object's."""
     object_of_point: Int[np.ndarray, " M"]
-    """Of the points that were told apart."""
+    """Of the points that were segmented."""
 
 
 def closed(
     taken: Intake,
-    things: Int[np.ndarray, " T"],
+    of_objects: Int[np.ndarray, " T"],
     position: Float[np.ndarray, "M 3"],
     object_of_point: Int[np.ndarray, " M"],
 ) -> Closed:
@@ -33,8 +33,8 @@ def closed(
 
     Args:
         taken: The Gaussians, upright, and the cameras that they are looked at by.
-        things: Which of them belong to things.
-        position: Points that were told apart, in the same frame.
+        of_objects: Which of them belong to objects.
+        position: Points that were segmented, in the same frame.
         object_of_point: Whose each point is.
 
     Raises:
@@ -42,12 +42,12 @@ def closed(
 
     """
     owner = np.full(taken.gaussians.count, -1, np.int64)
-    nearest = KDTree(position).query(taken.gaussians.mean[things])[1]
-    owner[things] = object_of_point[nearest]
+    nearest = KDTree(position).query(taken.gaussians.mean[of_objects])[1]
+    owner[of_objects] = object_of_point[nearest]
     owner = with_company(taken.gaussians, owner, taken.floor)
-    # Masks say what is a thing's: what is nobody's then takes no space from things.
+    # Masks say what is an object's: what is no object's then takes no space from objects.
     kept = np.ones(len(owner), bool) if taken.masks is None else owner >= 0
     found = solids(only(taken.gaussians, kept), owner[kept], taken.cameras, taken.masks)
     order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
-    place = np.append(np.argsort(order), -1)  # the last for what is nobody's
+    place = np.append(np.argsort(order), -1)  # the last for what is no object's
     return Closed(tuple(found[k] for k in order), place[owner], place[object_of_point])

@@ -1,7 +1,7 @@
-"""Masks of things on a floor, where nobody gave any, from Gaussians of whole photographs.
+"""Masks of objects on a floor, where none are given, from Gaussians of whole photographs.
 
-Where things are decides, not how they look: what lies in the floor's plane is floor, whatever its
-colour. So shadows are none of the things, and things of the floor's own colour are.
+Where objects are decides, not how they look: what lies in the floor's plane is floor, whatever its
+colour. So shadows are none of the objects, and objects of the floor's own colour are.
 """
 
 import numpy as np
@@ -14,11 +14,11 @@ from scipy.spatial.transform import Rotation
 
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.region import region
-from corporeal.splats.crew import Crew
 from corporeal.splats.foreground import HALF, THICK, foreground, shown
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, Parameters, parameters
 from corporeal.splats.raster import draw, picture_of, pinhole
 from corporeal.splats.start import clearance
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Gaussians
 
 APART = 0.04
@@ -26,7 +26,7 @@ APART = 0.04
 FILLED = 1.5
 """Standard deviations of a Gaussian that are its own."""
 CRUMB = 0.002
-"""Share of the things' Gaussians: separate pieces of fewer are none of them."""
+"""Share of the objects' Gaussians: separate pieces of fewer are none of them."""
 BLACK, WHITE = -0.5 / DC, 0.5 / DC
 """Harmonics of degree 0."""
 
@@ -34,9 +34,9 @@ BLACK, WHITE = -0.5 / DC, 0.5 / DC
 def cut_out(
     gaussians: Gaussians, cameras: tuple[Camera, ...], floor: bool, threads: int | None = None
 ) -> Bool[np.ndarray, "V H W"]:
-    """Return which pixels of the cameras' pictures are on things.
+    """Return which pixels of the cameras' pictures are on objects.
 
-    What is less than ``foreground.THICK`` above the floor cannot be told from it. There things are
+    What is less than ``foreground.THICK`` above the floor cannot be told from it. There objects are
     taken to go down to it as they begin above that layer: mirrored at its top.
 
     Args:
@@ -47,18 +47,18 @@ def cut_out(
 
     """
     radius = region(cameras, gaussians.mean).radius
-    things = foreground(gaussians, cameras, shown(gaussians, cameras, None, threads), floor)
-    if things.any():
-        things[things] = _joined(gaussians, things, APART * radius)
+    of_objects = foreground(gaussians, cameras, shown(gaussians, cameras, None, threads), floor)
+    if of_objects.any():
+        of_objects[of_objects] = _joined(gaussians, of_objects, APART * radius)
     theta = np.full((gaussians.count, COLOUR + 3), BLACK, np.float32)
     theta[:, :COLOUR] = parameters(gaussians)[:, :COLOUR]
-    theta[things, COLOUR:] = WHITE
+    theta[of_objects, COLOUR:] = WHITE
     if floor:
-        theta = _footed(theta, things, THICK * radius)
+        theta = _footed(theta, of_objects, THICK * radius)
     masks = []
-    with Crew(threads) as crew:
+    with ThreadPool(threads) as pool:
         for camera, near in zip(cameras, clearance(cameras), strict=True):
-            made = draw(theta, pinhole(camera, near=near), np.zeros(3), crew)
+            made = draw(theta, pinhole(camera, near=near), np.zeros(3), pool)
             masks.append(picture_of(made).rgb[..., 0] > HALF)
     return np.stack(masks)
 
@@ -82,13 +82,13 @@ def _joined(gaussians: Gaussians, which: np.ndarray, cell: float) -> Bool[np.nda
     return np.bincount(own)[own] >= CRUMB * count
 
 
-def _footed(theta: Parameters, things: Bool[np.ndarray, " N"], top: float) -> Parameters:
-    """Return Gaussians with a mirror image of things in place of what is in a layer below them."""
+def _footed(theta: Parameters, of_objects: Bool[np.ndarray, " N"], top: float) -> Parameters:
+    """Return Gaussians with a mirror image of objects in place of what is in a layer below them."""
     height = theta[:, MEAN + 2]
-    feet = theta[things & (height < 2 * top) & (theta[:, OPACITY] > 0)]
+    feet = theta[of_objects & (height < 2 * top) & (theta[:, OPACITY] > 0)]
     if not len(feet):
         return theta
     feet[:, MEAN + 2] = 2 * top - feet[:, MEAN + 2]
     feet[:, ROTATION + 1 : ROTATION + 3] *= -1  # M R M turns by (w, -x, -y, z)
     near = KDTree(feet[:, MEAN:ROTATION]).query(theta[:, MEAN:ROTATION])[0] < top
-    return np.concatenate([theta[things | ~near], feet])
+    return np.concatenate([theta[of_objects | ~near], feet])

@@ -1,4 +1,4 @@
-"""Surfaces of touching things drawn back to a common face wherever they overlap.
+"""Surfaces of touching objects drawn back to a common face wherever they overlap.
 
 Each was carved on its own grid and moved on its own, so that some end up a cell or two inside each
 other. What lies inside another goes half of the way out, again and again, as the other does: both
@@ -38,7 +38,7 @@ LEFT = 0.1
 
 @dataclass(frozen=True)
 class _Skin:
-    """A thing's surface, and the part of it that may move."""
+    """An object's surface, and the part of it that may move."""
 
     mesh: Mesh
     near: Int[np.ndarray, "N 3"]
@@ -86,7 +86,7 @@ def disjoint(meshes: Sequence[Mesh], cells: Sequence[float], floor: float) -> tu
     Where one goes through another, or deep into it, both stay as they are.
 
     Args:
-        meshes: Closed, one for each thing.
+        meshes: Closed, one for each object.
         cells: Of the grids that they were carved from [m].
         floor: What lies on it stays on it, whatever else is there [m].
 
@@ -103,7 +103,7 @@ def disjoint(meshes: Sequence[Mesh], cells: Sequence[float], floor: float) -> tu
 
 @dataclass(frozen=True)
 class _Seam:
-    """Where two things overlap."""
+    """Where two objects overlap."""
 
     of: tuple[int, int]
     points: Float[np.ndarray, "P 3"]
@@ -153,7 +153,7 @@ def _skin(mesh: Mesh, seams: list[_Seam], k: int, floor: float) -> _Skin:
 def _drawn_back(
     meshes: Sequence[Mesh], seams: list[_Seam], still: float, floor: float
 ) -> dict[int, _Skin]:
-    """Draw things back where they meet; still: what is no deeper stays [m]."""
+    """Draw objects back where they meet; still: what is no deeper stays [m]."""
     skins = {k: _skin(meshes[k], seams, k, floor) for k in sorted({k for s in seams for k in s.of})}
     others = {k: [j for s in seams if k in s.of for j in s.of if j != k] for k in skins}
     ever = {k: np.zeros(len(meshes[k].vertices), bool) for k in skins}
@@ -172,7 +172,7 @@ def _drawn_back(
 def _ways(
     skins: dict[int, _Skin], k: int, others: list[int], middles: bool
 ) -> tuple[Float[np.ndarray, " V"], Float[np.ndarray, "V 3"]]:
-    """How deep vertices of a thing are in others [m], and the way out of where they are deepest.
+    """How deep vertices of an object are in others [m], and the way out of where they are deepest.
 
     middles: A triangle's corners are as deep as its middle, if that is deeper.
     """

@@ -1,4 +1,4 @@
-"""Closed surfaces made fair: noise taken off, and what nobody saw put where it is likely."""
+"""Closed surfaces made fair: noise taken off, and unobserved surface put where it is likely."""
 
 import igl
 import numpy as np
@@ -61,7 +61,7 @@ def continued(
     floor: float,
     mean: csr_array,
 ) -> Mesh:
-    """Round off the patches of a surface that nobody knows, where that is likely.
+    """Round off the patches of a surface that no view observes, where that is likely.
 
     Where the surface about a patch nearly faces as the patch does, as about the underside of a
     ball, it goes on with the least bending. What is about it is known but for noise, which would

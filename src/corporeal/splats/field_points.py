@@ -1,4 +1,4 @@
-"""Points on things from a radiance field that is learned beside Gaussians."""
+"""Points on objects from a radiance field that is learned beside Gaussians."""
 
 from collections.abc import Callable
 from functools import partial
@@ -15,29 +15,29 @@ from corporeal.types import Views
 
 def field_points(
     taken: Intake,
-    things: Int[np.ndarray, " M"],
+    of_objects: Int[np.ndarray, " M"],
     most: int,
     config: FieldConfig,
     checkpoint: Path | None = None,
     progress: Callable[[float, str], None] = lambda fraction, words: None,
 ) -> tuple[Learned, Points]:
-    """Learn a field of the things, and take points from where it is dense and Gaussians agree.
+    """Learn a field of the objects, and take points from where it is dense and Gaussians agree.
 
     Args:
         taken: Pictures, or a splat that is pictured; masks where there are any.
-        things: Its Gaussians that belong to things.
+        of_objects: Its Gaussians that belong to objects.
         most: No more points than that.
         config: How to learn.
         checkpoint: Where what was learned is kept.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and what is being done.
 
     Raises:
         UserError: Cameras, pictures and masks do not belong together.
 
     """
     gaussians, cameras, masks = taken.gaussians, taken.cameras, taken.masks
-    masks = covered(gaussians, cameras, things) if masks is None else masks
+    masks = covered(gaussians, cameras, of_objects) if masks is None else masks
     views = Views(np.stack(taken.pictures()), cameras)
     learned = learn(views, masks, config, checkpoint, progress)
-    at = partial(near, gaussians, things)
+    at = partial(near, gaussians, of_objects)
     return learned, points(learned.field, cameras, most, config.seed, at)

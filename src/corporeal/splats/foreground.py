@@ -1,4 +1,4 @@
-"""Which Gaussians belong to the things: not the floor, not what is behind, no haze."""
+"""Which Gaussians belong to the objects: not the floor, not what is behind, no haze."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -24,19 +24,19 @@ FAINT = 0.05
 THICK = 0.01
 """Height of the layer that is the floor, in radii of what the cameras look at."""
 AROUND = 1.1
-"""Radius of what may be a thing, in those."""
+"""Radius of what may be an object, in those."""
 COMMON = 0.2
 """Share of the views that must see it, where there are no masks."""
 WIDE = 0.5
 """Standard deviation of haze, in those radii."""
 HALF = 0.5
-"""Share of a pixel from which on it is a thing's."""
+"""Share of a pixel from which on it is an object's."""
 TINY = 1e-12
 """Contribution that can be divided by [px]."""
 REACH = 2.0
 """Standard deviations to which a faint Gaussian reaches."""
 NEAR = 3.0
-"""Distances between neighbours within which a Gaussian, or a place, goes with a thing."""
+"""Distances between neighbours within which a Gaussian, or a place, goes with an object."""
 
 
 @dataclass(frozen=True)
@@ -89,7 +89,7 @@ def shown(
 def foreground(
     gaussians: Gaussians, cameras: Sequence[Camera], seen: Shown, floor: bool = True
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which Gaussians belong to the things.
+    """Tell which Gaussians belong to the objects.
 
     With masks: those that show mostly inside them. Without: those that are above the floor, within
     the ball that the cameras look at, in a fair share of the pictures, and neither faint nor as
@@ -116,19 +116,19 @@ def foreground(
 
 
 def covered(
-    gaussians: Gaussians, cameras: Sequence[Camera], things: Int[np.ndarray, " M"]
+    gaussians: Gaussians, cameras: Sequence[Camera], of_objects: Int[np.ndarray, " M"]
 ) -> Bool[np.ndarray, "V H W"]:
-    """Return the pixels that show mostly Gaussians of things."""
-    shares = [weights(gaussians, c, 1)[things].sum(axis=0) for c in cameras]
+    """Return the pixels that show mostly Gaussians of objects."""
+    shares = [weights(gaussians, c, 1)[of_objects].sum(axis=0) for c in cameras]
     pairs = zip(shares, cameras, strict=True)
     return np.stack([np.asarray(share).reshape(c.height, c.width) > HALF for share, c in pairs])
 
 
 def near(
-    gaussians: Gaussians, things: Int[np.ndarray, " M"], position: Float[np.ndarray, "N 3"]
+    gaussians: Gaussians, of_objects: Int[np.ndarray, " M"], position: Float[np.ndarray, "N 3"]
 ) -> Bool[np.ndarray, " N"]:
-    """Tell which places are at a Gaussian of things, within a few distances or widths of it."""
-    mean, widest = gaussians.mean[things], gaussians.scale[things].max(axis=1)
+    """Tell which places are at a Gaussian of objects, within a few distances or widths of it."""
+    mean, widest = gaussians.mean[of_objects], gaussians.scale[of_objects].max(axis=1)
     tree = KDTree(mean)
     apart = float(np.median(np.asarray(tree.query(mean, k=2)[0])[:, 1]))
     distance, nearest = map(np.asarray, tree.query(position))
@@ -138,7 +138,7 @@ def near(
 def with_company(
     gaussians: Gaussians, owner: Int[np.ndarray, " N"], floor: bool
 ) -> Int[np.ndarray, " N"]:
-    """Let faint and hidden Gaussians go with the thing they are near, or they would stay behind.
+    """Let faint and hidden Gaussians go with the object they are near, or they would stay behind.
 
     Faint ones are near what they reach. Where a floor is among them, only those above it go.
     """

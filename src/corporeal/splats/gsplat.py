@@ -12,10 +12,10 @@ import torch  # pyright: ignore[reportMissingImports]
 from gsplat import rasterization  # pyright: ignore[reportMissingImports]
 
 from corporeal.errors import UserError
-from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_project import DILATION, WIDTH, Pinhole
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE, Parameters
 from corporeal.splats.raster import Drawing
+from corporeal.splats.thread_pool import ThreadPool
 
 
 @dataclass(frozen=True)
@@ -37,7 +37,7 @@ def present() -> None:
         )
 
 
-def draw(theta: Parameters, camera: Pinhole, background: np.ndarray, crew: Crew) -> Graph:
+def draw(theta: Parameters, camera: Pinhole, background: np.ndarray, pool: ThreadPool) -> Graph:
     """Draw Gaussians before a background; the card shares the work itself.
 
     Raises:
@@ -85,7 +85,7 @@ def draw(theta: Parameters, camera: Pinhole, background: np.ndarray, crew: Crew)
     )
 
 
-def back(drawing: Graph, slope: np.ndarray, crew: Crew) -> Parameters:
+def back(drawing: Graph, slope: np.ndarray, pool: ThreadPool) -> Parameters:
     """Return dL/dθ from the slope, dL/d(red, green, blue, transmittance) of every pixel."""
     drawing.made.backward(torch.from_numpy(slope).to(drawing.made.device))
     return drawing.leaf.grad.cpu().numpy()

@@ -9,14 +9,14 @@ from scipy.ndimage import label, maximum
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
 from corporeal.geometry.silhouettes import cells_of, small
-from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_learn import witness
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Views
 
 CELLS = 2_000_000
 """Of the grid that the visual hull is carved from."""
 ASTRAY = 0.05
-"""Share of the views that may see a point of the hull beside things: masks err at edges."""
+"""Share of the views that may see a point of the hull beside objects: masks err at edges."""
 FEW = 7
 """Where no more views look, silhouettes may cross by chance where there is nothing."""
 NEEDED = 0.2
@@ -34,7 +34,7 @@ class Carved:
     inside: Bool[np.ndarray, "X Y Z"]
 
 
-def tight(views: Views, masks: Bool[np.ndarray, "V H W"], crew: Crew) -> Carved:
+def tight(views: Views, masks: Bool[np.ndarray, "V H W"], pool: ThreadPool) -> Carved:
     """Return the visual hull in a box that hardly holds more.
 
     Raises:
@@ -43,16 +43,16 @@ def tight(views: Views, masks: Bool[np.ndarray, "V H W"], crew: Crew) -> Carved:
     """
     around = region(views.cameras)
     middle, reach = np.array(around.centre), 1.5 * around.radius
-    rough = carved(middle - reach, middle + reach, views, masks, crew)
+    rough = carved(middle - reach, middle + reach, views, masks, pool)
     found = rough.cells[rough.inside]
     low, high = found.min(axis=0) - 2 * rough.side, found.max(axis=0) + 2 * rough.side
-    return carved(low, high, views, masks, crew)
+    return carved(low, high, views, masks, pool)
 
 
 def carved(
-    low: np.ndarray, high: np.ndarray, views: Views, masks: np.ndarray, crew: Crew
+    low: np.ndarray, high: np.ndarray, views: Views, masks: np.ndarray, pool: ThreadPool
 ) -> Carved:
-    """Carve a box: what is left is on things in all views that see it, but for a few.
+    """Carve a box: what is left is on objects in all views that see it, but for a few.
 
     Raises:
         UserError: Nothing is left.
@@ -61,7 +61,7 @@ def carved(
     side = float(np.cbrt(np.prod(high - low) / CELLS))
     axes = [np.arange(a + side / 2, b, side) for a, b in zip(low, high, strict=True)]
     cells = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
-    seen = witnessed(cells.reshape(-1, 3), views, masks, crew)
+    seen = witnessed(cells.reshape(-1, 3), views, masks, pool)
     count = len(views.cameras)
     inside = (seen[:, 1] <= ASTRAY * count) & (seen[:, 0] >= max(1, count / 4))
     if not inside.any():
@@ -78,7 +78,7 @@ def _without_phantoms(
 ) -> Carved:
     """Drop pieces that few views see and that fill little of the masks that others do not fill.
 
-    A piece that stands for a thing fills all of its silhouettes, one where silhouettes cross by
+    A piece that stands for an object fills all of its silhouettes, one where silhouettes cross by
     chance only what they share: those that fill most are taken first.
     """
     piece = np.empty(hull.inside.shape, np.int32)
@@ -115,14 +115,14 @@ def _shown(
 
 
 def witnessed(
-    points: np.ndarray, views: Views, masks: np.ndarray, crew: Crew
+    points: np.ndarray, views: Views, masks: np.ndarray, pool: ThreadPool
 ) -> Float[np.ndarray, "N 5"]:
     """Return what views say of points, as ``kernels_learn.witness`` has it."""
     out = np.empty((len(points), 5))
     patience = ASTRAY * len(views.cameras)
     rest = camera_rows(views.cameras), views.rgb, masks, patience, out
     points = np.ascontiguousarray(points, dtype=np.float64)
-    crew.each(witness, [(points, *span, *rest) for span in crew.spans(len(points))])
+    pool.each(witness, [(points, *span, *rest) for span in pool.spans(len(points))])
     return out
 
 

@@ -3,7 +3,6 @@
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
@@ -13,34 +12,34 @@ from corporeal.formats.photographs import NO_INSTANCES, Photographs, read_photog
 from corporeal.formats.sources import kind_of
 from corporeal.formats.splats import read_splat
 from corporeal.geometry.agreement import agreement
+from corporeal.geometry.gaussians import AskedUp
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians, similarity
 from corporeal.geometry.upright import Stated, Upright, upright
-from corporeal.splats.contact import lowest
 from corporeal.splats.cutout import cut_out
-from corporeal.splats.lesson import PRESETS, TrainConfig
+from corporeal.splats.lowest import lowest
 from corporeal.splats.quality import Quality
 from corporeal.splats.raster import render
 from corporeal.splats.start import Points
 from corporeal.splats.train import GAIN, Trained, train
+from corporeal.splats.training_schedule import PRESETS, TrainConfig
 from corporeal.types import Camera, Gaussians, Vector, Views
 
 Progress = Callable[[float, str], None]
-Up = Literal["auto", "x", "-x", "y", "-y", "z", "-z"]
 
 SOLID = 0.5
 """Opacity from which on a Gaussian says where something is."""
 ON = 128
-"""Of 255: from here on a pixel of a mask belongs to things."""
+"""Of 255: from here on a pixel of a mask belongs to objects."""
 POOR = 20.0
 """Held-out photographs agree worse than this only where something is wrong [dB]."""
 CUT_OUT = (
-    "There were no masks: what is above the floor was taken for things. What lies on it and is "
+    "There were no masks: what is above the floor was taken for objects. What lies on it and is "
     "thinner than 0.5 % of the scene is lost."
 )
 NO_FLOOR = (
-    "There were no masks, and no floor that things could be told from: all that most photographs "
-    "show was taken for things. Give masks, or say where the floor is with --floor-at."
+    "There were no masks, and no floor to tell objects from: all that most photographs "
+    "show was taken for objects. Give masks, or say where the floor is with --floor-at."
 )
 SHOWN = 4
 """Pictures that somebody is shown of the whole scene."""
@@ -59,7 +58,7 @@ class Intake:
     views: Views | None = None
     """The photographs; their cameras stay as the file has them."""
     masks: Bool[np.ndarray, "V H W"] | None = None
-    """Which pixels are on things; None: nobody says."""
+    """Which pixels are on objects; None: unknown."""
     z_up: bool = False
     """The file's kind says so, and that its unit is the metre."""
     usual: Vector | None = None
@@ -69,8 +68,9 @@ class Intake:
     world_from_file: Float[np.ndarray, "4 4"] = field(default_factory=lambda: np.eye(4))
     """How it was turned and shifted since it was read."""
     seen: Float[np.ndarray, "N 3"] | None = None
-    """Points on all that the photographs show, the floor too, where Gaussians are on things alone;
-    None: there are none but Gaussians."""
+    """Sparse points on all that the photographs show, the floor too; None: the file has none."""
+    quality: Quality | None = None
+    """How well pictures of the Gaussians agree with photographs held back; None: none was."""
     statements: tuple[str, ...] = ()
     """How it came about, in sentences, for the report."""
     warnings: tuple[str, ...] = ()
@@ -121,8 +121,8 @@ def take_in(
         source: A folder of photographs with poses, or a splat.
         training: How to learn.
         checkpoint: Where a training that is cut off leaves what it has.
-        progress: Told the fraction done and what is being done.
-        instances: Whether masks must tell things apart.
+        progress: Called with the fraction done and what is being done.
+        instances: Whether masks must segment objects.
 
     Raises:
         UserError: The input cannot be used.
@@ -135,8 +135,8 @@ def take_in(
     if splat:
         given = read_splat(source)
         usual = USUAL.get(source.suffix.lower(), (0.0, -1.0, 0.0))
-        said = (f"{given.count:,} Gaussians were read from {source.name}.",)
-        return Intake(given, usual=usual, statements=said, warnings=given.warnings)
+        read = (f"{given.count:,} Gaussians were read from {source.name}.",)
+        return Intake(given, usual=usual, statements=read, warnings=given.warnings)
     shown = read_photographs(source, PRESETS[training.preset].longest)
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
@@ -153,13 +153,14 @@ def take_in(
         shown.views,
         masks,
         shown.z_up,
-        seen=None if masks is None or points is None else points.position,
-        statements=_told(trained, len(shown.views.cameras)),
+        seen=None if points is None else points.position,
+        quality=trained.quality,
+        statements=_learned_how(trained, len(shown.views.cameras)),
         warnings=(*shown.warnings, *doubt, *_badly_learned(trained, len(shown.names))),
     )
 
 
-def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -> Intake:
+def turned_upright(taken: Intake, up: AskedUp = "auto", floor: float | None = None) -> Intake:
     """Return the same with +z up, the floor at z = 0, and what is looked at above the origin.
 
     Photographs without masks get some.
@@ -170,13 +171,18 @@ def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -
         floor: Its height along up, in the file's unit; None: it is looked for.
 
     """
-    alone = taken.masks is not None and taken.seen is None  # nothing but things is known
-    points = taken.solid if taken.seen is None else taken.seen
+    alone = taken.masks is not None and taken.seen is None  # nothing but objects is known
+    sparse = taken.seen
+    points = taken.solid if sparse is None or taken.masks is None else sparse
     of_things = None if taken.masks is None else taken.solid
     stated = Stated(_stated(up), floor)
     seen = points[:0] if alone else points
     frame = upright(taken.cameras, seen, taken.z_up, of_things, taken.usual, stated)
-    if frame.floor_by == "things" and taken.views is not None and taken.masks is not None:
+    if frame.floor_by == "objects" and taken.masks is None and sparse is not None:
+        # Gaussians of a poorly learned room may be anywhere; points that pictures share are not.
+        other = upright(taken.cameras, sparse, taken.z_up, of_things, taken.usual, stated)
+        frame = other if other.floor_by == "plane" else frame
+    if frame.floor_by == "objects" and taken.views is not None and taken.masks is not None:
         frame = _lowered(frame, taken.views, taken.masks)
     made = replace(
         taken,
@@ -191,7 +197,7 @@ def turned_upright(taken: Intake, up: Up = "auto", floor: float | None = None) -
 
 
 def _lowered(frame: Upright, views: Views, masks: Bool[np.ndarray, "V H W"]) -> Upright:
-    """Put the floor where the outlines in masks say that things touch it."""
+    """Put the floor where the outlines in masks say that objects touch it."""
     cameras = moved_cameras(views.cameras, frame.world_from_file)
     try:
         height = lowest(Views(views.rgb, cameras), masks)
@@ -205,10 +211,10 @@ def _lowered(frame: Upright, views: Views, masks: Bool[np.ndarray, "V H W"]) -> 
 
 
 def _with_masks(taken: Intake) -> Intake:
-    """Return the same with masks of what is above the floor, where nobody gave any."""
-    told = CUT_OUT if taken.floor else NO_FLOOR
+    """Return the same with masks of what is above the floor, where none are given."""
+    warning = CUT_OUT if taken.floor else NO_FLOOR
     masks = cut_out(taken.gaussians, taken.cameras, taken.floor)
-    return replace(taken, masks=masks, warnings=(*taken.warnings, told))
+    return replace(taken, masks=masks, warnings=(*taken.warnings, warning))
 
 
 def _doubt(source: Path, shown: Photographs) -> tuple[str, ...]:
@@ -240,7 +246,7 @@ def _badly_learned(trained: Trained, photographs: int) -> tuple[str, ...]:
     )
 
 
-def _stated(up: Up) -> Vector | None:
+def _stated(up: AskedUp) -> Vector | None:
     if up == "auto":
         return None
     sign = -1.0 if up[0] == "-" else 1.0
@@ -254,22 +260,22 @@ def _points(shown: Photographs) -> Points | None:
     return Points(shown.points, shown.colours / 255)
 
 
-def _told(trained: Trained, photographs: int) -> tuple[str, ...]:
+def _learned_how(trained: Trained, photographs: int) -> tuple[str, ...]:
     count = f"{trained.gaussians.count:,}"
-    said = [f"{count} Gaussians were learned from {photographs} photographs."]
+    sentences = [f"{count} Gaussians were learned from {photographs} photographs."]
     if np.isfinite(trained.ahead):
-        inside, better = trained.ahead > GAIN, f"{trained.ahead:+.1f} dB on things"
+        inside, better = trained.ahead > GAIN, f"{trained.ahead:+.1f} dB on objects"
         where = "and inside of it" if inside else "alone"
-        said.append(
+        sentences.append(
             f"They began on the visual hull of the masks {where}: to begin inside, too, made "
             f"{better} in a small training."
         )
-    return (*said, *(() if trained.quality is None else (_agreed(trained.quality),)))
+    return (*sentences, *(() if trained.quality is None else (_agreed(trained.quality),)))
 
 
 def _agreed(quality: Quality) -> str:
-    things = "" if quality.psnr_things is None else f", {quality.psnr_things:.1f} dB on things"
+    shown = "" if quality.psnr_things is None else f", {quality.psnr_things:.1f} dB on objects"
     return (
         f"Pictures of them agree with {len(quality.views)} photographs that they were not learned "
-        f"from to {quality.psnr:.1f} dB{things}."
+        f"from to {quality.psnr:.1f} dB{shown}."
     )

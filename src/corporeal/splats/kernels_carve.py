@@ -13,7 +13,7 @@ MET = f4(0.85)
 """Transmittance at which a ray has met a surface. Learned Gaussians lie in a layer, and where half
 of the light is lost is already below what is seen."""
 HALF = f4(0.5)
-"""A pixel that lets more light through shows no thing."""
+"""A pixel that lets more light through shows no object."""
 FAR = 3.0
 """Nothing of a Gaussian is met farther from its mean, in standard deviations along the view."""
 OVERTAKEN = 1.6
@@ -115,7 +115,7 @@ def meet(tiles, first, ids, ellipses, slopes, depth, met):
 def carve(first, last, grid, cameras, depths, rule, out):
     """Fill out[first:last] of a grid (X, Y, Z): signed distance to what is seen [m], + outside.
 
-    grid: low corner's middle (3) and cell (1) [m]; cameras (V, 18): ``Sight.rows``;
+    grid: low corner's middle (3) and cell (1) [m]; cameras (V, 18): ``DepthRendering.rows``;
     depths (V, H, W) [m], where there is nothing minus the pixels to where there is. rule: reach of
     distances [m], share of the views that see a cell which may take it for emptier than the
     others do, and how many must. A cell that too few see is nan.

@@ -149,8 +149,8 @@ def witness(points, first, last, cameras, pictures, masks, patience, out):
     """Ask every view about points first to last.
 
     cameras (V, 16): camera from world (3 × 4), fx, fy, cx, cy; pictures (V, H, W, 3); masks
-    (V, H, W), true on things; patience: after more views that see it beside things
-    nobody else is asked. out (N, 5): views that see it, views that see it beside things, sums of
+    (V, H, W), true on objects; patience: after more views that see it beside objects
+    nobody else is asked. out (N, 5): views that see it, views that see it beside objects, sums of
     red, green and blue [0–1].
     """
     views, height, width, _ = pictures.shape

@@ -1,4 +1,4 @@
-"""Outlines of things in pictures and of surfaces, pixel by pixel. Compiled by numba."""
+"""Outlines of objects in pictures and of surfaces, pixel by pixel. Compiled by numba."""
 
 import numba
 import numpy as np
@@ -22,11 +22,11 @@ def _nearest(inside, y, x, reach):
 
 @numba.njit(**JIT)
 def outline(first, last, inside, depths, margin, reach, out):
-    """Fill out (V, H, W) with the distance to a thing's outline [px], negative inside.
+    """Fill out (V, H, W) with the distance to an object's outline [px], negative inside.
 
-    inside (V, H, W): pixels on the thing; depths (V, H, W): of what is seen [m]. nan farther than
+    inside (V, H, W): pixels on the object; depths (V, H, W): of what is seen [m]. nan farther than
     reach [px], and where what is outside is not farther away by margin [m]: there something hides
-    the thing, or touches it.
+    the object, or touches it.
     """
     _, height, width = inside.shape
     for v in range(first, last):

@@ -7,9 +7,9 @@ flat, and small in every picture; what few views see has one colour for all side
 import numpy as np
 from jaxtyping import Bool, Float32
 
-from corporeal.splats.crew import Crew
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE, Parameters
 from corporeal.splats.surfaces import Surfaces
+from corporeal.splats.thread_pool import ThreadPool
 
 WIDEST = 0.1
 """Scale over the least depth at which it is seen [-]."""
@@ -32,14 +32,14 @@ def even(theta: Parameters, widest: float) -> Limits:
 
 
 def strict(
-    theta: Parameters, radius: float, surfaces: Surfaces, crew: Crew
+    theta: Parameters, radius: float, surfaces: Surfaces, pool: ThreadPool
 ) -> tuple[Limits, Bool[np.ndarray, " N"]]:
     """Return the limits of Gaussians that views judge, and which of them are haze."""
     widths = np.exp(theta[:, SCALE:OPACITY]).max(axis=1)
-    said = surfaces.judge(theta[:, MEAN:ROTATION], widths, crew)
+    judged = surfaces.judge(theta[:, MEAN:ROTATION], widths, pool)
     limits = even(theta, REACH * radius)
-    near = np.minimum(said.nearest, REACH * radius / WIDEST)
+    near = np.minimum(judged.nearest, REACH * radius / WIDEST)
     limits[:, 0] = np.log(WIDEST * near)
     limits[:, 1] = np.log(THICKEST * near)
-    limits[said.few, 2], limits[:, 3] = COLOUR + 3, 1
-    return limits, said.haze
+    limits[judged.few, 2], limits[:, 3] = COLOUR + 3, 1
+    return limits, judged.haze

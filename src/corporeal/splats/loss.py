@@ -8,9 +8,9 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float32, UInt8
 
-from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_learn import compare
 from corporeal.splats.raster import Drawing
+from corporeal.splats.thread_pool import ThreadPool
 
 L1, SSIM, COVER = 0.8, 0.2, 0.1
 EVEN = np.ones(3, np.float32)
@@ -24,7 +24,7 @@ class Goal:
     planes: Float32[np.ndarray, "3 H W"]
     """sRGB in [0, 1], before the background where there is a mask."""
     mask: Float32[np.ndarray, "h w"]
-    """Share of each pixel that things cover; (0, 0): nobody knows."""
+    """Share of each pixel that objects cover; (0, 0): unknown."""
 
 
 @dataclass(frozen=True)
@@ -46,7 +46,7 @@ def goal(
 ) -> Goal:
     """Return a photograph laid on a background.
 
-    mask: 255 on things. gain: of red, green and blue, by which the photograph is too bright.
+    mask: 255 on objects. gain: of red, green and blue, by which the photograph is too bright.
     """
     planes = np.moveaxis(rgb, -1, 0) / (255 * gain[:, None, None])
     if mask is None:
@@ -55,16 +55,16 @@ def goal(
     return Goal(cover * planes + (1 - cover) * background[:, None, None], cover)
 
 
-def loss(drawing: Drawing, aim: Goal, crew: Crew) -> Loss:
+def loss(drawing: Drawing, aim: Goal, pool: ThreadPool) -> Loss:
     """Compare a drawing with what it is to be."""
     _, height, width = aim.planes.shape
     pixels = height * width
     weights = np.array([L1 / 3, SSIM / 3, COVER], np.float32) / pixels
     slope = np.empty((4, height, width), np.float32)
-    spans = crew.spans(height)
+    spans = pool.spans(height)
     sums = np.zeros((len(spans), 4))
     rest = drawing.planes, aim.planes, aim.mask, weights
-    crew.each(compare, [(*rest, *span, slope, row) for span, row in zip(spans, sums, strict=True)])
+    pool.each(compare, [(*rest, *span, slope, row) for span, row in zip(spans, sums, strict=True)])
     l1, alike, cover, l2 = sums.sum(axis=0)
     value = (L1 * l1 / 3 + SSIM * (pixels - alike / 3) + COVER * cover) / pixels
     return Loss(float(value), float(l2 / 3 / pixels), slope)

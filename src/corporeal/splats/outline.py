@@ -1,8 +1,8 @@
-"""Surfaces fitted to the outlines that things have in pictures.
+"""Surfaces fitted to the outlines that objects have in pictures.
 
-What carves space are depths, which are off by a pixel or two where a thing is plain or shiny, and
+What carves space are depths, which are off by a pixel or two where an object is plain or shiny, and
 mostly all to the same side. Outlines are known to a tenth of a pixel. Wherever the surface's own
-outline differs from the thing's, the surface there is moved along its normal by as much, and what
+outline differs from the object's, the surface there is moved along its normal by as much, and what
 lies between goes along (compare Kolev and Cremers 2008, who add outlines to stereo as constraints).
 """
 
@@ -12,10 +12,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.splats.crew import Crew
+from corporeal.splats.depth_rendering import DepthRendering
 from corporeal.splats.fairing import ON, means, smoothed
 from corporeal.splats.kernels_outline import outline, stray
-from corporeal.splats.sight import Sight
+from corporeal.splats.thread_pool import ThreadPool
 
 REACH = 4
 """Outlines may be so many pixels apart."""
@@ -35,28 +35,30 @@ PRIOR = 0.05
 
 @dataclass(frozen=True)
 class Outlines:
-    """Where a thing ends in pictures."""
+    """Where an object ends in pictures."""
 
     distance: Float32[np.ndarray, "V H W"]
     """To the outline [px], negative inside; nan: not near, or something hides it there."""
     cameras: Float[np.ndarray, "V 18"]
-    """As ``Sight.rows``."""
+    """As ``DepthRendering.rows``."""
 
 
-def outlined(mine: Bool[np.ndarray, "V H W"], sight: Sight, cell: float, crew: Crew) -> Outlines:
-    """Find a thing's outlines.
+def outlined(
+    mine: Bool[np.ndarray, "V H W"], rendering: DepthRendering, cell: float, pool: ThreadPool
+) -> Outlines:
+    """Find an object's outlines.
 
     Args:
-        mine: Pixels that show the thing.
-        sight: What the cameras see.
-        cell: Of the grid that the thing was carved from [m].
-        crew: Who works.
+        mine: Pixels that show the object.
+        rendering: What the cameras see.
+        cell: Of the grid that the object was carved from [m].
+        pool: Threads.
 
     """
     out = np.empty(mine.shape, np.float32)
-    rest = mine, sight.depth, BEHIND * cell, REACH, out
-    crew.each(outline, [(*span, *rest) for span in crew.spans(len(mine))])
-    return Outlines(out, sight.rows)
+    rest = mine, rendering.depth, BEHIND * cell, REACH, out
+    pool.each(outline, [(*span, *rest) for span in pool.spans(len(mine))])
+    return Outlines(out, rendering.rows)
 
 
 def fitted(
@@ -65,17 +67,17 @@ def fitted(
     seen: Bool[np.ndarray, " N"],
     still: Bool[np.ndarray, " N"],
     floor: float,
-    crew: Crew,
+    pool: ThreadPool,
 ) -> Mesh:
-    """Return a surface whose outlines are those of the thing.
+    """Return a surface whose outlines are those of the object.
 
     Args:
         mesh: Closed.
-        outlines: Of the thing.
+        outlines: Of the object.
         seen: Whether any view sees a vertex.
         still: Vertices that stay where they are.
         floor: Nothing is moved below it, nor off it [m].
-        crew: Who works.
+        pool: Threads.
 
     """
     views = len(outlines.cameras)
@@ -85,7 +87,7 @@ def fitted(
     for _ in range(ROUNDS):
         normals = mesh.vertex_normals
         rest = mesh.vertices, mesh.triangles, normals, outlines.cameras, outlines.distance
-        crew.each(stray, [(*span, *rest, rule, out) for span in crew.spans(views)])
+        pool.each(stray, [(*span, *rest, rule, out) for span in pool.spans(views)])
         known = np.isfinite(out)
         total, count = np.where(known, out, 0).sum(axis=0), known.sum(axis=0).astype(float)
         if not count.any():

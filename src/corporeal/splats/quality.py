@@ -6,12 +6,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from corporeal.splats.crew import Crew
 from corporeal.splats.exposure import gain
 from corporeal.splats.kernels_learn import similarity
 from corporeal.splats.parameters import parameters
 from corporeal.splats.raster import BLACK, draw, picture_of, pinhole
 from corporeal.splats.start import clearance
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Gaussians, Vector, Views
 
 Rgb = Float[np.ndarray, "H W 3"]
@@ -24,7 +24,7 @@ class Quality:
     psnr: float
     """Whole pictures [dB]."""
     psnr_things: float | None
-    """Only pixels on things [dB]; None without masks."""
+    """Only pixels on objects [dB]; None without masks."""
     ssim: float
     """Of whole pictures."""
     views: tuple[int, ...]
@@ -41,17 +41,17 @@ def quality(
 ) -> Quality:
     """Compare pictures with views.
 
-    masks: which pixels are on things. background: where given, what is beside things is that in
+    masks: which pixels are on objects. background: where given, what is beside objects is that in
     both; else whole photographs are compared, and black is behind everything. What is nearer to a
     camera than its ``start.clearance`` is not drawn. apart: photographs differ in exposure; each
     drawing has the gain that suits it best.
     """
     theta, rows, clear = parameters(gaussians), [], clearance(views.cameras)
     behind = np.array(BLACK if background is None else background, np.float32)
-    with Crew() as crew:
+    with ThreadPool() as pool:
         for k in which:
             eye = pinhole(views.cameras[k], near=clear[k])
-            made = draw(theta, eye, behind, crew)
+            made = draw(theta, eye, behind, pool)
             rgb, real = picture_of(made).rgb, views.rgb[k] / np.float32(255)
             if apart:
                 on_thing = None if masks is None else masks[k] * np.uint8(255)

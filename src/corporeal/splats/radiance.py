@@ -20,12 +20,12 @@ from corporeal.errors import UserError
 from corporeal.geometry.interpolation import within
 from corporeal.splats import kernels_radiance, saved
 from corporeal.splats.carve import Grid
-from corporeal.splats.crew import Crew
 from corporeal.splats.hull import tight
-from corporeal.splats.lesson import Masks, check, shrunk
 from corporeal.splats.quality import Quality, psnr, ssim
 from corporeal.splats.raster import Picture
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.splats.train import GREY
+from corporeal.splats.training_schedule import Masks, check, shrunk
 from corporeal.types import Camera, Views
 
 Progress = Callable[[float, str], None]
@@ -41,7 +41,7 @@ RAYS = 8192
 SHARES = 4
 """Into which a step's rays are dealt, whoever does them; each has a gradient of its own."""
 RIM = 9
-"""Width of the window that finds pixels beside things, which say where nothing is [px]."""
+"""Width of the window that finds pixels beside objects, which say where nothing is [px]."""
 PIXELS = 16_000_000
 """Of all pictures that points are sampled from, evenly: what bounds the memory."""
 WITNESSES = 2
@@ -61,14 +61,14 @@ class Preset:
     """Larger pictures are shrunk by a whole number until no side is longer [px]."""
 
 
-PRESETS = {"draft": Preset(400, 256), "normal": Preset(1000, 512)}
+PRESETS = {"preview": Preset(100, 128), "draft": Preset(400, 256), "normal": Preset(1000, 512)}
 
 
 @dataclass(frozen=True)
 class FieldConfig:
     """How to learn a field from pictures."""
 
-    preset: Literal["draft", "normal"] = "normal"
+    preset: Literal["preview", "draft", "normal"] = "normal"
     steps: int | None = None
     """None: as the preset says."""
     held_out: int = 8
@@ -119,7 +119,7 @@ class Learned:
         return (
             made,
             f"Pictures of it agree with {count} others that it was not learned from to "
-            f"{q.psnr:.1f} dB, {q.psnr_things:.1f} dB on things.",
+            f"{q.psnr:.1f} dB, {q.psnr_things:.1f} dB on objects.",
         )
 
 
@@ -152,8 +152,8 @@ def look(field: Field, camera: Camera, threads: int | None = None) -> Picture:
     """Picture a field before black; the depth is where half of the light is lost [m]."""
     out = np.empty((camera.height * camera.width, 5), np.float32)
     rest = camera_rows(field.grid, (camera,))[0], camera.width, parted(field), out
-    with Crew(threads) as crew:
-        crew.each(kernels_radiance.look, [(*span, *rest) for span in crew.spans(len(out))])
+    with ThreadPool(threads) as pool:
+        pool.each(kernels_radiance.look, [(*span, *rest) for span in pool.spans(len(out))])
     rgb, alpha, depth = out[:, :3], out[:, 3], out[:, 4]
     size = camera.height, camera.width
     return Picture(rgb.reshape(*size, 3).copy(), alpha.reshape(size), depth.reshape(size))
@@ -197,7 +197,7 @@ def points(
         cameras: That it was learned from.
         most: No more points than that, by chance.
         seed: Of chance.
-        allowed: Tells places (N, 3) where things are from others. Where only few views see, nothing
+        allowed: Tells places (N, 3) where objects are from others. Where few views see, nothing
             tells them that it is empty, and something may float.
         threads: None: one per processor.
 
@@ -279,14 +279,14 @@ def learn(
     checkpoint: Path | None = None,
     progress: Progress = lambda fraction, words: None,
 ) -> Learned:
-    """Learn a field of things from posed pictures.
+    """Learn a field of objects from posed pictures.
 
     Args:
         views: Pictures and cameras.
-        masks: What belongs to the things; only that is learned.
+        masks: What belongs to the objects; only that is learned.
         config: How.
         checkpoint: Where what was learned is kept, and not learned again.
-        progress: Told the fraction done and what is being done.
+        progress: Called with the fraction done and what is being done.
 
     Raises:
         UserError: There are too few pictures, masks of another shape, or cameras and pictures do
@@ -305,11 +305,11 @@ def learn(
     poses = [(c.K.tolist(), c.world_from_camera.tolist()) for c in cameras]
     name = saved.fingerprint(*work[0].rgb, work[1], poses, preset, steps, config.seed)
     state = saved.kept(checkpoint, name) if checkpoint is not None else {}
-    with Crew(config.threads) as crew:
-        made = _kept(state) if state else _hull(*work, crew)
+    with ThreadPool(config.threads) as pool:
+        made = _kept(state) if state else _hull(*work, pool)
         if not state:
-            lesson = _Lesson(made, *work, preset.longest, config.seed)
-            _taught(lesson, steps, crew, progress)
+            data = _TrainingData(made, *work, preset.longest, config.seed)
+            _optimised(data, steps, pool, progress)
     if checkpoint is not None and not state:
         saved.keep(checkpoint, name, _state(made))
     out = _quality(made, views, masks, held) if held else None
@@ -327,15 +327,15 @@ def _kept(state: dict[str, np.ndarray]) -> Field:
     return begun
 
 
-def _hull(views: Views, masks: Masks, crew: Crew) -> Field:
+def _hull(views: Views, masks: Masks, pool: ThreadPool) -> Field:
     """Return a field of haze in the visual hull of masks."""
-    hull = tight(views, masks, crew)
+    hull = tight(views, masks, pool)
     filled = binary_dilation(np.pad(hull.inside, SPARE), np.ones((3, 3, 3)), iterations=SPARE)
     low = hull.cells[0, 0, 0] - (0.5 + SPARE) * hull.side
     return field(low, hull.side, filled)
 
 
-class _Lesson:
+class _TrainingData:
     """What there is to learn from."""
 
     def __init__(self, made: Field, views: Views, masks: Masks, longest: int, seed: int) -> None:
@@ -353,28 +353,30 @@ class _Lesson:
         self.rays = np.argwhere(near.reshape(len(rgb), -1) > 0).astype(np.int32)
 
 
-def _taught(lesson: _Lesson, steps: int, crew: Crew, progress: Progress) -> None:
+def _optimised(data: _TrainingData, steps: int, pool: ThreadPool, progress: Progress) -> None:
     """Change a field's numbers until it looks like the pictures."""
-    values, grid = lesson.field.values, parted(lesson.field)
+    values, grid = data.field.values, parted(data.field)
     gradients = np.zeros((SHARES, *values.shape), np.float32)
     moments = np.zeros((2, *values.shape), np.float32)
-    shown = lesson.width, lesson.cameras, lesson.pictures, lesson.masks, grid
+    shown = data.width, data.cameras, data.pictures, data.masks, grid
     for step in range(steps):
-        rng = np.random.default_rng([lesson.seed, 3, step])
-        rays = lesson.rays[rng.integers(0, len(lesson.rays), RAYS)]
+        rng = np.random.default_rng([data.seed, 3, step])
+        rays = data.rays[rng.integers(0, len(data.rays), RAYS)]
+        # Random places along random rays, before a random background.
         jitter, background = rng.random(RAYS, np.float32), rng.random(3, np.float32)
         sums = np.zeros((SHARES, 3))
         deals = [slice(k, None, SHARES) for k in range(SHARES)]
-        crew.each(
+        pool.each(
             kernels_radiance.learn,
             [
                 (rays[d], jitter[d], background, *shown, gradients[k], sums[k])
                 for k, d in enumerate(deals)
             ],
         )
+        # Adam on the sum of all shares' gradients.
         rate = np.float32(RATE * FALL ** (step / steps))
         rest = values, gradients, moments, rate, step + 1
-        crew.each(kernels_radiance.adam, [(*span, *rest) for span in crew.spans(len(values))])
+        pool.each(kernels_radiance.adam, [(*span, *rest) for span in pool.spans(len(values))])
         error = sums[:, 1].sum() / 3 / RAYS
         words = f"step {step + 1} of {steps}, {-10 * np.log10(max(error, 1e-12)):.1f} dB"
         progress((step + 1) / steps, words)

@@ -11,17 +11,17 @@ from scipy.sparse import csr_array
 
 from corporeal.errors import UserError
 from corporeal.splats import kernels_blend, kernels_project
-from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_blend import PLANES, TILE
 from corporeal.splats.kernels_project import GRADIENTS, REACH, WIDTH, A, B, C, O, Pinhole, Z
 from corporeal.splats.parameters import Parameters, parameters
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Gaussians, Vector
 
 SEEN = 1e-3
 """Where less than this is covered, there is no depth to speak of."""
 BLACK: Vector = (0.0, 0.0, 0.0)
 NEAR = 0.01
-"""Nearest depth that is drawn where nobody says another [m]."""
+"""Nearest depth that is drawn unless another is given [m]."""
 
 
 @dataclass(frozen=True)
@@ -70,9 +70,9 @@ def render(
         UserError: The camera is skewed.
 
     """
-    with Crew(threads) as crew:
+    with ThreadPool(threads) as pool:
         eye = pinhole(camera, near=near)
-        return picture_of(draw(parameters(gaussians), eye, np.array(background), crew))
+        return picture_of(draw(parameters(gaussians), eye, np.array(background), pool))
 
 
 def picture_of(drawing: Drawing) -> Picture:
@@ -85,22 +85,22 @@ def picture_of(drawing: Drawing) -> Picture:
 
 
 def draw(
-    theta: Parameters, camera: Pinhole, background: Float[np.ndarray, "3"], crew: Crew
+    theta: Parameters, camera: Pinhole, background: Float[np.ndarray, "3"], pool: ThreadPool
 ) -> Drawing:
     """Draw Gaussians from front to back."""
-    ellipses, first, ids, places, spans = _in_tiles(theta, camera, crew)
+    ellipses, first, ids, places, spans = _in_tiles(theta, camera, pool)
     planes = np.empty((PLANES, camera.height, camera.width), np.float32)
     background = background.astype(np.float32)
-    shares = [(t, first, ids, ellipses, background, planes) for t in dealt(first, crew)]
-    crew.each(kernels_blend.blend, shares)
+    shares = [(t, first, ids, ellipses, background, planes) for t in dealt(first, pool)]
+    pool.each(kernels_blend.blend, shares)
     return Drawing(theta, camera, ellipses, first, ids, places, spans, planes)
 
 
-def _in_tiles(theta: Parameters, camera: Pinhole, crew: Crew) -> tuple[np.ndarray, ...]:
+def _in_tiles(theta: Parameters, camera: Pinhole, pool: ThreadPool) -> tuple[np.ndarray, ...]:
     """Return a drawing's ellipses and their entries, tile by tile, front to back in each."""
     ellipses = np.zeros((len(theta), WIDTH), np.float32)
-    shares = [(theta, *span, camera, ellipses) for span in crew.spans(len(theta))]
-    crew.each(kernels_project.project, shares)
+    shares = [(theta, *span, camera, ellipses) for span in pool.spans(len(theta))]
+    pool.each(kernels_project.project, shares)
     seen = np.flatnonzero(ellipses[:, REACH] > 0)
     order = seen[np.argsort(ellipses[seen, Z], kind="stable")]
     across, down = -(-camera.width // TILE), -(-camera.height // TILE)
@@ -108,18 +108,18 @@ def _in_tiles(theta: Parameters, camera: Pinhole, crew: Crew) -> tuple[np.ndarra
 
 
 def back(
-    drawing: Drawing, slope: Float32[np.ndarray, "4 H W"], crew: Crew
+    drawing: Drawing, slope: Float32[np.ndarray, "4 H W"], pool: ThreadPool
 ) -> Float32[np.ndarray, "N D"]:
     """Return dL/dθ from the slope, dL/d(red, green, blue, transmittance) of every pixel."""
     d = drawing
     entries = np.empty((len(d.ids), GRADIENTS), np.float32)
-    tiles = dealt(d.first, crew)
+    tiles = dealt(d.first, pool)
     shares = [(t, d.first, d.ids, d.ellipses, d.planes, slope, entries) for t in tiles]
-    crew.each(kernels_blend.blend_back, shares)
+    pool.each(kernels_blend.blend_back, shares)
     gradient = np.empty_like(d.theta)
     rest = d.camera, d.ellipses, entries, d.places, d.spans, gradient
-    shares = [(d.theta, *span, *rest) for span in crew.spans(len(d.theta))]
-    crew.each(kernels_project.project_back, shares)
+    shares = [(d.theta, *span, *rest) for span in pool.spans(len(d.theta))]
+    pool.each(kernels_project.project_back, shares)
     return gradient
 
 
@@ -145,11 +145,11 @@ def contributions(
         raise UserError(f"A cell of {cell} pixels does not divide a tile. Take 1, 2, 4, 8 or 16.")
     colourless = replace(gaussians, sh=gaussians.sh[:, :1])
     within, size = TILE // cell, (camera.height, camera.width)
-    with Crew(threads) as crew:
-        ellipses, first, ids, *_ = _in_tiles(parameters(colourless), pinhole(camera), crew)
+    with ThreadPool(threads) as pool:
+        ellipses, first, ids, *_ = _in_tiles(parameters(colourless), pinhole(camera), pool)
         sums = np.empty((len(ids), within, within), np.float32)
         rest = first, ids, ellipses, size, cell, sums
-        crew.each(kernels_blend.shares, [(t, *rest) for t in dealt(first, crew)])
+        pool.each(kernels_blend.shares, [(t, *rest) for t in dealt(first, pool)])
     entry, y, x = np.nonzero(sums)
     tile = np.repeat(np.arange(len(first) - 1), np.diff(first))[entry]
     across = -(-camera.width // TILE)
@@ -186,7 +186,7 @@ def pinhole(camera: Camera, scale: float = 1.0, near: float = NEAR) -> Pinhole:
     return Pinhole(turn, -turn @ eye, eye, fx, fy, cx, cy, *size, float(near))
 
 
-def dealt(first: Int[np.ndarray, " tiles_and_1"], crew: Crew) -> list[Int[np.ndarray, " t"]]:
+def dealt(first: Int[np.ndarray, " tiles_and_1"], pool: ThreadPool) -> list[Int[np.ndarray, " t"]]:
     """Deal tiles to threads, the fullest first, so that all have about as much to do."""
     order = np.argsort(-np.diff(first), kind="stable")
-    return [np.ascontiguousarray(order[k :: crew.threads]) for k in range(crew.threads)]
+    return [np.ascontiguousarray(order[k :: pool.threads]) for k in range(pool.threads)]

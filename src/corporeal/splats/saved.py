@@ -30,13 +30,13 @@ def kept(path: Path, name: str) -> dict[str, np.ndarray]:
     return state if str(state.pop("name", "")) == name else {}
 
 
-def fingerprint(*things: Any) -> str:
+def fingerprint(*values: Any) -> str:
     """Name arrays, and whatever has an exact ``repr``, by their content."""
     total = hashlib.sha256()
-    for thing in things:
-        if isinstance(thing, np.ndarray):
-            total.update(f"{thing.dtype.str}{thing.shape}".encode())
-            total.update(np.ascontiguousarray(thing).tobytes())
+    for value in values:
+        if isinstance(value, np.ndarray):
+            total.update(f"{value.dtype.str}{value.shape}".encode())
+            total.update(np.ascontiguousarray(value).tobytes())
         else:
-            total.update(repr(thing).encode())
+            total.update(repr(value).encode())
     return total.hexdigest()[:20]

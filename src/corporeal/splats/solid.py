@@ -1,8 +1,8 @@
-"""One closed surface for each thing that Gaussians show.
+"""One closed surface for each object that Gaussians show.
 
 Cameras look at the Gaussians, space is carved by what they see, the floor closes what stands on it,
-and where things touch every place inside belongs to the nearer one's Gaussians. Marching cubes
-(Lewiner et al. 2003) make a surface of what is left. Where surfaces of two things still overlap,
+and where objects touch every place inside belongs to the nearer one's Gaussians. Marching cubes
+(Lewiner et al. 2003) make a surface of what is left. Where surfaces of two objects still overlap,
 both are drawn back to a common face.
 """
 
@@ -20,28 +20,28 @@ from corporeal.geometry.harmonics import DC
 from corporeal.geometry.mesh import Mesh, signed_volume, volumes_under
 from corporeal.geometry.shape import Shape
 from corporeal.splats.carve import Grid, carved, gridded
-from corporeal.splats.crew import Crew
+from corporeal.splats.depth_rendering import DepthRendering, render_depth
 from corporeal.splats.disjoint import disjoint
 from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
 from corporeal.splats.outline import fitted, outlined
-from corporeal.splats.sight import Sight, looked
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Gaussians
 
 CELLS = 1_000_000
-"""Of the grid about each thing, about."""
+"""Of the grid about each object, about."""
 MOST_CELLS = 4_000_000
-"""Where a thing is thin."""
+"""Where an object is thin."""
 THICK = 6.0
 """Cells that its mean wall has then, if so many suffice and none is finer than a pixel."""
 ROUGH = 200_000
-"""Of the grid about everything, where each thing is looked for."""
+"""Of the grid about everything, where each object is looked for."""
 VOTERS = 4
 """A place belongs to those whose so many nearest Gaussians are nearer in the mean."""
 DEEP = 3.0
 """Farther than so many cells from all Gaussians is deep inside."""
 CRUMB = 0.02
-"""A separate piece with less of the volume is no piece of the thing."""
+"""A separate piece with less of the volume is no piece of the object."""
 AWAY = 0.02
 """Vertices stay so many cells away from the middles of cells, so that no triangle is degenerate."""
 PASSES = 8
@@ -58,7 +58,7 @@ ASTRAY = 0.01
 
 @dataclass(frozen=True)
 class Solid:
-    """A thing's surface: closed, its triangles anticlockwise seen from outside."""
+    """An object's surface: closed, its triangles anticlockwise seen from outside."""
 
     vertices: Float[np.ndarray, "V 3"]
     """[m]"""
@@ -66,7 +66,7 @@ class Solid:
     colours: Float[np.ndarray, "V 3"]
     """sRGB in [0, 1]."""
     gaussian_of_vertex: Int[np.ndarray, " V"]
-    """The nearest of the thing's own."""
+    """The nearest of the object's own."""
     cell: float
     """Of the grid that it was carved from [m]."""
     warnings: tuple[str, ...] = field(default=())
@@ -89,11 +89,11 @@ def solids(
     """Make a solid of each object, 0 to the largest label.
 
     Args:
-        gaussians: Of things and, where there is one, of floor and background.
-        object_of_gaussian: -1: floor or background, which hides things but is none.
+        gaussians: Of objects and, where there is one, of floor and background.
+        object_of_gaussian: -1: floor or background, which hides objects but is none.
         cameras: From where the Gaussians were learned, or are looked at: only what these see is
             known.
-        masks: Pixels of the cameras' pictures that show things, where somebody knows: outlines
+        masks: Pixels of the cameras' pictures that show objects, where given: outlines
             are made to fit them. What Gaussians cover is too coarse for that.
         floor: Height that nothing is below [m].
         threads: None: one per core that this process may use.
@@ -108,14 +108,14 @@ def solids(
     lacking = np.setdiff1d(np.arange(count), object_of_gaussian)
     if len(lacking):
         raise UserError(f"No Gaussian belongs to object {lacking[0]}.")
-    with Crew(threads) as crew:
-        sight = looked(gaussians, cameras, crew)
-        own = np.where(object_of_gaussian[sight.met] < 0, -1, sight.met)
-        sight, shown = _shown(replace(sight, met=own), object_of_gaussian, masks)
-        scene = _Scene(gaussians, object_of_gaussian, sight, shown, floor)
-        survey, made = _surveyed(scene, count, crew), []
+    with ThreadPool(threads) as pool:
+        rendering = render_depth(gaussians, cameras, pool)
+        own = np.where(object_of_gaussian[rendering.met] < 0, -1, rendering.met)
+        rendering, shown = _shown(replace(rendering, met=own), object_of_gaussian, masks)
+        scene = _Scene(gaussians, object_of_gaussian, rendering, shown, floor)
+        survey, made = _surveyed(scene, count, pool), []
         for k in range(count):
-            made.append(_solid(scene, k, survey, crew))
+            made.append(_solid(scene, k, survey, pool))
     meshes = [Mesh(one.vertices, one.triangles) for one in made]
     meshes = disjoint(meshes, [one.cell for one in made], floor)
     return tuple(replace(s, vertices=m.vertices) for s, m in zip(made, meshes, strict=True))
@@ -125,9 +125,9 @@ def solids(
 class _Scene:
     gaussians: Gaussians
     object_of_gaussian: Int[np.ndarray, " N"]
-    sight: Sight
+    rendering: DepthRendering
     shown: Int[np.ndarray, "V H W"] | None
-    """Whose each pixel is; -1: no thing's; None: no masks say it."""
+    """Whose each pixel is; -1: no object's; None: no masks say it."""
     floor: float
 
     def owner(self, places: Float[np.ndarray, "M 3"]) -> Int[np.ndarray, " M"]:
@@ -136,24 +136,28 @@ class _Scene:
 
 
 def _shown(
-    sight: Sight, object_of_gaussian: np.ndarray, masks: Bool[np.ndarray, "V H W"] | None
-) -> tuple[Sight, Int[np.ndarray, "V H W"] | None]:
-    """Return what is seen but for things where masks have none, and whose each pixel is.
+    rendering: DepthRendering,
+    object_of_gaussian: np.ndarray,
+    masks: Bool[np.ndarray, "V H W"] | None,
+) -> tuple[DepthRendering, Int[np.ndarray, "V H W"] | None]:
+    """Return what is seen but for objects where masks have none, and whose each pixel is.
 
-    What only a mask gives to things goes with what is next to it.
+    What only a mask gives to objects goes with what is next to it.
     """
     if masks is None:
-        return sight, None
-    spilt = (sight.met >= 0) & ~masks
-    met = np.where(spilt, -1, sight.met)
-    sight = replace(sight, depth=np.where(spilt, np.float32(np.inf), sight.depth), met=met)
+        return rendering, None
+    spilt = (rendering.met >= 0) & ~masks
+    met = np.where(spilt, -1, rendering.met)
+    rendering = replace(
+        rendering, depth=np.where(spilt, np.float32(np.inf), rendering.depth), met=met
+    )
     shown = np.where(met >= 0, object_of_gaussian[met], -1)
     for own, mask in zip(shown, masks, strict=True):
         if (own >= 0).any():
             nearest = distance_transform_edt(own < 0, return_distances=False, return_indices=True)
             y, x = np.asarray(nearest)
             own[:] = np.where(mask, own[y, x], -1)
-    return sight, shown
+    return rendering, shown
 
 
 @dataclass(frozen=True)
@@ -161,20 +165,20 @@ class _Survey:
     """What a rough grid about everything says."""
 
     grids: tuple[Grid, ...]
-    """A fine one about each thing."""
+    """A fine one about each object."""
     mesh: Mesh
-    """The surface of all things together."""
+    """The surface of all objects together."""
     owner: Int[np.ndarray, " T"]
     """Of its triangles."""
 
 
-def _surveyed(scene: _Scene, count: int, crew: Crew) -> _Survey:
-    """Find where each thing is on a rough grid, and lay a fine one about it."""
-    things = scene.gaussians.mean[scene.object_of_gaussian >= 0]
-    low, high = np.percentile(things, (0.1, 99.9), axis=0)
+def _surveyed(scene: _Scene, count: int, pool: ThreadPool) -> _Survey:
+    """Find where each object is on a rough grid, and lay a fine one about it."""
+    foreground = scene.gaussians.mean[scene.object_of_gaussian >= 0]
+    low, high = np.percentile(foreground, (0.1, 99.9), axis=0)
     room = 0.1 * (high - low)
     rough = gridded(low - room, high + room, ROUGH, scene.floor)
-    distance = carved(rough, scene.sight, scene.floor, crew)
+    distance = carved(rough, scene.rendering, scene.floor, pool)
     places = rough.points(distance < rough.cell)
     owner, grids = scene.owner(places), []
     margin = 1.5 * rough.cell
@@ -194,25 +198,25 @@ def _missing(k: int) -> UserError:
     return UserError(f"{what}: no camera sees it, or its Gaussians are haze.")
 
 
-def _solid(scene: _Scene, k: int, survey: _Survey, crew: Crew) -> Solid:
+def _solid(scene: _Scene, k: int, survey: _Survey, pool: ThreadPool) -> Solid:
     grid = survey.grids[k]
-    distance, cut, warnings = _emptied(grid, scene, k, survey, crew)
+    distance, cut, warnings = _emptied(grid, scene, k, survey, pool)
     mesh = _surface(distance, grid)
     finer = _finer(mesh, grid, scene, k)
     if finer is not None:
         grid = finer
-        distance, cut, warnings = _emptied(grid, scene, k, survey, crew)
+        distance, cut, warnings = _emptied(grid, scene, k, survey, pool)
         mesh = _surface(distance, grid)
     mesh = _without_specks(mesh)
     contact = cut[*grid.at(mesh.vertices).T]
-    mesh = _fitted(mesh, scene, k, contact, grid.cell, crew)
+    mesh = _fitted(mesh, scene, k, contact, grid.cell, pool)
     mine = np.flatnonzero(scene.object_of_gaussian == k)
     _, nearest = KDTree(scene.gaussians.mean[mine]).query(mesh.vertices)
     gaussian = mine[np.asarray(nearest)]
     return Solid(
         vertices=mesh.vertices,
         triangles=mesh.triangles,
-        colours=_coloured(mesh, scene, gaussian, _painted(mesh, scene.sight, grid.cell, crew)),
+        colours=_coloured(mesh, scene, gaussian, _painted(mesh, scene.rendering, grid.cell, pool)),
         gaussian_of_vertex=gaussian,
         cell=grid.cell,
         warnings=(*warnings, *_checked(mesh, distance, grid)),
@@ -220,10 +224,10 @@ def _solid(scene: _Scene, k: int, survey: _Survey, crew: Crew) -> Solid:
 
 
 def _emptied(
-    grid: Grid, scene: _Scene, k: int, survey: _Survey, crew: Crew
+    grid: Grid, scene: _Scene, k: int, survey: _Survey, pool: ThreadPool
 ) -> tuple[Float[np.ndarray, "X Y Z"], Bool[np.ndarray, "X Y Z"], tuple[str, ...]]:
-    """Carve a thing; return its distance [m], where it meets others, and warnings."""
-    distance = carved(grid, scene.sight, scene.floor, crew)
+    """Carve an object; return its distance [m], where it meets others, and warnings."""
+    distance = carved(grid, scene.rendering, scene.floor, pool)
     cut = _share(distance, grid, scene, k, survey)
     warnings = _cleaned(distance)
     if not (distance < 0).any():
@@ -232,7 +236,7 @@ def _emptied(
 
 
 def _finer(mesh: Mesh, grid: Grid, scene: _Scene, k: int) -> Grid | None:
-    """Lay a finer grid close about a thing whose walls or legs are few cells thick; None: is none.
+    """Lay a finer grid close about an object with walls or legs of few cells; None: it has none.
 
     2 V / A is a plate's thickness, half that of a rod and a third of a ball's diameter. Of what is
     finer than a pixel pictures say nothing: there the surface would only be rough.
@@ -247,9 +251,9 @@ def _finer(mesh: Mesh, grid: Grid, scene: _Scene, k: int) -> Grid | None:
 
 
 def _pixel(scene: _Scene, k: int) -> float:
-    """Return how wide a pixel is at a thing, in the mean [m]."""
-    met, rows = scene.sight.met, scene.sight.rows
-    wide = scene.sight.depth / rows[:, 12, None, None]
+    """Return how wide a pixel is at an object, in the mean [m]."""
+    met, rows = scene.rendering.met, scene.rendering.rows
+    wide = scene.rendering.depth / rows[:, 12, None, None]
     mine = wide[(met >= 0) & (scene.object_of_gaussian[met] == k)]
     return float(mine.mean()) if len(mine) else np.inf
 
@@ -309,7 +313,7 @@ def _apart(mean: Float[np.ndarray, "N 3"], places: Float[np.ndarray, "M 3"]) -> 
 
 
 def _cleaned(distance: Float[np.ndarray, "X Y Z"]) -> tuple[str, ...]:
-    """Remove crumbs that hang in the air; say so where a thing is in pieces."""
+    """Remove crumbs that hang in the air; say so where an object is in pieces."""
     pieces = np.asarray(measure.label(distance < 0, connectivity=1))
     count = int(pieces.max())
     sizes = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
@@ -321,25 +325,40 @@ def _cleaned(distance: Float[np.ndarray, "X Y Z"]) -> tuple[str, ...]:
 
 
 def _fitted(
-    mesh: Mesh, scene: _Scene, k: int, contact: Bool[np.ndarray, " V"], cell: float, crew: Crew
+    mesh: Mesh,
+    scene: _Scene,
+    k: int,
+    contact: Bool[np.ndarray, " V"],
+    cell: float,
+    pool: ThreadPool,
 ) -> Mesh:
     """Take noise off a surface, give it the outlines that masks show, and close it where unseen."""
-    sight, mean = scene.sight, means(mesh)
+    rendering, mean = scene.rendering, means(mesh)
     mesh = smoothed(mesh, scene.floor, PASSES, mean)
-    seen = _painted(mesh, sight, cell, crew)[:, 3] > SEEN
+    seen = _painted(mesh, rendering, cell, pool)[:, 3] > SEEN
     if scene.shown is not None:
-        lines = outlined(scene.shown == k, sight, cell, crew)
-        mesh = fitted(mesh, lines, seen, contact, scene.floor, crew)
+        lines = outlined(scene.shown == k, rendering, cell, pool)
+        mesh = fitted(mesh, lines, seen, contact, scene.floor, pool)
     lies = mesh.vertices[:, 2] < scene.floor + ON
     still = lies | contact
     return continued(mesh, ~(seen | still), still, cell, scene.floor, mean)
 
 
-def _painted(mesh: Mesh, sight: Sight, cell: float, crew: Crew) -> Float[np.ndarray, "V 4"]:
+def _painted(
+    mesh: Mesh, rendering: DepthRendering, cell: float, pool: ThreadPool
+) -> Float[np.ndarray, "V 4"]:
     """Return the sum of what cameras see of each vertex: red, green, blue, and its weight."""
     out = np.empty((len(mesh.vertices), 4))
-    rest = mesh.vertices, mesh.vertex_normals, sight.rows, sight.depth, sight.rgb, 2 * cell, out
-    crew.each(paint, [(*span, *rest) for span in crew.spans(len(out))])
+    rest = (
+        mesh.vertices,
+        mesh.vertex_normals,
+        rendering.rows,
+        rendering.depth,
+        rendering.rgb,
+        2 * cell,
+        out,
+    )
+    pool.each(paint, [(*span, *rest) for span in pool.spans(len(out))])
     return out
 
 

@@ -9,9 +9,9 @@ from scipy.spatial import KDTree
 
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.region import region
-from corporeal.splats.crew import Crew
 from corporeal.splats.hull import tight, witnessed
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE, Parameters
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Views
 
 OPAQUE, FAINT = 0.5, 0.3
@@ -34,7 +34,7 @@ class Points:
     opacity: float | Float[np.ndarray, " N"] = OPAQUE
     """Of the Gaussians that begin there."""
     normal: Float[np.ndarray, "N 3"] | None = None
-    """Unit, of surfaces, along which Gaussians begin flat; 0: nobody knows."""
+    """Unit, of surfaces, along which Gaussians begin flat; 0: unknown."""
     width: Float[np.ndarray, " N"] | None = None
     """Scale of the Gaussians that begin there [m]; nan: they are as wide as they are apart."""
 
@@ -80,7 +80,7 @@ def on_hull(
     masks: Bool[np.ndarray, "V H W"],
     count: int,
     rng: np.random.Generator,
-    crew: Crew,
+    pool: ThreadPool,
     within: float = 0.0,
 ) -> Points:
     """Return points on the visual hull, the surface of what all masks allow.
@@ -92,13 +92,13 @@ def on_hull(
         UserError: Nothing is inside all masks.
 
     """
-    fine = tight(views, masks, crew)
+    fine = tight(views, masks, pool)
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
     deep = round(within * count)
     on = count - deep
     position = np.concatenate([_some(fine.cells[fine.inside], deep, rng), _some(shell, on, rng)])
     position += fine.side * rng.uniform(-0.5, 0.5, position.shape)
-    seen = witnessed(position, views, masks, crew)
+    seen = witnessed(position, views, masks, pool)
     apart = fine.side * np.sqrt(len(shell) / on)
     return Points(
         position,

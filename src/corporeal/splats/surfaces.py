@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool, Float
 
-from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_sweep import before
+from corporeal.splats.thread_pool import ThreadPool
 
 FEW = 0.25
 """Share of the views: what fewer see is known badly."""
@@ -40,7 +40,7 @@ class Surfaces:
     """Of what encloses everything [m]."""
 
     def judge(
-        self, position: Float[np.ndarray, "N 3"], width: Float[np.ndarray, " N"], crew: Crew
+        self, position: Float[np.ndarray, "N 3"], width: Float[np.ndarray, " N"], pool: ThreadPool
     ) -> Judgement:
         """Ask all views about Gaussians; width: their greatest standard deviation [m].
 
@@ -49,7 +49,7 @@ class Surfaces:
         votes = np.empty((len(position), 5))
         at, width = position.astype(np.float64), width.astype(np.float64)
         rest = self.cameras, self.depths, self.behind, self.clear, self.pace, votes
-        crew.each(before, [(at, width, *span, *rest) for span in crew.spans(len(at))])
+        pool.each(before, [(at, width, *span, *rest) for span in pool.spans(len(at))])
         there, past, maybe, wide, nearest = votes.T
         few = there + past + maybe < FEW * len(self.cameras)
         haze = (wide > 0) & ((past > there) | (few & (past + maybe > there)))

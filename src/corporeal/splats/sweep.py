@@ -1,8 +1,8 @@
 """Points on what posed pictures show, found by sweeping planes through space (Collins 1996).
 
 For pixels of every view, the depth at which the views beside it show the same; kept is what other
-views confirm. No mask and no mesh is needed. Where pictures are too smooth to say, things are taken
-to be as far away as what encloses the scene.
+views confirm. No mask and no mesh is needed. Where pictures are too smooth to say, objects are
+taken to be as far away as the background model.
 """
 
 from dataclasses import dataclass
@@ -12,12 +12,12 @@ from jaxtyping import Bool, Float, Int
 
 from corporeal.errors import UserError
 from corporeal.geometry.region import region
-from corporeal.splats.crew import Crew
-from corporeal.splats.enclosure import cover, enclosure
+from corporeal.splats.background_model import background_model, cover
 from corporeal.splats.hull import camera_rows
 from corporeal.splats.kernels_sweep import prefer, support, sweep
 from corporeal.splats.start import Points, clearance, joined
 from corporeal.splats.surfaces import Surfaces
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Views
 
 LONGEST = 160
@@ -37,7 +37,7 @@ NEAR = 0.04
 FEWEST = 50
 """Points that must be found."""
 OWN, BEHIND, COVER = 9, 2, 1
-"""Shares of the points: on things, on the enclosure where views see it, and all over it."""
+"""Shares of the points: on objects, on the background where views see it, and all over it."""
 
 
 @dataclass(frozen=True)
@@ -48,7 +48,7 @@ class Swept:
     surfaces: Surfaces
 
 
-def swept(views: Views, count: int, rng: np.random.Generator, crew: Crew) -> Swept:
+def swept(views: Views, count: int, rng: np.random.Generator, pool: ThreadPool) -> Swept:
     """Find points on what the pictures show, at most so many.
 
     Raises:
@@ -56,17 +56,17 @@ def swept(views: Views, count: int, rng: np.random.Generator, crew: Crew) -> Swe
 
     """
     looks = _Looks(views)
-    depths = looks.depths(crew)
-    good = looks.confirmed(depths, crew)
+    depths = looks.depths(pool)
+    good = looks.confirmed(depths, pool)
     if np.count_nonzero(good) < FEWEST:
         raise UserError(
             "The pictures agree on no place in space. Check that cameras and pictures belong "
             "together, and the convention of the camera poses; or give masks."
         )
-    about = enclosure(looks.points(depths)[good.ravel()], views.cameras, rng)
+    about = background_model(looks.points(depths)[good.ravel()], views.cameras, rng)
     behind = about.reach(looks.eyes, looks.rays).reshape(depths.shape)
-    depths = looks.preferred(depths, behind, crew)
-    good = looks.confirmed(depths, crew)
+    depths = looks.preferred(depths, behind, pool)
+    good = looks.confirmed(depths, pool)
     unit = count // (OWN + BEHIND + COVER)
     own = _some(np.flatnonzero(good & (depths != behind)), OWN * unit, rng)
     beyond = _some(np.arange(depths.size), BEHIND * unit, rng)
@@ -112,7 +112,7 @@ class _Looks:
                 np.isfinite(z := depths.reshape(-1, 1)), self.eyes + z * self.rays, np.nan
             )
 
-    def depths(self, crew: Crew) -> Float[np.ndarray, "V h w"]:
+    def depths(self, pool: ThreadPool) -> Float[np.ndarray, "V h w"]:
         """Sweep every view."""
         around = region(self.cameras)
         depths = np.full(self.grid, np.inf)
@@ -121,28 +121,31 @@ class _Looks:
             near = max(0.1 * middle, middle - 1.5 * around.radius)
             planes = np.linspace(1 / (middle + FARTHEST * around.radius), 1 / near, PLANES)
             rest = *self._mates(k), planes, depths[k]
-            crew.each(sweep, [(k, *span, *rest) for span in crew.spans(self.grid[1])])
+            pool.each(sweep, [(k, *span, *rest) for span in pool.spans(self.grid[1])])
         return depths
 
     def preferred(
-        self, depths: Float[np.ndarray, "V h w"], wanted: Float[np.ndarray, "V h w"], crew: Crew
+        self,
+        depths: Float[np.ndarray, "V h w"],
+        wanted: Float[np.ndarray, "V h w"],
+        pool: ThreadPool,
     ) -> Float[np.ndarray, "V h w"]:
         """Return other depths where they look as good."""
         depths = depths.copy()
         for k in range(len(self.cameras)):
             rest = *self._mates(k), wanted[k], depths[k]
-            crew.each(prefer, [(k, *span, *rest) for span in crew.spans(self.grid[1])])
+            pool.each(prefer, [(k, *span, *rest) for span in pool.spans(self.grid[1])])
         return depths
 
     def confirmed(
-        self, depths: Float[np.ndarray, "V h w"], crew: Crew
+        self, depths: Float[np.ndarray, "V h w"], pool: ThreadPool
     ) -> Bool[np.ndarray, "V h w"]:
         """Return which depths more of the other views confirm than deny, and enough of them."""
         found = np.flatnonzero(np.isfinite(depths))
         points, view = self.points(depths)[found], self.view[found]
         votes = np.empty((len(points), 2))
         rest = self.rows, depths, float(self.pace), NEAR, votes
-        crew.each(support, [(points, view, *span, *rest) for span in crew.spans(len(points))])
+        pool.each(support, [(points, view, *span, *rest) for span in pool.spans(len(points))])
         wanted = 1 if len(self.cameras) < 6 else 2
         good = np.zeros(depths.size, np.bool_)
         good[found] = (votes[:, 0] >= wanted) & (votes[:, 0] > votes[:, 1])

@@ -1,4 +1,4 @@
-"""Work shared among threads. Compiled loops release Python's lock, so that plain threads do.
+"""A pool of threads. Compiled loops release Python's lock, so that plain threads do.
 
 Results never depend on how many there are: no two shares write to the same place.
 """
@@ -10,7 +10,7 @@ from itertools import pairwise
 from corporeal.machine import cores
 
 
-class Crew:
+class ThreadPool:
     """Threads that wait for work; to be used in a ``with`` statement."""
 
     def __init__(self, threads: int | None = None) -> None:
@@ -18,12 +18,12 @@ class Crew:
         self.threads = threads or cores()
         self.others = ThreadPoolExecutor(self.threads - 1) if self.threads > 1 else None
 
-    def __enter__(self) -> "Crew":
+    def __enter__(self) -> "ThreadPool":
         """Return itself."""
         return self
 
     def __exit__(self, *_: object) -> None:
-        """Send the threads home."""
+        """End the threads."""
         if self.others is not None:
             self.others.shutdown()
 

@@ -1,4 +1,4 @@
-"""What cameras see of Gaussians: the surface that each pixel's ray meets, not a mean of depths."""
+"""Depth of Gaussians: of the surface that each pixel's ray meets first, not a mean of depths."""
 
 from dataclasses import dataclass
 
@@ -6,17 +6,17 @@ import numpy as np
 from jaxtyping import Float, Float32, Int
 from scipy.spatial.transform import Rotation
 
-from corporeal.splats.crew import Crew
 from corporeal.splats.kernels_carve import meet, slopes
 from corporeal.splats.kernels_project import Pinhole
 from corporeal.splats.parameters import parameters
 from corporeal.splats.raster import dealt, draw, picture_of, pinhole
 from corporeal.splats.start import clearance
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Gaussians
 
 
 @dataclass(frozen=True)
-class Sight:
+class DepthRendering:
     """What some cameras see; V views."""
 
     rgb: Float32[np.ndarray, "V H W 3"]
@@ -29,8 +29,10 @@ class Sight:
     """Cameras as kernels read them: camera from world (3 × 4), fx, fy, cx, cy, width, height."""
 
 
-def looked(gaussians: Gaussians, cameras: tuple[Camera, ...], crew: Crew) -> Sight:
-    """Look at Gaussians with every camera."""
+def render_depth(
+    gaussians: Gaussians, cameras: tuple[Camera, ...], pool: ThreadPool
+) -> DepthRendering:
+    """Render Gaussians, and their depth, from every camera."""
     theta, clear = parameters(gaussians), clearance(cameras)
     eyes = [pinhole(c, near=near) for c, near in zip(cameras, clear, strict=True)]
     shape = len(eyes), max(e.height for e in eyes), max(e.width for e in eyes)
@@ -39,16 +41,18 @@ def looked(gaussians: Gaussians, cameras: tuple[Camera, ...], crew: Crew) -> Sig
     met = np.full(shape, -1, np.int32)
     spread = covariances(gaussians)
     for k, eye in enumerate(eyes):
-        drawing = draw(theta, eye, np.zeros(3), crew)
+        # Colours, and which Gaussians each tile meets.
+        drawing = draw(theta, eye, np.zeros(3), pool)
         picture = picture_of(drawing)
         own = k, slice(eye.height), slice(eye.width)
         rgb[own] = np.clip(picture.rgb / np.maximum(picture.alpha, 1e-3)[..., None], 0, 1)
+        # How depth varies across each Gaussian; then the surface that each ray meets first.
         slope = np.empty((gaussians.count, 4), np.float32)
         seen = gaussians.mean, spread, drawing.ellipses, eye, slope
-        crew.each(slopes, [(*span, *seen) for span in crew.spans(gaussians.count)])
+        pool.each(slopes, [(*span, *seen) for span in pool.spans(gaussians.count)])
         rest = drawing.first, drawing.ids, drawing.ellipses, slope, depth[own], met[own]
-        crew.each(meet, [(t, *rest) for t in dealt(drawing.first, crew)])
-    return Sight(rgb, depth, met, np.stack([_row(eye) for eye in eyes]))
+        pool.each(meet, [(t, *rest) for t in dealt(drawing.first, pool)])
+    return DepthRendering(rgb, depth, met, np.stack([_row(eye) for eye in eyes]))
 
 
 def covariances(gaussians: Gaussians) -> Float[np.ndarray, "N 3 3"]:

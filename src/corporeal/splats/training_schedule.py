@@ -1,4 +1,4 @@
-"""What there is to learn Gaussians from, and how: pictures in two sizes, presets, settings."""
+"""The schedule of a training: pictures in two sizes, presets, settings."""
 
 from dataclasses import dataclass, replace
 from typing import Literal
@@ -38,15 +38,20 @@ class Preset:
     """Larger pictures are shrunk by a whole number until no side is longer [px]."""
 
 
-PRESETS = {"draft": Preset(20_000, 1, 1000, 256), "normal": Preset(30_000, 2, 2500, 512)}
+PRESETS = {
+    "preview": Preset(4000, 1, 300, 128),
+    "draft": Preset(20_000, 1, 1000, 256),
+    "normal": Preset(30_000, 2, 2500, 512),
+}
 
 
 @dataclass(frozen=True)
 class TrainConfig:
     """How to learn Gaussians from pictures."""
 
-    preset: Literal["draft", "normal"] = "normal"
-    """draft: within a minute on two cores; normal: within four."""
+    preset: Literal["preview", "draft", "normal"] = "normal"
+    """preview: rough shapes in some seconds; draft: within a minute on two cores; normal: within
+    four."""
     gaussians: int | None = None
     """How many at most; None: as the preset says."""
     steps: int | None = None
@@ -73,14 +78,14 @@ RASTERISERS = {"numba": "corporeal.splats.raster", "gsplat": "corporeal.splats.g
 """Modules with the verbs draw and back."""
 
 
-def accept(rasteriser: str) -> None:
+def validate(rasteriser: str) -> None:
     """Raise UserError where there is no such rasteriser here."""
     if rasteriser == "gsplat":
         load("rasteriser", rasteriser, {"gsplat": "corporeal.splats.gsplat:present"})()
 
 
-class Lesson:
-    """What there is to learn from: pictures in two sizes, and how."""
+class TrainingSchedule:
+    """What each step of a training looks at, and how: pictures in two sizes."""
 
     def __init__(
         self, views: Views, masks: Masks | None, points: Points | None, config: TrainConfig
@@ -114,7 +119,7 @@ class Lesson:
 
     @property
     def name(self) -> str:
-        """What a checkpoint of this lesson is called."""
+        """What a checkpoint of this training is called."""
         cameras = [(c.K.tolist(), c.world_from_camera.tolist()) for c in self.views.cameras]
         p = self.points
         begin = () if p is None else vars(p).values()
@@ -135,14 +140,14 @@ class Lesson:
 class _Size:
     """The pictures, shrunk by a whole number."""
 
-    def __init__(self, lesson: Lesson, factor: int) -> None:
-        views, masks = lesson.views, lesson.masks
-        self.rgb = {k: shrunk(views.rgb[k], factor) for k in lesson.learned}
-        full = {} if masks is None else {k: masks[k] * np.uint8(255) for k in lesson.learned}
+    def __init__(self, schedule: TrainingSchedule, factor: int) -> None:
+        views, masks = schedule.views, schedule.masks
+        self.rgb = {k: shrunk(views.rgb[k], factor) for k in schedule.learned}
+        full = {} if masks is None else {k: masks[k] * np.uint8(255) for k in schedule.learned}
         self.masks = {k: shrunk(mask[..., None], factor)[..., 0] for k, mask in full.items()}
         self.cameras: dict[int, Pinhole] = {}
         for k, picture in self.rgb.items():
-            eye = pinhole(views.cameras[k], 1 / factor, lesson.clear[k])
+            eye = pinhole(views.cameras[k], 1 / factor, schedule.clear[k])
             self.cameras[k] = eye._replace(height=picture.shape[0], width=picture.shape[1])
 
 

@@ -1,4 +1,4 @@
-"""Gaussians that died move to where live ones are, and more join them.
+"""Densification: dead Gaussians move to where live ones are, and more join them.
 
 3DGS-MCMC (Kheradmand et al. 2024): a new one takes the place of a share of an old one such that
 their sum looks as before.
@@ -14,7 +14,7 @@ from corporeal.splats.parameters import OPACITY, ROTATION, SCALE, Parameters, op
 DEAD = 0.005
 """A Gaussian less opaque than this is dead."""
 PACE = 1.05
-"""Growth per round."""
+"""Factor by which their number grows a round."""
 CROWD = 51
 """As many stand in for one at most."""
 BINOMIAL = np.array([[comb(i, k) * (-1.0) ** k for k in range(CROWD)] for i in range(CROWD)])

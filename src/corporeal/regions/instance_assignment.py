@@ -1,4 +1,4 @@
-"""Whose each point is: by instance masks, by look and concavity, or by the published rule."""
+"""Instance assignment: by masks, by appearance and concavity, or by the published rule."""
 
 from typing import Literal
 
@@ -16,32 +16,32 @@ Rule = Literal["auto", "masks", "look", "components"]
 
 SAME = 0.9
 """Share of what views say of points that must be one number each, for numbers to mean the same in
-all views; two things numbered at random in each view give 0.6."""
+all views; two objects numbered at random in each view give 0.6."""
 CRUMB = 0.003
-"""Share of the points below which what masks or neighbours tell apart is no thing."""
+"""Share of the points below which what masks or neighbours separate is no object."""
 PUBLISHED = "the connected components of each point's 20 nearest, as published: a control"
 NUMBERED = "instance masks, whose numbers mean the same in all pictures"
 MATCHED = "instance masks, matched from picture to picture by the points that they share"
 
 
-def told_apart(
+def assign_instances(
     cloud: Cloud,
     rule: Rule = "auto",
     count: int | None = None,
     normals: Float[np.ndarray, "N 3"] | None = None,
     masks: Int[np.ndarray, "V N"] | None = None,
 ) -> Split:
-    """Tell things apart.
+    """Segment objects.
 
     Args:
         cloud: Points with features.
-        rule: auto: by instance masks where there are any, else by look and concavity.
-        count: How many things there are, if somebody said so.
+        rule: auto: by instance masks where there are any, else by appearance and concavity.
+        count: How many objects there are, if known.
         normals: Unit, outward; None: found from the points.
-        masks: What each view takes each point for; -1: not said. None: nobody drew any.
+        masks: What each view takes each point for; -1: unknown. None: nobody drew any.
 
     Raises:
-        UserError: Masks are asked for and there are none, there are no points, or more things than
+        UserError: Masks are asked for and there are none, there are no points, or more objects than
             can be.
 
     """
@@ -65,21 +65,21 @@ def by_numbers(
 
     Args:
         cloud: Points.
-        masks: What each view takes each point for; -1: not said.
-        count: How many things there are, if somebody said so.
+        masks: What each view takes each point for; -1: unknown.
+        count: How many objects there are, if known.
         found_by: What the numbers are, in a clause.
 
     """
     known, number = np.unique(masks, return_inverse=True)
-    said = np.zeros((cloud.count, len(known)), np.int64)
+    votes = np.zeros((cloud.count, len(known)), np.int64)
     for view in number.reshape(masks.shape):
-        said[np.arange(cloud.count), view] += 1
-    said = said[:, known >= 0]
-    best, total = said.max(axis=1, initial=0), said.sum(axis=1)
+        votes[np.arange(cloud.count), view] += 1
+    votes = votes[:, known >= 0]
+    best, total = votes.max(axis=1, initial=0), votes.sum(axis=1)
     if not total.any() or best.sum() < SAME * total.sum():
         return None
     sure = np.where(total > 0, best / np.maximum(total, 1), 0.0)
-    owner = _without_crumbs(cloud, np.where(total > 0, said.argmax(axis=1), -1))
+    owner = _without_crumbs(cloud, np.where(total > 0, votes.argmax(axis=1), -1))
     return Split(owner, sure, tuple(_otherwise(count, owner, "instance masks")), found_by)
 
 
@@ -97,17 +97,17 @@ def _by_masks(
 
 def _by_neighbours(cloud: Cloud, count: int | None) -> Split:
     owner = _without_crumbs(cloud, components(cloud.position))
-    told = tuple(_otherwise(count, owner, "nearest neighbours"))
-    return Split(owner, np.ones(cloud.count), told, PUBLISHED)
+    doubts = tuple(_otherwise(count, owner, "nearest neighbours"))
+    return Split(owner, np.ones(cloud.count), doubts, PUBLISHED)
 
 
 def _without_crumbs(cloud: Cloud, number: Int[np.ndarray, " N"]) -> Int[np.ndarray, " N"]:
-    """Return things from 0, what has most points first; crumbs and -1 go with what is nearest."""
+    """Return objects from 0, what has most points first; crumbs and -1 go with what is nearest."""
     known, index, sizes = np.unique(number, return_inverse=True, return_counts=True)
     sizes = np.where(known < 0, 0, sizes)
-    things = [k for k in np.argsort(-sizes, kind="stable") if sizes[k] >= CRUMB * cloud.count]
+    kept = [k for k in np.argsort(-sizes, kind="stable") if sizes[k] >= CRUMB * cloud.count]
     rank = np.full(len(known), -1, np.int64)
-    rank[things] = np.arange(len(things))
+    rank[kept] = np.arange(len(kept))
     owner = rank[index]
     own, rest = np.flatnonzero(owner >= 0), np.flatnonzero(owner < 0)
     if len(rest):
@@ -120,4 +120,4 @@ def _otherwise(count: int | None, owner: Int[np.ndarray, " N"], who: str) -> lis
     found = int(owner.max()) + 1
     if count is None or count == found:
         return []
-    return [f"{count} things were named or counted, but {who} tell {found} apart: they were kept."]
+    return [f"{count} objects were named or counted, but {who} show {found}: these were kept."]

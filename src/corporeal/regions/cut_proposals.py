@@ -1,4 +1,4 @@
-"""Ways to cut a graph in two that are worth a look: two families of them.
+"""Cut proposals: two sets of ways to cut a graph in two, ``Sweep`` and ``Tree``.
 
 ``Sweep``: nodes sorted by a number, cut between each two. ``Tree``: nodes merged pair by pair, what
 holds best first, and each of what they merge into cut from the rest.
@@ -12,7 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 BY_SIZE = 0.5
-"""Small things merge sooner: their cost counts by this power of the smaller one's size."""
+"""Small objects merge sooner: their cost counts by this power of the smaller one's size."""
 
 
 @dataclass(frozen=True)
@@ -25,7 +25,7 @@ class Graph:
     whole: Float[np.ndarray, " E"]
     """What the weight would be were there nothing against it."""
     size: Float[np.ndarray, " M"]
-    look: Float[np.ndarray, "M C"]
+    appearance: Float[np.ndarray, "M C"]
 
     def only(self, nodes: Int[np.ndarray, " m"]) -> "Graph":
         """Return what some of the nodes make up, in their order."""
@@ -34,10 +34,10 @@ class Graph:
         i, j = number[self.first], number[self.second]
         kept = (i >= 0) & (j >= 0)
         edges = i[kept], j[kept], self.weight[kept], self.whole[kept]
-        return Graph(*edges, self.size[nodes], self.look[nodes])
+        return Graph(*edges, self.size[nodes], self.appearance[nodes])
 
 
-class Family(Protocol):
+class Proposals(Protocol):
     """Candidates 0 … K - 1, each a set of nodes."""
 
     def sums(self, values: Float[np.ndarray, "M C"]) -> Float[np.ndarray, "K C"]:

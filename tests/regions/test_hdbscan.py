@@ -1,7 +1,7 @@
 import numpy as np
 import pytest
 
-from corporeal.regions.density import NOISE, hdbscan
+from corporeal.regions.hdbscan import NOISE, hdbscan
 
 
 def blobs(rng, middles, each=100, wide=0.1):

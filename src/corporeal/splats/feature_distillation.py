@@ -1,4 +1,4 @@
-"""What a radiance field looks like to a model: features in space, distilled from maps on pictures.
+"""Feature distillation: features in space, from a model's maps on pictures, as a radiance field.
 
 A map's feature f on a ray is to be Σ w F, the field's features weighted as its colours are (F3RM,
 Shen et al., CoRL 2023). Density stays as it is, so that w is known and F solves a sparse linear
@@ -17,8 +17,8 @@ from corporeal.errors import UserError
 from corporeal.geometry.interpolation import between, within
 from corporeal.splats import kernels_radiance
 from corporeal.splats.carve import Grid
-from corporeal.splats.crew import Crew
 from corporeal.splats.radiance import Field, camera_rows, parted
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera
 
 COARSER = 2
@@ -33,13 +33,13 @@ LEAST = 0.02
 MOST = 48
 """Places along a ray that do."""
 COVERED = 0.8
-"""Rays that lose less light look past the things."""
+"""Rays that lose less light look past the objects."""
 CHANNELS = 64
 """That are worked on at a time: what bounds the memory beside maps and result."""
 
 
 @dataclass(frozen=True)
-class Channel:
+class FeatureField:
     """Features in space; M nodes of a grid have them."""
 
     grid: Grid
@@ -75,8 +75,8 @@ def distilled(
     maps: Sequence[np.ndarray],
     rounds: int = ROUNDS,
     threads: int | None = None,
-) -> Channel:
-    """Learn what a field looks like to a model.
+) -> FeatureField:
+    """Distil maps of features into a field.
 
     Args:
         field: Density, which stays as it is.
@@ -92,19 +92,22 @@ def distilled(
     _check(cameras, maps)
     x, y, z = (-(-(n - 1) // COARSER) + 1 for n in field.row.shape)
     grid = Grid(field.grid.low, COARSER * field.grid.cell, (max(x, 2), max(y, 2), max(z, 2)))
-    with Crew(threads) as crew:
-        seen = _seen(field, grid, cameras, [m.shape[:2] for m in maps], crew)
+    # What each ray sees of the nodes, weighted as its colours are, and of the map.
+    with ThreadPool(threads) as pool:
+        seen = _seen(field, grid, cameras, [m.shape[:2] for m in maps], pool)
     share = csr_array(vstack([one.share for one in seen]))
     total = np.asarray(share.sum(axis=0)).ravel()
     known = np.flatnonzero(total > 0)
     if not len(known):
         raise UserError("The radiance field is empty: no view shows anything of it.")
+    # Only nodes that some ray sees have features.
     row = np.full(np.prod(grid.shape), -1, np.int64)
     row[known] = np.arange(len(known))
     share = csr_array(share[:, known], dtype=np.float32)
     back = csr_array(share.T)
     each = (1 / total[known]).astype(np.float32)[:, None]
     values = np.empty((len(known), maps[0].shape[2]), np.float16)
+    # Iterative reconstruction, some channels at a time: what is missing on rays, back to nodes.
     for some in _batches(values.shape[1]):
         aim = np.concatenate(
             [one.place @ _flat(m[..., some]) for one, m in zip(seen, maps, strict=True)]
@@ -113,7 +116,7 @@ def distilled(
         for _ in range(rounds):
             made += each * (back @ (aim - share @ made))
         values[:, some] = made
-    return Channel(grid, row, values)
+    return FeatureField(grid, row, values)
 
 
 def _check(cameras: Sequence[Camera], maps: Sequence[np.ndarray]) -> None:
@@ -131,7 +134,7 @@ def _seen(
     grid: Grid,
     cameras: Sequence[Camera],
     sizes: Sequence[tuple[int, int]],
-    crew: Crew,
+    pool: ThreadPool,
 ) -> list[_Seen]:
     rows, walk = camera_rows(field.grid, tuple(cameras)), parted(field)
     made = []
@@ -141,10 +144,10 @@ def _seen(
         place = np.zeros((len(pixels), MOST, 3), np.float32)
         weight = np.zeros((len(pixels), MOST), np.float32)
         rest = row, camera.width, walk, np.float32(LEAST)
-        spans = [slice(*span) for span in crew.spans(len(pixels))]
+        spans = [slice(*span) for span in pool.spans(len(pixels))]
         deals = [(pixels[d], *rest, count[d], place[d], weight[d]) for d in spans]
-        crew.each(kernels_radiance.weigh, deals)
-        made.append(_ray_by_ray(camera, pixels, place / COARSER, weight, (grid.shape, size)))
+        pool.each(kernels_radiance.weigh, deals)
+        made.append(_ray_by_ray(camera, pixels, place / COARSER, weight, grid.shape, size))
     return made
 
 
@@ -153,10 +156,10 @@ def _ray_by_ray(
     pixels: Int[np.ndarray, " R"],
     place: Float[np.ndarray, "R M 3"],
     weight: Float[np.ndarray, "R M"],
-    shapes: tuple[tuple[int, int, int], tuple[int, int]],
+    nodes: tuple[int, int, int],
+    size: tuple[int, int],
 ) -> _Seen:
-    """Return what rays see: of the grid's nodes, and of the map."""
-    nodes, size = shapes
+    """Return what rays see: of the grid's nodes (their number each way), and of the map."""
     on = np.flatnonzero(weight.sum(axis=1) >= COVERED)
     ray, entry = np.nonzero(weight[on])
     own = weight[on] / weight[on].sum(axis=1, keepdims=True)

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.errors import UserError
-from corporeal.regions.telling import told_apart
+from corporeal.regions.instance_assignment import assign_instances
 from corporeal.types import Cloud
 
 RNG = np.random.default_rng(0)
@@ -18,9 +18,9 @@ def pair():
     on = rays / np.linalg.norm(rays, axis=-1, keepdims=True) + [[[-1.0, 0, 0]], [[1.0, 0, 0]]]
     position, owner = on.reshape(-1, 3), np.repeat([0, 1], EACH)
     normal = (rays / np.linalg.norm(rays, axis=-1, keepdims=True)).reshape(-1, 3)
-    look = np.ones((2 * EACH, 1), np.float32)
+    appearance = np.ones((2 * EACH, 1), np.float32)
     seen = np.full(2 * EACH, 4)
-    return Cloud(position, np.full((2 * EACH, 3), 0.5), look, look, seen), normal, owner
+    return Cloud(position, np.full((2 * EACH, 3), 0.5), appearance, appearance, seen), normal, owner
 
 
 def views(owner, numbers, hidden=0.5):
@@ -38,7 +38,7 @@ def same(found, owner):
 
 def test_numbers_that_mean_the_same_in_all_views_say_whose_points_are(pair):
     cloud, normal, owner = pair
-    split = told_apart(cloud, "auto", None, normal, views(owner, [(7, 3)] * 12))
+    split = assign_instances(cloud, "auto", None, normal, views(owner, [(7, 3)] * 12))
     assert same(split.object_of_point, owner) > 0.99
     assert split.warnings == () and "mean the same in all pictures" in split.found_by
     assert split.confidence.min() >= 0 and split.confidence.mean() > 0.93
@@ -48,7 +48,7 @@ def test_what_no_view_shows_goes_with_what_is_nearest(pair):
     cloud, normal, owner = pair
     masks = views(owner, [(0, 1)] * 12)
     masks[:, ::5] = -1
-    split = told_apart(cloud, "masks", 2, normal, masks)
+    split = assign_instances(cloud, "masks", 2, normal, masks)
     assert same(split.object_of_point, owner) > 0.98
 
 
@@ -56,13 +56,13 @@ def test_crumbs_of_a_third_number_are_no_thing(pair):
     cloud, normal, owner = pair
     masks = views(owner, [(0, 1)] * 12)
     masks[:, :5] = 9
-    assert told_apart(cloud, "masks", None, normal, masks).object_of_point.max() == 1
+    assert assign_instances(cloud, "masks", None, normal, masks).object_of_point.max() == 1
 
 
 def test_numbers_that_differ_from_view_to_view_tell_what_belongs_together(pair):
     cloud, normal, owner = pair
     masks = views(owner, [RNG.permutation(2) for _ in range(12)])
-    split = told_apart(cloud, "auto", None, normal, masks)
+    split = assign_instances(cloud, "auto", None, normal, masks)
     assert same(split.object_of_point, owner) > 0.99
     assert split.warnings == () and "matched from picture to picture" in split.found_by
 
@@ -78,28 +78,30 @@ def test_masks_that_cut_things_elsewhere_in_every_view_count_beside_look(pair):
         away = np.linalg.norm(cloud.position[:, None] - seeds, axis=-1)
         away[owner == 0, 10:] = away[owner == 1, :10] = np.inf
         masks.append(away.argmin(axis=1))
-    split = told_apart(cloud, "auto", 2, normal, np.stack(masks))
+    split = assign_instances(cloud, "auto", 2, normal, np.stack(masks))
     assert same(split.object_of_point, owner) > 0.95
-    assert "look and concavity and instance masks" in split.found_by
+    assert "appearance and concavity and instance masks" in split.found_by
 
 
 def test_masks_are_believed_before_a_count(pair):
     cloud, normal, owner = pair
-    split = told_apart(cloud, "auto", 3, normal, views(owner, [(0, 1)] * 12))
+    split = assign_instances(cloud, "auto", 3, normal, views(owner, [(0, 1)] * 12))
     assert split.object_of_point.max() == 1
-    assert split.warnings[0].startswith("3 things were named or counted, but instance masks tell 2")
+    assert split.warnings[0].startswith(
+        "3 objects were named or counted, but instance masks show 2"
+    )
 
 
 def test_the_published_rule_takes_what_touches_for_one(pair):
     cloud, normal, owner = pair
     masks = views(owner, [(0, 1)] * 12)
-    split = told_apart(cloud, "components", None, normal, masks)
+    split = assign_instances(cloud, "components", None, normal, masks)
     assert split.object_of_point.max() == 0 and "as published" in split.found_by
 
 
 def test_masks_that_are_forgotten_or_missing(pair):
     cloud, normal, owner = pair
-    split = told_apart(cloud, "look", 2, normal, views(owner, [(0, 1)] * 12))
+    split = assign_instances(cloud, "look", 2, normal, views(owner, [(0, 1)] * 12))
     assert "instance masks" not in split.found_by
     with pytest.raises(UserError, match="There are no instance masks"):
-        told_apart(cloud, "masks", 2, normal)
+        assign_instances(cloud, "masks", 2, normal)

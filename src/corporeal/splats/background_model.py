@@ -1,4 +1,4 @@
-"""What is behind things where pictures are too smooth to say how far: a floor, and a dome over it.
+"""A model of the background where pictures are too smooth to tell depth: a floor under a dome.
 
 A floor without texture agrees with itself at any depth. Were nothing known of it, Gaussians would
 float before single cameras; a plane that the rest of the floor is on says where it belongs.
@@ -27,11 +27,11 @@ ALIKE = 30
 """Pixels whose mean is the colour of a place that no view shows, maybe."""
 OPAQUE = 0.95
 WIDE = 1.2
-"""Scale of what covers the enclosure, over the distance from one to the next."""
+"""Scale of what covers floor and dome, over the distance from one to the next."""
 
 
 @dataclass(frozen=True)
-class Enclosure:
+class BackgroundModel:
     """A ball about everything, cut off by a floor."""
 
     centre: Float[np.ndarray, "3"]
@@ -70,17 +70,17 @@ class Enclosure:
         return np.abs(points @ self.ground.normal - self.ground.offset) < self.thick
 
 
-def enclosure(
+def background_model(
     points: Float[np.ndarray, "N 3"], cameras: tuple[Camera, ...], rng: np.random.Generator
-) -> Enclosure:
-    """Return what encloses a scene; points: on what is in it, some of them on its floor."""
+) -> BackgroundModel:
+    """Fit floor and dome to a scene; points: on what is in it, some of them on its floor."""
     around = region(cameras)
     centre = np.array(around.centre)
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
     near = points[np.linalg.norm(points - centre, axis=1) < ABOUT * around.radius]
     search = Search(np.array([0.0, 0.0, 1.0]), np.pi, around.radius, eyes)
     farthest = float(np.linalg.norm(eyes - centre, axis=1).max())
-    return Enclosure(
+    return BackgroundModel(
         centre,
         max(DOME * around.radius, BEYOND * farthest),
         ground_plane(near, search, rng),
@@ -89,7 +89,7 @@ def enclosure(
 
 
 def cover(
-    about: Enclosure,
+    about: BackgroundModel,
     cameras: tuple[Camera, ...],
     count: int,
     seen: Float[np.ndarray, "M 3"],

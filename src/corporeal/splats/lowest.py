@@ -1,8 +1,8 @@
-"""How low things reach, as their outlines tell: the height of a floor that masks hide.
+"""How low objects reach, as their outlines tell: the height of a floor that masks hide.
 
 Gaussians say it badly: nobody sees undersides, and what all masks allow bulges below them. But
-where a thing touches the floor its lower outlines all meet: a ray through an outline touches what
-all masks allow in a short stretch there, and that lies on the thing.
+where an object touches the floor its lower outlines all meet: a ray through an outline touches what
+all masks allow in a short stretch there, and that lies on the object.
 """
 
 import numpy as np
@@ -10,14 +10,14 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import shift
 
 from corporeal.geometry.region import region
-from corporeal.splats.crew import Crew
 from corporeal.splats.hull import Carved, tight
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Views
 
 STEEP = 0.3
 """Length of a unit vector down in a picture, below which the view is too steep to show it."""
 SHORT = 0.04
-"""Longest stretch in height that still says where a thing is, in radii of the region."""
+"""Longest stretch in height that still says where an object is, in radii of the region."""
 LOWEST = 5
 """Percentile of heights that is the floor's: of rays through rims that touch it, all but a few."""
 FEWEST = 20
@@ -27,14 +27,14 @@ FEWEST = 20
 def lowest(
     views: Views, masks: Bool[np.ndarray, "V H W"], threads: int | None = None
 ) -> float | None:
-    """Return the height that things stand on [m], +z up; None: outlines do not tell.
+    """Return the height that objects stand on [m], +z up; None: outlines do not tell.
 
     Raises:
         UserError: Nothing is inside all masks.
 
     """
-    with Crew(threads) as crew:
-        hull = tight(views, masks, crew)
+    with ThreadPool(threads) as pool:
+        hull = tight(views, masks, pool)
     around = region(views.cameras)
     pairs = zip(views.cameras, masks, strict=True)
     found = [_touched(hull, c, m, np.array(around.centre), around.radius) for c, m in pairs]

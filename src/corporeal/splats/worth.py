@@ -1,0 +1,60 @@
+"""Whether what was found in pictures is worth simulating, or a film of the room."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.geometry.region import region
+from corporeal.splats.quality import Quality
+from corporeal.types import Camera
+
+HELD = 0.1
+"""Share of the cameras that stand in a thing's box, from which on the thing is the room."""
+FILLS = 2.0
+"""Longest side of a thing's box over the radius of the ball that cameras look at, from which on,
+where nobody gave masks, it is all that is in the ball."""
+GREY = 14.0
+"""Held-out photographs agree with a plain grey picture as well as this [dB]."""
+GO_ON = "--force goes on all the same."
+SAY_WHAT = (
+    "What the thing is was not told from the room: give masks (a folder 'masks' with the names of "
+    f"the pictures), or say where the floor is with --floor-at. {GO_ON}"
+)
+
+
+def not_worth(
+    boxes: Float[np.ndarray, "K 2 3"],
+    cameras: Sequence[Camera],
+    masked: bool,
+    quality: Quality | None = None,
+) -> str | None:
+    """Return in a sentence or two why things are not worth simulating; None: they may be.
+
+    Args:
+        boxes: Low and high corner of each thing, in the cameras' frame and unit.
+        cameras: That took the photographs; (): nobody knows, and nothing is said.
+        masked: Whether somebody said which pixels are things.
+        quality: How well pictures agree with photographs held back; None: none was.
+
+    """
+    if not cameras:
+        return None
+    if quality is not None and quality.psnr < GREY:
+        return (
+            f"The shapes would be made up: photographs that were not learned from look otherwise "
+            f"({quality.psnr:.1f} dB, as a plain grey picture has). Look at poses and lenses, at "
+            f"what moved, and take more photographs. {GO_ON}"
+        )
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
+    radius = region(tuple(cameras)).radius
+    for low, high in boxes:
+        inside = int(((eyes > low) & (eyes < high)).all(axis=1).sum())
+        if inside >= HELD * len(cameras):
+            what = f"its box holds {inside} of {len(cameras)} cameras"
+            return f"The thing would be as large as the room: {what}. {SAY_WHAT}"
+        longest = float((high - low).max())
+        if not masked and longest > FILLS * radius:
+            what = f"{longest / radius / 2:.1f} times as long as the ball that the cameras look at"
+            return f"The thing would be all that is in the pictures, {what}. {SAY_WHAT}"
+    return None

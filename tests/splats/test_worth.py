@@ -1,0 +1,52 @@
+"""A film of the room is refused, a thing among its cameras is not."""
+
+import numpy as np
+import pytest
+
+from corporeal.render.camera import camera_of
+from corporeal.splats.quality import Quality
+from corporeal.splats.worth import GREY, not_worth
+from patterned_scene import ring
+
+CAMERAS = [camera_of(aim) for aim in ring(np.arange(20) * 18, away=0.5, height=0.35)]
+
+
+def box(side, height, at=(0.0, 0.0)):
+    low = np.array([at[0] - side / 2, at[1] - side / 2, 0.0])
+    return np.array([low, low + np.array([side, side, height])])
+
+
+def refused(*boxes, masked=False, **more):
+    return not_worth(np.array(boxes), CAMERAS, masked, **more)
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_a_thing_that_cameras_stand_around_is_fine(masked):
+    assert refused(box(0.1, 0.12), box(0.05, 0.2, (0.1, 0.1)), masked=masked) is None
+
+
+@pytest.mark.parametrize("masked", [False, True])
+def test_a_thing_that_holds_cameras_is_the_room(masked):
+    why = refused(box(0.1, 0.12), box(1.2, 0.5), masked=masked)
+    assert why is not None and "its box holds 20 of 20 cameras" in why and "--force" in why
+    # A few that bend over it are no reason, a tenth is.
+    assert refused(box(0.3, 0.5, (0.5, 0.0)), masked=True) is None
+    assert "holds 3 of 20" in str(refused(box(0.4, 0.5, (0.5, 0.0)), masked=masked))
+
+
+def test_without_masks_a_thing_that_fills_the_pictures_is_all_there_is():
+    why = refused(box(0.6, 0.2))
+    assert why is not None and "as long as the ball" in why and "--floor-at" in why
+    assert refused(box(0.6, 0.2), masked=True) is None, "somebody said that it is the thing"
+
+
+def test_pictures_no_better_than_grey_are_no_shape():
+    def told(psnr):
+        return refused(box(0.1, 0.1), quality=Quality(psnr, None, 0.5, (0,)))
+
+    assert told(GREY + 1) is None
+    assert "12.0 dB, as a plain grey picture has" in str(told(12.0))
+
+
+def test_of_a_splat_without_cameras_nothing_is_said():
+    assert not_worth(np.array([box(9.0, 9.0)]), (), masked=False) is None
