@@ -3,6 +3,7 @@
 import csv
 import json
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
@@ -16,51 +17,58 @@ from corporeal.corpus.manifest import Row
 from corporeal.corpus.plan import CorpusConfig, plan, write_plan
 from corporeal.corpus.report import report_corpus
 from corporeal.errors import UserError
+from corporeal.findings import Expectation
+from corporeal.settle.certificate import Certificate
+from corporeal.settle.composition import (
+    ComposedObject,
+    Composition,
+    write_certificate,
+    write_composition,
+)
 from corporeal.settle.rehearsal import hops
+from corporeal.trajectory.audit_file import write_audit
+from made_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
 
 SETTINGS = {
     "ground": {"library": "default"},
     "fill": {"detail": "draft"},
-    "simulate": {"engine": "warp", "contact": "multi"},
+    "simulate": {"engine": "cpu", "contact": "multi"},
     "describe": {"vlm": "metadata"},
 }
 
 
-def thing(**what):
-    said = {"at_rest": True, "dent_depth_dx": 0.1, "moved_level_m": 0.0, "deepest_squeeze_m": 0.0}
-    return said | what
-
-
-def part(name, material, law, treatment="deformable", mass=1.0):
-    return {"object": name, "material": material, "law": law, "treatment": treatment,
-            "mass_kg": mass}  # fmt: skip
+PARTS = (
+    part_audit(object="a_0", material="steel", law="von_mises", treatment="rigid", mass_kg=5.0),
+    part_audit(object="b_0", material="rubber", law="neo_hookean"),
+)
+HAPPENED = outcome(
+    {
+        "a_0": object_outcome(dent_depth_dx=0.1),
+        "b_0": object_outcome(dent_depth_dx=0.1, at_rest=False),
+    },
+    {
+        "a_0|b_0": pair_outcome(first_contact_s=0.5, separated=True),
+        "a_0|floor": pair_outcome(first_contact_s=0.0),
+        "b_0|floor": pair_outcome(first_contact_s=0.8),
+    },
+    [("a_0", "b_0")],
+)
 
 
 def audit(**what):
     """Two things of which one is thrown into the other, and both end on the floor."""
-    said = {
-        "particles": 1000, "objects": 2, "frames": 61, "cell_m": 0.01, "steps": 100,
-        "momentum_residual": 1e-6, "energy_growth": 0.0, "mechanical_growth": 0.0,
-        "mass_error": 0.0, "max_penetration_m": 0.002, "max_penetration_dx": 0.2,
-        "floor_penetration_m": 0.001, "pair_penetration_m": 0.002, "nan_count": 0,
-        "particles_out_of_domain": 0, "peak_memory_mb": 400.0, "warnings": [], "expectations": [],
-        "seconds": {"simulate": 40.0, "total": 60.0},
-        "parts": [
-            part("a_0", "steel", "von_mises", "rigid", 5.0),
-            part("b_0", "rubber", "neo_hookean"),
-        ],
-        "outcome": {
-            "objects": {"a_0": thing(), "b_0": thing(at_rest=False)},
-            "pairs": {
-                "a_0|b_0": {"first_contact_s": 0.5, "separated": True},
-                "a_0|floor": {"first_contact_s": 0.0, "separated": None},
-                "b_0|floor": {"first_contact_s": 0.8, "separated": None},
-            },
-            "order": [["a_0", "b_0"]],
-            "duration_s": 1.0,
-        },
-    }  # fmt: skip
-    return said | what
+    return run_audit(**{"parts": PARTS, "outcome": HAPPENED} | what)
+
+
+def composed(scene):
+    """What a planned scene consists of, had it been composed."""
+    objects = tuple(
+        ComposedObject(a, c, a, "somewhere", "", "CC-BY-4.0", f"<b>{a}'s maker</b>", 0.1, "", "", 1)
+        for a, c in zip(scene.assets, scene.classes, strict=True)
+    )
+    return Composition(
+        scene.seed, scene.arrangement, "mujoco", scene.interaction, "it <falls>", objects
+    )
 
 
 def a_corpus(folder, audits, failed=()):
@@ -70,23 +78,16 @@ def a_corpus(folder, audits, failed=()):
     rows = {"assemble": {}, "run": {}}
     for scene, found in zip(made.scenes, [*audits, *failed], strict=True):
         place = folder / "scenes" / scene.name
-        store.write_json(place / "certificate.json",
-                         {"drift_m": 1e-5, "penetration_m": 1e-4, "extent_m": 0.5})  # fmt: skip
-        objects = [
-            {"asset": a, "class": c, "licence": "CC-BY-4.0", "attribution": f"<b>{a}'s maker</b>",
-             "source": "somewhere"}
-            for a, c in zip(scene.assets, scene.classes, strict=True)
-        ]  # fmt: skip
-        store.write_json(place / "composition.json",
-                         {"what_happens": "it <falls>", "objects": objects})  # fmt: skip
+        write_certificate(place, Certificate(1e-5, 1e-4, 0.5, 1, 1, 2.0, scene.count))
+        write_composition(place, composed(scene))
         store.finish(place, "k", {}, 2.0)
         rows["assemble"][scene.name] = Row("finished", 2.0, "", 1, "k")
         if isinstance(found, str):
             rows["run"][scene.name] = Row("failed", None, found, 2, "k")
             continue
         run = folder / "runs" / scene.name
-        store.write_json(run / "audit.json", found)
-        store.write_json(run / "run.json", {"settings": SETTINGS})
+        write_audit(run, found)
+        store.write_json(run / "run.json", {"inputs": [], "settings": SETTINGS})
         Image.new("RGB", (600, 80), (200, 60, 60)).save(run / "strip.png")
         store.finish(run, "k", {}, 61.0)
         rows["run"][scene.name] = Row("finished", 61.0, "", 1, "k")
@@ -100,40 +101,37 @@ def silent(*words):
 
 def test_numbers_of_a_scene_are_those_of_its_audit():
     found = measures(audit(), "collision")
-    assert found["clean"] and found["seen"] and found["breaches"] == []
-    assert (found["objects"], found["at_rest"]) == (2, 1)
-    assert found["impacts"] == 2, "the two met, and one came down; the other stood from the start"
-    assert (found["met"], found["separated"]) == (1, 1)
-    assert (found["seconds"], found["particles"]) == (60.0, 1000)
+    assert found.clean and found.seen and found.breaches == ()
+    assert (found.objects, found.at_rest) == (2, 1)
+    assert found.impacts == 2, "the two met, and one came down; the other stood from the start"
+    assert (found.met, found.separated) == (1, 1)
+    assert (found.seconds, found.particles) == (60.0, 1000)
 
 
 @pytest.mark.parametrize(
     ("wrong", "words"),
     [
-        ({"max_penetration_dx": 1.2}, "sink"),
-        ({"momentum_residual": 2e-3}, "momentum"),
-        ({"mechanical_growth": 0.02}, "Energy grew"),
-        ({"nan_count": 1}, "not numbers"),
+        ({"max_penetration_dx": 1.2}, "penetrate"),
+        ({"momentum_residual": 2e-3}, "Momentum"),
+        ({"mechanical_growth": 0.02}, "elastic energy grew"),
+        ({"nan_count": 1}, "not finite"),
     ],
 )
 def test_a_broken_bound_is_no_clean_audit(wrong, words):
     found = measures(audit(**wrong), "fall")
-    assert not found["clean"] and len(found["breaches"]) == 1 and words in found["breaches"][0]
+    assert not found.clean and len(found.breaches) == 1 and words in found.breaches[0]
 
 
 def test_what_an_interaction_promises_must_have_happened():
-    quiet = audit()
-    quiet["outcome"] = quiet["outcome"] | {
-        "order": [],
-        "pairs": {"a_0|floor": {"first_contact_s": 0.0, "separated": None}},
-    }
+    stood = {"a_0|floor": pair_outcome(first_contact_s=0.0)}
+    quiet = audit(outcome=replace(HAPPENED, order=(), pairs=stood))
     for kind in ("fall", "fall-onto", "collision", "chain", "wind"):
-        assert not measures(quiet, kind, ["a_0"])["seen"], kind
+        assert not measures(quiet, kind, ["a_0"]).seen, kind
     for kind, seen in (("fall", True), ("fall-onto", True), ("collision", True), ("chain", False)):
-        assert measures(audit(), kind, ["a_0"])["seen"] is seen, kind
-    swayed = audit()
-    swayed["outcome"]["objects"]["b_0"]["deepest_squeeze_m"] = 2e-3
-    assert measures(swayed, "wind")["seen"] and not measures(audit(), "wind")["seen"]
+        assert measures(audit(), kind, ["a_0"]).seen is seen, kind
+    swayed = HAPPENED.objects | {"b_0": object_outcome(deepest_squeeze_m=2e-3)}
+    assert measures(audit(outcome=replace(HAPPENED, objects=swayed)), "wind").seen
+    assert not measures(audit(), "wind").seen
 
 
 def test_a_chain_is_one_only_when_what_was_struck_strikes_a_third():
@@ -145,9 +143,9 @@ def test_a_chain_is_one_only_when_what_was_struck_strikes_a_third():
 
 
 def test_the_showcase_is_judged_by_its_own_expectations():
-    wanted = [{"met": True}, {"met": False}]
+    wanted = tuple(Expectation("It falls", "", "", met) for met in (True, False))
     found = measures(audit(expectations=wanted), "collision")
-    assert not found["seen"] and (found["expected_met"], found["expected"]) == (1, 2)
+    assert not found.seen and (found.expected_met, found.expected) == (1, 2)
 
 
 def test_groups_count_scenes_and_objects_and_give_median_and_worst(tmp_path):
@@ -176,7 +174,7 @@ def test_the_page_the_table_and_the_data_tell_of_every_scene(tmp_path):
     assert all(s.name in page for s in made.scenes)
     assert "the &lt;grid&gt; is too wide" in page and "<grid>" not in page
     assert "it &lt;falls&gt;" in page and "&#x27;s maker&lt;/b&gt;" in page
-    assert "Objects sink up to 1.7 grid cells" in page
+    assert "by up to 1.7 grid cells" in page
     assert "4 assembled, 3 run, 1 failed." in page
     assert len(re.findall(r'src="data:image/jpeg', page)) == 3
     assert len(re.findall(r'src="data:image/svg', page)) == 4
@@ -195,8 +193,8 @@ def test_every_model_that_was_used_is_credited_once(tmp_path):
     made = a_corpus(tmp_path, [audit()] * 6)
     found = credits(collect(tmp_path).scenes)
     used = [a for s in made.scenes for a in s.assets]
-    assert [c["asset"] for c in found] == sorted(set(used))
-    assert sum(c["scenes"] for c in found) == len(used)
+    assert [c.asset.asset for c in found] == sorted(set(used))
+    assert sum(c.scenes for c in found) == len(used)
 
 
 def test_a_report_of_what_was_not_run_yet_says_so_and_the_same_data_gives_the_same_page(tmp_path):
@@ -221,7 +219,7 @@ def test_a_library_that_is_gone_is_missed_and_one_that_is_small_leaves_the_rest_
     own = tmp_path / "own.toml"
     settings = SETTINGS | {"ground": {"library": str(own)}}
     run = tmp_path / "runs" / made.scenes[0].name
-    store.write_json(run / "run.json", {"settings": settings})
+    store.write_json(run / "run.json", {"inputs": [], "settings": settings})
     with pytest.raises(UserError, match=rf"{made.scenes[0].name} was run with .*own\.toml.* back"):
         collect(tmp_path)
     own.write_text(

@@ -25,17 +25,17 @@ def dumbbell(tmp_path):
 
 
 def test_what_is_heavier_at_the_top_has_its_centre_there(dumbbell, tmp_path):
-    matter = weigh(dumbbell, 0.5)
+    inertial = weigh(dumbbell, 0.5)
     volume = 4 / 3 * np.pi * 0.1**3
-    assert np.allclose(matter.centre[:2], 0.0, atol=2e-3)
+    assert np.allclose(inertial.centre[:2], 0.0, atol=2e-3)
     heavy, light = 7850 * volume, 600 * volume
-    assert matter.mass == pytest.approx(heavy + light, rel=0.03)
+    assert inertial.mass == pytest.approx(heavy + light, rel=0.03)
     height = 0.15 * (heavy - light) / (heavy + light)
-    assert matter.centre[2] == pytest.approx(height, rel=0.02)
+    assert inertial.centre[2] == pytest.approx(height, rel=0.02)
     own = 0.4 * (heavy + light) * 0.1**2
-    assert matter.inertia[2, 2] == pytest.approx(own, rel=0.03)
+    assert inertial.inertia[2, 2] == pytest.approx(own, rel=0.03)
     apart = heavy * (0.15 - height) ** 2 + light * (0.15 + height) ** 2
-    assert matter.inertia[0, 0] == pytest.approx(own + apart, rel=0.03)
+    assert inertial.inertia[0, 0] == pytest.approx(own + apart, rel=0.03)
 
 
 def test_nothing_is_weighed_twice(dumbbell, tmp_path, monkeypatch):

@@ -183,7 +183,7 @@ def test_what_stands_apart_is_several_things(tmp_path, gap, things):
     pool = index([tmp_path / "in"], tmp_path / "pool")
     assert len(pool.assets) == (things == 1)
     if things == 2:
-        assert "holds 2 things that stand apart; the largest has 50% of" in reasons(pool)["pair"]
+        assert "holds 2 objects that stand apart; the largest has 50% of" in reasons(pool)["pair"]
 
 
 def test_open_edges_are_counted(tmp_path):

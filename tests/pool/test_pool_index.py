@@ -35,8 +35,8 @@ def test_every_real_object_is_let_in_but_those_that_are_several(shared_assets, t
     pool = index(folders, tmp_path / "pool")
     reasons = {Path(r.source).stem: r.reason for r in pool.rejections}
     assert set(reasons) == {"tea_set_polyhaven", "pillow_smallhouse"}
-    assert "8 things" in reasons["tea_set_polyhaven"]
-    assert "2 things" in reasons["pillow_smallhouse"]
+    assert "8 objects" in reasons["tea_set_polyhaven"]
+    assert "2 objects" in reasons["pillow_smallhouse"]
     assert len(pool.assets) == 53
     assert len(pool.classes) == 40
     duck = pool.asset("duck_khronos")

@@ -16,9 +16,9 @@ from bodies import box
 from corporeal.cli.parse import parse
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.pool.asset import Asset, Pool
-from corporeal.settle.blender import SCRIPT, SIZE, BlenderConfig, BlenderError, settle_in_blender
+from corporeal.settle.blender import SCRIPT, SIZE, BlenderConfig, BlenderError, drop_in_blender
 from corporeal.settle.body import Pose
-from corporeal.settle.matter import Matter
+from corporeal.settle.mass_properties import MassProperties
 from corporeal.settle.rest import RestConfig, at_rest
 from corporeal.stages.compose import ComposeConfig, compose
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker
@@ -41,21 +41,21 @@ def fake(tmp_path, monkeypatch):
 
 @pytest.mark.parametrize("size", [0.02, 10.0])
 def test_poses_come_back_in_metres_and_in_the_bodies_own_frames(fake, size):
-    heavy_top = Matter(3.0, np.array([0.1, 0.0, 0.2]) * size, 0.01 * np.eye(3) * size**2)
-    thing = replace(box(size, 0.5 * size, 0.8 * size), matter=heavy_top)
+    heavy_top = MassProperties(3.0, np.array([0.1, 0.0, 0.2]) * size, 0.01 * np.eye(3) * size**2)
+    thing = replace(box(size, 0.5 * size, 0.8 * size), inertial=heavy_top)
     other = box(0.3 * size, 0.3 * size, 0.2 * size)
     starts = [Pose((size, -size, 3 * size), TURN), Pose((-size, 0.0, size))]
-    settled = settle_in_blender([thing, other], starts)
-    assert settled.quiet and settled.seconds == pytest.approx(1)
-    assert settled.poses[0].position == pytest.approx((size, -size, 0.4 * size), abs=1e-6 * size)
-    assert settled.poses[0].quaternion == pytest.approx(TURN)
-    assert settled.poses[1].position == pytest.approx((-size, 0, 0.1 * size), abs=1e-6 * size)
+    dropped = drop_in_blender([thing, other], starts)
+    assert dropped.quiet and dropped.seconds == pytest.approx(1)
+    assert dropped.poses[0].position == pytest.approx((size, -size, 0.4 * size), abs=1e-6 * size)
+    assert dropped.poses[0].quaternion == pytest.approx(TURN)
+    assert dropped.poses[1].position == pytest.approx((-size, 0, 0.1 * size), abs=1e-6 * size)
 
 
 def test_the_job_says_what_falls_in_lengths_and_masses_that_suit_bullet(fake, tmp_path):
     fake(f"keep {tmp_path / 'kept.json'}")
     things = [replace(box(0.4, 0.2, 0.2), density=1000.0), box(0.2, 0.2, 0.2)]
-    settle_in_blender(things, [Pose((0.0, 0.0, 0.3)), Pose((1.0, 0.0, 0.3), TURN)])
+    drop_in_blender(things, [Pose((0.0, 0.0, 0.3)), Pose((1.0, 0.0, 0.3), TURN)])
     job = json.loads((tmp_path / "kept.json").read_text())
     assert [b["name"] for b in job["bodies"]] == ["0", "1"]
     assert [b["mass"] for b in job["bodies"]] == pytest.approx([4, 1], rel=1e-4)
@@ -81,13 +81,13 @@ def test_what_blender_settled_is_certified_like_any_other(fake):
 
 def test_a_crash_after_the_whole_result_harms_nothing(fake):
     fake("crash")
-    settled = settle_in_blender([box(0.4, 0.3, 0.2)], [Pose((0.0, 0.0, 1.0))])
-    assert settled.poses[0].position[2] == pytest.approx(0.1, abs=1e-6)
+    dropped = drop_in_blender([box(0.4, 0.3, 0.2)], [Pose((0.0, 0.0, 1.0))])
+    assert dropped.poses[0].position[2] == pytest.approx(0.1, abs=1e-6)
 
 
 def refusal(config=BlenderConfig()):  # noqa: B008
     with pytest.raises(BlenderError) as caught:
-        settle_in_blender([box(0.4, 0.3, 0.2)], [Pose((0.0, 0.0, 1.0))], config)
+        drop_in_blender([box(0.4, 0.3, 0.2)], [Pose((0.0, 0.0, 1.0))], config)
     return str(caught.value)
 
 
@@ -156,7 +156,7 @@ def said(*bodies, seconds=1.0, quiet=True):
 def test_a_result_that_makes_no_sense_is_refused(fake, text, words):
     fake(f"say {text}")
     with pytest.raises(BlenderError, match=f"its result makes no sense: .*{words}"):
-        settle_in_blender([box(0.4, 0.3, 0.2)], [Pose((0.0, 0.0, 1.0))])
+        drop_in_blender([box(0.4, 0.3, 0.2)], [Pose((0.0, 0.0, 1.0))])
 
 
 def test_an_engine_that_is_not_on_the_menu_is_refused():
@@ -185,7 +185,7 @@ def test_the_script_uses_what_blenderproc_documents_and_reads_what_the_job_says(
     names = ("job", "entry")
     keys = {k: {n.slice.value for n in read if ast.unparse(n.value) == k} for k in names}
     fake(f"keep {tmp_path / 'kept.json'}")
-    settle_in_blender([box(0.4, 0.3, 0.2)], [Pose((0.0, 0.0, 1.0))])
+    drop_in_blender([box(0.4, 0.3, 0.2)], [Pose((0.0, 0.0, 1.0))])
     job = json.loads((tmp_path / "kept.json").read_text())
     assert keys["job"] == set(job)
     assert keys["entry"] == set(job["bodies"][0])
@@ -206,7 +206,7 @@ def test_a_scene_is_composed_with_blender_and_not_tried_again_where_that_does_no
 ):
     typed = ("--settle-with", "blenderproc", "--interaction", "none", "--count", "1")
     monkeypatch.setattr(sys, "argv", ["corporeal", "assemble", *typed])
-    config = parse(ComposeConfig, "assemble", "")
+    config = parse(ComposeConfig, "assemble", "", first=("count", "settle-with"))
     made = compose(pool, tmp_path / "scene", config)
     said = json.loads((tmp_path / "scene" / "composition.json").read_text())
     assert said["settled_with"] == "blenderproc"

@@ -1,11 +1,16 @@
 """The certificate refuses what is not at rest, whatever the engine says."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
-from bodies import ball, box
+import trimesh
+from bodies import ball, box, convex
 
 from corporeal.settle.body import Pose
 from corporeal.settle.certificate import drift, examine
+from corporeal.settle.mass_properties import MassProperties
+from corporeal.settle.mujoco import FIRM_STEP, Engine
 
 FLAT = Pose((0.0, 0.0, 0.1))
 
@@ -75,3 +80,48 @@ def test_rest_is_the_same_at_any_size(size):
     assert examine([thing], [Pose((0.0, 0.0, size / 2))], 1e-3 * size).objections == ()
     balanced = turned(np.pi / 4, size / np.sqrt(2))
     assert examine([thing], [balanced], 1e-3 * size).objections
+
+
+SLOPE = np.radians(24)
+"""tan 24° = 0.445: above the friction of some pairs, below that of others."""
+
+
+def on_a_wedge(grip):
+    """A slab that lies on the slope of a wedge, and the friction between the two."""
+    corners = [(x, y, z) for y in (-0.3, 0.3) for x, z in ((-0.4, 0), (0.4, 0), (0.4, 0.356))]
+    wedge = replace(convex(trimesh.Trimesh(corners).convex_hull, "wedge"), density=5000.0)
+    slab = box(0.2, 0.2, 0.04, name="slab")
+    wedge, slab = replace(wedge, grips={"slab": grip}), replace(slab, grips={"wedge": grip})
+    up = np.array([-np.sin(SLOPE), 0.0, np.cos(SLOPE)])
+    half = SLOPE / 2
+    lying = Pose(
+        tuple(np.array([0.0, 0.0, 0.178]) + 0.02001 * up), (np.cos(half), 0.0, -np.sin(half), 0.0)
+    )
+    return [wedge, slab], [Pose((0.0, 0.0, 0.0)), lying]
+
+
+@pytest.mark.parametrize(("grip", "rests"), [(0.54, True), (0.37, False)])
+def test_what_holds_is_the_friction_of_the_pair_that_touches(grip, rests):
+    """Coulomb: it stays where tan α ≤ μ of slab on wedge, however rough both are elsewhere."""
+    evidence = examine(*on_a_wedge(grip), 1e-3)
+    assert (evidence.objections == ()) is rests
+    if not rests:
+        assert "moves" in evidence.objections[0]
+
+
+def test_a_smooth_foot_does_not_hold_on_the_floor():
+    """The least friction of any part counts: which part it stands on is not known."""
+    ramp = [Pose((0.0, 0.0, 0.1), (1.0, 0.0, 0.0, 0.0))]
+    matter = MassProperties(2.0, np.zeros(3), 0.02 * np.eye(3), 0.6, 0.1)
+    (body,) = [replace(box(0.2, 0.2, 0.2), inertial=matter)]
+    assert body.grip_on(None) == 0.1 and body.friction == 0.6
+    engine = Engine([body], ramp, FIRM_STEP)
+    engine.let_roll()
+    engine.harden()
+    engine.send(0, np.array([1.0, 0.0]))
+    start, times = engine.poses()[0].position[0], round(0.2 / engine.unit**0.5 / FIRM_STEP)
+    for _ in range(times):
+        engine.step()
+    gone = engine.poses()[0].position[0] - start
+    seconds = times * FIRM_STEP * engine.unit**0.5
+    assert gone == pytest.approx(seconds - 0.5 * 0.1 * 9.81 * seconds**2, rel=0.02)

@@ -11,7 +11,7 @@ from corporeal.errors import UserError
 from corporeal.settle import mujoco
 from corporeal.settle.body import Body, Pose
 from corporeal.settle.hull import hull_of
-from corporeal.settle.mujoco import SettleConfig, settle
+from corporeal.settle.mujoco import DropConfig, drop
 from corporeal.settle.rest import at_rest
 
 
@@ -36,9 +36,9 @@ def test_what_chatters_when_time_is_up_is_left_to_the_certificate():
     """Some things never lie quite still on hard ground; what moves for good is no such thing."""
     thing = box(0.3, 0.2, 0.1)
     start = [Pose((0.0, 0.0, 0.06))]
-    never = SettleConfig(shift=0.0, longest=1.0, roll=0.3, firm=0.3)
-    assert settle([thing], start, never).quiet
-    assert not settle([thing], start, replace(never, chatter=0.0)).quiet
+    never = DropConfig(shift=0.0, longest=1.0, roll=0.3, firm=0.3)
+    assert drop([thing], start, never).quiet
+    assert not drop([thing], start, replace(never, chatter=0.0)).quiet
 
 
 def test_a_thing_of_many_pieces_has_room_for_all_its_contacts(monkeypatch):
@@ -54,11 +54,11 @@ def test_a_thing_of_many_pieces_has_room_for_all_its_contacts(monkeypatch):
     pieces = tuple(hull_of(np.asarray(stud.vertices), 0.0) for stud in studs)
     brush = Body("brush", np.asarray(whole.vertices), np.asarray(whole.faces), pieces)
     poses = [Pose((0.0, 0.0, 0.05)), Pose((0.0, 0.0, 0.1249))]
-    engine = mujoco.Engine([plate, brush], poses, SettleConfig.step)
+    engine = mujoco.Engine([plate, brush], poses, DropConfig.step)
     for _ in range(3):
         engine.step()
     assert engine.data.ncon > 300 and engine.data.nefc == 6 * engine.data.ncon
     monkeypatch.setattr(mujoco, "MEMORY", 1 << 22)
-    cramped = mujoco.Engine([plate, brush], poses, SettleConfig.step)
+    cramped = mujoco.Engine([plate, brush], poses, DropConfig.step)
     with pytest.raises(UserError, match="more places"):
         cramped.step()

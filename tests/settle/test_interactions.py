@@ -8,7 +8,7 @@ import pytest
 from bodies import ball, box
 
 from corporeal.geometry.air import AIR_DENSITY, PLATE, drag_areas
-from corporeal.mpm import wind
+from corporeal.mpm.physics import wind
 from corporeal.settle.body import FRICTION, Pose
 from corporeal.settle.breeze import FIRM, wind_that_moves
 from corporeal.settle.interactions import (

@@ -124,14 +124,14 @@ def planned(scene: PlannedScene, composing: ComposeConfig) -> ComposeConfig:
 def _compose_job(folder: Path, pool: Pool, config: ComposeConfig, sources: Sources) -> Job:
     assets = _assets(pool, config.assets)
     capturing = replace(sources.capturing, threads=None)
-    said = [asdict(replace(config, record=None)), asdict(capturing)]
+    configs = [asdict(replace(config, record=None)), asdict(capturing)]
     inputs = [*(a.sha256 for a in assets), *pipeline.files_read(config)]
     few = Pool(pool.folder.resolve(), assets)
     return Job(
         name=folder.name,
         function=planned_scene,
         folder=folder,
-        key=store.key("corpus assemble", said, inputs),
+        key=store.key("corpus assemble", configs, inputs),
         arguments={"pool": few, "config": config, "capturing": sources.capturing},
     )
 

@@ -1,11 +1,13 @@
 """Sum a corpus up: by interaction, number of objects, material class and constitutive law."""
 
+from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from statistics import median
 from typing import Any
 
 from corporeal.corpus.collect import Collected, PartRecord, SceneRecord
+from corporeal.settle.composition import ComposedObject
 from corporeal.settle.interactions import KINDS
 
 
@@ -77,34 +79,34 @@ def _by_part(
     for name in {key(p) for p in parts}:
         mine = [p for p in parts if key(p) == name]
         within = {p.scene for p in mine}
-        things = {(p.scene, p.object): p.at_rest for p in mine}
-        lines.append(_line(name, [s for s in scenes if s.name in within], things))
+        objects = {(p.scene, p.object): p.at_rest for p in mine}
+        lines.append(_line(name, [s for s in scenes if s.name in within], objects))
     return sorted(lines, key=lambda line: (-line.objects, line.group))
 
 
 def _line(
     group: str,
     scenes: Sequence[SceneRecord],
-    things: Mapping[tuple[str, str], bool] | None = None,
+    objects: Mapping[tuple[str, str], bool] | None = None,
 ) -> Line:
     numbers = [s.numbers for s in scenes if s.numbers is not None]
 
     def add(name: str) -> int:
-        return sum(int(n[name]) for n in numbers)
+        return sum(int(getattr(n, name)) for n in numbers)
 
     def middle(name: str) -> float:
-        return float(median(n[name] for n in numbers))
+        return float(median(getattr(n, name) for n in numbers))
 
     def worst(name: str) -> float:
-        return float(max(n[name] for n in numbers))
+        return float(max(getattr(n, name) for n in numbers))
 
     return Line(
         group=group,
         scenes=len(numbers),
-        objects=add("objects") if things is None else len(things),
+        objects=add("objects") if objects is None else len(objects),
         clean=add("clean"),
         seen=add("seen"),
-        at_rest=add("at_rest") if things is None else sum(things.values()),
+        at_rest=add("at_rest") if objects is None else sum(objects.values()),
         impacts=add("impacts"),
         met=add("met"),
         separated=add("separated"),
@@ -127,8 +129,8 @@ def rows(corpus: Collected) -> list[dict[str, Any]]:
 
 
 def _row(scene: SceneRecord) -> dict[str, Any]:
-    planned, proof = scene.planned, scene.certificate or {}
-    numbers = dict(scene.numbers or {})
+    planned, proof = scene.planned, scene.certificate
+    numbers = asdict(scene.numbers) if scene.numbers else {}
     words = {name: " | ".join(numbers.pop(name, ())) for name in ("breaches", "warnings")}
     return {
         "scene": planned.name,
@@ -144,7 +146,9 @@ def _row(scene: SceneRecord) -> dict[str, Any]:
         "run": scene.ran.status if scene.ran else "not yet",
         "attempts": scene.ran.attempts if scene.ran else None,
         "error": scene.error,
-        **{f"certificate_{k}": proof.get(k) for k in ("drift_m", "penetration_m", "extent_m")},
+        "certificate_drift_m": None if proof is None else proof.drift_m,
+        "certificate_penetration_m": None if proof is None else proof.penetration_m,
+        "certificate_extent_m": None if proof is None else proof.extent_m,
         **numbers,
         **words,
     }
@@ -158,18 +162,35 @@ def materials_of(scene: SceneRecord) -> list[str]:
     return [name.replace("_", " ") for name in sorted(mass, key=lambda m: -mass[m])]
 
 
-def credits(scenes: Iterable[SceneRecord]) -> list[dict[str, Any]]:
-    """Return every asset that was used: class, licence, attribution, and in how many scenes."""
-    used: dict[str, dict[str, Any]] = {}
-    for scene in scenes:
-        for thing in (scene.composition or {}).get("objects", ()):
-            known = used.setdefault(
-                thing["asset"],
-                {k: thing[k] for k in ("asset", "class", "licence", "attribution", "source")}
-                | {"scenes": 0},
-            )
-            known["scenes"] += 1
-    return sorted(used.values(), key=lambda c: (c["class"], c["asset"]))
+@dataclass(frozen=True)
+class UsedAsset:
+    """An asset that occurs in a corpus."""
+
+    asset: ComposedObject
+    """As in the first scene that it occurs in."""
+    scenes: int
+    """How often it occurs."""
+
+
+def credits(scenes: Iterable[SceneRecord]) -> list[UsedAsset]:
+    """Return every asset that was used, by class and name."""
+    objects = [o for s in scenes if s.composition is not None for o in s.composition.objects]
+    first = {o.asset: o for o in reversed(objects)}
+    count = Counter(o.asset for o in objects)
+    used = [UsedAsset(asset, count[name]) for name, asset in first.items()]
+    return sorted(used, key=lambda u: (u.asset.class_name, u.asset.asset))
+
+
+def _credit_row(used: UsedAsset) -> dict[str, Any]:
+    asset = used.asset
+    return {
+        "asset": asset.asset,
+        "class": asset.class_name,
+        "licence": asset.licence,
+        "attribution": asset.attribution,
+        "source": asset.source,
+        "scenes": used.scenes,
+    }
 
 
 def as_data(corpus: Collected) -> dict[str, Any]:
@@ -182,5 +203,5 @@ def as_data(corpus: Collected) -> dict[str, Any]:
         "total": None if whole is None else asdict(whole),
         "breakdowns": {k: [asdict(x) for x in v] for k, v in breakdowns(corpus).items()},
         "scenes": rows(corpus),
-        "credits": credits(corpus.scenes),
+        "credits": [_credit_row(used) for used in credits(corpus.scenes)],
     }

@@ -1,28 +1,85 @@
 """Read what a corpus left on the disk: one record per scene, and one per simulated part."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 from corporeal import store
 from corporeal.corpus.manifest import Row, read_rows
 from corporeal.corpus.plan import Plan, PlannedScene, read_plan
 from corporeal.corpus.run import RUNS, SCENE, SCENES, VIEWS
 from corporeal.errors import UserError
+from corporeal.findings import Outcome, RunAudit
 from corporeal.formats.scene_file import read_scene_file
 from corporeal.materials import named
-from corporeal.mpm.audit import breaches
+from corporeal.pipeline import Settings, reopen
 from corporeal.render.colours import LAWS
+from corporeal.settle.certificate import Certificate
+from corporeal.settle.composition import (
+    CERTIFICATE,
+    COMPOSITION,
+    Composition,
+    read_certificate,
+    read_composition,
+)
 from corporeal.settle.interactions import Kind
 from corporeal.settle.rehearsal import hops
+from corporeal.trajectory.audit import breaches
+from corporeal.trajectory.audit_file import AUDIT, read_run_audit
 from corporeal.types import Law
 
 SWAY = 1e-3
 """Least movement or deformation that counts as having been moved by the wind [m]."""
 RIGID = "rigid body"
 
-Numbers = dict[str, Any]
+
+@dataclass(frozen=True)
+class Numbers:
+    """What was measured in one scene, as scenes are compared."""
+
+    clean: bool
+    """No bound of the audit is broken."""
+    breaches: tuple[str, ...]
+    """Sentences for the bounds that are."""
+    warnings: tuple[str, ...]
+    objects: int
+    at_rest: int
+    """Objects at rest at the end."""
+    impacts: int
+    """Objects that were apart and met, or met the floor after the first frame."""
+    met: int
+    """Pairs of objects that touched."""
+    separated: int
+    """Of those, pairs that parted again."""
+    seen: bool
+    """What the interaction promises happened; in the showcase, all that is expected."""
+    expected: int
+    """How much is expected of a scene of the showcase."""
+    expected_met: int
+    largest_dent_dx: float
+    """[cells]"""
+    seconds: float
+    """Of computing [s]."""
+    seconds_simulate: float
+    """Of simulating alone [s]."""
+    duration_s: float
+    """Simulated [s]."""
+    particles: int
+    steps: int
+    cell_m: float
+    """Grid spacing [m]."""
+    momentum_residual: float
+    energy_growth: float
+    mechanical_growth: float
+    mass_error: float
+    max_penetration_dx: float
+    """[cells]"""
+    max_penetration_m: float
+    floor_penetration_m: float
+    pair_penetration_m: float
+    nan_count: int
+    particles_out_of_domain: int
+    peak_memory_mb: float
 
 
 @dataclass(frozen=True)
@@ -51,14 +108,16 @@ class SceneRecord:
     """Whether it is assembled."""
     assembled: Row | None
     ran: Row | None
-    certificate: Mapping[str, Any] | None
-    composition: Mapping[str, Any] | None
-    numbers: Mapping[str, Any] | None
+    certificate: Certificate | None
+    """None where there is none: a scene of the showcase, or one that was not assembled."""
+    composition: Composition | None
+    """As above."""
+    numbers: Numbers | None
     """What was measured; None: it was not run."""
     parts: tuple[PartRecord, ...] = ()
     picture: Path | None = None
     """The film as a row of frames; of a scene that was not run, a view of it at rest."""
-    settings: Mapping[str, Any] | None = None
+    settings: Settings | None = None
 
     @property
     def name(self) -> str:
@@ -105,19 +164,20 @@ def _record(
     folder: Path, planned: PlannedScene, assembled: Row | None, ran: Row | None
 ) -> SceneRecord:
     scene, run = folder / SCENES / planned.name, folder / RUNS / planned.name
-    audit = _json(run / "audit.json") if (run / store.META).exists() else None
-    said = None if audit is None else store.read_json(run / "run.json")["settings"]
+    finished = (run / store.META).exists() and (run / AUDIT).exists()
+    audit = read_run_audit(run) if finished else None
+    settings = reopen(run).settings if finished else None
     return SceneRecord(
         planned=planned,
         made=(scene / store.META).exists(),
         assembled=assembled,
         ran=ran,
-        certificate=_json(scene / "certificate.json"),
-        composition=_json(scene / "composition.json"),
+        certificate=read_certificate(scene) if (scene / CERTIFICATE).exists() else None,
+        composition=read_composition(scene) if (scene / COMPOSITION).exists() else None,
         numbers=None if audit is None else measures(audit, planned.interaction, _sent(scene)),
-        parts=() if audit is None or said is None else _parts(planned.name, audit, said),
+        parts=() if audit is None or settings is None else _parts(planned.name, audit, settings),
         picture=_picture(run / "strip.png", scene / VIEWS / "rgb"),
-        settings=said,
+        settings=settings,
     )
 
 
@@ -135,14 +195,10 @@ def _sent(scene: Path) -> list[str]:
     return [e.name for e in entries if e.name and e.velocity is not None]
 
 
-def _json(path: Path) -> Any:
-    return store.read_json(path) if path.exists() else None
-
-
 # ---------------------------------------------------------------- numbers of one scene
 
 
-def measures(audit: Mapping[str, Any], kind: Kind, sent: Sequence[str] = ()) -> Numbers:
+def measures(audit: RunAudit, kind: Kind, sent: Sequence[str] = ()) -> Numbers:
     """Condense an audit into the numbers that scenes are compared by.
 
     Args:
@@ -150,45 +206,30 @@ def measures(audit: Mapping[str, Any], kind: Kind, sent: Sequence[str] = ()) -> 
         kind: What was to happen.
         sent: Objects that were sent off at the start.
 
-    Returns:
-        ``clean``: no bound of the audit is broken; ``breaches``: sentences. ``impacts``: objects
-        that were apart and met, or met the floor after the first frame. ``met``, ``separated``:
-        pairs of objects. ``seen``: what the interaction promises happened; in the showcase, all
-        that is expected of the scene; ``expected``, ``expected_met``: how many. The rest is copied
-        from the audit.
-
     """
-    happened = audit["outcome"]
-    things, pairs = happened["objects"], happened["pairs"]
-    first = happened["duration_s"] / max(1, audit["frames"] - 1)
-    among = [p for name, p in pairs.items() if not name.endswith("|floor")]
-    landed = [
-        p
-        for name, p in pairs.items()
-        if name.endswith("|floor") and (p["first_contact_s"] or 0.0) > first
-    ]
-    met = [p for p in among if p["first_contact_s"] is not None]
-    wrong, wanted = breaches(dict(audit)), audit["expectations"]
-    return {
-        "clean": not wrong,
-        "breaches": wrong,
-        "warnings": list(audit["warnings"]),
-        "objects": len(things),
-        "at_rest": sum(bool(t["at_rest"]) for t in things.values()),
-        "impacts": len(happened["order"]) + len(landed),
-        "met": len(met),
-        "separated": sum(bool(p["separated"]) for p in met),
-        "seen": all(e["met"] for e in wanted)
-        if wanted
-        else _seen(kind, happened, len(landed), sent),
-        "expected": len(wanted),
-        "expected_met": sum(bool(e["met"]) for e in wanted),
-        "largest_dent_dx": max((t["dent_depth_dx"] for t in things.values()), default=0.0),
-        "seconds": audit["seconds"]["total"],
-        "seconds_simulate": audit["seconds"]["simulate"],
-        "duration_s": happened["duration_s"],
-        **{name: audit[name] for name in COPIED},
-    }
+    happened, wanted = audit.outcome, audit.expectations
+    objects, wrong = happened.objects.values(), breaches(audit)
+    first = happened.duration_s / max(1, audit.frames - 1)
+    landed = sum((p.first_contact_s or 0.0) > first for p in happened.with_floor)
+    met = [p for p in happened.between_objects if p.first_contact_s is not None]
+    return Numbers(
+        clean=not wrong,
+        breaches=tuple(wrong),
+        warnings=audit.warnings,
+        objects=len(objects),
+        at_rest=sum(t.at_rest for t in objects),
+        impacts=len(happened.order) + landed,
+        met=len(met),
+        separated=sum(bool(p.separated) for p in met),
+        seen=all(e.met for e in wanted) if wanted else _seen(kind, happened, landed, sent),
+        expected=len(wanted),
+        expected_met=sum(e.met for e in wanted),
+        largest_dent_dx=max((t.dent_depth_dx for t in objects), default=0.0),
+        seconds=audit.seconds["total"],
+        seconds_simulate=audit.seconds["simulate"],
+        duration_s=happened.duration_s,
+        **{name: getattr(audit, name) for name in COPIED},
+    )
 
 
 COPIED = (
@@ -209,19 +250,17 @@ COPIED = (
 )
 
 
-def _seen(kind: Kind, happened: Mapping[str, Any], landed: int, sent: Sequence[str]) -> bool:
+def _seen(kind: Kind, happened: Outcome, landed: int, sent: Sequence[str]) -> bool:
     """Tell whether what the interaction promises happened.
 
     fall: something came down on the floor or on another. fall-onto, collision: two objects met.
     chain: what was struck struck a third. wind: something moved or gave way by a millimetre.
     """
-    met = happened["order"]
+    met = happened.order
     if kind == "fall":
         return len(met) + landed > 0
     if kind == "wind":
-        moves = (
-            max(t["moved_level_m"], t["deepest_squeeze_m"]) for t in happened["objects"].values()
-        )
+        moves = (max(t.moved_level_m, t.deepest_squeeze_m) for t in happened.objects.values())
         return max(moves, default=0.0) > SWAY
     return max(hops(met, sent).values(), default=0) > 1 if kind == "chain" else len(met) > 0
 
@@ -229,23 +268,20 @@ def _seen(kind: Kind, happened: Mapping[str, Any], landed: int, sent: Sequence[s
 # ---------------------------------------------------------------- parts
 
 
-def _parts(
-    scene: str, audit: Mapping[str, Any], settings: Mapping[str, Any]
-) -> tuple[PartRecord, ...]:
-    things = audit["outcome"]["objects"]
-    source = settings["ground"]["library"]
+def _parts(scene: str, audit: RunAudit, settings: Settings) -> tuple[PartRecord, ...]:
+    objects, source = audit.outcome.objects, settings.ground.library
     return tuple(
         PartRecord(
             scene=scene,
-            object=p["object"],
-            material=p["material"],
-            group=_group(scene, p["material"], source),
-            law=RIGID if p["treatment"] == "rigid" else LAWS[Law[p["law"].upper()]][0],
-            mass=p["mass_kg"],
-            at_rest=bool(things[p["object"]]["at_rest"]),
+            object=p.object,
+            material=p.material,
+            group=_group(scene, p.material, source),
+            law=RIGID if p.treatment == "rigid" else LAWS[Law[p.law.upper()]][0],
+            mass=p.mass_kg,
+            at_rest=objects[p.object].at_rest,
         )
-        for p in audit["parts"]
-        if p["object"] is not None
+        for p in audit.parts
+        if p.object is not None
     )
 
 

@@ -46,7 +46,7 @@ class Job:
     @property
     def seconds(self) -> float:
         """What the result took [s]."""
-        return float(store.read_json(self.folder / store.META)["seconds"])
+        return store.read_meta(self.folder).seconds
 
 
 def perform(job: Job, progress: Progress) -> None:

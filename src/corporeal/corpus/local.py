@@ -15,9 +15,12 @@ from collections.abc import Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
-from corporeal.corpus.jobs import Event, Job
-from corporeal.corpus.worker import pack
+from corporeal.corpus.carry_out import Hands, Say
+from corporeal.corpus.jobs import Event, Job, Progress
+from corporeal.corpus.worker import Message, pack
+from corporeal.machine import cores
 from corporeal.store import writing
+from corporeal.typed import typed
 
 LOGS = "logs"
 """Folder of a corpus for what its processes print."""
@@ -34,7 +37,7 @@ class LocalWorkers:
         self.process: dict[str, subprocess.Popen[bytes]] = {}
         self.buffer: dict[str, bytes] = {}
         self.job: dict[str, Job] = {}
-        self.said: dict[str, Event] = {}
+        self.last: dict[str, Event] = {}
 
     def start(self, job: Job) -> None:
         """Begin a job in a new process."""
@@ -73,14 +76,13 @@ class LocalWorkers:
     def _hear(self, name: str, block: bytes) -> list[Event]:
         *lines, self.buffer[name] = (self.buffer[name] + block).split(b"\n")
         heard = []
-        for words in map(json.loads, lines):
-            job = self.job[name]
-            if "finished" in words:
-                self.said[name] = Event(job, "finished", 1.0)
-            elif "failed" in words:
-                self.said[name] = Event(job, "failed", words=words["failed"])
+        for line in lines:
+            message = typed(Message, json.loads(line))
+            event = Event(self.job[name], message.kind, message.fraction, message.words)
+            if message.kind == "progress":
+                heard.append(event)
             else:
-                heard.append(Event(job, "progress", words["fraction"], words["words"]))
+                self.last[name] = event
         return heard
 
     def _end(self, name: str) -> Event:
@@ -92,7 +94,7 @@ class LocalWorkers:
         with suppress(BrokenPipeError):
             process.stdin.close()
         died = Event(job, "died", words=f"{ending(code)} Its words are in {LOGS}/{name}.log.")
-        return self.said.pop(name, died)
+        return self.last.pop(name, died)
 
     def stop(self) -> None:
         """Interrupt every process once, wait a while, and kill those that go on."""
@@ -134,3 +136,24 @@ def local(slots: int, threads: int, logs: Path) -> Iterator[LocalWorkers]:
     finally:
         workers.stop()
         workers.ready.close()
+
+
+def local_hands(
+    folder: str | Path,
+    slots: int = 0,
+    threads: int = 1,
+    progress: Progress = lambda fraction, words: None,
+    say: Say = lambda words: None,
+) -> Hands:
+    """Let processes of this machine do the jobs of a corpus.
+
+    Args:
+        folder: The corpus's; what the processes print goes to ``logs`` in it.
+        slots: Scenes at the same time; 0: one per core and ``threads``.
+        threads: Of each scene.
+        progress: Told the fraction done.
+        say: Told each event in a sentence.
+
+    """
+    slots = slots or max(1, cores() // threads)
+    return Hands(lambda: local(slots, threads, Path(folder) / LOGS), progress, say)

@@ -16,7 +16,7 @@ from contextlib import contextmanager
 from typing import Any
 
 from corporeal.corpus.jobs import Event, Job
-from corporeal.corpus.worker import attempt, pack
+from corporeal.corpus.worker import Packed, attempt, pack
 from corporeal.errors import UserError
 
 QUIET = {
@@ -40,7 +40,7 @@ class RayWorkers:
 
     def start(self, job: Job) -> None:
         """Submit a job."""
-        self.job[self.task.remote(*pack(job), self.threads)] = job
+        self.job[self.task.remote(pack(job), self.threads)] = job
 
     def wait(self, seconds: float) -> list[Event]:
         """Return tasks that ended."""
@@ -67,9 +67,9 @@ class RayWorkers:
         self.job.clear()
 
 
-def _task(path: list[str], packed: bytes, threads: int) -> str | None:
+def _task(packed: Packed, threads: int) -> str | None:
     os.environ["OMP_NUM_THREADS"] = str(threads)
-    return attempt(path, packed, lambda fraction, words: None)
+    return attempt(packed, lambda fraction, words: None)
 
 
 def _first_line(error: Exception) -> str:
@@ -112,7 +112,7 @@ def on_ray(slots: int, threads: int, gpus: float, address: str) -> Iterator[RayW
         ) from None
     _reach(address)
     folder = None if address else tempfile.mkdtemp(prefix="ray-")
-    said: dict[str, Any] = {"address": address} if address else {
+    options: dict[str, Any] = {"address": address} if address else {
         "address": "local",
         "num_cpus": slots * threads,
         "include_dashboard": False,
@@ -120,7 +120,7 @@ def on_ray(slots: int, threads: int, gpus: float, address: str) -> Iterator[RayW
     }  # fmt: skip
     try:
         try:
-            ray.init(log_to_driver=False, logging_level=logging.ERROR, **said)
+            ray.init(log_to_driver=False, logging_level=logging.ERROR, **options)
         except (ConnectionError, ValueError, RuntimeError) as error:
             where = address or "this machine"
             raise UserError(f"Cannot use Ray at {where}: {_first_line(error)}") from error

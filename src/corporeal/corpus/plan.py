@@ -21,6 +21,7 @@ from corporeal.pool.draw import counts, draw
 from corporeal.settle.arrange import Arrangement
 from corporeal.settle.interactions import KINDS, NEEDS, STANDING, Kind
 from corporeal.showcase.scenes import SCENES
+from corporeal.typed import typed
 
 PLAN = "corpus.json"
 MOST = 10_000
@@ -164,15 +165,10 @@ def read_plan(folder: Path) -> Plan:
     if not path.exists():
         raise UserError(f"{folder} is not a corpus: it has no {PLAN}. Make one: corporeal corpus "
                         f"assemble {folder}.")  # fmt: skip
-    said = store.read_json(path)
+    data = store.read_json(path)
     try:
-        config = CorpusConfig(**said["config"])
-        scenes = [
-            PlannedScene(**{**s, "classes": tuple(s["classes"]), "assets": tuple(s["assets"])})
-            for s in said["scenes"]
-        ]
-        return Plan(config, tuple(scenes), tuple(said["messages"]))
-    except (KeyError, TypeError) as error:
+        return typed(Plan, data)
+    except (ValueError, TypeError, AttributeError) as error:
         what = f"is not the plan of a corpus ({error})."
         raise BadFileError(path, what, "Assemble the corpus again.") from error
 
@@ -249,7 +245,7 @@ def with_wind(
     """Let wind blow where it moves something.
 
     A scene in which it would move nothing changes its interaction with another one, of as many
-    objects where there is one; where none can, its things fall instead.
+    objects where there is one; where none can, its objects fall instead.
 
     Args:
         kinds: What is to happen in every scene.
@@ -257,7 +253,7 @@ def with_wind(
         windy: Says what the wind can move.
 
     Returns:
-        What happens, and what is to be told.
+        What happens, and messages about what was changed.
 
     """
     happens, messages = list(kinds), []
@@ -334,9 +330,9 @@ def _by_class(models: Sequence[Asset]) -> dict[str, list[str]]:
 
 
 def _showcase(name: str) -> PlannedScene:
-    things = [t.model.replace("_", " ") for t in SCENES[name]().things]
+    objects = [t.model.replace("_", " ") for t in SCENES[name]().things]
     kind = SHOWCASE[name]
-    return PlannedScene(name, 0, tuple(things), (), "scatter", kind)
+    return PlannedScene(name, 0, tuple(objects), (), "scatter", kind)
 
 
 def _fewer(found: int, wanted: int) -> str:

@@ -2,7 +2,6 @@
 
 import csv
 import io
-from collections import Counter
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -20,10 +19,10 @@ from corporeal.corpus.breakdown import (
     total,
 )
 from corporeal.corpus.collect import SWAY, Collected, SceneRecord, collect
-from corporeal.corpus.figures import drawings
+from corporeal.corpus.drawings import drawings
 from corporeal.corpus.jobs import Progress
-from corporeal.mpm.audit import ALLOWED
 from corporeal.render.page import figure, held, page, safe
+from corporeal.trajectory.audit import ALLOWED
 
 PAGE, TABLE, DATA = "report.html", "report.csv", "report.json"
 THUMB = 840
@@ -43,7 +42,7 @@ NUMBERS = (
 )
 
 
-def report_corpus(folder: Path, progress: Progress) -> list[Path]:
+def report_corpus(folder: Path, progress: Progress = lambda fraction, words: None) -> list[Path]:
     """Write the report beside the scenes; return the files.
 
     Raises:
@@ -118,12 +117,12 @@ def _tiles(corpus: Collected) -> str:
     ]
     if whole is not None:
         numbers = [s.numbers for s in corpus.run if s.numbers]
-        hours = sum(n["seconds"] for n in numbers) / 3600
+        hours = sum(n.seconds for n in numbers) / 3600
         tiles += [
             (f"{whole.clean} / {whole.scenes}", "with a clean audit"),
             (f"{whole.seen} / {whole.scenes}", "show their interaction"),
-            (f"{sum(n['particles'] for n in numbers):,}", "particles in all"),
-            (f"{sum(n['duration_s'] for n in numbers):.0f} s", "of motion simulated"),
+            (f"{sum(n.particles for n in numbers):,}", "particles in all"),
+            (f"{sum(n.duration_s for n in numbers):.0f} s", "of motion simulated"),
             (f"{whole.penetration_median:.2f} dx", "deepest penetration, median"),
             (f"{hours:.2f} h", "of computing, all processes"),
         ]
@@ -185,27 +184,27 @@ def _line(line: Line, style: str = "") -> str:
 
 def _scene(scene: SceneRecord) -> str:
     planned, numbers = scene.planned, scene.numbers
-    made = scene.composition or {}
-    words = safe(made.get("what_happens", ""))
-    stands = made.get("arrangement", planned.arrangement)
-    things, matter = ", ".join(planned.classes), ", ".join(materials_of(scene))
+    made = scene.composition
+    words = "" if made is None else safe(made.what_happens)
+    stands = planned.arrangement if made is None else made.arrangement
+    objects, matter = ", ".join(planned.classes), ", ".join(materials_of(scene))
     cells = [
         _thumbnail(scene),
         f"<b>{safe(scene.name)}</b><br><small>{safe(stands)}. {words}</small>",
-        f"{safe(things)}<br><small>{safe(matter)}</small>",
+        f"{safe(objects)}<br><small>{safe(matter)}</small>",
     ]
     if numbers is None:
         state = scene.error or _state(scene)
         return f'<tr>{_cells(cells)}<td colspan="7" class="none">{safe(state)}</td></tr>'
-    judged = numbers["expected"]
-    seen = f"{numbers['expected_met']} of {judged}" if judged else _tick(numbers["seen"])
+    judged = numbers.expected
+    seen = f"{numbers.expected_met} of {judged}" if judged else _tick(numbers.seen)
     cells += [
-        f"{numbers['particles']:,}",
-        f"{numbers['max_penetration_dx']:.2f}",
-        _small(numbers["momentum_residual"]),
-        _small(numbers["mechanical_growth"]),
-        f"{numbers['seconds']:.0f} s",
-        _tick(numbers["clean"], "; ".join(numbers["breaches"])),
+        f"{numbers.particles:,}",
+        f"{numbers.max_penetration_dx:.2f}",
+        _small(numbers.momentum_residual),
+        _small(numbers.mechanical_growth),
+        f"{numbers.seconds:.0f} s",
+        _tick(numbers.clean, "; ".join(numbers.breaches)),
         seen,
     ]
     return f"<tr>{_cells(cells)}</tr>"
@@ -240,19 +239,19 @@ def _thumbnail(scene: SceneRecord) -> str:
 
 def _failures(corpus: Collected) -> str:
     lines = [f"<li><b>{safe(s.name)}</b> {safe(s.error)}</li>" for s in _failed(corpus)]
-    broken = Counter(b for s in corpus.run for b in (s.numbers or {})["breaches"])
-    unseen = [s.name for s in corpus.run if not (s.numbers or {})["seen"]]
+    measured = [(s.name, s.numbers) for s in corpus.run if s.numbers]
+    unseen = [name for name, numbers in measured if not numbers.seen]
     text = f"<ul>{''.join(lines)}</ul>" if lines else '<p class="good">No scene failed.</p>'
     if unseen:
         text += f"<p>What was meant to happen did not, in: {safe(', '.join(unseen))}.</p>"
-    if not broken:
-        return text
-    said = [
-        f"<li><b>{safe(s.name)}</b> {safe(' '.join((s.numbers or {})['breaches']))}</li>"
-        for s in corpus.run
-        if (s.numbers or {})["breaches"]
+    breaches = [
+        f"<li><b>{safe(name)}</b> {safe(' '.join(numbers.breaches))}</li>"
+        for name, numbers in measured
+        if numbers.breaches
     ]
-    return f"{text}<p>Bounds that the audits found broken:</p><ul>{''.join(said)}</ul>"
+    if not breaches:
+        return text
+    return f"{text}<p>Bounds that the audits found exceeded:</p><ul>{''.join(breaches)}</ul>"
 
 
 # ---------------------------------------------------------------- at the end
@@ -264,21 +263,22 @@ def _credits(corpus: Collected) -> str:
         return "<p>The corporeal authors, Apache-2.0.</p>"
     heads = "<tr><th>class</th><th>model</th><th>scenes</th><th>licence</th><th>by</th></tr>"
     lines = "".join(
-        f"<tr><td>{safe(c['class'])}</td><td>{safe(c['asset'])}</td><td>{c['scenes']}</td>"
-        f"<td>{safe(c['licence'])}</td><td>{safe(c['attribution'] or c['source'])}</td></tr>"
-        for c in used
+        f"<tr><td>{safe(u.asset.class_name)}</td><td>{safe(u.asset.asset)}</td>"
+        f"<td>{u.scenes}</td><td>{safe(u.asset.licence)}</td>"
+        f"<td>{safe(u.asset.attribution or u.asset.source)}</td></tr>"
+        for u in used
     )
     return f'<div class="wide"><table>{heads}{lines}</table></div>'
 
 
 def _settings(corpus: Collected) -> str:
-    if not corpus.run:
+    settings = corpus.run[0].settings if corpus.run else None
+    if settings is None:
         return ""
-    said = corpus.run[0].settings or {}
-    peak = max((s.numbers or {})["peak_memory_mb"] for s in corpus.run)
+    peak = max(s.numbers.peak_memory_mb for s in corpus.run if s.numbers)
     return (
-        f"detail {safe(said['fill']['detail'])}, engine {safe(said['simulate']['engine'])}, "
-        f"contact {safe(said['simulate']['contact'])}, answers by {safe(said['describe']['vlm'])}. "
+        f"detail {safe(settings.fill.detail)}, engine {safe(settings.simulate.engine)}, "
+        f"contact {safe(settings.simulate.contact)}, answers by {safe(settings.describe.vlm)}. "
         f"Largest memory of a process {peak:,.0f} MB."
     )
 

@@ -16,6 +16,7 @@ from corporeal.corpus.plan import Plan, PlannedScene, read_plan
 from corporeal.errors import UserError
 from corporeal.pipeline import Settings
 from corporeal.showcase.scenes import view
+from corporeal.stages.simulate import as_kept
 
 SCENES, RUNS = "scenes", "runs"
 SCENE, VIEWS = "scene.toml", "views"
@@ -84,13 +85,14 @@ def _looking(plan: Plan, scene: PlannedScene, settings: Settings) -> Settings:
 def _job(folder: Path, scene: PlannedScene, settings: Settings, read: Sequence[str]) -> Job:
     """Say what is to be done for one scene; ``read`` names the files that settings point to."""
     path = folder / SCENES / scene.name
-    made = store.read_json(path / store.META)["key"]
-    said = replace(settings, describe=replace(settings.describe, record=None))
+    made = store.read_meta(path).key
+    asked, how = replace(settings.describe, record=None), as_kept(settings.simulate)
+    named = replace(settings, describe=asked, simulate=how)
     return Job(
         name=scene.name,
         function=run_scene,
         folder=folder / RUNS / scene.name,
-        key=store.key("corpus run", said, [made, *read]),
+        key=store.key("corpus run", named, [made, *read]),
         arguments={"scene": (path / SCENE).resolve(), "settings": settings},
         resumable=True,
     )

@@ -13,7 +13,8 @@ import sys
 import threading
 import time
 import traceback
-from typing import Any
+from dataclasses import asdict, dataclass
+from typing import Literal
 
 from corporeal.corpus.jobs import Job, Progress, perform
 from corporeal.errors import UserError
@@ -31,33 +32,50 @@ def main() -> int:
     out = os.fdopen(os.dup(1), "w", encoding="utf-8")
     os.dup2(2, 1)  # what anybody prints goes to the log, not among the lines of JSON
 
-    def say(**words: Any) -> None:
-        out.write(json.dumps(words) + "\n")
+    def send(message: Message) -> None:
+        out.write(json.dumps(asdict(message)) + "\n")
         out.flush()
 
     try:
-        path, packed = pickle.load(sys.stdin.buffer)
+        packed = pickle.load(sys.stdin.buffer)
         threading.Thread(target=_watch, daemon=True).start()
-        wrong = attempt(path, packed, _seldom(lambda done, words: say(fraction=done, words=words)))
+        error = attempt(packed, _seldom(lambda done, words: send(Message("progress", done, words))))
     except KeyboardInterrupt:
         return STOPPED
-    if wrong is None:
-        say(finished=True)
-    else:
-        say(failed=wrong)
+    send(Message("finished", 1.0) if error is None else Message("failed", words=error))
     return 0
 
 
-def pack(job: Job) -> tuple[list[str], bytes]:
-    """Make a job ready to travel: where modules are found, and the job itself."""
-    return sys.path, pickle.dumps(job)
+@dataclass(frozen=True)
+class Message:
+    """What a worker tells whoever started it: one line of JSON."""
+
+    kind: Literal["progress", "finished", "failed"]
+    fraction: float = 0.0
+    words: str = ""
+    """What is being done, or why it failed."""
 
 
-def attempt(path: list[str], packed: bytes, progress: Progress) -> str | None:
+@dataclass(frozen=True)
+class Packed:
+    """A job ready to travel to another process."""
+
+    path: list[str]
+    """Where modules are found."""
+    job: bytes
+    """Pickled: it can be read once ``path`` is set."""
+
+
+def pack(job: Job) -> Packed:
+    """Make a job ready to travel."""
+    return Packed(sys.path, pickle.dumps(job))
+
+
+def attempt(packed: Packed, progress: Progress) -> str | None:
     """Do a packed job; return what went wrong in a sentence, None when nothing did."""
     try:
-        sys.path[:] = path
-        perform(pickle.loads(packed), progress)
+        sys.path[:] = packed.path
+        perform(pickle.loads(packed.job), progress)
     except UserError as error:
         return str(error)
     except MemoryError:

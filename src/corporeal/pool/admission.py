@@ -11,7 +11,7 @@ from corporeal.pool.candidate import Candidate
 from corporeal.pool.verdict import MODELS, Verdict
 
 ABSURD = 10.0
-"""How many times beyond the usual sizes of its class a thing that is in metres may be."""
+"""How many times beyond the usual sizes of its class an object that is in metres may be."""
 OTHER = 0.1
 """Relative difference of a stated and a measured extent from which the units are in doubt."""
 
@@ -72,7 +72,7 @@ class Admission:
     def _remember(self, member: Member) -> None:
         """Keep what a double would share: the mesh, and either the class or the look.
 
-        A rubber ball and a steel ball may well have one mesh; they are two things.
+        A rubber ball and a steel ball may well have one mesh; they are two objects.
         """
         for other in (member.asset.class_name, member.look):
             self._doubles.setdefault((member.mesh, other), member.asset.name)
@@ -100,8 +100,8 @@ def _in_words(class_name: str) -> str:
 def is_metric(candidate: Candidate, extent: float, words: str) -> bool:
     """Tell whether lengths are metres: what is said, unless the mesh has another extent.
 
-    Where nobody says, they are if the thing is then as large as such things are: glTF is in metres
-    by its specification, and most files are not.
+    Where nobody says, they are if the object is then as large as such objects are: glTF is in
+    metres by its specification, and most files are not.
     """
     said = candidate.said
     if said.extent is not None and abs(said.extent / max(extent, 1e-300) - 1) > OTHER:
@@ -110,7 +110,7 @@ def is_metric(candidate: Candidate, extent: float, words: str) -> bool:
 
 
 def absurd(extent: float, words: str) -> str:
-    """Return why a thing of such an extent [m] can't be in metres; empty where it can."""
+    """Return why an object of such an extent [m] can't be in metres; empty where it can."""
     known = typical_extent(words)
     low, high = (known.low, known.high) if known else (SMALLEST, LARGEST)
     if low / ABSURD <= extent <= high * ABSURD:

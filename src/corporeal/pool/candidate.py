@@ -5,8 +5,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 
 from corporeal.errors import UserError
-from corporeal.formats.obj import OBJ
-from corporeal.formats.sources import MODELS
+from corporeal.formats.mesh_suffixes import is_mesh
+from corporeal.formats.sources import GLTF
 from corporeal.formats.words import everyday
 from corporeal.pool.table import Row, read_table
 
@@ -72,7 +72,7 @@ def models_below(folder: Path, pool: Path | None = None) -> list[Path]:
     return [
         path
         for path in sorted(folder.rglob("*"))
-        if path.suffix.lower() in (*MODELS, *OBJ)
+        if (path.suffix.lower() in GLTF or is_mesh(path))
         and not any(part.startswith(".") for part in path.relative_to(folder).parts)
         and path.is_file()
         and (own is None or not path.resolve().is_relative_to(own))

@@ -24,9 +24,9 @@ BROKEN = 0.5
 MAIN = 0.01
 """Share of the area that at least one connected component must have."""
 APART = 0.02
-"""Gap that makes two things of what one file holds, over its extent."""
+"""Gap that makes two objects of what one file holds, over its extent."""
 WHOLE = 0.9
-"""Share of the area that hangs together, within that gap, in one thing."""
+"""Share of the area that hangs together, within that gap, in one object."""
 SAMPLES = 60_000
 """Points of the surface by which that is told."""
 FEW_COLOURS = 64
@@ -44,7 +44,7 @@ class GateConfig:
     """What a model must be like to get into the pool."""
 
     least_triangles: int = 12
-    """Fewer make no thing but a placeholder."""
+    """Fewer make no object but a placeholder."""
     least_plain: int = 100
     """The same, of a model without any picture on it."""
     most_triangles: int = 200_000
@@ -160,10 +160,10 @@ def largest_component(mesh: Mesh) -> float:
     return float(areas.max() / areas.sum())
 
 
-def things_apart(mesh: Mesh) -> Float[np.ndarray, " K"]:
-    """Share of the area [-] of each thing that stands clear of the others, the largest first.
+def shares_apart(mesh: Mesh) -> Float[np.ndarray, " K"]:
+    """Share of the area [-] of each object that stands clear of the others, the largest first.
 
-    Told by voxels as large as the gap, which sampled points fill: what they bridge is one thing,
+    Told by voxels as large as the gap, which sampled points fill: what they bridge is one object,
     whether its pieces are joined or, as in most models, merely stuck together.
     """
     points, _ = sample_surface(mesh, SAMPLES, np.random.default_rng(0))
@@ -171,9 +171,9 @@ def things_apart(mesh: Mesh) -> Float[np.ndarray, " K"]:
     places = ((points - low) / (APART * np.ptp(points, axis=0).max())).astype(int)
     taken = np.zeros(places.max(axis=0) + 1, dtype=bool)
     taken[tuple(places.T)] = True
-    thing = np.empty(taken.shape, dtype=np.int32)
-    label(taken, np.ones((3, 3, 3)), output=thing)
-    counts = np.bincount(thing[tuple(places.T)])[1:]
+    labels = np.empty(taken.shape, dtype=np.int32)
+    label(taken, np.ones((3, 3, 3)), output=labels)
+    counts = np.bincount(labels[tuple(places.T)])[1:]
     return np.sort(counts)[::-1] / SAMPLES
 
 
@@ -187,7 +187,7 @@ def _extent(scene: Scene) -> float:
     extent = float(np.ptp(corners, axis=0).max())
     low, high = SIZES
     if not low <= extent <= high:
-        raise Rejected(f"is {extent:.3g} units large; {low:g} to {high:g} can be a thing")
+        raise Rejected(f"is {extent:.3g} units large; {low:g} to {high:g} can be an object")
     return extent
 
 
@@ -225,7 +225,7 @@ def _areas(s: Surface) -> Float[np.ndarray, " T"]:
 
 
 def _check_count(triangles: int, texture: int, config: GateConfig) -> None:
-    """Tell a placeholder from a simple thing: a cardboard box has few triangles and a picture."""
+    """Tell a placeholder from a simple object: a cardboard box has few triangles and a picture."""
     least = config.least_triangles if texture else config.least_plain
     if triangles < least:
         look = "" if texture else " and no picture"
@@ -278,9 +278,9 @@ def _check_components(mesh: Mesh) -> None:
         raise Rejected(
             f"falls into crumbs: its largest connected piece has {share:.2%} of the area"
         )
-    things = things_apart(mesh)
-    if things[0] < WHOLE:
+    shares = shares_apart(mesh)
+    if shares[0] < WHOLE:
         raise Rejected(
-            f"holds {len(things)} things that stand apart; the largest has {things[0]:.0%} of the "
+            f"holds {len(shares)} objects that stand apart; the largest has {shares[0]:.0%} of the "
             "area. Save each in a file of its own"
         )

@@ -9,12 +9,11 @@ from pathlib import Path
 
 from corporeal import store
 from corporeal.errors import UserError
-from corporeal.formats import obj
+from corporeal.formats.any_model import read_model
 from corporeal.formats.credits import Credit, credit_in
-from corporeal.formats.glb import read_glb
 from corporeal.formats.glb_writer import encode_glb
 from corporeal.formats.gltf_document import Document
-from corporeal.formats.sources import sources
+from corporeal.formats.sources import GLTF, sources
 from corporeal.formats.words import everyday, writable
 from corporeal.pool.gate import GateConfig, Measures, Rejected, inspect
 from corporeal.types import Scene
@@ -89,7 +88,7 @@ def _in_words_of_one_line(verdict: Verdict) -> Verdict:
 def content_key(file: Path, gate: GateConfig) -> str:
     """Name the content of a file and its companions, and the gate it stands before."""
     total = hashlib.sha256(json.dumps([RULES, asdict(gate)]).encode())
-    for path in _parts(file):
+    for path in sources([file]):
         total.update(path.name.encode() if path != file else file.suffix.lower().encode())
         total.update(_digest(path).encode())
     return total.hexdigest()[:32]
@@ -138,9 +137,7 @@ def _accepted(file: Path, key: str, m: Measures, pool: Path) -> Verdict:
 
 def _scene(file: Path) -> Scene:
     """Read a file as one object; of what is modelled as several the file's name says the class."""
-    if file.suffix.lower() in obj.OBJ:
-        return obj.read_obj(file)
-    scene = read_glb(file)
+    scene = read_model(file).scene
     if len(scene.objects) == 1:
         return scene
     one = replace(scene.objects[0], class_name=everyday(file.stem) or "object")
@@ -149,13 +146,7 @@ def _scene(file: Path) -> Scene:
 
 
 def _credit(file: Path) -> Credit:
-    return Credit() if file.suffix.lower() in obj.OBJ else credit_in(Document(file))
-
-
-def _parts(file: Path) -> list[Path]:
-    if file.suffix.lower() in obj.OBJ:
-        return [file, *obj.companions(file)]
-    return sources([file])
+    return credit_in(Document(file)) if file.suffix.lower() in GLTF else Credit()
 
 
 def _digest(path: Path) -> str:

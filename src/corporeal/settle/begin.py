@@ -1,4 +1,4 @@
-"""Settle things until they rest so that what is to happen can happen."""
+"""Settle objects until they rest so that what is to happen can happen."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -19,8 +19,8 @@ TRIES = 6
 
 
 @dataclass(frozen=True)
-class Settled:
-    """Things at rest, and what happens then."""
+class Begun:
+    """Objects at rest, and what happens then."""
 
     poses: list[Pose]
     arrangement: Arrangement
@@ -28,14 +28,15 @@ class Settled:
     certificate: Certificate
 
 
-def settle_and_begin(
+def drop_and_begin(
     bodies: Sequence[Body],
     arrangement: Arrangement | Literal["auto"],
     kinds: Sequence[Kind],
     rng: np.random.Generator,
-    rest: tuple[float, RestConfig],
-) -> Settled:
-    """Settle until things rest and one of some interactions is possible.
+    deepest: float,
+    config: RestConfig,
+) -> Begun:
+    """Settle until objects rest and one of some interactions is possible.
 
     Where nobody asked for an arrangement, another one is tried when one finds no rest.
 
@@ -44,7 +45,8 @@ def settle_and_begin(
         arrangement: How it begins to fall.
         kinds: What may happen, best first; none: nothing is to.
         rng: Of everything that is left to chance.
-        rest: Penetration allowed [m], and how hard to try.
+        deepest: Penetration allowed [m].
+        config: How hard to try.
 
     Raises:
         UserError: No rest is found, or nothing can happen.
@@ -55,7 +57,7 @@ def settle_and_begin(
     for k in range(TRIES):
         way = ways[k % len(ways)]
         try:
-            poses, certificate = at_rest(bodies, way, int(rng.integers(2**31)), *rest)
+            poses, certificate = at_rest(bodies, way, int(rng.integers(2**31)), deepest, config)
         except BlenderError:
             raise
         except UserError as refusal:
@@ -65,16 +67,16 @@ def settle_and_begin(
                 break
             continue
         if not kinds:
-            return Settled(poses, way, None, certificate)
+            return Begun(poses, way, None, certificate)
         begun = (act(bodies, poses, kind, rng) for kind in _fitting(kinds, way))
         action = next((a for a in begun if a), None)
         if action is not None:
-            return Settled(poses, way, action, certificate)
+            return Begun(poses, way, action, certificate)
     names = ", ".join(b.name for b in bodies)
     raise UserError(
         reason
         or f"{names}: {_why_not(kinds[0])} in {TRIES} compositions. Try another --seed, another "
-        "--interaction, or other things."
+        "--interaction, or other objects."
     )
 
 
@@ -84,7 +86,7 @@ def _arrangements(
     count: int,
     rng: np.random.Generator,
 ) -> list[Arrangement]:
-    """Return the ways in which things may stand, in an order of chance."""
+    """Return the ways in which objects may stand, in an order of chance."""
     if asked != "auto":
         return [asked]
     if count == 1:
@@ -94,13 +96,13 @@ def _arrangements(
 
 
 def _fitting(kinds: Sequence[Kind], arrangement: Arrangement) -> list[Kind]:
-    """Keep what may happen to things that stand so; the first may, however they stand."""
+    """Keep what may happen to objects that stand so; the first may, however they stand."""
     return [kinds[0], *(k for k in kinds[1:] if arrangement in STANDING[k])]
 
 
 def _why_not(kind: Kind) -> str:
-    said = {
+    reasons = {
         "wind": f"no wind of up to {STORM:g} m/s moves anything",
         "chain": "no blow reaches the last of the row",
     }
-    return said.get(kind, f"no room for a {kind}")
+    return reasons.get(kind, f"no room for a {kind}")

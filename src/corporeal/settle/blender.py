@@ -19,14 +19,14 @@ from typing import Any
 import numpy as np
 
 from corporeal.errors import UserError
-from corporeal.settle.body import Body, Pose, unit_of
-from corporeal.settle.mujoco import SLIDING, Settled
+from corporeal.settle.body import FRICTION, Body, Pose, unit_of
+from corporeal.settle.mujoco import Dropped
 
 SCRIPT = Path(__file__).with_name("blender_script.py")
 SIZE = 10.0
 """Of the scene's unit, in Blender's."""
 MARGIN = 5e-4
-"""Around pieces, in Blender's unit: things hover by this."""
+"""Around pieces, in Blender's unit: objects hover by this."""
 GRAVITY = 9.81
 UNIT = 1e-3
 """How far the norm of a quaternion may be from one."""
@@ -50,7 +50,7 @@ class BlenderConfig:
     longest: float = 8.0
     """Simulated [s]."""
     hold: float = 0.25
-    """How long things must stay where they are [s] …"""
+    """How long objects must stay where they are [s] …"""
     shift: float = 1e-4
     """… but for so much [m]."""
     fps: int = 60
@@ -68,9 +68,9 @@ class BlenderError(UserError):
     """BlenderProc does not work: whatever else is tried, it will not."""
 
 
-def settle_in_blender(
+def drop_in_blender(
     bodies: Sequence[Body], poses: Sequence[Pose], config: BlenderConfig = DEFAULT
-) -> Settled:
+) -> Dropped:
     """Drop bodies and wait until all are at rest; not the same bits on every machine.
 
     Args:
@@ -88,7 +88,7 @@ def settle_in_blender(
         (folder / "job.json").write_text(text, encoding="utf-8")
         _run(folder, config)
         result = _read(folder / "result.json", config.program)
-    return _settled(result, bodies, config.program)
+    return _dropped(result, bodies, config.program)
 
 
 def _job(bodies: Sequence[Body], poses: Sequence[Pose], config: BlenderConfig) -> dict[str, Any]:
@@ -116,7 +116,7 @@ def _job(bodies: Sequence[Body], poses: Sequence[Pose], config: BlenderConfig) -
     return {
         "bodies": entries,
         "gravity": GRAVITY,
-        "friction": SLIDING**0.5,  # Bullet multiplies the two of a contact
+        "friction": FRICTION**0.5,  # Bullet multiplies the two of a contact
         "margin": MARGIN,
         "floor": 10 * SIZE,
         "damping": config.damping,
@@ -173,7 +173,7 @@ def _kill(process: "subprocess.Popen[bytes]") -> None:
 
 def _last_words(log: Path) -> str:
     lines = [line for line in log.read_text(errors="replace").splitlines() if line.strip()]
-    return f"Its last words: {' | '.join(lines[-LAST_WORDS:])}." if lines else "It said nothing."
+    return f"Its last words: {' | '.join(lines[-LAST_WORDS:])}." if lines else "It printed nothing."
 
 
 def _read(path: Path, program: str) -> Any:
@@ -183,7 +183,7 @@ def _read(path: Path, program: str) -> Any:
         raise _nonsense(program, f"no JSON ({error})") from error
 
 
-def _settled(result: Any, bodies: Sequence[Body], program: str) -> Settled:
+def _dropped(result: Any, bodies: Sequence[Body], program: str) -> Dropped:
     """Check what came back and say it in metres, of the bodies' own frames."""
     if not isinstance(result, Mapping) or not isinstance(result.get("bodies"), list):
         raise _nonsense(program, "no bodies")
@@ -198,14 +198,14 @@ def _settled(result: Any, bodies: Sequence[Body], program: str) -> Settled:
     by_name = {str(e["name"]): e for e in entries}
     scale = unit_of(bodies) / SIZE
     poses = [_pose(by_name[k], b, scale, program) for k, b in zip(wanted, bodies, strict=True)]
-    return Settled(poses, seconds[0] / SIZE**0.5, quiet)
+    return Dropped(poses, seconds[0] / SIZE**0.5, quiet)
 
 
 def _pose(entry: Mapping[str, Any], body: Body, scale: float, program: str) -> Pose:
     where, turn = _numbers(entry.get("position"), 3), _numbers(entry.get("quaternion"), 4)
     if where is None or turn is None:
-        said = f"{entry.get('position')}, turned by {entry.get('quaternion')}"
-        raise _nonsense(program, f"{body.name} is at {said}")
+        pose = f"{entry.get('position')}, turned by {entry.get('quaternion')}"
+        raise _nonsense(program, f"{body.name} is at {pose}")
     norm = float(np.linalg.norm(turn))
     if abs(norm - 1) > UNIT:
         raise _nonsense(program, f"{body.name} is turned by {turn}, which is no rotation")

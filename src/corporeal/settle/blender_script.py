@@ -97,7 +97,7 @@ def farthest(before: list, after: list, radius: list) -> float:
     return most
 
 
-def settle(job: dict) -> dict:
+def drop(job: dict) -> dict:
     """Step frames until nothing moves for a while, or time is up."""
     bproc.clean_up()
     scene = bpy.context.scene
@@ -131,7 +131,7 @@ def main() -> None:
     """Read the job, write the result: all of it or nothing."""
     with open(sys.argv[1], encoding="utf-8") as file:
         job = json.load(file)
-    result = settle(job)
+    result = drop(job)
     with open(sys.argv[2] + ".part", "w", encoding="utf-8") as file:
         json.dump(result, file)
     os.replace(sys.argv[2] + ".part", sys.argv[2])

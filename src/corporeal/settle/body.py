@@ -1,7 +1,7 @@
 """What is settled: bodies with their convex pieces, and where they are."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 
 import numpy as np
@@ -10,7 +10,7 @@ from jaxtyping import Float, Int
 from corporeal.geometry.mesh import orient, weld
 from corporeal.geometry.shape import Shape
 from corporeal.settle.hull import Piece, Stance, hull_of, stances
-from corporeal.settle.matter import Matter
+from corporeal.settle.mass_properties import MassProperties
 from corporeal.types import Vector
 
 Quaternion = tuple[float, float, float, float]
@@ -68,8 +68,10 @@ class Body:
     """Convex; together about the body."""
     density: float = 500.0
     """Of the pieces, where nothing is known of the matter [kg/m³]."""
-    matter: Matter | None = None
+    inertial: MassProperties | None = None
     """How its mass lies, where that is known."""
+    grips: Mapping[str, float] = field(default_factory=dict)
+    """Coulomb μ on other bodies, by their names, whichever of their parts touch [-]."""
 
     @cached_property
     def hull(self) -> Piece:
@@ -95,19 +97,26 @@ class Body:
     @property
     def mass(self) -> float:
         """In kilograms."""
-        return self.matter.mass if self.matter else self.volume * self.density
+        return self.inertial.mass if self.inertial else self.volume * self.density
 
     @property
     def friction(self) -> float:
-        """Coulomb μ on the floor [-]."""
-        known = self.matter.friction if self.matter else None
+        """Coulomb μ on the floor of its roughest part [-]: what must be overcome."""
+        known = self.inertial.friction if self.inertial else None
+        return FRICTION if known is None else known
+
+    def grip_on(self, other: "Body | None") -> float:
+        """Coulomb μ that holds it on another body, or on the floor, whichever part touches [-]."""
+        if other is not None:
+            return self.grips.get(other.name, FRICTION)
+        known = self.inertial.grip if self.inertial else None
         return FRICTION if known is None else known
 
     @cached_property
     def centre(self) -> Float[np.ndarray, "3"]:
         """Centre of mass [m]."""
-        if self.matter:
-            return self.matter.centre
+        if self.inertial:
+            return self.inertial.centre
         return np.array([p.volume * p.centre for p in self.pieces]).sum(axis=0) / self.volume
 
     @cached_property
@@ -127,8 +136,8 @@ class Body:
     def scaled(self, factor: float) -> "Body":
         """Return the same body in another size."""
         pieces = tuple(Piece(p.vertices * factor, p.triangles) for p in self.pieces)
-        matter = self.matter.scaled(factor) if self.matter else None
-        return replace(self, vertices=self.vertices * factor, pieces=pieces, matter=matter)
+        inertial = self.inertial.scaled(factor) if self.inertial else None
+        return replace(self, vertices=self.vertices * factor, pieces=pieces, inertial=inertial)
 
 
 def unit_of(bodies: Sequence[Body]) -> float:

@@ -1,4 +1,4 @@
-"""The slowest wind in which a thing at rest begins to slide or to fall over."""
+"""The slowest wind in which an object at rest begins to slide or to fall over."""
 
 from dataclasses import dataclass
 from math import inf, sqrt
@@ -21,7 +21,7 @@ BEARINGS = 8
 
 @dataclass(frozen=True)
 class Drag:
-    """What wind from one side does to a thing, over ½ ρ_air u²."""
+    """What wind from one side does to an object, over ½ ρ_air u²."""
 
     along: float
     """Force with the wind [m²]."""
@@ -32,7 +32,7 @@ class Drag:
 
 
 def wind_that_moves(body: Body, pose: Pose, heading: Float[np.ndarray, "2"]) -> float:
-    """Return the slowest wind that moves a thing [m/s]; inf: none does.
+    """Return the slowest wind that moves an object [m/s]; inf: none does.
 
     It slides where the drag exceeds friction, D q > μ (m g - L q) with q = ½ ρ_air u², and falls
     over where the moment of the air about the edge of its foot exceeds that of its weight. What
@@ -58,7 +58,7 @@ def wind_that_moves(body: Body, pose: Pose, heading: Float[np.ndarray, "2"]) -> 
 
 
 def slowest_wind(body: Body) -> float:
-    """Return the slowest wind from any side that moves a thing standing alone [m/s]."""
+    """Return the slowest wind from any side that moves an object standing alone [m/s]."""
     pose = standing_alone(body)
     return min(wind_that_moves(body, pose, heading) for heading in headings(0.0))
 
@@ -77,7 +77,7 @@ def headings(first: float) -> Float[np.ndarray, "H 2"]:
 def drag_of(
     body: Body, pose: Pose, heading: Float[np.ndarray, "2"], pivot: Float[np.ndarray, "3"]
 ) -> Drag:
-    """Add up the air's force on every face of a thing, and its moment about a point of an edge.
+    """Add up the air's force on every face of an object, and its moment about a point of an edge.
 
     Args:
         body: What.

@@ -1,9 +1,9 @@
 """How fast to send the first of a row, so that the blow reaches the last.
 
 Backwards along the row: what slides a way d arrives with v² = v₀² - 2 μ g d, and goes on together
-with what it strikes, M v/(M + m): impacts without a bounce. Where heavy things come first that
+with what it strikes, M v/(M + m): impacts without a bounce. Where heavy objects come first that
 takes the least speed; from the light end it may take too much. Then the row is played with rigid
-bodies, for hits beside the middle, and for things that turn, topple or roll.
+bodies, for hits beside the middle, and for objects that turn, topple or roll.
 """
 
 from collections.abc import Sequence
@@ -20,7 +20,7 @@ GRAVITY = 9.81
 LAST = (0.15, 0.3)
 """Speed with which the last of the row is struck, over √(g L)."""
 FASTEST = 3.0
-"""Nothing is sent off faster, over √(g L): 6.6 m/s where the largest thing is half a metre."""
+"""Nothing is sent off faster, over √(g L): 6.6 m/s where the largest object is half a metre."""
 SLOWER = 0.8
 """The row must pass the blow on even from this share of the speed."""
 FASTER = 1.25
@@ -45,7 +45,7 @@ def chain(still: Standing, arrival: float, rng: np.random.Generator) -> Blow | N
     """Find the end and the speed from which a blow reaches the last of a row.
 
     Args:
-        still: Three things or more, in a row.
+        still: Three objects or more, in a row.
         arrival: Speed with which the second is struck at least [m/s].
         rng: Draws how fast the last is struck.
 
@@ -70,7 +70,7 @@ def start_speed(still: Standing, row: Sequence[int], arrival: float, last: float
 
     Args:
         still: Where all stand.
-        row: Numbers of the things, the mover first.
+        row: Numbers of the objects, the mover first.
         arrival: Least speed at the second [m/s].
         last: Least speed at the last [m/s].
 

@@ -113,7 +113,7 @@ class Stance:
     tip: float
     """How far it must be tilted before it falls over [rad]."""
     top: float
-    """Area of what is level at its top [m²]: what other things can stand on."""
+    """Area of what is level at its top [m²]: what other objects can stand on."""
 
 
 def stances(hull: Piece, centre: Float[np.ndarray, "3"]) -> tuple[Stance, Stance]:

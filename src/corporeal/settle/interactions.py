@@ -34,11 +34,11 @@ STANDING: dict[Kind, tuple[Arrangement, ...]] = {
     "chain": ("row",),
     "wind": ("scatter", "stack", "onto"),
 }
-"""How several things may stand before it begins."""
+"""How several objects may stand before it begins."""
 
 GRAVITY = 9.81
 FALL = (0.5, 1.5)
-"""Height of a fall, over the falling thing's own size."""
+"""Height of a fall, over the falling object's own size."""
 SPEED = (0.5, 0.9)
 """Speed on impact over √(g L), L the largest object's size: 1.1 to 2.0 m/s at half a metre."""
 LIGHTEST = 0.5
@@ -112,7 +112,7 @@ def _fall(still: Standing, rng: np.random.Generator) -> Action:
 
 
 def _fall_onto(still: Standing, rng: np.random.Generator) -> Action | None:
-    """Hang one thing above another: something light enough to have nothing resting on it."""
+    """Hang one object above another: something light enough to have nothing resting on it."""
     boxes, names = still.boxes, still.names
     for top, target in sorted(_pairs(still, rng), key=lambda p: _grows(still, p)):
         height = float(rng.uniform(*FALL)) * size(boxes[top])
@@ -132,7 +132,7 @@ def _fall_onto(still: Standing, rng: np.random.Generator) -> Action | None:
 
 
 def _collision(still: Standing, rng: np.random.Generator) -> Action | None:
-    """Send one thing along the floor into another: one that is heavy enough to be felt.
+    """Send one object along the floor into another: one that is heavy enough to be felt.
 
     Friction leaves it the speed drawn when it arrives, v₀² = v² + 2 μ g d over the gap d; what
     rolls arrives faster.
@@ -149,7 +149,7 @@ def _collision(still: Standing, rng: np.random.Generator) -> Action | None:
 
 
 def _chain(still: Standing, rng: np.random.Generator) -> Action | None:
-    """Send the thing at one end of a row into its neighbour, and that one into the next."""
+    """Send the object at one end of a row into its neighbour, and that one into the next."""
     blow = chain(still, _arrival(still, rng), rng)
     if blow is None:
         return None
@@ -167,9 +167,9 @@ def _arrival(still: Standing, rng: np.random.Generator) -> float:
 
 
 def _wind(still: Standing, rng: np.random.Generator) -> Action | None:
-    """Let air blow on everything from one side, somewhat faster than what moves the easiest thing.
+    """Let air blow on everything from one side, somewhat faster than what moves the easiest object.
 
-    Of the things that carry others nothing is expected.
+    Of the objects that carry others nothing is expected.
     """
     share, first = float(rng.uniform(*WIND)), float(rng.uniform(0, 2 * np.pi))
     loose = [k for k in range(len(still)) if still.free(k)]

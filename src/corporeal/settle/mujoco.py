@@ -1,12 +1,13 @@
 """Let bodies fall and come to rest in MuJoCo.
 
 The floor meets the exact convex hull of each mesh; bodies meet each other with their convex
-pieces. All is computed for a scene of unit size: lengths are divided by the scene's unit and times
-by the root of it (Froude's similarity keeps gravity and friction as they are), because the
-engine's softness, tolerances and thresholds are absolute.
+pieces, every two bodies with the friction that is certain to hold them. All is computed for a scene
+of unit size: lengths are divided by the scene's unit and times by the root of it (Froude's
+similarity keeps gravity and friction as they are), because the engine's softness, tolerances and
+thresholds are absolute.
 
 Soft contacts and some resistance to rolling bring everything to rest soon, but elsewhere than hard
-smooth things rest: what is round would roll on, and what stands on small faces would tilt. So the
+smooth objects rest: what is round would roll on, and what stands on small faces would tilt. So the
 resistance is taken away and contacts are hardened before the end.
 """
 
@@ -15,19 +16,20 @@ resistance is taken away and contacts are hardened before the end.
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from itertools import combinations
 
 import mujoco
 import numpy as np
 from jaxtyping import Float
 
 from corporeal.errors import UserError
-from corporeal.settle.body import FRICTION, Body, Pose, unit_of
+from corporeal.settle.body import Body, Pose, unit_of
 from corporeal.settle.hull import Piece
-from corporeal.settle.matter import Matter
+from corporeal.settle.mass_properties import MassProperties
 
 
 @dataclass(frozen=True)
-class SettleConfig:
+class DropConfig:
     """How long to wait, and what counts as rest, in a scene of unit size."""
 
     step: float = 2e-3
@@ -39,7 +41,7 @@ class SettleConfig:
     damping: float = 4e-3
     """Share of the velocity taken away at every step from then on."""
     hold: float = 0.25
-    """How long things must stay where they are [s] …"""
+    """How long objects must stay where they are [s] …"""
     shift: float = 1e-4
     """… but for so much [m]. Contacts on many points chatter: speeds would tell less."""
     chatter: float = 2e-4
@@ -47,30 +49,32 @@ class SettleConfig:
     roll: float = 4.0
     """How long what is round may look for a better place [s]."""
     firm: float = 2.0
-    """How long things may take to find their places on hard ground [s]."""
+    """How long objects may take to find their places on hard ground [s]."""
 
 
-DEFAULT = SettleConfig()
-SLIDING, SPIN, ROLL = FRICTION, 0.02, 0.02
-"""Coefficients of friction: against sliding [-], turning about the normal [unit], and rolling, of a
-body's extent."""
+DEFAULT = DropConfig()
+SPIN, ROLL = 0.02, 0.02
+"""Coefficients of friction against turning about the normal [unit], and rolling, of a body's
+extent."""
 SOLREF = [0.008, 1.0]
 FIRM_STEP, FIRM_SOLREF = 5e-4, 1e-3
 """Step [s] and time constant [s] of hard contacts: they give way a few thousandths of a millimetre
 per metre of scene."""
 SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
-FLOOR_AND_HULLS, PIECES = 1, 2
+FLOOR_AND_HULLS = 1
+"""Bit of contype and conaffinity; pieces meet in explicit pairs only, as the engine would take the
+larger of two frictions."""
 LEAST_INERTIA = 1e-6
 """Of a body's inertia, added about every axis."""
 MEMORY = 1 << 30
 """Room for contacts [bytes]; what is not used costs nothing. By itself the engine takes room for
-about 200, and lets things fall through each other at more, or stops."""
+about 200, and lets objects fall through each other at more, or stops."""
 FULL = (mujoco.mjtWarning.mjWARN_CONTACTFULL, mujoco.mjtWarning.mjWARN_CNSTRFULL)
 """Warnings of contacts that were left out."""
 
 
 @dataclass(frozen=True)
-class Settled:
+class Dropped:
     """Where bodies came to rest, or were when time was up."""
 
     poses: list[Pose]
@@ -80,9 +84,7 @@ class Settled:
     """Whether all were at rest."""
 
 
-def settle(
-    bodies: Sequence[Body], poses: Sequence[Pose], config: SettleConfig = DEFAULT
-) -> Settled:
+def drop(bodies: Sequence[Body], poses: Sequence[Pose], config: DropConfig = DEFAULT) -> Dropped:
     """Drop bodies and wait until all are at rest.
 
     Args:
@@ -97,11 +99,11 @@ def settle(
     _wait(engine, config, config.roll, 0.0)
     engine.harden()
     moved = _wait(engine, config, config.firm, 0.0)
-    return Settled(engine.poses(), float(engine.data.time), moved < config.chatter)
+    return Dropped(engine.poses(), float(engine.data.time), moved < config.chatter)
 
 
-def _wait(engine: "Engine", config: SettleConfig, longest: float, calm_after: float) -> float:
-    """Step until nothing moves for a while, or time is up; return how far things went last."""
+def _wait(engine: "Engine", config: DropConfig, longest: float, calm_after: float) -> float:
+    """Step until nothing moves for a while, or time is up; return how far objects went last."""
     step = float(engine.model.opt.timestep)
     window, calm = round(config.hold / step), round(calm_after / step)
     before, moved = engine.data.qpos.copy(), np.inf
@@ -142,24 +144,24 @@ class Engine:
         if full:
             raise UserError(
                 f"Things touch in more places ({self.data.ncon}) than MuJoCo has room for. Take "
-                "fewer or simpler things, or another arrangement."
+                "fewer or simpler objects, or another arrangement."
             )
 
     def let_roll(self) -> None:
         """Resist nothing but sliding from now on."""
-        self.model.geom_condim[:] = 3
+        self.model.geom_condim[:] = self.model.pair_dim[:] = 3
 
     def harden(self) -> None:
         """Make contacts hard from now on."""
         self.model.opt.timestep = FIRM_STEP
-        self.model.geom_solref[:, 0] = FIRM_SOLREF
+        self.model.geom_solref[:, 0] = self.model.pair_solref[:, 0] = FIRM_SOLREF
 
     def roughen(self, friction: Sequence[float]) -> None:
         """Give every body, and where it meets others, its own friction; the rougher one counts."""
-        self.model.geom_friction[0, 0] = 0.0
-        for geom, body in enumerate(self.model.geom_bodyid):
-            if body > 0:
-                self.model.geom_friction[geom, 0] = friction[body - 1]
+        own = np.array([0.0, *friction])[self.model.geom_bodyid]
+        self.model.geom_friction[:, 0] = own
+        rougher = np.maximum(own[self.model.pair_geom1], own[self.model.pair_geom2])
+        self.model.pair_friction[:, :2] = rougher[:, None]
 
     def send(self, number: int, velocity: Float[np.ndarray, "2"]) -> None:
         """Let a body go along the floor with a velocity [m/s]."""
@@ -171,10 +173,14 @@ class Engine:
 
     def near(self, distance: float) -> set[tuple[int, int]]:
         """Pairs of bodies that are no farther apart than that [unit]."""
-        self.model.geom_margin[:] = self.model.geom_gap[:] = distance
-        mujoco.mj_forward(self.model, self.data)
+        model = self.model
+        reaches = model.geom_margin, model.geom_gap, model.pair_margin, model.pair_gap
+        for reach in reaches:
+            reach[:] = distance
+        mujoco.mj_forward(model, self.data)
         found = self.touching()
-        self.model.geom_margin[:] = self.model.geom_gap[:] = 0.0
+        for reach in reaches:
+            reach[:] = 0.0
         return found
 
     def touching(self) -> set[tuple[int, int]]:
@@ -213,7 +219,7 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
     spec.worldbody.add_geom(
         type=mujoco.mjtGeom.mjGEOM_PLANE,
         size=[5, 5, 0.1],
-        friction=[SLIDING, 0.0, 0.0],
+        friction=[0.0, 0.0, 0.0],  # the larger of two counts: the hull's
         contype=FLOOR_AND_HULLS,
         conaffinity=0,
         **surface,
@@ -221,15 +227,15 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
     # Contacts are as soft for any mass; only masses near the engine's smallest number matter.
     lightest = min(b.mass for b in bodies)
     for k, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
-        thing = spec.worldbody.add_body(
+        node = spec.worldbody.add_body(
             name=f"{k}", pos=np.array(pose.position) / unit, quat=pose.quaternion
         )
-        if body.matter:
-            _give(thing, body.matter, unit, lightest)
-        thing.add_freejoint()
-        surface["friction"] = [SLIDING, SPIN, ROLL * body.extent / unit]
+        if body.inertial:
+            _give(node, body.inertial, unit, lightest)
+        node.add_freejoint()
+        surface["friction"] = [body.grip_on(None), SPIN, ROLL * body.extent / unit]
         _add_mesh(spec, f"{k} hull", body.hull, unit)
-        thing.add_geom(
+        node.add_geom(
             type=mujoco.mjtGeom.mjGEOM_MESH,
             meshname=f"{k} hull",
             mass=0,
@@ -238,27 +244,56 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
             **surface,
         )
         for number, piece in enumerate(body.pieces):
-            _add_mesh(spec, f"{k} piece {number}", piece, unit)
-            thing.add_geom(
+            name = _piece_name(k, number)
+            _add_mesh(spec, name, piece, unit)
+            node.add_geom(
+                name=name,
                 type=mujoco.mjtGeom.mjGEOM_MESH,
-                meshname=f"{k} piece {number}",
-                density=0.0 if body.matter else body.density * unit**3 / lightest,
-                contype=PIECES,
-                conaffinity=PIECES,
+                meshname=name,
+                density=0.0 if body.inertial else body.density * unit**3 / lightest,
+                contype=0,
+                conaffinity=0,
                 **surface,
             )
+    for a, b in combinations(range(len(bodies)), 2):
+        _add_pairs(spec, bodies, (a, b), unit)
     return spec
 
 
-def _give(thing: "mujoco.MjsBody", matter: Matter, unit: float, lightest: float) -> None:
+def _piece_name(body: int, number: int) -> str:
+    return f"{body} piece {number}"
+
+
+def _add_pairs(
+    spec: mujoco.MjSpec, bodies: Sequence[Body], numbers: tuple[int, int], unit: float
+) -> None:
+    """Let every piece of one body meet every piece of another."""
+    one, other = (bodies[k] for k in numbers)
+    sliding, roll = one.grip_on(other), ROLL * max(one.extent, other.extent) / unit
+    first, second = (
+        [_piece_name(k, number) for number in range(len(bodies[k].pieces))] for k in numbers
+    )
+    for a in first:
+        for b in second:
+            spec.add_pair(
+                geomname1=a,
+                geomname2=b,
+                condim=6,
+                friction=[sliding, sliding, SPIN, roll, roll],
+                solref=SOLREF,
+                solimp=SOLIMP,
+            )
+
+
+def _give(node: "mujoco.MjsBody", inertial: MassProperties, unit: float, lightest: float) -> None:
     """Say how a body's mass lies, in units of length and of the lightest mass."""
-    tensor = matter.inertia / (lightest * unit**2)
+    tensor = inertial.inertia / (lightest * unit**2)
     # The engine refuses what is thinner than any body can be.
     tensor = tensor + LEAST_INERTIA * np.trace(tensor) * np.eye(3)
-    thing.explicitinertial = True
-    thing.mass = matter.mass / lightest
-    thing.ipos = matter.centre / unit
-    thing.fullinertia = [*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
+    node.explicitinertial = True
+    node.mass = inertial.mass / lightest
+    node.ipos = inertial.centre / unit
+    node.fullinertia = [*np.diag(tensor), tensor[0, 1], tensor[0, 2], tensor[1, 2]]
 
 
 def _add_mesh(spec: mujoco.MjSpec, name: str, piece: Piece, unit: float) -> None:

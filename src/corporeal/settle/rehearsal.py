@@ -30,7 +30,7 @@ Name = TypeVar("Name", bound=Hashable)
 
 @dataclass(frozen=True)
 class Meeting:
-    """Two things that were apart touch for the first time."""
+    """Two objects that were apart touch for the first time."""
 
     a: int
     b: int
@@ -41,7 +41,7 @@ class Meeting:
 def rehearse(
     still: Standing, velocity: Mapping[int, Float[np.ndarray, "2"]], longest: float
 ) -> list[Meeting]:
-    """Send things off along the floor and see who meets whom.
+    """Send objects off along the floor and see who meets whom.
 
     Args:
         still: Where all stand.

@@ -13,12 +13,12 @@ from corporeal.settle.arrange import Arrangement, arrange
 from corporeal.settle.blender import BlenderConfig
 from corporeal.settle.body import Body, Pose, unit_of
 from corporeal.settle.certificate import Certificate, Evidence, examine
-from corporeal.settle.mujoco import SettleConfig, Settled
+from corporeal.settle.mujoco import DropConfig, Dropped
 
 SettlingEngine = Literal["mujoco", "blenderproc"]
 ENGINES = {
-    "mujoco": "corporeal.settle.mujoco:settle",
-    "blenderproc": "corporeal.settle.blender:settle_in_blender",
+    "mujoco": "corporeal.settle.mujoco:drop",
+    "blenderproc": "corporeal.settle.blender:drop_in_blender",
 }
 
 STRAY = 0.75
@@ -35,8 +35,8 @@ class RestConfig:
 
     attempts: int = 8
     engine: SettlingEngine = "mujoco"
-    """What lets things fall; the certificate is the same for both."""
-    settle: SettleConfig = field(default_factory=SettleConfig)
+    """What lets objects fall; the certificate is the same for both."""
+    drop: DropConfig = field(default_factory=DropConfig)
     """In MuJoCo."""
     blender: BlenderConfig = field(default_factory=BlenderConfig)
     """In Blender, through BlenderProc."""
@@ -74,10 +74,10 @@ def at_rest(
     for attempt in range(config.attempts):
         rng = np.random.default_rng([seed, attempt])
         start = arrange(bodies, arrangement, rng)
-        settled = _settled(bodies, start, config)
+        dropped = _dropped(bodies, start, config)
         evidence = None
-        reason = _lost(bodies, start, settled)
-        poses = _around_origin(bodies, settled.poses)
+        reason = _lost(bodies, start, dropped)
+        poses = _around_origin(bodies, dropped.poses)
         if not reason:
             evidence = examine(bodies, poses, deepest)
             reason = " and ".join(evidence.objections)
@@ -98,19 +98,17 @@ def at_rest(
     )
 
 
-def _settled(bodies: Sequence[Body], start: Sequence[Pose], config: RestConfig) -> Settled:
-    settle = load("settling engine", config.engine, ENGINES)
-    return settle(
-        bodies, start, config.blender if config.engine == "blenderproc" else config.settle
-    )
+def _dropped(bodies: Sequence[Body], start: Sequence[Pose], config: RestConfig) -> Dropped:
+    drop = load("settling engine", config.engine, ENGINES)
+    return drop(bodies, start, config.blender if config.engine == "blenderproc" else config.drop)
 
 
-def _lost(bodies: Sequence[Body], start: Sequence[Pose], settled: Settled) -> str:
+def _lost(bodies: Sequence[Body], start: Sequence[Pose], dropped: Dropped) -> str:
     """Say why bodies are not worth examining; "": they are."""
-    if not settled.quiet:
-        return f"something still moved after {settled.seconds:.0f} s"
+    if not dropped.quiet:
+        return f"something still moved after {dropped.seconds:.0f} s"
     far = STRAY * unit_of(bodies)
-    for body, before, after in zip(bodies, start, settled.poses, strict=True):
+    for body, before, after in zip(bodies, start, dropped.poses, strict=True):
         way = after.world(body.centre[None]) - before.world(body.centre[None])
         if np.linalg.norm(way[0, :2]) > far:
             return f"{body.name} rolled away"

@@ -1,4 +1,4 @@
-"""Things at rest, and what stands in whose way; boxes stand for them."""
+"""Objects at rest, and what stands in whose way; boxes stand for them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from jaxtyping import Float
 from corporeal.settle.body import Body, Pose
 
 CLEAR = 0.02
-"""Free space kept beside what falls, over the larger thing's size."""
+"""Free space kept beside what falls, over the larger object's size."""
 SLICES = 33
 """Places along a way at which it is looked whether something is there."""
 
@@ -53,7 +53,7 @@ class Standing:
         return np.array([*self.boxes[k].mean(axis=0)[:2], self.boxes[k][0, 2]])
 
     def free(self, k: int) -> bool:
-        """Tell whether nothing lies on a thing, so that it may leave its place."""
+        """Tell whether nothing lies on an object, so that it may leave its place."""
         box = self.boxes[k]
         above = np.array([[*box[0, :2], box[1, 2]], [*box[1, :2], np.inf]])
         touching = [
@@ -98,6 +98,6 @@ def meet(a: Float[np.ndarray, "2 3"], b: Float[np.ndarray, "2 3"], margin: float
 
 
 def _level(a: np.ndarray, b: np.ndarray) -> bool:
-    """Tell whether two things stand on one support and one could run into the other."""
+    """Tell whether two objects stand on one support and one could run into the other."""
     shared = min(a[1, 2], b[1, 2]) - max(a[0, 2], b[0, 2])
     return bool(shared > 0.3 * min(a[1, 2] - a[0, 2], b[1, 2] - b[0, 2]))

@@ -7,7 +7,7 @@ from jaxtyping import Float
 
 
 @dataclass(frozen=True)
-class Matter:
+class MassProperties:
     """Mass, and the first two moments of where it is, in the body's frame."""
 
     mass: float
@@ -17,17 +17,22 @@ class Matter:
     inertia: Float[np.ndarray, "3 3"]
     """About the centre [kg m²]."""
     friction: float | None = None
-    """Coulomb μ of what it may slide on [-]; None: unknown."""
+    """Coulomb μ of its roughest part on the floor [-]; None: unknown."""
+    grip: float | None = None
+    """Coulomb μ of its smoothest part on the floor: what holds it whichever part it stands on [-];
+    None: unknown."""
+    materials: tuple[str, ...] = ()
+    """Names of what its parts are made of."""
 
-    def scaled(self, factor: float) -> "Matter":
+    def scaled(self, factor: float) -> "MassProperties":
         """Return that of a body of the same materials and another size, walls and all."""
         mass, inertia = self.mass * factor**3, self.inertia * factor**5
         return replace(self, mass=mass, centre=self.centre * factor, inertia=inertia)
 
 
-def matter_of(
+def mass_properties(
     points: Float[np.ndarray, "N 3"], mass: Float[np.ndarray, " N"], size: Float[np.ndarray, " N"]
-) -> Matter:
+) -> MassProperties:
     """Add up cubes.
 
     Args:
@@ -41,4 +46,4 @@ def matter_of(
     arm = points - centre
     own = float(mass @ size**2) / 6 * np.eye(3)
     square = float(mass @ (arm**2).sum(axis=1)) * np.eye(3)
-    return Matter(total, centre, own + square - (mass * arm.T) @ arm)
+    return MassProperties(total, centre, own + square - (mass * arm.T) @ arm)

@@ -17,9 +17,9 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 
 from corporeal.corpus.collect import RIGID, Collected, SceneRecord
-from corporeal.mpm.audit import ALLOWED
 from corporeal.render.colours import LAWS
 from corporeal.settle.interactions import KINDS, Kind
+from corporeal.trajectory.audit import ALLOWED
 
 INK, SOFT, LINE = "#22262b", "#6a727c", "#d9dde2"
 BAR = "#4477aa"
@@ -127,8 +127,8 @@ def _rest(axes: Axes, corpus: Collected) -> None:
         proofs = [
             s.certificate for s in corpus.scenes if s.certificate and s.planned.interaction == kind
         ]
-        drift = [1e3 * p["drift_m"] / p["extent_m"] for p in proofs]
-        depth = [1e3 * p["penetration_m"] / p["extent_m"] for p in proofs]
+        drift = [1e3 * p.drift_m / p.extent_m for p in proofs]
+        depth = [1e3 * p.penetration_m / p.extent_m for p in proofs]
         axes.scatter(
             np.maximum(drift, 1e-6), np.maximum(depth, 1e-6), s=26, marker=MARK[kind],
             color=COLOUR[kind], edgecolor="white", linewidth=0.5, label=kind,
@@ -186,7 +186,7 @@ def _by_kind(axes: Axes, corpus: Collected, name: str, log: bool) -> None:
 
 def _values(scenes: Sequence[SceneRecord], kind: Kind, name: str, log: bool) -> list[float]:
     mine = [s.numbers for s in scenes if s.numbers and s.planned.interaction == kind]
-    return [max(n[name], FLOOR) if log else n[name] for n in mine]
+    return [max(getattr(n, name), FLOOR) if log else getattr(n, name) for n in mine]
 
 
 # ---------------------------------------------------------------- matter and cost
@@ -214,7 +214,7 @@ def _cost(axes: Axes, corpus: Collected) -> None:
     for kind in KINDS:
         mine = [s.numbers for s in corpus.run if s.numbers and s.planned.interaction == kind]
         axes.scatter(
-            [n["particles"] for n in mine], [n["seconds"] for n in mine], s=26,
+            [n.particles for n in mine], [n.seconds for n in mine], s=26,
             marker=MARK[kind], color=COLOUR[kind], edgecolor="white", linewidth=0.5, label=kind,
         )  # fmt: skip
     axes.set(xscale="log", yscale="log")
