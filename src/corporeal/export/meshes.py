@@ -1,0 +1,43 @@
+"""Meshes and pictures beside an MJCF or a URDF."""
+
+from pathlib import Path
+
+import numpy as np
+from PIL import Image
+
+from corporeal.export.solids import Solid
+from corporeal.formats.obj_text import obj_text
+from corporeal.settle.hull import Piece
+from corporeal.types import Finish
+
+FOLDER = "meshes"
+
+
+def write_surfaces(solid: Solid, folder: Path) -> dict[str, int]:
+    """Write what is seen of a solid; return file name without suffix → finish."""
+    found = {}
+    for number, surface in zip(solid.surface_numbers, solid.surfaces, strict=True):
+        if not len(surface.triangles):
+            continue
+        name = f"{solid.name}_surface_{number}"
+        _write(folder, name, obj_text(surface.vertices, surface.triangles, surface.uv))
+        found[name] = surface.finish
+    return found
+
+
+def write_collider(name: str, shape: Piece, folder: Path) -> None:
+    """Write a convex shape."""
+    _write(folder, name, obj_text(shape.vertices, shape.triangles))
+
+
+def write_picture(name: str, finish: Finish, folder: Path) -> None:
+    """Write the colours of a finish that has a texture, without transparency."""
+    assert finish.texture is not None, "only textures are written"
+    (folder / FOLDER).mkdir(exist_ok=True)
+    picture = np.ascontiguousarray(finish.texture[..., :3])
+    Image.fromarray(picture).save(folder / FOLDER / f"{name}.png")
+
+
+def _write(folder: Path, name: str, text: str) -> None:
+    (folder / FOLDER).mkdir(exist_ok=True)
+    (folder / FOLDER / f"{name}.obj").write_text(text, encoding="ascii", newline="\n")

@@ -1,0 +1,200 @@
+"""From what the verbs of a run made to solids at one instant."""
+
+from dataclasses import replace
+from functools import partial
+from typing import Any
+
+import numpy as np
+from jaxtyping import Float, Int
+from scipy.spatial import KDTree
+from scipy.spatial.transform import Rotation
+
+from corporeal.errors import UserError
+from corporeal.export.motion import Motion
+from corporeal.export.names import identifiers
+from corporeal.export.solids import Collider, Grains, Matter, PhysicalScene, Solid
+from corporeal.export.unsaid import unsaid
+from corporeal.geometry.mesh import joined
+from corporeal.geometry.sizes import scale_of_part
+from corporeal.materials import materials_json
+from corporeal.mpm.physics.rigid import mass_of
+from corporeal.settle.decompose import decompose
+from corporeal.settle.hull import Piece, hull_of
+from corporeal.store import plain
+from corporeal.trajectory.played import Prepared
+from corporeal.types import Particles, PartWords, Surface
+
+THIN = 1e-4
+"""Of the extent: thickness that the hull of a flat thing is given."""
+BUILT = ("structure", "thickness", "contents", "fill")
+"""Fields of ``PartWords`` that say how a part is built."""
+RESERVED = ("World", "Looks", "Matter", "Physics", "Floor", "Floors", "Hulls", "Pieces", "floor")
+"""Names that our files use for other things."""
+
+
+def physical_scene(prepared: Prepared, motion: Motion) -> PhysicalScene:
+    """Take a scene as it stands at an instant of its motion.
+
+    Args:
+        prepared: The scene, its materials and its material points.
+        motion: Of it; its instant is exported.
+
+    Raises:
+        UserError: An object has no matter.
+
+    """
+    scene, field, particles = prepared.scene, prepared.field, prepared.particles
+    empty = [o.name for k, o in enumerate(scene.objects) if not np.any(particles.object == k)]
+    if empty:
+        raise UserError(f"{', '.join(empty)} holds no material points. Run corporeal fill again.")
+    titles = [o.name for o in scene.objects]
+    names = identifiers(titles, RESERVED)
+    made = partial(_solid, prepared, motion)
+    solids = tuple(made(k, name) for k, name in enumerate(names))
+    (name,) = identifiers([scene.name])
+    return PhysicalScene(
+        name=name,
+        title=scene.name,
+        solids=solids,
+        matter=_matter(prepared),
+        finishes=scene.finishes,
+        friction=np.asarray(field.friction, dtype=float),
+        restitution=np.asarray(field.restitution, dtype=float),
+        gravity=scene.gravity,
+        walls=scene.walls,
+        fps=scene.fps,
+        settled=scene.settled,
+        cell=particles.cell,
+        time=motion.instant,
+        duration=scene.duration,
+        credits=tuple(dict.fromkeys(o.credit for o in scene.objects if o.credit)),
+        unsaid=unsaid(scene, particles, motion),
+    )
+
+
+def _matter(prepared: Prepared) -> tuple[Matter, ...]:
+    heavy = prepared.particles.mass_real, scale_of_part(prepared.scene, prepared.parts)
+    told = materials_json(prepared.field, prepared.parts, *heavy)["parts"]
+    catalogue = prepared.parts.catalogue
+    field = prepared.field
+    rows = zip(
+        catalogue, field.materials, prepared.particles.treatments, told, field.words, strict=True
+    )
+    return tuple(
+        Matter(
+            part.name,
+            part.object,
+            material,
+            treatment,
+            said | {"words": _words(words), "simulated": plain(treatment)},
+        )
+        for part, material, treatment, said, words in rows
+    )
+
+
+def _words(words: PartWords) -> dict[str, Any]:
+    """Return how somebody said that a part is built, before its shape was looked at."""
+    return {key: getattr(words, key) for key in BUILT}
+
+
+def _provenance(prepared: Prepared, motion: Motion, number: int) -> dict[str, Any]:
+    thing = prepared.scene.objects[number]
+    return {
+        "class": thing.class_name,
+        "real_extent_m": thing.real_extent,
+        "scale": thing.scale,
+        "source": thing.source,
+        "credit": thing.credit,
+        "sized_by": thing.sized_by,
+        "velocity_m_s": [float(v) for v in motion.velocity(number)],
+    }
+
+
+def _parts_of_surfaces(prepared: Prepared, numbers: list[int]) -> tuple[int, ...]:
+    """Return the part that most triangles of each surface belong to; none named: the first."""
+    counts = [len(s.triangles) for s in prepared.scene.surfaces]
+    ends = np.cumsum([0, *counts])
+    found = []
+    for n in numbers:
+        label = prepared.parts.part_of_point[ends[n] : ends[n + 1]]
+        label = label[label >= 0]
+        found.append(int(np.bincount(label).argmax()) if len(label) else 0)
+    return tuple(found)
+
+
+def _solid(prepared: Prepared, motion: Motion, number: int, name: str) -> Solid:
+    scene, particles = prepared.scene, prepared.particles
+    own = np.flatnonzero(particles.object == number)
+    now = motion.particles[own]
+    whole = mass_of(now, particles.mass[own], particles.volume[own])
+    rigid = motion.is_rigid(number)
+    surfaces = [n for n, s in enumerate(scene.surfaces) if s.object == number]
+    solid = Solid(
+        name=name,
+        title=scene.objects[number].name,
+        number=number,
+        rigid=rigid,
+        origin=whole.centre,
+        mass=whole.total,
+        inertia=whole.inertia,
+        velocity=motion.velocity(number),
+        spin=motion.spin(number),
+        parts=_by_weight(particles, own),
+        surfaces=tuple(_posed(scene.surfaces[n], motion, n, whole.centre) for n in surfaces),
+        surface_numbers=tuple(surfaces),
+        part_of_surface=_parts_of_surfaces(prepared, surfaces),
+        provenance=_provenance(prepared, motion, number),
+    )
+    if not rigid:
+        return replace(solid, grains=_grains(particles, motion, own, whole.centre))
+    return _with_colliders(solid, prepared, motion, own)
+
+
+def _by_weight(particles: Particles, own: Int[np.ndarray, " N"]) -> tuple[int, ...]:
+    part, mass = particles.part[own], particles.mass[own]
+    return tuple(sorted(set(part.tolist()), key=lambda k: -float(mass[part == k].sum())))
+
+
+def _posed(surface: Surface, motion: Motion, number: int, origin: np.ndarray) -> Surface:
+    vertices, normals = motion.surface_now(number)
+    kept = None if surface.normals is None else normals
+    return replace(surface, vertices=vertices - origin, normals=kept)
+
+
+def _grains(
+    particles: Particles, motion: Motion, own: np.ndarray, origin: Float[np.ndarray, "3"]
+) -> Grains:
+    return Grains(
+        position=motion.particles[own] - origin,
+        velocity=motion.particle_velocity[own],
+        volume=particles.volume[own],
+        mass=particles.mass[own],
+        part=particles.part[own],
+        number=own,
+    )
+
+
+def _with_colliders(solid: Solid, prepared: Prepared, motion: Motion, own: np.ndarray) -> Solid:
+    """Cut the mesh as the scene has it, and turn the pieces to where the body is now."""
+    scene, particles = prepared.scene, prepared.particles
+    mesh = joined([scene.surfaces[n] for n in solid.surface_numbers])
+    pieces = decompose(mesh.vertices, mesh.triangles)
+    near = KDTree(particles.position[own])
+    parts = [int(particles.part[own[near.query(p.centre)[1]]]) for p in pieces]
+    hull = hull_of(mesh.vertices, THIN * float(np.ptp(mesh.vertices, axis=0).max()))
+
+    def here(piece: Piece) -> Piece:
+        return Piece(motion.placed(solid.number, piece.vertices) - solid.origin, piece.triangles)
+
+    return replace(
+        solid,
+        pieces=tuple(Collider(here(p), k) for p, k in zip(pieces, parts, strict=True)),
+        hull=Collider(here(hull), solid.heaviest),
+    )
+
+
+def principal(inertia: Float[np.ndarray, "3 3"]) -> tuple[np.ndarray, np.ndarray]:
+    """Return the moments of inertia [kg m²] and the quaternion (w, x, y, z) of their axes."""
+    moments, axes = np.linalg.eigh(inertia)
+    axes[:, 2] *= np.sign(np.linalg.det(axes))
+    return moments, Rotation.from_matrix(axes).as_quat(scalar_first=True)

@@ -1,0 +1,89 @@
+"""Rigid solids as URDF, one file each: one link with mass, inertia, looks and convex pieces.
+
+URDF says neither where a body stands nor how it moves: ``placements.json`` beside the files does.
+"""
+
+import json
+import xml.etree.ElementTree as ET
+from pathlib import Path
+
+import numpy as np
+
+from corporeal.export.meshes import FOLDER, write_collider, write_surfaces
+from corporeal.export.solids import PhysicalScene, Solid
+from corporeal.export.target import Asked, NothingToWriteError, Written
+from corporeal.formats.xml_text import comment, words, write_xml
+from corporeal.store import write_json
+
+PLACEMENTS = "placements.json"
+
+
+def write_urdf(asked: Asked, folder: Path) -> Written:
+    """Write a file for every rigid solid.
+
+    Raises:
+        NothingToWriteError: Nothing is rigid.
+
+    """
+    scene = asked.scene
+    rigid = [s for s in scene.solids if s.rigid]
+    if not rigid:
+        raise NothingToWriteError(f"Nothing of {scene.title} is rigid, and URDF knows no other.")
+    for solid in rigid:
+        write_xml(folder / f"{solid.name}.urdf", _robot(solid, scene, folder))
+    write_json(folder / PLACEMENTS, {s.name: _placement(s) for s in rigid})
+    soft = [s.title for s in scene.solids if not s.rigid]
+    said = ["Each body has one friction, that with the floor; URDF has no restitution."]
+    said += [f"{', '.join(soft)} can deform and is left out."] if soft else []
+    return Written(tuple(said))
+
+
+def _placement(solid: Solid) -> dict:
+    return {
+        "title": solid.title,
+        "position_m": solid.origin,
+        "quaternion_wxyz": [1.0, 0.0, 0.0, 0.0],
+        "velocity_m_s": solid.velocity,
+        "angular_velocity_rad_s": solid.spin,
+    }
+
+
+def _robot(solid: Solid, scene: PhysicalScene, folder: Path) -> ET.Element:
+    robot = ET.Element("robot", name=solid.name)
+    for part in solid.parts:
+        data = json.dumps(scene.matter[part].provenance, ensure_ascii=False, allow_nan=False)
+        robot.append(comment(f"corporeal part_{part} {data}"))
+    link = ET.SubElement(robot, "link", name="body")
+    _inertial(link, solid)
+    friction = float(scene.friction[solid.heaviest, -1])
+    # Bullet's own element; other readers leave it out.
+    law = ET.SubElement(link, "contact")
+    ET.SubElement(law, "lateral_friction", value=words([friction]))
+    for name, finish in write_surfaces(solid, folder).items():
+        visual = _shape(link, "visual", name)
+        material = ET.SubElement(visual, "material", name=f"look_{finish}")
+        ET.SubElement(material, "color", rgba=words(scene.finishes[finish].colour))
+    for k, collider in enumerate(solid.pieces):
+        name = f"{solid.name}_piece_{k}"
+        write_collider(name, collider.shape, folder)
+        _shape(link, "collision", name)
+    return robot
+
+
+def _inertial(link: ET.Element, solid: Solid) -> None:
+    inertial = ET.SubElement(link, "inertial")
+    ET.SubElement(inertial, "origin", xyz="0 0 0", rpy="0 0 0")
+    ET.SubElement(inertial, "mass", value=words([solid.mass]))
+    six = {
+        f"i{'xyz'[row]}{'xyz'[column]}": words([solid.inertia[row, column]])
+        for row, column in zip(*np.triu_indices(3), strict=True)
+    }
+    ET.SubElement(inertial, "inertia", six)
+
+
+def _shape(link: ET.Element, role: str, name: str) -> ET.Element:
+    item = ET.SubElement(link, role)
+    ET.SubElement(item, "origin", xyz="0 0 0", rpy="0 0 0")
+    shape = ET.SubElement(item, "geometry")
+    ET.SubElement(shape, "mesh", filename=f"{FOLDER}/{name}.obj")
+    return item
