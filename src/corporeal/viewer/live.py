@@ -1,0 +1,275 @@
+"""A simulation that runs while pages watch and touch it: one thread, the newest picture only."""
+
+import threading
+import time
+from collections import deque
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from corporeal.errors import UserError
+from corporeal.machine import cores
+from corporeal.mpm.problem import Snapshot
+from corporeal.playback import cast_of, slowed
+from corporeal.render.take import Cast, stress_bytes
+from corporeal.stages.fill import fill
+from corporeal.trajectory.played import Prepared
+from corporeal.trajectory.stress import VonMises
+from corporeal.treatment.live_quality import deformable, live_quality
+from corporeal.treatment.problem_from_scene import pose
+from corporeal.types import Frame, Scene, Wind
+from corporeal.viewer.hands import Hands
+from corporeal.viewer.orders import Order
+from corporeal.viewer.shelf import Made
+
+FPS = 30.0
+"""Pictures a second, at most."""
+LEAST = 2e-4
+"""Simulated time of a picture, at least [s]."""
+SMOOTH = 0.1
+"""Share of the newest cost in the smoothed one."""
+TOP = 99.5
+"""Percentile of the stresses that the scale ends at."""
+CALM = 1e-3
+"""Air that hardly moves [m/s]: it gives every object its faces for a wind to come."""
+MOST_TOUCHES = 100_000
+"""Of a record: then it is only kept that it is not whole."""
+HEAD = "<u4"
+MOST_THREADS = 4
+
+
+def live_scene(made: Made, threads: int) -> Prepared:
+    """Fill a scene again for what can be simulated in real time."""
+    old = made.results.prepared
+    air = Wind((CALM, 0.0, 0.0))
+    objects = tuple(o if o.wind else replace(o, wind=air) for o in old.scene.objects)
+    scene: Scene = replace(old.scene, objects=objects)
+    quality = live_quality(deformable(old.particles), made.detail, threads)
+    return replace(old, scene=scene, particles=fill(scene, old.parts, old.field, quality=quality))
+
+
+class Live:
+    """One live simulation. Orders come in from any thread; pictures are ``latest``."""
+
+    def __init__(self, prepared: Prepared, threads: int) -> None:
+        """Begin at time 0, paused.
+
+        Args:
+            prepared: From ``live_scene``.
+            threads: Of the engine.
+
+        """
+        self.prepared, self.threads = prepared, threads
+        self.cast: Cast = cast_of(prepared)
+        self.posed = pose(prepared.scene, prepared.particles, prepared.field)
+        self.stress = VonMises(self.posed.problem)
+        self.place = np.empty_like(self.posed.order)
+        self.place[self.posed.order] = np.arange(len(self.posed.order))
+        counts = [len(body.position) for body in self.posed.problem.bodies]
+        self.stiff = np.repeat(self.posed.rigid, counts)
+        self.orders: deque[Order] = deque(maxlen=1000)
+        self.news = threading.Condition()
+        self.latest, self.number = b"", 0
+        self.said: str = ""
+        self.playing = self.closed = self.whole = False
+        self.done, self.rate, self.top = 0, 0.0, 1.0
+        self.spent = {"step": 0.0, "show": 0.0}
+        self.reset(single=False)
+        self.thread = threading.Thread(target=self._run, name="live", daemon=True)
+
+    def hello(self) -> dict:
+        """Say what pictures will hold, and how honest they are."""
+        return {
+            "honest": slowed(self.prepared),
+            "rigid": self.cast.rigid.tolist(),
+            "gravity": list(self.prepared.scene.gravity),
+            "orders": "one hand; others watch",
+        }
+
+    def reset(self, single: bool) -> None:
+        """Begin again at time 0; single: with one velocity field for all, the control."""
+        self.single = single
+        problem = replace(self.posed.problem, contact="single" if single else "multi")
+        self.hands = Hands(self.posed, problem, self.threads)
+        self.pace, self.cost = LEAST, 3.0
+        self.said, self.whole = "", True
+
+    def start(self) -> None:
+        """Let it run in its thread."""
+        self.thread.start()
+
+    def close(self) -> None:
+        """End the thread."""
+        self.closed = True
+        if self.thread.is_alive():
+            self.thread.join(10.0)
+
+    # ---------------------------------------------------------------- the thread
+
+    def _run(self) -> None:
+        self.publish()
+        while not self.closed:
+            begun = time.perf_counter()
+            touched = self._obey()
+            moved = self.playing and self._advance()
+            stepped = time.perf_counter()
+            if moved or touched:
+                self.publish()
+            shown = time.perf_counter()
+            self._keep_pace(stepped - begun, shown - stepped, moved)
+            time.sleep(max(1 / FPS - (shown - begun), 0.001))
+            passed = time.perf_counter() - begun
+            self.rate += SMOOTH * (self.pace * moved / passed - self.rate)
+
+    def _obey(self) -> bool:
+        """Do the orders that have come; a bad one is refused and the simulation goes on."""
+        some = False
+        while self.orders:
+            order, some = self.orders.popleft(), True
+            self.done = max(self.done, order.seq)
+            try:
+                self._do(order)
+            except UserError as error:
+                self.said = str(error)
+        return some
+
+    def _do(self, order: Order) -> None:
+        if order.do in ("play", "pause"):
+            self.playing = order.do == "play"
+        elif order.do == "reset":
+            self.reset(self.single)
+        elif order.do == "contact":
+            self.reset(order.single)
+        elif order.do == "step":
+            self.hands.advance(1 / FPS)
+        else:
+            self.hands.obey(order)
+
+    def _advance(self) -> bool:
+        try:
+            self.hands.advance(self.pace)
+        except UserError as error:  # it is where it was before
+            self.playing, self.said = False, f"{error} Begin again with reset."
+            return False
+        if len(self.hands.touches) > MOST_TOUCHES:
+            self.hands.touches.clear()
+            self.whole = False
+        return True
+
+    def _keep_pace(self, stepping: float, showing: float, moved: bool) -> None:
+        """As much simulated time a picture as the machine can do, at most real time."""
+        self.spent = {"step": stepping, "show": showing}
+        if moved:
+            self.cost += SMOOTH * (stepping / self.pace - self.cost)
+            room = max(1 / FPS - showing, 0.3 / FPS)
+            self.pace = float(np.clip(room / max(self.cost, 1e-3), LEAST, 1 / FPS))
+
+    # ---------------------------------------------------------------- pictures
+
+    def publish(self) -> None:
+        """Make the present the newest picture."""
+        now = self.hands.engine.snapshot()
+        picture = self.picture(now)
+        with self.news:
+            self.latest, self.number = picture, self.number + 1
+            self.news.notify_all()
+
+    def wait(self, seen: int, patience: float) -> int:
+        """Wait until there is a newer picture than number ``seen``; return its number."""
+        with self.news:
+            self.news.wait_for(lambda: self.number > seen or self.closed, patience)
+            return self.number
+
+    def picture(self, now: Snapshot) -> bytes:
+        """One instant: a head of 40 bytes, then every object in order.
+
+        Head: the last order's number (uint32), simulated over real time, force of the hand [N],
+        end of the scale of stresses [Pa] (float32), time [s] (float64), the point that is held [m]
+        (3 × float32, nan: none), playing (uint32). An object: pose (12 × float32); one that
+        deforms, then residuals (3 × int16 a vertex), normals (2 × int8), stress (uint8).
+        """
+        place = self.place
+        motion = np.where(self.stiff[:, None, None], now.deformation, now.motion)[place]
+        stress = self.stress.at(now)[place]
+        self.top = max(self.top, float(np.percentile(stress, TOP)))
+        frame = Frame(now.time, now.position[place], motion, stress)
+        at = self.hands.grip(now.position)
+        held = np.full(3, np.nan) if at is None else at
+        numbers = [self.rate, self.hands.force(now.position), self.top]
+        out = [
+            np.array([self.done], HEAD).tobytes(),
+            np.array(numbers, "<f4").tobytes(),
+            np.array([now.time], "<f8").tobytes(),
+            np.asarray(held, "<f4").tobytes(),
+            np.array([self.playing], HEAD).tobytes(),
+        ]
+        for instant in self.cast.at(frame):
+            out.append(instant.pose.astype("<f4").tobytes())
+            if instant.residual is not None and instant.normal is not None:
+                shade = stress_bytes(instant.stress, self.top)  # type: ignore[arg-type]
+                body = instant.residual.astype("<i2").tobytes() + instant.normal.tobytes()
+                body += shade.tobytes()
+                out += [body, b"\0" * (-len(body) % 4)]
+        return b"".join(out)
+
+
+class Room:
+    """The one live simulation of a server, of whichever run was asked for last."""
+
+    def __init__(self, read: Callable[[str], Made]) -> None:
+        """Hold none yet.
+
+        Args:
+            read: Gives by its name what a run's verbs made.
+
+        """
+        self.read, self.lock = read, threading.Lock()
+        self.name = ""
+        self.live: Live | None = None
+        self.visitors = 0
+        self.hand: object | None = None
+
+    def enter(self, name: str) -> Live:
+        """Come in to watch a run; starts it where it does not run, and ends another one.
+
+        Raises:
+            UserError: There is no such run, or it cannot be simulated.
+
+        """
+        with self.lock:
+            if self.live is None or self.name != name:
+                self._clear()
+                threads = min(MOST_THREADS, cores())
+                self.live = Live(live_scene(self.read(name), threads), threads)
+                self.name = name
+                self.live.start()
+                self.visitors = 0
+            self.visitors += 1
+            return self.live
+
+    def leave(self, live: Live, visitor: object) -> None:
+        """Go; the last one turns the light off."""
+        with self.lock:
+            if self.hand is visitor:
+                self.hand = None
+            if live is self.live:
+                self.visitors -= 1
+                if self.visitors <= 0:
+                    self._clear()
+
+    def takes(self, visitor: object) -> bool:
+        """Whether a visitor has the hand: whoever comes first, until he goes."""
+        with self.lock:
+            self.hand = self.hand or visitor
+            return self.hand is visitor
+
+    def close(self) -> None:
+        """End what runs."""
+        with self.lock:
+            self._clear()
+
+    def _clear(self) -> None:
+        if self.live is not None:
+            self.live.close()
+        self.live, self.name, self.hand = None, "", None

@@ -1,0 +1,89 @@
+"""What a page may ask of a live simulation: a closed table; every number finite and bounded."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any
+
+from corporeal.errors import UserError
+from corporeal.types import Vector
+
+FARTHEST = 100.0
+"""Of a point that is pulled to [m]."""
+SOFTEST, FIRMEST = 0.5, 10.0
+"""Natural frequency of what hangs on the hand [Hz]."""
+STRONGEST = 25.0
+"""Gravity [m/s²]."""
+STORM = 40.0
+"""Wind [m/s]."""
+LONGEST = 4096
+"""Of one order [bytes]."""
+PER_SECOND = 200
+KINDS = ("grab", "pull", "drop", "gravity", "wind", "play", "pause", "step", "reset", "contact")
+
+
+@dataclass(frozen=True)
+class Order:
+    """One order; what its kind does not need is 0."""
+
+    do: str
+    seq: int = 0
+    """The page's number of it, told back with the pictures that it is seen in."""
+    object: int = 0
+    point: Vector = (0.0, 0.0, 0.0)
+    """Where an object is taken [m]."""
+    to: Vector = (0.0, 0.0, 0.0)
+    """Where it is pulled [m]; gravity [m/s²]; wind [m/s]."""
+    firm: float = 4.0
+    """Natural frequency on the hand's spring [Hz]."""
+    single: bool = False
+    """One velocity field for all: the control."""
+
+
+def parsed(text: str) -> Order:
+    """Read an order.
+
+    Raises:
+        UserError: It is not in the table, or a number is not finite.
+
+    """
+    if len(text) > LONGEST:
+        raise UserError("An order is too long.")
+    try:
+        asked = json.loads(text)
+    except (ValueError, RecursionError) as error:
+        raise UserError("An order is no JSON.") from error
+    if not isinstance(asked, dict) or asked.get("do") not in KINDS:
+        raise UserError(f"Unknown order. Choose one of: {', '.join(KINDS)}.")
+    limit = {"gravity": STRONGEST, "wind": STORM}.get(asked["do"], FARTHEST)
+    return Order(
+        do=asked["do"],
+        seq=_whole(asked, "seq"),
+        object=_whole(asked, "object"),
+        point=_vector(asked, "point", FARTHEST),
+        to=_vector(asked, "to", limit),
+        firm=min(max(_number(asked.get("firm", 4.0)), SOFTEST), FIRMEST),
+        single=asked.get("single") is True,
+    )
+
+
+def _number(value: Any) -> float:
+    if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
+        raise UserError("A number of an order is not finite.")
+    return float(value)
+
+
+def _whole(asked: Mapping[str, Any], name: str) -> int:
+    value = _number(asked.get(name, 0))
+    if value != int(value) or not 0 <= value < 2**31:
+        raise UserError(f"{name} of an order is no number of anything.")
+    return int(value)
+
+
+def _vector(asked: Mapping[str, Any], name: str, limit: float) -> Vector:
+    value = asked.get(name, (0, 0, 0))
+    if not isinstance(value, list | tuple) or len(value) != 3:
+        raise UserError(f"{name} of an order is no three numbers.")
+    x, y, z = (min(max(_number(v), -limit), limit) for v in value)
+    return x, y, z

@@ -1,0 +1,229 @@
+"""Runs that the page asked for: one after the other, each in its own process.
+
+What was asked stands in ``.queue.json``. A job that is stopped, or whose server is killed, goes on
+in the same folder from where it was.
+"""
+
+import signal
+import threading
+from collections.abc import Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+from typing import Any, Literal
+
+from corporeal import store
+from corporeal.corpus.jobs import Event, Job, Progress
+from corporeal.corpus.local import LocalWorkers
+from corporeal.errors import UserError
+from corporeal.machine import cores
+from corporeal.pipeline import Settings, run, verbs
+from corporeal.typed import typed
+
+FILE = ".queue.json"
+JOBS = ".jobs"
+"""Folder of what processes say and of their results' keys, among the runs."""
+KEPT = 50
+"""Finished entries that the list remembers."""
+PAUSE = 0.2
+"""[s]"""
+State = Literal["waiting", "running", "finished", "failed", "stopped"]
+
+
+@dataclass(frozen=True)
+class Asked:
+    """One run that was asked for."""
+
+    id: str
+    name: str
+    """Of the run's folder."""
+    inputs: tuple[str, ...]
+    until: str = "report"
+    state: State = "waiting"
+    error: str = ""
+
+
+@dataclass
+class Told:
+    """How far the running job is."""
+
+    verbs: dict[str, float] = field(default_factory=dict)
+    words: str = ""
+
+
+def carry_out(
+    place: Path,
+    progress: Progress,
+    inputs: list[Path],
+    folder: Path,
+    settings: Settings,
+    until: str,
+) -> None:
+    """Do one run, in a process of its own; every word about progress begins with its verb."""
+
+    def tell(verb: str) -> Progress:
+        return lambda fraction, words: progress(fraction, f"{verb}: {words}")
+
+    run(inputs, folder, settings, tell, until)
+
+
+class Queue:
+    """The runs of one server. ``close`` ends what runs, and keeps what it has."""
+
+    def __init__(self, runs: Path) -> None:
+        """Read what is still to do; what ran when the server ended waits again."""
+        self.runs, self.lock = runs, threading.RLock()
+        self.workers = LocalWorkers(1, min(4, cores()), runs / JOBS)
+        self.settings: dict[str, Settings] = {}
+        self.told: dict[str, Told] = {}
+        self.stopping: set[str] = set()
+        self.entries: list[Asked] = []
+        self._read()
+        self.closed = False
+        self.thread = threading.Thread(target=self._run, name="queue", daemon=True)
+        self.thread.start()
+
+    # ---------------------------------------------------------------- what a page asks
+
+    def add(self, asked: Asked, settings: Settings) -> Asked:
+        """Put a run at the end of the queue.
+
+        Raises:
+            UserError: A run of that name is waiting or running.
+
+        """
+        with self.lock:
+            busy = [e for e in self.entries if e.state in ("waiting", "running")]
+            if any(e.name == asked.name for e in busy):
+                raise UserError(f"{asked.name} is in the queue already.")
+            self.settings[asked.id] = settings
+            self.entries.append(asked)
+            self._write()
+        return asked
+
+    def stop(self, job: str) -> None:
+        """Take a run out of the queue, or stop it; it can go on later.
+
+        Raises:
+            UserError: There is none, or it is over.
+
+        """
+        with self.lock:
+            entry = self._entry(job)
+            if entry.state == "waiting":
+                self._set(replace(entry, state="stopped"))
+            elif entry.state == "running":
+                self.stopping.add(job)
+                process = self.workers.process.get(job)
+                if process is not None:
+                    process.send_signal(signal.SIGINT)
+            else:
+                raise UserError(f"{entry.name} is over.")
+
+    def go_on(self, job: str) -> None:
+        """Let a run that stopped or failed wait again, to its end.
+
+        Raises:
+            UserError: There is none, or it has not ended.
+
+        """
+        with self.lock:
+            entry = self._entry(job)
+            if entry.state in ("waiting", "running"):
+                raise UserError(f"{entry.name} has not ended.")
+            self._set(replace(entry, state="waiting", error="", until="report"))
+
+    def listed(self) -> list[dict[str, Any]]:
+        """Say of every run how far it is, the newest first."""
+        with self.lock:
+            return [self._row(entry) for entry in reversed(self.entries)]
+
+    def close(self) -> None:
+        """End what runs; it waits for the next server."""
+        self.closed = True
+        self.thread.join(60.0)
+        self.workers.stop()
+        self.workers.ready.close()
+
+    # ---------------------------------------------------------------- the thread
+
+    def _run(self) -> None:
+        while not self.closed:
+            with self.lock:
+                if not self.workers.process:
+                    self._begin()
+            events = self.workers.wait(PAUSE)
+            with self.lock:
+                for event in events:
+                    self._hear(event)
+
+    def _begin(self) -> None:
+        entry = next((e for e in self.entries if e.state == "waiting"), None)
+        if entry is None:
+            return
+        folder = self.runs / entry.name
+        given = {
+            "inputs": [Path(path) for path in entry.inputs],
+            "folder": folder,
+            "settings": self.settings[entry.id],
+            "until": entry.until,
+        }
+        job = Job(entry.id, carry_out, self.runs / JOBS / entry.id, entry.id, given, resumable=True)
+        self.told[entry.id] = Told()
+        self._set(replace(entry, state="running"))
+        self.workers.start(job)
+
+    def _hear(self, event: Event) -> None:
+        entry = self._entry(event.job.name)
+        if event.kind == "progress":
+            verb, _, words = event.words.partition(": ")
+            told = self.told[entry.id]
+            told.verbs = {v: 1.0 for v in told.verbs} | {verb: event.fraction}
+            told.words = words
+            return
+        if entry.id in self.stopping and event.kind != "finished":
+            self._set(replace(entry, state="stopped"))
+        elif event.kind == "finished":
+            self._set(replace(entry, state="finished"))
+        else:
+            self._set(replace(entry, state="failed", error=event.words))
+        self.stopping.discard(entry.id)
+
+    # ---------------------------------------------------------------- what is kept
+
+    def _entry(self, job: str) -> Asked:
+        found = next((e for e in self.entries if e.id == job), None)
+        if found is None:
+            raise UserError("There is no such job.")
+        return found
+
+    def _set(self, entry: Asked) -> None:
+        self.entries = [entry if e.id == entry.id else e for e in self.entries]
+        self._write()
+
+    def _row(self, entry: Asked) -> dict[str, Any]:
+        told = self.told.get(entry.id, Told())
+        row = {"id": entry.id, "name": entry.name, "state": entry.state, "error": entry.error}
+        running = entry.state == "running"
+        bars = {v: told.verbs.get(v, 0.0) for v in self._verbs(entry)} if running else {}
+        return row | {"until": entry.until, "verbs": bars, "words": told.words if running else ""}
+
+    def _verbs(self, entry: Asked) -> Sequence[str]:
+        every = verbs([Path(path) for path in entry.inputs])
+        return every[: every.index(entry.until) + 1]
+
+    def _read(self) -> None:
+        path = self.runs / FILE
+        if not path.exists():
+            return
+        for row in store.read_json(path):
+            entry = typed(Asked, row["asked"])
+            self.settings[entry.id] = typed(Settings, row["settings"])
+            again = replace(entry, state="waiting") if entry.state == "running" else entry
+            self.entries.append(again)
+
+    def _write(self) -> None:
+        over = [e for e in self.entries if e.state in ("finished", "failed", "stopped")]
+        old = {e.id for e in over[:-KEPT]}
+        self.entries = [e for e in self.entries if e.id not in old]
+        rows = [{"asked": e, "settings": self.settings[e.id]} for e in self.entries]
+        store.write_json(self.runs / FILE, rows)

@@ -1,0 +1,76 @@
+"""The WebSocket of a live simulation: pictures go out, orders come in."""
+
+import asyncio
+import time
+from collections import deque
+from contextlib import suppress
+
+from starlette.concurrency import run_in_threadpool
+from starlette.routing import WebSocketRoute
+from starlette.websockets import WebSocket, WebSocketDisconnect
+
+from corporeal.errors import UserError
+from corporeal.viewer.live import Live, Room
+from corporeal.viewer.orders import PER_SECOND, parsed
+
+PATIENCE = 1.0
+"""How long to wait for a picture before looking whether the visitor is still there [s]."""
+
+
+def live_route(room: Room) -> WebSocketRoute:
+    """Return the route of the room's live simulation."""
+
+    async def visit(socket: WebSocket) -> None:
+        await socket.accept()
+        try:
+            live = await run_in_threadpool(room.enter, socket.path_params["name"])
+        except UserError as error:
+            await socket.send_json({"said": str(error), "over": True})
+            return await socket.close()
+        try:
+            await socket.send_json(live.hello())
+            await _both(_hear(socket, room, live), _show(socket, live))
+        finally:
+            room.leave(live, socket)
+
+    return WebSocketRoute("/live/{name}", visit)
+
+
+async def _both(*ways) -> None:
+    """Do both until one ends; a page that went away is no mistake."""
+    tasks = [asyncio.create_task(way) for way in ways]
+    _, rest = await asyncio.wait(tasks, return_when=asyncio.FIRST_COMPLETED)
+    for task in rest:
+        task.cancel()
+    for task in tasks:
+        with suppress(WebSocketDisconnect, RuntimeError, asyncio.CancelledError):
+            await task
+
+
+async def _hear(socket: WebSocket, room: Room, live: Live) -> None:
+    recent: deque[float] = deque(maxlen=PER_SECOND)
+    async for text in socket.iter_text():
+        now = time.monotonic()
+        if len(recent) == PER_SECOND and now - recent[0] < 1.0:
+            continue  # too many: this one is not heard
+        recent.append(now)
+        try:
+            order = parsed(text)
+            if not room.takes(socket):
+                raise UserError("Another page has the hand: this one watches.")
+            live.orders.append(order)
+        except UserError as error:
+            await socket.send_json({"said": str(error)})
+
+
+async def _show(socket: WebSocket, live: Live) -> None:
+    """Send the newest picture, never a queue of old ones: a slow line misses some."""
+    seen, said = 0, ""
+    while not live.closed:
+        seen, before = await run_in_threadpool(live.wait, seen, PATIENCE), seen
+        if live.said != said:
+            said = live.said
+            await socket.send_json({"said": said})
+        if seen > before:
+            await socket.send_bytes(live.latest)
+    await socket.send_json({"said": "Another run is simulated now.", "over": True})

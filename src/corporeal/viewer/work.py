@@ -1,0 +1,88 @@
+"""What a page may start: runs of uploads, and runs like others with something changed."""
+
+import secrets
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+from starlette.concurrency import run_in_threadpool
+from starlette.requests import Request
+from starlette.responses import JSONResponse, Response
+from starlette.routing import BaseRoute, Route
+
+from corporeal.errors import UserError
+from corporeal.materials.library import library
+from corporeal.pipeline import Settings
+from corporeal.viewer.edits import DETAILS, changed, new_name
+from corporeal.viewer.queue import Asked, Queue
+from corporeal.viewer.shelf import Shelf
+from corporeal.viewer.site import answered
+from corporeal.viewer.uploads import Inbox, upload_route
+
+FIRST = "fill"
+"""The last verb of a first look: then every part's material can be seen and changed."""
+
+
+class Work:
+    """Uploads and jobs of one server."""
+
+    def __init__(self, shelf: Shelf, runs: Path) -> None:
+        self.shelf, self.runs = shelf, runs
+        self.inbox, self.queue = Inbox(runs), Queue(runs)
+
+    def routes(self) -> tuple[BaseRoute, ...]:
+        """Return what a page may ask."""
+        return (
+            upload_route(self.inbox),
+            Route("/jobs", self._jobs),
+            Route("/materials", self._materials),
+            Route("/jobs/start", answered(self.start), methods=["POST"]),
+            Route("/jobs/stop", answered(self.stop), methods=["POST"]),
+            Route("/jobs/go-on", answered(self.go_on), methods=["POST"]),
+            Route("/jobs/change", answered(self.change), methods=["POST"]),
+        )
+
+    def start(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Run an upload: ``upload``, ``name``, ``detail``, ``first`` (only as far as materials)."""
+        source = self.inbox.find(str(asked.get("upload", "")))
+        detail = asked.get("detail", DETAILS[0])
+        if detail not in DETAILS:
+            raise UserError(f"Unknown detail. Choose one of: {', '.join(DETAILS)}.")
+        settings = _with_detail(Settings(), detail)
+        name = new_name(self.runs, str(asked.get("name", ""))[:80])
+        (self.runs / name).mkdir()
+        until = FIRST if asked.get("first") is True else "report"
+        job = Asked(secrets.token_hex(8), name, (str(source.resolve()),), until)
+        return {"id": self.queue.add(job, settings).id, "name": name}
+
+    def change(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Run another run again with something changed: see ``edits.changed``; ``run`` names it."""
+        name = str(asked.get("run", ""))
+        made = self.shelf.made(name).results
+        job, settings = changed(self.shelf.path(name), made, asked)
+        return {"id": self.queue.add(job, settings).id, "name": job.name}
+
+    def stop(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Stop a job: ``id``."""
+        self.queue.stop(str(asked.get("id", "")))
+        return {}
+
+    def go_on(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Go on with a job that ended: ``id``."""
+        self.queue.go_on(str(asked.get("id", "")))
+        return {}
+
+    async def _jobs(self, request: Request) -> Response:
+        return JSONResponse({"jobs": await run_in_threadpool(self.queue.listed)})
+
+    async def _materials(self, request: Request) -> Response:
+        rows = [{"name": e.name, "group": e.group} for e in library().values()]
+        return JSONResponse({"materials": rows})
+
+    def close(self) -> None:
+        """End what runs; it goes on with the next server."""
+        self.queue.close()
+
+
+def _with_detail(settings: Settings, detail: Any) -> Settings:
+    return replace(settings, fill=replace(settings.fill, detail=detail))

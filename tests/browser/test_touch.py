@@ -1,0 +1,76 @@
+"""A simulation that runs is touched with the mouse, in a real browser."""
+
+import time
+
+import numpy as np
+import pytest
+
+from chromium import browser
+
+READY = "window.viewer?.stats.ready && viewer.stats.drawn > 2"
+MIDDLE = """(() => {
+  const stage = viewer.stages[0], mesh = stage.meshes.find(m => m.surface.object === OBJECT)
+  mesh.geometry.computeBoundingBox()
+  const w = mesh.geometry.boundingBox.getCenter(viewer.eye.position.clone())
+  const z = w.applyMatrix4(mesh.matrix).z, c = w.project(viewer.eye)
+  const r = viewer.canvas.getBoundingClientRect()
+  return [r.left + (c.x + 1) / 2 * r.width, r.top + (1 - c.y) / 2 * r.height, z] })()"""
+RISEN = 0.1
+"""[m]"""
+
+
+@pytest.mark.slow
+def test_the_mouse_lifts_a_ball_and_the_force_at_rest_is_its_weight(small_run, tmp_path):
+    from corporeal.viewer.live import Room
+    from corporeal.viewer.shelf import Shelf
+    from corporeal.viewer.site import Shown, site
+    from corporeal.viewer.socket import live_route
+    from viewer_served import LOCAL, serving
+
+    shelf = Shelf((), small_run.parent)
+    room = Room(shelf.made)
+    app = site(Shown(shelf), LOCAL, (live_route(room),))
+    with serving(app) as server, browser(tmp_path) as tab:
+        tab.open(f"{server.address}/view/drop")
+        tab.until(READY)
+        tab.run("viewer.openTab('Touch')")
+        tab.until("viewer.stats.got > 5 && viewer.stats.time > 0.3")
+        live = room.live
+        assert live is not None
+        # Lift the stone, and hold it.
+        x, y, before = tab.run(MIDDLE.replace("OBJECT", "1"))
+        tab.mouse("mouseMoved", x, y, button="none", buttons=0)
+        tab.mouse("mousePressed", x, y)
+        for k in range(30):
+            tab.mouse("mouseMoved", x, y - 10 * k)
+            time.sleep(0.03)
+        tab.until("viewer.live.grip?.to")
+        tab.until(f"{MIDDLE.replace('OBJECT', '1')}[2] > {before + RISEN}")
+        body = int(np.flatnonzero(live.posed.object_of_body == 1)[0])
+        weight = float(live.hands.engine.measure().mass[body]) * 9.81
+        tab.until(f"Math.abs(viewer.stats.force / {weight} - 1) < 0.05")
+        # Without gravity nothing is left to hold.
+        tab.run("viewer.pages.get('Touch') && viewer.live.tell({do: 'gravity', to: [0, 0, 0]})")
+        tab.until(f"viewer.stats.force < {0.05 * weight}")
+        tab.mouse("mouseReleased", x, y - 290)
+        tab.until("viewer.live.grip === null")
+        # A pause holds, and what was done can be done again, bit for bit.
+        tab.press(" ")
+        tab.until("!viewer.playing")
+        time.sleep(0.3)
+        then = live.hands.engine.time
+        time.sleep(0.3)
+        assert live.hands.engine.time == then
+        again = type(live.hands)(live.posed, live.posed.problem, threads=1)
+        again.replay(live.hands.touches)
+        now, then = live.hands.engine.snapshot(), again.engine.snapshot()
+        np.testing.assert_array_equal(now.position, then.position)
+        np.testing.assert_array_equal(now.velocity, then.velocity)
+        # Back to what was recorded; the simulation ends with its last visitor.
+        tab.run("viewer.openTab('Look')")
+        tab.until("viewer.stages[0].frame >= 0")
+        end = time.monotonic() + 20
+        while room.live is not None and time.monotonic() < end:
+            time.sleep(0.1)
+        assert room.live is None
+        assert tab.errors == []

@@ -1,0 +1,63 @@
+"""What a page may ask of a live simulation."""
+
+import json
+
+import pytest
+
+from corporeal.errors import UserError
+from corporeal.treatment.live_quality import CELLS, COST, FEWEST, MOST, SHARE, live_quality
+from corporeal.viewer.orders import FARTHEST, FIRMEST, STRONGEST, Order, parsed
+
+
+def order(**given):
+    return parsed(json.dumps(given))
+
+
+def test_an_order_is_read():
+    asked = order(do="grab", seq=3, object=1, point=[0, 0.1, 2], to=[1, 2, 3], firm=2)
+    assert asked == Order("grab", 3, 1, (0, 0.1, 2), (1, 2, 3), 2.0)
+    assert order(do="contact", single=True).single and not order(do="contact", single=1).single
+
+
+@pytest.mark.parametrize(
+    "text",
+    [
+        "", "[]", "null", "7", '"grab"', "{", '{"do": "run"}', '{"do": ["grab"]}', "[" * 3000,
+        '{"do": "pull", "to": [1, 2]}', '{"do": "pull", "to": [1, 2, NaN]}',
+        '{"do": "pull", "to": [1, 2, 1e999]}', '{"do": "pull", "to": [1, 2, "3"]}',
+        '{"do": "pull", "to": {"0": 1}}', '{"do": "grab", "firm": -Infinity}',
+        '{"do": "grab", "object": 1.5}', '{"do": "grab", "object": -1}',
+        '{"do": "grab", "object": true}', '{"do": "step", "seq": 1e300}',
+        '{"do": "step", "x": "' + "a" * 5000 + '"}',
+    ],
+)  # fmt: skip
+def test_everything_else_is_refused(text):
+    with pytest.raises(UserError):
+        parsed(text)
+
+
+def test_numbers_are_bounded():
+    assert order(do="pull", to=[1e6, -1e6, 5]).to == (FARTHEST, -FARTHEST, 5)
+    assert order(do="gravity", to=[0, 0, -1e4]).to == (0, 0, -STRONGEST)
+    assert order(do="grab", firm=1e5).firm == FIRMEST
+
+
+@pytest.mark.parametrize("count", [10, 2_000, 20_000, 400_000])
+@pytest.mark.parametrize("threads", [1, 4])
+def test_a_live_quality_fits_into_its_share_of_the_threads(count, threads):
+    found = live_quality(count, "draft", threads)
+    assert found.cells_across in CELLS
+    particles = count * (found.cells_across / 8) ** 3
+    cost = COST * particles * found.steps_per_second
+    assert FEWEST <= found.steps_per_second <= MOST
+    assert cost <= SHARE * threads * 1.001 or (
+        found.cells_across == CELLS[-1] and found.steps_per_second == FEWEST
+    )
+
+
+def test_spare_time_buys_cells_and_then_steps():
+    few, many = live_quality(500, "draft", 2), live_quality(30_000, "draft", 2)
+    assert few.cells_across == CELLS[0] and few.steps_per_second == MOST
+    assert many.cells_across < few.cells_across
+    finer = live_quality(30_000, "draft", 4)
+    assert (finer.cells_across, finer.steps_per_second) > (many.cells_across, 0)
