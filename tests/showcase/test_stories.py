@@ -40,26 +40,26 @@ def test_everything_that_must_be_seen_is_seen(story, name):
     met = {e.sentence: e.met for e in told.expectations()}
     assert met and all(met.values()), met
     audit = told.audit
-    assert audit["nan_count"] == audit["particles_out_of_domain"] == 0
-    assert audit["momentum_residual"] < 1e-4
+    assert audit.nan_count == audit.particles_out_of_domain == 0
+    assert audit.momentum_residual < 1e-4
 
 
 def test_the_can_keeps_a_dent_where_the_duck_struck_and_the_duck_recovers(story):
     happened = story("duck-on-can", "multi").outcome
-    can, duck = (happened["objects"][f"{thing}_0"] for thing in ("soda_can", "rubber_duck"))
-    assert can["dent_depth_dx"] > 1
-    assert can["dent_from_contact_m"]["rubber_duck_0"] < duck["length_m"] / 3
-    assert duck["shape_error_end"] < 0.03
-    assert duck["shape_error_max"] > 0.005
+    can, duck = (happened.objects[f"{thing}_0"] for thing in ("soda_can", "rubber_duck"))
+    assert can.dent_depth_dx > 1
+    assert can.dent_from_contact_m["rubber_duck_0"] < duck.length_m / 3
+    assert duck.shape_error_end < 0.03
+    assert duck.shape_error_max > 0.005
     assert dent_from_impact(happened) < 1 / 3
 
 
 def test_vase_ball_and_armchair_touch_in_order_and_end_apart(story):
     happened = story("vase-ball-armchair", "multi").outcome
-    assert happened["order"] == [["vase_0", "ball_0"], ["ball_0", "armchair_0"]]
-    for pair in ("vase_0|ball_0", "ball_0|armchair_0"):
-        assert happened["pairs"][pair]["separated"]
-        assert happened["pairs"][pair]["gap_end_dx"] > CELL_APART
+    assert happened.order == (("vase_0", "ball_0"), ("ball_0", "armchair_0"))
+    for pair in happened.order:
+        assert happened.pair(*pair).separated
+        assert happened.pair(*pair).gap_end_dx > CELL_APART
 
 
 def test_on_a_single_grid_the_vase_sticks_to_the_ball(story):
@@ -68,7 +68,7 @@ def test_on_a_single_grid_the_vase_sticks_to_the_ball(story):
     A single field knows no pairs, so its booked contacts say nothing: the gaps over time do.
     """
     glued = story("vase-ball-armchair", "single", LONG_ENOUGH)
-    assert glued.audit["nan_count"] == glued.audit["particles_out_of_domain"] == 0
+    assert glued.audit.nan_count == glued.audit.particles_out_of_domain == 0
     vase_to_ball = glued.gap(0, 1)
     met = int(np.argmax(vase_to_ball < CELL_APART))
     assert met > 0, "the vase comes within a cell of the ball"

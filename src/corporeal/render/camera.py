@@ -9,7 +9,7 @@ from jaxtyping import Float
 from corporeal.types import Camera, Vector
 
 VIEW: Vector = (0.80, -0.62, 0.36)
-"""Three-quarter view: things face +x."""
+"""Three-quarter view: objects face +x."""
 FILL = 0.84
 """Share of the picture that the motion takes at most."""
 LOWEST, HIGHEST = 0.17, 0.96

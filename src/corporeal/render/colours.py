@@ -7,6 +7,7 @@ import matplotlib
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.mpm.laws import MENU
 from corporeal.types import Law
 
 SALT = "s41605"
@@ -14,14 +15,10 @@ SALT = "s41605"
 HUES = 30
 TIERS = ((0.52, 0.115), (0.66, 0.125), (0.79, 0.105), (0.40, 0.085))
 """Lightness and chroma of OKLCH."""
-LAWS = {
-    Law.COROTATED: ("fixed corotated", "#4477aa"),
-    Law.NEO_HOOKEAN: ("Neo-Hookean", "#228833"),
-    Law.HENCKY: ("Hencky", "#66ccee"),
-    Law.DRUCKER_PRAGER: ("Drucker–Prager", "#ccbb44"),
-    Law.VON_MISES: ("von Mises", "#aa3377"),
-}
-"""What each law is called in figures, and its colour (Tol's bright scheme)."""
+BRIGHT = ("#4477aa", "#228833", "#66ccee", "#ccbb44", "#aa3377", "#ee6677")
+"""Tol's bright scheme, without its grey."""
+LAWS = {law: (MENU[law].name, BRIGHT[law.value % len(BRIGHT)]) for law in Law}
+"""What each law is called in figures, and its colour."""
 OBJECTS = (
     "#4477aa", "#ee6677", "#228833", "#ccbb44", "#66ccee", "#aa3377", "#ee8866", "#77aadd",
     "#44bb99", "#ffaabb", "#999933", "#882255",

@@ -13,7 +13,9 @@ from typing import Literal
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
+from jaxtyping import Float32
 
+from corporeal.geometry.srgb import linear
 from corporeal.machine import cores
 from corporeal.render import kernels, kernels_light
 from corporeal.render.camera import Aim, axes
@@ -21,7 +23,6 @@ from corporeal.render.kernels import NOTHING, Samples
 from corporeal.render.kernels_light import CHANNELS, GLOSSY, SHARP, Lamps
 from corporeal.render.look import (
     Look,
-    linear,
     pack,
     painted,
     positions,
@@ -174,8 +175,8 @@ def render(
 def identify(stage: Stage, camera: Aim, grid: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """For each sample, the triangle it sees (-1: none) and its depth [m]; rows first."""
     job = _Job(stage, camera, Sampling(grid, 1, 1))
-    o, d = job.rays((0, camera.height))
-    prim, _, _, t = stage.hit(o, d)
+    rays = job.rays((0, camera.height))
+    prim, _, _, t = stage.hit(rays.origin, rays.direction)
     shape = camera.height * grid, camera.width * grid
     return prim.reshape(shape), t.reshape(shape)
 
@@ -189,7 +190,8 @@ def first_seen(stage: Stage, camera: Aim) -> Samples:
     seen = kernels.samples(camera.width * camera.height)
     lines = max(1, WORTH_A_BATCH // camera.width)
     for row in range(0, camera.height, lines):
-        o, d = job.rays((row, min(row + lines, camera.height)))
+        rays = job.rays((row, min(row + lines, camera.height)))
+        o, d = rays.origin, rays.direction
         part = slice(row * camera.width, row * camera.width + len(o))
         met = job.meet(o, d, np.arange(len(o)), stage.hit(o, d))
         for whole, piece in zip(seen, met, strict=True):
@@ -227,6 +229,26 @@ def lamps(stage: Stage, camera: Aim) -> Lamps:
     )
 
 
+@dataclass(frozen=True)
+class _Rays:
+    """R rays from the camera, or from behind what they passed."""
+
+    origin: Float32[np.ndarray, "R 3"]
+    """[m], in the stage's frame."""
+    direction: Float32[np.ndarray, "R 3"]
+    """Unit."""
+
+
+@dataclass(frozen=True)
+class _Block:
+    """Some rows of a picture's samples."""
+
+    first: int
+    """Its first row in the picture."""
+    rows: int
+    columns: int
+
+
 class _Job:
     """One picture being taken."""
 
@@ -238,9 +260,9 @@ class _Job:
         self.lamps = lamps(stage, camera)
         self.pixel = 2 * self.tangent / (camera.height * sampling.grid)
 
-    def rays(self, rows: tuple[int, int]) -> tuple[np.ndarray, np.ndarray]:
-        size = self.camera.width, self.camera.height
-        return kernels.rays(self.eye, self.frame, self.tangent, size, rows, self.sampling.grid)
+    def rays(self, rows: tuple[int, int]) -> _Rays:
+        size, grid = (self.camera.width, self.camera.height), self.sampling.grid
+        return _Rays(*kernels.rays(self.eye, self.frame, self.tangent, size, rows, grid))
 
     def band(self, rows: tuple[int, int], out: np.ndarray) -> None:
         """Cast some rows with as many more above and below as the light filter looks at."""
@@ -248,34 +270,35 @@ class _Job:
         height, width = self.camera.height, self.camera.width
         halo = -(-6 * every // grid)
         wide = max(rows[0] - halo, 0), min(rows[1] + halo, height)
-        o, d = self.rays(wide)
+        # The studio behind everything, where rays miss.
+        rays = self.rays(wide)
+        o, d = rays.origin, rays.direction
         light = np.empty((len(o), 3), np.float32)
         kernels_light.backdrop(self.lamps, wide, height, width, grid, light)
         shape = (wide[1] - wide[0]) * grid, width * grid
         hit = self.stage.hit(o, d) if self.stage.shown else self.stage.missed(o)
+        # Shade what is worth a sample of its own; the rest takes its neighbours' light.
         looked = kernels.worth(hit[0], shape, every)
         index = np.flatnonzero(looked)
         hit = tuple(x[index] for x in hit)
-        self.layer((o, d), index, (wide[0] * grid, *shape), light, hit)
+        self.layer(rays, index, _Block(wide[0] * grid, *shape), light, hit)
         kernels.fill(light, looked, shape, every)
+        # Develop the band's own rows only, without the halo.
         line = width * grid * grid
         mine = light[(rows[0] - wide[0]) * line : (rows[1] - wide[0]) * line]
         kernels_light.develop(mine, rows, (width, height), grid, out)
 
     def layer(
         self,
-        rays: tuple[np.ndarray, np.ndarray],
+        rays: _Rays,
         index: np.ndarray,
-        place: tuple[int, int, int],
+        block: _Block,
         light: np.ndarray,
         hit: tuple[np.ndarray, ...],
         depth: int = 0,
     ) -> None:
-        """Shade what rays ``index`` (origins, directions) hit, over what is behind, into light.
-
-        place: first row of samples, rows, columns.
-        """
-        o, d = rays
+        """Shade what rays ``index`` hit, over what is behind, into light."""
+        o, d = rays.origin, rays.direction
         s = self.meet(o, d, index, hit)
         thin = index[s.traits[index, 4] < 1]
         if len(thin) and depth < LAYERS:
@@ -283,9 +306,9 @@ class _Job:
             start = np.zeros_like(o)
             start[thin] = behind
             beyond = self.stage.hit(behind, d[thin])
-            self.layer((start, d), thin, place, light, beyond, depth + 1)
+            self.layer(_Rays(start, d), thin, block, light, beyond, depth + 1)
         on = index[s.kind[index] != NOTHING]
-        arriving = self.gather(s, d, on, place)
+        arriving = self.gather(s, d, on, block)
         near = np.zeros_like(light)
         kernels_light.shade(s, on, d, arriving, self.lamps, near)
         kernels_light.blend(s, on, near, self.lamps, light)
@@ -313,11 +336,9 @@ class _Job:
             hit = stage.hit(o, e)
         return s
 
-    def gather(
-        self, s: Samples, d: np.ndarray, on: np.ndarray, place: tuple[int, int, int]
-    ) -> np.ndarray:
+    def gather(self, s: Samples, d: np.ndarray, on: np.ndarray, block: _Block) -> np.ndarray:
         """Light (G, CHANNELS) that arrives at the samples ``on``."""
-        first, height, width = place
+        first, height, width = block.first, block.rows, block.columns
         every = self.sampling.every
         rows = np.arange(-first % every, height, every)
         chosen = (rows[:, None] * width + np.arange(0, width, every)).ravel()
@@ -326,7 +347,7 @@ class _Job:
         present[on] = True
         active = present[chosen]
         lattice = np.zeros((len(chosen), CHANNELS), np.float32)
-        lattice[active] = self.ask(s, d, chosen[active], place, self.sampling.sky)
+        lattice[active] = self.ask(s, d, chosen[active], block, self.sampling.sky)
         normal = s.normal[chosen].reshape(*shape, 3)
         depth = np.log(np.maximum(s.depth[chosen], 1e-12)).reshape(shape)
         grid = active.reshape(shape)
@@ -337,18 +358,18 @@ class _Job:
             s, on, (height, width), lattice, normal, depth, grid, every, light
         )
         lone = np.flatnonzero(missing)
-        light[lone] = self.ask(s, d, lone, place, 2 * self.sampling.sky)
+        light[lone] = self.ask(s, d, lone, block, 2 * self.sampling.sky)
         sharp = on[(s.traits[on, 1] <= SHARP) & (s.kind[on] == kernels.THING)]
         if len(sharp):
             self.reflect(s, d, sharp, np.zeros(len(sharp), np.int64), light, sharp)
         return light
 
     def ask(
-        self, s: Samples, d: np.ndarray, index: np.ndarray, place: tuple[int, int, int], sky: int
+        self, s: Samples, d: np.ndarray, index: np.ndarray, block: _Block, sky: int
     ) -> np.ndarray:
         """Send rays to sky and sun and along the mirrored direction."""
         stage, every = self.stage, self.sampling.every
-        row, column = index // place[2] + place[0], index % place[2]
+        row, column = index // block.columns + block.first, index % block.columns
         cells = ((row // every % 4) * 4 + column // every % 4) * 7 % 16
         pixels = row * 65536 + column
         light = np.zeros((len(index), CHANNELS), np.float32)

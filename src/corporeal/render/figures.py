@@ -15,10 +15,10 @@ from matplotlib.patches import Patch
 from PIL import Image, ImageDraw, ImageFont
 
 from corporeal.errors import UserError
+from corporeal.geometry.srgb import linear
 from corporeal.render import colours, video
 from corporeal.render.camera import place
 from corporeal.render.embree import Light, Stage, identify, render
-from corporeal.render.look import linear
 from corporeal.store import writing
 from corporeal.types import Film, MaterialField, Parts, Scene
 
@@ -112,17 +112,30 @@ def strip(film: Film, path: Path, count: int = 6, width: int = 340) -> None:
     pictures = video.pictures(film.path, numbers)
     if not pictures:
         raise UserError(f"{film.path}: has no frames. Make it again.")
-    height = round(width * film.height / film.width)
+    small = (width, round(width * film.height / film.width))
+    shown = [
+        np.asarray(Image.fromarray(p).resize(small, Image.Resampling.LANCZOS)) for p in pictures
+    ]
+    times = [film.times[k] if film.times else k / film.fps for k in numbers]
+    row_of(shown, [f"{t:.2f} s" for t in times], path)
+
+
+def row_of(pictures: Sequence[np.ndarray], words: Sequence[str], path: Path) -> None:
+    """Set pictures of one size in a row with thin white gaps, each over its words.
+
+    Raises:
+        UserError: The file cannot be written.
+
+    """
+    height, width = pictures[0].shape[:2]
     gap, foot = 6, 30
-    size = len(pictures) * (width + gap) - gap, height + foot
-    row = Image.new("RGB", size, "white")
+    row = Image.new("RGB", (len(pictures) * (width + gap) - gap, height + foot), "white")
     draw = ImageDraw.Draw(row)
     font = ImageFont.load_default(size=17)
-    for k, (number, picture) in enumerate(zip(numbers, pictures, strict=True)):
-        small = Image.fromarray(picture).resize((width, height), Image.Resampling.LANCZOS)
-        row.paste(small, (k * (width + gap), 0))
+    for k, (picture, said) in enumerate(zip(pictures, words, strict=True)):
+        row.paste(Image.fromarray(picture), (k * (width + gap), 0))
         middle = (k * (width + gap) + width / 2, height + foot / 2 + 1)
-        draw.text(middle, f"{number / film.fps:.2f} s", fill=INK, font=font, anchor="mm")
+        draw.text(middle, said, fill=INK, font=font, anchor="mm")
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(f".{path.stem}.{os.getpid()}.part.png")

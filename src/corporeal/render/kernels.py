@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from corporeal.geometry.srgb import linear
 from corporeal.render.look import (
     ALPHA,
     CUT,
@@ -18,7 +19,6 @@ from corporeal.render.look import (
     TEXTURE,
     TRANSLUCENT,
     TRANSMIT,
-    linear,
 )
 
 JIT = {"nogil": True, "cache": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
@@ -283,7 +283,7 @@ def _meet_floor(floor, o, d, g, out):
 
 @numba.njit(**JIT)
 def worth(prim, shape, every):
-    """Which samples need a look of their own: one of each block (every × every) of no things."""
+    """Which samples need a look of their own: one of each block (every × every) of no objects."""
     out = np.ones(len(prim), np.bool_)
     for i in range(0, shape[0], every):
         for j in range(0, shape[1], every):

@@ -16,7 +16,7 @@ from corporeal.render.kernels import FLOOR, JIT, THING, colour, dot, hash01
 SHARP = 0.2
 """Roughness up to which each sample follows its own mirrored ray."""
 GLOSSY = 0.45
-"""Roughness up to which things are seen mirrored at all."""
+"""Roughness up to which objects are seen mirrored at all."""
 CHANNELS = 7
 """Of light: sky above, its height, floor below, sun, mirrored RGB."""
 
@@ -27,7 +27,7 @@ class Lamps(NamedTuple):
     sun: np.ndarray
     """(3,) unit, towards the sun"""
     side: np.ndarray
-    """(3,) unit, towards the strip light that shiny things mirror"""
+    """(3,) unit, towards the strip light that shiny objects mirror"""
     sun_colour: np.ndarray
     softness: float
     """Angular radius of the sun [rad]: a large softbox rather than a point."""
@@ -85,7 +85,7 @@ def gather_sky(s, index, w, free, lamps, share, light):
             light[k, 0] += share
             light[k, 1] += share * w[k, 2]
         else:
-            # The floor is darker right under things.
+            # The floor is darker right under objects.
             gap = min(max((s.point[g, 2] - lamps.floor[3]) / (0.1 * lamps.size), 0), 1)
             light[k, 2] += share * (0.35 + 0.75 * gap)
 
@@ -173,7 +173,7 @@ def _studio(w, blur, lamps, out):
 
 @numba.njit(**JIT)
 def mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first):
-    """Write what was mirrored into light[:, first:first+3]: things roughly lit, or the studio."""
+    """Write what was mirrored into light[:, first:first+3]: objects roughly lit, or the studio."""
     rgba = np.empty(4, np.float32)
     for k in range(len(index)):
         rough = s.traits[index[k], 1]

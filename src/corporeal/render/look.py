@@ -6,6 +6,7 @@ import numpy as np
 from PIL import Image
 
 from corporeal.geometry.mesh import joined
+from corporeal.geometry.srgb import encoded, linear
 from corporeal.types import Finish, Scene, Surface
 
 TEXTURE_LIMIT = 2048
@@ -87,18 +88,6 @@ def positions(scene: Scene) -> np.ndarray:
     """(V, 3) of all surfaces in order [m]."""
     places = _join([s.vertices for s in scene.surfaces], (0, 3), np.float64)
     return np.where(np.all(np.isfinite(places), axis=1)[:, None], places, 0.0)
-
-
-def linear(colour: np.ndarray) -> np.ndarray:
-    """SRGB in [0, 1] to linear light (IEC 61966-2-1)."""
-    c = np.asarray(colour, dtype=np.float64)
-    return np.where(c <= 0.04045, c / 12.92, ((np.maximum(c, 0) + 0.055) / 1.055) ** 2.4)
-
-
-def encoded(light: np.ndarray) -> np.ndarray:
-    """Linear light in [0, 1] to sRGB."""
-    c = np.clip(light, 0, 1)
-    return np.where(c <= 0.0031308, 12.92 * c, 1.055 * np.maximum(c, 1e-9) ** (1 / 2.4) - 0.055)
 
 
 def _join(arrays: list[np.ndarray], empty: tuple[int, ...], kind: type) -> np.ndarray:

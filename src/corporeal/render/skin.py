@@ -63,37 +63,46 @@ class Skin:
         return now, F
 
 
+@dataclass(frozen=True)
+class _Owners:
+    """What every vertex belongs to; V vertices."""
+
+    part: Int[np.ndarray, " V"]
+    """-1: none."""
+    object: Int[np.ndarray, " V"]
+
+
 def bind(scene: Scene, parts: Parts, particles: Particles, loose: Bool[np.ndarray, " K"]) -> Skin:
     """Bind every vertex to the nearest particles of its own part, or else of its own object.
 
     loose: which parts are granular.
     """
-    part, thing = _owners(scene, parts)
-    return _bound(positions(scene), vertex_normals(scene), (part, thing), particles, loose)
+    owners = _owners(scene, parts)
+    return _bound(positions(scene), vertex_normals(scene), owners, particles, loose)
 
 
 def bind_points(
     points: Float[np.ndarray, "V 3"],
-    thing: Int[np.ndarray, " V"],
+    object_of_point: Int[np.ndarray, " V"],
     particles: Particles,
     loose: Bool[np.ndarray, " K"],
 ) -> Skin:
     """Bind every point to the nearest particles of its own object; without any it stays."""
     points = np.ascontiguousarray(points, dtype=np.float64)
-    owners = np.full(len(points), -1), np.asarray(thing)
+    owners = _Owners(np.full(len(points), -1), np.asarray(object_of_point))
     return _bound(points, np.zeros_like(points), owners, particles, loose)
 
 
 def _bound(
     rest: np.ndarray,
     normals: np.ndarray,
-    owners: tuple[np.ndarray, np.ndarray],
+    owners: _Owners,
     particles: Particles,
     loose: np.ndarray,
 ) -> Skin:
     near = np.zeros((len(rest), NEIGHBOURS), dtype=np.int64)
     weight = np.zeros((len(rest), NEIGHBOURS))
-    for vertices, own in _families(*owners, particles):
+    for vertices, own in _carried(owners, particles):
         near[vertices], weight[vertices] = _nearest(rest[vertices], own, particles.position)
     return Skin(
         rest=rest,
@@ -130,10 +139,9 @@ def bounded(
     return F
 
 
-def _owners(scene: Scene, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
-    """Part (-1: none) and object of every vertex."""
+def _owners(scene: Scene, parts: Parts) -> _Owners:
     counts = [len(s.vertices) for s in scene.surfaces]
-    thing = np.repeat([s.object for s in scene.surfaces], counts).astype(np.int64)
+    number = np.repeat([s.object for s in scene.surfaces], counts).astype(np.int64)
     part = np.full(sum(counts), -1, dtype=np.int64)
     first, triangle = 0, 0
     for s in scene.surfaces:
@@ -141,15 +149,16 @@ def _owners(scene: Scene, parts: Parts) -> tuple[np.ndarray, np.ndarray]:
         for corner in range(3):
             part[first + s.triangles[:, corner]] = mine
         first, triangle = first + len(s.vertices), triangle + len(s.triangles)
-    return part, thing
+    return _Owners(part, number)
 
 
-def _families(part: np.ndarray, thing: np.ndarray, particles: Particles):
+def _carried(owners: _Owners, particles: Particles):
     """Vertices with the particles that may carry them."""
+    part, number = owners.part, owners.object
     for k in np.unique(part):
         of_part = np.flatnonzero(particles.part == k)
-        for j in np.unique(thing[part == k]):
-            vertices = np.flatnonzero((part == k) & (thing == j))
+        for j in np.unique(number[part == k]):
+            vertices = np.flatnonzero((part == k) & (number == j))
             own = of_part[particles.object[of_part] == j]
             if len(own) == 0:
                 own = np.flatnonzero(particles.object == j)

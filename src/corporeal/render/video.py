@@ -83,7 +83,7 @@ def reel(path: Path, fps: int, size: tuple[int, int], credit: str = "") -> Itera
         path: Of the film.
         fps: Pictures per second.
         size: Width and height [px].
-        credit: Whose things are to be seen, and under which licences; the film carries it.
+        credit: Whose objects are to be seen, and under which licences; the film carries it.
 
     Raises:
         UserError: The size is odd, the disk is full, or the encoder is missing or fails.

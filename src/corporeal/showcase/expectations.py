@@ -1,32 +1,22 @@
 """What must be seen in each showcase scene, as numbers: data, and a function that compares.
 
-The measures are those of ``mpm.audit.outcome``: per object, per pair, and who met whom in order.
+The measures are those of ``findings.Outcome``: per object, per pair, and who met whom in order.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from operator import attrgetter
 from typing import Any, Literal
 
-Outcome = dict[str, Any]
+from corporeal.findings import Expectation, ObjectOutcome, Outcome
+
 Measure = Callable[[Outcome], float | None]
 
 
 @dataclass(frozen=True)
-class Expectation:
-    """One thing that had to be seen, and whether it was."""
-
-    sentence: str
-    value: str
-    """What was measured, in words and units."""
-    target: str
-    """What it had to be."""
-    met: bool
-
-
-@dataclass(frozen=True)
 class Demand:
-    """One thing that must be seen in a scene."""
+    """One object that must be seen in a scene."""
 
     sentence: str
     measure: Measure
@@ -69,7 +59,7 @@ def expect(name: str, outcome: Outcome) -> list[Expectation]:
 
     Args:
         name: The scene's name.
-        outcome: As ``mpm.audit.outcome`` returns it.
+        outcome: What happened in it.
 
     """
     return [demand.compare(outcome) for demand in EXPECTED.get(name, ())]
@@ -78,22 +68,27 @@ def expect(name: str, outcome: Outcome) -> list[Expectation]:
 # ---------------------------------------------------------------- measures
 
 
+def only(outcome: Outcome, thing: str) -> ObjectOutcome:
+    """Return what happened to the only object of its kind."""
+    return outcome.objects[f"{thing}_0"]
+
+
 def of(thing: str, measure: str) -> Measure:
-    """Read one measure of the only object of its kind."""
-    return lambda outcome: outcome["objects"][f"{thing}_0"][measure]
+    """Read one field of ``ObjectOutcome`` of the only object of its kind."""
+    return lambda outcome: attrgetter(measure)(only(outcome, thing))
 
 
 def between(first: str, second: str, measure: str) -> Callable[[Outcome], Any]:
-    """Read one measure of a pair, in the scene's order."""
-    return lambda outcome: outcome["pairs"][f"{first}_0|{second}_0"][measure]
+    """Read one field of ``PairOutcome`` of the only objects of their kinds."""
+    return lambda outcome: attrgetter(measure)(outcome.pair(f"{first}_0", f"{second}_0"))
 
 
 def apart(first: str, second: str) -> Callable[[Outcome], bool]:
     """Say whether two met, parted for 0.1 s, and are more than a cell apart at the end."""
 
     def judge(outcome: Outcome) -> bool:
-        pair = outcome["pairs"][f"{first}_0|{second}_0"]
-        return bool(pair["separated"]) and pair["gap_end_dx"] > 1
+        pair = outcome.pair(f"{first}_0", f"{second}_0")
+        return bool(pair.separated) and pair.gap_end_dx is not None and pair.gap_end_dx > 1
 
     return judge
 
@@ -101,19 +96,19 @@ def apart(first: str, second: str) -> Callable[[Outcome], bool]:
 def met_in_order(*things: str) -> Callable[[Outcome], bool]:
     """Say whether neighbours in a row met one after the other, before any other pair."""
     pairs = [{f"{a}_0", f"{b}_0"} for a, b in pairwise(things)]
-    return lambda outcome: [set(p) for p in outcome["order"]][: len(pairs)] == pairs
+    return lambda outcome: [set(p) for p in outcome.order][: len(pairs)] == pairs
 
 
 def dent_from_impact(outcome: Outcome) -> float | None:
     """Distance of the can's dent from the first contact, as a share of the duck's length [-]."""
-    distance = outcome["objects"]["soda_can_0"]["dent_from_contact_m"].get("rubber_duck_0")
-    length = outcome["objects"]["rubber_duck_0"]["length_m"]
-    return None if distance is None else distance / length
+    distance = only(outcome, "soda_can").dent_from_contact_m.get("rubber_duck_0")
+    return None if distance is None else distance / only(outcome, "rubber_duck").length_m
 
 
 def rebounds_differ(outcome: Outcome) -> float | None:
     """Difference of two rebound heights, each as a share of its fall [-]."""
-    steel, rubber = (of(ball, "rebound_ratio")(outcome) for ball in ("steel_ball", "rubber_ball"))
+    steel = only(outcome, "steel_ball").rebound_ratio
+    rubber = only(outcome, "rubber_ball").rebound_ratio
     return None if steel is None or rubber is None else abs(steel - rubber)
 
 

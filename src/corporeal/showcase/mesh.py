@@ -9,6 +9,7 @@ from jaxtyping import Float, Int, UInt8
 from numpy.typing import ArrayLike
 from scipy.spatial.transform import Rotation
 
+from corporeal.geometry.srgb import linear
 from corporeal.types import Finish
 
 Point = tuple[float, float, float]
@@ -59,7 +60,7 @@ class Part:
 
 @dataclass(frozen=True)
 class Model:
-    """A thing: its parts, standing on z = 0 and facing +x."""
+    """An object: its parts, standing on z = 0 and facing +x."""
 
     name: str
     parts: tuple[Part, ...]
@@ -76,17 +77,12 @@ class Model:
         return np.stack([points.min(0), points.max(0)])
 
 
-def linear(hex_colour: str) -> Float[np.ndarray, "3"]:
-    """'#rrggbb' in sRGB to linear RGB in [0, 1] (IEC 61966-2-1)."""
-    c = np.array([int(hex_colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
-    return np.where(c <= 0.04045, c / 12.92, ((c + 0.055) / 1.055) ** 2.4)
-
-
 def plain(
     name: str, colour: str, roughness: float, metallic: float = 0.0, glow: float = 0.0
 ) -> Finish:
-    """Make a finish of one colour, given as '#rrggbb'."""
-    red, green, blue = (float(x) for x in linear(colour).round(6))
+    """Make a finish of one colour, given as '#rrggbb' in sRGB."""
+    rgb = np.array([int(colour[i : i + 2], 16) for i in (1, 3, 5)]) / 255
+    red, green, blue = (float(x) for x in linear(rgb).round(6))
     return Finish(name, (red, green, blue, 1.0), metallic=metallic, roughness=roughness, glow=glow)
 
 

@@ -1,4 +1,4 @@
-"""The showcase's models one by one: a pool of things that comes with the package."""
+"""The showcase's models one by one: a pool of objects that comes with the package."""
 
 from corporeal.errors import UnknownChoiceError
 from corporeal.showcase.models import MODELS

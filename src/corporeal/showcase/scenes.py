@@ -1,6 +1,6 @@
 """The seven showcase scenes: who stands where before the first step, and what is done to them.
 
-Metres, z up, floor at z = 0. A thing that falls from far above starts lower, at the speed that it
+Metres, z up, floor at z = 0. An object that falls from far above starts lower, at the speed that it
 has there: the film begins when something is about to happen. Nothing numerical is in a scene.
 """
 
@@ -50,7 +50,7 @@ class Composition:
     duration: float
     """[s]"""
     planted: dict[int, int] = field(default_factory=dict)
-    """Place of a thing that stands in another → place of that other, which makes room for it."""
+    """Place of an object that stands in another → place of that other, which makes room for it."""
 
 
 def fallen(height: float, gap: float) -> Point:
@@ -113,7 +113,7 @@ def vase_ball_armchair() -> Composition:
     """
     shove = Push((18.0, 0.0, 0.0), start=0.05, end=0.15)
     return Composition(
-        "Force passes through a row of things that part again: vase, ball, armchair.",
+        "Force passes through a row of objects that part again: vase, ball, armchair.",
         (
             Placed("vase", (-0.976, 0.0, 0.0), push=shove),
             Placed("ball", (-0.689, 0.0, 0.0)),
@@ -213,7 +213,7 @@ def alone(model: str) -> Scene:
 def scene_of(
     name: str, models: Sequence[Model], things: Sequence[Placed], duration: float
 ) -> Scene:
-    """Put models, one per thing, into a scene."""
+    """Put models, one per object, into a scene."""
     finishes = {id(p.finish): p.finish for m in models for p in m.parts}
     places = list(finishes)
     surfaces = tuple(

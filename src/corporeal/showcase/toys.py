@@ -1,4 +1,4 @@
-"""Small things: duck, balls, book, cushion."""
+"""Small objects: duck, balls, book, cushion."""
 
 from dataclasses import replace
 

@@ -1,4 +1,4 @@
-"""Turned things: can, vase, mug, floor lamp."""
+"""Turned objects: can, vase, mug, floor lamp."""
 
 from dataclasses import replace
 

@@ -1,0 +1,163 @@
+"""Where a film's camera stands: far enough to see everything, close to a contact, or alongside.
+
+Boxes are those of objects over time, nan where an object is absent or went far away.
+"""
+
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+from jaxtyping import Float
+from scipy.ndimage import gaussian_filter1d
+
+from corporeal.render.camera import Aim, place
+from corporeal.types import Ledger, Vector
+
+Shot = Literal["wide", "close", "follow"]
+SMOOTH = 0.12
+"""A camera that moves with something follows a mean over this time [s, standard deviation]."""
+MOVES = 0.1
+"""What travels farther than this share of its own size moves."""
+AROUND = 0.5
+"""Before and after a contact, what a close shot chooses its direction by [s]."""
+ROOM = 1.25
+"""Share of an object's largest box that a close shot keeps in the picture."""
+
+
+@dataclass(frozen=True)
+class Contact:
+    """The first time that two bodies touched."""
+
+    time: float
+    """[s]"""
+    objects: tuple[int, ...]
+    """Two, or the one that touched the floor or a wall."""
+
+
+def first_contact(ledger: Ledger, objects: int) -> Contact | None:
+    """Return the first contact of two objects after the start, or else that of one with a plane.
+
+    None: nothing touched anything that it did not touch from the start.
+    """
+    when = np.array(ledger.first_contact[-1], dtype=float)
+    start = float(ledger.time[0])
+    when[~(when > start)] = np.inf
+    between = when[:objects, :objects]
+    if between.size and np.isfinite(between.min()):
+        i, j = np.unravel_index(int(between.argmin()), between.shape)
+        return Contact(float(between.min()), (int(min(i, j)), int(max(i, j))))
+    planes = when[:objects, objects:]
+    if planes.size and np.isfinite(planes.min()):
+        i, _ = np.unravel_index(int(planes.argmin()), planes.shape)
+        return Contact(float(planes.min()), (int(i),))
+    return None
+
+
+@dataclass(frozen=True)
+class Reel:
+    """What moves, for whoever places a camera; F instants, B objects."""
+
+    time: Float[np.ndarray, " F"]
+    """[s]"""
+    boxes: Float[np.ndarray, "F B 2 3"]
+    """[m]"""
+    contact: Contact | None
+
+
+@dataclass(frozen=True)
+class Track:
+    """A camera that keeps its distance and direction, and looks where something goes."""
+
+    aim: Aim
+    """As it would stand if nothing moved."""
+    time: Float[np.ndarray, " F"]
+    """[s]"""
+    shift: Float[np.ndarray, "F 3"]
+    """[m]"""
+
+    def at(self, time: float) -> Aim:
+        """Return where it stands at a time [s]."""
+        x, y, z = (float(np.interp(time, self.time, self.shift[:, k])) for k in range(3))
+        (a, b, c), (p, q, r) = self.aim.eye, self.aim.target
+        return replace(self.aim, eye=(a + x, b + y, c + z), target=(p + x, q + y, r + z))
+
+
+def track(shot: Shot, reel: Reel, size: tuple[int, int], view: Vector | None) -> Track:
+    """Place the camera.
+
+    Args:
+        shot: wide: everything, all the time; close: the object that is struck first, or else that
+            moves most; follow: all that moves.
+        reel: What moves.
+        size: Of the picture [px].
+        view: Direction from the scene to the camera; None: where objects hide each other least.
+
+    """
+    seen = {"wide": [], "close": _struck(reel), "follow": _moving(reel)}[shot]
+    if not seen:
+        still = np.zeros((len(reel.time), 3))
+        return Track(place(reel.boxes, size, view), reel.time, still)
+    return _beside(reel, seen, size, view)
+
+
+def _struck(reel: Reel) -> list[int]:
+    """Return the lower of the two that touch first, or else what moves most."""
+    if reel.contact is not None:
+        k = int(np.argmin(np.abs(reel.time - reel.contact.time)))
+        height = {b: reel.boxes[k, b, :, 2].mean() for b in reel.contact.objects}
+        there = [b for b, z in height.items() if np.isfinite(z)]
+        return sorted(there, key=lambda b: height[b])[:1]
+    travel = _travel(reel)
+    return [int(np.argmax(travel))] if travel.size and travel.max() > 0 else []
+
+
+def _moving(reel: Reel) -> list[int]:
+    return np.flatnonzero(_travel(reel) > MOVES).tolist()
+
+
+def _travel(reel: Reel) -> Float[np.ndarray, " B"]:
+    """How far each object's box went or stretched, over the box's size [-]."""
+    size = np.linalg.norm(_extent(reel.boxes[:1])[0], axis=-1)
+    way = np.nan_to_num(np.abs(reel.boxes - reel.boxes[:1])).max(axis=(0, 2, 3), initial=0.0)
+    return way / np.where(size > 0, size, np.inf)
+
+
+def _extent(boxes: np.ndarray) -> np.ndarray:
+    return np.nan_to_num(boxes[:, :, 1] - boxes[:, :, 0])
+
+
+def _beside(reel: Reel, seen: list[int], size: tuple[int, int], view: Vector | None) -> Track:
+    """Move along with some objects, in the direction in which they are hidden least."""
+    union = np.stack(
+        [np.nanmin(reel.boxes[:, seen, 0], axis=1), np.nanmax(reel.boxes[:, seen, 1], axis=1)], 1
+    )
+    centre = _filled(union.mean(axis=1))
+    steps = np.diff(reel.time)
+    spread = SMOOTH / float(np.median(steps)) if len(steps) else 0.0
+    smooth = gaussian_filter1d(centre, max(spread, 1e-6), axis=0, mode="nearest")
+    # The direction is chosen at the contact, by those that touch.
+    pair, near = list(range(reel.boxes.shape[1])), np.ones(len(reel.time), bool)
+    if reel.contact is not None:
+        pair = sorted({*reel.contact.objects, *seen})
+        near = np.abs(reel.time - reel.contact.time) <= AROUND
+        near |= np.arange(len(near)) == int(np.argmin(np.abs(reel.time - reel.contact.time)))
+    chosen = place(reel.boxes[near][:, pair], size, view)
+    direction = np.subtract(chosen.eye, chosen.target)
+    # The distance is that at which the largest box fits, wherever it is.
+    half = ROOM / 2 * np.nanmax(union[:, 1] - union[:, 0], axis=0)
+    box = np.stack([smooth[0] - half, smooth[0] + half])
+    aim = place(box[None, None], size, (direction[0], direction[1], direction[2]))
+    shift = smooth - smooth[0]
+    # The eye stays above the floor.
+    shift[:, 2] = np.maximum(shift[:, 2], 0.1 * half.max() - aim.eye[2])
+    return Track(aim, reel.time, shift)
+
+
+def _filled(path: np.ndarray) -> np.ndarray:
+    """Stay where the last place is known."""
+    out = path.copy()
+    for k in range(3):
+        good = np.flatnonzero(np.isfinite(out[:, k]))
+        if len(good):
+            out[:, k] = np.interp(np.arange(len(out)), good, out[good, k])
+    return np.nan_to_num(out)

@@ -1,0 +1,24 @@
+"""What a sentence of warning is about: the part or the object that it names."""
+
+import re
+
+from corporeal.types import Parts, Scene
+
+
+def parts_named(sentence: str, scene: Scene, parts: Parts) -> list[int]:
+    """Return the parts that a sentence is about.
+
+    Those that it names as "object: part"; or else all parts of the objects that it names. A name
+    counts where no letter, digit or underscore stands beside it.
+    """
+    owners = [scene.objects[part.object].name for part in parts.catalogue]
+    named = [
+        k
+        for k, (owner, part) in enumerate(zip(owners, parts.catalogue, strict=True))
+        if _says(sentence, f"{owner}: {part.name}")
+    ]
+    return named or [k for k, owner in enumerate(owners) if _says(sentence, owner)]
+
+
+def _says(sentence: str, name: str) -> bool:
+    return bool(name) and re.search(rf"(?<!\w){re.escape(name)}(?!\w)", sentence) is not None

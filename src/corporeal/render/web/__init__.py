@@ -1,0 +1,1 @@
+"""Files of the viewer that a browser reads."""

@@ -1,0 +1,180 @@
+// Touch: the run simulated now, on the server, while somebody pulls at it.
+
+import * as THREE from './three.min.js'
+import { key, el, si, spoken, table } from './cards.js'
+
+const MOVED = 4 // a pointer that moves less is a click [px]
+const HEAD = 40 // bytes of a picture before its objects
+const WINDS = [0, 2, 5, 10, 20] // [m/s]
+const FIRMNESS = [['soft', 2], ['firm', 4], ['hard', 8]] // [Hz]
+const HAND = 0xb5482a
+
+export class Touch {
+  constructor(viewer, name) {
+    Object.assign(this, {viewer, name, news: null, seq: 0, sent: new Map(), grip: null, gravity: 9.81})
+    this.firm = el('select', {'aria-label': 'spring'}, FIRMNESS.map(([word, hz]) => el('option', {value: hz, selected: hz === 4}, word)))
+    this.pull = el('input', {type: 'range', min: 0, max: 20, step: .01, value: 9.81, 'aria-label': 'gravity', oninput: () => {
+      this.gravityWords.textContent = `${(+this.pull.value).toFixed(2)} m/s²`
+      this.tell({do: 'gravity', to: [0, 0, -this.pull.value]})
+    }})
+    this.gravityWords = el('b', {}, '9.81 m/s²')
+    const objects = viewer.takes[0].header.objects
+    this.who = el('select', {'aria-label': 'object in the wind'}, objects.map((o, k) => el('option', {value: k}, spoken(o.name))))
+    this.wind = el('select', {'aria-label': 'wind'}, WINDS.map(w => el('option', {value: w}, `${w} m/s`)))
+    const blow = () => {
+      const d = viewer.eye.getWorldDirection(new THREE.Vector3()), level = Math.hypot(d.x, d.y) || 1, w = +this.wind.value
+      this.tell({do: 'wind', object: +this.who.value, to: [w * d.x / level, w * d.y / level, 0]})
+    }
+    this.wind.onchange = blow
+    this.single = el('select', {'aria-label': 'contact', onchange: () => { this.single.value === 'single' ? this.tell({do: 'contact', single: true}) : this.tell({do: 'contact'}) }},
+      el('option', {value: 'multi'}, 'a velocity field per object'), el('option', {value: 'single'}, 'one for all (control)'))
+    this.said = el('p', {class: 'bad', role: 'alert'})
+    this.honest = el('p', {class: 'note'}, 'Starting …')
+    this.card = el('div', {class: 'picked'})
+    this.content = el('div', {}, this.honest, this.said,
+      el('p', {}, 'Drag an object to pull at it. Drag beside it to look around. A click opens its card. Wind blows away from you.'),
+      el('label', {class: 'line'}, 'spring', this.firm),
+      el('label', {class: 'line'}, 'gravity', this.pull, this.gravityWords),
+      el('label', {class: 'line'}, 'wind on', this.who, this.wind),
+      el('label', {class: 'line'}, 'contact', this.single),
+      el('button', {class: 'do', onclick: () => this.tell({do: 'reset'})}, 'Begin again'), this.card)
+    this.line = new THREE.Line(new THREE.BufferGeometry().setAttribute('position', new THREE.BufferAttribute(new Float32Array(6), 3)),
+      new THREE.LineBasicMaterial({color: HAND}))
+    this.line.frustumCulled = this.line.visible = false
+    viewer.stages[0].scene.add(this.line)
+  }
+
+  // ---------------------------------------------------------------- coming and going
+
+  enter() {
+    const viewer = this.viewer
+    if (viewer.live) return
+    viewer.live = this
+    viewer.state.textContent = 'live'
+    viewer.at.disabled = true
+    if (viewer.by.value === 'speed') { viewer.by.value = 'itself'; viewer.paint('itself') }
+    this.socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/live/${encodeURIComponent(this.name)}`)
+    this.socket.binaryType = 'arraybuffer'
+    this.socket.onmessage = event => this.hear(event.data)
+    this.socket.onclose = () => { if (viewer.live === this) { viewer.state.textContent = 'stopped'; this.said.textContent ||= 'The simulation has ended.' } }
+    viewer.playing = true
+    viewer.say()
+    this.socket.onopen = () => this.tell({do: 'play'})
+  }
+
+  leave() {
+    const viewer = this.viewer
+    if (viewer.live !== this) return
+    viewer.live = null
+    this.socket?.close()
+    this.news = this.rigid = null
+    this.line.visible = false
+    viewer.stages[0].liveTop = null
+    viewer.state.textContent = 'recorded'
+    viewer.at.disabled = false
+    viewer.honest.textContent = viewer.takes[0].header.honest
+    viewer.hud.replaceChildren()
+    viewer.stages[0].frame = -1
+    viewer.shownAt = null
+    viewer.touch()
+  }
+
+  tell(order) {
+    if (this.socket?.readyState !== 1) return
+    order.seq = ++this.seq
+    this.sent.set(this.seq, performance.now())
+    this.socket.send(JSON.stringify(order))
+  }
+
+  hear(data) {
+    if (typeof data !== 'string') { this.news = data; this.viewer.stats.got = (this.viewer.stats.got ?? 0) + 1; return }
+    const told = JSON.parse(data)
+    if (told.rigid) {
+      this.rigid = told.rigid
+      this.honest.textContent = this.viewer.honest.textContent = told.honest
+      this.pull.value = -told.gravity[2]
+      this.pull.oninput()
+    }
+    if (told.said !== undefined) this.said.textContent = told.said
+  }
+
+  // ---------------------------------------------------------------- pictures
+
+  tick(viewer) {
+    if (!this.news || !this.rigid) return
+    const data = new DataView(this.news), buffer = this.news, stage = viewer.stages[0]
+    this.news = null
+    const done = data.getUint32(0, true), rate = data.getFloat32(4, true), force = data.getFloat32(8, true), top = data.getFloat32(12, true)
+    viewer.clock = data.getFloat64(16, true)
+    const held = [24, 28, 32].map(at => data.getFloat32(at, true)), playing = data.getUint32(36, true) > 0
+    if (playing !== viewer.playing) { viewer.playing = playing; viewer.say() }
+    if (!stage.liveTop || Math.abs(top / stage.liveTop - 1) > .02) {
+      stage.liveTop = top
+      if (stage.by === 'stress') viewer.legend.replaceChildren(key(stage))
+    }
+    let at = HEAD
+    viewer.takes[0].header.objects.forEach((object, k) => {
+      const n = object.vertices, instant = {pose: new Float32Array(buffer, at, 12)}
+      at += 48
+      if (!this.rigid[k]) {
+        instant.residual = new Int16Array(buffer, at, 3 * n)
+        instant.normal = new Int8Array(buffer, at + 6 * n, 2 * n)
+        instant.stress = new Uint8Array(buffer, at + 8 * n, n)
+        at += 4 * Math.ceil(9 * n / 4)
+      }
+      stage.place(k, instant)
+    })
+    this.show(held, force)
+    for (const [number, then] of this.sent) if (number <= done) { viewer.stats.lag.push(performance.now() - then); this.sent.delete(number) }
+    viewer.stats.frames++
+    Object.assign(viewer.stats, {rate, force, time: viewer.clock})
+    viewer.clockWords.textContent = `${viewer.clock.toFixed(2)} s`
+    viewer.hud.textContent = `${rate.toFixed(2)} × real time${force > 0 ? ` · pull ${si(force, 'N')}` : ''}`
+    viewer.touch()
+  }
+
+  show(held, force) {
+    this.line.visible = Boolean(this.grip?.to) && Number.isFinite(held[0])
+    if (!this.line.visible) return
+    const points = this.line.geometry.attributes.position
+    points.setXYZ(0, ...held)
+    points.setXYZ(1, ...this.grip.to)
+    points.needsUpdate = true
+  }
+
+  // ---------------------------------------------------------------- the hand
+
+  pressed(viewer, event) {
+    if (event.button) return
+    const {hit} = viewer.meet(event)
+    if (!hit) return
+    viewer.orbit.enabled = false
+    const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(viewer.eye.getWorldDirection(new THREE.Vector3()), hit.point)
+    this.grip = {hit, plane, to: null}
+    const moved = later => this.moved(viewer, event, later)
+    const released = () => {
+      removeEventListener('pointermove', moved)
+      removeEventListener('pointerup', released)
+      removeEventListener('pointercancel', released)
+      if (this.grip?.to) this.tell({do: 'drop'})
+      this.grip = null
+      this.line.visible = false
+      viewer.orbit.enabled = true
+      viewer.touch()
+    }
+    addEventListener('pointermove', moved)
+    addEventListener('pointerup', released)
+    addEventListener('pointercancel', released)
+  }
+
+  moved(viewer, first, event) {
+    const grip = this.grip
+    if (!grip || (!grip.to && Math.hypot(event.clientX - first.clientX, event.clientY - first.clientY) < MOVED)) return
+    viewer.aim(event)
+    const spot = viewer.ray.ray.intersectPlane(grip.plane, new THREE.Vector3())
+    if (!spot) return
+    const kind = grip.to ? 'pull' : 'grab'
+    grip.to = spot.toArray()
+    this.tell({do: kind, object: grip.hit.object, point: grip.hit.point.toArray(), to: grip.to, firm: +this.firm.value})
+  }
+}

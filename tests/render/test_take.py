@@ -1,0 +1,110 @@
+"""What the page is given is what happened."""
+
+import json
+
+import numpy as np
+import pytest
+from scipy.spatial.transform import Rotation
+
+import corporeal as co
+from corporeal.playback import cast_of, playback, recorded
+from corporeal.render.deltas import in_time, octahedral, unfolded
+from corporeal.render.take import STEP, Cast, record, stress_bytes
+from corporeal.types import Frame
+
+NEAR = 0.5 * STEP * np.sqrt(3) + 1e-6
+"""Rounding of three coordinates, and that of float32 [m]."""
+
+
+@pytest.fixture(scope="module")
+def played():
+    """A soft ball and a rigid one fall on the floor."""
+    soft = co.ball("seat_foam", radius=0.04, at=(0, 0, 0.06))
+    stone = co.ball("granite", radius=0.03, at=(0.12, 0, 0.05))
+    return co.play(co.build_scene(soft, stone, duration=0.15, fps=60))
+
+
+def read(block):
+    length = int.from_bytes(block[:4], "little")
+    return json.loads(block[4 : 4 + length]), block[4 + length :]
+
+
+def array(spec, data):
+    offset, count, kind = spec
+    return np.frombuffer(data, f"<{kind}", count, offset)
+
+
+def summed(raw, frames, axes, kind):
+    """What the page does with ``in_time``."""
+    wide = np.dtype(kind).itemsize
+    planes = raw.reshape(wide, -1).T.copy().view(kind).reshape(axes, frames, -1)
+    return np.cumsum(planes, axis=1, dtype=kind).transpose(1, 2, 0)
+
+
+def test_differences_in_time_give_the_values_back_even_where_they_wrap_around():
+    values = np.random.default_rng(1).integers(-32768, 32767, (5, 7, 3)).astype("<i2")
+    np.testing.assert_array_equal(summed(in_time(values), 5, 3, "<i2"), values)
+
+
+def test_a_normal_in_two_bytes_is_within_a_degree_and_a_half():
+    n = np.random.default_rng(2).normal(size=(20_000, 3))
+    n /= np.linalg.norm(n, axis=1, keepdims=True)
+    n[:6] = [[1, 0, 0], [-1, 0, 0], [0, 1, 0], [0, -1, 0], [0, 0, 1], [0, 0, -1]]
+    angle = np.degrees(np.arccos(np.clip((unfolded(octahedral(n)) * n).sum(axis=1), -1, 1)))
+    assert angle.max() < 1.5
+
+
+def test_vertices_and_normals_of_the_take_are_those_of_the_film(played):
+    cast = cast_of(played.prepared)
+    recording = recorded(cast, played.trajectory)
+    header, data = read(playback(played.prepared, cast, played.outcome, recording))
+    frames = len(recording.time)
+    assert header["film"]["time"] == recording.time.tolist()
+    assert [o["rigid"] for o in header["objects"]] == [False, True]
+    for k, (told, mine) in enumerate(zip(header["film"]["objects"], cast.vertices, strict=True)):
+        pose = array(told["pose"], data).reshape(frames, 12).astype(float)
+        shift, normal = np.zeros((frames, len(mine), 3)), None
+        if "residual" in told:
+            shift = STEP * summed(array(told["residual"], data), frames, 3, "<i2")
+            normal = summed(array(told["normal"], data), frames, 2, "<i1")
+        for t, time in enumerate(recording.time):
+            number = int(np.argmin(np.abs(played.trajectory.time - time)))
+            place, turned = cast.skin.pose(played.trajectory.frames[number])
+            R = pose[t, :9].reshape(3, 3)
+            found = (cast.skin.rest[mine] + shift[t]) @ R.T + pose[t, 9:]
+            assert np.abs(found - place[mine]).max() < NEAR, (k, t)
+            if normal is not None:
+                cosine = ((unfolded(normal[t]) @ R.T) * turned[mine]).sum(axis=1)
+                assert np.degrees(np.arccos(np.clip(cosine.min(), -1, 1))) < 1.5
+
+
+def test_a_recording_thins_out_and_keeps_its_beginning(played):
+    whole = recorded(cast_of(played.prepared), played.trajectory, fps=60)
+    assert len(whole.time) == len(played.trajectory.frames)
+    assert whole.every(2).time.tolist() == whole.time[::2].tolist()
+
+
+def test_stress_is_kept_and_the_scale_ends_at_its_largest(played):
+    stress = played.trajectory.frames[-1].stress
+    assert stress is not None and stress.max() > 0
+    rigid = played.prepared.particles.object == 1
+    assert (stress[rigid] == 0).all()
+    np.testing.assert_array_equal(
+        stress_bytes(np.array([0.0, 0.25, 1.0, 2.0]), 1.0), [0, 128, 255, 255]
+    )
+
+
+def test_a_thing_that_only_turns_leaves_nothing_but_its_pose(played):
+    """The control: a pose without the rotation leaves residuals of centimetres."""
+    p = played.prepared.particles
+    R = Rotation.from_rotvec([0.3, -1.2, 0.4]).as_matrix()
+    turned = Frame(0.0, p.position @ R.T, np.broadcast_to(R, (p.count, 3, 3)))
+    cast = cast_of(played.prepared)
+    residual = record(cast, [turned]).objects[0][0].residual
+    assert np.abs(residual).max() <= 1
+    still = Cast._pose
+    try:
+        Cast._pose = lambda self, k, frame: (np.eye(3), still(self, k, frame)[1])
+        assert np.abs(record(cast, [turned]).objects[0][0].residual).max() > 100
+    finally:
+        Cast._pose = still
