@@ -18,7 +18,8 @@ from matplotlib import pyplot
 from matplotlib.axes import Axes
 from stories import Told, tell
 
-from corporeal.mpm.shape import rigid_fit
+from corporeal.findings import pair_name
+from corporeal.geometry.rigid_fit import rigid_fit
 from corporeal.pipeline import Settings
 from corporeal.stages.fill import FillConfig
 from corporeal.stages.simulate import SimulateConfig
@@ -84,14 +85,14 @@ def say(name: str, told: dict[str, Told]) -> None:
     for variant, run in told.items():
         seen = run.outcome
         if name == "duck-on-can":
-            can = seen["objects"]["soda_can_0"]
-            place = can["dent_from_contact_m"].get("rubber_duck_0")
+            can = seen.objects["soda_can_0"]
+            place = can.dent_from_contact_m.get("rubber_duck_0")
             where = "no contact is booked" if place is None else f"{1e3 * place:.1f} mm from impact"
-            print(f"{name:20s} {variant:18s} dent {1e3 * can['dent_depth_m']:6.1f} mm, {where}")
+            print(f"{name:20s} {variant:18s} dent {1e3 * can.dent_depth_m:6.1f} mm, {where}")
             continue
-        for pair in ("vase_0|ball_0", "ball_0|armchair_0"):
-            row = seen["pairs"][pair]
-            print(f"{name:20s} {variant:18s} {pair:20s} ends {row['gap_end_dx']:6.2f} cells apart")
+        for pair in (("vase_0", "ball_0"), ("ball_0", "armchair_0")):
+            gap = seen.pair(*pair).gap_end_dx
+            print(f"{name:20s} {variant:18s} {pair_name(*pair):20s} ends {gap:6.2f} cells apart")
 
 
 def main() -> None:

@@ -33,9 +33,9 @@ from laws.watching import started
 
 from corporeal.machine import cores
 from corporeal.materials import find
-from corporeal.mpm.part import Motion, PartGeometry
-from corporeal.mpm.shape import dent
-from corporeal.mpm.treatment import QUALITIES, Detail, plan
+from corporeal.trajectory.residual_shape import dent
+from corporeal.treatment.part import Motion, PartGeometry
+from corporeal.treatment.plan import QUALITIES, Detail, plan
 from corporeal.types import Law, Material, Structure, Treatment
 
 PAGE = Path(__file__).parents[1] / "docs" / "detail.md"
@@ -205,8 +205,8 @@ HEAD = (
     "# What detail changes",
     "",
     "Written by `python benchmarks/detail.py --docs`. Each experiment has the grid and the "
-    "stiffness that the policy gives it at `--detail draft`, `normal` and `fine`: 8, 12 and 20 "
-    "cells across its shortest side. The aim is to be within 30 % of fine at draft and within 10 % "
+    "stiffness of the treatment policy at `--detail draft`, `normal` and `fine`: 8, 12 and 20 "
+    "cells across its shortest side. The target is within 30 % of fine at draft and within 10 % "
     "at normal.",
     "",
 )
@@ -214,16 +214,16 @@ TAIL = (
     "",
     "- Balls of 10 cm hit the floor at 2 m/s. The loss per bounce shrinks with the grid.",
     "- A column of dry sand (φ = 30°), twice as wide as high, runs out on a rough floor; 98 % of "
-    "it stay within the run-out. What differs is the front, which is thinner than a cell "
+    "it stay within the run-out. The difference is in the front, which is thinner than a cell "
     "(decision 6).",
     "- Rollers as wide as the showcase's duck hit mud as deep as the heap of scene 1, in plane "
-    "strain: a light one, of as much mass for its length as the duck has, at 4.4 m/s, and one of "
-    "1500 kg/m³ at 1.5 m/s. The imprint is measured as in the showcase: the largest residual "
-    "displacement, over one cell's worth of particles. Coarse grids leave it too shallow, by .6 "
-    "cells and 1.9 cells at draft. Some of that is locking, as mud hardly changes its volume: with "
-    "ν = .2 instead of .45 the heavy roller's is 45 and 58 mm deep at draft and normal.",
-    "- The dent of the showcase's can is not here: its wall is simulated as thick as two cells, so "
-    "that every detail dents another wall (docs/showcase.md says what to believe of it).",
+    "strain: a light one, with the duck's mass per length, at 4.4 m/s, and one of 1500 kg/m³ at "
+    "1.5 m/s. The imprint is measured as in the showcase: the largest residual displacement, "
+    "over one cell's worth of particles. On coarse grids it is too shallow, by .6 and 1.9 cells "
+    "at draft. Part of that is volumetric locking: with ν = .2 instead of .45 the heavy roller's "
+    "imprint is 45 and 58 mm deep at draft and normal.",
+    "- The dent of the showcase's can is not included: its wall is simulated two cells thick, so "
+    "that each detail dents a different wall ([showcase](showcase.md) lists its known errors).",
     "",
 )
 

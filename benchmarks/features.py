@@ -26,7 +26,7 @@ from corporeal.features.lifting import back_projection, fill, uplift, visible
 from corporeal.formats.transforms import read_views
 from corporeal.geometry.shape import sphere_directions
 from corporeal.machine import cores
-from corporeal.splats.channel import distilled
+from corporeal.splats.feature_distillation import distilled
 from corporeal.splats.radiance import FieldConfig, learn, points
 from corporeal.types import Camera, Views
 

@@ -23,8 +23,8 @@ from corporeal.geometry.rotation import matrix
 from corporeal.geometry.similarity import moved_cameras, similarity
 from corporeal.geometry.upright import upright
 from corporeal.splats.intake import Intake, turned_upright
-from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.train import train
+from corporeal.splats.training_schedule import TrainConfig
 from corporeal.types import Camera, Views
 
 TWO = 2

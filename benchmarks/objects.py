@@ -15,14 +15,16 @@ import resource
 import subprocess
 import sys
 import time
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
-from corporeal.evaluation.objects import ObjectsEvaluationConfig, ObjectsRow, Told, judge
+from corporeal.evaluation.objects import Judged, ObjectsEvaluationConfig, ObjectsRow, judge
 from corporeal.evaluation.objects_figure import draw
 from corporeal.regions.objects import objects
 from corporeal.store import read_json, write_json
+from corporeal.typed import typed
 from corporeal.types import Cloud
 
 DOCS = Path(__file__).parents[1] / "docs"
@@ -53,8 +55,6 @@ MORE = {
 SIZES = ((100_000, 768), (500_000, 768))
 """Points and channels of what is timed."""
 
-Found = list[tuple[ObjectsRow, Told]]
-
 
 def composed(models: list[Path], out: Path) -> None:
     """Compose all scenes that are not there."""
@@ -72,22 +72,39 @@ def composed(models: list[Path], out: Path) -> None:
         subprocess.run([sys.executable, "-m", "corporeal.cli", *command], check=True)
 
 
-def told_apart(out: Path, names: list[str], gaussians: bool) -> Found:
+def segmented(out: Path, names: list[str], gaussians: bool) -> list[Judged]:
     """Judge scenes one after the other; what was judged before is kept."""
     source = "gaussians" if gaussians else "surface"
     config = ObjectsEvaluationConfig(points_from=source, kept=out / "gaussians")
-    found: Found = []
+    found: list[Judged] = []
     for name in names:
         path = out / source / f"{name}.pickle"
         if not path.exists():
             path.parent.mkdir(parents=True, exist_ok=True)
             path.write_bytes(pickle.dumps(judge(out / "scenes" / name, config)[0]))
         found.append(pickle.loads(path.read_bytes()))
-        print(line(found[-1][0]), flush=True)
+        print(line(found[-1].row), flush=True)
     return found
 
 
-def timed() -> list[dict]:
+@dataclass(frozen=True)
+class Timing:
+    """What segmenting so many points took."""
+
+    points: int
+    cpu_s: float
+    clock_s: float
+    peak_gb: float
+
+
+@dataclass(frozen=True)
+class Timings:
+    """As kept in ``times.json``."""
+
+    rows: tuple[Timing, ...]
+
+
+def timed() -> Timings:
     """Tell four balls in a heap apart by features of 768 numbers: seconds, and the memory."""
     made = []
     for count, depth in SIZES:
@@ -107,12 +124,12 @@ def timed() -> list[dict]:
         objects(cloud, 4, normal)
         spent, clock = time.process_time() - spent, time.perf_counter() - clock
         peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
-        made.append({"points": count, "cpu_s": spent, "clock_s": clock, "peak_gb": peak})
+        made.append(Timing(count, spent, clock, peak))
         print(made[-1], flush=True)
-    return made
+    return Timings(tuple(made))
 
 
-HEAD = "| scene | points | identity | ours | warned | with masks | nobody counted | components |"
+HEAD = "| scene | points | identity | ours | warned | with masks | not counted | components |"
 
 
 def line(row: ObjectsRow) -> str:
@@ -139,120 +156,119 @@ def main() -> None:
     parser.add_argument("--docs", action="store_true", help="write docs/objects.md")
     asked = parser.parse_args()
     composed(asked.models, asked.out)
-    shown = told_apart(asked.out, list(PAIRS) + list(STACKS), gaussians=False)
-    learned = told_apart(asked.out, list(PAIRS) if asked.gaussians else [], gaussians=True)
-    more = told_apart(asked.out, list(MORE), gaussians=False)
+    shown = segmented(asked.out, list(PAIRS) + list(STACKS), gaussians=False)
+    learned = segmented(asked.out, list(PAIRS) if asked.gaussians else [], gaussians=True)
+    more = segmented(asked.out, list(MORE), gaussians=False)
     tables = {
-        "surface": table([row for row, _ in shown if row.scene in PAIRS]),
-        "stacks": table([row for row, _ in shown if row.scene in STACKS]),
-        "more": table([row for row, _ in more]),
-        "gaussians": table([row for row, _ in learned]),
+        "surface": table([j.row for j in shown if j.row.scene in PAIRS]),
+        "stacks": table([j.row for j in shown if j.row.scene in STACKS]),
+        "more": table([j.row for j in more]),
+        "gaussians": table([j.row for j in learned]),
     }
     times = asked.out / "times.json"
     if not times.exists():
-        write_json(times, {"rows": timed()})
+        write_json(times, timed())
     if asked.docs:
         draw(shown, DOCS / "images" / "objects.png")
-        said = (
-            f"{t['points'] // 1000}k points: {t['cpu_s']:.0f} s, {t['peak_gb']:.1f} GB"
-            for t in read_json(times)["rows"]
+        costs = (
+            f"{t.points // 1000}k points: {t.cpu_s:.0f} s, {t.peak_gb:.1f} GB"
+            for t in typed(Timings, read_json(times)).rows
         )
         words = PAGE
-        for name, text in (tables | {"times": "; ".join(said)}).items():
+        for name, text in (tables | {"times": "; ".join(costs)}).items():
             words = words.replace(f"{{{name}}}", text)
         (DOCS / "objects.md").write_text(words, encoding="utf-8")
 
 
-PAGE = """# Telling things apart that touch
+PAGE = """# Separating objects that touch
 
-Settled things touch, so that nearness does not tell them apart. `corporeal.regions` knows four
-ways:
+Settled objects touch, so that distance alone does not separate them. `corporeal.regions` has four
+methods:
 
-| way | needs |
+| method | needs |
 |---|---|
-| identity | a model's nodes, a settled scene, or numbers on every pixel: exact by construction |
-| look and concavity | points with features; better with normals, and with the number of things |
-| the same with instance masks | masks on views; numbers need not agree between views |
+| identity | a model's nodes, a settled scene, or numbers per pixel: exact by construction |
+| appearance and concavity | points with features; better with normals and the number of objects |
+| the same with instance masks | masks on views; instance numbers need not agree between views |
 | `components` | points; the published rule (20 nearest, connected components), for comparison |
 
-    objects(cloud, count, normals) -> Split           whose each point is, how sure, what to doubt
-    lifted(weights, labels, points) -> masks          what each view takes each point for
+    objects(cloud, count, normals) -> Split           instance of each point, confidence, doubts
+    lifted(weights, labels, points) -> masks          instance of each point as each view has it
     components(position) -> labels                    the published rule
-    match(similarity) -> pairs                        found things to named ones (Hungarian method)
+    match(similarity) -> pairs                        found objects to named ones (Hungarian method)
 
-## How
+## Method
 
-1. Points are parted where there is clear space between them: where single linkage by mutual
+1. **Gaps.** Points are separated wherever there is clear space: where single linkage by mutual
    reachability joins groups over gaps 1.8 times as wide as is usual within them.
-2. Features become unit vectors, and those their first 64 principal components. Half precision is
-   widened in batches only.
-3. Points become about 2000 superpoints: k-means of place, look and normal in which a point only
-   goes to patches that began near it (SLIC).
-4. Superpoints that meet hold together by exp(-(difference / δ)² / 2 - (concavity / c)² / 2) times
-   the length of their border. δ is 1.5 times the scene's own root mean square difference between
-   neighbours; concavity is positive where the surface folds inwards. Where there are instance
-   masks whose numbers cannot be matched from view to view, the share of views that take the two for
-   different things counts in the same way.
-5. The graph is cut in two, and the piece that is cheapest to cut again, until there are as many
-   things as somebody counted. A cut costs (cut + 0.003) (1/A + 1/(1-A)) (1 - R²)²: its share of
-   all borders, how unequal the sides are, and how little they explain of the differences in look.
-   The 0.003 keeps crumbs that hang by nothing from being things. Candidates are the sweeps of a
-   normalised cut, and all that merging neighbours passes through.
+2. **Features** are normalised and reduced to their first 64 principal components.
+3. **Superpoints**, about 2000: k-means over position, features and normal in which a point can only
+   join clusters seeded near it (SLIC).
+4. **Affinity** of adjacent superpoints: exp(-(difference / δ)² / 2 - (concavity / c)² / 2) times
+   the length of their border. δ is 1.5 times the scene's own root mean square feature difference
+   between neighbours; concavity is positive where the surface folds inwards. Where there are
+   instance masks whose numbers cannot be matched between views, the share of views in which the
+   two lie in different instances enters in the same way.
+5. **Graph cuts.** The graph is cut in two, then the piece whose cut is cheapest again, until the
+   given number of objects is reached. A cut costs (cut + 0.003) (1/A + 1/(1-A)) (1 - R²)²: its
+   share of all borders, the imbalance of the two sides, and the share of feature variance that it
+   leaves unexplained. The 0.003 keeps loosely attached fragments from becoming objects. Candidates
+   are sweeps of a normalised cut, and every state that agglomerative merging passes through.
 
-Instance masks whose numbers agree between views, or can be matched by the points that they share,
-need none of this: a point is what most views say.
+Where instance numbers agree between views, or can be matched by the points that they share, none
+of this is needed: each point takes the instance that most views give it.
 
-Nobody counted: cuts are made up to a cost of 0.018, and a warning says so. That is a guess. It
-counts rightly where things are plain, and takes legs, flowers and cushions for things of their
-own.
+If the number of objects is not given, cuts are made up to a cost of 0.018, and a warning says so.
+That value is a guess: it counts textureless objects correctly, and takes legs, flowers and cushions
+for objects of their own.
 
-**Warnings.** Another cut, quite different, costs less than 1.3 times as much; or a thing is thin
-(less than a third as high as wide) and lies on or under another. Both mean: draw instance masks,
-or look at the result.
+**Warnings.** A different cut costs less than 1.3 times as much; or an object is thin (less than a
+third as high as wide) and lies on or under another. Both mean: provide instance masks, or check the
+result.
 
-## How well
+## Results
 
 Written by `python benchmarks/objects.py objects/ ycb/ --gaussians --docs`. Pairs are composed
-from public models with `corporeal assemble`; what stands beside another is pushed until it
-touches it. Points lie on what 24 pictures of 256² show, colours come from the pictures, and
-features are the weight-free [descriptor](features.md). Numbers are the mean IoU of things, paired
-with what was found by the Hungarian method. "Ours" is told how many things there are; "nobody
-counted" shows in brackets how many it counted. Masks are exact, numbered anew in each view.
-`corporeal evaluate objects SCENES` does the same for any settled scenes.
+from public models with `corporeal assemble`; objects side by side are pushed until they touch.
+Points lie on the surface seen in 24 pictures of 256², colours come from the pictures, and features
+are the [descriptor](features.md), which needs no weights. Numbers are the mean IoU of objects after
+Hungarian matching. "Ours" is given the number of objects; "not counted" estimates it (in brackets).
+Masks are exact, numbered anew in each view. `corporeal evaluate objects SCENES` does the same for
+any settled scenes.
 
 {surface}
 
-![Points of the pairs, whose they are, and whose they were taken for](images/objects.png)
+![Points of the pairs: colours, true instances, found instances](images/objects.png)
 
-Stacks of thin things, which warn:
+Stacks of thin objects, which warn:
 
 {stacks}
 
-Others; the constants above were chosen with most of these and the pairs in view, so that none of
-the figures is of a scene that was never looked at:
+Other pairs. The constants above were chosen with most of these scenes in view, so that no figure on
+this page is of a held-out scene:
 
 {more}
 
-The means of Gaussians that were learned from the same pictures (`draft`, with masks of all things
+Points that are means of Gaussians learned from the same pictures (`draft`, one mask for all objects
 together):
 
 {gaussians}
 
 - **Teddy on couch** fails: both are off-white without texture, and the couch is made of loose
-  cushions. **Cat on table** hangs by a hair: the cat nearly covers the table's width, and whether
-  it or half the table is cut off depends on which points were drawn. **Duck on armchair**: cushions
-  and frame look less alike than cushion and duck. **Lamp beside armchair** loses a leg to it, and
-  does not warn. The first three warn, and masks settle all.
-- **Normals** matter. Without them they are found from the points, outward being up where the
-  scene is highest. That is as good for most pairs, and much worse for some (bottle beside box, cat
-  on table): give normals where cameras say what is outside.
-- **No number here comes from learned features.** With CLIP's, "look" means what a thing is; how
-  much better that is must be measured by somebody who has the weights.
+  cushions. **Cat on table** is borderline: the cat nearly covers the table's width, and whether it
+  or half the table is cut off depends on the sampled points. **Duck on armchair** fails: cushions
+  differ more from the frame than from the duck. **Lamp beside armchair** loses a leg to it, without
+  a warning. The first three warn, and instance masks resolve all four.
+- **Normals** matter. Without them they are estimated from the points and oriented upwards at the
+  highest point. That is as good for most pairs, and much worse for some (bottle beside box, cat on
+  table): give normals where cameras tell the outside.
+- **No number here comes from learned features.** CLIP features would separate by what objects are;
+  how much better that is must be measured with the weights.
 
-## How fast
+## Speed
 
-Four balls in a heap, 768 numbers to a point in half precision, processor seconds and the
-process's peak memory, features included: {times}."""
+Four balls in a heap, 768 channels in half precision; CPU seconds and the process's peak memory,
+features included: {times}."""
 
 
 if __name__ == "__main__":

@@ -27,22 +27,19 @@ from rich.console import Console
 
 from corporeal.errors import UserError
 from corporeal.formats.scene_file import SceneFile, write_scene_file
-from corporeal.mpm.shape import rigid_fit
-from corporeal.mpm.treatment import Detail
+from corporeal.geometry.rigid_fit import rigid_fit
 from corporeal.pipeline import Progress, Settings, opened
 from corporeal.stages.assemble import AssembleConfig
 from corporeal.stages.fill import FillConfig
-from corporeal.stages.simulate import SETTLING
-from corporeal.types import MaterialField, Particles, Parts, Scene, Trajectory
+from corporeal.trajectory.audit_file import read_audit
+from corporeal.trajectory.played import Played
+from corporeal.treatment.plan import Detail
 
 STILL = 0.5
 """Largest drift of what is at rest [dx]."""
 FPS = 20
 LATE = 0.1
 """The end of the simulation, over which is measured whether a thing is still on its way [s]."""
-
-Told = tuple[Scene, Parts, MaterialField, Particles, Trajectory]
-FLOWS = ("assemble", "segment", "ground", "fill", "simulate")
 
 
 def measure(path: Path, out: Path, detail: Detail, seconds: float, settled: str = "said") -> dict:
@@ -59,42 +56,43 @@ def measure(path: Path, out: Path, detail: Detail, seconds: float, settled: str 
         write_scene_file(scene_file, said)
         path = scene_file
     try:
-        with opened([path], out / row["scene"], settings, _quietly, "simulate") as (made, _):
-            told = tuple(made[verb] for verb in FLOWS)
+        with opened([path], out / row["scene"], settings, _quietly, "simulate") as run:
+            played = run.made.played
     except UserError as error:
         return row | {"error": str(error)}
-    return row | scene_row(told) | {"cpu_s": time.process_time() - start}
+    return row | scene_row(played) | {"cpu_s": time.process_time() - start}
 
 
 def _quietly(verb: str) -> Progress:
     return lambda fraction, words: None
 
 
-def scene_row(told: Told) -> dict:
+def scene_row(played: Played) -> dict:
     """Measure a whole scene."""
-    scene, _, _, particles, trajectory = told
-    objects = [object_row(b, told) for b in range(len(scene.objects))]
-    ledger, before = trajectory.ledger, trajectory.folder / SETTLING
-    settling = json.loads(before.read_text(encoding="utf-8")) if before.exists() else None
+    scene, particles = played.prepared.scene, played.prepared.particles
+    objects = [object_row(b, played) for b in range(len(scene.objects))]
+    ledger, settling = played.trajectory.ledger, read_audit(played.trajectory.folder).settling
     for k, row in enumerate(objects):
-        row["sank_dx"] = settling["objects"][k]["moved_dx"] if settling else 0.0
+        row["sank_dx"] = settling.objects[k].moved_dx if settling else 0.0
     return {
-        "settling_s": settling["seconds"] if settling else 0.0,
-        "settled": settling["found"] if settling else None,
+        "settling_s": settling.seconds if settling else 0.0,
+        "settled": settling.found if settling else None,
         "cell_m": particles.cell,
         "particles": particles.count,
-        "steps": int(ledger["steps"][-1]),
+        "steps": int(ledger.steps[-1]),
         "drift_dx": max(o["drift_dx"] for o in objects),
         "warnings": list(dict.fromkeys((*scene.warnings, *particles.warnings))),
         "objects": objects,
     }
 
 
-def object_row(body: int, told: Told) -> dict:
+def object_row(body: int, played: Played) -> dict:
     """Measure one object."""
-    scene, parts, field, particles, trajectory = told
+    prepared, trajectory = played.prepared, played.trajectory
+    scene, parts, field = prepared.scene, prepared.parts, prepared.field
+    particles = prepared.particles
     own = [k for k, p in enumerate(parts.catalogue) if p.object == body]
-    path = trajectory.ledger["centre"][:, body] - trajectory.ledger["centre"][0, body]
+    path = trajectory.ledger.centre[:, body] - trajectory.ledger.centre[0, body]
     late = trajectory.time >= trajectory.time[-1] - LATE - 1e-9
     mine = particles.object == body
     first, last = (trajectory.frames[k].position[mine].astype(float) for k in (0, -1))

@@ -1,18 +1,18 @@
-"""There and back: a scene's own run beside a run from photographs of it, with the mesh forgotten.
+"""Round trip: the run of a scene beside the run of its reconstruction from rendered photographs.
 
     python benchmarks/round_trip.py ball-duck-armchair --out runs/round-trip [--docs]
     python benchmarks/round_trip.py scenes/desk/scene.toml --out runs/round-trip
 
-Each scene is one of the showcase's by name, or a file. It is run; it is photographed from 48 sides
-with masks at 512 × 512 pixels; of these photographs a second run is made, which is told what the
-things are called, what they are made of, how they start to move and where the floor is, but nothing
-of their shapes. It forgets which of them each pixel shows, which captured views say (--apart look).
-Of each thing, pieces of one material that are built alike are told as one, by the names of those
-that show most and the colour that they have in the photographs; what takes less than a hundredth of
-its pixels is not told. Masses, the number of objects and where they end are compared. How much ends
-depend on chance says the own spread: the model's own run again, twice, with each thing filled with
-other particles and put aside by 1 % of its size to a random side. Aims: the whole mass within 10 %,
-as many objects, ends within 5 % of the scene's size.
+Each scene is a showcase scene by name, or a file. It is run, and photographed from 48 views with
+masks at 512 × 512 pixels; a second run starts from these photographs. It is given names,
+materials, initial velocities and the height of the floor, but no shape, and it ignores the
+instance masks that captured views hold (--apart look). Pieces of one object that share material
+and structure are described as one part, by the names of the most visible ones and their colour in
+the photographs; pieces of less than a hundredth of the object's pixels are not described.
+Compared are total mass, number of objects and end positions. The own spread shows how far end
+positions depend on sampling: the model's own run is repeated twice, each object filled with other
+particles and displaced by 1 % of its size in a random direction. Targets: total mass within 10 %,
+equal number of objects, end positions within 5 % of the scene's size.
 """
 
 import argparse
@@ -44,12 +44,13 @@ from corporeal.geometry.foliage import is_leafy
 from corporeal.geometry.similarity import moved_points
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.pipeline import Settings, opened, write_showcase
+from corporeal.results import Results
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.fill import FillConfig, examine
 from corporeal.stages.reconstruct import ReconstructConfig
-from corporeal.terminal import show_table, told
+from corporeal.terminal import progress_bars, show_table
 from corporeal.types import MaterialField, Reconstruction, Scene, Views
 
 SIZE = (512, 512)
@@ -66,36 +67,37 @@ ASIDE = 0.01
 Detail = Literal["draft", "normal", "fine"]
 Training = Literal["draft", "normal"]
 FOUND = (
-    "- Compact things keep their mass to a percent, and a duck on mud lands, sinks in and stays "
-    "as its model does. Plants stand and sway.",
-    "- Where things fly, bounce or topple, small differences grow. A model's balls, lamp and vase "
-    "end where they end whatever particles they are filled with, to within the own spread. The "
-    "rubber ball from pictures leaves its bounces askew: an offset of a tenth of a millimetre does "
-    "that, where a pixel shows .6 mm, and what nobody sees of it from below is rounded by guess. "
-    "The duck that hits a can at 6 m/s goes anywhere, and from pictures twice as far.",
+    "- Compact objects keep their mass within a percent, and a duck on mud lands, sinks in and "
+    "stays as its model does. Plants stand and sway.",
+    "- Where objects fly, bounce or topple, small differences grow. End positions of the model's "
+    "balls, lamp and vase depend on the particle sampling only within the own spread. The "
+    "reconstructed rubber ball leaves its bounces at an angle: an offset of a tenth of a "
+    "millimetre suffices, where a pixel covers .6 mm, and its unobserved underside is rounded by "
+    "guess. The duck that hits a can at 6 m/s ends anywhere, and from pictures twice as far away.",
     "- The duck on the can weighs 11 % too much, its beak being solid and large; the can too "
-    "little: its tab, 7 % of it, is not told.",
-    "- Boards of 16 mm come out 7 % too heavy. Nobody sees how deep the vase is hollow: it is "
-    "closed below its neck, so that its wall is counted across the mouth.",
+    "little: its tab, 7 % of its mass, is not described.",
+    "- Boards of 16 mm come out 7 % too heavy. No view shows how deep the vase is hollow: its "
+    "reconstruction is closed below the neck, so that the wall is counted across the mouth.",
     "- The couch's own volume is right to 5 %, but the panels of its plywood base that lie below "
-    "the cushions are in no picture, and where plywood ends and foam begins no colour says, only "
-    "words, by height. Its seat is plain, and found only because some Gaussians begin inside the "
-    "visual hull ([decision 15](decisions/0015-a-small-training-tells-where-to-begin.md)).",
-    "- The lamp falls to another side than its model: its mass is right as a whole, but its foot, "
-    "dented by 5 mm of its 15, is too light, and its shade, lumpy inside and with bulb and wires "
-    "that nobody told from it, too heavy.",
-    "- Pot and soil of the plant are told apart badly in the shade, and of its trunk a third is "
-    "found. A crown is weighed by the area of its leaves, within a factor of two; "
-    "feet in sand or a pot, which no picture shows, are guessed.",
+    "the cushions are in no picture, and the border between plywood and foam shows in no colour; "
+    "only the description gives it, by height. Its textureless seat is reconstructed only "
+    "because some Gaussians begin inside the visual hull ([decision "
+    "15](decisions/0015-a-small-training-tells-where-to-begin.md)).",
+    "- The lamp falls to another side than its model: its total mass is right, but its foot, "
+    "reconstructed with a dent of 5 of its 15 mm, is too light, and its shade, uneven inside and "
+    "merged with bulb and wires, too heavy.",
+    "- Pot and soil of the plant are poorly segmented in the shade, and a third of its trunk is "
+    "found. A crown is weighed by the area of its leaves, within a factor of two; feet in sand "
+    "or a pot, which no picture shows, are guessed.",
 )
 HEADS = (
     "scene",
     "objects",
     "found",
     "mass [kg]",
-    "again [kg]",
-    "off",
-    "ends off",
+    "reconstructed [kg]",
+    "difference",
+    "end positions off",
     "own spread",
     "quality [dB]",
 )
@@ -107,20 +109,20 @@ def settings(detail: Detail, seed: int = 0) -> Settings:
     return Settings(fill=FillConfig(detail=detail, seed=seed))
 
 
-def masses(made: dict) -> np.ndarray:
+def masses(made: Results) -> np.ndarray:
     """Return every object's mass [kg]."""
-    parts, heavy = made["segment"].catalogue, made["fill"].mass_real
-    total = np.zeros(len(made["assemble"].objects))
+    parts, heavy = made.parts.catalogue, made.particles.mass_real
+    total = np.zeros(len(made.scene.objects))
     np.add.at(total, [p.object for p in parts], heavy)
     return total
 
 
-def ends(made: dict) -> np.ndarray:
+def ends(made: Results) -> np.ndarray:
     """Return where every object's centre of mass is at the end [m], in the first run's frame."""
-    centre = made["simulate"].ledger["centre"][-1]
-    if "reconstruct" not in made:
+    centre = made.trajectory.ledger.centre[-1]
+    if made.reconstruct is None:
         return centre
-    return moved_points(centre, np.linalg.inv(made["reconstruct"].world_from_file))
+    return moved_points(centre, np.linalg.inv(made.reconstruct.world_from_file))
 
 
 @dataclass(frozen=True)
@@ -136,27 +138,27 @@ class Piece:
     """[m²]"""
 
 
-def as_told(made: dict, views: Views, path: Path) -> Path:
+def as_told(made: Results, views: Views, path: Path) -> Path:
     """Write what things are made of as a person would say it; return the file."""
     said, members = {}, {m.part: m for a in _examined(made) for m in a.members}
-    for number, thing in enumerate(made["assemble"].objects):
-        mine = [k for k, p in enumerate(made["segment"].catalogue) if p.object == number]
+    for number, thing in enumerate(made.scene.objects):
+        mine = [k for k, p in enumerate(made.parts.catalogue) if p.object == number]
         rows = _merged([_piece(made, views, members[k]) for k in mine])
         said[thing.name] = {"parts": rows} if len(rows) > 1 else next(iter(rows.values()))
     path.write_text(yaml.safe_dump(said))
     return path
 
 
-def _examined(made: dict) -> list[Anatomy]:
-    return examine(made["assemble"], made["segment"], 0)
+def _examined(made: Results) -> list[Anatomy]:
+    return examine(made.scene, made.parts, 0)
 
 
-def _piece(made: dict, views: Views, member: Member) -> Piece:
+def _piece(made: Results, views: Views, member: Member) -> Piece:
     """Say what a piece is, how it looks, and how thick a wall is that its mesh has two sides of.
 
     Leaves are such walls, whatever their mesh.
     """
-    field, k = made["ground"], member.part
+    field, k = made.field, member.part
     said = _said(field, k)
     if said["structure"] == "solid" and member.volume:
         rng = np.random.default_rng(0)
@@ -164,12 +166,12 @@ def _piece(made: dict, views: Views, member: Member) -> Piece:
         if is_leafy(field.materials[k]) or shared > WALLED:
             thickness = 2e3 * member.volume / member.body_area
             said |= {"structure": "shell", "thickness_mm": thickness}
-    triangles = [len(s.triangles) for s in made["assemble"].surfaces]
-    part_of_surface = made["segment"].part_of_point[np.cumsum([0, *triangles[:-1]])]
+    triangles = [len(s.triangles) for s in made.scene.surfaces]
+    part_of_surface = made.parts.part_of_point[np.cumsum([0, *triangles[:-1]])]
     assert views.part_of_pixel is not None
     shown = np.isin(views.part_of_pixel, np.flatnonzero(part_of_surface == k))
     colour = _colour(views.rgb[shown]) if shown.any() else ""
-    name, area = made["segment"].catalogue[k].name, member.body_area + member.sheet_area
+    name, area = made.parts.catalogue[k].name, member.body_area + member.sheet_area
     return Piece(name, int(shown.sum()), colour, said, area)
 
 
@@ -225,9 +227,9 @@ def as_begun(scene: Scene, folder: Path) -> Path:
     return path
 
 
-def put_aside(made: dict, path: Path, folder: Path, seed: int) -> Path:
+def put_aside(made: Results, path: Path, folder: Path, seed: int) -> Path:
     """Write the scene with each thing put aside; what stands on the floor stays on it."""
-    names, boxes = [o.name for o in made["assemble"].objects], boxes_of(made["assemble"])
+    names, boxes = [o.name for o in made.scene.objects], boxes_of(made.scene)
     rng, entries = np.random.default_rng(seed), {}
     said = SceneFile(path, path)
     if path.suffix == ".toml":
@@ -260,15 +262,18 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
     name = Path(source).resolve().parent.name if source.endswith(".toml") else Path(source).stem
     folder = out / name
     path = write_showcase(source, folder / "input") if source in SCENES else Path(source)
-    with told() as tell, opened([path], folder / "mesh", settings(detail), tell, "simulate") as of:
-        mesh = of[0]
-    scene, spread = mesh["assemble"], []
+    with (
+        progress_bars() as tell,
+        opened([path], folder / "mesh", settings(detail), tell, "simulate") as of,
+    ):
+        mesh = of.made
+    scene, spread = mesh.scene, []
     for seed in (1, 2):
         aside = put_aside(mesh, path, folder, seed)
         work = folder / aside.stem
         other = settings(detail, seed)
-        with told() as tell, opened([aside], work, other, tell, "simulate") as of:
-            spread.append(apart(ends(mesh), ends(of[0]), scene))
+        with progress_bars() as tell, opened([aside], work, other, tell, "simulate") as of:
+            spread.append(apart(ends(mesh), ends(of.made), scene))
     views = folder / "views"
     if not (views / "transforms.json").exists():
         write_views(views, capture(scene, CaptureConfig(views=48, size=SIZE)))
@@ -285,9 +290,12 @@ def round_trip(source: str, out: Path, detail: Detail, training: Training) -> di
             ),
             describe=DescribeConfig(annotations=said),
         )
-        with told() as tell, opened([start], folder / "pictures", again, tell, until) as of:
-            pictures = of[0]
-        order = ordered(scene, pictures["reconstruct"], order)
+        with (
+            progress_bars() as tell,
+            opened([start], folder / "pictures", again, tell, until) as of,
+        ):
+            pictures = of.made
+        order = ordered(scene, reconstructed(pictures), order)
         store.write_json(kept, order.tolist())
     return compared(name, mesh, pictures, order) | {"spread": np.max(spread, axis=0).tolist()}
 
@@ -296,6 +304,12 @@ def apart(one: np.ndarray, other: np.ndarray, scene: Scene) -> np.ndarray:
     """Return how far ends are from each other, over the scene's size."""
     whole = float(np.linalg.norm(np.ptp(box_of(scene.surfaces), axis=0)))
     return np.linalg.norm(one - other, axis=1) / whole
+
+
+def reconstructed(made: Results) -> Reconstruction:
+    """Return what was reconstructed in a run from pictures."""
+    assert made.reconstruct is not None
+    return made.reconstruct
 
 
 def ordered(scene: Scene, found: Reconstruction, order: np.ndarray) -> np.ndarray:
@@ -307,9 +321,9 @@ def ordered(scene: Scene, found: Reconstruction, order: np.ndarray) -> np.ndarra
     return linear_sum_assignment(apart)[1]
 
 
-def compared(name: str, mesh: dict, pictures: dict, order: np.ndarray) -> dict:
+def compared(name: str, mesh: Results, pictures: Results, order: np.ndarray) -> dict:
     """Compare two runs; the second has its objects by size."""
-    scene, found = mesh["assemble"], pictures["reconstruct"]
+    scene, found = mesh.scene, reconstructed(pictures)
     first, second = masses(mesh)[order], masses(pictures)
     row = {"scene": name, "objects": len(first), "found": len(second)}
     row |= {"mass": first.tolist(), "again": second.tolist(), "off": second.sum() / first.sum() - 1}
@@ -338,7 +352,7 @@ def cells(row: dict) -> tuple[str, ...]:
 def write_docs(rows: list[dict], said: str) -> None:
     """Write the table as a page."""
     about = " ".join((__doc__ or "").partition("\n\nEach scene")[2].split())
-    lines = ["# There and back: a scene from photographs of itself", ""]
+    lines = ["# Round trip: a scene reconstructed from photographs of itself", ""]
     lines += [f"Written by `{said}`. Each scene {about}", ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
     lines += ["| " + " | ".join(cells(row)) + " |" for row in rows]

@@ -15,11 +15,12 @@ from typing import get_args
 from rich.console import Console
 from stories import Told, tell
 
+from corporeal.findings import Audit
 from corporeal.machine import cores
-from corporeal.mpm.treatment import Detail
 from corporeal.pipeline import Settings
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.fill import FillConfig
+from corporeal.treatment.plan import Detail
 
 PAGE = Path(__file__).parents[1] / "docs" / "showcase.md"
 BEGIN, END = "<!-- made by benchmarks/showcase.py -->", "<!-- end -->"
@@ -27,12 +28,10 @@ MOMENTUM, ENERGY = 1e-4, 0.05
 """Largest share of momentum that may go astray, and of energy that may come from nowhere."""
 
 
-def clean(audit: dict) -> bool:
+def clean(audit: Audit) -> bool:
     """Say whether the simulation kept its books."""
-    lost = audit["nan_count"] + audit["particles_out_of_domain"]
-    return bool(
-        lost == 0 and audit["momentum_residual"] < MOMENTUM and audit["energy_growth"] < ENERGY
-    )
+    lost = audit.nan_count + audit.particles_out_of_domain
+    return bool(lost == 0 and audit.momentum_residual < MOMENTUM and audit.energy_growth < ENERGY)
 
 
 def row(told: Told, detail: str) -> dict:
@@ -42,11 +41,11 @@ def row(told: Told, detail: str) -> dict:
         "scene": told.name,
         "detail": detail,
         "expectations": [asdict(e) for e in told.expectations()],
-        "particles": audit["particles"],
-        "steps": audit["steps"],
-        "momentum_residual": audit["momentum_residual"],
-        "energy_growth": audit["energy_growth"],
-        "penetration_dx": audit["max_penetration_dx"],
+        "particles": audit.particles,
+        "steps": audit.steps,
+        "momentum_residual": audit.momentum_residual,
+        "energy_growth": audit.energy_growth,
+        "penetration_dx": audit.max_penetration_dx,
         "clean": clean(audit),
         "seconds": told.seconds,
     }

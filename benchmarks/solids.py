@@ -24,9 +24,9 @@ from corporeal.formats.transforms import read_views
 from corporeal.geometry.filling import sample_surface
 from corporeal.geometry.mesh import Mesh, joined, weld
 from corporeal.geometry.shape import Shape
-from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.solid import Solid, solids
 from corporeal.splats.train import train
+from corporeal.splats.training_schedule import TrainConfig
 from corporeal.stages.assemble import assemble
 from corporeal.types import Gaussians, Scene, Views
 
@@ -171,95 +171,94 @@ TABLE = (
 HEAD = (
     "# Solids from Gaussians",
     "",
-    "A splat is a cloud of soft ellipsoids, without inside or outside. To weigh, fill and simulate "
-    "a thing, `corporeal.splats.solid` makes one closed surface of each:",
+    "A Gaussian splat has no inside and no outside. To weigh, fill and simulate its objects, "
+    "`corporeal.splats.solid` extracts one closed surface per object:",
     "",
     "    solids(gaussians, object_of_gaussian, cameras, masks) -> tuple[Solid, ...]",
     "",
-    "1. **Look.** Every camera that pictures were taken with looks at the Gaussians again. A "
-    "ray meets the first surface where 15 % of its light is lost, one standard deviation before "
-    "the densest point of that Gaussian along the ray: what was learned with masks lies below the "
-    "outline by about that much. A pixel that lets more than half through shows nothing.",
-    "2. **Carve.** Each cell of a grid of a million about the thing asks all views how far behind "
-    "or before their surfaces it is. Of those that see it at all, four in ten may say it is "
-    "emptier. What no view sees, inside and below, is filled in between with about the least area. "
-    "Only what the pictures saw is known: below a seat, where no camera looked, and deep in a "
-    "vase, the surface is a guess. What is thinner than six cells in the mean is carved again on a "
-    "grid of up to four million close about it, whose cells are no finer than pixels are.",
-    "3. **Close.** Nothing is below the floor, and what stands on it is cut off flat there. What "
-    "seems to be below the floor is a plate that lies on it, at least 1.5 cells thick.",
-    "4. **Share.** Where things touch, a place belongs to the one whose Gaussians are nearer; deep "
-    "inside, to the one whose share of the common surface encloses it more (generalised winding "
-    "number). So the face between two things spans the rim of their contact, and every place "
-    "inside belongs to one thing. Floor and background (label -1) are no things, but hide what is "
-    "behind them and keep what is theirs.",
-    "5. **Surface.** Marching cubes; separate crumbs below 2 % are dropped, more than one piece is "
-    "said in a warning; smoothing without shrinking (Taubin).",
-    "6. **Fit.** Depths are off by a pixel or two where a thing is plain or shiny, mostly all to "
-    "one side; masks are not. Where there are masks, the surface is moved until its outlines are "
-    "theirs, and what lies between goes along. A patch that no view sees goes on with the least "
-    "bending where the surface about it nearly faces as it does, as below a ball; noise about it, "
-    "finer than a tenth of the patch and than two cells, gives way, which would tilt it. Elsewhere "
-    "it stays as it was filled in. Vertices get the colour that the cameras see there. Winding "
-    "numbers of the surface are compared with the cells it was made of; where more than 1 % "
-    "disagree a warning says so.",
-    "7. **Draw back.** Each thing was carved on its own grid and moved on its own, so that things "
-    "that touch end up a cell or two inside each other near the rim of their contact. What lies "
-    "inside another goes half of the way out, 14 times at most, as the other does, so that both "
-    "meet in a common face; meanwhile vertices spread along their surface, so that it does not "
-    "fold. What is clear of all others stays where it is. Nothing gets out through the floor, and "
-    "what lies on it stays flat on it. Triangles stay the same, so that closed surfaces stay "
-    "closed. Where less than nine tenths of an overlap go that way, because one thing goes through "
-    "the other, or where one is six cells deep in the other, both stay as they are; `assemble` "
-    "warns of things that overlap.",
+    "1. **Depth rendering.** The Gaussians are rendered from every camera of the input. A ray "
+    "hits the surface where its transmittance has fallen by 15 %, one standard deviation before "
+    "the densest point of that Gaussian along the ray: Gaussians learned with masks lie inside "
+    "the silhouette by about that much. A pixel with transmittance above one half counts as "
+    "empty.",
+    "2. **Carving.** For each cell of a grid of a million cells around the object, all views "
+    "give its signed distance to their depth maps; the value is a quantile: up to four in ten of "
+    "the views that see the cell may call it emptier. Cells that no view observes, inside and "
+    "below, are interpolated with about the least surface area. So the unobserved surface, below "
+    "a seat or deep in a vase, is a guess. Objects thinner than six cells on average are carved "
+    "again on a tighter grid of up to four million cells, no finer than the pixels.",
+    "3. **Floor.** The surface is cut off flat at the floor. An object that seems to lie below "
+    "the floor becomes a plate on it, at least 1.5 cells thick.",
+    "4. **Assignment.** Where objects touch, each point of space is assigned to the object with "
+    "the nearer Gaussians, and deep inside to the one whose part of the common surface has the "
+    "larger generalised winding number. The interface between two objects therefore spans the "
+    "rim of their contact. Floor and background (label -1) occlude, but are not extracted.",
+    "5. **Surface.** Marching cubes; separate components below 2 % are dropped, a warning tells "
+    "of more than one; Taubin smoothing, which does not shrink.",
+    "6. **Silhouette fit.** Rendered depth of textureless or glossy objects is biased by a pixel "
+    "or two; masks are not. Where there are masks, the surface is deformed until its silhouettes "
+    "match them. An unobserved patch is replaced by one of least bending energy where the "
+    "normals around it are close to its own, as below a ball; noise in the surrounding surface, "
+    "finer than a tenth of the patch and than two cells, is smoothed first because it would tilt "
+    "the patch. Elsewhere the patch stays as interpolated. Vertices get the colours that the "
+    "cameras see. A warning tells when winding numbers of the surface and the carved cells "
+    "disagree in more than 1 % of the cells.",
+    "7. **Overlap removal.** Objects are carved and fitted on their own grids, so that touching "
+    "objects end up overlapping by a cell or two near the rim of their contact. Vertices inside "
+    "another object move half of the way out, up to 14 times, in both objects, so that the two "
+    "meet in a common face; tangential smoothing keeps triangles from folding. All other "
+    "vertices stay, none passes through the floor, and the connectivity is unchanged, so that "
+    "closed surfaces stay closed. Where less than nine tenths of an overlap can be removed this "
+    "way, because one object passes through the other, or where it is six cells deep, both "
+    "surfaces are left unchanged; `assemble` warns of the overlap.",
     "",
-    "## How near to the truth",
+    "## Accuracy",
     "",
     "Written by `python benchmarks/solids.py scenes/box scenes/duck scenes/can scenes/bowl "
-    "scenes/chair scenes/pair --clad scenes/bowl scenes/chair --docs`: things pictured from 48 "
-    "sides at 256 × 256, Gaussians learned with the preset `draft`, solids compared with the "
-    "models. The scenes are made by",
+    "scenes/chair scenes/pair --clad scenes/bowl scenes/chair --docs`: 48 views at 256 × 256, "
+    "Gaussians learned with the preset `draft`, extracted surfaces compared with the models. The "
+    "scenes are made by",
     "",
     "    corporeal assemble --from models/ --name box --seed 1 --assets 004_sugar_box --views 48 "
     "--size 256 256",
     "",
     "with `duck_khronos`, `soda_can_coke`, `024_bowl` and `chair_smallhouse_a` likewise, and "
-    "`--name pair --seed 7 --assets duck_khronos soda_can_coke`, which stacks the two. Each thing "
-    "is about half a metre large in its scene, so that a pixel shows 2 to 3 mm. Volume: against "
-    "the model's. Overlap: common volume over joint volume. Distances are means over the "
-    "surface, in cells. In another: how deep the surface lies in other things at most, and what "
-    "share of the volume is also theirs.",
+    "`--name pair --seed 7 --assets duck_khronos soda_can_coke`, which stacks the two. Each "
+    "object is about half a metre large in its scene, so that a pixel covers 2 to 3 mm. Volume: "
+    "error relative to the model's. Overlap: intersection over union of the volumes. Distances "
+    "are means over the surface, in cells. In another: the largest depth of the surface inside "
+    "other objects, and the share of its volume that lies in them.",
     "",
 )
 TAIL = (
     "",
-    "- Compact things come out within two percent, also where they touch, and their surfaces an "
-    "eighth to a third of a cell from the models'. Without the sixth step that was up to three "
-    "percent and twice to three times as far.",
-    "- Where the pair touches, without the seventh step the duck lay up to 1.0 cells deep in the "
-    "can and the can up to 2.0 cells in the duck, with 0.08 % of their volumes in common. What is "
-    "left is along the rim, where thin lips of surfaces that the sixth step moved go through "
-    "themselves: inside and outside are not told apart well there. It takes two seconds.",
-    "- The chair is black and plain. Nothing in its pictures says how deep the seat lies between "
-    "the arms, so that the learned Gaussians themselves are off by centimetres there, and no "
-    "carving mends that. With Gaussians on its true surface (clad) it comes out with all four "
-    "legs, 4 pixels wide, and a seat closed from below, where no camera looked.",
+    "- Volumes of compact objects are within two percent, also where they touch, and their "
+    "surfaces an eighth to a third of a cell from the models'. Without step 6 it was up to three "
+    "percent, and two to three times the distance.",
+    "- Pair: without step 7 the duck lay up to 1.0 cells deep in the can and the can up to 2.0 "
+    "cells in the duck, with 0.08 % of their volumes in common. The remaining overlap lies along "
+    "the rim, where step 6 leaves thin self-intersections and inside and outside are ambiguous. "
+    "Step 7 takes two seconds.",
+    "- The chair is black and textureless. Its pictures do not constrain the depth of the seat "
+    "between the arms, so that the learned Gaussians themselves are off by centimetres there, "
+    "which carving cannot correct. With Gaussians placed on its true surface (clad) the result "
+    "has all four legs, 4 pixels wide, and a seat closed from below, where no camera looked.",
     "- The wall of the bowl is 2 to 3 mm thick, about a pixel and a cell. With Gaussians on its "
-    "true surface half of what either encloses is common, two fifths on a grid of a million. "
-    "Learned, its plain inside lies too high, and the wall comes out three times as thick as in "
-    "life, whatever the grid. Say how thick a wall is where its weight matters.",
-    "- Legs and boards gain most from the second grid: the wooden armchair of the round trip, "
-    "boards of 16 mm where a pixel shows 8, came out a quarter too heavy on cells of 12 mm and a "
-    "seventh on cells of 7.",
+    "true surface the intersection over union is .46, two fifths on the grid of a million cells "
+    "alone. Learned, its textureless inside lies too high, and the wall comes out three times as "
+    "thick as in life on any grid. State the wall thickness where the mass matters.",
+    "- Legs and boards gain most from the tighter grid: the wooden armchair of the round trip, "
+    "with boards of 16 mm and pixels of 8 mm, came out a quarter too heavy on cells of 12 mm and "
+    "a seventh too heavy on cells of 7 mm.",
     "",
     "## Films",
     "",
     "`corporeal film` draws a scene that was made of Gaussians from them: each is bound at the "
-    "start to the nearest particles of its own object, with the weights that vertices have, and "
-    "goes where they go. Its covariance becomes F Σ F^T and its colours turn with the rotation in "
-    "F. Gaussians of floor and background stand still. What is behind is the usual floor and sky; "
-    "the solids are not drawn but cast their shadows on it. `--look surfaces` draws the solids "
-    "instead.",
+    "start to the nearest particles of its own object, with the same skinning weights as mesh "
+    "vertices. Its covariance becomes F Σ F^T, and its spherical harmonics turn with the "
+    "rotation of F. Gaussians of floor and background stand still. Behind them are the usual "
+    "floor and sky; the extracted surfaces are not drawn but cast shadows. `--look surfaces` "
+    "draws the solids instead.",
     "",
     "`--colour-by material | law | object | part | young | poisson | density | speed` colours "
     "Gaussians or surfaces by what they are, with a key in the corner. Colours of materials, "

@@ -25,14 +25,14 @@ import numpy as np
 from corporeal.formats.transforms import read_views
 from corporeal.geometry.region import region
 from corporeal.machine import cores
-from corporeal.splats.crew import Crew
+from corporeal.splats.depth_rendering import render_depth
 from corporeal.splats.exposure import differ
-from corporeal.splats.lesson import PRESETS, TrainConfig
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE
 from corporeal.splats.quality import quality
 from corporeal.splats.raster import back, draw, pinhole
-from corporeal.splats.sight import looked
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.splats.train import train
+from corporeal.splats.training_schedule import PRESETS, TrainConfig
 from corporeal.types import Camera, Gaussians, Views
 
 PAGE = Path(__file__).parents[1] / "docs" / "splats.md"
@@ -80,8 +80,8 @@ def misplaced(gaussians: Gaussians, seen: Views) -> dict:
     """Return how much of what things show is seen behind them, and before them."""
     if seen.depth is None or seen.object_of_pixel is None:
         raise SystemExit("These views do not say how far things are away.")
-    with Crew(CORES) as crew:
-        found = looked(gaussians, seen.cameras, crew).depth
+    with ThreadPool(CORES) as pool:
+        found = render_depth(gaussians, seen.cameras, pool).depth
     on = seen.object_of_pixel >= 0
     behind = (found[on] - seen.depth[on]) / region(seen.cameras).radius
     return {"deep": float((behind > OFF).mean()), "near": float((behind < -OFF).mean())}
@@ -101,12 +101,12 @@ def drawn() -> dict:
     eye = pinhole(Camera(K, pose, side, side))
     slope = np.ones((4, side, side), np.float32)
     forward, backward = [], []
-    with Crew(1) as crew:
+    with ThreadPool(1) as pool:
         for _ in range(5):
             start = time.process_time()
-            drawing = draw(theta, eye, np.zeros(3), crew)
+            drawing = draw(theta, eye, np.zeros(3), pool)
             middle = time.process_time()
-            back(drawing, slope, crew)
+            back(drawing, slope, pool)
             forward.append(middle - start)
             backward.append(time.process_time() - middle)
     return {"draw_s": min(forward) / CORES, "back_s": min(backward) / CORES}
@@ -172,16 +172,16 @@ def main() -> None:
 HEAD = (
     "# Gaussians from pictures",
     "",
-    "`corporeal.splats` draws Gaussians on the processor, learns them from posed pictures, and "
-    "carries them along with deformed matter:",
+    "`corporeal.splats` renders Gaussians on the CPU, learns them from posed pictures, and "
+    "deforms them with simulated particles:",
     "",
     "    train(views, masks) -> Trained            pictures and cameras in, Gaussians out",
-    "    render(gaussians, camera) -> Picture      colours, coverage, depth",
-    "    weights(gaussians, camera) -> csr_array   what each contributes to each pixel",
+    "    render(gaussians, camera) -> Picture      colours, opacity, depth",
+    "    weights(gaussians, camera) -> csr_array   blending weight of each Gaussian in each pixel",
     "    deformed(gaussians, F, x) -> Gaussians    after a simulation",
     "",
-    "Written by `python benchmarks/splats.py scenes/helmet scenes/plant scenes/duck --docs`. Three "
-    "scenes are composed from models of public collections and pictured from 48 sides:",
+    "Written by `python benchmarks/splats.py scenes/helmet scenes/plant scenes/duck --docs`. "
+    "Three scenes are composed from models of public collections and rendered in 48 views:",
     "",
     "    corporeal assemble --from models/ --name duck --seed 7 --assets duck_khronos "
     "soda_can_coke --views 48 --size 256 256",
@@ -190,48 +190,52 @@ HEAD = (
     "    corporeal assemble --from models/ --name helmet --seed 5 --assets flight_helmet_khronos "
     "chair_smallhouse_a 004_sugar_box 024_bowl --views 48 --size 256 256",
     "",
-    "Every eighth view is held out: 42 are learned from, 6 compared with. Neither depth nor mesh "
-    "is used. The aims are 28 dB for the whole picture and 26 dB for the pixels on things, within "
-    "four minutes on two cores; a draft within one minute.",
+    "Every eighth view is held out: 42 views are used for training, 6 for comparison; neither "
+    "depth nor mesh. The targets are 28 dB (PSNR) for the whole picture and 26 dB for the pixels "
+    "on objects (*things*), within four minutes on two cores; a draft within one minute. *Deep*, "
+    "*near*: share of object pixels whose rendered depth is too large, or too small, by more "
+    "than 2 % of the radius of the ball that the cameras look at.",
     "",
 )
 TAIL = (
     "",
-    "- With masks only the things are learned, before random backgrounds; the whole picture is "
-    "then things before grey. Two cores: seconds of the processor, halved. Clock: what passed "
-    "while other programs kept the machine busy.",
-    "- Things [dB] is mostly lost along their outlines: a mask says yes or no for each pixel, "
-    "while the picture mixes thing and floor there. Two pixels further in, the helmet scene has 29 "
-    "to 33 dB at preset normal.",
-    "- Without masks (`--sources pictures`) floor and backdrop are learned too. A plane sweep "
-    "finds what has texture; a floor among that, and a dome over it, are behind all that is too "
-    "smooth to say how far away it is, and have Gaussians all over before learning begins. What "
-    "floats is taken away while learning: Gaussians that are wide, and that more views see past "
-    "than see something there. What is wide must be flat, what few views see has one colour from "
-    "all sides, and what is out of a picture stays as it is. Before that, the helmet scene's draft "
-    "had 21 dB (13 dB in views along the floor). What is left is lost in those views still: 24 to "
-    "30 dB, against 32 to 36 dB from above. The backdrop of these scenes belongs to each picture "
-    "and not to the room, which no Gaussians can follow.",
-    "- With masks, learning begins on their visual hull, also where a COLMAP model brings points: "
-    "a few hundred sparse points grow too slowly. Where a small training finds it better, a fifth "
-    "begins inside (decision 15): a seat between its arms lies below the hull. None of these three "
-    "scenes wants it.",
+    "- With masks only the objects are learned, in front of random backgrounds; *whole* is then "
+    "the objects in front of grey. *Two cores*: CPU seconds, halved. *Clock*: wall time while "
+    "other programs kept the machine busy.",
+    "- Most of the error on objects lies along their silhouettes: masks are binary, while pixels "
+    "there mix object and floor. Two pixels further inside, the helmet scene has 29 to 33 dB at "
+    "preset normal.",
+    "- Without masks (`--sources pictures`) floor and background are learned too. A plane sweep "
+    "initialises textured regions; the floor found in it, and a dome above, stand in for regions "
+    "too smooth for stereo, and are covered with Gaussians before training. Floaters are removed "
+    "during training: wide Gaussians at which more views see free space than a surface. Wide "
+    "Gaussians are forced flat, those seen in few views have no view-dependent colour, and "
+    "Gaussians outside a picture are left unchanged by it. Without these measures the helmet "
+    "scene's draft had 21 dB (13 dB in views along the floor). The remaining loss is in those "
+    "views: 24 to 30 dB, against 32 to 36 dB from above. The background of these scenes is "
+    "attached to each picture and not to the room, which no set of Gaussians can reproduce.",
+    "- With masks, training is initialised on their visual hull, also where a COLMAP model has "
+    "sparse points: a few hundred points grow too slowly. Where a small trial training gives "
+    "lower loss, a fifth of the Gaussians begin inside the hull (decision 15), since a seat "
+    "between its arms lies below it. None of these three scenes needs it.",
     "- Exposures (`splats/exposure.py`) are learned as one gain for each photograph and channel. "
-    "Where they differ, Gaussians have the mean one, and held-out views are compared after the "
-    "gain that suits each.",
-    "- Photographs, imitated: `python benchmarks/as_photographed.py scenes/helmet photo/helmet` "
-    "puts planks and papered walls behind the things and gives every picture its own exposure, "
-    "white balance, blur, noise and JPEG. Learned without masks by preset draft, held-out "
-    "photographs are met with 30.1 dB (29.0 dB on things) in the helmet scene, and 29.1 dB "
+    "The Gaussians take the mean exposure, and held-out views are compared after fitting their "
+    "gain.",
+    "- Imitated photographs: `python benchmarks/as_photographed.py scenes/helmet photo/helmet` "
+    "puts planks and papered walls behind the objects and gives every picture its own exposure, "
+    "white balance, blur, noise and JPEG compression. Learned without masks with preset draft, "
+    "held-out photographs reach 30.1 dB (29.0 dB on objects) in the helmet scene, and 29.1 dB "
     "(31.6 dB) in the duck scene; walls that few views see stay blurred.",
-    "- Without masks 55 % of the steps look at pictures of half the size, with masks 40 %. Drafts "
-    "of two scenes took 51 and 52 s with it and 65 and 61 s without, for 0.1 dB less.",
-    "- The helmet scene misses the aim for things without masks.",
-    '- `train(config=TrainConfig(rasteriser="gsplat"))` learns on a graphics card, through gsplat '
-    "1.5. It has never run on one here: tests hold it against a plain stand-in with gsplat's "
-    "signature, so that numbers, shapes and gradients are right if gsplat does what it says.",
-    "- `tests/splats` holds every gradient of the rasteriser equal to a plain reference within "
-    "1e-5, by a complex step and, where torch is installed, by its autograd.",
+    "- Coarse to fine: 55 % of the steps without masks, and 40 % with masks, use pictures of "
+    "half the size. Drafts of two scenes took 51 and 52 s with it and 65 and 61 s without, for "
+    "0.1 dB less.",
+    "- The helmet scene without masks misses the target for objects.",
+    '- `train(config=TrainConfig(rasteriser="gsplat"))` learns on a graphics card, through '
+    "gsplat 1.5. It has never run on one here: tests compare it with a stand-in that has "
+    "gsplat's signature, so that values, shapes and gradients are right if gsplat behaves as "
+    "documented.",
+    "- `tests/splats` checks every gradient of the rasteriser against a plain reference to 1e-5, "
+    "by complex-step differentiation and, where torch is installed, by autograd.",
     "",
 )
 

@@ -3,19 +3,21 @@
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
 from corporeal import pipeline
-from corporeal.mpm.frames import read_trajectory
-from corporeal.mpm.gaps import RADIUS
-from corporeal.mpm.outcome import outcome
+from corporeal.findings import Audit, Expectation, Outcome
+from corporeal.mpm.constants import PARTICLE_RADIUS
 from corporeal.pipeline import FOLDERS, Settings
-from corporeal.showcase.expectations import Expectation, expect
-from corporeal.store import DATA, META, load, read_json
+from corporeal.showcase.expectations import expect
+from corporeal.store import DATA, load, read_meta
+from corporeal.trajectory.audit import believed
+from corporeal.trajectory.audit_file import read_audit
+from corporeal.trajectory.frames import read_trajectory
+from corporeal.trajectory.outcome import outcome
 from corporeal.types import Particles, Scene, Trajectory
 
 
@@ -27,18 +29,18 @@ class Told:
     scene: Scene
     particles: Particles
     film: Trajectory
-    audit: dict[str, Any]
+    audit: Audit
     seconds: float
     """Of simulating alone."""
 
     @cached_property
-    def outcome(self) -> dict[str, Any]:
+    def outcome(self) -> Outcome:
         """Who met whom, who was dented where, who bounced how high."""
         return outcome(self.scene, self.particles, self.film)
 
     def expectations(self) -> list[Expectation]:
         """Compare what happened with what must be seen."""
-        return expect(self.name, self.outcome)
+        return list(believed(expect(self.name, self.outcome), self.audit))
 
     def gap(self, first: int, second: int) -> Float[np.ndarray, " F"]:
         """Distance between two objects at every frame [cells].
@@ -51,7 +53,7 @@ class Told:
             KDTree(frame.position[one]).query(frame.position[other])[0].min() / cell
             for frame in self.film.frames
         ]
-        return np.array(nearest) - 2 * RADIUS
+        return np.array(nearest) - 2 * PARTICLE_RADIUS
 
 
 def tell(name: str, folder: Path, settings: Settings) -> Told:
@@ -65,6 +67,6 @@ def tell(name: str, folder: Path, settings: Settings) -> Told:
         load(folder / FOLDERS["assemble"] / DATA),
         load(folder / FOLDERS["fill"] / DATA),
         read_trajectory(simulated),
-        read_json(simulated / "audit.json"),
-        read_json(simulated / META)["seconds"],
+        read_audit(simulated),
+        read_meta(simulated).seconds,
     )

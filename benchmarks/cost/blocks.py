@@ -102,5 +102,6 @@ def _body(drop: Drop, name: str, place: np.ndarray) -> Body:
         hardening=one * 0.0,
         friction_angle=one * np.radians(32.0),
         cohesion=one * 0.0,
-        viscosity=one * 0.0,
+        loss=one * 0.0,
+        vibration=one,
     )

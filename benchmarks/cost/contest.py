@@ -8,7 +8,7 @@ from typing import Any, NamedTuple, Protocol
 import numpy as np
 import warp as wp
 
-from corporeal.mpm.warp import WarpEngine
+from corporeal.mpm.cpu.engine import CpuEngine
 from cost.blocks import Drop, problem_of
 
 ROUNDS = 5
@@ -54,11 +54,11 @@ class Ours:
         problem = problem_of(drop)
         before = resident()
         if drop.device == "cpu":
-            self.solver: Any = WarpEngine(problem, threads=drop.threads)
+            self.solver: Any = CpuEngine(problem, threads=drop.threads)
         else:
-            from corporeal.mpm.device import DeviceEngine
+            from corporeal.mpm.cuda.engine import CudaEngine
 
-            self.solver = DeviceEngine(problem, drop.device)
+            self.solver = CudaEngine(problem, drop.device)
         self.drop, self.particles = drop, drop.particles
         self.step = self.solver.stable_step()
         self.batch(4)

@@ -11,19 +11,14 @@ import matplotlib
 import numpy as np
 import warp as wp
 
+from corporeal.mpm.laws import MENU
 from corporeal.types import Law
 from cost.blocks import Drop
 
 matplotlib.use("Agg")
 from matplotlib import pyplot as plt
 
-NAMES = {
-    Law.COROTATED: "fixed corotated",
-    Law.NEO_HOOKEAN: "Neo-Hookean",
-    Law.HENCKY: "Hencky",
-    Law.DRUCKER_PRAGER: "Drucker–Prager",
-    Law.VON_MISES: "von Mises",
-}
+NAMES = {law: rule.name for law, rule in MENU.items()}
 BLUE, GREY, RED = "#2b6cb0", "#718096", "#c53030"
 
 
@@ -118,7 +113,7 @@ def write(results: list[Result], where: str, command: str, docs: Path) -> None:
     figures = {
         "particles": (_particles, "Cost against the number of particles; one thread."),
         "threads": (_threads, "Cost against the number of threads."),
-        "laws": (_laws, "The five laws; one thread."),
+        "laws": (_laws, "All laws; one thread."),
     }
     shown = []
     for name, (draw, words) in figures.items():
@@ -203,7 +198,7 @@ def _targets(results: list[Result]) -> list[tuple[str, ...]]:
     laws = [r.cost for r in _find(results, threads=1, across=across)]
     rows = [
         _judged("fixed corotated, one thread", usual.cost, "ns", 80.0, at_most=True),
-        _judged("slowest of the five laws", max(laws), "ns", 150.0, at_most=True),
+        _judged("slowest of all laws", max(laws), "ns", 150.0, at_most=True),
         _judged("memory", usual.bytes / usual.particles, "bytes", 400.0, at_most=True),
     ]
     for threads, target in ((2, 1.7), (4, 2.8)):
@@ -289,7 +284,9 @@ def _threads(axes: Any, results: list[Result]) -> None:
             axes.loglog(count, [first[t] for t in count], label=words, **style)
             axes.loglog(count, first[1] / count, ":", color=GREY)
 
-    for law, shade in zip(Law, plt.get_cmap("viridis")(np.linspace(0.1, 0.85, 5)), strict=True):
+    for law, shade in zip(
+        Law, plt.get_cmap("viridis")(np.linspace(0.1, 0.85, len(Law))), strict=True
+    ):
         line(_find(results, law=law, across=across), NAMES[law], marker="o", color=shade)
     line(_find(results, engine="genesis"), "genesis-world, corotated", marker="s", color=RED)
     axes.set(xlabel="threads (dotted: in proportion)", ylabel="ns per particle and substep")

@@ -29,7 +29,11 @@ class Stuff:
     hardening: float = 0.0
     friction_angle: float = 0.5
     cohesion: float = 0.0
-    viscosity: float = 0.0
+    loss: float = 0.0
+    """Loss factor at the body's slowest vibration [-]."""
+    consistency: float = 0.0
+    """K_c of a liquid [Pa sⁿ]."""
+    flow_index: float = 1.0
 
     @property
     def p_wave_modulus(self) -> float:
@@ -71,9 +75,15 @@ def body(
             "hardening",
             "friction_angle",
             "cohesion",
-            "viscosity",
+            "loss",
         )
     }
+    shear = stuff.young / (2 * (1 + stuff.poisson))
+    extent = max(float(np.ptp(points, axis=0).max()), 1e-30)
+    numbers["vibration"] = np.full(n, np.pi * np.sqrt(shear / stuff.density) / extent)
+    if stuff.law is Law.FLUID:
+        more["consistency"] = np.full(n, stuff.consistency)
+        more["flow_index"] = np.full(n, stuff.flow_index)
     arm = points - points.mean(axis=0)
     if more.get("surface") is None:
         more["surface"] = np.zeros((0, 3))

@@ -4,9 +4,10 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from corporeal.mpm import contact
+from corporeal.mpm.constants import SWEEPS
+from corporeal.mpm.physics import contact
 from corporeal.mpm.problem import Problem
-from corporeal.mpm.reference import ReferenceEngine
+from corporeal.mpm.reference.engine import ReferenceEngine
 from laws.bodies import RUBBER, Stuff, ball, body, disc, problem, walls
 from laws.outcome import Outcome, absolute, at_least, relative
 from laws.watching import bodies_of, follow, half_width, rise, started, watch
@@ -88,7 +89,7 @@ class NodeSolve:
     """Largest approach left of a node, relative to the fastest body; mean over nodes [-]."""
 
 
-def crowded_node(bodies: int, trials: int, sweeps: int = contact.SWEEPS) -> NodeSolve:
+def crowded_node(bodies: int, trials: int, sweeps: int = SWEEPS) -> NodeSolve:
     """Let random bodies with random outward normals meet in a node, with friction."""
     rng = np.random.default_rng(1)
     found = []
@@ -130,7 +131,7 @@ def node_of_many_bodies(quick: bool = False) -> Outcome:
         absolute("growth of kinetic energy", max(0.0, *(f.energy - 1 for f in found)), 0.0, 1e-12),
         absolute("approach left [%]", 100 * max(f.residual for f in found), 0.0, 1.0, "%"),
     )
-    words = f"3, 4 and 5 random bodies, masses over two decades, {contact.SWEEPS} sweeps"
+    words = f"3, 4 and 5 random bodies, masses over two decades, {SWEEPS} sweeps"
     return Outcome("2", "Many bodies in a node conserve momentum", words, checks)
 
 

@@ -3,7 +3,18 @@
 from collections.abc import Callable
 from dataclasses import dataclass
 
-from laws import bending, collisions, friction, grains, plastic, rest, rotation, statics, waves
+from laws import (
+    bending,
+    collisions,
+    friction,
+    grains,
+    plastic,
+    rest,
+    rotation,
+    statics,
+    touching,
+    waves,
+)
 from laws.outcome import Outcome
 
 
@@ -39,5 +50,8 @@ CASES = {
         Case("15", plastic.copper_bar, (7, 17)),
         Case("16", grains.sand, (5, 43)),
         Case("17", rotation.rotating_body, (2, 22)),
+        Case("18", touching.newtons_cradle, (1, 2)),
+        Case("19", touching.marble_at_rest, (30, 60)),
+        Case("20", touching.plate_holds, (8, 24)),
     )
 }

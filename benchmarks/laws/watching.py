@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import Engine, Measure, Problem
-from corporeal.mpm.warp import WarpEngine
 
 
 @dataclass(frozen=True)
@@ -43,9 +43,9 @@ class History:
         return sum(parts, np.zeros(len(self.measures)))
 
 
-def started(given: Problem) -> WarpEngine:
+def started(given: Problem) -> CpuEngine:
     """Build the production engine, on one thread: cases run side by side."""
-    return WarpEngine(given, threads=1)
+    return CpuEngine(given, threads=1)
 
 
 def watch(run: Engine, until: float, looks: int) -> History:

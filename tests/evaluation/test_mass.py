@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import re
 import shutil
 from dataclasses import replace
 
@@ -11,11 +12,10 @@ import pytest
 import trimesh
 
 from corporeal.errors import BadFileError, UserError
-from corporeal.evaluation import mass
 from corporeal.evaluation.baselines import constant, hull_fit, solid_water
-from corporeal.evaluation.mass import MassAnswer, MassConfig, anonymous, compare, predict_all
+from corporeal.evaluation.mass import MassConfig, anonymous, compare, predict_all
+from corporeal.evaluation.mass_report import mass_figure, tables
 from corporeal.evaluation.metrics import coverage, errors
-from corporeal.evaluation.report import mass_figure, tables
 from corporeal.evaluation.truth import models_of, objects, read_abo, read_truth
 from corporeal.formats.glb_writer import write_glb
 from corporeal.materials import find
@@ -23,7 +23,7 @@ from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.ground import GroundConfig
 from corporeal.types import Finish, Scene, SceneObject, Surface
-from corporeal.vlm import Reply
+from oracle import Oracle, part, weighs, whole
 
 FEW = MassConfig(samples=40)
 
@@ -177,27 +177,28 @@ def test_what_nobody_recognised_may_weigh_anything(weighed):
 
 def test_the_comparison_has_every_method_and_every_group(weighed, tmp_path):
     result = compare(weighed[1])
-    assert set(result["metrics"]) == {"all", "hollow", "solid"}
-    assert result["metrics"]["hollow"]["mass"]["alde"] == pytest.approx(0, abs=1e-4)
-    every = result["metrics"]["all"]
+    assert set(result.metrics) == {"all", "hollow", "solid"}
+    assert result.metrics["hollow"]["mass"].alde == pytest.approx(0, abs=1e-4)
+    every = result.metrics["all"]
     assert set(every) == {
-        "solid_water", "constant", "hull_fit", "solid_usual", "built_usual", "mass"
+        "solid_water", "constant", "hull_fit", "solid_usual", "built_usual", "placed", "mixture",
+        "mass",
     }  # fmt: skip
-    assert every["solid_usual"]["ape"] > 1 > every["mass"]["ape"]
-    row = result["rows"][2]
-    assert {"object", "fill", "mass_true", "mass", "low", "high", "hull_fit"} <= set(row)
-    assert row["constant"] == pytest.approx(
-        math.prod(r["mass_true"] for k, r in enumerate(result["rows"]) if k != 2) ** (1 / 3)
+    assert every["solid_usual"].ape > 1 > every["mass"].ape
+    row = result.rows[2]
+    assert row.hull_fit > 0
+    assert row.constant == pytest.approx(
+        math.prod(r.mass_true for k, r in enumerate(result.rows) if k != 2) ** (1 / 3)
     )
-    mass_figure(result["rows"], tmp_path / "mass.png")
+    mass_figure(result.rows, tmp_path / "mass.png")
     assert (tmp_path / "mass.png").read_bytes()[:4] == b"\x89PNG"
-    titles = [title for title, _, _ in tables(result)]
+    titles = [table.title for table in tables(result)]
     assert titles[0] == "Masses"
     assert "Errors, all" in titles[1]
     unweighed = compare([replace(p, mass_true=None) for p in weighed[1]])
-    assert unweighed["metrics"] == {}
+    assert unweighed.metrics == {}
     with pytest.raises(UserError, match="no mass was measured"):
-        mass_figure(unweighed["rows"], tmp_path / "none.png")
+        mass_figure(unweighed.rows, tmp_path / "none.png")
 
 
 def test_questions_about_all_objects_that_wait_are_counted(weighed, tmp_path):
@@ -236,45 +237,37 @@ def test_an_anonymous_object_betrays_nothing_but_its_pictures(weighed):
     assert "unknown" in blind.described
 
 
-class Guesser:
-    """A model that always guesses the same."""
-
-    looks = True
-
-    def __init__(self):
-        self.asked = []
-
-    def ask(self, question, answer, check=None):
-        self.asked.append(question)
-        return Reply(answer(mass_kg=0.4, reason="It looks so."), "model", "guesser")
+SAID = weighs(0.3, 0.4, 0.5)
 
 
-def test_a_model_can_be_asked_for_the_number_itself(weighed, monkeypatch):
-    things, _ = weighed
-    guesser = Guesser()
-    monkeypatch.setattr(mass, "connect", lambda spec: guesser)
-    asked = replace(FEW, direct=True, anonymous=True)
-    config = DescribeConfig(views=2, view_size=64)
-    found = predict_all(things[:2], config, GroundConfig(), asked)
+def asked(things, monkeypatch, said=SAID, **config):
+    """Predict with an oracle in the model's place: (oracle, predictions)."""
+    oracle = Oracle(
+        parts=whole("ball"),
+        materials=lambda q: {"parts": [part("ball", "soft_PVC", "hollow")]},
+        mass=said,
+    )
+    monkeypatch.setattr("corporeal.stages.describe.connect", lambda spec, record: oracle)
+    describing = DescribeConfig(vlm="oracle:1", views=2, view_size=32, **config)
+    return oracle, predict_all(things, describing, GroundConfig(), replace(FEW, anonymous=True))
+
+
+def test_a_model_is_asked_for_the_number_itself_too(weighed, monkeypatch):
+    oracle, found = asked(weighed[0][:2], monkeypatch)
     assert [p.direct for p in found] == [0.4, 0.4]
-    assert len(guesser.asked) == 2
-    question = guesser.asked[0]
-    assert question.task == "mass"
+    question = next(q for q in oracle.asked if q.task == "mass")
     assert len(question.pictures) == 2
     assert "object-" in question.text
     assert "steel" not in question.text
-    assert "6 cm" in question.text
-    assert compare(found)["metrics"]["all"]["direct"]["count"] == 2
+    assert re.search(r"[56][.\d]* × [56][.\d]* × [56][.\d]* cm", question.text)
+    assert compare(found).metrics["all"]["direct"].count == 2
 
 
-def test_nobody_can_be_asked_without_a_model(weighed):
-    with pytest.raises(UserError, match="Name a model with --vlm"):
-        predict_all(weighed[0][:1], DescribeConfig(), GroundConfig(), replace(FEW, direct=True))
-
-
-def test_a_guessed_mass_is_above_zero():
-    with pytest.raises(ValueError, match="greater than 0"):
-        MassAnswer(mass_kg=0.0)
+def test_outside_evidence_is_left_out_where_it_is_not_wanted(weighed, monkeypatch):
+    oracle, found = asked(weighed[0][:1], monkeypatch, direct=False)
+    assert "mass" not in oracle.tasks()
+    assert (found[0].direct, found[0].warning) == (None, "")
+    assert found[0].mass == found[0].mixture
 
 
 # ---------------------------------------------------------------- the verb

@@ -52,15 +52,18 @@ def test_a_scene_is_judged_by_what_its_pictures_show(scene, tmp_path):
         corners = own.vertices[:, :2].min(0), own.vertices[:, :2].max(0)
         inward = np.minimum(bottom - corners[0], corners[1] - bottom).min(axis=1)
         assert (inward < 0.03).all()  # two pixels
-    row, told = objects.judged("two", taken)
+    judged = objects.judged("two", taken)
+    row = judged.row
     assert row.identity == 1 and row.ours > 0.95 and row.with_masks > 0.95
     assert row.components < 0.6 and row.things == ("tall", "low")
-    objects_figure.draw([(row, told)], tmp_path / "figure.png")
+    objects_figure.draw([judged], tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
-    (_, heads, cells) = objects.tables([row])[0]
-    assert len(heads) == len(cells[0]) and objects.record([row])["rows"][0]["identity"] == 1
+    table = objects.tables([row])[0]
+    assert (
+        len(table.heads) == len(table.rows[0]) and objects.record([row])["rows"][0]["identity"] == 1
+    )
 
 
 def test_a_folder_without_scenes_is_refused(tmp_path):
-    with pytest.raises(UserError, match="no scene of several things"):
+    with pytest.raises(UserError, match="no scene of several objects"):
         objects.judge(tmp_path)

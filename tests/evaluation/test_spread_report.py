@@ -11,9 +11,17 @@ from corporeal import cli, store
 from corporeal.errors import SimulationError, UserError
 from corporeal.evaluation import ensemble as ensembles
 from corporeal.evaluation import spread_report
-from corporeal.evaluation.ensemble import QUANTITIES, ensemble, spread
+from corporeal.evaluation.ensemble import (
+    QUANTITIES,
+    Ensemble,
+    MemberOutcome,
+    Spread,
+    ensemble,
+    spread,
+)
 from corporeal.formats.glb_writer import write_glb
 from corporeal.pipeline import Settings, run
+from corporeal.typed import typed
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
 
@@ -44,19 +52,19 @@ def made(ran):
 
 
 def test_members_differ_and_stay_in_their_ranges(ran, made):
-    assert [row["number"] for row in made["members"]] == [0, 1, 2]
-    young = [row["drawn"][0]["young"] for row in made["members"]]
+    assert [member.number for member in made.members] == [0, 1, 2]
+    young = [member.drawn[0]["young"] for member in made.members]
     assert len(set(young)) == 3
     assert all(1.5e6 <= y <= 2.5e6 for y in young)
-    masses = [row["objects"]["ball"]["mass_kg"] for row in made["members"]]
-    density = [row["drawn"][0]["density"] for row in made["members"]]
+    masses = [member.objects["ball"]["mass_kg"] for member in made.members]
+    density = [member.drawn[0]["density"] for member in made.members]
     assert masses == pytest.approx(
         [d * trimesh.creation.icosphere(2, 0.05).volume for d in density]
     )
-    told = made["spread"]["ball"]["mass_kg"]
-    assert told["smallest"] <= told["low"] <= told["median"] <= told["high"] <= told["largest"]
-    assert told["count"] == 3
-    assert store.read_json(ran / "ensemble.json")["spread"] == made["spread"]
+    told = made.of("ball", "mass_kg")
+    assert told.smallest <= told.low <= told.median <= told.high <= told.largest
+    assert told.count == 3
+    assert typed(Ensemble, store.read_json(ran / "ensemble.json")) == made
     assert not list((ran / "ensemble").rglob("frames/*.npz")), "frames were kept"
 
 
@@ -69,7 +77,7 @@ def test_what_is_done_is_not_done_again_and_more_members_add_to_it(ran, made, mo
         assert ensemble(ran, 3, 0, None, silent) == made
     told = []
     more = ensemble(ran, 4, 0, None, lambda verb: lambda share, words: told.append((share, words)))
-    assert more["members"][:3] == made["members"]
+    assert more.members[:3] == made.members
     shares = [share for share, words in told if "of 4" in words]
     assert shares == sorted(shares)
     assert shares[-1] == pytest.approx(1.0)
@@ -90,7 +98,7 @@ def test_a_member_that_was_cut_off_goes_on(ran, made, monkeypatch):
         ensemble(ran, 2, 7, None, silent)
     again = ensemble(ran, 2, 7, None, silent)
     assert calls == ["000", "001", "001"]
-    assert again["members"] != made["members"]
+    assert again.members != made.members
 
 
 def test_a_member_that_breaks_is_told_and_the_others_count(ran, monkeypatch, tmp_path):
@@ -104,21 +112,23 @@ def test_a_member_that_breaks_is_told_and_the_others_count(ran, monkeypatch, tmp
     monkeypatch.setattr(ensembles, "simulate", breaks)
     result = ensemble(ran, 2, 9, None, silent)
     assert spread_report.failures(result) == ["Member 1 stopped: It burst."]
-    assert result["spread"]["ball"]["mass_kg"]["count"] == 1
+    assert result.of("ball", "mass_kg").count == 1
     spread_report.spread_figure(result, tmp_path / "spread.png")
     assert (tmp_path / "spread.png").read_bytes()[:4] == b"\x89PNG"
 
 
 def test_the_spread_is_that_of_the_members():
-    rows = [{"objects": {"a": {"rebound_m": float(v)}}} for v in range(101)]
-    rows += [{"objects": {"a": {"rebound_m": None}}}, {"objects": {}, "error": "burst"}]
-    told = spread({"a": {"rebound_m": 7.0}}, rows)["a"]["rebound_m"]
-    assert told == {
-        "chosen": 7.0, "low": 5.0, "median": 50.0, "high": 95.0,
-        "smallest": 0.0, "largest": 100.0, "count": 101,
-    }  # fmt: skip
-    nothing = spread({"a": {"rebound_m": None}}, rows[101:])["a"]["rebound_m"]
-    assert nothing == {"chosen": None, "count": 0}
+    rows = [MemberOutcome(v, (), {"a": {"rebound_m": float(v)}}) for v in range(101)]
+    rows += [
+        MemberOutcome(101, (), {"a": {"rebound_m": None}}),
+        MemberOutcome(102, (), {}, "burst"),
+    ]
+    (told,) = spread({"a": {"rebound_m": 7.0}}, rows)["a"].values()
+    assert told == Spread(
+        chosen=7.0, low=5.0, median=50.0, high=95.0, smallest=0.0, largest=100.0, count=101
+    )
+    (nothing,) = spread({"a": {"rebound_m": None}}, rows[101:])["a"].values()
+    assert nothing == Spread(chosen=None, count=0)
 
 
 @pytest.mark.parametrize("samples", [0, -1, 10_000])
@@ -138,6 +148,6 @@ def test_the_verb_writes_table_data_and_figure(ran, made, monkeypatch, capsys):
         assert quantity in said
     assert json.loads((ran / "ensemble.json").read_text())["samples"] == 3
     assert (ran / "ensemble.png").read_bytes()[:4] == b"\x89PNG"
-    heights = [row["objects"]["ball"]["rebound_m"] for row in made["members"]]
+    heights = [member.objects["ball"]["rebound_m"] for member in made.members]
     assert np.ptp(heights) >= 0
-    assert set(made["spread"]["ball"]) == set(QUANTITIES)
+    assert set(made.spread["ball"]) == set(QUANTITIES)

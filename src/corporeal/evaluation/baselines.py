@@ -1,4 +1,4 @@
-"""What mass one would guess without knowing what a thing is made of.
+"""What mass one would guess without knowing what an object is made of.
 
 The fits leave the object out that they predict.
 """
@@ -13,7 +13,7 @@ WATER = 1000.0
 
 
 def solid_water(volume: Sequence[float]) -> list[float]:
-    """Mass of each thing if it were water through and through [kg]."""
+    """Mass of each object if it were water through and through [kg]."""
     return [WATER * v for v in volume]
 
 
@@ -31,7 +31,7 @@ def hull_fit(hull: Sequence[float], measured: Sequence[float]) -> list[float | N
     None: fewer than two others, or others of one size.
 
     Args:
-        hull: Volume of each thing's convex hull [m³].
+        hull: Volume of each object's convex hull [m³].
         measured: [kg]
 
     """

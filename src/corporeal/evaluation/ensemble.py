@@ -9,19 +9,21 @@ import shutil
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from corporeal import store
 from corporeal.errors import SimulationError, UserError
-from corporeal.materials.ensemble import otherwise, sample
-from corporeal.mpm.frames import FOLDER
-from corporeal.mpm.outcome import outcome
-from corporeal.pipeline import Progress, Settings, Tell, opened, reopen
+from corporeal.materials.ensemble import sample
+from corporeal.mixture import drawn_given
+from corporeal.pipeline import Progress, Settings, Tell, opened, quiet, reopen
+from corporeal.results import Results
 from corporeal.stages.fill import fill
 from corporeal.stages.ground import ground
 from corporeal.stages.simulate import SimulateConfig, simulate
+from corporeal.trajectory.frames import FOLDER
+from corporeal.trajectory.outcome import outcome
+from corporeal.typed import typed
 from corporeal.types import Particles, Scene, Trajectory
 
 MEMBERS, DATA, SPREAD = "ensemble", "outcome.json", "ensemble.json"
@@ -40,6 +42,59 @@ MOST = 1000
 """Members of one ensemble."""
 
 
+Numbers = Mapping[str, Mapping[str, float | None]]
+"""Object → quantity → what it was."""
+
+
+@dataclass(frozen=True)
+class Spread:
+    """How far one quantity of one object is known."""
+
+    chosen: float | None
+    """In the run's own simulation."""
+    count: int
+    """Members in which there was such a number."""
+    low: float | None = None
+    """5 % of these are below."""
+    median: float | None = None
+    high: float | None = None
+    """5 % are above."""
+    smallest: float | None = None
+    largest: float | None = None
+
+
+@dataclass(frozen=True)
+class MemberOutcome:
+    """What was drawn for one member, and what came of it."""
+
+    number: int
+    drawn: tuple[Mapping[str, str | float], ...]
+    """Per part: ``part``, ``material``, and field of ``Material`` → value [SI]."""
+    objects: Numbers
+    """Empty where it could not be simulated to the end."""
+    error: str = ""
+    """Why not."""
+
+
+@dataclass(frozen=True)
+class Ensemble:
+    """A run simulated again with other values from the ranges."""
+
+    samples: int
+    seed: int
+    interval: tuple[float, float]
+    """Shares of the members below ``Spread.low`` and ``Spread.high``."""
+    chosen: Numbers
+    """Of the run itself."""
+    members: tuple[MemberOutcome, ...]
+    spread: Mapping[str, Mapping[str, Spread]]
+    """Object → quantity → how far it is known."""
+
+    def of(self, obj: str, quantity: str) -> Spread:
+        """Return how far one of ``QUANTITIES`` of an object is known."""
+        return self.spread[obj][quantity]
+
+
 @dataclass(frozen=True)
 class Member:
     """One drawn set of values, and where its result goes."""
@@ -56,8 +111,12 @@ class Member:
 
 
 def ensemble(
-    folder: Path, samples: int, seed: int, config: SimulateConfig | None, tell: Tell
-) -> dict[str, Any]:
+    folder: Path,
+    samples: int,
+    seed: int = 0,
+    config: SimulateConfig | None = None,
+    tell: Tell = quiet,
+) -> Ensemble:
     """Simulate a run again ``samples`` times over the ranges, and keep the spread in its folder.
 
     Args:
@@ -67,36 +126,27 @@ def ensemble(
         config: How to simulate; None: as the run was.
         tell: Whom to tell about progress.
 
-    Returns:
-        ``members``: one row each; ``spread[object][quantity]``: ``chosen`` (the run's own), ``low``
-        (5 % of the members are below), ``median``, ``high``, ``smallest``, ``largest``, ``count``.
-
     Raises:
         UserError: The folder is no run, or the number of samples makes no sense.
 
     """
     if not 1 <= samples <= MOST:
         raise UserError(f"--samples is {samples}. Give a number from 1 to {MOST}.")
-    inputs, settings = reopen(folder)
+    asked = reopen(folder)
+    settings = asked.settings
     if config is not None:
         settings = replace(settings, simulate=config)
-    with opened(inputs, folder, settings, tell, "simulate") as (made, key):
-        scene = made["assemble"]
+    with opened(asked.inputs, folder, settings, tell, "simulate") as work:
+        made = work.made
         progress = tell("ensemble")
-        chosen = outcome_row(scene, made["fill"], made["simulate"])
+        chosen = outcome_row(made.scene, made.particles, made.trajectory)
         rows = []
         for number in range(samples):
-            name = store.key("member", {"seed": seed, "number": number}, [key])
+            name = store.key("member", {"seed": seed, "number": number}, [work.key])
             member = Member(number, seed, folder / MEMBERS / f"{number:03d}", name)
             rows.append(_member(member, made, settings, _share(progress, number, samples)))
-        result = {
-            "samples": samples,
-            "seed": seed,
-            "interval": [LOW, HIGH],
-            "chosen": chosen,
-            "members": rows,
-            "spread": spread(chosen, rows),
-        }
+        known = spread(chosen, rows)
+        result = Ensemble(samples, seed, (LOW, HIGH), chosen, tuple(rows), known)
         store.write_json(folder / SPREAD, result)
     return result
 
@@ -108,20 +158,18 @@ def _share(progress: Progress, number: int, samples: int) -> Progress:
     return tell
 
 
-def _member(
-    member: Member, made: Mapping[str, Any], settings: Settings, progress: Progress
-) -> dict[str, Any]:
+def _member(member: Member, made: Results, settings: Settings, progress: Progress) -> MemberOutcome:
     """Return a member's outcome, from disk where it is done."""
     place = member.folder
     if store.fresh(place, member.key):
         progress(1.0, "done before")
-        return store.read_json(place / DATA)
+        return typed(MemberOutcome, store.read_json(place / DATA))
     started = place / "started.json"
     if place.exists() and not (started.exists() and store.read_json(started) == member.key):
         shutil.rmtree(place)
     store.begin(place)
     store.write_json(started, member.key)
-    row = {"number": member.number} | _simulated(member, made, settings, progress)
+    row = _simulated(member, made, settings, progress)
     store.write_json(place / DATA, row)
     shutil.rmtree(place / FOLDER, ignore_errors=True)
     store.finish(place, member.key, {"number": member.number, "seed": member.seed}, 0.0)
@@ -129,63 +177,58 @@ def _member(
 
 
 def _simulated(
-    member: Member, made: Mapping[str, Any], settings: Settings, progress: Progress
-) -> dict[str, Any]:
-    scene, parts, random = made["assemble"], made["segment"], member.random
+    member: Member, made: Results, settings: Settings, progress: Progress
+) -> MemberOutcome:
+    scene, parts, random = made.scene, made.parts, member.random
     library, floor = settings.ground.library, settings.ground.floor
-    words = otherwise(made["describe"], random, library)
+    words = drawn_given(made.inventory, made.field.mixtures, random, library)
     field = ground(scene, parts, words, settings.ground)
     field = sample(field, [p.object for p in parts.catalogue], random, library, floor)
     progress(0.0, "filling")
     particles = fill(scene, parts, field, settings.fill)
-    drawn = [
+    drawn = tuple(
         {"part": w.name, "material": m.name} | {f: g.value for f, g in m.grounds.items()}
         for w, m in zip(field.words, field.materials, strict=True)
-    ]
+    )
     try:
         trajectory = simulate(scene, particles, field, settings.simulate, member.folder, progress)
     except SimulationError as error:
-        return {"error": str(error), "drawn": drawn, "objects": {}}
-    return {"drawn": drawn, "objects": outcome_row(scene, particles, trajectory)}
+        return MemberOutcome(member.number, drawn, {}, str(error))
+    return MemberOutcome(member.number, drawn, outcome_row(scene, particles, trajectory))
 
 
-def outcome_row(
-    scene: Scene, particles: Particles, trajectory: Trajectory
-) -> dict[str, dict[str, float | None]]:
-    """Return what happened to every object: name → quantity → number."""
-    happened = outcome(scene, particles, trajectory)["objects"]
+def outcome_row(scene: Scene, particles: Particles, trajectory: Trajectory) -> Numbers:
+    """Return what happened to every object."""
+    happened = outcome(scene, particles, trajectory).objects
     mass = np.bincount(particles.object, particles.mass, len(scene.objects))
     return {
-        thing.name: {
-            q: float(mass[k]) if q == "mass_kg" else happened[thing.name][q] for q in QUANTITIES
+        obj.name: {
+            q: float(mass[k]) if q == "mass_kg" else getattr(happened[obj.name], q)
+            for q in QUANTITIES
         }
-        for k, thing in enumerate(scene.objects)
+        for k, obj in enumerate(scene.objects)
     }
 
 
-def spread(
-    chosen: Mapping[str, Mapping[str, float | None]], rows: Sequence[Mapping[str, Any]]
-) -> dict[str, dict[str, dict[str, float | int | None]]]:
+def spread(chosen: Numbers, rows: Sequence[MemberOutcome]) -> Mapping[str, Mapping[str, Spread]]:
     """Say how far each outcome number is spread over the members that came through."""
     return {
-        name: {
-            q: _spread(own[q], [r["objects"][name][q] for r in rows if r["objects"]]) for q in own
-        }
+        name: {q: _spread(own[q], [r.objects[name][q] for r in rows if r.objects]) for q in own}
         for name, own in chosen.items()
     }
 
 
-def _spread(chosen: float | None, values: Sequence[float | None]) -> dict[str, float | int | None]:
+def _spread(chosen: float | None, values: Sequence[float | None]) -> Spread:
     known = np.array([v for v in values if v is not None])
     if not len(known):
-        return {"chosen": chosen, "count": 0}
+        return Spread(chosen, 0)
     low, median, high = np.quantile(known, [LOW, 0.5, HIGH])
-    return {
-        "chosen": chosen,
-        "low": float(low),
-        "median": float(median),
-        "high": float(high),
-        "smallest": float(known.min()),
-        "largest": float(known.max()),
-        "count": len(known),
-    }
+    return Spread(
+        chosen=chosen,
+        count=len(known),
+        low=float(low),
+        median=float(median),
+        high=float(high),
+        smallest=float(known.min()),
+        largest=float(known.max()),
+    )

@@ -1,78 +1,58 @@
 """Mass: how well what was recognised predicts what the scales said.
 
 The ladder of what is known, each step in the same run: the scan's volume as water; everything
-solid and usual; how things are built and filled, with usual values; and values placed in their
-ranges. Beside it stand a constant, a fit on the size, and a model that is asked for the number.
+solid and usual; how objects are built and filled, with usual values; values placed in their
+ranges; all ways they may be; and these reweighted by what was said of the mass outright. Beside it
+stand a constant, a fit on the size, and that number itself.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, replace
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from pydantic import BaseModel, Field
 from scipy.spatial import ConvexHull
 
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.evaluation.baselines import constant, hull_fit, solid_water
-from corporeal.evaluation.metrics import coverage, errors
+from corporeal.evaluation.metrics import Errors, coverage, errors
 from corporeal.evaluation.truth import Weighed
 from corporeal.geometry.arrangement import life_sized
-from corporeal.geometry.make import weight
-from corporeal.geometry.room import is_vessel, room_of
-from corporeal.geometry.survey import Anatomy
-from corporeal.materials.ensemble import otherwise, sample
-from corporeal.render.portrait import Portrait, portraits
+from corporeal.mixture import DRAWS, HIGH, LOW, Scale, weighed
 from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import DescribeConfig, describe
-from corporeal.stages.fill import examine
-from corporeal.stages.ground import GroundConfig, ground
+from corporeal.stages.ground import GroundConfig
 from corporeal.stages.segment import segment
-from corporeal.types import Inventory, MaterialField, Parts, PartWords, Scene
-from corporeal.vlm import LIVE, Question, connect
+from corporeal.types import Inventory, MassMixture, PartWords, Scene
+from corporeal.vlm import LIVE
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.together import together
 
-LOW, HIGH = 0.05, 0.95
-"""Quantiles of the samples that bound the interval."""
 METHODS = {
     "solid_water": "solid water",
     "constant": "mean of the others",
     "hull_fit": "fit on the hull",
-    "direct": "asked for the number",
-    "solid_usual": "solid, usual values",
-    "built_usual": "as built, usual values",
-    "mass": "as built, placed values",
+    "solid_usual": "solid, typical values",
+    "built_usual": "as built, typical values",
+    "placed": "as built, placed values",
+    "mixture": "all ways it may be",
+    "mass": "all ways, with outside evidence",
+    "direct": "asked directly",
 }
-"""From knowing least to knowing most; the last is the prediction."""
-PROMPT = """How heavy is this object?
-
-Object: {name}, longest side {extent}.
-
-The pictures show it from several sides. Say its mass as it is, with whatever is in it."""
-
-
-class MassAnswer(BaseModel):
-    """A model's answer when it is asked for the number itself."""
-
-    mass_kg: float = Field(gt=0, lt=1e5, allow_inf_nan=False)
-    reason: str = ""
+"""From knowing least to knowing most; ``mass`` is the prediction, ``direct`` stands beside it."""
 
 
 @dataclass(frozen=True)
 class MassConfig:
-    """How masses are predicted."""
+    """Prediction of masses."""
 
     anonymous: bool = False
-    """Hide file names, class names and the names inside the files: whoever is asked sees pictures
-    and a neutral name."""
-    direct: bool = False
-    """Also ask the model for the number itself."""
-    samples: int = 200
-    """Sets of values that are drawn for the interval."""
+    """Hide the names of files, classes, nodes and materials: a model sees pictures and a neutral
+    name only."""
+    samples: int = DRAWS
+    """Number of sets of ways and values drawn for prediction and interval."""
     seed: int = 0
 
 
@@ -89,13 +69,46 @@ class Prediction:
     solid_water: float
     solid_usual: float
     built_usual: float
+    placed: float
+    """The likeliest way, with its values where they were placed."""
+    mixture: float
+    """Median over all ways, without outside evidence."""
+    mixture_low: float
+    mixture_high: float
     direct: float | None
+    """What a model said outright; None: nobody was asked."""
+    warning: str
+    """Where that contradicts all the rest; "": nowhere."""
     volume_m3: float
     hull_m3: float
     described: str
     """What it was taken for."""
     asked_as: str
     """The name it was recognised under."""
+    constant: float | None = None
+    """None, as ``hull_fit``: it was not measured, so that it takes no part in the comparison."""
+    hull_fit: float | None = None
+
+
+@dataclass(frozen=True)
+class Comparison:
+    """Predictions against the scales."""
+
+    rows: tuple[Prediction, ...]
+    """One per object."""
+    metrics: Mapping[str, Mapping[str, Errors]]
+    """Group of objects → method → errors; empty without measured masses."""
+    coverage: Mapping[str, float]
+    """Group → share of the measured masses inside the intervals; empty without these."""
+    width: Mapping[str, float]
+    """Group → median of high over low."""
+    coverage_without: Mapping[str, float]
+    """As ``coverage``, without outside evidence."""
+    width_without: Mapping[str, float]
+    interval: tuple[float, float] = (LOW, HIGH)
+    """Quantiles that bound the intervals."""
+    methods: Mapping[str, str] = field(default_factory=lambda: METHODS)
+    """Method → in words."""
 
 
 Progress = Callable[[float, str], None]
@@ -116,7 +129,7 @@ def predict_all(
 
     """
     live = describing.vlm.partition(":")[0] in LIVE
-    jobs = [partial(predict, thing, describing, grounding, config) for thing in objects]
+    jobs = [partial(predict, obj, describing, grounding, config) for obj in objects]
     results = together(
         jobs,
         describing.parallel if live else 1,
@@ -133,30 +146,33 @@ def predict_all(
 
 
 def predict(
-    thing: Weighed, describing: DescribeConfig, grounding: GroundConfig, config: MassConfig
+    obj: Weighed, describing: DescribeConfig, grounding: GroundConfig, config: MassConfig
 ) -> Prediction:
     """Predict one object's mass at its real size by every method that needs no other object."""
-    scene = life_sized(assemble([thing.file]))
+    scene = life_sized(assemble([obj.file]))
     if config.anonymous:
-        scene = anonymous(scene, thing.file)
+        scene = anonymous(scene, obj.file)
     inventory = describe(scene, describing, grounding.library)
-    direct = _ask(scene, describing) if config.direct else None
     parts = segment(scene, inventory)
     scale = Scale(scene, parts, grounding, config.seed)
-    masses = scale.samples(inventory, config.samples)
-    low, high = np.quantile(masses, [LOW, HIGH])
+    mixture = _summed(weighed(scale, inventory, config.samples).mixtures)
     everything = np.concatenate([a.vertices for a in scale.anatomies])
     return Prediction(
-        object=thing.name,
-        fill=thing.fill,
-        mass_true=thing.mass,
-        mass=scale.mass(inventory),
-        low=float(low),
-        high=float(high),
+        object=obj.name,
+        fill=obj.fill,
+        mass_true=obj.mass,
+        mass=mixture.mass,
+        low=mixture.low,
+        high=mixture.high,
         solid_water=solid_water([scale.volume])[0],
         solid_usual=scale.mass(_every(inventory, _solid)),
         built_usual=scale.mass(_every(inventory, _usual)),
-        direct=direct,
+        placed=scale.mass(inventory),
+        mixture=mixture.mass_without,
+        mixture_low=mixture.low_without,
+        mixture_high=mixture.high_without,
+        direct=mixture.direct,
+        warning=mixture.warning,
         volume_m3=scale.volume,
         hull_m3=float(ConvexHull(everything).volume),
         described=_told(inventory),
@@ -164,55 +180,49 @@ def predict(
     )
 
 
-class Scale:
-    """Weighs one scene as it is described; measures its meshes once."""
+@dataclass(frozen=True)
+class _Sum:
+    """What the objects of one file weigh together [kg]."""
 
-    def __init__(self, scene: Scene, parts: Parts, grounding: GroundConfig, seed: int) -> None:
-        self.scene, self.parts, self.grounding, self.seed = scene, parts, grounding, seed
-        self.anatomies: list[Anatomy] = examine(scene, parts, seed)
-        members = [(a, m) for a in self.anatomies for m in a.members]
-        self.members = [m for _, m in members]
-        self.rooms = [
-            room_of(a, m, 0.0, np.random.default_rng([seed, m.part, 5])).volume
-            if is_vessel(m)
-            else 0.0
-            for a, m in members
-        ]
-        self.volume = sum(m.volume for m in self.members)
-        """Of everything that is enclosed [m³]."""
+    mass: float
+    low: float
+    high: float
+    mass_without: float
+    low_without: float
+    high_without: float
+    direct: float | None
+    warning: str
 
-    def mass(self, inventory: Inventory) -> float:
-        """Return the mass of the whole scene [kg]."""
-        return self.of(ground(self.scene, self.parts, inventory, self.grounding))
 
-    def of(self, field: MaterialField) -> float:
-        """Return the mass of the whole scene made of given materials [kg]."""
-        rows = zip(self.members, self.rooms, strict=True)
-        return sum(weight(member, field, room) for member, room in rows)
+def _summed(mixtures: Sequence[MassMixture]) -> _Sum:
+    """Add up; the interval of a sum is at most the sum of the intervals."""
 
-    def samples(self, inventory: Inventory, count: int) -> list[float]:
-        """Draw masses over the ranges and the alternatives [kg]."""
-        library, floor = self.grounding.library, self.grounding.floor
-        owner = [p.object for p in self.parts.catalogue]
-        found = []
-        for number in range(count):
-            rng = np.random.default_rng([self.seed, number])
-            words = otherwise(inventory, rng, library)
-            field = ground(self.scene, self.parts, words, self.grounding)
-            found.append(self.of(sample(field, owner, rng, library, floor)))
-        return found
+    def total(name: str) -> float:
+        return sum(getattr(m, name) for m in mixtures)
+
+    said = [m.evidence.likely for m in mixtures if m.evidence]
+    return _Sum(
+        mass=total("mass"),
+        low=total("low"),
+        high=total("high"),
+        mass_without=total("mass_without"),
+        low_without=total("low_without"),
+        high_without=total("high_without"),
+        direct=sum(said) if len(said) == len(mixtures) else None,
+        warning=" ".join(m.warning for m in mixtures if m.warning),
+    )
 
 
 # ---------------------------------------------------------------- what is left out
 
 
 def anonymous(scene: Scene, file: Path) -> Scene:
-    """Replace every name that could tell what a thing is by a neutral one, made from its content.
+    """Replace every name that could tell what an object is by a neutral one, made from its content.
 
-    Pictures stay as they are: what is printed on a thing can still be read.
+    Pictures stay as they are: what is printed on an object can still be read.
     """
     name = f"object-{store.digest(file)[:6]}"
-    things = tuple(
+    objects = tuple(
         replace(o, name=_numbered(name, k), class_name="object", source=f"{name}.glb", credit="")
         for k, o in enumerate(scene.objects)
     )
@@ -224,7 +234,7 @@ def anonymous(scene: Scene, file: Path) -> Scene:
         scene,
         name=name,
         source=f"{name}.glb",
-        objects=things,
+        objects=objects,
         surfaces=surfaces,
         finishes=finishes,
         warnings=(),
@@ -248,7 +258,9 @@ def _usual(words: PartWords) -> PartWords:
 
 def _solid(words: PartWords) -> PartWords:
     """Keep the materials only."""
-    words = replace(_usual(words), structure="solid", thickness=None, contents=None, fill=None)
+    words = replace(
+        _usual(words), structure="solid", thickness=None, contents=None, fill=None, solidity=None
+    )
     return replace(words, pieces=tuple(_solid(p) for p in words.pieces))
 
 
@@ -258,80 +270,64 @@ def _told(inventory: Inventory) -> str:
 
 
 def _piece_told(words: PartWords) -> str:
-    said = f"{words.name}: {words.material or 'unknown'}"
-    said += f", {words.structure}" if words.structure else ""
-    return said + (f" of {words.contents}" if words.contents else "")
-
-
-# ---------------------------------------------------------------- the number itself
-
-
-def _ask(scene: Scene, describing: DescribeConfig) -> float:
-    model = connect(describing.vlm)
-    if model is None:
-        raise UserError("Nobody is there to be asked for a mass. Name a model with --vlm.")
-    portrait = Portrait(describing.views, describing.view_size, describing.view_seed)
-    shown: list[int | None] = [0] * len(scene.surfaces)
-    extent = max(o.real_extent for o in scene.objects)
-    question = Question(
-        task="mass",
-        prompt=PROMPT.format(name=scene.name, extent=f"{100 * extent:.3g} cm"),
-        scene=scene.name,
-        views=portrait.words,
-        pictures=portraits(scene, shown, portrait) if model.looks else (),
-    )
-    return model.ask(question, MassAnswer).answer.mass_kg
+    described = f"{words.name}: {words.material or 'unknown'}"
+    described += f", {words.structure}" if words.structure else ""
+    return described + (f" of {words.contents}" if words.contents else "")
 
 
 # ---------------------------------------------------------------- against the scales
 
 
-def compare(predictions: Sequence[Prediction]) -> dict:
-    """Return rows and errors, over all and per fill group, as plain data.
+def compare(predictions: Sequence[Prediction]) -> Comparison:
+    """Return errors over all and per fill group; objects without a measured mass are only listed.
 
-    Returns:
-        ``rows``: one per object, with every method's mass. ``metrics[group][method]``: ``count``,
-        ``ade`` [kg], ``alde``, ``ape``, ``mnre``, ``within_2``. ``coverage[group]``: share of the
-        measured masses inside the intervals. Without measured masses the last two are empty.
-
+    The methods that need other objects' masses are added here.
     """
-    empty = {"constant": None, "hull_fit": None}
-    rows: list[dict[str, Any]] = [asdict(p) | empty for p in predictions]
-    weighed = [r for r in rows if r["mass_true"] is not None]
-    truth = [r["mass_true"] for r in weighed]
-    fits = {
-        "constant": constant(truth),
-        "hull_fit": hull_fit([r["hull_m3"] for r in weighed], truth),
+    weighed = [p for p in predictions if p.mass_true is not None]
+    truth = [_true(p) for p in weighed]
+    fits = zip(constant(truth), hull_fit([p.hull_m3 for p in weighed], truth), strict=True)
+    known = {
+        p.object: replace(p, constant=mean, hull_fit=fit)
+        for p, (mean, fit) in zip(weighed, fits, strict=True)
     }
-    for name, values in fits.items():
-        for row, value in zip(weighed, values, strict=True):
-            row[name] = value
-    fills = sorted({r["fill"] for r in weighed})
-    groups = {"all": weighed} | {
-        fill: [r for r in weighed if r["fill"] == fill]
-        for fill in (fills if len(fills) > 1 else ())
-    }
-    return {
-        "rows": rows,
-        "metrics": {name: _metrics(members) for name, members in groups.items() if members},
-        "coverage": {name: _covered(members) for name, members in groups.items() if members},
-        "interval": [LOW, HIGH],
-        "methods": METHODS,
-    }
+    weighed = list(known.values())
+    fills = sorted({p.fill for p in weighed})
+    groups = {"all": weighed} if weighed else {}
+    if len(fills) > 1:
+        groups |= {fill: [p for p in weighed if p.fill == fill] for fill in fills}
+    return Comparison(
+        rows=tuple(known.get(p.object, p) for p in predictions),
+        metrics={name: _metrics(members) for name, members in groups.items()},
+        coverage={name: _covered(members, "low", "high") for name, members in groups.items()},
+        width={name: _width(members, "low", "high") for name, members in groups.items()},
+        coverage_without={
+            name: _covered(members, "mixture_low", "mixture_high")
+            for name, members in groups.items()
+        },
+        width_without={
+            name: _width(members, "mixture_low", "mixture_high") for name, members in groups.items()
+        },
+    )
 
 
-def _metrics(rows: Sequence[dict]) -> dict:
+def _true(prediction: Prediction) -> float:
+    assert prediction.mass_true is not None, "objects without a measured mass were left out"
+    return prediction.mass_true
+
+
+def _metrics(rows: Sequence[Prediction]) -> dict[str, Errors]:
     found = {}
     for method in METHODS:
-        known = [r for r in rows if r.get(method) is not None and r[method] > 0]
+        known = [r for r in rows if (getattr(r, method) or 0.0) > 0]
         if known:
-            found[method] = asdict(
-                errors([r[method] for r in known], [r["mass_true"] for r in known])
-            )
+            found[method] = errors([getattr(r, method) for r in known], [_true(r) for r in known])
     return found
 
 
-def _covered(rows: Sequence[dict]) -> float:
-    return coverage(
-        [r["low"] for r in rows], [r["high"] for r in rows], [r["mass_true"] for r in rows]
-    )
+def _covered(rows: Sequence[Prediction], low: str, high: str) -> float:
+    ends = [getattr(r, low) for r in rows], [getattr(r, high) for r in rows]
+    return coverage(*ends, [_true(r) for r in rows])
+
+
+def _width(rows: Sequence[Prediction], low: str, high: str) -> float:
+    return float(np.median([getattr(r, high) / max(getattr(r, low), 1e-300) for r in rows]))

@@ -1,10 +1,10 @@
-"""Are things told apart that touch? Settled scenes, photographed; whose each point is, is known.
+"""Instance segmentation of objects that touch, in pictures of settled scenes with ground truth.
 
 Points are either spread over the surface that pictures show, or the means of Gaussians that were
-learned from the pictures. Three ways to tell things apart are compared: identity, which knows whose
-each point is; superpoints cut by look and concavity, with and without the number of things, and
-with instance masks; and the connected components of each point's nearest, the rule of published
-pipelines.
+learned from the pictures. Three methods are compared: identity, which is the ground truth;
+superpoints cut by appearance features and concavity, with and without the number of objects, and
+with instance masks; and the connected components of each point's nearest neighbours, the rule of
+published pipelines.
 """
 
 import time
@@ -20,6 +20,7 @@ from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
 from corporeal.evaluation.overlap import matched_iou
+from corporeal.evaluation.result_table import Table
 from corporeal.features.descriptor import LET_THROUGH, descriptor, seen_from
 from corporeal.features.lifting import back_projection, visible
 from corporeal.formats.splat_ply import write_splat
@@ -29,13 +30,13 @@ from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
 from corporeal.geometry.mesh import joined
 from corporeal.geometry.spread import sample_surface
+from corporeal.regions.instance_assignment import assign_instances
 from corporeal.regions.masks import lifted
 from corporeal.regions.objects import Split, components, objects
-from corporeal.regions.telling import told_apart
 from corporeal.splats.foreground import foreground, shown
-from corporeal.splats.lesson import TrainConfig
 from corporeal.splats.raster import weights
 from corporeal.splats.train import train
+from corporeal.splats.training_schedule import TrainConfig
 from corporeal.stages.assemble import assemble
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.types import Camera, Cloud, Gaussians, Scene, Views
@@ -46,23 +47,25 @@ CLOSE = 0.002
 DENSE = 60_000
 """Points on the surface by which distances are measured, and Gaussians told whose they are."""
 STEPS = 100
-"""Of bringing one thing to another."""
+"""Of bringing one object to another."""
 AROUND = 16
 """Points that a normal is found from."""
 
 
 @dataclass(frozen=True)
 class ObjectsEvaluationConfig:
-    """How scenes are pictured, and where points come from."""
+    """Views of scenes, and where points come from."""
 
     points_from: Literal["surface", "gaussians"] = "surface"
-    """Spread over what pictures show, or the means of Gaussians learned from them."""
+    """On visible surfaces, or the means of Gaussians trained on the views."""
     surface_points: int = 20_000
+    """Number of points on the surface."""
     pictures: int = 24
+    """Number of views."""
     picture_size: int = 256
     """Height and width [px]."""
     kept: Path | None = None
-    """Folder of Gaussians that were learned before."""
+    """Folder of Gaussians that were trained before, which are reused."""
 
 
 DEFAULT = ObjectsEvaluationConfig()
@@ -70,23 +73,23 @@ DEFAULT = ObjectsEvaluationConfig()
 
 @dataclass(frozen=True)
 class ObjectsRow:
-    """One scene; mean IoU over its things, paired by the Hungarian method."""
+    """One scene; mean IoU over its objects, paired by the Hungarian method."""
 
     scene: str
     things: tuple[str, ...]
     points: int
     identity: float
-    """Of what is known: 1 by construction."""
+    """The ground truth against itself: 1 by construction."""
     ours: float
-    """Superpoints, told how many things there are."""
+    """Superpoints, given the number of objects."""
     with_masks: float
     """The same, with instance masks on every view, numbered anew in each."""
     uncounted: float
-    """Superpoints that nobody told."""
+    """Superpoints, without the number of objects."""
     counted: int
-    """How many they counted."""
+    """Number of objects that they estimated."""
     components: float
-    """The published rule."""
+    """Connected components, the published rule."""
     seconds: float
     """Of the processor, for ``ours``."""
     warnings: tuple[str, ...]
@@ -104,9 +107,10 @@ class Touching:
 
 
 @dataclass(frozen=True)
-class Told:
-    """Whose each point was taken for."""
+class Judged:
+    """One scene: how well its objects were segmented, and its points with what was found."""
 
+    row: ObjectsRow
     taken: Touching
     ours: Split
     components: Int[np.ndarray, " N"]
@@ -116,8 +120,8 @@ def judge(
     folder: Path,
     config: ObjectsEvaluationConfig = DEFAULT,
     progress: Progress = lambda share, words: None,
-) -> list[tuple[ObjectsRow, Told]]:
-    """Tell the things of every scene of a folder apart, and compare.
+) -> list[Judged]:
+    """Segment every scene of a folder into objects, and compare with the truth.
 
     Args:
         folder: Of scenes as ``corporeal assemble`` writes them, or one such scene.
@@ -125,7 +129,7 @@ def judge(
         progress: Told the share done.
 
     Raises:
-        UserError: There is no scene of several things.
+        UserError: There is no scene of several objects.
 
     """
     inside = sorted(folder.glob("*/scene.toml")) if folder.is_dir() else []
@@ -138,21 +142,21 @@ def judge(
             found.append(judged(path.parent.name, photographed(path.parent.name, scene, config)))
     if not found:
         raise UserError(
-            f"{folder} holds no scene of several things. Make some: corporeal assemble --from "
+            f"{folder} holds no scene of several objects. Make some: corporeal assemble --from "
             "models/ --count 2 --out scenes."
         )
     return found
 
 
-def judged(name: str, taken: Touching) -> tuple[ObjectsRow, Told]:
-    """Tell things apart in all ways, and compare."""
+def judged(name: str, taken: Touching) -> Judged:
+    """Segment objects by all methods, and compare."""
     truth, cloud = taken.object_of_point, taken.cloud
     present = np.unique(truth)
     count = len(present)
     start = time.process_time()
     ours = objects(cloud, count, taken.normals)
     seconds = time.process_time() - start
-    masked = told_apart(cloud, "masks", count, taken.normals, taken.masks)
+    masked = assign_instances(cloud, "masks", count, taken.normals, taken.masks)
     uncounted = objects(cloud, None, taken.normals)
     published = components(cloud.position)
     row = ObjectsRow(
@@ -168,14 +172,14 @@ def judged(name: str, taken: Touching) -> tuple[ObjectsRow, Told]:
         seconds=seconds,
         warnings=ours.warnings,
     )
-    return row, Told(taken, ours, published)
+    return Judged(row, taken, ours, published)
 
 
 # ---------------------------------------------------------------- photographs of a scene
 
 
 def photographed(name: str, scene: Scene, config: ObjectsEvaluationConfig = DEFAULT) -> Touching:
-    """Picture a scene whose things touch, and take its points from the pictures."""
+    """Picture a scene whose objects touch, and take its points from the pictures."""
     scene = closed_up(scene)
     size = (config.picture_size, config.picture_size)
     views = capture(scene, CaptureConfig(config.pictures, size))
@@ -185,9 +189,9 @@ def photographed(name: str, scene: Scene, config: ObjectsEvaluationConfig = DEFA
 
 
 def closed_up(scene: Scene) -> Scene:
-    """Bring each thing that touches none before it to the nearest of them, along the floor.
+    """Bring each object that touches none before it to the nearest of them, along the floor.
 
-    What stands side by side still stands so. A thing moves by less than its distance each time, so
+    What stands side by side still stands so. An object moves by less than its distance, so
     that it stops where it touches.
     """
     for k in range(1, len(scene.objects)):
@@ -210,9 +214,9 @@ def closed_up(scene: Scene) -> Scene:
     return scene
 
 
-def _on(scene: Scene, thing: int) -> np.ndarray:
+def _on(scene: Scene, obj: int) -> np.ndarray:
     mesh, owner = joined(scene.surfaces), scene.object_of_triangle
-    return sample_surface(mesh.only(owner == thing), DENSE, np.random.default_rng(thing))[0]
+    return sample_surface(mesh.only(owner == obj), DENSE, np.random.default_rng(obj))[0]
 
 
 def _of_surface(scene: Scene, views: Views, config: ObjectsEvaluationConfig) -> Touching:
@@ -290,7 +294,7 @@ def _taken(scene: Scene, views: Views, found: _Seen) -> Touching:
     assert views.object_of_pixel is not None
     drawn = _renumbered(views.object_of_pixel)
     return Touching(
-        tuple(thing.name for thing in scene.objects),
+        tuple(obj.name for obj in scene.objects),
         cloud,
         normals(found.position, near, found.towards),
         found.truth,
@@ -299,7 +303,7 @@ def _taken(scene: Scene, views: Views, found: _Seen) -> Touching:
 
 
 def _renumbered(objects_of_view: np.ndarray) -> list[np.ndarray]:
-    """Return things numbered anew in every view, as who draws masks does."""
+    """Return objects numbered anew in every view, as who draws masks does."""
     rng, count = np.random.default_rng(0), int(objects_of_view.max()) + 1
     return [np.append(rng.permutation(count), -1)[view] for view in objects_of_view]
 
@@ -310,7 +314,7 @@ def _renumbered(objects_of_view: np.ndarray) -> list[np.ndarray]:
 HEADS = ("scene", "points", "identity", "ours", "with masks", "uncounted", "components", "seconds")
 
 
-def tables(rows: Sequence[ObjectsRow]) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+def tables(rows: Sequence[ObjectsRow]) -> list[Table]:
     """Return what to print: title, heads, cells."""
     cells = [
         (
@@ -325,7 +329,7 @@ def tables(rows: Sequence[ObjectsRow]) -> list[tuple[str, tuple[str, ...], list[
         )
         for row in rows
     ]
-    return [("Mean IoU of things; !: warned; (n): how many were counted", HEADS, cells)]
+    return [Table("Mean IoU of objects; !: warned; (n): how many were counted", HEADS, cells)]
 
 
 def record(rows: Sequence[ObjectsRow]) -> dict:

@@ -7,36 +7,37 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from corporeal.evaluation.figure import keep
-from corporeal.evaluation.objects import ObjectsRow, Told
+from corporeal.evaluation.objects import Judged
 from corporeal.evaluation.overlap import iou
 from corporeal.evaluation.parts_figure import seen, tinted
 from corporeal.regions.match import match
 
-COLUMNS = ("points of photographs", "identity", "look and concavity", "components")
+COLUMNS = ("points of photographs", "identity", "superpoints", "components")
 
 DRAWN = 5000
 """Points of a scene that are drawn, about."""
 
 
-def draw(found: Sequence[tuple[ObjectsRow, Told]], path: Path) -> None:
+def draw(found: Sequence[Judged], path: Path) -> None:
     """Draw one row per scene."""
     figure = Figure(figsize=(10, 2.6 * len(found)), dpi=72, layout="constrained")
     grid = figure.subplots(len(found), len(COLUMNS), squeeze=False)
-    for (row, told), axes in zip(found, grid, strict=True):
-        truth = told.taken.object_of_point
-        place, order = seen(told.taken.cloud.position)
+    for judged, axes in zip(found, grid, strict=True):
+        row = judged.row
+        truth = judged.taken.object_of_point
+        place, order = seen(judged.taken.cloud.position)
         order = order[:: max(1, len(order) // DRAWN)]
         tints = (
-            np.clip(told.taken.cloud.colour, 0, 1),
+            np.clip(judged.taken.cloud.colour, 0, 1),
             tinted(truth, "tab10"),
-            tinted(_as(truth, told.ours.object_of_point), "tab10"),
-            tinted(_as(truth, told.components), "tab10"),
+            tinted(_as(truth, judged.ours.object_of_point), "tab10"),
+            tinted(_as(truth, judged.components), "tab10"),
         )
         for axis, tint in zip(axes, tints, strict=True):
             axis.scatter(*place[order].T, s=2.0, c=tint[order], lw=0)
             axis.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
-        said = ("", *(f"mean IoU {v:.2f}" for v in (row.identity, row.ours, row.components)))
-        for axis, text in zip(axes, said, strict=True):
+        scores = ("", *(f"mean IoU {v:.2f}" for v in (row.identity, row.ours, row.components)))
+        for axis, text in zip(axes, scores, strict=True):
             axis.set_xlabel(text, fontsize=8)
         axes[0].set_ylabel(row.scene.replace("_", " "), fontsize=9)
     for axis, title in zip(grid[0], COLUMNS, strict=True):

@@ -1,4 +1,4 @@
-"""How well things were told apart, against the truth."""
+"""How well objects were told apart, against the truth."""
 
 import numpy as np
 from jaxtyping import Float, Int

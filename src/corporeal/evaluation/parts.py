@@ -18,6 +18,7 @@ from jaxtyping import Int
 from corporeal import features
 from corporeal.errors import BadFileError, UserError
 from corporeal.evaluation.overlap import best_names, matched_iou, named_iou, roc_area
+from corporeal.evaluation.result_table import Table
 from corporeal.features.descriptor import descriptor, seen_from
 from corporeal.features.lifting import back_projection, visible
 from corporeal.formats.sources import models_in
@@ -43,22 +44,23 @@ What is called the same is one part."""
 
 @dataclass(frozen=True)
 class PartsEvaluationConfig:
-    """How models are pictured, and who looks."""
+    """Views of models, and features."""
 
     points: int = 20_000
-    """On the surface; those that no picture shows are left out."""
+    """Number of points on the surface; those that are not visible are left out."""
     photographs: int = 24
-    """From all sides above the floor."""
+    """Number of views, from all sides above the floor."""
     photograph_size: int = 256
     """Height and width [px]."""
     point_seed: int = 0
-    """Chooses the points."""
+    """Seed of the points."""
     lying: bool = False
-    """Whether each model lies on its side when it is pictured."""
+    """Lay each model on its side before it is rendered."""
     structural: str = "descriptor"
-    """What tells parts apart: "descriptor" needs no model; or "dinov2", or "dinov2:FOLDER"."""
+    """Features that parts are segmented by: "descriptor", which needs no weights, "dinov2", or
+    "dinov2:FOLDER"."""
     semantic: str = ""
-    """What finds names' points: "clip", "clip:FOLDER"; "": colour, height and shape."""
+    """Features that parts are named by: "clip", "clip:FOLDER"; "": colour, height and shape."""
 
 
 @dataclass(frozen=True)
@@ -130,8 +132,9 @@ class Judging:
 
 @dataclass(frozen=True)
 class Judged:
-    """One object's points, with what they were taken for."""
+    """One object: how well its parts were found, and its points with what they were taken for."""
 
+    row: PartsRow
     taken: Photographed
     truth: Int[np.ndarray, " N"]
     """Index into the parts that a picture shows."""
@@ -144,7 +147,7 @@ def judge(
     names: Names,
     how: Judging,
     progress: Progress = lambda share, text: None,
-) -> list[tuple[PartsRow, Judged]]:
+) -> list[Judged]:
     """Find the parts of every model that has several, and compare.
 
     Args:
@@ -165,7 +168,7 @@ def judge(
         stem = each if isinstance(each, str) else each.stem
         progress(number / len(chosen), stem)
         taken = photographed(scene, how.look, look, how.describe)
-        if len(_called(taken, names.get(stem, {}))[0]) > 1:
+        if len(_called(taken, names.get(stem, {})).parts) > 1:
             found.append(judged(stem, taken, names.get(stem, {}), look, how.clusters))
     if not found:
         raise UserError(f"No model in {folder} has two parts that a picture shows.")
@@ -192,7 +195,7 @@ def _models(folder: Path) -> list[Path]:
     found = models_in(folder) if folder.is_dir() else []
     if not found:
         raise UserError(
-            f"There are no models in {folder}. Name a folder of GLB, glTF or OBJ files."
+            f"There are no models in {folder}. Name a folder of GLB, glTF or mesh files."
         )
     return found
 
@@ -255,21 +258,22 @@ def _cloud(
 
 def judged(
     name: str, taken: Photographed, names: Mapping[str, str], look: Lookers, config: PartsConfig
-) -> tuple[PartsRow, Judged]:
+) -> Judged:
     """Find one object's parts, and compare; only what a picture shows is asked for."""
-    told, truth = _called(taken, names)
-    thing = replace(taken.inventory.objects[0], parts=tuple(told))
-    vectors = None if look.semantic is None else look.semantic.words(phrases(thing))
+    called = _called(taken, names)
+    shown, truth = called.parts, called.part_of_point
+    words = replace(taken.inventory.objects[0], parts=tuple(shown))
+    vectors = None if look.semantic is None else look.semantic.words(phrases(words))
     start = time.process_time()
     clusters = parts(taken.cloud, config)
-    found = named(clusters, taken.cloud, vectors, told)
+    found = named(clusters, taken.cloud, vectors, shown)
     seconds = time.process_time() - start
     part, cluster = found.part_of_point, clusters.cluster_of_point
     right = part == truth
-    matter = _matters(told)
+    material = _materials(shown)
     row = PartsRow(
         object=name,
-        parts=tuple(p.name for p in told),
+        parts=tuple(p.name for p in shown),
         points=len(truth),
         clusters=clusters.count,
         clusters_iou=matched_iou(truth, cluster),
@@ -277,29 +281,39 @@ def judged(
         found_iou=matched_iou(truth, part),
         named_iou=named_iou(truth, part),
         right=float(right.mean()),
-        matter_iou=named_iou(matter[truth], matter[part]),
+        matter_iou=named_iou(material[truth], material[part]),
         chance_iou=named_iou(truth, np.full_like(truth, np.bincount(truth).argmax())),
         ordering=roc_area(found.confidence[right], found.confidence[~right]),
         seconds=seconds,
     )
-    return row, Judged(taken, truth, cluster, part)
+    return Judged(row, taken, truth, cluster, part)
 
 
-def _called(taken: Photographed, names: Mapping[str, str]) -> tuple[list[PartWords], np.ndarray]:
-    """Return the parts that a picture shows, and each point's; parts of one name are one part."""
-    said = [p for thing in taken.inventory.objects for p in thing.parts]
+@dataclass(frozen=True)
+class _Called:
+    """The parts that a picture shows, under the names that are asked for."""
+
+    parts: list[PartWords]
+    part_of_point: Int[np.ndarray, " N"]
+    """Index into ``parts``."""
+
+
+def _called(taken: Photographed, names: Mapping[str, str]) -> _Called:
+    """Return the parts that a picture shows; parts of one name are one part."""
+    known = [p for one in taken.inventory.objects for p in one.parts]
     present = np.unique(taken.part_of_point)
-    called = {int(k): names.get(said[k].name, said[k].name) for k in present}
+    called = {int(k): names.get(known[k].name, known[k].name) for k in present}
     distinct = list(dict.fromkeys(called.values()))
-    number = np.full(len(said), -1)
+    number = np.full(len(known), -1)
     number[present] = [distinct.index(called[int(k)]) for k in present]
-    first = {called[int(k)]: said[k] for k in present[::-1]}
-    return [replace(first[name], name=name) for name in distinct], number[taken.part_of_point]
+    first = {called[int(k)]: known[k] for k in present[::-1]}
+    shown = [replace(first[name], name=name) for name in distinct]
+    return _Called(shown, number[taken.part_of_point])
 
 
-def _matters(told: Sequence[PartWords]) -> np.ndarray:
+def _materials(shown: Sequence[PartWords]) -> np.ndarray:
     """Return one number per material; parts of unknown ones are each of their own."""
-    keys = [part.material or f"? {k}" for k, part in enumerate(told)]
+    keys = [part.material or f"? {k}" for k, part in enumerate(shown)]
     return np.array([keys.index(key) for key in keys])
 
 
@@ -322,10 +336,10 @@ def read_names(path: Path) -> Names:
 
 # ---------------------------------------------------------------- for people and programs
 
-HEADS = ("object", "parts", "clusters", "alone", "best", "told apart", "named", "by matter")
+HEADS = ("object", "parts", "clusters", "alone", "best", "segmented", "named", "by material")
 
 
-def tables(rows: Sequence[PartsRow]) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+def tables(rows: Sequence[PartsRow]) -> list[Table]:
     """Return title, heads and cells of what a person is shown."""
     cells = [
         (r.object, str(len(r.parts)), f"{r.clusters} ({r.ratio:.1f}×)", *map(_share, _scores(r)))
@@ -334,7 +348,7 @@ def tables(rows: Sequence[PartsRow]) -> list[tuple[str, tuple[str, ...], list[tu
     mean = np.mean([_scores(r) for r in rows], axis=0)
     ratio = np.mean([r.ratio for r in rows])
     last = ("mean", "", f"({ratio:.1f}×)", *map(_share, mean))
-    return [("Parts: mean IoU", HEADS, [*cells, last])]
+    return [Table("Parts: mean IoU", HEADS, [*cells, last])]
 
 
 def _scores(r: PartsRow) -> tuple[float, ...]:

@@ -9,7 +9,7 @@ from matplotlib import colormaps
 from matplotlib.figure import Figure
 
 from corporeal.evaluation.figure import keep
-from corporeal.evaluation.parts import Judged, PartsRow
+from corporeal.evaluation.parts import Judged
 
 FROM = (0.75, -0.55, 0.38)
 """Direction from the object to who looks at it."""
@@ -18,11 +18,12 @@ WIDE = 44
 COLUMNS = ("points of photographs", "true parts", "clusters", "parts found by their names")
 
 
-def draw(found: Sequence[tuple[PartsRow, Judged]], path: Path) -> None:
+def draw(found: Sequence[Judged], path: Path) -> None:
     """Draw one row per object."""
     figure = Figure(figsize=(11, 2.9 * len(found)), dpi=110, layout="constrained")
     grid = figure.subplots(len(found), len(COLUMNS), squeeze=False)
-    for (row, judged), axes in zip(found, grid, strict=True):
+    for judged, axes in zip(found, grid, strict=True):
+        row = judged.row
         place, order = seen(judged.taken.cloud.position)
         shades = (
             np.clip(judged.taken.cloud.colour, 0, 1),
@@ -33,13 +34,13 @@ def draw(found: Sequence[tuple[PartsRow, Judged]], path: Path) -> None:
         for axis, shade in zip(axes, shades, strict=True):
             axis.scatter(*place[order].T, s=1.2, c=shade[order], lw=0)
             axis.set(aspect="equal", xticks=[], yticks=[], frame_on=False)
-        said = (
+        labels = (
             "",
             fill(", ".join(row.parts), WIDE),
             f"{row.clusters}",
             f"mean IoU {row.named_iou:.2f}",
         )
-        for axis, text in zip(axes, said, strict=True):
+        for axis, text in zip(axes, labels, strict=True):
             axis.set_xlabel(text, fontsize=7)
         axes[0].set_ylabel(row.object, fontsize=9)
     for axis, title in zip(grid[0], COLUMNS, strict=True):

@@ -11,6 +11,7 @@ import numpy as np
 from corporeal import materials
 from corporeal.errors import BadFileError, UserError
 from corporeal.evaluation.overlap import roc_area
+from corporeal.evaluation.result_table import Table
 from corporeal.formats.sources import models_in
 from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import DescribeConfig, describe
@@ -78,7 +79,7 @@ def judge(
     for number, path in enumerate(known):
         progress(number / len(known), path.stem)
         told = describe(assemble([path]), config, library)
-        words = {w.name: w for thing in told.objects for w in thing.parts}
+        words = {w.name: w for obj in told.objects for w in obj.parts}
         for part, accepted in truth[path.stem].items():
             if part not in words:
                 raise UserError(
@@ -110,10 +111,10 @@ def read_truth(path: Path, library: str = "default") -> Truth:
     return truth
 
 
-def _accepted(path: Path, where: str, said: object, library: str) -> tuple[str, ...]:
-    if not (isinstance(said, list) and said and all(isinstance(m, str) for m in said)):
-        raise BadFileError(path, f"{where}: is {said!r}, no list of materials.", EXAMPLE)
-    return tuple(materials.named(name, library).name for name in said)
+def _accepted(path: Path, where: str, names: object, library: str) -> tuple[str, ...]:
+    if not (isinstance(names, list) and names and all(isinstance(m, str) for m in names)):
+        raise BadFileError(path, f"{where}: is {names!r}, no list of materials.", EXAMPLE)
+    return tuple(materials.named(name, library).name for name in names)
 
 
 # ---------------------------------------------------------------- how good
@@ -138,26 +139,40 @@ def ordering(rows: Sequence[Row]) -> float | None:
     return roc_area(right, wrong)
 
 
-def bands(rows: Sequence[Row]) -> list[tuple[float, float, int, float, float]]:
-    """Per band of margins: its edges, answers in it, their mean margin, share of them right."""
+@dataclass(frozen=True)
+class Band:
+    """Answers whose margins lie close together."""
+
+    low: float
+    high: float
+    """Edges of the margins."""
+    count: int
+    margin: float
+    """Mean."""
+    right: float
+    """Share that is right."""
+
+
+def bands(rows: Sequence[Row]) -> list[Band]:
+    """Group answers by their margins; bands without an answer are left out."""
     found = []
     for low, high in pairwise(BANDS):
         inside = [r for r in rows if r.answer is not None and low <= r.margin < high]
         if inside:
             mean = sum(r.margin for r in inside) / len(inside)
             right = sum(r.verdict == "right" for r in inside) / len(inside)
-            found.append((low, min(high, 1.0), len(inside), mean, right))
+            found.append(Band(low, min(high, 1.0), len(inside), mean, right))
     return found
 
 
 # ---------------------------------------------------------------- for people and programs
 
 
-def tables(rows: Sequence[Row]) -> list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]:
+def tables(rows: Sequence[Row]) -> list[Table]:
     """Return title, heads and cells of what a person is shown."""
     s = score(rows)
     shares = (s.right, s.likeliest, s.wrong, s.unknown)
-    told = "–" if s.ordering is None else f"{s.ordering:.2f}"
+    order = "–" if s.ordering is None else f"{s.ordering:.2f}"
     heads = ("parts", "right", "likeliest", "wrong", "unknown", "margin orders")
     wrong = [
         (r.file, r.part, str(r.answer), f"{r.margin:.2f}", r.accepted[0])
@@ -165,12 +180,12 @@ def tables(rows: Sequence[Row]) -> list[tuple[str, tuple[str, ...], list[tuple[s
         if r.verdict == "wrong"
     ]
     return [
-        ("Materials of parts", heads, [(str(s.parts), *(f"{x:.0%}" for x in shares), told)]),
-        ("Wrong answers", ("object", "part", "answer", "margin", "likeliest"), wrong),
+        Table("Materials of parts", heads, [(str(s.parts), *(f"{x:.0%}" for x in shares), order)]),
+        Table("Wrong answers", ("object", "part", "answer", "margin", "likeliest"), wrong),
     ]
 
 
 def record(rows: Sequence[Row]) -> dict:
     """Return rows and scores as plain data."""
-    told = [asdict(r) | {"verdict": r.verdict} for r in rows]
-    return {"rows": told, "scores": asdict(score(rows))}
+    verdicts = [asdict(r) | {"verdict": r.verdict} for r in rows]
+    return {"rows": verdicts, "scores": asdict(score(rows))}

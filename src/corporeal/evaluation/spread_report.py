@@ -5,7 +5,7 @@ from typing import Any
 
 from matplotlib.figure import Figure
 
-from corporeal.evaluation.ensemble import QUANTITIES
+from corporeal.evaluation.ensemble import QUANTITIES, Ensemble
 from corporeal.evaluation.figure import keep
 
 HEADS = ("object", "quantity", "as chosen", "5 %", "median", "95 %", "members")
@@ -15,28 +15,27 @@ COLUMNS = 4
 INK, FAINT, MARK = "#222222", "#9fb8c4", "#c8553d"
 
 
-def rows(result: dict[str, Any]) -> list[tuple[str, ...]]:
+def rows(result: Ensemble) -> list[tuple[str, ...]]:
     """Return one row per object and quantity that anything can be said of."""
     return [
         (
             name,
             QUANTITIES[quantity],
-            _number(s["chosen"]),
-            *(_number(s[k]) for k in ("low", "median", "high")),
-            str(s["count"]),
+            *map(_number, (s.chosen, s.low, s.median, s.high)),
+            str(s.count),
         )
-        for name, own in result["spread"].items()
+        for name, own in result.spread.items()
         for quantity, s in own.items()
-        if s["count"]
+        if s.count
     ]
 
 
-def failures(result: dict[str, Any]) -> list[str]:
+def failures(result: Ensemble) -> list[str]:
     """Say which members could not be simulated to the end."""
     return [
-        f"Member {row['number']} stopped: {row['error']}"
-        for row in result["members"]
-        if "error" in row
+        f"Member {member.number} stopped: {member.error}"
+        for member in result.members
+        if member.error
     ]
 
 
@@ -44,10 +43,10 @@ def _number(value: float | None) -> str:
     return "–" if value is None else f"{value:.3g}"
 
 
-def spread_figure(result: dict[str, Any], path: Path) -> None:
+def spread_figure(result: Ensemble, path: Path) -> None:
     """Draw a panel per quantity: every member, the interval, and what was chosen."""
     shown = [q for q in QUANTITIES if _varies(result, q)]
-    names = list(result["spread"])
+    names = list(result.spread)
     lines = -(-max(len(shown), 1) // COLUMNS)
     size = (2.6 * COLUMNS, lines * (0.3 * len(names) + 0.9))
     figure = Figure(figsize=size, dpi=150, layout="constrained")
@@ -65,18 +64,18 @@ def spread_figure(result: dict[str, Any], path: Path) -> None:
     keep(figure, path)
 
 
-def _varies(result: dict[str, Any], quantity: str) -> bool:
-    found = [own[quantity] for own in result["spread"].values()]
-    return any(s["count"] and s["largest"] - s["smallest"] > STILL for s in found)
+def _varies(result: Ensemble, quantity: str) -> bool:
+    found = [result.of(name, quantity) for name in result.spread]
+    return any((s.largest or 0.0) - (s.smallest or 0.0) > STILL for s in found)
 
 
-def _draw(axes: Any, result: dict[str, Any], name: str, quantity: str, k: int) -> None:
-    own = result["spread"][name][quantity]
-    if not own["count"]:
+def _draw(axes: Any, result: Ensemble, name: str, quantity: str, k: int) -> None:
+    own = result.of(name, quantity)
+    if not own.count:
         return
-    values = [r["objects"][name][quantity] for r in result["members"] if r["objects"]]
+    values = [member.objects[name][quantity] for member in result.members if member.objects]
     values = [v for v in values if v is not None]
-    axes.plot([own["low"], own["high"]], [k, k], color=FAINT, lw=7, solid_capstyle="butt")
+    axes.plot([own.low, own.high], [k, k], color=FAINT, lw=7, solid_capstyle="butt")
     axes.plot(values, [k] * len(values), "o", color=INK, ms=2.5, alpha=0.6, mew=0)
-    if own["chosen"] is not None:
-        axes.plot([own["chosen"]], [k], "D", color=MARK, ms=5, mew=0)
+    if own.chosen is not None:
+        axes.plot([own.chosen], [k], "D", color=MARK, ms=5, mew=0)

@@ -115,13 +115,13 @@ def _column(table: Path, heads: list[str], names: tuple[str, ...]) -> str:
     raise BadFileError(table, f"has no column {names[0]!r}.", step)
 
 
-def _mass(table: Path, name: str, said: Any) -> float:
+def _mass(table: Path, name: str, given: Any) -> float:
     try:
-        mass = float(said)
+        mass = float(given)
     except (TypeError, ValueError):
         mass = math.nan
     if not 0 < mass < math.inf:
-        raise BadFileError(table, f"{name}: a mass must be a number of kilograms, not {said!r}.")
+        raise BadFileError(table, f"{name}: a mass must be a number of kilograms, not {given!r}.")
     return mass
 
 
@@ -138,8 +138,8 @@ def read_abo(folder: Path, split: str) -> list[Weighed]:
 
     """
     splits, weights = store.read_json(folder / SPLITS), store.read_json(folder / WEIGHTS)
-    for path, said in ((folder / SPLITS, splits), (folder / WEIGHTS, weights)):
-        if not isinstance(said, dict):
+    for path, given in ((folder / SPLITS, splits), (folder / WEIGHTS, weights)):
+        if not isinstance(given, dict):
             raise BadFileError(path, "must map names.", "Download it again.")
     if split != "all" and split not in splits:
         raise UserError(

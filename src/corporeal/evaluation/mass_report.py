@@ -2,54 +2,69 @@
 
 from collections.abc import Sequence
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from matplotlib.figure import Figure
 
 from corporeal.errors import UserError
 from corporeal.evaluation.figure import keep
+from corporeal.evaluation.mass import Comparison, Prediction
+from corporeal.evaluation.result_table import Table
 
 COLOURS = ("#1f6f8b", "#c8553d", "#588157", "#7b5ea7", "#b08900", "#555555")
 INK = "#222222"
 
 
-Table = tuple[str, tuple[str, ...], list[tuple[str, ...]]]
-"""Title, heads, rows."""
-
-
-def tables(result: dict[str, Any]) -> list[Table]:
+def tables(result: Comparison) -> list[Table]:
     """Return what a person wants to read of ``compare``'s result."""
     heads = ("object", "filled", "measured [kg]", "predicted", "from", "to", "taken for")
     rows = [
         (
-            r["object"],
-            r["fill"],
-            _kg(r["mass_true"]),
-            _kg(r["mass"]),
-            _kg(r["low"]),
-            _kg(r["high"]),
-            r["described"],
+            r.object,
+            r.fill,
+            _kg(r.mass_true),
+            _kg(r.mass),
+            _kg(r.low),
+            _kg(r.high),
+            r.described,
         )
-        for r in result["rows"]
+        for r in result.rows
     ]
-    found: list[Table] = [("Masses", heads, rows)]
-    for group, metrics in result["metrics"].items():
+    found: list[Table] = [Table("Masses", heads, rows)]
+    if any(r.direct for r in result.rows):
+        heads = ("object", "predicted [kg]", "without evidence", "from", "to", "asked directly")
+        rows = [
+            (
+                r.object,
+                _kg(r.mass),
+                _kg(r.mixture),
+                _kg(r.mixture_low),
+                _kg(r.mixture_high),
+                _kg(r.direct),
+            )
+            for r in result.rows
+        ]
+        found.append(Table("With and without outside evidence", heads, rows))
+    for group, metrics in result.metrics.items():
         heads = ("method", "objects", "ADE [kg]", "ALDE", "APE", "MnRE", "within 2×")
         lines = [
             (
-                result["methods"][method],
-                str(e["count"]),
-                f"{e['ade']:.3f}",
-                f"{e['alde']:.3f}",
-                f"{e['ape']:.3f}",
-                f"{e['mnre']:.3f}",
-                f"{e['within_2']:.0%}",
+                result.methods[method],
+                str(e.count),
+                f"{e.ade:.3f}",
+                f"{e.alde:.3f}",
+                f"{e.ape:.3f}",
+                f"{e.mnre:.3f}",
+                f"{e.within_2:.0%}",
             )
             for method, e in metrics.items()
         ]
-        inside = f"{result['coverage'][group]:.0%} of the measured masses lie in their intervals"
-        found.append((f"Errors, {group}: {inside}", heads, lines))
+        inside = (
+            f"{result.coverage[group]:.0%} of the measured masses lie in their intervals, whose "
+            f"median width is a factor {result.width[group]:.2f} (without outside evidence "
+            f"{result.coverage_without[group]:.0%}, {result.width_without[group]:.2f})"
+        )
+        found.append(Table(f"Errors, {group}: {inside}", heads, lines))
     return found
 
 
@@ -57,33 +72,34 @@ def _kg(mass: float | None) -> str:
     return "–" if mass is None else f"{mass:.3g}"
 
 
-def mass_figure(rows: Sequence[dict[str, Any]], path: Path) -> None:
+def mass_figure(rows: Sequence[Prediction], path: Path) -> None:
     """Draw each object with its interval, the line of truth, and a factor of two on either side.
 
     Raises:
         UserError: No object's mass is known.
 
     """
-    known = [r for r in rows if r["mass_true"] is not None]
+    known = [r for r in rows if r.mass_true is not None]
     if not known:
         raise UserError("There is nothing to draw: no mass was measured. Give --truth FILE.")
     figure = Figure(figsize=(7.2, 6.4), dpi=150, layout="constrained")
     axes = figure.add_subplot()
-    every = [r[k] for r in known for k in ("mass_true", "low", "high", "mass")]
+    every = [v for r in known for v in (r.mass_true or 0.0, r.low, r.high, r.mass)]
     ends = np.array([min(v for v in every if v > 0) / 2, max(every) * 2])
     axes.plot(ends, ends, color=INK, lw=1)
     axes.fill_between(ends, ends / 2, ends * 2, color=INK, alpha=0.07, lw=0, label="factor of 2")
-    for k, fill in enumerate(sorted({r["fill"] for r in known})):
+    for k, fill in enumerate(sorted({r.fill for r in known})):
         colour = COLOURS[k % len(COLOURS)]
-        own = [r for r in known if r["fill"] == fill]
+        own = [r for r in known if r.fill == fill]
         true, mass, low, high = (
-            np.array([r[k] for r in own]) for k in ("mass_true", "mass", "low", "high")
+            np.array([getattr(r, name) for r in own])
+            for name in ("mass_true", "mass", "low", "high")
         )
         reach = [np.maximum(mass - low, 0), np.maximum(high - mass, 0)]
         axes.errorbar(true, mass, reach, fmt="o", ms=5, lw=1, color=colour, label=fill)
     for row in known:
         axes.annotate(
-            row["object"], (row["mass_true"], row["mass"]), (4, 4), textcoords="offset points",
+            row.object, (row.mass_true, row.mass), (4, 4), textcoords="offset points",
             fontsize=6, color=INK,
         )  # fmt: skip
     axes.set(xscale="log", yscale="log", xlim=ends, ylim=ends)

@@ -1,0 +1,192 @@
+"""Liquids and pastes in plane strain, against theory and a published experiment.
+
+A slab two cells thick between walls without friction; what is rough holds what touches it.
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+
+import numpy as np
+
+from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
+from corporeal.mpm.problem import Engine, Plane, Problem
+from corporeal.types import Law
+from laws.bodies import G, Stuff, body, floor, problem, walls
+from laws.watching import started
+
+ROUGH = 50.0
+"""Friction of what holds whatever touches it [-]."""
+PER_CELL = 2
+"""Particles per cell and axis."""
+MARTIN_MOYCE = np.array(
+    [[0.832, 1.217], [1.219, 1.474], [1.997, 2.292], [2.547, 2.995], [3.345, 4.134], [4.034, 4.944]]
+)
+"""Front of a collapsing column twice as high as wide: t √(2g/a), z/a (Martin and Moyce 1952,
+n² = 2, as digitised in pysph's examples/db_exp_data.py)."""
+
+
+@dataclass(frozen=True)
+class Liquid:
+    """A liquid or paste; SI."""
+
+    density: float
+    consistency: float
+    """K_c [Pa sⁿ]; the viscosity [Pa s] where n is 1."""
+    yield_shear: float = 0.0
+    """τ_y [Pa]"""
+    flow_index: float = 1.0
+
+
+WATER = Liquid(1000.0, 1e-3)
+
+
+@dataclass(frozen=True)
+class Tank:
+    """A block of liquid at the left wall of a tank, in plane strain."""
+
+    liquid: Liquid
+    width: float
+    """Of the block [m]."""
+    height: float
+    """[m]"""
+    cells: int
+    """Across the height."""
+    speed: float
+    """Largest that is expected [m/s]."""
+    room: float | None = None
+    """Width of the tank [m]; None: the block's."""
+    rough: bool = False
+    """Whether the floor holds what touches it."""
+    gravity: tuple[float, float, float] = (0.0, 0.0, -G)
+    ramp: float = 0.0
+    """[s]"""
+
+    @property
+    def cell(self) -> float:
+        """Grid spacing dx [m]."""
+        return self.height / self.cells
+
+    @property
+    def thick(self) -> float:
+        """Of the slab [m]."""
+        return 2.0 * self.cell
+
+    def posed(self) -> Problem:
+        """Give the problem; the block's corner is the origin."""
+        h = self.cell / PER_CELL
+        size = np.array([self.width, self.thick, self.height])
+        axes = [(np.arange(round(s / h)) + 0.5) * s / round(s / h) for s in size]
+        points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+        given = self.liquid
+        young, poisson = elastic_numbers(bulk_modulus(given.density, self.speed))
+        stuff = Stuff(
+            law=Law.FLUID,
+            young=young,
+            poisson=poisson,
+            density=given.density,
+            yield_stress=sqrt(3.0) * given.yield_shear,
+            consistency=given.consistency,
+            flow_index=given.flow_index,
+        )
+        planes: list[Plane] = [floor(), *walls(1, 0.0, self.thick)]
+        planes += walls(0, 0.0, self.width if self.room is None else self.room)
+        friction = np.zeros((1 + len(planes), 1 + len(planes)))
+        friction[0, 1] = friction[1, 0] = ROUGH if self.rough else 0.0
+        poured = body(points, float(np.prod(size)), stuff)
+        return problem(
+            poured,
+            cell=self.cell,
+            friction=friction,
+            planes=planes,
+            gravity=self.gravity,
+            gravity_ramp=self.ramp,
+        )
+
+    def started(self) -> Engine:
+        """Build an engine with it."""
+        return started(self.posed())
+
+
+def front(run: Engine, tank: Tank) -> float:
+    """How far a liquid reaches [m]: its third particles from the front, and half a spacing."""
+    across = np.sort(run.snapshot().position[:, 0])
+    layers = 2 * PER_CELL
+    return float(across[-3 * layers : -2 * layers].mean()) + 0.5 * tank.cell / PER_CELL
+
+
+def level(run: Engine, tank: Tank) -> float:
+    """How high a liquid stands at rest [m]: the topmost layer and the half spacing above it."""
+    height = np.sort(run.snapshot().position[:, 2])
+    top = round(len(height) / (PER_CELL * tank.cells))
+    return float(height[-top:].mean()) + 0.5 * tank.cell / PER_CELL
+
+
+# ---------------------------------------------------------------- the cases
+
+
+def resting_level(cells: int, seconds: float = 1.0) -> float:
+    """Level of water at rest in a tank of .2 x .1 m, relative error [-]."""
+    tank = Tank(WATER, 0.2, 0.1, cells, sqrt(G * 0.1), ramp=0.5)
+    run = tank.started()
+    run.advance(seconds)
+    return level(run, tank) / tank.height - 1.0
+
+
+def film_on_a_slope(viscosity: float, cells: int, seconds: float = 0.3) -> float:
+    """Let a film of honey flow down a wall: rms error over the greatest speed [-].
+
+    u = ρ g sin α (h y - y²/2)/η, far from the ends; gravity is tilted.
+    """
+    angle, thick = 0.5, 0.02
+    pull = (G * np.sin(angle), 0.0, -G * np.cos(angle))
+    honey = Liquid(1400.0, viscosity)
+    tank = Tank(honey, 0.3, thick, cells, 0.5, room=0.6, rough=True, gravity=pull)
+    run = tank.started()
+    run.advance(seconds)
+    now = run.snapshot()
+    x, y = now.position[:, 0], now.position[:, 2]
+    exact = 1400.0 * pull[0] * (thick * y - y**2 / 2) / viscosity
+    middle = np.abs(x - 0.18) < 0.03
+    off = now.velocity[middle, 0] - exact[middle]
+    return float(np.sqrt(np.mean(off**2)) / exact[middle].max())
+
+
+def spreading_column(viscosity: float, cells: int, times: tuple[float, ...]) -> list[float]:
+    """Let a column of honey spread on a rough floor: error of its front [-] (Huppert 1982).
+
+    x_N = 1.411 (g q³ t/3ν)^⅕ with q the half section.
+    """
+    side, density = 0.05, 1400.0
+    tank = Tank(Liquid(density, viscosity), side, side, cells, 1.0, room=0.4, rough=True)
+    run, found = tank.started(), []
+    for t in times:
+        run.advance(t)
+        exact = 1.411 * (G * side**6 * t / (3.0 * viscosity / density)) ** 0.2
+        found.append(front(run, tank) / exact - 1.0)
+    return found
+
+
+def stopped_paste(yield_shear: float, cells: int, seconds: float = 3.0) -> tuple[float, float]:
+    """Let a paste slump until it stops: error of its length [-], and its speed then [m/s].
+
+    h = √(2 τ_y (L - x)/ρ g), so L = (9 q² ρ g/8 τ_y)^⅓.
+    """
+    side, density = 0.05, 1100.0
+    paste = Liquid(density, 1.0, yield_shear)
+    tank = Tank(paste, side, side, cells, 1.0, room=0.3, rough=True)
+    run = tank.started()
+    run.advance(seconds)
+    exact = (9.0 * side**4 * density * G / 8.0 / yield_shear) ** (1.0 / 3.0)
+    speed = float(np.sqrt(np.mean(np.sum(run.snapshot().velocity ** 2, axis=1))))
+    return front(run, tank) / exact - 1.0, speed
+
+
+def dam_break(cells: int) -> list[float]:
+    """Water that was held: errors of its front [-] against Martin and Moyce (1952)."""
+    a = 0.05715
+    tank = Tank(WATER, a, 2 * a, 2 * cells, sqrt(2 * G * 2 * a), room=6 * a)
+    run, found = tank.started(), []
+    for t, z in MARTIN_MOYCE:
+        run.advance(t / sqrt(2 * G / a))
+        found.append(front(run, tank) / a / z - 1.0)
+    return found

@@ -1,0 +1,113 @@
+"""How close to real time the live simulation of the viewer runs, and how many pictures it sends.
+
+    python benchmarks/live.py [SCENE ...] [--seconds 8] [--threads N]
+
+Prepares showcase scenes, fills them again at the quality of the page's tab Touch, and lets each run
+as the server does, with somebody who pulls at the first object and a visitor who takes every
+picture. Aim on two quiet cores: .8 of real time and 20 pictures a second in all seven scenes.
+"""
+
+import argparse
+import threading
+import time
+
+import corporeal as co
+from corporeal.machine import cores
+from corporeal.results import Results
+from corporeal.showcase.scenes import SCENES, build
+from corporeal.viewer.live import MOST_THREADS, Live, live_scene
+from corporeal.viewer.orders import Order
+from corporeal.viewer.shelf import Made
+
+HEADS = ("scene", "× real time", "pictures/s", "kB", "step ms", "show ms", "order ms p95", "slowed")
+
+
+def results_of(name):
+    """Prepare a scene as a run does, up to fill."""
+    p = co.prepare(build(name))
+    return Results(
+        assemble=p.scene, describe=p.inventory, segment=p.parts, ground=p.field, fill=p.particles
+    )
+
+
+class Visitor:
+    """Somebody who takes every picture, and notes when an order is first seen in one."""
+
+    def __init__(self, live):
+        self.live, self.sent, self.sizes, self.late, self.away = live, {}, [], [], False
+        self.thread = threading.Thread(target=self._look)
+        self.thread.start()
+
+    def order(self, asked):
+        """Give an order, and remember when."""
+        self.sent[asked.seq] = time.perf_counter()
+        self.live.orders.append(asked)
+
+    def leave(self):
+        """Look no more."""
+        self.away = True
+        self.thread.join()
+
+    def _look(self):
+        number, done = 0, 0
+        while not self.away:
+            number, before = self.live.wait(number, 0.5), number
+            if number > before:
+                self.sizes.append(len(self.live.latest))
+                seen = int.from_bytes(self.live.latest[:4], "little")
+                now = time.perf_counter()
+                self.late += [now - self.sent.pop(k) for k in range(done + 1, seen + 1)]
+                done = max(done, seen)
+
+
+def measure(name, seconds, threads):
+    """Let one scene run for so many seconds of wall time; return a row."""
+    live = Live(live_scene(Made(results_of(name), "draft"), threads), threads)
+    visitor = Visitor(live)
+    live.start()
+    visitor.order(Order("play", 1))
+    time.sleep(2.0)  # until the pace is found
+    begun, start, before = time.perf_counter(), live.hands.engine.time, len(visitor.sizes)
+    spent = pull(live, visitor, begun + seconds)
+    passed = time.perf_counter() - begun
+    rate = (live.hands.engine.time - start) / passed
+    pictures = (len(visitor.sizes) - before) / passed
+    visitor.leave()
+    live.close()
+    late = sorted(visitor.late)[int(0.95 * (len(visitor.late) - 1))]
+    step, show = (1e3 * sum(s[k] for s in spent) / len(spent) for k in ("step", "show"))
+    size = sum(visitor.sizes) / len(visitor.sizes) / 1e3
+    numbers = f"{rate:.2f} {pictures:.1f} {size:.0f} {step:.1f} {show:.1f} {1e3 * late:.0f}".split()
+    stopped = f" [stopped: {live.said}]" if live.said else ""
+    return (name, *numbers, live.hello()["honest"] + stopped)
+
+
+def pull(live, visitor, until):
+    """Pull at the first object ten times a second; return what the thread spent."""
+    place = tuple(live.hands.engine.snapshot().position[0].tolist())
+    visitor.order(Order("grab", 2, 0, place, place))
+    number, spent = 2, []
+    up = (place[0], place[1], place[2] + 0.1)
+    while time.perf_counter() < until:
+        number += 1
+        visitor.order(Order("pull", number, to=up))
+        spent.append(dict(live.spent))
+        time.sleep(0.1)
+    return spent
+
+
+def main():
+    """Print a row a scene."""
+    wanted = argparse.ArgumentParser(description=__doc__.splitlines()[0])
+    wanted.add_argument("scenes", nargs="*", metavar="SCENE")
+    wanted.add_argument("--seconds", type=float, default=8.0)
+    wanted.add_argument("--threads", type=int, default=min(MOST_THREADS, cores()))
+    asked = wanted.parse_args()
+    print("|", " | ".join(HEADS), "|")
+    print("|", " | ".join("---" for _ in HEADS), "|")
+    for name in asked.scenes or SCENES:
+        print("|", " | ".join(measure(name, asked.seconds, asked.threads)), "|", flush=True)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,88 @@
+"""How high real things rebound, as published: ``life.toml``, read."""
+
+import tomllib
+from dataclasses import dataclass
+from functools import cache
+from importlib.resources import files
+
+from corporeal.errors import BadFileError
+
+
+@dataclass(frozen=True)
+class Block:
+    """What a thing is dropped on, where it is not the floor."""
+
+    material: str
+    size: tuple[float, float, float]
+    """[m]"""
+
+
+@dataclass(frozen=True)
+class Rebound:
+    """One ball that was dropped, and the range in which it came back."""
+
+    name: str
+    material: str | None
+    """None: its name has to tell it."""
+    wall: float | None
+    """Thickness of its wall [m]; None: solid, or its name has to tell it."""
+    inflation: float | None
+    """Gauge pressure of the air in it [Pa]."""
+    diameter: float
+    """[m]"""
+    drop: float
+    """Height of the fall [m]."""
+    floor: str
+    on: Block | None
+    low: float
+    """Least published restitution [-]."""
+    high: float
+    """Greatest [-]."""
+    source: str
+    """Key of ``sources``."""
+
+    def off(self, restitution: float) -> float:
+        """Say how far a restitution is from the range [-]; 0 in it."""
+        return max(self.low - restitution, restitution - self.high, 0.0)
+
+
+@cache
+def _table() -> dict:
+    place = files("corporeal.evaluation").joinpath("life.toml")
+    return tomllib.loads(place.read_text(encoding="utf-8"))
+
+
+def sources() -> dict[str, str]:
+    """Return every source's citation by its key, with what was read of it."""
+    return {key: f"{row['cite']} ({row['check']})" for key, row in _table()["source"].items()}
+
+
+def rebounds() -> tuple[Rebound, ...]:
+    """Return all published rebounds.
+
+    Raises:
+        BadFileError: A range is none, or its source is missing.
+
+    """
+    return tuple(_rebound(row) for row in _table()["rebound"])
+
+
+def _rebound(row: dict) -> Rebound:
+    low, high = row["e"]
+    if not 0.0 <= low < high <= 1.0 or row["source"] not in _table()["source"]:
+        raise BadFileError("life.toml", f"{row['name']}: no range with a source.", "Mend the row.")
+    on, wall, pressure = row.get("on"), row.get("wall_mm"), row.get("inflation_kPa")
+    x, y, z = (1e-3 * side for side in on["size_mm"]) if on else (0.0, 0.0, 0.0)
+    return Rebound(
+        name=row["name"],
+        material=row.get("material"),
+        wall=None if wall is None else 1e-3 * wall,
+        inflation=None if pressure is None else 1e3 * pressure,
+        diameter=1e-3 * row["diameter_mm"],
+        drop=row["drop_m"],
+        floor=row.get("floor", "concrete"),
+        on=Block(on["material"], (x, y, z)) if on else None,
+        low=low,
+        high=high,
+        source=row["source"],
+    )
