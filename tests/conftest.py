@@ -15,8 +15,8 @@ install_import_hook(
     [
         "corporeal.types",
         "corporeal.mpm.problem",
-        "corporeal.mpm.elasticity",
-        "corporeal.mpm.plasticity",
+        "corporeal.mpm.laws",
+        "corporeal.mpm.substance",
         "corporeal.stages",
         "corporeal.formats",
         "corporeal.features",

@@ -8,11 +8,13 @@ from corporeal.vlm import Reply, Spent, UnansweredError
 SIMPLE = {"reason": "So it looks."}
 
 
-def part(name, material, structure="solid", **said):
-    """One part of a materials answer."""
-    return {"part": name, "material": material, "probability": 0.7, "structure": structure} | (
-        SIMPLE | said
-    )
+def part(name, material, built="solid", alternatives=(), **said):
+    """One part of a materials answer, certain to 0.7 unless other materials are named."""
+    names = ("probability", "contents", "fill", "solidity", "reading", "reason")
+    own = {k: said.pop(k) for k in names if k in said}
+    way = {"material": material, "built": built, "probability": 0.7} | SIMPLE | own
+    others = [{"built": built} | SIMPLE | other for other in alternatives]
+    return {"part": name, "ways": [way, *others]} | said
 
 
 def whole(name="thing"):
@@ -26,7 +28,7 @@ def decomposed(*options):
         "object": "a thing",
         "decompositions": [
             {
-                "parts": [{"name": n, "look": "plain", "visible": True} for n in names],
+                "parts": [{"name": n, "look": "plain", "seen": "yes"} for n in names],
                 "why": "So it looks.",
             }
             for names in options
@@ -70,6 +72,13 @@ def sizes(metres):
     return answer
 
 
+def weighs(low=0.5, likely=1.0, high=2.0, printed=()):
+    """What was said of an object's mass [kg], and read on it."""
+    return {
+        "printed": list(printed), "low_kg": low, "likely_kg": likely, "high_kg": high,
+    } | SIMPLE  # fmt: skip
+
+
 class Oracle:
     """Answers as it was told; what it was not told, it cannot answer."""
 
@@ -81,6 +90,7 @@ class Oracle:
             "ranking": lambda q: {"ranking": []},
             "placement": everywhere(0.25),
             "extents": sizes(1.0),
+            "mass": weighs(),
         } | answers
         self.asked = []
         self._one = Lock()

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from corporeal.cli.accept import accept
+from corporeal.cli.validate import validate
 from corporeal.formats.splat_ply import write_splat
 from corporeal.geometry.gaussians import placed
 from corporeal.pipeline import Settings, opened
@@ -16,7 +16,7 @@ from corporeal.splats import solid
 from corporeal.stages import reconstruct as stage
 from corporeal.stages.describe import DescribeConfig
 from gaussian_boxes import DOWN, box, together
-from oracle import decomposed, part
+from oracle import decomposed, part, weighs
 
 sys.path.insert(0, str(Path(__file__).parent / "vlm"))
 from fake_server import FakeServer
@@ -51,10 +51,14 @@ def answer(text):
         return {"regions": [{"colour": "red", "thing": 2}, {"colour": "blue", "thing": 1}]}
     if "Which parts does it have?" in text:
         return decomposed(["crate"] if "crate" in text else ["blue base", "yellow top"])
-    if "What is each of its parts made of" in text:
+    if "What may each of its parts be made of" in text:
         named = re.search(r"^Parts: (.*)$", text, flags=re.MULTILINE)[1].split("; ")
+        named = [re.sub(r" \(.*\)$", "", name) for name in named]
         shares = {"volume_share": 1 / len(named), "surface_share": 1 / len(named)}
+        shares = shares if "volume_share: what lies" in text else {}
         return {"parts": [part(n, MADE_OF[n], **shares) for n in named]}
+    if "Then judge what the whole object weighs" in text:
+        return weighs(1.0, 5.0, 100.0)
     if "How large is the real thing" in text:
         return {"classes": [{"class_name": n, "metres": m} for n, _, m in THINGS]}
     blocks = re.split(r"^Part ", text, flags=re.MULTILINE)[1:]
@@ -87,9 +91,9 @@ def test_a_model_counts_names_and_takes_apart_what_a_splat_shows(monkeypatch, tm
     with FakeServer(lambda request: {"content": json.dumps(answer(text_of(request)))}) as server:
         asking = DescribeConfig(vlm=f"openai:gpt-5.4@{server.url}", view_size=64)
         settings, folder = Settings(describe=asking), tmp_path / "run"
-        accept(folder, settings)
-        with opened([splat], folder, settings, lambda verb: lambda *_: None, "ground") as (made, _):
-            scene, parts, field = (made[verb] for verb in ("assemble", "segment", "ground"))
+        validate(folder, settings)
+        with opened([splat], folder, settings, lambda verb: lambda *_: None, "ground") as done:
+            scene, parts, field = done.made.scene, done.made.parts, done.made.field
     rows = zip(parts.catalogue, field.materials, field.words, strict=True)
     assert [(p.object, p.name, m.name, w.answered_by) for p, m, w in rows] == [
         (0, "crate", "wood", "model"),

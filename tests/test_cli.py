@@ -155,7 +155,7 @@ def test_a_full_disk_is_said_and_the_run_is_not_taken_for_finished(typed, tmp_pa
 def test_the_doctor_examines_without_failing(typed):
     code, text = typed("doctor")
     assert code == 0
-    assert "warp engine" in text.out
+    assert "cpu engine" in text.out
 
 
 def test_materials_can_be_listed_and_shown(typed):
@@ -203,7 +203,7 @@ def test_what_cannot_be_asked_is_not_remembered(typed, tmp_path, monkeypatch):
     for words in wrong:
         refused(typed(*words))
         assert (tmp_path / "box" / "run.json").read_bytes() == before, words
-    assert {state for _, state, _ in pipeline.status(tmp_path / "box")[:4]} == {"finished"}
+    assert {row.state for row in pipeline.status(tmp_path / "box")[:4]} == {"finished"}
     assert typed("ground", "box")[0] == 0
 
 

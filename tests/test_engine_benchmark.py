@@ -35,7 +35,7 @@ def test_rows_and_page_are_made_from_one_run(engine, tmp_path, monkeypatch):
     rows = json.loads((tmp_path / "rows.json").read_text())
     assert all(set(row) == KEYS for row in rows)
     assert {row["law"] for row in rows} == {
-        "corotated", "neo_hookean", "hencky", "drucker_prager", "von_mises",
+        "corotated", "neo_hookean", "hencky", "drucker_prager", "von_mises", "fluid",
     }  # fmt: skip
     assert {row["objects"] for row in rows} >= {1, 2}
     assert all(row["ns_per_particle_substep"] > 0 for row in rows)
@@ -48,7 +48,7 @@ def test_memory_is_counted_once(engine):
     from cost.contest import held
 
     class Window:
-        __module__ = "corporeal.mpm.window"
+        __module__ = "corporeal.mpm.cpu.window"
 
         def __init__(self):
             self.part = np.zeros(1000)
@@ -56,7 +56,7 @@ def test_memory_is_counted_once(engine):
             self.lists = {"a": [np.zeros(10, np.int32)]}
 
     class Engine:
-        __module__ = "corporeal.mpm.warp"
+        __module__ = "corporeal.mpm.cpu.engine"
 
         def __init__(self):
             self.problem = np.zeros(5000)
@@ -78,3 +78,14 @@ def test_blocks_have_the_particles_they_say_and_do_not_overlap(engine):
         assert len(np.unique(np.floor(places / (0.4 * CELL)), axis=0)) == drop.particles
         if drop.extent:
             np.testing.assert_allclose(np.ptp(places, axis=0), drop.extent * CELL, rtol=0.02)
+
+
+@pytest.mark.slow
+def test_a_checkout_costs_what_it_costs(engine):
+    """Both processes run the same code, so their costs agree but for the machine's noise."""
+    import against
+
+    case = against.Case("COROTATED", 1, 2000)
+    here, there, ratio = against.compare(case, against.HERE, rounds=3, substeps=4)
+    assert here > 0 and there > 0
+    assert 0.2 < ratio < 5.0

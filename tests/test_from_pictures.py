@@ -12,7 +12,7 @@ from corporeal.formats.colmap import write_colmap
 from corporeal.formats.transforms import write_views
 from corporeal.geometry.similarity import moved_cameras, similarity
 from corporeal.render import figures
-from corporeal.splats import lesson, train
+from corporeal.splats import train, training_schedule
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
@@ -44,7 +44,9 @@ def views():
 def typed(monkeypatch, tmp_path, command):
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(figures, "PANEL", (130, 98))
-    monkeypatch.setitem(lesson.PRESETS, "draft", lesson.Preset(4000, 1, 300, 128))
+    monkeypatch.setitem(
+        training_schedule.PRESETS, "draft", training_schedule.Preset(4000, 1, 300, 128)
+    )
     return command
 
 
@@ -102,11 +104,11 @@ def test_a_training_that_is_stopped_goes_on(typed, views, tmp_path, monkeypatch)
     monkeypatch.setattr(train, "EVERY", 0.0)
     steps, step = [], train._step
 
-    def stopping(pupil, *rest):
-        steps.append(pupil.step)
+    def stopping(training, *rest):
+        steps.append(training.step)
         if len(steps) == 60:
             raise KeyboardInterrupt
-        return step(pupil, *rest)
+        return step(training, *rest)
 
     monkeypatch.setattr(train, "_step", stopping)
     words = ("run", "photos", "--things", *NAMES, *BRIEF, *SMALL)

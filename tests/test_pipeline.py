@@ -3,7 +3,7 @@ from pathlib import Path
 
 import pytest
 
-from corporeal import pipeline, results, store
+from corporeal import pipeline, run_files, store
 from corporeal.errors import UserError
 from corporeal.pipeline import Settings, reopen, run
 from corporeal.stages.describe import DescribeConfig
@@ -23,9 +23,9 @@ def test_a_run_remembers_what_it_was_asked(tmp_path):
     )
     with pytest.raises(UserError):
         run([tmp_path / "nowhere.glb"], tmp_path / "run", wanted, silent)
-    inputs, settings = reopen(tmp_path / "run")
-    assert inputs == [(tmp_path / "nowhere.glb").resolve()]
-    assert settings == wanted
+    asked = reopen(tmp_path / "run")
+    assert asked.inputs == [(tmp_path / "nowhere.glb").resolve()]
+    assert asked.settings == wanted
 
 
 def test_a_failed_run_says_why(tmp_path):
@@ -64,7 +64,7 @@ def test_other_weights_in_a_folder_make_what_they_saw_stale(tmp_path):
 
 
 def test_memory_is_counted_in_megabytes():
-    assert 10 < results.peak_memory_mb() < 100_000
+    assert 10 < run_files.peak_memory_mb() < 100_000
 
 
 def test_a_size_that_a_model_has_judged_is_doubted_once():
@@ -72,9 +72,9 @@ def test_a_size_that_a_model_has_judged_is_doubted_once():
     table = [f"{name} is 9 m large. Set its size with --extent {name}=0.3." for name, _ in objects]
     made = replace(scene(*objects), warnings=("vase_0 and hut_0 overlap at the start.", *table))
     words = [ObjectWords(name, "", (), usual_extent=None) for name, _ in objects]
-    assert results.still_doubted(made, Inventory(tuple(words))) == made.warnings
+    assert run_files.still_doubted(made, Inventory(tuple(words))) == made.warnings
     words[0] = replace(words[0], usual_extent=0.25)
-    assert results.still_doubted(made, Inventory(tuple(words))) == (
+    assert run_files.still_doubted(made, Inventory(tuple(words))) == (
         "vase_0 and hut_0 overlap at the start.",
         *table[1:],
     )

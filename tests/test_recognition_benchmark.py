@@ -43,7 +43,7 @@ def test_a_wrong_answer_is_rare_and_unknown_is_normal(rows):
 def test_the_margin_knows_right_from_wrong(rows):
     assert ordering(rows) > 0.7
     assert ordering(of(rows, "unseen")) > 0.8
-    shares = [right for *_, right in bands(rows)]
+    shares = [band.right for band in bands(rows)]
     assert shares[-1] > 0.9
     assert min(shares) == min(shares[:2]), "small margins are the doubtful ones"
 

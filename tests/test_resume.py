@@ -22,7 +22,7 @@ FACES = np.array([t for a, b, c, d in QUADS for t in ([a, b, c], [a, c, d])])
 SIMULATE = """
 import sys
 from pathlib import Path
-from corporeal.mpm import checkpoint
+from corporeal.trajectory import checkpoint
 from corporeal.pipeline import Settings, run
 checkpoint.EVERY, checkpoint.LARGEST_SHARE = 0.05, 1.0
 silent = lambda fraction, words: None
@@ -133,6 +133,24 @@ def test_three_kills_at_random_moments_change_nothing(tmp_path):
         kill(process)
     ended(start(scene, broken))
     assert_same(tmp_path / "whole", broken)
+
+
+def test_a_run_of_the_engine_that_was_called_warp_is_opened_and_not_done_again(tmp_path):
+    scene, folder, said = a_scene(tmp_path / "two.glb", duration=0.05), tmp_path / "run", []
+    quiet = lambda verb: lambda fraction, words: said.append(words)  # noqa: E731
+    pipeline.run([scene], folder, Settings(), quiet, until="simulate")
+    filled, simulated = (folder / pipeline.FOLDERS[verb] for verb in ("fill", "simulate"))
+    former = {"engine": "warp", "contact": "multi"}
+    key = store.key("simulate", former, [store.read_json(filled / store.META)["key"]])
+    store.finish(simulated, key, former, 1.0)
+    declared = store.read_json(folder / pipeline.RUN)
+    declared["settings"]["simulate"] = former
+    store.write_json(folder / pipeline.RUN, declared)
+    asked = pipeline.reopen(folder)
+    assert asked.settings.simulate.engine == "cpu"
+    said.clear()
+    pipeline.run(asked.inputs, folder, asked.settings, quiet, until="simulate")
+    assert not said, "what is done is not done again"
 
 
 def test_a_run_is_let_go_of_when_it_ends(tmp_path):

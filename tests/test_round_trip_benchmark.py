@@ -8,6 +8,7 @@ from round_trip import ASIDE, Piece, _called, _merged, as_told, put_aside
 
 from corporeal.geometry.arrangement import boxes_of
 from corporeal.pipeline import Settings, opened
+from corporeal.results import Results
 from corporeal.stages.assemble import assemble
 from corporeal.stages.capture import CaptureConfig, capture
 
@@ -59,9 +60,9 @@ def drum(tmp_path):
 
 @pytest.mark.slow
 def test_a_wall_that_is_modelled_with_both_faces_is_told_as_a_wall(drum, tmp_path):
-    with opened([drum], tmp_path / "run", Settings(), lambda verb: _deaf, "ground") as (made, _):
-        views = capture(made["assemble"], CaptureConfig(4, (48, 48), threads=1))
-        told = yaml.safe_load(as_told(made, views, tmp_path / "told.yaml").read_text())
+    with opened([drum], tmp_path / "run", Settings(), lambda verb: _deaf, "ground") as done:
+        views = capture(done.made.scene, CaptureConfig(4, (48, 48), threads=1))
+        told = yaml.safe_load(as_told(done.made, views, tmp_path / "told.yaml").read_text())
     (row,) = told.values()
     assert row["structure"] == "shell"
     assert row["thickness_mm"] == pytest.approx(5 * np.cos(np.pi / 48) * 0.4 / 0.405, rel=0.02)
@@ -73,7 +74,7 @@ def _deaf(fraction, words):
 
 def test_things_are_put_aside_by_a_hundredth_of_their_size(drum, tmp_path):
     scene = assemble([drum])
-    aside = assemble([put_aside({"assemble": scene}, drum, tmp_path, seed=1)])
+    aside = assemble([put_aside(Results(assemble=scene), drum, tmp_path, seed=1)])
     shift = boxes_of(aside)[0] - boxes_of(scene)[0]
     assert np.linalg.norm(shift[0]) == pytest.approx(
         ASIDE * np.ptp(boxes_of(scene)[0], axis=0).max()

@@ -8,7 +8,7 @@ import pytest
 import trimesh
 
 from corporeal.formats.transforms import write_views
-from corporeal.splats import lesson, solid
+from corporeal.splats import solid, training_schedule
 from corporeal.stages.assemble import assemble
 from corporeal.stages.capture import CaptureConfig, capture
 
@@ -78,8 +78,8 @@ def scene_of(folder):
 
 @pytest.mark.slow
 def test_pictures_of_a_crate_become_the_crate(bench, scene, tmp_path, monkeypatch):
-    small = replace(lesson.PRESETS["draft"], gaussians=6000, steps=500)
-    monkeypatch.setitem(lesson.PRESETS, "draft", small)
+    small = replace(training_schedule.PRESETS["draft"], gaussians=6000, steps=500)
+    monkeypatch.setitem(training_schedule.PRESETS, "draft", small)
     found = row(bench.judged(scene, "draft", tmp_path)[0])
     assert found["closed"] and abs(found["volume"]) < 0.1
     assert max(found["apart"]) < 1.0 and found["overlap"] > 0.85

@@ -12,6 +12,7 @@ from corporeal import store
 from corporeal.errors import UserError
 from corporeal.types import (
     Finish,
+    Hypothesis,
     Law,
     Material,
     PartWords,
@@ -49,7 +50,9 @@ def test_enums_nothing_and_infinity_come_back(tmp_path):
 def test_what_is_filled_comes_back_with_its_contents(tmp_path):
     syrup = Material("syrup", Law.NEO_HOOKEAN, 1e4, 0.49, 1330.0)
     made = Structure("filled", 4e-4, "said", contents=syrup, fill=0.9)
-    words = PartWords("jar", "glass", "filled", contents="syrup", alternatives=(("PET", 0.25),))
+    words = PartWords(
+        "jar", "glass", "filled", contents="syrup", hypotheses=(Hypothesis("PET", "filled", 0.25),)
+    )
     store.save(tmp_path / "x.npz", {"made": made, "words": words})
     assert store.load(tmp_path / "x.npz") == {"made": made, "words": words}
 
@@ -59,7 +62,7 @@ def test_what_was_kept_before_a_type_grew_is_still_read(tmp_path, monkeypatch):
 
     def older(value, arrays):
         tree = encode(value, arrays)
-        for name in ("contents", "fill", "alternatives"):
+        for name in ("contents", "fill", "hypotheses"):
             tree.get("fields", {}).pop(name, None)
         return tree
 

@@ -1,4 +1,4 @@
-"""What works on this machine, and what would be gained by what."""
+"""What works on this machine, with advice."""
 
 import os
 import platform
@@ -9,12 +9,20 @@ from importlib.metadata import PackageNotFoundError, version
 from importlib.util import find_spec
 from typing import Any
 
-from corporeal import __version__
 from corporeal.machine import cores
+from corporeal.version import __version__
 
 KEYS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
-LIBRARIES = {"embreex": "films and pictures", "igl": "filling of meshes", "DracoPy": "Draco files"}
-PACKAGES = {"igl": "libigl"}
+LIBRARIES = {
+    "embreex": "films and pictures",
+    "igl": "filling of meshes",
+    "DracoPy": "Draco files",
+    "pycolmap": "photographs without poses, and films",
+    "pxr": "meshes in USD",
+    "lxml": "meshes in 3MF and DAE",
+    "collada": "meshes in DAE",
+}
+PACKAGES = {"igl": "libigl", "pxr": "usd-core", "collada": "pycollada"}
 
 
 @dataclass(frozen=True)
@@ -46,15 +54,15 @@ def _machine() -> list[Finding]:
 
 def _engines() -> list[Finding]:
     try:
-        from corporeal.mpm.kernels import wp  # started without its word about cards on stderr
+        from corporeal.mpm.cpu.program import wp  # started without its word about cards on stderr
 
         cards = [_card(device) for device in wp.get_cuda_devices()]
     except Exception as error:  # whatever is broken in a native library belongs in the table
-        return [Finding("warp engine", False, str(error), "Reinstall: pip install warp-lang.")]
+        return [Finding("cpu engine", False, str(error), "Reinstall: pip install warp-lang.")]
     gpu = ", ".join(cards) or "no CUDA card: simulations run on the processor"
     use = "Simulate on it with --engine cuda." if cards else "Not needed."
     return [
-        Finding("warp engine", True, f"Warp {version('warp-lang')}, on the processor"),
+        Finding("cpu engine", True, f"Warp {version('warp-lang')}, on the processor"),
         Finding("GPU", bool(cards), gpu, use),
         Finding("reference engine", True, "NumPy, slow: for checking"),
     ]
@@ -90,7 +98,7 @@ def _keys() -> list[Finding]:
     present = [name for name in KEYS if os.environ.get(name)]
     found = ", ".join(present) or "no API key in the environment"
     advice = (
-        "Only to ask a model what things are made of (--vlm openai:MODEL). Without one there are "
+        "Only to ask a model what objects are made of (--vlm openai:MODEL). Without one there are "
         "the names in the file, --annotations, --vlm ask:FOLDER (you answer) and --vlm "
         "replay:FOLDER."
     )

@@ -7,11 +7,11 @@ interrupted goes on. ``run.json`` says how far the run came.
 
 import shutil
 import time
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from corporeal import store
 from corporeal.errors import UserError
@@ -21,21 +21,34 @@ from corporeal.formats.scene_file import read_scene_file, write_scene_file
 from corporeal.formats.sources import called, kind_of, pictured, sources
 from corporeal.formats.splat_ply import write_splat
 from corporeal.formats.words import safe
-from corporeal.geometry.followed import followed
-from corporeal.mpm.frames import read_trajectory
-from corporeal.results import FILES as RESULTS
-from corporeal.results import write_results
+from corporeal.geometry.gaussians import axis
+from corporeal.mixture import ground_weighed
+from corporeal.poses.pose import FIGURE, POSES
+from corporeal.results import Results
+from corporeal.run_files import FILES, Spent, write_results
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import AssembleConfig, assemble
 from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.fill import FillConfig, fill
 from corporeal.stages.film import FilmConfig, film
-from corporeal.stages.ground import GroundConfig, ground
+from corporeal.stages.ground import GroundConfig
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
 from corporeal.stages.segment import SegmentConfig, segment
-from corporeal.stages.simulate import SimulateConfig, simulate
-from corporeal.types import Film, MaterialField, Particles, Parts, Reconstruction, Scene, Trajectory
-from corporeal.vlm.things import Viewer
+from corporeal.stages.simulate import SimulateConfig, as_kept, simulate
+from corporeal.trajectory.audit_file import read_audit
+from corporeal.trajectory.frames import read_trajectory
+from corporeal.typed import typed
+from corporeal.types import (
+    Film,
+    Inventory,
+    MaterialField,
+    Particles,
+    Parts,
+    Reconstruction,
+    Scene,
+    Trajectory,
+)
+from corporeal.vlm.seen_objects import Viewer
 
 Progress = Callable[[float, str], None]
 """Told the fraction done and what is being done."""
@@ -76,11 +89,19 @@ class Settings:
     film: FilmConfig = field(default_factory=FilmConfig)
 
 
+DEFAULT = Settings()
+
+
+def quiet(verb: str) -> Progress:
+    """Tell nobody about progress."""
+    return lambda fraction, words: None
+
+
 def run(
-    inputs: list[Path],
-    folder: Path,
-    settings: Settings,
-    tell: Tell,
+    inputs: Sequence[str | Path],
+    folder: str | Path,
+    settings: Settings = DEFAULT,
+    tell: Tell = quiet,
     until: str = "report",
 ) -> Path:
     """Do every verb up to ``until``; return the run's folder.
@@ -97,27 +118,45 @@ def run(
             or the simulation cannot go on.
 
     """
-    with opened(inputs, folder, settings, tell, until):
+    folder = Path(folder)
+    with opened([Path(path) for path in inputs], folder, settings, tell, until):
         return folder
+
+
+@dataclass(frozen=True)
+class Opened:
+    """A run whose verbs are done."""
+
+    made: Results
+    key: str
+    """Of the last verb's result: names all that it depends on."""
 
 
 @contextmanager
 def opened(
     inputs: list[Path], folder: Path, settings: Settings, tell: Tell, until: str
-) -> Iterator[tuple[dict[str, Any], str]]:
+) -> Iterator[Opened]:
     """Do every verb up to ``until`` and keep the run's folder from others meanwhile.
 
     Yields:
-        What each verb made, and the key of the last one's result.
+        What each verb made, under which key.
 
     """
     with store.alone(folder), store.writing(folder):
         work = _Run(inputs, folder, settings, tell)
         work.through(until)
-        yield work.made, work.key
+        yield Opened(work.made, work.key)
 
 
-def reopen(folder: Path) -> tuple[list[Path], Settings]:
+@dataclass(frozen=True)
+class Asked:
+    """What a run was asked to do."""
+
+    inputs: list[Path]
+    settings: Settings
+
+
+def reopen(folder: Path) -> Asked:
     """Read back what a run was asked to do.
 
     Raises:
@@ -126,25 +165,28 @@ def reopen(folder: Path) -> tuple[list[Path], Settings]:
     """
     if not (folder / RUN).exists():
         raise UserError(f"{folder} is not a run: it has no {RUN}. Start one with: corporeal run.")
-    said = store.read_json(folder / RUN)
-    configs = {f.name: f.default_factory for f in fields(Settings)}  # type: ignore[misc]
-    known = {
-        name: _config(make(), said["settings"].get(name, {}))  # type: ignore[operator]
-        for name, make in configs.items()
-    }
-    return [Path(p) for p in said["inputs"]], Settings(**known)
+    return typed(Asked, store.read_json(folder / RUN))
 
 
-def _config(default: Any, said: dict) -> Any:
-    given = {}
-    for known in fields(default):
-        value = said.get(known.name, getattr(default, known.name))
-        if isinstance(value, list):
-            value = tuple(value)
-        if isinstance(value, str) and "Path" in str(known.type):
-            value = Path(value)
-        given[known.name] = value
-    return replace(default, **given)
+def read_back(folder: Path) -> Results:
+    """Read what the finished verbs of a run made; nothing is done, and nothing in it changes.
+
+    Raises:
+        UserError: The folder is not a run.
+
+    """
+    reopen(folder)
+    made = Results()
+    for verb, name in FOLDERS.items():
+        if (folder / name / store.META).exists():
+            made = made.having(verb, _result(verb, folder / name))
+    return made
+
+
+def _result(verb: str, folder: Path) -> Any:
+    if verb == "simulate":
+        return read_trajectory(folder)
+    return None if verb == "report" else store.load(folder / store.DATA)
 
 
 def files_read(config: Any) -> list[str]:
@@ -160,17 +202,32 @@ def _named(value: str) -> Path:
     return Path(rest if colon and kind in BEFORE_PATHS else value).expanduser()
 
 
-def status(folder: Path) -> list[tuple[str, str, float | None]]:
-    """For each verb: its name, "finished", "unfinished" or "not yet", and its seconds."""
-    inputs, _ = reopen(folder)
+@dataclass(frozen=True)
+class VerbState:
+    """How far a run came with one verb."""
+
+    verb: str
+    state: Literal["finished", "unfinished", "not yet"]
+    seconds: float | None = None
+    """What it took [s]; None: it is not finished."""
+
+
+def status(folder: Path) -> list[VerbState]:
+    """Return the state of every verb of a run, in their order.
+
+    Raises:
+        UserError: The folder is not a run.
+
+    """
+    inputs = reopen(folder).inputs
     rows = []
     for verb in verbs(inputs):
         name = FOLDERS[verb]
-        meta = folder / name / store.META
-        if meta.exists():
-            rows.append((verb, "finished", store.read_json(meta)["seconds"]))
+        if (folder / name / store.META).exists():
+            rows.append(VerbState(verb, "finished", store.read_meta(folder / name).seconds))
         else:
-            rows.append((verb, "unfinished" if (folder / name).exists() else "not yet", None))
+            begun = (folder / name).exists()
+            rows.append(VerbState(verb, "unfinished" if begun else "not yet"))
     return rows
 
 
@@ -217,7 +274,7 @@ class _Run:
         self.inputs, self.folder, self.settings, self.tell = inputs, folder, settings, tell
         self.key = ""
         self.seconds: dict[str, float] = {}
-        self.made: dict[str, Any] = {}
+        self.made = Results()
 
     def through(self, until: str) -> None:
         """Do all verbs up to ``until`` and say in ``run.json`` how it went."""
@@ -240,28 +297,24 @@ class _Run:
 
     def _declare(self, state: str, error: str = "") -> None:
         settings = {f.name: asdict(getattr(self.settings, f.name)) for f in fields(Settings)}
-        said = {
-            "state": state,
-            "inputs": [str(path.resolve()) for path in self.inputs],
-            "settings": settings,
-            "error": error,
-        }
-        store.write_json(self.folder / RUN, said)
+        asked = {"inputs": [str(path.resolve()) for path in self.inputs], "settings": settings}
+        store.write_json(self.folder / RUN, {"state": state, **asked, "error": error})
 
     def _do(self, verb: str) -> None:
         config = getattr(self.settings, verb, None)
         before = [self.key] if self.key else [store.digest(p) for p in self._files()]
-        self.key = store.key(verb, config, before + files_read(config) + self._borrowed(verb))
+        named = as_kept(config) if isinstance(config, SimulateConfig) else config
+        self.key = store.key(verb, named, before + files_read(config) + self._borrowed(verb))
         folder = self.folder / FOLDERS[verb]
         step = getattr(self, f"_{verb}")
         if store.fresh(folder, self.key):
-            self.made[verb] = self._read(verb, folder)
-            self.seconds[verb] = store.read_json(folder / store.META)["seconds"]
+            self.made = self.made.having(verb, _result(verb, folder))
+            self.seconds[verb] = store.read_meta(folder).seconds
             return
         self._clear(verb, folder)
         store.begin(folder)
         start = time.perf_counter()
-        self.made[verb] = step(folder, self.tell(verb))
+        self.made = self.made.having(verb, step(folder, self.tell(verb)))
         self.seconds[verb] = time.perf_counter() - start
         store.finish(folder, self.key, config, self.seconds[verb])
 
@@ -270,6 +323,8 @@ class _Run:
         if verb == "reconstruct":
             asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
             return [*self.settings.assemble.extent, *asked]
+        if verb == "assemble":
+            return [up for up in [self.settings.reconstruct.up] if up != "auto"]
         if verb != "describe":
             return []
         library = self.settings.ground.library
@@ -287,7 +342,7 @@ class _Run:
         An unfinished simulation is kept, and what a reconstruction learned: both go on from there,
         a training only if it is of the same pictures.
         """
-        for name in RESULTS:
+        for name in FILES:
             (self.folder / name).unlink(missing_ok=True)
         for later in VERBS[VERBS.index(verb) + 1 :]:
             (self.folder / FOLDERS[later] / store.META).unlink(missing_ok=True)
@@ -297,11 +352,6 @@ class _Run:
         if not kept and folder.exists():
             shutil.rmtree(folder)
         store.write_json(started, {"key": self.key})
-
-    def _read(self, verb: str, folder: Path) -> Any:
-        if verb == "simulate":
-            return read_trajectory(folder)
-        return None if verb == "report" else store.load(folder / store.DATA)
 
     def _keep(self, folder: Path, value: Any) -> Any:
         store.save(folder / store.DATA, value)
@@ -314,9 +364,10 @@ class _Run:
         assert source is not None, "models need no reconstruction"
         config, extents = self.settings.reconstruct, self.settings.assemble.extent
         if self.settings.assemble.objects != "auto":
-            raise UserError("--objects is for models. Say what tells things apart with --apart.")
+            raise UserError("--objects is for models. Say what tells objects apart with --apart.")
         viewer = Viewer(safe(called(source)), asked.vlm, asked.record)
-        made, scene = reconstruct(source, config, extents, viewer, folder, progress)
+        result = reconstruct(source, config, extents, viewer, folder, progress)
+        made, scene = result.found, result.scene
         if viewer.asked().transcript:
             store.write_json(folder / "transcript.json", viewer.asked().transcript)
         write_splat(folder / GAUSSIANS, made.gaussians)
@@ -326,59 +377,53 @@ class _Run:
     def _assemble(self, folder: Path, progress: Progress) -> Scene:
         progress(0.0, "reading the scene")
         inputs, config = self.inputs, self.settings.assemble
-        if "reconstruct" in self.made:
+        if self.made.reconstruct is not None:
             inputs = [_modelled(self.inputs[0], self.folder / FOLDERS["reconstruct"])]
             config = replace(config, extent=())  # the reconstruction has its size from them
-        return self._keep(folder, assemble(inputs, config))
+            return self._keep(folder, assemble(inputs, config))
+        return self._keep(folder, assemble(inputs, config, axis(self.settings.reconstruct.up)))
 
-    def _found(self) -> Reconstruction | None:
-        """Return what was reconstructed, where the scene's objects stand now."""
-        made = self.made.get("reconstruct")
-        return None if made is None else followed(made, self.made["assemble"])
-
-    def _describe(self, folder: Path, progress: Progress) -> Any:
+    def _describe(self, folder: Path, progress: Progress) -> Inventory:
         progress(0.0, "recognising")
-        scene, library = self.made["assemble"], self.settings.ground.library
-        pictures = "reconstruct" in self.made
-        made = describe(scene, self.settings.describe, library, progress, pictures)
+        config, library = self.settings.describe, self.settings.ground.library
+        pictures = self.made.reconstruct is not None
+        made = describe(self.made.scene, config, library, progress, pictures)
         if made.transcript:
             store.write_json(folder / "transcript.json", made.transcript)
         return self._keep(folder, made)
 
     def _segment(self, folder: Path, progress: Progress) -> Parts:
         progress(0.0, "finding parts")
-        scene, inventory = self.made["assemble"], self.made["describe"]
-        config, semantic = self.settings.segment, self.settings.reconstruct.semantic
-        return self._keep(folder, segment(scene, inventory, config, self._found(), semantic))
+        made, config = self.made, self.settings.segment
+        semantic = self.settings.reconstruct.semantic
+        parts = segment(made.scene, made.inventory, config, made.reconstruction, semantic)
+        return self._keep(folder, parts)
 
     def _ground(self, folder: Path, progress: Progress) -> MaterialField:
         progress(0.0, "looking numbers up")
-        scene, inventory, parts = (self.made[v] for v in ("assemble", "describe", "segment"))
-        made = ground(scene, parts, inventory, self.settings.ground)
-        return self._keep(folder, made)
+        made = self.made
+        found = ground_weighed(made.scene, made.parts, made.inventory, self.settings.ground)
+        return self._keep(folder, found)
 
     def _fill(self, folder: Path, progress: Progress) -> Particles:
         progress(0.0, "filling with particles")
-        scene, parts, made = (self.made[v] for v in ("assemble", "segment", "ground"))
-        return self._keep(folder, fill(scene, parts, made, self.settings.fill))
+        made = self.made
+        return self._keep(folder, fill(made.scene, made.parts, made.field, self.settings.fill))
 
     def _simulate(self, folder: Path, progress: Progress) -> Trajectory:
-        scene, particles, made = (self.made[v] for v in ("assemble", "fill", "ground"))
-        return simulate(scene, particles, made, self.settings.simulate, folder, progress)
+        made, config = self.made, self.settings.simulate
+        return simulate(made.scene, made.particles, made.field, config, folder, progress)
 
     def _film(self, folder: Path, progress: Progress) -> Film:
-        names = ("assemble", "segment", "fill", "ground", "simulate")
-        scene, parts, particles, made, trajectory = (self.made[v] for v in names)
-        config, found = self.settings.film, self._found()
-        splat, owner = (found.gaussians, found.object_of_gaussian) if found else (None, None)
-        taken = scene, parts, particles, made, trajectory, config, folder, progress
-        return self._keep(folder, film(*taken, splat, owner))
+        return self._keep(folder, film(self.made.played, self.settings.film, folder, progress))
 
     def _report(self, folder: Path, progress: Progress) -> None:
         progress(0.0, "writing the report")
-        audit = store.read_json(self.folder / FOLDERS["simulate"] / "audit.json")
-        settings = _spoken(self.settings)
-        write_results(self.folder, self.made, audit, settings, self.seconds, progress)
+        audit = read_audit(self.folder / FOLDERS["simulate"])
+        spent = Spent(_spoken(self.settings), self.seconds)
+        seen = self.folder / FOLDERS["reconstruct"] / POSES / FIGURE
+        more = {"Where the photographs were taken from": seen} if seen.exists() else {}
+        write_results(self.folder, self.made, audit, spent, progress, more)
 
 
 def _modelled(asked: Path, folder: Path) -> Path:

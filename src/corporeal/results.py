@@ -1,114 +1,98 @@
-"""What a run leaves in its folder for people and programs: film, report, tables, figures."""
+"""What the verbs of a run made, one typed field a verb."""
 
-import resource
-import shutil
-import sys
-import time
-from collections.abc import Callable, Mapping
-from dataclasses import asdict
-from pathlib import Path
-from typing import Any
+from dataclasses import dataclass, replace
+from typing import Any, TypeVar
 
-from corporeal import materials, store
-from corporeal.geometry.sizes import scale_of_part
-from corporeal.mpm.outcome import outcome
-from corporeal.render.figures import fields_figure, strip
-from corporeal.showcase.expectations import expect
-from corporeal.stages.ground import doubts
-from corporeal.stages.report import Story, report
-from corporeal.types import Inventory, Scene
-
-Progress = Callable[[float, str], None]
-
-FILES = (
-    *("film.mp4", "report.html", "materials.json", "audit.json", "fields.png", "strip.png"),
-    *("ensemble.json", "ensemble.png"),
+from corporeal.geometry.followed import followed
+from corporeal.trajectory.played import Played, Prepared
+from corporeal.types import (
+    Film,
+    Inventory,
+    MaterialField,
+    Particles,
+    Parts,
+    Reconstruction,
+    Scene,
+    Trajectory,
 )
-"""All that may lie in a run's folder beside the folders of its verbs."""
+
+T = TypeVar("T")
 
 
-def write_results(
-    folder: Path,
-    made: Mapping[str, Any],
-    audit: Mapping[str, Any],
-    settings: Mapping[str, str],
-    seconds: dict[str, float],
-    progress: Progress,
-) -> None:
-    """Write everything that a run leaves.
+@dataclass(frozen=True)
+class Results:
+    """What each verb made; None: it has not been done, or need not be.
 
-    Args:
-        folder: The run's.
-        made: What each verb made.
-        audit: The simulation's.
-        settings: What the report says of them.
-        seconds: That each verb took; this one's are added before they are written down.
-        progress: Told the fraction done and what is being done.
-
+    The fields carry the names of the verbs. Read the properties, which carry the names of objects:
+    they raise LookupError where a verb has not been done.
     """
-    started = time.perf_counter()
-    scene, parts, field, particles = (made[v] for v in ("assemble", "segment", "ground", "fill"))
-    movie, found = made["film"], made.get("reconstruct")
-    figures = {
-        "The film as a row of frames": folder / "strip.png",
-        "Materials, laws and values of every part": folder / "fields.png",
-    }
-    fields_figure(scene, parts, field, folder / "fields.png")
-    progress(0.5, "drawing the figures")
-    strip(movie, folder / "strip.png")
-    happened = outcome(scene, particles, made["simulate"])
-    seen = expect(scene.name, happened)
-    seconds["report"] = time.perf_counter() - started
-    audit = dict(audit) | {
-        "outcome": happened,
-        "expectations": [asdict(e) for e in seen],
-        "seconds": seconds | {"total": sum(seconds.values())},
-        "peak_memory_mb": peak_memory_mb(),
-        "settings": settings,
-        "questions": made["describe"].usage,
-        "warnings": _warnings(made, audit),
-    }
-    shutil.copyfile(movie.path, folder / "film.mp4")
-    store.write_json(folder / "audit.json", audit)
-    heavy = particles.mass_real, scale_of_part(scene, parts)
-    store.write_json(folder / "materials.json", materials.materials_json(field, parts, *heavy))
-    story = Story(
-        scene=scene,
-        parts=parts,
-        field=field,
-        particles=particles,
-        film=movie,
-        audit=audit,
-        figures=figures,
-        sources=materials.sources(),
-        expectations=tuple((e.sentence, e.value, e.target, e.met) for e in seen),
-        origin=found.statements if found else (),
-    )
-    report(story, folder / "report.html")
+
+    reconstruct: Reconstruction | None = None
+    assemble: Scene | None = None
+    describe: Inventory | None = None
+    segment: Parts | None = None
+    ground: MaterialField | None = None
+    fill: Particles | None = None
+    simulate: Trajectory | None = None
+    film: Film | None = None
+    report: None = None
+
+    def having(self, verb: str, made: Any) -> "Results":
+        """Return the results with what one more verb made."""
+        return replace(self, **{verb: made})
+
+    @property
+    def scene(self) -> Scene:
+        """From assemble."""
+        return _made(self.assemble, "assemble")
+
+    @property
+    def inventory(self) -> Inventory:
+        """From describe."""
+        return _made(self.describe, "describe")
+
+    @property
+    def parts(self) -> Parts:
+        """From segment."""
+        return _made(self.segment, "segment")
+
+    @property
+    def field(self) -> MaterialField:
+        """From ground."""
+        return _made(self.ground, "ground")
+
+    @property
+    def particles(self) -> Particles:
+        """From fill."""
+        return _made(self.fill, "fill")
+
+    @property
+    def trajectory(self) -> Trajectory:
+        """From simulate."""
+        return _made(self.simulate, "simulate")
+
+    @property
+    def movie(self) -> Film:
+        """From film."""
+        return _made(self.film, "film")
+
+    @property
+    def reconstruction(self) -> Reconstruction | None:
+        """What was reconstructed, where the scene's objects stand now; None: nothing was."""
+        return None if self.reconstruct is None else followed(self.reconstruct, self.scene)
+
+    @property
+    def prepared(self) -> Prepared:
+        """All up to fill."""
+        return Prepared(self.scene, self.inventory, self.parts, self.field, self.particles)
+
+    @property
+    def played(self) -> Played:
+        """All up to simulate."""
+        return Played(self.prepared, self.trajectory, self.reconstruction)
 
 
-def _warnings(made: Mapping[str, Any], audit: Mapping[str, Any]) -> list[str]:
-    """Return what every verb warns of, each sentence once, in the order of the verbs."""
-    scene, inventory, found = made["assemble"], made["describe"], made.get("reconstruct")
-    said = (
-        found.warnings if found else (),
-        still_doubted(scene, inventory),
-        inventory.warnings,
-        made["segment"].warnings,
-        doubts(made["ground"], made["segment"], scene),
-        made["fill"].warnings,
-        audit["warnings"],
-    )
-    return list(dict.fromkeys(w for group in said for w in group))
-
-
-def still_doubted(scene: Scene, inventory: Inventory) -> tuple[str, ...]:
-    """Return a scene's warnings, less doubts about sizes that a model has judged since."""
-    judged = [f"--extent {o.name}=" for o in inventory.objects if o.usual_extent]
-    return tuple(w for w in scene.warnings if not any(words in w for words in judged))
-
-
-def peak_memory_mb() -> float:
-    """Largest resident memory of this process so far [MB]."""
-    peak = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss
-    return round(peak / (1e6 if sys.platform == "darwin" else 1e3), 1)
+def _made(value: T | None, verb: str) -> T:
+    if value is None:
+        raise LookupError(f"{verb} has not been done")
+    return value

@@ -15,15 +15,17 @@ import time
 import zipfile
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from dataclasses import fields, is_dataclass
+from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
 from pathlib import Path
-from typing import IO, Any
+from typing import IO, Any, get_type_hints
 
 import numpy as np
 
-from corporeal import __version__, types
+from corporeal import types
 from corporeal.errors import BadFileError, UserError
+from corporeal.typed import typed
+from corporeal.version import __version__
 
 META = "meta.json"
 DATA = "data.npz"
@@ -149,6 +151,35 @@ def write_bytes(path: Path, data: bytes) -> None:
             partial.unlink(missing_ok=True)
 
 
+@contextmanager
+def whole_folder(folder: Path) -> Iterator[Path]:
+    """Fill a folder that appears whole or not at all; what was there before goes only then.
+
+    The caller keeps others out of the folder above (``alone``): what a killed process left there is
+    removed.
+
+    Yields:
+        An empty folder to write into.
+
+    """
+    partial = folder.with_name(f".{folder.name}.part")
+    before = folder.with_name(f".{folder.name}.before")
+    with writing(folder):
+        if before.exists() and not folder.exists():
+            before.rename(folder)  # killed between the two renamings below
+        for left in (partial, before):
+            shutil.rmtree(left, ignore_errors=True)
+        partial.mkdir(parents=True)
+        try:
+            yield partial
+            if folder.exists():
+                folder.rename(before)
+            partial.rename(folder)
+        finally:
+            shutil.rmtree(partial, ignore_errors=True)
+        shutil.rmtree(before, ignore_errors=True)
+
+
 def write_json(path: Path, value: Any) -> None:
     """Write JSON that any parser reads: no NaN, no infinity."""
     text = json.dumps(plain(value), indent=1, ensure_ascii=False, allow_nan=False)
@@ -263,7 +294,22 @@ def _decode(tree: dict, arrays: Any) -> Any:
     kind = KNOWN[tree["type"]]
     if "member" in tree:
         return kind[tree["member"]]
-    return kind(**{k: _decode(v, arrays) for k, v in tree["fields"].items()})
+    return _built(kind, {k: _decode(v, arrays) for k, v in tree["fields"].items()})
+
+
+def _built(kind: type, given: dict[str, Any]) -> Any:
+    """Make a dataclass; where an older version kept a dictionary, make what it is now.
+
+    What a type no longer has is left out.
+    """
+    hints = get_type_hints(kind)
+    given = {name: value for name, value in given.items() if name in hints}
+    now = {
+        name: typed(hints[name], value)
+        for name, value in given.items()
+        if isinstance(value, dict) and is_dataclass(hints.get(name))
+    }
+    return kind(**given | now)
 
 
 # ---------------------------------------------------------------- stage folders
@@ -287,16 +333,41 @@ def digest(path: Path) -> str:
     return total.hexdigest()[:20]
 
 
+@dataclass(frozen=True)
+class Meta:
+    """What stands beside a finished result."""
+
+    key: str = ""
+    """Names the result by all it depends on."""
+    config: Any = None
+    """As plain data."""
+    seconds: float = 0.0
+    """What it took [s]."""
+    version: str = ""
+    """Of this package."""
+
+
+def read_meta(folder: Path) -> Meta:
+    """Read what stands beside the finished result in ``folder``.
+
+    Raises:
+        BadFileError: The folder holds no finished result, or the file is damaged.
+
+    """
+    data = read_json(folder / META)
+    if not isinstance(data, dict):
+        raise BadFileError(folder / META, "is no description of a result.", "Remove the folder.")
+    return typed(Meta, data)
+
+
 def fresh(folder: Path, wanted: str) -> bool:
     """Whether ``folder`` holds the finished result named ``wanted``."""
-    path = folder / META
-    return path.exists() and read_json(path).get("key") == wanted
+    return (folder / META).exists() and read_meta(folder).key == wanted
 
 
 def finish(folder: Path, wanted: str, config: Any, seconds: float) -> None:
     """Declare the folder finished."""
-    meta = {"key": wanted, "config": config, "seconds": round(seconds, 3), "version": __version__}
-    write_json(folder / META, meta)
+    write_json(folder / META, Meta(wanted, config, round(seconds, 3), __version__))
 
 
 def begin(folder: Path) -> None:

@@ -22,7 +22,7 @@ def show_table(
 
 
 @contextmanager
-def told() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
+def progress_bars() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
     """Draw one bar per verb, with the time left; in a log, one line per verb."""
     columns = (
         TextColumn("[bold]{task.fields[verb]:>9}"),

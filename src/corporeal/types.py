@@ -1,4 +1,4 @@
-"""The things that flow through the house, in the order they appear. Read this file first.
+"""The data that pass between the stages, in the order they appear. Read this file first.
 
 Every array states its shape and its unit. All quantities are SI. Frames are right-handed with +Z
 up and the floor at z = 0; quaternions are (w, x, y, z); cameras follow OpenCV. A name ``x_of_y``
@@ -7,7 +7,7 @@ N points, K parts.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from enum import Enum
 from pathlib import Path
 from typing import Literal
@@ -16,6 +16,9 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 Vector = tuple[float, float, float]
+SUBSTANCE, MATTER = "substance", "stated_matter"
+"""Keys of a surface's extras: the name of what a file says that it is made of, and all that the
+file says of it (``values``, ``words``)."""
 
 # ---------------------------------------------------------------- what comes in
 
@@ -77,6 +80,23 @@ class Push:
 
 
 @dataclass(frozen=True)
+class Keyframes:
+    """Prescribed motion of a rigid object: how far it has moved and turned at given times.
+
+    N rows, the first of them where the object starts. Between rows all is smooth (monotone cubic
+    interpolation); before the first and after the last the object rests.
+    """
+
+    time: tuple[float, ...]
+    """Rising [s]."""
+    shift: tuple[Vector, ...]
+    """From the start, of what was then the middle of the underside of its bounding box [m]; the
+    first is zero."""
+    turn: tuple[Vector, ...]
+    """Rotation vector from the row before, about that point [rad]; the first is zero."""
+
+
+@dataclass(frozen=True)
 class Wind:
     """Air that blows on one whole object within a time window; at rest it only slows down."""
 
@@ -100,27 +120,35 @@ class Wall:
     """Any point of it [m]."""
 
 
+Objects = Literal["auto", "one", "nodes"]
+"""What counts as one object within a file."""
+
+
 @dataclass(frozen=True)
 class SceneObject:
-    """One separable thing, and how it starts."""
+    """One separable object, and how it starts."""
 
     name: str
     class_name: str
     """What it is, in words ("soda can"); the name without its number when the file says no more."""
     real_extent: float
-    """Largest extent of the real thing [m]."""
+    """Largest extent of the real object [m]."""
     scale: float = 1.0
     """Scene size over real size."""
     velocity: Vector = (0.0, 0.0, 0.0)
     """[m/s]"""
     push: Push | None = None
     wind: Wind | None = None
+    path: Keyframes | None = None
+    """Prescribed motion: it moves as told, as one rigid body, whatever it meets."""
     source: str = ""
     """The file it came from."""
     credit: str = ""
     """Licence and attribution, where the file states them."""
     sized_by: str = ""
-    """Who said how large the real thing is, in a clause; "": the file."""
+    """Who said how large the real object is, in a clause; "": the file."""
+    mass: float | None = None
+    """As the file states it, of the object in the scene [kg]; None: its materials say."""
 
 
 @dataclass(frozen=True)
@@ -232,7 +260,7 @@ class Cloud:
     semantic: Float[np.ndarray, "N S"]
     """What it is: unit vectors, comparable with words where they come from CLIP."""
     structural: Float[np.ndarray, "N D"]
-    """Which part of a thing it is: unit vectors."""
+    """Which part of an object it is: unit vectors."""
     seen: Int[np.ndarray, " N"]
     """In how many views; 0: its features are its neighbours'."""
     gaussian_of_point: Int[np.ndarray, " N"] | None = None
@@ -278,9 +306,64 @@ class Placement:
 
     fraction: float
     """0: the low end, 1: the high end; on a logarithmic scale where the range is wide."""
-    chosen_by: Literal["model", "recording", "fallback"]
+    chosen_by: Literal["model", "recording", "fallback", "evidence"]
     reason: str
     """Why there, in one sentence."""
+
+
+Built = Literal["solid", "shell", "sheet", "hollow", "filled", "packed"]
+"""How a part is made: solid throughout; a wall, open or closed (``shell``, where nobody says which;
+``sheet`` open: cup, plate, lid, cover; ``hollow`` closed about air); a wall with contents behind it
+(``filled``); or parts and air (``packed``)."""
+WALLED: tuple[str, ...] = ("shell", "sheet", "hollow", "filled")
+"""What has a wall."""
+
+
+@dataclass(frozen=True)
+class Hypothesis:
+    """One way a part may be: of what, how built, with what in it, and where in its ranges."""
+
+    material: str | None
+    """A name from the library; None: unknown."""
+    structure: Built | None
+    probability: float
+    """In [0, 1]; those of a part add up to 1 at most."""
+    contents: str | None = None
+    fill: float | None = None
+    """Share of the room behind the wall that the contents take up, in [0, 1]."""
+    solidity: float | None = None
+    """Of what is packed: share of its outer shape that is matter, in [0, 1]."""
+    reading: str = ""
+    """What the whole object is then ("imitation"): ways of one reading are drawn together."""
+    reason: str = ""
+    placements: dict[str, Placement] = field(default_factory=dict)
+
+
+@dataclass(frozen=True)
+class PrintedFact:
+    """Something that is printed on an object and says how much of it there is."""
+
+    kind: str
+    """"net weight", "total weight", "volume", "size", "count" or "other"."""
+    value: float | None
+    """[kg], [m³] or [m]; None: not a number that weighs."""
+    words: str
+    """As read."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What was said of an object's mass without the library: it reweights, and sets no value."""
+
+    low: float
+    """90 % of what it may weigh lies between ``low`` and ``high`` [kg]."""
+    likely: float
+    """[kg]"""
+    high: float
+    """[kg]"""
+    reason: str
+    printed: tuple[PrintedFact, ...] = ()
+    answered_by: Literal["model", "recording"] = "model"
 
 
 Speaker = Literal["annotation", "recording", "model", "metadata", "unknown"]
@@ -293,7 +376,7 @@ class PartWords:
     name: str
     material: str | None
     """A name from the library; None: unknown, which is a normal answer."""
-    structure: Literal["solid", "shell", "filled"] | None = None
+    structure: Built | None = None
     """How the part is made; None: not said, the shape decides."""
     thickness: float | None = None
     """Thickness of the wall of what is a shell or filled, where it is known [m]."""
@@ -304,24 +387,59 @@ class PartWords:
     """Why this answer, in one sentence."""
     values: dict[str, float] = field(default_factory=dict)
     """Numbers that a person stated: field of ``Material`` → value, SI."""
+    stated: "dict[str, Ground]" = field(default_factory=dict)
+    """Numbers that the scene's file states, with who says so; a person's go before them."""
     contents: str | None = None
     """A name from the library: what is behind the wall of what is filled."""
     fill: float | None = None
     """Share of the room behind the wall that the contents take up, in [0, 1]."""
-    alternatives: tuple[tuple[str, float], ...] = ()
-    """Other materials it may be, each with its stated probability; what is left is ``material``'s.
-    """
+    solidity: float | None = None
+    """Of what is packed: share of its outer shape that is matter, in [0, 1]."""
+    hypotheses: tuple[Hypothesis, ...] = ()
+    """All ways it may be, the one above among them, likeliest first; empty: only the one above."""
     placements: dict[str, Placement] = field(default_factory=dict)
     """Field of ``Material`` → where in its range a model put it; fields not named are typical."""
+    inflation: float | None = None
+    """Gauge pressure of the air sealed behind the wall [Pa]; 0: no more than around it; None: it is
+    not sealed."""
     volume_share: float = 1.0
-    """Of a piece: its share of the volume inside the part's surface, in [0, 1]."""
+    """Of a piece: its outer shape's share of the volume inside the part's surface, in [0, 1]."""
     surface_share: float = 1.0
-    """Of a piece: its share of the part's surface, in [0, 1]."""
+    """Of a piece: the area of its own outer face over that of the part's surface, in [0, 1]."""
+    inside: str = ""
+    """Of a piece: the piece that encloses it; "": it lies at the part's surface."""
+    inner_share: float = 0.0
+    """Of a piece: the share of the same volume that lies within pieces inside it, in [0, 1]."""
+    missing: bool = False
+    """Whether the mesh does not show this piece, as a scanner does not see glass."""
     pieces: "tuple[PartWords, ...]" = ()
     """What the part consists of where its mesh does not tell them apart: the shaft and the handle
     of a scanned screwdriver. The words above are then those of the piece that matters most."""
     built_by: Speaker = "unknown"
     """Who said how it is built; ``answered_by`` said what it is made of."""
+
+    @property
+    def alternatives(self) -> tuple[tuple[str, float], ...]:
+        """Other materials it may be, with the probabilities of all ways that have them."""
+        found: dict[str, float] = {}
+        for way in self.hypotheses:
+            if way.material not in (None, self.material):
+                found[str(way.material)] = found.get(str(way.material), 0.0) + way.probability
+        return tuple(found.items())
+
+
+def in_way(words: PartWords, way: Hypothesis) -> PartWords:
+    """Let a part be in one of its ways: of that, built so, with that in it."""
+    return replace(
+        words,
+        material=way.material,
+        structure=way.structure,
+        contents=way.contents,
+        fill=way.fill,
+        solidity=way.solidity,
+        placements=way.placements,
+        reason=way.reason,
+    )
 
 
 @dataclass(frozen=True)
@@ -332,7 +450,31 @@ class ObjectWords:
     class_name: str
     parts: tuple[PartWords, ...]
     usual_extent: float | None = None
-    """How large such a thing usually is, as a model says [m]."""
+    """How large such an object usually is, as a model says [m]."""
+    evidence: Evidence | None = None
+    """What was said of its mass without the library; None: nobody was asked."""
+
+
+@dataclass(frozen=True)
+class Usage:
+    """What the questions to models took; nothing where nothing was asked."""
+
+    models: tuple[str, ...] = ()
+    """Who answered, as a person types it, or whoever gave the recorded answers."""
+    questions: int = 0
+    calls: int = 0
+    """Requests that were sent; 0 where all answers came from the disk."""
+    input_tokens: int = 0
+    output_tokens: int = 0
+    seconds: float = 0.0
+    """Of waiting [s]."""
+    dollars: float | None = 0.0
+    """At list prices [US$]; None where one model's price is not known."""
+    prices_of: str = ""
+    """Date of the list prices."""
+
+
+NOTHING_ASKED = Usage()
 
 
 @dataclass(frozen=True)
@@ -342,8 +484,8 @@ class Inventory:
     objects: tuple[ObjectWords, ...]
     transcript: tuple[dict, ...] = ()
     """Every question put to a model with its answer, as data."""
-    usage: dict = field(default_factory=dict)
-    """What the questions took: calls, tokens, US dollars where the price is known, seconds."""
+    usage: Usage = NOTHING_ASKED
+    """What the questions took."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the answers, in sentences."""
 
@@ -376,7 +518,7 @@ class Parts:
 
 
 class Law(Enum):
-    """How a material answers to strain: an elastic energy and, for two of them, a plastic map."""
+    """How a material answers to strain: each stands in the file of its name in ``mpm/laws``."""
 
     COROTATED = 0
     NEO_HOOKEAN = 1
@@ -385,6 +527,8 @@ class Law(Enum):
     """Hencky elasticity with the Drucker–Prager cone: sand, soil, snow."""
     VON_MISES = 4
     """Hencky elasticity with the von Mises cylinder: metals, plasticine."""
+    FLUID = 5
+    """Pressure of its volume, and a shear stress that its rate makes: liquids and pastes."""
 
 
 @dataclass(frozen=True)
@@ -430,6 +574,8 @@ class Material:
     """Mass density [kg/m³]."""
     yield_stress: float | None = None
     """Von Mises yield stress [Pa]; None where the law does not yield."""
+    strength: float | None = None
+    """Of what breaks before it yields: in bending or in tension, of a whole bar [Pa]."""
     friction_angle: float | None = None
     """Internal friction angle of a granular material [rad]."""
     cohesion: float | None = None
@@ -441,11 +587,27 @@ class Material:
     restitution: float = 0.5
     """Normal restitution where rigid meets rigid [-]."""
     loss: float = 0.0
-    """Loss factor of small vibrations [-]."""
+    """Loss factor at a blow: tan δ of the bulk at an impact's frequencies and strains [-]."""
     shell_thickness: float | None = None
-    """How thin such things are usually made [m]; None: solid as a rule."""
+    """How thin such objects are usually made [m]; None: solid as a rule."""
+    viscosity: float | None = None
+    """η of a liquid whose stress is proportional to its shear rate [Pa s]."""
+    consistency: float | None = None
+    """K_c of any other liquid or paste [Pa sⁿ]: its stress beyond yielding, at a rate of 1/s."""
+    flow_index: float = 1.0
+    """n of that: the stress grows with the rate to this power [-]."""
+    yield_shear: float = 0.0
+    """Shear stress below which a paste does not flow [Pa]."""
+    strength_local: float | None = None
+    """Tension that a brittle material bears over a square millimetre [Pa]; None: not brittle, or
+    nobody measured it."""
     grounds: dict[str, Ground] = field(default_factory=dict)
     """Field name → why, for every measured number above."""
+
+    @property
+    def thickness_of_flow(self) -> float:
+        """K_c of a liquid, whose viscosity it is where n is 1 [Pa sⁿ]; 0 of what is none."""
+        return self.consistency or self.viscosity or 0.0
 
 
 @dataclass(frozen=True)
@@ -462,15 +624,58 @@ class Structure:
     """Share of the room behind the wall that the contents take up, in [0, 1]."""
     loose: bool = False
     """Whether the contents lie at the bottom, as liquids and grains do; else they are all over."""
+    inflated: bool = False
+    """Whether wall and contents, sealed air, are one soft solid: of mass over volume all through.
+    """
+    solidity: float = 1.0
+    """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
 
 
 @dataclass(frozen=True)
 class Piece:
-    """One of several things that share a part's mesh."""
+    """One of several objects that share a part's mesh."""
 
     words: PartWords
     material: Material
     structure: Structure
+
+
+@dataclass(frozen=True)
+class WeighedHypothesis:
+    """One way the parts of an object may be, with what it then weighs."""
+
+    words: str
+    """Materials and builds of all parts that are in doubt."""
+    probability: float
+    """After the evidence, in [0, 1]."""
+    prior: float
+    """Before it, in [0, 1]."""
+    mass: float
+    """Median of its draws [kg]."""
+
+
+@dataclass(frozen=True)
+class MassMixture:
+    """What one object may weigh, over all ways it may be, and over all ranges."""
+
+    object: str
+    mass: float
+    """Median [kg]: it minimises the expected error of the logarithm."""
+    low: float
+    """5 % [kg]."""
+    high: float
+    """95 % [kg]."""
+    mass_without: float
+    """Median without outside evidence [kg]."""
+    low_without: float
+    """[kg]"""
+    high_without: float
+    """[kg]"""
+    hypotheses: tuple[WeighedHypothesis, ...] = ()
+    """Likeliest first."""
+    evidence: Evidence | None = None
+    warning: str = ""
+    """Where outside evidence contradicts all that was drawn: what would reconcile them."""
 
 
 @dataclass(frozen=True)
@@ -490,6 +695,8 @@ class MaterialField:
     """Newton's coefficient between rigid parts [-]; last row and column as above."""
     pieces: tuple[tuple[Piece, ...], ...] = ()
     """Per part, of what it consists where its mesh does not tell; empty: nowhere more than one."""
+    mixtures: tuple[MassMixture, ...] = ()
+    """Per object that a model described, what it may weigh; empty: no model was asked."""
 
 
 # ---------------------------------------------------------------- what is simulated
@@ -520,6 +727,8 @@ class Treatment:
     step: float
     """Largest stable time step of this part [s]; inf when rigid."""
     why: str
+    loss: float = 0.0
+    """Simulated loss factor [-]: its material's, less what the grid takes of a blow by itself."""
 
 
 @dataclass(frozen=True)
@@ -601,6 +810,79 @@ class Frame:
     """[m]"""
     deformation: Float[np.ndarray, "P 3 3"]
     """Deformation gradient F [-]; a rigid object's is its rotation."""
+    stress: Float[np.ndarray, " P"] | None = None
+    """Von Mises stress [Pa]; None where a run did not keep it."""
+
+
+@dataclass(frozen=True)
+class Ledger:
+    """Sums over bodies and pairs, at one instant or over time.
+
+    B objects, W planes. F is absent for one instant, the number of frames for a trajectory. Work
+    and impulses are accumulated since time 0.
+    """
+
+    time: Float[np.ndarray, "*F"]
+    """[s]"""
+    mass: Float[np.ndarray, "*F B"]
+    """[kg]"""
+    centre: Float[np.ndarray, "*F B 3"]
+    """Centre of mass [m]."""
+    momentum: Float[np.ndarray, "*F B 3"]
+    """[kg m/s]"""
+    angular_momentum: Float[np.ndarray, "*F B 3"]
+    """About the origin, affine part included [kg m²/s]."""
+    kinetic: Float[np.ndarray, "*F B"]
+    """½ Σ m (|v|² + dx²/4 ‖C‖²) [J]."""
+    elastic: Float[np.ndarray, "*F B"]
+    """[J]"""
+    potential: Float[np.ndarray, "*F B"]
+    """-m g · x [J]."""
+    speed: Float[np.ndarray, "*F"]
+    """Largest particle speed [m/s]."""
+    external_impulse: Float[np.ndarray, "*F B 3"]
+    """Of gravity, pushes and wind [N s]."""
+    plane_impulse: Float[np.ndarray, "*F W B 3"]
+    """Of each plane on each object [N s]."""
+    pair_impulse: Float[np.ndarray, "*F B B"]
+    """Sum of normal impulse magnitudes between two objects [N s]; symmetric."""
+    push_work: Float[np.ndarray, "*F"]
+    """Of pushes and wind [J]."""
+    friction_loss: Float[np.ndarray, "*F"]
+    """[J]"""
+    impact_loss: Float[np.ndarray, "*F"]
+    """Taken by normal contact: by restitution of what is rigid, and of what is soft by the nodes of
+    the grid [J]."""
+    plastic_loss: Float[np.ndarray, "*F"]
+    """[J]"""
+    viscous_loss: Float[np.ndarray, "*F"]
+    """[J]"""
+    first_contact: Float[np.ndarray, "*F B+W B+W"]
+    """Time of the first impulse of each pair [s]; nan: none yet."""
+    last_contact: Float[np.ndarray, "*F B+W B+W"]
+    """Time of the latest impulse of each pair [s]; nan: none yet."""
+    contact_point: Float[np.ndarray, "*F B+W B+W 3"]
+    """Where each pair first touched [m]; nan: it did not."""
+    lost: Int[np.ndarray, "*F"]
+    """Number of particles that are not finite or left the domain."""
+    flow: Float[np.ndarray, "*F B"]
+    """Σ m |v| [kg m/s]."""
+    rms_speed: Float[np.ndarray, "*F B"]
+    """Root mean square of particle speeds, weighted by mass [m/s]."""
+    plane_depth: Float[np.ndarray, "*F W B"]
+    """How deep each object reaches into each plane [m]."""
+    gap: Float[np.ndarray, "*F B B"]
+    """Distance between two objects [m]."""
+    overlap: Float[np.ndarray, "*F B B"]
+    """How deep two objects reach into each other [m]."""
+    steps: Int[np.ndarray, "*F"]
+    """Time steps since time 0."""
+    dt_min: Float[np.ndarray, "*F"]
+    """Smallest of them [s]."""
+    dt_max: Float[np.ndarray, "*F"]
+    """Largest of them [s]."""
+    nan: Int[np.ndarray, "*F"]
+    """Number of particles that are not finite."""
 
 
 @dataclass(frozen=True)
@@ -611,7 +893,7 @@ class Trajectory:
     """Holds ``frames/00000.npz`` … and ``ledger.npz``."""
     time: Float[np.ndarray, " F"]
     """[s]"""
-    ledger: dict[str, np.ndarray]
+    ledger: Ledger
     """Per frame: energies [J], momentum per object [kg m/s], impulses [N s], penetration [m]."""
     frames: Sequence[Frame]
     """Reads frame i from disk when asked for."""
@@ -625,3 +907,5 @@ class Film:
     fps: int
     width: int
     height: int
+    times: tuple[float, ...] = ()
+    """What time every picture shows [s]; empty: picture k shows k / fps."""

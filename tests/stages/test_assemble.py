@@ -3,6 +3,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.glb_writer import write_glb
@@ -217,9 +218,9 @@ def test_inputs_that_are_no_models_are_refused(tmp_path, models):
         ([], "No input"),
         ([tmp_path / "none.glb"], "no such file"),
         ([tmp_path / "none"], "no such file"),
-        ([tmp_path / "empty"], "holds no .glb"),
-        ([tmp_path / "photos"], "holds 1 pictures, but nothing that says from where"),
-        ([tmp_path / "mesh.obj"], "is not a .glb"),
+        ([tmp_path / "empty"], "holds no model"),
+        ([tmp_path / "photos"], "holds 1 pictures and no model"),
+        ([tmp_path / "mesh.obj"], "OBJ|no triangles"),
         ([tmp_path / "zero.glb"], "0 bytes"),
         ([tmp_path / "none.toml"], "no such file"),
         ([models[0], toml(tmp_path, 'file = "duck.glb"')], "stands alone"),
@@ -273,3 +274,65 @@ def test_a_working_extent_moves_the_walls_with_the_things(models):
     assert scene.objects[0].scale == pytest.approx(5.0)
     assert scene.walls[0].point == pytest.approx((1.5, 0.0, 0.5))
     assert scene.walls[0].normal == (-1, 0, 0)
+
+
+# ---------------------------------------------------------------- meshes that state no unit
+
+
+def stl(path, extent):
+    """A cube as STL, which knows no unit."""
+    trimesh.creation.box([extent, extent / 2, extent / 3]).export(path)
+    return path
+
+
+@pytest.mark.parametrize(
+    ("name", "size", "metres", "said"),
+    [
+        ("bracket.stl", 45.0, 0.045, "in millimetres"),
+        ("bracket.stl", 2.0, 2.0, "in metres"),
+        ("bracket.obj", 0.3, 0.3, "in metres"),
+        ("chair.stl", 90.0, 0.9, "in centimetres"),
+        ("chair.off", 900.0, 0.9, "in millimetres"),
+        ("duck.obj", 2.0, 0.0508, "in inches"),
+        ("chair.obj", 3e6, 0.9, "as large as a chair usually is"),
+    ],
+)
+def test_a_mesh_without_a_unit_is_as_large_as_such_things_are(tmp_path, name, size, metres, said):
+    scene = assemble([stl(tmp_path / name, size)])
+    assert scene.objects[0].real_extent == pytest.approx(metres)
+    assert np.ptp(boxes_of(scene)[0], axis=0).max() == pytest.approx(metres)
+    told = [w for w in scene.warnings if "states no unit" in w]
+    assert len(told) == 1 and said in told[0] and "--unit or --extent" in told[0]
+
+
+def test_a_person_knows_the_unit_better(tmp_path):
+    path = stl(tmp_path / "bracket.stl", 45.0)
+    inches = assemble([path], AssembleConfig(unit="in"))
+    assert inches.objects[0].real_extent == pytest.approx(45 * 0.0254)
+    asked = assemble([path], AssembleConfig(extent=("0.3",)))
+    assert asked.objects[0].real_extent == 0.3
+    assert not any("states no unit" in w for w in (*inches.warnings, *asked.warnings))
+
+
+def test_a_mesh_of_no_likely_size_asks_for_its_unit(tmp_path):
+    with pytest.raises(BadFileError, match=r"3e\+06 units large\. Give --unit, or --extent"):
+        assemble([stl(tmp_path / "bracket.obj", 3e6)])
+
+
+def test_a_mesh_may_be_told_which_axis_is_up(tmp_path):
+    path = stl(tmp_path / "bracket.stl", 60.0)
+    heights = [np.ptp(boxes_of(assemble([path], up=up))[0], axis=0)[2] for up in (None, "+x", "-y")]
+    assert heights == pytest.approx([0.02, 0.06, 0.03])
+
+
+def test_gltf_states_its_axes_and_unit(models):
+    for refused in ({"up": "+x"}, {"config": AssembleConfig(unit="mm")}):
+        with pytest.raises(BadFileError, match="Leave --up and --unit out"):
+            assemble(models[:1], **refused)
+
+
+@pytest.mark.parametrize("kind", [".fbx", ".blend"])
+def test_what_only_blender_reads_comes_with_the_command_that_converts_it(tmp_path, kind):
+    (tmp_path / f"chair{kind}").write_bytes(b"x")
+    with pytest.raises(BadFileError, match=r"Convert it: blender --background .*chair\.glb"):
+        assemble([tmp_path / f"chair{kind}"])

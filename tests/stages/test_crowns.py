@@ -53,7 +53,7 @@ def anatomy():
 def crown(whole, field, scale=1.0):
     leaves = whole.members[-1]
     made = compose(whole, leaves, field, np.random.default_rng(0))
-    return in_leaves(made, (whole, leaves), field, TISSUE, scale)
+    return in_leaves(made, whole, leaves, field, TISSUE, scale)
 
 
 def test_a_crown_weighs_what_its_leaves_weigh_and_each_swings_as_a_usual_one_does():
@@ -115,7 +115,7 @@ def test_a_potted_stem_whose_foot_nobody_saw_reaches_halfway_down():
     assert (found.wood, found.soil) == (2, 1)
     assert (found.foot, found.top) == pytest.approx((0.095, 0.19))
     assert seen.seen and not found.seen and "0.095 m, halfway down" in found.doubt
-    root = root_of(found, (pictured, 0), field.materials, lambda wood, point: 1.0)
+    root = root_of(found, pictured, 0, field.materials, lambda wood, point: 1.0)
     assert root.stiffness == pytest.approx(0.34 * 3e5 * 0.095**3)
     assert root.point[2] == pytest.approx(0.095 + 0.4 * 0.095)
     hung = replace(whole, members=(pot, top, above(stem, 0.4), leaves))

@@ -13,7 +13,7 @@ from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.ground import ground
 from corporeal.stages.segment import segment
-from oracle import decomposed, part
+from oracle import decomposed, part, weighs
 
 sys.path.insert(0, str(Path(__file__).parents[1] / "vlm"))
 from fake_server import FakeServer
@@ -34,16 +34,17 @@ def _answer(text):
         return decomposed(["body", "beak"], ["duck"])
     if "Rank all" in text:
         return {"ranking": [{"number": n, "reason": "So it looks."} for n in (1, 2)]}
-    if "What is each of its parts made of" in text:
+    if "What may each of its parts be made of" in text:
         named = re.search(r"^Parts: (.*)$", text, flags=re.MULTILINE)[1].split("; ")
         shares = {"volume_share": 1 / len(named), "surface_share": 1 / len(named)}
-        shares = shares if "they add up to 1" in text else {}
+        shares = shares if "volume_share: what lies" in text else {}
         return {
-            "parts": [
-                part(re.sub(r" \(\w+ in the last picture\)", "", name), "leather", **shares)
-                for name in named
-            ]
+            "parts": [part(re.sub(r" \(.*\)$", "", name), "leather", **shares) for name in named]
         }
+    if "Then judge what the whole object weighs" in text:
+        a, b, c, unit = re.search(r"are ([\d.]+) × ([\d.]+) × ([\d.]+) (c?m)", text).groups()
+        box = float(a) * float(b) * float(c) * (1e-6 if unit == "cm" else 1.0)
+        return weighs(50 * box, 100 * box, 200 * box)  # as furniture is, for its box
     if "How large is the real thing" in text:
         classes = re.findall(r"^- (.+)$", text, flags=re.MULTILINE)
         return {"classes": [{"class_name": c, "metres": 0.4} for c in classes]}
@@ -87,11 +88,12 @@ def test_real_objects_of_many_parts_are_described_placed_and_grounded(described)
         "ranking": 1,
         "materials": 5,
         "placement": 5,
+        "mass": 5,
         "extents": 1,
     }
     assert [len(o.parts) for o in inventory.objects[:4]] == [2, 3, 3, 6]
-    assert inventory.usage["calls"] == len(sent) == len(tasks)
-    assert inventory.usage["input_tokens"] == 1200 * len(tasks)
+    assert inventory.usage.calls == len(sent) == len(tasks)
+    assert inventory.usage.input_tokens == 1200 * len(tasks)
     parts = segment(scene, inventory)
     field = ground(scene, parts, inventory)
     for material, words in zip(field.materials, field.words, strict=True):
@@ -126,9 +128,9 @@ def test_pictures_go_out_only_with_the_questions_that_need_them(described):
     _, inventory, sent, _ = described
     pictures = sorted(request.pictures for request in sent)
     tasks = [row["task"] for row in inventory.transcript]
-    assert pictures.count(0) == tasks.count("placement") + tasks.count("extents")
-    assert pictures.count(5) == 4  # objects of several parts: four views, and parts in colours
-    assert pictures.count(4) == 3  # the duck: parts, ranking, materials
+    assert pictures.count(0) == tasks.count("extents")
+    assert pictures.count(5) == 12  # objects of several parts: four views, and parts in colours
+    assert pictures.count(4) == 5  # the duck: parts, ranking, materials, placement, mass
     for request in sent:
         assert "/objects/" not in request.text
         assert str(Path.home()) not in request.text

@@ -8,11 +8,11 @@ import trimesh
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
-from corporeal.mpm.ledger_row import object_of_body
-from corporeal.mpm.pose import pose
 from corporeal.mpm.problem import Plane
 from corporeal.stages.fill import FillConfig, examine, fill, motions
 from corporeal.stages.simulate import SimulateConfig, simulate
+from corporeal.trajectory.ledger_row import object_of_body
+from corporeal.treatment.problem_from_scene import pose
 from corporeal.types import (
     Finish,
     Law,
@@ -437,10 +437,10 @@ def test_a_ball_comes_back_from_a_wall(tmp_path):
     scene = replace(scene, walls=(Wall((-1.0, 0.0, 0.0), (0.15, 0.0, 0.0)),), duration=0.2, fps=20)
     particles = fill(scene, parts, field)
     moved = simulate(scene, particles, field, SimulateConfig(), tmp_path)
-    velocity = moved.ledger["momentum"][-1, 0, 0] / moved.ledger["mass"][-1, 0]
+    velocity = moved.ledger.momentum[-1, 0, 0] / moved.ledger.mass[-1, 0]
     assert -2.0 < velocity < -1.2
-    assert moved.ledger["plane_impulse"][-1, 1, 0, 0] == pytest.approx(
-        moved.ledger["momentum"][-1, 0, 0] - moved.ledger["momentum"][0, 0, 0], rel=1e-3
+    assert moved.ledger.plane_impulse[-1, 1, 0, 0] == pytest.approx(
+        moved.ledger.momentum[-1, 0, 0] - moved.ledger.momentum[0, 0, 0], rel=1e-3
     )
 
 
@@ -579,6 +579,6 @@ def test_what_is_filled_falls_as_one_and_its_audit_is_clean(tmp_path):
     trajectory = simulate(
         replace(scene, duration=0.1), particles, field, SimulateConfig(), tmp_path
     )
-    assert np.isfinite(trajectory.ledger["centre"]).all()
-    mass = trajectory.ledger["mass"][0]
+    assert np.isfinite(trajectory.ledger.centre).all()
+    mass = trajectory.ledger.mass[0]
     assert mass[0] == pytest.approx(particles.mass_real[0], rel=1e-6)

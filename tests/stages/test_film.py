@@ -11,10 +11,12 @@ from PIL import Image
 
 from corporeal.errors import UserError
 from corporeal.render import video
-from corporeal.stages.film import FilmConfig, film
+from corporeal.stages.film import FilmConfig, film, validate
+from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
     Finish,
     Frame,
+    Inventory,
     Law,
     Material,
     MaterialField,
@@ -28,11 +30,12 @@ from corporeal.types import (
     Surface,
     Trajectory,
 )
+from made_ledger import ledger
 
 SMALL = FilmConfig(width=128, height=96, quality="draft")
 
 
-class Played(Sequence):
+class Frames(Sequence):
     """Frames made when asked for, as a trajectory on disk reads them."""
 
     def __init__(self, points, motion, count):
@@ -79,9 +82,12 @@ def play(shape, motion, count=6):
     words = PartWords("thing", "rubber")
     pair = np.full((2, 2), 0.5)
     field = MaterialField((rubber,), (Structure("solid"),), (words,), pair, pair)
-    frames = Played(points, motion, count)
-    trajectory = Trajectory(Path("nowhere"), np.arange(count) / 60, {}, frames)
-    return scene, parts, particles, field, trajectory
+    frames = Frames(points, motion, count)
+    trajectory = Trajectory(
+        Path("nowhere"), np.arange(count) / 60, ledger(np.arange(count) / 60), frames
+    )
+    prepared = Prepared(scene, Inventory(()), parts, field, particles)
+    return Played(prepared, trajectory)
 
 
 def cube():
@@ -95,7 +101,7 @@ def red(picture):
 
 def test_a_film_has_all_frames_and_any_browser_plays_it(tmp_path):
     told = []
-    made = film(*play(cube(), spin), SMALL, tmp_path, lambda f, words: told.append(f))
+    made = film(play(cube(), spin), SMALL, tmp_path, lambda f, words: told.append(f))
     assert (made.width, made.height, made.fps) == (128, 96, 60)
     assert len(video.pictures(made.path, list(range(6)))) == 6
     probe = subprocess.run(
@@ -110,11 +116,13 @@ def test_a_film_has_all_frames_and_any_browser_plays_it(tmp_path):
 
 
 def test_the_film_carries_whom_to_thank_for_what_is_seen(tmp_path):
-    scene, *rest = play(cube(), spin, 2)
+    played = play(cube(), spin, 2)
+    scene = played.prepared.scene
     things = [
         replace(scene.objects[0], credit=c) for c in ("CC0; Ada", "MIT;\0 Bo", "CC0; Ada", "")
     ]
-    made = film(replace(scene, objects=tuple(things)), *rest, SMALL, tmp_path)
+    thanked = replace(played.prepared, scene=replace(scene, objects=tuple(things)))
+    made = film(replace(played, prepared=thanked), SMALL, tmp_path)
     probe = subprocess.run(
         [imageio_ffmpeg.get_ffmpeg_exe(), "-i", str(made.path)], capture_output=True, text=True
     ).stderr
@@ -126,7 +134,7 @@ def test_the_film_carries_whom_to_thank_for_what_is_seen(tmp_path):
 def test_a_sphere_that_is_squashed_is_seen_lower_and_wider(tmp_path):
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.5)
     ball.apply_translation([0, 0, 0.5])
-    made = film(*play(ball, squash), SMALL, tmp_path)
+    made = film(play(ball, squash), SMALL, tmp_path)
     first, last = (red(p) for p in video.pictures(made.path, [0, 5]))
     extent = [[np.ptp(np.nonzero(m)[a]) for a in (0, 1)] for m in (first, last)]
     assert extent[1][0] < 0.85 * extent[0][0]
@@ -135,15 +143,15 @@ def test_a_sphere_that_is_squashed_is_seen_lower_and_wider(tmp_path):
 
 def test_what_does_not_move_does_not_flicker(tmp_path):
     still = play(cube(), lambda t: (np.eye(3), np.zeros(3)))
-    config = FilmConfig(width=128, height=96, quality="draft", stills=True)
-    film(*still, config, tmp_path)
+    config = FilmConfig(width=128, height=96, quality="draft", stills=True, caption=False)
+    film(still, config, tmp_path)
     stills = [np.asarray(Image.open(p)) for p in sorted((tmp_path / "stills").iterdir())]
     assert len(stills) == 6
     assert all(np.array_equal(s, stills[0]) for s in stills)
 
 
 def test_the_whole_motion_stays_in_the_picture(tmp_path):
-    made = film(*play(cube(), lambda t: (np.eye(3), np.array([0, 4 * t, 0.0]))), SMALL, tmp_path)
+    made = film(play(cube(), lambda t: (np.eye(3), np.array([0, 4 * t, 0.0]))), SMALL, tmp_path)
     for picture in video.pictures(made.path, [0, 3, 5]):
         seen = red(picture)
         assert seen.sum() > 50
@@ -152,22 +160,22 @@ def test_the_whole_motion_stays_in_the_picture(tmp_path):
 
 def test_frames_are_read_one_by_one_and_few_are_kept(tmp_path):
     given = play(cube(), spin)
-    film(*given, SMALL, tmp_path)
+    film(given, SMALL, tmp_path)
     # Once to place the camera, once to draw; the type checker of the tests looks a few times too.
-    assert len(given[4].frames.asked) <= 3 * 6
+    assert len(given.trajectory.frames.asked) <= 3 * 6
 
 
 def test_a_failed_film_says_so_and_leaves_nothing(tmp_path, monkeypatch):
     monkeypatch.setattr(video, "COMPRESSION", "nonsense")
     with pytest.raises(UserError, match="ffmpeg"):
-        film(*play(cube(), spin), SMALL, tmp_path)
+        film(play(cube(), spin), SMALL, tmp_path)
     assert not list(tmp_path.glob("*.mp4")) and not list(tmp_path.glob(".*"))
 
 
 def test_a_missing_encoder_is_one_clear_sentence(tmp_path, monkeypatch):
     monkeypatch.setenv("IMAGEIO_FFMPEG_EXE", str(tmp_path / "no-such-ffmpeg"))
     with pytest.raises(UserError, match="IMAGEIO_FFMPEG_EXE"):
-        film(*play(cube(), spin), SMALL, tmp_path)
+        film(play(cube(), spin), SMALL, tmp_path)
 
 
 def test_a_full_disk_is_one_clear_sentence(tmp_path):
@@ -176,9 +184,35 @@ def test_a_full_disk_is_one_clear_sentence(tmp_path):
         pytest.skip("this system has no /dev/full")
     (tmp_path / f".{video.Path('film').stem}.part.mp4").symlink_to(full)
     with pytest.raises(UserError, match=r"disk is full|ffmpeg failed"):
-        film(*play(cube(), spin), SMALL, tmp_path)
+        film(play(cube(), spin), SMALL, tmp_path)
 
 
 def test_odd_sizes_are_refused_with_a_reason(tmp_path):
     with pytest.raises(UserError, match="even"):
-        film(*play(cube(), spin), FilmConfig(width=127, height=96), tmp_path)
+        film(play(cube(), spin), FilmConfig(width=127, height=96), tmp_path)
+
+
+def test_a_slow_film_is_longer_and_every_picture_knows_its_time(tmp_path):
+    """Nothing touches here: all of it is slow."""
+    made = film(play(cube(), spin), replace(SMALL, slow=2.0), tmp_path)
+    assert len(made.times) == len(video.pictures(made.path, list(range(11)))) == 11
+    np.testing.assert_allclose(made.times, np.arange(11) / 120, atol=1e-9)
+
+
+def test_the_time_is_written_into_the_picture_where_it_is_asked_for(tmp_path):
+    still = play(cube(), lambda t: (np.eye(3), np.zeros(3)), 2)
+    with_time, without = (
+        film(still, replace(SMALL, stills=True, caption=c), tmp_path / str(c))
+        for c in (True, False)
+    )
+    paths = [m.path.parent / "stills" / "00001.png" for m in (with_time, without)]
+    a, b = (np.asarray(Image.open(path)) for path in paths)
+    assert np.array_equal(a, b), "stills are of the scene alone"
+    p, q = (video.pictures(m.path, [1])[0].astype(int) for m in (with_time, without))
+    changed = np.abs(p - q).max(axis=2) > 60
+    assert changed[70:, :60].any() and not changed[:60].any()
+
+
+def test_slowness_that_makes_no_sense_is_refused(tmp_path):
+    with pytest.raises(UserError, match="--slow"):
+        validate(replace(SMALL, slow=0.5))

@@ -17,10 +17,13 @@ from corporeal.render.camera import Aim, camera_of
 from corporeal.splats import raster
 from corporeal.stages import film as stage
 from corporeal.stages.film import FilmConfig, film
+from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
+    Cloud,
     Finish,
     Frame,
     Gaussians,
+    Inventory,
     Law,
     Material,
     MaterialField,
@@ -28,12 +31,14 @@ from corporeal.types import (
     Particles,
     Parts,
     PartWords,
+    Reconstruction,
     Scene,
     SceneObject,
     Structure,
     Surface,
     Trajectory,
 )
+from made_ledger import ledger
 
 SMALL = FilmConfig(width=128, height=96, quality="draft", stills=True)
 TURN = Rotation.from_rotvec([0.7, -1.1, 0.4]).as_matrix()
@@ -66,7 +71,7 @@ def together(*some):
     return Gaussians(**{n: np.concatenate([getattr(g, n) for g in some]) for n in names}), owner
 
 
-class Played(Sequence):
+class Frames(Sequence):
     """Two cubes; the second one moves by F and shift, from the second frame on."""
 
     def __init__(self, particles, F, shift, count):
@@ -110,20 +115,33 @@ def play(F=TURN, shift=(0.0, 0.0, 0.3), count=3):
     pair, words = np.full((3, 3), 0.5), PartWords("thing", "rubber")
     field = MaterialField(made, (Structure("solid"),) * 2, (words,) * 2, pair, pair)
     trajectory = Trajectory(
-        Path("nowhere"), np.arange(count) / 60, {}, Played(particles, F, shift, count)
+        Path("nowhere"),
+        np.arange(count) / 60,
+        ledger(np.arange(count) / 60),
+        Frames(particles, F, shift, count),
     )
-    return scene, parts, particles, field, trajectory
+    return Played(Prepared(scene, Inventory(()), parts, field, particles), trajectory)
 
 
-def puppet(gaussians, owner, particles):
-    return stage._puppet(SMALL, gaussians, owner, particles, np.zeros(2, bool))
+def made_of(played, gaussians, owner):
+    """Say that a scene was made of Gaussians."""
+    none = np.zeros((0, 3))
+    cloud = Cloud(none, none, none, none, np.zeros(0, int))
+    boxes = np.array([mesh.bounds for mesh in (cube(0), cube(1))])
+    names = tuple(o.name for o in played.prepared.scene.objects)
+    found = Reconstruction(gaussians, owner, cloud, np.zeros(0, int), names, boxes, 1.0, np.eye(4))
+    return replace(played, reconstruction=found)
+
+
+def puppet(gaussians, owner, played):
+    return stage._puppet(SMALL, made_of(played, gaussians, owner))
 
 
 def test_things_that_move_rigidly_look_as_they_do_to_the_inverse_camera():
-    _, _, particles, _, trajectory = play()
+    played = play()
     gaussians, owner = together(clad(0), clad(1))
     only = replace(gaussians, opacity=np.where(owner == 1, gaussians.opacity, 0.0))
-    after = puppet(only, owner, particles).at(trajectory.frames[1], None)
+    after = puppet(only, owner, played).at(played.trajectory.frames[1], None)
     back = np.eye(4)
     back[:3, :3], back[:3, 3] = TURN, (0.0, 0.0, 0.3)
     there = replace(EYE, world_from_camera=np.linalg.inv(back) @ EYE.world_from_camera)
@@ -136,10 +154,10 @@ def test_things_that_move_rigidly_look_as_they_do_to_the_inverse_camera():
 
 
 def test_gaussians_follow_particles_of_their_own_object_and_the_rest_stands_still():
-    _, _, particles, _, trajectory = play()
+    played = play()
     gaussians, owner = together(clad(0), clad(1), clad(1))
     owner = np.where(owner == 2, -1, owner)
-    after = puppet(gaussians, owner, particles).at(trajectory.frames[1], None)
+    after = puppet(gaussians, owner, played).at(played.trajectory.frames[1], None)
     np.testing.assert_array_equal(after.mean[owner == -1], gaussians.mean[owner == -1])
     np.testing.assert_array_equal(after.sh[owner == -1], gaussians.sh[owner == -1])
     np.testing.assert_allclose(after.mean[owner == 0], gaussians.mean[owner == 0], atol=1e-6)
@@ -149,10 +167,10 @@ def test_gaussians_follow_particles_of_their_own_object_and_the_rest_stands_stil
 
 def test_gaussians_stretch_with_the_matter():
     F = np.diag([1.4, 1.0, 0.6])
-    _, _, particles, _, trajectory = play(F)
+    played = play(F)
     gaussians, owner = together(clad(0), clad(1))
     round_ = replace(gaussians, scale=np.full_like(gaussians.scale, 0.03))
-    after = puppet(round_, owner, particles).at(trajectory.frames[1], None)
+    after = puppet(round_, owner, played).at(played.trajectory.frames[1], None)
     wanted = np.tile([0.018, 0.03, 0.042], ((owner == 1).sum(), 1))
     np.testing.assert_allclose(np.sort(after.scale[owner == 1], axis=1), wanted, rtol=1e-6)
 
@@ -172,10 +190,9 @@ def greenish(picture):
 @pytest.fixture(scope="module")
 def films(tmp_path_factory):
     folder = tmp_path_factory.mktemp("films")
-    things, gaussians = play(np.eye(3), (0.0, 0.0, 0.6)), together(clad(0), clad(1))
-    made = film(*things, SMALL, folder / "gaussians", lambda f, w: None, *gaussians)
-    seen = replace(SMALL, look="surfaces")
-    film(*things, seen, folder / "surfaces", lambda f, w: None, *gaussians)
+    played = made_of(play(np.eye(3), (0.0, 0.0, 0.6)), *together(clad(0), clad(1)))
+    made = film(played, SMALL, folder / "gaussians")
+    film(played, replace(SMALL, look="surfaces"), folder / "surfaces")
     assert len(video.pictures(made.path, [0, 1, 2])) == 3
     return folder
 
@@ -202,20 +219,19 @@ def test_the_picture_follows_the_motion(films):
 
 
 def test_colours_can_tell_what_things_are(tmp_path):
-    things, (gaussians, owner) = play(), together(clad(0), clad(1))
-    rest = tmp_path, lambda f, w: None, gaussians, owner
-    film(*things, replace(SMALL, colour_by="object"), *rest)
+    played = made_of(play(), *together(clad(0), clad(1)))
+    film(played, replace(SMALL, colour_by="object"), tmp_path)
     picture = still(tmp_path, 0)
     for k in (0, 1):
         wanted = 255 * np.array(colours.of_hex(colours.OBJECTS[k]))
         assert (np.abs(picture - wanted).max(axis=-1) < 4).sum() > 300
-    film(*things, replace(SMALL, colour_by="speed"), *rest)
+    film(played, replace(SMALL, colour_by="speed"), tmp_path)
     slow = 255 * colours.ramp(np.zeros(1))[0]
     assert (np.abs(still(tmp_path, 0) - slow).max(axis=-1) < 4).sum() > 300
 
 
 def test_surfaces_can_be_coloured_too(tmp_path):
-    film(*play(), replace(SMALL, colour_by="young"), tmp_path)
+    film(play(), replace(SMALL, colour_by="young"), tmp_path)
     picture = still(tmp_path, 0)
     soft = picture[..., 2] > 1.3 * picture[..., 0]
     stiff = picture[..., 0] > 1.3 * picture[..., 2]
@@ -224,4 +240,4 @@ def test_surfaces_can_be_coloured_too(tmp_path):
 
 def test_gaussians_that_are_not_there_cannot_be_filmed(tmp_path):
     with pytest.raises(UserError, match="look 'surfaces'"):
-        film(*play(), replace(SMALL, look="gaussians"), tmp_path)
+        film(play(), replace(SMALL, look="gaussians"), tmp_path)

@@ -9,7 +9,7 @@ from corporeal.errors import OutOfRangeError, UserError
 from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.ground import GroundConfig, doubts, ground
 from corporeal.stages.segment import segment
-from corporeal.types import PartWords, Placement
+from corporeal.types import Law, PartWords, Placement
 from handmade import plain, scene
 
 
@@ -261,7 +261,6 @@ def test_a_library_without_contents_leaves_them_to_the_default_one(tmp_path):
     [
         ("block_0: { structure: filled, thickness_mm: 1 }", "not with what"),
         ("block_0: { material: sand, structure: filled, contents: water }", "Give thickness_mm"),
-        ("block_0: water", "a liquid.*structure: filled"),
         ("block_0: { structure: filled, thickness_mm: 1, contents: phlogiston }", "phlogiston"),
         ("block_0: { structure: filled, contents: water, fill: 1.5 }", "fill is a share"),
         ("block_0: { structure: filled, contents: 3 }", "contents must be a name"),
@@ -270,6 +269,14 @@ def test_a_library_without_contents_leaves_them_to_the_default_one(tmp_path):
 def test_what_cannot_be_filled_says_what_to_do(tmp_path, text, words):
     with pytest.raises(UserError, match=words):
         grounded(BLOCK, annotations=said(tmp_path, text))
+
+
+def test_an_object_of_its_own_can_be_a_liquid(tmp_path):
+    field, _, _ = grounded(BLOCK, annotations=said(tmp_path, "block_0: honey"))
+    honey = field.materials[0]
+    assert honey.law == Law.FLUID
+    assert honey.thickness_of_flow == materials.find("honey").ranges["viscosity"].typical
+    assert honey.flow_index == 1.0
 
 
 def test_pieces_are_grounded_each_for_itself():

@@ -18,7 +18,7 @@ from corporeal.geometry.similarity import moved_points
 from corporeal.splats import hull, radiance, solid
 from corporeal.stages import reconstruct as stage
 from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
-from corporeal.vlm.things import Thing, Viewer
+from corporeal.vlm.seen_objects import SeenObject, Viewer
 from gaussian_boxes import DOWN, box, together
 
 RED, BLUE = (0.8, 0.1, 0.1), (0.1, 0.2, 0.8)
@@ -53,7 +53,7 @@ def made(splat):
 
 
 def test_things_come_out_in_metres_on_the_floor(made):
-    found, scene = made
+    found, scene = made.found, made.scene
     assert [(o.name, o.class_name) for o in scene.objects] == [
         ("crate", "crate"),
         ("blue pillar", "blue pillar"),
@@ -74,7 +74,7 @@ def test_things_come_out_in_metres_on_the_floor(made):
 
 
 def test_every_gaussian_knows_whose_it_is(made):
-    found, _ = made
+    found = made.found
     red = found.gaussians.sh[:, 0, 0] > 0
     assert np.mean(found.object_of_gaussian[red] == 0) > 0.99
     assert np.mean(found.object_of_gaussian[~red] == 1) > 0.99, "undersides, too"
@@ -85,7 +85,7 @@ def test_every_gaussian_knows_whose_it_is(made):
 
 
 def test_surfaces_are_coloured_as_seen(made):
-    _, scene = made
+    scene = made.scene
     for surface, colour in zip(scene.surfaces, (RED, BLUE), strict=True):
         expected = np.where(
             np.array(colour) <= 0.04045, 0, ((np.array(colour) + 0.055) / 1.055) ** 2.4
@@ -94,14 +94,14 @@ def test_surfaces_are_coloured_as_seen(made):
 
 
 def test_the_scene_is_a_glb_like_any_other(made, tmp_path):
-    _, scene = made
+    scene = made.scene
     write_glb(tmp_path / "boxes.glb", scene)
     back = read_glb(tmp_path / "boxes.glb")
     assert [o.name for o in back.objects] == ["crate", "blue pillar"]
 
 
 def test_gaussians_follow_their_objects(made):
-    found, scene = made
+    found, scene = made.found, made.scene
     there = followed(found, moved(scene, (0.0, 0.0, 1.0), 1))
     shift = there.gaussians.mean - found.gaussians.mean
     up = (found.object_of_gaussian == 1)[:, None] * np.array([0.0, 0.0, 1.0])
@@ -111,10 +111,10 @@ def test_gaussians_follow_their_objects(made):
 
 
 def test_the_report_is_told_how_it_came_about(made):
-    found, _ = made
+    found = made.found
     told = " ".join(found.statements)
     assert "Gaussians were read from boxes.ply" in told
-    assert "2 objects, told apart by" in told
+    assert "2 objects, segmented by" in told
     assert "the command line" in told
 
 
@@ -124,11 +124,11 @@ class Seer(Viewer):
     def __init__(self):
         super().__init__("boxes", "metadata")
 
-    def things(self, pictures):
+    def objects(self, pictures):
         assert all(p.dtype == np.uint8 and p.ndim == 3 for p in pictures)
         return [
-            Thing("pillar", "blue", 0.3, "a model (x)"),
-            Thing("crate", "red", 0.4, "a model (x)"),
+            SeenObject("pillar", "blue", 0.3, "a model (x)"),
+            SeenObject("crate", "red", 0.4, "a model (x)"),
         ]
 
     def regions(self, pictures, colours, things):
@@ -139,7 +139,8 @@ class Seer(Viewer):
 
 
 def test_somebody_who_sees_the_pictures_names_things_and_their_sizes(splat):
-    found, scene = reconstruct(splat, viewer=Seer())
+    result = reconstruct(splat, viewer=Seer())
+    found, scene = result.found, result.scene
     assert [o.class_name for o in scene.objects] == ["crate", "pillar"]
     assert found.metres_per_unit == pytest.approx(0.5, rel=0.05)
 
@@ -164,7 +165,7 @@ def test_every_way_of_lifting_says_of_points_what_pictures_show(splat, lifting, 
     def stopped(cloud, *_):
         raise Enough(cloud)
 
-    monkeypatch.setattr(stage, "told_apart", stopped)
+    monkeypatch.setattr(stage, "assign_instances", stopped)
     monkeypatch.setattr(clouds, "connect", lambda spec, folder: Colours())
     monkeypatch.setattr(hull, "CELLS", 100_000)
     monkeypatch.setitem(radiance.PRESETS, "draft", radiance.Preset(100, 160))

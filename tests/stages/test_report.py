@@ -7,19 +7,27 @@ from corporeal import materials
 from corporeal.stages.describe import describe
 from corporeal.stages.fill import fill
 from corporeal.stages.ground import ground
-from corporeal.stages.report import Story, asked, built, others, report, si, simulated
+from corporeal.stages.report import Story, asked, built, others, report, si, simulated, weighed
 from corporeal.stages.segment import segment
 from corporeal.types import (
+    NOTHING_ASKED,
+    Evidence,
     Film,
+    Hypothesis,
     Law,
+    MassMixture,
     Material,
     ObjectWords,
     PartWords,
     Placement,
+    PrintedFact,
     Structure,
     Treatment,
+    Usage,
+    WeighedHypothesis,
 )
 from handmade import plain, scene
+from made_findings import run_audit
 
 
 @pytest.mark.parametrize(
@@ -47,8 +55,8 @@ def treated(kind, young):
 
 def test_the_real_stiffness_stands_beside_the_simulated_one():
     assert simulated(treated("rigid", 1e9)) == "rigid"
-    assert simulated(treated("deformable", 1e9)) == "1 GPa (as real)"
-    assert simulated(treated("shell", 1e6)) == "1 MPa (0.001 × real)"
+    assert simulated(treated("deformable", 1e9)) == "1 GPa (as measured)"
+    assert simulated(treated("shell", 1e6)) == "1 MPa (0.001 × measured)"
 
 
 def test_what_is_inside_is_told_with_how_it_is_built():
@@ -59,27 +67,44 @@ def test_what_is_inside_is_told_with_how_it_is_built():
 
 def test_what_a_part_may_be_instead_and_what_was_told_apart_in_it_is_told():
     head = PartWords("head", "steel", volume_share=0.25)
-    words = PartWords("hammer", "hardwood", alternatives=(("ABS", 0.3),), pieces=(head,))
+    words = PartWords(
+        "hammer", "hardwood", hypotheses=(Hypothesis("ABS", "solid", 0.3),), pieces=(head,)
+    )
     assert others(words) == (
-        " It may also be ABS (30%). Told apart in it: head: steel (25% of the volume)."
+        " Alternatives: ABS (30%). Components: head: steel (25% of the volume)."
     )
     assert others(PartWords("hammer", "hardwood")) == ""
 
 
+def test_the_leading_two_ways_and_what_was_said_of_a_mass_stand_beside_it():
+    ways = [WeighedHypothesis(f"way {k}", 0.5 - 0.1 * k, 0.2, 1.0 + k) for k in range(3)]
+    printed = (PrintedFact("net weight", 0.453, "Net Wt 1 lb"),)
+    said = Evidence(0.4, 0.49, 0.6, "It says so.", printed)
+    told = weighed([MassMixture("box_0", 0.5, 0.4, 0.6, 0.7, 0.3, 1.2, tuple(ways), said, "Far.")])
+    for words in (
+        "0.5 (0.4 to 0.6)", "0.7 (0.3 to 1.2)", "0.49 (0.4 to 0.6)", "Net Wt 1 lb", "<b>Far.</b>",
+        "way 0: 1 kg (50%; before 20%)", "way 1: 2 kg (40%; before 20%)",
+    ):  # fmt: skip
+        assert words in told
+    assert "way 2" not in told
+    assert weighed([]) == ""
+
+
+TOOK = Usage(("openai:x",), 9, 11, 20500, 1200, 43.2, 0.0693, "2026-11-21")
+
+
 def test_what_the_questions_took_is_told_and_an_unknown_price_is_said_to_be_unknown():
-    took = {"models": ["openai:x"], "questions": 9, "calls": 11, "input_tokens": 20500}
-    took |= {"output_tokens": 1200, "seconds": 43.2, "dollars": 0.0693, "prices_of": "2026-11-21"}
-    assert asked(took) == (
-        "<br>9 questions to openai:x: 11 calls, 20,500 tokens in, 1,200 out, 43 s of waiting, "
+    assert asked(TOOK) == (
+        "<br>9 questions to openai:x: 11 calls, 20,500 tokens in, 1,200 out, 43 s waited, "
         "about $0.069 at the list prices of 2026-11-21."
     )
-    assert "price not known" in asked(took | {"dollars": None})
-    by_hand = took | {"calls": 0, "models": ["by hand, from the sheets"]}
+    assert "price not known" in asked(replace(TOOK, dollars=None))
+    by_hand = replace(TOOK, calls=0, models=("by hand, from the sheets",))
     assert asked(by_hand) == (
-        "<br>9 questions answered from the disk, by recorded answers (by hand, from the sheets): "
-        "no cost."
+        "<br>9 questions, answered from the disk by recorded answers (by hand, from the sheets), "
+        "at no cost."
     )
-    assert asked({}) == ""
+    assert asked(NOTHING_ASKED) == ""
 
 
 # ---------------------------------------------------------------- the whole page
@@ -100,7 +125,7 @@ def page(tmp_path):
         film.path.write_bytes(b"")
         particles = fill(made, parts, field)
         report(
-            Story(made, parts, field, particles, film, audit, {}, materials.sources()),
+            Story(made, parts, field, particles, film, run_audit(**audit), {}, materials.sources()),
             tmp_path / "report.html",
         )
         return (tmp_path / "report.html").read_text(encoding="utf-8")
@@ -122,14 +147,12 @@ def test_every_piece_of_a_mesh_has_its_values_with_range_source_and_reason(page)
 
 def test_who_looked_at_the_pictures_is_named(page):
     words = PartWords("", "ABS", "solid", answered_by="recording")
-    took = {"models": ["by hand, from the sheets"], "questions": 4, "calls": 0}
+    took = replace(TOOK, models=("by hand, from the sheets",), calls=0)
     told = page(words, questions=took)
-    assert "from pictures by recorded answers (by hand, from the sheets)." in told
+    assert "in pictures by recorded answers (by hand, from the sheets)." in told
     assert "vision-language" not in told
-    took = {"models": ["openai:x"], "questions": 4, "calls": 4, "input_tokens": 1, "seconds": 1.0}
-    took |= {"output_tokens": 1, "dollars": None}
     seen = replace(words, answered_by="model")
-    assert "from pictures by openai:x." in page(seen, questions=took)
+    assert "in pictures by openai:x." in page(seen, questions=TOOK)
 
 
 def test_a_wall_thickness_stands_only_where_a_wall_has_it(page):
@@ -140,7 +163,7 @@ def test_a_wall_thickness_stands_only_where_a_wall_has_it(page):
 
 def test_margin_is_explained_and_an_estimate_is_no_measurement(page):
     told = page(PartWords("", "steel", "shell"))
-    assert "Margin: how sure the material is, from 0 (a guess) to 1 (stated outright)." in told
+    assert "Margin: confidence in the material, from 0 (a guess) to 1 (stated)." in told
     (wall,) = re.findall("<tr><td>wall thickness.*?</tr>", told)
     assert "the usual value in the estimated range" in wall
     (density,) = re.findall("<tr><td>density.*?</tr>", told)

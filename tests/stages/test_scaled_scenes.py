@@ -15,9 +15,6 @@ from corporeal.formats.glb_writer import write_glb
 from corporeal.geometry.arrangement import scaled
 from corporeal.geometry.make import compose
 from corporeal.geometry.sizes import how_heavy, how_scaled, in_scene, scale_of_part
-from corporeal.mpm.audit import part_rows
-from corporeal.mpm.part import Motion, PartGeometry, life_sized
-from corporeal.mpm.treatment import plan
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import DescribeConfig, describe
@@ -25,8 +22,12 @@ from corporeal.stages.fill import examine, fill
 from corporeal.stages.ground import GroundConfig, ground
 from corporeal.stages.report import Story, report
 from corporeal.stages.segment import segment
+from corporeal.trajectory.audit import part_rows
+from corporeal.treatment.part import Motion, PartGeometry, life_sized
+from corporeal.treatment.plan import plan
 from corporeal.types import Film, Law, Material, Scene, SceneObject, Structure, Surface
 from handmade import plain
+from made_findings import run_audit
 
 REPLAY = f"replay:{Path(__file__).parents[1] / 'recordings' / 'showcase'}"
 
@@ -82,7 +83,7 @@ def test_both_masses_stand_side_by_side(life, large, tmp_path):
     assert f"{125 * real:.3g} ({real:.3g} in life)" == how_heavy(125 * real, 5.0)
     assert (
         "Not life-size: can 0 at 5 times its real 10 cm (a recorded answer). Walls are scaled with "
-        "their thing"
+        "their object"
     ) in told
     assert (
         f"In life, 0.2 times as large, it weighs {real:.3g} kg, with a wall 0.4 mm thick." in told
@@ -110,7 +111,7 @@ def page(scene, made, folder):
     _, parts, field, particles = made
     film = Film(folder / "film.mp4", 24, 64, 64)
     film.path.write_bytes(b"")
-    story = Story(scene, parts, field, particles, film, {}, {}, materials.sources())
+    story = Story(scene, parts, field, particles, film, run_audit(), {}, materials.sources())
     report(story, folder / "report.html")
     return (folder / "report.html").read_text(encoding="utf-8")
 
@@ -140,8 +141,8 @@ def test_both_masses_are_data(large):
     assert row["real_mass_kg"] == pytest.approx(particles.mass_real[0] / 125, rel=1e-12)
     assert row["structure"]["thickness"] == 4e-4
     (row,) = part_rows(scene, particles, field)
-    assert row["real_mass_kg"] == pytest.approx(row["mass_kg"] / 125, rel=1e-12)
-    assert row["thickness_m"] == 4e-4
+    assert row.real_mass_kg == pytest.approx(row.mass_kg / 125, rel=1e-12)
+    assert row.thickness_m == 4e-4
 
 
 def test_a_sentence_tells_only_what_is_not_life_size():

@@ -11,14 +11,14 @@ import pytest
 
 from corporeal import store
 from corporeal.errors import SimulationError
-from corporeal.mpm import checkpoint
-from corporeal.mpm import frames as disk
 from corporeal.mpm import problem as contract
-from corporeal.mpm.frames import read_trajectory
 from corporeal.mpm.problem import Measure, Problem, Snapshot, Steps
 from corporeal.stages import simulate as stage
 from corporeal.stages.simulate import SimulateConfig, simulate
 from corporeal.store import DiskError
+from corporeal.trajectory import checkpoint
+from corporeal.trajectory import frames as disk
+from corporeal.trajectory.frames import read_trajectory
 from corporeal.types import (
     Law,
     Material,
@@ -93,6 +93,7 @@ class Ballistic:
             pair_impulse=np.zeros((count, count)),
             push_work=0.0,
             friction_loss=0.0,
+            impact_loss=0.0,
             plastic_loss=0.0,
             viscous_loss=0.0,
             first_contact=np.full((everything, everything), np.nan),
@@ -107,17 +108,17 @@ class Ballistic:
     def restore(self, saved):
         self.x, self.v, self.time = saved["x"], saved["v"], float(saved["time"])
 
-    def halt(self, bodies):
+    def stop(self, bodies):
         self.v[np.isin(self.owner, list(bodies))] = 0.0
 
-    def begin(self, saved, bodies):
+    def start_from(self, saved, bodies):
         mine = np.isin(self.owner, list(bodies))
         self.x[mine] = saved["x"][mine]
 
 
 @pytest.fixture(autouse=True)
 def ballistic(monkeypatch):
-    monkeypatch.setitem(contract.MENU, "warp", f"{__name__}:Ballistic")
+    monkeypatch.setitem(contract.MENU, "cpu", f"{__name__}:Ballistic")
     monkeypatch.setattr(Ballistic, "explode_at", np.inf)
     monkeypatch.setattr(Ballistic, "interrupt_at", np.inf)
 
@@ -130,7 +131,7 @@ def lattice(low, high):
 def treated(material=RUBBER, kind="deformable"):
     return Treatment(
         kind, material.young, material.young, material.poisson, material.density,
-        material.yield_stress, None, 0.1, 1.0, 38.0, 2e-4, "Deformable.",
+        material.yield_stress, None, 0.1, 1.0, 38.0, 2e-4, "Deformable.", material.loss,
     )  # fmt: skip
 
 
@@ -196,7 +197,7 @@ def test_the_audit_names_every_field_and_finds_the_hole_in_the_floor(tmp_path):
     assert audit["energy_growth"] < 1e-12
     sunk = 0.5 * 9.81 * 0.2**2 - 0.1
     assert audit["max_penetration_m"] == pytest.approx(sunk, abs=1e-6)
-    assert any("sink" in w and "floor" in w for w in audit["warnings"])
+    assert any("penetrate" in w and "floor" in w for w in audit["warnings"])
 
 
 def final(folder: Path):
@@ -237,7 +238,7 @@ def test_a_killed_simulation_goes_on_from_its_last_checkpoint(tmp_path, monkeypa
     told = []
     trajectory = simulate(*asked, SimulateConfig(), tmp_path, lambda f, w: told.append(f))
     assert told[0] > 0.6
-    assert trajectory.ledger["steps"][0] == 0
+    assert trajectory.ledger.steps[0] == 0
     assert len(trajectory.frames) == 11
 
 
@@ -333,10 +334,10 @@ def test_friction_with_the_floor_is_that_of_the_part_that_stands_on_it(tmp_path,
 
 def test_what_is_lossy_is_damped_and_what_is_not_is_not(tmp_path, monkeypatch):
     scene, particles, field = scene_of()
-    field = replace(field, materials=(RUBBER, replace(RUBBER, loss=0.0)))
+    particles = replace(particles, treatments=(treated(), treated(replace(RUBBER, loss=0.0))))
     problem = problem_of(monkeypatch, tmp_path, (scene, particles, field))
-    assert problem.bodies[0].viscosity.min() > 0
-    assert problem.bodies[1].viscosity.max() == 0
+    assert problem.bodies[0].loss.min() > 0
+    assert problem.bodies[1].loss.max() == 0
 
 
 def test_an_object_is_rigid_only_when_all_its_parts_are(tmp_path, monkeypatch):
@@ -344,3 +345,8 @@ def test_an_object_is_rigid_only_when_all_its_parts_are(tmp_path, monkeypatch):
     particles = replace(particles, treatments=(treated(kind="rigid"), treated()))
     problem = problem_of(monkeypatch, tmp_path, (scene, particles, field))
     assert [b.rigid for b in problem.bodies] == [True, False]
+
+
+def test_the_former_name_of_the_processors_engine_still_works_and_says_so(caplog):
+    assert SimulateConfig(engine="warp") == SimulateConfig(engine="cpu")
+    assert caplog.messages == ["The engine 'warp' is called 'cpu' now."]

@@ -1,6 +1,5 @@
 """Small real scenes through the whole stage, with the production engine."""
 
-import json
 from dataclasses import replace
 
 import numpy as np
@@ -10,11 +9,12 @@ import trimesh
 from corporeal.geometry.filling import fill_body
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.shape import Shape
-from corporeal.mpm import checkpoint
-from corporeal.mpm.audit import outcome
-from corporeal.mpm.frames import read_trajectory
-from corporeal.mpm.treatment import Motion, PartGeometry, plan
 from corporeal.stages.simulate import SimulateConfig, simulate
+from corporeal.trajectory import checkpoint
+from corporeal.trajectory.audit_file import read_audit
+from corporeal.trajectory.frames import read_trajectory
+from corporeal.trajectory.outcome import outcome
+from corporeal.treatment.plan import Motion, PartGeometry, plan
 from corporeal.types import (
     Law,
     Material,
@@ -103,31 +103,32 @@ def bounce(tmp_path_factory):
 
 def test_a_jelly_ball_bounces_and_is_round_again(bounce):
     (scene, particles, _), trajectory, _ = bounce
-    row = outcome(scene, particles, trajectory)["objects"]["ball_0"]
-    assert row["fall_m"] == pytest.approx(FALL, abs=0.3 * particles.cell)
-    assert 0.6 < row["rebound_ratio"] < 1.0
-    assert row["shape_error_max"] > 0.008
-    assert row["shape_error_end"] < 0.006
+    row = outcome(scene, particles, trajectory).objects["ball_0"]
+    assert row.fall_m == pytest.approx(FALL, abs=0.3 * particles.cell)
+    assert 0.6 < row.rebound_ratio < 1.0
+    assert row.shape_error_max > 0.008
+    assert row.shape_error_end < 0.006
 
 
 def test_its_audit_has_nothing_to_complain_about(bounce):
     _, trajectory, folder = bounce
-    audit = json.loads((folder / "audit.json").read_text())
-    assert audit["warnings"] == []
-    assert audit["momentum_residual"] < 1e-5
-    assert audit["energy_growth"] < 1e-3
-    assert audit["max_penetration_dx"] < 0.5
-    assert audit["dt_max"] >= audit["dt_min"] > 0
-    first = trajectory.ledger["first_contact"][-1, 0, 1]
+    audit = read_audit(folder)
+    assert audit.warnings == ()
+    assert audit.momentum_residual < 1e-5
+    assert audit.energy_growth < 1e-3
+    assert audit.max_penetration_dx < 0.5
+    assert audit.dt_max >= audit.dt_min > 0
+    first = trajectory.ledger.first_contact[-1, 0, 1]
     assert first == pytest.approx(np.sqrt(2 * FALL / 9.81), rel=0.05)
 
 
 def test_a_steel_ball_rebounds_by_its_coefficient_of_restitution(tmp_path):
     scene, particles, field = balls([STEEL], [FALL], duration=0.4)
-    row = outcome(scene, particles, simulate(scene, particles, field, SimulateConfig(), tmp_path))
+    moved = simulate(scene, particles, field, SimulateConfig(), tmp_path)
+    row = outcome(scene, particles, moved).objects["ball_0"]
     assert particles.treatments[0].kind == "rigid"
-    assert row["objects"]["ball_0"]["rebound_ratio"] == pytest.approx(0.36, abs=0.04)
-    assert row["objects"]["ball_0"]["shape_error_max"] < 1e-6
+    assert row.rebound_ratio == pytest.approx(0.36, abs=0.04)
+    assert row.shape_error_max < 1e-6
 
 
 def test_a_ball_dropped_upright_bounces_upright(tmp_path):
@@ -150,7 +151,7 @@ def test_a_ball_dropped_upright_bounces_upright(tmp_path):
                 part=np.zeros(len(volumes), np.int64),
             )
             out = tmp_path / f"{way}{seed}"
-            middle = simulate(scene, dropped, field, SimulateConfig(), out).ledger["centre"][:, 0]
+            middle = simulate(scene, dropped, field, SimulateConfig(), out).ledger.centre[:, 0]
             low = np.argmin(middle[:, 2])
             risen = middle[low:][np.argmax(middle[low:, 2])] - middle[low]
             aside[way].append(np.hypot(*risen[:2]) / risen[2])
@@ -165,9 +166,9 @@ def test_two_balls_that_meet_part_again_and_one_field_glues_them(tmp_path):
     pairs = {}
     for contact in ("multi", "single"):
         trajectory = simulate(*asked, SimulateConfig(contact=contact), tmp_path / contact)
-        pairs[contact] = outcome(asked[0], asked[1], trajectory)["pairs"]["ball_0|ball_1"]
-    assert pairs["multi"]["separated"]
-    assert not pairs["single"]["separated"]
+        pairs[contact] = outcome(asked[0], asked[1], trajectory).pair("ball_0", "ball_1")
+    assert pairs["multi"].separated
+    assert not pairs["single"].separated
 
 
 def test_a_run_that_was_cut_off_ends_exactly_like_one_that_was_not(bounce, tmp_path, monkeypatch):
@@ -184,4 +185,4 @@ def test_a_run_that_was_cut_off_ends_exactly_like_one_that_was_not(bounce, tmp_p
     simulate(*asked, SimulateConfig(), tmp_path)
     resumed = read_trajectory(tmp_path)
     np.testing.assert_array_equal(whole.frames[-1].position, resumed.frames[-1].position)
-    assert whole.ledger["steps"][-1] == resumed.ledger["steps"][-1]
+    assert whole.ledger.steps[-1] == resumed.ledger.steps[-1]

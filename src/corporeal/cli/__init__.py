@@ -1,4 +1,4 @@
-"""The front door: every verb a person can type."""
+"""Command line: every verb."""
 
 import os
 import sys
@@ -10,39 +10,50 @@ from typing import Annotated, Any
 
 import tyro
 
-from corporeal import __version__
 from corporeal.cli.assets import verb_assets
 from corporeal.cli.capture import verb_capture
 from corporeal.cli.corpus import verb_corpus
 from corporeal.cli.evaluate import verb_evaluate
+from corporeal.cli.export import verb_export
 from corporeal.cli.parse import parse
+from corporeal.cli.view import verb_view
 from corporeal.errors import UserError
-from corporeal.terminal import console, show_table, told
+from corporeal.terminal import console, progress_bars, show_table
+from corporeal.version import __version__
 
-Inputs = Annotated[tuple[Path, ...], tyro.conf.Positional, tyro.conf.arg(metavar="SCENE ...")]
-Folder = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN")]
+Inputs = Annotated[
+    tuple[Path, ...],
+    tyro.conf.Positional,
+    tyro.conf.arg(
+        metavar="SCENE ...", help="Models, photographs with poses, a splat, or a scene.toml."
+    ),
+]
+Folder = Annotated[
+    Path, tyro.conf.Positional, tyro.conf.arg(metavar="RUN", help="The folder of a run.")
+]
 MATERIAL_WORDS = ("corporeal materials show NAME", "corporeal materials check FILE")
 
 
 @dataclass(frozen=True)
 class Where:
-    """Where a run's folder goes."""
+    """Folder of the run."""
 
     out: Path = Path("runs")
-    """Folder that holds the runs."""
+    """Folder of all runs."""
     name: str = ""
-    """The run's own folder inside; by default the scene's name."""
+    """Name of the run's folder; by default the scene's name."""
     resume: bool = True
-    """Go on with what an interrupted run left, instead of starting its simulation again."""
+    """Continue an interrupted simulation from its checkpoint instead of starting it again."""
 
 
 def verb_run() -> None:
-    """Do everything, from a scene to a film and a report.
+    """Run all verbs on a scene: from files to a film and a report.
 
-    SCENE is a GLB or glTF file, several of them (each one object), or a scene.toml; or a folder of
-    photographs with poses (transforms.json, COLMAP, 3 x 4 matrices), or a trained Gaussian splat.
+    SCENE is a model (GLB, glTF, OBJ, PLY, STL, OFF, 3MF, DAE, USD), several of them (each one
+    object), or a scene.toml; or a folder of photographs, with poses (transforms.json, COLMAP,
+    3 x 4 matrices) or without, a film, or a trained Gaussian splat.
     Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
-    What is already done with the same settings is not done again.
+    Results that are up to date are reused.
     """
     from corporeal.pipeline import Settings
 
@@ -52,12 +63,13 @@ def verb_run() -> None:
         where: Where = Where()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
-    asked = parse(Run, "run", verb_run.__doc__)
+    first = ("detail", "vlm", "annotations", "drop", "things", "out")
+    asked = parse(Run, "run", verb_run.__doc__, first=first)
     _go(list(asked.inputs), _folder(asked.where, list(asked.inputs)), asked.settings, asked.where)
 
 
 def verb_demo() -> None:
-    """Run one of the showcase's own scenes, end to end; needs no files, no key, no GPU.
+    """Run one of the showcase scenes, end to end; needs no files, no key, no GPU.
 
     The first scene drops a rubber duck on mud. The scene is written to runs/<scene>/input/ as a
     GLB, and then run like any other.
@@ -73,7 +85,9 @@ def verb_demo() -> None:
         where: Where = Where()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
-    asked = parse(Demo, "demo", f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}.")
+    first_options = ("detail", "duration", "quality", "view", "name", "out")
+    words = f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}."
+    asked = parse(Demo, "demo", words, first=first_options)
     where = replace(asked.where, name=asked.where.name or asked.scene)
     folder = where.out / where.name
     with console.status("building the scene"):
@@ -85,7 +99,7 @@ def verb_demo() -> None:
 
 
 def verb_status() -> None:
-    """Tell how far a run came, and how long each verb took."""
+    """Show which verbs of a run are finished, and the time that each took."""
     from corporeal.pipeline import status
 
     @dataclass(frozen=True)
@@ -95,7 +109,7 @@ def verb_status() -> None:
     rows = status(parse(Status, "status", verb_status.__doc__).run)
     show_table(
         ("verb", "state", "seconds"),
-        [(verb, state, "" if took is None else f"{took:.1f}") for verb, state, took in rows],
+        [(r.verb, r.state, "" if r.seconds is None else f"{r.seconds:.1f}") for r in rows],
     )
 
 
@@ -119,15 +133,15 @@ def verb_materials() -> None:
         problems = materials.check(Path(asked.words[1]))
         if problems:
             count = "a mistake" if len(problems) == 1 else f"{len(problems)} mistakes"
-            told = [f"{asked.words[1]} has {count}:", *map(str, problems)]
-            raise UserError("\n  ".join(told))
-        print(f"{asked.words[1]}: nothing to complain about.")
+            lines = [f"{asked.words[1]} has {count}:", *map(str, problems)]
+            raise UserError("\n  ".join(lines))
+        print(f"{asked.words[1]}: no mistakes found.")
     else:
         raise UserError(f"Say `corporeal materials`, or one of: {'; '.join(MATERIAL_WORDS)}.")
 
 
 def verb_doctor() -> None:
-    """Tell what works on this machine, and what would be gained by what."""
+    """Check engines, libraries, encoder and keys on this machine, with advice."""
     from corporeal.doctor import examine
 
     parse(dataclass(frozen=True)(type("Doctor", (), {})), "doctor", verb_doctor.__doc__)
@@ -142,8 +156,8 @@ def _again(verb: str) -> Callable[[], None]:
         from corporeal.pipeline import Settings, reopen
 
         known = verb in Settings.__dataclass_fields__
-        kept = reopen(Path(sys.argv[2])) if _names_a_run() else ([], Settings())
-        config: Any = getattr(kept[1], verb, None)
+        kept = reopen(Path(sys.argv[2])).settings if _names_a_run() else Settings()
+        config: Any = getattr(kept, verb, None)
 
         @dataclass(frozen=True)
         class Redo:
@@ -158,18 +172,20 @@ def _again(verb: str) -> Callable[[], None]:
                     {"__annotations__": {"run": Folder, "config": type(config)}, "config": config},
                 )
             )
-        asked = parse(shape, verb, f"Redo `{verb}` of a run; what comes after goes stale.")
-        inputs, settings = reopen(asked.run)
+        words = f"Redo `{verb}` of a run with other settings, and all verbs after it."
+        asked = parse(shape, verb, words, first=FIRST.get(verb, ()))
+        before = reopen(asked.run)
+        settings = before.settings
         if known:
             settings = replace(settings, **{verb: asked.config})
-        _go(inputs, asked.run, settings, Where(), verb, again=True)
+        _go(before.inputs, asked.run, settings, Where(), verb, again=True)
 
     redo.__doc__ = f"Redo `{verb}` of a run with other settings."
     return redo
 
 
 def verb_assemble() -> None:
-    """Assemble a settled scene from a pool of models, or redo `assemble` of a run."""
+    """Compose a scene at rest from a pool of models, or redo `assemble` of a run."""
     from corporeal.cli.assemble import compose_from_pool
 
     return _again("assemble")() if _names_a_run() else compose_from_pool()
@@ -178,38 +194,38 @@ def verb_assemble() -> None:
 def verb_simulate() -> None:
     """Redo `simulate` of a run with other settings, or over the ranges: --samples N.
 
-    With --samples the run's own simulation stays; N sets of values are drawn from the measured
-    ranges and the stated alternatives, each is simulated, and ensemble.json and ensemble.png in the
-    run's folder say how far rebounds, dents and displacements are known.
+    With --samples N an ensemble is simulated beside the run's own simulation: N sets of values are
+    drawn from the measured ranges and the stated alternatives. ensemble.json and ensemble.png in
+    the run's folder hold the spread of rebounds, dents and displacements.
     """
     from corporeal.pipeline import reopen
     from corporeal.stages.simulate import SimulateConfig
 
-    known = reopen(Path(sys.argv[2]))[1].simulate if _names_a_run() else SimulateConfig()
+    known = reopen(Path(sys.argv[2])).settings.simulate if _names_a_run() else SimulateConfig()
 
     @dataclass(frozen=True)
     class Simulate:
         run: Folder
         samples: int | None = None
-        """Sets of values to draw and simulate beside the chosen one."""
+        """Number of ensemble members."""
         seed: int = 0
-        """Of the draws."""
+        """Seed of the ensemble."""
         config: SimulateConfig = known
 
     asked = parse(Simulate, "simulate", verb_simulate.__doc__)
     if asked.samples is not None:
         return _spread(asked)
-    inputs, settings = reopen(asked.run)
-    settings = replace(settings, simulate=asked.config)
-    _go(inputs, asked.run, settings, Where(), "simulate", again=True)
+    before = reopen(asked.run)
+    settings = replace(before.settings, simulate=asked.config)
+    _go(before.inputs, asked.run, settings, Where(), "simulate", again=True)
 
 
 def _spread(asked: Any) -> None:
-    """Simulate an ensemble, and show how far the outcome is spread."""
+    """Simulate an ensemble, and show the spread of its outcomes."""
     from corporeal.evaluation import spread_report
     from corporeal.evaluation.ensemble import ensemble
 
-    with told() as tell:
+    with progress_bars() as tell:
         result = ensemble(asked.run, asked.samples, asked.seed, asked.config, tell)
     show_table(spread_report.HEADS, spread_report.rows(result))
     spread_report.spread_figure(result, asked.run / "ensemble.png")
@@ -224,14 +240,23 @@ def _names_a_run() -> bool:
 VERBS: dict[str, Callable[[], None]] = {
     "demo": verb_demo,
     "run": verb_run,
+    "view": verb_view,
     "status": verb_status,
     "materials": verb_materials,
     "assets": verb_assets,
     "capture": verb_capture,
+    "export": verb_export,
     "corpus": verb_corpus,
     "evaluate": verb_evaluate,
     "doctor": verb_doctor,
 }
+FIRST = {
+    "reconstruct": ("things", "count", "up", "metres-per-unit", "training", "apart"),
+    "assemble": ("drop", "stack", "extent", "duration", "fps", "objects"),
+    "describe": ("vlm", "annotations", "record", "critic", "views", "parallel"),
+    "film": ("quality", "width", "height", "speed", "view", "colour-by"),
+}
+"""Options of a verb that come first in its help; of few options all do."""
 REDO = ("reconstruct", "assemble", "describe", "segment", "ground", "fill", "simulate", "film")
 REDO = (*REDO, "report")
 VERBS |= {verb: _again(verb) for verb in REDO}
@@ -261,15 +286,15 @@ def _go(
     again: bool = False,
 ) -> None:
     """Do every verb up to ``until``, that one ``again`` even where its settings are the same."""
-    from corporeal.cli.accept import accept
+    from corporeal.cli.validate import validate
     from corporeal.pipeline import forget_simulation, outdate, run
 
-    accept(folder, settings)
+    validate(folder, settings)
     if again:
         outdate(folder, until)
     if not where.resume:
         forget_simulation(folder)
-    with told() as tell:
+    with progress_bars() as tell:
         run(inputs, folder, settings, tell, until)
     if until == "report":
         print(folder / "report.html")
@@ -283,7 +308,7 @@ def _usage() -> str:
     for name, verb in VERBS.items():
         first = (verb.__doc__ or "").strip().splitlines()[0]
         lines.append(f"  corporeal {name:10} {first}")
-    return "\n".join([*lines, "", "corporeal VERB --help tells more."])
+    return "\n".join([*lines, "", "Options of a verb: corporeal VERB --help"])
 
 
 def main() -> None:

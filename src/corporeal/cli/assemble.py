@@ -1,4 +1,4 @@
-"""`corporeal assemble`: a settled scene of things from a pool."""
+"""`corporeal assemble`: a settled scene of objects from a pool."""
 
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -10,16 +10,17 @@ from corporeal.cli.parse import parse
 from corporeal.errors import UserError
 from corporeal.formats.words import safe
 from corporeal.pool.asset import Pool
-from corporeal.store import read_json
-from corporeal.terminal import show_table, told
+from corporeal.settle.composition import read_certificate, read_composition
+from corporeal.terminal import progress_bars, show_table
 
 
 def compose_from_pool() -> None:
-    """Assemble a settled scene of things from a pool, ready to run.
+    """Compose a scene at rest from a pool of models, ready to run.
 
-    Draws classes and things, sizes them, places them free of each other, lets them settle, proves
-    that they rest, and gives the scene something to happen. The folder holds scene.glb (at rest),
-    scene.toml (what happens), certificate.json, composition.json and views/ (posed pictures).
+    Classes and assets are drawn at random, scaled, placed without overlap and dropped to rest; a
+    certificate states the remaining drift and overlap, and an interaction is chosen. The folder
+    holds scene.glb (at rest), scene.toml (the interaction), certificate.json, composition.json and
+    views/ (posed pictures).
 
         corporeal assemble --from models/ --classes duck "soda can" --seed 7
         corporeal run scenes/duck-soda_can-7/scene.toml
@@ -34,17 +35,18 @@ def compose_from_pool() -> None:
     @dataclass(frozen=True)
     class Assemble:
         sources: Annotated[tuple[Path, ...], tyro.conf.arg(name="from", metavar="POOL|FOLDER ...")]
-        """A pool, or folders of models: those are made a pool first."""
+        """A pool, or folders of models, which are indexed first."""
         out: Path = Path("scenes")
-        """Folder that holds the scenes."""
+        """Folder of all scenes."""
         name: str = ""
-        """The scene's own folder inside; by default its classes and seed."""
+        """Name of the scene's folder; by default its classes and seed."""
         compose: ComposeConfig = field(default_factory=ComposeConfig)
         capture: CaptureConfig = field(default_factory=CaptureConfig)
 
-    asked = parse(Assemble, "assemble", compose_from_pool.__doc__)
+    first = ("from", "classes", "count", "seed", "vlm", "out")
+    asked = parse(Assemble, "assemble", compose_from_pool.__doc__, first=first)
     folder = asked.out / (asked.name or _name(asked.compose))
-    with told() as tell:
+    with progress_bars() as tell:
         pool = _pool(asked.sources, asked.out, tell)
         arguments = {"pool": pool, "config": asked.compose, "capturing": asked.capture}
         perform(Job(folder.name, compose_scene, folder, "", arguments), tell("assemble"))
@@ -68,20 +70,19 @@ def _pool(sources: tuple[Path, ...], out: Path, tell: Any) -> Pool:
 
 
 def _show(folder: Path) -> None:
-    made = read_json(folder / "composition.json")
-    proof = read_json(folder / "certificate.json")
+    made, certificate = read_composition(folder), read_certificate(folder)
     rows = [
-        (o["name"], o["asset"], _length(o["real_extent_m"]), o["said_by"], _length(o["extent_m"]))
-        for o in made["objects"]
+        (o.name, o.asset, _length(o.real_extent_m), o.said_by, _length(o.extent_m))
+        for o in made.objects
     ]
-    show_table(("object", "asset", "real size", "said by", "size in the scene"), rows)
-    for warning in made["warnings"]:
+    show_table(("object", "asset", "real size", "size from", "size in the scene"), rows)
+    for warning in made.warnings:
         print(f"! {warning}")
-    print(f"Stands as a {made['arrangement']}. What happens: {made['what_happens']}.")
+    print(f"Arrangement: {made.arrangement}. Interaction: {made.what_happens}.")
     print(
-        f"At rest: moves {1e3 * proof['drift_m']:.2g} mm in a second, meshes overlap by at most "
-        f"{1e3 * proof['penetration_m']:.2g} mm; {_attempts(proof['attempts'])}, "
-        f"{proof['seconds']:.1f} s."
+        f"At rest: drift {1e3 * certificate.drift_m:.2g} mm in one second, largest overlap of "
+        f"meshes {1e3 * certificate.penetration_m:.2g} mm; {_attempts(certificate.attempts)}, "
+        f"{certificate.seconds:.1f} s."
     )
     print(f"Go on with: corporeal run {folder / 'scene.toml'}")
 

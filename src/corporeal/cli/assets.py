@@ -11,7 +11,7 @@ import tyro
 from corporeal.cli.parse import do_second_word, parse
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.pool.asset import Asset, Pool
-from corporeal.terminal import show_table, told
+from corporeal.terminal import progress_bars, show_table
 
 POOL = Path("pool")
 Folder = Annotated[Path, tyro.conf.arg(metavar="POOL")]
@@ -52,11 +52,12 @@ def _index() -> None:
         objaverse: Wanted = field(default_factory=Wanted)
         gate: GateConfig = field(default_factory=GateConfig)
 
-    asked = parse(Index, "assets index", _index.__doc__, words=2)
+    first = ("pool", "from", "csv", "classes", "per-class", "most-triangles")
+    asked = parse(Index, "assets index", _index.__doc__, words=2, first=first)
     if not asked.folders and asked.origin != "objaverse":
         raise UserError("Name at least one folder of models: corporeal assets index FOLDER.")
     origin = OriginConfig(asked.origin, asked.csv, asked.objaverse)
-    with told() as tell:
+    with progress_bars() as tell:
         pool = index(asked.folders, asked.pool, IndexConfig(origin, asked.gate), tell("index"))
     _sum_up(pool)
 
@@ -150,7 +151,7 @@ def _show() -> None:
             f"The reasons: corporeal assets list --pool {asked.pool} --rejected"
         )
     path = asked.out or asked.pool / "assets.png"
-    with told() as tell:
+    with progress_bars() as tell:
         contact_sheet(assets, path, asked.size, tell("show"))
     print(path)
 
@@ -183,7 +184,7 @@ def _props() -> None:
         folder: Annotated[Path, tyro.conf.Positional] = Path("props")
 
     asked = parse(Props, "assets props", _props.__doc__, words=2)
-    with told() as tell, writing(asked.folder):
+    with progress_bars() as tell, writing(asked.folder):
         progress = tell("props")
         for k, name in enumerate(MODELS):
             progress(k / len(MODELS), name)

@@ -7,7 +7,7 @@ from typing import Annotated
 import tyro
 
 from corporeal.cli.parse import parse
-from corporeal.terminal import told
+from corporeal.terminal import progress_bars
 
 
 def verb_capture() -> None:
@@ -30,8 +30,9 @@ def verb_capture() -> None:
         assemble: AssembleConfig = field(default_factory=AssembleConfig)
         capture: CaptureConfig = field(default_factory=CaptureConfig)
 
-    asked = parse(Capture, "capture", verb_capture.__doc__)
-    with told() as tell:
+    first = ("views", "size", "drop", "stack", "extent", "out")
+    asked = parse(Capture, "capture", verb_capture.__doc__, first=first)
+    with progress_bars() as tell:
         scene = assemble(list(asked.inputs), asked.assemble)
         views = capture(scene, asked.capture, tell("capture"))
         print(write_views(asked.out, views))

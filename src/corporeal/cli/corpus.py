@@ -10,7 +10,7 @@ import tyro
 from corporeal.cli.parse import do_second_word, parse
 from corporeal.errors import UserError
 from corporeal.machine import cores
-from corporeal.terminal import console, show_table, told
+from corporeal.terminal import console, progress_bars, show_table
 
 Corpus = Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="CORPUS")]
 
@@ -63,7 +63,7 @@ def _assemble() -> None:
         plan: CorpusConfig = field(default_factory=CorpusConfig)
         sizing: Sizing = field(default_factory=Sizing)
         vlm: str = ComposeConfig.vlm
-        """Who says how large things of a class are; by default a table."""
+        """Who says how large objects of a class are; by default a table."""
         record: Path | None = None
         """Keep a model's answers in this folder, for --vlm replay:FOLDER."""
         views: int = CaptureConfig.views
@@ -72,7 +72,8 @@ def _assemble() -> None:
         """Their width and height [px]."""
         crew: Crew = Crew()
 
-    asked = parse(Assemble, "corpus assemble", _assemble.__doc__, words=2)
+    first = ("pool", "preset", "scenes", "seed", "views", "workers")
+    asked = parse(Assemble, "corpus assemble", _assemble.__doc__, words=2, first=first)
     pool = read_pool(asked.pool) if asked.plan.preset == "fortytwo" else None
     composing = ComposeConfig(sizing=asked.sizing, vlm=asked.vlm, record=asked.record)
     capturing = CaptureConfig(views=asked.views, size=asked.size, threads=asked.crew.threads)
@@ -104,7 +105,8 @@ def _run() -> None:
         crew: Crew = Crew()
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
-    asked = parse(Run, "corpus run", _run.__doc__, words=2)
+    first = ("detail", "vlm", "first", "workers", "threads", "on")
+    asked = parse(Run, "corpus run", _run.__doc__, words=2, first=first)
     _carry_out(
         asked,
         "run",
@@ -122,7 +124,7 @@ def _report() -> None:
         corpus: Corpus
 
     asked = parse(Report, "corpus report", _report.__doc__, words=2)
-    with told() as tell:
+    with progress_bars() as tell:
         written = report_corpus(asked.corpus, tell("report"))
     print(*written, sep="\n")
 
@@ -135,7 +137,7 @@ def _carry_out(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: s
     from corporeal.corpus.carry_out import Hands
     from corporeal.corpus.local import LOGS
 
-    with told() as tell:
+    with progress_bars() as tell:
         rows = do(Hands(_hire(asked), tell(verb), _say))
     failed = {name: row for name, row in rows.items() if row.status == "failed"}
     print(f"{len(rows) - len(failed)} of {len(rows)} scenes finished: {asked.corpus}")

@@ -1,107 +1,141 @@
-"""`corporeal evaluate WHAT`: what was predicted against what is known."""
+"""`corporeal evaluate mass | materials | parts | objects`: predicted against known."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated, Any, Literal
+from typing import Annotated
 
 import tyro
 
 from corporeal import store
-from corporeal.cli.parse import parse
+from corporeal.cli.parse import do_second_word, parse
 from corporeal.errors import UserError
-from corporeal.terminal import show_table, told
+from corporeal.evaluation.result_table import Table
+from corporeal.terminal import progress_bars, show_table
+
+Folder = Annotated[
+    Path | None,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="FOLDER", help="Models, one object each, or settled scenes."),
+]
 
 
 def verb_evaluate() -> None:
-    """Compare what was predicted with what is known: mass, materials, parts or objects.
+    """Compare predictions with ground truth: evaluate mass, materials, parts or objects."""
+    do_second_word("evaluate", JUDGES)
 
-    FOLDER holds models, one object each; the CSV has columns object, mass_kg and, if you like, fill
-    (solid, hollow, full: whose errors are told apart). Without --truth masses are predicted only.
-    A folder in the layout of ABO-500 needs no CSV: choose its --split. `evaluate materials` needs
-    --truth TOML: per file and part the materials that are right, the likeliest first.
-    `evaluate parts` pictures each model from all sides, looks for its parts among the points that
-    the pictures show, and compares with the file's own nodes and materials; without FOLDER it takes
-    four models of the showcase. With --structural dinov2 --semantic clip models look at them.
-    `evaluate objects` pictures settled scenes (FOLDER: what `assemble` wrote) and tells their
-    things apart by points on what the pictures show, or by Gaussians: --points-from gaussians.
+
+def _folder(folder: Path | None, what: str) -> Path:
+    if folder is None:
+        raise UserError(f"Name a folder: corporeal evaluate {what} FOLDER.")
+    return folder
+
+
+def evaluate_mass() -> None:
+    """Predict masses, and compare them with measured ones where --truth gives them.
+
+    FOLDER holds models, one object each; the CSV has columns object, mass_kg and, optionally, fill
+    (solid, hollow, full), by which errors are grouped. Without --truth masses are
+    predicted only. A folder in the layout of ABO-500 needs no CSV: choose its --split.
     """
-    from corporeal.evaluation import mass, objects, parts
-    from corporeal.regions.parts import PartsConfig
+    from corporeal.evaluation import mass, mass_report, truth
     from corporeal.stages.describe import DescribeConfig
     from corporeal.stages.ground import GroundConfig
 
     @dataclass(frozen=True)
-    class Evaluate:
-        what: tyro.conf.Positional[Literal["mass", "materials", "parts", "objects"]]
-        folder: Annotated[Path | None, tyro.conf.Positional] = None
+    class Mass:
+        folder: Folder = None
         truth: Path | None = None
-        """Table of measured masses (CSV), or of what parts are made of (TOML)."""
-        names: Path | None = None
-        """TOML with what parts are called: per file, the file's name of a part = another name."""
+        """Table of measured masses (CSV)."""
         split: str = "test"
         """Of ABO-500; "all" for all."""
         json: Path | None = None
-        """Where rows and errors go, as data."""
+        """File for rows and errors (JSON)."""
         figure: Path | None = None
-        """Where a picture goes (PNG): of predicted against measured mass, of parts, of objects."""
+        """File for a plot of predicted against measured mass (PNG)."""
         how: mass.MassConfig = field(default_factory=mass.MassConfig)
-        look: parts.PartsEvaluationConfig = field(default_factory=parts.PartsEvaluationConfig)
-        clusters: PartsConfig = field(default_factory=PartsConfig)
-        scenes: objects.ObjectsEvaluationConfig = field(
-            default_factory=objects.ObjectsEvaluationConfig
-        )
         describe: DescribeConfig = field(default_factory=DescribeConfig)
         ground: GroundConfig = field(default_factory=GroundConfig)
 
-    asked = parse(Evaluate, "evaluate", verb_evaluate.__doc__)
-    judges = {"mass": _masses, "materials": _materials, "parts": _parts, "objects": _objects}
-    judges[asked.what](asked)
-
-
-def _folder(asked: Any) -> Path:
-    if asked.folder is None:
-        raise UserError(f"Name a folder: corporeal evaluate {asked.what} FOLDER.")
-    return asked.folder
-
-
-def _masses(asked: Any) -> None:
-    from corporeal.evaluation import mass, report, truth
-
-    things = truth.objects(_folder(asked), asked.truth, asked.split)
-    with told() as tell:
+    first = ("truth", "vlm", "anonymous", "split", "json", "figure")
+    asked = parse(Mass, "evaluate mass", evaluate_mass.__doc__, words=2, first=first)
+    objects = truth.objects(_folder(asked.folder, "mass"), asked.truth, asked.split)
+    with progress_bars() as tell:
         done = tell("evaluate")
-        found = mass.predict_all(things, asked.describe, asked.ground, asked.how, done)
+        found = mass.predict_all(objects, asked.describe, asked.ground, asked.how, done)
     result = mass.compare(found)
-    _show(report.tables(result))
+    _show(mass_report.tables(result))
     if asked.json is not None:
         store.write_json(asked.json, result)
     if asked.figure is not None:
-        report.mass_figure(result["rows"], asked.figure)
+        mass_report.mass_figure(result.rows, asked.figure)
 
 
-def _materials(asked: Any) -> None:
+def evaluate_materials() -> None:
+    """Compare recognised materials with those that --truth TOML accepts.
+
+    FOLDER holds models; the table lists, per file and part, the accepted materials, the likeliest
+    first.
+    """
     from corporeal.evaluation import recognition
+    from corporeal.stages.describe import DescribeConfig
+    from corporeal.stages.ground import GroundConfig
 
+    @dataclass(frozen=True)
+    class Materials:
+        folder: Folder = None
+        truth: Path | None = None
+        """What parts are made of (TOML)."""
+        json: Path | None = None
+        """File for rows and errors (JSON)."""
+        describe: DescribeConfig = field(default_factory=DescribeConfig)
+        ground: GroundConfig = field(default_factory=GroundConfig)
+
+    first = ("truth", "vlm", "annotations", "record", "json", "library")
+    asked = parse(Materials, "evaluate materials", evaluate_materials.__doc__, words=2, first=first)
     if asked.truth is None:
         raise UserError(f"Nothing to judge by. Say --truth TOML. {recognition.EXAMPLE}")
     library = asked.ground.library
     truth = recognition.read_truth(asked.truth, library)
-    with told() as tell:
-        done = tell("evaluate")
-        rows = recognition.judge(_folder(asked), truth, asked.describe, library, done)
+    folder = _folder(asked.folder, "materials")
+    with progress_bars() as tell:
+        rows = recognition.judge(folder, truth, asked.describe, library, tell("evaluate"))
     _show(recognition.tables(rows))
     if asked.json is not None:
         store.write_json(asked.json, recognition.record(rows))
 
 
-def _parts(asked: Any) -> None:
-    from corporeal.evaluation import parts, parts_figure
+def evaluate_parts() -> None:
+    """Compare the parts found in pictures of models with the files' own nodes and materials.
 
+    Each model is rendered from all sides, and its parts are segmented in the visible points;
+    without FOLDER, four models of the showcase are used. --structural dinov2 --semantic clip
+    selects learned features.
+    """
+    from corporeal.evaluation import parts, parts_figure
+    from corporeal.regions.parts import PartsConfig
+    from corporeal.stages.describe import DescribeConfig
+
+    @dataclass(frozen=True)
+    class PartsAsked:
+        folder: Folder = None
+        names: Path | None = None
+        """TOML with what parts are called: per file, the file's name of a part = another name."""
+        json: Path | None = None
+        """File for rows and errors (JSON)."""
+        figure: Path | None = None
+        """File for a picture of the parts (PNG)."""
+        look: parts.PartsEvaluationConfig = field(default_factory=parts.PartsEvaluationConfig)
+        clusters: PartsConfig = field(default_factory=PartsConfig)
+        describe: DescribeConfig = field(default_factory=DescribeConfig)
+
+    first = ("structural", "semantic", "names", "lying", "json", "figure")
+    asked = parse(PartsAsked, "evaluate parts", evaluate_parts.__doc__, words=2, first=first)
     names = {} if asked.names is None else parts.read_names(asked.names)
-    with told() as tell:
+    with progress_bars() as tell:
         how = parts.Judging(asked.look, asked.clusters, asked.describe)
         found = parts.judge(asked.folder, names, how, tell("evaluate"))
-    rows = [row for row, _ in found]
+    rows = [judged.row for judged in found]
     _show(parts.tables(rows))
     if asked.json is not None:
         store.write_json(asked.json, parts.record(rows))
@@ -109,12 +143,30 @@ def _parts(asked: Any) -> None:
         parts_figure.draw(found, asked.figure)
 
 
-def _objects(asked: Any) -> None:
+def evaluate_objects() -> None:
+    """Compare the objects segmented in pictures of settled scenes with the scenes' own.
+
+    FOLDER holds scenes that `assemble` wrote. Objects are segmented in points on the visible
+    surfaces, or in Gaussians: --points-from gaussians.
+    """
     from corporeal.evaluation import objects, objects_figure
 
-    with told() as tell:
-        found = objects.judge(_folder(asked), asked.scenes, tell("evaluate"))
-    rows = [row for row, _ in found]
+    @dataclass(frozen=True)
+    class Objects:
+        folder: Folder = None
+        json: Path | None = None
+        """File for rows and errors (JSON)."""
+        figure: Path | None = None
+        """File for a picture of the objects (PNG)."""
+        scenes: objects.ObjectsEvaluationConfig = field(
+            default_factory=objects.ObjectsEvaluationConfig
+        )
+
+    first = ("points-from", "surface-points", "pictures", "kept", "json", "figure")
+    asked = parse(Objects, "evaluate objects", evaluate_objects.__doc__, words=2, first=first)
+    with progress_bars() as tell:
+        found = objects.judge(_folder(asked.folder, "objects"), asked.scenes, tell("evaluate"))
+    rows = [judged.row for judged in found]
     _show(objects.tables(rows))
     if asked.json is not None:
         store.write_json(asked.json, objects.record(rows))
@@ -122,7 +174,15 @@ def _objects(asked: Any) -> None:
         objects_figure.draw(found, asked.figure)
 
 
-def _show(tables: list[tuple[str, tuple[str, ...], list[tuple[str, ...]]]]) -> None:
-    for title, heads, rows in tables:
-        if rows:
-            show_table(heads, rows, title)
+def _show(tables: Sequence[Table]) -> None:
+    for table in tables:
+        if table.rows:
+            show_table(table.heads, table.rows, table.title)
+
+
+JUDGES = {
+    "mass": evaluate_mass,
+    "materials": evaluate_materials,
+    "parts": evaluate_parts,
+    "objects": evaluate_objects,
+}

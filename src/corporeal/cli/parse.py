@@ -1,16 +1,19 @@
 """From the rest of the command line to a dataclass."""
 
 import sys
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from inspect import cleandoc
 from typing import Any
 
 import tyro
 
+from corporeal.cli.help_layout import lay_out
 from corporeal.errors import UnknownChoiceError
 
 
-def parse(kind: Any, verb: str, description: str | None, words: int = 1) -> Any:
+def parse(
+    kind: Any, verb: str, description: str | None, words: int = 1, first: Sequence[str] = ()
+) -> Any:
     """Read the command line into ``kind``; its nested settings become plain flags.
 
     Args:
@@ -18,14 +21,17 @@ def parse(kind: Any, verb: str, description: str | None, words: int = 1) -> Any:
         verb: What was typed after the program's name ("run", "assets list").
         description: For the help.
         words: How many words of the command line the verb takes up.
+        first: Options that come first in the help, six at most; all others stand under "more".
 
     """
-    return tyro.cli(
-        tyro.conf.OmitArgPrefixes[kind],
+    layout = lay_out(kind, first)
+    typed = tyro.cli(
+        tyro.conf.OmitArgPrefixes[layout.shape],
         prog=f"corporeal {verb}",
         description=cleandoc(description or ""),
         args=sys.argv[1 + words :],
     )
+    return layout.settings(typed)
 
 
 def do_second_word(verb: str, verbs: Mapping[str, Callable[[], None]]) -> None:

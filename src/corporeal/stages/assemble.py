@@ -1,7 +1,7 @@
 """Put what the files hold into one scene: on the floor, apart from each other, in metres."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
@@ -9,22 +9,24 @@ from typing import Literal
 import numpy as np
 
 from corporeal.errors import BadFileError, UserError, check_range
-from corporeal.formats.glb import read_model
+from corporeal.formats.any_model import READ, Frame, Unit, read_model
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
-from corporeal.formats.sources import MODELS, models_in, pictures_in
-from corporeal.formats.typical_extents import doubt
+from corporeal.formats.sources import models_in, pictures_in
+from corporeal.formats.typical_extents import doubt, likely_unit
 from corporeal.formats.words import safe, unique
 from corporeal.geometry import placing
 from corporeal.geometry.arrangement import (
     box_of,
     boxes_of,
+    in_unit,
     intersecting,
     moved,
     resized,
     scaled,
 )
+from corporeal.geometry.gaussians import Up
 from corporeal.geometry.sizes import said_extent
-from corporeal.types import Scene, SceneObject
+from corporeal.types import Objects, Scene, SceneObject
 
 SHORTEST, LONGEST = 1.0, 3.0
 """Bounds of the time that is watched when nobody says how long [s]."""
@@ -42,15 +44,17 @@ class AssembleConfig:
     stack: bool = False
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
-    """Hang each object this many times its own size above what it stands on."""
+    """Raise each object above what it stands on by this many times its own size."""
     extent: tuple[str, ...] = ()
-    """Real largest extents, such as "duck=0.1" [m]."""
+    """Largest real extent of an object, such as "duck=0.1" [m]."""
+    unit: Unit = "auto"
+    """Length of one unit of a mesh file; auto: as stated, else what its size makes likely."""
     working_extent: float | None = None
     """Scale the whole scene so that its largest extent is this [m]."""
     duration: float | None = None
-    """How long to watch [s]; by default as the scene file says, else as the falls need."""
+    """Simulated time [s]; by default from the scene file, else long enough for the falls."""
     fps: int | None = None
-    """Frames per second of the film; by default as the scene file says, else 30."""
+    """Frames per second of the film; by default from the scene file, else 30."""
 
 
 DEFAULT = AssembleConfig()
@@ -64,25 +68,35 @@ class _Block:
     ours: bool
     entry: ObjectEntry | None
     """What a scene file says of the whole block; None: it is the scene file's ``file``."""
+    metric: bool = True
+    """Whether its lengths are metres; else they are in a unit that nobody states."""
 
 
-def assemble(inputs: Sequence[Path], config: AssembleConfig = DEFAULT) -> Scene:
-    """Return one scene from GLB or glTF files, a folder of them, or one ``scene.toml``.
+def assemble(
+    inputs: Sequence[Path], config: AssembleConfig = DEFAULT, up: Up | None = None
+) -> Scene:
+    """Return one scene from models, a folder of them, or one ``scene.toml``.
+
+    Args:
+        inputs: What a person typed.
+        config: How.
+        up: Axis of mesh files that points up; None: as they state, or as their kind usually has it.
 
     Raises:
         UserError: A file cannot be used, or the options don't fit what the files hold.
 
     """
-    accept(config)
+    validate(config)
     plan = _plan([Path(p) for p in inputs])
-    blocks = _sized(_named(_read(plan, config)), config.extent)
+    frame = Frame(up, config.unit)
+    blocks = _sized(_named(_read(plan, config.objects, frame)), config.extent)
     scene = _merged(plan, _placed(blocks, plan, config.stack))
     scene = _at_working_extent(scene, config.working_extent)
     scene = _dropped(scene, config.drop)
-    return _timed(_with_overlaps_told(scene), blocks, plan, config)
+    return _timed(_with_overlaps_named(scene), blocks, plan, config)
 
 
-def accept(config: AssembleConfig) -> None:
+def validate(config: AssembleConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scene."""
     check_range("The drop", config.drop, 0.0, 100.0)
     check_range("The working extent", config.working_extent, 1e-3, 1e3)
@@ -98,13 +112,13 @@ def accept(config: AssembleConfig) -> None:
 def _plan(inputs: list[Path]) -> SceneFile:
     """Return the inputs as if somebody had written a scene file for them."""
     if not inputs:
-        raise UserError("No input. Name a .glb file, several of them, or a scene.toml.")
+        raise UserError("No input. Name a model, several of them, or a scene.toml.")
     if any(p.suffix.lower() == ".toml" for p in inputs):
         if len(inputs) > 1:
             step = "Name the models in the scene file instead."
             raise BadFileError(inputs[0], "a scene file stands alone.", step)
         return read_scene_file(inputs[0])
-    files = [f for p in inputs for f in (_models_in(p) if p.is_dir() else [_model(p)])]
+    files = [f for p in inputs for f in (_models_in(p) if p.is_dir() else [p])]
     if len(files) == 1:
         return SceneFile(files[0], file=files[0])
     return SceneFile(inputs[0], objects=tuple(ObjectEntry(file=f) for f in files))
@@ -115,36 +129,30 @@ def _models_in(folder: Path) -> list[Path]:
     if found:
         return found
     if pictures_in(folder):
-        what = f"the folder holds {len(pictures_in(folder))} pictures, but nothing that says from "
-        step = "Pose them, for example with COLMAP; transforms.json and 3 × 4 matrices do as well."
-        raise BadFileError(folder, f"{what}where they were taken.", step)
-    step = "Name a .glb file, or a folder that holds some, or photographs with poses."
-    raise BadFileError(folder, "the folder holds no .glb or .gltf file, and no pictures.", step)
+        what = f"the folder holds {len(pictures_in(folder))} pictures and no model."
+        step = "Name the folder in which the photographs lie, to reconstruct what they show."
+        raise BadFileError(folder, what, step)
+    step = "Name a model, or a folder that holds some, or photographs with poses."
+    raise BadFileError(folder, f"the folder holds no model ({READ}) and no pictures.", step)
 
 
-def _model(path: Path) -> Path:
-    if path.exists() and path.suffix.lower() not in MODELS:
-        step = "Convert it to .glb, for example with Blender."
-        raise BadFileError(path, "is not a .glb, .gltf or .toml file.", step)
-    return path
-
-
-def _read(plan: SceneFile, config: AssembleConfig) -> list[_Block]:
-    """Read every file once for each time it is asked for, with what is said of its objects."""
+def _read(plan: SceneFile, objects: Objects, frame: Frame) -> list[_Block]:
+    """Read every file once per use, with what the scene file states of its objects."""
     blocks = []
     if plan.file is not None:
-        model = read_model(plan.file, config.objects)
-        blocks.append(_Block(model.scene, model.ours, None))
+        model = read_model(plan.file, objects, frame)
+        blocks.append(_Block(model.scene, model.ours, None, model.metric))
     for entry in plan.objects:
         if entry.file is None:
             blocks[0] = replace(blocks[0], scene=_told(blocks[0].scene, entry, plan))
             continue
         single = entry.name or entry.class_name or entry.extent
-        model = read_model(entry.file, "one" if single else config.objects)
+        model = read_model(entry.file, "one" if single else objects, frame)
         scene = model.scene
         for k in range(len(scene.objects)):
             scene = _with_object(scene, k, entry)
-        blocks.append(_Block(scene, model.ours, entry))
+        metric = model.metric or entry.extent is not None
+        blocks.append(_Block(scene, model.ours, entry, metric))
     return blocks
 
 
@@ -158,16 +166,17 @@ def _told(scene: Scene, entry: ObjectEntry, plan: SceneFile) -> Scene:
 
 
 def _with_object(scene: Scene, k: int, entry: ObjectEntry) -> Scene:
-    thing = scene.objects[k]
-    thing = replace(
-        thing,
-        name=entry.name or thing.name,
-        class_name=entry.class_name or thing.class_name,
-        velocity=entry.velocity or thing.velocity,
-        push=entry.push or thing.push,
-        wind=entry.wind or thing.wind,
+    obj = scene.objects[k]
+    obj = replace(
+        obj,
+        name=entry.name or obj.name,
+        class_name=entry.class_name or obj.class_name,
+        velocity=entry.velocity or obj.velocity,
+        push=entry.push or obj.push,
+        wind=entry.wind or obj.wind,
+        path=entry.path or obj.path,
     )
-    objects = (*scene.objects[:k], thing, *scene.objects[k + 1 :])
+    objects = (*scene.objects[:k], obj, *scene.objects[k + 1 :])
     scene = replace(scene, objects=objects)
     return scene if entry.extent is None else resized(scene, k, entry.extent)
 
@@ -196,16 +205,17 @@ def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
     wanted = [said_extent(text, only) for text in extents]
     used = set()
     for i, block in enumerate(blocks):
-        scene, told = block.scene, []
-        for k, thing in enumerate(scene.objects):
-            hits = [w for w in wanted if _means(w[0], thing)]
+        block = _in_metres(block, dict(wanted))
+        scene, messages = block.scene, []
+        for k, obj in enumerate(scene.objects):
+            hits = [w for w in wanted if _means(w[0], obj)]
             used.update(hits)
             if hits:
                 scene = resized(scene, k, hits[-1][1])
-            elif sentence := doubt(thing.name, thing.class_name, thing.real_extent):
-                told.append(sentence)
-        told = [s for s in told if not block.ours]
-        blocks[i] = replace(block, scene=replace(scene, warnings=(*scene.warnings, *told)))
+            elif sentence := doubt(obj.name, obj.class_name, obj.real_extent):
+                messages.append(sentence)
+        messages = [s for s in messages if not block.ours]
+        blocks[i] = replace(block, scene=replace(scene, warnings=(*scene.warnings, *messages)))
     for name, _ in wanted:
         if name not in {n for n, _ in used}:
             names = [o.name for b in blocks for o in b.scene.objects]
@@ -213,11 +223,32 @@ def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
     return blocks
 
 
-def _means(words: str, thing: SceneObject) -> bool:
+def _in_metres(block: _Block, wanted: Mapping[str, float]) -> _Block:
+    """Find the unit of a file that states none, by an extent that was asked for or by its size."""
+    if block.metric:
+        return block
+    scene = block.scene
+    for thing in scene.objects:
+        asked = [extent for name, extent in wanted.items() if _means(name, thing)]
+        if asked:
+            return replace(block, scene=in_unit(scene, asked[-1] / thing.real_extent), metric=True)
+    file = Path(scene.source)
+    largest = max(scene.objects, key=lambda o: o.real_extent)
+    printed = file.suffix.lower() == ".stl"
+    found = likely_unit(largest.class_name, largest.real_extent, printed)
+    if found is None:
+        what = f"states no unit, and {largest.name} is {largest.real_extent:.4g} units large."
+        raise BadFileError(file, what, "Give --unit, or --extent NAME=METRES.")
+    message = f"{file.name} states no unit: {found.reason}. --unit or --extent says otherwise."
+    scene = in_unit(scene, found.metres)
+    return replace(block, scene=replace(scene, warnings=(*scene.warnings, message)), metric=True)
+
+
+def _means(words: str, obj: SceneObject) -> bool:
     """Tell whether somebody who types these words means this object."""
-    said = set(words.lower().replace("_", " ").split())
-    exactly = words in (thing.name, Path(thing.source).stem)
-    return exactly or said <= set(thing.class_name.lower().split())
+    asked = set(words.lower().replace("_", " ").split())
+    exactly = words in (obj.name, Path(obj.source).stem)
+    return exactly or asked <= set(obj.class_name.lower().split())
 
 
 def _at_working_extent(scene: Scene, extent: float | None) -> Scene:
@@ -277,11 +308,11 @@ def _dropped(scene: Scene, drop: float) -> Scene:
     return scene
 
 
-def _with_overlaps_told(scene: Scene) -> Scene:
+def _with_overlaps_named(scene: Scene) -> Scene:
     """Warn of objects that stand in each other: they would burst apart."""
     pairs = ((scene.objects[a].name, scene.objects[b].name) for a, b in intersecting(scene))
-    told = tuple(f"{a} and {b} overlap at the start." for a, b in pairs)
-    return replace(scene, warnings=scene.warnings + told)
+    messages = tuple(f"{a} and {b} overlap at the start." for a, b in pairs)
+    return replace(scene, warnings=scene.warnings + messages)
 
 
 # ---------------------------------------------------------------- the whole, and how long
@@ -320,6 +351,7 @@ def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: Assemble
     scene = replace(
         scene,
         gravity=plan.gravity or (own or scene).gravity,
+        walls=(*scene.walls, *(own.walls if own else ())),
         fps=config.fps or plan.fps or (own.fps if own else FPS),
         settled=(own or scene).settled if plan.settled is None else plan.settled,
     )
@@ -332,11 +364,12 @@ def _watched(scene: Scene) -> float:
     """Return three times the longest fall and a second more [s], and never less than the forces."""
     fall = 0.0
     g = -scene.gravity[2]
-    for thing, height in zip(scene.objects, boxes_of(scene)[:, 0, 2], strict=True):
-        v = thing.velocity[2]
+    for obj, height in zip(scene.objects, boxes_of(scene)[:, 0, 2], strict=True):
+        v = obj.velocity[2]
         if g > 0:
             fall = max(fall, (v + math.sqrt(v * v + 2 * g * max(height, 0.0))) / g)
     forces = [f for o in scene.objects for f in (o.push, o.wind) if f is not None]
     ends = [f.end for f in forces if math.isfinite(f.end)]
+    ends += [o.path.time[-1] for o in scene.objects if o.path is not None]
     forced = max(ends, default=0.0) + 0.5
     return round(max(min(max(3 * fall + 1, SHORTEST), LONGEST), forced), 1)

@@ -30,16 +30,16 @@ LARGEST = 2**28
 
 @dataclass(frozen=True)
 class CaptureConfig:
-    """How many pictures, and how large."""
+    """Number, size and quality of pictures."""
 
     views: int = 24
-    """Cameras about the scene."""
+    """Number of cameras around the scene."""
     size: tuple[int, int] = (256, 256)
     """Width and height [px]."""
     quality: Literal["draft", "normal", "fine"] = "draft"
-    """How many rays; depth, normals and numbers are exact at any."""
+    """Rays per pixel for colour; depth, normals and object ids are exact at any quality."""
     threads: int | None = None
-    """None: one per processor."""
+    """Threads; None: one per core."""
 
 
 DEFAULT = CaptureConfig()

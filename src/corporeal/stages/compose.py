@@ -1,4 +1,4 @@
-"""Compose a scene of things from a pool: draw, size, settle, certify, begin, write it all down.
+"""Compose a scene of objects from a pool: draw, size, settle, certify, begin, write it all down.
 
 A composed scene is a folder: ``scene.glb`` (everything at rest), ``scene.toml`` (what happens),
 ``certificate.json`` (that it is at rest), ``composition.json`` (what it is made of, and why so
@@ -6,13 +6,13 @@ large), and ``views/`` (posed pictures).
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
+from itertools import product
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
-from corporeal import store
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.formats.glb import read_model
 from corporeal.formats.glb_merge import Member, merge
@@ -20,21 +20,28 @@ from corporeal.formats.scene_file import SceneFile, write_scene_file
 from corporeal.formats.words import numbered
 from corporeal.geometry.mesh import joined
 from corporeal.geometry.sizes import Sizing, scene_extents
+from corporeal.materials import find, friction_between
 from corporeal.pool.asset import UNKNOWN, Asset, Pool
 from corporeal.pool.draw import counts, draw
 from corporeal.settle.arrange import Arrangement
-from corporeal.settle.begin import Settled, settle_and_begin
+from corporeal.settle.begin import Begun, drop_and_begin
 from corporeal.settle.body import Body, Pose
 from corporeal.settle.breeze import slowest_wind
 from corporeal.settle.certificate import Certificate
+from corporeal.settle.composition import (
+    ComposedObject,
+    Composition,
+    write_certificate,
+    write_composition,
+)
 from corporeal.settle.decompose import decompose
 from corporeal.settle.interactions import KINDS, NEEDS, STANDING, STORM, WIND, Action, Kind
-from corporeal.settle.matter import Matter
+from corporeal.settle.mass_properties import MassProperties
 from corporeal.settle.rest import RestConfig, SettlingEngine
 from corporeal.vlm.sizes import RealExtent, real_extent, usual_sizes
 
 Progress = Callable[[float, str], None]
-Weigh = Callable[[Asset, float], Matter]
+Weigh = Callable[[Asset, float], MassProperties]
 """Given an asset and its real extent [m], says how its mass lies: at that size, about the middle of
 its box."""
 
@@ -51,26 +58,26 @@ class ComposeConfig:
     """What goes into a scene and what happens in it."""
 
     classes: tuple[str, ...] = ()
-    """Draw from these classes; by default from all of the pool."""
+    """Classes to draw from; by default all of the pool."""
     assets: tuple[str, ...] = ()
-    """Exactly these things, by their names in the pool; nothing is drawn then."""
+    """Exactly these assets of the pool, by name, instead of a random choice."""
     count: str = "1-4"
-    """How many things: a number, or a range to draw from."""
+    """Number of objects, or a range to draw it from."""
     repeat: bool = False
-    """A class may come twice."""
+    """Allow several objects of one class."""
     seed: int = 0
-    """Of everything that is left to chance."""
+    """Seed of all random numbers."""
     arrangement: Arrangement | Literal["auto"] = "auto"
-    """How things stand at rest: side by side, stacked, dropped onto one, in a row."""
+    """Arrangement at rest: side by side, stacked, dropped onto one, or in a row."""
     settle_with: SettlingEngine = "mujoco"
-    """What lets them fall: MuJoCo, or Blender through the program blenderproc on the PATH."""
+    """Rigid-body engine: MuJoCo, or Blender through the program blenderproc on the PATH."""
     interaction: Kind | Literal["auto", "none"] = "auto"
-    """What happens when the film starts."""
+    """Interaction that starts at time 0."""
     sizing: Sizing = field(default_factory=Sizing)
     vlm: str = "metadata"
-    """Who says how large things of a class are: as --vlm of `describe`; by default a table."""
+    """Source of usual sizes of classes, as --vlm of `describe`; by default a table."""
     record: Path | None = None
-    """Keep a model's answers in this folder, for --vlm replay:FOLDER."""
+    """Folder to record a model's answers in, for --vlm replay:FOLDER."""
 
 
 DEFAULT = ComposeConfig()
@@ -103,7 +110,7 @@ def compose(
         folder: Where the scene goes.
         config: What goes into it.
         progress: Told the fraction done and what is being done.
-        weigh: Says how the mass of a thing lies; None: as in a solid of one material.
+        weigh: Says how the mass of an object lies; None: as in a solid of one material.
 
     Raises:
         UserError: The pool lacks what is asked for, no rest is found, or nothing has room to
@@ -112,39 +119,41 @@ def compose(
     """
     tell = progress or (lambda fraction, words: None)
     rng = np.random.default_rng(config.seed)
+    # Which assets, how large, and what may happen.
     tell(0.0, "choosing")
     kind = None if config.interaction in ("auto", "none") else config.interaction
     assets = _chosen(pool, config, kind, rng)
     kinds: list[Kind] = [kind] if kind else _possible_kinds(config, len(assets), rng)
     sizes = _sized(assets, config)
     tell(0.1, "cutting into convex pieces")
-    things = _weighed(_things(pool, assets, sizes, config.sizing), weigh)
+    objects = _weighed(_objects(pool, assets, sizes, config.sizing), weigh)
     tell(0.3, "settling")
-    deepest = 0.5 * max(t.extent for t in things) / FINEST
-    bodies, rest = [t.body for t in things], RestConfig(engine=config.settle_with)
-    settled = settle_and_begin(bodies, config.arrangement, kinds, rng, (deepest, rest))
+    deepest = 0.5 * max(t.extent for t in objects) / FINEST
+    bodies, rest = [t.body for t in objects], RestConfig(engine=config.settle_with)
+    settled = drop_and_begin(bodies, config.arrangement, kinds, rng, deepest, rest)
     tell(0.9, "writing")
-    warnings = _write(folder, things, settled, config)
-    told = tuple(dict.fromkeys([*(w for s in sizes for w in s.warnings), *warnings]))
-    _keep(folder, things, settled, config, told)
-    names = tuple(t.name for t in things)
-    return Composed(folder, names, settled.arrangement, settled.action, settled.certificate, told)
+    warnings = _write(folder, objects, settled, config)
+    stated = tuple(dict.fromkeys([*(w for s in sizes for w in s.warnings), *warnings]))
+    _keep(folder, objects, settled, config, stated)
+    names = tuple(t.name for t in objects)
+    return Composed(folder, names, settled.arrangement, settled.action, settled.certificate, stated)
 
 
 def moved_by_wind(assets: Sequence[Asset], config: ComposeConfig, weigh: Weigh) -> bool:
-    """Tell whether any of the things of a scene could be moved by a wind, standing alone.
+    """Tell whether any of the objects of a scene could be moved by a wind, standing alone.
 
     Args:
         assets: What the scene is of.
-        config: How large things are.
-        weigh: Says how the mass of a thing lies.
+        config: How large objects are.
+        weigh: Says how the mass of an object lies.
 
     """
     real = [s.extent for s in _sized(assets, config)]
     for asset, size, extent in zip(assets, real, scene_extents(real, config.sizing), strict=True):
         points, triangles, _ = _shape(asset, float(extent))
-        matter = weigh(asset, size).scaled(float(extent) / size)
-        if WIND[1] * slowest_wind(Body(asset.name, points, triangles, (), matter=matter)) <= STORM:
+        inertial = weigh(asset, size).scaled(float(extent) / size)
+        body = Body(asset.name, points, triangles, (), inertial=inertial)
+        if WIND[1] * slowest_wind(body) <= STORM:
             return True
     return False
 
@@ -153,7 +162,7 @@ def moved_by_wind(assets: Sequence[Asset], config: ComposeConfig, weigh: Weigh) 
 
 
 def _possible_kinds(config: ComposeConfig, count: int, rng: np.random.Generator) -> list[Kind]:
-    """Return what so many things, standing as asked, can do, in an order of chance."""
+    """Return what so many objects, standing as asked, can do, in an order of chance."""
     if config.interaction == "none":
         return []
     stands = config.arrangement
@@ -183,7 +192,7 @@ def _chosen(
     most = high if config.repeat else min(high, len(offered))
     if most < low:
         raise UserError(
-            f"{low} things are asked for, of {len(offered)} "
+            f"{low} objects are asked for, of {len(offered)} "
             f"class{'es' * (len(offered) != 1)} that may come once each. Name more --classes, or "
             "say --repeat."
         )
@@ -203,7 +212,7 @@ def _named(pool: Pool, name: str) -> Asset:
 
 
 @dataclass(frozen=True)
-class _Thing:
+class _Placed:
     """One object of the scene to be."""
 
     name: str
@@ -229,13 +238,13 @@ def _sized(assets: Sequence[Asset], config: ComposeConfig) -> list[RealExtent]:
     return sizes
 
 
-def _things(
+def _objects(
     pool: Pool, assets: Sequence[Asset], sizes: Sequence[RealExtent], sizing: Sizing
-) -> list[_Thing]:
+) -> list[_Placed]:
     """Give every asset its name, its size in the scene and a body."""
     names = numbered([a.class_name for a in assets])
     extents = scene_extents([s.extent for s in sizes], sizing)
-    things = []
+    objects = []
     for name, asset, size, extent in zip(names, assets, sizes, extents, strict=True):
         points, triangles, centre = _shape(asset, float(extent))
         try:
@@ -243,17 +252,36 @@ def _things(
         except UserError as problem:
             raise UserError(f"{asset.name}: {problem}") from None
         body = Body(name, points, triangles, pieces)
-        things.append(_Thing(name, asset, size, float(extent), body, centre))
-    return things
+        objects.append(_Placed(name, asset, size, float(extent), body, centre))
+    return objects
 
 
-def _weighed(things: list[_Thing], weigh: Weigh | None) -> list[_Thing]:
-    """Let bodies know how their mass lies, walls being as thick as the thing is large."""
+def _weighed(objects: list[_Placed], weigh: Weigh | None) -> list[_Placed]:
+    """Let bodies know how their mass lies, walls being as thick as the object is large."""
     if weigh is None:
-        return things
-    matters = [weigh(t.asset, t.real.extent).scaled(t.extent / t.real.extent) for t in things]
-    bodies = [replace(t.body, matter=m) for t, m in zip(things, matters, strict=True)]
-    return [replace(t, body=b) for t, b in zip(things, bodies, strict=True)]
+        return objects
+    matters = [weigh(t.asset, t.real.extent).scaled(t.extent / t.real.extent) for t in objects]
+    bodies = [
+        replace(t.body, inertial=m, grips=_grips(k, objects, matters))
+        for k, (t, m) in enumerate(zip(objects, matters, strict=True))
+    ]
+    return [replace(t, body=b) for t, b in zip(objects, bodies, strict=True)]
+
+
+def _grips(
+    number: int, objects: Sequence[_Placed], matters: Sequence[MassProperties]
+) -> dict[str, float]:
+    """Return the least friction of any two parts of an object and of each other one, by name [-].
+
+    Which parts will touch is not known before all lie at rest; the least holds whichever do.
+    """
+    found = {}
+    for k, (other, matter) in enumerate(zip(objects, matters, strict=True)):
+        meeting = product(matters[number].materials, matter.materials)
+        pairs = [friction_between(find(a), find(b)).sliding.typical for a, b in meeting]
+        if k != number and pairs:
+            found[other.name] = min(pairs)
+    return found
 
 
 def _shape(asset: Asset, extent: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
@@ -267,12 +295,12 @@ def _shape(asset: Asset, extent: float) -> tuple[np.ndarray, np.ndarray, np.ndar
 
 
 def _write(
-    folder: Path, things: Sequence[_Thing], settled: Settled, config: ComposeConfig
+    folder: Path, objects: Sequence[_Placed], settled: Begun, config: ComposeConfig
 ) -> tuple[str, ...]:
     """Write ``scene.glb`` and ``scene.toml``; return what was left out of the files."""
     action = settled.action
     duration = action.duration if action else AT_REST
-    members = [_member(t, p) for t, p in zip(things, settled.poses, strict=True)]
+    members = [_member(t, p) for t, p in zip(objects, settled.poses, strict=True)]
     extras = {"gravity_m_s2": [0.0, 0.0, -9.81], "duration_s": duration, "fps": 30, "settled": True}
     warnings = merge(folder / "scene.glb", members, "scene", extras)
     scene_file = SceneFile(
@@ -286,57 +314,57 @@ def _write(
     return warnings
 
 
-def _member(thing: _Thing, pose: Pose) -> Member:
-    asset, scale = thing.asset, thing.scale_of_file
-    x, y, z = pose.world(-scale * thing.centre[None])[0].tolist()
+def _member(obj: _Placed, pose: Pose) -> Member:
+    asset, scale = obj.asset, obj.scale_of_file
+    x, y, z = pose.world(-scale * obj.centre[None])[0].tolist()
     extras = {
-        "object_id": thing.name,
+        "object_id": obj.name,
         "class": asset.class_name,
         "asset": asset.name,
         "asset_sha256": asset.sha256,
         "source": asset.source,
-        "real_extent_m": thing.real.extent,
-        "scale": thing.extent / thing.real.extent,
-        "sized_by": thing.real.by,
+        "real_extent_m": obj.real.extent,
+        "scale": obj.extent / obj.real.extent,
+        "sized_by": obj.real.by,
     }
     known = {"licence": asset.licence, "attribution": asset.attribution}
     extras |= {key: words for key, words in known.items() if words not in ("", UNKNOWN)}
-    return Member(asset.file, thing.name, (x, y, z), pose.quaternion, scale, extras)
+    return Member(asset.file, obj.name, (x, y, z), pose.quaternion, scale, extras)
 
 
 def _keep(
     folder: Path,
-    things: Sequence[_Thing],
-    settled: Settled,
+    objects: Sequence[_Placed],
+    settled: Begun,
     config: ComposeConfig,
     warnings: tuple[str, ...],
 ) -> None:
     """Write ``certificate.json`` and ``composition.json``."""
-    store.write_json(folder / "certificate.json", asdict(settled.certificate))
+    write_certificate(folder, settled.certificate)
     action = settled.action
-    composition = {
-        "seed": config.seed,
-        "arrangement": settled.arrangement,
-        "settled_with": config.settle_with,
-        "interaction": action.kind if action else "none",
-        "what_happens": action.words if action else "nothing: everything stays at rest",
-        "sizing": asdict(config.sizing),
-        "objects": [
-            {
-                "name": t.name,
-                "class": t.asset.class_name,
-                "asset": t.asset.name,
-                "source": t.asset.source,
-                "sha256": t.asset.sha256,
-                "licence": t.asset.licence,
-                "attribution": t.asset.attribution,
-                "real_extent_m": t.real.extent,
-                "said_by": t.real.said_by,
-                "reason": t.real.reason,
-                "extent_m": t.extent,
-            }
-            for t in things
-        ],
-        "warnings": list(warnings),
-    }
-    store.write_json(folder / "composition.json", composition)
+    composition = Composition(
+        seed=config.seed,
+        arrangement=settled.arrangement,
+        settled_with=config.settle_with,
+        interaction=action.kind if action else "none",
+        what_happens=action.words if action else "nothing: everything stays at rest",
+        sizing=config.sizing,
+        objects=tuple(
+            ComposedObject(
+                name=t.name,
+                class_name=t.asset.class_name,
+                asset=t.asset.name,
+                source=t.asset.source,
+                sha256=t.asset.sha256,
+                licence=t.asset.licence,
+                attribution=t.asset.attribution,
+                real_extent_m=t.real.extent,
+                said_by=t.real.said_by,
+                reason=t.real.reason,
+                extent_m=t.extent,
+            )
+            for t in objects
+        ),
+        warnings=warnings,
+    )
+    write_composition(folder, composition)

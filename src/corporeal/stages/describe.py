@@ -1,18 +1,22 @@
 """Describe: say in words what is in the scene and what each part is made of."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from importlib.resources import files
 from pathlib import Path
 from typing import Literal
 
+import numpy as np
+
 from corporeal import materials
-from corporeal.errors import UnknownChoiceError, check_range
+from corporeal.errors import UnknownChoiceError, UserError, check_range
+from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.identity import Identity, identify
 from corporeal.geometry.identity import words as telling
 from corporeal.materials.offer import Choice, contents_offered, substances_offered
 from corporeal.materials.placement import (
+    Judgement,
     choices,
     entry_of,
     from_fractions,
@@ -22,62 +26,84 @@ from corporeal.materials.placement import (
     usual,
     wall_put,
 )
+from corporeal.materials.quantities import QUANTITIES
 from corporeal.render.portrait import DIRECTIONS, Portrait, colour_of_part, portraits
-from corporeal.types import Inventory, ObjectWords, PartWords, Placement, Scene, Surface
+from corporeal.types import (
+    Ground,
+    Inventory,
+    ObjectWords,
+    PartWords,
+    Placement,
+    Scene,
+    Surface,
+    in_way,
+)
 from corporeal.vlm import Album, Vlm, connect, critic_of
 from corporeal.vlm.annotation import Annotation, built, named_pieces, read_annotations
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Offer, Subject
 from corporeal.vlm.metadata import (
+    as_stated,
     evidence,
+    hollowed,
     matter_hint,
     recognise,
+    sealed,
+    stated_inflation,
     stated_substance,
     stated_thickness,
+    stated_values,
+    usual_inflation,
     walled,
 )
 from corporeal.vlm.together import together
 from corporeal.vlm.words import (
     Asked,
     against,
+    another,
+    evidence_of,
     gathered,
     leaves,
-    length,
     part_words,
     placed,
-    settled,
+    resolved,
+    sides,
     usage,
     with_extents,
 )
 
-TASKS = ("parts", "ranking", "materials", "placement", "extents")
+TASKS = ("parts", "ranking", "materials", "placement", "mass", "extents")
 
 
 @dataclass(frozen=True)
 class DescribeConfig:
-    """Who is asked what things are made of."""
+    """What recognises parts and materials."""
 
     annotations: Path | None = None
-    """YAML file that says what parts are made of; believed before anybody else."""
+    """YAML file with materials of parts; it takes precedence over every other answer."""
     vlm: str = "metadata"
     """"metadata": names and materials in the file. "openai:MODEL", "anthropic:MODEL",
     "google:MODEL", "ollama:MODEL", or "openai:MODEL@http://host/v1" for any compatible server.
     "ask:FOLDER": you answer. "replay:FOLDER": recorded answers."""
     critic: str = ""
-    """Who ranks ways of taking an object apart; "": the same, or a cheaper model of OpenAI's."""
+    """Model that ranks proposed decompositions into parts, as --vlm; "": the same model, or a
+    cheaper one of OpenAI's."""
     record: Path | None = None
-    """Folder where every answer is kept for --vlm replay:FOLDER."""
+    """Folder to record every answer in, for --vlm replay:FOLDER."""
     sampling: Literal["fraction", "value"] = "fraction"
-    """Ask for places inside the measured ranges, or for values, which are checked."""
+    """Ask a model for fractions of the measured ranges, or for values, which are then checked."""
     views: int = 4
-    """Pictures of each object, out of 8 from all sides; one more shows its parts in colours."""
+    """Pictures of each object, out of 8 around it; one more shows its parts in colours."""
     view_size: int = 512
     """Their height and width [px]."""
     view_seed: int = 0
     """Chooses the views."""
+    direct: bool = True
+    """Also ask a model, without the library, what is printed on each object and what it weighs.
+    This reweights the ways it may be, and sets no value."""
     parallel: int = 4
-    """Objects that a model is asked about at the same time."""
+    """Number of objects that a model is asked about at the same time."""
 
 
 DEFAULT = DescribeConfig()
@@ -92,10 +118,11 @@ def describe(
     progress: Progress = lambda fraction, words: None,
     from_pictures: bool = False,
 ) -> Inventory:
-    """Name every object's parts and their materials; the first that knows answers.
+    """Name every object's parts and their materials.
 
-    Annotation file, model (or its recorded answers), the file's own names, unknown. A model is also
-    asked where in the measured ranges each value lies, and how large things usually are.
+    Answers are taken, in this order, from the annotation file, a model (or its recorded answers)
+    and the names in the file; what none of them knows is unknown. A model is also asked where in
+    the measured ranges each value lies, and how large such objects usually are.
 
     Args:
         scene: What was assembled.
@@ -109,15 +136,15 @@ def describe(
             questions wait for a person's answers.
 
     """
-    accept(config)
+    validate(config)
     identity = identify(scene, matter_hint)
     told = _annotations(scene, identity, config, library, from_pictures)
     file = _file_words(scene, identity, library)
     model = connect(config.vlm, config.record)
     if model is None:
         objects = [
-            ObjectWords(thing.name, thing.class_name, tuple(_told(words, told, thing.name, config)))
-            for thing, words in zip(scene.objects, file, strict=True)
+            ObjectWords(obj.name, obj.class_name, tuple(_told(words, told, obj.name, config)))
+            for obj, words in zip(scene.objects, file, strict=True)
         ]
         return Inventory(tuple(objects))
     critic = connect(critic_of(config.vlm, config.critic), config.record) or model
@@ -125,7 +152,7 @@ def describe(
     return asking.inventory(file, told, progress)
 
 
-def accept(config: DescribeConfig) -> None:
+def validate(config: DescribeConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scene."""
     for name, value, low, high in (
         ("--views", config.views, 1, DIRECTIONS),
@@ -161,14 +188,14 @@ class _Asking:
         self.names = Vocabulary(
             partial(spelling, library_name=library, offered=materials.substances(library)),
             partial(spelling, library_name=library, offered=materials.contents(library)),
-            lambda name: "shell_thickness" in entry_of(name, library).ranges,
+            partial(_walled, library),
         )
 
     def inventory(self, file: list, told: Mapping, progress: Progress) -> Inventory:
         """Ask about every object, and about the sizes of all."""
         count = len(self.scene.objects)
         interviews = [self._interview(number) for number in range(count)]
-        sizes = self._about(Subject(self.scene.name, self.scene.name, "", ""))
+        sizes = self._about(Subject(self.scene.name, self.scene.name, "", "not known"))
         named = dict.fromkeys(o.class_name or o.name for o in self.scene.objects)
         classes = [name for name in named if telling(name)]  # "object" has no usual size
         jobs: list[Callable] = [
@@ -209,7 +236,7 @@ class _Asking:
         return [p.name for p in self.identity.catalogue if p.object == number]
 
     def _interview(self, number: int) -> Interview:
-        thing, parts = self.scene.objects[number], self._names(number)
+        obj, parts = self.scene.objects[number], self._names(number)
         portrait = Portrait(self.config.views, self.config.view_size, self.config.view_seed)
         first = next(k for k, p in enumerate(self.identity.catalogue) if p.object == number)
         own = [
@@ -218,12 +245,15 @@ class _Asking:
                 self.identity.part_of_surface, self.scene.surfaces, strict=True
             )
         ]
+        corners = [s.vertices for s in self.scene.surfaces if s.object == number]
+        lengths = [side / obj.scale for side in oriented_size(np.concatenate(corners))]
         return self._about(
             Subject(
-                scene=f"{self.scene.name}/{thing.name}",
-                name=thing.name,
-                class_name=thing.class_name,
-                extent=length(thing.real_extent),
+                scene=f"{self.scene.name}/{obj.name}",
+                name=obj.name,
+                class_name=obj.class_name,
+                sides=sides(lengths),
+                box=float(np.prod(lengths)),
                 views=portrait.words,
                 count=self.config.views + (len(parts) > 1),
                 pictures=Album(partial(portraits, self.scene, own, portrait))
@@ -236,26 +266,32 @@ class _Asking:
         self, number: int, interview: Interview, file: list[PartWords], told: Mapping
     ) -> ObjectWords:
         """Ask everything about one object."""
-        thing, names = self.scene.objects[number], self._names(number)
-        stated = {part: said.material for (name, part), said in told.items() if name == thing.name}
+        obj, names = self.scene.objects[number], self._names(number)
+        stated = {part: said.material for (name, part), said in told.items() if name == obj.name}
         words = file
         if not (all(stated.get(name) for name in names) or stated.keys() - set(names)):
             words = self._materials(interview, names, self._pieces(interview, names), file)
-        words = _told(words, told, thing.name, self.config)
+        words = _told(words, told, obj.name, self.config)
         words = self._placed(interview, words)
-        return ObjectWords(thing.name, thing.class_name, tuple(words))
+        weighs = interview.mass() if self.config.direct else None
+        evidence = evidence_of(*weighs) if weighs else None
+        return ObjectWords(obj.name, obj.class_name, tuple(words), evidence=evidence)
 
     def _pieces(self, interview: Interview, names: list[str]) -> list[str]:
         """Name the parts to ask about: the file's, or what a single mesh is taken apart into."""
         taken = interview.parts() if len(names) == 1 else None
         pieces = [p.name for p in taken[0].parts] if taken else names
-        return pieces if len(pieces) > 1 else names
+        if len(pieces) > 1:
+            return pieces
+        looks = list(interview.looks.values())
+        interview.looks = dict(zip(names, looks, strict=True)) if len(names) == len(looks) else {}
+        return names
 
     def _materials(
         self, interview: Interview, names: list[str], pieces: list[str], file: list[PartWords]
     ) -> list[PartWords]:
         shared = len(pieces) > len(names)
-        looks = {name: "" for name in pieces}
+        looks = {name: interview.looks.get(name, "") for name in pieces}
         if len(names) > 1:
             colours = zip(names, colour_of_part(len(names)), strict=True)
             looks = {name: f"{colour} in the last picture" for name, colour in colours}
@@ -266,13 +302,21 @@ class _Asking:
         if len(names) == 1:
             words = [gathered(names[0], words)]
         said = {w.name: w for w in words}
-        known = zip(names, file, strict=True)
-        return [settled(said[name], own, self.names.walled) for name, own in known]
+        known = list(zip(names, file, strict=True))
+        found = [
+            replace(resolved(said[name], own, self.names.walled), stated=own.stated)
+            for name, own in known
+        ]
+        # How hard it is inflated no picture shows: its name says it.
+        return [sealed(w, own.inflation, None) for w, (_, own) in zip(found, known, strict=True)]
 
     def _placed(self, interview: Interview, words: list[PartWords]) -> list[PartWords]:
-        """Ask where in its measured range each open value of each part lies."""
-        parts = {leaf.name: leaf for leaf in leaves(words)}
-        offered = {name: choices(leaf, self.library) for name, leaf in parts.items()}
+        """Ask where in its measured range each open value of each part lies, in all its ways."""
+        parts = {name: way for leaf in leaves(words) for name, way in _in_all_ways(leaf).items()}
+        offered = {
+            name: choices(way, self.library, weighing=name != way.name)
+            for name, way in parts.items()
+        }
         offered = {name: found for name, found in offered.items() if found}
         if not offered:
             return words
@@ -284,7 +328,11 @@ class _Asking:
                 for clause in odd(parts[name], places, self.library).values()
             ]
 
-        offers = {name: _offer(parts[name], found) for name, found in offered.items()}
+        looks = interview.looks
+        offers = {
+            name: _offer(name, parts[name], looks.get(parts[name].name, ""), found)
+            for name, found in offered.items()
+        }
         shape = ValueAnswer if self.config.sampling == "value" else FractionAnswer
         asked = interview.placement(offers, shape, problems)
         if asked is None:
@@ -295,17 +343,26 @@ class _Asking:
         return [placed(w, places) for w in words]
 
 
+def _in_all_ways(words: PartWords) -> dict[str, PartWords]:
+    """Return the part in each of its ways under the name it is asked about; the first is itself."""
+    others = enumerate(words.hypotheses[1:], 1)
+    return {words.name: words} | {another(words.name, k): in_way(words, w) for k, w in others}
+
+
 Placed = FractionAnswer | ValueAnswer
 Offered = Mapping[str, Mapping[str, Choice]]
 """Part → quantity → what it can be."""
 
 
-def _offer(words: PartWords, offered: Mapping[str, Choice]) -> Offer:
+def _offer(name: str, words: PartWords, look: str, offered: Mapping[str, Choice]) -> Offer:
     made = [str(words.material), *([words.structure] if words.structure else [])]
     if words.contents is not None:
         made.append(f"{words.fill or 1.0:.0%} full of {words.contents}")
+    if words.solidity is not None:
+        made.append(f"{words.solidity:.0%} of it matter")
+    seen = f" (it looks: {look})" if look else ""
     return Offer(
-        f"{words.name}: {', '.join(made)}",
+        f"{name}: {', '.join(made)}{seen}",
         {field: c.words for field, c in offered.items()},
         {field: c.bounds for field, c in offered.items()},
     )
@@ -314,7 +371,9 @@ def _offer(words: PartWords, offered: Mapping[str, Choice]) -> Offer:
 def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, Placement]]:
     read = from_values if isinstance(answer, ValueAnswer) else from_fractions
     return {
-        p.part: read({v.quantity: (v.number, v.reason) for v in p.values}, by, offered[p.part])
+        p.part: read(
+            {v.quantity: Judgement(v.number, v.reason) for v in p.values}, by, offered[p.part]
+        )
         for p in answer.parts
     }
 
@@ -324,14 +383,42 @@ def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, 
 
 def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[PartWords]]:
     words: list[list[PartWords]] = [[] for _ in scene.objects]
+    walls = partial(_walled, library)
     for entry, seen in zip(identity.catalogue, evidence(scene, identity), strict=True):
-        told = _stated(list(seen.surfaces), library) or recognise(seen)
+        told = _stated(list(seen.surfaces), library) or hollowed(recognise(seen), seen, walls)
         by = "metadata" if told.material else "unknown"
         told = replace(told, name=entry.name, answered_by=by)
         told = walled(told, stated_thickness(seen.surfaces))
+        told = replace(as_stated(told, seen.surfaces), stated=_stated_values(seen.surfaces))
+        told = sealed(told, stated_inflation(seen.surfaces), usual_inflation(seen))
         built_by = "metadata" if told.structure else "unknown"
         words[entry.object].append(replace(told, built_by=built_by))
     return words
+
+
+def _walled(library: str, name: str) -> bool:
+    """Tell whether a library knows walls of a material."""
+    return "shell_thickness" in entry_of(name, library).ranges
+
+
+def _stated_values(surfaces: Sequence[Surface]) -> dict[str, Ground]:
+    """Return the numbers that the file states, of quantities that there are.
+
+    Raises:
+        UserError: One of them can be no material's.
+
+    """
+    found = {n: g for n, g in stated_values(surfaces).items() if n in QUANTITIES}
+    for name, ground in found.items():
+        quantity = QUANTITIES[name]
+        if not quantity.low <= ground.value <= quantity.high:
+            unit = "" if quantity.unit == "-" else f" {quantity.unit}"
+            raise UserError(
+                f"{surfaces[0].name}: {quantity.words.lower()} {ground.value:.4g}{unit} "
+                f"({ground.range.source}): no material has less than {quantity.low:g} or more than "
+                f"{quantity.high:g}{unit}. Correct the file, or its units of length and mass."
+            )
+    return found
 
 
 def _stated(surfaces: list[Surface], library: str) -> PartWords | None:
@@ -354,8 +441,8 @@ def _annotations(
     if config.annotations is None:
         return {}
     names = {
-        thing.name: [p.name for p in identity.catalogue if p.object == number]
-        for number, thing in enumerate(scene.objects)
+        obj.name: [p.name for p in identity.catalogue if p.object == number]
+        for number, obj in enumerate(scene.objects)
     }
     said = read_annotations(Path(config.annotations), names, names if from_pictures else ())
     return {key: _spelt(one, library) for key, one in said.items()}
@@ -370,14 +457,14 @@ def _spelt(said: Annotation, library: str) -> Annotation:
 def _told(
     words: list[PartWords],
     told: Mapping[tuple[str, str], Annotation],
-    thing: str,
+    obj: str,
     config: DescribeConfig,
 ) -> list[PartWords]:
-    own = [_annotated(told.get((thing, w.name)), w, config.annotations) for w in words]
-    pieces = named_pieces(told, thing, [w.name for w in own])
+    own = [_annotated(told.get((obj, w.name)), w, config.annotations) for w in words]
+    pieces = named_pieces(told, obj, [w.name for w in own])
     if not pieces:
         return own
-    said = [_annotated(told[thing, p.name], p, config.annotations) for p in pieces]
+    said = [_annotated(told[obj, p.name], p, config.annotations) for p in pieces]
     return [gathered(own[0].name, said)]
 
 
@@ -389,6 +476,8 @@ def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> 
     if said.material is not None:
         found = PartWords(words.name, said.material, None, None, "annotation", 1.0, where)
         words = replace(found, **{s: getattr(words, s) for s in SHARES})
+    if said.material is not None or said.structure is not None or said.contents is not None:
+        words = replace(words, hypotheses=())  # a person is certain
     known = ((*materials.si(key), value) for key, value in said.values.items())
     values = {field: value * factor for field, factor, value in known}
     return replace(built(said, words), values=values)

@@ -1,55 +1,94 @@
 """Fill every part with material points: solids, walls and sheets, with their true masses."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Literal
 
 import numpy as np
+from jaxtyping import Float, Int
 
 from corporeal.errors import UserError, check_range
+from corporeal.formats.typical_bulk import doubt_mass
+from corporeal.geometry.arrangement import underside
 from corporeal.geometry.contact_points import contact_points
-from corporeal.geometry.exposure import cross_section, faces
+from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.falls import drop_heights
 from corporeal.geometry.foliage import in_leaves, is_leafy, leaves_of, planted
-from corporeal.geometry.make import Make, compose, how_filled, recipe
+from corporeal.geometry.make import (
+    Make,
+    as_plate,
+    compose,
+    heavier,
+    how_filled,
+    plate_thickness,
+    recipe,
+)
+from corporeal.geometry.mass_shares import keep_apart, weigh
 from corporeal.geometry.mesh import joined
+from corporeal.geometry.outer_skin import cross_section, faces
 from corporeal.geometry.packing import Packing, Recipe, pack
 from corporeal.geometry.rods import Rod, rod_of
 from corporeal.geometry.rooting import drawn_into_ground
 from corporeal.geometry.sizes import in_scene, is_scaled, scale_of_part
 from corporeal.geometry.survey import Anatomy, Member, survey
-from corporeal.geometry.weights import keep_apart, weigh
 from corporeal.materials import find
-from corporeal.mpm.part import Motion, PartGeometry
-from corporeal.mpm.treatment import Plan, plan
-from corporeal.mpm.wind import greatest_acceleration
+from corporeal.materials.quantities import QUANTITIES
+from corporeal.mpm.physics.prescribed import fastest_velocity, start_velocity
+from corporeal.mpm.physics.wind import greatest_acceleration
+from corporeal.treatment.part import Motion, PartGeometry
+from corporeal.treatment.plan import Detail, Plan, Quality, plan
 from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject, Treatment
 
 
 @dataclass(frozen=True)
 class FillConfig:
-    """How to fill."""
+    """How objects are filled with material points."""
 
     detail: Literal["draft", "normal", "fine"] = "draft"
-    """The one knob of quality."""
+    """Spatial resolution and step budget; the only setting of accuracy."""
     stiffness: Literal["true", "capped"] = "true"
-    """The published rule, "capped", is a control only."""
+    """Young's moduli as measured, or capped by the published rule, which is a control only."""
     seed: int = 0
+    """Seed of all random numbers."""
 
 
 DEFAULT = FillConfig()
+NOTABLE = 0.01
+"""Relative difference of a stated mass that is told."""
 
 
-def accept(config: FillConfig) -> None:
+@dataclass(frozen=True)
+class Accuracy:
+    """What a filling is to be worth."""
+
+    detail: Detail | Quality
+    stiffness: Literal["true", "capped"]
+    seed: int
+
+
+def validate(config: FillConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scene."""
     check_range("--seed", config.seed, 0, 2**63)
 
 
 def fill(
-    scene: Scene, parts: Parts, field: MaterialField, config: FillConfig = DEFAULT
+    scene: Scene,
+    parts: Parts,
+    field: MaterialField,
+    config: FillConfig = DEFAULT,
+    quality: Quality | None = None,
 ) -> Particles:
     """Turn meshes into material points, choosing resolution and treatment on the way.
 
-    Walls are as thick as their thing is large in the scene: real thickness times its scale.
+    Walls are as thick as their object is large in the scene: real thickness times its scale.
+
+    Args:
+        scene: What is filled.
+        parts: Which triangles belong to which part.
+        field: What every part is made of.
+        config: Resolution.
+        quality: What is bought instead of what ``config.detail`` buys; None: that.
+
     """
     field = in_scene(field, scale_of_part(scene, parts))
     scene, drawn = drawn_into_ground(scene, parts, field)
@@ -59,23 +98,32 @@ def fill(
     makes = {
         m.part: in_leaves(
             compose(a, m, field, np.random.default_rng([config.seed, m.part, 5])),
-            (a, m),
+            a,
+            m,
             field,
             tissue,
-            thing.scale,
+            obj.scale,
         )
-        for thing, a in zip(scene.objects, anatomies, strict=True)
+        for obj, a in zip(scene.objects, anatomies, strict=True)
         for m in a.members
     }
+    makes, heavy = as_heavy_as_stated(scene, anatomies, makes)
     refuse_flat(scene, anatomies)
+    # Rods bend as rings of points; resolution and treatments follow from all of it.
     rods = {
         m.part: rod
         for a in anatomies
         for m in a.members
         if makes[m.part].thickness == 0 and (rod := rod_of(m, np.random.default_rng(config.seed)))
     }
-    chosen = resolve(scene, field, anatomies, (makes, rods), config)
+    asked = Accuracy(quality or config.detail, config.stiffness, config.seed)
+    chosen = resolve(scene, field, anatomies, makes, rods, asked)
+    # A plate thinner than two cells is a wall, whoever called it solid; with it the cell may grow.
+    while thin := thin_plates(anatomies, makes, rods, chosen, config.seed):
+        makes |= {k: as_plate(makes[k], thickness) for k, thickness in thin.items()}
+        chosen = resolve(scene, field, anatomies, makes, rods, asked)
     refuse_buried(scene, anatomies, chosen.cell)
+    # Points, object by object.
     packings = []
     for number, anatomy in enumerate(anatomies):
         recipes = {
@@ -90,9 +138,11 @@ def fill(
         rng = np.random.default_rng([config.seed, number, 1])
         coarse = is_rigid(anatomy, chosen)
         packings.append(pack(anatomy, recipes, chosen.cell / 2, rng, coarse=coarse))
+    # No point of one object in another; volumes and densities that add up to the masses.
     packings = keep_apart(packings, chosen.cell)
     particles = gather(scene, parts, anatomies, makes, chosen, packings)
-    particles = replace(particles, warnings=(*particles.warnings, *drawn))
+    doubted = implausible_masses(scene, anatomies, particles.mass_real)
+    particles = replace(particles, warnings=(*particles.warnings, *drawn, *heavy, *doubted))
     return planted(scene, particles, anatomies, field, tissue)
 
 
@@ -133,6 +183,29 @@ def _whole(label: np.ndarray) -> np.ndarray:
     return np.where(label >= 0, label, np.bincount(named).argmax())
 
 
+def implausible_masses(
+    scene: Scene, anatomies: Sequence[Anatomy], masses: Sequence[float]
+) -> list[str]:
+    """Say which objects are too heavy or too light for the room that they take.
+
+    Args:
+        scene: The objects, with what they are.
+        anatomies: One per object.
+        masses: Of every part [kg].
+
+    """
+    said = (
+        doubt_mass(
+            obj.name,
+            obj.class_name or obj.name,
+            sum(masses[m.part] for m in anatomy.members),
+            oriented_size(anatomy.vertices),
+        )
+        for obj, anatomy in zip(scene.objects, anatomies, strict=True)
+    )
+    return [sentence for sentence in said if sentence]
+
+
 def refuse_flat(scene: Scene, anatomies: list[Anatomy]) -> None:
     """Stop when nothing in the scene has a body.
 
@@ -144,7 +217,7 @@ def refuse_flat(scene: Scene, anatomies: list[Anatomy]) -> None:
     if all(m.volume == 0 and m.size[0] < 1e-6 * m.size[2] for m in members):
         raise UserError(
             f"{scene.source}: no object encloses a volume; every part is flat, so there is "
-            "nothing to fill. Use a model of a solid thing."
+            "nothing to fill. Use a model of a solid object."
         )
 
 
@@ -155,18 +228,18 @@ def refuse_buried(scene: Scene, anatomies: list[Anatomy], cell: float) -> None:
         UserError: It names the object.
 
     """
-    for thing, anatomy in zip(scene.objects, anatomies, strict=True):
+    for obj, anatomy in zip(scene.objects, anatomies, strict=True):
         lowest = float(anatomy.vertices[:, 2].min())
         if lowest < -cell:
             raise UserError(
-                f"Object {thing.name!r} reaches {-lowest:.3g} m below the floor. "
+                f"Object {obj.name!r} reaches {-lowest:.3g} m below the floor. "
                 "Raise its position by as much."
             )
         for k, wall in enumerate(scene.walls):
             depth = float(((np.array(wall.point) - anatomy.vertices) @ np.array(wall.normal)).max())
             if depth > cell:
                 raise UserError(
-                    f"Object {thing.name!r} reaches {depth:.3g} m into wall {k + 1}. "
+                    f"Object {obj.name!r} reaches {depth:.3g} m into wall {k + 1}. "
                     "Move one of them, or turn the wall's normal round."
                 )
 
@@ -174,15 +247,51 @@ def refuse_buried(scene: Scene, anatomies: list[Anatomy], cell: float) -> None:
 # ------------------------------------------------------------------ how it is made
 
 
+def as_heavy_as_stated(
+    scene: Scene, anatomies: list[Anatomy], makes: dict[int, Make]
+) -> tuple[dict[int, Make], tuple[str, ...]]:
+    """Let objects weigh what their file states: all of one object by the same factor.
+
+    Returns:
+        How every part is made, and a sentence for each object that its materials and its shape
+        would give another mass.
+
+    Raises:
+        UserError: No material is as dense as that.
+
+    """
+    made, told = dict(makes), []
+    for thing, anatomy in zip(scene.objects, anatomies, strict=True):
+        own = [m.part for m in anatomy.members]
+        usual = sum(makes[k].mass for k in own)
+        if thing.mass is None or usual <= 0:
+            continue
+        made |= {k: heavier(makes[k], thing.mass / usual) for k in own}
+        possible = QUANTITIES["density"]
+        for row in (made[k] for k in own):
+            if not possible.low <= row.density <= possible.high:
+                raise UserError(
+                    f"{thing.name}: its file states {thing.mass:.3g} kg, so that its matter would "
+                    f"have {row.density:.3g} kg/m³; no material has less than {possible.low:g} or "
+                    f"more than {possible.high:g}. Correct the file, or its unit of mass."
+                )
+        if abs(thing.mass / usual - 1) > NOTABLE:
+            told.append(
+                f"{thing.name} weighs {thing.mass:.3g} kg, as its file states; its materials and "
+                f"its shape would give {usual:.3g} kg."
+            )
+    return made, tuple(told)
+
+
 def resolve(
     scene: Scene,
     field: MaterialField,
     anatomies: list[Anatomy],
-    found: tuple[dict[int, Make], dict[int, Rod]],
-    config: FillConfig,
+    makes: dict[int, Make],
+    rods: dict[int, Rod],
+    config: Accuracy,
 ) -> Plan:
-    """Ask for grid spacing and treatments."""
-    makes, rods = found
+    """Choose grid spacing and treatments."""
     geometries = {
         m.part: PartGeometry(
             object=number,
@@ -198,6 +307,7 @@ def resolve(
             diameter=rods[m.part].diameter if m.part in rods else 0.0,
             burden=burden(m, anatomy, makes, field),
             scale=scene.objects[number].scale,
+            prescribed=scene.objects[number].path is not None,
         )
         for number, anatomy in enumerate(anatomies)
         for m in anatomy.members
@@ -206,6 +316,21 @@ def resolve(
     masses = [sum(makes[m.part].mass for m in a.members) for a in anatomies]
     moved = motions(scene, anatomies, masses, config.seed)
     return plan(ordered, moved, config.detail, config.stiffness)
+
+
+def thin_plates(
+    anatomies: list[Anatomy], makes: dict[int, Make], rods: dict[int, Rod], chosen: Plan, seed: int
+) -> dict[int, float]:
+    """Thickness of each solid part that bends and is a plate thinner than two cells [m]."""
+    found = {}
+    for member in (m for a in anatomies for m in a.members if m.part not in rods):
+        if chosen.treatments[member.part].kind != "deformable":
+            continue
+        rng = np.random.default_rng([seed, member.part, 6])
+        thickness = plate_thickness(member, makes[member.part], rng)
+        if 0 < thickness < 2 * chosen.cell:
+            found[member.part] = thickness
+    return found
 
 
 def closes_about(member: Member, made: Make) -> bool:
@@ -234,12 +359,13 @@ def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: i
     meshes = [a.everything for a in anatomies]
     heights = drop_heights(meshes, np.random.default_rng([seed, 2]))
     across, fall, forced = [], [], []
-    for k, (thing, height) in enumerate(zip(scene.objects, heights, strict=True)):
-        gained, strongest = driven(thing, anatomies[k], masses[k], scene.duration)
-        velocity = np.array(thing.velocity) + gained
+    for k, (obj, height) in enumerate(zip(scene.objects, heights, strict=True)):
+        drive = driven(obj, anatomies[k], masses[k], scene.duration)
+        velocity = np.array(obj.velocity) + drive.velocity
         across.append(velocity[:2])
-        fall.append(np.sqrt(velocity[2] ** 2 + 2 * gravity * height))
-        forced.append(strongest)
+        dropped = 0.0 if obj.path is not None else height
+        fall.append(np.sqrt(velocity[2] ** 2 + 2 * gravity * dropped))
+        forced.append(drive.acceleration)
     result = []
     for i in range(len(scene.objects)):
         speeds = [float(np.hypot(fall[i], np.linalg.norm(across[i])))]
@@ -251,26 +377,34 @@ def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: i
     return result
 
 
-def driven(
-    thing: SceneObject, anatomy: Anatomy, mass: float, duration: float
-) -> tuple[np.ndarray, float]:
-    """Velocity [m/s] that push and wind give a thing, and their largest acceleration [m/s²].
+@dataclass(frozen=True)
+class Drive:
+    """What push, wind or a path do to an object."""
 
-    The wind carries a thing no faster than itself.
-    """
+    velocity: Float[np.ndarray, " 3"]
+    """Gained at most [m/s]."""
+    acceleration: float
+    """Largest [m/s²]."""
+
+
+def driven(obj: SceneObject, anatomy: Anatomy, mass: float, duration: float) -> Drive:
+    """Estimate what push and wind do to an object: the wind carries it no faster than itself."""
     gained, strongest = np.zeros(3), 0.0
-    if thing.push is not None:
-        push = np.array(thing.push.acceleration)
-        gained += push * max(0.0, min(thing.push.end, duration) - thing.push.start)
+    if obj.path is not None:
+        reach = float(np.ptp(anatomy.everything.vertices, axis=0).max())
+        return Drive(fastest_velocity(obj.path, reach), 0.0)
+    if obj.push is not None:
+        push = np.array(obj.push.acceleration)
+        gained += push * max(0.0, min(obj.push.end, duration) - obj.push.start)
         strongest += float(np.linalg.norm(push))
-    if thing.wind is not None:
-        air = np.array(thing.wind.velocity) * (1.0 + thing.wind.gust)
-        shown = cross_section(anatomy, thing.wind.velocity)
-        blown = greatest_acceleration(thing.wind, shown, mass)
-        lasts = max(0.0, min(thing.wind.end, duration) - thing.wind.start)
+    if obj.wind is not None:
+        air = np.array(obj.wind.velocity) * (1.0 + obj.wind.gust)
+        shown = cross_section(anatomy, obj.wind.velocity)
+        blown = greatest_acceleration(obj.wind, shown, mass)
+        lasts = max(0.0, min(obj.wind.end, duration) - obj.wind.start)
         gained += air * min(1.0, blown * lasts / max(float(np.linalg.norm(air)), 1e-30))
         strongest += blown
-    return gained, strongest
+    return Drive(gained, strongest)
 
 
 def on_rings(recipe: Recipe, rod: Rod | None, treatment: Treatment, cell: float) -> Recipe:
@@ -317,11 +451,16 @@ def gather(
             columns["bearer"].append(first + bearer)
         first += len(packing.points)
     counts = [len(p.points) for p in packings]
-    velocity = np.array([o.velocity for o in scene.objects], dtype=np.float64).reshape(-1, 3)
+    velocity = [
+        start_velocity(o.path, underside(scene, k), p.points)
+        if o.path is not None
+        else np.broadcast_to(np.array(o.velocity, dtype=np.float64), p.points.shape)
+        for k, (o, p) in enumerate(zip(scene.objects, packings, strict=True))
+    ]
     part = np.concatenate([p.part for p in packings])
     return Particles(
         position=np.concatenate([p.points for p in packings]),
-        velocity=np.repeat(velocity, counts, axis=0),
+        velocity=np.concatenate(velocity),
         volume=np.concatenate(columns["volume"]),
         density=np.concatenate(columns["density"]),
         object=np.repeat(np.arange(len(packings)), counts),
@@ -333,7 +472,7 @@ def gather(
         face=np.concatenate([np.zeros((0, 3)), *columns["face"]]),
         particle_of_face=np.concatenate([np.zeros(0, np.int64), *columns["bearer"]]),
         mass_real=tuple(makes[k].mass for k in range(len(parts.catalogue))),
-        fills=describe(scene, parts, anatomies, makes, (chosen, part)),
+        fills=describe(scene, parts, anatomies, makes, chosen, part),
         walls=tuple((makes[k].thickness, makes[k].sheet) for k in range(len(parts.catalogue))),
         warnings=chosen.warnings,
     )
@@ -344,14 +483,14 @@ def describe(
     parts: Parts,
     anatomies: list[Anatomy],
     makes: dict[int, Make],
-    packed: tuple[Plan, np.ndarray],
+    chosen: Plan,
+    part_of_particle: Int[np.ndarray, " P"],
 ) -> tuple[str, ...]:
-    """One sentence per part; a second one where its thing is not life-size."""
-    chosen, part = packed
+    """One sentence per part; a second one where its object is not life-size."""
     members = {m.part: m for a in anatomies for m in a.members}
     sentences = []
     for k, entry in enumerate(parts.catalogue):
-        made, count = makes[k], int((part == k).sum())
+        made, count = makes[k], int((part_of_particle == k).sum())
         what = how_filled(members[k], made, chosen.treatments[k], chosen.cell)
         shared = f" It weighs what its pieces weigh: {'; '.join(made.pieces)}."
         sentences.append(

@@ -11,33 +11,32 @@ ray caster are fixed per pixel, so that nothing flickers.
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Float
 from PIL import Image
 
 from corporeal.errors import UserError, check_range
-from corporeal.geometry.harmonics import DC
+from corporeal.geometry.srgb import linear
 from corporeal.render import colours, key, video
-from corporeal.render.camera import Aim, camera_of, place
+from corporeal.render.camera import Aim, camera_of
+from corporeal.render.camera_track import Reel, Shot, first_contact, track
 from corporeal.render.embree import Stage, render
-from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, shades, si
-from corporeal.render.look import linear
-from corporeal.render.skin import Skin, bind, bind_points
+from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, row_of, shades, si
+from corporeal.render.pace import between, instants, is_slow
+from corporeal.render.skin import Skin, bind
 from corporeal.splats import raster
-from corporeal.splats.deform import deformed
 from corporeal.store import writing
+from corporeal.trajectory.moving_gaussians import MovingGaussians, granular, moving_gaussians
+from corporeal.trajectory.played import Played
 from corporeal.types import (
     Film,
     Frame,
     Gaussians,
-    Law,
-    MaterialField,
     Particles,
-    Parts,
     Scene,
     Trajectory,
     Vector,
@@ -45,6 +44,11 @@ from corporeal.types import (
 
 FILM = "film.mp4"
 THUMBNAIL = "thumbnail.png"
+CLOSE_UP = "close-up.png"
+STILL = (340, 256)
+"""Of the close-up [px]."""
+MOMENTS = (-0.03, 0.0, 0.02, 0.05, 0.12, 0.4)
+"""Pictures of the close-up, from the first contact on [s]."""
 LOOKS = 60
 """Frames that the camera's place is chosen by, at most."""
 STRAYS = 0.4
@@ -52,108 +56,137 @@ STRAYS = 0.4
 NEAR = 0.1
 """Gaussians nearer than this share of the way to the scene are haze, and not drawn."""
 FAR = 2.5
-"""Sizes of the scene beyond which the camera lets things go."""
+"""Sizes of the scene beyond which the camera lets objects go."""
 
 Progress = Callable[[float, str], None]
 
 
 @dataclass(frozen=True)
 class FilmConfig:
-    """How the film is taken."""
+    """Camera, size and quality of the film."""
 
     width: int = 640
     """[px]"""
     height: int = 480
     """[px]"""
     quality: Literal["draft", "normal", "fine"] = "draft"
-    """How many rays: about 1, 2 and 6 CPU seconds a picture of 640 × 480."""
+    """Rays per pixel: about 1, 2 and 6 CPU seconds for a frame of 640 × 480."""
     speed: float = 1.0
-    """1: as fast as in life; 0.25: four times slower."""
+    """Playback speed; 1: real time, 0.25: four times slower."""
     view: Vector | None = None
-    """From where to look, as a direction; None: where things hide each other least."""
+    """Direction from the scene to the camera; None: where objects occlude each other least."""
     stills: bool = False
-    """Keep every picture as PNG too."""
+    """Also keep every frame as PNG."""
     look: Literal["surfaces", "gaussians"] | None = None
-    """What is drawn; None: Gaussians where the scene was made of them."""
+    """What is rendered; None: Gaussians where the scene was reconstructed, else surfaces."""
     colour_by: Literal["itself", "speed"] | Quantity = "itself"
-    """What the colours of things tell, with a key in the corner."""
+    """Quantity shown by colour, with a colour bar; itself: the objects' own colours."""
+    shot: Shot = "wide"
+    """wide: everything, all the time; close: what is struck first, or moves most; follow: the
+    camera goes along with what moves."""
+    slow: float = 1.0
+    """How many times slower the film is about the first contact."""
+    caption: bool = True
+    """Write the time into the picture."""
 
 
 DEFAULT = FilmConfig()
 SLOWEST, FASTEST = 0.01, 100.0
+MOST_SLOWED = 100.0
 
 
-def accept(config: FilmConfig) -> None:
+def validate(config: FilmConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scene."""
     video.check_size(config.width, config.height)
     check_range("--speed", config.speed, SLOWEST, FASTEST)
+    check_range("--slow", config.slow, 1.0, MOST_SLOWED)
     if config.view is not None and not 0 < float(np.linalg.norm(config.view)) < np.inf:
-        told = " ".join(f"{x:g}" for x in config.view)
-        raise UserError(f"--view is {told}, which is no direction. Give one, for example 1 -1 0.5.")
+        given = " ".join(f"{x:g}" for x in config.view)
+        raise UserError(f"--view is {given}, which is no direction. Give one: --view 1 -1 0.5.")
 
 
-def film(  # noqa: PLR0913
-    scene: Scene,
-    parts: Parts,
-    particles: Particles,
-    field: MaterialField,
-    trajectory: Trajectory,
+def film(
+    played: Played,
     config: FilmConfig,
     folder: Path,
     progress: Progress = lambda fraction, words: None,
-    gaussians: Gaussians | None = None,
-    object_of_gaussian: Int[np.ndarray, " N"] | None = None,
 ) -> Film:
     """Write ``film.mp4`` and ``thumbnail.png``: what the scene looks like follows the particles.
 
     Args:
-        scene: What is to be seen.
-        parts: Which part each triangle belongs to.
-        particles: What the surfaces are bound to, at the start.
-        field: Says which parts are granular; their surfaces follow positions more than stretch.
-        trajectory: Where the particles go.
+        played: What is to be seen: surfaces, or Gaussians where the scene was made of them, bound
+            to material points at the start; those of no object stand still.
         config: Size, quality, view.
         folder: Where the film goes.
         progress: Told the fraction done and what is going on.
-        gaussians: What the scene was made of, where it was made of Gaussians.
-        object_of_gaussian: Which object each belongs to; -1: floor or background, standing still.
 
     Raises:
         UserError: There is nothing to show, Gaussians are asked for and there are none, the disk
             is full, or the encoder fails.
 
     """
-    count = len(trajectory.frames)
+    prepared, trajectory = played.prepared, played.trajectory
+    scene, count = prepared.scene, len(trajectory.frames)
     if count == 0:
         raise UserError(f"{trajectory.folder} holds no frames. Run corporeal simulate again.")
     progress(0.0, "placing the camera")
-    skin = bind(scene, parts, particles, granular(field))
-    camera = watch(skin, scene, particles, trajectory, config)
-    fps = max(round(scene.fps * config.speed), 1)
+    skin = bind(scene, prepared.parts, prepared.particles, granular(prepared.field))
+    reel = reel_of(skin, scene, prepared.particles, trajectory)
     size = config.width, config.height
+    camera = track(config.shot, reel, size, config.view)
+    fps = max(round(scene.fps * config.speed), 1)
     credit = "; ".join(dict.fromkeys(o.credit for o in scene.objects if o.credit))
-    puppet = _puppet(config, gaussians, object_of_gaussian, particles, granular(field))
-    paint = _paint(config.colour_by, scene, parts, particles, field, trajectory)
-    troupe = _Troupe(Stage(scene), skin, puppet, paint)
-    with video.reel(folder / FILM, fps, size, credit) as reel:
-        for number, scenery in enumerate(_sceneries(troupe, trajectory)):
-            picture = scenery.picture(camera, config.quality)
+    paint = _paint(config.colour_by, played)
+    troupe = _Troupe(Stage(scene), skin, _puppet(config, played), paint)
+    about = None if reel.contact is None else reel.contact.time
+    places = instants(trajectory.time, config.slow, about)
+    times = []
+    with video.reel(folder / FILM, fps, size, credit) as made:
+        for number, scenery in enumerate(_sceneries(troupe, trajectory, places)):
+            picture = scenery.picture(camera.at(scenery.time), config.quality)
             picture = picture if paint is None else paint.keyed(picture)
-            reel.add(picture)
-            _keep(picture, number, count, config, folder)
-            progress((number + 1) / count, f"frame {number + 1} of {count}")
-    return Film(folder / FILM, fps, *size)
+            _keep(picture, number, len(places), config, folder)
+            times.append(scenery.time)
+            made.add(captioned(picture, scenery.time, config, about))
+            progress((number + 1) / len(places), f"frame {number + 1} of {len(places)}")
+    _close_up(troupe, reel, trajectory, config, folder)
+    return Film(folder / FILM, fps, *size, times=tuple(times))
 
 
-def granular(field: MaterialField) -> np.ndarray:
-    """Which parts are made of grains."""
-    return np.array([m.law is Law.DRUCKER_PRAGER for m in field.materials], dtype=bool)
+def _close_up(
+    troupe: "_Troupe", reel: Reel, trajectory: Trajectory, config: FilmConfig, folder: Path
+) -> None:
+    """Draw the first contact from close by as a row of pictures; none where nothing touches."""
+    if reel.contact is None:
+        return
+    camera = track("close", reel, STILL, config.view)
+    last = float(trajectory.time[-1])
+    times = np.unique([min(max(reel.contact.time + s, 0.0), last) for s in MOMENTS])
+    places = np.interp(times, trajectory.time, np.arange(len(trajectory.time)))
+    pictures = [
+        scenery.picture(camera.at(scenery.time), config.quality)
+        for scenery in _sceneries(troupe, trajectory, places)
+    ]
+    row_of(pictures, [f"{t:.3f} s" for t in times.tolist()], folder / CLOSE_UP)
 
 
-def watch(
-    skin: Skin, scene: Scene, particles: Particles, trajectory: Trajectory, config: FilmConfig
-) -> Aim:
-    """Place one camera for the whole motion."""
+def captioned(
+    picture: np.ndarray, time: float, config: FilmConfig, about: float | None
+) -> np.ndarray:
+    """Write the time [s] into a picture, and that the film is slow there."""
+    if not config.caption:
+        return picture
+    slower = config.slow / config.speed if is_slow(time, about) else 1.0 / config.speed
+    words = f"{time:.2f} s"
+    if slower > 1.0:
+        words += f"  slowed {slower:.3g} times"
+    elif slower < 1.0:
+        words += f"  {1.0 / slower:.3g} times as fast"
+    return key.caption(picture, words)
+
+
+def reel_of(skin: Skin, scene: Scene, particles: Particles, trajectory: Trajectory) -> Reel:
+    """Return what moves, for the camera: boxes of the start's surfaces, then of particles."""
     count = len(trajectory.frames)
     numbers = np.unique(np.linspace(0, count - 1, min(count, LOOKS)).round().astype(int))
     boxes = [_surface_boxes(skin, scene)]
@@ -161,7 +194,9 @@ def watch(
         _boxes(trajectory.frames[int(k)].position, particles.object, len(scene.objects))
         for k in numbers
     ]
-    return place(_near(np.array(boxes)), (config.width, config.height), config.view)
+    time = np.concatenate([trajectory.time[:1], trajectory.time[numbers]])
+    contact = first_contact(trajectory.ledger, len(scene.objects))
+    return Reel(time, _near(np.array(boxes)), contact)
 
 
 def _boxes(points: np.ndarray, owner: np.ndarray, objects: int) -> np.ndarray:
@@ -205,6 +240,8 @@ class _Scenery:
 
     stage: Stage
     gaussians: Gaussians | None
+    time: float
+    """[s]"""
 
     def picture(self, camera: Aim, quality: Literal["draft", "normal", "fine"]) -> np.ndarray:
         behind = render(self.stage, camera, quality)
@@ -216,52 +253,16 @@ class _Scenery:
         return np.clip(255 * front.rgb + through + 0.5, 0, 255).astype(np.uint8)
 
 
-@dataclass(frozen=True)
-class _Puppet:
-    """Gaussians that follow particles; those of no object stand still."""
-
-    gaussians: Gaussians
-    moving: Int[np.ndarray, " M"]
-    skin: Skin
-    """Of those that move."""
-
-    def at(self, frame: Frame, colour: np.ndarray | None) -> Gaussians:
-        """Return all Gaussians at one instant; colour: of every particle, (P, 3) sRGB."""
-        g, names = self.gaussians, ("mean", "rotation", "scale", "opacity", "sh")
-        place, F = self.skin.carried(frame)
-        moved = deformed(replace(g, **{n: getattr(g, n)[self.moving] for n in names}), F, place)
-        if colour is not None:
-            moved = replace(moved, sh=_flat(moved.sh, colour[self.skin.near[:, 0]]))
-        arrays = {n: getattr(g, n).copy() for n in names}
-        for name, values in arrays.items():
-            values[self.moving] = getattr(moved, name)
-        return replace(g, **arrays)
-
-
-def _flat(sh: np.ndarray, colour: np.ndarray) -> np.ndarray:
-    """Return coefficients of colours that are the same from all sides."""
-    out = np.zeros_like(sh)
-    out[:, 0] = (colour - 0.5) / DC
-    return out
-
-
-def _puppet(
-    config: FilmConfig,
-    gaussians: Gaussians | None,
-    owner: np.ndarray | None,
-    particles: Particles,
-    loose: np.ndarray,
-) -> _Puppet | None:
-    if config.look == "surfaces" or (config.look is None and gaussians is None):
+def _puppet(config: FilmConfig, played: Played) -> MovingGaussians | None:
+    found = played.reconstruction
+    if config.look == "surfaces" or (config.look is None and found is None):
         return None
-    if gaussians is None or owner is None:
+    if found is None:
         raise UserError(
             "This scene was made of surfaces and has no Gaussians to be filmed. "
             "Film it with look 'surfaces', or run it from photographs or a splat."
         )
-    moving = np.flatnonzero(owner >= 0)
-    skin = bind_points(gaussians.mean[moving], owner[moving], particles, loose)
-    return _Puppet(gaussians, moving, skin)
+    return moving_gaussians(found, played.prepared)
 
 
 @dataclass(frozen=True)
@@ -286,18 +287,12 @@ class _Paint:
         """Say in the picture what the colours mean."""
         p = self.panel
         if isinstance(p, Names):
-            return key.names(picture, p.title, list(zip(p.label, p.colour, strict=True)))
+            return key.names(picture, p.title, p.label, p.colour)
         return key.scale(picture, p.title, *(si(f(p.value), p.unit) for f in (min, max)))
 
 
-def _paint(
-    colour_by: Literal["itself", "speed"] | Quantity,
-    scene: Scene,
-    parts: Parts,
-    particles: Particles,
-    field: MaterialField,
-    trajectory: Trajectory,
-) -> _Paint | None:
+def _paint(colour_by: Literal["itself", "speed"] | Quantity, played: Played) -> _Paint | None:
+    prepared, trajectory = played.prepared, played.trajectory
     if colour_by == "itself":
         return None
     if colour_by == "speed":
@@ -305,8 +300,8 @@ def _paint(
         some = np.unique(np.linspace(0, count - 1, min(count, LOOKS)).round().astype(int))
         top = max(float(np.percentile(speeds(trajectory, int(k)), 99.5)) for k in some)
         return _Paint(Numbers("Speed", "m/s", [0.0, top]), None, trajectory, max(top, 1e-9))
-    panel = panels(scene, parts, field)[colour_by]
-    return _Paint(panel, shades(panel)[particles.part], trajectory)
+    panel = panels(prepared.scene, prepared.parts, prepared.field)[colour_by]
+    return _Paint(panel, shades(panel)[prepared.particles.part], trajectory)
 
 
 def speeds(trajectory: Trajectory, number: int) -> Float[np.ndarray, " P"]:
@@ -326,38 +321,50 @@ class _Troupe:
 
     stage: Stage
     skin: Skin
-    puppet: _Puppet | None
+    puppet: MovingGaussians | None
     paint: _Paint | None
 
     def at(self, number: int, frame: Frame) -> _Scenery:
         stage = self.stage.posed(*self.skin.pose(frame))
         colour = None if self.paint is None else self.paint.at(number)
         if self.puppet is not None:
-            return _Scenery(stage.shadows(), self.puppet.at(frame, colour))
+            return _Scenery(stage.shadows(), self.puppet.at(frame, colour), frame.time)
         if colour is not None:
             nearest = self.skin.near[self.stage.look.triangles[:, 0], 0]
             stage = stage.painted(linear(colour[nearest]), PAPER)
-        return _Scenery(stage, None)
+        return _Scenery(stage, None, frame.time)
 
 
-def _sceneries(troupe: _Troupe, trajectory: Trajectory) -> Iterator[_Scenery]:
-    """Every frame's scenery in order; the next one is made ready while one is drawn."""
+def _sceneries(
+    troupe: _Troupe, trajectory: Trajectory, places: Float[np.ndarray, " N"]
+) -> Iterator[_Scenery]:
+    """Every picture's scenery in order; the next one is made ready while one is drawn.
 
-    def ready(number: int) -> _Scenery:
-        return troupe.at(number, trajectory.frames[number])
+    Args:
+        troupe: All that moves.
+        trajectory: How.
+        places: Of the pictures among the frames: see ``render.pace``.
 
-    count = len(trajectory.frames)
+    """
+
+    def ready(place: float) -> _Scenery:
+        first = int(place)
+        frame = trajectory.frames[first]
+        if place > first:
+            frame = between(frame, trajectory.frames[first + 1], place - first)
+        return troupe.at(round(place), frame)
+
     with ThreadPoolExecutor(1) as ahead:
-        coming = ahead.submit(ready, 0)
-        for number in range(count):
+        coming = ahead.submit(ready, float(places[0]))
+        for number in range(len(places)):
             current = coming.result()
-            if number + 1 < count:
-                coming = ahead.submit(ready, number + 1)
+            if number + 1 < len(places):
+                coming = ahead.submit(ready, float(places[number + 1]))
             yield current
 
 
 def _keep(picture: np.ndarray, number: int, count: int, config: FilmConfig, folder: Path) -> None:
-    """Save the thumbnail (two thirds through, when things have met) and the stills asked for."""
+    """Save the thumbnail (two thirds through, when objects have met) and the stills asked for."""
     names = [f"stills/{number:05d}.png"] if config.stills else []
     names += [THUMBNAIL] if number == (2 * (count - 1)) // 3 else []
     for name in names:

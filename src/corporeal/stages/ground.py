@@ -8,17 +8,19 @@ from corporeal import materials
 from corporeal.errors import UserError
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
+from corporeal.materials.inflated import air_bears, sealed_air
 from corporeal.materials.placement import CONTENTS, entry_of, held
 from corporeal.materials.scale import place
+from corporeal.mpm.laws import MENU
 from corporeal.types import (
     Ground,
     Inventory,
-    Law,
     Material,
     MaterialField,
     Parts,
     PartWords,
     Piece,
+    Range,
     Scene,
     Structure,
 )
@@ -45,10 +47,18 @@ SAID = {
     "unknown": "It is assumed",
 }
 """Who said how a part is built."""
+WALLS = {
+    "shell": "has a wall",
+    "sheet": "is a wall formed into something open",
+    "hollow": "is a closed wall with air behind it",
+    "filled": "has a wall",
+}
+"""What is said of what has one."""
 PUT = {
     "annotation": "Your annotation puts",
     "recording": "A recorded answer puts",
     "model": "A model puts",
+    "evidence": "What was said of its mass puts",
 }
 """Who chose a wall's thickness."""
 UNFIT = "It does not fit the others:"
@@ -75,7 +85,10 @@ def ground(
     surfaces, bodies = [*entries, floor], [*made, floor.pick(floor.typical())]
     return MaterialField(
         materials=made,
-        structures=tuple(_structure(m, w, config) for m, w in zip(made, words, strict=True)),
+        structures=tuple(
+            with_air(_structure(m, w, config), m, w, radius(scene, part.object))
+            for m, w, part in zip(made, words, parts.catalogue, strict=True)
+        ),
         words=words,
         friction=_matrix(len(bodies), lambda a, b: _friction(surfaces, bodies, a, b)),
         restitution=_matrix(
@@ -120,7 +133,7 @@ def _words(inventory: Inventory, number: int, name: str) -> PartWords:
     raise UserError(f"The description has no part {name!r}. Describe the scene again.")
 
 
-def accept(config: GroundConfig) -> None:
+def validate(config: GroundConfig) -> None:
     """Raise UserError where a material is unknown, or cannot be what it is to be."""
     entry_of(config.floor, config.library)
     if entry_of(config.neutral, config.library).group == "liquid":
@@ -129,10 +142,10 @@ def accept(config: GroundConfig) -> None:
 
 def _entry(words: PartWords, config: GroundConfig) -> Entry:
     entry = entry_of(words.material or config.neutral, config.library)
-    if entry.group == "liquid":
+    if entry.group == "liquid" and not MENU[entry.law].liquid:
         raise UserError(
-            f"{words.name} is said to be made of {entry.name}, a liquid, for which there is no law "
-            "of flow. Say what holds it, with structure: filled and contents: "
+            f"{words.name} is said to be made of {entry.name}, a liquid, for which its library has "
+            "no law of flow. Say what holds it, with structure: filled and contents: "
             f"{entry.name}."
         )
     return entry
@@ -143,6 +156,9 @@ def _entry(words: PartWords, config: GroundConfig) -> Entry:
 
 def _material(entry: Entry, words: PartWords) -> Material:
     grounds = _placed(entry, words)
+    for field, said in words.stated.items():
+        if field in entry.ranges:
+            grounds[field] = _from_file(said, entry.ranges[field])
     for field, value in words.values.items():
         allowed = entry.ranges.get(field)
         if allowed is None:
@@ -154,6 +170,19 @@ def _material(entry: Entry, words: PartWords) -> Material:
         reason = f"{grounds[field].reason} {UNFIT} {clause}."
         grounds[field] = replace(grounds[field], reason=reason)
     return entry.pick(grounds)
+
+
+def _from_file(said: Ground, measured: Range) -> Ground:
+    """Believe a number of the scene's file: in the range that the file names, from its source.
+
+    A file of ours names the library's range, and then that is it.
+    """
+    if (said.range.low, said.range.high) == (measured.low, measured.high):
+        return replace(said, range=measured)
+    if said.value in measured or said.range.low < said.range.high:
+        return said
+    span = f"{measured.low:.4g} to {measured.high:.4g}"
+    return replace(said, reason=f"{said.reason}. {UNFIT} measured values are {span}.")
 
 
 def _placed(entry: Entry, words: PartWords) -> dict[str, Ground]:
@@ -189,14 +218,19 @@ def _piece(words: PartWords, config: GroundConfig) -> Piece:
 def _structure(material: Material, words: PartWords, config: GroundConfig) -> Structure:
     if words.structure == "solid":
         return Structure("solid", None, f"{SAID[words.built_by]} that it is solid.")
+    if words.structure == "packed":
+        share = words.solidity or 1.0
+        said = f"{SAID[words.built_by]} that it is packed: {share:.0%} of its shape is matter."
+        return Structure("solid", None, said, solidity=share)
     if words.structure is None:
         return Structure("solid", None, "How it is built is not said: the shape decides.")
     if not (words.material or words.thickness or material.shell_thickness):
         said = f"It is said to be a {words.structure} of unknown material"
         return Structure("solid", None, f"{said}; of {material.name} none are: the shape decides.")
-    thickness, reason = _wall(material, words)
-    reason = f"{SAID[words.built_by]} that it has a wall. {reason}"
-    if words.structure == "shell":
+    wall = _wall(material, words)
+    thickness, reason = wall.thickness, wall.reason
+    reason = f"{SAID[words.built_by]} that it {WALLS[words.structure]}. {reason}"
+    if words.structure != "filled":
         return Structure("shell", thickness, reason)
     if words.contents is None:
         raise UserError(
@@ -211,6 +245,34 @@ def _structure(material: Material, words: PartWords, config: GroundConfig) -> St
     return Structure("filled", thickness, reason, inner, fill, loose=_flows(inside))
 
 
+def radius(scene: Scene, number: int) -> float:
+    """Half of the middle extent of a real object [m]: the radius of a ball."""
+    points = np.concatenate([s.vertices for s in scene.surfaces if s.object == number])
+    return 0.5 * float(np.median(np.ptp(points, axis=0))) / scene.objects[number].scale
+
+
+def with_air(
+    structure: Structure, material: Material, words: PartWords, radius: float
+) -> Structure:
+    """Put sealed air behind a wall that dents more easily than the air is pressed.
+
+    Args:
+        structure: How the part is built.
+        material: Of its wall.
+        words: What was said of it.
+        radius: Of the object [m].
+
+    """
+    gauge = words.inflation
+    if structure.kind != "shell" or structure.thickness is None or gauge is None:
+        return structure
+    said = f"{structure.reason} Air at {gauge / 1e3:.3g} kPa above its surroundings is sealed in it"
+    if not air_bears(gauge, material, structure.thickness, radius):
+        return replace(structure, reason=f"{said}, which dents it less than its wall resists.")
+    reason = f"{said}: it bounces as a soft solid, nine times as stiff as the pressure."
+    return Structure("filled", structure.thickness, reason, sealed_air(gauge), 1.0, inflated=True)
+
+
 def _inner_grounds(inside: Entry, words: PartWords) -> dict[str, Ground]:
     grounds = _usual(inside, words)
     chosen = words.placements.get(CONTENTS)
@@ -221,17 +283,26 @@ def _inner_grounds(inside: Entry, words: PartWords) -> dict[str, Ground]:
     return grounds
 
 
-def _wall(material: Material, words: PartWords) -> tuple[float, str]:
+@dataclass(frozen=True)
+class _Wall:
+    """How thick a wall is, and why."""
+
+    thickness: float
+    """[m]"""
+    reason: str
+
+
+def _wall(material: Material, words: PartWords) -> _Wall:
     if words.thickness:
-        return words.thickness, f"Its thickness, {_mm(words.thickness)} mm, is stated."
+        return _Wall(words.thickness, f"Its thickness, {_mm(words.thickness)} mm, is stated.")
     if material.shell_thickness:
         ground = material.grounds["shell_thickness"]
-        said = f"{_mm(ground.value)} mm, in the range of {material.name}: " + " to ".join(
+        where = f"{_mm(ground.value)} mm, in the range of {material.name}: " + " to ".join(
             (_mm(ground.range.low), f"{_mm(ground.range.high)} mm.")
         )
         if ground.chosen_by in PUT:
-            return ground.value, f"{PUT[ground.chosen_by]} its thickness at {said}"
-        return ground.value, f"Its thickness, unless its mesh shows it, is the usual {said}"
+            return _Wall(ground.value, f"{PUT[ground.chosen_by]} its thickness at {where}")
+        return _Wall(ground.value, f"Its thickness, unless its mesh shows it, is the usual {where}")
     raise UserError(
         f"{words.name} is said to be a {words.structure or 'shell'} of {material.name}, but how "
         "thin its wall is is not known. Give thickness_mm in the annotation file."
@@ -243,7 +314,7 @@ def _mm(metres: float) -> str:
 
 
 def _flows(entry: Entry) -> bool:
-    return entry.group == "liquid" or entry.law is Law.DRUCKER_PRAGER
+    return entry.group == "liquid" or MENU[entry.law].granular
 
 
 # ---------------------------------------------------------------- pairs

@@ -4,6 +4,7 @@ What comes out is a scene of objects like any other, which ``assemble`` reads as
 Gaussians themselves, for the film and for telling parts apart.
 """
 
+import tempfile
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from functools import cache, cached_property
@@ -11,47 +12,49 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError, check_range
 from corporeal.features import Reader, connect
-from corporeal.features.clouds import Placed, looked_at, projected
+from corporeal.features.clouds import Placed, projected, with_features
 from corporeal.features.descriptor import LET_THROUGH, seen_from
 from corporeal.features.lifting import Lifted, known, uplift
 from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
-from corporeal.formats.sources import called
+from corporeal.formats.sources import called, kind_of, unposed
 from corporeal.formats.words import safe
 from corporeal.geometry.extent import oriented_size
-from corporeal.geometry.gaussians import LARGEST
+from corporeal.geometry.gaussians import LARGEST, AskedUp
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
 from corporeal.geometry.metric import MetricScale, TwoPoints, measured
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
+from corporeal.geometry.srgb import linear
+from corporeal.poses.pose import POSES, Posed, pose
+from corporeal.regions.instance_assignment import Rule, assign_instances
 from corporeal.regions.masks import lifted
 from corporeal.regions.match import match
-from corporeal.regions.telling import Rule, told_apart
 from corporeal.render.camera import cameras_around
-from corporeal.render.look import linear
 from corporeal.render.portrait import COLOURS, colour_of_part
-from corporeal.splats import lesson
-from corporeal.splats.channel import distilled
+from corporeal.splats import training_schedule
 from corporeal.splats.closed import Closed, closed
-from corporeal.splats.crew import Crew
+from corporeal.splats.depth_rendering import render_depth
+from corporeal.splats.feature_distillation import distilled
 from corporeal.splats.field_points import field_points
 from corporeal.splats.foreground import Shown, foreground, shown
-from corporeal.splats.intake import Intake, Up, take_in, turned_upright
-from corporeal.splats.lesson import TrainConfig
+from corporeal.splats.intake import Intake, take_in, turned_upright
 from corporeal.splats.radiance import FieldConfig
 from corporeal.splats.raster import weights
-from corporeal.splats.sight import looked
 from corporeal.splats.solid import Solid
+from corporeal.splats.thread_pool import ThreadPool
+from corporeal.splats.training_schedule import TrainConfig
+from corporeal.splats.worth import not_worth
 from corporeal.types import Cloud, Finish, Reconstruction, Scene, SceneObject, Surface
-from corporeal.vlm.things import (
+from corporeal.vlm.seen_objects import (
     PERSON,
     UNKNOWN,
-    Thing,
+    SeenObject,
     Viewer,
     check_extents,
     metres,
@@ -74,42 +77,48 @@ AROUND = 16
 GREY = (0.2, 0.2, 0.2)
 """Linear RGB of what is nobody's, in painted pictures."""
 NOBODY = Viewer("", "metadata")
+POSED = 0.5
+"""Share of learning from pictures that is done when poses that nobody gave are found."""
 TRAINED, LOOKED, FOUND = 0.75, 0.85, 0.9
 """Share of the work that is done after each step."""
 
 
 @dataclass(frozen=True)
 class ReconstructConfig:
-    """How pictures, or a splat, become objects. Says nothing where the input is a model."""
+    """Reconstruction from photographs or a splat; of a model only ``up`` is used."""
 
     things: tuple[str, ...] = ()
-    """What the objects are, the largest first, such as "armchair" "soda can"."""
+    """Names of the objects, the largest first, such as "armchair" "soda can"."""
     count: int | None = None
-    """How many objects there are; by default as many as --things names, else it is estimated."""
+    """Number of objects; by default as many as --things names, else it is estimated."""
     apart: Rule = "auto"
-    """What tells objects apart; auto: instance masks where there are any, else look and folds."""
-    up: Up = "auto"
-    """Which axis of the file points up; auto: what the file or the cameras say."""
+    """What objects are segmented by; auto: instance masks where there are any, else appearance
+    features and concavity (look)."""
+    up: AskedUp = "auto"
+    """Axis of the file that points up, also of a mesh; auto: from the file or the cameras."""
     floor_at: float | None = None
-    """Height of the floor along up, in the file's unit; by default a plane is looked for, and where
-    there is none things are put onto the floor."""
+    """Height of the floor along the up axis, in the file's unit; by default a plane is fitted, or,
+    where there is none, the floor is put below the lowest object."""
     metres_per_unit: float | None = None
-    """What one unit of the file is [m]; by default sizes of things say it."""
+    """Length of one unit of the file [m]; by default it follows from the sizes of the objects."""
     known_distance: TwoPoints | None = None
     """Two points of the file, x y z x y z, and their true distance [m]."""
-    training: Literal["draft", "normal"] = "normal"
-    """How long Gaussians are learned from photographs: one minute or four on two cores."""
+    training: Literal["preview", "draft", "normal"] = "normal"
+    """Length of training on photographs: seconds, about one minute, or four, on two cores."""
     rasteriser: Literal["numba", "gsplat"] = "numba"
-    """Where pictures are drawn while learning: on the processor, or on a card with CUDA."""
+    """Rasteriser for training: numba on the processor, or gsplat on a CUDA card."""
     semantic: str = "descriptor"
-    """What tells what a point is: "clip", "clip:FOLDER", or "descriptor", which needs no model."""
+    """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which
+    needs no weights."""
     structural: str = "descriptor"
-    """What tells which part a point is of: "dinov2", "dinov2:FOLDER", or "descriptor"."""
+    """Features that parts are segmented by: "dinov2", "dinov2:FOLDER", or "descriptor"."""
     lifting: Literal["uplift", "back-projection", "radiance"] = "uplift"
-    """How what pictures look like comes onto points: onto Gaussians, by the weights that they are
-    drawn with, or by where they fall; or onto points of a radiance field that is learned, too."""
+    """How image features are lifted to points: to Gaussians by their blending weights (uplift) or
+    by back-projection, or to points of a radiance field, which is then trained as well."""
+    force: bool = False
+    """Continue where objects are as large as the room, or photographs are reproduced badly."""
     training_seed: int = 0
-    """Of everything that is left to chance."""
+    """Seed of all random numbers."""
 
 
 DEFAULT = ReconstructConfig()
@@ -132,9 +141,25 @@ class _Found:
         return len(self.solids)
 
     @cached_property
+    def boxes(self) -> Float[np.ndarray, "K 2 3"]:
+        """Low and high corner of each one's surface, in the file's unit."""
+        corners = [solid.vertices for solid in self.solids]
+        return np.array([[v.min(axis=0), v.max(axis=0)] for v in corners])
+
+    @cached_property
     def extents(self) -> list[float]:
-        """Longest side of each one's box, in the file's unit, whichever way the thing is turned."""
+        """Longest side of each one's oriented bounding box, in the file's unit."""
         return [oriented_size(solid.vertices)[2] for solid in self.solids]
+
+
+@dataclass(frozen=True)
+class Reconstructed:
+    """What was found in pictures or in a splat."""
+
+    found: Reconstruction
+    """Gaussians, and points with features."""
+    scene: Scene
+    """Every object with one closed, coloured surface."""
 
 
 def reconstruct(
@@ -144,54 +169,86 @@ def reconstruct(
     viewer: Viewer = NOBODY,
     folder: Path | None = None,
     progress: Progress = lambda fraction, words: None,
-) -> tuple[Reconstruction, Scene]:
+) -> Reconstructed:
     """Find the objects of a scene in photographs, or in a splat.
 
     Args:
-        source: A folder of photographs with poses, or a splat.
+        source: A folder of photographs, a film, or a splat.
         config: How.
         extents: Real largest extents, such as "duck=0.1" [m].
         viewer: Who is asked what the pictures show, where ``config.things`` does not say it.
         folder: Where an interrupted training, and maps of learned features, are kept.
         progress: Told the fraction done and what is being done.
 
-    Returns:
-        What was found, and the scene: every object with one closed, coloured surface.
-
     Raises:
         UserError: The input cannot be used, holds nothing that could be an object, or an option
             does not fit it.
 
     """
-    accept(config, extents, asked=viewer.model is not None)
-    training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
-    kept = None if folder is None else folder / "training.npz"
-    learning = _within(progress, 0.0, TRAINED)
-    taken = take_in(source, training, kept, learning, config.apart == "masks")
+    validate(config, extents, asked=viewer.model is not None)
+    # Gaussians: trained on photographs or read, upright, with cameras to look from.
+    taken = _taken(source, config, folder, _within(progress, 0.0, TRAINED))
+    masked = taken.masks is not None
     taken = turned_upright(taken, config.up, config.floor_at)
+    photographers = taken.cameras
     if not taken.cameras:
         taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
-    progress(TRAINED, "telling things from the background")
-    seen, of_things = _of_things(source, taken)
-    placed = _placed(taken, seen, of_things, config, folder, _within(progress, TRAINED, LOOKED))
+    # Points of the foreground, with features of what the pictures show.
+    progress(TRAINED, "segmenting foreground from background")
+    front = _foreground(source, taken)
+    placed = _placed(
+        taken, front.shown, front.on_objects, config, folder, _within(progress, TRAINED, LOOKED)
+    )
     specs, maps = (config.semantic, config.structural), None if folder is None else folder / "maps"
-    cloud = looked_at(placed, taken.pictures, specs, maps)
+    cloud = with_features(placed, taken.pictures, specs, maps)
+    # Objects among them.
     progress(LOOKED, "finding objects")
     wanted = _wanted(config, viewer, taken)
     normal = normals(cloud.position, neighbours(cloud.position, AROUND), placed.outside)
-    count, drawn = config.count or len(wanted) or None, _drawn(taken, cloud, of_things)
-    split = told_apart(cloud, config.apart, count, normal, drawn)
+    count, drawn = config.count or len(wanted) or None, _drawn(taken, cloud, front.on_objects)
+    split = assign_instances(cloud, config.apart, count, normal, drawn)
+    # One closed surface for each object.
     progress(FOUND, "closing surfaces")
-    found = _Found(taken, cloud, closed(taken, of_things, cloud.position, split.object_of_point))
-    things = _recognised(wanted, found, config, viewer)
-    names = names_of(things)
+    found = _Found(
+        taken, cloud, closed(taken, front.on_objects, cloud.position, split.object_of_point)
+    )
+    if not config.force and (why := not_worth(found.boxes, photographers, masked, taken.quality)):
+        raise UserError(f"{source}: {why}")
+    # What they are, and so their names and their size in metres.
+    objects = _recognised(wanted, found, config, viewer)
+    names = names_of(objects)
     sizes = dict(zip(names, found.extents, strict=True))
-    scale = metres(sizes, things, extents, _measured(config), taken.z_up)
+    scale = metres(sizes, objects, extents, _measured(config), taken.z_up)
     warnings = [*taken.warnings, *split.warnings, *viewer.asked().warnings, *scale.warnings]
     warnings += [f"{n}: {w}" for n, s in zip(names, found.solids, strict=True) for w in s.warnings]
-    said = (*taken.statements, *placed.statements, split.statement, scale.reason)
-    result = _in_metres(found, names, scale, said, tuple(dict.fromkeys(warnings)))
-    return result, _scene(source, found, names, things, scale)
+    statements = (*taken.statements, *placed.statements, split.statement, scale.reason)
+    result = _in_metres(found, names, scale, statements, tuple(dict.fromkeys(warnings)))
+    return Reconstructed(result, _scene(source, found, names, objects, scale))
+
+
+def _taken(
+    source: Path, config: ReconstructConfig, folder: Path | None, progress: Progress
+) -> Intake:
+    """Read a splat, or learn Gaussians from pictures, whose poses are found if nobody gave any."""
+    training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
+    kept = None if folder is None else folder / "training.npz"
+    posed, instances = _posed(source, folder, progress), config.apart == "masks"
+    if posed is None:
+        return take_in(source, training, kept, progress, instances)
+    taken = take_in(posed.folder, training, kept, _within(progress, POSED, 1.0), instances)
+    return replace(
+        taken,
+        statements=(*posed.statements, *taken.statements),
+        warnings=(*posed.warnings, *taken.warnings),
+    )
+
+
+def _posed(source: Path, folder: Path | None, progress: Progress) -> Posed | None:
+    """Find where pictures were taken from; None: that is known, or there are none."""
+    if kind_of([source]) != "photographs" or not unposed(source):
+        return None
+    place = Path(tempfile.mkdtemp(prefix="corporeal-")) if folder is None else folder
+    return pose(source, place / POSES, _within(progress, 0.0, POSED))
 
 
 def _within(progress: Progress, begin: float, end: float) -> Progress:
@@ -199,7 +256,7 @@ def _within(progress: Progress, begin: float, end: float) -> Progress:
     return lambda fraction, words: progress(begin + (end - begin) * fraction, words)
 
 
-def accept(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool = False) -> None:
+def validate(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool = False) -> None:
     """Raise UserError where a setting cannot be right, whatever the pictures.
 
     asked: whether somebody will be asked what there is.
@@ -216,7 +273,7 @@ def accept(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool =
         check_extents(extents, [usual(name) for name in config.things])
     for spec in (config.semantic, config.structural):
         connect(spec)  # who is to look must be there before anything is learned
-    lesson.accept(config.rasteriser)
+    training_schedule.validate(config.rasteriser)
     _measured(config)
 
 
@@ -224,61 +281,75 @@ def _measured(config: ReconstructConfig) -> MetricScale | None:
     return measured(config.metres_per_unit, config.known_distance, PERSON)
 
 
-# ---------------------------------------------------------------- what is a thing
+# ---------------------------------------------------------------- what is an object
 
 
-def _of_things(source: Path, taken: Intake) -> tuple[Shown, Int[np.ndarray, " M"]]:
-    """Return what shows of all Gaussians, and which of them belong to things."""
+@dataclass(frozen=True)
+class _Foreground:
+    """What shows of the Gaussians, and which of them are no floor and no background."""
+
+    shown: Shown
+    on_objects: Int[np.ndarray, " M"]
+    """Numbers of Gaussians."""
+
+
+def _foreground(source: Path, taken: Intake) -> _Foreground:
+    """Tell objects from floor and background.
+
+    Raises:
+        UserError: Nothing stands out.
+
+    """
     seen = shown(taken.gaussians, taken.cameras, taken.masks)
     found = np.flatnonzero(foreground(taken.gaussians, taken.cameras, seen, taken.floor))
     if not len(found):
         what = "shows nothing but floor and background"
-        raise UserError(f"{source} {what}. Masks would say what belongs to things.")
-    return seen, found
+        raise UserError(f"{source} {what}. Give masks of the objects.")
+    return _Foreground(seen, found)
 
 
 def _placed(
     taken: Intake,
     seen: Shown,
-    things: Int[np.ndarray, " M"],
+    on_objects: Int[np.ndarray, " M"],
     config: ReconstructConfig,
     folder: Path | None,
     progress: Progress,
 ) -> Placed:
-    """Return points on things, and how what their pictures look like comes onto them."""
+    """Return points on objects, and how what their pictures look like comes onto them."""
     if config.lifting == "radiance":
-        return _of_field(taken, things, config, folder, progress)
+        return _of_field(taken, on_objects, config, folder, progress)
     gaussians, cameras = taken.gaussians, taken.cameras
-    if len(things) > MOST_POINTS:
+    if len(on_objects) > MOST_POINTS:
         random = np.random.default_rng(config.training_seed)
-        things = np.sort(random.choice(things, MOST_POINTS, replace=False))
-    position = gaussians.mean[things].astype(np.float64)
-    colour = np.clip(0.5 + DC * gaussians.sh[things, 0], 0, 1)
+        on_objects = np.sort(random.choice(on_objects, MOST_POINTS, replace=False))
+    position = gaussians.mean[on_objects].astype(np.float64)
+    colour = np.clip(0.5 + DC * gaussians.sh[on_objects, 0], 0, 1)
     if config.lifting == "back-projection":
-        with Crew() as crew:
-            depth = looked(gaussians, cameras, crew).depth
-        return projected(position, colour, cameras, depth, things)
-    outside = seen_from(position, cameras, list(seen.share[:, things]), LET_THROUGH)
-    shares = cache(lambda v: weights(gaussians, cameras[v], CELL)[things])
+        with ThreadPool() as pool:
+            depth = render_depth(gaussians, cameras, pool).depth
+        return projected(position, colour, cameras, depth, on_objects)
+    outside = seen_from(position, cameras, list(seen.share[:, on_objects]), LET_THROUGH)
+    shares = cache(lambda v: weights(gaussians, cameras[v], CELL)[on_objects])
     cells = -(-cameras[0].height // CELL), -(-cameras[0].width // CELL)
 
     def lift(maps: Sequence[np.ndarray]) -> Lifted:
-        return uplift(shares, cells, maps, len(things), seen.least)
+        return uplift(shares, cells, maps, len(on_objects), seen.least)
 
-    return Placed(position, colour, outside, seen.views[things], lift, things)
+    return Placed(position, colour, outside, seen.views[on_objects], lift, on_objects)
 
 
 def _of_field(
     taken: Intake,
-    things: Int[np.ndarray, " M"],
+    on_objects: Int[np.ndarray, " M"],
     config: ReconstructConfig,
     folder: Path | None,
     progress: Progress,
 ) -> Placed:
-    """Learn a radiance field of the things, and take points from where it is dense."""
+    """Learn a radiance field of the objects, and take points from where it is dense."""
     how = FieldConfig(config.training, seed=config.training_seed)
     kept = None if folder is None else folder / "radiance.npz"
-    learned, found = field_points(taken, things, MOST_POINTS, how, kept, progress)
+    learned, found = field_points(taken, on_objects, MOST_POINTS, how, kept, progress)
     placed = projected(found.position, found.colour, taken.cameras, found.depth)
 
     def lift(maps: Sequence[np.ndarray]) -> Lifted:
@@ -288,52 +359,52 @@ def _of_field(
 
 
 def _drawn(
-    taken: Intake, cloud: Cloud, of_things: Int[np.ndarray, " M"]
+    taken: Intake, cloud: Cloud, on_objects: Int[np.ndarray, " M"]
 ) -> Int[np.ndarray, "V N"] | None:
     """Return what instance masks take each point for in each view; None: there are none."""
     if taken.views is None or taken.views.object_of_pixel is None:
         return None
-    near = of_things[KDTree(taken.gaussians.mean[of_things]).query(cloud.position)[1]]
+    near = on_objects[KDTree(taken.gaussians.mean[on_objects]).query(cloud.position)[1]]
     pixels = list(taken.views.object_of_pixel)
     return lifted(lambda v: weights(taken.gaussians, taken.cameras[v])[near], pixels, cloud.count)
 
 
-# ---------------------------------------------------------------- which thing is it
+# ---------------------------------------------------------------- which object is it
 
 
-def _wanted(config: ReconstructConfig, viewer: Viewer, taken: Intake) -> list[Thing]:
-    """Return what things there are: as the command line says, else as somebody sees; or nothing."""
+def _wanted(config: ReconstructConfig, viewer: Viewer, taken: Intake) -> list[SeenObject]:
+    """Return what objects there are, from the command line or a model; or nothing."""
     if config.things:
         return [usual(name) for name in config.things]
-    return viewer.things([*taken.some().values()])
+    return viewer.objects([*taken.some().values()])
 
 
 def _recognised(
-    wanted: Sequence[Thing], found: _Found, config: ReconstructConfig, viewer: Viewer
-) -> list[Thing]:
-    """Return which thing each object is; the objects are in order of size.
+    wanted: Sequence[SeenObject], found: _Found, config: ReconstructConfig, viewer: Viewer
+) -> list[SeenObject]:
+    """Return what each segmented object is; these are in order of size.
 
-    Who named things on the command line named the largest first. Others are told by CLIP where
+    Who named objects on the command line named the largest first. Others are told by CLIP where
     there is one, else by whoever sees the objects painted.
     """
     count = found.count
     if config.things or not wanted:
-        said: Sequence[int | None] = range(len(wanted))
+        number: Sequence[int | None] = range(len(wanted))
     elif config.semantic.startswith("clip"):
-        said = _by_words(wanted, found, config.semantic)
+        number = _by_words(wanted, found, config.semantic)
     else:
-        said = viewer.regions(_painted(found), colour_of_part(count), wanted) or []
-    known = [None if k is None or k < 0 or k >= len(wanted) else wanted[k] for k in said]
-    return [thing or Thing(UNKNOWN) for thing in [*known, *[None] * count][:count]]
+        number = viewer.regions(_painted(found), colour_of_part(count), wanted) or []
+    known = [None if k is None or k < 0 or k >= len(wanted) else wanted[k] for k in number]
+    return [obj or SeenObject(UNKNOWN) for obj in [*known, *[None] * count][:count]]
 
 
-def _by_words(wanted: Sequence[Thing], found: _Found, spec: str) -> list[int]:
-    """Pair objects and things so that what CLIP sees fits best what they are called."""
+def _by_words(wanted: Sequence[SeenObject], found: _Found, spec: str) -> list[int]:
+    """Pair segmented objects with names by CLIP similarity."""
     encoder = connect(spec)
     assert isinstance(encoder, Reader)
     of, seen = found.closed.object_of_point, found.cloud.semantic
     looks = np.stack([seen[of == k].mean(axis=0, dtype=np.float64) for k in range(found.count)])
-    words = encoder.words([thing.class_name for thing in wanted])
+    words = encoder.words([obj.class_name for obj in wanted])
     return match(likeness(unit(looks), words)).tolist()
 
 
@@ -374,21 +445,21 @@ def _scene(
     source: Path,
     found: _Found,
     names: Sequence[str],
-    named: Sequence[Thing],
+    named: Sequence[SeenObject],
     scale: MetricScale,
 ) -> Scene:
     """Make one object of each solid, coloured as its Gaussians are."""
     factor = scale.metres_per_unit
-    things, surfaces = [], []
-    for k, (name, thing, solid) in enumerate(zip(names, named, found.solids, strict=True)):
+    objects, surfaces = [], []
+    for k, (name, obj, solid) in enumerate(zip(names, named, found.solids, strict=True)):
         extent, by = factor * found.extents[k], scale.reason
-        things.append(SceneObject(name, thing.class_name, extent, source=str(source), sized_by=by))
+        objects.append(SceneObject(name, obj.class_name, extent, source=str(source), sized_by=by))
         colours, vertices = linear(solid.colours), factor * solid.vertices
         surfaces.append(Surface(name, k, 0, vertices, solid.triangles, colours=colours))
     return Scene(
         name=safe(called(source)) or "scene",
         source=str(source),
-        objects=tuple(things),
+        objects=tuple(objects),
         surfaces=tuple(surfaces),
         finishes=(Finish("as seen", roughness=ROUGHNESS),),
     )

@@ -5,18 +5,21 @@ range it was chosen from and where that range was read.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
+from corporeal.findings import Breakage, Expectation, RunAudit
 from corporeal.geometry.sizes import how_heavy, how_scaled
 from corporeal.materials.scale import fraction_of, logarithmic
-from corporeal.mpm.audit import how_settled
+from corporeal.mpm.laws import MENU
 from corporeal.render.page import figure, inlined, page, safe
+from corporeal.render.subject import parts_named
+from corporeal.trajectory.audit import breakage_words, equilibrium_words
 from corporeal.types import (
     Film,
     Ground,
+    MassMixture,
     Material,
     MaterialField,
     Particles,
@@ -28,6 +31,7 @@ from corporeal.types import (
     SceneObject,
     Structure,
     Treatment,
+    Usage,
     Wind,
 )
 
@@ -43,49 +47,50 @@ UNITS = {
     "restitution": ("restitution e", ""),
     "loss": ("loss factor η", ""),
     "shell_thickness": ("wall thickness", "m"),
+    "strength_local": ("local strength", "Pa"),
+    "viscosity": ("viscosity η", "Pa s"),
+    "consistency": ("consistency K_c", "Pa sⁿ"),
+    "flow_index": ("flow index n", ""),
+    "yield_shear": ("yield shear stress τ_y", "Pa"),
 }
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"), (1e-6, "µ"))
-LAWS = {
-    "COROTATED": "fixed corotated",
-    "NEO_HOOKEAN": "Neo-Hookean",
-    "HENCKY": "Hencky",
-    "DRUCKER_PRAGER": "Hencky + Drucker–Prager",
-    "VON_MISES": "Hencky + von Mises",
-}
 WHO = {
     "annotation": "your annotation",
     "recording": "a recorded answer",
     "model": "a model",
-    "metadata": "the file's own words",
-    "unknown": "nobody: a neutral stand-in",
+    "metadata": "metadata of the file",
+    "unknown": "unknown: neutral material",
 }
 CHOSEN = {
-    "typical": "nobody: the usual value",
-    "fallback": "nobody could say: the usual value",
+    "typical": "typical value",
+    "fallback": "typical value: the model's answer was not usable",
     "model": "a model",
     "recording": "a recorded answer",
     "annotation": "your annotation",
+    "evidence": "a model, to fit the mass it was said to have",
 }
+WAYS_SHOWN = 2
+"""Ways an object may be, of those that were drawn."""
 
 
 @dataclass(frozen=True)
 class Story:
-    """Everything the page tells."""
+    """Everything that the page shows."""
 
     scene: Scene
     parts: Parts
     field: MaterialField
     particles: Particles
     film: Film
-    audit: Mapping[str, Any]
+    audit: RunAudit
     figures: Mapping[str, Path]
     """Caption → picture, in order."""
     sources: Mapping[str, str]
     """Citation key → where it was read."""
-    expectations: tuple[tuple[str, str, str, bool], ...] = ()
-    """What should be seen: sentence, measured value and target in words, whether it was."""
     origin: tuple[str, ...] = ()
     """How the scene was found in pictures, in sentences."""
+    view: str = ""
+    """The 3D view as HTML (``render.viewer_page``), or why there is none."""
 
 
 def report(story: Story, path: Path) -> None:
@@ -96,12 +101,15 @@ def report(story: Story, path: Path) -> None:
         "report.html",
         title=safe(story.scene.name),
         summary=_summary(story),
+        view=story.view,
         film=inlined(story.film.path),
         width=story.film.width,
+        caption=_caption(audit.breakage),
         figures="".join(figure(caption, inlined(file)) for caption, file in story.figures.items()),
-        verdict=_verdict(audit),
-        expectations=_expectations(story),
+        verdict=_verdict(story),
+        expectations=_expectations(audit.expectations),
         parts="".join(_part_row(story, k) for k in range(len(story.parts.catalogue))),
+        masses=weighed(story.field.mixtures),
         grounds="".join(_grounds(story, k) for k in range(len(story.parts.catalogue))),
         audit=_audit_table(audit),
         sources=_sources(story),
@@ -116,80 +124,140 @@ def report(story: Story, path: Path) -> None:
 
 def _summary(story: Story) -> str:
     scene, field = story.scene, story.field
-    things = ", ".join(safe(o.name.replace("_", " ")) for o in scene.objects)
+    objects = ", ".join(safe(o.name.replace("_", " ")) for o in scene.objects)
     unknown = sum(w.answered_by == "unknown" for w in field.words)
     seen = any(w.answered_by in ("model", "recording") for w in field.words)
     sentences = [
-        f"{len(scene.objects)} object{'s' * (len(scene.objects) != 1)} ({things}), "
+        f"{len(scene.objects)} object{'s' * (len(scene.objects) != 1)} ({objects}), "
         f"{len(field.materials)} part{'s' * (len(field.materials) != 1)}, "
         f"{scene.duration:g} s simulated with {story.particles.count:,} particles.",
-        _looked(story.audit.get("questions", {}))
+        _looked(story.audit.questions)
         if seen
-        else "No vision-language model looked at pictures of this scene: materials come from "
-        "annotations and from the words in the file.",
+        else "No vision-language model was asked: materials come from annotations and from "
+        "metadata of the file.",
     ]
     sentences += map(safe, story.origin)
-    sentences += [_forced(o) for o in scene.objects if o.push or o.wind]
-    settled = how_settled(story.audit.get("settling"))
+    sentences += [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
+    settled = equilibrium_words(story.audit.settling)
     sentences += filter(None, [safe(how_scaled(scene.objects)), safe(settled)])
     if unknown:
         sentences.append(
-            f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got a "
-            "neutral stand-in material: name it with --annotations."
+            f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got the "
+            "neutral material. State materials with --annotations."
         )
     return " ".join(sentences)
 
 
-def _looked(questions: Mapping[str, Any]) -> str:
+def _looked(questions: Usage) -> str:
     """Say who chose the materials from pictures."""
-    return f"Materials were chosen from pictures by {safe(_answerers(questions))}."
+    return f"Materials were recognised in pictures by {safe(_answerers(questions))}."
 
 
-def _answerers(questions: Mapping[str, Any]) -> str:
+def _answerers(questions: Usage) -> str:
     """Name who answered: a model, or who gave the answers that were recorded."""
-    models = ", ".join(questions.get("models", ())) or "not said by whom"
-    return models if questions.get("calls") else f"recorded answers ({models})"
+    models = ", ".join(questions.models) or "source not recorded"
+    return models if questions.calls else f"recorded answers ({models})"
 
 
-def _forced(thing: SceneObject) -> str:
-    """Say in one sentence what pushes a thing and what blows on it."""
-    said = []
-    if thing.push is not None:
-        size = math.hypot(*thing.push.acceleration)
-        said.append(f"is pushed with {size:.3g} m/s² {_window(thing.push)}")
-    if thing.wind is not None:
-        gusts = f" in gusts of ± {thing.wind.gust:.0%}" if thing.wind.gust else ""
-        size = math.hypot(*thing.wind.velocity)
-        said.append(f"stands in a wind of {size:.3g} m/s{gusts} {_window(thing.wind)}")
-    return f"{safe(thing.name.replace('_', ' '))} {' and '.join(said)}."
+def _forced(obj: SceneObject) -> str:
+    """Say in one sentence what pushes an object and what blows on it."""
+    forces = []
+    if obj.path is not None:
+        rows = len(obj.path.time)
+        forces.append(f"follows a prescribed path of {rows} rows, whatever it meets")
+    if obj.push is not None:
+        size = math.hypot(*obj.push.acceleration)
+        forces.append(f"is accelerated by a push of {size:.3g} m/s² {_window(obj.push)}")
+    if obj.wind is not None:
+        gusts = f" with gusts of ± {obj.wind.gust:.0%}" if obj.wind.gust else ""
+        size = math.hypot(*obj.wind.velocity)
+        forces.append(f"is exposed to wind of {size:.3g} m/s{gusts} {_window(obj.wind)}")
+    return f"{safe(obj.name.replace('_', ' '))} {' and '.join(forces)}."
 
 
 def _window(force: Push | Wind) -> str:
-    until = f"to {force.end:g} s" if math.isfinite(force.end) else "to the end"
+    until = f"until {force.end:g} s" if math.isfinite(force.end) else "until the end"
     return f"from {force.start:g} s {until}"
 
 
-def _verdict(audit: Mapping[str, Any]) -> str:
-    warnings = list(audit.get("warnings", ()))
-    if not warnings:
-        return '<p class="good">The audit found nothing to warn about.</p>'
-    items = "".join(f"<li>{safe(w)}</li>" for w in warnings)
-    return f'<div class="warn"><b>Read this before you trust the film.</b><ul>{items}</ul></div>'
+def _caption(found: Sequence[Breakage]) -> str:
+    """Say below the film what it shows whole although it may not stay so."""
+    doubted = [b for b in found if b.word != "holds"]
+    return "".join(f"<p>{safe(breakage_words(b))}</p>" for b in doubted)
 
 
-def _expectations(story: Story) -> str:
-    if not story.expectations:
+def _struck(story: Story, k: int) -> str:
+    """Say what the hardest blow does to a brittle part; "" of all others."""
+    owner = story.scene.objects[story.parts.catalogue[k].object].name
+    mine = (owner, story.field.words[k].name)
+    said = [b for b in story.audit.breakage if (b.object, b.part) == mine]
+    return "".join(f"<br>{safe(breakage_words(b))}" for b in said)
+
+
+def _verdict(story: Story) -> str:
+    if not story.audit.warnings:
+        return '<p class="good">The audit found no violations.</p>'
+    items = "".join(f"<li>{safe(w)} {_subject(w, story)}</li>" for w in story.audit.warnings)
+    return (
+        f'<div class="warn"><b>The audit found the following limitations.</b><ul>{items}</ul></div>'
+    )
+
+
+def _subject(warning: str, story: Story) -> str:
+    """Link a warning to the parts that it names, or else to the audit."""
+    named = parts_named(warning, story.scene, story.parts)
+    links = [(f"part-{k}", story.parts.catalogue[k].name) for k in named] or [("audit", "audit")]
+    return ", ".join(f'<a href="#{place}">{safe(name)}</a>' for place, name in links)
+
+
+def _expectations(expectations: Sequence[Expectation]) -> str:
+    if not expectations:
         return ""
     rows = "".join(
-        f'<tr><td class="{"yes" if met else "no"}">{"✓" if met else "✗"}</td>'
-        f"<td>{safe(sentence)}</td><td>{safe(value)}</td><td>{safe(target)}</td></tr>"
-        for sentence, value, target, met in story.expectations
+        f'<tr><td class="{"yes" if e.met else "no"}">{"✓" if e.met else "✗"}</td>'
+        f"<td>{safe(e.sentence)}</td><td>{safe(e.value)}</td><td>{safe(e.target)}</td></tr>"
+        for e in expectations
     )
-    head = "<tr><th></th><th></th><th>measured</th><th>wanted</th></tr>"
-    return f'<h2>What must be seen in this scene</h2><table class="short">{head}{rows}</table>'
+    head = "<tr><th></th><th></th><th>measured</th><th>expected</th></tr>"
+    return f'<h2>Expected outcomes of this scene</h2><table class="short">{head}{rows}</table>'
 
 
 # ---------------------------------------------------------------- tables
+
+
+def weighed(mixtures: Sequence[MassMixture]) -> str:
+    """Lay out what each object may weigh, the two likeliest ways it may be, and what was said."""
+    if not mixtures:
+        return ""
+    rows = "".join(_mixture_row(m) for m in mixtures)
+    return (
+        "<h2>Masses over all ways the objects may be</h2>"
+        '<p class="lead">Median and 90 % interval over the ways the objects may be, the measured '
+        "ranges and what the meshes leave open, at real size. What was said of a mass without the "
+        "library reweights the ways; it sets no value.</p>"
+        '<div class="wide"><table><tr><th>object</th><th>mass [kg]</th>'
+        "<th>without outside evidence [kg]</th><th>likeliest ways</th><th>said of its mass [kg]"
+        f"</th><th>printed on it</th></tr>{rows}</table></div>"
+    )
+
+
+def _mixture_row(m: MassMixture) -> str:
+    ways = "<br>".join(
+        f"{safe(h.words)}: {h.mass:.3g} kg ({h.probability:.0%}; before {h.prior:.0%})"
+        for h in m.hypotheses[:WAYS_SHOWN]
+    )
+    said = m.evidence
+    judged = "–" if said is None else f"{said.likely:.3g} ({said.low:.3g} to {said.high:.3g})"
+    printed = "; ".join(dict.fromkeys(f.words for f in said.printed)) if said else ""
+    warning = f"<br><b>{safe(m.warning)}</b>" if m.warning else ""
+    cells = (
+        _cells(safe(m.object), f"{m.mass:.3g} ({m.low:.3g} to {m.high:.3g})"),
+        _cells(f"{m.mass_without:.3g} ({m.low_without:.3g} to {m.high_without:.3g})"),
+        _cells(ways + warning, wrap=True),
+        _cells(judged),
+        _cells(safe(printed) or "–", wrap=True),
+    )
+    return f"<tr>{''.join(cells)}</tr>"
 
 
 def _part_row(story: Story, k: int) -> str:
@@ -206,7 +274,7 @@ def _part_row(story: Story, k: int) -> str:
     )
     cells = (
         _cells(*map(safe, names), f"<b>{safe(material.name)}</b>"),
-        _cells(WHO[words.answered_by], LAWS[material.law.name], wrap=True),
+        _cells(WHO[words.answered_by], MENU[material.law].full_name, wrap=True),
         _cells(*numbers),
         _cells(safe(built(story.field.structures[k])), safe(treatment.kind), wrap=True),
         _cells(simulated(treatment), wrap=True),
@@ -221,7 +289,8 @@ def _cells(*texts: str, wrap: bool = False) -> str:
 def built(structure: Structure) -> str:
     """Say how a part is built, and what is in it."""
     if structure.contents is None:
-        return structure.kind
+        packed = f"packed, {structure.solidity:.0%} of it matter"
+        return packed if structure.solidity < 1 else structure.kind
     return f"{structure.kind} with {structure.contents.name}"
 
 
@@ -230,7 +299,7 @@ def simulated(treatment: Treatment) -> str:
     if treatment.kind == "rigid":
         return "rigid"
     ratio = treatment.young / treatment.young_real
-    factor = "as real" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × real"
+    factor = "as measured" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × measured"
     return f"{si(treatment.young, 'Pa')} ({factor})"
 
 
@@ -243,16 +312,16 @@ def _grounds(story: Story, k: int) -> str:
     tables = "".join(_piece_grounds(p) for p in pieces) or own
     fill = story.particles.fills[k] if k < len(story.particles.fills) else ""
     return (
-        f"<details><summary><b>{safe(part.name)}</b> of "
+        f'<details id="part-{k}"><summary><b>{safe(part.name)}</b> of '
         f"{safe(story.scene.objects[part.object].name)}: {safe(material.name)}</summary>"
         f"<p>{safe(words.reason)} (margin {words.margin:.2f}; {WHO[words.answered_by]})"
         f"{others(words)}<br>{safe(structure.reason)} {safe(fill)}<br>"
-        f"{safe(story.particles.treatments[k].why)}</p>{tables}</details>"
+        f"{safe(story.particles.treatments[k].why)}{_struck(story, k)}</p>{tables}</details>"
     )
 
 
 def _piece_grounds(piece: Piece) -> str:
-    """Tell of one of several things that share a part's mesh why it is as it is."""
+    """Tell of one of several objects that share a part's mesh why it is as it is."""
     words = piece.words
     return (
         f"<p><b>{safe(words.name)}</b>: {safe(piece.material.name)}, "
@@ -280,20 +349,20 @@ def _values(material: Material, structure: Structure, walled: bool) -> str:
     if inner is not None and "density" in inner.grounds:
         rows += _ground_row("density", inner.grounds["density"], f" of the {inner.name} in it")
     return (
-        "<table><tr><th>quantity</th><th>value</th><th>place in the range</th>"
-        f"<th>chosen by</th><th>why</th><th>source</th></tr>{rows}</table>"
+        "<table><tr><th>quantity</th><th>value</th><th>position in range</th>"
+        f"<th>chosen by</th><th>reason</th><th>source of range</th></tr>{rows}</table>"
     )
 
 
 def others(words: PartWords) -> str:
-    """Say what else a part may be made of, and what a model told apart in it."""
+    """Return alternatives to a part's material, and its components."""
     maybe = [f"{name} ({p:.0%})" for name, p in words.alternatives]
     pieces = [
         f"{p.name}: {p.material or 'unknown'} ({p.volume_share:.0%} of the volume)"
         for p in words.pieces
     ]
-    said = f" It may also be {', '.join(maybe)}." if maybe else ""
-    return safe(said + (f" Told apart in it: {'; '.join(pieces)}." if pieces else ""))
+    rest = f" Alternatives: {', '.join(maybe)}." if maybe else ""
+    return safe(rest + (f" Components: {'; '.join(pieces)}." if pieces else ""))
 
 
 def _ground_row(name: str, ground: Ground, of: str = "") -> str:
@@ -312,25 +381,27 @@ def _ground_row(name: str, ground: Ground, of: str = "") -> str:
 
 
 AUDIT_ROWS = (
-    ("momentum_residual", "momentum not accounted for, relative", ".2g"),
-    ("mechanical_growth", "energy of motion and strain created, relative", ".2g"),
-    ("energy_growth", "the same with booked losses, relative", ".2g"),
-    ("max_penetration_dx", "deepest penetration, in grid cells", ".2f"),
-    ("max_penetration_m", "deepest penetration [m]", ".2g"),
+    ("momentum_residual", "momentum residual, relative", ".2g"),
+    ("mechanical_growth", "growth of kinetic and elastic energy, relative", ".2g"),
+    ("impact_loss", "energy lost in normal contact, relative", ".2g"),
+    ("unbooked_loss", "energy lost in transfers and not booked, relative", ".2g"),
+    ("energy_growth", "growth including dissipated energy, relative", ".2g"),
+    ("max_penetration_dx", "largest penetration [grid cells]", ".2f"),
+    ("max_penetration_m", "largest penetration [m]", ".2g"),
     ("particles", "particles", ",d"),
     ("steps", "time steps", ",d"),
     ("dt_min", "smallest step [s]", ".2g"),
     ("dt_max", "largest step [s]", ".2g"),
-    ("nan_count", "numbers that are not numbers", "d"),
-    ("particles_out_of_domain", "particles lost", "d"),
+    ("nan_count", "values that are not finite", "d"),
+    ("particles_out_of_domain", "particles outside the domain", "d"),
 )
 
 
-def _audit_table(audit: Mapping[str, Any]) -> str:
-    rows = [(label, audit.get(key), spec) for key, label, spec in AUDIT_ROWS]
+def _audit_table(audit: RunAudit) -> str:
     return "".join(
-        f"<tr><td>{label}</td><td>{'–' if value is None else format(value, spec)}</td></tr>"
-        for label, value, spec in rows
+        f"<tr><td>{label}</td><td>{format(getattr(audit, name), spec)}</td></tr>"
+        for name, label, spec in AUDIT_ROWS
+        if getattr(audit, name) is not None
     )
 
 
@@ -348,36 +419,34 @@ def _credits(scene: Scene) -> str:
     return "".join(f"<li>{safe(c)}</li>" for c in credits) or "<li>none stated in the files</li>"
 
 
-def _settings(audit: Mapping[str, Any]) -> str:
-    seconds = audit.get("seconds", {})
-    spent = ", ".join(f"{stage} {value:.1f} s" for stage, value in seconds.items())
-    memory = audit.get("peak_memory_mb")
-    peak = "" if memory is None else f" Peak memory {memory:,.0f} MB."
-    settings = ", ".join(f"{k} {safe(str(v))}" for k, v in audit.get("settings", {}).items())
-    return f"{settings}.<br>Time: {spent}.{peak}{asked(audit.get('questions', {}))}"
+def _settings(audit: RunAudit) -> str:
+    spent = ", ".join(f"{verb} {value:.1f} s" for verb, value in audit.seconds.items())
+    settings = ", ".join(f"{name} {safe(value)}" for name, value in audit.settings.items())
+    peak = f"Peak memory {audit.peak_memory_mb:,.0f} MB."
+    return f"{settings}.<br>Time: {spent}. {peak}{asked(audit.questions)}"
 
 
-def asked(questions: Mapping[str, Any]) -> str:
+def asked(questions: Usage) -> str:
     """Say what the questions to models took."""
-    if not questions:
+    if not questions.questions:
         return ""
-    if not questions["calls"]:
-        who = safe(_answerers(questions))
-        return f"<br>{questions['questions']} questions answered from the disk, by {who}: no cost."
-    cost = questions["dollars"]
+    who, number = safe(_answerers(questions)), questions.questions
+    if not questions.calls:
+        return f"<br>{number} questions, answered from the disk by {who}, at no cost."
+    cost = questions.dollars
     paid = (
         "price not known"
         if cost is None
-        else f"about ${cost:.3f} at the list prices of {questions['prices_of']}"
+        else f"about ${cost:.3f} at the list prices of {questions.prices_of}"
     )
     return (
-        f"<br>{questions['questions']} questions to {safe(_answerers(questions))}: "
-        f"{questions['calls']} calls, {questions['input_tokens']:,} tokens in, "
-        f"{questions['output_tokens']:,} out, {questions['seconds']:.0f} s of waiting, {paid}."
+        f"<br>{number} questions to {who}: "
+        f"{questions.calls} calls, {questions.input_tokens:,} tokens in, "
+        f"{questions.output_tokens:,} out, {questions.seconds:.0f} s waited, {paid}."
     )
 
 
-# ---------------------------------------------------------------- small things
+# ---------------------------------------------------------------- small functions
 
 
 def si(value: float, unit: str) -> str:

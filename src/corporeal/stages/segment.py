@@ -21,10 +21,10 @@ VOTERS = 5
 
 @dataclass(frozen=True)
 class SegmentConfig:
-    """How objects from pictures are taken apart; of a model the file's own identity decides."""
+    """Part segmentation of objects from pictures; a model's parts are its nodes and materials."""
 
     position_weight: float = 0.3
-    """How much place counts beside look; 0: not at all."""
+    """Weight of position relative to appearance features; 0: position is not used."""
 
 
 DEFAULT = SegmentConfig()
@@ -32,7 +32,7 @@ UNSEEN = ("metadata", "unknown")
 """Who says of parts what words say, and has seen none."""
 
 
-def accept(config: SegmentConfig) -> None:
+def validate(config: SegmentConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scene."""
     check_range("--position-weight", config.position_weight, 0.0, 100.0)
 
@@ -74,19 +74,19 @@ def segment(
     if found is None:
         return parts
     middle = np.concatenate([s.vertices[s.triangles].mean(axis=1) for s in scene.surfaces])
-    for number, thing in enumerate(inventory.objects):
-        pieces = thing.parts[0].pieces if len(thing.parts) == 1 else ()
+    for number, obj in enumerate(inventory.objects):
+        pieces = obj.parts[0].pieces if len(obj.parts) == 1 else ()
         if len(pieces) > 1:
-            thing = replace(thing, parts=pieces)
+            obj = replace(obj, parts=pieces)
             cloud = _of_object(found.cloud, found.object_of_point == number)
-            vectors = _vectors(semantic, thing)
-            named = name_parts(cloud, thing, vectors, PartsConfig(config.position_weight))
-            parts = _taken_apart(parts, number, thing, named, cloud, middle)
+            vectors = _vectors(semantic, obj)
+            named = name_parts(cloud, obj, vectors, PartsConfig(config.position_weight))
+            parts = _taken_apart(parts, number, obj, named, cloud, middle)
     return replace(parts, warnings=(*parts.warnings, *_unparted(inventory)))
 
 
 def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
-    described = [part.name for thing in inventory.objects for part in thing.parts]
+    described = [part.name for obj in inventory.objects for part in obj.parts]
     if described != names:
         raise UserError(
             f"The description speaks of the parts {', '.join(described) or 'none'}, but "
@@ -100,9 +100,9 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 def _unparted(inventory: Inventory) -> list[str]:
     """Say of which objects nobody told the pieces: a chair from pictures may be all foam."""
     names = [
-        thing.name
-        for thing in inventory.objects
-        if not any(p.pieces or p.answered_by not in UNSEEN for p in thing.parts)
+        obj.name
+        for obj in inventory.objects
+        if not any(p.pieces or p.answered_by not in UNSEEN for p in obj.parts)
     ]
     if not names:
         return []
@@ -126,41 +126,41 @@ def _of_object(cloud: Cloud, mine: Bool[np.ndarray, " N"]) -> Cloud:
     )
 
 
-def _vectors(semantic: str, thing: ObjectWords) -> Float[np.ndarray, "K S"] | None:
+def _vectors(semantic: str, obj: ObjectWords) -> Float[np.ndarray, "K S"] | None:
     """Return what the parts' names are among features; None where these know no words."""
     encoder = connect(semantic)
     if not isinstance(encoder, Reader):
         return None
-    return encoder.words(phrases(thing))
+    return encoder.words(phrases(obj))
 
 
 def _taken_apart(
     parts: Parts,
     number: int,
-    thing: ObjectWords,
+    obj: ObjectWords,
     named: Named,
     cloud: Cloud,
     middle: Float[np.ndarray, "T 3"],
 ) -> Parts:
     """Put the pieces that were found in the place of the object's only part."""
     own = np.flatnonzero(parts.object_of_point == number)
-    share = _voted(middle[own], cloud.position, named, len(thing.parts))
+    share = _voted(middle[own], cloud.position, named, len(obj.parts))
     best = share.argmax(axis=1)
     kept = np.unique(best)
     place = next(k for k, p in enumerate(parts.catalogue) if p.object == number)
-    new = [Part(thing.parts[k].name, number, named.found_by) for k in kept]
+    new = [Part(obj.parts[k].name, number, named.found_by) for k in kept]
     later = parts.part_of_point > place
     of_point = np.where(later, parts.part_of_point + len(new) - 1, parts.part_of_point)
     of_point[own] = place + np.searchsorted(kept, best)
     confidence = parts.confidence.copy()
     confidence[own] = share[np.arange(len(own)), best]
-    said = [f"{thing.name}: {words}" for words in _doubts(named, thing, kept.tolist())]
+    doubts = [f"{obj.name}: {words}" for words in _doubts(named, obj, kept.tolist())]
     return replace(
         parts,
         part_of_point=of_point,
         confidence=confidence,
         catalogue=(*parts.catalogue[:place], *new, *parts.catalogue[place + 1 :]),
-        warnings=(*parts.warnings, *said),
+        warnings=(*parts.warnings, *doubts),
     )
 
 
@@ -180,7 +180,7 @@ def _voted(
     return share
 
 
-def _doubts(named: Named, thing: ObjectWords, kept: Sequence[int]) -> list[str]:
-    lost = [p.name for k, p in enumerate(thing.parts) if k not in kept]
+def _doubts(named: Named, obj: ObjectWords, kept: Sequence[int]) -> list[str]:
+    lost = [p.name for k, p in enumerate(obj.parts) if k not in kept]
     gone = f"{', '.join(lost)} has no place on its surface, and is left out."
     return [*named.warnings, *([gone] if lost and not named.warnings else [])]

@@ -2,55 +2,87 @@
 
 Frames are written one by one and nothing holds a film in memory. A checkpoint lies beside them:
 whatever stops a simulation, the same call goes on from there exactly as if nothing had happened.
-A scene that is said to have settled finds its balance first (``mpm.settling``).
+A scene declared as settled is brought to equilibrium first (``trajectory.static_equilibrium``).
 """
 
+import logging
 from collections.abc import Callable
+from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 
-from corporeal import __version__, backends, store
+from corporeal import backends, store
 from corporeal.errors import SimulationError
-from corporeal.mpm import audit as audits
-from corporeal.mpm.checkpoint import Checkpoints, fingerprint
-from corporeal.mpm.frames import FOLDER, Layout, frame_path, gather, write_frame, write_layout
-from corporeal.mpm.ledger_row import ledger_row
-from corporeal.mpm.pose import Posed, pose, standing
+from corporeal.findings import Settled, SettledObject
 from corporeal.mpm.problem import MENU, Engine, Problem
-from corporeal.mpm.settling import Balance, Settling, before
+from corporeal.trajectory.audit import audit
+from corporeal.trajectory.audit_file import write_audit
+from corporeal.trajectory.checkpoint import Checkpoints, fingerprint
+from corporeal.trajectory.energy_gain import EnergyWatch
+from corporeal.trajectory.frames import (
+    FOLDER,
+    Layout,
+    frame_path,
+    gather,
+    write_frame,
+    write_layout,
+)
+from corporeal.trajectory.ledger_row import ledger_row
+from corporeal.trajectory.static_equilibrium import Balance, Relaxation, before
+from corporeal.trajectory.stress import VonMises
+from corporeal.treatment.problem_from_scene import Posed, pose, standing
+from corporeal.typed import typed
 from corporeal.types import Frame, MaterialField, Particles, Scene, Trajectory
+from corporeal.version import __version__
 
-AUDIT = "audit.json"
 SETTLING = "settling.json"
-"""How what is soft found its balance before time 0."""
+"""How static equilibrium was found before time 0."""
 
 Progress = Callable[[float, str], None]
 Build = Callable[[Problem], Engine]
-Settle = Callable[[], dict[str, np.ndarray]]
+Relax = Callable[[], dict[str, np.ndarray]]
 
 
 @dataclass(frozen=True)
 class SimulateConfig:
-    """How the scene is stepped; nothing here tunes the physics."""
+    """Solver settings; none of them changes material numbers."""
 
-    engine: Literal["warp", "cuda", "reference"] = "warp"
-    """The fast engine on the processor, the one for a CUDA card, or the slow one in double
-    precision that both are checked against."""
+    engine: Literal["cpu", "cuda", "reference", "warp"] = "cpu"
+    """cpu: the fast engine; cuda: the same on a CUDA card; reference: NumPy in double precision,
+    slow, which the others are tested against; warp: the former name of cpu."""
     contact: Literal["multi", "single"] = "multi"
-    """One velocity field per object, or the control: one for all, which glues what touches."""
+    """multi: one velocity field per object, with friction between them; single: one field for all,
+    a control in which touching objects stick together."""
+
+    def __post_init__(self) -> None:
+        """Take the former name of an engine for its present one, and say so."""
+        if self.engine == "warp":
+            logging.getLogger(__name__).warning("The engine 'warp' is called 'cpu' now.")
+            object.__setattr__(self, "engine", "cpu")
 
 
 DEFAULT = SimulateConfig()
 
 
-def accept(config: SimulateConfig) -> None:
+def as_kept(config: SimulateConfig) -> SimulateConfig:
+    """Name the engine as results on disk do: they were first kept when `cpu` was called `warp`.
+
+    What is kept is named by its settings; so runs of that time stay what they are.
+    """
+    kept = copy(config)
+    if config.engine == "cpu":
+        object.__setattr__(kept, "engine", "warp")
+    return kept
+
+
+def validate(config: SimulateConfig) -> None:
     """Raise UserError where there is no engine as asked for, whatever the scene."""
     if config.engine == "cuda":
-        backends.load("engine", "cuda", {"cuda": "corporeal.mpm.device:present"})("cuda")
+        backends.load("engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:present"})("cuda")
 
 
 def simulate(
@@ -81,19 +113,18 @@ def simulate(
     posed = pose(scene, particles, field, config.contact)
     build: Build = backends.load("engine", config.engine, MENU)
     times = frame_times(scene)
-    lying = what_settles(scene, particles, posed)
+    lying = relaxed_first(scene, particles, posed)
     if lying:
         posed = replace(posed, problem=replace(posed.problem, gravity_ramp=0.0))
-    name = fingerprint(__version__, posed.problem, config, times, lying)
+    name = fingerprint(__version__, posed.problem, as_kept(config), times, lying)
     with store.writing(folder):
         kept, slept = Checkpoints(folder, name), Checkpoints(folder / "settling", name)
-        settle = partial(settled, scene, posed, lying, build, slept, progress)
+        relax = partial(relaxed, scene, posed, lying, build, slept, progress)
         run = Run(build(posed.problem), posed, folder, times, kept)
-        run.through(progress, lying, settle)
+        run.through(progress, lying, relax)
         trajectory = gather(folder, len(times))
-        said = store.read_json(folder / SETTLING) if lying else None
-        found = audits.audit(scene, particles, field, trajectory, said)
-        store.write_json(folder / AUDIT, found)
+        found = typed(Settled, store.read_json(folder / SETTLING)) if lying else None
+        write_audit(folder, audit(scene, particles, field, trajectory, found))
         kept.forget()
         slept.forget()
     return trajectory
@@ -102,8 +133,8 @@ def simulate(
 # ------------------------------------------------------------------ before time 0
 
 
-def what_settles(scene: Scene, particles: Particles, posed: Posed) -> tuple[int, ...]:
-    """Bodies that find their balance first: all that stand or lie, where any of them is soft."""
+def relaxed_first(scene: Scene, particles: Particles, posed: Posed) -> tuple[int, ...]:
+    """Return bodies to bring to static equilibrium: all supported ones, if any deforms."""
     if not scene.settled or not any(scene.gravity):
         return ()
     carried = standing(scene, particles)
@@ -111,7 +142,7 @@ def what_settles(scene: Scene, particles: Particles, posed: Posed) -> tuple[int,
     return tuple(lying) if not posed.rigid[lying].all() else ()
 
 
-def settled(
+def relaxed(
     scene: Scene,
     posed: Posed,
     lying: tuple[int, ...],
@@ -119,53 +150,45 @@ def settled(
     kept: Checkpoints,
     progress: Progress,
 ) -> dict[str, np.ndarray]:
-    """Let what lies find its balance, or go on with it; return where everything is then."""
-    told = kept.folder.parent / SETTLING
-    _, state = kept.newest()
-    if state and told.exists():
+    """Find static equilibrium, or go on with it; return the state of the engine in it."""
+    record = kept.folder.parent / SETTLING
+    state = kept.newest().state
+    if state and record.exists():
         return state
     hung = set(range(len(posed.problem.bodies))) - set(lying)
     problem = before(posed.problem, hung)
-    settling = Settling(build(problem), problem, hung)
+    relaxation = Relaxation(build(problem), problem, hung)
     if state:
-        settling.restore(state)
-    good = {"state": settling.saved()}
+        relaxation.restore(state)
+    good = {"state": relaxation.saved()}
 
-    def breathe(time: float) -> None:
-        good["state"] = settling.saved()
+    def pause(time: float) -> None:
+        good["state"] = relaxation.saved()
         if kept.due:
             kept.keep(good["state"], 0)
-        progress(0.0, f"settling, {time:.2f} s")
+        progress(0.0, f"finding static equilibrium, {time:.2f} s")
 
     try:
-        balance = settling.run(breathe)
+        balance = relaxation.run(pause)
     except KeyboardInterrupt:
         kept.keep(good["state"], 0)
         raise
     except SimulationError as error:
-        raise SimulationError(f"While things settled: {error}") from error
+        raise SimulationError(f"While objects found their static equilibrium: {error}") from error
     kept.keep(balance.state, 0)
-    store.write_json(told, settling_row(scene, posed, balance))
+    store.write_json(record, equilibrium_found(scene, posed, balance))
     return balance.state
 
 
-def settling_row(scene: Scene, posed: Posed, balance: Balance) -> dict[str, Any]:
-    """Say how the balance was found, as data."""
+def equilibrium_found(scene: Scene, posed: Posed, balance: Balance) -> Settled:
+    """Return how equilibrium was found, by object."""
     cell = posed.problem.cell
     moved = zip(scene.objects, balance.moved.tolist(), balance.farthest.tolist(), strict=True)
-    return {
-        "seconds": balance.seconds,
-        "found": balance.found,
-        "objects": [
-            {
-                "name": thing.name,
-                "moved_m": shift,
-                "moved_dx": float(np.linalg.norm(shift)) / cell,
-                "farthest_m": far,
-            }
-            for thing, shift, far in moved
-        ],
-    }
+    objects = [
+        SettledObject(obj.name, (x, y, z), float(np.linalg.norm([x, y, z])) / cell, far)
+        for obj, (x, y, z), far in moved
+    ]
+    return Settled(balance.seconds, balance.found, tuple(objects))
 
 
 # ------------------------------------------------------------------ from time 0 on
@@ -194,17 +217,19 @@ class Run:
         bodies = posed.problem.bodies
         owner = np.repeat(np.arange(len(bodies)), [len(b.position) for b in bodies])
         self.layout = Layout(object=owner[self.place], rigid=posed.rigid)
+        self.watch = EnergyWatch.of(posed.problem)
+        self.stress = VonMises(posed.problem)
 
-    def through(self, progress: Progress, lying: tuple[int, ...], settle: Settle) -> None:
+    def through(self, progress: Progress, lying: tuple[int, ...], relax: Relax) -> None:
         """Step to the end, writing every frame as it comes.
 
         Args:
             progress: Told the fraction done and what is going on.
-            lying: Bodies that find their balance before time 0.
-            settle: Says where they do.
+            lying: Bodies that are brought to static equilibrium before time 0.
+            relax: Returns the state in it.
 
         """
-        done = self.begin(lying, settle)
+        done = self.begin(lying, relax)
         saved = self.engine.save()
         try:
             for number in range(done, len(self.times)):
@@ -222,15 +247,16 @@ class Run:
                 f"{error} {done} of {len(self.times)} frames are in {self.folder}."
             ) from error
 
-    def begin(self, lying: tuple[int, ...], settle: Settle) -> int:
+    def begin(self, lying: tuple[int, ...], relax: Relax) -> int:
         """Go back to the newest checkpoint, or write the first frame; return how many are done."""
         for half in self.folder.rglob(".*.part"):
             half.unlink()  # left by a process that was killed while writing
-        done, state = self.checkpoints.newest()
+        newest = self.checkpoints.newest()
+        done, state = newest.done, newest.state
         if done:
             self.engine.restore(state)
         elif lying:
-            self.engine.begin(settle(), lying)
+            self.engine.start_from(relax(), lying)
         for frame in (self.folder / FOLDER).glob("[0-9]*.npz"):
             if int(frame.stem) >= done:
                 frame.unlink()
@@ -251,6 +277,9 @@ class Run:
         now, measure = self.engine.snapshot(), self.engine.measure()
         rigid = self.posed.rigid[self.layout.object]
         motion = np.where(rigid[:, None, None], now.deformation[self.place], now.motion[self.place])
-        frame = Frame(time=now.time, position=now.position[self.place], deformation=motion)
+        stress = self.stress.at(now)[self.place]
+        frame = Frame(now.time, now.position[self.place], motion, stress)
         row = ledger_row(self.posed.problem, now, measure, self.engine.steps)
         write_frame(self.folder, number, frame, self.layout, row)
+        if self.watch is not None:
+            self.watch.see(row)

@@ -1,0 +1,188 @@
+"""The order of a verb's options in its help: what most people need first, all others under "more".
+
+Settings are nested dataclasses, each with a heading of its own. Here their fields are dealt out to
+flat dataclasses, one for each heading of the help, and what was typed is put together again.
+"""
+
+import ast
+import inspect
+import textwrap
+from collections.abc import Sequence
+from dataclasses import MISSING, dataclass, field, fields, is_dataclass, make_dataclass
+from itertools import pairwise
+from typing import Annotated, Any, get_args, get_origin, get_type_hints
+
+import tyro
+
+FIRST = 6
+"""So many options stand before the others."""
+
+
+@dataclass(frozen=True)
+class Option:
+    """One field of the settings, however deep it lies."""
+
+    path: tuple[str, ...]
+    """Names of fields that lead to it."""
+    annotation: Any
+    """Its type, with what tyro is told of it."""
+    default: Any
+    """``dataclasses.MISSING``: it must be typed."""
+    kind: type
+    """The dataclass that it belongs to."""
+
+    @property
+    def name(self) -> str:
+        """As it is typed, without the dashes."""
+        given = [m.name for m in _metadata(self.annotation) if getattr(m, "name", None)]
+        return given[-1] if given else self.path[-1].replace("_", "-")
+
+    @property
+    def positional(self) -> bool:
+        """Whether it is typed without a name."""
+        return tyro.conf.Positional in _metadata(self.annotation)
+
+
+@dataclass(frozen=True)
+class Layout:
+    """Headings of the help, and the way back from what was typed to the settings."""
+
+    shape: Any
+    """A dataclass that tyro reads the command line into."""
+    kind: type
+    """The settings."""
+    slots: dict[tuple[str, ...], tuple[str, ...]]
+    """Path of an option in the settings → its path in ``shape``."""
+
+    def settings(self, typed: Any) -> Any:
+        """Return the settings of what was typed, an instance of ``shape``."""
+        return self._made(self.kind, (), typed)
+
+    def _made(self, kind: type, path: tuple[str, ...], typed: Any) -> Any:
+        values = {}
+        for f in fields(kind):
+            slot = self.slots.get((*path, f.name))
+            if slot is None:
+                values[f.name] = self._made(_dataclass_of(kind, f.name), (*path, f.name), typed)
+            else:
+                values[f.name] = _at(typed, slot)
+        return kind(**values)
+
+
+def lay_out(kind: type, first: Sequence[str] = ()) -> Layout:
+    """Deal out options to headings.
+
+    Args:
+        kind: A dataclass, others within it.
+        first: Names of the options that come first, as they are typed, in that order; of few
+            options all do.
+
+    Raises:
+        ValueError: ``first`` names an option that there is not, or none or too many of many.
+
+    """
+    options = options_of(kind)
+    named = {option.name: option for option in options if not option.positional}
+    if len(named) <= FIRST:
+        first = list(named)
+    elif not 0 < len(first) <= FIRST or not set(first) <= set(named):
+        raise ValueError(f"{kind.__name__}: of {sorted(named)}, {list(first)} cannot come first.")
+    top = [option for option in options if option.positional] + [named[name] for name in first]
+    slots = {option.path: (option.path[-1],) for option in top}
+    rest: dict[tuple[str, ...], list[Option]] = {(): []}
+    for option in options:
+        if option not in top:
+            rest.setdefault(option.path[:-1], []).append(option)
+    rows = [_row(option) for option in top]
+    for path, group in rest.items():
+        if group:
+            heading = "_".join(("more", *path))
+            slots |= {option.path: (heading, option.path[-1]) for option in group}
+            rows.append(_heading(heading, path, group))
+    return Layout(make_dataclass(kind.__name__, rows, frozen=True), kind, slots)
+
+
+def options_of(kind: type, path: tuple[str, ...] = (), given: Any = None) -> list[Option]:
+    """Return every field of a dataclass, and of the dataclasses within it.
+
+    Args:
+        kind: The dataclass.
+        path: Where it lies.
+        given: Its default, if it has one.
+
+    """
+    hints = get_type_hints(kind, include_extras=True)
+    found = []
+    for f in fields(kind):
+        default = _default(f) if given is None else getattr(given, f.name)
+        if is_dataclass(_bare(hints[f.name])):
+            inner = None if default is MISSING else default
+            found += options_of(_dataclass_of(kind, f.name), (*path, f.name), inner)
+        else:
+            found.append(Option((*path, f.name), hints[f.name], default, kind))
+    return found
+
+
+# ---------------------------------------------------------------- headings
+
+
+def _heading(name: str, path: tuple[str, ...], group: list[Option]) -> tuple[str, Any, Any]:
+    """Return a field that stands for one heading and what is below it."""
+    kind = make_dataclass(name, [_row(option) for option in group], frozen=True)
+    kind.__doc__ = group[0].kind.__doc__ if path else "Further options."
+    title = f"more: {path[-1]}" if path else "more"
+    return name, Annotated[kind, tyro.conf.arg(name=title)], field(default_factory=kind)
+
+
+def _row(option: Option) -> tuple[Any, ...]:
+    """Return an option as a field with its help."""
+    words = documented(option.kind).get(option.path[-1], "")
+    annotation = option.annotation
+    if words:
+        annotation = Annotated[annotation, tyro.conf.arg(help=words)]
+    if option.default is MISSING:
+        return option.path[-1], annotation
+    return option.path[-1], annotation, field(default_factory=lambda: option.default)
+
+
+def documented(kind: type) -> dict[str, str]:
+    """Return the strings that stand below the fields of a dataclass in its source."""
+    found: dict[str, str] = {}
+    for one in reversed(kind.__mro__[:-1]):
+        try:
+            tree = ast.parse(textwrap.dedent(inspect.getsource(one)))
+        except (OSError, TypeError):  # it was not written but made
+            continue
+        assert isinstance(tree.body[0], ast.ClassDef)
+        rows = tree.body[0].body
+        for row, below in pairwise(rows):
+            if isinstance(row, ast.AnnAssign) and isinstance(row.target, ast.Name):
+                words = below.value if isinstance(below, ast.Expr) else None
+                if isinstance(words, ast.Constant) and isinstance(words.value, str):
+                    found[row.target.id] = " ".join(words.value.split())
+    return found
+
+
+# ---------------------------------------------------------------- types
+
+
+def _metadata(annotation: Any) -> tuple[Any, ...]:
+    return get_args(annotation)[1:] if get_origin(annotation) is Annotated else ()
+
+
+def _bare(annotation: Any) -> Any:
+    return get_args(annotation)[0] if get_origin(annotation) is Annotated else annotation
+
+
+def _dataclass_of(kind: type, name: str) -> Any:
+    return _bare(get_type_hints(kind, include_extras=True)[name])
+
+
+def _default(f: Any) -> Any:
+    return f.default if f.default_factory is MISSING else f.default_factory()
+
+
+def _at(typed: Any, slot: tuple[str, ...]) -> Any:
+    for name in slot:
+        typed = getattr(typed, name)
+    return typed

@@ -1,0 +1,37 @@
+"""Settings are validated before a run keeps them."""
+
+from pathlib import Path
+
+from corporeal.pipeline import RUN, Settings, reopen
+from corporeal.stages import assemble, describe, fill, film, ground, reconstruct, segment, simulate
+from corporeal.vlm import connect, critic_of
+from corporeal.vlm.annotation import mapping_of
+
+
+def validate(folder: Path, settings: Settings) -> None:
+    """Refuse settings that no scene could be run with: a model without its key, a missing library.
+
+    Settings that the run in ``folder`` already has are not validated again: its answers may be on
+    the disk, so that no model is needed.
+
+    Raises:
+        UserError: Something is missing or unknown; nothing was changed.
+
+    """
+    known = reopen(folder).settings if (folder / RUN).exists() else None
+    for stage in (assemble, segment, fill, simulate, film):
+        stage.validate(getattr(settings, stage.__name__.rpartition(".")[2]))
+    if known is None or known.describe != settings.describe:
+        _validate_answers(settings.describe)
+    if known is None or known.ground != settings.ground:
+        ground.validate(settings.ground)
+    if known is None or known.reconstruct != settings.reconstruct:
+        reconstruct.validate(settings.reconstruct)
+
+
+def _validate_answers(config: describe.DescribeConfig) -> None:
+    describe.validate(config)
+    if config.annotations is not None:
+        mapping_of(config.annotations)
+    for spec in (config.vlm, critic_of(config.vlm, config.critic)):
+        connect(spec)

@@ -1,0 +1,96 @@
+"""`corporeal view`: look at runs in a browser."""
+
+from dataclasses import dataclass
+from functools import partial
+from importlib.util import find_spec
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from corporeal.cli.parse import parse
+from corporeal.errors import UserError
+
+NEEDED = ("starlette", "uvicorn", "websockets")
+MOST = 2
+"""Runs that one page shows."""
+
+
+@dataclass(frozen=True)
+class View:
+    """What to show, and where to listen."""
+
+    runs: Annotated[
+        tuple[Path, ...],
+        tyro.conf.Positional,
+        tyro.conf.arg(metavar="[RUN [RUN]]", help="One run, or two to compare; none: all."),
+    ] = ()
+    out: Path = Path("runs")
+    """Folder of all runs, where none is named."""
+    port: int = 8321
+    """Port to listen on; 0: any that is free."""
+    host: str = "127.0.0.1"
+    """Address to listen on; any but this machine's own demands a token."""
+    browser: bool = True
+    """Open the page in a browser."""
+    read_only: bool = False
+    """Show runs only: no uploads, no jobs, no live simulation."""
+
+
+def verb_view() -> None:
+    """Look at a run in a browser: turn it, colour it, ask what every part is and why.
+
+    With two runs: side by side, one timeline, one camera. Without any: a list of all runs.
+    Needs the extra `viewer`: pip install 'corporeal[viewer]'.
+    """
+    asked = parse(View, "view", verb_view.__doc__)
+    absent = [name for name in NEEDED if find_spec(name) is None]
+    if absent:
+        raise UserError(
+            f"The viewer needs {', '.join(absent)}: pip install 'corporeal[viewer]'. "
+            "report.html of every run holds a 3D view that needs nothing."
+        )
+    _show(asked)
+
+
+def _show(asked: View) -> None:
+    from corporeal.viewer.live import Room
+    from corporeal.viewer.serve import Address, door_of, listening, serve, where
+    from corporeal.viewer.shelf import Shelf
+    from corporeal.viewer.site import Shown, site
+    from corporeal.viewer.socket import live_route
+    from corporeal.viewer.work import Work
+
+    names = _names(asked)
+    address = Address(asked.host, asked.port)
+    door, listener = door_of(address), listening(address)
+    said = where(address, listener.getsockname()[1], door)
+    shelf = Shelf(asked.runs, None if asked.runs else asked.out)
+    room = Room(shelf.made)
+    work = None if asked.read_only or asked.runs else Work(shelf, asked.out)
+    more = () if asked.read_only else (live_route(room),)
+    more = more if work is None else (*more, *work.routes())
+    app = site(Shown(shelf, names, asked.read_only, work is not None), door, more)
+    try:
+        ready = partial(print, *said, "Ctrl-C ends.", sep="\n", flush=True)
+        serve(app, listener, ready, said[0] if asked.browser else "")
+    finally:
+        room.close()
+        if work is not None:
+            work.close()
+
+
+def _names(asked: View) -> tuple[str, ...]:
+    """Return the names of the runs that were asked for; refuse what is none."""
+    from corporeal.pipeline import reopen
+
+    if len(asked.runs) > MOST:
+        raise UserError(f"A page shows one run, or two beside each other, not {len(asked.runs)}.")
+    for run in asked.runs:
+        reopen(run)  # says what to do where it is no run
+    names = tuple(run.resolve().name for run in asked.runs)
+    if len(set(names)) < len(names):
+        raise UserError("Two runs of one name cannot be told apart. Name two different ones.")
+    if not asked.runs and not asked.out.is_dir():
+        raise UserError(f"{asked.out} is no folder. Name a run, or a folder of runs with --out.")
+    return names

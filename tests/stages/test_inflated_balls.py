@@ -1,0 +1,91 @@
+"""An inflated ball, from its name or an annotation to how it bounces."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import corporeal as co
+from corporeal.errors import UserError
+from corporeal.pipeline import Settings
+
+RADIUS = 0.11
+
+
+def named(name, **extras):
+    made = co.build_scene(co.ball("rubber", RADIUS, (0, 0, 0.2), (0, 0, -6.0), name))
+    (surface,) = made.surfaces
+    return replace(made, surfaces=(replace(surface, extras=extras),))
+
+
+def test_a_football_is_inflated_by_its_name_and_weighs_what_skin_and_air_do():
+    ready = co.prepare(named("football"))
+    structure, particles = ready.field.structures[0], ready.particles
+    assert structure.inflated
+    assert structure.contents is not None
+    assert structure.contents.name == "air at 80 kPa"
+    volume = 4 / 3 * np.pi * RADIUS**3
+    skin = 1100 * 4 * np.pi * RADIUS**2 * 0.003
+    assert particles.mass.sum() == pytest.approx(skin + 2.15 * volume, rel=0.05)
+    np.testing.assert_allclose(particles.density, particles.mass.sum() / volume, rtol=0.02)
+    assert particles.treatments[0].young == structure.contents.young
+
+
+def test_a_file_states_its_pressure_and_what_is_not_sealed_stays_a_wall():
+    asked = {"substance": "rubber", "shell_thickness_m": 0.003}
+    blown = co.prepare(named("thing", **asked, inflation_kPa=40)).field.structures[0]
+    assert blown.contents is not None
+    assert blown.contents.name == "air at 40 kPa"
+    for extras in ({}, {"inflation_kPa": "much"}, {"inflation_kPa": -3}):
+        open_one = co.prepare(named("thing", **asked, **extras)).field.structures[0]
+        assert (open_one.kind, open_one.contents) == ("shell", None)
+    duck = co.prepare(named("rubber duck")).field.structures[0]
+    assert (duck.kind, duck.contents) == ("shell", None)
+
+
+def annotated(tmp_path, text, name="thing"):
+    (tmp_path / "said.yaml").write_text(text)
+    usual = Settings()
+    describe = replace(usual.describe, annotations=tmp_path / "said.yaml")
+    return co.prepare(named(name), replace(usual, describe=describe)).field.structures[0]
+
+
+def test_an_annotation_inflates_a_ball_and_lets_the_air_out_of_one(tmp_path):
+    blown = annotated(tmp_path, "thing: {material: rubber, thickness_mm: 2, inflation_kPa: 60}\n")
+    assert blown.contents is not None
+    assert blown.contents.name == "air at 60 kPa"
+    assert "nine times as stiff" in blown.reason
+    flat = annotated(tmp_path, "football: {inflation_kPa: 0}\n", "football")
+    assert flat.contents is None or flat.contents.young < 50e3
+
+
+@pytest.mark.parametrize(
+    ("text", "message"),
+    [
+        ("thing: {inflation_kPa: -1}", "gauge pressure"),
+        ("thing: {inflation_kPa: 80000}", "gauge pressure"),
+        ("thing: {inflation_kPa: hard}", "must be a number"),
+        ("thing: {structure: solid, inflation_kPa: 80}", "Say structure: shell"),
+    ],
+)
+def test_what_cannot_be_inflated_so_is_said(tmp_path, text, message):
+    with pytest.raises(UserError, match=message):
+        annotated(tmp_path, text)
+
+
+def test_it_bounces_as_its_rules_ask_and_touches_as_long_as_measured():
+    """Published contact times of footballs are 8 to 10 ms at 6 m/s."""
+    problem = co.pose_problem(co.prepare(named("football")))
+    engine = co.build_engine(problem)
+    while not (engine.time > 0.02 and engine.measure().momentum[0, 2] > 0 and left(engine)):
+        engine.advance(engine.time + 1e-3)
+        assert engine.time < 0.1
+    m = engine.measure()
+    touched = np.nanmax(m.last_contact[0]) - np.nanmin(m.first_contact[0])
+    fall = np.sqrt(6.0**2 + 2 * 9.81 * (0.2 - RADIUS))
+    assert m.momentum[0, 2] / m.mass[0] / fall == pytest.approx(0.8, abs=0.03)
+    assert 0.0075 < touched < 0.011
+
+
+def left(engine):
+    return engine.time - np.nanmax(engine.measure().last_contact[0]) > 2e-3

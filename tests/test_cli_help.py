@@ -1,0 +1,120 @@
+"""What a verb's help shows: six options that most people need, then all others."""
+
+import re
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Annotated, Literal, get_args, get_origin
+
+import pytest
+import tyro
+
+from corporeal import cli
+from corporeal.cli.help_layout import FIRST, lay_out, options_of
+from corporeal.pipeline import Settings
+
+NEEDED = ("detail", "vlm", "annotations", "drop", "things", "out")
+
+
+@dataclass(frozen=True)
+class Place:
+    """Where it goes."""
+
+    out: Path = Path("runs")
+    """A folder, whose
+    name is on two lines."""
+
+
+@dataclass(frozen=True)
+class Everything:
+    """As `run` has it."""
+
+    inputs: tyro.conf.Positional[tuple[Path, ...]]
+    place: Place = Place()
+    settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
+
+
+def verbs_of(command):
+    """Return every verb, with its second word where it has some."""
+    for verb in cli.VERBS:
+        code, said = command(verb, "--help")
+        assert code == 0, said.err
+        words = re.findall(rf"^  corporeal {verb} (\w+)", said.out, re.MULTILINE)
+        listed = "WORD --help tells more" in said.out
+        yield from ((verb, word) for word in words) if listed else ((verb,),)
+
+
+def headings(said):
+    """Return the heading of each option of a help text, in order."""
+    found, heading = {}, ""
+    for line in said.splitlines():
+        if title := re.match(r"╭─ (.+?) ─+╮", line):
+            heading = title[1]
+        elif flag := re.match(r"│ (--[\w-]+)", line):
+            found[flag[1]] = heading
+    return found
+
+
+def test_no_verb_shows_more_than_six_options_before_the_others(command, monkeypatch):
+    monkeypatch.setenv("COLUMNS", "100")
+    seen = list(verbs_of(command))
+    assert ("evaluate", "parts") in seen and ("corpus", "run") in seen and ("film",) in seen
+    for words in seen:
+        found = headings(command(*words, "--help")[1].out)
+        before = [flag for flag, heading in found.items() if not heading.startswith("more")]
+        assert len(before) <= FIRST, words
+        assert len(before) == min(FIRST, len(found)), words
+        assert list(found)[: len(before)] == before, words
+
+
+def value(annotation):
+    """Return words for the command line that are no option's default."""
+    if get_origin(annotation) is Annotated:
+        return value(get_args(annotation)[0])
+    inner = [a for a in get_args(annotation) if a not in (type(None), Ellipsis)]
+    if get_origin(annotation) is Literal:
+        return [inner[-1]]
+    if get_origin(annotation) is tuple:
+        return [word for a in inner for word in value(a)]
+    if inner:
+        return value(inner[0])
+    return {int: ["7"], float: ["7.5"], str: ["x"], Path: ["x"]}[annotation]
+
+
+@pytest.mark.parametrize("option", options_of(Everything), ids=lambda option: option.name)
+def test_every_option_means_the_same_wherever_it_stands_in_the_help(option):
+    if option.positional:
+        words = ["a.glb", "b.glb"]
+    elif option.annotation is bool:
+        words = ["a.glb", f"--{'no-' if option.default else ''}{option.name}"]
+    else:
+        words = ["a.glb", f"--{option.name}", *value(option.annotation)]
+    layout = lay_out(Everything, NEEDED)
+    plain = tyro.cli(tyro.conf.OmitArgPrefixes[Everything], args=words)
+    ordered = layout.settings(tyro.cli(tyro.conf.OmitArgPrefixes[layout.shape], args=words))
+    assert ordered == plain
+
+
+def test_words_below_an_option_stay_with_it_wherever_it_stands(capsys):
+    for first in (NEEDED, ("fps", *NEEDED[:-1])):
+        layout = lay_out(Everything, first)
+        with pytest.raises(SystemExit):
+            tyro.cli(tyro.conf.OmitArgPrefixes[layout.shape], args=["--help"])
+        assert "A folder, whose name is on two lines." in capsys.readouterr().out
+
+
+def test_an_option_that_is_not_there_cannot_come_first():
+    with pytest.raises(ValueError, match=r"Everything: .*\['nowhere'\] cannot come first"):
+        lay_out(Everything, ("nowhere",))
+
+
+def test_an_unknown_second_word_shows_the_menu(command):
+    code, said = command("evaluate", "weight", "scans/")
+    assert code == 2
+    assert "Unknown word after evaluate 'weight'" in said.err
+    assert "Choose one of: mass, materials, objects, parts." in said.err
+
+
+def test_an_option_of_another_sub_command_is_refused(command):
+    code, said = command("evaluate", "objects", "scenes/", "--anonymous")
+    assert code == 2
+    assert "--anonymous" in said.err

@@ -1,0 +1,22 @@
+"""The three lines of Python at the top of the README do what a reader expects of them."""
+
+import re
+from pathlib import Path
+
+ROOT = Path(__file__).parents[1]
+
+
+def first_python(page: str) -> str:
+    """Return the first block of Python of a page."""
+    found = re.search(r"```python\n(.+?)```", (ROOT / page).read_text(), re.DOTALL)
+    assert found is not None
+    return found[1]
+
+
+def test_the_ball_of_the_readme_rebounds(capsys):
+    exec(first_python("README.md"), {})
+    assert 0.3 < float(capsys.readouterr().out) < 0.98
+
+
+def test_readme_and_api_page_begin_with_the_same_lines():
+    assert first_python("README.md") == first_python("docs/api.md")
