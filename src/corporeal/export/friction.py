@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 Rule = Literal["multiply", "average", "geometric", "larger"]
 """How an engine makes one coefficient of two: their product, mean, geometric mean, or maximum."""
 LEAST = 1e-3
-"""Smallest coefficient that is told from none [-]."""
+"""Smallest coefficient that is distinguished from none [-]."""
 
 
 @dataclass(frozen=True)

@@ -95,13 +95,13 @@ class Memory:
         inverse = np.linalg.inv(matter.inertia)
         r = Rigid()
         r.stiff = self.put(stiff, wp.int32)
-        told = np.array([b.path is not None for b in problem.bodies])
+        prescribed = np.array([b.path is not None for b in problem.bodies])
         surfaces = [len(b.surface) > 0 for b in problem.bodies]
-        r.pointed = self.put(stiff & (told | surfaces), wp.int32)
-        r.light = self.put(np.where(told, 0.0, 1.0 / matter.total), wp.float64)
+        r.pointed = self.put(stiff & (prescribed | surfaces), wp.int32)
+        r.light = self.put(np.where(prescribed, 0.0, 1.0 / matter.total), wp.float64)
         r.centre = self.put(matter.centre, wp.vec3d)
         r.turn = self.put(np.tile(np.eye(3), (len(stiff), 1, 1)), wp.mat33d)
-        acting = np.where(told[:, None, None], 0.0, inverse)
+        acting = np.where(prescribed[:, None, None], 0.0, inverse)
         r.rest, r.inertia = self.put(acting, wp.mat33d), self.put(acting, wp.mat33d)
         r.speed = self.put(start.speed, wp.vec3d)
         r.moment = self.put(start.spin_momentum, wp.vec3d)
@@ -113,7 +113,7 @@ class Memory:
         r.last_moment = self.zeros(len(stiff), wp.vec3d)
         r.busy, r.lost = self.zeros(len(stiff), wp.int32), self.zeros(len(stiff), wp.int32)
         self._rigid_particles(r, problem, matter, np.flatnonzero(stiff[matter.body]))
-        self._surfaces(r, matter, np.flatnonzero(stiff & ~told), problem.cell)
+        self._surfaces(r, matter, np.flatnonzero(stiff & ~prescribed), problem.cell)
         self._paths(r, problem, matter)
         return r
 
