@@ -122,9 +122,11 @@ def test_unclear_raises_no_alarm_and_what_applies_in_no_look_is_not_counted():
 
 @pytest.mark.parametrize(
     ("wins", "count", "told"),
-    [(3, 3, True), (2.5, 3, False), (6.5, 8, True), (6, 8, False), (9, 12, True)]
-    + [(8.5, 12, False), (26.5, 42, True), (26, 42, False)],
-)
+    [
+        (3, 3, True), (2.5, 3, False), (6.5, 8, True), (6, 8, False),
+        (9, 12, True), (8.5, 12, False), (26.5, 42, True), (26, 42, False),
+    ],
+)  # fmt: skip
 def test_what_is_beyond_chance(wins, count, told):
     interval = jeffreys(wins, count)
     assert interval.low < Fraction(wins) / count < interval.high or wins == count

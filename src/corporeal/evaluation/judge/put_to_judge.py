@@ -54,11 +54,7 @@ def put_to_judge(
 
     """
     check_judging(config)
-    model = judge or connect(config.judge, config.record)
-    if model is None:
-        raise UserError(
-            "Nobody judges. Say who: --judge openai:MODEL, ask:FOLDER or replay:FOLDER."
-        )
+    asking = judge or _connected(config)
     reckoned = price(films.asked, config.judge)
     say(price_words(reckoned, config))
     _agreed(reckoned, config)
@@ -79,6 +75,15 @@ def put_to_judge(
     verdicts = [film_verdict(*film, said) for film, said in sorted(looks.items())]
     unanswered = sum(isinstance(r, UnansweredError) for r in results)
     return Judged(films, verdicts, unanswered, config.judge, reckoned, tuple(sorted(by)))
+
+
+def _connected(config: JudgeConfig) -> Vlm:
+    model = connect(config.judge, config.record)
+    if model is None:
+        raise UserError(
+            "Nobody judges. Say who: --judge openai:MODEL, ask:FOLDER or replay:FOLDER."
+        )
+    return model
 
 
 def price_words(reckoned: Price, config: JudgeConfig) -> str:
