@@ -117,7 +117,7 @@ def check_judging(config: JudgeConfig) -> None:
 
 def gather_films(
     scenes: Sequence[SceneRuns],
-    controls: Path,
+    out: Path,
     config: JudgeConfig,
     progress: Progress = lambda fraction, words: None,
 ) -> Films:
@@ -125,7 +125,7 @@ def gather_films(
 
     Args:
         scenes: With finished runs.
-        controls: Folder for the runs of controls, by scene.
+        out: Folder of the evaluation; runs of controls go to ``OUT/SCENE/control-NAME``.
         config: How many looks, and controls of how many scenes.
         progress: Told the fraction done and what is being done.
 
@@ -133,7 +133,7 @@ def gather_films(
     films = Films([], [], [], {}, methods_of(scenes))
     for number, scene in enumerate(scenes):
         progress(number / len(scenes), scene.name)
-        _gather_scene(scene, controls / scene.name, number < config.control_scenes, config, films)
+        _gather_scene(scene, out / scene.name, number < config.control_scenes, config, films)
     return films
 
 
@@ -172,16 +172,17 @@ def _gather_scene(
 
 def _methods(scene: SceneRuns, films: Films) -> dict[str, FilmedMotion]:
     """Return the films of all methods but the reference; what cannot be judged is a row."""
-    shown = {}
-    for method in scene.runs:
-        if method == REFERENCE:
-            continue
-        played, why = _run(scene, method)
-        if played is None:
-            films.failed.append(Failed(scene.name, method, why))
-        else:
-            shown[method] = simulated(played)
-    return shown
+    shown = {m: _read(scene, m, films) for m in scene.runs if m != REFERENCE}
+    return {m: film for m, film in shown.items() if film is not None}
+
+
+def _read(scene: SceneRuns, method: str, films: Films) -> FilmedMotion | None:
+    played, why = _run(scene, method)
+    if played is None:
+        failed = Failed(scene.name, method, why)
+        films.failed.extend([failed] if failed not in films.failed else [])
+        return None
+    return simulated(played)
 
 
 def _controls(
@@ -225,8 +226,10 @@ def _control(
 ) -> FilmedMotion | None:
     if control in EDITED:
         return edited(control, reference)
+    if control in scene.runs:  # also a method, so it was run
+        return _read(scene, control, films)
     try:
-        played = simulate_control(control, scene.runs[REFERENCE], folder / control)
+        played = simulate_control(control, scene.runs[REFERENCE], folder / f"control-{control}")
     except UserError as error:
         films.failed.append(Failed(scene.name, control_name(control), str(error)))
         return None
