@@ -8,6 +8,7 @@ import numpy as np
 
 from corporeal import pipeline
 from corporeal.errors import UserError, check_range
+from corporeal.evaluation.dynamics.places import OURS
 from corporeal.evaluation.judge.control_effect import (
     AFTER_CONTACT,
     UNMEASURED,
@@ -29,7 +30,7 @@ from corporeal.trajectory.played import Played
 from corporeal.vlm import NOBODY
 
 Progress = Callable[[float, str], None]
-REFERENCE = "ours"
+REFERENCE = OURS
 CONTROLS = (*EDITED, *SIMULATED)
 WITH_CONTROLS = 12
 """Scenes whose controls are judged unless more are asked for."""
