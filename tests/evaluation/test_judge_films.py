@@ -373,7 +373,10 @@ def test_the_price_is_said_before_anybody_is_asked_and_more_than_5_dollars_want_
 
     def ask(count, **config):
         said.clear()
-        films = judge_scenes.Films([one] * count, [], [], {}, [REFERENCE])
+        many = [
+            replace(one, question=replace(one.question, scene=f"film-{k}")) for k in range(count)
+        ]
+        films = judge_scenes.Films(many, [], [], {}, [REFERENCE])
         return put_to_judge(films, JudgeConfig(**config), said.append, judge=Asked({}))
 
     ask(3, judge="openai:gpt-5.4")

@@ -23,11 +23,13 @@ class FilmedMotion:
     prepared: Prepared
     at: Callable[[float], Frame]
     """Instant [s] → where the matter is then."""
+    bound_as: "FilmedMotion | None" = None
+    """Another film of the same prepared scene, whose surfaces need not be bound again."""
 
     @cached_property
     def cast(self) -> Cast:
         """Surfaces bound to particles."""
-        return cast_of(self.prepared)
+        return cast_of(self.prepared) if self.bound_as is None else self.bound_as.cast
 
     @cached_property
     def members(self) -> list[Int[np.ndarray, " N"]]:

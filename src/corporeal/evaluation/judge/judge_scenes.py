@@ -1,7 +1,7 @@
 """All films of several scenes: references, controls and methods, ready to be asked about."""
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -163,7 +163,9 @@ def _gather_scene(
             effect = ControlEffect(scene.name, control, far, limit, far.exceeds(limit))
             films.effects.append(effect)
             if effect.effective:
-                shown[control_name(control)] = film
+                same = film.prepared is reference.prepared
+                bound = shown[REFERENCE] if same else None
+                shown[control_name(control)] = replace(film, bound_as=bound)
     films.asked.extend(
         FilmAsked(scene.name, condition, look, question(film, staging, told, look))
         for condition, film in shown.items()

@@ -13,7 +13,7 @@ from corporeal.render.camera import Aim, axes
 
 TICK = 0.05
 """Between two dots on a path [s]."""
-STEP = 1.0 / 240
+STEP = 1.0 / 120
 """Between two corners of a line [s]."""
 MARGIN = 26
 """[px]"""

@@ -1,14 +1,14 @@
 """Ask a judge about films: the price first, every film in a conversation of its own."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
 
 from corporeal.errors import UserError
-from corporeal.evaluation.judge.film_question import Price, price
+from corporeal.evaluation.judge.film_question import FilmAsked, Price, price
 from corporeal.evaluation.judge.judge_scenes import Films, JudgeConfig, check_judging
 from corporeal.evaluation.judge.subquestions import Verdict
 from corporeal.evaluation.judge.telling import FilmVerdict, film_verdict
-from corporeal.vlm import LIVE, UnansweredError, Vlm, connect
+from corporeal.vlm import LIVE, Reply, UnansweredError, Vlm, connect
 from corporeal.vlm.by_hand import WaitingError, all_answered
 from corporeal.vlm.together import together
 
@@ -55,10 +55,10 @@ def put_to_judge(
     """
     check_judging(config)
     asking = judge or _connected(config)
-    reckoned = price(films.asked, config.judge)
+    jobs = distinct(films.asked)
+    reckoned = price(jobs, config.judge)
     say(price_words(reckoned, config))
     _agreed(reckoned, config)
-    jobs = sorted(films.asked, key=lambda a: (a.question.scene, a.look))
     results = together(
         [lambda a=a: asking.ask(a.question, Verdict) for a in jobs],
         AT_ONCE,
@@ -66,15 +66,27 @@ def put_to_judge(
         lambda error: not isinstance(error, WaitingError | UnansweredError),
     )
     all_answered(results, config.judge)
+    replies = {_named(a): r for a, r in zip(jobs, results, strict=True) if isinstance(r, Reply)}
     looks: dict[tuple[str, str], list[Verdict]] = {}
-    by: set[str] = set()
-    for asked, reply in zip(jobs, results, strict=True):
-        if not isinstance(reply, Exception):
-            looks.setdefault((asked.scene, asked.condition), []).append(reply.answer)
-            by.add(reply.model)
+    for asked in films.asked:
+        if _named(asked) in replies:
+            said = looks.setdefault((asked.scene, asked.condition), [])
+            said.append(replies[_named(asked)].answer)
     verdicts = [film_verdict(*film, said) for film, said in sorted(looks.items())]
-    unanswered = sum(isinstance(r, UnansweredError) for r in results)
-    return Judged(films, verdicts, unanswered, config.judge, reckoned, tuple(sorted(by)))
+    by = tuple(sorted({reply.model for reply in replies.values()}))
+    return Judged(films, verdicts, len(jobs) - len(replies), config.judge, reckoned, by)
+
+
+def distinct(asked: Sequence[FilmAsked]) -> list[FilmAsked]:
+    """Return each question once, in an order that tells nothing.
+
+    A baseline that is also a control is one motion, and is asked about once.
+    """
+    return [a for _, a in sorted({_named(a): a for a in asked}.items())]
+
+
+def _named(asked: FilmAsked) -> tuple[str, int, str]:
+    return asked.question.scene, asked.look, asked.question.prompt
 
 
 def _connected(config: JudgeConfig) -> Vlm:
