@@ -11,6 +11,7 @@ from corporeal.errors import UserError, check_range
 from corporeal.formats.typical_bulk import doubt_mass
 from corporeal.geometry.arrangement import underside
 from corporeal.geometry.contact_points import contact_points
+from corporeal.geometry.contents import with_contents
 from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.falls import drop_heights
 from corporeal.geometry.foliage import in_leaves, is_leafy, leaves_of, planted
@@ -31,13 +32,16 @@ from corporeal.geometry.rods import Rod, rod_of
 from corporeal.geometry.rooting import drawn_into_ground
 from corporeal.geometry.sizes import in_scene, is_scaled, scale_of_part
 from corporeal.geometry.survey import Anatomy, Member, survey
+from corporeal.geometry.wetted import wetted_points
 from corporeal.materials import find
 from corporeal.materials.quantities import QUANTITIES
+from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.prescribed import fastest_velocity, start_velocity
 from corporeal.mpm.physics.wind import greatest_acceleration
 from corporeal.treatment.part import Motion, PartGeometry
 from corporeal.treatment.plan import Detail, Plan, Quality, plan
-from corporeal.types import MaterialField, Particles, Parts, Scene, SceneObject, Treatment
+from corporeal.treatment.poured import moving, pour
+from corporeal.types import Contents, MaterialField, Particles, Parts, Scene, SceneObject, Treatment
 
 
 @dataclass(frozen=True)
@@ -90,6 +94,9 @@ def fill(
         quality: What is bought instead of what ``config.detail`` buys; None: that.
 
     """
+    # What moves in vessels is an object of its own.
+    contents = pour_out(scene, parts, field, config.seed)
+    scene, parts, field = with_contents(scene, parts, field, contents).all
     field = in_scene(field, scale_of_part(scene, parts))
     scene, drawn = drawn_into_ground(scene, parts, field)
     anatomies = examine(scene, parts, config.seed)
@@ -139,11 +146,52 @@ def fill(
         coarse = is_rigid(anatomy, chosen)
         packings.append(pack(anatomy, recipes, chosen.cell / 2, rng, coarse=coarse))
     # No point of one object in another; volumes and densities that add up to the masses.
-    packings = keep_apart(packings, chosen.cell)
+    packings = keep_apart(packings, chosen.cell, in_vessels(parts, field))
     particles = gather(scene, parts, anatomies, makes, chosen, packings)
+    if any(MENU[m.law].liquid for m in field.materials):
+        particles = wet(particles, anatomies, makes, config.seed)
     doubted = implausible_masses(scene, anatomies, particles.mass_real)
-    particles = replace(particles, warnings=(*particles.warnings, *drawn, *heavy, *doubted))
+    told = (*particles.warnings, *drawn, *heavy, *doubted)
+    particles = replace(particles, warnings=told, contents=contents)
     return planted(scene, particles, anatomies, field, tissue)
+
+
+def pour_out(scene: Scene, parts: Parts, field: MaterialField, seed: int) -> tuple[Contents, ...]:
+    """Return what moves in vessels that it does not fill."""
+    if not moving(field):
+        return ()
+    life = in_scene(field, scale_of_part(scene, parts))
+    return pour(scene, parts, life, examine(scene, parts, seed), seed)
+
+
+def in_vessels(parts: Parts, field: MaterialField) -> set[tuple[int, int]]:
+    """Objects that hold something, each with every object that may be that."""
+    owners = [part.object for part in parts.catalogue]
+    held = [owners[k] for k, s in enumerate(field.structures) if s.holds]
+    loose = [owners[k] for k, m in enumerate(field.materials) if MENU[m.law].loose]
+    return {(min(a, b), max(a, b)) for a in held for b in loose}
+
+
+def wet(
+    particles: Particles, anatomies: list[Anatomy], makes: dict[int, Make], seed: int
+) -> Particles:
+    """Cover rigid objects with points where liquids touch them."""
+    points, normals = [np.zeros((0, 3))], [np.zeros((0, 3))]
+    owner = [np.zeros(0, np.int64)]
+    for number, anatomy in enumerate(anatomies):
+        if any(particles.treatments[m.part].kind != "rigid" for m in anatomy.members):
+            continue
+        rng = np.random.default_rng([seed, number, 7])
+        found, normal = wetted_points(anatomy, makes, particles.cell, rng)
+        points.append(found)
+        normals.append(normal)
+        owner.append(np.full(len(found), number))
+    return replace(
+        particles,
+        wetted=np.concatenate(points),
+        wetted_normal=np.concatenate(normals),
+        object_of_wetted=np.concatenate(owner),
+    )
 
 
 # ------------------------------------------------------------------ what is there
