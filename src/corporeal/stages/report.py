@@ -15,7 +15,7 @@ from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.mpm.laws import MENU
 from corporeal.render.page import figure, inlined, page, safe
 from corporeal.render.subject import parts_named
-from corporeal.trajectory.audit import breakage_words, equilibrium_words
+from corporeal.trajectory.audit_words import breakage_words, equilibrium_words
 from corporeal.types import (
     Film,
     Ground,
