@@ -16,6 +16,7 @@ from typing import Any, Literal
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.features import MENU as ENCODERS
+from corporeal.fields.specification import READERS
 from corporeal.formats.glb_writer import write_glb
 from corporeal.formats.scene_file import read_scene_file, write_scene_file
 from corporeal.formats.sources import called, kind_of, pictured, sources
@@ -70,7 +71,7 @@ VERBS = tuple(FOLDERS)
 RUN = "run.json"
 WRITTEN = ("record",)
 """Settings that name what is written, not what is read."""
-BEFORE_PATHS = ("replay", *ENCODERS)
+BEFORE_PATHS = ("replay", *READERS, *ENCODERS)
 """What stands before a colon and a path."""
 GAUSSIANS = "gaussians.ply"
 
