@@ -268,7 +268,7 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
             0.02,
             0.2,
             "mm",
-            "wrong",
+            "frozen",
         ),
         Demand(
             "The lamp keeps its shape (shape error)",
