@@ -164,7 +164,8 @@ def ground_weighed(
     """
     if not inventory.transcript:  # nothing but ranges is open
         return ground(scene, parts, inventory, grounding)
-    believed = weighed(Scale(life_sized(scene), parts, grounding, 0), inventory, DRAWS)
+    ours = replace(grounding, field="")  # draws are of our ranges, whoever decides in the end
+    believed = weighed(Scale(life_sized(scene), parts, ours, 0), inventory, DRAWS)
     found = ground(scene, parts, believed.inventory, grounding)
     return replace(found, mixtures=believed.mixtures)
 

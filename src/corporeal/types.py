@@ -697,6 +697,8 @@ class MaterialField:
     """Per part, of what it consists where its mesh does not tell; empty: nowhere more than one."""
     mixtures: tuple[MassMixture, ...] = ()
     """Per object that a model described, what it may weigh; empty: no model was asked."""
+    notes: tuple[str, ...] = ()
+    """What a reader of the report should know of numbers from elsewhere, in sentences."""
 
 
 # ---------------------------------------------------------------- what is simulated

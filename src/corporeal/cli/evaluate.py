@@ -1,4 +1,4 @@
-"""`corporeal evaluate mass | materials | parts | objects | judge`: predicted against known."""
+"""`corporeal evaluate mass | materials | parts | objects | dynamics | judge`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -8,6 +8,7 @@ from typing import Annotated
 import tyro
 
 from corporeal import store
+from corporeal.cli.corpus import Crew, hire, say
 from corporeal.cli.parse import do_second_word, parse
 from corporeal.errors import UserError
 from corporeal.evaluation.result_table import Table
@@ -18,10 +19,15 @@ Folder = Annotated[
     tyro.conf.Positional,
     tyro.conf.arg(metavar="FOLDER", help="Models, one object each, or settled scenes."),
 ]
+Target = Annotated[
+    str,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="TARGET", help='"showcase", or the folder of a corpus.'),
+]
 
 
 def verb_evaluate() -> None:
-    """Compare predictions with ground truth: evaluate mass, materials, parts, objects or judge."""
+    """Compare predictions with what is known: mass, materials, parts, objects, dynamics, judge."""
     do_second_word("evaluate", JUDGES)
 
 
@@ -174,6 +180,64 @@ def evaluate_objects() -> None:
         objects_figure.draw(found, asked.figure)
 
 
+def evaluate_dynamics() -> None:
+    """Compare how scenes move with baselines, with a finer run of ours, and with life.
+
+        corporeal evaluate dynamics showcase --against single capped one
+        corporeal evaluate dynamics corpus/ --against vomp:fields/ --json d.json
+
+    TARGET is "showcase" or a corpus whose scenes are assembled. Each run lies in OUT/SCENE/METHOD,
+    is done in a process of its own, and is not done again; say the same again to go on. A run that
+    fails is a row. What a vision-language model makes of the runs: corporeal evaluate judge OUT.
+    """
+    from corporeal.corpus.carry_out import Hands
+    from corporeal.evaluation.dynamics import dynamics_figure, dynamics_page, dynamics_tables
+    from corporeal.evaluation.dynamics.run_evaluation import DynamicsConfig
+    from corporeal.evaluation.dynamics.run_evaluation import evaluate_dynamics as evaluate
+    from corporeal.evaluation.dynamics.summary import record
+    from corporeal.pipeline import Settings
+
+    @dataclass(frozen=True)
+    class Dynamics:
+        target: Target
+        how: DynamicsConfig = field(default_factory=DynamicsConfig)
+        out: Path | None = None
+        """Folder of the runs; by default dynamics/ here, of a corpus CORPUS/dynamics/."""
+        json: Path | None = None
+        """File for all numbers (JSON)."""
+        figure: Path | None = None
+        """File for a figure (PNG)."""
+        page: Path | None = None
+        """File of the report; by default OUT/report.html."""
+        docs: Path | None = None
+        """File for the measured rows as a page of documentation (Markdown)."""
+        crew: Crew = field(default_factory=Crew)
+        settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
+
+    first = ("against", "reference", "detail", "out", "json", "figure")
+    doc = evaluate_dynamics.__doc__
+    asked = parse(Dynamics, "evaluate dynamics", doc, words=2, first=first)
+    here = Path() if asked.target == "showcase" else Path(asked.target)
+    out = asked.out or here / "dynamics"
+    with progress_bars() as tell:
+        hands = Hands(hire(asked.crew, out), tell("evaluate"), say)
+        found = evaluate(asked.target, out, asked.how, asked.settings, hands)
+    _show(dynamics_tables.tables(found))
+    for sentence in (*dynamics_tables.verdicts(found), *dynamics_tables.missing_references(found)):
+        console.print(sentence, markup=False, highlight=False)
+    page = asked.page or out / "report.html"
+    dynamics_page.write_page(found, page)
+    print(page)
+    if asked.json is not None:
+        store.write_json(asked.json, record(found))
+    if asked.figure is not None:
+        dynamics_figure.draw(found, asked.figure)
+    if asked.docs is not None:
+        command = f"corporeal evaluate dynamics {asked.target} --against "
+        command += f"{' '.join(asked.how.against)} --docs {asked.docs}"
+        dynamics_page.write_docs(found, command, asked.docs)
+
+
 def evaluate_judge() -> None:
     """Let a vision-language model judge films of runs, after judging the model by control films.
 
@@ -216,5 +280,6 @@ JUDGES = {
     "materials": evaluate_materials,
     "parts": evaluate_parts,
     "objects": evaluate_objects,
+    "dynamics": evaluate_dynamics,
     "judge": evaluate_judge,
 }

@@ -34,6 +34,7 @@ from corporeal.types import (
 )
 
 SPAN = {"typical": 1.0, "fallback": 1.0, "model": 0.5, "recording": 0.5, "annotation": 0.0}
+SPAN |= {"field": 0.0}
 """How far towards the ends of its range a value is drawn, by who chose it."""
 TOGETHER = 0.9
 """Correlation of what moves together."""

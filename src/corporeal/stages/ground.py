@@ -6,6 +6,8 @@ import numpy as np
 
 from corporeal import materials
 from corporeal.errors import UserError
+from corporeal.fields.impose import impose
+from corporeal.fields.specification import asked
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
 from corporeal.materials.inflated import air_bears, sealed_air
@@ -36,6 +38,9 @@ class GroundConfig:
     """What the floor and the walls are made of, for friction and rebound."""
     neutral: str = "plastics-PP"
     """What stands in for a part of unknown material."""
+    field: str = ""
+    """Numbers of another method instead of ours: vomp:PATH, pixie:PATH or table:PATH.csv (a file of
+    the scene, or a folder with one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs."""
 
 
 DEFAULT = GroundConfig()
@@ -89,7 +94,7 @@ def ground(
     )
     solid = [*(s.kind == "solid" for s in structures), True]
     strikers = [materials.Striker(*s) for s in zip(surfaces, bodies, solid, strict=True)]
-    return MaterialField(
+    found = MaterialField(
         materials=made,
         structures=structures,
         words=words,
@@ -99,11 +104,12 @@ def ground(
         ),
         pieces=tuple(tuple(_piece(p, config) for p in w.pieces) for w in words),
     )
+    return impose(found, scene, parts, config.field)
 
 
 def doubts(field: MaterialField, parts: Parts, scene: Scene) -> tuple[str, ...]:
     """Say, one sentence each, which materials nobody knew and which values are to be doubted."""
-    said = []
+    said = list(field.notes)
     for k, part in enumerate(parts.catalogue):
         where = f"{scene.objects[part.object].name}: {part.name}"
         pieces = field.pieces[k] if field.pieces else ()
@@ -137,10 +143,11 @@ def _words(inventory: Inventory, number: int, name: str) -> PartWords:
 
 
 def validate(config: GroundConfig) -> None:
-    """Raise UserError where a material is unknown, or cannot be what it is to be."""
+    """Raise UserError where a material or a file is unknown, or cannot be what it is to be."""
     entry_of(config.floor, config.library)
     if entry_of(config.neutral, config.library).group == "liquid":
         raise UserError(f"--neutral {config.neutral} is a liquid, of which no part can be made.")
+    asked(config.field)
 
 
 def _entry(words: PartWords, config: GroundConfig) -> Entry:

@@ -68,6 +68,8 @@ CHOSEN = {
     "recording": "a recorded answer",
     "annotation": "your annotation",
     "evidence": "a model, to fit the mass it was said to have",
+    "field": "another method",
+    "borrowed": "ours, which the other method does not tell",
 }
 WAYS_SHOWN = 2
 """Ways an object may be, of those that were drawn."""
