@@ -158,7 +158,8 @@ def test_a_squashed_body_differs_in_shape_alone(played, staging):
         frame = played.trajectory.frames[0]
         x = frame.position.copy()
         for m in simulated(played).members:
-            x[m, 2] = x[m, 2].mean() + 0.5 * (x[m, 2] - x[m, 2].mean())
+            middle = np.average(x[m, 2], weights=played.prepared.particles.mass[m])
+            x[m, 2] = middle + 0.5 * (x[m, 2] - middle)
         return replace(frame, position=x)
 
     whole = edited("frozen", played)
@@ -236,12 +237,12 @@ def test_no_condition_is_named_in_a_question_or_on_its_page(run, tmp_path, edite
     pages = list((tmp_path / "asked" / "questions").glob("*.md"))
     # The baseline is the same run, and one motion is asked about once.
     assert len(pages) == len(films.asked) - 1
-    for page in pages:
-        text = page.name + page.read_text()
-        for word in (*CONTROLS, REFERENCE, "control", "baseline", "reference"):
-            found = re.search(rf"(?<![a-z]){word}(?![a-z])", text)
-            # "gain" and "start" are names of questions, "frozen" and the like of nothing.
-            assert not found or word in {q.id for q in catalogue().question}, (page.name, word)
+    # Pages differ in the order of their questions alone, and are named by motions.
+    lines = {tuple(sorted(page.read_text().splitlines())) for page in pages}
+    assert len(lines) == 1
+    assert all(re.fullmatch(r"film-[0-9a-f]{12}-dynamics-[0-9a-f]{6}", page.stem) for page in pages)
+    told = facts(pipeline.read_back(run).played.prepared)
+    assert not any(word in told for word in (*CONTROLS, "control", "baseline", "reference"))
 
 
 class Planted:
