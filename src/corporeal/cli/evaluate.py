@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
@@ -13,6 +13,10 @@ from corporeal.cli.parse import do_second_word, parse
 from corporeal.errors import UserError
 from corporeal.evaluation.result_table import Table
 from corporeal.terminal import console, progress_bars, show_table
+
+if TYPE_CHECKING:
+    from corporeal.evaluation.dynamics.summary import Summary
+    from corporeal.evaluation.judge.judge_scenes import JudgeConfig
 
 Folder = Annotated[
     Path | None,
@@ -188,14 +192,17 @@ def evaluate_dynamics() -> None:
 
     TARGET is "showcase" or a corpus whose scenes are assembled. Each run lies in OUT/SCENE/METHOD,
     is done in a process of its own, and is not done again; say the same again to go on. A run that
-    fails is a row. What a vision-language model makes of the runs: corporeal evaluate judge OUT.
+    fails is a row. With --judge a vision-language model judges films of the runs, after proving
+    on control films what it can tell; corporeal evaluate judge OUT does the same later.
     """
     from corporeal.corpus.carry_out import Hands
-    from corporeal.evaluation.dynamics import dynamics_figure, dynamics_page, dynamics_tables
+    from corporeal.evaluation.dynamics import dynamics_tables
     from corporeal.evaluation.dynamics.run_evaluation import DynamicsConfig
     from corporeal.evaluation.dynamics.run_evaluation import evaluate_dynamics as evaluate
-    from corporeal.evaluation.dynamics.summary import record
+    from corporeal.evaluation.judge.judge_scenes import JudgeConfig
+    from corporeal.evaluation.judge.put_to_judge import connected
     from corporeal.pipeline import Settings
+    from corporeal.vlm import NOBODY
 
     @dataclass(frozen=True)
     class Dynamics:
@@ -211,12 +218,21 @@ def evaluate_dynamics() -> None:
         """File of the report; by default OUT/report.html."""
         docs: Path | None = None
         """File for the measured rows as a page of documentation (Markdown)."""
+        judge: str = NOBODY
+        """Model that also judges films of the runs, as --vlm: see evaluate judge. Its page and
+        answers lie in OUT as judge.html and judge.json; --record keeps the answers for replay."""
+        looks: int = 1
+        """Times that the judge looks at each film, each from another side: 1 to 3."""
+        yes: bool = False
+        """Ask a judge that costs more than 5 US$, or whose price is not known."""
         crew: Crew = field(default_factory=Crew)
         settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
 
     first = ("against", "reference", "detail", "out", "json", "figure")
     doc = evaluate_dynamics.__doc__
     asked = parse(Dynamics, "evaluate dynamics", doc, words=2, first=first)
+    how = JudgeConfig(asked.judge, asked.settings.describe.record, asked.looks, yes=asked.yes)
+    connected(how)  # a key that is absent is told before hours of simulation
     here = Path() if asked.target == "showcase" else Path(asked.target)
     out = asked.out or here / "dynamics"
     with progress_bars() as tell:
@@ -225,6 +241,16 @@ def evaluate_dynamics() -> None:
     _show(dynamics_tables.tables(found))
     for sentence in (*dynamics_tables.verdicts(found), *dynamics_tables.missing_references(found)):
         console.print(sentence, markup=False, highlight=False)
+    _keep_dynamics(found, asked, out)
+    if asked.judge != NOBODY:  # pages and answers beside the runs
+        _judge(out, how, out / "judge.json", out / "judge.html")
+
+
+def _keep_dynamics(found: "Summary", asked: Any, out: Path) -> None:
+    """Write the report of an evaluation of dynamics, and the files that somebody asks for."""
+    from corporeal.evaluation.dynamics import dynamics_figure, dynamics_page
+    from corporeal.evaluation.dynamics.summary import record
+
     page = asked.page or out / "report.html"
     dynamics_page.write_page(found, page)
     print(page)
@@ -245,8 +271,6 @@ def evaluate_judge() -> None:
     "ours" with one known fault each. Of a law of physics the judge is believed only where its
     answers tell the controls of that law; else the tables say that this judge cannot tell.
     """
-    from corporeal.evaluation.judge import judge_page, judge_tables
-    from corporeal.evaluation.judge.judge_runs import judge_runs
     from corporeal.evaluation.judge.judge_scenes import JudgeConfig
 
     @dataclass(frozen=True)
@@ -260,13 +284,21 @@ def evaluate_judge() -> None:
 
     first = ("judge", "looks", "record", "yes", "json", "page")
     asked = parse(Judge, "evaluate judge", evaluate_judge.__doc__, words=2, first=first)
+    _judge(_folder(asked.folder, "judge"), asked.how, asked.json, asked.page)
+
+
+def _judge(out: Path, how: "JudgeConfig", json: Path | None, page: Path | None) -> None:
+    """Judge the runs in OUT, show what follows, and keep it where somebody asks for it."""
+    from corporeal.evaluation.judge import judge_page, judge_tables
+    from corporeal.evaluation.judge.judge_runs import judge_runs
+
     with progress_bars() as tell:
-        found = judge_runs(_folder(asked.folder, "judge"), asked.how, console.print, tell("judge"))
+        found = judge_runs(out, how, console.print, tell("judge"))
     _show(judge_tables.tables(found.judged, found.result))
-    if asked.json is not None:
-        store.write_json(asked.json, judge_tables.record(found.judged, found.result))
-    if asked.page is not None:
-        judge_page.write_page(found.judged, found.result, asked.page)
+    if json is not None:
+        store.write_json(json, judge_tables.record(found.judged, found.result))
+    if page is not None:
+        judge_page.write_page(found.judged, found.result, page)
 
 
 def _show(tables: Sequence[Table]) -> None:
