@@ -26,6 +26,7 @@ from corporeal.mpm.cpu.layout import (
     SHEAR,
     SPEED,
     SPIN,
+    STIFFENING,
     TIME,
     TURN,
     VE,
@@ -51,8 +52,6 @@ class Materials:
     """Whether any of it has a return map."""
     relaxes: bool
     """Whether any of it has Maxwell branches."""
-    stiffening: float
-    """How much faster waves run with what branches resist than without, at most [-]."""
 
     @classmethod
     def of(cls, substances: Substances) -> "Materials":
@@ -63,6 +62,7 @@ class Materials:
         numbers = (s.mu, s.lam, s.yield_stress, s.hardening, s.cone, s.apex, none, s.flow_index)
         table[:, :SHEAR] = np.column_stack([s.law, *numbers, s.forgetting, s.density, s.rigid])
         table[:, CONSISTENCY] = s.consistency
+        table[:, STIFFENING] = s.stiffening**2
         branches = s.branches
         for first, column in (
             (SHEAR, branches.shear),
@@ -71,7 +71,7 @@ class Materials:
         ):
             table[:, first : first + BRANCHES] = column
         kinds = (bool(s.swells.all()), bool(s.flows.any()), bool(s.relaxes.any()))
-        return cls(table, s.body, *kinds, float(s.stiffening.max()))
+        return cls(table, s.body, *kinds)
 
 
 def particle_rows(
