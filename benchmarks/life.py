@@ -277,8 +277,9 @@ Written by `python benchmarks/life.py --docs`: real things, dropped through the 
 nothing set but the detail, {len(SEEDS)} seeds each. *e* is the speed after over the speed before,
 *spread* how far the seeds are apart, *off* the distance from the published range, *E* the simulated
 over the real modulus (of a thickened wall much less), *unbooked* what the blow lost to transfers
-between particles and grid, and to no loss that is booked. Rigid things rebound by the coefficients
-of restitution of their materials. Ranges and sources: `src/corporeal/evaluation/life.toml`."""
+between particles and grid, and to no loss that is booked. Rigid things rebound by the
+coefficient of restitution that was measured of the pair, else by those of their materials. Ranges
+and sources: `src/corporeal/evaluation/life.toml`."""
 
 
 def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
