@@ -1,10 +1,12 @@
 """Drop real things and hold their rebound to what was published.
 
-    python benchmarks/life.py [--quick] [--row NAME ...] [--json FILE] [--docs]
+    python benchmarks/life.py [--quick] [--row NAME ...] [--json FILE [--resume]] [--docs]
 
 Every thing goes through the verbs as a scene of a person would: names or materials, walls, the air
 in balls, one word of detail; nothing else can be set. ``--quick`` drops each once, at draft;
-``--docs`` writes docs/life.md. Ranges and sources: src/corporeal/evaluation/life.toml.
+``--docs`` writes docs/life.md. Every drop is written to FILE as it ends; ``--resume`` goes on from
+what is there, which holds as long as the code is the same. Ranges and sources:
+src/corporeal/evaluation/life.toml.
 """
 
 import argparse
@@ -167,8 +169,9 @@ Written by `python benchmarks/life.py --docs`: real things, dropped through the 
 nothing set but the detail, {len(SEEDS)} seeds each. *e* is the speed after over the speed before,
 *spread* how far the seeds are apart, *off* the distance from the published range, *E* the simulated
 over the real modulus (of a thickened wall much less), *unbooked* what the blow lost to transfers
-between particles and grid, and to no loss that is booked. Rigid things rebound by the coefficients
-of restitution of their materials. Ranges and sources: `src/corporeal/evaluation/life.toml`."""
+between particles and grid, and to no loss that is booked. Rigid things rebound by the
+coefficient of restitution that was measured of the pair, else by those of their materials. Ranges
+and sources: `src/corporeal/evaluation/life.toml`."""
 
 
 def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
@@ -198,33 +201,56 @@ def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Run what was asked."""
+def keep(drops: Sequence[Drop], path: Path) -> None:
+    """Write drops to a file."""
+    path.write_text(json.dumps([asdict(d) for d in drops], indent=1) + "\n", encoding="utf-8")
+
+
+def kept(path: Path) -> list[Drop]:
+    """Read drops from a file; none where there is no file."""
+    return [Drop(**row) for row in json.loads(path.read_text())] if path.exists() else []
+
+
+def asked_for() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--quick", action="store_true", help="one seed, draft only")
     parser.add_argument("--json", type=Path, help="write every drop to this file")
+    parser.add_argument("--resume", action="store_true", help="keep the drops that it holds")
     parser.add_argument("--row", nargs="+", metavar="NAME", help="only these things")
     parser.add_argument("--docs", action="store_true", help="write docs/life.md")
     parser.add_argument("--workers", type=int, default=min(4, cores()), help="drops side by side")
     asked = parser.parse_args()
     if asked.docs and (asked.quick or asked.row):
         parser.error("--docs needs all of it: leave out --quick and --row")
+    if asked.resume and not asked.json:
+        parser.error("--resume needs --json: the file to go on from")
+    return asked
+
+
+def main() -> None:
+    """Run what was asked."""
+    asked = asked_for()
     rows = [r for r in rebounds() if not asked.row or r.name in asked.row]
     details, seeds = (DETAILS[:1], SEEDS[:1]) if asked.quick else (DETAILS, SEEDS)
-    jobs = [(r, d, s) for r in rows for d in details for s in seeds]
-    done = []
+    drops = kept(asked.json) if asked.resume else []
+    there = {(d.name, d.detail, d.seed) for d in drops}
+    jobs = [(r, d, s) for r in rows for d in details for s in seeds if (r.name, d, s) not in there]
+    wrong = []
     with ProcessPoolExecutor(asked.workers) as pool:
-        for one in track(pool.map(tried, *zip(*jobs, strict=True)), "dropping", len(jobs)):
-            done.append(one)
-    drops = [d for d in done if isinstance(d, Drop)]
-    wrong = [d for d in done if isinstance(d, str)]
+        made = pool.map(tried, *zip(*jobs, strict=True)) if jobs else ()
+        for one in track(made, "dropping", len(jobs)):
+            if isinstance(one, str):
+                wrong.append(one)
+                continue
+            drops.append(one)
+            if asked.json:
+                keep(drops, asked.json)
     found = list(results(rows, drops))
     met = verdicts(found, wrong)
     show(found, met)
-    if asked.json:
-        asked.json.write_text(json.dumps([asdict(d) for d in drops], indent=1) + "\n")
     if asked.docs:
         (DOCS / "life.md").write_text(page(found, met), encoding="utf-8")
 
