@@ -140,8 +140,8 @@ def take_in(
         usual = USUAL.get(source.suffix.lower(), (0.0, -1.0, 0.0))
         read = (f"{given.count:,} Gaussians were read from {source.name}.",)
         return Intake(given, usual=usual, statements=read, warnings=given.warnings)
-    read = read_photographs(source, PRESETS[training.preset].longest, masked_by)
-    shown = _consistent(read)
+    longest = PRESETS[training.preset].longest
+    shown = _consistent(read_photographs(source, longest, masked_by))
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
