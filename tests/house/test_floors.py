@@ -17,7 +17,7 @@ FLOORS = [
     {"geometry", "backends", "store"},
     {"formats"},
     {"materials", "vlm", "render", "showcase", "pool", "settle"}
-    | {"splats", "features", "regions", "poses"},
+    | {"splats", "features", "regions", "poses", "masking"},
     {"treatment", "fields"},
     {"trajectory"},
     {"stages"},

@@ -108,6 +108,8 @@ class DescribeConfig:
 
 DEFAULT = DescribeConfig()
 SHARES = ("volume_share", "surface_share")
+OPEN = ("sheet", "metadata")
+"""What an open vessel is by its name, and who says so."""
 Progress = Callable[[float, str], None]
 
 
@@ -139,7 +141,7 @@ def describe(
     validate(config)
     identity = identify(scene, matter_hint)
     annotations = _annotations(scene, identity, config, library, from_pictures)
-    file = _file_words(scene, identity, library)
+    file = _file_words(scene, identity, library, from_pictures)
     model = connect(config.vlm, config.record)
     if model is None:
         objects = [
@@ -150,7 +152,7 @@ def describe(
             )
             for obj, words in zip(scene.objects, file, strict=True)
         ]
-        return Inventory(tuple(objects))
+        return Inventory(tuple(objects), warnings=_open_ware(objects) if from_pictures else ())
     critic = connect(critic_of(config.vlm, config.critic), config.record) or model
     asking = _Asking(scene, identity, config, library, model, critic)
     return asking.inventory(file, annotations, progress)
@@ -387,11 +389,15 @@ def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, 
 # ---------------------------------------------------------------- the file's own names
 
 
-def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[PartWords]]:
+def _file_words(
+    scene: Scene, identity: Identity, library: str, from_pictures: bool
+) -> list[list[PartWords]]:
     words: list[list[PartWords]] = [[] for _ in scene.objects]
     walls = partial(_walled, library)
     for entry, seen in zip(identity.catalogue, evidence(scene, identity), strict=True):
-        found = _stated(list(seen.surfaces), library) or hollowed(recognise(seen), seen, walls)
+        found = _stated(list(seen.surfaces), library) or hollowed(
+            recognise(seen), seen, walls, from_pictures
+        )
         by = "metadata" if found.material else "unknown"
         found = replace(found, name=entry.name, answered_by=by)
         found = walled(found, stated_thickness(seen.surfaces))
@@ -400,6 +406,17 @@ def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[Par
         built_by = "metadata" if found.structure else "unknown"
         words[entry.object].append(replace(found, built_by=built_by))
     return words
+
+
+def _open_ware(objects: Sequence[ObjectWords]) -> tuple[str, ...]:
+    """Say of which objects from pictures the name decided that they are no solids."""
+    made = [o.name for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN]
+    return tuple(
+        f"{name}: pictures need not show how deep it is inside. By its name it is taken for open "
+        "ware, with a wall as thick as its material usually has; annotate structure and "
+        "thickness_mm if that is wrong."
+        for name in made
+    )
 
 
 def _walled(library: str, name: str) -> bool:

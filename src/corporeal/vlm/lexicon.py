@@ -145,12 +145,17 @@ def _single(kind: str) -> frozenset[str]:
 
 def hollow(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name is that of something hollow: its last noun is what it names."""
-    return any(tokens[-len(phrase) :] == phrase for phrase in _hollow())
+    return any(tokens[-len(phrase) :] == phrase for phrase in _listed("hollow"))
+
+
+def open_ware(tokens: tuple[str, ...]) -> bool:
+    """Tell whether a name is that of an open vessel: its last noun is what it names."""
+    return any(tokens[-len(phrase) :] == phrase for phrase in _listed("open"))
 
 
 @cache
-def _hollow() -> frozenset[tuple[str, ...]]:
-    return frozenset(tuple(singular(w) for w in phrase.split()) for phrase in _table()["hollow"])
+def _listed(table: str) -> frozenset[tuple[str, ...]]:
+    return frozenset(tuple(singular(w) for w in phrase.split()) for phrase in _table()[table])
 
 
 def singular(word: str) -> str:

@@ -27,6 +27,7 @@ from corporeal.vlm.lexicon import (
     hollow,
     lookbook,
     metals,
+    open_ware,
     seen_as,
     singular,
     tokens_of,
@@ -254,19 +255,27 @@ def sealed(words: PartWords, stated: float | None, usual: float | None) -> PartW
     return replace(words, inflation=usual if stated is None else stated)
 
 
-def hollowed(words: PartWords, evidence: Evidence, walled: Callable[[str], bool]) -> PartWords:
+def hollowed(
+    words: PartWords,
+    evidence: Evidence,
+    walled: Callable[[str], bool],
+    from_pictures: bool = False,
+) -> PartWords:
     """Let what is hollow by what it is have a wall, where it is not stated how it is built.
 
     Args:
         words: What was recognised of a part.
         evidence: All that the file says about it.
         walled: Tells whether walls of a material were ever measured.
+        from_pictures: Whether its shape is from pictures, which need not show how deep a vessel is.
 
     """
-    is_hollow = words.structure is None and any(hollow(name.words) for name in evidence.general)
-    if not is_hollow or not (words.material is None or walled(words.material)):
+    if words.structure is not None or not (words.material is None or walled(words.material)):
         return words
-    return replace(words, structure="shell")
+    if from_pictures and any(open_ware(name.words) for name in evidence.general):
+        return replace(words, structure="sheet")
+    is_hollow = any(hollow(name.words) for name in evidence.general)
+    return replace(words, structure="shell") if is_hollow else words
 
 
 def matter_hint(surface: Surface, finish: Finish) -> str:
