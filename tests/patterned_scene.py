@@ -9,6 +9,9 @@ from corporeal.render.camera import Aim, camera_of
 from corporeal.render.embree import Light, Stage, render
 from corporeal.types import Camera, Finish, Scene, SceneObject, Surface
 
+OF_SLAB = 12
+"""Triangles of the slab, which come first."""
+
 
 def blots(seed, side=256):
     """A picture of blots of three sizes: something to find again at any scale."""
@@ -53,10 +56,10 @@ def stepped(turned_over=False):
     uv = (np.concatenate([u for _, _, u in made]) + np.stack([face % 4, face // 4], axis=1)) / 4
     if turned_over:  # by half a turn about x, and pushed aside
         vertices = vertices * (1, -1, -1) + np.array([0.02, 0.01, 0.12])
-    return on_slab((vertices, triangles, uv))
+    return on_slab((vertices, triangles, uv), side=512)
 
 
-def on_slab(block, seed=0):
+def on_slab(block, seed=0, side=256):
     """A block, or whatever, on a slab of 60 cm; the slab's twelve triangles come first."""
     made = [box((-0.3, -0.3, -0.02), (0.3, 0.3, 0)), block]
     surfaces = tuple(
@@ -64,7 +67,7 @@ def on_slab(block, seed=0):
         for k, (name, (v, t, uv)) in enumerate(zip(("slab", "block"), made, strict=True))
     )
     finishes = tuple(
-        Finish(f"look{k}", texture=blots(seed + k, 512 >> k), roughness=1.0) for k in range(2)
+        Finish(f"look{k}", texture=blots(seed + k, (512, side)[k]), roughness=1.0) for k in range(2)
     )
     things = (SceneObject("slab", "slab", 0.6), SceneObject("block", "block", 0.12))
     return Scene("patterned", "made by a test", things, surfaces, finishes)

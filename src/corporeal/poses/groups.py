@@ -2,7 +2,9 @@
 
 A folder of which a part shows something else would cost many minutes before COLMAP says that the
 pictures fall apart. Small pictures share enough points with their neighbours to see two separate
-circles of pictures, each well joined within; where they share few, nothing is said.
+circles of pictures, each well joined within; where they share few, nothing is said. Real sets of
+48, 49 and 97 photographs are one group each, with 5 to 27 partners in the median; 16 of a banana,
+far apart, fall into groups of 7, 4 and 3 whose median is 2.
 """
 
 from collections.abc import Callable, Sequence
@@ -22,6 +24,8 @@ from corporeal.poses.judge import names_of
 
 LONGEST, MOST_POINTS = 480, 1024
 """Longer side of the copies [px]; points of each."""
+TRIALS = 1000
+"""Samples of a pair: most of the time would go to pairs that share nothing."""
 SHARED = 15
 """Points that two pictures share by epipolar geometry, as COLMAP asks of a pair."""
 JOINED = 4
@@ -126,7 +130,7 @@ def shared_points(
     matching = pycolmap.FeatureMatchingOptions()
     matching.num_threads, matching.use_gpu = cores(), False
     checking = pycolmap.TwoViewGeometryOptions()
-    checking.ransac.random_seed = 0
+    checking.ransac.random_seed, checking.ransac.max_num_trials = 0, TRIALS
     pycolmap.match_exhaustive(
         database,
         matching_options=matching,
