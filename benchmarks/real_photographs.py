@@ -183,7 +183,7 @@ def write_docs(rows: list[tuple[str, ...]], said: str) -> None:
     """Write the table as a page."""
     about = (__doc__ or "").split("\n\n")
     lines = ["# Real photographs", "", f"Written by `{said}`."]
-    lines += [" ".join(about[2].split()), ""]
+    lines += [" ".join(about[2].replace("``", "`").split()), ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
     lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows]
     DOCS.write_text("\n".join(lines) + "\n", encoding="utf-8")
