@@ -41,6 +41,7 @@ from corporeal.formats.transforms import read_views, write_views
 from corporeal.geometry.anatomy import inner_share
 from corporeal.geometry.arrangement import box_of, boxes_of
 from corporeal.geometry.foliage import is_leafy
+from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.similarity import moved_points
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.pipeline import Settings, opened, write_showcase
@@ -48,7 +49,7 @@ from corporeal.results import Results
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.stages.describe import DescribeConfig
-from corporeal.stages.fill import FillConfig, examine
+from corporeal.stages.fill import FillConfig
 from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.terminal import progress_bars, show_table
 from corporeal.types import MaterialField, Reconstruction, Scene, Views

@@ -18,6 +18,7 @@ from stories import Told, tell
 from corporeal.findings import Audit
 from corporeal.machine import cores
 from corporeal.pipeline import Settings
+from corporeal.showcase.expectations import EXPECTED
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.fill import FillConfig
 from corporeal.treatment.plan import Detail
@@ -53,12 +54,14 @@ def row(told: Told, detail: str) -> dict:
 
 def seen_table(rows: list[dict]) -> str:
     """Tell what must be seen in every scene, and whether it was."""
-    lines = ["| scene | must show | target | measured | |", "|---|---|---|---|---|"]
+    lines = ["| scene | must show | target | measured | | must fail |", "|---|---|---|---|---|---|"]
     for number, found in enumerate(rows, 1):
-        for k, e in enumerate(found["expectations"]):
+        demands = EXPECTED[found["scene"]]
+        for k, (e, demand) in enumerate(zip(found["expectations"], demands, strict=True)):
             scene = "" if k else f"{number} {found['scene']}"
             met = "✓" if e["met"] else "missed"
-            lines.append(f"| {scene} | {e['sentence']} | {e['target']} | {e['value']} | {met} |")
+            said = (scene, e["sentence"], e["target"], e["value"], met, demand.spoiled_by)
+            lines.append(f"| {' | '.join(said)} |")
     return "\n".join(lines)
 
 

@@ -15,11 +15,11 @@ from jaxtyping import Float
 from corporeal.geometry.arrangement import life_sized
 from corporeal.geometry.make import weight
 from corporeal.geometry.room import is_vessel, room_of
+from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.materials.ensemble import otherwise, sample
 from corporeal.materials.placement import CONTENTS, WEIGHING
 from corporeal.materials.scale import fraction_of
-from corporeal.stages.fill import examine
 from corporeal.stages.ground import GroundConfig, ground
 from corporeal.types import (
     Evidence,

@@ -16,7 +16,9 @@ from typing import Any, Literal
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.features import MENU as ENCODERS
+from corporeal.features.maskers import MENU as MASKERS
 from corporeal.formats.glb_writer import write_glb
+from corporeal.formats.mask_files import corrected
 from corporeal.formats.scene_file import read_scene_file, write_scene_file
 from corporeal.formats.sources import called, kind_of, pictured, sources
 from corporeal.formats.splat_ply import write_splat
@@ -70,7 +72,7 @@ VERBS = tuple(FOLDERS)
 RUN = "run.json"
 WRITTEN = ("record",)
 """Settings that name what is written, not what is read."""
-BEFORE_PATHS = ("replay", *ENCODERS)
+BEFORE_PATHS = ("replay", *ENCODERS, *MASKERS)
 """What stands before a colon and a path."""
 GAUSSIANS = "gaussians.ply"
 
@@ -322,7 +324,8 @@ class _Run:
         """Name what a verb takes from another verb's settings."""
         if verb == "reconstruct":
             asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
-            return [*self.settings.assemble.extent, *asked]
+            by_hand = sorted(corrected(self.folder / FOLDERS[verb]).items())
+            return [*self.settings.assemble.extent, *asked, *(" ".join(mask) for mask in by_hand)]
         if verb == "assemble":
             return [up for up in [self.settings.reconstruct.up] if up != "auto"]
         if verb != "describe":

@@ -629,6 +629,8 @@ class Structure:
     """
     solidity: float = 1.0
     """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
+    holds: str = ""
+    """What moves by itself behind the wall of a shell, as an object of its own; "": nothing."""
 
 
 @dataclass(frozen=True)
@@ -747,6 +749,26 @@ class Root:
 
 
 @dataclass(frozen=True)
+class Contents:
+    """What lies loose in a vessel that it does not fill: an object of its own, and its one part."""
+
+    vessel: int
+    """Which object holds it."""
+    wall: int
+    """Which part's wall is around it."""
+    holder: SceneObject
+    """The vessel without it."""
+    thing: SceneObject
+    surface: Surface
+    """Where it meets the wall and the air, at the start; its finish is counted after all others."""
+    finish: Finish
+    material: Material
+    words: PartWords
+    friction: Float[np.ndarray, " K1"]
+    """On each part of the vessels' scene, those before it among the contents, and the floor [-]."""
+
+
+@dataclass(frozen=True)
 class Particles:
     """Material points ready to simulate."""
 
@@ -782,6 +804,15 @@ class Particles:
     [rad/s]; empty where there is no foliage."""
     roots: tuple[Root, ...] = ()
     """Of plants that stand in soil."""
+    contents: tuple[Contents, ...] = ()
+    """What moves in vessels: objects and parts after all that the scene has."""
+    wetted: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    """Where liquids touch rigid objects, inside of what is hollow too [m]."""
+    wetted_normal: Float[np.ndarray, "W 3"] = field(default_factory=lambda: np.zeros((0, 3)))
+    """Unit, out of the matter there."""
+    object_of_wetted: Int[np.ndarray, " W"] = field(
+        default_factory=lambda: np.zeros(0, dtype=np.int64)
+    )
     fills: tuple[str, ...] = ()
     """How each part was filled, in words, for the report."""
     walls: tuple[tuple[float, float], ...] = ()

@@ -26,7 +26,8 @@ FLOORS = [
     {"playback"},
     {"run_files"},
     {"pipeline"},
-    {"corpus", "evaluation", "scene_building", "in_memory"},
+    {"corpus", "scene_building", "in_memory"},
+    {"evaluation"},  # whose runs are jobs, as those of a corpus are
     {"export"},
     {"doctor", "terminal", "viewer"},
     {"cli"},

@@ -153,6 +153,14 @@ def test_friction_stays_within_what_was_published():
     assert all(np.array_equal(f.friction, f.friction.T) for f in found)
 
 
+def test_measured_restitution_stays_within_what_was_published():
+    field = field_of("glass", "PMMA")
+    found = draws(field, [0, 1], 100)
+    drawn = np.array([f.restitution[0, 1] for f in found])
+    assert 0.92 <= drawn.min() < drawn.max() <= 0.98
+    assert all(np.array_equal(f.restitution, f.restitution.T) for f in found)
+
+
 def inventory(words):
     return Inventory((ObjectWords("thing", "thing", (words,)),))
 

@@ -6,7 +6,7 @@ import pytest
 
 from corporeal import materials
 from corporeal.errors import OutOfRangeError, UnknownChoiceError, UserError
-from corporeal.materials.contact import pairs
+from corporeal.materials.contact import pairs, rebounds
 from corporeal.materials.shipped import source_table
 from corporeal.types import Ground, Law, MaterialField, Part, Parts, PartWords, Structure
 
@@ -14,7 +14,7 @@ LIBRARIES = ["default", "reference"]
 
 
 def test_every_source_can_be_looked_up_and_none_is_idle():
-    cited = {row["source"] for row in pairs().values()}
+    cited = {row["source"] for table in (pairs(), rebounds()) for row in table.values()}
     for name in LIBRARIES:
         for entry in materials.library(name).values():
             cited |= {key for r in entry.ranges.values() for key in r.source.split("+")}
@@ -188,6 +188,44 @@ def test_the_softer_body_decides_how_two_bodies_part():
     assert materials.restitution_between(made["steel"], made["steel"]) == pytest.approx(
         made["steel"].restitution
     )
+
+
+def striker(name, solid=True, **stated):
+    entry = materials.find(name)
+    grounds = entry.typical()
+    for field, value in stated.items():
+        grounds[field] = Ground(value, grounds[field].range, "annotation", "stated")
+    return materials.Striker(entry, entry.pick(grounds), solid)
+
+
+def test_measured_restitution_comes_before_the_rule():
+    glass, acrylic, bearing = (striker(n) for n in ("glass", "PMMA", "hardened_steel"))
+    assert materials.restitution(glass, glass).value == pytest.approx(0.97)
+    assert materials.restitution(glass, acrylic) == materials.restitution(acrylic, glass)
+    floor = striker("concrete")
+    of_its_family = materials.restitution(bearing, floor)
+    assert of_its_family.measured is not None
+    assert of_its_family.measured.source == "physics-factbook"
+    ruled = materials.restitution(glass, bearing)
+    assert ruled.measured is None
+    assert ruled.value == materials.restitution_between(glass.material, bearing.material)
+
+
+def test_walls_and_stated_values_do_not_rebound_as_measured_balls_do():
+    ball, bowl = striker("glass"), striker("glass", solid=False)
+    stated = striker("glass", restitution=0.7)
+    rule = materials.restitution_between(ball.material, ball.material)
+    assert materials.restitution(bowl, ball).value == pytest.approx(rule)
+    assert materials.restitution(stated, stated).value == pytest.approx(0.7)
+    assert materials.restitution(ball, ball).value > rule + 0.1
+
+
+def test_every_measured_restitution_is_a_range_of_known_materials():
+    groups = {e.group for e in materials.library().values()}
+    for key, row in rebounds().items():
+        assert all(name in groups or materials.find(name) for name in key)
+        low, typical, high = row["restitution"]
+        assert 0 < low <= typical <= high <= 1
 
 
 def test_the_tables_are_readable_and_complete():

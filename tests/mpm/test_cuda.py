@@ -4,15 +4,15 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import pytest
+from point_bodies import CELL, ball, body, problem, step_together
 
 from corporeal.errors import SimulationError, UserError
 from corporeal.mpm.cuda import program
 from corporeal.mpm.cuda.engine import CudaEngine
-from corporeal.mpm.problem import FLOOR, MENU, Body, Problem
+from corporeal.mpm.problem import MENU, Problem
 from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.types import Law, Push
 
-CELL = 0.02
 ARCHITECTURES = [86, 90, 120]
 
 
@@ -20,56 +20,8 @@ def on_processor(given):
     return CudaEngine(given, device="cpu")
 
 
-def ball(centre, radius=0.05, spacing=CELL / 2):
-    axis = np.arange(-radius + spacing / 2, radius, spacing)
-    points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
-    return points[np.linalg.norm(points, axis=1) < radius] + centre
-
-
-def body(points, law=Law.NEO_HOOKEAN, velocity=(0, 0, 0), spacing=CELL / 2, **given):
-    one = np.ones(len(points))
-    numbers = {
-        "density": 1000.0,
-        "young": 1e5,
-        "poisson": 0.3,
-        "yield_stress": 2e3,
-        "hardening": 1e4,
-        "friction_angle": np.radians(30.0),
-        "cohesion": 200.0,
-        "loss": 0.2,
-        "vibration": 300.0,
-    }
-    extra = {k: given.pop(k) for k in list(given) if k not in numbers}
-    return Body(
-        name=extra.pop("name", "ball"),
-        position=points,
-        velocity=np.tile(np.array(velocity, float), (len(points), 1)),
-        volume=one * spacing**3,
-        law=np.full(len(points), law.value),
-        **{k: one * v for k, v in (numbers | given).items()},
-        **extra,
-    )
-
-
-def problem(*bodies, planes=(FLOOR,), friction=0.4, restitution=0.5, **given):
-    count = len(bodies) + len(planes)
-    return Problem(
-        bodies,
-        CELL,
-        friction=np.full((count, count), friction),
-        restitution=np.full((count, count), restitution),
-        planes=planes,
-        **given,
-    )
-
-
 def side_by_side(given, steps):
-    ours, sure = on_processor(given), ReferenceEngine(given)
-    for _ in range(steps):
-        dt = min(ours.stable_step(), sure.stable_step())
-        ours.step(dt)
-        sure.step(dt)
-    return ours, sure
+    return step_together(on_processor(given), ReferenceEngine(given), steps)
 
 
 def fall(law=Law.DRUCKER_PRAGER):

@@ -5,49 +5,30 @@ from math import sqrt
 
 import numpy as np
 import pytest
+from point_bodies import CELL, body, problem
 
 from corporeal.errors import SimulationError
 from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.branches import share_of
 from corporeal.mpm.physics.spline import stencil
-from corporeal.mpm.problem import FLOOR, Body, Problem
 from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.types import Law
 
-CELL = 0.02
+LOSSLESS = {
+    "name": "cube",
+    "yield_stress": 500.0,
+    "hardening": 0.0,
+    "friction_angle": 0.5,
+    "cohesion": 0.0,
+    "loss": 0.0,
+}
+"""Of a cube's points: neither losses nor hardening."""
 
 
 def cube(centre, side=0.04, law=Law.NEO_HOOKEAN, velocity=(0.0, 0.0, 0.0), **given):
     axis = (np.arange(4) + 0.5) / 4 * side - side / 2
     points = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3) + centre
-    one = np.ones(64)
-    numbers = {
-        "density": 1000.0,
-        "young": 1e5,
-        "poisson": 0.3,
-        "yield_stress": 500.0,
-        "hardening": 0.0,
-        "friction_angle": 0.5,
-        "cohesion": 0.0,
-        "loss": 0.0,
-        "vibration": 300.0,
-    }
-    words = {k: given.pop(k) for k in ("rigid", "surface", "push", "name") if k in given}
-    return Body(
-        name=words.pop("name", "cube"),
-        position=points,
-        velocity=np.tile(np.array(velocity, float), (64, 1)),
-        volume=one * side**3 / 64,
-        law=np.full(64, law.value),
-        **{k: one * v for k, v in (numbers | given).items()},
-        **words,
-    )
-
-
-def problem(*bodies, planes=(FLOOR,), friction=0.3, **given):
-    n = len(bodies) + len(planes)
-    table = np.full((n, n), friction)
-    return Problem(bodies, CELL, table, np.full((n, n), 0.5), planes, **given)
+    return body(points, law, velocity, side / 4, **(LOSSLESS | given))
 
 
 # ---------------------------------------------------------------- splines

@@ -1,8 +1,11 @@
-"""What must be seen is a number with a target, and it can fail."""
+"""What must be seen is a number with a target on both sides, and it can fail."""
+
+from dataclasses import replace
+from math import inf
 
 import pytest
 
-from corporeal.showcase.expectations import EXPECTED, expect
+from corporeal.showcase.expectations import EXPECTED, SPOILERS, Demand, expect
 from corporeal.showcase.scenes import SCENES
 from made_findings import object_outcome, outcome, pair_outcome
 
@@ -11,9 +14,13 @@ def pair(separated=True, gap=3.0):
     return pair_outcome(separated=separated, gap_end_dx=gap)
 
 
-def chain(order, **pairs):
+def chain(order, vase=0.0, chair=0.0, **pairs):
     names = ("vase_0|ball_0", "vase_0|armchair_0", "ball_0|armchair_0")
-    return outcome({}, {n: pairs.get(n, pair()) for n in names}, order)
+    objects = {
+        "vase_0": object_outcome(shape_error_max=vase),
+        "armchair_0": object_outcome(shape_error_max=chair),
+    }
+    return outcome(objects, {n: pairs.get(n, pair()) for n in names}, order)
 
 
 VASE_BALL, BALL_CHAIR = ("vase_0", "ball_0"), ("ball_0", "armchair_0")
@@ -27,12 +34,24 @@ def test_every_scene_says_what_must_be_seen():
     assert set(EXPECTED) == set(SCENES)
 
 
+def test_every_expectation_names_a_run_that_must_not_meet_it():
+    demands = [d for row in EXPECTED.values() for d in row]
+    assert {d.spoiled_by for d in demands} <= set(SPOILERS)
+    assert all(d.low < d.high for d in demands if isinstance(d, Demand))
+    assert all((d.low, d.high) != (-inf, inf) for d in demands if isinstance(d, Demand))
+
+
+def test_sentences_are_told_apart():
+    for row in EXPECTED.values():
+        assert len({d.sentence for d in row}) == len(row)
+
+
 def test_nothing_is_expected_of_other_peoples_scenes():
     assert expect("my kitchen", outcome({})) == []
 
 
 def test_a_chain_that_meets_in_order_and_parts_is_as_expected():
-    assert met("vase-ball-armchair", chain([VASE_BALL, BALL_CHAIR])) == [True, True, True]
+    assert all(met("vase-ball-armchair", chain([VASE_BALL, BALL_CHAIR])))
 
 
 def test_a_chain_in_another_order_is_not():
@@ -42,36 +61,99 @@ def test_a_chain_in_another_order_is_not():
 
 def test_things_that_stick_together_have_not_parted():
     stuck = chain([VASE_BALL, BALL_CHAIR], **{"vase_0|ball_0": pair(False, 0.0)})
-    assert met("vase-ball-armchair", stuck) == [True, False, True]
+    assert met("vase-ball-armchair", stuck)[:3] == [True, False, True]
     close = chain([VASE_BALL, BALL_CHAIR], **{"ball_0|armchair_0": pair(True, 0.5)})
-    assert met("vase-ball-armchair", close) == [True, True, False]
+    assert met("vase-ball-armchair", close)[:3] == [True, True, False]
+
+
+def test_a_vase_or_a_chair_that_gives_way_is_none():
+    assert met("vase-ball-armchair", chain([VASE_BALL, BALL_CHAIR], vase=0.01))[3] is False
+    assert met("vase-ball-armchair", chain([VASE_BALL, BALL_CHAIR], chair=0.01))[4] is False
+
+
+# ---------------------------------------------------------------- balls, one as it was measured
+
+
+def balls(steel=None, rubber=None):
+    """What happens at draft, but for what is said of either ball."""
+    as_it_was = object_outcome(fall_m=0.50, rebound_ratio=0.384)
+    high = object_outcome(fall_m=0.50, rebound_ratio=0.670)
+    made = {
+        "steel_ball_0": replace(as_it_was, **(steel or {})),
+        "rubber_ball_0": replace(high, **(rubber or {})),
+    }
+    return {e.sentence: e.met for e in expect("steel-and-rubber", outcome(made))}
+
+
+def test_balls_as_measured_meet_all():
+    assert all(balls().values())
+
+
+@pytest.mark.parametrize("fall", [0.40, 0.75, None])
+def test_a_fall_must_be_as_high_as_the_scene_says(fall):
+    assert balls(steel={"fall_m": fall})["The steel ball strikes as after its fall"] is False
 
 
 @pytest.mark.parametrize(
-    ("imprint", "error", "seen"),
-    [(2.5, 0.004, [True, True]), (0.0, 0.004, [False, True]), (2.5, 0.021, [True, False])],
+    ("steel", "rubber"), [(0.67, 0.38), (0.5, 0.55), (0.11, 0.95), (0.0, 0.56), (None, 0.67)]
 )
-def test_mud_must_keep_an_imprint_and_the_duck_its_shape(imprint, error, seen):
-    objects = {
-        "mud_pile_0": object_outcome(dent_depth_dx=imprint),
-        "rubber_duck_0": object_outcome(shape_error_end=error),
-    }
-    assert met("duck-on-mud", outcome(objects)) == seen
+def test_exchanged_level_or_impossible_rebounds_fail(steel, rubber):
+    found = balls({"rebound_ratio": steel}, {"rebound_ratio": rubber})
+    assert not all(found.values())
 
 
-@pytest.mark.parametrize(("distance", "seen"), [(0.03, True), (0.05, False), (None, False)])
-def test_a_dent_must_lie_within_a_third_of_the_duck_from_where_it_struck(distance, seen):
-    duck = object_outcome(length_m=0.126, shape_error_max=0.05, shape_error_end=0.01)
-    can = object_outcome(dent_depth_dx=2.0, dent_from_contact_m={"rubber_duck_0": distance})
+# ---------------------------------------------------------------- the duck
+
+
+def duck_on_can(depth=0.027, distance=0.004, largest=0.015, end=0.0008, fall=2.0):
+    duck = object_outcome(length_m=0.117, shape_error_max=largest, shape_error_end=end, fall_m=fall)
+    can = object_outcome(
+        dent_depth_m=depth,
+        dent_depth_dx=depth / 0.0083,
+        dent_from_contact_m={"rubber_duck_0": distance},
+    )
     found = expect("duck-on-can", outcome({"rubber_duck_0": duck, "soda_can_0": can}))
-    assert [e.met for e in found] == [True, seen, True, True]
+    return {e.sentence for e in found if not e.met}
+
+
+def test_a_can_as_measured_meets_all():
+    assert duck_on_can() == set()
+
+
+@pytest.mark.parametrize(
+    ("what", "sentence"),
+    [
+        ({"depth": 0.005}, "The can keeps a dent"),
+        ({"depth": 1.0}, "The dent is shallower than the can is wide"),
+        ({"distance": 0.05}, "The dent is where the duck struck"),
+        ({"distance": None}, "The dent is where the duck struck"),
+        ({"largest": 0.2}, "The duck gives way (largest shape error)"),
+        ({"fall": 3.8}, "The duck strikes as after its fall"),
+        ({"end": 0.014}, "The duck recovers (shape error at the end over the largest)"),
+    ],
+)
+def test_each_fault_alone_fails_its_own_expectation(what, sentence):
+    assert duck_on_can(**what) == {sentence}
+
+
+def test_a_duck_of_metal_neither_gives_way_nor_recovers():
+    assert duck_on_can(largest=4e-6, end=3.5e-6) == {
+        "The duck gives way (largest shape error)",
+        "The duck recovers (shape error at the end over the largest)",
+    }
+    assert "The duck recovers (shape error at the end)" in duck_on_can(largest=0.08, end=0.05)
 
 
 def test_an_expectation_reads_as_words():
     objects = {
-        "mud_pile_0": object_outcome(dent_depth_dx=2.5),
-        "rubber_duck_0": object_outcome(shape_error_end=0.004),
+        "steel_ball_0": object_outcome(fall_m=0.5, rebound_ratio=0.384),
+        "rubber_ball_0": object_outcome(fall_m=0.5, rebound_ratio=None),
     }
-    imprint, shape = expect("duck-on-mud", outcome(objects))
-    assert (imprint.value, imprint.target) == ("2.5 grid cells", "above 1 grid cell")
-    assert (shape.value, shape.target) == ("0.4 %", "below 2 %")
+    said = expect("steel-and-rubber", outcome(objects))
+    assert (said[0].value, said[0].target) == ("0.5 m", "0.45 to 0.55 m")
+    assert (said[2].value, said[2].met) == ("it did not happen", False)
+    assert said[4].target == "below 0.5 %"
+    can = expect("duck-on-can", outcome({
+        "soda_can_0": object_outcome(dent_depth_dx=2.5), "rubber_duck_0": object_outcome(),
+    }))  # fmt: skip
+    assert (can[1].value, can[1].target) == ("2.5 grid cells", "above 1 grid cell")

@@ -9,6 +9,7 @@ from stories import tell
 from corporeal.pipeline import Settings
 from corporeal.showcase.expectations import dent_from_impact
 from corporeal.stages.assemble import AssembleConfig
+from corporeal.stages.fill import FillConfig
 from corporeal.stages.simulate import SimulateConfig
 
 pytestmark = pytest.mark.slow
@@ -75,3 +76,11 @@ def test_on_a_single_grid_the_vase_sticks_to_the_ball(story):
     assert np.all(vase_to_ball[met:] < GLUED), "and never leaves it again"
     apart = story("vase-ball-armchair", "multi").gap(0, 1)[len(vase_to_ball) - 1]
     assert apart > 2 * GLUED, "while with separate fields they have parted by then"
+
+
+def test_two_balls_at_normal_gain_no_energy(tmp_path):
+    """Nearly incompressible rubber once gained 47 times its energy in flight: decision 23."""
+    settings = Settings(fill=FillConfig(detail="normal"))
+    told = tell("steel-and-rubber", tmp_path, settings)
+    assert told.audit.mechanical_growth < 1e-3
+    assert all(e.met for e in told.expectations())

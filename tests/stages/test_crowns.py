@@ -13,8 +13,9 @@ from test_fill import LEAVES, SOLID, WOOD, a_potted_plant, inputs, put, thing
 from corporeal.geometry.foliage import in_leaves, root_of, rooted, swinging
 from corporeal.geometry.make import compose
 from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.scene_survey import examine
 from corporeal.materials import find
-from corporeal.stages.fill import examine, fill
+from corporeal.stages.fill import fill
 from corporeal.types import Structure
 
 CELL, LEAF, COUNT = 0.0125, 0.08, 40

@@ -8,10 +8,12 @@ import trimesh
 from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
+from corporeal.geometry.scene_survey import examine
 from corporeal.mpm.problem import Plane
-from corporeal.stages.fill import FillConfig, examine, fill, motions
+from corporeal.stages.fill import FillConfig, fill
 from corporeal.stages.simulate import SimulateConfig, simulate
 from corporeal.trajectory.ledger_row import object_of_body
+from corporeal.treatment.impact_speeds import motions
 from corporeal.treatment.problem_from_scene import pose
 from corporeal.types import (
     Finish,

@@ -14,11 +14,12 @@ from corporeal.formats.glb_merge import Member, merge
 from corporeal.formats.glb_writer import write_glb
 from corporeal.geometry.arrangement import scaled
 from corporeal.geometry.make import compose
+from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.sizes import how_heavy, how_scaled, in_scene, scale_of_part
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import DescribeConfig, describe
-from corporeal.stages.fill import examine, fill
+from corporeal.stages.fill import fill
 from corporeal.stages.ground import GroundConfig, ground
 from corporeal.stages.report import Story, report
 from corporeal.stages.segment import segment

@@ -1,4 +1,4 @@
-"""`corporeal evaluate mass | materials | parts | objects`: predicted against known."""
+"""`corporeal evaluate mass | materials | parts | objects | judge`: predicted against known."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -11,7 +11,7 @@ from corporeal import store
 from corporeal.cli.parse import do_second_word, parse
 from corporeal.errors import UserError
 from corporeal.evaluation.result_table import Table
-from corporeal.terminal import progress_bars, show_table
+from corporeal.terminal import console, progress_bars, show_table
 
 Folder = Annotated[
     Path | None,
@@ -21,7 +21,7 @@ Folder = Annotated[
 
 
 def verb_evaluate() -> None:
-    """Compare predictions with ground truth: evaluate mass, materials, parts or objects."""
+    """Compare predictions with ground truth: evaluate mass, materials, parts, objects or judge."""
     do_second_word("evaluate", JUDGES)
 
 
@@ -174,6 +174,37 @@ def evaluate_objects() -> None:
         objects_figure.draw(found, asked.figure)
 
 
+def evaluate_judge() -> None:
+    """Let a vision-language model judge films of runs, after judging the model by control films.
+
+    FOLDER holds SCENE/METHOD, each a run, as evaluate dynamics leaves them. Controls are the run
+    "ours" with one known fault each. Of a law of physics the judge is believed only where its
+    answers tell the controls of that law; else the tables say that this judge cannot tell.
+    """
+    from corporeal.evaluation.judge import judge_page, judge_tables
+    from corporeal.evaluation.judge.judge_runs import judge_runs
+    from corporeal.evaluation.judge.judge_scenes import JudgeConfig
+
+    @dataclass(frozen=True)
+    class Judge:
+        folder: Folder = None
+        json: Path | None = None
+        """File for answers, intervals and marks (JSON)."""
+        page: Path | None = None
+        """File for a page with every film (HTML)."""
+        how: JudgeConfig = field(default_factory=JudgeConfig)
+
+    first = ("judge", "looks", "record", "yes", "json", "page")
+    asked = parse(Judge, "evaluate judge", evaluate_judge.__doc__, words=2, first=first)
+    with progress_bars() as tell:
+        found = judge_runs(_folder(asked.folder, "judge"), asked.how, console.print, tell("judge"))
+    _show(judge_tables.tables(found.judged, found.result))
+    if asked.json is not None:
+        store.write_json(asked.json, judge_tables.record(found.judged, found.result))
+    if asked.page is not None:
+        judge_page.write_page(found.judged, found.result, asked.page)
+
+
 def _show(tables: Sequence[Table]) -> None:
     for table in tables:
         if table.rows:
@@ -185,4 +216,5 @@ JUDGES = {
     "materials": evaluate_materials,
     "parts": evaluate_parts,
     "objects": evaluate_objects,
+    "judge": evaluate_judge,
 }

@@ -8,6 +8,9 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.shape import Shape
 from corporeal.settle.thinning import thinned
 
+ON_CARD, ON_PROCESSOR = 64, 255
+"""Corners of a convex mesh that PhysX simulates on a graphics card, and on a processor; it cooks
+others anew."""
 LEAST = 8
 """Corners of the box that every hull is cut from."""
 

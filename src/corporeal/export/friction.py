@@ -8,6 +8,8 @@ from jaxtyping import Float, Int
 
 Rule = Literal["multiply", "average", "geometric", "larger"]
 """How an engine makes one coefficient of two: their product, mean, geometric mean, or maximum."""
+SPINNING, ROLLING = 1e-4, 2e-5
+"""Coefficients against turning about the normal and rolling [m]: only to steady solvers."""
 LEAST = 1e-3
 """Smallest coefficient that is told from none [-]."""
 

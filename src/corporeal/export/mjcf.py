@@ -14,6 +14,7 @@ from pathlib import Path
 
 import numpy as np
 
+from corporeal.export.friction import ROLLING, SPINNING
 from corporeal.export.meshes import FOLDER, write_collider, write_picture, write_surfaces
 from corporeal.export.solids import PhysicalScene, Solid
 from corporeal.export.target import Asked, Written
@@ -31,8 +32,6 @@ FLEX_CONTACT = 8e-3
 """Time constant of the contacts of what can deform [s]."""
 INELASTIC = 0.01
 """Restitution below it is none."""
-SPINNING, ROLLING = 1e-4, 1e-5
-"""Coefficients against turning about the normal and rolling [m]: only to steady the solver."""
 POISSON = 0.45
 """Largest that the tetrahedra of MuJoCo bear: they lock above it [-]."""
 FLEX_RADIUS = 0.05

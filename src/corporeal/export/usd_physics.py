@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from corporeal.export.friction import Rule, SurfaceFriction, surface_friction
+from corporeal.export.few_corners import ON_CARD, ON_PROCESSOR
+from corporeal.export.friction import ROLLING, SPINNING, Rule, SurfaceFriction, surface_friction
 from corporeal.export.physical_scene import principal
 from corporeal.export.solids import Matter, PhysicalScene, Solid
 from corporeal.export.target import Engine, Soft
@@ -27,6 +28,17 @@ RULES: dict[Engine, Rule] = {
 """How engines combine two coefficients; PhysX as ``frictionCombineMode`` tells it."""
 MATTER = f"/{WORLD}/Matter"
 FLOOR_PART = "floor"
+CONVEX = (
+    *("PhysicsCollisionAPI", "PhysicsMeshCollisionAPI", "NewtonMeshCollisionAPI"),
+    *("PhysxConvexHullCollisionAPI", "MaterialBindingAPI"),
+)
+ALL_CORNERS = -1
+"""Newton: all corners of a hull."""
+GAP = 2e-3
+"""What is farther apart than two of these is no contact yet [m]. By default Newton takes 0.1 m: a
+scene then has more contacts than its solvers keep, and things fall through the floor."""
+ROLLING_TOO = 6
+"""Directions in which a contact resists: also against turning and rolling."""
 
 
 def fitted(scene: PhysicalScene, engine: Engine) -> SurfaceFriction:
@@ -84,10 +96,12 @@ def _simulation(scene: PhysicalScene, engine: Engine, found: SurfaceFriction) ->
 
 
 def _surface(name: str, friction: float, restitution: float, engine: Engine) -> Prim:
-    prim = Prim("Material", name, ["PhysicsMaterialAPI"])
+    prim = Prim("Material", name, ["PhysicsMaterialAPI", "NewtonMaterialAPI"])
     prim.set("float", "physics:dynamicFriction", number(friction))
     prim.set("float", "physics:restitution", number(restitution))
     prim.set("float", "physics:staticFriction", number(friction))
+    prim.set("float", "newton:torsionalFriction", number(SPINNING))
+    prim.set("float", "newton:rollingFriction", number(ROLLING))
     if engine == "physx":
         prim.schemas.append("PhysxMaterialAPI")
         prim.set("uniform token", "physxMaterial:frictionCombineMode", text("multiply"))
@@ -129,11 +143,26 @@ def _towards(normal: np.ndarray) -> np.ndarray:
 
 
 def _plane(name: str) -> Prim:
-    prim = Prim("Plane", name, ["PhysicsCollisionAPI", "MaterialBindingAPI"])
+    applied = ["PhysicsCollisionAPI", "NewtonCollisionAPI", "MaterialBindingAPI"]
+    prim = Prim("Plane", name, applied)
     prim.set("uniform token", "axis", text("Z"))
     prim.set("uniform token", "purpose", text("guide"))
+    _touching(prim)
     bind(prim, f"{MATTER}/{FLOOR_PART}")
     return prim
+
+
+def _touching(shape: Prim) -> None:
+    """Say how Newton finds a shape's contacts, and in which directions they resist."""
+    shape.set("float", "newton:contactGap", number(GAP))
+    shape.set("uniform int", "mjc:condim", str(ROLLING_TOO))
+
+
+def _keep_corners(shape: Prim, corners: int) -> None:
+    """Let readers take a hull as it is: things stand on the corners that settling saw."""
+    shape.set("uniform int", "newton:maxHullVertices", str(ALL_CORNERS))
+    kept = int(np.clip(corners, ON_CARD, ON_PROCESSOR))
+    shape.set("int", "physxConvexHullCollision:hullVertexLimit", str(kept))
 
 
 def _groups(scene: PhysicalScene, grounds: list[str]) -> list[Prim]:
@@ -175,8 +204,9 @@ def _rigid(solid: Solid) -> Prim:
     group = prim.add(Prim("", "colliders"))
     colliders = [*solid.pieces, *([solid.hull] if solid.hull else [])]
     for (name, _), collider in zip(named_colliders(solid), colliders, strict=True):
-        applied = ["PhysicsCollisionAPI", "PhysicsMeshCollisionAPI", "MaterialBindingAPI"]
-        shape = group.add(Prim("", name, applied))
+        shape = group.add(Prim("", name, list(CONVEX)))
         shape.set("uniform token", "physics:approximation", text("convexHull"))
+        _keep_corners(shape, len(collider.shape.vertices))
+        _touching(shape)
         bind(shape, f"{MATTER}/part_{collider.part}")
     return prim

@@ -7,7 +7,7 @@ readers of physics take defaults.
 
 from pathlib import Path
 
-from corporeal.export.few_corners import colliders, with_few_corners
+from corporeal.export.few_corners import ON_CARD, colliders, with_few_corners
 from corporeal.export.solids import PhysicalScene
 from corporeal.export.target import Asked, Written
 from corporeal.export.usd_geometry import WORLD, geometry
@@ -18,8 +18,6 @@ from corporeal.version import __version__
 
 GEOMETRY, PHYSICS, MOTION = "geometry.usda", "physics.usda", "motion.usda"
 SIM, FILM = "sim.usda", "film.usda"
-ON_CARD = 64
-"""Corners of a convex mesh that PhysX simulates on a graphics card; it cooks others anew."""
 
 
 def write_usd(asked: Asked, folder: Path) -> Written:

@@ -4,7 +4,7 @@ from typing import Any
 
 import numpy as np
 import torch  # pyright: ignore[reportMissingImports]
-from jaxtyping import Float16, UInt8
+from jaxtyping import Float16, Float32, UInt8
 from PIL import Image
 
 from corporeal.features.vectors import unit
@@ -44,3 +44,11 @@ def as_map(patches: torch.Tensor, size: tuple[int, int]) -> Float16[np.ndarray, 
     """Return 1 x (h w) x D patches as a map of unit features."""
     rows = unit(patches[0].float().numpy())
     return rows.reshape(*size, -1).astype(np.float16)
+
+
+def enlarged(logits: torch.Tensor, size: tuple[int, int]) -> Float32[np.ndarray, "H W"]:
+    """Return a map of logits at a picture's size (rows, columns), interpolated."""
+    large = torch.nn.functional.interpolate(
+        logits[None, None].float(), size=size, mode="bilinear", align_corners=False
+    )
+    return large[0, 0].numpy()

@@ -13,6 +13,8 @@ from corporeal import store
 from corporeal.errors import BadFileError, UserError
 
 CONFIG, PREPROCESSOR = "config.json", "preprocessor_config.json"
+PROCESSOR = "processor_config.json"
+"""Holds, in later versions of the library, what the other file held."""
 
 
 @dataclass(frozen=True)
@@ -157,3 +159,35 @@ def find(kind: str, spec: str, default: str) -> Weights:
             f"Hugging Face hub, such as {default}."
         )
     return Weights(kind, place, wish)
+
+
+def in_folder(folder: Path, kinds: Sequence[str]) -> Weights:
+    """Return the weights in a folder, of one of a few kinds; nothing is fetched.
+
+    Raises:
+        UserError: They are of another kind, or something of them is missing.
+
+    """
+    said = Weights(kinds[0], str(folder)).read(CONFIG).get("model_type")
+    made = Weights(next((kind for kind in kinds if kind == said), kinds[0]), str(folder))
+    made.check()
+    made.holds([PREPROCESSOR, PROCESSOR])
+    return made
+
+
+def statistics(weights: Weights) -> dict[str, Any]:
+    """Return ``image_mean`` and ``image_std`` that pictures are prepared by.
+
+    Raises:
+        UserError: No file of the model says them.
+
+    """
+    known: dict[str, Any] = {}
+    for name in (PROCESSOR, PREPROCESSOR):
+        if (Path(weights.place) / name).is_file():
+            said = weights.read(name)
+            known |= said.get("image_processor", said)
+    if not {"image_mean", "image_std"} <= known.keys():
+        what = f"neither {PREPROCESSOR} nor {PROCESSOR} states image_mean and image_std."
+        raise BadFileError(weights.place, what, "Save it with save_pretrained.")
+    return known

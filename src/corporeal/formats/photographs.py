@@ -3,13 +3,15 @@
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
-from pathlib import Path
+from pathlib import Path, PurePath
 
 import numpy as np
 from jaxtyping import Float, UInt8
+from PIL import Image
 
 from corporeal.errors import BadFileError
 from corporeal.formats.colmap import ColmapModel, is_colmap, read_colmap
+from corporeal.formats.images import FORMATS
 from corporeal.formats.projections import check_focal, parted, projections_in, read_projection
 from corporeal.formats.resources import beside
 from corporeal.formats.shots import Shot, develop
@@ -72,31 +74,126 @@ class Photographs:
         return replace(self, views=views, names=tuple(self.names[k] for k in chosen), masks=masks)
 
 
-def read_photographs(path: Path, longest: int = LONGEST) -> Photographs:
+@dataclass(frozen=True)
+class Listed:
+    """What a folder says of its photographs, before any is read."""
+
+    source: Path
+    """Named in errors."""
+    shots: list[Shot]
+    z_up: bool
+    """As in ``Photographs``."""
+    model: ColmapModel | None = None
+
+
+def read_photographs(
+    path: Path, longest: int = LONGEST, masks: Path | None = None, bare: bool = False
+) -> Photographs:
     """Read a folder of posed photographs, or the ``transforms.json`` of one.
 
     All come out at one size, the most frequent one, at most ``longest`` pixels long, with lenses
     straightened. A minority of pictures that are missing or broken is left out and named.
 
+    Args:
+        path: The folder or file.
+        longest: Of a picture's sides [px].
+        masks: A folder of masks instead of the photographs' own, or one that holds ``masks``,
+            ``instances`` or both.
+        bare: Whether masks and instances beside the photographs are ignored.
+
     Raises:
-        BadFileError: There are no poses, a pose or camera is bad, or too few pictures can be used.
+        BadFileError: There are no poses, a pose or camera is bad, or too few pictures can be used;
+            or no mask has the name of a photograph.
+
+    """
+    found = listed(path)
+    shots = found.shots
+    if bare or masks is not None:
+        shots = [replace(shot, mask=None, instances=None) for shot in shots]
+    if masks is not None:
+        shots = _masked_by(masks, shots)
+    done = develop(found.source, shots, longest)
+    seen = found.model if found.model is not None and len(found.model.points) else None
+    return Photographs(
+        views=Views(done.rgb, done.cameras, object_of_pixel=done.object_of_pixel),
+        names=done.names,
+        z_up=found.z_up,
+        masks=done.masks,
+        points=seen.points if seen else None,
+        colours=seen.colours if seen else None,
+        warnings=done.warnings,
+    )
+
+
+def listed(path: Path) -> Listed:
+    """List the photographs of a folder, or of a ``transforms.json``, with their poses.
+
+    Raises:
+        BadFileError: There are no poses, or one of them is bad.
 
     """
     path = Path(path)
     if not path.exists():
         raise BadFileError(path, "there is no such file or folder.", KINDS)
     if path.is_file():
-        return _of_transforms(path, longest)
+        return _of_transforms(path)
     file = next((path / name for name in TRANSFORMS if (path / name).is_file()), None)
     if file is not None:
-        return _of_transforms(file, longest)
+        return _of_transforms(file)
     model = next((path / name for name in MODELS if is_colmap(path / name)), None)
     if model is not None:
-        return _of_colmap(path, model, longest)
+        return _of_colmap(path, model)
     pairs = projections_in(path) if path.is_dir() else []
     if pairs:
-        return _of_projections(path, pairs, longest)
+        return Listed(path, _of_projections(path, pairs), False)
     raise BadFileError(path, "holds no photographs with poses.", KINDS)
+
+
+def has_masks(shots: list[Shot]) -> bool:
+    """Tell whether there are masks, instances or an alpha channel, by names and headers."""
+    return any(s.mask or s.instances or _with_alpha(s.picture) for s in shots)
+
+
+def _with_alpha(path: Path | None) -> bool:
+    try:
+        with Image.open(path or "", formats=FORMATS) as picture:
+            return picture.has_transparency_data
+    except Exception:  # Pillow's decoders raise almost anything; who reads the picture says why
+        return False
+
+
+def _masked_by(folder: Path, shots: list[Shot]) -> list[Shot]:
+    """Return the photographs with masks and instances of another folder."""
+    folder = folder.expanduser()
+    if not folder.is_dir():
+        raise BadFileError(folder, "there is no such folder.", "Name a folder of masks.")
+    parted = any((folder / name).is_dir() for name in (*MASKS, *INSTANCES))
+    masks, instances = (
+        [folder / name for name in names if (folder / name).is_dir()]
+        for names in (MASKS, INSTANCES)
+    )
+    made = [
+        replace(
+            shot,
+            mask=_named(shot, masks if parted else [folder]),
+            instances=_named(shot, instances),
+        )
+        for shot in shots
+    ]
+    if not any(shot.mask or shot.instances for shot in made):
+        step = "Masks are PNG pictures with the names of the photographs, white where things are."
+        raise BadFileError(folder, "holds no mask with the name of a photograph.", step)
+    return made
+
+
+def _named(shot: Shot, folders: list[Path]) -> Path | None:
+    """Return the picture in folders that is named as a photograph, with its folder or without."""
+    if shot.picture is None:
+        return None
+    name = PurePath(shot.name.lstrip("./"))
+    files = [name.as_posix(), name.with_suffix("").as_posix(), f"{name.as_posix()}.png"]
+    files += [shot.picture.name, shot.picture.stem, f"{shot.picture.name}.png"]
+    return next((p for base in folders for f in files if (p := _found(base, f)) is not None), None)
 
 
 def holds_photographs(folder: Path) -> bool:
@@ -105,28 +202,11 @@ def holds_photographs(folder: Path) -> bool:
     return posed or any(is_colmap(folder / m) for m in MODELS) or bool(projections_in(folder))
 
 
-def _developed(
-    source: Path, shots: list[Shot], longest: int, z_up: bool, model: ColmapModel | None = None
-) -> Photographs:
-    done = develop(source, shots, longest)
-    seen = model if model is not None and len(model.points) else None
-    return Photographs(
-        views=Views(done.rgb, done.cameras, object_of_pixel=done.object_of_pixel),
-        names=done.names,
-        z_up=z_up,
-        masks=done.masks,
-        points=seen.points if seen else None,
-        colours=seen.colours if seen else None,
-        warnings=done.warnings,
-    )
-
-
 # ---------------------------------------------------------------- transforms.json
 
 
-def _of_transforms(path: Path, longest: int) -> Photographs:
-    shots = [_shot(frame) for frame in frames_of(path)]
-    return _developed(path, shots, longest, z_up=True)
+def _of_transforms(path: Path) -> Listed:
+    return Listed(path, [_shot(frame) for frame in frames_of(path)], z_up=True)
 
 
 def _shot(frame: Frame) -> Shot:
@@ -166,7 +246,7 @@ def companion(picture: Path | None, folder: Path, names: tuple[str, ...]) -> Pat
 # ---------------------------------------------------------------- COLMAP
 
 
-def _of_colmap(folder: Path, place: Path, longest: int) -> Photographs:
+def _of_colmap(folder: Path, place: Path) -> Listed:
     model = read_colmap(place)
     root = _images_folder(folder, model)
     shots = []
@@ -176,7 +256,7 @@ def _of_colmap(folder: Path, place: Path, longest: int) -> Photographs:
         more = (companion(picture, folder, names) for names in (MASKS, INSTANCES))
         shots.append(Shot(image.name, picture, lens, image.world_from_camera, *more))
     shots.sort(key=lambda shot: shot.name)
-    return _developed(folder, shots, longest, False, model)
+    return Listed(folder, shots, False, model)
 
 
 def _images_folder(folder: Path, model: ColmapModel) -> Path:
@@ -194,13 +274,13 @@ def _as_stated(lens: Lens, width: int, height: int) -> Lens:
 # ---------------------------------------------------------------- projection matrices
 
 
-def _of_projections(folder: Path, pairs: list[tuple[Path, Path]], longest: int) -> Photographs:
+def _of_projections(folder: Path, pairs: list[tuple[Path, Path]]) -> list[Shot]:
     shots = []
     for picture, file in pairs:
         K, pose = parted(file, read_projection(file))
         more = (companion(picture, folder, names) for names in (MASKS, INSTANCES))
         shots.append(Shot(picture.name, picture, partial(_pinhole, file, K), pose, *more))
-    return _developed(folder, shots, longest, z_up=False)
+    return shots
 
 
 def _pinhole(path: Path, K: np.ndarray, width: int, height: int) -> Lens:

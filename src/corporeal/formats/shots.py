@@ -169,6 +169,11 @@ def _size(shot: Shot, bad: list[Bad]) -> tuple[int, int] | None:
     return (height, width) if _turned(shot, width, height, asked) else (width, height)
 
 
+def stored(shot: Shot) -> tuple[int, int] | None:
+    """Return width and height of a photograph as its camera took it [px]; None: it is bad."""
+    return _size(shot, [])
+
+
 def unreadable(path: Path) -> str:
     """Say in a clause why a file is no picture that can be read."""
     with suppress(OSError), path.open("rb") as file:
@@ -180,7 +185,7 @@ def unreadable(path: Path) -> str:
 def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
     picture = _decoded(shot.picture)
     height, width = picture.shape[:2]
-    asked = _asked_of(shot.picture)
+    asked = asked_of(shot.picture)
     turned = _turned(shot, width, height, asked)
     if turned:
         picture = np.ascontiguousarray(np.rot90(picture, asked))
@@ -225,7 +230,8 @@ def _asked(picture: Image.Image) -> int:
     return TURNS.get(picture.getexif().get(ORIENTATION, 1), 0)
 
 
-def _asked_of(path: Path | None) -> int:
+def asked_of(path: Path | None) -> int:
+    """Return by how many quarter turns to the left a file says that it is to be shown."""
     assert path is not None
     with Image.open(path, formats=FORMATS) as picture:
         return _asked(picture)

@@ -9,11 +9,14 @@ Brown's model as OpenCV and COLMAP have it: at x, y = the direction over its dep
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Int32, UInt8
+from jaxtyping import Float, Float32, Int32, UInt8
 from scipy.ndimage import map_coordinates
 
 ZOOMS = (0.5, 4.0)
 """How much the focal length may change so that a straightened picture has no empty border."""
+
+UNBENDING = 20
+"""Rounds in which directions are found that a lens bends to given ones."""
 
 
 @dataclass(frozen=True)
@@ -57,6 +60,15 @@ def bent(lens: Lens, xy: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2"]:
     )
 
 
+def unbent(lens: Lens, points: Float[np.ndarray, "N 2"]) -> Float[np.ndarray, "N 2"]:
+    """Return the directions x, y that a photograph shows at points [px]: undo ``bent``."""
+    seen = _directions(lens.K, points)
+    xy = seen
+    for _ in range(UNBENDING):
+        xy = seen - (bent(lens, xy) - xy)
+    return xy
+
+
 def straightened(
     picture: UInt8[np.ndarray, "H W C"] | Int32[np.ndarray, "H W C"], lens: Lens
 ) -> tuple[np.ndarray, Float[np.ndarray, "3 3"]]:
@@ -80,6 +92,24 @@ def straightened(
         for c in range(picture.shape[2])
     ]
     return np.round(np.stack(planes, axis=-1)).astype(picture.dtype), K
+
+
+def as_photographed(picture: Float32[np.ndarray, "H W"], lens: Lens) -> Float32[np.ndarray, "H W"]:
+    """Return what a straightened picture shows as the lens shows it: undo ``straightened``.
+
+    Beyond the edge of the straightened picture its edge goes on.
+
+    Raises:
+        ValueError: The lens bends more than that allows.
+
+    """
+    if lens.straight:
+        return picture
+    K = _without_border(lens)
+    xy = unbent(lens, _middles(lens.width, lens.height))
+    source = xy @ K[:2, :2].T + K[:2, 2]
+    rows, columns = (source[:, k].reshape(picture.shape) - 0.5 for k in (1, 0))
+    return map_coordinates(picture, [rows, columns], np.float32, order=1, mode="nearest")
 
 
 def _without_border(lens: Lens) -> np.ndarray:

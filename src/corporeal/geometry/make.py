@@ -362,6 +362,9 @@ def recipe(member: Member, made: Make, treatment: Treatment, cell: float) -> Rec
     if made.held:
         wall = max(made.thickness, 0.5 * cell)
         return Recipe(np.inf, wall, sheet, level=made.held.level, vessel=is_vessel(member))
+    if made.structure.holds and not made.modelled:
+        wall = max(made.thickness, 0.5 * cell)
+        return Recipe(wall, wall, sheet)
     if made.modelled:
         thin = made.thickness < 0.99 * simulated and treatment.kind == "shell"
         return Recipe(0.0 if thin else np.inf, simulated, sheet)

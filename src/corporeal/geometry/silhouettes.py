@@ -23,6 +23,17 @@ MARGIN = 1.3
 """Half edge of that cube, in radii of the object as the cameras see it."""
 INSIDE = 127
 """What a mask must exceed."""
+BESIDE_VIEWS, BESIDE_SHARE = 2, 0.2
+"""So many views, and so large a share of those that look, must see a place beside their masks for
+it to be outside: outlines drawn by hand, or by a program, are off by some pixels."""
+
+
+def outside(
+    beside: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
+    looking: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
+) -> Bool[np.ndarray, " N"]:
+    """Tell which places are outside, by how many views look there and see them beside masks."""
+    return (beside >= BESIDE_VIEWS) & (beside >= BESIDE_SHARE * looking)
 
 
 def coherence(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> float:

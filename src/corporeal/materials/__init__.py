@@ -1,6 +1,14 @@
 """The measured library: what a material is like, in which range, and who measured it."""
 
-from corporeal.materials.contact import Friction, combine, friction_between, restitution_between
+from corporeal.materials.contact import (
+    Friction,
+    Restitution,
+    Striker,
+    combine,
+    friction_between,
+    restitution,
+    restitution_between,
+)
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import (
     check,
@@ -24,6 +32,8 @@ __all__ = [
     "Friction",
     "Problem",
     "Quantity",
+    "Restitution",
+    "Striker",
     "check",
     "citation",
     "combine",
@@ -38,6 +48,7 @@ __all__ = [
     "menu",
     "named",
     "read",
+    "restitution",
     "restitution_between",
     "show",
     "si",

@@ -1,6 +1,7 @@
 """What happens between two surfaces: measured pairs first, then a stated rule."""
 
 import tomllib
+from collections.abc import Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -23,19 +24,55 @@ class Friction:
 
 def friction_between(a: Entry, b: Entry) -> Friction:
     """Sliding friction of ``a`` on ``b``: the most particular measured pair, else ``combine``."""
-    for one, other in _by_closeness(a, b):
-        row = pairs().get(frozenset((one, other)))
-        if row:
-            low, typical, high = row["sliding"]
-            measured = Range(low, typical, high, row["source"])
-            static = (row["static"][0], row["static"][1])
-            return Friction(measured, static, f"measured: {one} on {other}, clean and dry")
-    return _by_rule(a, b)
+    row = _closest(a, b, pairs())
+    if row is None:
+        return _by_rule(a, b)
+    low, typical, high = row["sliding"]
+    measured = Range(low, typical, high, row["source"])
+    static = (row["static"][0], row["static"][1])
+    one, other = row["of"] if row["of"][0] in a.kin else reversed(row["of"])
+    return Friction(measured, static, f"measured: {one} on {other}, clean and dry")
 
 
 def combine(friction_a: float, friction_b: float) -> float:
     """Friction of an unmeasured pair from the surfaces' own values: μ = √(μ_a μ_b)."""
     return sqrt(friction_a * friction_b)
+
+
+@dataclass(frozen=True)
+class Striker:
+    """One of two rigid bodies that strike each other."""
+
+    entry: Entry
+    """Where its material is looked up."""
+    material: Material
+    """Its chosen values."""
+    solid: bool = True
+    """Whether it is solid where it strikes: a wall rings, and takes energy that a ball keeps."""
+
+
+@dataclass(frozen=True)
+class Restitution:
+    """Newton's coefficient of two bodies that strike each other."""
+
+    value: float
+    """[-]"""
+    measured: Range | None
+    """Of the pair; None: nobody measured it, and ``value`` is the rule's."""
+
+
+def restitution(a: Striker, b: Striker) -> Restitution:
+    """Restitution of two bodies: the most particular measured pair, else ``restitution_between``.
+
+    What was measured are solid balls on solid bodies, so it holds for what is solid. A value that
+    a person stated for one of the materials outranks it.
+    """
+    particular = not all(s.solid for s in (a, b)) or any(_stated(s.material) for s in (a, b))
+    row = None if particular else _closest(a.entry, b.entry, rebounds())
+    if row is None:
+        return Restitution(restitution_between(a.material, b.material), None)
+    low, typical, high = row["restitution"]
+    return Restitution(typical, Range(low, typical, high, row["source"]))
 
 
 def restitution_between(a: Material, b: Material) -> float:
@@ -52,9 +89,30 @@ def restitution_between(a: Material, b: Material) -> float:
 
 @cache
 def pairs() -> dict[frozenset[str], dict]:
-    """Every measured pair, by the names in it."""
+    """Every pair of measured friction, by the names in it."""
+    return _rows("pair")
+
+
+@cache
+def rebounds() -> dict[frozenset[str], dict]:
+    """Every pair of measured restitution, by the names in it."""
+    return _rows("rebound")
+
+
+def _rows(table: str) -> dict[frozenset[str], dict]:
     text = files("corporeal.materials").joinpath("pairs.toml").read_text(encoding="utf-8")
-    return {frozenset(row["of"]): row for row in tomllib.loads(text)["pair"]}
+    return {frozenset(row["of"]): row for row in tomllib.loads(text)[table]}
+
+
+def _closest(a: Entry, b: Entry, known: Mapping[frozenset[str], dict]) -> dict | None:
+    """Return the most particular row that lists the two or their kin; None: there is none."""
+    rows = (known.get(frozenset(names)) for names in _by_closeness(a, b))
+    return next((row for row in rows if row), None)
+
+
+def _stated(material: Material) -> bool:
+    ground = material.grounds.get("restitution")
+    return ground is not None and ground.chosen_by == "annotation"
 
 
 def _by_closeness(a: Entry, b: Entry) -> list[tuple[str, str]]:

@@ -13,7 +13,7 @@ from math import erf, sqrt
 import numpy as np
 
 from corporeal.errors import UserError
-from corporeal.materials.contact import friction_between, restitution_between
+from corporeal.materials.contact import Striker, friction_between, restitution
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import find, library, substances
 from corporeal.materials.placement import CONTENTS, entry_of
@@ -184,12 +184,16 @@ def sample(
     )
     ground = entry_of(floor, library)
     bodies = [*made, _material(ground.pick(ground.typical()), -1, grades, library)]
+    entries = [entry_of(m.name, library) for m in bodies]
+    solid = [*(s.kind == "solid" for s in structures), True]
     return MaterialField(
         materials=tuple(made),
         structures=structures,
         words=words,
-        friction=_friction(field, [entry_of(m.name, library) for m in bodies], grades),
-        restitution=np.array([[restitution_between(a, b) for b in bodies] for a in bodies]),
+        friction=_friction(field, entries, grades),
+        restitution=_restitution(
+            [Striker(*s) for s in zip(entries, bodies, solid, strict=True)], grades
+        ),
         pieces=pieces if field.pieces else (),
     )
 
@@ -296,6 +300,21 @@ def _friction(field: MaterialField, entries: Sequence[Entry], grades: Grades) ->
             first, second = sorted((one.name, other.name))
             quantile = grades.quantile(-1, first, f"on {second}", False)
             drawn[a, b] = drawn[b, a] = _within(r, chosen, quantile, 1.0)
+    return drawn
+
+
+def _restitution(strikers: Sequence[Striker], grades: Grades) -> np.ndarray:
+    """Draw the restitution of measured pairs in its range; the others follow their materials."""
+    drawn = np.zeros((len(strikers), len(strikers)))
+    for a, one in enumerate(strikers):
+        for b, other in enumerate(strikers[: a + 1]):
+            pair = restitution(one, other)
+            value = pair.value
+            if pair.measured:
+                first, second = sorted((one.entry.name, other.entry.name))
+                quantile = grades.quantile(-1, first, f"rebound from {second}", False)
+                value = _within(pair.measured, value, quantile, 1.0)
+            drawn[a, b] = drawn[b, a] = value
     return drawn
 
 

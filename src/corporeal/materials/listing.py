@@ -1,10 +1,10 @@
 """The library as text for the terminal, and what a scene is made of as data."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from math import degrees
 
-from corporeal.materials.contact import pairs
+from corporeal.materials.contact import pairs, rebounds
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import find, library
 from corporeal.materials.quantities import QUANTITIES
@@ -50,7 +50,8 @@ def show(name: str, library_name: str = "default") -> str:
         lines.append(f"  {words:<18} {span(field, r.low, r.typical, r.high):<26} {r.source}")
         lines += [f"    {entry.notes[field]}"] if field in entry.notes else []
     lines += _uses(entry)
-    lines += _measured_friction(entry)
+    lines += _measured("Measured sliding friction, clean and dry", "sliding", pairs(), entry)
+    lines += _measured("Measured restitution of solid bodies", "restitution", rebounds(), entry)
     keys = sorted({key for r in entry.ranges.values() for key in _keys(r.source)})
     lines += ["", "Sources", *(f"  {key}{_seen(key)}" for key in keys)]
     return "\n".join(lines)
@@ -74,16 +75,18 @@ def _unit(field: str, value: float) -> str:
     return "" if unit == "-" else f" {unit}"
 
 
-def _measured_friction(entry: Entry) -> list[str]:
+def _measured(
+    title: str, key: str, known: Mapping[frozenset[str], dict], entry: Entry
+) -> list[str]:
     """Tell the measured pairs that this material is named in, itself or as one of its kind."""
     rows = []
-    for names, row in pairs().items():
+    for names, row in known.items():
         own = [n for n in entry.kin if n in names]
         if own:
             other = next(iter(names - {own[0]}), own[0])
-            low, typical, high = row["sliding"]
+            low, typical, high = row[key]
             rows.append(f"  as {own[0]} on {other}: {span('friction', low, typical, high)}")
-    return ["", "Measured sliding friction, clean and dry", *rows] if rows else []
+    return ["", title, *rows] if rows else []
 
 
 def _keys(source: str) -> list[str]:

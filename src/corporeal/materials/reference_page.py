@@ -2,7 +2,7 @@
 
 from collections.abc import Sequence
 
-from corporeal.materials.contact import pairs
+from corporeal.materials.contact import pairs, rebounds
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import library
 from corporeal.materials.listing import COLUMNS, HEADS, span
@@ -82,8 +82,14 @@ Measured pairs come first, the most particular one: a material's own name before
 ("wood" for plywood), that before its group's ("metal"). Published tables disagree; the range holds
 them all. What is simulated is sliding friction. For a pair that nobody measured the rule is
 μ = √(μ_a μ_b) of the surfaces' own values, which were chosen so that the rule comes near the
-measured pairs. Restitution of a pair: e² = (E_b e_a² + E_a e_b²)/(E_a + E_b) with the plane-strain
-moduli, so the softer body decides (Cross, Am. J. Phys. 68 (2000) 1025).
+measured pairs.
+"""
+REBOUND_RULE = """## Restitution of two rigid bodies
+
+Measured pairs come first here too, most particular one first, where both bodies are solid: what was
+measured are balls, and walls ring. A restitution that a person states for a material outranks it.
+For all other pairs e² = (E_b e_a² + E_a e_b²)/(E_a + E_b) of the materials' own values with the
+plane-strain moduli, so the softer body decides (Cross, Am. J. Phys. 68 (2000) 1025).
 """
 SOURCES = """## Sources
 
@@ -117,6 +123,8 @@ def markdown() -> str:
             *(*_table(HEADS, reference, _core), ""),
             RULE,
             *(*_friction(), ""),
+            REBOUND_RULE,
+            *(*_rebounds(), ""),
             SOURCES,
             *(f"- **{k}** ({row['check']}): {row['cite']}" for k, row in source_table().items()),
             "",
@@ -194,4 +202,13 @@ def _friction() -> list[str]:
         sliding = span("friction", *row["sliding"])
         pair = " on ".join(row["of"])
         lines.append(f"| {pair}{note} | {static} | {sliding} | {row['source']} |")
+    return lines
+
+
+def _rebounds() -> list[str]:
+    lines = ["| pair | restitution | source |", "| --- | --- | --- |"]
+    for row in rebounds().values():
+        note = f" ({row['note']})" if "note" in row else ""
+        value = span("restitution", *row["restitution"])
+        lines.append(f"| {' on '.join(row['of'])}{note} | {value} | {row['source']} |")
     return lines

@@ -22,6 +22,16 @@ class Faces:
     """Which of the body's particles each face moves with."""
 
 
+@dataclass(frozen=True)
+class WettedSurface:
+    """Where liquids touch a rigid body, inside of it too where it is hollow; N points."""
+
+    point: Float[np.ndarray, "N 3"]
+    """[m]"""
+    normal: Float[np.ndarray, "N 3"]
+    """Unit, out of the matter."""
+
+
 NO_FACES = Faces(np.zeros((0, 3)), np.zeros(0, np.int64))
 
 
@@ -92,6 +102,8 @@ class Body:
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
+    wetted: WettedSurface | None = None
+    """Of a rigid body: liquids touch it here; None: as everything else does."""
     push: Push | None = None
     wind: Wind | None = None
     faces: Faces = NO_FACES

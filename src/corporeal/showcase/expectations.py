@@ -1,43 +1,70 @@
 """What must be seen in each showcase scene, as numbers: data, and a function that compares.
 
 The measures are those of ``findings.Outcome``: per object, per pair, and who met whom in order.
+Each expectation bounds a measure from both sides where too much is as wrong as too little, and
+names a run that must not meet it: one of ``SPOILERS``, each the same scene with one known fault.
 """
 
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
+from math import inf
 from operator import attrgetter
 from typing import Any, Literal
 
 from corporeal.findings import Expectation, ObjectOutcome, Outcome
 
 Measure = Callable[[Outcome], float | None]
+Spoiler = Literal[
+    "single", "capped", "wrong", "halfgravity", "frozen", "squashed", "toppled", "shifted"
+]
+SPOILERS: dict[Spoiler, str] = {
+    "single": "one velocity field for all objects",
+    "capped": "Young's moduli capped by the published rule",
+    "wrong": "stiff and soft materials exchanged",
+    "halfgravity": "half of gravity",
+    "frozen": "nothing moves",
+    "squashed": "every object ends at seven tenths of its height",
+    "toppled": "every object ends on its side",
+    "shifted": "every object ends a tenth of its length aside",
+}
+"""Runs with one fault: four are simulated, the others made from the frames of a sound run."""
 
 
 @dataclass(frozen=True)
 class Demand:
-    """One object that must be seen in a scene."""
+    """A measure that must lie between two bounds."""
 
     sentence: str
     measure: Measure
-    relation: Literal["below", "above"]
-    limit: float
-    unit: Literal["%", "mm", "grid cells", "degrees", "lengths of the duck", ""] = ""
+    low: float
+    """-inf: only the upper bound counts."""
+    high: float
+    """inf: only the lower bound counts."""
+    unit: Literal["%", "mm", "m", "grid cells", "degrees", "lengths of the duck", ""]
+    spoiled_by: Spoiler
+    """A run that must not meet it."""
 
     def compare(self, outcome: Outcome) -> Expectation:
         """Measure and judge; what did not happen is not met."""
         value = self.measure(outcome)
         if value is None:
             return Expectation(self.sentence, "it did not happen", self._target(), False)
-        met = value < self.limit if self.relation == "below" else value > self.limit
+        met = self.low < value < self.high
         return Expectation(self.sentence, self._said(value), self._target(), met)
 
     def _target(self) -> str:
-        return f"{self.relation} {self._said(self.limit)}"
+        if self.low == -inf:
+            return f"below {self._said(self.high)}"
+        if self.high == inf:
+            return f"above {self._said(self.low)}"
+        return f"{self._number(self.low)} to {self._said(self.high)}"
+
+    def _number(self, value: float) -> str:
+        return f"{value * {'%': 100, 'mm': 1000}.get(self.unit, 1):.3g}"
 
     def _said(self, value: float) -> str:
-        scale = {"%": 100, "mm": 1000}.get(self.unit, 1)
-        number = f"{value * scale:.3g}"
+        number = self._number(value)
         return f"{number} {self.unit.removesuffix('s') if number == '1' else self.unit}".strip()
 
 
@@ -47,6 +74,8 @@ class Fact:
 
     sentence: str
     holds: Callable[[Outcome], bool | float | None]
+    spoiled_by: Spoiler
+    """A run in which it must not be so."""
 
     def compare(self, outcome: Outcome) -> Expectation:
         """Look whether it is so."""
@@ -105,79 +134,212 @@ def dent_from_impact(outcome: Outcome) -> float | None:
     return None if distance is None else distance / only(outcome, "rubber_duck").length_m
 
 
-def rebounds_differ(outcome: Outcome) -> float | None:
-    """Difference of two rebound heights, each as a share of its fall [-]."""
+def rubber_above_steel(outcome: Outcome) -> float | None:
+    """How much higher the rubber ball rebounds than the steel one, as shares of their falls [-]."""
     steel = only(outcome, "steel_ball").rebound_ratio
     rubber = only(outcome, "rubber_ball").rebound_ratio
-    return None if steel is None or rubber is None else abs(steel - rubber)
+    return None if steel is None or rubber is None else rubber - steel
+
+
+def still_squashed(thing: str) -> Measure:
+    """Measure the shape error at the end over the largest one [-]; None: it never deformed."""
+
+    def share(outcome: Outcome) -> float | None:
+        mine = only(outcome, thing)
+        return mine.shape_error_end / mine.shape_error_max if mine.shape_error_max > 0 else None
+
+    return share
+
+
+FALLS_BY = 0.1
+"""A fall must be as high as the scene says to this share [-]: what a step misses of a contact."""
+
+
+def falls(thing: str, height: float, words: str) -> Demand:
+    """Demand that an object strikes as after a free fall of some height [m]."""
+    low, high = (1 - FALLS_BY) * height, (1 + FALLS_BY) * height
+    return Demand(words, of(thing, "fall_m"), low, high, "m", "halfgravity")
 
 
 EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
     "duck-on-mud": (
+        falls("rubber_duck", 1.2, "The duck strikes as after its fall"),
+        # A few centimetres: above half of the estimate, and below half of the duck's height.
         Demand(
-            "The mud keeps an imprint", of("mud_pile", "dent_depth_dx"), "above", 1, "grid cells"
+            "The mud keeps an imprint",
+            of("mud_pile", "dent_depth_m"),
+            0.015,
+            0.06,
+            "mm",
+            "frozen",
         ),
         Demand(
             "The duck ends undeformed (shape error)",
             of("rubber_duck", "shape_error_end"),
-            "below",
+            -inf,
             0.02,
             "%",
+            "squashed",
         ),
     ),
     "duck-on-can": (
-        Demand("The can keeps a dent", of("soda_can", "dent_depth_dx"), "above", 1, "grid cells"),
+        falls("rubber_duck", 2.0, "The duck strikes as after its fall"),
+        Demand(
+            "The can keeps a dent",
+            of("soda_can", "dent_depth_dx"),
+            1,
+            inf,
+            "grid cells",
+            "wrong",
+        ),
+        # The can is 0.066 m across.
+        Demand(
+            "The dent is shallower than the can is wide",
+            of("soda_can", "dent_depth_m"),
+            -inf,
+            0.066,
+            "mm",
+            "capped",
+        ),
         Demand(
             "The dent is where the duck struck",
             dent_from_impact,
-            "below",
+            -inf,
             1 / 3,
             "lengths of the duck",
+            "single",
         ),
+        # A body that is squashed flat has a shape error of some 10 %.
         Demand(
             "The duck gives way (largest shape error)",
             of("rubber_duck", "shape_error_max"),
-            "above",
             0.005,
+            0.1,
             "%",
+            "wrong",
         ),
         Demand(
             "The duck recovers (shape error at the end)",
             of("rubber_duck", "shape_error_end"),
-            "below",
+            -inf,
             0.03,
             "%",
+            "squashed",
+        ),
+        Demand(
+            "The duck recovers (shape error at the end over the largest)",
+            still_squashed("rubber_duck"),
+            -inf,
+            0.5,
+            "%",
+            "wrong",
         ),
     ),
     "vase-ball-armchair": (
         Fact(
             "The vase meets the ball, then the ball meets the armchair",
             met_in_order("vase", "ball", "armchair"),
+            "single",
         ),
-        Fact("Vase and ball part again", apart("vase", "ball")),
-        Fact("Ball and armchair part again", apart("ball", "armchair")),
+        Fact("Vase and ball part again", apart("vase", "ball"), "single"),
+        Fact("Ball and armchair part again", apart("ball", "armchair"), "frozen"),
+        Demand(
+            "The vase keeps its shape (largest shape error)",
+            of("vase", "shape_error_max"),
+            -inf,
+            0.005,
+            "%",
+            "wrong",
+        ),
+        Demand(
+            "The armchair keeps its shape (largest shape error)",
+            of("armchair", "shape_error_max"),
+            -inf,
+            0.005,
+            "%",
+            "capped",
+        ),
     ),
     "lamp-on-couch": (
-        Demand("The cushions give far", of("couch", "deepest_squeeze_m"), "above", 0.02, "mm"),
+        # Its cushions are 0.2 m thick.
+        Demand(
+            "The cushions give far",
+            of("couch", "deepest_squeeze_m"),
+            0.02,
+            0.2,
+            "mm",
+            "wrong",
+        ),
         Demand(
             "The lamp keeps its shape (shape error)",
             of("floor_lamp", "shape_error_end"),
-            "below",
+            -inf,
             0.02,
             "%",
+            "squashed",
         ),
-        Fact("The lamp lifts off again", between("couch", "floor_lamp", "separated")),
+        Fact("The lamp lifts off again", between("couch", "floor_lamp", "separated"), "frozen"),
     ),
     "ficus-pushed": (
-        Demand("The plant sways", of("potted_ficus", "deepest_squeeze_m"), "above", 0.001, "mm"),
-        Demand("The pot stays put", of("potted_ficus", "moved_level_m"), "below", 0.01, "mm"),
+        # Leaves that swing by a third of its height would be torn off.
+        Demand(
+            "The plant sways",
+            of("potted_ficus", "deepest_squeeze_m"),
+            0.001,
+            0.3,
+            "mm",
+            "frozen",
+        ),
+        Demand(
+            "The pot stays put",
+            of("potted_ficus", "moved_level_m"),
+            -inf,
+            0.01,
+            "mm",
+            "shifted",
+        ),
     ),
     "tree-and-ball-in-sand": (
-        Demand("The sand keeps a mark", of("sand_pile", "dent_depth_dx"), "above", 1, "grid cells"),
-        Demand("The tree stands", of("small_tree", "turned_deg"), "below", 15, "degrees"),
+        falls("ball", 1.2, "The ball strikes as after its fall"),
+        # The crater is estimated at 0.03 m; at 0.1 m the ball would be in the sand by half.
+        Demand(
+            "The sand keeps a mark",
+            of("sand_pile", "dent_depth_m"),
+            0.015,
+            0.1,
+            "mm",
+            "frozen",
+        ),
+        Demand("The tree stands", of("small_tree", "turned_deg"), -inf, 15, "degrees", "toppled"),
     ),
     "steel-and-rubber": (
-        Demand("The rebounds differ, as shares of the fall", rebounds_differ, "above", 0.1, "%"),
+        falls("steel_ball", 0.5, "The steel ball strikes as after its fall"),
+        falls("rubber_ball", 0.5, "The rubber ball strikes as after its fall"),
+        Demand(
+            "The rubber ball rebounds higher, as shares of the fall",
+            rubber_above_steel,
+            0.1,
+            0.8,
+            "%",
+            "wrong",
+        ),
+        # Steel on concrete: e between 0.3 and 0.8.
+        Demand(
+            "The steel ball rebounds (share of the fall)",
+            of("steel_ball", "rebound_ratio"),
+            0.1,
+            0.65,
+            "%",
+            "capped",
+        ),
+        Demand(
+            "The steel ball keeps its shape (largest shape error)",
+            of("steel_ball", "shape_error_max"),
+            -inf,
+            0.005,
+            "%",
+            "capped",
+        ),
     ),
 }
 """Scene → what must be seen in it."""

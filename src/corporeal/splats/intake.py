@@ -115,6 +115,7 @@ def take_in(
     checkpoint: Path | None = None,
     progress: Progress = lambda fraction, words: None,
     instances: bool = False,
+    masked_by: Path | None = None,
 ) -> Intake:
     """Read a splat, or photographs and learn Gaussians from them, in the file's own frame and unit.
 
@@ -124,6 +125,7 @@ def take_in(
         checkpoint: Where a training that is cut off leaves what it has.
         progress: Called with the fraction done and what is being done.
         instances: Whether masks must segment objects.
+        masked_by: A folder of masks instead of the photographs' own.
 
     Raises:
         UserError: The input cannot be used.
@@ -138,7 +140,8 @@ def take_in(
         usual = USUAL.get(source.suffix.lower(), (0.0, -1.0, 0.0))
         read = (f"{given.count:,} Gaussians were read from {source.name}.",)
         return Intake(given, usual=usual, statements=read, warnings=given.warnings)
-    shown = _consistent(read_photographs(source, PRESETS[training.preset].longest))
+    longest = PRESETS[training.preset].longest
+    shown = _consistent(read_photographs(source, longest, masked_by))
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON

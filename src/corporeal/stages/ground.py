@@ -83,16 +83,19 @@ def ground(
     made = tuple(_material(e, w) for e, w in zip(entries, words, strict=True))
     floor = entry_of(config.floor, config.library)
     surfaces, bodies = [*entries, floor], [*made, floor.pick(floor.typical())]
+    structures = tuple(
+        with_air(_structure(m, w, config), m, w, radius(scene, part.object))
+        for m, w, part in zip(made, words, parts.catalogue, strict=True)
+    )
+    solid = [*(s.kind == "solid" for s in structures), True]
+    strikers = [materials.Striker(*s) for s in zip(surfaces, bodies, solid, strict=True)]
     return MaterialField(
         materials=made,
-        structures=tuple(
-            with_air(_structure(m, w, config), m, w, radius(scene, part.object))
-            for m, w, part in zip(made, words, parts.catalogue, strict=True)
-        ),
+        structures=structures,
         words=words,
         friction=_matrix(len(bodies), lambda a, b: _friction(surfaces, bodies, a, b)),
         restitution=_matrix(
-            len(bodies), lambda a, b: materials.restitution_between(bodies[a], bodies[b])
+            len(bodies), lambda a, b: materials.restitution(strikers[a], strikers[b]).value
         ),
         pieces=tuple(tuple(_piece(p, config) for p in w.pieces) for w in words),
     )

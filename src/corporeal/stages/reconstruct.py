@@ -19,9 +19,13 @@ from corporeal.errors import UserError, check_range
 from corporeal.features import Reader, connect
 from corporeal.features.clouds import Placed, projected, with_features
 from corporeal.features.descriptor import LET_THROUGH, seen_from
+from corporeal.features.learned_masks import learned_masks
 from corporeal.features.lifting import Lifted, known, uplift
+from corporeal.features.maskers import MENU as MASKERS
+from corporeal.features.maskers import connect_masker, split
 from corporeal.features.vectors import similarity as likeness
 from corporeal.features.vectors import unit
+from corporeal.formats.photographs import has_masks, listed
 from corporeal.formats.sources import called, kind_of, unposed
 from corporeal.formats.words import safe
 from corporeal.geometry.extent import oriented_size
@@ -32,6 +36,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.metric import MetricScale, TwoPoints, measured
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.geometry.srgb import linear
+from corporeal.masking.grown_masks import grown_masks
 from corporeal.poses.pose import POSES, Posed, pose
 from corporeal.regions.instance_assignment import Rule, assign_instances
 from corporeal.regions.masks import lifted
@@ -80,6 +85,12 @@ GREY = (0.2, 0.2, 0.2)
 NOBODY = Viewer("", "metadata")
 POSED = 0.5
 """Share of learning from pictures that is done when poses that nobody gave are found."""
+MASKED = 0.1
+"""The same, of finding masks."""
+AUTO, NONE = "auto", "none"
+CORRECT = (
+    "They lie in 0-reconstruct/masks of the run: what is corrected there is taken by the next run."
+)
 TRAINED, LOOKED, FOUND = 0.75, 0.85, 0.9
 """Share of the work that is done after each step."""
 
@@ -95,6 +106,10 @@ class ReconstructConfig:
     apart: Rule = "auto"
     """What objects are segmented by; auto: instance masks where there are any, else appearance
     features and concavity (look)."""
+    masks: str = "auto"
+    """Masks of the objects: a folder of them; "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER"
+    with weights of such a model; auto: those beside the photographs, else grown from what all
+    cameras look at; none: objects are what stands on the floor."""
     up: AskedUp = "auto"
     """Axis of the file that points up, also of a mesh; auto: from the file or the cameras."""
     floor_at: float | None = None
@@ -188,8 +203,7 @@ def reconstruct(
     """
     validate(config, extents, asked=viewer.model is not None)
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
-    taken = _taken(source, config, folder, _within(progress, 0.0, TRAINED))
-    masked = taken.masks is not None
+    taken, masked = _taken(source, config, folder, _within(progress, 0.0, TRAINED))
     taken = turned_upright(taken, config.up, config.floor_at)
     photographers = taken.cameras
     if not taken.cameras:
@@ -239,24 +253,68 @@ def _why_not(found: _Found, photographers: Sequence[Camera], masked: bool) -> st
 
 def _taken(
     source: Path, config: ReconstructConfig, folder: Path | None, progress: Progress
-) -> Intake:
-    """Read a splat, or learn Gaussians from pictures, whose poses are found if nobody gave any."""
+) -> tuple[Intake, bool]:
+    """Read a splat, or learn Gaussians from pictures, whose poses are found if nobody gave any.
+
+    Returns:
+        What there is, and whether somebody said which pixels are objects.
+
+    """
     training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
     kept = None if folder is None else folder / "training.npz"
-    posed, instances = _posed(source, folder, progress), config.apart == "masks"
-    if posed is None:
-        return take_in(source, training, kept, progress, instances)
-    taken = take_in(posed.folder, training, kept, _within(progress, POSED, 1.0), instances)
-    return replace(
+    instances = config.apart == "masks"
+    if kind_of([source]) == "splat":
+        return take_in(source, training, kept, progress, instances), False
+    posed = _posed(source, folder, progress)
+    begun = 0.0 if posed is None else POSED
+    posed = posed or Posed(source, (), ())
+    found = _masks(config, posed.folder, folder, _within(progress, begun, begun + MASKED))
+    later = _within(progress, begun + MASKED, 1.0)
+    taken = take_in(posed.folder, training, kept, later, instances, found.folder)
+    made = replace(
         taken,
-        statements=(*posed.statements, *taken.statements),
-        warnings=(*posed.warnings, *taken.warnings),
+        statements=(*posed.statements, *found.statements, *taken.statements),
+        warnings=(*posed.warnings, *found.warnings, *taken.warnings),
+    )
+    return made, taken.masks is not None and not found.grown
+
+
+@dataclass(frozen=True)
+class _Masks:
+    """Where masks are, if they are not beside the photographs."""
+
+    folder: Path | None = None
+    statements: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    grown: bool = False
+    """Whether nobody, and no model, said what an object is."""
+
+
+def _masks(
+    config: ReconstructConfig, source: Path, folder: Path | None, progress: Progress
+) -> _Masks:
+    """Take masks from a folder, find them with a model, or grow them where there are none."""
+    if config.masks not in (AUTO, NONE) and split(config.masks) is None:
+        return _Masks(Path(config.masks))
+    shots = listed(source).shots
+    if config.masks == NONE or (config.masks == AUTO and has_masks(shots)):
+        return _Masks()
+    place = folder or Path(tempfile.mkdtemp(prefix="corporeal-"))
+    if config.masks != AUTO:
+        masker = connect_masker(config.masks)
+        learned = learned_masks(source, place, masker, config.things, progress)
+        return _Masks(learned.folder, (*learned.said, CORRECT))
+    grown = grown_masks(source, place, progress=progress)
+    if grown.folder is None:
+        return _Masks(warnings=grown.said)
+    return _Masks(
+        grown.folder, (), (" ".join(("There were no masks.", *grown.said, CORRECT)),), True
     )
 
 
 def _posed(source: Path, folder: Path | None, progress: Progress) -> Posed | None:
     """Find where pictures were taken from; None: that is known, or there are none."""
-    if kind_of([source]) != "photographs" or not unposed(source):
+    if not unposed(source):
         return None
     place = Path(tempfile.mkdtemp(prefix="corporeal-")) if folder is None else folder
     return pose(source, place / POSES, _within(progress, 0.0, POSED))
@@ -285,7 +343,21 @@ def validate(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool
     for spec in (config.semantic, config.structural):
         connect(spec)  # who is to look must be there before anything is learned
     training_schedule.validate(config.rasteriser)
+    _check_masks(config)
     _measured(config)
+
+
+def _check_masks(config: ReconstructConfig) -> None:
+    if config.masks in (AUTO, NONE):
+        return
+    if split(config.masks) is None:
+        if not Path(config.masks).expanduser().is_dir():
+            raise UserError(
+                f"There is no folder {config.masks} for --masks. Name a folder of masks, or "
+                f"{', '.join(f'{kind}:FOLDER' for kind in MASKERS)}."
+            )
+    elif connect_masker(config.masks).needs_words and not config.things:
+        raise UserError("These masks are found by words: name the objects with --things.")
 
 
 def _measured(config: ReconstructConfig) -> MetricScale | None:

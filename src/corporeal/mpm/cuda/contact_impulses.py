@@ -138,7 +138,8 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
     size = wp.length(slide)
     if size > SMALLEST_SLIP:
         rub = rub + slide / softness_of(c, r, s, t, slide / size)
-    given = within_cone(c.friction[c.fa[t], c.fc[t]], new, n, rub)
+    grip = c.friction[c.fa[t], c.fc[t]] * D(1 - c.slips[t])
+    given = within_cone(grip, new, n, rub)
     change = given - J
     c.impulse[t] = given
     c.turn[t] = -wp.dot(change, given - c.last_impulse[t]) * soft

@@ -1,0 +1,56 @@
+"""`corporeal masks`: masks of photographs, grown from a point, a box, or what all look at."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated
+
+import tyro
+
+from corporeal.cli.parse import parse
+from corporeal.errors import UserError
+from corporeal.terminal import progress_bars
+
+
+def verb_masks() -> None:
+    """Grow masks of photographs with poses, from a point or a box in one of them.
+
+    Colours and edges decide in one photograph; the visual hull carries it to the others. Without
+    a point and a box it begins at what all cameras look at. The masks are PNG pictures with the
+    names of the photographs, to be looked at, corrected, and given to `corporeal run --masks`.
+    """
+    from corporeal.formats.sources import called, unposed
+    from corporeal.masking.grown_masks import grown_masks
+    from corporeal.masking.pointed import Pointed
+
+    @dataclass(frozen=True)
+    class Masks:
+        photographs: Annotated[Path, tyro.conf.Positional, tyro.conf.arg(metavar="PHOTOS")]
+        at: tuple[float, float] | None = None
+        """Column and row of a pixel on the object, in the photograph's own pixels."""
+        box: tuple[float, float, float, float] | None = None
+        """Left, upper, right and lower end of a box around the object [px]."""
+        on: str = ""
+        """Name of the photograph that --at or --box are of; by default the first."""
+        out: Path | None = None
+        """Folder of the masks; by default runs/masks/NAME."""
+
+    asked = parse(Masks, "masks", verb_masks.__doc__)
+    if asked.at is not None and asked.box is not None:
+        raise UserError("Give --at or --box, not both.")
+    if not asked.photographs.exists():
+        raise UserError(f"No such file: {asked.photographs}. Check the path.")
+    if unposed(asked.photographs):
+        raise UserError(
+            f"{asked.photographs} has no poses, by which a mask is carried from one photograph to "
+            "the others. Let `corporeal run` find them first, and name RUN/0-reconstruct/poses."
+        )
+    pointed = None
+    if asked.at is not None or asked.box is not None:
+        pointed = Pointed(asked.on, asked.at, asked.box)
+    out = asked.out or Path("runs", "masks", called(asked.photographs))
+    with progress_bars() as tell:
+        made = grown_masks(asked.photographs, out, pointed, tell("masks"))
+    if made.folder is None:
+        raise UserError(f"{' '.join(made.said)} Point at the object with --at or --box.")
+    print(*made.said, sep="\n")
+    print(f"Look at {out}. Go on with: corporeal run {asked.photographs} --masks {out}")

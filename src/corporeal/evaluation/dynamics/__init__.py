@@ -1,0 +1,1 @@
+"""Dynamics evaluated: methods against a finer run and against life, measured alike."""

@@ -1,0 +1,1 @@
+"""Masks of objects in posed photographs, from colours and the visual hull; no weights needed."""

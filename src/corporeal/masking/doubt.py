@@ -1,0 +1,33 @@
+"""Whether masks that nobody drew are of what the photographs are of."""
+
+from corporeal.masking.grow import Grown
+
+ALIKE = 0.3
+"""Overlap of the colours of objects and of what is around them, above which the outline is chance:
+a brown axe on white has .06, a doll on a bed before a wall of its colours .56."""
+COHERENT = 0.7
+"""Masks and the silhouettes of their hull must agree by so much."""
+SETTLED = 0.95
+"""Masks of the last two rounds must."""
+OUTER = 0.25
+"""Share of the hull at the edge of what all cameras look at, above which it goes on beyond."""
+CROPPED = 0.5
+"""Share of the photographs in which objects may be cropped."""
+SMALLEST, LARGEST = 0.005, 0.7
+"""Shares of the photographs that objects may fill."""
+
+
+def doubt(grown: Grown | None) -> str | None:
+    """Return in a clause why masks are not to be believed; None: they are."""
+    if grown is None:
+        return "no place in space looks like the middle of all photographs"
+    if grown.alike > ALIKE:
+        what = f"{grown.alike:.0%} of the colours of what is in their middle"
+        return f"what is around it has {what}, too"
+    if not SMALLEST <= grown.share <= LARGEST:
+        return f"it would fill {grown.share:.1%} of the photographs"
+    if grown.outer > OUTER or grown.cropped > CROPPED:
+        return "it reaches beyond what all cameras look at"
+    if grown.coherence < COHERENT or grown.settled < SETTLED:
+        return f"its outlines contradict each other ({grown.coherence:.0%} agree)"
+    return None

@@ -1,0 +1,189 @@
+"""Masks grown from seeds: colours, edges and the visual hull, in turn.
+
+What objects and what is around them look like is learned from seeds; every picture is cut in two
+by it, along its edges; the cuts carve a volume; and its silhouettes say in the next round what
+belongs to objects and what does not. So a colour that the floor has, too, is lost only where no
+other picture knows better.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32
+from PIL import Image
+from scipy.ndimage import binary_dilation, label
+
+from corporeal.masking.colours import against, bins_of, histogram, overlap
+from corporeal.masking.reduced import reduced
+from corporeal.masking.seeds import Seeds
+from corporeal.masking.total_variation import Cutter
+from corporeal.masking.volume import Volume, volume
+from corporeal.types import Views
+
+Progress = Callable[[float, str], None]
+
+ROUGH, FINE = 192, 384
+"""Longer side of the pictures that rounds look at, and of the masks that come out [px]."""
+ROUNDS = 4
+IN_HULL, BESIDE_HULL = -0.5, 2.0
+"""Evidence against a pixel that is in the silhouette of the hull, and of one well beside it."""
+MARGIN = 0.03
+"""Width of the band around silhouettes in which only colours and edges count, in widths of the
+picture."""
+HALF = 0.5
+"""Of a pixel: from here on it is inside."""
+CRUMB = 0.02
+"""Pieces of a mask that fill less of its silhouette, against the one that fills most, are noise."""
+BORDER = 0.1
+"""Share of a side of the picture that masks fill where objects are cropped."""
+
+
+@dataclass(frozen=True)
+class Grown:
+    """Masks, and how they came about; V views of h × w."""
+
+    inside: Float32[np.ndarray, "V h w"]
+    """How far each pixel is inside, 0 to 1; ½ is the outline."""
+    coherence: float
+    """Intersection over union of masks and silhouettes of their hull, the median of all views."""
+    settled: float
+    """The same, of masks of the last round and the one before."""
+    alike: float
+    """Overlap of the colours inside and outside, 0 to 1."""
+    outer: float
+    """Share of the hull's cells at the edge of the ball that cameras look at."""
+    cropped: float
+    """Share of the pictures in which masks reach the border."""
+    share: float
+    """Share of the pictures' pixels that is inside."""
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What a cut is made by."""
+
+    inside: Float[np.ndarray, " K"]
+    """Histogram of the colours of objects."""
+    outside: Float[np.ndarray, " K"]
+    """The same, of what is around them."""
+    prior: Float32[np.ndarray, "V H W"]
+    """Evidence against pixels from where they are."""
+
+
+class _Side:
+    """Pictures of one size, ready to be cut in two again and again."""
+
+    def __init__(self, views: Views) -> None:
+        self.bins, self.cutter = bins_of(views.rgb), Cutter(views.rgb)
+
+    def cut(self, evidence: Evidence) -> Float32[np.ndarray, "V H W"]:
+        """Return how far each pixel is inside."""
+        colours = against(self.bins, evidence.inside, evidence.outside)
+        return self.cutter.cut(colours + evidence.prior.astype(np.float32))
+
+
+def grow(
+    views: Views, seeds: Seeds, progress: Progress = lambda fraction, words: None
+) -> Grown | None:
+    """Grow masks; None: nothing is left.
+
+    Args:
+        views: Pictures of at most FINE pixels.
+        seeds: For the same pictures at ROUGH pixels, as ``reduced`` returns them.
+        progress: Told the fraction done and what is being done.
+
+    """
+    rough = reduced(views, ROUGH)
+    side, room = _Side(rough), volume(rough.cameras, seeds.around, seeds.floor, seeds.cone)
+    inside, outside = (histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
+    never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0))
+    state: _Round | None = None
+    evidence, before = Evidence(inside, outside, never), seeds.never
+    for turn in range(ROUNDS):
+        progress(turn / (ROUNDS + 1), f"growing masks, round {turn + 1} of {ROUNDS}")
+        before = before if state is None else state.masks
+        state = _round(side, room, evidence)
+        if state is None:
+            return None
+        evidence = state.evidence
+    assert state is not None
+    progress(ROUNDS / (ROUNDS + 1), "drawing their outlines")
+    return Grown(
+        inside=_drawn(views, evidence, state.silhouettes),
+        coherence=_agreement(state.masks, state.silhouettes),
+        settled=_agreement(state.masks, before),
+        alike=overlap(evidence.inside, evidence.outside),
+        outer=state.outer,
+        cropped=_cropped(state.masks),
+        share=float(state.masks.mean()),
+    )
+
+
+@dataclass(frozen=True)
+class _Round:
+    masks: Bool[np.ndarray, "V H W"]
+    silhouettes: Bool[np.ndarray, "V H W"]
+    """Of the hull that masks leave."""
+    outer: float
+    """As in ``Grown``."""
+    evidence: Evidence
+    """For the next round."""
+
+
+def _round(side: _Side, room: Volume, evidence: Evidence) -> _Round | None:
+    """Cut all pictures, carve, and learn colours anew; None: nothing is left."""
+    masks = side.cut(evidence) > HALF
+    hull = room.carved(masks)
+    if not hull.any():
+        return None
+    seen = room.silhouettes(hull)
+    band = _widened(seen)
+    masks &= band
+    inside = histogram(side.bins, masks & seen)
+    outside = histogram(side.bins, ~band | ~(seen | masks))
+    prior = np.where(seen, IN_HULL, np.where(band, 0, BESIDE_HULL)).astype(np.float32)
+    outer = float(room.outer[hull].mean())
+    return _Round(masks, seen, outer, Evidence(inside, outside, prior))
+
+
+def _drawn(
+    views: Views, evidence: Evidence, seen: Bool[np.ndarray, "V H W"]
+) -> Float32[np.ndarray, "V h w"]:
+    """Cut the pictures at their full size, and keep what hangs together with silhouettes."""
+    size = views.rgb.shape[1:3]
+    fine = replace(evidence, prior=_enlarged(evidence.prior, size))
+    inside = _Side(views).cut(fine)
+    for one, hull in zip(inside, _enlarged(seen.astype(np.float32), size), strict=True):
+        pieces = label(one > HALF)
+        assert isinstance(pieces, tuple)
+        share = np.bincount(pieces[0][hull > HALF], minlength=pieces[1] + 1)
+        share[0] = 0
+        kept = share >= CRUMB * max(share.max(), 1)
+        one[~kept[pieces[0]]] = 0
+    return inside
+
+
+def _enlarged(
+    pictures: Float32[np.ndarray, "V H W"], size: tuple[int, int]
+) -> Float32[np.ndarray, "V h w"]:
+    wide = size[1], size[0]
+    made = [Image.fromarray(p).resize(wide, Image.Resampling.BILINEAR) for p in pictures]
+    return np.stack([np.asarray(p) for p in made])
+
+
+def _widened(seen: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, "V H W"]:
+    steps = max(1, round(MARGIN * seen.shape[2]))
+    return np.stack([binary_dilation(one, iterations=steps) for one in seen])
+
+
+def _agreement(a: Bool[np.ndarray, "V H W"], b: Bool[np.ndarray, "V H W"]) -> float:
+    both, either = (a & b).sum(axis=(1, 2)), (a | b).sum(axis=(1, 2))
+    return float(np.median(both / np.maximum(either, 1)))
+
+
+def _cropped(masks: Bool[np.ndarray, "V H W"]) -> float:
+    """Return in which share of the pictures masks fill much of a border."""
+    sides = masks[:, 0], masks[:, -1], masks[:, :, 0], masks[:, :, -1]
+    most = np.max([side.mean(axis=1) for side in sides], axis=0)
+    return float((most > BORDER).mean())

@@ -1,0 +1,116 @@
+"""Masks of photographs that have none, grown, and written where people can correct them."""
+
+import shutil
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+
+from corporeal import store
+from corporeal.formats.mask_files import (
+    RECORD,
+    corrected,
+    file_names,
+    in_own_pixels,
+    read_record,
+    write_mask,
+    write_record,
+)
+from corporeal.formats.photographs import MASKS, Photographs, listed, read_photographs
+from corporeal.masking.doubt import doubt
+from corporeal.masking.grow import FINE, ROUGH, Grown, grow
+from corporeal.masking.pointed import Pointed, pointed_at, spot_of
+from corporeal.masking.reduced import reduced
+from corporeal.masking.seeds import looked_at
+
+Progress = Callable[[float, str], None]
+
+GROWN = 0.8
+"""Share of the work that is done when masks are grown."""
+
+
+@dataclass(frozen=True)
+class GrownMasks:
+    """What came of it."""
+
+    folder: Path | None
+    """Holds the masks; None: they are not to be believed, and were not written."""
+    said: tuple[str, ...]
+    """How they came about, or why there are none, in sentences."""
+
+
+def grown_masks(
+    source: Path,
+    folder: Path,
+    pointed: Pointed | None = None,
+    progress: Progress = lambda fraction, words: None,
+) -> GrownMasks:
+    """Grow masks of posed photographs, and write them.
+
+    Args:
+        source: A folder of photographs with poses. Masks that it has are not looked at.
+        folder: Gets ``masks`` and ``masks.json``. Masks of the same that lie there are kept, and
+            what somebody corrected in them.
+        pointed: At what, in which photograph; None: at what all cameras look at.
+        progress: Told the fraction done and what is being done.
+
+    Raises:
+        UserError: The photographs cannot be used, or nothing is at the place that is pointed at.
+
+    """
+    made_by = store.key("grown masks", pointed, [store.digest(source)])
+    record = read_record(folder)
+    if record is not None and record.made_by == made_by:
+        return GrownMasks(folder if record.digest_of else None, (*record.said, *_changes(folder)))
+    progress(0.0, "reading photographs")
+    shown = read_photographs(source, FINE, bare=True)
+    rough = reduced(shown.views, ROUGH)
+    if pointed is None:
+        seeds = looked_at(rough, shown.points)
+    else:
+        seeds = pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
+    grown = grow(shown.views, seeds, lambda f, words: progress(GROWN * f, words))
+    why = doubt(grown)
+    for name in (MASKS[0], RECORD):
+        _forget(folder / name)
+    if grown is None or (why is not None and pointed is None):
+        said = (f"No masks were grown from what all photographs show: {why}.",)
+        write_record(folder, made_by, said)
+        return GrownMasks(None, said)
+    _written(source, shown, grown, folder, progress)
+    said = (_told(grown, pointed), *([] if why is None else [f"Check them: {why}."]))
+    write_record(folder, made_by, said)
+    return GrownMasks(folder, said)
+
+
+def _written(
+    source: Path, shown: Photographs, grown: Grown, folder: Path, progress: Progress
+) -> None:
+    shots = listed(source).shots
+    file_of = dict(zip((shot.name for shot in shots), file_names(shots), strict=True))
+    shot_of = {shot.name: shot for shot in shots}
+    with store.writing(folder):
+        for k, (name, inside) in enumerate(zip(shown.names, grown.inside, strict=True)):
+            progress(GROWN + (1 - GROWN) * k / len(shown.names), "writing masks")
+            own = in_own_pixels(inside, shot_of[name])
+            if own is not None:
+                write_mask(folder, file_of[name], own)
+
+
+def _told(grown: Grown, pointed: Pointed | None) -> str:
+    what = "what all cameras look at" if pointed is None else "what was pointed at"
+    return (
+        f"Masks were grown from colours and the visual hull of {what}; {grown.coherence:.0%} of "
+        "them and of the silhouettes of their hull agree."
+    )
+
+
+def _changes(folder: Path) -> list[str]:
+    count = len(corrected(folder))
+    return [f"{count} of the masks were corrected by hand."] * bool(count)
+
+
+def _forget(path: Path) -> None:
+    if path.is_dir():
+        shutil.rmtree(path)
+    else:
+        path.unlink(missing_ok=True)

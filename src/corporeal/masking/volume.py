@@ -1,0 +1,124 @@
+"""Cells of space that objects may fill, carved by masks, and the silhouettes of what is left."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float, Int, Int32
+from scipy.ndimage import binary_dilation, label
+
+from corporeal.geometry.epipolar import projection
+from corporeal.geometry.ground_plane import Plane
+from corporeal.geometry.region import Region
+from corporeal.geometry.silhouettes import outside
+from corporeal.types import Camera
+
+ACROSS = 72
+"""Cells along the diameter of the ball that objects are looked for in."""
+SEEN = 0.25
+"""Share of the views that must see a cell."""
+PIECE = 0.1
+"""Pieces of a hull smaller than that share of the largest are chance."""
+ON_FLOOR = 0.01
+"""Height of the layer that is the floor, in radii of the ball."""
+
+
+@dataclass(frozen=True)
+class Volume:
+    """Cells that may be filled, and where each view shows them; M cells, V views."""
+
+    index: Int[np.ndarray, " M"]
+    """In the cube of ACROSS³ cells."""
+    pixel: Int32[np.ndarray, "V M"]
+    """Row · width + column; -1: not in the picture."""
+    shape: tuple[int, int, int]
+    """Views, height and width [px]."""
+    footprint: Int[np.ndarray, " V"]
+    """How far a cell reaches beside the pixel of its middle [px]."""
+    outer: Bool[np.ndarray, " M"]
+    """Whether a cell is at the edge of the ball."""
+
+    def carved(self, masks: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, " M"]:
+        """Return which cells masks leave, without small pieces.
+
+        As few views may see a cell beside the masks as ``geometry.silhouettes.outside`` forgives.
+        """
+        flat = masks.reshape(len(masks), -1)
+        beside = np.zeros(len(self.index), np.int32)
+        looking = np.zeros(len(self.index), np.int32)
+        for mask, pixel in zip(flat, self.pixel, strict=True):
+            sees = pixel >= 0
+            looking += sees
+            beside += sees & ~mask[pixel]
+        kept = ~outside(beside, looking) & (looking >= SEEN * len(flat))
+        return self._without_crumbs(kept)
+
+    def silhouettes(self, filled: Bool[np.ndarray, " M"]) -> Bool[np.ndarray, "V H W"]:
+        """Return the pixels in which filled cells are seen."""
+        views, height, width = self.shape
+        made = np.zeros((views, height * width), bool)
+        for one, pixel in zip(made, self.pixel, strict=True):
+            shown = pixel[filled]
+            one[shown[shown >= 0]] = True
+        pairs = zip(made.reshape(self.shape), self.footprint, strict=True)
+        return np.stack([binary_dilation(one, iterations=int(n)) for one, n in pairs])
+
+    def _without_crumbs(self, kept: np.ndarray) -> np.ndarray:
+        if not kept.any():
+            return kept
+        cube = np.zeros(ACROSS**3, bool)
+        cube[self.index[kept]] = True
+        found = label(cube.reshape(ACROSS, ACROSS, ACROSS), np.ones((3, 3, 3)))
+        assert isinstance(found, tuple)
+        piece = found[0].ravel()[self.index]
+        sizes = np.bincount(piece, minlength=found[1] + 1)
+        sizes[0] = 0
+        return kept & (sizes >= PIECE * sizes.max())[piece]
+
+
+def volume(
+    cameras: tuple[Camera, ...],
+    around: Region,
+    floor: Plane | None,
+    cone: Bool[np.ndarray, "V H W"] | None = None,
+) -> Volume:
+    """Fill a ball with cells.
+
+    Args:
+        cameras: Of the pictures.
+        around: The ball.
+        floor: Nothing is below it, and nothing in a thin layer above; None: nobody knows.
+        cone: Pixels that cells must be seen in, if a view shows them; None: any.
+
+    """
+    line = (np.arange(ACROSS) + 0.5) / ACROSS * 2 - 1
+    cells = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1).reshape(-1, 3)
+    far = np.linalg.norm(cells, axis=1)
+    places = np.array(around.centre) + around.radius * cells
+    good = far < 1
+    if floor is not None:
+        good &= places @ floor.normal - floor.offset > ON_FLOOR * around.radius
+    index = np.flatnonzero(good)
+    pixel = np.stack([pixels_of(places[index], c) for c in cameras])
+    if cone is not None:
+        within = [(p < 0) | allowed.ravel()[p] for p, allowed in zip(pixel, cone, strict=True)]
+        kept = np.all(within, axis=0)
+        index, pixel = index[kept], pixel[:, kept]
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
+    away = np.linalg.norm(eyes - np.array(around.centre), axis=1)
+    focal = np.array([c.K[0, 0] for c in cameras])
+    side = 2 * around.radius / ACROSS * focal / away
+    footprint = np.maximum(np.ceil(side / 2), 1).astype(np.int64)
+    shape = len(cameras), cameras[0].height, cameras[0].width
+    outer = far[index] > 1 - 4 / ACROSS
+    return Volume(index, pixel.astype(np.int32), shape, footprint, outer)
+
+
+def pixels_of(points: Float[np.ndarray, "N 3"], camera: Camera) -> Int[np.ndarray, " N"]:
+    """Return which pixel shows each point; -1: none."""
+    P = projection(camera)
+    u, v, depth = (points @ P[:, :3].T + P[:, 3]).T
+    with np.errstate(divide="ignore", invalid="ignore"):
+        column, row = np.floor(u / depth), np.floor(v / depth)
+    seen = (depth > 0) & (column >= 0) & (column < camera.width)
+    seen &= (row >= 0) & (row < camera.height)
+    return np.where(seen, row * camera.width + column, -1).astype(np.int64)

@@ -1,0 +1,89 @@
+"""Expected impact speed and acceleration of every object, before anything is simulated."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.geometry.falls import drop_heights
+from corporeal.geometry.outer_skin import cross_section
+from corporeal.geometry.survey import Anatomy
+from corporeal.mpm.physics.prescribed import fastest_velocity
+from corporeal.mpm.physics.wind import greatest_acceleration
+from corporeal.treatment.part import Motion
+from corporeal.types import Scene, SceneObject
+
+
+@dataclass(frozen=True)
+class Drive:
+    """What a push, wind or a prescribed path does to an object."""
+
+    velocity: Float[np.ndarray, " 3"]
+    """Gained at most [m/s]."""
+    acceleration: float
+    """Largest [m/s²]."""
+
+
+def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: int) -> list[Motion]:
+    """Estimate every object's speed at impact.
+
+    Falling gives √(v_z² + 2 g h) with the free height h below; pushes, wind and own velocity add
+    horizontally. What may be hit by another object is hit at the difference of their horizontal
+    velocities, and at the larger of their speeds of fall.
+
+    Args:
+        scene: The objects, gravity, and what acts on each object.
+        anatomies: One per object.
+        masses: Of every object [kg].
+        seed: Of the points by which free heights are measured.
+
+    """
+    gravity = float(np.linalg.norm(scene.gravity))
+    heights = drop_heights([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
+    # Each object by itself.
+    horizontal, fall, forced = [], [], []
+    for k, (obj, height) in enumerate(zip(scene.objects, heights, strict=True)):
+        drive = driven(obj, anatomies[k], masses[k], scene.duration)
+        velocity = np.array(obj.velocity) + drive.velocity
+        horizontal.append(velocity[:2])
+        dropped = 0.0 if obj.path is not None else height
+        fall.append(np.sqrt(velocity[2] ** 2 + 2 * gravity * dropped))
+        forced.append(drive.acceleration)
+    # Each object against every other.
+    result = []
+    for i in range(len(scene.objects)):
+        speeds = [float(np.hypot(fall[i], np.linalg.norm(horizontal[i])))]
+        for j in range(len(scene.objects)):
+            if j != i:
+                closing = np.linalg.norm(horizontal[i] - horizontal[j])
+                speeds.append(float(np.hypot(max(fall[i], fall[j]), closing)))
+        result.append(Motion(max(speeds), gravity + forced[i], forced[i]))
+    return result
+
+
+def driven(obj: SceneObject, anatomy: Anatomy, mass: float, duration: float) -> Drive:
+    """Estimate what push and wind do to an object: wind makes it no faster than the air.
+
+    Args:
+        obj: With its push, wind or path.
+        anatomy: Its shape.
+        mass: [kg]
+        duration: Of the simulation [s].
+
+    """
+    gained, strongest = np.zeros(3), 0.0
+    if obj.path is not None:
+        reach = float(np.ptp(anatomy.everything.vertices, axis=0).max())
+        return Drive(fastest_velocity(obj.path, reach), 0.0)
+    if obj.push is not None:
+        push = np.array(obj.push.acceleration)
+        gained += push * max(0.0, min(obj.push.end, duration) - obj.push.start)
+        strongest += float(np.linalg.norm(push))
+    if obj.wind is not None:
+        air = np.array(obj.wind.velocity) * (1.0 + obj.wind.gust)
+        shown = cross_section(anatomy, obj.wind.velocity)
+        blown = greatest_acceleration(obj.wind, shown, mass)
+        lasts = max(0.0, min(obj.wind.end, duration) - obj.wind.start)
+        gained += air * min(1.0, blown * lasts / max(float(np.linalg.norm(air)), 1e-30))
+        strongest += blown
+    return Drive(gained, strongest)

@@ -1,0 +1,120 @@
+"""Grid spacing and treatments, from how every part of a scene is made and what awaits it."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Literal
+
+import numpy as np
+
+from corporeal.geometry.foliage import is_leafy, leaves_of
+from corporeal.geometry.make import Make, as_plate, plate_thickness
+from corporeal.geometry.rods import Rod
+from corporeal.geometry.survey import Anatomy, Member
+from corporeal.treatment.impact_speeds import motions
+from corporeal.treatment.part import PartGeometry
+from corporeal.treatment.plan import Detail, Plan, Quality, plan
+from corporeal.types import MaterialField, Scene
+
+
+@dataclass(frozen=True)
+class Accuracy:
+    """What a simulation is to be worth."""
+
+    detail: Detail | Quality
+    stiffness: Literal["true", "capped"]
+    seed: int
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """The objects of a scene as measured, and how their parts are made."""
+
+    scene: Scene
+    field: MaterialField
+    anatomies: list[Anatomy]
+    """One per object."""
+    makes: Mapping[int, Make]
+    """Of each part."""
+    rods: Mapping[int, Rod]
+    """Of each part that is a solid rod."""
+
+
+def resolve(bodies: Bodies, accuracy: Accuracy) -> tuple[Bodies, Plan]:
+    """Choose grid spacing and treatments, and make walls of thin plates.
+
+    A plate thinner than two cells is a wall, whoever called it solid; with it the cell may grow,
+    so that other plates become thin.
+
+    Args:
+        bodies: What is to be simulated.
+        accuracy: Resolution and step budget.
+
+    Returns:
+        The bodies with their plates as walls; grid spacing and treatments.
+
+    """
+    chosen = _plan(bodies, accuracy)
+    while thin := thin_plates(bodies, chosen, accuracy.seed):
+        walls = {k: as_plate(bodies.makes[k], thickness) for k, thickness in thin.items()}
+        bodies = replace(bodies, makes={**bodies.makes, **walls})
+        chosen = _plan(bodies, accuracy)
+    return bodies, chosen
+
+
+def _plan(bodies: Bodies, accuracy: Accuracy) -> Plan:
+    anatomies = enumerate(bodies.anatomies)
+    geometries = {m.part: _geometry(m, bodies, n) for n, a in anatomies for m in a.members}
+    ordered = [geometries[k] for k in sorted(geometries)]
+    masses = [sum(bodies.makes[m.part].mass for m in a.members) for a in bodies.anatomies]
+    moved = motions(bodies.scene, bodies.anatomies, masses, accuracy.seed)
+    return plan(ordered, moved, accuracy.detail, accuracy.stiffness)
+
+
+def _geometry(member: Member, bodies: Bodies, number: int) -> PartGeometry:
+    """Collect what the treatment policy needs to know of a part of object ``number``."""
+    obj, k = bodies.scene.objects[number], member.part
+    made, material = bodies.makes[k], bodies.field.materials[k]
+    return PartGeometry(
+        object=number,
+        material=replace(material, density=made.density),
+        structure=made.structure,
+        size=(max(member.size[0], made.sheet), member.size[1], member.size[2]),
+        volume=made.volume,
+        area=made.area,
+        closed=closes_about(member, made),
+        leaves=leaves_of(member, material, made, obj.scale),
+        diameter=bodies.rods[k].diameter if k in bodies.rods else 0.0,
+        burden=burden(member, bodies.anatomies[number], bodies),
+        scale=obj.scale,
+        prescribed=obj.path is not None,
+    )
+
+
+def thin_plates(bodies: Bodies, chosen: Plan, seed: int) -> dict[int, float]:
+    """Thickness of each solid part that bends and is a plate thinner than two cells [m]."""
+    found = {}
+    members = (m for a in bodies.anatomies for m in a.members)
+    for member in (m for m in members if m.part not in bodies.rods):
+        if chosen.treatments[member.part].kind != "deformable":
+            continue
+        rng = np.random.default_rng([seed, member.part, 6])
+        thickness = plate_thickness(member, bodies.makes[member.part], rng)
+        if 0 < thickness < 2 * chosen.cell:
+            found[member.part] = thickness
+    return found
+
+
+def closes_about(member: Member, made: Make) -> bool:
+    """Whether a part cannot bend without stretching, as what closes about something cannot."""
+    if made.modelled:
+        return False
+    return member.encloses if made.thickness else member.closed
+
+
+def burden(member: Member, anatomy: Anatomy, bodies: Bodies) -> float:
+    """Mass of the foliage of an object over that of one of its other parts [-]."""
+    leafy = [m.part for m in anatomy.members if is_leafy(bodies.field.materials[m.part])]
+    if member.part in leafy:
+        return 0.0
+    makes = bodies.makes
+    return sum(makes[k].mass for k in leafy) / max(makes[member.part].mass, 1e-30)
