@@ -5,13 +5,14 @@
 
 Each folder in FOLDER with ``images`` and a COLMAP model, ``sparse/0``, is a set; it may have
 ``masks``. It is reconstructed in up to four cases: with all that it has, without its masks, without
-its poses, and from the photographs alone (bare). Measured are: photographs registered, and of these
-the share within 1.5° and 3 % of the given poses; quality on photographs held out, whole and on
-objects; the angle between up and the normal of the plane with the most sparse points, where the
-object is known to stand on one; size against what ``real_sets.toml`` states; intersection over
-union of the closed surfaces' silhouettes with the masks of the set, mean and worst; minutes of the
-processor, all threads together. A set that is refused or fails is a row that says why. Rows that
-are there already are kept, and a training or a search for poses that was interrupted is continued.
+its poses, and from the photographs alone (bare). Measured are: photographs registered, of these the
+share within 1.5° and 3 % of the given poses, and the medians; quality on photographs held out,
+whole and on objects; the angle between up and the normal of the plane with the most sparse points,
+where the object is known to stand on one; size against what ``real_sets.toml`` states; intersection
+over union of the closed surfaces' silhouettes with the masks of the set, mean and worst; minutes of
+the processor, all threads together. A set that is refused or fails is a row that says why. Rows
+that are there already are kept, and a training or a search for poses that was interrupted is
+continued.
 """
 
 import argparse
@@ -39,8 +40,8 @@ WORDS: dict[Case, str] = {
     "bare": "photographs alone",
 }
 HEADS = (
-    "set", "given", "registered", "right", "held out, thing [dB]", "up off", "size off",
-    "IoU, worst", "one closed piece", "minutes", "why not",
+    "set", "given", "registered", "right", "rotation off", "place off", "held out, thing [dB]",
+    "up off", "size off", "IoU, worst", "one closed piece", "minutes", "why not",
 )  # fmt: skip
 DOCS = Path(__file__).parents[1] / "docs" / "real-photographs.md"
 ROW = "row.json"
@@ -110,7 +111,7 @@ def row_of(folder: Path, case: Case, training: str, out: Path) -> dict[str, Any]
             made = reconstruct(photos, config, folder=work, progress=told)
             row |= results(made, folder, None if posed else work / POSES)
         except UserError as problem:
-            row["why"] = str(problem)
+            row["why"] = str(problem).replace(str(photos), folder.name)
             row |= {} if posed else poses_row(folder, work / POSES)
         except Exception as problem:  # a row says that it failed; the other sets go on
             row["why"] = f"failed: {type(problem).__name__}: {problem}"
@@ -166,6 +167,8 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
         WORDS[row["case"]],
         registered,
         shown("{:.0%}", "right"),
+        shown("{:.2f}°", "angle_deg"),
+        shown("{:.2%}", "place"),
         shown("{:.1f}", "psnr", "psnr_thing"),
         shown("{:.1f}°", "up_off_deg"),
         shown("{:+.1%}", "size_off"),
@@ -180,9 +183,9 @@ def write_docs(rows: list[tuple[str, ...]], said: str) -> None:
     """Write the table as a page."""
     about = (__doc__ or "").split("\n\n")
     lines = ["# Real photographs", "", f"Written by `{said}`."]
-    lines += [" ".join(about[2].split()), ""]
+    lines += [" ".join(about[2].replace("``", "`").split()), ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
-    lines += ["| " + " | ".join(row) + " |" for row in rows]
+    lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows]
     DOCS.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 

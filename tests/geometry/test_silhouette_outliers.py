@@ -8,18 +8,16 @@ import pytest
 from corporeal.geometry.silhouette_outliers import outliers, overlaps
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
-from patterned_scene import patterned, ring
+from patterned_scene import OF_SLAB, patterned, ring
 
 COUNT = 16
-BLOCK = 12
-"""The slab's triangles come first."""
 
 
 @pytest.fixture(scope="module")
 def seen():
     """Masks of a block from all around, and their cameras."""
     stage, aims = Stage(patterned()), ring(np.arange(COUNT) * 360 / COUNT, (160, 120))
-    masks = [np.uint8(255) * (identify(stage, aim)[0] >= BLOCK) for aim in aims]
+    masks = [np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB) for aim in aims]
     return np.stack(masks), tuple(camera_of(aim) for aim in aims)
 
 

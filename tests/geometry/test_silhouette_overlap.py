@@ -7,9 +7,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.silhouette_overlap import sampled, silhouette_overlaps
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
-from patterned_scene import box, patterned, ring
-
-OF_SLAB = 12
+from patterned_scene import OF_SLAB, box, patterned, ring
 
 
 @pytest.fixture(scope="module")

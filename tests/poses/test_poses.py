@@ -27,11 +27,18 @@ from corporeal.poses.standstill import Standstill
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
 from corporeal.render.video import reel
-from patterned_scene import blots, on_its_side, patterned, photographs, pose_errors, ring
+from patterned_scene import (
+    OF_SLAB,
+    blots,
+    on_its_side,
+    patterned,
+    photographs,
+    pose_errors,
+    ring,
+    stepped,
+)
 
 COUNT = 14
-OF_SLAB = 12
-"""Triangles of the slab, which come first."""
 AWAY = np.array([[1, 0, 0, 0.06], [0, 1, 0, 0.04], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 TURN_RIGHT = 6
 """EXIF: the picture is to be turned by a quarter to the right."""
@@ -85,47 +92,65 @@ def test_cameras_are_found_where_they_were(taken, spoilt, tmp_path):
     assert (found.folder / "sparse" / "0" / "images.txt").exists()
 
 
-def turned_over(folder):
-    """Two rounds about a block that was turned over between them; masks; cameras as it sees them.
+@pytest.fixture
+def turned_over(tmp_path, monkeypatch):
+    """Two rounds about a block that was turned over between them, and what attempts come to.
 
-    The slab's pattern is the same in both, so that all pictures fit together by it.
+    By the slab all pictures fit together; by what is inside masks too, where that is found.
     """
-    aims = ring(np.arange(COUNT) * 360 / COUNT, (400, 300), height=0.2, away=0.28)
-    cameras, back = [], np.diag([1.0, -1.0, -1.0, 1.0])
-    back[:3, 3] = np.array([-0.02, 0.01, 0.12])
+    folder, aims = tmp_path / "photos", ring(np.arange(COUNT) * 360 / COUNT, (160, 120), 0.2, 0.28)
+    (folder / "masks").mkdir(parents=True)
+    back = np.diag([1.0, -1.0, -1.0, 1.0])
+    back[:3, 3] = -0.02, 0.01, 0.12
+    by_slab, by_block, names = [], [], []
     for turned in (False, True):
-        scene = patterned(turned)
-        own = photographs(folder / f"round{int(turned)}", aims, scene)
-        stage = Stage(scene)
-        for k, (aim, camera) in enumerate(zip(aims, own, strict=True)):
-            name = f"{int(turned)}_{k:02d}"
-            picture = folder / f"round{int(turned)}" / f"photo_{k:03d}.jpg"
-            (folder / "masks").mkdir(exist_ok=True)
-            shutil.move(picture, folder / f"{name}.jpg")
+        stage = Stage(stepped(turned))
+        for k, aim in enumerate(aims):
+            names.append(f"{int(turned)}_{k:02d}.jpg")
             mask = np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB)
-            Image.fromarray(mask).save(folder / "masks" / f"{name}.png")
-            pose = back @ camera.world_from_camera if turned else camera.world_from_camera
-            cameras.append(replace(camera, world_from_camera=pose))
-        (folder / f"round{int(turned)}").rmdir()
-    return cameras
+            Image.fromarray(mask).save(folder / "masks" / f"{names[-1][:-4]}.png")
+            noise = np.random.default_rng(len(names)).integers(0, 255, (120, 160, 3))
+            Image.fromarray(noise.astype(np.uint8)).save(folder / names[-1])
+            camera = camera_of(aim)
+            by_slab.append(camera)
+            seen = back @ camera.world_from_camera if turned else camera.world_from_camera
+            by_block.append(replace(camera, world_from_camera=seen))
+    models, tried = {"plain": by_slab, "masked": by_block}, []
+
+    def attempt(source, out, gathered, way, progress):
+        tried.append(way)
+        points = np.random.default_rng(0).normal(size=(2000, 3))
+        cameras = models[way] if way in models else []
+        if cameras:
+            grey = np.full((2000, 3), 90, np.uint8)
+            write_colmap(out / "sparse" / "0", tuple(cameras), tuple(names), points, grey)
+        return Attempt(way, len(names), len(cameras), 9000 * bool(cameras), focal=1.0)
+
+    monkeypatch.setattr(posing, "attempt", attempt)
+    return folder, models, tried
 
 
-@pytest.mark.slow
-def test_an_object_that_was_turned_over_is_posed_by_what_its_masks_show(tmp_path):
-    """Without masks all pictures fit by the floor, whose reprojection error says nothing."""
-    pytest.importorskip("pycolmap")
-    true = turned_over(tmp_path / "photos")
-    found = pose(tmp_path / "photos", tmp_path / "poses", silent)
-    kept = json.loads((tmp_path / "poses" / "poses.json").read_text())
-    first, last = kept["attempts"][0], kept["attempts"][-1]
-    assert first["registered"] == 2 * COUNT and first["filled"] < FILLED
-    assert last["way"] == "masked" and last["filled"] > FILLED
+def test_an_object_that_was_turned_over_is_posed_by_what_its_masks_show(turned_over, tmp_path):
+    """All pictures fit by the floor, and no count of the model speaks against that."""
+    folder, models, tried = turned_over
+    found = pose(folder, tmp_path / "poses", silent)
+    assert tried == ["plain", "masked"] and found.warnings == ()
     assert "from points on objects alone" in found.statements[0]
-    seen = read_photographs(found.folder)
-    assert len(seen.names) >= 0.9 * len(true)
-    chosen = [true[int(name[0]) * COUNT + int(name[2:4])] for name in seen.names]
-    angle, place = pose_errors(seen.views.cameras, chosen)
-    assert np.median(angle) < 1.0 and np.median(place) < 0.03
+    angle, place = pose_errors(read_photographs(found.folder).views.cameras, models["masked"])
+    assert angle.max() < 0.01 and place.max() < 1e-4
+    kept = json.loads((tmp_path / "poses" / "poses.json").read_text())
+    first, last = (told["filled"] for told in kept["attempts"])
+    assert first < FILLED < last
+
+
+def test_masks_that_nothing_agrees_with_are_a_warning(turned_over, tmp_path):
+    """They may be poor: what all pictures agree on is not refused for them."""
+    folder, models, tried = turned_over
+    models["masked"] = []
+    found = pose(folder, tmp_path / "poses", silent)
+    assert tried == ["plain", "masked"], "what is plainly believed needs no thorough attempt"
+    assert "masks alone" not in found.statements[0] and len(found.warnings) >= 1
+    assert "turned over between the pictures, or masks miss parts" in found.warnings[-1]
 
 
 def test_a_picture_on_the_wrong_piece_of_a_pattern_is_left_out(taken, tmp_path):
@@ -144,7 +169,7 @@ def test_a_picture_on_the_wrong_piece_of_a_pattern_is_left_out(taken, tmp_path):
     told = Attempt("plain", COUNT, registered=COUNT, points=9000, focal=1.0)
     left = checked_by_masks(told, folder, tmp_path / "model")
     assert left.astray == ("photo_004.jpg",) and left.registered == COUNT - 1
-    assert left.filled > FILLED and not doubts(left)
+    assert left.filled > FILLED
     assert "photo_004.jpg" not in (tmp_path / "model" / "images.txt").read_text()
     again = checked_by_masks(told, folder, tmp_path / "model")
     assert again.astray == () and again.registered == COUNT

@@ -8,11 +8,9 @@ from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
 from corporeal.splats.quality import Quality
 from corporeal.splats.worth import GREY, not_worth, unlike_masks
+from patterned_scene import OF_SLAB, patterned, ring
 from patterned_scene import box as made_box
-from patterned_scene import patterned, ring
 
-OF_SLAB = 12
-"""Triangles of the slab, which come first."""
 CAMERAS = [camera_of(aim) for aim in ring(np.arange(20) * 18, away=0.5, height=0.35)]
 
 

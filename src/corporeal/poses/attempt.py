@@ -71,7 +71,7 @@ class Attempt:
     astray: tuple[str, ...] = ()
     """Registered pictures in which masks say that the object is elsewhere."""
     filled: float = 1.0
-    """Median overlap of masks with the visual hull of the others, 1 without masks [-]."""
+    """Share of a mask that the visual hull of all fills, the median; 1 without masks [-]."""
 
 
 def require() -> Any:
@@ -196,6 +196,8 @@ class _Work:
         matching = self.pycolmap.FeatureMatchingOptions()
         matching.num_threads, matching.use_gpu = cores(), False
         matching.guided_matching = self.thorough
+        checking = self.pycolmap.TwoViewGeometryOptions()
+        checking.ransac.random_seed = 0
         names, pairs = self.gathered.names, pairs_of(len(self.gathered.names))
         pairing = self.pycolmap.ImportedPairingOptions()
         pairing.match_list_path = str(self.out / "pairs.txt")
@@ -208,6 +210,7 @@ class _Work:
                 self.database,
                 matching_options=matching,
                 pairing_options=pairing,
+                verification_options=checking,
                 device=self.pycolmap.Device.cpu,
                 cancellation_token=token,
             )
@@ -217,6 +220,7 @@ class _Work:
         """Place cameras one after the other, in groups that share points."""
         options = self.pycolmap.IncrementalPipelineOptions()
         options.num_threads, options.random_seed, options.min_model_size = cores(), 0, 3
+        options.mapper.random_seed = options.triangulation.random_seed = 0
         if self.thorough:  # believe less: pictures are far apart; the whole is judged afterwards
             options.min_num_matches = 10
             options.mapper.init_min_num_inliers = 40

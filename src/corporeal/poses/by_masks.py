@@ -14,7 +14,8 @@ from PIL import Image
 
 from corporeal.formats.colmap import ColmapImage, ColmapModel, read_colmap
 from corporeal.formats.photographs import MASKS
-from corporeal.geometry.silhouette_outliers import FEWEST, outliers, overlaps
+from corporeal.geometry.silhouette_outliers import FEWEST, outliers
+from corporeal.geometry.silhouettes import coherence
 from corporeal.poses.attempt import Attempt, require
 from corporeal.types import Camera
 
@@ -48,7 +49,7 @@ def checked_by_masks(told: Attempt, folder: Path, place: Path) -> Attempt:
     drawn = np.stack([_mask(masks / _mask_of(image), size) for image in shown])
     wrong = outliers(drawn, cameras)
     right = [k for k in range(len(shown)) if k not in wrong]
-    filled = overlaps(drawn[right], tuple(cameras[k] for k in right))
+    filled = coherence(drawn[right], tuple(cameras[k] for k in right))
     astray = tuple(sorted(shown[k].name for k in wrong))
     left = _without(place, astray) if astray else (told.registered, told.points)
     return replace(
@@ -56,7 +57,7 @@ def checked_by_masks(told: Attempt, folder: Path, place: Path) -> Attempt:
         registered=left[0],
         points=left[1],
         astray=astray,
-        filled=round(float(np.nanmedian(filled)), 3),
+        filled=round(filled, 3),
     )
 
 

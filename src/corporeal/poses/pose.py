@@ -14,7 +14,8 @@ from corporeal.poses.by_masks import checked_by_masks
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
 from corporeal.poses.gather import Gathered, gather
-from corporeal.poses.judge import WHAT_TO_DO, doubts, names_of, unseen_side
+from corporeal.poses.groups import SORT_THEM, groups_of, shared_points, told_apart, without
+from corporeal.poses.judge import WHAT_TO_DO, doubt_of_masks, doubts, names_of, unseen_side
 from corporeal.typed import typed
 
 Progress = Callable[[float, str], None]
@@ -31,6 +32,9 @@ METHOD = 2
 """Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
+LOOKED = 0.15
+"""The same, when it is known whether they show one place."""
+LOOKING = "looking whether all show one place"
 UNTIL: dict[Way, float] = {"plain": 0.5, "masked": 0.7, "thorough": 1.0}
 """The same, after each attempt, in their order."""
 
@@ -54,6 +58,7 @@ class _Kept:
     refused: str
     """Why there are no poses; "": there are."""
     attempts: tuple[Attempt, ...]
+    what_to_do: str = WHAT_TO_DO
 
 
 def pose(source: Path, folder: Path, progress: Progress) -> Posed:
@@ -79,26 +84,44 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
         kept = _found(source, folder, progress)
         store.write_json(folder / FOUND, kept)
     if kept.refused:
-        raise BadFileError(source, kept.refused, WHAT_TO_DO)
+        raise BadFileError(source, kept.refused, kept.what_to_do)
     return Posed(folder, kept.statements, kept.warnings)
 
 
 def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     said, gathered = _gathered(source, folder, _within(progress, 0.0, GATHERED))
+    groups = None
+    if not (folder / MASKS[0]).is_dir():  # what was turned over shares nothing, and masks help
+        look = _within(progress, GATHERED, LOOKED)
+        groups = groups_of(shared_points(folder, gathered, lambda f: look(f, LOOKING)))
+    if groups is not None and groups.mixed:
+        return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
+    if groups is not None and groups.beside:
+        gathered = without(gathered, groups.beside)
     tried: list[Attempt] = []
-    before = GATHERED
+    before = LOOKED
     for way, until in UNTIL.items():
         share, before = (before, until), until
-        if way == "masked" and not (folder / MASKS[0]).is_dir():
+        if not _worth_trying(way, folder, tried):
             continue
         told = attempt(folder, folder / way, gathered, way, _within(progress, *share))
         tried.append(checked_by_masks(told, folder, folder / way / "sparse" / "0"))
-        if not doubts(tried[-1]):
-            _accept(folder / way, folder)
-            return _told(folder, gathered, tuple(said), tuple(tried))
+        if not doubts(tried[-1]) and doubt_of_masks(tried[-1]) is None:
+            break
+    believed = [told for told in tried if not doubts(told)]
+    if believed:  # the first of those that masks agree with best: masks may be poor
+        best = max(believed, key=lambda told: told.filled)
+        return _told(folder, gathered, tuple(said), tuple(tried), best)
     best = max(tried, key=lambda told: told.registered)
     why = f"where the pictures were taken from cannot be found: {'; '.join(doubts(best))}."
     return _Kept((), (), why, tuple(tried))
+
+
+def _worth_trying(way: Way, folder: Path, tried: list[Attempt]) -> bool:
+    """Tell whether an attempt can better those before: thorough where none is believed."""
+    if way == "masked":
+        return (folder / MASKS[0]).is_dir()
+    return way == "plain" or all(doubts(told) for told in tried)
 
 
 def _gathered(source: Path, folder: Path, progress: Progress) -> tuple[list[str], Gathered]:
@@ -124,9 +147,13 @@ def _accept(out: Path, folder: Path) -> None:
 
 
 def _told(
-    folder: Path, gathered: Gathered, said: tuple[str, ...], tried: tuple[Attempt, ...]
+    folder: Path,
+    gathered: Gathered,
+    said: tuple[str, ...],
+    tried: tuple[Attempt, ...],
+    last: Attempt,
 ) -> _Kept:
-    last = tried[-1]
+    _accept(folder / last.way, folder)
     statement = (
         f"Where {last.registered} of {last.pictures} photographs were taken from was found by "
         f"COLMAP{SAID[last.way]}: {last.points:,} points, "
@@ -145,6 +172,7 @@ def _told(
             f"by their masks, and were left out: {names_of(last.astray)}. The floor's pattern "
             "repeats, or the mask shows something else."
         )
+    warnings += filter(None, [doubt_of_masks(last)])
     seen = read_photographs(folder, longest=64)
     cameras_figure(seen, folder / FIGURE)
     unseen = unseen_side(seen.views.cameras, seen.names)
