@@ -1,4 +1,4 @@
-"""The seven showcase scenes: who stands where before the first step, and what is done to them.
+"""The ten showcase scenes: who stands where before the first step, and what is done to them.
 
 Metres, z up, floor at z = 0. An object that falls from far above starts lower, at the speed that it
 has there: the film begins when something is about to happen. Nothing numerical is in a scene.
@@ -213,9 +213,9 @@ def honey_on_plate() -> Composition:
 def ketchup_stops() -> Composition:
     """Lift the cup off a portion of ketchup: it slumps and stops.
 
-    Where the floor's yield stress and its own, which resists being stretched, hold its slope, it has
-    the profile h = π b/2 + √((π b/2)² + 2 b (R - r)) with b = τ_y/ρ g (Nye 1967): of 165 cm³ of 25 Pa
-    it is 12.5 cm across and 21 mm high. Without a yield stress it would not stop.
+    Where the floor's yield stress and its own, which resists being stretched, hold its slope, its
+    profile is h = π b/2 + √((π b/2)² + 2 b (R - r)) with b = τ_y/ρ g (Nye 1967): of 165 cm³ of
+    25 Pa it is 12.5 cm across and 21 mm high. Without a yield stress it would not stop.
     """
     return Composition(
         "Ketchup slumps into a heap that stays.",
