@@ -380,10 +380,10 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
             "frozen",
         ),
     ),
-    "honey-on-plate": (
+    "honey-poured": (
         # Huppert 1982: 0.063 m after 1 s; layers of two cells end short by a quarter.
         Demand(
-            "The honey spreads on the plate (radius)",
+            "The honey spreads (radius)",
             of("honey", "reach_m"),
             0.04,
             0.068,

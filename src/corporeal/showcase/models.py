@@ -25,7 +25,6 @@ MODELS: dict[str, Callable[[], Model]] = {
     "mug": vessels.mug,
     "cushion": toys.cushion,
     "tumbler": tableware.tumbler,
-    "plate": tableware.plate,
     "honey": tableware.honey,
     "ketchup": tableware.ketchup,
     "wooden_ball": tableware.wooden_ball,

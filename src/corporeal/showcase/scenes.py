@@ -196,15 +196,15 @@ def water_knocked_over() -> Composition:
     )
 
 
-def honey_on_plate() -> Composition:
-    """Pour a column of honey onto a plate.
+def honey_poured() -> Composition:
+    """Let a column of honey fall out of its jar onto the floor.
 
     A viscous drop of volume V spreads as r = 0.894 (g V³ t/3ν)^⅛ (Huppert 1982): 113 cm³ of 10 Pa s
     are 12.6 cm across after 1 s.
     """
     return Composition(
-        "Honey folds onto the plate and spreads, slower and slower.",
-        (Placed("plate"), Placed("honey", (0.0, 0.0, 0.028))),
+        "Honey folds down and spreads, slower and slower.",
+        (Placed("honey", (0.0, 0.0, 0.02)),),
         view=(0.80, -0.62, 0.45),
         duration=1.2,
     )
@@ -234,7 +234,7 @@ SCENES: dict[str, Callable[[], Composition]] = {
     "tree-and-ball-in-sand": tree_and_ball_in_sand,
     "steel-and-rubber": steel_and_rubber,
     "water-knocked-over": water_knocked_over,
-    "honey-on-plate": honey_on_plate,
+    "honey-poured": honey_poured,
     "ketchup-stops": ketchup_stops,
 }
 

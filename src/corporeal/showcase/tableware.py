@@ -1,4 +1,4 @@
-"""What liquids are held by, and liquids: a tumbler, a plate, honey, ketchup; and a wooden ball."""
+"""What liquids are held by, and liquids: a tumbler, honey, ketchup; and a wooden ball."""
 
 from dataclasses import replace
 
@@ -17,15 +17,6 @@ def tumbler() -> Model:
     look = replace(pale, colour=(*pale.colour[:3], 0.25), alpha_mode="BLEND")
     wall = Part("glass", shape.lathe(profile, 72), look, "glass", contents="water", fill=0.6)
     return Model("tumbler", (wall,))
-
-
-def plate() -> Model:
-    """Model a flat plate, 24 cm across, 8 mm thick, its rim a little higher."""
-    top = [(0.120, 0.011), (0.112, 0.0125), (0.100, 0.009), (0.0, 0.008)]
-    foot = [(0.0, 0.0), (0.085, 0.0), (0.105, 0.003), (0.120, 0.011)]
-    profile = np.concatenate([shape.soften(foot, 4), shape.soften(top, 4)[1:]])
-    look = plain("white glaze", "#f2f0ea", 0.2)
-    return Model("plate", (Part("plate", shape.lathe(profile, 72), look, "ceramic"),))
 
 
 def honey() -> Model:
