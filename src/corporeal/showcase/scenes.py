@@ -179,7 +179,7 @@ def steel_and_rubber() -> Composition:
 def water_knocked_over() -> Composition:
     """Knock a glass of water over with a wooden ball that strikes it just under its rim.
 
-    The ball, 46 g at 4 m/s, brings 0.18 kg m/s; the glass with 130 g of water weighs 0.35 kg. About
+    The ball, 46 g at 4 m/s, brings 0.18 kg m/s; the glass with 170 g of water weighs 0.38 kg. About
     the edge of its foot the blow gives 0.18 × 0.085 = 16 g m²/s; to tip over it has to lift its
     centre from 4.5 cm over the floor to 5.5 cm from that edge, √(2 I m g 0.01) = 10 g m²/s with
     I ≈ 1.5 g m². A glass that lies on its side holds what is below its lower rim: at three fifths
