@@ -14,7 +14,7 @@ def tumbler() -> Model:
     inside = [(0.0325, 0.1), (0.032, 0.098), (0.031, 0.012), (0.027, 0.008), (0.0, 0.008)]
     profile = np.concatenate([shape.soften(outside, 4), shape.soften(inside, 4)])
     pale = plain("clear glass", "#dcecf0", 0.05)
-    look = replace(pale, colour=(*pale.colour[:3], 0.25), alpha_mode="BLEND")
+    look = replace(pale, colour=(*pale.colour[:3], 0.1), alpha_mode="BLEND")
     wall = Part("glass", shape.lathe(profile, 72), look, "glass", contents="water", fill=0.6)
     return Model("tumbler", (wall,))
 
