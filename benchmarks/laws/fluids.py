@@ -4,9 +4,10 @@ A slab two cells thick between walls without friction; what is rough holds what 
 """
 
 from dataclasses import dataclass
-from math import sqrt
+from math import pi, sqrt
 
 import numpy as np
+from scipy.optimize import brentq
 
 from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers
 from corporeal.mpm.problem import Engine, Plane, Problem
@@ -166,17 +167,38 @@ def spreading_column(viscosity: float, cells: int, times: tuple[float, ...]) -> 
     return found
 
 
-def stopped_paste(yield_shear: float, cells: int, seconds: float = 3.0) -> tuple[float, float]:
-    """Let a paste slump until it stops: error of its length [-], and its speed then [m/s].
+def stopped_length(area: float, depth: float) -> float:
+    """Length of a paste that has stopped on a rough floor, in plane strain [m].
 
-    h = √(2 τ_y (L - x)/ρ g), so L = (9 q² ρ g/8 τ_y)^⅓.
+    The floor bears τ_y, and where the layer is stretched it pulls back by its own yield stress:
+    over its height ∫ (σ_xx - σ_zz) dz = π/2 τ_y h, as between rough plates (Nye 1967; Dubash et al.
+    2009). So d/dx (h²/2 - π/2 b h) = -b with b = τ_y/ρ g, and
+
+        h = π b/2 + √((π b/2)² + 2 b (L - x)).
+
+    Without that term L = (9 q²/8 b)^⅓, which is 10 to 34 % longer for what is compared here.
+
+    Args:
+        area: q [m²].
+        depth: b [m].
+
     """
+    k = 0.5 * pi * depth
+
+    def excess(length: float) -> float:
+        return k * length + ((k**2 + 2 * depth * length) ** 1.5 - k**3) / (3 * depth) - area
+
+    return float(brentq(excess, 0.0, (9 * area**2 / 8 / depth) ** (1 / 3)))
+
+
+def stopped_paste(yield_shear: float, cells: int, seconds: float = 3.0) -> tuple[float, float]:
+    """Let a paste slump until it stops: error of its length [-], and its speed then [m/s]."""
     side, density = 0.05, 1100.0
     paste = Liquid(density, 1.0, yield_shear)
     tank = Tank(paste, side, side, cells, 1.0, room=0.3, rough=True)
     run = tank.started()
     run.advance(seconds)
-    exact = (9.0 * side**4 * density * G / 8.0 / yield_shear) ** (1.0 / 3.0)
+    exact = stopped_length(side**2, yield_shear / density / G)
     speed = float(np.sqrt(np.mean(np.sum(run.snapshot().velocity ** 2, axis=1))))
     return front(run, tank) / exact - 1.0, speed
 

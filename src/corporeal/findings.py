@@ -59,6 +59,13 @@ class ObjectOutcome:
     """How far its centre rose after that [m]."""
     rebound_ratio: float | None
     """Rebound over fall [-]."""
+    reach_m: float | None = None
+    """Level distance from its middle within which 98 % of its mass lie at the end, and a quarter
+    cell [m]."""
+    height_m: float | None = None
+    """Of its top over its bottom at the end, a particle's own size included [m]."""
+    left_vessel: float | None = None
+    """Share of it that is outside of the vessel that held it [-]; None: none did."""
 
 
 @dataclass(frozen=True)

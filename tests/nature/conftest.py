@@ -55,3 +55,9 @@ def holds():
         return found
 
     return check
+
+
+@pytest.fixture
+def engines():
+    """Give the function that builds an engine of a name."""
+    return built

@@ -34,9 +34,9 @@ def test_a_column_of_honey_spreads_as_huppert_says():
 
 @pytest.mark.slow
 def test_a_paste_stops_where_its_yield_stress_holds_it():
-    """Thin layers end short, at first order in dx: -14 % here; without yield stress none stops."""
+    """Within 7 % here: the layer's own yield stress holds it back too (``stopped_length``)."""
     error, speed = stopped_paste(40.0, 16, 1.5)
-    assert -0.16 < error < 0.0
+    assert abs(error) < 0.1
     assert speed < 1e-3
     assert stopped_paste(1e-3, 8, 0.5)[1] > 0.01
 

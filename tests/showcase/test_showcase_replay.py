@@ -1,4 +1,4 @@
-"""The seven scenes described by what somebody answered who looked at their pictures."""
+"""The ten scenes described by what somebody answered who looked at their pictures."""
 
 from functools import partial
 

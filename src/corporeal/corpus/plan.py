@@ -120,7 +120,7 @@ def plan(models: Sequence[Asset], config: CorpusConfig, windy: Windy | None = No
     if config.preset == "seven":
         ignored = " ".join(config.changes)
         ignores = (f"The showcase has scenes of its own: {ignored} changes nothing.",)
-        return Plan(config, tuple(_showcase(name) for name in SCENES), ignores if ignored else ())
+        return Plan(config, tuple(_showcase(name) for name in SHOWCASE), ignores if ignored else ())
     _check(config)
     if not models:
         raise UserError("The pool has no usable asset. See why: corporeal assets list --rejected.")

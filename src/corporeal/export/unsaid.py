@@ -21,6 +21,7 @@ def _sentences(scene: Scene, particles: Particles, motion: Motion) -> Iterator[s
             yield f"{thing.name} follows a path in corporeal; no format has a word for it."
         if thing.wind is not None:
             yield f"Wind blows on {thing.name} in corporeal; no format has a word for it."
+    yield from _poured(scene, particles)
     stiff = np.array([t.kind == "rigid" for t in particles.treatments])[particles.part]
     for k, thing in enumerate(scene.objects):
         mine = particles.object == k
@@ -32,3 +33,11 @@ def _sentences(scene: Scene, particles: Particles, motion: Motion) -> Iterator[s
     for root in particles.roots:
         name = scene.objects[root.object].name
         yield f"The wood of {name} is held by a rotational spring in its soil, which is left out."
+
+
+def _poured(scene: Scene, particles: Particles) -> Iterator[str]:
+    for one in particles.contents:
+        yield (
+            f"{one.thing.name} lies loose in {scene.objects[one.vessel].name} and flows; formats "
+            "take it for a soft solid, and films carry the mesh of its start along."
+        )

@@ -161,6 +161,9 @@ HELD_BY_WALL = 1.5
 LIKE_HALF_SPACE = 0.15
 """… its mean place there is that of a half space within this [cells]: pressure pushes them all, and
 the wall answers behind its face alone."""
+STICKS = 0.5
+"""Where friction is at least this, what lies at the wall is not squeezed along it, and higher nodes
+are not held: a layer that sticks could not thin [-]."""
 WETTED_REACH = 2.0
 """A liquid looks for the surface of a rigid body no farther than this [cells]."""
 WETTED_PATCH = 0.5

@@ -107,6 +107,16 @@ def of(thing: str, measure: str) -> Measure:
     return lambda outcome: attrgetter(measure)(only(outcome, thing))
 
 
+def named(thing: str, measure: str) -> Measure:
+    """Read one field of ``ObjectOutcome`` of an object by its whole name."""
+    return lambda outcome: attrgetter(measure)(outcome.objects[thing])
+
+
+def left(contents: str) -> Measure:
+    """Measure how much of what lay in a vessel has left it [-]."""
+    return named(contents, "left_vessel")
+
+
 def between(first: str, second: str, measure: str) -> Callable[[Outcome], Any]:
     """Read one field of ``PairOutcome`` of the only objects of their kinds."""
     return lambda outcome: attrgetter(measure)(outcome.pair(f"{first}_0", f"{second}_0"))
@@ -339,6 +349,74 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
             0.005,
             "%",
             "capped",
+        ),
+    ),
+    "water-knocked-over": (
+        # The blow has one and a half times what tips it over (``showcase.scenes``).
+        Demand(
+            "The glass falls over",
+            of("tumbler", "turned_deg"),
+            60,
+            120,
+            "degrees",
+            "frozen",
+        ),
+        # What lies below the lower rim of a glass on its side stays: a tenth at most.
+        Demand(
+            "The water leaves it (share)",
+            left("tumbler_0_water"),
+            0.6,
+            1.0,
+            "%",
+            "frozen",
+        ),
+        # A ball that came back as fast as it came would give 0.37 kg m/s to 0.38 kg.
+        Demand(
+            "The blow carries the water no farther than its momentum can (mean way)",
+            named("tumbler_0_water", "moved_level_m"),
+            0.05,
+            0.95,
+            "m",
+            "frozen",
+        ),
+    ),
+    "honey-poured": (
+        # Huppert 1982: 0.063 m after 1 s; layers of two cells end short by a quarter.
+        Demand(
+            "The honey spreads (radius)",
+            of("honey", "reach_m"),
+            0.04,
+            0.068,
+            "mm",
+            "frozen",
+        ),
+        Demand(
+            "It lies flat: its height",
+            of("honey", "height_m"),
+            0.006,
+            0.03,
+            "mm",
+            "toppled",
+        ),
+    ),
+    "ketchup-stops": (
+        # 0.0625 m (``showcase.scenes``) to a fifth.
+        Demand(
+            "The ketchup slumps as far as its yield stress lets it (radius)",
+            of("ketchup", "reach_m"),
+            0.05,
+            0.075,
+            "mm",
+            "halfgravity",
+        ),
+        # 0.021 m to a quarter.
+        Demand(
+            "The ketchup stays a heap: its height",
+            of("ketchup", "height_m"),
+            0.016,
+            0.027,
+            "mm",
+            "squashed",
         ),
     ),
 }

@@ -56,6 +56,10 @@ class Part:
     """A name from the material library."""
     shell: float = 0.0
     """Wall of what is hollow in life but modelled by its outside [m]; 0: solid as modelled."""
+    contents: str = ""
+    """What is in the vessel that it is, from the library; "": nothing."""
+    fill: float = 0.0
+    """Share of its room that they take up."""
 
 
 @dataclass(frozen=True)

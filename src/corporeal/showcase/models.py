@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from corporeal.showcase import furniture, heaps, plants, snowman, toys, vessels
+from corporeal.showcase import furniture, heaps, plants, snowman, tableware, toys, vessels
 from corporeal.showcase.mesh import Model
 
 MODELS: dict[str, Callable[[], Model]] = {
@@ -24,4 +24,8 @@ MODELS: dict[str, Callable[[], Model]] = {
     "book": toys.book,
     "mug": vessels.mug,
     "cushion": toys.cushion,
+    "tumbler": tableware.tumbler,
+    "honey": tableware.honey,
+    "ketchup": tableware.ketchup,
+    "wooden_ball": tableware.wooden_ball,
 }

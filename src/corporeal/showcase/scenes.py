@@ -1,4 +1,4 @@
-"""The seven showcase scenes: who stands where before the first step, and what is done to them.
+"""The ten showcase scenes: who stands where before the first step, and what is done to them.
 
 Metres, z up, floor at z = 0. An object that falls from far above starts lower, at the speed that it
 has there: the film begins when something is about to happen. Nothing numerical is in a scene.
@@ -13,7 +13,7 @@ import numpy as np
 from corporeal.errors import UnknownChoiceError
 from corporeal.showcase.mesh import STILL, Model, Part, Point, cut, together
 from corporeal.showcase.models import MODELS
-from corporeal.types import Push, Scene, SceneObject, Surface
+from corporeal.types import MATTER, SUBSTANCE, Push, Scene, SceneObject, Surface
 
 GRAVITY = 9.81
 """[m/s²]"""
@@ -176,6 +176,55 @@ def steel_and_rubber() -> Composition:
     )
 
 
+def water_knocked_over() -> Composition:
+    """Knock a glass of water over with a wooden ball that strikes it just under its rim.
+
+    The ball, 46 g at 4 m/s, brings 0.18 kg m/s; the glass with 170 g of water weighs 0.38 kg. About
+    the edge of its foot the blow gives 0.18 × 0.085 = 16 g m²/s; to tip over it has to lift its
+    centre from 4.5 cm over the floor to 5.5 cm from that edge, √(2 I m g 0.01) = 10 g m²/s with
+    I ≈ 1.5 g m². A glass that lies on its side holds what is below its lower rim: at three fifths
+    full hardly anything.
+    """
+    return Composition(
+        "A glass of water falls over: water leaves it, and is heavier than the glass.",
+        (
+            Placed("tumbler"),
+            Placed("wooden_ball", (-0.085, 0.004, 0.062), velocity=(4.0, 0.0, 0.0)),
+        ),
+        view=(0.30, -0.85, 0.42),
+        duration=1.0,
+    )
+
+
+def honey_poured() -> Composition:
+    """Let a column of honey fall out of its jar onto the floor.
+
+    A viscous drop of volume V spreads as r = 0.894 (g V³ t/3ν)^⅛ (Huppert 1982): 113 cm³ of 10 Pa s
+    are 12.6 cm across after 1 s.
+    """
+    return Composition(
+        "Honey folds down and spreads, slower and slower.",
+        (Placed("honey", (0.0, 0.0, 0.02)),),
+        view=(0.80, -0.62, 0.45),
+        duration=1.2,
+    )
+
+
+def ketchup_stops() -> Composition:
+    """Lift the cup off a portion of ketchup: it slumps and stops.
+
+    Where the floor's yield stress and its own, which resists being stretched, hold its slope, its
+    profile is h = π b/2 + √((π b/2)² + 2 b (R - r)) with b = τ_y/ρ g (Nye 1967): of 165 cm³ of
+    25 Pa it is 12.5 cm across and 21 mm high. Without a yield stress it would not stop.
+    """
+    return Composition(
+        "Ketchup slumps into a heap that stays.",
+        (Placed("ketchup"),),
+        view=(0.80, -0.62, 0.40),
+        duration=1.0,
+    )
+
+
 SCENES: dict[str, Callable[[], Composition]] = {
     "duck-on-mud": duck_on_mud,
     "duck-on-can": duck_on_can,
@@ -184,6 +233,9 @@ SCENES: dict[str, Callable[[], Composition]] = {
     "ficus-pushed": ficus_pushed,
     "tree-and-ball-in-sand": tree_and_ball_in_sand,
     "steel-and-rubber": steel_and_rubber,
+    "water-knocked-over": water_knocked_over,
+    "honey-poured": honey_poured,
+    "ketchup-stops": ketchup_stops,
 }
 
 
@@ -292,8 +344,16 @@ def _surface(part: Part, k: int, finish: int) -> Surface:
         normals=mesh.normals,
         uv=mesh.uv * [1, -1] + [0, 1],
         colours=mesh.colours if tinted else None,
-        extras={"substance": part.substance, "shell_thickness_m": part.shell},
+        extras=_said(part),
     )
+
+
+def _said(part: Part) -> dict:
+    """Say of what a part is, and what is in it."""
+    if not part.contents:
+        return {SUBSTANCE: part.substance, "shell_thickness_m": part.shell}
+    words = {"structure": "filled", "contents": part.contents, "fill": part.fill}
+    return {SUBSTANCE: part.substance, MATTER: {"words": words}}
 
 
 def _scene_object(model: Model, placed: Placed, number: int) -> SceneObject:

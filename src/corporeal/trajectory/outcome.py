@@ -7,6 +7,7 @@ from math import degrees
 
 import numpy as np
 from jaxtyping import Float
+from scipy.spatial import Delaunay
 
 from corporeal.findings import FLOOR, ObjectOutcome, Outcome, PairOutcome, pair_name
 from corporeal.geometry.rigid_fit import rigid_fit
@@ -17,6 +18,8 @@ REST = 0.3
 """A dent is what is left after so long at rest [s]."""
 APART = 0.1
 """Bodies have separated when they stay apart so long [s]."""
+MOST = 0.98
+"""Share of the particles that tell how far something reaches [-]; lone drops do not."""
 SAMPLES = 8
 """Frames that are averaged over the rest."""
 TOUCHING = 0.5
@@ -53,6 +56,9 @@ class Bodies:
         self.cell, self.time, self.ledger = particles.cell, trajectory.time, trajectory.ledger
         self.trajectory = trajectory
         count = len(trajectory.ledger.mass[0])
+        first_of_contents = len(scene.objects) - len(particles.contents)
+        self.vessel_of = {first_of_contents + k: c.vessel for k, c in enumerate(particles.contents)}
+        """Object that lay in a vessel → that vessel."""
         self.members = [np.flatnonzero(particles.object == b) for b in range(count)]
         first = trajectory.frames[0].position.astype(float)
         self.start = [first[m] for m in self.members]
@@ -125,7 +131,38 @@ def object_row(body: int, names: list[str], bodies: Bodies) -> ObjectOutcome:
         fall_m=bounced.fall,
         rebound_m=bounced.rebound,
         rebound_ratio=bounced.ratio,
+        reach_m=reach(bodies.last[body][-1], cell),
+        height_m=height(bodies.last[body][-1], cell),
+        left_vessel=left_vessel(body, bodies),
     )
+
+
+def reach(points: Float[np.ndarray, "N 3"], cell: float) -> float:
+    """Level distance from their middle within which most points lie [m]."""
+    points = points[np.isfinite(points).all(axis=1)]
+    aside = points[:, :2] - np.median(points[:, :2], axis=0)
+    return float(np.quantile(np.hypot(*aside.T), MOST)) + cell / 4
+
+
+def height(points: Float[np.ndarray, "N 3"], cell: float) -> float:
+    """Extent of most points along z [m]."""
+    points = points[np.isfinite(points).all(axis=1)]
+    low, high = np.quantile(points[:, 2], (1 - MOST, MOST))
+    return float(high - low) + cell / 2
+
+
+def left_vessel(body: int, bodies: "Bodies") -> float | None:
+    """Share of what lay in a vessel that is outside of the vessel's convex hull at the end [-]."""
+    vessel = bodies.vessel_of.get(body)
+    if vessel is None:
+        return None
+    fit = rigid_fit(
+        bodies.start[vessel], bodies.last[vessel][-1], np.ones(len(bodies.start[vessel]))
+    )
+    points = bodies.last[body][-1]
+    there = np.isfinite(points).all(axis=1)
+    inside = Delaunay(bodies.start[vessel]).find_simplex(fit.undo(points[there])) >= 0
+    return 1.0 - float(inside.sum()) / len(points)
 
 
 def vector(values: Float[np.ndarray, "3"]) -> Vector:

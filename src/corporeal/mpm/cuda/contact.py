@@ -9,6 +9,7 @@ from corporeal.mpm.constants import (
     FIRST_BIAS,
     OTHER_BIAS,
     SHOWN_AROUND,
+    STICKS,
     TINY,
     VAST,
     WALL_REACH,
@@ -311,7 +312,10 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             if face[3] < VAST:
                 out = wp.vec3(face[0], face[1], face[2])
                 c.normal[t] = way * out
-                gap = gap_of_liquid(-wp.dot(mean, out) / s.cell, face[3])
+                xi = -wp.dot(mean, out) / s.cell
+                gap = gap_to_surface(xi, face[3])
+                if c.friction[c.fa[t], c.fc[t]] < wp.float64(STICKS):
+                    gap = gap_of_liquid(xi, face[3])
                 if face[3] > WALL_REACH:
                     c.slips[t] = 1
                 if gap < VAST:

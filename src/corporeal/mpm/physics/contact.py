@@ -140,21 +140,19 @@ def gap_to_surface(mean: Vectors, begins: Scalars, normal: Vectors, cell: float)
     return gap_to_wall(mean, begins, normal, cell)
 
 
-def gap_of_liquid(mean: Vectors, height: Scalars, outward: Vectors, cell: float) -> Scalars:
-    """Open distance [m] of a liquid to a rigid surface that lies ``height`` [m] below the node.
+def gap_of_liquid(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -> Scalars:
+    """Open distance [m] along n of a liquid to a surface that lies ``height`` [m] below the node.
 
     Pressure pushes every node whose spline reaches the surface, and a wall that answers behind its
     face alone would let the first layer of a liquid be squeezed along it. So nodes up to
     ``HELD_BY_WALL`` above are in contact too, where the liquid fills the half space up to the face
     as far as the node can tell; what is thinner than a cell is not.
     """
-    h = height / cell
-    gap = gap_to_wall(mean, height, -outward, cell)
-    off = half_space_mean(h) + np.sum(mean * outward, axis=1) / cell
-    xi = -np.sum(mean * outward, axis=1) / cell
+    h, xi = height / cell, np.sum(mean * normal, axis=1) / cell
     deep = (-half_space_mean(-h) - xi - touching_distance(h)) * cell
-    held = (h > WALL_REACH) & (h <= HELD_BY_WALL) & (np.abs(off) < LIKE_HALF_SPACE)
-    return np.where(held, deep, gap)
+    like = np.abs(half_space_mean(h) - xi) < LIKE_HALF_SPACE
+    held = (h > WALL_REACH) & (h <= HELD_BY_WALL) & like
+    return np.where(held, deep, gap_to_wall(mean, height, normal, cell))
 
 
 class WettedFaces(NamedTuple):

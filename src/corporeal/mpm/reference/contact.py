@@ -15,6 +15,7 @@ from corporeal.mpm import laws
 from corporeal.mpm.constants import (
     POINT_REACH,
     SHOWN_AROUND,
+    STICKS,
     SWEEPS,
     SWEEPS_OF_A_HIT,
     TINY_DOUBLE,
@@ -405,7 +406,9 @@ def _wet(
     node, mean = scene.grid.index[slot] * cell, look.mean[slot]
     face = contact.wetted_faces(surface, node, node + mean, cell)
     k, out = face.node, face.outward
-    gap = contact.gap_of_liquid(mean[k], face.height, out, cell)
+    sticks = scene.problem.friction[pair] >= STICKS
+    measure = contact.gap_to_surface if sticks else contact.gap_of_liquid
+    gap = measure(mean[k], face.height, -out, cell)
     normal = out if rigid_side == 0 else -out
     movers = scene.mover_of_slot(slots[0][k]), scene.mover_of_slot(slots[1][k])
     slips = face.height > WALL_REACH * cell

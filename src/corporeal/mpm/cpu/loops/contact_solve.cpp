@@ -13,7 +13,10 @@ struct Solver {
     const Side &C = sides[T.c];
     const Field &F = w->field[A.field], &G = w->field[C.field];
     double pc = C.mean[0] * n[0] + C.mean[1] * n[1] + C.mean[2] * n[2];
-    if (liquid(F, G)) return Face::gap_of_liquid(F.rigids ? -pc : pa, T.gap * inv);
+    if (liquid(F, G)) {
+      const double mean = F.rigids ? -pc : pa, h = T.gap * inv;
+      return T.mu < mpm::STICKS ? Face::gap_of_liquid(mean, h) : Face::gap_to_surface(mean, h);
+    }
     if (!F.thin && !G.thin) return Face::gap(w->face, pa, pc);
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
     if (!F.surfaces) return Face::gap_to_surface(pa, sc);
@@ -256,9 +259,10 @@ if (from < to) {
         Solver::slip(sides, T, u);
         const bool slips = T.c >= 0 && T.gap > mpm::WALL_REACH * dx &&
                            Solver::liquid(world->field[T.fa], world->field[T.fc]);
+        T.mu = world->friction[T.fa * all + T.fc];
         T.gap = Solver::gap(world, sides, T, inv) * dx;
         T.target = Impact::closing(T.gap, dt);
-        T.mu = slips ? 0.0 : world->friction[T.fa * all + T.fc];
+        if (slips) T.mu = 0.0;
         T.active = 1;
         if (M.stiff) continue;
         T.inverse = sides[T.a].inverse + (T.c < 0 ? 0.0 : sides[T.c].inverse);

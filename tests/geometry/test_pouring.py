@@ -1,0 +1,65 @@
+"""What lies loose in a vessel has the shape of its hollow, up to its level."""
+
+import numpy as np
+import pytest
+
+from corporeal.geometry.mesh import signed_volume
+from corporeal.geometry.pouring import pool
+from corporeal.geometry.survey import survey
+
+R, WALL, BASE, HEIGHT = 0.035, 0.003, 0.005, 0.1
+
+
+def turned(profile, segments=64):
+    """Turn an outline (r, z) about the z axis: vertices and triangles."""
+    profile = np.array(profile)
+    turn = 2 * np.pi * np.arange(segments) / segments
+    ring = np.stack([np.cos(turn), np.sin(turn)], axis=1)
+    vertices = np.concatenate(
+        [np.column_stack([r * ring, np.full(segments, z)]) for r, z in profile]
+    )
+    triangles = []
+    for k in range(len(profile) - 1):
+        for i in range(segments):
+            a, b = k * segments + i, k * segments + (i + 1) % segments
+            triangles += [(a, b, b + segments), (a, b + segments, a + segments)]
+    return vertices, np.array(triangles)
+
+
+def measured(profile):
+    vertices, triangles = turned(profile)
+    part = np.zeros(len(triangles), np.int64)
+    anatomy = survey(vertices, triangles, part, np.random.default_rng(0))
+    return anatomy, anatomy.members[0]
+
+
+OPEN = [
+    *((1e-5, 0.0), (R, 0.0), (R, HEIGHT), (R - WALL, HEIGHT)),
+    *((R - WALL, BASE), (1e-5, BASE)),
+]
+CLOSED = [(1e-5, 0.0), (R, 0.0), (R, HEIGHT), (1e-5, HEIGHT)]
+
+
+@pytest.mark.parametrize("fill", [0.3, 0.6])
+def test_a_tumbler_holds_its_share_up_to_its_level(fill):
+    lies = pool(*measured(OPEN), 0.0, fill)
+    room = np.pi * (R - WALL) ** 2 * (HEIGHT - BASE)
+    assert lies.volume == pytest.approx(fill * room, rel=0.02)
+    assert signed_volume(lies.mesh) == pytest.approx(lies.volume, rel=0.02)
+    top = lies.mesh.vertices[:, 2].max()
+    assert top == pytest.approx(BASE + fill * (HEIGHT - BASE), rel=0.02)
+    assert top == pytest.approx(lies.level, abs=1e-5)
+
+
+def test_a_closed_can_that_is_drawn_by_its_outside_is_hollow_behind_its_wall():
+    lies = pool(*measured(CLOSED), WALL, 0.5)
+    room = np.pi * (R - WALL) ** 2 * (HEIGHT - 2 * WALL)
+    assert lies.volume == pytest.approx(0.5 * room, rel=0.02)
+    assert lies.level == pytest.approx(HEIGHT / 2, rel=0.02)
+
+
+def test_nothing_can_be_poured_on_a_plate():
+    flat = [(1e-5, 0.0), (0.1, 0.0), (0.1, 0.01), (1e-5, 0.01)]
+    anatomy, member = measured(flat)
+    lies = pool(anatomy, member, 0.006, 0.5)
+    assert lies is None
