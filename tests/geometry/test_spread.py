@@ -36,6 +36,22 @@ def test_as_many_points_as_the_volume_holds(rng):
     assert len(scatter(ball, 0.06, rng)) * 0.06**3 == pytest.approx(4.18, rel=0.01)
 
 
+def test_what_fills_a_pot_to_its_walls_has_its_whole_volume(rng):
+    """Faces of pot and soil lie upon each other; rays that miss the second took the soil away."""
+    outer, inner = trimesh.creation.box((2, 2, 2)), trimesh.creation.box((1.6, 1.6, 1.6))
+    for body in (outer, inner):
+        body.apply_transform(TILT)
+    n = len(outer.vertices)
+    cavity, soil = inner.faces[:, ::-1] + n, inner.faces + n
+    both, _ = weld(
+        np.concatenate([outer.vertices, inner.vertices]),
+        np.concatenate([outer.faces, cavity, soil]),
+        np.repeat([0, 0, 1], 12),
+    )
+    assert len(both.triangles) == 36
+    assert len(scatter(Shape(both), 0.06, rng)) * 0.06**3 == pytest.approx(8.0, rel=0.01)
+
+
 def test_points_lie_evenly(tilted_cube):
     near = neighbour(tilted_cube[1]) / 0.05
     assert near.min() > 0.5

@@ -100,7 +100,7 @@ def walk(met, heights, at, layer):
 @numba.njit(cache=True)
 def drop(points, vertices, triangles, table, found):
     """Add the faces that a line down from each point meets."""
-    low, width, counts, first, face = table
+    low, width, counts, first, face, box = table
     for n in range(len(points)):
         x, y, z = points[n]
         i, j = int((x - low[0]) // width), int((y - low[1]) // width)
@@ -108,10 +108,10 @@ def drop(points, vertices, triangles, table, found):
             continue
         cell = i * counts[1] + j
         for k in range(first[cell], first[cell + 1]):
-            triangle = triangles[face[k]]
-            a, b, c = triangle
-            if min(vertices[a, 2], vertices[b, 2], vertices[c, 2]) >= z:
+            # What lies aside has no say, and what lies above is not met.
+            if x < box[k, 0] or x > box[k, 1] or y < box[k, 2] or y > box[k, 3] or z <= box[k, 4]:
                 continue
+            triangle = triangles[face[k]]
             around = covers(vertices, triangle, x, y)
             if around != 0 and height(vertices, triangle, x, y) < z:
                 found[n] -= around

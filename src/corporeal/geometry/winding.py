@@ -32,6 +32,8 @@ class PlumbLines:
     first: Int[np.ndarray, " C1"]
     """Of each cell, in ``face``."""
     face: Int[np.ndarray, " F"]
+    box: Float[np.ndarray, "F 5"]
+    """Of each, as it stands in ``face``: least and greatest x, then y, and least height [m]."""
     rim: Int[np.ndarray, "E 2"]
     """Edges that are walked more often one way than the other."""
     excess: Int[np.ndarray, " E"]
@@ -41,7 +43,7 @@ class PlumbLines:
         """Winding number of the mesh about points."""
         found = np.zeros(len(points))
         points = np.ascontiguousarray(points, dtype=np.float64)
-        table = self.low, self.width, self.counts, self.first, self.face
+        table = self.low, self.width, self.counts, self.first, self.face, self.box
         kernels.drop(points, self.mesh.vertices, self.mesh.triangles, table, found)
         if len(self.rim):
             kernels.hang(points, self.mesh.vertices, self.rim, self.excess, found)
@@ -64,7 +66,9 @@ def plumb_lines(mesh: Mesh) -> PlumbLines:
         width *= 2
     counts = to_cell.max(axis=0) + 1
     first, face = _entered(from_cell, to_cell, counts)
-    return PlumbLines(mesh, start, width, counts, first, face, rim, excess)
+    lowest = mesh.corners[:, :, 2].min(axis=1)
+    box = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1], lowest], axis=1)[face]
+    return PlumbLines(mesh, start, width, counts, first, face, box, rim, excess)
 
 
 def unbalanced(mesh: Mesh) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, " E"]]:
