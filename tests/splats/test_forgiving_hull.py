@@ -35,11 +35,6 @@ def kept_and_added(masks, cameras):
     return (made.inside & true).sum() / true.sum(), (made.inside & ~true).sum() / true.sum()
 
 
-@pytest.fixture(autouse=True)
-def coarse(monkeypatch):
-    monkeypatch.setattr(hull, "CELLS", 120_000)
-
-
 @pytest.mark.parametrize("count", [12, 30])
 def test_outlines_that_are_off_by_ten_of_640_pixels_eat_little(count, monkeypatch):
     cameras = around(count, (SIDE, SIDE), focal=1.3 * SIDE)
@@ -48,7 +43,7 @@ def test_outlines_that_are_off_by_ten_of_640_pixels_eat_little(count, monkeypatc
     monkeypatch.setattr(hull, "FILLED", 0.0)
     strict, _ = kept_and_added(masks, cameras)
     assert strict < 0.93, "the control eats"
-    assert 1 - kept < 0.5 * (1 - strict)
+    assert 1 - kept < 0.6 * (1 - strict)
     assert added < 0.2
 
 

@@ -11,6 +11,7 @@ from corporeal.geometry.region import region
 from corporeal.geometry.silhouettes import (
     BESIDE_SHARE,
     BESIDE_VIEWS,
+    SIDE,
     cells_of,
     outside,
     small,
@@ -23,9 +24,11 @@ CELLS = 2_000_000
 """Of the grid that the visual hull is carved from."""
 ASTRAY = 0.05
 """Share of the views that may see a point of the hull beside objects: masks err at edges."""
-FILLED = 0.98
+FILLED = 0.996
 """Share of its mask that a silhouette of the hull fills where masks agree: the median. Outlines
-that err by 10 of 640 pixels leave .94 to .97, exact ones and those that err by 4 at least .99."""
+that err by 10 of 640 pixels leave .992, exact ones and those that err by 4 leave nothing."""
+COARSE = 0.4
+"""Pixels of the pictures in which that is compared, per cell along the box: a cell is smaller."""
 MANY = 8
 """Views from which on some may err more: of fewer, each is needed."""
 FEW = 7
@@ -79,7 +82,8 @@ def carved(
     seen = witnessed(points, views, masks, pool, patience)
     enough = seen[:, 0] >= max(1, count / 4)
     inside = enough & (seen[:, 1] <= ASTRAY * count)
-    if count >= MANY and filled(points[inside], views.cameras, masks) < FILLED:
+    compared = min(SIDE, int(COARSE * max(cells.shape[:3])))
+    if count >= MANY and filled(points[inside], views.cameras, masks, compared) < FILLED:
         inside = enough & ~outside(seen[:, 1], seen[:, 0] + seen[:, 1])
     if not inside.any():
         raise UserError(
@@ -132,12 +136,12 @@ def _shown(
 
 
 def filled(
-    points: Float[np.ndarray, "N 3"], cameras: tuple[Camera, ...], masks: np.ndarray
+    points: Float[np.ndarray, "N 3"], cameras: tuple[Camera, ...], masks: np.ndarray, side: int
 ) -> float:
-    """Return which share of their masks points fill in small pictures, the median of all views."""
+    """Return which share of masks points fill in pictures of ``side`` pixels: the median view."""
     shares = []
     for camera, mask in zip(cameras, masks, strict=True):
-        on = small(255 * mask.astype(np.uint8))
+        on = small(255 * mask.astype(np.uint8), side)
         pixel = cells_of(points, camera, on.shape)
         met = np.zeros(on.size, bool)
         met[pixel[pixel >= 0]] = True
