@@ -39,9 +39,16 @@ def box(low, high):
     return np.array(vertices), np.array(triangles), np.array(uv, float)
 
 
-def patterned():
-    """A block of 10 × 8 × 12 cm on a slab of 60 cm."""
+def patterned(turned_over=False):
+    """A block of 10 × 8 × 12 cm on a slab of 60 cm; each of its sides looks otherwise."""
     made = [box((-0.3, -0.3, -0.02), (0.3, 0.3, 0)), box((-0.05, -0.04, 0), (0.05, 0.04, 0.12))]
+    vertices, triangles, uv = made[1]
+    face = np.arange(len(uv)) // 4
+    made[1] = vertices, triangles, (uv + np.stack([face % 3, face // 3], axis=1)) / 3
+    if turned_over:  # by half a turn about x, and pushed aside
+        made[1] = (
+            vertices * (1, -1, -1) + (0.02, 0.01, 0.12), triangles, made[1][2]
+        )  # fmt: skip
     surfaces = tuple(
         Surface(name, k, k, v, t, uv=uv)
         for k, (name, (v, t, uv)) in enumerate(zip(("slab", "block"), made, strict=True))

@@ -12,6 +12,7 @@ from pathlib import Path
 from corporeal import backends
 from corporeal.errors import UserError
 from corporeal.formats.sources import kind_of
+from corporeal.geometry.contents import with_contents
 from corporeal.geometry.gaussians import AskedUp, axis
 from corporeal.mixture import ground_weighed
 from corporeal.mpm.problem import MENU, Engine, Problem
@@ -85,7 +86,9 @@ def prepare(scene: Scene, settings: Settings = USUAL, progress: Progress = silen
     progress(0.5, "looking numbers up")
     field = ground_weighed(scene, parts, inventory, settings.ground)
     progress(0.6, "filling with particles")
-    return Prepared(scene, inventory, parts, field, fill(scene, parts, field, settings.fill))
+    particles = fill(scene, parts, field, settings.fill)
+    whole = with_contents(scene, parts, field, particles.contents)
+    return Prepared(whole.scene, inventory, whole.parts, whole.field, particles)
 
 
 def pose_problem(prepared: Prepared, settings: Settings = USUAL) -> Problem:

@@ -3,6 +3,7 @@
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
+from corporeal.geometry.contents import Whole, with_contents
 from corporeal.geometry.followed import followed
 from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
@@ -43,8 +44,17 @@ class Results:
 
     @property
     def scene(self) -> Scene:
-        """From assemble."""
-        return _made(self.assemble, "assemble")
+        """From assemble, and once it is filled with what moves in its vessels."""
+        return self._whole.scene if self._pours else _made(self.assemble, "assemble")
+
+    @property
+    def _pours(self) -> bool:
+        return self.fill is not None and len(self.fill.contents) > 0
+
+    @property
+    def _whole(self) -> Whole:
+        scene, parts = _made(self.assemble, "assemble"), _made(self.segment, "segment")
+        return with_contents(scene, parts, _made(self.ground, "ground"), self.particles.contents)
 
     @property
     def inventory(self) -> Inventory:
@@ -54,12 +64,12 @@ class Results:
     @property
     def parts(self) -> Parts:
         """From segment."""
-        return _made(self.segment, "segment")
+        return self._whole.parts if self._pours else _made(self.segment, "segment")
 
     @property
     def field(self) -> MaterialField:
         """From ground."""
-        return _made(self.ground, "ground")
+        return self._whole.field if self._pours else _made(self.ground, "ground")
 
     @property
     def particles(self) -> Particles:
@@ -79,7 +89,11 @@ class Results:
     @property
     def reconstruction(self) -> Reconstruction | None:
         """What was reconstructed, where the scene's objects stand now; None: nothing was."""
-        return None if self.reconstruct is None else followed(self.reconstruct, self.scene)
+        return (
+            None
+            if self.reconstruct is None
+            else followed(self.reconstruct, _made(self.assemble, "assemble"))
+        )
 
     @property
     def prepared(self) -> Prepared:

@@ -1,6 +1,6 @@
 """Every point's share of its part's mass, and no point of one object among another's."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,11 +16,22 @@ from corporeal.geometry.survey import Anatomy, Member
 from corporeal.types import Treatment
 
 
-def keep_apart(packings: list[Packing], cell: float) -> list[Packing]:
-    """Remove points of one object that lie among another's; masses are set afterwards."""
+def keep_apart(
+    packings: list[Packing], cell: float, together: Collection[tuple[int, int]] = ()
+) -> list[Packing]:
+    """Remove points of one object that lie among another's; masses are set afterwards.
+
+    Args:
+        packings: One per object.
+        cell: dx [m].
+        together: Vessels and what is in them, which their true surfaces keep apart.
+
+    """
     result = list(packings)
     for i in range(len(result)):
         for j in range(i):
+            if (j, i) in together:
+                continue
             more, less = (i, j) if len(result[i].points) >= len(result[j].points) else (j, i)
             tree = KDTree(result[less].points)
             gap = tree.query(result[more].points, distance_upper_bound=cell / 4)[0]

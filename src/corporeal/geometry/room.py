@@ -89,16 +89,25 @@ def within(
 
     Those outside the matter with the part's faces below and, but for one crack, all around.
     """
+    return points[reachable(anatomy, member, points)]
+
+
+def reachable(
+    anatomy: Anatomy, member: Member, points: Float[np.ndarray, "N 3"]
+) -> Bool[np.ndarray, " N"]:
+    """Whether a level liquid in a vessel could reach each point without running over the rim."""
+    found = np.ones(len(points), dtype=bool)
     if anatomy.shape is not None:
-        points = points[~anatomy.shape.inside(points)]
+        found = ~anatomy.shape.inside(points)
     faces = [m for m in (member.body, member.sheet) if len(m.triangles)]
     shapes = [Shape(m) for m in faces]
-    points = points[blocked(shapes, points, np.array([0.0, 0.0, -1.0]))]
+    found[found] = blocked(shapes, points[found], np.array([0.0, 0.0, -1.0]))
     turns = 2 * np.pi * np.arange(ROUND) / ROUND
-    around = np.zeros(len(points), dtype=np.int64)
+    around = np.zeros(int(found.sum()), dtype=np.int64)
     for turn in turns:
-        around += blocked(shapes, points, np.array([np.cos(turn), np.sin(turn), 0.0]))
-    return points[around >= ROUND - 1]
+        around += blocked(shapes, points[found], np.array([np.cos(turn), np.sin(turn), 0.0]))
+    found[found] = around >= ROUND - 1
+    return found
 
 
 def blocked(

@@ -156,6 +156,21 @@ SOUND_OVER_SPEED = 10.0
 """Of a liquid's waves over its largest expected speed [-]: its density changes by 1 %."""
 LIQUID_SHEAR = 0.125
 """G/K of a liquid's Maxwell branch [-]."""
+HELD_BY_WALL = 1.5
+"""Nodes of a liquid up to this high over a wall are held too, without friction, where … [cells]"""
+LIKE_HALF_SPACE = 0.15
+"""… its mean place there is that of a half space within this [cells]: pressure pushes them all, and
+the wall answers behind its face alone."""
+WETTED_REACH = 2.0
+"""A liquid looks for the surface of a rigid body no farther than this [cells]."""
+WETTED_PATCH = 0.5
+"""Points of it count that are farther than the nearest by no more than this [cells] …"""
+WETTED_TURN = 0.7
+"""… and whose normals have at least this cosine; what looks another way is another face [-]."""
+WETTED_FACES = 3
+"""Faces of one body that a node knows: three meet in a corner."""
+WETTED_ROWS = 512
+"""Points of a surface that are looked at for one node, at most."""
 
 # ---------------------------------------------------------------- what bodies are tied to
 

@@ -22,6 +22,16 @@ class Faces:
     """Which of the body's particles each face moves with."""
 
 
+@dataclass(frozen=True)
+class WettedSurface:
+    """Where liquids touch a rigid body, inside of it too where it is hollow; N points."""
+
+    point: Float[np.ndarray, "N 3"]
+    """[m]"""
+    normal: Float[np.ndarray, "N 3"]
+    """Unit, out of the matter."""
+
+
 NO_FACES = Faces(np.zeros((0, 3)), np.zeros(0, np.int64))
 
 
@@ -92,6 +102,8 @@ class Body:
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
+    wetted: WettedSurface | None = None
+    """Of a rigid body: liquids touch it here; None: as everything else does."""
     push: Push | None = None
     wind: Wind | None = None
     faces: Faces = NO_FACES
@@ -151,9 +163,9 @@ class Problem:
 
     @property
     def never_touch(self) -> tuple[tuple[int, int], ...]:
-        """Pairs without contact: what is bonded or apart, and bodies that both move as told."""
-        told = [b for b, body in enumerate(self.bodies) if body.path is not None]
-        return (*self.bonds, *self.apart, *combinations(told, 2))
+        """Pairs without contact: what is bonded or apart, and two prescribed motions."""
+        prescribed = [b for b, body in enumerate(self.bodies) if body.path is not None]
+        return (*self.bonds, *self.apart, *combinations(prescribed, 2))
 
 
 @dataclass(frozen=True)
@@ -303,7 +315,7 @@ class Interactive(Engine, Protocol):
         ...
 
     def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
-        """Pull on a body by a damped spring until told otherwise.
+        """Pull on a body by a damped spring until released.
 
         Args:
             body: Which.

@@ -22,6 +22,8 @@ BENT = 0.25
 """Largest |k1| of a lens that is no fisheye."""
 RIVAL = 1 / 3
 """Share of the first group from which on a second one rivals it."""
+FILLED = 0.6
+"""Median overlap of masks with the visual hull of the others: 0.9 under right poses."""
 NAMED = 8
 GAP = 60.0
 """Angle between neighbouring cameras, about what they look at, that leaves a side unseen [deg]."""
@@ -45,6 +47,11 @@ def doubts(told: Attempt) -> list[str]:
         found.append(
             f"it takes a lens that nobody has (focal length {told.focal:g} × the longer side, "
             f"k1 {told.bent:g})"
+        )
+    if told.filled < FILLED:
+        found.append(
+            f"masks agree with one another to {told.filled:.0%} only: the object was moved or "
+            "turned over between the pictures"
         )
     if told.others and told.others[0] > RIVAL * told.registered:
         groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])

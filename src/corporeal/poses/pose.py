@@ -1,4 +1,4 @@
-"""Find where photographs were taken from, in one or two attempts, or say why that cannot be."""
+"""Find where photographs were taken from, in up to three attempts, or say why that cannot be."""
 
 import shutil
 from collections.abc import Callable
@@ -7,9 +7,10 @@ from pathlib import Path
 
 from corporeal import store
 from corporeal.errors import BadFileError
-from corporeal.formats.photographs import read_photographs
+from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
-from corporeal.poses.attempt import Attempt, attempt, require
+from corporeal.poses.attempt import Attempt, Way, attempt, require
+from corporeal.poses.by_masks import checked_by_masks
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
 from corporeal.poses.gather import Gathered, gather
@@ -20,11 +21,18 @@ Progress = Callable[[float, str], None]
 
 POSES = "poses"
 """Folder of a reconstruction in which they are kept."""
+SAID: dict[Way, str] = {
+    "plain": "",
+    "masked": ", from points on objects alone",
+    "thorough": ", at the thorough attempt",
+}
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
+METHOD = 2
+"""Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
-FIRST = 0.6
-"""The same, after the first attempt."""
+UNTIL: dict[Way, float] = {"plain": 0.5, "masked": 0.7, "thorough": 1.0}
+"""The same, after each attempt, in their order."""
 
 
 @dataclass(frozen=True)
@@ -61,7 +69,7 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
 
     """
     require()
-    begun = {"source": store.digest(source)}
+    begun = {"source": store.digest(source), "method": METHOD}
     if not (folder / BEGUN).exists() or store.read_json(folder / BEGUN) != begun:
         shutil.rmtree(folder, ignore_errors=True)
         store.write_json(folder / BEGUN, begun)
@@ -78,12 +86,15 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
 def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     said, gathered = _gathered(source, folder, _within(progress, 0.0, GATHERED))
     tried: list[Attempt] = []
-    for thorough in (False, True):
-        out = folder / ("second" if thorough else "first")
-        share = (FIRST, 1.0) if thorough else (GATHERED, FIRST)
-        tried.append(attempt(folder, out, gathered, thorough, _within(progress, *share)))
+    before = GATHERED
+    for way, until in UNTIL.items():
+        share, before = (before, until), until
+        if way == "masked" and not (folder / MASKS[0]).is_dir():
+            continue
+        told = attempt(folder, folder / way, gathered, way, _within(progress, *share))
+        tried.append(checked_by_masks(told, folder, folder / way / "sparse" / "0"))
         if not doubts(tried[-1]):
-            _accept(out, folder)
+            _accept(folder / way, folder)
             return _told(folder, gathered, tuple(said), tuple(tried))
     best = max(tried, key=lambda told: told.registered)
     why = f"where the pictures were taken from cannot be found: {'; '.join(doubts(best))}."
@@ -108,8 +119,8 @@ def _accept(out: Path, folder: Path) -> None:
     """Put the model where it is looked for, and drop what it was made of."""
     shutil.rmtree(folder / "sparse", ignore_errors=True)
     shutil.move(out / "sparse", folder / "sparse")
-    for name in ("first", "second"):
-        shutil.rmtree(folder / name, ignore_errors=True)
+    for way in UNTIL:
+        shutil.rmtree(folder / way, ignore_errors=True)
 
 
 def _told(
@@ -118,7 +129,7 @@ def _told(
     last = tried[-1]
     statement = (
         f"Where {last.registered} of {last.pictures} photographs were taken from was found by "
-        f"COLMAP{', at the second attempt' if last.thorough else ''}: {last.points:,} points, "
+        f"COLMAP{SAID[last.way]}: {last.points:,} points, "
         f"{last.reprojection:.2f} px reprojection error, focal length {last.focal:.2f} × the "
         "longer side."
     )
@@ -127,6 +138,12 @@ def _told(
         warnings.append(
             f"{len(last.left_out)} of {last.pictures} photographs do not fit the others and were "
             f"left out: {names_of(last.left_out)}."
+        )
+    if last.astray:
+        warnings.append(
+            f"{len(last.astray)} photographs fit the others by what is around the object, but not "
+            f"by their masks, and were left out: {names_of(last.astray)}. The floor's pattern "
+            "repeats, or the mask shows something else."
         )
     seen = read_photographs(folder, longest=64)
     cameras_figure(seen, folder / FIGURE)

@@ -5,6 +5,7 @@ nothing and run in threads (Embree and the compiled loops release Python's lock)
 throughout; a filmic curve and sRGB at the end.
 """
 
+from collections.abc import Sequence
 from concurrent.futures import ThreadPoolExecutor
 from copy import copy
 from dataclasses import dataclass
@@ -21,8 +22,10 @@ from corporeal.render import kernels, kernels_light
 from corporeal.render.camera import Aim, axes
 from corporeal.render.kernels import NOTHING, Samples
 from corporeal.render.kernels_light import CHANNELS, GLOSSY, SHARP, Lamps
+from corporeal.render.liquid_surface import LiquidSurface
 from corporeal.render.look import (
     Look,
+    grown,
     pack,
     painted,
     positions,
@@ -102,6 +105,30 @@ class Stage:
         there.normals = np.ascontiguousarray(normals, dtype=np.float32)
         if not np.array_equal(there.vertices, self.vertices):
             there.scene = there._built()
+        return there
+
+    def with_liquids(
+        self, gone: np.ndarray, liquids: Sequence[tuple[LiquidSurface, int]]
+    ) -> "Stage":
+        """Return the stage with surfaces of liquids in place of some of its triangles.
+
+        Args:
+            gone: Of each triangle (T,), whether it is a liquid's at rest.
+            liquids: New surfaces, behind all that stay, each with its finish.
+
+        """
+        there, first, look = copy(self), len(self.vertices), self.look
+        vertices, normals, triangles, finish = [self.vertices], [self.normals], [], []
+        for surface, number in liquids:
+            triangles.append(surface.triangles.astype(np.int32) + first)
+            finish.append(np.full(len(surface.triangles), number, np.int32))
+            vertices.append((surface.vertices - self.origin).astype(np.float32))
+            normals.append(surface.normals.astype(np.float32))
+            first += len(surface.vertices)
+        there.look = grown(look, ~gone, np.concatenate(triangles), np.concatenate(finish), first)
+        there.vertices = np.ascontiguousarray(np.concatenate(vertices))
+        there.normals = np.ascontiguousarray(np.concatenate(normals))
+        there.scene = there._built()
         return there
 
     def painted(self, colours: np.ndarray, light: Light) -> "Stage":

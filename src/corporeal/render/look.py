@@ -73,6 +73,30 @@ def painted(look: Look, shades: np.ndarray, shade_of_triangle: np.ndarray) -> Lo
     )
 
 
+def grown(
+    look: Look, kept: np.ndarray, triangles: np.ndarray, finish: np.ndarray, vertices: int
+) -> Look:
+    """Return some of the triangles and new ones behind them, which are smooth and plain.
+
+    Args:
+        look: Before.
+        kept: Which of its triangles stay (T,).
+        triangles: New ones (N, 3), int32.
+        finish: Of each new one (N,), int32.
+        vertices: How many there are then, of which the first are those before.
+
+    """
+    more, new = vertices - len(look.uv), len(triangles)
+    return look._replace(
+        triangles=np.ascontiguousarray(np.concatenate([look.triangles[kept], triangles])),
+        uv=np.concatenate([look.uv, np.zeros((more, 2), np.float32)]),
+        colours=np.concatenate([look.colours, np.ones((more, 4), np.float32)]),
+        finish_of_triangle=np.concatenate([look.finish_of_triangle[kept], finish]),
+        smooth=np.concatenate([look.smooth[kept], np.ones(new, np.bool_)]),
+        density=np.concatenate([look.density[kept], np.zeros(new, np.float32)]),
+    )
+
+
 def sees_through(look: Look) -> bool:
     """Whether any ray may pass a surface that it meets."""
     f = look.finish

@@ -9,6 +9,7 @@ from jaxtyping import Float, Int
 from corporeal.errors import check_range
 from corporeal.geometry.arrangement import underside
 from corporeal.geometry.contact_points import contact_points
+from corporeal.geometry.contents import with_contents
 from corporeal.geometry.foliage import in_leaves, planted
 from corporeal.geometry.make import Make, compose, how_filled, recipe
 from corporeal.geometry.mass_shares import keep_apart, weigh
@@ -24,6 +25,7 @@ from corporeal.mpm.physics.prescribed import start_velocity
 from corporeal.treatment.object_masses import as_heavy_as_stated, implausible_masses
 from corporeal.treatment.plan import Plan, Quality
 from corporeal.treatment.resolution import Accuracy, Bodies, resolve
+from corporeal.treatment.vessels import in_vessels, pour_out, wetted
 from corporeal.types import Material, MaterialField, Particles, Parts, Scene, Treatment
 
 
@@ -66,6 +68,9 @@ def fill(
         quality: What is bought instead of what ``config.detail`` buys; None: that.
 
     """
+    # What moves in vessels is an object of its own.
+    contents = pour_out(scene, parts, field, config.seed)
+    scene, parts, field = with_contents(scene, parts, field, contents).all
     field = in_scene(field, scale_of_part(scene, parts))
     scene, drawn = drawn_into_ground(scene, parts, field)
     anatomies = examine(scene, parts, config.seed)
@@ -81,10 +86,12 @@ def fill(
     bodies, chosen = resolve(bodies, asked)
     refuse_buried(scene, anatomies, chosen.cell)
     # No point of one object in another; volumes and densities that add up to the masses.
-    packings = keep_apart(packed(bodies, chosen, config.seed), chosen.cell)
-    particles = gather(parts, bodies, chosen, packings)
+    together = in_vessels(parts, field)
+    packings = keep_apart(packed(bodies, chosen, config.seed), chosen.cell, together)
+    particles = wetted(gather(parts, bodies, chosen, packings), bodies, config.seed)
     doubted = implausible_masses(scene, anatomies, particles.mass_real)
-    particles = replace(particles, warnings=(*particles.warnings, *drawn, *heavy, *doubted))
+    told = (*particles.warnings, *drawn, *heavy, *doubted)
+    particles = replace(particles, warnings=told, contents=contents)
     return planted(scene, particles, anatomies, field, tissue)
 
 

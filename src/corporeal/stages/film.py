@@ -16,22 +16,25 @@ from pathlib import Path
 from typing import Literal
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from PIL import Image
+from scipy.spatial import KDTree
 
 from corporeal.errors import UserError, check_range
 from corporeal.geometry.srgb import linear
+from corporeal.mpm.laws import MENU
 from corporeal.render import colours, key, video
 from corporeal.render.camera import Aim, camera_of
 from corporeal.render.camera_track import Reel, Shot, first_contact, track
 from corporeal.render.embree import Stage, render
 from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, row_of, shades, si
+from corporeal.render.liquid_surface import LiquidSurface, surface_of
 from corporeal.render.pace import between, instants, is_slow
 from corporeal.render.skin import Skin, bind
 from corporeal.splats import raster
 from corporeal.store import writing
 from corporeal.trajectory.moving_gaussians import MovingGaussians, granular, moving_gaussians
-from corporeal.trajectory.played import Played
+from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
     Film,
     Frame,
@@ -137,7 +140,8 @@ def film(
     fps = max(round(scene.fps * config.speed), 1)
     credit = "; ".join(dict.fromkeys(o.credit for o in scene.objects if o.credit))
     paint = _paint(config.colour_by, played)
-    troupe = _Troupe(Stage(scene), skin, _puppet(config, played), paint)
+    liquids = liquids_of(played.prepared)
+    troupe = _Troupe(Stage(scene), skin, _puppet(config, played), paint, liquids)
     about = None if reel.contact is None else reel.contact.time
     places = instants(trajectory.time, config.slow, about)
     times = []
@@ -235,6 +239,49 @@ def _near(boxes: np.ndarray) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class Liquids:
+    """What of a scene is liquid, and has a surface of its own in every picture."""
+
+    of_triangle: Bool[np.ndarray, " T"]
+    """Which triangles are its surface at the start."""
+    bodies: tuple[tuple[Int[np.ndarray, " N"], int], ...]
+    """Particles of each liquid part, and its finish."""
+    spacing: float
+    """Between particles [m]."""
+
+    def at(self, position: Float[np.ndarray, "P 3"]) -> list[tuple[LiquidSurface, int]]:
+        """Return the surfaces where particles are at some places [m], each with its finish."""
+        return [
+            (surface_of(position[mine].astype(np.float64), self.spacing), finish)
+            for mine, finish in self.bodies
+        ]
+
+    def nearest(
+        self, position: np.ndarray, surfaces: list[tuple[LiquidSurface, int]]
+    ) -> Int[np.ndarray, " N"]:
+        """Particle next to each triangle of those surfaces."""
+        found = [np.zeros(0, np.int64)]
+        for (surface, _), (mine, _) in zip(surfaces, self.bodies, strict=True):
+            corner = surface.vertices[surface.triangles[:, 0]]
+            if len(corner):
+                found.append(mine[KDTree(np.nan_to_num(position[mine])).query(corner)[1]])
+        return np.concatenate(found)
+
+
+def liquids_of(prepared: Prepared) -> Liquids:
+    """Find the liquid parts of a scene."""
+    scene, particles = prepared.scene, prepared.particles
+    part = prepared.parts.part_of_point
+    counts = [len(s.triangles) for s in scene.surfaces]
+    finish = np.repeat([s.finish for s in scene.surfaces], counts)
+    wet = [k for k, m in enumerate(prepared.field.materials) if MENU[m.law].liquid]
+    rigid = [t.kind == "rigid" for t in particles.treatments]
+    wet = [k for k in wet if not rigid[k] and (part == k).any()]
+    bodies = [(np.flatnonzero(particles.part == k), int(finish[part == k][0])) for k in wet]
+    return Liquids(np.isin(part, wet), tuple(bodies), 0.5 * particles.cell)
+
+
+@dataclass(frozen=True)
 class _Scenery:
     """What is to be seen at one instant."""
 
@@ -323,14 +370,21 @@ class _Troupe:
     skin: Skin
     puppet: MovingGaussians | None
     paint: _Paint | None
+    liquids: Liquids
 
     def at(self, number: int, frame: Frame) -> _Scenery:
         stage = self.stage.posed(*self.skin.pose(frame))
         colour = None if self.paint is None else self.paint.at(number)
         if self.puppet is not None:
             return _Scenery(stage.shadows(), self.puppet.at(frame, colour), frame.time)
+        nearest = self.skin.near[self.stage.look.triangles[:, 0], 0]
+        if self.liquids.bodies:
+            surfaces = self.liquids.at(frame.position)
+            stage = stage.with_liquids(self.liquids.of_triangle, surfaces)
+            nearest = np.concatenate(
+                [nearest[~self.liquids.of_triangle], self.liquids.nearest(frame.position, surfaces)]
+            )
         if colour is not None:
-            nearest = self.skin.near[self.stage.look.triangles[:, 0], 0]
             stage = stage.painted(linear(colour[nearest]), PAPER)
         return _Scenery(stage, None, frame.time)
 

@@ -13,7 +13,17 @@ from scipy.spatial import KDTree
 
 from corporeal.geometry.arrangement import underside
 from corporeal.mpm.physics.distance import pair_gaps
-from corporeal.mpm.problem import FLOOR, NO_FACES, Body, Faces, Joint, Plane, Problem, Tether
+from corporeal.mpm.problem import (
+    FLOOR,
+    NO_FACES,
+    Body,
+    Faces,
+    Joint,
+    Plane,
+    Problem,
+    Tether,
+    WettedSurface,
+)
 from corporeal.treatment.filled import acting
 from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment, Wall
 
@@ -219,6 +229,7 @@ def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Pie
         law=column.pop("law").astype(np.int64),
         rigid=piece.rigid,
         surface=particles.surface[piece.surface].astype(float),
+        wetted=wetted_of(particles, piece),
         push=obj.push,
         wind=obj.wind,
         faces=faces_of(particles, mine) if obj.wind is not None else NO_FACES,
@@ -226,6 +237,16 @@ def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Pie
         path=obj.path,
         pivot=STILL if obj.path is None else underside(scene, piece.object),
         **column,
+    )
+
+
+def wetted_of(particles: Particles, piece: Piece) -> WettedSurface | None:
+    """Give where liquids touch an object that is rigid all through; None: there are none."""
+    own = particles.object_of_wetted == piece.object
+    if not piece.rigid or not own.any():
+        return None
+    return WettedSurface(
+        particles.wetted[own].astype(float), particles.wetted_normal[own].astype(float)
     )
 
 

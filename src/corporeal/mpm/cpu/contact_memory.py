@@ -1,8 +1,8 @@
-"""Memory that the native contact piece works in, and what it is told of the problem."""
+"""Memory that the native contact piece works in, and the parameters it takes from the problem."""
 
 import numpy as np
 
-from corporeal.mpm.constants import WALL_REACH
+from corporeal.mpm.constants import WALL_REACH, WETTED_REACH
 from corporeal.mpm.cpu import layout
 from corporeal.mpm.cpu.layout import BOX, CENTRE, PAIR, RADIUS
 from corporeal.mpm.ledger import Ledger
@@ -54,7 +54,8 @@ def rigid_grid(
     if body.path is not None:
         # It never meets a plane, neither on nodes nor on points of its own.
         surface = np.zeros((1, 3))
-    points, clumps = _clumped(points, cell)
+    points, clumps = _clumped(points, 4.0 * cell)
+    wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
     state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
     arrays = {
         "node": np.zeros((across**3, 64, 8), np.float32),
@@ -65,25 +66,42 @@ def rigid_grid(
         "point": points,
         "clump": clumps,
         "surface": np.ascontiguousarray(surface),
+        "wetted": wetted,
+        "patch": patches,
         "rigid": state,
     }
     point(record, **arrays)
     record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
-    record["clumps"] = len(clumps)
+    record["clumps"], record["patches"] = len(clumps), len(patches)
     record["spacing"] = rigid.spacing(body.surface)
     record["thin"] = rigid.thinness(body.surface, cell)
     return arrays
 
 
-def _clumped(points: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
-    """Sort a rigid body's particles into cubes of 4 cells, which are passed over where all is far.
+def _wetted(body: Body, centre: np.ndarray, cell: float) -> tuple[np.ndarray, np.ndarray]:
+    """Give points that liquids touch and their normals, in the body's frame, and patches of them.
+
+    Patches are two cells wide: a liquid looks no farther.
+    """
+    if body.wetted is None:
+        return np.zeros((0, 6)), np.zeros((0, 6))
+    rows = np.concatenate([body.wetted.point - centre, body.wetted.normal], axis=1)
+    return _clumped(rows, WETTED_REACH * cell)
+
+
+def _clumped(points: np.ndarray, width: float) -> tuple[np.ndarray, np.ndarray]:
+    """Sort a rigid body's points into cubes, which are passed over where all is far.
+
+    Args:
+        points: Places first, in the body's frame [m].
+        width: Of a cube [m].
 
     Returns:
-        The particles, and for each cube the first and last of them, its middle and its radius [m].
+        The points, and for each cube the first and last of them, its middle and its radius [m].
 
     """
-    cube = np.floor(points[:, :3] / (4.0 * cell)).astype(np.int64)
+    cube = np.floor(points[:, :3] / width).astype(np.int64)
     order = np.lexsort(cube.T)
     points, cube = np.ascontiguousarray(points[order]), cube[order]
     starts = np.flatnonzero(np.any(np.diff(cube, axis=0, prepend=cube[:1] - 1) != 0, axis=1))

@@ -252,7 +252,7 @@ class CpuEngine(Interaction):
         record["origin"], record["dim"] = window.origin, window.dim
         record["blocks"], record["pool"] = len(window.block), len(window.where)
         record["flows"], record["relaxes"] = self.material[f].flows, len(window.branch) > 0
-        record["swells"] = self.material[f].swells
+        record["swells"], record["pours"] = self.material[f].swells, self.material[f].pours
         # One lane of a node says how high mass lies over a floor.
         record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
 

@@ -86,7 +86,7 @@ LIGHT, HEAVY, NEXT = 54, 55, 64
 """First columns of a rigid state, after its mass: centre (3), rotation (9), inverse inertia at rest
 (9), velocity (3), angular momentum (3), inverse inertia now (9), spin (3), radius, kick (3); while
 a frame holds soft nodes its own mass and centre (4); lowest and highest corner of the box around
-its particles in its own frame (6). Then 1/M in contact (0: it moves as told), and of what does its
+its particles in its own frame (6). Then 1/M in contact (0: prescribed motion), and of what does its
 inertia at rest (9) and its rotation at the end of the step (9)."""
 RIGID_STATE = 80
 """Columns with room to spare."""
@@ -171,6 +171,8 @@ FIELD = Record(
     ("double *", "point"),  # rigid: [points][5] place in the body's frame, mass, volume
     ("double *", "rigid"),  # rigid: its state
     ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
+    ("double *", "wetted"),  # rigid: [..][6] points that liquids touch, and their normals
+    ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
     ("double", "spacing"),  # rigid: of its surface points
     ("double", "mass stiffening"),  # stiffening: how much faster waves run with Maxwell branches
@@ -178,7 +180,8 @@ FIELD = Record(
     ("int", "blocks pool rigids points surfaces pushed swells flows relaxes"),
     ("int", "floor"),  # the only plane that the window reaches, or -1
     ("float[3]", "level"),  # its normal, or 0
-    ("int", "thin spare"),  # thin: of a rigid body, see physics/rigid.py thinness
+    ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
+    ("int", "patches spare"),
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )
 BLOW = Record(  # a body in the wind: see wind_records.py
@@ -279,6 +282,7 @@ LEAN = (
 TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - c
     "Touch",
     ("int", "meet a c fa fc active"),
+    ("int", "face spare"),  # which face of a rigid body a liquid meets
     ("double[3]", "x normal"),
     ("double", "gap target inverse mu"),
     ("double[3]", "J before"),

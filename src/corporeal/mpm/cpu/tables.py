@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float, Int
 
+from corporeal.mpm import laws
 from corporeal.mpm.constants import BRANCHES
 from corporeal.mpm.cpu.layout import (
     BOND,
@@ -51,6 +52,8 @@ class Materials:
     """Whether any of it has a return map."""
     relaxes: bool
     """Whether any of it has Maxwell branches."""
+    pours: bool
+    """Whether any of it is a liquid."""
     stiffening: float
     """How much faster waves run with what branches resist than without, at most [-]."""
 
@@ -71,7 +74,8 @@ class Materials:
         ):
             table[:, first : first + BRANCHES] = column
         kinds = (bool(s.swells.all()), bool(s.flows.any()), bool(s.relaxes.any()))
-        return cls(table, s.body, *kinds, float(s.stiffening.max()))
+        pours = bool(np.isin(s.law, laws.LIQUID).any() and not s.rigid.all())
+        return cls(table, s.body, *kinds, pours, float(s.stiffening.max()))
 
 
 def particle_rows(

@@ -11,8 +11,9 @@ from corporeal.mpm.constants import (
     SHOWN_AROUND,
     TINY,
     VAST,
+    WALL_REACH,
 )
-from corporeal.mpm.cuda.contact_nodes import height_of
+from corporeal.mpm.cuda.contact_nodes import height_of, wets
 from corporeal.mpm.cuda.grid import block_of, find, node_of
 from corporeal.mpm.cuda.layout import (
     FULL,
@@ -27,12 +28,14 @@ from corporeal.mpm.cuda.layout import (
 )
 from corporeal.mpm.formulas.one_lane import (
     gap_between,
+    gap_of_liquid,
     gap_to_plane,
     gap_to_surface,
     reach_of,
     slopes,
     splines,
     surface_begins,
+    wetted_face,
 )
 
 wp.set_module_options(formulas.options(max_unroll=0))
@@ -246,6 +249,23 @@ def begins(r: Rigid, s: Sheet, b: int, x: wp.vec3d, n: wp.vec3):
 
 
 @wp.func
+def face_of(r: Rigid, s: Sheet, b: int, x: wp.vec3d, mean: wp.vec3, number: int):
+    """Outward normal of a rigid body's face and the height of a node over it [cells].
+
+    Seen from the mean place of the liquid at the node.
+    """
+    R = wp.transpose(r.turn[b])
+    y = R * (x - r.centre[b])
+    place = y + R * wp.vec3d(mean)
+    face = wetted_face(r.wetted, r.wetted_first[b], r.wetted_count[b], y, place, s.dx, number)
+    n = r.turn[b] * wp.vec3d(face[0], face[1], face[2])
+    height = VAST
+    if face[3] < wp.float64(VAST):
+        height = float(face[3] / s.dx)
+    return wp.vec4(float(n[0]), float(n[1]), float(n[2]), height)
+
+
+@wp.func
 def gap_of(c: Contacts, r: Rigid, s: Sheet, t: int, xa: wp.float32, xc: wp.float32):
     """Open distance of two fields along n [cells], of which one may be a thin rigid body."""
     a = c.fa[t]
@@ -276,6 +296,26 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             h = height_of(s, -1 - other, c.at[c.meet[t]])
             xi = wp.dot(c.mean[a], n) / (g.node[c.slot[a]][0] * s.cell)
             c.gap[t] = gap_to_plane(xi, h) * s.cell
+        elif wets(r, c.fa[t], c.fc[t]) > 0:
+            # The liquid's mean place, and a face of the body that it has there.
+            which = wets(r, c.fa[t], c.fc[t])
+            liquid = a
+            body = c.fc[t]
+            way = float(-1.0)
+            if which == 1:
+                liquid = other
+                body = c.fa[t]
+                way = 1.0
+            mean = c.mean[liquid] / g.node[c.slot[liquid]][0]
+            face = face_of(r, s, body, c.point[t], mean, c.facet[t])
+            if face[3] < VAST:
+                out = wp.vec3(face[0], face[1], face[2])
+                c.normal[t] = way * out
+                gap = gap_of_liquid(-wp.dot(mean, out) / s.cell, face[3])
+                if face[3] > WALL_REACH:
+                    c.slips[t] = 1
+                if gap < VAST:
+                    c.gap[t] = gap * s.cell
         else:
             n = smoothed(g, c, t)
             c.normal[t] = n

@@ -138,7 +138,8 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
     size = wp.length(slide)
     if size > SMALLEST_SLIP:
         rub = rub + slide / softness_of(c, r, s, t, slide / size)
-    given = within_cone(c.friction[c.fa[t], c.fc[t]], new, n, rub)
+    grip = c.friction[c.fa[t], c.fc[t]] * D(1 - c.slips[t])
+    given = within_cone(grip, new, n, rub)
     change = given - J
     c.impulse[t] = given
     c.turn[t] = -wp.dot(change, given - c.last_impulse[t]) * soft
@@ -443,7 +444,7 @@ def hand_back(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
 
 @wp.func
 def react(c: Contacts, r: Rigid, s: Sheet, t: int, field: int, J: wp.vec3d):
-    """Book what a contact's impulse on a body that moves as told takes of its mover."""
+    """Book what a contact's impulse on a body that has a prescribed motion takes of its mover."""
     if r.path_count[field] > 0:
         work = wp.dot(J, speed_at(r, field, c.point[t]))
         wp.atomic_add(s.loss, PUSHING, t % LANES, -work)

@@ -4,7 +4,7 @@ Same rules as ``reference.contact.find``.
 """
 
 from corporeal.mpm import constants
-from corporeal.mpm.constants import FIELDS_AT_NODE, VAST, WALL_REACH
+from corporeal.mpm.constants import FIELDS_AT_NODE, VAST, WALL_REACH, WETTED_FACES
 from corporeal.mpm.cuda.layout import (
     BLOCKS,
     FULL,
@@ -77,6 +77,8 @@ def add_touch(c: Contacts, t: int, k: int, a: int, other: int):
     c.c[t] = other
     c.active[t] = 0
     c.gap[t] = VAST
+    c.facet[t] = 0
+    c.slips[t] = 0
     c.impulse[t] = wp.vec3d(D(0.0))
     c.last_impulse[t] = wp.vec3d(D(0.0))
     for q in range(3):
@@ -86,11 +88,32 @@ def add_touch(c: Contacts, t: int, k: int, a: int, other: int):
 
 
 @wp.func
+def wets(r: Rigid, a: int, b: int):
+    """Whether a liquid meets a rigid body that says where liquids touch it: 1 or 2, which is it."""
+    if r.wetted_count[a] > 0 and r.pours[b] == 1:
+        return 1
+    if r.wetted_count[b] > 0 and r.pours[a] == 1:
+        return 2
+    return 0
+
+
+@wp.func
+def faces_of(r: Rigid, a: int, b: int):
+    """How many faces two fields may meet in."""
+    if wets(r, a, b) > 0:
+        return WETTED_FACES
+    return 1
+
+
+@wp.func
 def add_touches(c: Contacts, s: Sheet, r: Rigid, k: int, room: int):
     """Enter all pairs of a meeting, and its planes."""
     n = c.number[k]
     total = n * (n - 1) // 2
     for a in range(n):
+        f = c.field[k * FIELDS_AT_NODE + a]
+        for b in range(a + 1, n):
+            total += faces_of(r, f, c.field[k * FIELDS_AT_NODE + b]) - 1
         total += walls_near(s, r, c.field[k * FIELDS_AT_NODE + a], c.at[k])
     t = wp.atomic_add(s.flag, TOUCHES, total)
     c.first[k] = t
@@ -105,11 +128,13 @@ def add_touches(c: Contacts, s: Sheet, r: Rigid, k: int, room: int):
         for b in range(a + 1, n):
             if c.apart[f, c.field[k * FIELDS_AT_NODE + b]] == 1:
                 continue
-            add_touch(c, t, k, k * FIELDS_AT_NODE + a, k * FIELDS_AT_NODE + b)
-            c.point[t] = x
-            c.fa[t] = f
-            c.fc[t] = c.field[k * FIELDS_AT_NODE + b]
-            t += 1
+            for facet in range(faces_of(r, f, c.field[k * FIELDS_AT_NODE + b])):
+                add_touch(c, t, k, k * FIELDS_AT_NODE + a, k * FIELDS_AT_NODE + b)
+                c.point[t] = x
+                c.fa[t] = f
+                c.fc[t] = c.field[k * FIELDS_AT_NODE + b]
+                c.facet[t] = facet
+                t += 1
         for w in range(s.planes):
             if r.pointed[f] == 0 and height_of(s, w, c.at[k]) <= WALL_REACH:
                 add_touch(c, t, k, k * FIELDS_AT_NODE + a, -1 - w)

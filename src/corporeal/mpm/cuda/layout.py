@@ -245,7 +245,7 @@ class Rigid:
     """Rows of each body's path; 0: it moves freely."""
     path_arm: wp.array(dtype=wp.vec3d)
     heavy: wp.array(dtype=wp.mat33d)
-    """Inertia at the start of what moves as told [kg m²] …"""
+    """Inertia at the start of what has a prescribed motion [kg m²] …"""
     heading: wp.array(dtype=wp.mat33d)
     """… and how it is turned when the step ends."""
     centre: wp.array(dtype=wp.vec3d)
@@ -284,6 +284,14 @@ class Rigid:
     """Distance of its surface points [m]."""
     thin: wp.array(dtype=wp.int32)
     """See ``physics.rigid.thinness``; 0 for what deforms."""
+    wetted: wp.array(dtype=wp.vec3d)
+    """Points that liquids touch, each followed by its normal."""
+    wetted_first: wp.array(dtype=wp.int32)
+    """Of each body: its first such point …"""
+    wetted_count: wp.array(dtype=wp.int32)
+    """… and how many it has."""
+    pours: wp.array(dtype=wp.int32)
+    """1: the body is liquid."""
 
 
 @wp.struct
@@ -422,6 +430,10 @@ class Contacts:
     fa: wp.array(dtype=wp.int32)
     fc: wp.array(dtype=wp.int32)
     """Fields; B + plane for a plane."""
+    facet: wp.array(dtype=wp.int32)
+    """Which face of a rigid body a liquid meets."""
+    slips: wp.array(dtype=wp.int32)
+    """1: there is no friction in it."""
     point: wp.array(dtype=wp.vec3d)
     active: wp.array(dtype=wp.int32)
     """0: not in this step; ``WAITING`` or ``SWEPT_NOW``."""

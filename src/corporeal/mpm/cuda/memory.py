@@ -4,6 +4,7 @@ from typing import Any
 
 import numpy as np
 
+from corporeal.mpm import laws
 from corporeal.mpm.constants import FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP
 from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.layout import Contacts, Grid, Particles, Rigid, Sheet, wp
@@ -95,13 +96,13 @@ class Memory:
         inverse = np.linalg.inv(matter.inertia)
         r = Rigid()
         r.stiff = self.put(stiff, wp.int32)
-        told = np.array([b.path is not None for b in problem.bodies])
+        prescribed = np.array([b.path is not None for b in problem.bodies])
         surfaces = [len(b.surface) > 0 for b in problem.bodies]
-        r.pointed = self.put(stiff & (told | surfaces), wp.int32)
-        r.light = self.put(np.where(told, 0.0, 1.0 / matter.total), wp.float64)
+        r.pointed = self.put(stiff & (prescribed | surfaces), wp.int32)
+        r.light = self.put(np.where(prescribed, 0.0, 1.0 / matter.total), wp.float64)
         r.centre = self.put(matter.centre, wp.vec3d)
         r.turn = self.put(np.tile(np.eye(3), (len(stiff), 1, 1)), wp.mat33d)
-        acting = np.where(told[:, None, None], 0.0, inverse)
+        acting = np.where(prescribed[:, None, None], 0.0, inverse)
         r.rest, r.inertia = self.put(acting, wp.mat33d), self.put(acting, wp.mat33d)
         r.speed = self.put(start.speed, wp.vec3d)
         r.moment = self.put(start.spin_momentum, wp.vec3d)
@@ -113,7 +114,8 @@ class Memory:
         r.last_moment = self.zeros(len(stiff), wp.vec3d)
         r.busy, r.lost = self.zeros(len(stiff), wp.int32), self.zeros(len(stiff), wp.int32)
         self._rigid_particles(r, problem, matter, np.flatnonzero(stiff[matter.body]))
-        self._surfaces(r, matter, np.flatnonzero(stiff & ~told), problem.cell)
+        self._surfaces(r, matter, np.flatnonzero(stiff & ~prescribed), problem.cell)
+        self._wetted(r, problem, matter, stiff)
         self._paths(r, problem, matter)
         return r
 
@@ -158,6 +160,21 @@ class Memory:
         r.first = self.put(np.cumsum(count) - count, wp.int32)
         r.points, r.thin = self.put(count, wp.int32), self.put(thin, wp.int32)
 
+    def _wetted(self, r: Struct, problem: Problem, matter: Matter, stiff: np.ndarray) -> None:
+        rows, count = [np.zeros((0, 3))], np.zeros(len(stiff), int)
+        for b in np.flatnonzero(stiff):
+            wetted = problem.bodies[b].wetted
+            if wetted is not None:
+                both = np.stack([wetted.point - matter.centre[b], wetted.normal], axis=1)
+                rows.append(both.reshape(-1, 3))
+                count[b] = len(both)
+        r.wetted = self.put(np.concatenate(rows), wp.vec3d)
+        r.wetted_first = self.put(np.cumsum(count) - count, wp.int32)
+        r.wetted_count = self.put(count, wp.int32)
+        liquid = matter.body[np.isin(matter.law, laws.LIQUID)]
+        pours = np.isin(np.arange(len(stiff)), liquid) & ~stiff
+        r.pours = self.put(pours, wp.int32)
+
     # ------------------------------------------------------------ contacts
 
     def contacts(self, problem: Problem, room: int) -> Struct:
@@ -171,7 +188,7 @@ class Memory:
         c.field, c.slot = self.zeros(entries, wp.int32), self.zeros(entries, wp.int32)
         c.mean, c.outward = self.zeros(entries, wp.vec3), self.zeros(entries, wp.vec3)
         c.velocity, c.light = self.zeros(entries, wp.vec3d), self.zeros(entries, wp.float64)
-        for name in ("meet", "a", "c", "fa", "fc", "active"):
+        for name in ("meet", "a", "c", "fa", "fc", "active", "facet", "slips"):
             setattr(c, name, self.zeros(touches, wp.int32))
         c.candidate = self.zeros(touches, wp.mat33)
         c.far_a, c.far_c = self.zeros(3 * touches, wp.float32), self.zeros(3 * touches, wp.float32)

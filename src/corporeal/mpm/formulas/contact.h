@@ -39,6 +39,12 @@ template <class R> struct Face {
   }
   // The same to a plane, h below the node.
   CUDA_CALLABLE static inline R gap_to_plane(R a, R h) { return -mean(-h) - a - touching(h); }
+  // The same to a wall of a liquid that fills the half space above it as far as the node tells.
+  CUDA_CALLABLE static inline R gap_of_liquid(R a, R h) {
+    const R off = mean(h) - a;
+    const bool like = off < R(LIKE_HALF_SPACE) && off > R(-LIKE_HALF_SPACE);
+    return h > R(WALL_REACH) && (h > R(HELD_BY_WALL) || !like) ? R(VAST) : gap_to_plane(a, h);
+  }
   // The same to a surface; what is deep inside of a field does not feel it.
   CUDA_CALLABLE static inline R gap_to_surface(R a, R h) {
     return h > R(WALL_REACH) ? R(VAST) : gap_to_plane(a, h);
@@ -59,6 +65,50 @@ struct Surface {
       if (aside < nearest) nearest = aside, there = along;
     }
     return least < VAST ? least : there;
+  }
+};
+// Where the surface of a rigid body lies for a liquid: twin of physics/contact.py wetted_faces. Rows of
+// six: point and outward normal; X is the liquid's place, x the node.
+struct Wetted {
+  double normal[3], height;
+  static CUDA_CALLABLE inline double dot(const double *a, const double *b) {
+    return a[0] * b[0] + a[1] * b[1] + a[2] * b[2];
+  }
+  static CUDA_CALLABLE inline double square(const double *p, const double *X) {
+    const double a = p[0] - X[0], b = p[1] - X[1], c = p[2] - X[2];
+    return a * a + b * b + c * c;
+  }
+  // Whether a row may belong to one more face than those known: it looks another way, at the liquid.
+  static CUDA_CALLABLE inline bool other(const double *p, const double *X, const Wetted *known, int count) {
+    for (int f = 0; f < count; f++)
+      if (dot(p + 3, known[f].normal) > WETTED_TURN) return false;
+    return !count || dot(X, p + 3) > dot(p, p + 3);
+  }
+  // Find the faces around X, the nearest first; how many.
+  static CUDA_CALLABLE inline int faces(const double *rows, int count, const double *x, const double *X,
+                                        double dx, Wetted *face) {
+    for (int f = 0; f < WETTED_FACES; f++) {
+      double near = WETTED_REACH * dx * WETTED_REACH * dx;
+      const double *first = 0;
+      for (int i = 0; i < count; i++) {
+        const double d = square(rows + 6 * i, X);
+        if (d < near && other(rows + 6 * i, X, face, f)) near = d, first = rows + 6 * i;
+      }
+      if (!first) return f;
+      const double root = sqrt(near) + WETTED_PATCH * dx, far = root * root;
+      double n[3] = {0, 0, 0}, above = 0, weight = 0;
+      for (int i = 0; i < count; i++) {
+        const double *p = rows + 6 * i, d = square(p, X);
+        if (d > far || dot(p + 3, first + 3) < WETTED_TURN || !other(p, X, face, f)) continue;
+        const double u = 1.0 - (d - near) / (far - near), w = u * u;
+        for (int k = 0; k < 3; k++) n[k] += w * p[3 + k], above += w * (x[k] - p[k]) * p[3 + k];
+        weight += w;
+      }
+      const double size = sqrt(dot(n, n));
+      for (int k = 0; k < 3; k++) face[f].normal[k] = n[k] / size;
+      face[f].height = above / weight;
+    }
+    return WETTED_FACES;
   }
 };
 // How far a particle reaches along n: r0 |Ft n|.

@@ -153,6 +153,29 @@ def surface_begins(
 ) -> wp.float64: ...
 
 
+@wp.func_native("""
+  const double *from = (const double *)rows.data + 6 * first;
+  mpm::Wetted face[mpm::WETTED_FACES];
+  const int found = mpm::Wetted::faces(from, count, &x.c[0], &place.c[0], dx, face);
+  if (number >= found) return wp::vec4d(0.0, 0.0, 0.0, (double)mpm::VAST);
+  const double *n = face[number].normal;
+  return wp::vec4d(n[0], n[1], n[2], face[number].height);
+""")
+def wetted_face(
+    rows: wp.array(dtype=wp.vec3d),
+    first: int,
+    count: int,
+    x: wp.vec3d,
+    place: wp.vec3d,
+    dx: wp.float64,
+    number: int,
+) -> wp.vec4d: ...
+
+
+@wp.func_native("return mpm::Face<float>::gap_of_liquid(mean, height);")
+def gap_of_liquid(mean: wp.float32, height: wp.float32) -> wp.float32: ...
+
+
 @wp.func_native("return mpm::Support<float>::reach(&F.data[0][0], n[0], n[1], n[2], radius);")
 def reach_of(F: wp.mat33, n: wp.vec3, radius: wp.float32) -> wp.float32: ...
 

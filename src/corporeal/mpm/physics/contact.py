@@ -11,15 +11,18 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from numba import njit
+from scipy.spatial import KDTree
 
 from corporeal.mpm.constants import (
     DEEPEST,
     FACE_STEPS,
     FIRST_BIAS,
+    HELD_BY_WALL,
     IMPACTS,
     LATTICE_GAP,
     LATTICE_SLOPE,
     LATTICE_START,
+    LIKE_HALF_SPACE,
     OTHER_BIAS,
     PATCH,
     SCATTER,
@@ -29,7 +32,12 @@ from corporeal.mpm.constants import (
     SWEEPS_OF_A_HIT,
     TINY,
     WALL_REACH,
+    WETTED_FACES,
+    WETTED_PATCH,
+    WETTED_REACH,
+    WETTED_TURN,
 )
+from corporeal.mpm.problem import WettedSurface
 
 Vectors = Float[np.ndarray, "E 3"]
 Scalars = Float[np.ndarray, " E"]
@@ -130,6 +138,74 @@ def surface_begins(points: Vectors, node: Vectors, normal: Vectors, around: floa
 def gap_to_surface(mean: Vectors, begins: Scalars, normal: Vectors, cell: float) -> Scalars:
     """Open distance along n [m] of a field to a surface that begins there [m] beyond the node."""
     return gap_to_wall(mean, begins, normal, cell)
+
+
+def gap_of_liquid(mean: Vectors, height: Scalars, outward: Vectors, cell: float) -> Scalars:
+    """Open distance [m] of a liquid to a rigid surface that lies ``height`` [m] below the node.
+
+    Pressure pushes every node whose spline reaches the surface, and a wall that answers behind its
+    face alone would let the first layer of a liquid be squeezed along it. So nodes up to
+    ``HELD_BY_WALL`` above are in contact too, where the liquid fills the half space up to the face
+    as far as the node can tell; what is thinner than a cell is not.
+    """
+    h = height / cell
+    gap = gap_to_wall(mean, height, -outward, cell)
+    off = half_space_mean(h) + np.sum(mean * outward, axis=1) / cell
+    xi = -np.sum(mean * outward, axis=1) / cell
+    deep = (-half_space_mean(-h) - xi - touching_distance(h)) * cell
+    held = (h > WALL_REACH) & (h <= HELD_BY_WALL) & (np.abs(off) < LIKE_HALF_SPACE)
+    return np.where(held, deep, gap)
+
+
+class WettedFaces(NamedTuple):
+    """Faces of a rigid body that nodes of a liquid see; F rows, at most three for a node."""
+
+    node: Indices
+    """Which node."""
+    outward: Vectors
+    """Unit, out of the body."""
+    height: Scalars
+    """Of the node over the face [m]."""
+
+
+def wetted_faces(surface: WettedSurface, node: Vectors, place: Vectors, cell: float) -> WettedFaces:
+    """Say where a rigid body's surface lies for the liquid at each node.
+
+    The surface point nearest to the liquid's own place decides which face of a thin wall it is; it
+    and its neighbours that look alike are averaged, w = (1 - u)² with u from 0 at the nearest to 1
+    at ``WETTED_PATCH`` beyond it in squared distance. What looks another way, and at the liquid, is
+    one more face: walls of a vessel and its bottom hold a node together.
+
+    Args:
+        surface: The body's, now.
+        node: Nodes [m].
+        place: Mean place of the liquid at each [m].
+        cell: dx [m].
+
+    """
+    rows: list[tuple[int, np.ndarray, float]] = []
+    around = KDTree(surface.point).query_ball_point(place, WETTED_REACH * cell)
+    for k, near in enumerate(around):
+        point, normal = surface.point[near], surface.normal[near]
+        square = np.sum((point - place[k]) ** 2, axis=1)
+        left = np.ones(len(near), dtype=bool)
+        for _ in range(WETTED_FACES):
+            if not left.any():
+                break
+            first = np.flatnonzero(left)[np.argmin(square[left])]
+            far = (np.sqrt(square[first]) + WETTED_PATCH * cell) ** 2
+            mine = left & (square <= far) & (normal @ normal[first] >= WETTED_TURN)
+            weight = (1.0 - (square[mine] - square[first]) / (far - square[first])) ** 2
+            above = np.sum((node[k] - point[mine]) * normal[mine], axis=1)
+            outward = unit(weight @ normal[mine])
+            rows.append((k, outward, weight @ above / weight.sum()))
+            looks = np.sum((place[k] - point) * normal, axis=1) > 0.0
+            left &= looks & (normal @ outward <= WETTED_TURN)
+    return WettedFaces(
+        np.array([k for k, _, _ in rows], dtype=np.int64),
+        np.array([n for _, n, _ in rows]).reshape(-1, 3),
+        np.array([h for _, _, h in rows], dtype=np.float64),
+    )
 
 
 # ---------------------------------------------------------------- which way it looks

@@ -9,8 +9,9 @@ from itertools import combinations
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from corporeal.mpm import laws
 from corporeal.mpm.constants import (
     POINT_REACH,
     SHOWN_AROUND,
@@ -22,7 +23,7 @@ from corporeal.mpm.constants import (
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import contact, rigid
 from corporeal.mpm.physics.spline import Stencil
-from corporeal.mpm.problem import Problem
+from corporeal.mpm.problem import Problem, WettedSurface
 from corporeal.mpm.state import Matter, State
 
 
@@ -70,6 +71,20 @@ class Scene:
         turned = self.matter.surface[body] @ self.state.rotation[body].T
         return self.state.centre[body] + turned
 
+    def wetted(self, body: int) -> WettedSurface | None:
+        """Where liquids touch a rigid body now; None: as everything else does."""
+        given = self.problem.bodies[body].wetted
+        if given is None or not self.is_rigid(body):
+            return None
+        R = self.state.rotation[body].T
+        point = self.state.centre[body] + (given.point - self.matter.centre[body]) @ R
+        return WettedSurface(point, given.normal @ R)
+
+    def pours(self, field: int) -> bool:
+        """Whether a field holds a liquid."""
+        mine = self.matter.law[self.matter.body == field]
+        return not self.is_rigid(field) and bool(np.isin(mine, laws.LIQUID).any())
+
     def thinness(self, field: int) -> int:
         """How thin a rigid body is against the cell; 0 for what deforms."""
         if not self.is_rigid(field):
@@ -93,7 +108,7 @@ class Scene:
         bodies = len(self.problem.bodies)
         still = np.zeros((len(self.problem.planes), 3))
         stiff = np.array([self.is_rigid(b) for b in range(bodies)])
-        # What moves as told is as heavy as a wall.
+        # A body with prescribed motion is as heavy as a wall.
         free = stiff & [body.path is None for body in self.problem.bodies]
         inertia = np.zeros((self.wall_mover + len(still), 3, 3))
         inertia[:bodies] = np.where(
@@ -132,6 +147,13 @@ class Touch:
     point: Float[np.ndarray, "E 3"]
     normal: Float[np.ndarray, "E 3"]
     gap: Float[np.ndarray, " E"]
+    slips: Bool[np.ndarray, " E"] | None = None
+    """Which of them transmit no friction; None: all do."""
+
+    @property
+    def grips(self) -> Float[np.ndarray, " E"]:
+        """Share of the pair's friction that each transmits [-]."""
+        return np.ones(len(self.gap)) if self.slips is None else 1.0 - self.slips
 
 
 @dataclass(frozen=True)
@@ -162,7 +184,8 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     pair = pair.reshape(-1, 2)
     contacts = contact.Contacts(
         *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _COLUMNS),
-        friction=_friction(problem)[pair[:, 0], pair[:, 1]],
+        friction=_friction(problem)[pair[:, 0], pair[:, 1]]
+        * _joined([t.grips for t in touches], (0,)).astype(np.float64),
         group=np.repeat(np.arange(len(touches)), [len(t.gap) for t in touches]),
     )
     movers = scene.movers(velocity)
@@ -204,7 +227,8 @@ def _possible(touch: Touch) -> Touch:
     """Leave out what is no contact at all."""
     real = np.isfinite(touch.gap)
     columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
-    return Touch(touch.pair, **columns)
+    slips = None if touch.slips is None else touch.slips[real]
+    return Touch(touch.pair, **columns, slips=slips)
 
 
 _COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
@@ -272,7 +296,7 @@ def _common(
 
 
 def _walls(scene: Scene, field: int) -> range:
-    """Planes that a field meets on nodes: none when it has surface points or moves as told."""
+    """Planes that a field meets on nodes: none with surface points or prescribed motion."""
     body = scene.problem.bodies[field]
     spared = scene.is_rigid(field) and (len(body.surface) > 0 or body.path is not None)
     return range(0 if spared else len(scene.problem.planes))
@@ -341,6 +365,9 @@ def _between(
     scene: Scene, look: Look, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
 ) -> Touch:
     """Contacts of two fields on their common nodes, with separating-axis normals, smoothed."""
+    wet = _wet(scene, look, pair, slots)
+    if wet is not None:
+        return wet
     a, c = slots
     cell, index = scene.problem.cell, scene.grid.index[a]
     candidates = contact.candidate_normals(look.outward[a], look.outward[c])
@@ -358,6 +385,31 @@ def _between(
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
     movers = scene.mover_of_slot(a), scene.mover_of_slot(c)
     return Touch(pair, *movers, index * cell, normal, gap)
+
+
+def _wet(
+    scene: Scene, look: Look, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
+) -> Touch | None:
+    """Contacts of a liquid with a rigid body that says where liquids touch it; None: another pair.
+
+    Its walls may be thinner than a cell, and its corners concave: its surface says how high a node
+    lies over it, and which way it looks.
+    """
+    for rigid_side, liquid_side in ((0, 1), (1, 0)):
+        surface = scene.wetted(pair[rigid_side])
+        if surface is not None and scene.pours(pair[liquid_side]):
+            break
+    else:
+        return None
+    cell, slot = scene.problem.cell, slots[liquid_side]
+    node, mean = scene.grid.index[slot] * cell, look.mean[slot]
+    face = contact.wetted_faces(surface, node, node + mean, cell)
+    k, out = face.node, face.outward
+    gap = contact.gap_of_liquid(mean[k], face.height, out, cell)
+    normal = out if rigid_side == 0 else -out
+    movers = scene.mover_of_slot(slots[0][k]), scene.mover_of_slot(slots[1][k])
+    slips = face.height > WALL_REACH * cell
+    return Touch(pair, *movers, node[k], normal, gap, slips)
 
 
 def _between_surfaces(

@@ -123,7 +123,8 @@ for (int f = 0; f < fields; f++) {
         }
         J.met[a] |= 1 << c;
         J.several |= both;
-        found += Grid::count(both);
+        const bool wet = (A.patches && C.pours) || (C.patches && A.pours);
+        found += Grid::count(both) * (wet ? mpm::WETTED_FACES : 1);
       }
     J.mask = J.several;
     // Planes, where a field may touch more than one; else they cost nothing but here: contact_stand.

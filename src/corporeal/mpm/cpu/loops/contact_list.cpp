@@ -75,8 +75,9 @@ for (int j = from; j < to; j++) {
       const Side &A = sides[M.side + a];
       const Field &F = world->field[A.field];
       for (int c = a + 1; c < M.sides + near; c++) {
-        int w = c - M.sides;
+        int w = c - M.sides, faces = 1;
         Touch &T = touches[t];
+        T.face = 0;
         if (w >= 0) {
           if (!(wall[w] >> i & 1) || (F.rigids && F.surfaces)) continue;
           T.c = -1 - walls[w];
@@ -85,12 +86,19 @@ for (int j = from; j < to; j++) {
           T.c = M.side + c;
           T.fc = sides[T.c].field;
           if (!(J.met[here[a]] >> here[c] & 1)) continue;
+          const Field &G = world->field[T.fc];
+          if ((F.patches && G.pours) || (G.patches && F.pours)) faces = mpm::WETTED_FACES;
         }
         leans[t] = Lean{{0, 0, 0}, (unsigned char)here[a], (unsigned char)(w >= 0 ? 255 : here[c]), (unsigned char)i, 0};
         T.meet = k;
         T.a = M.side + a;
         T.fa = A.field;
         t++;
+        for (int f = 1; f < faces; f++, t++) {
+          touches[t] = T;
+          touches[t].face = f;
+          leans[t] = leans[t - 1];
+        }
       }
     }
     M.touches = t - M.touch;

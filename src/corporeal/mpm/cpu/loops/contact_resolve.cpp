@@ -168,6 +168,7 @@ for (int f = 0; f < fields; f++) {
       if (gap >= mpm::POINT_REACH * dx) continue;
       Touch &T = touches[nt++];
       T.meet = -1;
+      T.face = 0;
       T.a = p;
       T.c = -1 - w;
       T.fa = f;
@@ -193,7 +194,7 @@ for (int t = 0; t < nt; t++) {
   Line &R = lines[n++];
   R.touch = t;
   R.group = (kind * all + T.fa) * all + T.fc;
-  R.key = (u64)R.group << 48;
+  R.key = (u64)(4 * R.group + T.face) << 48;
   if (T.meet < 0)
     R.key |= (u64)T.a;
   else

@@ -13,10 +13,51 @@ struct Solver {
     const Side &C = sides[T.c];
     const Field &F = w->field[A.field], &G = w->field[C.field];
     double pc = C.mean[0] * n[0] + C.mean[1] * n[1] + C.mean[2] * n[2];
+    if (liquid(F, G)) return Face::gap_of_liquid(F.rigids ? -pc : pa, T.gap * inv);
     if (!F.thin && !G.thin) return Face::gap(w->face, pa, pc);
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
     if (!F.surfaces) return Face::gap_to_surface(pa, sc);
     return G.surfaces ? sc - sa : Face::gap_to_surface(-pc, -sa);
+  }
+  // Whether a liquid meets a rigid body that says where liquids touch it.
+  static inline bool liquid(const Field &F, const Field &G) {
+    return (F.patches && G.pours) || (G.patches && F.pours);
+  }
+  // How high such a node lies over one of the body's faces, and along which normal they meet there;
+  // the contacts before it are of the other faces. How many of them there are.
+  static inline int wet(const World *w, const Side *sides, const double *x, const Touch &T, mpm::Wetted *face) {
+    const Side &S = sides[w->field[T.fa].patches ? T.c : T.a];
+    const Field &F = w->field[w->field[T.fa].patches ? T.fa : T.fc];
+    const double *s = F.rigid;
+    double y[3], X[3];   // the node and the liquid's place, in the body's frame
+    for (int i = 0; i < 3; i++) {
+      y[i] = X[i] = 0;
+      for (int k = 0; k < 3; k++) {
+        const double r = x[k] - s[CENTRE + k];
+        y[i] += s[TURN + 3 * k + i] * r;
+        X[i] += s[TURN + 3 * k + i] * (r + S.mean[k] * w->dx);
+      }
+    }
+    double rows[6 * mpm::WETTED_ROWS];
+    const double reach = mpm::WETTED_REACH * w->dx;
+    int count = 0;
+    for (int p = 0; p < F.patches; p++) {
+      const double *patch = F.patch + 6 * p;
+      if (mpm::Wetted::square(patch + 2, X) > (patch[5] + reach) * (patch[5] + reach)) continue;
+      for (int i = (int)patch[0]; i < (int)patch[1] && count < mpm::WETTED_ROWS; i++) {
+        const double *row = F.wetted + 6 * i;
+        if (mpm::Wetted::square(row, X) > reach * reach) continue;
+        for (int k = 0; k < 6; k++) rows[6 * count + k] = row[k];
+        count++;
+      }
+    }
+    const int found = mpm::Wetted::faces(rows, count, y, X, w->dx, face);
+    for (int f = 0; f < found; f++) {
+      double n[3];
+      for (int i = 0; i < 3; i++) n[i] = Vec::dot(s + TURN + 3 * i, face[f].normal);
+      for (int i = 0; i < 3; i++) face[f].normal[i] = w->field[T.fa].patches ? n[i] : -n[i];
+    }
+    return found;
   }
   // Where a thin rigid body begins along n, or against it for a negative scale; in cells.
   static inline double begins(const World *w, const Field &F, const double *x, const double *n,
@@ -182,7 +223,8 @@ if (from < to) {
     }
     for (int k = J.meet; k < end; k++) {
       Meet &M = meets[k];
-      int active = 0, nears = M.stiff;
+      int active = 0, nears = M.stiff, faces = 0;
+      mpm::Wetted face[mpm::WETTED_FACES];
       for (int t = M.touch; t < M.touch + M.touches; t++) {
         Touch &T = touches[t];
         for (int d = 0; d < 3; d++) {
@@ -192,6 +234,11 @@ if (from < to) {
         T.active = 0;
         if (T.c < 0) {
           for (int d = 0; d < 3; d++) T.normal[d] = -world->plane[4 * (-1 - T.c) + d];
+        } else if (Solver::liquid(world->field[T.fa], world->field[T.fc])) {
+          if (T.face == 0) faces = Solver::wet(world, sides, T.x, T, face);
+          if (T.face >= faces) continue;
+          for (int d = 0; d < 3; d++) T.normal[d] = face[T.face].normal[d];
+          T.gap = face[T.face].height;
         } else if (Vec::unit(T.normal) <= mpm::TINY) {
           continue;
         }
@@ -207,9 +254,11 @@ if (from < to) {
         if (!T.active) continue;
         double u[3];
         Solver::slip(sides, T, u);
+        const bool slips = T.c >= 0 && T.gap > mpm::WALL_REACH * dx &&
+                           Solver::liquid(world->field[T.fa], world->field[T.fc]);
         T.gap = Solver::gap(world, sides, T, inv) * dx;
         T.target = Impact::closing(T.gap, dt);
-        T.mu = world->friction[T.fa * all + T.fc];
+        T.mu = slips ? 0.0 : world->friction[T.fa * all + T.fc];
         T.active = 1;
         if (M.stiff) continue;
         T.inverse = sides[T.a].inverse + (T.c < 0 ? 0.0 : sides[T.c].inverse);
