@@ -249,7 +249,11 @@ def test_json_page_figure_and_docs_tell_the_same_twice(evaluated, tmp_path):
     assert '"path": [[' not in json.dumps(record(found))
     dynamics_page.write_page(found, tmp_path / "page.html")
     page = (tmp_path / "page.html").read_text()
-    assert "falls: ours first" in page and "rolls: no reference" in page and "$" not in page
+    assert (
+        "falls: ours first, beside single." in page
+        and "rolls: no reference" in page
+        and "$" not in page
+    )
     dynamics_figure.draw(found, tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
     dynamics_page.write_docs(found, "corporeal evaluate dynamics", tmp_path / "page.md")

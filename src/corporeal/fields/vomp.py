@@ -29,7 +29,7 @@ def read_vomp(path: Path) -> SampledField:
     except KeyError as error:
         raise BadFileError(path, "has no array voxel_data.", AGAIN) from error
     except (ValueError, OSError, EOFError, zipfile.BadZipFile) as error:
-        pickled = "pickle" in str(error)
+        pickled = "Object arrays" in str(error)
         what = "holds pickled objects, which are not read." if pickled else "is no sound npz file."
         raise BadFileError(path, what, AGAIN) from error
     except (AttributeError, TypeError, IndexError) as error:  # an npy file: one array, no names

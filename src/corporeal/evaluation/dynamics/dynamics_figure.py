@@ -34,8 +34,10 @@ def draw(found: Summary, path: Path) -> None:
         above.bar(at, [_met(row) for row in rows], 0.9 * width, color=colour, label=method)
         off = [row.against.path if row.against else np.nan for row in rows]
         below.bar(at, off, 0.9 * width, color=colour)
-        marked = [(x, _met(r)) for x, r in zip(at, rows, strict=True) if r.numbers and not r.clean]
-        above.plot(*np.array(marked or np.zeros((0, 2))).T, "x", color="#c0392b", ms=5)
+        marked = [
+            (x, _met(r) + 0.025) for x, r in zip(at, rows, strict=True) if r.numbers and not r.clean
+        ]
+        above.plot(*np.array(marked or np.zeros((0, 2))).T, "x", color=INK, ms=5)
     above.set_ylabel("expectations met (×: audit not clean)")
     above.set_ylim(0, 1.05)
     above.legend(

@@ -37,7 +37,9 @@ COLUMNS = {
 }
 RULE = (
     "Columns are expectations, audit, path, contacts and separation; ours is first where no "
-    "baseline is better in more of them than it is worse. What is better than ours is named."
+    "baseline that was run is better in more of them than it is worse. What is better than ours is "
+    "named. Means are over the scenes that a method was run in: compare them only where these are "
+    "as many."
 )
 
 

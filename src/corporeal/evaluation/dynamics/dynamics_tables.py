@@ -108,7 +108,8 @@ def verdicts(found: Summary) -> list[str]:
         if ours.numbers and ours.numbers.faults:
             why.append(ours.numbers.faults[0])
         because = f" Ours falls short in: {'; '.join(why)}." if why else ""
-        place = "ours first" if s.first else "ours is not first"
+        place = f"ours {'first' if s.first else 'is not first'}, beside {', '.join(s.beside)}"
+        place += "" if s.referred else " (by expectations and the audit alone)"
         said.append(f"{s.scene}: {place}. {where}{because}".replace("..", ".").strip())
     return said
 

@@ -41,6 +41,10 @@ class Standing:
     """Whether no baseline is better in more columns than it is worse."""
     lost: tuple[str, ...]
     """Columns in which a baseline is better, in sentences."""
+    beside: tuple[str, ...]
+    """Baselines that were run."""
+    referred: bool
+    """Whether there was a reference; else expectations and the audit alone were compared."""
 
 
 def standing(scene: str, rows: Mapping[str, Row]) -> Standing | None:
@@ -61,7 +65,8 @@ def standing(scene: str, rows: Mapping[str, Row]) -> Standing | None:
             if ours < other:
                 lost.append(f"{column}: {theirs.method} {words}")
         first = first and behind <= won
-    return Standing(scene, first, tuple(lost))
+    beside = tuple(row.method for row in others)
+    return Standing(scene, first, tuple(lost), beside, mine.against is not None)
 
 
 def _columns(mine: Row, theirs: Row) -> list[tuple[str, float, float, str]]:
