@@ -2,7 +2,7 @@
 
 from dataclasses import replace
 
-from corporeal.evaluation.dynamics.motion import Body, RunNumbers
+from corporeal.evaluation.dynamics.run_numbers import Body, RunNumbers
 from corporeal.findings import Expectation
 from made_findings import object_outcome, outcome, pair_outcome
 

@@ -14,12 +14,12 @@ from corporeal import store
 from corporeal.errors import UserError
 from corporeal.evaluation.dynamics import dynamics_figure, dynamics_page, dynamics_tables
 from corporeal.evaluation.dynamics.difference import difference
+from corporeal.evaluation.dynamics.first_place import Row, standing
 from corporeal.evaluation.dynamics.jobs_of_runs import Comparison, SceneInput, jobs
 from corporeal.evaluation.dynamics.methods import method_of, ours, settings_of
-from corporeal.evaluation.dynamics.motion import read_numbers, write_numbers
 from corporeal.evaluation.dynamics.rank_correlation import rank_correlation
 from corporeal.evaluation.dynamics.run_evaluation import chosen, scenes_of
-from corporeal.evaluation.dynamics.standing import Row, standing
+from corporeal.evaluation.dynamics.run_numbers import read_numbers, write_numbers
 from corporeal.evaluation.dynamics.summary import record, summary
 from corporeal.pipeline import Settings
 from made_findings import object_outcome

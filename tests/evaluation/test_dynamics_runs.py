@@ -15,8 +15,8 @@ from corporeal.corpus.local import local_hands
 from corporeal.errors import UserError
 from corporeal.evaluation.dynamics import run_evaluation
 from corporeal.evaluation.dynamics.jobs_of_runs import SceneInput, run_and_measure
-from corporeal.evaluation.dynamics.motion import read_numbers
 from corporeal.evaluation.dynamics.run_evaluation import DynamicsConfig, evaluate_dynamics
+from corporeal.evaluation.dynamics.run_numbers import read_numbers
 from corporeal.pipeline import Settings
 from corporeal.trajectory.frames import frame_path
 

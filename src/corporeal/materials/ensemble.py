@@ -177,7 +177,8 @@ def sample(
     )
     pieces = tuple(
         tuple(
-            _piece(p, said, owner, grades, library) for p, said in zip(group, w.pieces, strict=True)
+            _piece(p, piece, owner, grades, library)
+            for p, piece in zip(group, w.pieces, strict=True)
         )
         for group, w, owner in zip(
             field.pieces or ((),) * len(made), words, object_of_part, strict=True

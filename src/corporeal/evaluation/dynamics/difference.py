@@ -6,7 +6,7 @@ from statistics import mean, median
 
 import numpy as np
 
-from corporeal.evaluation.dynamics.motion import Body, RunNumbers
+from corporeal.evaluation.dynamics.run_numbers import Body, RunNumbers
 from corporeal.findings import FLOOR, Outcome
 
 AFTERWARDS = 0.2

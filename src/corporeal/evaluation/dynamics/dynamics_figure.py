@@ -5,8 +5,8 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
+from corporeal.evaluation.dynamics.first_place import Row
 from corporeal.evaluation.dynamics.places import OURS
-from corporeal.evaluation.dynamics.standing import Row
 from corporeal.evaluation.dynamics.summary import Summary
 from corporeal.evaluation.figure import keep
 from corporeal.evaluation.mass_report import COLOURS, INK
@@ -22,7 +22,7 @@ def draw(found: Summary, path: Path) -> None:
         UserError: The disk refuses the file.
 
     """
-    scenes = list(dict.fromkeys(row.scene for row in found.rows))
+    scenes = list(dict.fromkeys(row.scene for row in found.rows if row.numbers))
     size = (max(7.0, 1.3 * len(scenes) + 2), 6.4)
     figure = Figure(figsize=size, dpi=150, layout="constrained")
     above, below = figure.subplots(2, 1, sharex=True)
@@ -45,7 +45,9 @@ def draw(found: Summary, path: Path) -> None:
     if any(row.against for row in found.rows):
         below.set_yscale("log")
     else:
+        below.set_yticks([])
         below.text(0.5, 0.5, "no reference yet", transform=below.transAxes, ha="center", color=INK)
+    below.set_xlim(-0.5, max(len(scenes), 1) - 0.5)
     below.set_xticks(range(len(scenes)), scenes, rotation=20, ha="right")
     keep(figure, path)
 

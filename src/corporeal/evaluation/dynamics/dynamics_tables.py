@@ -2,8 +2,8 @@
 
 from collections.abc import Sequence
 
+from corporeal.evaluation.dynamics.first_place import Row
 from corporeal.evaluation.dynamics.places import OURS
-from corporeal.evaluation.dynamics.standing import Row
 from corporeal.evaluation.dynamics.summary import Mean, Summary
 from corporeal.evaluation.result_table import Table
 

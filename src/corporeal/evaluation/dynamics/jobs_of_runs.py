@@ -7,8 +7,8 @@ from pathlib import Path
 from corporeal import pipeline, store
 from corporeal.corpus.jobs import Job, Progress
 from corporeal.evaluation.dynamics.methods import Method, ours, settings_of
-from corporeal.evaluation.dynamics.motion import measure, write_numbers
 from corporeal.evaluation.dynamics.places import Finer, reference_folder, run_folder
+from corporeal.evaluation.dynamics.run_numbers import measure, write_numbers
 from corporeal.pipeline import Settings
 from corporeal.stages.simulate import as_kept
 

@@ -5,14 +5,13 @@ Everything is read from what finished runs left on the disk.
 
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from pathlib import Path
 from statistics import mean
 
 from corporeal import store
 from corporeal.evaluation.dynamics.difference import difference
+from corporeal.evaluation.dynamics.first_place import Row, Standing, standing
 from corporeal.evaluation.dynamics.jobs_of_runs import Comparison, SceneInput, jobs
 from corporeal.evaluation.dynamics.life_drops import LEEWAY, Dropped, dropped, knows_life
-from corporeal.evaluation.dynamics.motion import Body, RunNumbers, read_numbers
 from corporeal.evaluation.dynamics.places import (
     OURS,
     reference_folder,
@@ -23,7 +22,7 @@ from corporeal.evaluation.dynamics.rank_correlation import (
     RankCorrelation,
     rank_correlation,
 )
-from corporeal.evaluation.dynamics.standing import Row, Standing, standing
+from corporeal.evaluation.dynamics.run_numbers import Body, RunNumbers, read_numbers
 from corporeal.findings import FLOOR
 from corporeal.trajectory.audit import ALLOWED
 
@@ -118,10 +117,11 @@ def summary(
 
     """
     done = {job.name for job in jobs(scenes, comparison) if job.done}
+    state = _State(comparison, done, errors)
     methods = [m.name for m in comparison.methods]
-    references = [_reference(s.name, comparison, done, errors) for s in scenes]
+    references = [_reference(s.name, state) for s in scenes]
     rows = [
-        _row(scene.name, method, reference, comparison.out, (done, errors))
+        _row(scene.name, method, reference, state)
         for scene, reference in zip(scenes, references, strict=True)
         for method in methods
     ]
@@ -145,32 +145,39 @@ def summary(
 # ---------------------------------------------------------------- rows
 
 
-def _reference(
-    scene: str, comparison: Comparison, done: set[str], errors: Mapping[str, str]
-) -> Reference:
+@dataclass(frozen=True)
+class _State:
+    """How far the runs of an evaluation came."""
+
+    comparison: Comparison
+    done: set[str]
+    """Names of finished jobs."""
+    errors: Mapping[str, str]
+    """Name of a failed job → why."""
+
+    def missing(self, name: str) -> str:
+        """Say why a run is not there."""
+        return self.errors.get(name, NOT_RUN)
+
+
+def _reference(scene: str, state: _State) -> Reference:
     """Read the reference; one that is not physics is none."""
-    folder = reference_folder(comparison.out, scene, comparison.reference)
+    folder = reference_folder(state.comparison.out, scene, state.comparison.reference)
     name = f"{scene}.{folder.name}"
-    if name not in done:
-        return Reference(scene, None, errors.get(name, NOT_RUN))
+    if name not in state.done:
+        return Reference(scene, None, state.missing(name))
     numbers = read_numbers(folder)
     if numbers.faults:
         return Reference(scene, None, f"refused, its audit is not clean: {numbers.faults[0]}")
     return Reference(scene, numbers)
 
 
-def _row(
-    scene: str,
-    method: str,
-    reference: Reference,
-    out: Path,
-    state: tuple[set[str], Mapping[str, str]],
-) -> Row:
-    done, errors = state
+def _row(scene: str, method: str, reference: Reference, state: _State) -> Row:
+    """Read one run, and compare it with the reference unless it gained energy."""
     name = f"{scene}.{method}"
-    if name not in done:
-        return Row(scene, method, None, None, errors.get(name, NOT_RUN))
-    numbers = read_numbers(run_folder(out, scene, method))
+    if name not in state.done:
+        return Row(scene, method, None, None, state.missing(name))
+    numbers = read_numbers(run_folder(state.comparison.out, scene, method))
     if numbers.growth > ALLOWED["mechanical_growth"]:
         return Row(scene, method, numbers, None, f"failed: energy grew by {numbers.growth:.1%}")
     against = None if reference.numbers is None else difference(numbers, reference.numbers)

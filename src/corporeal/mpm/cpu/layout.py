@@ -86,7 +86,7 @@ LIGHT, HEAVY, NEXT = 54, 55, 64
 """First columns of a rigid state, after its mass: centre (3), rotation (9), inverse inertia at rest
 (9), velocity (3), angular momentum (3), inverse inertia now (9), spin (3), radius, kick (3); while
 a frame holds soft nodes its own mass and centre (4); lowest and highest corner of the box around
-its particles in its own frame (6). Then 1/M in contact (0: it moves as told), and of what does its
+its particles in its own frame (6). Then 1/M in contact (0: prescribed motion), and of what does its
 inertia at rest (9) and its rotation at the end of the step (9)."""
 RIGID_STATE = 80
 """Columns with room to spare."""

@@ -4,8 +4,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from corporeal.evaluation.dynamics.difference import Difference
-from corporeal.evaluation.dynamics.motion import RunNumbers
 from corporeal.evaluation.dynamics.places import OURS
+from corporeal.evaluation.dynamics.run_numbers import RunNumbers
 
 
 @dataclass(frozen=True)
