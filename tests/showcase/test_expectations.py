@@ -157,3 +157,14 @@ def test_an_expectation_reads_as_words():
         "soda_can_0": object_outcome(dent_depth_dx=2.5), "rubber_duck_0": object_outcome(),
     }))  # fmt: skip
     assert (can[1].value, can[1].target) == ("2.5 grid cells", "above 1 grid cell")
+
+
+@pytest.mark.parametrize(
+    ("depth", "cell", "seen"), [(0.03, 0.011, True), (0.01, 0.011, False), (0.07, 0.011, False)]
+)
+def test_an_imprint_is_deeper_than_a_cell_and_swallows_nobody(depth, cell, seen):
+    objects = {
+        "mud_pile_0": object_outcome(dent_depth_m=depth, dent_depth_dx=depth / cell),
+        "rubber_duck_0": object_outcome(fall_m=1.2),
+    }
+    assert met("duck-on-mud", outcome(objects)) == [True, seen, True]

