@@ -13,7 +13,6 @@ from PIL import Image
 
 from corporeal.formats.colmap import ColmapModel, read_colmap
 from corporeal.formats.photographs import MASKS, companion
-from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.silhouette_overlap import silhouette_overlaps
 from corporeal.geometry.similarity import parted, similarity
@@ -143,7 +142,7 @@ def sizes(result: Came, facts: Known) -> dict[str, Any]:
     if facts.unit is None:
         return {}
     mesh, unit = result.upright[0], facts.unit
-    sides = [unit * s for s in oriented_size(mesh.vertices)]
+    sides = (unit * np.ptp(result.meshes[0].vertices, axis=0)).tolist()
     height = unit * float(np.ptp(mesh.vertices[:, 2]))
     volume = unit**3 * float(trimesh.Trimesh(mesh.vertices, mesh.triangles).volume)
     row: dict[str, Any] = {"sides_m": sides, "height_m": height, "volume_m3": volume}

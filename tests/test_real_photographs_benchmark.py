@@ -16,7 +16,7 @@ from corporeal.types import Camera
 from patterned_scene import OF_SLAB, patterned, photographs, ring
 
 COUNT = 16
-FACTS = measure.Known(unit=0.5, floor=True, sides=(0.08, 0.1, 0.12), height=0.12)
+FACTS = measure.Known(unit=0.5, floor=True, sides=(0.1, 0.12, 0.08), height=0.12)
 
 
 @pytest.fixture(scope="module")
