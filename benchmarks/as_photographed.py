@@ -1,17 +1,23 @@
 """Make captured views look as if somebody had photographed them in a room.
 
-    python benchmarks/as_photographed.py SCENE OUT [--seed 0]
+    python benchmarks/as_photographed.py SCENE OUT [--seed 0] [--pictures 24] [--wall] [--clutter]
+        [--flash] [--rolled]
 
 SCENE is a folder that ``corporeal assemble`` wrote, with ``views``. In OUT they have a floor of
 planks and four papered walls behind the things, the same from all sides, in place of the plain
 backdrop; shadows stay. Every picture then has its own exposure and white balance, is a little out
 of focus or shaken, noisy, and was a JPEG. Masks stay with the views for comparing; none is learned
 from by ``benchmarks/splats.py OUT --sources pictures``.
+
+``--wall`` puts a wall close behind the things and keeps the views from before it; ``--clutter``
+puts painted balls on the floor around them; ``--flash`` lights everything from the camera, so that
+what is near is bright; ``--rolled`` turns every second picture by a quarter, as telephones are
+held (all are cropped to squares); ``--pictures`` keeps so many.
 """
 
 import argparse
 import io
-from dataclasses import replace
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -33,6 +39,12 @@ NOISE = 2.0
 """Standard deviation [of 255]."""
 JPEG = (70, 90)
 """Qualities."""
+CLOSE = 0.35
+"""Distance of the near wall from the middle, in distances of the farthest camera."""
+BALLS, BALL, AWAY = 7, 0.09, 0.6
+"""Number, radius and distance from the middle of balls around the things, in these distances."""
+LIT = 0.9
+"""Distance, in these distances, at which flash light is as bright as the room's."""
 OAK, PAPER, STRIPE = (0.62, 0.46, 0.32), (0.70, 0.72, 0.66), (0.45, 0.52, 0.56)
 
 
@@ -58,8 +70,23 @@ def paint(points: np.ndarray, floor: np.ndarray, size: float) -> np.ndarray:
     return np.where(floor[:, None], oak, np.where(skirting, 0.85, paper))
 
 
-def backdrop(camera: Camera, half: float, size: float) -> np.ndarray:
-    """Return what a camera sees of an empty room (H, W, 3)."""
+@dataclass(frozen=True)
+class Room:
+    """Around the things."""
+
+    size: float
+    """Distance of the farthest camera from the middle [m]."""
+    wall: bool
+    """Whether the wall at +y is near."""
+    balls: np.ndarray
+    """Middle and radius of each ball (B, 4) [m]."""
+
+
+def backdrop(camera: Camera, room: Room) -> tuple[np.ndarray, np.ndarray]:
+    """Return what a camera sees of a room without the things (H, W, 3), and how far away (H, W)."""
+    size = room.size
+    half = np.full((2, 2), ROOM * size)
+    half[1, 1] = CLOSE * size if room.wall else half[1, 1]
     h, w = camera.height * GRID, camera.width * GRID
     v, u = (np.indices((h, w)).reshape(2, -1) + 0.5) / GRID
     K, pose = camera.K, camera.world_from_camera
@@ -67,10 +94,29 @@ def backdrop(camera: Camera, half: float, size: float) -> np.ndarray:
     ray, eye = local @ pose[:3, :3].T, pose[:3, 3]
     with np.errstate(divide="ignore"):
         down = np.where(ray[:, 2] < 0, -eye[2] / ray[:, 2], np.inf)
-        out = np.min((half * np.sign(ray[:, :2]) - eye[:2]) / ray[:, :2], axis=1)
-    there = eye + np.minimum(down, out)[:, None] * ray
-    colours = paint(there, down < out, size).reshape(camera.height, GRID, camera.width, GRID, 3)
-    return colours.mean(axis=(1, 3))
+        ahead = np.where(ray[:, :2] > 0, half[:, 1] - eye[:2], -half[:, 0] - eye[:2])
+        out = np.min(ahead / ray[:, :2], axis=1)
+    far = np.minimum(down, out)
+    there = eye + far[:, None] * ray
+    colours = paint(there, down < out, size)
+    for k, (*middle, radius) in enumerate(room.balls):
+        met = _met(eye - middle, ray, radius)
+        near = met < far
+        far[near] = met[near]
+        tone = 0.8 + 0.2 * noise(eye + far[near, None] * ray[near], 0.03 * size, 5 + k)
+        colours[near] = np.random.default_rng(k).uniform(0.1, 0.9, 3) * tone[:, None]
+    colours = colours.reshape(camera.height, GRID, camera.width, GRID, 3)
+    far = far.reshape(camera.height, GRID, camera.width, GRID)
+    return colours.mean(axis=(1, 3)), far.mean(axis=(1, 3))
+
+
+def _met(eye: np.ndarray, ray: np.ndarray, radius: float) -> np.ndarray:
+    """Return how far along rays a ball about the origin is, in lengths of the ray; inf: beside."""
+    a, b, c = (ray * ray).sum(axis=1), ray @ eye, eye @ eye - radius**2
+    inside = b * b - a * c
+    with np.errstate(invalid="ignore"):
+        far = (-b - np.sqrt(inside)) / a
+    return np.where((inside > 0) & (far > 0), far, np.inf)
 
 
 def photographed(rgb: np.ndarray, k: int, rng: np.random.Generator) -> np.ndarray:
@@ -86,21 +132,66 @@ def photographed(rgb: np.ndarray, k: int, rng: np.random.Generator) -> np.ndarra
     return np.asarray(Image.open(raw))
 
 
-def degraded(views: Views, seed: int) -> Views:
+def degraded(views: Views, asked: argparse.Namespace) -> Views:
     """Return the views with a room behind the things, photographed."""
-    if views.object_of_pixel is None:
+    if views.object_of_pixel is None or views.depth is None:
         raise SystemExit("These views do not say where things are.")
     eyes = np.stack([c.world_from_camera[:3, 3] for c in views.cameras])
     size = float(np.linalg.norm(eyes[:, :2], axis=1).max())
-    rng, rgb = np.random.default_rng(seed), views.rgb.copy()
+    before = np.flatnonzero(eyes[:, 1] < 0.5 * CLOSE * size if asked.wall else eyes[:, 1] < np.inf)
+    count = min(asked.pictures or len(before), len(before))
+    views = _some(views, before[np.linspace(0, len(before) - 1, count).round().astype(int)])
+    assert views.object_of_pixel is not None and views.depth is not None
+    rng, rgb = np.random.default_rng(asked.seed), views.rgb.copy()
+    room = Room(size, asked.wall, _balls(size, rng) if asked.clutter else np.zeros((0, 4)))
     plain = np.median(views.rgb[views.object_of_pixel < 0].mean(axis=-1))
     for k, camera in enumerate(views.cameras):
         real = views.rgb[k] / 255
         shade = np.minimum(real.mean(axis=-1, keepdims=True) * 255 / plain, 1)
-        room = backdrop(camera, ROOM * size, size) * shade
-        on = (views.object_of_pixel[k] >= 0)[..., None]
-        rgb[k] = photographed(np.where(on, real, room), k, rng)
-    return replace(views, rgb=rgb)
+        around, far = backdrop(camera, room)
+        on = views.object_of_pixel[k] >= 0
+        seen = np.where(on[..., None], real, around if asked.flash else around * shade)
+        if asked.flash:
+            away = np.where(on, views.depth[k], far) / (LIT * size)
+            seen = np.clip(seen / np.maximum(away, 0.3)[..., None] ** 2, 0, 1)
+        rgb[k] = photographed(seen, k, rng)
+    made = Views(rgb, views.cameras, object_of_pixel=views.object_of_pixel)
+    return rolled(made) if asked.rolled else made
+
+
+def _some(views: Views, which: np.ndarray) -> Views:
+    assert views.depth is not None and views.object_of_pixel is not None
+    cameras = tuple(views.cameras[k] for k in which)
+    owners = views.object_of_pixel[which]
+    return Views(views.rgb[which], cameras, depth=views.depth[which], object_of_pixel=owners)
+
+
+def _balls(size: float, rng: np.random.Generator) -> np.ndarray:
+    """Return balls on the floor, around the things and not before any camera."""
+    turn = 2 * np.pi * (np.arange(BALLS) + rng.uniform(-0.3, 0.3, BALLS)) / BALLS
+    radius = BALL * size * rng.uniform(0.5, 1.0, BALLS)
+    away = AWAY * size
+    return np.stack([away * np.cos(turn), away * np.sin(turn), radius, radius], axis=1)
+
+
+def rolled(views: Views) -> Views:
+    """Return the middle square of each picture, every second one turned by a quarter."""
+    assert views.object_of_pixel is not None
+    height, width = views.rgb.shape[1:3]
+    side = min(height, width)
+    top, left = (height - side) // 2, (width - side) // 2
+    rgb = views.rgb[:, top : top + side, left : left + side].copy()
+    owners = views.object_of_pixel[:, top : top + side, left : left + side].copy()
+    cameras = []
+    for k, camera in enumerate(views.cameras):
+        K, pose = camera.K.copy(), camera.world_from_camera.copy()
+        K[:2, 2] -= left, top
+        if k % 2:
+            rgb[k], owners[k] = np.rot90(rgb[k]), np.rot90(owners[k])
+            K = np.array([[K[1, 1], 0, K[1, 2]], [0, K[0, 0], side - K[0, 2]], [0, 0, 1]])
+            pose[:3, 0], pose[:3, 1] = pose[:3, 1].copy(), -pose[:3, 0]
+        cameras.append(Camera(K, pose, side, side))
+    return Views(rgb, tuple(cameras), object_of_pixel=owners)
 
 
 def main() -> None:
@@ -111,8 +202,11 @@ def main() -> None:
     parser.add_argument("scene", type=Path)
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--pictures", type=int)
+    for name in ("wall", "clutter", "flash", "rolled"):
+        parser.add_argument(f"--{name}", action="store_true")
     asked = parser.parse_args()
-    write_views(asked.out / "views", degraded(read_views(asked.scene / "views"), asked.seed))
+    write_views(asked.out / "views", degraded(read_views(asked.scene / "views"), asked))
 
 
 if __name__ == "__main__":

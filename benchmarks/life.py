@@ -1,10 +1,12 @@
 """Drop real things and hold their rebound to what was published.
 
-    python benchmarks/life.py [--quick] [--row NAME ...] [--json FILE] [--docs]
+    python benchmarks/life.py [--quick] [--row NAME ...] [--json FILE [--resume]] [--docs]
 
 Every thing goes through the verbs as a scene of a person would: names or materials, walls, the air
 in balls, one word of detail; nothing else can be set. ``--quick`` drops each once, at draft;
-``--docs`` writes docs/life.md. Ranges and sources: src/corporeal/evaluation/life.toml.
+``--docs`` writes docs/life.md. Every drop is written to FILE as it ends; ``--resume`` goes on from
+what is there, which holds as long as the code is the same. Ranges and sources:
+src/corporeal/evaluation/life.toml.
 """
 
 import argparse
@@ -15,18 +17,15 @@ from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from statistics import mean
 
-import numpy as np
 from rich.console import Console
 from rich.progress import track
 from rich.table import Table
 
-import corporeal as co
 from corporeal.errors import SimulationError
+from corporeal.evaluation.drop_test import Drop, drop
 from corporeal.evaluation.life import Rebound, rebounds, sources
 from corporeal.machine import cores
-from corporeal.mpm.problem import Engine, Measure
 from corporeal.pipeline import Settings
-from corporeal.types import Scene
 
 DOCS = Path(__file__).parents[1] / "docs"
 DETAILS, SEEDS = ("draft", "normal"), (0, 1, 2)
@@ -38,119 +37,14 @@ INSIDE = 0.85
 """Least share of rows inside."""
 UNBOOKED = 0.08
 """Most that may be lost unbooked at draft, over the energy of the blow [-]."""
-GAP = 0.1
-"""How far above what it strikes a ball begins, over its diameter [-]."""
-LOOKS = 2000
-"""How often the ball is looked at while it falls its own diameter at its speed of impact."""
-
-
-@dataclass(frozen=True)
-class Drop:
-    """One thing that was dropped in the simulation."""
-
-    name: str
-    detail: str
-    seed: int
-    restitution: float
-    """Speed after over speed before [-]."""
-    contact: float
-    """How long it touched [s]."""
-    treatment: str
-    young_ratio: float
-    """Simulated over real Young's modulus [-]."""
-    unbooked: float
-    """Energy lost that no loss accounts for, over that of the blow [-]; rigid ones lose theirs in
-    their restitution, and have none."""
-    steps: int
-
-
-def scene_of(row: Rebound) -> Scene:
-    """Put the ball just above what it strikes, as fast as its fall has made it there."""
-    radius, gap = 0.5 * row.diameter, GAP * row.diameter
-    ground = row.on.size[2] if row.on else 0.0
-    speed = np.sqrt(2.0 * 9.81 * max(row.drop - gap, 0.0))
-    material = row.material or "rubber"
-    thing = co.ball(
-        material, radius, (0.0, 0.0, ground + gap + radius), (0.0, 0.0, -speed), row.name
-    )
-    below = [co.box(row.on.material, row.on.size, name="block")] if row.on else []
-    scene = co.build_scene(thing, *below, name="life", duration=0.1)
-    said: dict = {"substance": row.material} if row.material else {}
-    said |= {} if row.wall is None else {"shell_thickness_m": row.wall}
-    said |= {} if row.inflation is None else {"inflation_kPa": 1e-3 * row.inflation}
-    first, *others = scene.surfaces
-    return replace(scene, surfaces=(replace(first, extras=said), *others))
-
-
-def drop(row: Rebound, detail: str, seed: int) -> Drop:
-    """Drop one thing and watch until it has left what it struck."""
-    usual = Settings()
-    settings = replace(
-        usual,
-        fill=replace(usual.fill, detail=detail, seed=seed),
-        ground=replace(usual.ground, floor=row.floor),
-    )
-    prepared = co.prepare(scene_of(row), settings)
-    problem = co.pose_problem(prepared, settings)
-    engine = co.build_engine(problem)
-    first = engine.measure()
-    speed = float(np.sqrt(2.0 * 9.81 * row.drop))
-    last = bounce(engine, row.diameter / speed / LOOKS * 10, 30.0 * row.diameter / speed)
-    treatment = prepared.particles.treatments[0]
-    met = touch(last)
-    after = last.momentum[0, 2] / last.mass[0] + 9.81 * (last.time - met[1])
-    rigid = treatment.kind == "rigid"
-    return Drop(
-        row.name,
-        detail,
-        seed,
-        float(max(after, 0.0) / speed),
-        met[1] - met[0],
-        treatment.kind,
-        treatment.young / treatment.young_real if not rigid else 1.0,
-        0.0 if rigid else lost(first, last) / float(0.5 * first.mass[0] * speed**2),
-        engine.steps.count,
-    )
-
-
-def touch(now: Measure) -> tuple[float, float]:
-    """First and last instant [s] at which the ball touched anything; nan: it has not."""
-    first, last = now.first_contact[0], now.last_contact[0]
-    if not np.isfinite(first).any():
-        return np.nan, np.nan
-    return float(np.nanmin(first)), float(np.nanmax(last))
-
-
-def bounce(engine: Engine, look: float, longest: float) -> Measure:
-    """Go on until the ball rises and has touched nothing for a fifth of the time it touched.
-
-    Args:
-        engine: At time 0.
-        look: How often it is looked at [s].
-        longest: What has not risen by then does not [s].
-
-    """
-    while engine.time < longest:
-        engine.advance(engine.time + look)
-        now = engine.measure()
-        began, ended = touch(now)
-        rises = now.momentum[0, 2] > 0.0
-        if rises and now.time - ended > max(0.2 * (ended - began), 2.0 * look):
-            return now
-    return engine.measure()
-
-
-def lost(first: Measure, last: Measure) -> float:
-    """Energy [J] that is neither in motion, strain or height nor booked as lost."""
-    energy = [m.kinetic.sum() + m.elastic.sum() + m.potential.sum() for m in (first, last)]
-    booked = last.friction_loss + last.impact_loss + last.plastic_loss + last.viscous_loss
-    return float(energy[0] - energy[1] - booked)
 
 
 def tried(row: Rebound, detail: str, seed: int) -> Drop | str:
     """Drop one thing; say in a sentence what went wrong."""
+    usual = Settings()
+    settings = replace(usual, fill=replace(usual.fill, detail=detail, seed=seed))
     try:
-        return drop(row, detail, seed)
+        return drop(row, settings)
     except SimulationError as error:
         return f"{row.name}, {detail}, seed {seed}: {error}"
 
@@ -275,8 +169,9 @@ Written by `python benchmarks/life.py --docs`: real things, dropped through the 
 nothing set but the detail, {len(SEEDS)} seeds each. *e* is the speed after over the speed before,
 *spread* how far the seeds are apart, *off* the distance from the published range, *E* the simulated
 over the real modulus (of a thickened wall much less), *unbooked* what the blow lost to transfers
-between particles and grid, and to no loss that is booked. Rigid things rebound by the coefficients
-of restitution of their materials. Ranges and sources: `src/corporeal/evaluation/life.toml`."""
+between particles and grid, and to no loss that is booked. Rigid things rebound by the
+coefficient of restitution that was measured of the pair, else by those of their materials. Ranges
+and sources: `src/corporeal/evaluation/life.toml`."""
 
 
 def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
@@ -306,33 +201,56 @@ def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
     return "\n".join(lines)
 
 
-def main() -> None:
-    """Run what was asked."""
+def keep(drops: Sequence[Drop], path: Path) -> None:
+    """Write drops to a file."""
+    path.write_text(json.dumps([asdict(d) for d in drops], indent=1) + "\n", encoding="utf-8")
+
+
+def kept(path: Path) -> list[Drop]:
+    """Read drops from a file; none where there is no file."""
+    return [Drop(**row) for row in json.loads(path.read_text())] if path.exists() else []
+
+
+def asked_for() -> argparse.Namespace:
+    """Read the command line."""
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("--quick", action="store_true", help="one seed, draft only")
     parser.add_argument("--json", type=Path, help="write every drop to this file")
+    parser.add_argument("--resume", action="store_true", help="keep the drops that it holds")
     parser.add_argument("--row", nargs="+", metavar="NAME", help="only these things")
     parser.add_argument("--docs", action="store_true", help="write docs/life.md")
     parser.add_argument("--workers", type=int, default=min(4, cores()), help="drops side by side")
     asked = parser.parse_args()
     if asked.docs and (asked.quick or asked.row):
         parser.error("--docs needs all of it: leave out --quick and --row")
+    if asked.resume and not asked.json:
+        parser.error("--resume needs --json: the file to go on from")
+    return asked
+
+
+def main() -> None:
+    """Run what was asked."""
+    asked = asked_for()
     rows = [r for r in rebounds() if not asked.row or r.name in asked.row]
     details, seeds = (DETAILS[:1], SEEDS[:1]) if asked.quick else (DETAILS, SEEDS)
-    jobs = [(r, d, s) for r in rows for d in details for s in seeds]
-    done = []
+    drops = kept(asked.json) if asked.resume else []
+    there = {(d.name, d.detail, d.seed) for d in drops}
+    jobs = [(r, d, s) for r in rows for d in details for s in seeds if (r.name, d, s) not in there]
+    wrong = []
     with ProcessPoolExecutor(asked.workers) as pool:
-        for one in track(pool.map(tried, *zip(*jobs, strict=True)), "dropping", len(jobs)):
-            done.append(one)
-    drops = [d for d in done if isinstance(d, Drop)]
-    wrong = [d for d in done if isinstance(d, str)]
+        made = pool.map(tried, *zip(*jobs, strict=True)) if jobs else ()
+        for one in track(made, "dropping", len(jobs)):
+            if isinstance(one, str):
+                wrong.append(one)
+                continue
+            drops.append(one)
+            if asked.json:
+                keep(drops, asked.json)
     found = list(results(rows, drops))
     met = verdicts(found, wrong)
     show(found, met)
-    if asked.json:
-        asked.json.write_text(json.dumps([asdict(d) for d in drops], indent=1) + "\n")
     if asked.docs:
         (DOCS / "life.md").write_text(page(found, met), encoding="utf-8")
 

@@ -78,7 +78,7 @@ def measure(name, seconds, threads):
     step, show = (1e3 * sum(s[k] for s in spent) / len(spent) for k in ("step", "show"))
     size = sum(visitor.sizes) / len(visitor.sizes) / 1e3
     numbers = f"{rate:.2f} {pictures:.1f} {size:.0f} {step:.1f} {show:.1f} {1e3 * late:.0f}".split()
-    stopped = f" [stopped: {live.said}]" if live.said else ""
+    stopped = f" [stopped: {live.message}]" if live.message else ""
     return (name, *numbers, live.hello()["honest"] + stopped)
 
 

@@ -9,6 +9,9 @@ from corporeal.render.camera import Aim, camera_of
 from corporeal.render.embree import Light, Stage, render
 from corporeal.types import Camera, Finish, Scene, SceneObject, Surface
 
+OF_SLAB = 12
+"""Triangles of the slab, which come first."""
+
 
 def blots(seed, side=256):
     """A picture of blots of three sizes: something to find again at any scale."""
@@ -39,15 +42,32 @@ def box(low, high):
     return np.array(vertices), np.array(triangles), np.array(uv, float)
 
 
-def patterned():
+def patterned(seed=0):
     """A block of 10 × 8 × 12 cm on a slab of 60 cm."""
-    made = [box((-0.3, -0.3, -0.02), (0.3, 0.3, 0)), box((-0.05, -0.04, 0), (0.05, 0.04, 0.12))]
+    return on_slab(box((-0.05, -0.04, 0), (0.05, 0.04, 0.12)), seed)
+
+
+def stepped(turned_over=False):
+    """A tower beside a step on the same slab, whose sides all look otherwise; also upside down."""
+    made = [box((-0.05, -0.04, 0), (0.05, 0.04, 0.04)), box((-0.05, -0.04, 0.04), (0, 0.04, 0.12))]
+    vertices = np.concatenate([v for v, _, _ in made])
+    triangles = np.concatenate([t + len(made[0][0]) * k for k, (_, t, _) in enumerate(made)])
+    face = np.arange(len(vertices)) // 4
+    uv = (np.concatenate([u for _, _, u in made]) + np.stack([face % 4, face // 4], axis=1)) / 4
+    if turned_over:  # by half a turn about x, and pushed aside
+        vertices = vertices * (1, -1, -1) + np.array([0.02, 0.01, 0.12])
+    return on_slab((vertices, triangles, uv), side=512)
+
+
+def on_slab(block, seed=0, side=256):
+    """A block, or whatever, on a slab of 60 cm; the slab's twelve triangles come first."""
+    made = [box((-0.3, -0.3, -0.02), (0.3, 0.3, 0)), block]
     surfaces = tuple(
         Surface(name, k, k, v, t, uv=uv)
         for k, (name, (v, t, uv)) in enumerate(zip(("slab", "block"), made, strict=True))
     )
     finishes = tuple(
-        Finish(f"look{k}", texture=blots(k, 512 >> k), roughness=1.0) for k in range(2)
+        Finish(f"look{k}", texture=blots(seed + k, (512, side)[k]), roughness=1.0) for k in range(2)
     )
     things = (SceneObject("slab", "slab", 0.6), SceneObject("block", "block", 0.12))
     return Scene("patterned", "made by a test", things, surfaces, finishes)

@@ -111,7 +111,13 @@ def test_an_unknown_second_word_shows_the_menu(command):
     code, said = command("evaluate", "weight", "scans/")
     assert code == 2
     assert "Unknown word after evaluate 'weight'" in said.err
-    assert "Choose one of: mass, materials, objects, parts." in said.err
+    assert "Choose one of: judge, mass, materials, objects, parts." in said.err
+
+
+def test_a_judge_without_runs_is_told_where_they_come_from(command, tmp_path):
+    code, said = command("evaluate", "judge", str(tmp_path), "--judge", "ask:answers")
+    assert code == 2
+    assert "holds no runs to judge" in said.err and "evaluate dynamics" in said.err
 
 
 def test_an_option_of_another_sub_command_is_refused(command):

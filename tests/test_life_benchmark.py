@@ -12,7 +12,8 @@ ROWS = {row.name: row for row in rebounds()}
 
 @pytest.mark.parametrize("name", ["rubber ball", "football", "ball of memory foam", "wooden ball"])
 def test_what_is_dropped_at_draft_comes_back_as_in_life(name):
-    found = life.drop(ROWS[name], "draft", 0)
+    found = life.tried(ROWS[name], "draft", 0)
+    assert isinstance(found, life.Drop)
     assert ROWS[name].off(found.restitution) <= life.LEEWAY
     assert abs(found.unbooked) < life.UNBOOKED
     assert (found.contact > 1e-3) == (found.treatment != "rigid")

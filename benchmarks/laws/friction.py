@@ -1,6 +1,6 @@
 """Bodies that slide, stick and roll: cases 7 to 10."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -11,6 +11,9 @@ from laws.watching import follow, started
 
 RUBBER = Stuff(young=1e6, poisson=0.3, density=1000.0)
 SLOPE = np.radians(30.0)
+NEAR, LOSS = 0.9, 0.3
+"""Share of the friction that would hold a block, and its loss factor: without loss it shakes, and
+parts of it stick at times (decision 33)."""
 HELD = 10.0
 """Friction that holds a slab to the floor."""
 SIZE = (0.2, 0.1, 0.1)
@@ -56,6 +59,8 @@ class Slope:
     rigid: bool = False
     ramp: float = 0.0
     """Time in which gravity grows [s]."""
+    loss: float = 0.0
+    """Loss factor of block and slab [-]."""
 
 
 def block_on_slab(given: Slope, time: float) -> Slide:
@@ -85,6 +90,8 @@ def _block_and_slab(given: Slope, cell: float, turn: np.ndarray) -> tuple[Body, 
     thick, wide, long = 0.08, SIZE[1] + 3 * cell, 0.62
     origin = turn @ (np.array([0.13, 0.31, 0.22]) * cell)
 
+    stuff = replace(RUBBER, loss=given.loss)
+
     def at(x: float, z: float) -> tuple:
         return tuple(origin + turn @ np.array([x, 0.0, z]))
 
@@ -94,11 +101,11 @@ def _block_and_slab(given: Slope, cell: float, turn: np.ndarray) -> tuple[Body, 
         cell / 2,
         given.fill,
         turn,
-        stuff=RUBBER,
+        stuff=stuff,
         rigid=given.rigid,
     )
     slab = box(
-        at(long / 2, thick / 2), (long, wide, thick), cell / 2, given.fill, turn, stuff=RUBBER
+        at(long / 2, thick / 2), (long, wide, thick), cell / 2, given.fill, turn, stuff=stuff
     )
     normal = turn[:, 2]
     return block, slab, Plane(tuple(normal), float(origin @ normal))
@@ -125,6 +132,17 @@ def sliding_block(quick: bool = False) -> Outcome:
         )
         stiff = block_on_slab(Slope(rigid=True), time).distance
         checks.append(relative("slip of a rigid block on a slab [m]", stiff, slide(0.3, time), 2.0))
+        # A tenth of its weight drives it: an error of friction shows ten times as large.
+        near = NEAR * float(np.tan(SLOPE))
+        lossy = block_on_slab(Slope(friction=near, ramp=0.1, loss=LOSS), time).distance
+        checks.append(
+            relative(
+                f"slip at {NEAR} of the friction that holds, loss {LOSS} [m]",
+                lossy,
+                slide(near, time, 0.1),
+                3.0,
+            )
+        )
     return Outcome(
         "7",
         "A block slides down a slope as Coulomb says",

@@ -31,5 +31,5 @@ def _granted(quota: Path) -> int:
 
 def _wished() -> int:
     """Give the threads that the environment grants; very many where it says nothing."""
-    said = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
-    return int(said) if said.isdecimal() and int(said) > 0 else UNLIMITED
+    asked = os.environ.get("OMP_NUM_THREADS", "").split(",")[0].strip()
+    return int(asked) if asked.isdecimal() and int(asked) > 0 else UNLIMITED

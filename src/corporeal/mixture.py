@@ -1,6 +1,6 @@
 """What objects may weigh: over all ways they may be, all ranges, and what their meshes leave open.
 
-Draws of the whole scene are weighed; what was said of an object's mass without the library
+Draws of the whole scene are weighed; an estimate of an object's mass made without the library
 (``Evidence``) gives each draw a weight, and sets no value: whatever is chosen was drawn, lies
 inside measured ranges, and its parts fit each other.
 """
@@ -60,7 +60,7 @@ TRIES = 200
 """Draws of an object, until one is as likely as outside evidence leaves it."""
 OPEN = 0.3
 """Standard deviation of the logarithm of the volume of what is not closed [-]."""
-SAID_BY = "What was said of the object's mass fits best here, of all draws from this range."
+FITTED = "This draw from the range fits the estimate of the object's mass best."
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ def doubt(member: Member) -> float:
 def ground_weighed(
     scene: Scene, parts: Parts, inventory: Inventory, grounding: GroundConfig
 ) -> MaterialField:
-    """Choose every value, as ``ground`` does; where a model was asked, weigh what it said first.
+    """Choose every value, as ``ground`` does; where a model was asked, weigh its answers first.
 
     Raises:
         UserError: As ``ground``.
@@ -164,7 +164,8 @@ def ground_weighed(
     """
     if not inventory.transcript:  # nothing but ranges is open
         return ground(scene, parts, inventory, grounding)
-    believed = weighed(Scale(life_sized(scene), parts, grounding, 0), inventory, DRAWS)
+    ours = replace(grounding, field="")  # draws are of our ranges, whoever decides in the end
+    believed = weighed(Scale(life_sized(scene), parts, ours, 0), inventory, DRAWS)
     found = ground(scene, parts, believed.inventory, grounding)
     return replace(found, mixtures=believed.mixtures)
 
@@ -308,10 +309,10 @@ def _taken(words: PartWords, drawn: PartWords, made: Material, built: Structure)
     for name in WEIGHING:
         if name in made.grounds and (name == "density" or built.kind != "solid"):
             ground = made.grounds[name]
-            places[name] = Placement(fraction_of(ground.range, ground.value), "evidence", SAID_BY)
+            places[name] = Placement(fraction_of(ground.range, ground.value), "evidence", FITTED)
     if built.contents is not None:
         ground = built.contents.grounds["density"]
-        places[CONTENTS] = Placement(fraction_of(ground.range, ground.value), "evidence", SAID_BY)
+        places[CONTENTS] = Placement(fraction_of(ground.range, ground.value), "evidence", FITTED)
     probability = {(h.material, h.structure, h.contents): h.probability for h in words.hypotheses}
     return replace(
         drawn,
@@ -325,23 +326,25 @@ def _taken(words: PartWords, drawn: PartWords, made: Material, built: Structure)
 # ---------------------------------------------------------------- evidence
 
 
-def likelihood(masses: Float[np.ndarray, " N"], said: Evidence | None) -> Float[np.ndarray, " N"]:
-    """Return how well each mass [kg] agrees with what was said: log-normal, or about nothing."""
+def likelihood(
+    masses: Float[np.ndarray, " N"], evidence: Evidence | None
+) -> Float[np.ndarray, " N"]:
+    """Return how well each mass [kg] agrees with the evidence: log-normal above a floor."""
     found = np.ones(len(masses))
-    for centre, width in readings(said):
+    for centre, width in readings(evidence):
         away = np.log(masses / centre) / width
         found *= (1 - WRONG) * np.exp(-0.5 * away**2) + WRONG
     return found
 
 
-def readings(said: Evidence | None) -> list[tuple[float, float]]:
-    """Return what was said as masses: centre [kg] and standard deviation of the logarithm."""
-    if said is None:
+def readings(evidence: Evidence | None) -> list[tuple[float, float]]:
+    """Return the evidence as masses: centre [kg] and standard deviation of the logarithm."""
+    if evidence is None:
         return []
-    width = log(said.high / said.low) / NINE_IN_TEN
-    found = [(said.likely, max(width, JUDGED))]
+    width = log(evidence.high / evidence.low) / NINE_IN_TEN
+    found = [(evidence.likely, max(width, JUDGED))]
     for kind, factor in (("net weight", PACKAGING), ("total weight", 1.0)):
-        values = [f.value for f in said.printed if f.kind == kind and f.value]
+        values = [f.value for f in evidence.printed if f.kind == kind and f.value]
         if values:  # the same in ounces and in grams is one statement
             found.append((factor * float(np.median(values)), PRINTED))
     return found
@@ -357,18 +360,18 @@ def contradiction(words: ObjectWords, masses: Float[np.ndarray, " N"]) -> str:
             clauses.append((centre, nearest))
     if not clauses:
         return ""
-    said, _ = max(clauses, key=lambda row: abs(row[1]))
+    estimate, _ = max(clauses, key=lambda row: abs(row[1]))
     low, high = float(masses.min()), float(masses.max())
     return (
         f"{words.name}: everything that it was taken for weighs {low:.3g} to {high:.3g} kg, but "
-        f"what was said of its mass is {said:.3g} kg. {_reconciled(words, masses, said)} "
+        f"its mass was estimated at {estimate:.3g} kg. {_reconciled(words, masses, estimate)} "
         "--annotations decides."
     )
 
 
-def _reconciled(words: ObjectWords, masses: np.ndarray, said: float) -> str:
-    """Name what would make the likeliest description weigh what was said."""
-    ratio = said / float(np.median(masses))
+def _reconciled(words: ObjectWords, masses: np.ndarray, estimate: float) -> str:
+    """Name what would make the likeliest description weigh as estimated."""
+    ratio = estimate / float(np.median(masses))
     main = max(_leaves(words), key=lambda p: p.volume_share - p.inner_share)
     size = f"an object {ratio ** (1 / 3):.2f} times as large"
     if main.structure == "filled":
@@ -388,12 +391,12 @@ def _reconciled(words: ObjectWords, masses: np.ndarray, said: float) -> str:
 
 def label(words: ObjectWords, drawn: ObjectWords) -> str:
     """Say in words which of its ways each part in doubt was drawn in."""
-    told = [
+    in_doubt = [
         f"{p.name}: {q.material}, {q.structure}{f' of {q.contents}' if q.contents else ''}"
         for p, q in zip(_leaves(words), _leaves(drawn), strict=True)
         if len(p.hypotheses) > 1
     ]
-    return "; ".join(told) or "as described"
+    return "; ".join(in_doubt) or "as described"
 
 
 def _leaves(words: ObjectWords) -> list[PartWords]:

@@ -17,6 +17,7 @@ from corporeal import store
 from corporeal.errors import UserError
 from corporeal.features import MENU as ENCODERS
 from corporeal.features.maskers import MENU as MASKERS
+from corporeal.fields.specification import READERS
 from corporeal.formats.glb_writer import write_glb
 from corporeal.formats.mask_files import corrected
 from corporeal.formats.scene_file import read_scene_file, write_scene_file
@@ -72,7 +73,7 @@ VERBS = tuple(FOLDERS)
 RUN = "run.json"
 WRITTEN = ("record",)
 """Settings that name what is written, not what is read."""
-BEFORE_PATHS = ("replay", *ENCODERS, *MASKERS)
+BEFORE_PATHS = ("replay", *READERS, *ENCODERS, *MASKERS)
 """What stands before a colon and a path."""
 GAUSSIANS = "gaussians.ply"
 

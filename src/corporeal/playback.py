@@ -66,15 +66,15 @@ def playback(
         audit: Warnings and numbers, where the run has been reported on.
 
     """
-    told = told_of(prepared)
+    summary = summary_of(prepared)
     if happened is not None:
-        told["marks"] = marks(happened)
+        summary["marks"] = marks(happened)
     if audit is not None:
-        told["audit"] = audit_of(audit, prepared)
-    return take(prepared.scene, prepared.parts, cast, recording, told)
+        summary["audit"] = audit_of(audit, prepared)
+    return take(prepared.scene, prepared.parts, cast, recording, summary)
 
 
-def told_of(prepared: Prepared) -> dict[str, Any]:
+def summary_of(prepared: Prepared) -> dict[str, Any]:
     """Return what is known of a scene before it moves: parts, colours, credits."""
     scene, parts, field = prepared.scene, prepared.parts, prepared.field
     credits = dict.fromkeys(o.credit for o in scene.objects if o.credit)

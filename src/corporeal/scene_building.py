@@ -241,8 +241,8 @@ def _object(one: Solid, name: str) -> SceneObject:
 
 
 def _surface(one: Solid, number: int) -> Surface:
-    said = {"substance": one.material}
-    return Surface(one.name, number, number, one.vertices, one.triangles, extras=said)
+    stated = {"substance": one.material}
+    return Surface(one.name, number, number, one.vertices, one.triangles, extras=stated)
 
 
 def _with_overlaps_told(scene: Scene) -> Scene:

@@ -140,13 +140,13 @@ class SceneObject:
     push: Push | None = None
     wind: Wind | None = None
     path: Keyframes | None = None
-    """Prescribed motion: it moves as told, as one rigid body, whatever it meets."""
+    """Prescribed motion, as one rigid body, whatever it meets."""
     source: str = ""
     """The file it came from."""
     credit: str = ""
     """Licence and attribution, where the file states them."""
     sized_by: str = ""
-    """Who said how large the real object is, in a clause; "": the file."""
+    """The source of the real object's size, in a clause; "": the file."""
     mass: float | None = None
     """As the file states it, of the object in the scene [kg]; None: its materials say."""
 
@@ -231,7 +231,7 @@ class Gaussians:
     """
 
     mean: Float[np.ndarray, "N 3"]
-    """[m], or the file's unit where nobody said its size."""
+    """[m], or the file's unit where its size is not stated."""
     rotation: Float[np.ndarray, "N 4"]
     """World from the ellipsoid's axes: unit quaternions (w, x, y, z)."""
     scale: Float[np.ndarray, "N 3"]
@@ -353,7 +353,7 @@ class PrintedFact:
 
 @dataclass(frozen=True)
 class Evidence:
-    """What was said of an object's mass without the library: it reweights, and sets no value."""
+    """An estimate of an object's mass made without the library: it reweights, and sets no value."""
 
     low: float
     """90 % of what it may weigh lies between ``low`` and ``high`` [kg]."""
@@ -371,13 +371,13 @@ Speaker = Literal["annotation", "recording", "model", "metadata", "unknown"]
 
 @dataclass(frozen=True)
 class PartWords:
-    """What somebody or something said about one part."""
+    """The description of one part: what it is made of and how, and by what source."""
 
     name: str
     material: str | None
     """A name from the library; None: unknown, which is a normal answer."""
     structure: Built | None = None
-    """How the part is made; None: not said, the shape decides."""
+    """How the part is made; None: unknown, the shape decides."""
     thickness: float | None = None
     """Thickness of the wall of what is a shell or filled, where it is known [m]."""
     answered_by: Speaker = "unknown"
@@ -416,7 +416,7 @@ class PartWords:
     """What the part consists of where its mesh does not tell them apart: the shaft and the handle
     of a scanned screwdriver. The words above are then those of the piece that matters most."""
     built_by: Speaker = "unknown"
-    """Who said how it is built; ``answered_by`` said what it is made of."""
+    """The source of how it is built; ``answered_by``: of what it is made of."""
 
     @property
     def alternatives(self) -> tuple[tuple[str, float], ...]:
@@ -452,7 +452,7 @@ class ObjectWords:
     usual_extent: float | None = None
     """How large such an object usually is, as a model says [m]."""
     evidence: Evidence | None = None
-    """What was said of its mass without the library; None: nobody was asked."""
+    """An estimate of its mass made without the library; None: nobody was asked."""
 
 
 @dataclass(frozen=True)
@@ -497,7 +497,7 @@ class Part:
     name: str
     object: int
     found_by: str
-    """How the part was told apart: "node", "material", "whole object" …"""
+    """What the part was separated by: "node", "material", "whole object" …"""
 
 
 @dataclass(frozen=True)
@@ -699,6 +699,8 @@ class MaterialField:
     """Per part, of what it consists where its mesh does not tell; empty: nowhere more than one."""
     mixtures: tuple[MassMixture, ...] = ()
     """Per object that a model described, what it may weigh; empty: no model was asked."""
+    notes: tuple[str, ...] = ()
+    """What a reader of the report should know of numbers from elsewhere, in sentences."""
 
 
 # ---------------------------------------------------------------- what is simulated

@@ -17,8 +17,8 @@ FLOORS = [
     {"geometry", "backends", "store"},
     {"formats"},
     {"materials", "vlm", "render", "showcase", "pool", "settle"}
-    | {"splats", "features", "regions", "poses"},
-    {"treatment"},
+    | {"splats", "features", "regions", "poses", "masking"},
+    {"treatment", "fields"},
     {"trajectory"},
     {"stages"},
     {"mixture"},

@@ -21,7 +21,6 @@ NESTED = {
 FOREIGN = {
     "viewer/orders.py": "orders of a page, of which nothing is trusted",
     "formats/sog.py": "meta.json of splats in SOG, a format of others",
-    "materials/contact.py": "pairs.toml, written by hand",
     "materials/library.py": "libraries of materials, written by hand",
     "materials/lint.py": "libraries of materials, whose mistakes it finds",
     "regions/attributes.py": "the table of colours and materials beside it, written by hand",

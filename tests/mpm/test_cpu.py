@@ -156,6 +156,20 @@ def test_the_number_of_threads_changes_nothing(threads):
         assert np.array_equal(value, many.save()[name], equal_nan=True), name
 
 
+@pytest.mark.parametrize("poisson", [0.2, 0.48])
+def test_steps_are_those_of_each_matter_and_not_of_the_fastest_with_the_greatest_loss(poisson):
+    """A couch of firm foam with a limp, lossy pillow: branches stiffen the pillow alone."""
+    points = ball((0, 0, 0.05), 0.05)
+    limp = points[:, 0] > 0.0
+    mixed = body(points, velocity=(0, 0, -1.0), poisson=poisson)
+    mixed.young[:] = np.where(limp, 5e3, 6e4)
+    mixed.loss[:] = np.where(limp, 1.1, 0.2)
+    fast, sure = CpuEngine(problem(mixed), threads=1), ReferenceEngine(problem(mixed))
+    assert fast.stable_step() == pytest.approx(sure.stable_step(), rel=1e-3)
+    step_together(fast, sure, 10)
+    assert fast.stable_step() == pytest.approx(sure.stable_step(), rel=0.02)
+
+
 def test_steps_taken_one_by_one_are_the_steps_of_a_run():
     run, single = CpuEngine(crowd()), CpuEngine(crowd())
     run.advance(0.008)

@@ -82,6 +82,50 @@ def test_a_block_sticks_when_friction_exceeds_the_slope(patient_engine, rigid):
     assert abs(moved[1]) < 0.01 * CELL
 
 
+LOSSY, LOSSLESS = Stuff(young=1e6, loss=0.3), Stuff(young=1e6)
+LIMIT = float(np.tan(ANGLE))
+"""Friction that just holds a block on the slope [-]."""
+
+
+def slid(build, friction, stuff, cells=4, **more):
+    """How far [m] a soft block came in .5 s; gravity grows in .1 s, so that hardly a wave runs."""
+    cell = SIZE[2] / cells
+    block = box(CENTRE, SIZE, cell / 2, stuff=stuff)
+    given = {"planes": [floor()], "gravity": SLOPE, "gravity_ramp": 0.1} | more
+    run = build(problem(block, cell=cell, friction=friction, **given))
+    run.advance(0.5)
+    return float(run.measure().centre[0, 0] - CENTRE[0])
+
+
+def creeping(share):
+    """Way of a rigid block [m] at this share of the friction that holds it."""
+    pull = G * np.sin(ANGLE) * (1.0 - share)
+    return pull * (0.5**2 / 2 - 0.1 * 0.5 / 2 + 0.1**2 / 6)
+
+
+def test_a_soft_block_near_the_limit_of_friction_slides_as_coulomb_says(fast_engine):
+    """A tenth of its weight drives it: an error of friction shows ten times as large."""
+    assert slid(fast_engine, 0.9 * LIMIT, LOSSY) == pytest.approx(creeping(0.9), rel=0.03)
+    assert slid(fast_engine, 0.8 * LIMIT, LOSSY) == pytest.approx(creeping(0.8), rel=0.015)
+
+
+@pytest.mark.parametrize("stuff", [LOSSY, LOSSLESS])
+def test_a_soft_block_just_beyond_the_limit_of_friction_does_not_creep(fast_engine, stuff):
+    assert abs(slid(fast_engine, 1.1 * LIMIT, stuff)) < 0.02 * CELL
+
+
+@pytest.mark.slow
+def test_a_block_without_loss_shakes_and_slides_farther_on_any_grid(fast_engine):
+    """The control: friction excites its vibrations, which stick in places and let others slip.
+
+    That is elastodynamics and no error of the grid, which twice the resolution would halve.
+    """
+    coarse, fine = (slid(fast_engine, 0.9 * LIMIT, LOSSLESS, cells) for cells in (4, 8))
+    rigid = creeping(0.9)
+    assert coarse > 1.2 * rigid
+    assert fine - rigid > 0.8 * (coarse - rigid)
+
+
 def test_a_block_without_friction_slides_freely(patient_engine):
     run = patient_engine(block_on_slope(0.0))
     run.advance(0.2)

@@ -85,7 +85,7 @@ def test_a_mesh_that_is_not_as_large_as_the_table_says_is_not_in_metres(root):
 
 def test_copies_from_before_the_terms_were_eased_say_so(root):
     (root / "LICENSE-CC-BY-NC-4.0.txt").touch()
-    assert {c.said.licence for c in abo.candidates(root)} == {"CC-BY-NC-4.0"}
+    assert {c.declared.licence for c in abo.candidates(root)} == {"CC-BY-NC-4.0"}
 
 
 def test_what_was_not_unpacked_is_passed_over_and_a_path_leads_nowhere_else(root, tmp_path):

@@ -1,5 +1,6 @@
 """Where photographs, or frames of a film, were taken from."""
 
+import json
 import shutil
 import subprocess
 import sys
@@ -11,20 +12,34 @@ import pytest
 from PIL import Image
 
 from corporeal.errors import BadFileError, UserError
+from corporeal.formats.colmap import write_colmap
 from corporeal.formats.photographs import read_photographs
 from corporeal.formats.sources import kind_of, photographs_in, sources, unposed
 from corporeal.poses import film_frames
 from corporeal.poses import pose as posing
 from corporeal.poses.attempt import Attempt
+from corporeal.poses.by_masks import checked_by_masks
 from corporeal.poses.film_frames import choose, write_frames
 from corporeal.poses.gather import gather
-from corporeal.poses.judge import doubts, names_of, unseen_side
+from corporeal.poses.judge import FILLED, doubts, names_of, unseen_side
 from corporeal.poses.pose import FIGURE, pose
+from corporeal.poses.standstill import Standstill
 from corporeal.render.camera import camera_of
+from corporeal.render.embree import Stage, identify
 from corporeal.render.video import reel
-from patterned_scene import blots, on_its_side, photographs, pose_errors, ring
+from patterned_scene import (
+    OF_SLAB,
+    blots,
+    on_its_side,
+    patterned,
+    photographs,
+    pose_errors,
+    ring,
+    stepped,
+)
 
 COUNT = 14
+AWAY = np.array([[1, 0, 0, 0.06], [0, 1, 0, 0.04], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 TURN_RIGHT = 6
 """EXIF: the picture is to be turned by a quarter to the right."""
 
@@ -77,13 +92,96 @@ def test_cameras_are_found_where_they_were(taken, spoilt, tmp_path):
     assert (found.folder / "sparse" / "0" / "images.txt").exists()
 
 
+@pytest.fixture
+def turned_over(tmp_path, monkeypatch):
+    """Two rounds about a block that was turned over between them, and what attempts come to.
+
+    By the slab all pictures fit together; by what is inside masks too, where that is found.
+    """
+    folder, aims = tmp_path / "photos", ring(np.arange(COUNT) * 360 / COUNT, (160, 120), 0.2, 0.28)
+    (folder / "masks").mkdir(parents=True)
+    back = np.diag([1.0, -1.0, -1.0, 1.0])
+    back[:3, 3] = -0.02, 0.01, 0.12
+    by_slab, by_block, names = [], [], []
+    for turned in (False, True):
+        stage = Stage(stepped(turned))
+        for k, aim in enumerate(aims):
+            names.append(f"{int(turned)}_{k:02d}.jpg")
+            mask = np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB)
+            Image.fromarray(mask).save(folder / "masks" / f"{names[-1][:-4]}.png")
+            noise = np.random.default_rng(len(names)).integers(0, 255, (120, 160, 3))
+            Image.fromarray(noise.astype(np.uint8)).save(folder / names[-1])
+            camera = camera_of(aim)
+            by_slab.append(camera)
+            seen = back @ camera.world_from_camera if turned else camera.world_from_camera
+            by_block.append(replace(camera, world_from_camera=seen))
+    models, tried = {"plain": by_slab, "masked": by_block}, []
+
+    def attempt(source, out, gathered, way, progress):
+        tried.append(way)
+        points = np.random.default_rng(0).normal(size=(2000, 3))
+        cameras = models[way] if way in models else []
+        if cameras:
+            grey = np.full((2000, 3), 90, np.uint8)
+            write_colmap(out / "sparse" / "0", tuple(cameras), tuple(names), points, grey)
+        return Attempt(way, len(names), len(cameras), 9000 * bool(cameras), focal=1.0)
+
+    monkeypatch.setattr(posing, "attempt", attempt)
+    return folder, models, tried
+
+
+def test_an_object_that_was_turned_over_is_posed_by_what_its_masks_show(turned_over, tmp_path):
+    """All pictures fit by the floor, and no count of the model speaks against that."""
+    folder, models, tried = turned_over
+    found = pose(folder, tmp_path / "poses", silent)
+    assert tried == ["plain", "masked"] and found.warnings == ()
+    assert "from points on objects alone" in found.statements[0]
+    angle, place = pose_errors(read_photographs(found.folder).views.cameras, models["masked"])
+    assert angle.max() < 0.01 and place.max() < 1e-4
+    kept = json.loads((tmp_path / "poses" / "poses.json").read_text())
+    first, last = (told["filled"] for told in kept["attempts"])
+    assert first < FILLED < last
+
+
+def test_masks_that_nothing_agrees_with_are_a_warning(turned_over, tmp_path):
+    """They may be poor: what all pictures agree on is not refused for them."""
+    folder, models, tried = turned_over
+    models["masked"] = []
+    found = pose(folder, tmp_path / "poses", silent)
+    assert tried == ["plain", "masked"], "what is plainly believed needs no thorough attempt"
+    assert "masks alone" not in found.statements[0] and len(found.warnings) >= 1
+    assert "turned over between the pictures, or masks miss parts" in found.warnings[-1]
+
+
+def test_a_picture_on_the_wrong_piece_of_a_pattern_is_left_out(taken, tmp_path):
+    """As one of the bananas on a carpet was: right by reprojection, wrong by its silhouette."""
+    pytest.importorskip("pycolmap")
+    scene, folder = Stage(patterned()), tmp_path / "poses"
+    aims = ring(np.arange(COUNT) * 360 / COUNT, (320, 240))
+    (folder / "masks").mkdir(parents=True)
+    for k, aim in enumerate(aims):
+        mask = np.uint8(255) * (identify(scene, aim)[0] >= OF_SLAB)
+        Image.fromarray(mask).save(folder / "masks" / f"photo_{k:03d}.png")
+    names = tuple(f"photo_{k:03d}.jpg" for k in range(COUNT))
+    cameras = list(taken[1])
+    cameras[4] = replace(cameras[4], world_from_camera=AWAY @ cameras[4].world_from_camera)
+    write_colmap(tmp_path / "model", tuple(cameras), names)
+    told = Attempt("plain", COUNT, registered=COUNT, points=9000, focal=1.0)
+    left = checked_by_masks(told, folder, tmp_path / "model")
+    assert left.astray == ("photo_004.jpg",) and left.registered == COUNT - 1
+    assert left.filled > FILLED
+    assert "photo_004.jpg" not in (tmp_path / "model" / "images.txt").read_text()
+    again = checked_by_masks(told, folder, tmp_path / "model")
+    assert again.astray == () and again.registered == COUNT
+
+
 def test_what_was_found_is_not_looked_for_again(taken, tmp_path, monkeypatch):
     pytest.importorskip("pycolmap")
     tried = []
 
-    def attempt(folder, out, gathered, thorough, progress):
-        tried.append(thorough)
-        return Attempt(thorough, COUNT, registered=5, points=20)
+    def attempt(folder, out, gathered, way, progress):
+        tried.append(way)
+        return Attempt(way, COUNT, registered=5, points=20)
 
     monkeypatch.setattr(posing, "attempt", attempt)
     said = []
@@ -91,7 +189,7 @@ def test_what_was_found_is_not_looked_for_again(taken, tmp_path, monkeypatch):
         with pytest.raises(BadFileError, match=r"only 5 of 14 pictures fit together; there are 4 "):
             said.append(1)
             pose(taken[0], tmp_path / "poses", silent)
-    assert tried == [False, True], "both attempts once"
+    assert tried == ["plain", "thorough"], "both attempts once"
     shutil.copytree(taken[0], tmp_path / "other")
     (tmp_path / "other" / "photo_000.jpg").unlink()
     with pytest.raises(BadFileError, match="Put the thing on something with a pattern"):
@@ -178,18 +276,21 @@ def test_photographs_lie_in_a_folder_or_in_its_images(tmp_path):
 # ---------------------------------------------------------------- what is believed
 
 RIGHT = {
-    "a patterned slab": Attempt(False, 48, 48, 13_999, 0.21, (), 1.0, 0.01),
-    "a plain floor": Attempt(True, 48, 47, 2403, 0.98, (), 1.0, 0.05),
-    "real": Attempt(True, 13, 12, 2092, 0.43, (), 0.99, 0.1),
-    "a film": Attempt(False, 30, 30, 9705, 0.3, (), 1.0, 0.0),
+    "a patterned slab": Attempt("plain", 48, 48, 13_999, 0.21, (), 1.0, 0.01),
+    "a plain floor": Attempt("thorough", 48, 47, 2403, 0.98, (), 1.0, 0.05),
+    "real": Attempt("thorough", 13, 12, 2092, 0.43, (), 0.99, 0.1),
+    "a film": Attempt("plain", 30, 30, 9705, 0.3, (), 1.0, 0.0),
 }
 WRONG = {
-    "nothing": (Attempt(True, 20), "no two pictures"),
-    "groups": (Attempt(False, 48, 34, 2000, 0.5, (18,), 1.0, 0.0), "groups of 34 and 18"),
-    "few": (Attempt(True, 24, 11, 541, 0.9, (), 0.85, 0.1), "only 11 of 24"),
-    "a lens": (Attempt(True, 24, 20, 1541, 0.9, (), 0.85, 0.55), "k1 0.55"),
-    "a vase": (Attempt(True, 48, 40, 380, 1.1, (), 1.0, 0.0), "10 points per picture"),
-    "a lens of a vase": (Attempt(True, 48, 40, 4000, 1.1, (), 0.14, 0.0), "focal length 0.14"),
+    "nothing": (Attempt("thorough", 20), "no two pictures"),
+    "groups": (Attempt("plain", 48, 34, 2000, 0.5, (18,), 1.0, 0.0), "groups of 34 and 18"),
+    "few": (Attempt("thorough", 24, 11, 541, 0.9, (), 0.85, 0.1), "only 11 of 24"),
+    "a lens": (Attempt("thorough", 24, 20, 1541, 0.9, (), 0.85, 0.55), "k1 0.55"),
+    "a vase": (Attempt("thorough", 48, 40, 380, 1.1, (), 1.0, 0.0), "10 points per picture"),
+    "a lens of a vase": (
+        Attempt("thorough", 48, 40, 4000, 1.1, (), 0.14, 0.0),
+        "focal length 0.14",
+    ),
 }
 
 
@@ -299,3 +400,29 @@ def test_films_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, monk
     with pytest.raises(BadFileError, match=said) as error:
         write_frames(path, tmp_path / "frames", silent)
     assert "\n" not in str(error.value)
+
+
+def test_a_recording_of_a_screen_is_refused(tmp_path):
+    """A page that scrolls in a window whose frame stands still."""
+    page = np.kron(blots(0, 512), np.ones((2, 2, 1), np.uint8))
+    frame = blots(3, 256)[:240].repeat(2, axis=1)[:, :320]
+    with reel(tmp_path / "a.mp4", 30, (320, 240)) as made:
+        for k in range(60):
+            shown = frame.copy()
+            shown[40:220, 60:] = page[8 * k : 8 * k + 180, :260]
+            made.add(shown)
+    with pytest.raises(BadFileError, match="never moves: it is a recording of a screen") as error:
+        write_frames(tmp_path / "a.mp4", tmp_path / "frames", silent)
+    assert "\n" not in str(error.value) and "Do not turn the thing" in str(error.value)
+
+
+def test_what_stands_still_before_a_plain_wall_is_no_screen():
+    """A turntable; and a camera that moves."""
+    moves, turns = Standstill(), Standstill()
+    paper = blots(0, 512)[..., 0]
+    for k in range(40):
+        moves.look(paper[k : k + 200, 3 * k : 3 * k + 300].copy())
+        plain = np.full((200, 300), 200, np.uint8)
+        plain[60:140, 100:200] = paper[60:140, 3 * k : 3 * k + 100]
+        turns.look(plain)
+    assert moves.share < 0.01 and turns.share < 0.05

@@ -9,12 +9,15 @@ import pytest
 from corporeal.errors import UserError
 from corporeal.formats.photographs import Photographs
 from corporeal.geometry.agreement import Agreement
+from corporeal.render.camera import camera_of
+from corporeal.render.embree import Stage, identify
 from corporeal.splats import intake
 from corporeal.splats.intake import take_in
 from corporeal.splats.quality import Quality
 from corporeal.splats.train import Trained
 from corporeal.splats.training_schedule import TrainConfig
 from corporeal.types import Camera, Gaussians, Views
+from patterned_scene import OF_SLAB, patterned, ring
 
 DOUBT = "The poses do not agree with the pictures."
 ONE = Gaussians(
@@ -95,3 +98,23 @@ def test_what_was_badly_learned_or_not_checked_is_said(taken, quality, said):
     told = taken(FINE, learned(quality)).warnings
     assert len(told) == len(said)
     assert all(words in warning for words, warning in zip(said, told, strict=True))
+
+
+def test_a_photograph_that_contradicts_the_masks_of_all_others_is_left_out(monkeypatch):
+    stage, aims = Stage(patterned()), ring(np.arange(12) * 30, (160, 120))
+    masks = np.stack([np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB) for aim in aims])
+    masks[7] = masks[7][::-1, ::-1]  # its picture was turned by half, and its pose was not
+    cameras = tuple(camera_of(aim) for aim in aims)
+    rgb = np.arange(12, dtype=np.uint8)[:, None, None, None] * np.ones((1, 120, 160, 3), np.uint8)
+    names = tuple(f"{k:02d}.jpg" for k in range(12))
+    shown = Photographs(Views(rgb, cameras), names, True, masks, warnings=("before",))
+    monkeypatch.setattr(intake, "read_photographs", lambda *_: shown)
+    monkeypatch.setattr(intake, "kind_of", lambda _: "photographs")
+    monkeypatch.setattr(intake, "agreement", lambda *_: FINE)
+    monkeypatch.setattr(intake, "train", lambda *_: learned(GOOD))
+    taken = take_in(Path("photos"), TrainConfig("draft"))
+    assert taken.views is not None and len(taken.cameras) == 11
+    assert 7 not in taken.views.rgb[:, 0, 0, 0] and taken.masks is not None
+    assert len(taken.masks) == 11
+    before, said = taken.warnings
+    assert before == "before" and "1 of 12 photographs were left out" in said and "07.jpg" in said

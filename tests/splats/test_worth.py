@@ -3,10 +3,13 @@
 import numpy as np
 import pytest
 
+from corporeal.geometry.mesh import Mesh
 from corporeal.render.camera import camera_of
+from corporeal.render.embree import Stage, identify
 from corporeal.splats.quality import Quality
-from corporeal.splats.worth import GREY, not_worth
-from patterned_scene import ring
+from corporeal.splats.worth import GREY, not_worth, unlike_masks
+from patterned_scene import OF_SLAB, patterned, ring
+from patterned_scene import box as made_box
 
 CAMERAS = [camera_of(aim) for aim in ring(np.arange(20) * 18, away=0.5, height=0.35)]
 
@@ -50,3 +53,15 @@ def test_pictures_no_better_than_grey_are_no_shape():
 
 def test_of_a_splat_without_cameras_nothing_is_said():
     assert not_worth(np.array([box(9.0, 9.0)]), (), masked=False) is None
+
+
+def test_a_surface_that_is_not_what_masks_show_is_refused():
+    aims = ring(np.arange(20) * 18, (160, 120))
+    stage, cameras = Stage(patterned()), [camera_of(aim) for aim in aims]
+    masks = np.stack([identify(stage, aim)[0] >= OF_SLAB for aim in aims])
+    vertices, triangles, _ = made_box((-0.05, -0.04, 0), (0.05, 0.04, 0.12))
+    assert unlike_masks([Mesh(vertices, triangles)], cameras, masks) is None
+    eaten = Mesh(vertices * (0.6, 0.6, 0.2), triangles)
+    why = unlike_masks([eaten], cameras, masks)
+    assert why is not None and "overlap by" in why and "--force" in why
+    assert unlike_masks([eaten], cameras, np.zeros_like(masks)) is None, "nobody said anything"

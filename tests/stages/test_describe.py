@@ -41,6 +41,18 @@ def test_a_stated_thickness_of_zero_means_solid():
     assert (said.structure, said.thickness) == ("solid", None)
 
 
+def test_open_ware_from_pictures_is_no_solid_and_that_is_said():
+    """What is plain inside looks solid; a model of the same shows its wall itself."""
+    bowl = scene(("bowl_0", [("mesh", plain(), {})]))
+    made = describe(bowl, from_pictures=True)
+    said = words(made)[("bowl_0", "bowl")]
+    assert (said.structure, said.built_by) == ("sheet", "metadata")
+    assert "By its name it is taken for open ware" in made.warnings[0]
+    drawn = describe(bowl)
+    assert words(drawn)[("bowl_0", "bowl")].structure is None and not drawn.warnings
+    assert not describe(scene(THING), from_pictures=True).warnings
+
+
 def test_a_foreign_substance_is_no_obstacle():
     odd = ("vase_0", [("mesh", plain(), {"substance": "unobtainium"})])
     assert words(describe(scene(odd)))[("vase_0", "vase")].material == "ceramic"

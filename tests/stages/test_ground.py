@@ -320,7 +320,7 @@ def test_pieces_are_in_materials_json_with_the_grounds_of_every_value():
         ("annotation", "Your annotation says"),
         ("model", "A model says"),
         ("recording", "A recorded answer says"),
-        ("metadata", "The file's own words say"),
+        ("metadata", "The file's metadata says"),
     ],
 )
 def test_who_said_how_a_part_is_built_is_named(built_by, who):

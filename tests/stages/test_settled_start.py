@@ -9,8 +9,8 @@ from corporeal.findings import Settled, SettledObject
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.stages.simulate import SETTLING, SimulateConfig, simulate
 from corporeal.trajectory import checkpoint
-from corporeal.trajectory.audit import equilibrium_warnings, equilibrium_words
 from corporeal.trajectory.audit_file import read_audit
+from corporeal.trajectory.audit_words import equilibrium_warnings, equilibrium_words
 from corporeal.trajectory.static_equilibrium import before
 from corporeal.treatment.problem_from_scene import pose
 from corporeal.types import (

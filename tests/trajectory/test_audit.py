@@ -8,12 +8,12 @@ import pytest
 
 from corporeal.trajectory.audit import (
     audit,
-    breaches,
     energy_growth,
     impact_loss,
     momentum_residual,
     unbooked_loss,
 )
+from corporeal.trajectory.audit_words import breaches
 from corporeal.trajectory.frames import Layout, gather, write_frame, write_layout
 from corporeal.trajectory.outcome import outcome
 from corporeal.types import (

@@ -10,7 +10,8 @@ from laws.bodies import Stuff, ball, box, floor, problem
 from corporeal.errors import SimulationError
 from corporeal.findings import EnergyGain, Expectation
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.trajectory.audit import believed, breaches
+from corporeal.trajectory.audit import believed
+from corporeal.trajectory.audit_words import breaches
 from corporeal.trajectory.energy_gain import EnergyWatch, energy_gain
 from corporeal.trajectory.ledger_row import ledger_row
 from corporeal.types import Ledger

@@ -8,7 +8,7 @@ import trimesh
 from test_audit import CELL, TREATMENT, row
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.trajectory.audit import surface_warnings
+from corporeal.trajectory.audit_words import surface_warnings
 from corporeal.trajectory.frames import Layout, gather, write_frame, write_layout
 from corporeal.trajectory.mesh_gaps import finer, surface_pairs
 from corporeal.types import Finish, Frame, Particles, Scene, SceneObject, Surface

@@ -1,5 +1,14 @@
 import pytest
 
+from corporeal.vlm.answer_checks import (
+    extents_complaints,
+    mass_complaints,
+    materials_complaints,
+    parts_complaints,
+    placement_complaints,
+    ranking_complaints,
+    shaky,
+)
 from corporeal.vlm.answers import (
     ExtentsAnswer,
     FractionAnswer,
@@ -9,13 +18,6 @@ from corporeal.vlm.answers import (
     RankingAnswer,
     ValueAnswer,
     Vocabulary,
-    extents_complaints,
-    mass_complaints,
-    materials_complaints,
-    parts_complaints,
-    placement_complaints,
-    ranking_complaints,
-    shaky,
 )
 from corporeal.vlm.by_hand import shape
 from corporeal.vlm.recordings import schema_digest

@@ -217,7 +217,7 @@ def test_a_name_without_words_spoils_no_prefix():
 @pytest.mark.parametrize(
     ("thing", "material"),
     [
-        ("golfball", "TPU"),
+        ("golfball", "golf_ball_core"),
         ("trashcan", "plastics-PP"),
         ("TrashCan_01", "plastics-PP"),
         ("steelbucket", "steel"),

@@ -6,13 +6,8 @@ import numpy as np
 import pytest
 from fake_server import FakeServer
 
-from corporeal.vlm.answers import (
-    PaintedRegion,
-    RegionsAnswer,
-    ThingsAnswer,
-    regions_complaints,
-    things_complaints,
-)
+from corporeal.vlm.answer_checks import regions_complaints, things_complaints
+from corporeal.vlm.answers import PaintedRegion, RegionsAnswer, ThingsAnswer
 from corporeal.vlm.seen_objects import SeenObject, Viewer
 
 DUCK = {"class_name": "rubber duck", "look": "yellow, in front", "metres": 0.1}

@@ -11,7 +11,8 @@ from fake_server import FakeServer
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.typical_extents import typical_extent
 from corporeal.types import NOTHING_ASKED
-from corporeal.vlm.answers import SizeAnswer, size_complaints
+from corporeal.vlm.answer_checks import size_complaints
+from corporeal.vlm.answers import SizeAnswer
 from corporeal.vlm.by_hand import WaitingError
 from corporeal.vlm.recordings import schema_digest
 from corporeal.vlm.sizes import NEUTRAL, Sizes, UsualSize, real_extent, usual_sizes

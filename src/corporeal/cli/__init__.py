@@ -15,7 +15,7 @@ from corporeal.cli.capture import verb_capture
 from corporeal.cli.corpus import verb_corpus
 from corporeal.cli.evaluate import verb_evaluate
 from corporeal.cli.export import verb_export
-from corporeal.cli.masks import verb_masks
+from corporeal.cli.grow_masks import verb_masks
 from corporeal.cli.parse import parse
 from corporeal.cli.view import verb_view
 from corporeal.errors import UserError

@@ -138,7 +138,7 @@ def _carry_out(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: s
     from corporeal.corpus.local import LOGS
 
     with progress_bars() as tell:
-        rows = do(Hands(_hire(asked), tell(verb), _say))
+        rows = do(Hands(hire(asked.crew, asked.corpus), tell(verb), say))
     failed = {name: row for name, row in rows.items() if row.status == "failed"}
     print(f"{len(rows) - len(failed)} of {len(rows)} scenes finished: {asked.corpus}")
     if failed:
@@ -148,14 +148,19 @@ def _carry_out(asked: Any, verb: str, do: Callable[..., dict[str, Any]], then: s
     print(then)
 
 
-def _say(words: str) -> None:
+def say(words: str) -> None:
     """Say an event as a line in a log; in a terminal the bar shows it, failures aside."""
     if not console.is_terminal or "failed" in words or "again" in words:
         console.print(words, markup=False, highlight=False, soft_wrap=True)
 
 
-def _hire(asked: Any) -> Callable[[], Any]:
-    crew: Crew = asked.crew
+def hire(crew: Crew, folder: Path) -> Callable[[], Any]:
+    """Return what opens workers, whose words go to a folder of logs in ``folder``.
+
+    Raises:
+        UserError: A number of the crew makes no sense.
+
+    """
     if crew.workers < 0 or crew.threads < 1 or crew.gpus < 0:
         raise UserError("--workers, --threads and --gpus cannot be negative, --threads not 0.")
     slots = crew.workers or max(1, cores() // crew.threads)
@@ -165,4 +170,4 @@ def _hire(asked: Any) -> Callable[[], Any]:
         return lambda: on_ray(slots, crew.threads, crew.gpus, crew.address)
     from corporeal.corpus.local import LOGS, local
 
-    return lambda: local(slots, crew.threads, asked.corpus / LOGS)
+    return lambda: local(slots, crew.threads, folder / LOGS)

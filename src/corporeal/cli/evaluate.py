@@ -1,27 +1,37 @@
-"""`corporeal evaluate mass | materials | parts | objects | judge`: predicted against known."""
+"""`corporeal evaluate mass | materials | parts | objects | dynamics | judge`."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import tyro
 
 from corporeal import store
+from corporeal.cli.corpus import Crew, hire, say
 from corporeal.cli.parse import do_second_word, parse
 from corporeal.errors import UserError
 from corporeal.evaluation.result_table import Table
 from corporeal.terminal import console, progress_bars, show_table
+
+if TYPE_CHECKING:
+    from corporeal.evaluation.dynamics.summary import Summary
+    from corporeal.evaluation.judge.judge_scenes import JudgeConfig
 
 Folder = Annotated[
     Path | None,
     tyro.conf.Positional,
     tyro.conf.arg(metavar="FOLDER", help="Models, one object each, or settled scenes."),
 ]
+Target = Annotated[
+    str,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="TARGET", help='"showcase", or the folder of a corpus.'),
+]
 
 
 def verb_evaluate() -> None:
-    """Compare predictions with ground truth: evaluate mass, materials, parts, objects or judge."""
+    """Compare predictions with what is known: mass, materials, parts, objects, dynamics, judge."""
     do_second_word("evaluate", JUDGES)
 
 
@@ -174,6 +184,86 @@ def evaluate_objects() -> None:
         objects_figure.draw(found, asked.figure)
 
 
+def evaluate_dynamics() -> None:
+    """Compare how scenes move with baselines, with a finer run of ours, and with life.
+
+        corporeal evaluate dynamics showcase --against single capped one
+        corporeal evaluate dynamics corpus/ --against vomp:fields/ --json d.json
+
+    TARGET is "showcase" or a corpus whose scenes are assembled. Each run lies in OUT/SCENE/METHOD,
+    is done in a process of its own, and is not done again; say the same again to go on. A run that
+    fails is a row. With --judge a vision-language model judges films of the runs, after proving
+    on control films what it can tell; corporeal evaluate judge OUT does the same later.
+    """
+    from corporeal.corpus.carry_out import Hands
+    from corporeal.evaluation.dynamics import dynamics_tables
+    from corporeal.evaluation.dynamics.run_evaluation import DynamicsConfig
+    from corporeal.evaluation.dynamics.run_evaluation import evaluate_dynamics as evaluate
+    from corporeal.evaluation.judge.judge_scenes import JudgeConfig
+    from corporeal.evaluation.judge.put_to_judge import connected
+    from corporeal.pipeline import Settings
+    from corporeal.vlm import NOBODY
+
+    @dataclass(frozen=True)
+    class Dynamics:
+        target: Target
+        how: DynamicsConfig = field(default_factory=DynamicsConfig)
+        out: Path | None = None
+        """Folder of the runs; by default dynamics/ here, of a corpus CORPUS/dynamics/."""
+        json: Path | None = None
+        """File for all numbers (JSON)."""
+        figure: Path | None = None
+        """File for a figure (PNG)."""
+        page: Path | None = None
+        """File of the report; by default OUT/report.html."""
+        docs: Path | None = None
+        """File for the measured rows as a page of documentation (Markdown)."""
+        judge: str = NOBODY
+        """Model that also judges films of the runs, as --vlm: see evaluate judge. Its page and
+        answers lie in OUT as judge.html and judge.json; --record keeps the answers for replay."""
+        looks: int = 1
+        """Times that the judge looks at each film, each from another side: 1 to 3."""
+        yes: bool = False
+        """Ask a judge that costs more than 5 US$, or whose price is not known."""
+        crew: Crew = field(default_factory=Crew)
+        settings: Annotated[Settings, tyro.conf.arg(name="")] = field(default_factory=Settings)
+
+    first = ("against", "reference", "detail", "out", "json", "figure")
+    doc = evaluate_dynamics.__doc__
+    asked = parse(Dynamics, "evaluate dynamics", doc, words=2, first=first)
+    how = JudgeConfig(asked.judge, asked.settings.describe.record, asked.looks, yes=asked.yes)
+    connected(how)  # a key that is absent is told before hours of simulation
+    here = Path() if asked.target == "showcase" else Path(asked.target)
+    out = asked.out or here / "dynamics"
+    with progress_bars() as tell:
+        hands = Hands(hire(asked.crew, out), tell("evaluate"), say)
+        found = evaluate(asked.target, out, asked.how, asked.settings, hands)
+    _show(dynamics_tables.tables(found))
+    for sentence in (*dynamics_tables.verdicts(found), *dynamics_tables.missing_references(found)):
+        console.print(sentence, markup=False, highlight=False)
+    _keep_dynamics(found, asked, out)
+    if asked.judge != NOBODY:  # pages and answers beside the runs
+        _judge(out, how, out / "judge.json", out / "judge.html")
+
+
+def _keep_dynamics(found: "Summary", asked: Any, out: Path) -> None:
+    """Write the report of an evaluation of dynamics, and the files that somebody asks for."""
+    from corporeal.evaluation.dynamics import dynamics_figure, dynamics_page
+    from corporeal.evaluation.dynamics.summary import record
+
+    page = asked.page or out / "report.html"
+    dynamics_page.write_page(found, page)
+    print(page)
+    if asked.json is not None:
+        store.write_json(asked.json, record(found))
+    if asked.figure is not None:
+        dynamics_figure.draw(found, asked.figure)
+    if asked.docs is not None:
+        command = f"corporeal evaluate dynamics {asked.target} --against "
+        command += f"{' '.join(asked.how.against)} --docs {asked.docs}"
+        dynamics_page.write_docs(found, command, asked.docs)
+
+
 def evaluate_judge() -> None:
     """Let a vision-language model judge films of runs, after judging the model by control films.
 
@@ -181,8 +271,6 @@ def evaluate_judge() -> None:
     "ours" with one known fault each. Of a law of physics the judge is believed only where its
     answers tell the controls of that law; else the tables say that this judge cannot tell.
     """
-    from corporeal.evaluation.judge import judge_page, judge_tables
-    from corporeal.evaluation.judge.judge_runs import judge_runs
     from corporeal.evaluation.judge.judge_scenes import JudgeConfig
 
     @dataclass(frozen=True)
@@ -196,13 +284,21 @@ def evaluate_judge() -> None:
 
     first = ("judge", "looks", "record", "yes", "json", "page")
     asked = parse(Judge, "evaluate judge", evaluate_judge.__doc__, words=2, first=first)
+    _judge(_folder(asked.folder, "judge"), asked.how, asked.json, asked.page)
+
+
+def _judge(out: Path, how: "JudgeConfig", json: Path | None, page: Path | None) -> None:
+    """Judge the runs in OUT, show what follows, and keep it where somebody asks for it."""
+    from corporeal.evaluation.judge import judge_page, judge_tables
+    from corporeal.evaluation.judge.judge_runs import judge_runs
+
     with progress_bars() as tell:
-        found = judge_runs(_folder(asked.folder, "judge"), asked.how, console.print, tell("judge"))
+        found = judge_runs(out, how, console.print, tell("judge"))
     _show(judge_tables.tables(found.judged, found.result))
-    if asked.json is not None:
-        store.write_json(asked.json, judge_tables.record(found.judged, found.result))
-    if asked.page is not None:
-        judge_page.write_page(found.judged, found.result, asked.page)
+    if json is not None:
+        store.write_json(json, judge_tables.record(found.judged, found.result))
+    if page is not None:
+        judge_page.write_page(found.judged, found.result, page)
 
 
 def _show(tables: Sequence[Table]) -> None:
@@ -216,5 +312,6 @@ JUDGES = {
     "materials": evaluate_materials,
     "parts": evaluate_parts,
     "objects": evaluate_objects,
+    "dynamics": evaluate_dynamics,
     "judge": evaluate_judge,
 }

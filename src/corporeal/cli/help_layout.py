@@ -25,7 +25,7 @@ class Option:
     path: tuple[str, ...]
     """Names of fields that lead to it."""
     annotation: Any
-    """Its type, with what tyro is told of it."""
+    """Its type, with its settings for tyro."""
     default: Any
     """``dataclasses.MISSING``: it must be typed."""
     kind: type

@@ -64,7 +64,7 @@ def _show(asked: View) -> None:
     names = _names(asked)
     address = Address(asked.host, asked.port)
     door, listener = door_of(address), listening(address)
-    said = where(address, listener.getsockname()[1], door)
+    addresses = where(address, listener.getsockname()[1], door)
     shelf = Shelf(asked.runs, None if asked.runs else asked.out)
     room = Room(shelf.made)
     work = None if asked.read_only or asked.runs else Work(shelf, asked.out)
@@ -72,8 +72,8 @@ def _show(asked: View) -> None:
     more = more if work is None else (*more, *work.routes())
     app = site(Shown(shelf, names, asked.read_only, work is not None), door, more)
     try:
-        ready = partial(print, *said, "Ctrl-C ends.", sep="\n", flush=True)
-        serve(app, listener, ready, said[0] if asked.browser else "")
+        ready = partial(print, *addresses, "Ctrl-C ends.", sep="\n", flush=True)
+        serve(app, listener, ready, addresses[0] if asked.browser else "")
     finally:
         room.close()
         if work is not None:
@@ -90,7 +90,7 @@ def _names(asked: View) -> tuple[str, ...]:
         reopen(run)  # says what to do where it is no run
     names = tuple(run.resolve().name for run in asked.runs)
     if len(set(names)) < len(names):
-        raise UserError("Two runs of one name cannot be told apart. Name two different ones.")
+        raise UserError("Two runs have the same name. Name two different ones.")
     if not asked.runs and not asked.out.is_dir():
         raise UserError(f"{asked.out} is no folder. Name a run, or a folder of runs with --out.")
     return names

@@ -19,7 +19,7 @@ Say = Callable[[str], None]
 
 @dataclass(frozen=True)
 class Hands:
-    """Who does the jobs, and who is told about it."""
+    """Who does the jobs, and who is informed of their progress."""
 
     hire: Hire
     """Opens the workers."""
@@ -39,7 +39,7 @@ def carry_out(folder: Path, verb: Verb, jobs: Sequence[Job], hands: Hands) -> di
         folder: The corpus's.
         verb: What is done.
         jobs: One per scene.
-        hands: Who does them, and who is told.
+        hands: Who does them, and who is informed.
 
     """
     for place in {job.folder.parent for job in jobs}:

@@ -24,8 +24,8 @@ from corporeal.settle.composition import (
 )
 from corporeal.settle.interactions import Kind
 from corporeal.settle.rehearsal import hops
-from corporeal.trajectory.audit import breaches
 from corporeal.trajectory.audit_file import AUDIT, read_run_audit
+from corporeal.trajectory.audit_words import breaches
 from corporeal.types import Law
 
 SWAY = 1e-3

@@ -19,7 +19,7 @@ from matplotlib.ticker import LogLocator, MaxNLocator, NullFormatter
 from corporeal.corpus.collect import RIGID, Collected, SceneRecord
 from corporeal.render.colours import LAWS
 from corporeal.settle.interactions import KINDS, Kind
-from corporeal.trajectory.audit import ALLOWED
+from corporeal.trajectory.audit_words import ALLOWED
 
 INK, SOFT, LINE = "#22262b", "#6a727c", "#d9dde2"
 BAR = "#4477aa"

@@ -79,7 +79,7 @@ class Event:
 
     job: Job
     kind: Literal["progress", "finished", "failed", "died"]
-    """failed: it said why. died: its process is gone without a word."""
+    """failed: it gave a reason. died: its process ended without one."""
     fraction: float = 0.0
     words: str = ""
 

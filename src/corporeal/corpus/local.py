@@ -109,7 +109,7 @@ class LocalWorkers:
 
 
 def ending(code: int) -> str:
-    """Say how a process ended that said nothing itself."""
+    """Say how a process ended that gave no reason itself."""
     if code >= 0:
         return f"Its process ended with code {code} without a word."
     try:

@@ -16,7 +16,7 @@ from corporeal.corpus.jobs import Job
 from corporeal.store import writing
 
 MANIFEST, LOG = "manifest.json", "corpus.log"
-Verb = Literal["assemble", "run"]
+Verb = Literal["assemble", "run", "evaluate"]
 Status = Literal["waiting", "running", "finished", "failed", "interrupted"]
 
 

@@ -119,8 +119,8 @@ def plan(models: Sequence[Asset], config: CorpusConfig, windy: Windy | None = No
     """
     if config.preset == "seven":
         ignored = " ".join(config.changes)
-        said = (f"The showcase has scenes of its own: {ignored} changes nothing.",)
-        return Plan(config, tuple(_showcase(name) for name in SHOWCASE), said if ignored else ())
+        ignores = (f"The showcase has scenes of its own: {ignored} changes nothing.",)
+        return Plan(config, tuple(_showcase(name) for name in SHOWCASE), ignores if ignored else ())
     _check(config)
     if not models:
         raise UserError("The pool has no usable asset. See why: corporeal assets list --rejected.")
@@ -143,8 +143,8 @@ def plan(models: Sequence[Asset], config: CorpusConfig, windy: Windy | None = No
     sets = _sets([n for _, n in pairs], classes, by_class, config.repeat, rng)
     happens: Sequence[Kind] = [k for k, _ in pairs]
     if windy:
-        happens, said = with_wind(happens, [assets for _, assets in sets], windy)
-        messages += said
+        happens, left_out = with_wind(happens, [assets for _, assets in sets], windy)
+        messages += left_out
     return Plan(config, tuple(_scenes(happens, sets, rng)), tuple(messages))
 
 

@@ -22,7 +22,7 @@ from corporeal.corpus.collect import SWAY, Collected, SceneRecord, collect
 from corporeal.corpus.drawings import drawings
 from corporeal.corpus.jobs import Progress
 from corporeal.render.page import figure, held, page, safe
-from corporeal.trajectory.audit import ALLOWED
+from corporeal.trajectory.audit_words import ALLOWED
 
 PAGE, TABLE, DATA = "report.html", "report.csv", "report.json"
 THUMB = 840

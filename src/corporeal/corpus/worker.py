@@ -87,7 +87,7 @@ def attempt(packed: Packed, progress: Progress) -> str | None:
 
 
 def _seldom(say: Progress) -> Progress:
-    """Pass on what is said a few times a second at most."""
+    """Pass on progress a few times a second at most."""
     last = 0.0
 
     def tell(done: float, words: str) -> None:

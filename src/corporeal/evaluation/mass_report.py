@@ -17,6 +17,12 @@ INK = "#222222"
 
 def tables(result: Comparison) -> list[Table]:
     """Return what a person wants to read of ``compare``'s result."""
+    evidence = [_with_evidence(result)] if any(r.direct for r in result.rows) else []
+    return [_masses(result), *evidence, *(_errors(result, group) for group in result.metrics)]
+
+
+def _masses(result: Comparison) -> Table:
+    """Every object's predicted mass beside the measured one."""
     heads = ("object", "filled", "measured [kg]", "predicted", "from", "to", "taken for")
     rows = [
         (
@@ -30,42 +36,47 @@ def tables(result: Comparison) -> list[Table]:
         )
         for r in result.rows
     ]
-    found: list[Table] = [Table("Masses", heads, rows)]
-    if any(r.direct for r in result.rows):
-        heads = ("object", "predicted [kg]", "without evidence", "from", "to", "asked directly")
-        rows = [
-            (
-                r.object,
-                _kg(r.mass),
-                _kg(r.mixture),
-                _kg(r.mixture_low),
-                _kg(r.mixture_high),
-                _kg(r.direct),
-            )
-            for r in result.rows
-        ]
-        found.append(Table("With and without outside evidence", heads, rows))
-    for group, metrics in result.metrics.items():
-        heads = ("method", "objects", "ADE [kg]", "ALDE", "APE", "MnRE", "within 2×")
-        lines = [
-            (
-                result.methods[method],
-                str(e.count),
-                f"{e.ade:.3f}",
-                f"{e.alde:.3f}",
-                f"{e.ape:.3f}",
-                f"{e.mnre:.3f}",
-                f"{e.within_2:.0%}",
-            )
-            for method, e in metrics.items()
-        ]
-        inside = (
-            f"{result.coverage[group]:.0%} of the measured masses lie in their intervals, whose "
-            f"median width is a factor {result.width[group]:.2f} (without outside evidence "
-            f"{result.coverage_without[group]:.0%}, {result.width_without[group]:.2f})"
+    return Table("Masses", heads, rows)
+
+
+def _with_evidence(result: Comparison) -> Table:
+    """Every object's mass with and without an estimate made without the library."""
+    heads = ("object", "predicted [kg]", "without evidence", "from", "to", "asked directly")
+    rows = [
+        (
+            r.object,
+            _kg(r.mass),
+            _kg(r.mixture),
+            _kg(r.mixture_low),
+            _kg(r.mixture_high),
+            _kg(r.direct),
         )
-        found.append(Table(f"Errors, {group}: {inside}", heads, lines))
-    return found
+        for r in result.rows
+    ]
+    return Table("With and without outside evidence", heads, rows)
+
+
+def _errors(result: Comparison, group: str) -> Table:
+    """Errors of all methods on one group of objects."""
+    heads = ("method", "objects", "ADE [kg]", "ALDE", "APE", "MnRE", "within 2×")
+    lines = [
+        (
+            result.methods[method],
+            str(e.count),
+            f"{e.ade:.3f}",
+            f"{e.alde:.3f}",
+            f"{e.ape:.3f}",
+            f"{e.mnre:.3f}",
+            f"{e.within_2:.0%}",
+        )
+        for method, e in result.metrics[group].items()
+    ]
+    inside = (
+        f"{result.coverage[group]:.0%} of the measured masses lie in their intervals, whose "
+        f"median width is a factor {result.width[group]:.2f} (without outside evidence "
+        f"{result.coverage_without[group]:.0%}, {result.width_without[group]:.2f})"
+    )
+    return Table(f"Errors, {group}: {inside}", heads, lines)
 
 
 def _kg(mass: float | None) -> str:

@@ -64,10 +64,10 @@ def write_alembic(asked: Asked, folder: Path) -> Written:
 
 
 def _provenance(scene: PhysicalScene, solid: Solid) -> str:
-    said = {"title": solid.title, "mass_kg": solid.mass, "rigid": solid.rigid}
-    said |= {"parts": [scene.matter[k].provenance for k in solid.parts]}
-    said |= {"credits": list(scene.credits)}
-    return json.dumps(said, ensure_ascii=False, allow_nan=False)
+    about = {"title": solid.title, "mass_kg": solid.mass, "rigid": solid.rigid}
+    about |= {"parts": [scene.matter[k].provenance for k in solid.parts]}
+    about |= {"credits": list(scene.credits)}
+    return json.dumps(about, ensure_ascii=False, allow_nan=False)
 
 
 def _fill(schema, surface: Surface, vertices: np.ndarray, normals: np.ndarray) -> None:

@@ -11,7 +11,7 @@ Rule = Literal["multiply", "average", "geometric", "larger"]
 SPINNING, ROLLING = 1e-4, 2e-5
 """Coefficients against turning about the normal and rolling [m]: only to steady solvers."""
 LEAST = 1e-3
-"""Smallest coefficient that is told from none [-]."""
+"""Smallest coefficient that is distinguished from none [-]."""
 
 
 @dataclass(frozen=True)

@@ -83,9 +83,9 @@ class _Film(GlbDocument):
         else:
             children = [self._soft(number, surface, shapes) for number, surface in rows]
         matter = [self.asked.scene.matter[k] for k in solid.parts]
-        said = {"mass_kg": solid.mass, "rigid": solid.rigid}
-        said |= {"parts": [m.provenance for m in matter]}
-        node = self.add("nodes", {"name": solid.title, "children": children, "extras": said})
+        extras = {"mass_kg": solid.mass, "rigid": solid.rigid}
+        extras |= {"parts": [m.provenance for m in matter]}
+        node = self.add("nodes", {"name": solid.title, "children": children, "extras": extras})
         if solid.rigid and moving:
             self._carry(node, solid)
         elif not moving:

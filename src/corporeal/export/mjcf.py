@@ -140,9 +140,9 @@ def _grounds(world: ET.Element, scene: PhysicalScene) -> list[_Geom]:
     planes = [("floor", (0.0, 0.0, 0.0), (0.0, 0.0, 1.0))]
     planes += [(f"wall_{k}", w.point, w.normal) for k, w in enumerate(scene.walls)]
     for name, point, normal in planes:
-        said = {"name": name, "type": "plane", "size": "0 0 0.05", "pos": words(point)}
+        attributes = {"name": name, "type": "plane", "size": "0 0 0.05", "pos": words(point)}
         meeting = {"contype": "0", "conaffinity": ONLY_FLEX}
-        ET.SubElement(world, "geom", said | meeting | {"zaxis": words(normal)})
+        ET.SubElement(world, "geom", attributes | meeting | {"zaxis": words(normal)})
     return [_Geom(name, -1, -1, "ground") for name, _, _ in planes]
 
 
@@ -170,10 +170,12 @@ def _rigid(solid: Solid, folder: Path, assets: ET.Element, world: ET.Element) ->
 
 
 def _mesh(
-    assets: ET.Element, body: ET.Element, name: str, inertia: str, said: dict[str, str]
+    assets: ET.Element, body: ET.Element, name: str, inertia: str, attributes: dict[str, str]
 ) -> None:
     ET.SubElement(assets, "mesh", name=name, file=f"{name}.obj", inertia=inertia)
-    ET.SubElement(body, "geom", {"name": name, "type": "mesh", "mesh": name, "mass": "0"} | said)
+    ET.SubElement(
+        body, "geom", {"name": name, "type": "mesh", "mesh": name, "mass": "0"} | attributes
+    )
 
 
 def _flex(solid: Solid, scene: PhysicalScene, world: ET.Element) -> None:
@@ -217,10 +219,10 @@ def _pairs(contact: ET.Element, scene: PhysicalScene, geoms: list[_Geom]) -> Non
         # MuJoCo knows no speed too small to bounce: what lies at rest would creep.
         returned = 0.0 if scene.settled else float(scene.restitution[a.part, b.part])
         ratio = damping_ratio(returned)
-        said = {"geom1": a.name, "geom2": b.name, "condim": "6"}
-        said["friction"] = words([friction, friction, SPINNING, ROLLING, ROLLING])
-        said["solref"] = words([CONTACT / ratio, ratio])
-        ET.SubElement(contact, "pair", said | {"solimp": ".95 .99 .001 .5 2"})
+        attributes = {"geom1": a.name, "geom2": b.name, "condim": "6"}
+        attributes["friction"] = words([friction, friction, SPINNING, ROLLING, ROLLING])
+        attributes["solref"] = words([CONTACT / ratio, ratio])
+        ET.SubElement(contact, "pair", attributes | {"solimp": ".95 .99 .001 .5 2"})
 
 
 def _start(root: ET.Element, scene: PhysicalScene, soft: list[Solid]) -> None:
@@ -237,19 +239,21 @@ def _start(root: ET.Element, scene: PhysicalScene, soft: list[Solid]) -> None:
 
 
 def _unsaid(asked: Asked) -> list[str]:
-    scene, said = asked.scene, []
+    scene, sentences = asked.scene, []
     soft = [s for s in scene.solids if not s.rigid]
     if soft and asked.config.soft == "none":
         return [f"{', '.join(s.title for s in soft)} can deform and is left out."]
     for solid in soft:
         matter = scene.matter[solid.heaviest]
         if matter.material.yield_stress or matter.material.friction_angle:
-            said.append(f"{solid.title} yields in corporeal; in MuJoCo it is elastic.")
+            sentences.append(f"{solid.title} yields in corporeal; in MuJoCo it is elastic.")
         if len(solid.parts) > 1:
-            said.append(f"All of {solid.title} has the modulus of {matter.name}.")
+            sentences.append(f"All of {solid.title} has the modulus of {matter.name}.")
         if matter.treatment.poisson > POISSON:
             ratio = f"{matter.treatment.poisson:.3g}"
-            said.append(f"Poisson's ratio of {matter.name} is {POISSON} in MuJoCo, not {ratio}.")
+            sentences.append(
+                f"Poisson's ratio of {matter.name} is {POISSON} in MuJoCo, not {ratio}."
+            )
     if scene.settled:
-        said.append("Nothing bounces: in MuJoCo what lies at rest would creep.")
-    return said
+        sentences.append("Nothing bounces: in MuJoCo what lies at rest would creep.")
+    return sentences

@@ -75,16 +75,16 @@ def save_npz(folder: Path, runs: Iterable[Asked]) -> Written:
         NothingToWriteError: Nothing moves.
 
     """
-    statistics, said = Statistics(), []
+    statistics, provenance = Statistics(), []
     rows: list[tuple[np.ndarray, np.ndarray, np.ndarray]] = []
     for asked in runs:
         table = table_of(asked)
         rows.append((table.position, table.kind, np.log10(table.columns["young"])))
-        said.append(table.provenance)
+        provenance.append(table.provenance)
         statistics.add(table)
     items = np.empty(len(rows), dtype=object)
     items[:] = rows
-    np.savez_compressed(folder / NPZ, gns_data=items, corporeal=np.array(said))
+    np.savez_compressed(folder / NPZ, gns_data=items, corporeal=np.array(provenance))
     write_json(folder / METADATA, statistics.metadata())
     lost = "The loader reads positions, kinds and one number a particle; HDF5 has all others."
     return Written((lost,), _counted(statistics))

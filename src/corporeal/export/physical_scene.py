@@ -74,11 +74,11 @@ def physical_scene(prepared: Prepared, motion: Motion) -> PhysicalScene:
 
 def _matter(prepared: Prepared) -> tuple[Matter, ...]:
     heavy = prepared.particles.mass_real, scale_of_part(prepared.scene, prepared.parts)
-    told = materials_json(prepared.field, prepared.parts, *heavy)["parts"]
+    listed = materials_json(prepared.field, prepared.parts, *heavy)["parts"]
     catalogue = prepared.parts.catalogue
     field = prepared.field
     rows = zip(
-        catalogue, field.materials, prepared.particles.treatments, told, field.words, strict=True
+        catalogue, field.materials, prepared.particles.treatments, listed, field.words, strict=True
     )
     return tuple(
         Matter(
@@ -86,14 +86,14 @@ def _matter(prepared: Prepared) -> tuple[Matter, ...]:
             part.object,
             material,
             treatment,
-            said | {"words": _words(words), "simulated": plain(treatment)},
+            row | {"words": _words(words), "simulated": plain(treatment)},
         )
-        for part, material, treatment, said, words in rows
+        for part, material, treatment, row, words in rows
     )
 
 
 def _words(words: PartWords) -> dict[str, Any]:
-    """Return how somebody said that a part is built, before its shape was looked at."""
+    """Return how a part is described as built, before its shape was looked at."""
     return {key: getattr(words, key) for key in BUILT}
 
 

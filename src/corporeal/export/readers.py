@@ -49,8 +49,8 @@ def check(target: Target, folder: Path, asked: Asked) -> Found:
     try:
         import_module(reader)
     except ImportError:
-        said = f"Not checked: {reader} is not installed (pip install 'corporeal[export]')."
-        return Found(doubts=(said,))
+        doubt = f"Not checked: {reader} is not installed (pip install 'corporeal[export]')."
+        return Found(doubts=(doubt,))
     return judge(folder, asked)
 
 

@@ -63,8 +63,8 @@ def read_record(path: Path) -> ExportRecord:
         BadFileError: It is damaged.
 
     """
-    said = store.read_json(path)
+    found = store.read_json(path)
     try:
-        return typed(ExportRecord, said)
+        return typed(ExportRecord, found)
     except (ValueError, TypeError, AttributeError) as error:
         raise BadFileError(path, f"is no record of an export ({error}).", "Delete it.") from error

@@ -27,12 +27,12 @@ def write_splat_film(asked: Asked, folder: Path) -> Written:
         write_splat(folder / FRAME.format(number), moving.at(frame))
     owner = played.reconstruction.object_of_gaussian
     write_splats(asked.scene, asked.motion, moving, owner, folder)
-    said = {
+    about = {
         "fps": asked.scene.fps,
         "time_s": asked.motion.time,
         "up": "+Z",
         "credits": asked.scene.credits,
         "parts": [m.provenance for m in asked.scene.matter],
     }
-    write_json(folder / BESIDE, said)
+    write_json(folder / BESIDE, about)
     return Written(("Gaussians of no object stand still.",))

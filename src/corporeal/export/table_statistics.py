@@ -36,7 +36,7 @@ class Statistics:
     def metadata(self) -> dict[str, Any]:
         """Return the contents of ``metadata.json``."""
         cell = float(np.median(self.cells))
-        said = {
+        rows = {
             "dim": 3,
             "dt": float(np.median(self.steps)),
             "write_every": 1,
@@ -48,8 +48,8 @@ class Statistics:
             "periodic_boundary_conditions": [False] * 3,
         }
         for name, change in self.changes.items():
-            said |= {f"{name}_mean": change.mean, f"{name}_std": change.spread}
-        return said
+            rows |= {f"{name}_mean": change.mean, f"{name}_std": change.spread}
+        return rows
 
 
 class _Change:

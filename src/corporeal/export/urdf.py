@@ -33,9 +33,9 @@ def write_urdf(asked: Asked, folder: Path) -> Written:
         write_xml(folder / f"{solid.name}.urdf", _robot(solid, scene, folder))
     write_json(folder / PLACEMENTS, {s.name: _placement(s) for s in rigid})
     soft = [s.title for s in scene.solids if not s.rigid]
-    said = ["Each body has one friction, that with the floor; URDF has no restitution."]
-    said += [f"{', '.join(soft)} can deform and is left out."] if soft else []
-    return Written(tuple(said))
+    sentences = ["Each body has one friction, that with the floor; URDF has no restitution."]
+    sentences += [f"{', '.join(soft)} can deform and is left out."] if soft else []
+    return Written(tuple(sentences))
 
 
 def _placement(solid: Solid) -> dict:

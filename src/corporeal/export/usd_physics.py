@@ -50,8 +50,8 @@ def fitted(scene: PhysicalScene, engine: Engine) -> SurfaceFriction:
 def physics(scene: PhysicalScene, engine: Engine, soft: Soft) -> Prim:
     """Return all that simulates: materials, floor and walls, bodies, who meets whom."""
     found = fitted(scene, engine)
-    said = {"friction_pairs": scene.friction.tolist(), "restitution": scene.restitution.tolist()}
-    rows = {k: {f"row_{i}": row for i, row in enumerate(v)} for k, v in said.items()}
+    about = {"friction_pairs": scene.friction.tolist(), "restitution": scene.restitution.tolist()}
+    rows = {k: {f"row_{i}": row for i, row in enumerate(v)} for k, v in about.items()}
     rows |= {"unsaid": list(scene.unsaid), "scene": _scene(scene)}
     world = Prim("", WORLD, metadata=[custom_data(KEY, rows)])
     world.add(_simulation(scene, engine, found))
@@ -87,8 +87,8 @@ def _scene(scene: PhysicalScene) -> dict[str, Any]:
 def _simulation(scene: PhysicalScene, engine: Engine, found: SurfaceFriction) -> Prim:
     size = float(np.linalg.norm(scene.gravity))
     down = np.asarray(scene.gravity) / size if size else np.array([0.0, 0.0, -1.0])
-    said = {"friction_for": engine, "largest_error": found.misfit, "order": "parts, then floor"}
-    prim = Prim("PhysicsScene", "Physics", ["NewtonMPMSceneAPI"], [custom_data(KEY, said)])
+    about = {"friction_for": engine, "largest_error": found.misfit, "order": "parts, then floor"}
+    prim = Prim("PhysicsScene", "Physics", ["NewtonMPMSceneAPI"], [custom_data(KEY, about)])
     prim.set("float", "newton:mpm:voxelSize", number(scene.cell))
     prim.set("vector3f", "physics:gravityDirection", vector(down))
     prim.set("float", "physics:gravityMagnitude", number(size))

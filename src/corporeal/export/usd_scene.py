@@ -44,24 +44,24 @@ def _corners(scene: PhysicalScene) -> int:
 
 
 def _unsaid(asked: Asked, corners: int) -> list[str]:
-    said = [
+    sentences = [
         "Friction of pairs is fitted by one coefficient a part; all pairs are in the customData "
         "of /World."
     ]
     soft = [s.title for s in asked.scene.solids if not s.rigid]
     if soft and asked.config.soft == "none":
-        said.append(f"{', '.join(soft)} can deform and is not simulated.")
+        sentences.append(f"{', '.join(soft)} can deform and is not simulated.")
     elif soft:
-        said.append(
+        sentences.append(
             f"{', '.join(soft)} can deform: Newton reads it; PhysX on the processor and MuJoCo do "
             "not, and what lies on it falls through."
         )
     if corners > ON_CARD:
-        said.append(
+        sentences.append(
             f"A convex collider has {corners} corners; PhysX on a card takes {ON_CARD}: "
             f"--hull-vertices {ON_CARD}."
         )
-    return said
+    return sentences
 
 
 def _write(path: Path, scene: PhysicalScene, world: Prim, last: int = 0) -> None:

@@ -143,7 +143,7 @@ def yielding(matter: Matter) -> dict[str, float]:
     for what is elastic. The correspondence was derived from Newton's kernels.
     """
     material = matter.material
-    said = {
+    values = {
         "internalFriction": 0.0,
         "yieldStress": INFINITE,
         "yieldPressure": INFINITE,
@@ -153,7 +153,7 @@ def yielding(matter: Matter) -> dict[str, float]:
         angle, cohesion = material.friction_angle or 0.0, material.cohesion or 0.0
         tip = cohesion / np.tan(angle) / INFINITE
         grains = {"internalFriction": float(np.sin(angle)), "yieldStress": 0.0}
-        return said | grains | {"tensileYieldRatio": float(tip)}
+        return values | grains | {"tensileYieldRatio": float(tip)}
     if material.law is Law.VON_MISES and matter.treatment.yield_stress:
-        return said | {"yieldStress": float(matter.treatment.yield_stress / np.sqrt(3))}
-    return said
+        return values | {"yieldStress": float(matter.treatment.yield_stress / np.sqrt(3))}
+    return values

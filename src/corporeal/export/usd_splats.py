@@ -59,8 +59,8 @@ def write_splats(
         own = np.flatnonzero(owner == solid.number)
         if not len(own):
             continue
-        told = {"parts": [scene.matter[k].provenance for k in solid.parts]}
-        about = [title(solid.title), custom_data(KEY, solid.provenance | told)]
+        parts = {"parts": [scene.matter[k].provenance for k in solid.parts]}
+        about = [title(solid.title), custom_data(KEY, solid.provenance | parts)]
         thing = world.add(Prim("Xform", solid.name, metadata=about))
         field = thing.add(_field("splats", moving.gaussians, own))
         for name, (kind, _) in MOVING.items():
@@ -103,8 +103,8 @@ def _field(name: str, gaussians: Gaussians, own: np.ndarray) -> Prim:
     degree = DEGREES[sh.shape[1]]
     prim.set("uniform int", "radiance:sphericalHarmonicsDegree", str(degree))
     if degree == 0 or name == "background":
-        kind, said = "float3[]", DIGITS(sh.reshape(-1, 3))
-        prim.set(kind, "radiance:sphericalHarmonicsCoefficients", said)
+        kind, numbers = "float3[]", DIGITS(sh.reshape(-1, 3))
+        prim.set(kind, "radiance:sphericalHarmonicsCoefficients", numbers)
     prim.set("uniform token", "sortingModeHint", text("zDepth"))
     return prim
 

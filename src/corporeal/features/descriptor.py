@@ -19,9 +19,9 @@ GREY = np.array([50.0, 0.0, 0.0])
 GAMUT = 1.36
 """No sRGB colour is further from it (blue is 135 away), in hundreds."""
 ROUGH = 0.5
-"""Largest local spread of colours that is told from larger ones, in hundreds of CIELAB."""
+"""Largest local spread of colours distinguished from larger ones, in hundreds of CIELAB."""
 THINNEST = 1e-3
-"""Smallest thickness that is told from smaller ones, as a share of the whole cloud's extent."""
+"""Smallest thickness distinguished from smaller ones, as a share of the whole cloud's extent."""
 LET_THROUGH = 0.12
 """Share of a Gaussian that may show through others that hide it."""
 CHANNELS = 11

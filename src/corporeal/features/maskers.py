@@ -66,7 +66,7 @@ class Masker(Protocol):
 def split(spec: str) -> tuple[str, str] | None:
     """Return kind and folder of ``"sam2:FOLDER"``; None: it names no kind of model."""
     kind, colon, place = spec.partition(":")
-    if not colon or not kind.isalnum() or Path(spec).exists():
+    if not colon or not kind.isalnum() or len(kind) == 1 or Path(spec).exists():
         return None
     if kind not in MENU:
         raise UnknownChoiceError("kind of masks", kind, [*MENU, "or a folder of masks"])

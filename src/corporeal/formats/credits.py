@@ -17,7 +17,7 @@ LICENCE = re.compile(
 
 @dataclass(frozen=True)
 class Credit:
-    """Empty: nothing is said."""
+    """Empty: nothing is stated."""
 
     licence: str = ""
     attribution: str = ""
@@ -25,8 +25,8 @@ class Credit:
     @property
     def words(self) -> str:
         """Both in one line."""
-        said = () if self.licence in self.attribution else (self.licence,)
-        return "; ".join(w for w in (*said, self.attribution) if w)
+        licence = () if self.licence in self.attribution else (self.licence,)
+        return "; ".join(w for w in (*licence, self.attribution) if w)
 
 
 def credit_in(document: Document) -> Credit:

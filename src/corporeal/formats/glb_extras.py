@@ -60,11 +60,11 @@ def object_of_extras(document: Document, head: Entry | None, extent: float) -> S
 
 def credit(extras: dict) -> str:
     """Return whom to thank for an object, and under which licence it may be used, if it says so."""
-    whole, *said = (
+    whole, *fields = (
         x if isinstance(x := extras.get(key), str) else ""
         for key in ("credit", "licence", "attribution")
     )
-    return whole or Credit(*said).words
+    return whole or Credit(*fields).words
 
 
 def _extras(document: Document, head: Entry | None) -> Entry:
@@ -74,9 +74,9 @@ def _extras(document: Document, head: Entry | None) -> Entry:
 
 
 def _class(document: Document, head: Entry | None, extras: Entry) -> str:
-    said = " ".join(extras.text("class").split())[:60]
-    if said:
-        return said
+    name = " ".join(extras.text("class").split())[:60]
+    if name:
+        return name
     stem = everyday(document.path.stem)
     if head is None:
         return stem or _first_word(document) or "object"
@@ -99,8 +99,8 @@ def _first_word(document: Document) -> str:
 
 def _real_extent(extras: Entry) -> float | None:
     """Return the largest stated extent [m]; a nonsensical one counts as not stated."""
-    said = extras.value.get("real_extent_m")
-    values = said if isinstance(said, list) else [said]
+    stated = extras.value.get("real_extent_m")
+    values = stated if isinstance(stated, list) else [stated]
     numbers = [x for x in values if isinstance(x, int | float) and not isinstance(x, bool)]
     good = [float(x) for x in numbers if 0 < x < 1e6]
     return max(good) if good and len(good) == len(values) else None

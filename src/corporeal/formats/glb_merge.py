@@ -120,12 +120,12 @@ class _Model:
         }
 
     def _extras(self, member: Member) -> dict:
-        said = {"class": everyday(member.name) or member.name} | member.extras
+        extras = {"class": everyday(member.name) or member.name} | member.extras
         asset = self.document.root.child("asset")
         copyright = asset.text("copyright") if asset else ""
-        if copyright and not credit(said):
-            said["attribution"] = copyright
-        return said
+        if copyright and not credit(extras):
+            extras["attribution"] = copyright
+        return extras
 
     def _copied(self) -> list[int]:
         """Copy every node; return the roots."""

@@ -224,8 +224,8 @@ def _object_extras(thing: SceneObject) -> dict:
             "shift_m": [x for row in path.shift for x in row],
             "turn_rad": [x for row in path.turn for x in row],
         }
-    said = {"source": thing.source, "credit": thing.credit, "sized_by": thing.sized_by}
-    for key, words in said.items():
+    origin = {"source": thing.source, "credit": thing.credit, "sized_by": thing.sized_by}
+    for key, words in origin.items():
         if words:
             extras[key] = words
     return extras

@@ -38,8 +38,8 @@ class Merged:
         self.json.setdefault(group, []).append(item)
         return len(self.json[group]) - 1
 
-    def view(self, data: memoryview, said: dict) -> int:
-        """Append bytes as a buffer view; ``said`` is what else its entry says.
+    def view(self, data: memoryview, rest: dict) -> int:
+        """Append bytes as a buffer view; ``rest`` holds its entry's other members.
 
         Raises:
             UserError: The file would grow beyond what is read back.
@@ -53,7 +53,7 @@ class Merged:
             )
         place = {"buffer": 0, "byteOffset": len(self.binary), "byteLength": len(data)}
         self.binary += data
-        return self.add("bufferViews", place | said)
+        return self.add("bufferViews", place | rest)
 
 
 class Assets:
@@ -122,8 +122,8 @@ class Assets:
     def _view(self, entry: Entry) -> int:
         view = entry.refer("bufferView", "bufferViews") or entry.fail("'bufferView' is missing.")
         if view.pointer not in self._numbers:
-            said = kept(view, "buffer", "byteOffset", "byteLength")
-            self._numbers[view.pointer] = self.merged.view(self.document.view(view), said)
+            rest = kept(view, "buffer", "byteOffset", "byteLength")
+            self._numbers[view.pointer] = self.merged.view(self.document.view(view), rest)
         return self._numbers[view.pointer]
 
     # ------------------------------------------------------------ how it looks

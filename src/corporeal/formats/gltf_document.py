@@ -151,14 +151,14 @@ class Document:
 
     def warn(self, sentence: str) -> None:
         """Remember, once, something a reader of the report should know."""
-        said = f"{self.path.name}: {sentence}"
-        if said not in self.warnings:
-            self.warnings.append(said)
+        warning = f"{self.path.name}: {sentence}"
+        if warning not in self.warnings:
+            self.warnings.append(warning)
 
     def warn_of(self, what: str, problem: BadFileError) -> None:
         """Remember that something was left out, and the problem behind it."""
-        said = str(problem).removeprefix(f"{self.path}: ").removesuffix(EXPORT_AGAIN).strip()
-        self.warn(f"{what} is left out: {said}")
+        reason = str(problem).removeprefix(f"{self.path}: ").removesuffix(EXPORT_AGAIN).strip()
+        self.warn(f"{what} is left out: {reason}")
 
     def spend(self, entry: Entry, rows: int) -> None:
         """Count the rows to be unpacked: a small file can ask for the same ones a million times."""

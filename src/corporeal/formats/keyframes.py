@@ -120,20 +120,20 @@ def _refuse_fast(time: Float[np.ndarray, " N"], way: Float[np.ndarray, " N1"], f
         fail(what, f"Give metres and seconds, at most {FASTEST:g} m/s.")
 
 
-def _turns(said: Float[np.ndarray, "N O"], fail: Fail) -> Float[np.ndarray, "N 3"]:
+def _turns(columns: Float[np.ndarray, "N O"], fail: Fail) -> Float[np.ndarray, "N 3"]:
     """Rotation vector of every row from the row before [rad]; that of the first is zero."""
-    turn = np.zeros((len(said), 3))
-    if said.shape[1] == TURNED - PLACE:
-        vectors = np.radians(said - said[0])
-        for k in range(1, len(said)):
+    turn = np.zeros((len(columns), 3))
+    if columns.shape[1] == TURNED - PLACE:
+        vectors = np.radians(columns - columns[0])
+        for k in range(1, len(columns)):
             turn[k] = _between(vectors[k - 1], vectors[k])
-    elif said.shape[1] == POSED - PLACE:
-        size = np.linalg.norm(said, axis=1)
+    elif columns.shape[1] == POSED - PLACE:
+        size = np.linalg.norm(columns, axis=1)
         if np.abs(size - 1.0).max() > 0.01:
             k = int(np.argmax(np.abs(size - 1.0)))
             fail(f"the quaternion of row {k + 1} has length {size[k]:.3g}.", "Give unit ones.")
-        frames = [matrix(q) for q in said]
-        for k in range(1, len(said)):
+        frames = [matrix(q) for q in columns]
+        for k in range(1, len(columns)):
             turn[k] = _vector_of(frames[k] @ frames[k - 1].T)
     return turn
 

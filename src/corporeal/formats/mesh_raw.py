@@ -29,8 +29,8 @@ class RawMesh:
     """What was left out, such as "pictures (2)"."""
     bodies: Mapping[str, Mapping[str, Any]] = field(default_factory=dict)
     """Path of each body that the file states → ``title``, ``mass`` [kg], ``velocity`` [m/s, the
-    file's axes], and ``said``, what our own writer says of it."""
-    said: Mapping[str, Any] = field(default_factory=dict)
+    file's axes], and ``custom``, what our own writer states of it."""
+    custom: Mapping[str, Any] = field(default_factory=dict)
     """What our own writer says of the whole scene; empty of other files."""
 
 

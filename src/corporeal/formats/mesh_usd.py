@@ -27,8 +27,8 @@ from corporeal.formats.usd_bodies import (
     StatedBody,
     StatedMaterial,
     bodies_of,
+    custom_data_of,
     physical_material,
-    said_of,
 )
 from corporeal.formats.usd_shapes import is_shape, triangles_of
 from corporeal.types import MATTER, SUBSTANCE, Finish, Surface
@@ -66,10 +66,10 @@ def read_usd(path: Path) -> RawMesh:
         unit=unit,
         lost=tuple(f"{what} ({count})" for what, count in (lost + looks.lost).items()),
         bodies={
-            b.path: {"title": b.title, "mass": b.mass, "velocity": b.velocity, "said": b.said}
+            b.path: {"title": b.title, "mass": b.mass, "velocity": b.velocity, "custom": b.custom}
             for b in bodies
         },
-        said=said_of(stage.GetDefaultPrim()).get("scene", {}),
+        custom=custom_data_of(stage.GetDefaultPrim()).get("scene", {}),
     )
 
 
@@ -87,8 +87,8 @@ def _with_matter(surface: Surface, matter: StatedMaterial | None) -> Surface:
     if matter is None:
         return surface
     values = {name: asdict(value) for name, value in matter.values.items()}
-    stated = {"values": values, "words": dict(matter.said.get("words", {}))}
-    name = str(matter.said.get("name") or surface.name)  # of the part
+    stated = {"values": values, "words": dict(matter.custom.get("words", {}))}
+    name = str(matter.custom.get("name") or surface.name)  # of the part
     extras = surface.extras | {SUBSTANCE: matter.name, MATTER: stated}
     return replace(surface, name=name, extras=extras)
 

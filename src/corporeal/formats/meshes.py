@@ -79,8 +79,8 @@ def read_mesh(path: Path, objects: Objects = "one", up: Up | None = None) -> Mes
     scene = _scene(path, turned, owners, raw)
     if bodies:
         scene = with_bodies(scene, list(dict.fromkeys(owners)), bodies, turn)
-    ours = bool(raw.said) and objects == "auto"
-    return MeshFile(with_scene(scene, raw.said) if ours else scene, raw.unit is not None, ours)
+    ours = bool(raw.custom) and objects == "auto"
+    return MeshFile(with_scene(scene, raw.custom) if ours else scene, raw.unit is not None, ours)
 
 
 def companions(path: Path) -> list[Path]:
@@ -225,7 +225,7 @@ def _bodies_of(surfaces: list[Surface], bodies: Mapping[str, Any]) -> list[str]:
 def _scene(path: Path, surfaces: list[Surface], owners: list[str], raw: RawMesh) -> Scene:
     name, names = safe(path.stem) or "object", list(dict.fromkeys(owners))
     words = [everyday(owner.rsplit("/", 1)[-1]) for owner in names]  # a path, or a name
-    classes = [said or everyday(path.stem) or "object" for said in words]
+    classes = [name or everyday(path.stem) or "object" for name in words]
     called = [name] if names == [""] else numbered(classes)
     things = []
     for owner, own_name, kind in zip(names, called, classes, strict=True):

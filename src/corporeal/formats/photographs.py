@@ -1,5 +1,6 @@
 """Posed photographs of any kind: what a folder holds tells how they are read."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path, PurePath
@@ -60,6 +61,17 @@ class Photographs:
     """Of the points, sRGB."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
+
+    def only(self, which: Sequence[int]) -> "Photographs":
+        """Return some of the pictures, by number, with all points."""
+        own, chosen = self.views.object_of_pixel, list(which)
+        views = Views(
+            self.views.rgb[chosen],
+            tuple(self.views.cameras[k] for k in chosen),
+            object_of_pixel=None if own is None else own[chosen],
+        )
+        masks = None if self.masks is None else self.masks[chosen]
+        return replace(self, views=views, names=tuple(self.names[k] for k in chosen), masks=masks)
 
 
 @dataclass(frozen=True)

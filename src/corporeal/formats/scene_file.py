@@ -19,7 +19,7 @@ There is nothing numerical to tune in it: quality is one word on the command lin
     push = { acceleration = [3, 0, 0], from = 0.0, to = 0.5 }
     wind = { velocity = [8, 0, 0], gust = 0.3, from = 0.0, to = 1.5 }
     [[object]]
-    file = "hand.glb"             # moves as told, as one rigid body, whatever it meets
+    file = "hand.glb"             # prescribed motion, as one rigid body, whatever it meets
     path = [[0, 0, 0, 0.2], [0.5, 0, 0, 0.1]]    # rows of t, x, y, z: see ``keyframes``
     # or follows = "hand.csv", a file of such rows
     [[wall]]
@@ -122,21 +122,21 @@ def write_scene_file(path: Path, scene: SceneFile) -> None:
 
 def _lines(scene: SceneFile) -> Iterator[str]:
     folder = scene.path.parent
-    told = {
+    head = {
         name: getattr(scene, name) for name in ("file", "duration", "fps", "gravity", "settled")
     }
-    yield from _pairs(told, folder)
+    yield from _pairs(head, folder)
     for entry in scene.objects:
         yield from ("", "[[object]]")
-        yield from _pairs(_said_of(entry), folder)
+        yield from _pairs(_rows_of(entry), folder)
     for wall in scene.walls:
         yield from ("", "[[wall]]")
         yield from _pairs({"point": wall.point, "normal": wall.normal}, folder)
     yield ""
 
 
-def _said_of(entry: ObjectEntry) -> dict[str, Any]:
-    said = {
+def _rows_of(entry: ObjectEntry) -> dict[str, Any]:
+    rows = {
         "name": entry.name,
         "file": entry.file,
         "class": entry.class_name,
@@ -145,21 +145,21 @@ def _said_of(entry: ObjectEntry) -> dict[str, Any]:
         "velocity": entry.velocity,
     }
     if entry.path is not None:
-        said["path"] = keyframes.rows_of(said.pop("position") or (0.0, 0.0, 0.0), entry.path)
+        rows["path"] = keyframes.rows_of(rows.pop("position") or (0.0, 0.0, 0.0), entry.path)
     if entry.push is not None:
-        said["push"] = {"acceleration": entry.push.acceleration} | _when(entry.push)
+        rows["push"] = {"acceleration": entry.push.acceleration} | _when(entry.push)
     if entry.wind is not None:
         blown = {"velocity": entry.wind.velocity, "gust": entry.wind.gust}
-        said["wind"] = blown | _when(entry.wind)
-    return said
+        rows["wind"] = blown | _when(entry.wind)
+    return rows
 
 
 def _when(force: Push | Wind) -> dict[str, float]:
     return {"from": force.start} | ({"to": force.end} if force.end < math.inf else {})
 
 
-def _pairs(said: dict[str, Any], folder: Path) -> Iterator[str]:
-    return (f"{key} = {_toml(x, folder)}" for key, x in said.items() if x is not None)
+def _pairs(rows: dict[str, Any], folder: Path) -> Iterator[str]:
+    return (f"{key} = {_toml(x, folder)}" for key, x in rows.items() if x is not None)
 
 
 def _toml(x: Any, folder: Path) -> str:
@@ -183,8 +183,8 @@ def _relative(file: Path, folder: Path) -> str:
     return str(file) if file.is_absolute() else os.path.relpath(file, folder)
 
 
-def _checked(path: Path, said: dict[str, Any]) -> SceneFile:
-    table = _Table(path, "", said)
+def _checked(path: Path, parsed: dict[str, Any]) -> SceneFile:
+    table = _Table(path, "", parsed)
     table.only(SCENE_KEYS)
     objects = tuple(_object(t) for t in table.tables("object"))
     file = table.file("file")

@@ -30,7 +30,7 @@ LARGEST = 2**28
 NAMED = 5
 """So many bad pictures are named."""
 PROPORTION = 0.01
-"""Pictures may differ that much in proportion from what the camera was said to take."""
+"""Pictures may differ that much in proportion from what the camera is stated to take."""
 GREY = 2
 """Largest difference between channels of a picture without colours."""
 SHOWN = 128
@@ -55,7 +55,7 @@ class Shot:
     picture: Path | None
     """None: it is not there."""
     lens: Callable[[int, int], Lens]
-    """Its lens, told the picture's width and height, for files that don't state them."""
+    """Its lens, given the picture's width and height, for files that don't state them."""
     world_from_camera: np.ndarray
     """(4, 4), the camera's axes as OpenCV has them."""
     mask: Path | None = None
@@ -127,11 +127,11 @@ def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
                 bad.append((shot.name, str(problem)))
     prints = _masked_alike(prints, bad)
     _refuse_most(source, len(shots), bad)
-    said = [*left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
-    return _developed(prints, tuple(said))
+    warnings = [*left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
+    return _developed(prints, tuple(warnings))
 
 
-def _developed(prints: list[_Print], said: tuple[str, ...]) -> Developed:
+def _developed(prints: list[_Print], warnings: tuple[str, ...]) -> Developed:
     rgba = np.stack([p.rgba for p in prints])
     masked = bool(prints[0].masked and (rgba[..., 3] < 255).any())
     nobody = np.zeros(rgba.shape[1:3], np.int32)
@@ -143,7 +143,7 @@ def _developed(prints: list[_Print], said: tuple[str, ...]) -> Developed:
         masks=np.ascontiguousarray(rgba[..., 3]) if masked else None,
         object_of_pixel=np.stack(numbers) - 1 if known else None,
         names=tuple(p.name for p in prints),
-        warnings=said,
+        warnings=warnings,
     )
 
 

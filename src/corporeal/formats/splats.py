@@ -1,4 +1,4 @@
-"""Trained Gaussian splats of any kind, told by what is in the file."""
+"""Trained Gaussian splats of any kind, recognised by what is in the file."""
 
 from dataclasses import replace
 from pathlib import Path

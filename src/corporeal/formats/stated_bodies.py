@@ -33,38 +33,38 @@ def with_bodies(
         for (o, path), name in zip(pairs, names, strict=True)
     ]
     loose = [name for (_, path), name in zip(pairs, names, strict=True) if path not in bodies]
-    told = (f"{', '.join(loose)}: no bodies in the file; they can move here.",) if loose else ()
-    return replace(scene, objects=tuple(things), warnings=(*scene.warnings, *told))
+    fixed = (f"{', '.join(loose)}: no bodies in the file; they can move here.",) if loose else ()
+    return replace(scene, objects=tuple(things), warnings=(*scene.warnings, *fixed))
 
 
-def with_scene(scene: Scene, said: Mapping[str, Any]) -> Scene:
+def with_scene(scene: Scene, stated: Mapping[str, Any]) -> Scene:
     """Take over gravity, walls, duration and the like from a file of ours."""
-    walls = [_wall(row) for row in _rows(said.get("walls"))]
-    gravity = _vector(said.get("gravity_m_s2"))
+    walls = [_wall(row) for row in _rows(stated.get("walls"))]
+    gravity = _vector(stated.get("gravity_m_s2"))
     return replace(
         scene,
         gravity=gravity or scene.gravity,
         walls=tuple(w for w in walls if w),
-        duration=_positive(said.get("duration_s")) or scene.duration,
-        fps=int(_positive(said.get("fps")) or scene.fps),
-        settled=said.get("settled") is True,
+        duration=_positive(stated.get("duration_s")) or scene.duration,
+        fps=int(_positive(stated.get("fps")) or scene.fps),
+        settled=stated.get("settled") is True,
     )
 
 
 def _as_stated(thing: SceneObject, body: Mapping[str, Any], turn: np.ndarray) -> SceneObject:
-    said = body["said"]
-    velocity = _vector(said.get("velocity_m_s")) or _turned(body["velocity"], turn)
+    stated = body["custom"]
+    velocity = _vector(stated.get("velocity_m_s")) or _turned(body["velocity"], turn)
     extent = thing.real_extent
-    real = _positive(said.get("real_extent_m")) or extent
+    real = _positive(stated.get("real_extent_m")) or extent
     return replace(
         thing,
-        class_name=str(said.get("class") or everyday(thing.name) or thing.class_name)[:60],
+        class_name=str(stated.get("class") or everyday(thing.name) or thing.class_name)[:60],
         real_extent=real,
-        scale=_positive(said.get("scale")) or extent / real,
+        scale=_positive(stated.get("scale")) or extent / real,
         velocity=velocity,
-        source=str(said.get("source") or thing.source)[:500],
-        credit=str(said.get("credit") or "")[:500],
-        sized_by=str(said.get("sized_by") or "")[:500],
+        source=str(stated.get("source") or thing.source)[:500],
+        credit=str(stated.get("credit") or "")[:500],
+        sized_by=str(stated.get("sized_by") or "")[:500],
         mass=_positive(body["mass"]),
     )
 
@@ -74,25 +74,25 @@ def _turned(vector: Sequence[float], turn: np.ndarray) -> Vector:
     return (x, y, z)
 
 
-def _rows(said: Any) -> list[Mapping[str, Any]]:
+def _rows(stated: Any) -> list[Mapping[str, Any]]:
     """Return a list of mappings, which USD keeps as a mapping of numbers."""
-    rows = list(said.values()) if isinstance(said, Mapping) else []
+    rows = list(stated.values()) if isinstance(stated, Mapping) else []
     return [row for row in rows if isinstance(row, Mapping)]
 
 
-def _wall(said: Mapping[str, Any]) -> Wall | None:
-    normal, point = _vector(said.get("normal")), _vector(said.get("point_m"))
+def _wall(stated: Mapping[str, Any]) -> Wall | None:
+    normal, point = _vector(stated.get("normal")), _vector(stated.get("point_m"))
     return Wall(normal, point) if normal and point else None
 
 
-def _vector(said: Any) -> Vector | None:
-    good = isinstance(said, list | tuple) and len(said) == 3 and all(map(_is_number, said))
-    return (float(said[0]), float(said[1]), float(said[2])) if good else None
+def _vector(stated: Any) -> Vector | None:
+    good = isinstance(stated, list | tuple) and len(stated) == 3 and all(map(_is_number, stated))
+    return (float(stated[0]), float(stated[1]), float(stated[2])) if good else None
 
 
-def _positive(said: Any) -> float | None:
-    return float(said) if _is_number(said) and said > 0 else None
+def _positive(stated: Any) -> float | None:
+    return float(stated) if _is_number(stated) and stated > 0 else None
 
 
-def _is_number(said: Any) -> bool:
-    return isinstance(said, int | float) and not isinstance(said, bool) and isfinite(said)
+def _is_number(stated: Any) -> bool:
+    return isinstance(stated, int | float) and not isinstance(stated, bool) and isfinite(stated)

@@ -63,7 +63,7 @@ def write_views(folder: Path, views: Views) -> Path:
             for k, frame in enumerate(frames):
                 frame[key] = f"{name}/{k:04}.png"
                 Image.fromarray(pictures(k)).save(folder / frame[key])
-    lenses = [_said_of(c) for c in views.cameras]
+    lenses = [_members_of(c) for c in views.cameras]
     shared = lenses[0] if all(x == lenses[0] for x in lenses) else {}
     if not shared:
         frames = [frame | lens for frame, lens in zip(frames, lenses, strict=True)]
@@ -96,7 +96,7 @@ def _layers(views: Views, unit: float) -> list[tuple[str, str, Callable[[int], n
     return layers
 
 
-def _said_of(camera: Camera) -> dict[str, float]:
+def _members_of(camera: Camera) -> dict[str, float]:
     K = camera.K
     if K[0, 1] or K[1, 0] or not np.array_equal(K[2], (0, 0, 1)):
         raise UserError("A camera's K is skewed, which transforms.json cannot say.")

@@ -40,7 +40,7 @@ FISHEYE = ("is_fisheye", "ftheta_p0", "latlong")
 
 @dataclass(frozen=True)
 class Frame:
-    """What is said of one frame, by itself or for all."""
+    """What is stated of one frame, by itself or for all."""
 
     path: Path
     where: str
@@ -126,11 +126,11 @@ def frames_of(path: Path) -> list[Frame]:
     """
     if not path.is_file():
         raise BadFileError(path, "there is no such file.", "Name a folder that holds one.")
-    said = _parsed(path)
-    frames = said.get("frames") if isinstance(said, dict) else None
+    parsed = _parsed(path)
+    frames = parsed.get("frames") if isinstance(parsed, dict) else None
     if not isinstance(frames, list) or not frames or not all(isinstance(f, dict) for f in frames):
         raise BadFileError(path, "it has no list of frames.", "Each needs its file_path.")
-    return [Frame(path, f"frame {k + 1}: ", said | frame) for k, frame in enumerate(frames)]
+    return [Frame(path, f"frame {k + 1}: ", parsed | frame) for k, frame in enumerate(frames)]
 
 
 def _parsed(path: Path) -> Any:

@@ -8,7 +8,7 @@ from pathlib import Path
 from corporeal.formats.typical_extents import joined, nouns
 
 MARGIN = 2.0
-"""How far beyond the table an object may be before anybody is told, as a factor."""
+"""How far beyond the table an object may be before it is reported, as a factor."""
 HEAVIEST = 2000.0
 """What no large thing of a class that is not in the table exceeds [kg/m³ of its box]: stone and
 metal fill a part of theirs."""
@@ -27,9 +27,9 @@ class TypicalBulk:
 
 def typical_bulk(class_name: str) -> TypicalBulk | None:
     """Return the entry of the name's last known noun, the one with the most words that fit."""
-    said = nouns(class_name, _compounds())
-    found = [e for e in _table() if set(e.words.split()) <= set(said)]
-    return max(found, key=lambda e: _fit(e, said), default=None)
+    named = nouns(class_name, _compounds())
+    found = [e for e in _table() if set(e.words.split()) <= set(named)]
+    return max(found, key=lambda e: _fit(e, named), default=None)
 
 
 def doubt_mass(
@@ -78,6 +78,6 @@ def _compounds() -> dict[str, tuple[str, ...]]:
     return joined(e.words for e in _table())
 
 
-def _fit(entry: TypicalBulk, said: list[str]) -> tuple[int, int]:
+def _fit(entry: TypicalBulk, named: list[str]) -> tuple[int, int]:
     own = entry.words.split()
-    return max(said.index(w) for w in own), len(own)
+    return max(named.index(w) for w in own), len(own)

@@ -8,7 +8,7 @@ from functools import cache
 from pathlib import Path
 
 MARGIN = 1.5
-"""How far beyond the table an object may be before anybody is told."""
+"""How far beyond the table an object may be before it is reported."""
 SMALLEST, LARGEST = 0.005, 20.0
 """Extents that would be remarkable for anything in a scene [m]."""
 UNITS = {"metres": 1.0, "centimetres": 1e-2, "millimetres": 1e-3, "inches": 0.0254}
@@ -45,14 +45,14 @@ def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str
         compounds: A known compound → the words that it is made of.
 
     """
-    said = (_singular(w) for w in re.findall(r"[a-zà-ÿ]+", class_name.lower()))
-    return [part for word in said for part in compounds.get(word, (word,))]
+    tokens = (_singular(w) for w in re.findall(r"[a-zà-ÿ]+", class_name.lower()))
+    return [part for word in tokens for part in compounds.get(word, (word,))]
 
 
 def joined(phrases: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return phrases of several words, by how they look when they are written as one."""
-    told = (tuple(phrase.split()) for phrase in phrases)
-    return {"".join(words): words for words in told if len(words) > 1}
+    compounds = (tuple(phrase.split()) for phrase in phrases)
+    return {"".join(words): words for words in compounds if len(words) > 1}
 
 
 def doubt(name: str, class_name: str, extent: float) -> str | None:

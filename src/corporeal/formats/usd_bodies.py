@@ -49,7 +49,7 @@ class StatedMaterial:
     """Of the material in our library where the file names one; else the prim's own."""
     values: Mapping[str, StatedValue] = field(default_factory=dict)
     """Field of ``Material`` → value."""
-    said: Mapping[str, Any] = field(default_factory=dict)
+    custom: Mapping[str, Any] = field(default_factory=dict)
     """All that a file of ours says of the part; empty of other files."""
 
 
@@ -69,7 +69,7 @@ class StatedBody:
     """Of a rigid body [m/s], along the axes of the stage."""
     turns: bool = False
     """Whether it has an angular velocity."""
-    said: Mapping[str, Any] = field(default_factory=dict)
+    custom: Mapping[str, Any] = field(default_factory=dict)
     """All that a file of ours says of the object; empty of other files."""
 
 
@@ -106,10 +106,10 @@ def bodies_of(stage: Any, path: Path) -> tuple[StatedBody, ...]:
     return tuple(_body(prim, path, units) for prim in _bodies(stage))
 
 
-def said_of(prim: Any) -> dict[str, Any]:
+def custom_data_of(prim: Any) -> dict[str, Any]:
     """Return what our own writer says at a prim; empty in other files."""
-    said = prim.GetCustomDataByKey(KEY) if prim else None
-    return _plain(said) if isinstance(said, Mapping) else {}
+    custom = prim.GetCustomDataByKey(KEY) if prim else None
+    return _plain(custom) if isinstance(custom, Mapping) else {}
 
 
 def physical_material(prim: Any, path: Path, stage: Any) -> StatedMaterial | None:
@@ -171,7 +171,7 @@ def _body(prim: Any, path: Path, units: _Units) -> StatedBody:
         materials=tuple(found.values()),
         velocity=(x, y, z),
         turns=any(_triple(prim, "physics:angularVelocity")),
-        said=said_of(prim),
+        custom=custom_data_of(prim),
     )
 
 
@@ -186,9 +186,9 @@ def _materials(prim: Any) -> Iterator[Any]:
 
 
 def _material(prim: Any, path: Path, units: _Units) -> StatedMaterial:
-    said = said_of(prim)
-    if isinstance(said.get("values"), Mapping):
-        return _ours(prim, said)
+    custom = custom_data_of(prim)
+    if isinstance(custom.get("values"), Mapping):
+        return _ours(prim, custom)
     source = f"stated by UsdPhysics in {path.name}"
     values = {}
     for attribute, name in FIELDS.items():
@@ -199,10 +199,10 @@ def _material(prim: Any, path: Path, units: _Units) -> StatedMaterial:
     return StatedMaterial(str(prim.GetPath()), prim.GetDisplayName() or prim.GetName(), values)
 
 
-def _ours(prim: Any, said: Mapping[str, Any]) -> StatedMaterial:
+def _ours(prim: Any, custom: Mapping[str, Any]) -> StatedMaterial:
     """Read what we wrote: every value with range, source, chooser and reason."""
     values = {}
-    for name, row in said["values"].items():
+    for name, row in custom["values"].items():
         low, high = row["range"]
         values[name] = StatedValue(
             value=row["value"],
@@ -212,7 +212,7 @@ def _ours(prim: Any, said: Mapping[str, Any]) -> StatedMaterial:
             reason=row.get("reason", ""),
             margin=row.get("margin", 1.0),
         )
-    return StatedMaterial(str(prim.GetPath()), said["material"], values, said)
+    return StatedMaterial(str(prim.GetPath()), custom["material"], values, custom)
 
 
 def _number(prim: Any, name: str) -> float | None:

@@ -96,16 +96,16 @@ class Prim:
         _put(file, depth, "}")
 
     def _parentheses(self) -> str:
-        said = list(self.metadata)
+        lines = list(self.metadata)
         if self.schemas:
-            said.append(f"prepend apiSchemas = {texts(self.schemas)}")
+            lines.append(f"prepend apiSchemas = {texts(self.schemas)}")
         if self.variants:
             chosen = f"{INDENT}string {self.variant_set} = {text(self.chosen)}"
-            said.append(f"variants = {{\n{chosen}\n}}")
-            said.append(f"prepend variantSets = {text(self.variant_set)}")
-        if not said:
+            lines.append(f"variants = {{\n{chosen}\n}}")
+            lines.append(f"prepend variantSets = {text(self.variant_set)}")
+        if not lines:
             return ""
-        inner = "\n".join(INDENT + line for entry in said for line in entry.split("\n"))
+        inner = "\n".join(INDENT + line for entry in lines for line in entry.split("\n"))
         return f" (\n{inner}\n)"
 
     def _write_variants(self, file: TextIO, depth: int) -> None:
@@ -134,7 +134,7 @@ class Layer:
 
     def write(self, file: TextIO) -> None:
         """Write the layer: +Z up, metres and kilograms."""
-        said = [
+        lines = [
             f'defaultPrim = "{self.default}"',
             f"endTimeCode = {self.last}",
             "kilogramsPerUnit = 1",
@@ -145,7 +145,7 @@ class Layer:
             'upAxis = "Z"',
         ]
         comment = [text(self.comment)] if self.comment else []
-        inner = "\n".join(INDENT + line for line in (*comment, *said))
+        inner = "\n".join(INDENT + line for line in (*comment, *lines))
         file.write(f"#usda 1.0\n(\n{inner}\n)\n")
         for prim in self.prims:
             file.write("\n")
@@ -215,17 +215,17 @@ def inactive() -> str:
     return "active = false"
 
 
-def custom_data(name: str, said: Mapping[str, Any]) -> str:
+def custom_data(name: str, values: Mapping[str, Any]) -> str:
     """Keep plain data under one name; null is left out, lists of mappings are numbered."""
-    return f"customData = {_dictionary({name: said})}"
+    return f"customData = {_dictionary({name: values})}"
 
 
 def _single(values: np.ndarray) -> list[float]:
     return np.asarray(values, dtype=np.float32).astype(np.float64).ravel().tolist()
 
 
-def _dictionary(said: Mapping[str, Any]) -> str:
-    rows = [f"{INDENT}{_entry(k, v)}" for k, v in said.items() if v is not None and v != []]
+def _dictionary(values: Mapping[str, Any]) -> str:
+    rows = [f"{INDENT}{_entry(k, v)}" for k, v in values.items() if v is not None and v != []]
     inner = "\n".join(row.replace("\n", f"\n{INDENT}") for row in rows)
     return f"{{\n{inner}\n}}" if rows else "{\n}"
 

@@ -13,7 +13,7 @@ from corporeal.types import Scene, SceneObject, Surface, Vector
 SAMPLES = 2000
 """Vertices of an object that are looked up in another."""
 TOUCH = 0.01
-"""Share of them that may lie inside before the two are said to overlap."""
+"""Share of them that may lie inside before the two are taken to overlap."""
 DEPTH = 2e-3
 """What rests on another may sink in so far, over the size of the smaller."""
 

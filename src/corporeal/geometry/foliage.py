@@ -91,7 +91,7 @@ def in_leaves(
     """Weigh a crown in bulk by the area of its leaves, m = ρ t A, and not by its volume.
 
     A is three quarters of its surface: half of it where every leaf shows both its faces, all where
-    each covers others. Thickness and density are those that were told for its walls, else a usual
+    each covers others. Thickness and density are those stated for its walls, else a usual
     leaf's. What nothing bears is no crown.
 
     Args:
@@ -286,7 +286,7 @@ def planted(
     leafy = [k for k, t in enumerate(particles.treatments) if t.kind == "foliage"]
     if not leafy:
         return particles
-    rate, roots, said = np.zeros(particles.count), [], []
+    rate, roots, doubts = np.zeros(particles.count), [], []
     for number, anatomy in enumerate(anatomies):
         crowns = [m for m in anatomy.members if m.part in leafy]
         for member in crowns:
@@ -297,8 +297,8 @@ def planted(
         if found is not None:
             swing = Swing(particles, [m.part for m in crowns])
             roots.append(root_of(found, anatomy, number, field.materials, swing))
-            said += [] if found.seen else [f"{scene.objects[number].name}: {found.doubt}"]
-    warnings = (*particles.warnings, *said)
+            doubts += [] if found.seen else [f"{scene.objects[number].name}: {found.doubt}"]
+    warnings = (*particles.warnings, *doubts)
     return replace(particles, rate=rate, roots=tuple(roots), warnings=warnings)
 
 

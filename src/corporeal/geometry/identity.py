@@ -108,11 +108,11 @@ def _names(scene: Scene, number: int, groups: dict) -> list[str]:
         first = scene.surfaces[surfaces[0]]
         finish = scene.finishes[first.finish].name
         own = (first.name,) if first.extras.get(SUBSTANCE) else _order(first, finish, surfaces)
-        told = next((n for n in own if words(n)), "")
+        named = next((n for n in own if words(n)), "")
         whole = thing.class_name or thing.name
         if len(groups) == 1:
-            told = told if first.extras.get(SUBSTANCE) and told else whole
-        names.append(told or f"{whole} part")
+            named = named if first.extras.get(SUBSTANCE) and named else whole
+        names.append(named or f"{whole} part")
     return _distinct(names)
 
 
@@ -124,10 +124,10 @@ def _order(first: Surface, finish: str, surfaces: list[int]) -> tuple[str, ...]:
 
 
 def _distinct(names: list[str]) -> list[str]:
-    told: dict[str, int] = {}
+    counts: dict[str, int] = {}
     numbered = []
     for name in names:
-        told[name] = told.get(name, 0) + 1
+        counts[name] = counts.get(name, 0) + 1
         again = names.count(name) > 1
-        numbered.append(f"{name} {told[name]}" if again else name)
+        numbered.append(f"{name} {counts[name]}" if again else name)
     return numbered

@@ -19,10 +19,10 @@ JUDGED = {
     "annotation": "as your annotation says",
     "recording": "as a recorded answer says",
     "model": "as a model says",
-    "metadata": "as the file's own words say",
-    "evidence": "as fits what was said of its mass",
+    "metadata": "as the file's metadata says",
+    "evidence": "as fits the estimate of its mass",
 }
-"""Who said how thick a wall is."""
+"""The source of a wall's thickness."""
 ALIKE = 0.05
 """Relative difference of two thicknesses that needs no telling."""
 BOTH_FACES = 4.0
@@ -59,7 +59,7 @@ class Held:
 
 @dataclass(frozen=True)
 class Make:
-    """How one part is made: what was said about it and what its mesh shows, put together."""
+    """How one part is made: its description and what its mesh shows, put together."""
 
     structure: Structure
     """As simulated: a solid whose mesh turns out to be a wall is a shell here."""
@@ -321,11 +321,11 @@ def _both_faces(words: PartWords, volume: float, wall: float) -> bool:
 def wall_of(
     structure: Structure, words: PartWords, shown: float, usual: float, guess: float
 ) -> tuple[float, str]:
-    """Return a wall's thickness [m], and who said it: the first that knows.
+    """Return a wall's thickness [m], and its source: the first that knows.
 
     Args:
         structure: How it is built.
-        words: What was said of it.
+        words: Its description.
         shown: What its mesh draws [m]; 0: nothing.
         usual: Of such walls [m]; 0: not known.
         guess: What is taken where nobody knows [m].
@@ -342,7 +342,7 @@ def wall_of(
 
 
 def judge(words: PartWords) -> str:
-    """Tell who said how thick such a wall is, having looked at the object; "" for nobody."""
+    """Return who stated the thickness having seen the object; "" for nobody."""
     if "shell_thickness" in words.values:
         return "annotation"
     placed = words.placements.get("shell_thickness")
@@ -389,7 +389,7 @@ def how_held(made: Make) -> str:
 
 
 def how_walled(made: Make) -> str:
-    """Say in words how thick the wall is, who said so, and whether the mesh draws another."""
+    """Say in words how thick the wall is, by what source, and whether the mesh draws another."""
     if not made.thickness:
         return f"a wall {made.sheet * 1e3:.3g} mm thick"
     wall = f"a wall {made.thickness * 1e3:.3g} mm thick {made.whose}"

@@ -8,12 +8,11 @@ volume is the midpoint rule: exact for whatever is linear within cells, so for m
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.spatial import KDTree
 
+from corporeal.geometry.nearest import cells
 from corporeal.geometry.relaxation import stay_inside
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import scattered
-from corporeal.machine import cores
 
 FINER = 5
 """Samples per spacing. With 3 a rubber ball bounces off to a side four times as far."""
@@ -39,10 +38,10 @@ def centred(
     """
     if not len(points):
         return points, np.zeros(0)
-    tree = KDTree(points)
+    table = cells(points, spacing)
     count, total = np.zeros(len(points)), np.zeros_like(points)
     for samples in scattered(shape, spacing / FINER, np.random.default_rng(5)):
-        _, owner = tree.query(samples, workers=cores())
+        owner = table.nearest(samples)
         count += np.bincount(owner, minlength=len(points))
         for axis in range(3):
             total[:, axis] += np.bincount(owner, samples[:, axis], len(points))

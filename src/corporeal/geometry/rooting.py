@@ -41,16 +41,16 @@ def drawn_into_ground(
         The scene, and what was done to whom, in words.
 
     """
-    said = []
+    warnings = []
     for plant in _plants(scene, parts, field):
         depth = _depth(scene, parts, field, plant)
         if depth > 0:
             scene = _drawn_out(scene, plant, depth)
-            said.append(
+            warnings.append(
                 f"{scene.objects[plant.number].name} grows from what it stands on, but ends there: "
                 f"its foot is taken to reach {depth:.2g} m deeper than is seen."
             )
-    return scene, tuple(said)
+    return scene, tuple(warnings)
 
 
 def _plants(scene: Scene, parts: Parts, field: MaterialField) -> list[_Plant]:

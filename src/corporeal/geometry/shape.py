@@ -10,6 +10,11 @@ from jaxtyping import Bool, Float, Int
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from corporeal.geometry.mesh import Mesh, boundary
+from corporeal.geometry.winding import PlumbLines, plumb_lines
+
+FEW_OPEN = 1000
+"""Open edges up to which their solid angles are added up one by one: 20 ns each, where a tree of
+faces takes 2 to 100 µs, the most where faces lie upon each other."""
 
 
 @dataclass(frozen=True)
@@ -22,6 +27,10 @@ class Shape:
     def closed(self) -> bool:
         """Whether no edge is open."""
         return not len(boundary(self.mesh)[0])
+
+    @cached_property
+    def _plumb_lines(self) -> PlumbLines:
+        return plumb_lines(self.mesh)
 
     @cached_property
     def _winding(self) -> igl.FastWindingNumberBVH:
@@ -43,10 +52,13 @@ class Shape:
     def winding(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
         """Generalised winding number: about ±1 inside, about 0 outside.
 
-        Barill et al. 2018, *Fast winding numbers for soups and clouds*, as in libigl.
+        Exact where few edges are open; else after Barill et al. 2018, *Fast winding numbers for
+        soups and clouds*, as in libigl.
         """
-        if not len(points):
-            return np.zeros(0)
+        if not len(points) or not len(self.mesh.triangles):
+            return np.zeros(len(points))
+        if len(self._plumb_lines.rim) <= FEW_OPEN:
+            return self._plumb_lines.winding(points)
         return np.asarray(self._winding.winding_number(np.ascontiguousarray(points))).reshape(-1)
 
     def inside(self, points: Float[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:

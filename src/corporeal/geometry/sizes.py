@@ -26,7 +26,7 @@ from corporeal.types import (
 )
 
 LIFE_SIZE = 5e-3
-"""Difference of a scale from 1 that nobody needs to be told: files round their extents."""
+"""Difference of a scale from 1 that need not be reported: files round their extents."""
 
 
 @dataclass(frozen=True)
@@ -118,13 +118,13 @@ def how_scaled(objects: Sequence[SceneObject]) -> str:
     odd = [own for own in objects if is_scaled(own.scale)]
     if not odd:
         return ""
-    told = "; ".join(
+    sizes = "; ".join(
         f"{o.name.replace('_', ' ')} at {o.scale:.3g} times its real {_centimetres(o.real_extent)}"
         + (f" ({o.sized_by})" if o.sized_by else "")
         for o in odd
     )
     return (
-        f"Not life-size: {told}. Walls are scaled with their object; lengths, masses and all that "
+        f"Not life-size: {sizes}. Walls are scaled with their object; lengths, masses and all that "
         "follows from them are those of the scene, and the real masses stand in brackets."
     )
 
@@ -141,7 +141,7 @@ def _centimetres(metres: float) -> str:
 def in_scene(field: MaterialField, scales: Sequence[float]) -> MaterialField:
     """Return what parts are made of with their walls as thick as in the scene.
 
-    Lengths that were said or looked up are real ones; in the scene they are scaled with the rest.
+    Lengths that were stated or looked up are real ones; in the scene they are scaled with the rest.
 
     Args:
         field: With real lengths.

@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Float32
 from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
-from corporeal.masking.colours import against, bins_of, histogram, overlap
+from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds
 from corporeal.masking.total_variation import Cutter

@@ -12,7 +12,7 @@ from corporeal.formats.photographs import Photographs, listed
 from corporeal.formats.shots import stored
 from corporeal.geometry.lens import unbent
 from corporeal.geometry.region import Region, region
-from corporeal.masking.colours import against, bins_of, histogram
+from corporeal.masking.colour_likelihood import against, bins_of, histogram
 from corporeal.masking.seeds import ABOUT, Seeds, beyond, floor_of, near
 from corporeal.masking.total_variation import Cutter
 from corporeal.masking.volume import pixels_of

@@ -34,6 +34,7 @@ from corporeal.types import (
 )
 
 SPAN = {"typical": 1.0, "fallback": 1.0, "model": 0.5, "recording": 0.5, "annotation": 0.0}
+SPAN |= {"field": 0.0}
 """How far towards the ends of its range a value is drawn, by who chose it."""
 TOGETHER = 0.9
 """Correlation of what moves together."""
@@ -176,7 +177,8 @@ def sample(
     )
     pieces = tuple(
         tuple(
-            _piece(p, said, owner, grades, library) for p, said in zip(group, w.pieces, strict=True)
+            _piece(p, piece, owner, grades, library)
+            for p, piece in zip(group, w.pieces, strict=True)
         )
         for group, w, owner in zip(
             field.pieces or ((),) * len(made), words, object_of_part, strict=True

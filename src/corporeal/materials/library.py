@@ -93,7 +93,7 @@ def read(path: Path) -> dict[str, Entry]:
     """Read a library of the user's own.
 
     Raises:
-        BadFileError: The file cannot be read, or has a mistake; the first one is told.
+        BadFileError: The file cannot be read, or has a mistake; the first one is reported.
 
     """
     try:
@@ -138,8 +138,8 @@ def _cited(row: dict, own: dict[str, str]) -> dict:
     cells = {}
     for key, cell in row.items():
         if isinstance(cell, dict) and set(cell["source"].split("+")) & set(own):
-            said = source_table()
-            cites = [own[k] if k in own else said[k]["cite"] for k in cell["source"].split("+")]
+            shipped = source_table()
+            cites = [own[k] if k in own else shipped[k]["cite"] for k in cell["source"].split("+")]
             cell = cell | {"source": " / ".join(cites)}
         cells[key] = cell
     return row | cells

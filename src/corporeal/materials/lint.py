@@ -317,12 +317,12 @@ def _look_at_rebound(found: _Finder, row: _Row, fields: dict[str, _Cell]) -> Non
         return
     if any(p.table == row.name and p.key in ("loss", "restitution") for p in found.problems):
         return  # what is wrong in itself comes first
-    said, loss = fields["restitution"].entries, fields["loss"].entries
+    restitution, loss = fields["restitution"].entries, fields["loss"].entries
     low, high = rebound_range(loss["low"], loss["high"])
-    if said.get("note") or (low <= said["high"] and said["low"] <= high):
+    if restitution.get("note") or (low <= restitution["high"] and restitution["low"] <= high):
         return
     what = (
-        f"{said['low']:g} to {said['high']:g} contradicts the loss factor: with "
+        f"{restitution['low']:g} to {restitution['high']:g} contradicts the loss factor: with "
         f"{loss['low']:g} to {loss['high']:g} a ball keeps {low:.2f} to {high:.2f} of its speed."
     )
     advice = "Correct one of the two, or say with note = '...' what else takes the energy."

@@ -58,7 +58,7 @@ def show(name: str, library_name: str = "default") -> str:
 
 
 def _uses(entry: Entry) -> list[str]:
-    """Tell how use or treatment narrows the ranges, as a model is told too."""
+    """Say how use or treatment narrows the ranges, as a model is offered them."""
     rows = []
     for use in treatments(entry.name):
         bands = [
@@ -120,11 +120,14 @@ def materials_json(
     rows = zip(parts.catalogue, field.materials, field.structures, field.words, pieces, strict=True)
     weighed = zip(masses, scales, strict=True)
     heavy = [{"scale": s, "mass_kg": m, "real_mass_kg": m / s**3} for m, s in weighed]
-    told = [_part_json(*row) for row in rows]
+    rows_of_parts = [_part_json(*row) for row in rows]
     mixtures = {"masses": [asdict(m) for m in field.mixtures]} if field.mixtures else {}
     return mixtures | {
         "units": {q.field: q.unit for q in QUANTITIES.values()},
-        "parts": [part | own for part, own in zip(told, heavy or [{}] * len(told), strict=True)],
+        "parts": [
+            part | own
+            for part, own in zip(rows_of_parts, heavy or [{}] * len(rows_of_parts), strict=True)
+        ],
         "friction": field.friction.round(4).tolist(),
         "restitution": field.restitution.round(4).tolist(),
         "order": "rows and columns are the parts in order, then the floor and the walls",
@@ -134,9 +137,9 @@ def materials_json(
 def _part_json(
     part: Part, material: Material, made: Structure, words: PartWords, pieces: tuple[Piece, ...]
 ) -> dict:
-    said = {"name": part.name, "object": part.object, "found_by": part.found_by}
-    said |= _made_json(material, made, words)
-    return said | ({"pieces": [_piece_json(p) for p in pieces]} if pieces else {})
+    row = {"name": part.name, "object": part.object, "found_by": part.found_by}
+    row |= _made_json(material, made, words)
+    return row | ({"pieces": [_piece_json(p) for p in pieces]} if pieces else {})
 
 
 def _piece_json(piece: Piece) -> dict:
@@ -161,7 +164,7 @@ def _made_json(material: Material, made: Structure, words: PartWords) -> dict:
 
 
 def _way_json(way: Hypothesis) -> dict:
-    said = {
+    row = {
         "material": way.material,
         "built": way.structure,
         "contents": way.contents,
@@ -169,21 +172,21 @@ def _way_json(way: Hypothesis) -> dict:
         "solidity": way.solidity,
         "reading": way.reading,
     }
-    return {k: v for k, v in said.items() if v not in (None, "")} | {
+    return {k: v for k, v in row.items() if v not in (None, "")} | {
         "probability": way.probability,
         "reason": way.reason,
     }
 
 
 def _structure_json(made: Structure) -> dict:
-    said: dict = {"kind": made.kind, "thickness": made.thickness, "reason": made.reason}
+    row: dict = {"kind": made.kind, "thickness": made.thickness, "reason": made.reason}
     if made.solidity < 1:
-        said["solidity"] = made.solidity
+        row["solidity"] = made.solidity
     if made.contents is not None:
         inner = made.contents
-        said |= {"contents": inner.name, "fill": made.fill}
-        said["contents_values"] = {name: _ground_json(name, g) for name, g in inner.grounds.items()}
-    return said
+        row |= {"contents": inner.name, "fill": made.fill}
+        row["contents_values"] = {name: _ground_json(name, g) for name, g in inner.grounds.items()}
+    return row
 
 
 def _ground_json(name: str, ground: Ground) -> dict:

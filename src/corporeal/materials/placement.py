@@ -56,7 +56,7 @@ def choices(
     """Offer the quantities of a part that somebody may place; nothing where none is open.
 
     Args:
-        words: What is said of the part.
+        words: The description of the part.
         library_name: Where its material is looked up.
         weighing: Offer only what its mass hangs on.
 

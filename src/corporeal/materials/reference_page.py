@@ -57,14 +57,14 @@ with `extends = "default"` (or `"reference"`) is merged, material by material: i
 the namesake whole. Any other file replaces the library, and must then hold every material that the
 scene is found to be made of, the floor (`--floor`) and what stands for the unknown (`--neutral`).
 
-`corporeal materials check my.toml` tells every mistake with its line and what to do: ends swapped,
+`corporeal materials check my.toml` lists every mistake with its line and what to do: ends swapped,
 a Poisson's ratio of 0.5, a number without a source, a source that nothing explains, a key or law
 that does not exist, a law without the numbers that it reads, and numbers that lie three times
 beyond those of the material's namesake or of all that share its group and law, which is how a
 wrong unit shows. Of what is soft (groups soft, fibrous, polymer, elastomer, foam, food) it holds
 the loss factor against the restitution, which a ball's rebound ties together (see below): ranges
 that cannot both be true are a mistake, unless the restitution has a note on what else takes the
-energy. What is true all the same is said to be: `{ low = …, unusual = true }`. A library
+energy. A range that is right all the same is marked so: `{ low = …, unusual = true }`. A library
 with a mistake is not used. Every law needs E, ν and ρ; %(needs)s.
 Without friction or restitution of its own a material gets 0.5.
 """
@@ -143,18 +143,18 @@ def _needs() -> str:
 
 def _counts() -> str:
     """Say how well founded the numbers are."""
-    told = {"read": 0, "recalled": 0, "ours": 0}
+    counts = {"read": 0, "recalled": 0, "ours": 0}
     for entry in library().values():
         for field in ("young", "poisson", "density", "yield_stress"):
             if field in entry.ranges:
                 keys = entry.ranges[field].source.split("+")
                 checks = [source_table()[k]["check"] for k in keys]
-                told[max(checks, key=list(told).index)] += 1
-    total = sum(told.values())
+                counts[max(checks, key=list(counts).index)] += 1
+    total = sum(counts.values())
     return (
-        f"Of their {total} values of E, ν, ρ and σ_y, {told['read']} rest on sources that were "
-        f"read, {told['recalled']} on handbooks that were recalled, and {told['ours']} at least in "
-        "part on an estimate of ours."
+        f"Of their {total} values of E, ν, ρ and σ_y, {counts['read']} rest on sources that were "
+        f"read, {counts['recalled']} on handbooks that were recalled, and {counts['ours']} at "
+        "least in part on an estimate of ours."
     )
 
 
@@ -186,11 +186,11 @@ def _cells(entry: Entry, fields: Sequence[str]) -> list[str]:
 
 def _notes() -> list[str]:
     """Collect what else takes the energy of a blow, and of which materials."""
-    said: dict[str, list[str]] = {}
+    names_of: dict[str, list[str]] = {}
     for entry in library().values():
         if "restitution" in entry.notes:
-            said.setdefault(entry.notes["restitution"], []).append(entry.name)
-    return [f"- {', '.join(names)}: {note}" for note, names in said.items()]
+            names_of.setdefault(entry.notes["restitution"], []).append(entry.name)
+    return [f"- {', '.join(names)}: {note}" for note, names in names_of.items()]
 
 
 def _friction() -> list[str]:

@@ -39,7 +39,7 @@ class Interaction(Diagnostics):
         self._enter(body, given, float(self.measure().kinetic[body] - before))
 
     def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
-        """Pull on a body by a spring until told otherwise: see ``problem.Interactive``."""
+        """Pull on a body by a spring until released: see ``problem.Interactive``."""
         check(self.problem, body, point, target)
         hold = None if point is None else self._hold(body, point)
         total = self._total(body)

@@ -158,11 +158,11 @@ class Diagnostics(ABC):
 
     @abstractmethod
     def _particles(self) -> Snapshot:
-        """Copy every particle's state; what is said of rigid bodies' is overwritten."""
+        """Copy every particle's state; those of rigid bodies are overwritten."""
 
     @abstractmethod
     def _sums(self) -> Sums:
-        """Add up particles in new arrays; what is said of rigid bodies is overwritten."""
+        """Add up particles in new arrays; those of rigid bodies are overwritten."""
 
     @abstractmethod
     def _rigid_bodies(self) -> dict[int, RigidBody]:

@@ -163,9 +163,9 @@ class Problem:
 
     @property
     def never_touch(self) -> tuple[tuple[int, int], ...]:
-        """Pairs without contact: what is bonded or apart, and bodies that both move as told."""
-        told = [b for b, body in enumerate(self.bodies) if body.path is not None]
-        return (*self.bonds, *self.apart, *combinations(told, 2))
+        """Pairs without contact: what is bonded or apart, and two prescribed motions."""
+        prescribed = [b for b, body in enumerate(self.bodies) if body.path is not None]
+        return (*self.bonds, *self.apart, *combinations(prescribed, 2))
 
 
 @dataclass(frozen=True)
@@ -315,7 +315,7 @@ class Interactive(Engine, Protocol):
         ...
 
     def pull(self, body: int, point: Vector | None, target: Vector, stiffness: float) -> None:
-        """Pull on a body by a damped spring until told otherwise.
+        """Pull on a body by a damped spring until released.
 
         Args:
             body: Which.

@@ -63,7 +63,7 @@ def candidates(root: Path) -> list[Candidate]:
 
 def _candidate(file: Path, row: dict[str, str], product: Product | None, licence: str) -> Candidate:
     title = f"{product.title}, " if product and product.title else ""
-    said = Row(
+    declared = Row(
         class_name=product.class_name if product else "",
         licence=licence,
         attribution=f"{title}Amazon Berkeley Objects (c) Amazon.com",
@@ -71,7 +71,7 @@ def _candidate(file: Path, row: dict[str, str], product: Product | None, licence
         metric=True,
         extent=_extent(row),
     )
-    return Candidate(file, said, name=f"abo_{row['3dmodel_id']}")
+    return Candidate(file, declared, name=f"abo_{row['3dmodel_id']}")
 
 
 def _extent(row: dict[str, str]) -> float | None:

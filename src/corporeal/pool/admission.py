@@ -43,10 +43,10 @@ class Admission:
 
     def ask(self, candidate: Candidate, verdict: Verdict) -> None:
         """Let a candidate in, or write down why not."""
-        said = candidate.said
-        words = _in_words(said.class_name or verdict.class_name) or "object"
+        declared = candidate.declared
+        words = _in_words(declared.class_name or verdict.class_name) or "object"
         metric = is_metric(candidate, verdict.extent, words)
-        reason = verdict.reason or self._why_not(verdict, words, bool(said.metric) and metric)
+        reason = verdict.reason or self._why_not(verdict, words, bool(declared.metric) and metric)
         if reason:
             self.rejections.append(Rejection(writable(str(candidate.file)), words, reason))
             return
@@ -54,10 +54,10 @@ class Admission:
             name=self._name(candidate),
             class_name=words,
             file=self.pool / MODELS / verdict.copy if verdict.copy else candidate.file.resolve(),
-            source=said.source or str(candidate.file),
+            source=declared.source or str(candidate.file),
             sha256=verdict.sha256,
-            licence=said.licence or verdict.licence or UNKNOWN,
-            attribution=said.attribution or verdict.attribution,
+            licence=declared.licence or verdict.licence or UNKNOWN,
+            attribution=declared.attribution or verdict.attribution,
             extent=verdict.extent,
             metric=metric,
             triangles=verdict.triangles,
@@ -98,15 +98,15 @@ def _in_words(class_name: str) -> str:
 
 
 def is_metric(candidate: Candidate, extent: float, words: str) -> bool:
-    """Tell whether lengths are metres: what is said, unless the mesh has another extent.
+    """Tell whether lengths are metres: as declared, unless the mesh has another extent.
 
     Where nobody says, they are if the object is then as large as such objects are: glTF is in
     metres by its specification, and most files are not.
     """
-    said = candidate.said
-    if said.extent is not None and abs(said.extent / max(extent, 1e-300) - 1) > OTHER:
+    declared = candidate.declared
+    if declared.extent is not None and abs(declared.extent / max(extent, 1e-300) - 1) > OTHER:
         return False
-    return doubt("", words, extent) is None if said.metric is None else said.metric
+    return doubt("", words, extent) is None if declared.metric is None else declared.metric
 
 
 def absurd(extent: float, words: str) -> str:
@@ -117,6 +117,6 @@ def absurd(extent: float, words: str) -> str:
         return ""
     usual = f"a {known.words} is usually {known.usual:g} m" if known else "nothing is so"
     return (
-        f"is said to be in metres and is {extent:.3g} m large; {usual}. Say metric = no if only "
+        f"is declared as in metres and is {extent:.3g} m large; {usual}. Set metric = no if only "
         "its shape counts"
     )

@@ -1,4 +1,4 @@
-"""Files that ask to be let into a pool, and what is said about them beside what they say."""
+"""Candidates for a pool: files, and what is declared about them beside their own metadata."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -24,7 +24,7 @@ class Candidate:
     """A model file, with what somebody says about it; empty or None: nothing."""
 
     file: Path
-    said: Row = field(default_factory=Row)
+    declared: Row = field(default_factory=Row)
     name: str = ""
 
 
@@ -46,14 +46,14 @@ def candidates_in(
         UserError: A folder is absent, or a table cannot be used.
 
     """
-    said = {} if table is None else read_table(table, [table.parent, *folders])
+    declared = {} if table is None else read_table(table, [table.parent, *folders])
     found: dict[Path, Candidate] = {}
     for folder in folders:
-        rows = _manifest(folder) | said
+        rows = _manifest(folder) | declared
         for file in models_below(folder, pool):
             row = rows.get(file.resolve()) or Row(class_name=_class_by_folder(file, folder))
             found.setdefault(file.resolve(), Candidate(file, row, _name(file, folder)))
-    for path, row in said.items():
+    for path, row in declared.items():
         if not path.exists():
             found.setdefault(path, Candidate(path, row))
     return [found[path] for path in sorted(found)]

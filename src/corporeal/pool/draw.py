@@ -37,17 +37,17 @@ def draw(
     return [names[order[k % len(names)]] for k in range(count)]
 
 
-def counts(said: str) -> tuple[int, int]:
+def counts(asked: str) -> tuple[int, int]:
     """Return fewest and most of "3" or "1-4".
 
     Raises:
         UserError: It is neither.
 
     """
-    low, _, high = said.partition("-")
+    low, _, high = asked.partition("-")
     if not low.strip().isdigit() or not (high or low).strip().isdigit():
-        raise UserError(f"--count {said!r}: write a number or a range, for example 1-4.")
+        raise UserError(f"--count {asked!r}: write a number or a range, for example 1-4.")
     least, most = int(low), int(high or low)
     if not 1 <= least <= most <= 16:
-        raise UserError(f"--count {said!r}: give numbers from 1 to 16, the smaller first.")
+        raise UserError(f"--count {asked!r}: give numbers from 1 to 16, the smaller first.")
     return least, most

@@ -28,7 +28,7 @@ APART = 0.02
 WHOLE = 0.9
 """Share of the area that hangs together, within that gap, in one object."""
 SAMPLES = 60_000
-"""Points of the surface by which that is told."""
+"""Points of the surface by which that is decided."""
 FEW_COLOURS = 64
 """A picture with no more colours than this is a palette: its pixels carry no detail."""
 FLAT = 1e-6

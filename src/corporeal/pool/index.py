@@ -1,7 +1,7 @@
 """Make a pool of folders of models, and read it back.
 
 A pool is a folder with ``pool.json`` (assets, and rejections with reasons), ``verdicts.jsonl``
-(what the gate said of each content, so that no content is judged twice) and ``models/`` (copies of
+(the gate's verdict on each content, so that no content is judged twice) and ``models/`` (copies of
 what had to be cleaned, decimated or converted).
 """
 
@@ -26,7 +26,7 @@ Progress = Callable[[float, str], None]
 
 @dataclass(frozen=True)
 class IndexConfig:
-    """What is said about the files, and how good they must be."""
+    """What is declared about the files, and how good they must be."""
 
     origin: OriginConfig = field(default_factory=OriginConfig)
     gate: GateConfig = field(default_factory=GateConfig)
@@ -120,11 +120,11 @@ def _read(pool: Path) -> tuple[list[Member], list[Rejection]]:
     path = pool / POOL
     if not path.exists():
         raise UserError(f"{pool}: there is no asset pool. {INDEX_AGAIN}")
-    said = store.read_json(path)
+    kept = store.read_json(path)
     try:
         return (
-            [_member(pool, dict(entry)) for entry in said["assets"]],
-            [Rejection(**entry) for entry in said["rejections"]],
+            [_member(pool, dict(entry)) for entry in kept["assets"]],
+            [Rejection(**entry) for entry in kept["rejections"]],
         )
     except (KeyError, TypeError, ValueError) as problem:
         words = f"is no index of an asset pool ({type(problem).__name__}: {problem})."

@@ -117,19 +117,19 @@ def words(category: str) -> str:
 
 
 def _candidate(uid: str, file: Path, class_name: str, note: dict) -> Candidate:
-    said = Row(
+    declared = Row(
         class_name=class_name,
         licence=LICENCES.get(str(note.get("license")), str(note.get("license") or "")),
         attribution=writable(_attribution(note)),
         source=writable(str(note.get("viewerUrl") or f"objaverse:{uid}")),
         metric=False,
     )
-    return Candidate(file, said, name=f"{class_name or 'objaverse'} {uid[:8]}")
+    return Candidate(file, declared, name=f"{class_name or 'objaverse'} {uid[:8]}")
 
 
 def _attribution(note: dict) -> str:
-    said = note.get("user")
-    user = said if isinstance(said, dict) else {}
+    author = note.get("user")
+    user = author if isinstance(author, dict) else {}
     author = str(user.get("displayName") or user.get("username") or "")
     title = str(note.get("name") or "")
     named = f"{title} by {author}" if title and author else title or author

@@ -14,7 +14,7 @@ Origin = Literal["folders", "objaverse", "abo"]
 
 @dataclass(frozen=True)
 class OriginConfig:
-    """What the folders are, and what is said about the files in them."""
+    """What the folders are, and what is declared about the files in them."""
 
     origin: Origin = "folders"
     """Plain folders, the cache of the package objaverse, or Amazon Berkeley Objects."""
@@ -49,4 +49,4 @@ def _of_objaverse(folders: Sequence[Path], wanted: objaverse.Wanted) -> list[Can
         folders = [objaverse.fetch(wanted)]
     found = [c for cache in folders or [None] for c in objaverse.candidates(cache)]
     names = {objaverse.words(c) for c in wanted.classes}
-    return [c for c in found if not names or c.said.class_name in names]
+    return [c for c in found if not names or c.declared.class_name in names]

@@ -81,8 +81,8 @@ class Verdicts:
 
 def _in_words_of_one_line(verdict: Verdict) -> Verdict:
     """Return the verdict without what a hostile file may have put into names and credits."""
-    said = {k: writable(v) for k, v in asdict(verdict).items() if isinstance(v, str)}
-    return replace(verdict, **said)
+    kept = {k: writable(v) for k, v in asdict(verdict).items() if isinstance(v, str)}
+    return replace(verdict, **kept)
 
 
 def content_key(file: Path, gate: GateConfig) -> str:
@@ -161,8 +161,8 @@ def _read(path: Path) -> Iterable[Verdict]:
     names = {f.name for f in fields(Verdict)}
     for line in path.read_text(encoding="utf-8").splitlines():
         try:
-            said = json.loads(line)
+            kept = json.loads(line)
         except ValueError:
             continue
-        if isinstance(said, dict) and set(said) == names:
-            yield Verdict(**said)
+        if isinstance(kept, dict) and set(kept) == names:
+            yield Verdict(**kept)

@@ -12,20 +12,38 @@ from dataclasses import dataclass
 from functools import partial
 from itertools import count
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
+
+import numpy as np
+from PIL import Image
 
 from corporeal.errors import UserError
+from corporeal.formats.photographs import MASKS
 from corporeal.machine import cores
 from corporeal.poses.gather import IMAGES, LONGEST, Gathered
 
 Progress = Callable[[float, str], None]
 
+Way = Literal["plain", "masked", "thorough"]
+"""masked: points on objects alone, for objects that were turned over or moved between pictures.
+thorough: affine shapes, pooling over scales, guided matching, lower minima, and points that two
+pictures alone share, for pictures that are far apart."""
+WORDS: dict[Way, str] = {
+    "plain": "",
+    "masked": "attempt on masks alone: ",
+    "thorough": "thorough attempt: ",
+}
+
+MOST_POINTS = 4096
+"""Points of a picture that are matched, the largest ones. Twice as many take four times as long."""
 EXHAUSTIVE = 80
 """Pictures up to which all pairs are matched; beyond, each with its neighbours by name."""
 OVERLAP = (*range(1, 11), 16, 32, 64)
 """Distances by name at which they are then matched."""
 BATCH, BLOCK = 4, 100
 """Pictures and pairs that are worked on before progress is told."""
+HALF = 127
+"""Of 255: more than that in a mask is on the object."""
 DATABASE = "database.db"
 FEATURES, MATCHES = 0.2, 0.6
 """Share of the work that is done after each step."""
@@ -37,7 +55,7 @@ LOOK = 0.5
 class Attempt:
     """What came of one attempt."""
 
-    thorough: bool
+    way: Way
     pictures: int
     registered: int = 0
     points: int = 0
@@ -50,6 +68,10 @@ class Attempt:
     bent: float = 0.0
     """Largest |k1| of its lens [-]."""
     left_out: tuple[str, ...] = ()
+    astray: tuple[str, ...] = ()
+    """Registered pictures in which masks say that the object is elsewhere."""
+    filled: float = 1.0
+    """Share of a mask that the visual hull of all fills, the median; 1 without masks [-]."""
 
 
 def require() -> Any:
@@ -70,27 +92,23 @@ def require() -> Any:
     return pycolmap
 
 
-def attempt(
-    folder: Path, out: Path, gathered: Gathered, thorough: bool, progress: Progress
-) -> Attempt:
+def attempt(folder: Path, out: Path, gathered: Gathered, way: Way, progress: Progress) -> Attempt:
     """Find poses, and write the largest model as text to ``out / "sparse" / "0"``.
 
     What an interrupted attempt left in the database is not done again.
 
     Args:
-        folder: Holds ``images``.
+        folder: Holds ``images``, and ``masks`` where points are looked for on objects alone.
         out: Gets the database and the model.
         gathered: What lies there.
-        thorough: Affine shapes, pooling over scales, guided matching, lower minima, and points that
-            two pictures alone share: for pictures that are far apart.
+        way: How points are found and matched.
         progress: Told the fraction done and what is being done.
 
     """
     pycolmap = require()
     out.mkdir(parents=True, exist_ok=True)
     pycolmap.set_random_seed(0)
-    words = "second attempt: " if thorough else ""
-    work = _Work(pycolmap, folder / IMAGES, out, gathered, thorough)
+    work = _Work(pycolmap, folder, out, gathered, way)
     steps = (
         (work.extract, 0.0, FEATURES, "looking for points"),
         (work.match, FEATURES, MATCHES, "matching pictures"),
@@ -99,10 +117,10 @@ def attempt(
     for step, begin, end, what in steps:
 
         def told(share: float, begin: float = begin, end: float = end, what: str = what) -> None:
-            progress(begin + (end - begin) * share, words + what)
+            progress(begin + (end - begin) * share, WORDS[way] + what)
 
         _watched(pycolmap, partial(step, told))
-    return _judged(work.models, out, gathered, thorough)
+    return _judged(work.models, out, gathered, way)
 
 
 def _watched(pycolmap: Any, work: Callable[[Any], None]) -> None:
@@ -133,10 +151,11 @@ class _Work:
     """
 
     def __init__(
-        self, pycolmap: Any, images: Path, out: Path, gathered: Gathered, thorough: bool
+        self, pycolmap: Any, folder: Path, out: Path, gathered: Gathered, way: Way
     ) -> None:
-        self.pycolmap, self.images, self.out = pycolmap, images, out
-        self.gathered, self.thorough = gathered, thorough
+        self.pycolmap, self.images, self.out = pycolmap, folder / IMAGES, out
+        self.gathered, self.thorough = gathered, way == "thorough"
+        self.masks = folder / MASKS[0] if way == "masked" else None
         self.database = out / DATABASE
         self.models: Any = {}
 
@@ -144,8 +163,11 @@ class _Work:
         """Find points; pictures of one size share a camera."""
         reading = self.pycolmap.ImageReaderOptions()
         reading.camera_model = "SIMPLE_RADIAL"
+        if self.masks is not None:
+            reading.mask_path = _points_allowed(self.masks, self.out, self.gathered)
         sift = self.pycolmap.FeatureExtractionOptions()
         sift.num_threads, sift.use_gpu, sift.max_image_size = cores(), False, LONGEST
+        sift.sift.max_num_features = MOST_POINTS
         sift.sift.estimate_affine_shape = sift.sift.domain_size_pooling = self.thorough
         done = 0
         for camera, size in enumerate(dict.fromkeys(self.gathered.sizes)):
@@ -174,6 +196,8 @@ class _Work:
         matching = self.pycolmap.FeatureMatchingOptions()
         matching.num_threads, matching.use_gpu = cores(), False
         matching.guided_matching = self.thorough
+        checking = self.pycolmap.TwoViewGeometryOptions()
+        checking.ransac.random_seed = 0
         names, pairs = self.gathered.names, pairs_of(len(self.gathered.names))
         pairing = self.pycolmap.ImportedPairingOptions()
         pairing.match_list_path = str(self.out / "pairs.txt")
@@ -186,6 +210,7 @@ class _Work:
                 self.database,
                 matching_options=matching,
                 pairing_options=pairing,
+                verification_options=checking,
                 device=self.pycolmap.Device.cpu,
                 cancellation_token=token,
             )
@@ -195,6 +220,7 @@ class _Work:
         """Place cameras one after the other, in groups that share points."""
         options = self.pycolmap.IncrementalPipelineOptions()
         options.num_threads, options.random_seed, options.min_model_size = cores(), 0, 3
+        options.mapper.random_seed = options.triangulation.random_seed = 0
         if self.thorough:  # believe less: pictures are far apart; the whole is judged afterwards
             options.min_num_matches = 10
             options.mapper.init_min_num_inliers = 40
@@ -215,18 +241,35 @@ class _Work:
         )
 
 
-def _judged(models: Any, out: Path, gathered: Gathered, thorough: bool) -> Attempt:
+def _points_allowed(masks: Path, out: Path, gathered: Gathered) -> Path:
+    """Write masks as COLMAP looks for them: named after pictures, and as large as these.
+
+    A picture without a mask gets a black one, so no points.
+    """
+    place = out / "masks"
+    place.mkdir(exist_ok=True)
+    for name, size in zip(gathered.names, gathered.sizes, strict=True):
+        file, own = masks / f"{Path(name).stem}.png", Image.new("L", size)
+        if file.exists():
+            with Image.open(file) as mask:
+                own = mask.convert("L").resize(size, Image.Resampling.NEAREST)
+        allowed = np.uint8(255) * (np.asarray(own) > HALF)
+        Image.fromarray(allowed).save(place / f"{name}.png")
+    return place
+
+
+def _judged(models: Any, out: Path, gathered: Gathered, way: Way) -> Attempt:
     total = len(gathered.names)
     best = max(models.values(), key=lambda m: m.num_reg_images(), default=None)
     if best is None:
-        return Attempt(thorough, total, left_out=gathered.names)
+        return Attempt(way, total, left_out=gathered.names)
     place = out / "sparse" / "0"
     place.mkdir(parents=True, exist_ok=True)
     best.write_text(str(place))
     placed = {image.name for image in best.images.values() if image.has_pose}
     focal, bent = _lens([c for c in best.cameras.values()])
     return Attempt(
-        thorough,
+        way,
         total,
         registered=best.num_reg_images(),
         points=best.num_points3D(),

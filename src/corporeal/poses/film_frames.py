@@ -17,6 +17,7 @@ from PIL import Image
 from scipy.ndimage import laplace
 
 from corporeal.errors import BadFileError
+from corporeal.poses.standstill import Standstill
 
 Progress = Callable[[float, str], None]
 
@@ -36,6 +37,8 @@ SMALL, THUMBNAIL = 480, (32, 24)
 """Longer side of the pictures in which sharpness is measured; size of those for change [px]."""
 STILL = 0.05
 """Mean difference of neighbouring thumbnails, of 255, that is noise."""
+UNMOVED = 0.25
+"""Share of what has contrast that never moves, from which on a film shows no way around a thing."""
 TAKE = "Film the thing slowly, all around and from above, for 20 to 60 s."
 
 
@@ -68,10 +71,11 @@ def write_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
     """
     film = _opened(path)
     change, sharp = [0.0], []
-    before = None
+    before, standstill = None, Standstill()
     expected = max(film.looked * film.seconds, 1.0)
     for grey in _grey(film):
         small = np.asarray(Image.fromarray(grey).resize(THUMBNAIL, Image.Resampling.BOX), float)
+        standstill.look(grey)
         sharp.append(float(laplace(grey.astype(np.float32)).var()))
         if before is not None:
             change.append(float(np.abs(small - before).mean()))
@@ -83,6 +87,10 @@ def write_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
     if len(chosen) < FEWEST:
         what = f"only {len(chosen)} of {len(sharp)} frames are sharp and differ from one another"
         raise BadFileError(path, f"{what}; at least {FEWEST} are needed.", TAKE)
+    if standstill.share > UNMOVED:
+        what = f"{standstill.share:.0%} of what has contrast in it never moves: it is a recording"
+        what += " of a screen, or the camera stood still."
+        raise BadFileError(path, what, f"{TAKE} Do not turn the thing instead.")
     progress(0.7, "writing frames")
     _write(film, chosen, folder)
     return [

@@ -22,6 +22,9 @@ BENT = 0.25
 """Largest |k1| of a lens that is no fisheye."""
 RIVAL = 1 / 3
 """Share of the first group from which on a second one rivals it."""
+FILLED = 0.9
+"""Share of a mask that the visual hull fills: 1.00 under right poses of two real sets, 0.85 under
+those of the card that an axe head lay on before and after it was turned over."""
 NAMED = 8
 GAP = 60.0
 """Angle between neighbouring cameras, about what they look at, that leaves a side unseen [deg]."""
@@ -50,6 +53,21 @@ def doubts(told: Attempt) -> list[str]:
         groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])
         found.append(f"the pictures fall into groups of {groups} that share nothing")
     return found
+
+
+def doubt_of_masks(told: Attempt) -> str | None:
+    """Say that masks contradict one another, if they do: right poses and poor masks do that, too.
+
+    Args:
+        told: What came of an attempt, after its outliers were left out.
+
+    """
+    if told.filled >= FILLED:
+        return None
+    return (
+        f"All masks together leave {told.filled:.0%} of what each shows: the object was moved or "
+        "turned over between the pictures, or masks miss parts of it. Look at the masks."
+    )
 
 
 def names_of(left_out: tuple[str, ...]) -> str:

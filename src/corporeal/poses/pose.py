@@ -1,4 +1,4 @@
-"""Find where photographs were taken from, in one or two attempts, or say why that cannot be."""
+"""Find where photographs were taken from, in up to three attempts, or say why that cannot be."""
 
 import shutil
 from collections.abc import Callable
@@ -7,24 +7,36 @@ from pathlib import Path
 
 from corporeal import store
 from corporeal.errors import BadFileError
-from corporeal.formats.photographs import read_photographs
+from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
-from corporeal.poses.attempt import Attempt, attempt, require
+from corporeal.poses.attempt import Attempt, Way, attempt, require
+from corporeal.poses.by_masks import checked_by_masks
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
 from corporeal.poses.gather import Gathered, gather
-from corporeal.poses.judge import WHAT_TO_DO, doubts, names_of, unseen_side
+from corporeal.poses.groups import SORT_THEM, groups_of, shared_points, told_apart, without
+from corporeal.poses.judge import WHAT_TO_DO, doubt_of_masks, doubts, names_of, unseen_side
 from corporeal.typed import typed
 
 Progress = Callable[[float, str], None]
 
 POSES = "poses"
 """Folder of a reconstruction in which they are kept."""
+SAID: dict[Way, str] = {
+    "plain": "",
+    "masked": ", from points on objects alone",
+    "thorough": ", at the thorough attempt",
+}
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
+METHOD = 2
+"""Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
-FIRST = 0.6
-"""The same, after the first attempt."""
+LOOKED = 0.15
+"""The same, when it is known whether they show one place."""
+LOOKING = "looking whether all show one place"
+UNTIL: dict[Way, float] = {"plain": 0.5, "masked": 0.7, "thorough": 1.0}
+"""The same, after each attempt, in their order."""
 
 
 @dataclass(frozen=True)
@@ -46,6 +58,7 @@ class _Kept:
     refused: str
     """Why there are no poses; "": there are."""
     attempts: tuple[Attempt, ...]
+    what_to_do: str = WHAT_TO_DO
 
 
 def pose(source: Path, folder: Path, progress: Progress) -> Posed:
@@ -61,7 +74,7 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
 
     """
     require()
-    begun = {"source": store.digest(source)}
+    begun = {"source": store.digest(source), "method": METHOD}
     if not (folder / BEGUN).exists() or store.read_json(folder / BEGUN) != begun:
         shutil.rmtree(folder, ignore_errors=True)
         store.write_json(folder / BEGUN, begun)
@@ -71,23 +84,44 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
         kept = _found(source, folder, progress)
         store.write_json(folder / FOUND, kept)
     if kept.refused:
-        raise BadFileError(source, kept.refused, WHAT_TO_DO)
+        raise BadFileError(source, kept.refused, kept.what_to_do)
     return Posed(folder, kept.statements, kept.warnings)
 
 
 def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     said, gathered = _gathered(source, folder, _within(progress, 0.0, GATHERED))
+    groups = None
+    if not (folder / MASKS[0]).is_dir():  # what was turned over shares nothing, and masks help
+        look = _within(progress, GATHERED, LOOKED)
+        groups = groups_of(shared_points(folder, gathered, lambda f: look(f, LOOKING)))
+    if groups is not None and groups.mixed:
+        return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
+    if groups is not None and groups.beside:
+        gathered = without(gathered, groups.beside)
     tried: list[Attempt] = []
-    for thorough in (False, True):
-        out = folder / ("second" if thorough else "first")
-        share = (FIRST, 1.0) if thorough else (GATHERED, FIRST)
-        tried.append(attempt(folder, out, gathered, thorough, _within(progress, *share)))
-        if not doubts(tried[-1]):
-            _accept(out, folder)
-            return _told(folder, gathered, tuple(said), tuple(tried))
+    before = LOOKED
+    for way, until in UNTIL.items():
+        share, before = (before, until), until
+        if not _worth_trying(way, folder, tried):
+            continue
+        told = attempt(folder, folder / way, gathered, way, _within(progress, *share))
+        tried.append(checked_by_masks(told, folder, folder / way / "sparse" / "0"))
+        if not doubts(tried[-1]) and doubt_of_masks(tried[-1]) is None:
+            break
+    believed = [told for told in tried if not doubts(told)]
+    if believed:  # the first of those that masks agree with best: masks may be poor
+        best = max(believed, key=lambda told: told.filled)
+        return _told(folder, gathered, tuple(said), tuple(tried), best)
     best = max(tried, key=lambda told: told.registered)
     why = f"where the pictures were taken from cannot be found: {'; '.join(doubts(best))}."
     return _Kept((), (), why, tuple(tried))
+
+
+def _worth_trying(way: Way, folder: Path, tried: list[Attempt]) -> bool:
+    """Tell whether an attempt can better those before: thorough where none is believed."""
+    if way == "masked":
+        return (folder / MASKS[0]).is_dir()
+    return way == "plain" or all(doubts(told) for told in tried)
 
 
 def _gathered(source: Path, folder: Path, progress: Progress) -> tuple[list[str], Gathered]:
@@ -108,17 +142,21 @@ def _accept(out: Path, folder: Path) -> None:
     """Put the model where it is looked for, and drop what it was made of."""
     shutil.rmtree(folder / "sparse", ignore_errors=True)
     shutil.move(out / "sparse", folder / "sparse")
-    for name in ("first", "second"):
-        shutil.rmtree(folder / name, ignore_errors=True)
+    for way in UNTIL:
+        shutil.rmtree(folder / way, ignore_errors=True)
 
 
 def _told(
-    folder: Path, gathered: Gathered, said: tuple[str, ...], tried: tuple[Attempt, ...]
+    folder: Path,
+    gathered: Gathered,
+    said: tuple[str, ...],
+    tried: tuple[Attempt, ...],
+    last: Attempt,
 ) -> _Kept:
-    last = tried[-1]
+    _accept(folder / last.way, folder)
     statement = (
         f"Where {last.registered} of {last.pictures} photographs were taken from was found by "
-        f"COLMAP{', at the second attempt' if last.thorough else ''}: {last.points:,} points, "
+        f"COLMAP{SAID[last.way]}: {last.points:,} points, "
         f"{last.reprojection:.2f} px reprojection error, focal length {last.focal:.2f} × the "
         "longer side."
     )
@@ -128,6 +166,13 @@ def _told(
             f"{len(last.left_out)} of {last.pictures} photographs do not fit the others and were "
             f"left out: {names_of(last.left_out)}."
         )
+    if last.astray:
+        warnings.append(
+            f"{len(last.astray)} photographs fit the others by what is around the object, but not "
+            f"by their masks, and were left out: {names_of(last.astray)}. The floor's pattern "
+            "repeats, or the mask shows something else."
+        )
+    warnings += filter(None, [doubt_of_masks(last)])
     seen = read_photographs(folder, longest=64)
     cameras_figure(seen, folder / FIGURE)
     unseen = unseen_side(seen.views.cameras, seen.names)

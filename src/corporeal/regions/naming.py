@@ -135,7 +135,7 @@ def _claimed(score: Float[np.ndarray, "C K"]) -> Int[np.ndarray, " C"]:
 def _by_attributes(
     clusters: Clusters, cloud: Cloud, parsed: Sequence[PartWords]
 ) -> tuple[Clusters, Float[np.ndarray, "C K"]]:
-    """Cut clusters into layers of the object's height, and hold what is said against each."""
+    """Cut clusters into layers of the object's height, and compare each with the names."""
     attributes = [described(part) for part in parsed]
     up = top_of(cloud, clusters.cluster_of_point, clusters.count, attributes)
     layer = np.minimum(heights(cloud.position, up) * LAYERS, LAYERS - 1).astype(int)
@@ -179,8 +179,8 @@ def _batches(count: int) -> list[slice]:
 def _agreed(appearance: np.ndarray, score: np.ndarray, part: np.ndarray) -> Int[np.ndarray, " C"]:
     """Let each cluster go over to the name whose other clusters it looks most like.
 
-    Once, all by what the first pass said. The last cluster of a name stays, and nobody takes a name
-    that words find less probable than one in a hundred of their own.
+    Once, all by the result of the first pass. The last cluster of a name stays, and none takes a
+    name that words find less probable than one in a hundred of their own.
     """
     total = np.stack([appearance[part == k].sum(axis=0) for k in range(score.shape[1])])
     left = np.bincount(part, minlength=score.shape[1])

@@ -132,10 +132,10 @@ def row_of(pictures: Sequence[np.ndarray], words: Sequence[str], path: Path) -> 
     row = Image.new("RGB", (len(pictures) * (width + gap) - gap, height + foot), "white")
     draw = ImageDraw.Draw(row)
     font = ImageFont.load_default(size=17)
-    for k, (picture, said) in enumerate(zip(pictures, words, strict=True)):
+    for k, (picture, label) in enumerate(zip(pictures, words, strict=True)):
         row.paste(Image.fromarray(picture), (k * (width + gap), 0))
         middle = (k * (width + gap) + width / 2, height + foot / 2 + 1)
-        draw.text(middle, said, fill=INK, font=font, anchor="mm")
+        draw.text(middle, label, fill=INK, font=font, anchor="mm")
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(f".{path.stem}.{os.getpid()}.part.png")

@@ -196,7 +196,7 @@ def take(
     parts: Parts,
     cast: Cast,
     recording: Recording | None,
-    told: Mapping[str, Any],
+    summary: Mapping[str, Any],
 ) -> bytes:
     """Return the whole block.
 
@@ -205,7 +205,7 @@ def take(
         parts: Which triangle belongs to which part.
         cast: From ``Cast.of``.
         recording: From ``record``; None: frames come later, from a simulation that runs.
-        told: What the page says of the run: goes into the header as it is.
+        summary: What the page shows of the run: goes into the header as it is.
 
     """
     block = Block()
@@ -224,7 +224,7 @@ def take(
         "finishes": [_finish(f) for f in scene.finishes],
         "film": None if recording is None else _film(recording, block),
     }
-    return block.under({**header, **told})
+    return block.under({**header, **summary})
 
 
 def _room(cast: Cast, recording: Recording | None) -> tuple[np.ndarray, np.ndarray]:
@@ -289,16 +289,16 @@ def _film(recording: Recording, block: Block) -> dict:
 
 
 def _reel(frames: Sequence[Instant], top: float, block: Block) -> dict:
-    told: dict[str, Any] = {"pose": block.add(np.array([f.pose for f in frames], "<f4"))}
+    tracks: dict[str, Any] = {"pose": block.add(np.array([f.pose for f in frames], "<f4"))}
     residual = [f.residual for f in frames if f.residual is not None]
     normal = [f.normal for f in frames if f.normal is not None]
     stress = [f.stress for f in frames if f.stress is not None]
     if residual:
-        told["residual"] = block.add(in_time(np.array(residual, "<i2")))
-        told["normal"] = block.add(in_time(np.array(normal)))
+        tracks["residual"] = block.add(in_time(np.array(residual, "<i2")))
+        tracks["normal"] = block.add(in_time(np.array(normal)))
     if stress and top > 0:
-        told["stress"] = block.add(in_time(stress_bytes(np.array(stress), top)[..., None]))
-    return told
+        tracks["stress"] = block.add(in_time(stress_bytes(np.array(stress), top)[..., None]))
+    return tracks
 
 
 def stress_bytes(stress: Float[np.ndarray, "*N"], top: float) -> UInt8[np.ndarray, "*N"]:

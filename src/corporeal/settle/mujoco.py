@@ -61,6 +61,8 @@ FIRM_STEP, FIRM_SOLREF = 5e-4, 1e-3
 """Step [s] and time constant [s] of hard contacts: they give way a few thousandths of a millimetre
 per metre of scene."""
 SOLIMP = [0.95, 0.99, 0.001, 0.5, 2.0]
+SURFACE = {"solref": SOLREF, "solimp": SOLIMP, "condim": 6}
+"""Contact of every geometry."""
 FLOOR_AND_HULLS = 1
 """Bit of contype and conaffinity; pieces meet in explicit pairs only, as the engine would take the
 larger of two frictions."""
@@ -207,23 +209,7 @@ class Engine:
 
 
 def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: float) -> mujoco.MjSpec:
-    spec = mujoco.MjSpec()
-    spec.option.timestep = step
-    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
-    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
-    spec.option.iterations = 100
-    spec.option.noslip_iterations = 4
-    spec.option.tolerance = 1e-10
-    spec.memory = MEMORY
-    surface = {"solref": SOLREF, "solimp": SOLIMP, "condim": 6}
-    spec.worldbody.add_geom(
-        type=mujoco.mjtGeom.mjGEOM_PLANE,
-        size=[5, 5, 0.1],
-        friction=[0.0, 0.0, 0.0],  # the larger of two counts: the hull's
-        contype=FLOOR_AND_HULLS,
-        conaffinity=0,
-        **surface,
-    )
+    spec = _floor(step)
     # Contacts are as soft for any mass; only masses near the engine's smallest number matter.
     lightest = min(b.mass for b in bodies)
     for k, (body, pose) in enumerate(zip(bodies, poses, strict=True)):
@@ -233,31 +219,67 @@ def _spec(bodies: Sequence[Body], poses: Sequence[Pose], unit: float, step: floa
         if body.inertial:
             _give(node, body.inertial, unit, lightest)
         node.add_freejoint()
-        surface["friction"] = [body.grip_on(None), SPIN, ROLL * body.extent / unit]
-        _add_mesh(spec, f"{k} hull", body.hull, unit)
-        node.add_geom(
-            type=mujoco.mjtGeom.mjGEOM_MESH,
-            meshname=f"{k} hull",
-            mass=0,
-            contype=0,
-            conaffinity=FLOOR_AND_HULLS,
-            **surface,
-        )
-        for number, piece in enumerate(body.pieces):
-            name = _piece_name(k, number)
-            _add_mesh(spec, name, piece, unit)
-            node.add_geom(
-                name=name,
-                type=mujoco.mjtGeom.mjGEOM_MESH,
-                meshname=name,
-                density=0.0 if body.inertial else body.density * unit**3 / lightest,
-                contype=0,
-                conaffinity=0,
-                **surface,
-            )
+        density = 0.0 if body.inertial else body.density * unit**3 / lightest
+        _add_shape(spec, node, body, k, unit, density)
     for a, b in combinations(range(len(bodies)), 2):
         _add_pairs(spec, bodies, (a, b), unit)
     return spec
+
+
+def _floor(step: float) -> mujoco.MjSpec:
+    """Return a scene with a floor and nothing else, to be solved by steps of ``step`` [s]."""
+    spec = mujoco.MjSpec()
+    spec.option.timestep = step
+    spec.option.integrator = mujoco.mjtIntegrator.mjINT_IMPLICITFAST
+    spec.option.cone = mujoco.mjtCone.mjCONE_ELLIPTIC
+    spec.option.iterations = 100
+    spec.option.noslip_iterations = 4
+    spec.option.tolerance = 1e-10
+    spec.memory = MEMORY
+    spec.worldbody.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_PLANE,
+        size=[5, 5, 0.1],
+        friction=[0.0, 0.0, 0.0],  # the larger of two counts: the hull's
+        contype=FLOOR_AND_HULLS,
+        conaffinity=0,
+        **SURFACE,
+    )
+    return spec
+
+
+def _add_shape(
+    spec: mujoco.MjSpec,
+    node: "mujoco.MjsBody",
+    body: Body,
+    number: int,
+    unit: float,
+    density: float,
+) -> None:
+    """Give body ``number`` its hull, which meets the floor, and its pieces, which meet others'."""
+    friction = [body.grip_on(None), SPIN, ROLL * body.extent / unit]
+    _add_mesh(spec, f"{number} hull", body.hull, unit)
+    node.add_geom(
+        type=mujoco.mjtGeom.mjGEOM_MESH,
+        meshname=f"{number} hull",
+        mass=0,
+        friction=friction,
+        contype=0,
+        conaffinity=FLOOR_AND_HULLS,
+        **SURFACE,
+    )
+    for k, piece in enumerate(body.pieces):
+        name = _piece_name(number, k)
+        _add_mesh(spec, name, piece, unit)
+        node.add_geom(
+            name=name,
+            type=mujoco.mjtGeom.mjGEOM_MESH,
+            meshname=name,
+            density=density,
+            friction=friction,
+            contype=0,
+            conaffinity=0,
+            **SURFACE,
+        )
 
 
 def _piece_name(body: int, number: int) -> str:

@@ -252,14 +252,14 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
             "single",
         ),
         Fact("Vase and ball part again", apart("vase", "ball"), "single"),
-        Fact("Ball and armchair part again", apart("ball", "armchair"), "frozen"),
+        Fact("Ball and armchair part again", apart("ball", "armchair"), "capped"),
         Demand(
             "The vase keeps its shape (largest shape error)",
             of("vase", "shape_error_max"),
             -inf,
             0.005,
             "%",
-            "wrong",
+            "squashed",
         ),
         Demand(
             "The armchair keeps its shape (largest shape error)",
@@ -278,7 +278,7 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
             0.02,
             0.2,
             "mm",
-            "wrong",
+            "frozen",
         ),
         Demand(
             "The lamp keeps its shape (shape error)",

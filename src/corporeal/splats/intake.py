@@ -14,6 +14,7 @@ from corporeal.formats.splats import read_splat
 from corporeal.geometry.agreement import agreement
 from corporeal.geometry.gaussians import AskedUp
 from corporeal.geometry.harmonics import DC
+from corporeal.geometry.silhouette_outliers import outliers
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians, similarity
 from corporeal.geometry.upright import Stated, Upright, upright
 from corporeal.splats.cutout import cut_out
@@ -139,7 +140,8 @@ def take_in(
         usual = USUAL.get(source.suffix.lower(), (0.0, -1.0, 0.0))
         read = (f"{given.count:,} Gaussians were read from {source.name}.",)
         return Intake(given, usual=usual, statements=read, warnings=given.warnings)
-    shown = read_photographs(source, PRESETS[training.preset].longest, masked_by)
+    longest = PRESETS[training.preset].longest
+    shown = _consistent(read_photographs(source, longest, masked_by))
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
@@ -217,6 +219,22 @@ def _with_masks(taken: Intake) -> Intake:
     warning = CUT_OUT if taken.floor else NO_FLOOR
     masks = cut_out(taken.gaussians, taken.cameras, taken.floor)
     return replace(taken, masks=masks, warnings=(*taken.warnings, warning))
+
+
+def _consistent(shown: Photographs) -> Photographs:
+    """Leave out photographs whose silhouettes contradict all others', and say which."""
+    if shown.masks is None:
+        return shown
+    wrong = outliers(shown.masks, shown.views.cameras)
+    if not wrong:
+        return shown
+    names = ", ".join(shown.names[k] for k in wrong)
+    said = (
+        f"{len(wrong)} of {len(shown.names)} photographs were left out, as they show the object "
+        f"where the others' masks do not have it: {names}. Their poses, or their masks, are wrong."
+    )
+    kept = np.setdiff1d(np.arange(len(shown.names)), wrong)
+    return replace(shown.only(kept.tolist()), warnings=(*shown.warnings, said))
 
 
 def _doubt(source: Path, shown: Photographs) -> tuple[str, ...]:

@@ -3,9 +3,11 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
+from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.region import region
+from corporeal.geometry.silhouette_overlap import silhouette_overlaps
 from corporeal.splats.quality import Quality
 from corporeal.types import Camera
 
@@ -16,6 +18,11 @@ FILLS = 2.0
 where nobody gave masks, it is all that is in the ball."""
 GREY = 14.0
 """Held-out photographs agree with a plain grey picture as well as this [dB]."""
+UNLIKE = 0.35
+"""Median overlap of surfaces with masks below which they are no shape of what masks show: 0.9 for
+most objects; foliage and wires, whose gaps close, have less."""
+COMPARED = 12
+"""Views in which that is compared."""
 GO_ON = "--force goes on all the same."
 SAY_WHAT = (
     "What the thing is was not told from the room: give masks (a folder 'masks' with the names of "
@@ -58,3 +65,30 @@ def not_worth(
             what = f"{longest / radius / 2:.1f} times as long as the ball that the cameras look at"
             return f"The thing would be all that is in the pictures, {what}. {SAY_WHAT}"
     return None
+
+
+def unlike_masks(
+    meshes: Sequence[Mesh], cameras: Sequence[Camera], masks: Bool[np.ndarray, "V H W"]
+) -> str | None:
+    """Return in a sentence or two why surfaces are not worth simulating; None: they may be.
+
+    Args:
+        meshes: Closed, of all things, in the cameras' frame and unit.
+        cameras: That took the photographs.
+        masks: Which pixels show things, as somebody said or was found.
+
+    """
+    shown = [k for k in range(len(cameras)) if masks[k].any()]
+    chosen = shown[:: -(-len(shown) // COMPARED)] if shown else []
+    if not chosen:
+        return None
+    drawn = [np.uint8(255) * masks[k] for k in chosen]
+    seen = [cameras[k] for k in chosen]
+    overlap = float(np.median(silhouette_overlaps(meshes, seen, drawn, np.random.default_rng(0))))
+    if overlap >= UNLIKE:
+        return None
+    return (
+        f"The closed surfaces are not what masks show: their silhouettes overlap by {overlap:.0%} "
+        "only. Look whether masks and poses belong to the pictures, and take more photographs from "
+        f"more sides. {GO_ON}"
+    )

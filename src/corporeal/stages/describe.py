@@ -108,6 +108,8 @@ class DescribeConfig:
 
 DEFAULT = DescribeConfig()
 SHARES = ("volume_share", "surface_share")
+OPEN = ("sheet", "metadata")
+"""What an open vessel is by its name, and who says so."""
 Progress = Callable[[float, str], None]
 
 
@@ -138,18 +140,22 @@ def describe(
     """
     validate(config)
     identity = identify(scene, matter_hint)
-    told = _annotations(scene, identity, config, library, from_pictures)
-    file = _file_words(scene, identity, library)
+    annotations = _annotations(scene, identity, config, library, from_pictures)
+    file = _file_words(scene, identity, library, from_pictures)
     model = connect(config.vlm, config.record)
     if model is None:
         objects = [
-            ObjectWords(obj.name, obj.class_name, tuple(_told(words, told, obj.name, config)))
+            ObjectWords(
+                obj.name,
+                obj.class_name,
+                tuple(_with_annotations(words, annotations, obj.name, config)),
+            )
             for obj, words in zip(scene.objects, file, strict=True)
         ]
-        return Inventory(tuple(objects))
+        return Inventory(tuple(objects), warnings=_open_ware(objects) if from_pictures else ())
     critic = connect(critic_of(config.vlm, config.critic), config.record) or model
     asking = _Asking(scene, identity, config, library, model, critic)
-    return asking.inventory(file, told, progress)
+    return asking.inventory(file, annotations, progress)
 
 
 def validate(config: DescribeConfig) -> None:
@@ -191,7 +197,7 @@ class _Asking:
             partial(_walled, library),
         )
 
-    def inventory(self, file: list, told: Mapping, progress: Progress) -> Inventory:
+    def inventory(self, file: list, annotations: Mapping, progress: Progress) -> Inventory:
         """Ask about every object, and about the sizes of all."""
         count = len(self.scene.objects)
         interviews = [self._interview(number) for number in range(count)]
@@ -199,7 +205,7 @@ class _Asking:
         named = dict.fromkeys(o.class_name or o.name for o in self.scene.objects)
         classes = [name for name in named if telling(name)]  # "object" has no usual size
         jobs: list[Callable] = [
-            partial(self._object, number, interviews[number], file[number], told)
+            partial(self._object, number, interviews[number], file[number], annotations)
             for number in range(count)
         ]
         results = together(
@@ -218,16 +224,18 @@ class _Asking:
 
     def _contradicted(self, number: int, words: ObjectWords) -> str:
         """Say where a model was believed before what the file states of an object outright."""
-        said, clauses = {w.name: w for w in words.parts}, []
+        believed, clauses = {w.name: w for w in words.parts}, []
         for k, entry in enumerate(self.identity.catalogue):
             if entry.object == number:
                 own = [self.scene.surfaces[s] for s in self.identity.surfaces(k)]
                 made = _stated(own, self.library)
                 name = made and entry_of(str(made.material), self.library).name
-                put = wall_put(said[entry.name], self.library)
-                clauses.append(against(said[entry.name], name, stated_thickness(own), put))
-        told = "; ".join(filter(None, clauses))
-        return f"{words.name}: {told}. The latter was believed; --annotations decides." * bool(told)
+                put = wall_put(believed[entry.name], self.library)
+                clauses.append(against(believed[entry.name], name, stated_thickness(own), put))
+        against_file = "; ".join(filter(None, clauses))
+        if not against_file:
+            return ""
+        return f"{words.name}: {against_file}. The latter was believed; --annotations decides."
 
     def _about(self, subject: Subject) -> Interview:
         return Interview(self.model, self.critic, self.prompts, subject)
@@ -263,15 +271,15 @@ class _Asking:
         )
 
     def _object(
-        self, number: int, interview: Interview, file: list[PartWords], told: Mapping
+        self, number: int, interview: Interview, file: list[PartWords], annotations: Mapping
     ) -> ObjectWords:
         """Ask everything about one object."""
         obj, names = self.scene.objects[number], self._names(number)
-        stated = {part: said.material for (name, part), said in told.items() if name == obj.name}
+        stated = {part: a.material for (name, part), a in annotations.items() if name == obj.name}
         words = file
         if not (all(stated.get(name) for name in names) or stated.keys() - set(names)):
             words = self._materials(interview, names, self._pieces(interview, names), file)
-        words = _told(words, told, obj.name, self.config)
+        words = _with_annotations(words, annotations, obj.name, self.config)
         words = self._placed(interview, words)
         weighs = interview.mass() if self.config.direct else None
         evidence = evidence_of(*weighs) if weighs else None
@@ -301,10 +309,10 @@ class _Asking:
         words = part_words(*asked, self.names)
         if len(names) == 1:
             words = [gathered(names[0], words)]
-        said = {w.name: w for w in words}
+        answered = {w.name: w for w in words}
         known = list(zip(names, file, strict=True))
         found = [
-            replace(resolved(said[name], own, self.names.walled), stated=own.stated)
+            replace(resolved(answered[name], own, self.names.walled), stated=own.stated)
             for name, own in known
         ]
         # How hard it is inflated no picture shows: its name says it.
@@ -381,23 +389,38 @@ def _places(answer: Placed, by: Asked, offered: Offered) -> dict[str, dict[str, 
 # ---------------------------------------------------------------- the file's own names
 
 
-def _file_words(scene: Scene, identity: Identity, library: str) -> list[list[PartWords]]:
+def _file_words(
+    scene: Scene, identity: Identity, library: str, from_pictures: bool
+) -> list[list[PartWords]]:
     words: list[list[PartWords]] = [[] for _ in scene.objects]
     walls = partial(_walled, library)
     for entry, seen in zip(identity.catalogue, evidence(scene, identity), strict=True):
-        told = _stated(list(seen.surfaces), library) or hollowed(recognise(seen), seen, walls)
-        by = "metadata" if told.material else "unknown"
-        told = replace(told, name=entry.name, answered_by=by)
-        told = walled(told, stated_thickness(seen.surfaces))
-        told = replace(as_stated(told, seen.surfaces), stated=_stated_values(seen.surfaces))
-        told = sealed(told, stated_inflation(seen.surfaces), usual_inflation(seen))
-        built_by = "metadata" if told.structure else "unknown"
-        words[entry.object].append(replace(told, built_by=built_by))
+        found = _stated(list(seen.surfaces), library) or hollowed(
+            recognise(seen), seen, walls, from_pictures
+        )
+        by = "metadata" if found.material else "unknown"
+        found = replace(found, name=entry.name, answered_by=by)
+        found = walled(found, stated_thickness(seen.surfaces))
+        found = replace(as_stated(found, seen.surfaces), stated=_stated_values(seen.surfaces))
+        found = sealed(found, stated_inflation(seen.surfaces), usual_inflation(seen))
+        built_by = "metadata" if found.structure else "unknown"
+        words[entry.object].append(replace(found, built_by=built_by))
     return words
 
 
+def _open_ware(objects: Sequence[ObjectWords]) -> tuple[str, ...]:
+    """Say of which objects from pictures the name decided that they are no solids."""
+    made = [o.name for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN]
+    return tuple(
+        f"{name}: pictures need not show how deep it is inside. By its name it is taken for open "
+        "ware, with a wall as thick as its material usually has; annotate structure and "
+        "thickness_mm if that is wrong."
+        for name in made
+    )
+
+
 def _walled(library: str, name: str) -> bool:
-    """Tell whether a library knows walls of a material."""
+    """Whether a library has a wall thickness for a material."""
     return "shell_thickness" in entry_of(name, library).ranges
 
 
@@ -428,11 +451,11 @@ def _stated(surfaces: list[Surface], library: str) -> PartWords | None:
     try:
         entry = materials.named(substance, library)
     except UnknownChoiceError:
-        return None  # a foreign file's word: names may still tell
+        return None  # not in the library: names may still identify it
     return PartWords("", entry.name, margin=1.0, reason=f"The file states it: {substance!r}.")
 
 
-# ---------------------------------------------------------------- what a person says
+# ---------------------------------------------------------------- a person's annotations
 
 
 def _annotations(
@@ -444,40 +467,44 @@ def _annotations(
         obj.name: [p.name for p in identity.catalogue if p.object == number]
         for number, obj in enumerate(scene.objects)
     }
-    said = read_annotations(Path(config.annotations), names, names if from_pictures else ())
-    return {key: _spelt(one, library) for key, one in said.items()}
+    read = read_annotations(Path(config.annotations), names, names if from_pictures else ())
+    return {key: _spelt(one, library) for key, one in read.items()}
 
 
-def _spelt(said: Annotation, library: str) -> Annotation:
+def _spelt(one: Annotation, library: str) -> Annotation:
     """Write the names of materials as the library spells them."""
-    named = [n and materials.named(n, library).name for n in (said.material, said.contents)]
-    return replace(said, material=named[0], contents=named[1])
+    named = [n and materials.named(n, library).name for n in (one.material, one.contents)]
+    return replace(one, material=named[0], contents=named[1])
 
 
-def _told(
+def _with_annotations(
     words: list[PartWords],
-    told: Mapping[tuple[str, str], Annotation],
+    annotations: Mapping[tuple[str, str], Annotation],
     obj: str,
     config: DescribeConfig,
 ) -> list[PartWords]:
-    own = [_annotated(told.get((obj, w.name)), w, config.annotations) for w in words]
-    pieces = named_pieces(told, obj, [w.name for w in own])
+    own = [_annotated(annotations.get((obj, w.name)), w, config.annotations) for w in words]
+    pieces = named_pieces(annotations, obj, [w.name for w in own])
     if not pieces:
         return own
-    said = [_annotated(told[obj, p.name], p, config.annotations) for p in pieces]
-    return [gathered(own[0].name, said)]
+    known = [_annotated(annotations[obj, p.name], p, config.annotations) for p in pieces]
+    return [gathered(own[0].name, known)]
 
 
-def _annotated(said: Annotation | None, words: PartWords, path: Path | None) -> PartWords:
-    """Let what a person said replace what was found; what they left open stays."""
-    if said is None:
+def _annotated(annotation: Annotation | None, words: PartWords, path: Path | None) -> PartWords:
+    """Let an annotation replace what was found; what it leaves open stays."""
+    if annotation is None:
         return words
     where = f"Stated in {Path(str(path)).name}."
-    if said.material is not None:
-        found = PartWords(words.name, said.material, None, None, "annotation", 1.0, where)
+    if annotation.material is not None:
+        found = PartWords(words.name, annotation.material, None, None, "annotation", 1.0, where)
         words = replace(found, **{s: getattr(words, s) for s in SHARES})
-    if said.material is not None or said.structure is not None or said.contents is not None:
+    if (
+        annotation.material is not None
+        or annotation.structure is not None
+        or annotation.contents is not None
+    ):
         words = replace(words, hypotheses=())  # a person is certain
-    known = ((*materials.si(key), value) for key, value in said.values.items())
+    known = ((*materials.si(key), value) for key, value in annotation.values.items())
     values = {field: value * factor for field, factor, value in known}
-    return replace(built(said, words), values=values)
+    return replace(built(annotation, words), values=values)

@@ -6,6 +6,8 @@ import numpy as np
 
 from corporeal import materials
 from corporeal.errors import UserError
+from corporeal.fields.impose import impose
+from corporeal.fields.specification import asked
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
 from corporeal.materials.inflated import air_bears, sealed_air
@@ -36,29 +38,32 @@ class GroundConfig:
     """What the floor and the walls are made of, for friction and rebound."""
     neutral: str = "plastics-PP"
     """What stands in for a part of unknown material."""
+    field: str = ""
+    """Numbers of another method instead of ours: vomp:PATH, pixie:PATH or table:PATH.csv (a file of
+    the scene, or a folder with one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs."""
 
 
 DEFAULT = GroundConfig()
-SAID = {
+BUILT_BY = {
     "annotation": "Your annotation says",
     "recording": "A recorded answer says",
     "model": "A model says",
-    "metadata": "The file's own words say",
+    "metadata": "The file's metadata says",
     "unknown": "It is assumed",
 }
-"""Who said how a part is built."""
+"""The source of how a part is built."""
 WALLS = {
     "shell": "has a wall",
     "sheet": "is a wall formed into something open",
     "hollow": "is a closed wall with air behind it",
     "filled": "has a wall",
 }
-"""What is said of what has one."""
+"""How a part that has a wall is described."""
 PUT = {
     "annotation": "Your annotation puts",
     "recording": "A recorded answer puts",
     "model": "A model puts",
-    "evidence": "What was said of its mass puts",
+    "evidence": "The estimate of its mass puts",
 }
 """Who chose a wall's thickness."""
 UNFIT = "It does not fit the others:"
@@ -89,7 +94,7 @@ def ground(
     )
     solid = [*(s.kind == "solid" for s in structures), True]
     strikers = [materials.Striker(*s) for s in zip(surfaces, bodies, solid, strict=True)]
-    return MaterialField(
+    found = MaterialField(
         materials=made,
         structures=structures,
         words=words,
@@ -99,18 +104,19 @@ def ground(
         ),
         pieces=tuple(tuple(_piece(p, config) for p in w.pieces) for w in words),
     )
+    return impose(found, scene, parts, config.field)
 
 
 def doubts(field: MaterialField, parts: Parts, scene: Scene) -> tuple[str, ...]:
     """Say, one sentence each, which materials nobody knew and which values are to be doubted."""
-    said = []
+    doubts = list(field.notes)
     for k, part in enumerate(parts.catalogue):
         where = f"{scene.objects[part.object].name}: {part.name}"
         pieces = field.pieces[k] if field.pieces else ()
-        told = [(f"{where}: {p.words.name}", p.material, p.words) for p in pieces]
-        for row in told or [(where, field.materials[k], field.words[k])]:
-            said += _doubts(*row)
-    return tuple(said)
+        rows = [(f"{where}: {p.words.name}", p.material, p.words) for p in pieces]
+        for row in rows or [(where, field.materials[k], field.words[k])]:
+            doubts += _doubts(*row)
+    return tuple(doubts)
 
 
 def _doubts(where: str, material: Material, words: PartWords) -> list[str]:
@@ -137,18 +143,19 @@ def _words(inventory: Inventory, number: int, name: str) -> PartWords:
 
 
 def validate(config: GroundConfig) -> None:
-    """Raise UserError where a material is unknown, or cannot be what it is to be."""
+    """Raise UserError where a material or a file is unknown, or cannot be what it is to be."""
     entry_of(config.floor, config.library)
     if entry_of(config.neutral, config.library).group == "liquid":
         raise UserError(f"--neutral {config.neutral} is a liquid, of which no part can be made.")
+    asked(config.field)
 
 
 def _entry(words: PartWords, config: GroundConfig) -> Entry:
     entry = entry_of(words.material or config.neutral, config.library)
     if entry.group == "liquid" and not MENU[entry.law].liquid:
         raise UserError(
-            f"{words.name} is said to be made of {entry.name}, a liquid, for which its library has "
-            "no law of flow. Say what holds it, with structure: filled and contents: "
+            f"{words.name} is described as made of {entry.name}, a liquid, for which its library "
+            "has no law of flow. Say what holds it, with structure: filled and contents: "
             f"{entry.name}."
         )
     return entry
@@ -159,9 +166,9 @@ def _entry(words: PartWords, config: GroundConfig) -> Entry:
 
 def _material(entry: Entry, words: PartWords) -> Material:
     grounds = _placed(entry, words)
-    for field, said in words.stated.items():
+    for field, stated in words.stated.items():
         if field in entry.ranges:
-            grounds[field] = _from_file(said, entry.ranges[field])
+            grounds[field] = _from_file(stated, entry.ranges[field])
     for field, value in words.values.items():
         allowed = entry.ranges.get(field)
         if allowed is None:
@@ -175,17 +182,17 @@ def _material(entry: Entry, words: PartWords) -> Material:
     return entry.pick(grounds)
 
 
-def _from_file(said: Ground, measured: Range) -> Ground:
+def _from_file(stated: Ground, measured: Range) -> Ground:
     """Believe a number of the scene's file: in the range that the file names, from its source.
 
     A file of ours names the library's range, and then that is it.
     """
-    if (said.range.low, said.range.high) == (measured.low, measured.high):
-        return replace(said, range=measured)
-    if said.value in measured or said.range.low < said.range.high:
-        return said
+    if (stated.range.low, stated.range.high) == (measured.low, measured.high):
+        return replace(stated, range=measured)
+    if stated.value in measured or stated.range.low < stated.range.high:
+        return stated
     span = f"{measured.low:.4g} to {measured.high:.4g}"
-    return replace(said, reason=f"{said.reason}. {UNFIT} measured values are {span}.")
+    return replace(stated, reason=f"{stated.reason}. {UNFIT} measured values are {span}.")
 
 
 def _placed(entry: Entry, words: PartWords) -> dict[str, Ground]:
@@ -220,31 +227,35 @@ def _piece(words: PartWords, config: GroundConfig) -> Piece:
 
 def _structure(material: Material, words: PartWords, config: GroundConfig) -> Structure:
     if words.structure == "solid":
-        return Structure("solid", None, f"{SAID[words.built_by]} that it is solid.")
+        return Structure("solid", None, f"{BUILT_BY[words.built_by]} that it is solid.")
     if words.structure == "packed":
         share = words.solidity or 1.0
-        said = f"{SAID[words.built_by]} that it is packed: {share:.0%} of its shape is matter."
-        return Structure("solid", None, said, solidity=share)
+        reason = (
+            f"{BUILT_BY[words.built_by]} that it is packed: {share:.0%} of its shape is matter."
+        )
+        return Structure("solid", None, reason, solidity=share)
     if words.structure is None:
-        return Structure("solid", None, "How it is built is not said: the shape decides.")
+        return Structure("solid", None, "How it is built is unknown: the shape decides.")
     if not (words.material or words.thickness or material.shell_thickness):
-        said = f"It is said to be a {words.structure} of unknown material"
-        return Structure("solid", None, f"{said}; of {material.name} none are: the shape decides.")
+        reason = f"It is described as a {words.structure} of unknown material"
+        return Structure(
+            "solid", None, f"{reason}; of {material.name} none are: the shape decides."
+        )
     wall = _wall(material, words)
     thickness, reason = wall.thickness, wall.reason
-    reason = f"{SAID[words.built_by]} that it {WALLS[words.structure]}. {reason}"
+    reason = f"{BUILT_BY[words.built_by]} that it {WALLS[words.structure]}. {reason}"
     if words.structure != "filled":
         return Structure("shell", thickness, reason)
     if words.contents is None:
         raise UserError(
-            f"{words.name} is said to be filled, but not with what. Give contents in the "
+            f"{words.name} is described as filled, but not with what. Give contents in the "
             "annotation file: corporeal materials lists them."
         )
     inside = held(words.contents, config.library)
     fill = 1.0 if words.fill is None else words.fill
-    said = "How full is not said: it is taken as full." if words.fill is None else ""
+    full = "How full is unknown: it is taken as full." if words.fill is None else ""
     inner = inside.pick(_inner_grounds(inside, words))
-    reason = f"{reason} It is filled with {inner.name}. {said}".strip()
+    reason = f"{reason} It is filled with {inner.name}. {full}".strip()
     return Structure("filled", thickness, reason, inner, fill, loose=_flows(inside))
 
 
@@ -262,17 +273,19 @@ def with_air(
     Args:
         structure: How the part is built.
         material: Of its wall.
-        words: What was said of it.
+        words: Its description.
         radius: Of the object [m].
 
     """
     gauge = words.inflation
     if structure.kind != "shell" or structure.thickness is None or gauge is None:
         return structure
-    said = f"{structure.reason} Air at {gauge / 1e3:.3g} kPa above its surroundings is sealed in it"
+    sealed = (
+        f"{structure.reason} Air at {gauge / 1e3:.3g} kPa above its surroundings is sealed in it"
+    )
     if not air_bears(gauge, material, structure.thickness, radius):
-        return replace(structure, reason=f"{said}, which dents it less than its wall resists.")
-    reason = f"{said}: it bounces as a soft solid, nine times as stiff as the pressure."
+        return replace(structure, reason=f"{sealed}, which dents it less than its wall resists.")
+    reason = f"{sealed}: it bounces as a soft solid, nine times as stiff as the pressure."
     return Structure("filled", structure.thickness, reason, sealed_air(gauge), 1.0, inflated=True)
 
 
@@ -307,7 +320,7 @@ def _wall(material: Material, words: PartWords) -> _Wall:
             return _Wall(ground.value, f"{PUT[ground.chosen_by]} its thickness at {where}")
         return _Wall(ground.value, f"Its thickness, unless its mesh shows it, is the usual {where}")
     raise UserError(
-        f"{words.name} is said to be a {words.structure or 'shell'} of {material.name}, but how "
+        f"{words.name} is described as a {words.structure or 'shell'} of {material.name}, but how "
         "thin its wall is is not known. Give thickness_mm in the annotation file."
     )
 

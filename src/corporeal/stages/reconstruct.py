@@ -32,6 +32,7 @@ from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.gaussians import LARGEST, AskedUp
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
+from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.metric import MetricScale, TwoPoints, measured
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.geometry.srgb import linear
@@ -54,8 +55,8 @@ from corporeal.splats.raster import weights
 from corporeal.splats.solid import Solid
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.splats.training_schedule import TrainConfig
-from corporeal.splats.worth import not_worth
-from corporeal.types import Cloud, Finish, Reconstruction, Scene, SceneObject, Surface
+from corporeal.splats.worth import not_worth, unlike_masks
+from corporeal.types import Camera, Cloud, Finish, Reconstruction, Scene, SceneObject, Surface
 from corporeal.vlm.seen_objects import (
     PERSON,
     UNKNOWN,
@@ -226,7 +227,7 @@ def reconstruct(
     found = _Found(
         taken, cloud, closed(taken, front.on_objects, cloud.position, split.object_of_point)
     )
-    if not config.force and (why := not_worth(found.boxes, photographers, masked, taken.quality)):
+    if not config.force and (why := _why_not(found, photographers, masked)):
         raise UserError(f"{source}: {why}")
     # What they are, and so their names and their size in metres.
     objects = _recognised(wanted, found, config, viewer)
@@ -238,6 +239,16 @@ def reconstruct(
     statements = (*taken.statements, *placed.statements, split.statement, scale.reason)
     result = _in_metres(found, names, scale, statements, tuple(dict.fromkeys(warnings)))
     return Reconstructed(result, _scene(source, found, names, objects, scale))
+
+
+def _why_not(found: _Found, photographers: Sequence[Camera], masked: bool) -> str | None:
+    """Say why what was found is not worth simulating, if it is not."""
+    taken = found.taken
+    why = not_worth(found.boxes, photographers, masked, taken.quality)
+    if why is not None or taken.masks is None or not photographers:
+        return why
+    meshes = [Mesh(solid.vertices, solid.triangles) for solid in found.solids]
+    return unlike_masks(meshes, photographers, taken.masks)
 
 
 def _taken(

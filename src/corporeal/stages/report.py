@@ -15,7 +15,7 @@ from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.mpm.laws import MENU
 from corporeal.render.page import figure, inlined, page, safe
 from corporeal.render.subject import parts_named
-from corporeal.trajectory.audit import breakage_words, equilibrium_words
+from corporeal.trajectory.audit_words import breakage_words, equilibrium_words
 from corporeal.types import (
     Film,
     Ground,
@@ -67,7 +67,9 @@ CHOSEN = {
     "model": "a model",
     "recording": "a recorded answer",
     "annotation": "your annotation",
-    "evidence": "a model, to fit the mass it was said to have",
+    "evidence": "a draw, to fit the estimate of its mass",
+    "field": "another method",
+    "borrowed": "ours, which the other method does not tell",
 }
 WAYS_SHOWN = 2
 """Ways an object may be, of those that were drawn."""
@@ -190,8 +192,8 @@ def _struck(story: Story, k: int) -> str:
     """Say what the hardest blow does to a brittle part; "" of all others."""
     owner = story.scene.objects[story.parts.catalogue[k].object].name
     mine = (owner, story.field.words[k].name)
-    said = [b for b in story.audit.breakage if (b.object, b.part) == mine]
-    return "".join(f"<br>{safe(breakage_words(b))}" for b in said)
+    broken = [b for b in story.audit.breakage if (b.object, b.part) == mine]
+    return "".join(f"<br>{safe(breakage_words(b))}" for b in broken)
 
 
 def _verdict(story: Story) -> str:
@@ -226,17 +228,17 @@ def _expectations(expectations: Sequence[Expectation]) -> str:
 
 
 def weighed(mixtures: Sequence[MassMixture]) -> str:
-    """Lay out what each object may weigh, the two likeliest ways it may be, and what was said."""
+    """Lay out what each object may weigh, the two likeliest ways it may be, and the evidence."""
     if not mixtures:
         return ""
     rows = "".join(_mixture_row(m) for m in mixtures)
     return (
         "<h2>Masses over all ways the objects may be</h2>"
         '<p class="lead">Median and 90 % interval over the ways the objects may be, the measured '
-        "ranges and what the meshes leave open, at real size. What was said of a mass without the "
-        "library reweights the ways; it sets no value.</p>"
+        "ranges and what the meshes leave open, at real size. Estimates of masses made without the "
+        "library reweight the ways; they set no value.</p>"
         '<div class="wide"><table><tr><th>object</th><th>mass [kg]</th>'
-        "<th>without outside evidence [kg]</th><th>likeliest ways</th><th>said of its mass [kg]"
+        "<th>without outside evidence [kg]</th><th>likeliest ways</th><th>estimate of its mass [kg]"
         f"</th><th>printed on it</th></tr>{rows}</table></div>"
     )
 
@@ -246,9 +248,13 @@ def _mixture_row(m: MassMixture) -> str:
         f"{safe(h.words)}: {h.mass:.3g} kg ({h.probability:.0%}; before {h.prior:.0%})"
         for h in m.hypotheses[:WAYS_SHOWN]
     )
-    said = m.evidence
-    judged = "–" if said is None else f"{said.likely:.3g} ({said.low:.3g} to {said.high:.3g})"
-    printed = "; ".join(dict.fromkeys(f.words for f in said.printed)) if said else ""
+    evidence = m.evidence
+    judged = (
+        "–"
+        if evidence is None
+        else f"{evidence.likely:.3g} ({evidence.low:.3g} to {evidence.high:.3g})"
+    )
+    printed = "; ".join(dict.fromkeys(f.words for f in evidence.printed)) if evidence else ""
     warning = f"<br><b>{safe(m.warning)}</b>" if m.warning else ""
     cells = (
         _cells(safe(m.object), f"{m.mass:.3g} ({m.low:.3g} to {m.high:.3g})"),

@@ -98,7 +98,7 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 
 
 def _unparted(inventory: Inventory) -> list[str]:
-    """Say of which objects nobody told the pieces: a chair from pictures may be all foam."""
+    """Say which objects have unknown pieces: a chair from pictures may be all foam."""
     names = [
         obj.name
         for obj in inventory.objects

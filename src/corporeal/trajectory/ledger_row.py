@@ -26,9 +26,9 @@ def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) 
         [np.sqrt(m @ v**2 / m.sum()) for m, v in zip(mass, speed, strict=True)]
     )
     found["plane_depth"] = plane_depths(problem, now)
-    # What moves as told may reach into walls, and into others that do.
-    told = np.array([body.path is not None for body in problem.bodies])
-    found["plane_depth"][:, told] = 0.0
+    # What has a prescribed motion may reach into walls, and into others that do.
+    prescribed = np.array([body.path is not None for body in problem.bodies])
+    found["plane_depth"][:, prescribed] = 0.0
     # The bodies of one object become one.
     group = object_of_body(problem)
     if problem.bonds or problem.apart:
@@ -37,8 +37,8 @@ def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) 
         position = [np.concatenate([position[b] for b in bodies]) for bodies in one]
     # Distances between objects, and how time was cut.
     gap, overlap = pair_gaps(position, problem.cell)
-    if told.any():
-        moved = np.isin(np.arange(len(gap)), group[told])
+    if prescribed.any():
+        moved = np.isin(np.arange(len(gap)), group[prescribed])
         overlap = np.where(moved[:, None] & moved, 0.0, overlap)
     finite = np.isfinite(now.position).all(axis=1) & np.isfinite(now.motion).all(axis=(1, 2))
     return Ledger(

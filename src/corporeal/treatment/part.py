@@ -45,7 +45,7 @@ class PartGeometry:
     scale: float = 1.0
     """Size here over the real object's [-]."""
     prescribed: bool = False
-    """Whether its object moves as told: it is rigid then, whatever it is made of."""
+    """Whether the motion of its object is prescribed: it is rigid then, whatever it is made of."""
 
 
 @dataclass(frozen=True)

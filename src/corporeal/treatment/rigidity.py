@@ -29,7 +29,7 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
     on the detail nor on what else is in the scene. A tube is judged as the bar that it is.
     """
     if part.prescribed:
-        return Verdict(0.0, inf, True, "its object moves as told, as one rigid body")
+        return Verdict(0.0, inf, True, "the motion of its object is prescribed, as one rigid body")
     if part.structure.holds:
         reason = f"what lies in it, {part.structure.holds}, moves by itself and its wall holds it"
         return Verdict(0.0, inf, True, reason)

@@ -57,7 +57,7 @@ def changed(run: Path, made: Results, asked: Mapping[str, Any]) -> tuple[Asked, 
     """
     before = reopen(run)
     settings, runs = before.settings, run.parent
-    said = _annotations(made, asked.get("parts", {}))
+    changes = _annotations(made, asked.get("parts", {}))
     settings = replace(
         settings,
         fill=replace(settings.fill, detail=_detail(asked.get("detail", settings.fill.detail))),
@@ -67,11 +67,11 @@ def changed(run: Path, made: Results, asked: Mapping[str, Any]) -> tuple[Asked, 
     name = new_name(runs, run.name)
     folder = runs / name
     folder.mkdir()
-    if said:
+    if changes:
         old = settings.describe.annotations
-        told = _merged(yaml.safe_load(Path(old).read_text()) if old else {}, said)
+        merged = _merged(yaml.safe_load(Path(old).read_text()) if old else {}, changes)
         path = folder / ANNOTATIONS
-        path.write_text(yaml.safe_dump(told, sort_keys=False), encoding="utf-8")
+        path.write_text(yaml.safe_dump(merged, sort_keys=False), encoding="utf-8")
         settings = replace(settings, describe=replace(settings.describe, annotations=path))
     inputs = tuple(str(path) for path in before.inputs)
     return Asked(secrets.token_hex(8), name, inputs), settings
@@ -91,22 +91,22 @@ def _drop(asked: Mapping[str, Any], before: float) -> float:
 
 
 def _annotations(made: Results, parts: Mapping[str, Any]) -> dict[str, dict[str, Any]]:
-    """Return object → part → what is said of it, as an annotation file has it."""
+    """Return object → part → its annotation, as in an annotation file."""
     scene, catalogue, field = made.scene, made.parts, made.field
     if not isinstance(parts, dict):
         raise UserError("The changes of parts are no table.")
-    told: dict[str, dict[str, Any]] = {}
+    annotations: dict[str, dict[str, Any]] = {}
     for number, change in parts.items():
         k = int(number) if str(number).isdecimal() else -1
         if not 0 <= k < len(catalogue.catalogue) or not isinstance(change, dict):
             raise UserError(f"There is no part {number!r}.")
         part = catalogue.catalogue[k]
         material = find(str(change.get("material", field.materials[k].name))).name
-        said: dict[str, Any] = {"material": material}
+        annotation: dict[str, Any] = {"material": material}
         if values := change.get("values"):
-            said["values"] = _values(material, values)
-        told.setdefault(scene.objects[part.object].name, {})[part.name] = said
-    return told
+            annotation["values"] = _values(material, values)
+        annotations.setdefault(scene.objects[part.object].name, {})[part.name] = annotation
+    return annotations
 
 
 def _values(material: str, values: Any) -> dict[str, float]:
@@ -125,12 +125,12 @@ def _values(material: str, values: Any) -> dict[str, float]:
 
 
 def _merged(old: Any, new: Mapping[str, Mapping[str, Any]]) -> dict[str, Any]:
-    """Lay what is said now over what an annotation file said before."""
-    told = dict(old) if isinstance(old, dict) else {}
+    """Return the annotations of a file with new ones in their place."""
+    merged = dict(old) if isinstance(old, dict) else {}
     for owner, parts in new.items():
-        before = told.get(owner)
+        before = merged.get(owner)
         whole = (
             {} if before is None else before if isinstance(before, dict) else {"material": before}
         )
-        told[owner] = {**whole, "parts": {**whole.get("parts", {}), **parts}}
-    return told
+        merged[owner] = {**whole, "parts": {**whole.get("parts", {}), **parts}}
+    return merged

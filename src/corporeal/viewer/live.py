@@ -71,7 +71,7 @@ class Live:
         self.orders: deque[Order] = deque(maxlen=1000)
         self.news = threading.Condition()
         self.latest, self.number = b"", 0
-        self.said: str = ""
+        self.message: str = ""
         self.playing = self.closed = self.whole = False
         self.done, self.rate, self.top = 0, 0.0, 1.0
         self.spent = {"step": 0.0, "show": 0.0}
@@ -93,7 +93,7 @@ class Live:
         problem = replace(self.posed.problem, contact="single" if single else "multi")
         self.hands = Hands(self.posed, problem, self.threads)
         self.pace, self.cost = LEAST, 3.0
-        self.said, self.whole = "", True
+        self.message, self.whole = "", True
 
     def start(self) -> None:
         """Let it run in its thread."""
@@ -131,7 +131,7 @@ class Live:
             try:
                 self._do(order)
             except UserError as error:
-                self.said = str(error)
+                self.message = str(error)
         return some
 
     def _do(self, order: Order) -> None:
@@ -150,7 +150,7 @@ class Live:
         try:
             self.hands.advance(self.pace)
         except UserError as error:  # it is where it was before
-            self.playing, self.said = False, f"{error} Begin again with reset."
+            self.playing, self.message = False, f"{error} Begin again with reset."
             return False
         if len(self.hands.touches) > MOST_TOUCHES:
             self.hands.touches.clear()

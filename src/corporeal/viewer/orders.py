@@ -29,7 +29,7 @@ class Order:
 
     do: str
     seq: int = 0
-    """The page's number of it, told back with the pictures that it is seen in."""
+    """The page's number of it, sent back with the pictures that show it."""
     object: int = 0
     point: Vector = (0.0, 0.0, 0.0)
     """Where an object is taken [m]."""

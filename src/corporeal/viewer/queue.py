@@ -43,7 +43,7 @@ class Asked:
 
 
 @dataclass
-class Told:
+class JobProgress:
     """How far the running job is."""
 
     verbs: dict[str, float] = field(default_factory=dict)
@@ -74,7 +74,7 @@ class Queue:
         self.runs, self.lock = runs, threading.RLock()
         self.workers = LocalWorkers(1, min(4, cores()), runs / JOBS)
         self.settings: dict[str, Settings] = {}
-        self.told: dict[str, Told] = {}
+        self.progress: dict[str, JobProgress] = {}
         self.stopping: set[str] = set()
         self.entries: list[Asked] = []
         self._read()
@@ -168,7 +168,7 @@ class Queue:
             "until": entry.until,
         }
         job = Job(entry.id, carry_out, self.runs / JOBS / entry.id, entry.id, given, resumable=True)
-        self.told[entry.id] = Told()
+        self.progress[entry.id] = JobProgress()
         self._set(replace(entry, state="running"))
         self.workers.start(job)
 
@@ -176,9 +176,9 @@ class Queue:
         entry = self._entry(event.job.name)
         if event.kind == "progress":
             verb, _, words = event.words.partition(": ")
-            told = self.told[entry.id]
-            told.verbs = {v: 1.0 for v in told.verbs} | {verb: event.fraction}
-            told.words = words
+            progress = self.progress[entry.id]
+            progress.verbs = {v: 1.0 for v in progress.verbs} | {verb: event.fraction}
+            progress.words = words
             return
         if entry.id in self.stopping and event.kind != "finished":
             self._set(replace(entry, state="stopped"))
@@ -201,11 +201,15 @@ class Queue:
         self._write()
 
     def _row(self, entry: Asked) -> dict[str, Any]:
-        told = self.told.get(entry.id, Told())
+        progress = self.progress.get(entry.id, JobProgress())
         row = {"id": entry.id, "name": entry.name, "state": entry.state, "error": entry.error}
         running = entry.state == "running"
-        bars = {v: told.verbs.get(v, 0.0) for v in self._verbs(entry)} if running else {}
-        return row | {"until": entry.until, "verbs": bars, "words": told.words if running else ""}
+        bars = {v: progress.verbs.get(v, 0.0) for v in self._verbs(entry)} if running else {}
+        return row | {
+            "until": entry.until,
+            "verbs": bars,
+            "words": progress.words if running else "",
+        }
 
     def _verbs(self, entry: Asked) -> Sequence[str]:
         every = verbs([Path(path) for path in entry.inputs])

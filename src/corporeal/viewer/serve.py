@@ -1,4 +1,4 @@
-"""Listen, say where, and serve until told to stop."""
+"""Listen, print the address, and serve until interrupted."""
 
 import secrets
 import socket

@@ -123,13 +123,13 @@ def read(run: Path) -> Read:
 
 def _row(name: str, run: Path) -> dict[str, Any]:
     try:
-        asked, said = reopen(run), store.read_json(run / RUN)
+        asked, kept = reopen(run), store.read_json(run / RUN)
     except (UserError, OSError, ValueError, TypeError, KeyError) as error:
         return {"name": name, "state": "unreadable", "error": str(error)[:300], "shown": False}
     return {
         "name": name,
-        "state": said.get("state", ""),
-        "error": said.get("error", ""),
+        "state": kept.get("state", ""),
+        "error": kept.get("error", ""),
         "input": ", ".join(path.name for path in asked.inputs),
         "detail": asked.settings.fill.detail,
         "shown": (run / FOLDERS[NEEDED] / store.META).exists(),

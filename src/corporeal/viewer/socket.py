@@ -65,12 +65,12 @@ async def _hear(socket: WebSocket, room: Room, live: Live) -> None:
 
 async def _show(socket: WebSocket, live: Live) -> None:
     """Send the newest picture, never a queue of old ones: a slow line misses some."""
-    seen, said = 0, ""
+    seen, message = 0, ""
     while not live.closed:
         seen, before = await run_in_threadpool(live.wait, seen, PATIENCE), seen
-        if live.said != said:
-            said = live.said
-            await socket.send_json({"said": said})
+        if live.message != message:
+            message = live.message
+            await socket.send_json({"said": message})
         if seen > before:
             await socket.send_bytes(live.latest)
     await socket.send_json({"said": "Another run is simulated now.", "over": True})

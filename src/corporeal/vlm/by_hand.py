@@ -66,14 +66,14 @@ class ByHand:
 
         """
         page = self.pages / self._name(question, answer)
-        said = _answer(page.with_suffix(".json"), answer, check)
-        if isinstance(said, BaseModel):
+        found = _answer(page.with_suffix(".json"), answer, check)
+        if isinstance(found, BaseModel):
             with self._one:
-                record(self.folder, question, said, BY_HAND)
-            return Reply(said, "recording", BY_HAND)
-        if not said and self.kept.holds(question, answer):
+                record(self.folder, question, found, BY_HAND)
+            return Reply(found, "recording", BY_HAND)
+        if not found and self.kept.holds(question, answer):
             return self.kept.ask(question, answer, check)
-        _write(page, question, answer, said)
+        _write(page, question, answer, found)
         raise WaitingError(f"{page.with_suffix('.md')} waits for an answer.")
 
     def _name(self, question: Question, answer: type[BaseModel]) -> str:
@@ -118,10 +118,10 @@ def _answer(path: Path, answer: type[Answer], check: Check[Answer]) -> Answer | 
         return ""
     fenced = re.fullmatch(r"```\w*\s*(.*?)\s*```", text, re.DOTALL)
     try:
-        said = answer.model_validate_json(fenced[1] if fenced else text)
+        found = answer.model_validate_json(fenced[1] if fenced else text)
     except ValidationError as error:
         return first_problem(error)
-    return "\n".join(check(said)) or said
+    return "\n".join(check(found)) or found
 
 
 def _write(page: Path, question: Question, answer: type[BaseModel], wrong: str) -> None:

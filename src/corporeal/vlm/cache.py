@@ -26,9 +26,9 @@ VERSION = 1
 
 def folder() -> Path:
     """Return where answers are kept: as the environment says, else where the system has such."""
-    said = os.environ.get(VARIABLE)
-    if said:
-        return Path(said).expanduser() / "answers"
+    kept = os.environ.get(VARIABLE)
+    if kept:
+        return Path(kept).expanduser() / "answers"
     if sys.platform == "darwin":
         base = Path.home() / "Library" / "Caches"
     elif sys.platform == "win32":
@@ -92,7 +92,7 @@ class Cached:
 def _read(path: Path, answer: type[Answer], check: Check[Answer]) -> Answer | None:
     """Return a kept answer; a damaged file, or one that no longer fits, is as good as none."""
     try:
-        said = answer.model_validate(json.loads(path.read_text(encoding="utf-8"))["answer"])
+        kept = answer.model_validate(json.loads(path.read_text(encoding="utf-8"))["answer"])
     except (OSError, ValueError, KeyError, TypeError, ValidationError):
         return None
-    return None if check(said) else said
+    return None if check(kept) else kept

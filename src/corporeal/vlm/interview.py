@@ -8,9 +8,21 @@ from string import Template
 import numpy as np
 
 from corporeal.vlm import Answer, Check, Question, Reply, UnansweredError, Vlm
-from corporeal.vlm.answers import (
+from corporeal.vlm.answer_checks import (
     MOST_PARTS,
     MOST_THINGS,
+    extents_complaints,
+    mass_complaints,
+    materials_complaints,
+    parts_complaints,
+    placement_complaints,
+    ranking_complaints,
+    regions_complaints,
+    shaky,
+    size_complaints,
+    things_complaints,
+)
+from corporeal.vlm.answers import (
     Decomposition,
     ExtentsAnswer,
     FractionAnswer,
@@ -24,16 +36,6 @@ from corporeal.vlm.answers import (
     ThingsAnswer,
     ValueAnswer,
     Vocabulary,
-    extents_complaints,
-    mass_complaints,
-    materials_complaints,
-    parts_complaints,
-    placement_complaints,
-    ranking_complaints,
-    regions_complaints,
-    shaky,
-    size_complaints,
-    things_complaints,
 )
 from corporeal.vlm.words import Asked
 

@@ -13,12 +13,12 @@ from corporeal.types import Finish
 SHORTEST = 3
 """Letters of the shortest word that a compound is taken apart into."""
 KINDS = ("substance", "piece", "thing")
-"""The most telling first: "oak", "table leg", "table"."""
+"""The most specific first: "oak", "table leg", "table"."""
 
 
 @dataclass(frozen=True)
-class Saying:
-    """One entry of the lexicon: what a phrase tells."""
+class Term:
+    """One term of the lexicon: a phrase and what it states."""
 
     phrase: tuple[str, ...]
     kind: str
@@ -46,7 +46,7 @@ class Saying:
 
 @dataclass(frozen=True)
 class Look:
-    """What a part's colour tells in certain objects."""
+    """What a part's colour indicates in certain objects."""
 
     hue: tuple[float, float]
     """[degrees]"""
@@ -71,40 +71,40 @@ class Name:
         return any(self.words[k : k + n] == phrase for k in range(len(self.words) - n + 1))
 
 
-def heads(tokens: tuple[str, ...]) -> list[Saying]:
+def heads(tokens: tuple[str, ...]) -> list[Term]:
     """Find what stands in a name; of compound nouns the last one is the object.
 
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
     standing = [
-        (k, saying)
-        for k, saying in _standing_in(tokens)
-        if saying.kind == "substance" or _after(tokens, k, saying) not in _holders()
+        (k, term)
+        for k, term in _standing_in(tokens)
+        if term.kind == "substance" or _after(tokens, k, term) not in _holders()
     ]
     last: dict[int, int] = {}
-    for k, saying in standing:
-        if saying.kind == "thing":
-            last[len(saying.phrase)] = k
+    for k, term in standing:
+        if term.kind == "thing":
+            last[len(term.phrase)] = k
     return [s for k, s in standing if s.kind != "thing" or k == last[len(s.phrase)]]
 
 
-def _after(tokens: tuple[str, ...], k: int, saying: Saying) -> str:
-    following = k + len(saying.phrase)
+def _after(tokens: tuple[str, ...], k: int, term: Term) -> str:
+    following = k + len(term.phrase)
     return tokens[following] if following < len(tokens) else ""
 
 
-def _standing_in(tokens: tuple[str, ...]) -> Iterator[tuple[int, Saying]]:
+def _standing_in(tokens: tuple[str, ...]) -> Iterator[tuple[int, Term]]:
     for k, token in enumerate(tokens):
-        for saying in _by_first_word().get(token, ()):
-            if tokens[k : k + len(saying.phrase)] == saying.phrase:
-                yield k, saying
+        for term in _by_first_word().get(token, ()):
+            if tokens[k : k + len(term.phrase)] == term.phrase:
+                yield k, term
 
 
 @cache
-def _by_first_word() -> dict[str, list[Saying]]:
-    index: dict[str, list[Saying]] = {}
-    for saying in lexicon():
-        index.setdefault(saying.phrase[0], []).append(saying)
+def _by_first_word() -> dict[str, list[Term]]:
+    index: dict[str, list[Term]] = {}
+    for term in lexicon():
+        index.setdefault(term.phrase[0], []).append(term)
     return index
 
 
@@ -129,7 +129,7 @@ def _apart(word: str) -> tuple[str, ...]:
 @cache
 def _known() -> frozenset[str]:
     """Return every word that stands in the lexicon by itself or in a phrase."""
-    return frozenset(w for saying in lexicon() for w in saying.phrase) | _holders()
+    return frozenset(w for term in lexicon() for w in term.phrase) | _holders()
 
 
 @cache
@@ -145,12 +145,17 @@ def _single(kind: str) -> frozenset[str]:
 
 def hollow(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name is that of something hollow: its last noun is what it names."""
-    return any(tokens[-len(phrase) :] == phrase for phrase in _hollow())
+    return any(tokens[-len(phrase) :] == phrase for phrase in _listed("hollow"))
+
+
+def open_ware(tokens: tuple[str, ...]) -> bool:
+    """Tell whether a name is that of an open vessel: its last noun is what it names."""
+    return any(tokens[-len(phrase) :] == phrase for phrase in _listed("open"))
 
 
 @cache
-def _hollow() -> frozenset[tuple[str, ...]]:
-    return frozenset(tuple(singular(w) for w in said.split()) for said in _table()["hollow"])
+def _listed(table: str) -> frozenset[tuple[str, ...]]:
+    return frozenset(tuple(singular(w) for w in phrase.split()) for phrase in _table()[table])
 
 
 def singular(word: str) -> str:
@@ -182,10 +187,10 @@ def metals() -> frozenset[str]:
 
 
 @cache
-def lexicon() -> tuple[Saying, ...]:
-    """Every phrase of the lexicon with what it tells."""
+def lexicon() -> tuple[Term, ...]:
+    """Every phrase of the lexicon with what it states."""
     return tuple(
-        _saying(kind, phrase, row)
+        _term(kind, phrase, row)
         for kind in KINDS
         for row in _table()[kind]
         for phrase in row["words"]
@@ -194,7 +199,7 @@ def lexicon() -> tuple[Saying, ...]:
 
 @cache
 def lookbook() -> tuple[Look, ...]:
-    """Every plain colour that tells of a part, with the objects it tells it of."""
+    """Every plain colour that indicates a part, with the objects in which it does."""
     return tuple(
         Look(
             hue=tuple(row["hue"]),
@@ -228,9 +233,9 @@ def _table() -> dict[str, list]:
     )
 
 
-def _saying(kind: str, phrase: str, row: dict) -> Saying:
+def _term(kind: str, phrase: str, row: dict) -> Term:
     thickness, pressure = row.get("thickness_mm"), row.get("inflation_kPa")
-    return Saying(
+    return Term(
         phrase=tuple(singular(w) for w in phrase.split()),
         kind=kind,
         material=row["material"],

@@ -1,4 +1,4 @@
-"""Recognition without a model: what the file's own names and surface values tell."""
+"""Recognition without a model: from the names and surface values in the file."""
 
 from collections import Counter
 from collections.abc import Callable, Iterable, Mapping, Sequence
@@ -21,19 +21,20 @@ from corporeal.types import (
 from corporeal.vlm.lexicon import (
     KINDS,
     Name,
-    Saying,
+    Term,
     emptied,
     heads,
     hollow,
     lookbook,
     metals,
+    open_ware,
     seen_as,
     singular,
     tokens_of,
 )
 
 WEAKER = 0.6
-"""Factor on the margin of what is said of the whole when the part is only one of several."""
+"""Factor on the margin of what describes the whole object when the part is only one of several."""
 METALLIC = 0.5
 """Metallic value from which most of a surface is metal: a picture's value is its mean."""
 LONGEST_WALL = 10.0
@@ -55,13 +56,13 @@ class Evidence:
     """Some surface of the object is not fully metallic: 1 is more than the exporter's default."""
     shared: tuple[tuple[str, ...], tuple[str, ...]] = ((), ())
     """Leading words that all of the object's surfaces have in common, and all its finishes: they
-    tell of the whole."""
+    describe the whole."""
     claimed: frozenset[str] = frozenset()
     """Materials that the object's other parts name as their own."""
 
     @property
     def own(self) -> list[Name]:
-        """Names that are the part's own, without what its sisters are called too."""
+        """Names that are the part's own, without what its sibling parts are called too."""
         finishes = [_name(f.name, self.shared[1]) for f in self.finishes]
         return [*finishes, *(_name(s.name, self.shared[0]) for s in self.surfaces)]
 
@@ -80,11 +81,11 @@ def evidence(scene: Scene, identity: Identity) -> list[Evidence]:
         parts_of.setdefault(part.object, []).append(number)
     gathered: dict[int, Evidence] = {}
     for thing, parts in parts_of.items():
-        gathered |= _sisters(scene, thing, {p: identity.surfaces(p) for p in parts})
+        gathered |= _siblings(scene, thing, {p: identity.surfaces(p) for p in parts})
     return [gathered[number] for number in range(len(identity.catalogue))]
 
 
-def _sisters(scene: Scene, thing: int, surfaces: dict[int, list[int]]) -> dict[int, Evidence]:
+def _siblings(scene: Scene, thing: int, surfaces: dict[int, list[int]]) -> dict[int, Evidence]:
     """Gather evidence about all parts of one object; ``surfaces`` of each part."""
     worn = {p: [scene.surfaces[k] for k in mine] for p, mine in surfaces.items()}
     finishes = {
@@ -106,7 +107,7 @@ def _sisters(scene: Scene, thing: int, surfaces: dict[int, list[int]]) -> dict[i
     )
     found = {p: replace(whole, surfaces=worn[p], finishes=finishes[p]) for p in worn}
     claims = {p: _substances(e.own) for p, e in found.items()}
-    times = Counter(m for told in claims.values() for m in told)
+    times = Counter(m for named in claims.values() for m in named)
     return {
         p: replace(e, claimed=frozenset(m for m, n in times.items() if n > (m in claims[p])))
         for p, e in found.items()
@@ -125,37 +126,37 @@ def _name(text: str, shared: tuple[str, ...] = ()) -> Name:
 
 def _prefix(names: Sequence[str]) -> tuple[str, ...]:
     """Return the leading words that several different names have in common."""
-    told = list(dict.fromkeys(tokens_of(name) for name in names))
-    if len(told) < 2:
+    tokens = list(dict.fromkeys(tokens_of(name) for name in names))
+    if len(tokens) < 2:
         return ()
-    same = [len(set(column)) == 1 for column in zip(*told, strict=False)]
-    return told[0][: same.index(False) if False in same else len(same)]
+    same = [len(set(column)) == 1 for column in zip(*tokens, strict=False)]
+    return tokens[0][: same.index(False) if False in same else len(same)]
 
 
 def stated_substance(surfaces: Iterable[Surface]) -> str | None:
     """Return what the nodes state outright in their extras, or None."""
-    said = {str(s.extras[SUBSTANCE]) for s in surfaces if s.extras.get(SUBSTANCE)}
-    return said.pop() if len(said) == 1 else None
+    stated = {str(s.extras[SUBSTANCE]) for s in surfaces if s.extras.get(SUBSTANCE)}
+    return stated.pop() if len(stated) == 1 else None
 
 
 def stated_thickness(surfaces: Iterable[Surface]) -> float | None:
     """Return the wall thickness [m] that the nodes state; 0: stated solid; None: unknown."""
-    said = {_length(s.extras.get("shell_thickness_m")) for s in surfaces}
-    return said.pop() if len(said) == 1 else None
+    stated = {_length(s.extras.get("shell_thickness_m")) for s in surfaces}
+    return stated.pop() if len(stated) == 1 else None
 
 
 def stated_inflation(surfaces: Iterable[Surface]) -> float | None:
     """Return the gauge pressure [Pa] of the air that the nodes say is sealed in; None: none is."""
-    said = {_pressure(s.extras.get("inflation_kPa")) for s in surfaces}
-    return said.pop() if len(said) == 1 else None
+    stated = {_pressure(s.extras.get("inflation_kPa")) for s in surfaces}
+    return stated.pop() if len(stated) == 1 else None
 
 
 def usual_inflation(evidence: Evidence) -> float | None:
-    """Gauge pressure [Pa] in a thing of such a name, which is one part; None: it is not sealed."""
-    told = [s for name in evidence.general for s in heads(name.words) if s.kind == "thing"]
-    longest = max((len(s.phrase) for s in told), default=0)
-    said = {s.inflation for s in told if len(s.phrase) == longest}
-    return said.pop() if evidence.alone and len(said) == 1 else None
+    """Gauge pressure [Pa] in an object of such a name and one part; None: not sealed."""
+    terms = [t for name in evidence.general for t in heads(name.words) if t.kind == "thing"]
+    longest = max((len(t.phrase) for t in terms), default=0)
+    usual = {t.inflation for t in terms if len(t.phrase) == longest}
+    return usual.pop() if evidence.alone and len(usual) == 1 else None
 
 
 SEALABLE = ("shell", "hollow")
@@ -164,15 +165,15 @@ HIGHEST_INFLATION = 1e6
 """No ball or tyre is inflated to more [Pa]."""
 
 
-def _pressure(said: object) -> float | None:
+def _pressure(value: object) -> float | None:
     """Return a foreign file's number where it can be a gauge pressure in kPa, in Pa."""
-    if isinstance(said, bool) or not isinstance(said, int | float):
+    if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return 1e3 * float(said) if isfinite(said) and 0 <= 1e3 * said <= HIGHEST_INFLATION else None
+    return 1e3 * float(value) if isfinite(value) and 0 <= 1e3 * value <= HIGHEST_INFLATION else None
 
 
 def stated_values(surfaces: Iterable[Surface]) -> dict[str, Ground]:
-    """Return the numbers that a file states of a part's matter, with who says so.
+    """Return the numbers that a file states of a part's material, with their sources.
 
     Field of ``Material`` → value; where the file names no range it is the value alone. What cannot
     be such a number is left out, and where surfaces of a part differ, the first counts.
@@ -185,8 +186,8 @@ def stated_values(surfaces: Iterable[Surface]) -> dict[str, Ground]:
     return {}
 
 
-def _mapping(said: object) -> Mapping[str, Any]:
-    return said if isinstance(said, Mapping) else {}
+def _mapping(value: object) -> Mapping[str, Any]:
+    return value if isinstance(value, Mapping) else {}
 
 
 def _ground(row: Mapping[str, Any]) -> Ground | None:
@@ -207,9 +208,9 @@ def _ground(row: Mapping[str, Any]) -> Ground | None:
 
 
 def as_stated(words: PartWords, surfaces: Iterable[Surface]) -> PartWords:
-    """Take over how a file of ours says that a part is built."""
-    said = next((s.extras[MATTER] for s in surfaces if MATTER in s.extras), None)
-    row = _mapping(_mapping(said).get("words"))
+    """Take over how a part is built, as a file that this package wrote states it."""
+    stated = next((s.extras[MATTER] for s in surfaces if MATTER in s.extras), None)
+    row = _mapping(_mapping(stated).get("words"))
     structure, contents = row.get("structure"), row.get("contents")
     if structure not in ("solid", "shell", "filled"):
         return words
@@ -223,11 +224,11 @@ def as_stated(words: PartWords, surfaces: Iterable[Surface]) -> PartWords:
     )
 
 
-def _length(said: object) -> float | None:
+def _length(value: object) -> float | None:
     """Return a foreign file's number where it can be a length [m]."""
-    if isinstance(said, bool) or not isinstance(said, int | float):
+    if isinstance(value, bool) or not isinstance(value, int | float):
         return None
-    return float(said) if isfinite(said) and 0 <= said < LONGEST_WALL else None
+    return float(value) if isfinite(value) and 0 <= value < LONGEST_WALL else None
 
 
 def walled(words: PartWords, thickness: float | None) -> PartWords:
@@ -245,8 +246,8 @@ def sealed(words: PartWords, stated: float | None, usual: float | None) -> PartW
 
     Args:
         words: Of one part.
-        stated: Gauge pressure that somebody states [Pa]; None: nobody.
-        usual: That such things have [Pa]; None: they are not sealed.
+        stated: Stated gauge pressure [Pa]; None: none is stated.
+        usual: That such objects have [Pa]; None: they are not sealed.
 
     """
     if words.structure not in SEALABLE:
@@ -254,26 +255,34 @@ def sealed(words: PartWords, stated: float | None, usual: float | None) -> PartW
     return replace(words, inflation=usual if stated is None else stated)
 
 
-def hollowed(words: PartWords, evidence: Evidence, walled: Callable[[str], bool]) -> PartWords:
-    """Let what is hollow by what it is have a wall, where nobody says how it is built.
+def hollowed(
+    words: PartWords,
+    evidence: Evidence,
+    walled: Callable[[str], bool],
+    from_pictures: bool = False,
+) -> PartWords:
+    """Let what is hollow by what it is have a wall, where it is not stated how it is built.
 
     Args:
         words: What was recognised of a part.
         evidence: All that the file says about it.
         walled: Tells whether walls of a material were ever measured.
+        from_pictures: Whether its shape is from pictures, which need not show how deep a vessel is.
 
     """
-    said = words.structure is None and any(hollow(name.words) for name in evidence.general)
-    if not said or not (words.material is None or walled(words.material)):
+    if words.structure is not None or not (words.material is None or walled(words.material)):
         return words
-    return replace(words, structure="shell")
+    if from_pictures and any(open_ware(name.words) for name in evidence.general):
+        return replace(words, structure="sheet")
+    is_hollow = any(hollow(name.words) for name in evidence.general)
+    return replace(words, structure="shell") if is_hollow else words
 
 
 def matter_hint(surface: Surface, finish: Finish) -> str:
-    """Return the material that a surface's own names state, "" for none: tells parts apart."""
+    """Return the material that a surface's own names state, "" for none: it separates parts."""
     names = [_name(finish.name), _name(surface.name)]
-    sayings, _ = _told(names, (finish,), ("substance", "piece"), ())
-    return sayings[0].material if len({s.material for s in sayings}) == 1 else ""
+    terms, _ = _strongest(names, (finish,), ("substance", "piece"), ())
+    return terms[0].material if len({s.material for s in terms}) == 1 else ""
 
 
 def recognise(evidence: Evidence) -> PartWords:
@@ -286,28 +295,28 @@ def recognise(evidence: Evidence) -> PartWords:
 
 
 def _own_names(evidence: Evidence) -> PartWords | None:
-    sayings, name = _told(evidence.own, evidence.finishes, KINDS, evidence.general)
-    if not sayings or (sayings[0].plant and not evidence.alone):
+    terms, name = _strongest(evidence.own, evidence.finishes, KINDS, evidence.general)
+    if not terms or (terms[0].plant and not evidence.alone):
         return None  # "plant" names the pot's node as often as the leaves
-    whole = sayings[0].kind != "thing" or evidence.alone or sayings[0].every
-    return _answer(_of_metal(sayings, evidence), name, 1.0 if whole else WEAKER)
+    whole = terms[0].kind != "thing" or evidence.alone or terms[0].every
+    return _answer(_of_metal(terms, evidence), name, 1.0 if whole else WEAKER)
 
 
 def _general_names(evidence: Evidence) -> PartWords | None:
     kinds, names = ("substance", "thing"), evidence.general
-    sayings, name = _told(names, evidence.finishes, kinds, names)
-    if not sayings:
+    terms, name = _strongest(names, evidence.finishes, kinds, names)
+    if not terms:
         return None
-    if evidence.alone or sayings[0].every:
-        return _answer(_of_metal(sayings, evidence), name, 1.0)
-    told = {s.material for s in sayings}
-    if sayings[0].kind != "substance" or told & evidence.claimed:
-        return None  # which of its parts this is, only the colour tells
-    return _answer(sayings, name, WEAKER)
+    if evidence.alone or terms[0].every:
+        return _answer(_of_metal(terms, evidence), name, 1.0)
+    named = {t.material for t in terms}
+    if terms[0].kind != "substance" or named & evidence.claimed:
+        return None  # only its colour says which of the parts this is
+    return _answer(terms, name, WEAKER)
 
 
 def _looks(evidence: Evidence) -> PartWords | None:
-    """Tell a part by its plain colour where the object has a part that looks so."""
+    """Recognise a part by its plain colour, where such objects have a part of that colour."""
     if evidence.alone or any(f.texture is not None for f in evidence.finishes):
         return None
     around = {w for name in evidence.general for w in name.words}
@@ -330,7 +339,7 @@ def _surface_values(evidence: Evidence) -> PartWords | None:
 
 
 def _metallic(evidence: Evidence) -> bool:
-    """Tell whether most of the surface is metal, and says so on purpose."""
+    """Whether most of the surface is stated to be metal, and not by an exporter's default."""
     return evidence.metallic_means_something and all(
         f.metallic >= METALLIC for f in evidence.finishes
     )
@@ -345,92 +354,92 @@ def _weighed(answer: PartWords, evidence: Evidence) -> PartWords:
 
 
 def _emptied(answer: PartWords, evidence: Evidence) -> PartWords:
-    """Leave contents only in goods that are one part and are not said to be empty."""
-    said = {w for name in (*evidence.own, *evidence.general) for w in name.words}
-    if answer.contents is None or (evidence.alone and not said & emptied()):
+    """Leave contents only in goods that are one part and are not called empty."""
+    named = {w for name in (*evidence.own, *evidence.general) for w in name.words}
+    if answer.contents is None or (evidence.alone and not named & emptied()):
         return answer
     return replace(answer, structure="shell", contents=None, fill=None)
 
 
-def _of_metal(sayings: list[Saying], evidence: Evidence) -> list[Saying]:
+def _of_metal(terms: list[Term], evidence: Evidence) -> list[Term]:
     """Let an object that looks metallic be of the metal that such objects are made of."""
     if not _metallic(evidence):
-        return sayings
-    return [replace(s, material=s.metallic or s.material) for s in sayings]
+        return terms
+    return [replace(s, material=s.metallic or s.material) for s in terms]
 
 
-def _answer(sayings: list[Saying], name: str, factor: float) -> PartWords:
-    materials = sorted({s.material for s in sayings})
+def _answer(terms: list[Term], name: str, factor: float) -> PartWords:
+    materials = sorted({s.material for s in terms})
     if len(materials) > 1:
-        reason = f"{name!r} speaks of {' and '.join(materials)}; which one is not said."
+        reason = f"{name!r} names {' and '.join(materials)}: it is not clear which one."
         return PartWords("", None, reason=reason)
-    said = sayings[0]
+    first = terms[0]
     kinds = {"substance": "names the material", "piece": "is usually", "thing": "is usually"}
-    reason = f"{' '.join(said.phrase)!r} in {name!r} {kinds[said.kind]} {said.material}."
-    shell = "shell" if said.structure == "shell" else None
+    reason = f"{' '.join(first.phrase)!r} in {name!r} {kinds[first.kind]} {first.material}."
+    shell = "shell" if first.structure == "shell" else None
     return PartWords(
         "",
-        said.material,
-        structure="filled" if said.contents else shell,
-        thickness=said.thickness,
-        margin=round(said.margin * factor, 3),
+        first.material,
+        structure="filled" if first.contents else shell,
+        thickness=first.thickness,
+        margin=round(first.margin * factor, 3),
         reason=reason,
-        contents=said.contents,
-        fill=said.fill,
-        inflation=said.inflation,
+        contents=first.contents,
+        fill=first.fill,
+        inflation=first.inflation,
     )
 
 
-def _told(
+def _strongest(
     names: Sequence[Name], finishes: Sequence[Finish], kinds: Sequence[str], thing: Sequence[Name]
-) -> tuple[list[Saying], str]:
-    """Find the strongest sayings in any of the names, and the name they stand in.
+) -> tuple[list[Term], str]:
+    """Find the strongest terms in any of the names, and the name they stand in.
 
-    Longest phrase first, then substance before piece before object; a piece's phrase is never more
-    telling than a substance ("oak table top"), nor is an object's than the one right before it
-    ("steel trash can"). Several are returned when equally strong ones stand in the names.
+    Longest phrase first, then substance before piece before object. The phrase of a piece never
+    ranks above a substance ("oak table top"), nor that of an object above the substance right
+    before it ("steel trash can"). Several are returned when equally strong ones stand in the names.
     """
-    found: list[tuple[tuple[int, int, int], Saying, str]] = []
+    found: list[tuple[tuple[int, int, int], Term, str]] = []
     around = {w for name in thing for w in name.words}
     nameless = thing and not any(_names_a_thing(name) for name in (*names, *thing))
     shiny = any(f.metallic > METALLIC for f in finishes)
     for name in names:
-        for saying in _adjectives(name):
-            if saying.colour and not shiny:
-                if not (saying.seldom and nameless):
+        for term in _adjectives(name):
+            if term.colour and not shiny:
+                if not (term.seldom and nameless):
                     continue
-                saying = replace(saying, margin=saying.margin * WEAKER)
-            if saying.kind in kinds and _fits(saying, finishes, around | set(name.words)):
-                length = len(saying.phrase)
-                said = 1 if saying.kind == "piece" else max(length, saying.before)
-                found.append(((said, -KINDS.index(saying.kind), length), saying, name.text))
+                term = replace(term, margin=term.margin * WEAKER)
+            if term.kind in kinds and _fits(term, finishes, around | set(name.words)):
+                length = len(term.phrase)
+                weight = 1 if term.kind == "piece" else max(length, term.before)
+                found.append(((weight, -KINDS.index(term.kind), length), term, name.text))
     if not found:
         return [], ""
     best = max(rank for rank, _, _ in found)
     strongest = [(s, n) for rank, s, n in found if rank == best]
     materials = {s.material for s, _ in strongest}
     kept = [(s, n) for s, n in strongest if not materials & set(s.gives_way)]
-    kept.sort(key=lambda told: -told[0].margin)
+    kept.sort(key=lambda pair: -pair[0].margin)
     return _particular([s for s, _ in kept]), kept[0][1]
 
 
 def _names_a_thing(name: Name) -> bool:
-    """Tell whether a name has a word for a thing, or a piece of one."""
+    """Whether a name has a word for an object, or a piece of one."""
     return any(s.kind != "substance" for s in heads(name.words))
 
 
-def _adjectives(name: Name) -> list[Saying]:
+def _adjectives(name: Name) -> list[Term]:
     """Find what stands in a name; a substance right before an object is that of such an object."""
     standing = heads(name.words)
     things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
-    for k, saying in enumerate(standing):
-        behind = next((t for t in things if name.says(saying.phrase + t.phrase)), None)
-        if saying.kind == "substance" and behind and behind.material not in saying.gives_way:
-            standing[k] = _made_as(saying, behind)
+    for k, term in enumerate(standing):
+        behind = next((t for t in things if name.says(term.phrase + t.phrase)), None)
+        if term.kind == "substance" and behind and behind.material not in term.gives_way:
+            standing[k] = _made_as(term, behind)
     return standing
 
 
-def _made_as(substance: Saying, thing: Saying) -> Saying:
+def _made_as(substance: Term, thing: Term) -> Term:
     """Return a substance built as an object is; how thick depends on what it is usually made of."""
     same = substance.material == thing.material
     return replace(
@@ -445,12 +454,12 @@ def _made_as(substance: Saying, thing: Saying) -> Saying:
     )
 
 
-def _particular(sayings: list[Saying]) -> list[Saying]:
-    """Among entries of one phrase, the one with a condition speaks; it was met."""
-    return sayings if not any(s.alpha for s in sayings) else [s for s in sayings if s.alpha]
+def _particular(terms: list[Term]) -> list[Term]:
+    """Among entries of one phrase, prefer those with a condition: it was met."""
+    return terms if not any(s.alpha for s in terms) else [s for s in terms if s.alpha]
 
 
-def _fits(saying: Saying, finishes: Sequence[Finish], around: set[str]) -> bool:
-    if saying.alpha and not all(f.alpha_mode == saying.alpha for f in finishes):
+def _fits(term: Term, finishes: Sequence[Finish], around: set[str]) -> bool:
+    if term.alpha and not all(f.alpha_mode == term.alpha for f in finishes):
         return False
-    return not saying.of or bool(around & {singular(w) for w in saying.of})
+    return not term.of or bool(around & {singular(w) for w in term.of})

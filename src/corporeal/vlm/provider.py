@@ -50,13 +50,13 @@ TOO_MANY = 429
 NO_KEY = "none"
 """Sent where a server wants no key: the clients insist on one."""
 OLLAMA = "http://localhost:11434/v1"
-"""Where Ollama listens unless it was told otherwise."""
+"""Where Ollama listens unless its settings say otherwise."""
 INSTRUCTIONS = (
     "You help to compute how real objects move. Answer from what the pictures show and from what "
     "you know of such things; say plainly when you cannot tell."
 )
 IN_WORDS = ModelProfile(supports_json_object_output=False)
-"""The shape of the answer is told in the prompt, and nothing else is asked of the server."""
+"""The schema of the answer is in the prompt, and nothing else is asked of the server."""
 PASSING = (
     ModelRateLimitError,
     ModelUnavailableError,
@@ -194,11 +194,11 @@ class Live(ABC):
         )
 
         @agent.output_validator
-        def fits(said: Any) -> Any:
-            complaints = check(said)
+        def fits(answered: Any) -> Any:
+            complaints = check(answered)
             if complaints:
                 raise ModelRetry("\n".join(complaints))
-            return said
+            return answered
 
         longest = self.patience.timeout
         settings = ModelSettings(timeout=longest, request_timeout=longest, max_retries=0)

@@ -134,17 +134,17 @@ def _read(path: Path) -> dict:
 
 def _validated(row: dict, answer: type[Answer], check: Check[Answer]) -> Answer:
     try:
-        said = answer.model_validate(row["answer"])
+        found = answer.model_validate(row["answer"])
     except ValidationError as error:
         raise BadFileError(
             row["file"], f"its answer does not fit: {first_problem(error)}.", "Record it again."
         ) from error
-    complaints = check(said)
+    complaints = check(found)
     if complaints:
         raise BadFileError(
             row["file"], f"its answer does not fit: {complaints[0]}", "Record it again."
         )
-    return said
+    return found
 
 
 def first_problem(error: ValidationError) -> str:

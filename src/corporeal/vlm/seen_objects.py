@@ -15,11 +15,11 @@ from corporeal.geometry.sizes import said_extent
 from corporeal.types import NOTHING_ASKED, Usage
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.interview import Interview, Subject
-from corporeal.vlm.sizes import SAID, TABLE
+from corporeal.vlm.sizes import ANSWERED, TABLE
 from corporeal.vlm.words import usage
 
 PERSON = "the command line"
-"""Who said what a person typed, in words for the report."""
+"""The source of what a person typed, in words for the report."""
 
 
 UNKNOWN = "object"
@@ -36,7 +36,7 @@ class SeenObject:
     extent: float | None = None
     """Largest extent of the real object [m]; None: unknown."""
     sized_by: str = ""
-    """Who said that, in words for the report."""
+    """Its source, in words for the report."""
 
 
 @dataclass(frozen=True)
@@ -78,7 +78,7 @@ class Viewer:
             return []
         reply = self._interview(self.model, "things", pictures, len(pictures)).things()
         seen = reply.answer.things if reply else []
-        who = "" if reply is None else f"{SAID[reply.by]} ({reply.model})"
+        who = "" if reply is None else f"{ANSWERED[reply.by]} ({reply.model})"
         return [SeenObject(t.class_name, t.look, t.metres, who) for t in seen]
 
     def regions(
@@ -102,14 +102,14 @@ class Viewer:
         reply = interview.regions(colours, [f"{t.class_name}: {t.look}" for t in objects])
         if reply is None:
             return None
-        said = {r.colour: r.thing for r in reply.answer.regions}
-        return [None if (n := said[colour]) is None else n - 1 for colour in colours]
+        object_of = {r.colour: r.thing for r in reply.answer.regions}
+        return [None if (n := object_of[colour]) is None else n - 1 for colour in colours]
 
     def asked(self) -> Asked:
         """Return all that was asked so far."""
         rows = tuple(row for interview in self.interviews for row in interview.transcript)
-        said = tuple(w for interview in self.interviews for w in interview.warnings)
-        return Asked(rows, usage(rows), said)
+        warnings = tuple(w for interview in self.interviews for w in interview.warnings)
+        return Asked(rows, usage(rows), warnings)
 
     def _interview(
         self, model: Vlm, task: str, pictures: Sequence[np.ndarray], count: int
@@ -151,7 +151,7 @@ def check_extents(stated: Sequence[str], objects: Sequence[SeenObject]) -> None:
     """Raise UserError where a size is stated of what no object can be called.
 
     Args:
-        stated: What a person said of some, such as "duck=0.1" [m].
+        stated: Sizes that a person gave for some, such as "duck=0.1" [m].
         objects: What there is, as far as anybody will say; others are objects.
 
     """
@@ -175,7 +175,7 @@ def metres(
     Args:
         sizes: Name → largest extent in the file [its unit].
         objects: What they are, in the same order.
-        stated: What a person said of some, such as "duck=0.1" [m].
+        stated: Sizes that a person gave for some, such as "duck=0.1" [m].
         measured: What a person measured of the unit.
         z_up: Whether the file's kind has +z up, and metres.
 

@@ -26,7 +26,7 @@ AT_ONCE = 4
 """Questions that are asked at the same time."""
 
 SizedBy = Literal["file", "model", "recording", "table", "nobody"]
-SAID = {"model": "a model", "recording": "a recorded answer"}
+ANSWERED = {"model": "a model", "recording": "a recorded answer"}
 
 
 @dataclass(frozen=True)
@@ -62,13 +62,13 @@ class Sizes:
 
 @dataclass(frozen=True)
 class RealExtent:
-    """How large one real object is, and who said so."""
+    """How large one real object is, and by whose estimate."""
 
     extent: float
     """Largest extent [m]."""
     said_by: SizedBy
     by: str
-    """Who said it, in a clause: "a model (openai:gpt-5.4)"."""
+    """Whose estimate it is, in a clause: "a model (openai:gpt-5.4)"."""
     reason: str
     """Why, in one sentence."""
     warnings: tuple[str, ...] = ()
@@ -94,13 +94,13 @@ def usual_sizes(classes: Iterable[str], vlm: str = "metadata", record: Path | No
     answers = together(
         [partial(_asked, interview) for interview in interviews], AT_ONCE, fatal=is_more
     )
-    told = [a for a in all_answered(answers, vlm) if isinstance(a, UsualSize)]
+    answered = [a for a in all_answered(answers, vlm) if isinstance(a, UsualSize)]
     known = {name: size for name in named if (size := _tabled(name))}
     rows = tuple(row for interview in interviews for row in interview.transcript)
     warnings = [w for interview in interviews for w in interview.warnings]
-    warnings += [w for size in told if (w := _against(size, known.get(size.class_name)))]
-    said = {size.class_name: size for size in told}
-    return Sizes(known | said, rows, usage(rows), tuple(warnings))
+    warnings += [w for size in answered if (w := _against(size, known.get(size.class_name)))]
+    asked = {size.class_name: size for size in answered}
+    return Sizes(known | asked, rows, usage(rows), tuple(warnings))
 
 
 def real_extent(
@@ -108,7 +108,7 @@ def real_extent(
 ) -> RealExtent:
     """Say how large the real object is of which a file holds a model.
 
-    A file in metres is the truth, and what is said of its class can only doubt it. Otherwise the
+    A file in metres counts; the usual size of its class can only cast doubt on it. Otherwise the
     usual size of its class counts, and where nobody knows that, a neutral stand-in.
 
     Args:
@@ -122,8 +122,8 @@ def real_extent(
     known = sizes.usual.get(class_name)
     if metric:
         doubt = _beyond(name, extent, known)
-        told = (doubt,) if doubt else ()
-        return RealExtent(extent, "file", "its file", "The file is in metres.", told)
+        warnings = (doubt,) if doubt else ()
+        return RealExtent(extent, "file", "its file", "The file is in metres.", warnings)
     if known is not None:
         return RealExtent(known.usual, known.said_by, _whose(known), known.reason)
     warning = (
@@ -146,15 +146,15 @@ def _asked(interview: Interview) -> UsualSize | None:
     reply = interview.size()
     if reply is None:
         return None
-    said = reply.answer
+    found = reply.answer
     return UsualSize(
         class_name=interview.subject.class_name,
-        low=said.smallest,
-        usual=said.usual,
-        high=said.largest,
+        low=found.smallest,
+        usual=found.usual,
+        high=found.largest,
         said_by=reply.by,
         who=reply.model,
-        reason=said.reason,
+        reason=found.reason,
     )
 
 
@@ -170,17 +170,17 @@ def _tabled(class_name: str) -> UsualSize | None:
 
 
 def _whose(size: UsualSize) -> str:
-    """Name who said a size: a table is its own name."""
-    return TABLE if size.said_by == "table" else f"{SAID[size.said_by]} ({size.who})"
+    """Name the source of a size: a table is its own name."""
+    return TABLE if size.said_by == "table" else f"{ANSWERED[size.said_by]} ({size.who})"
 
 
-def _against(said: UsualSize, known: UsualSize | None) -> str:
+def _against(answered: UsualSize, known: UsualSize | None) -> str:
     """Say where a model's size is beyond the table's; "" where it is not."""
-    if known is None or known.low / MARGIN <= said.usual <= known.high * MARGIN:
+    if known is None or known.low / MARGIN <= answered.usual <= known.high * MARGIN:
         return ""
     return (
-        f"According to {_whose(said)}, {length(said.usual)} is usual for objects like this: "
-        f"{said.class_name}; {TABLE} knows {length(known.low)} to {length(known.high)}. "
+        f"According to {_whose(answered)}, {length(answered.usual)} is usual for objects like "
+        f"this: {answered.class_name}; {TABLE} knows {length(known.low)} to {length(known.high)}. "
         "The former was believed."
     )
 

@@ -31,9 +31,9 @@ Asked = Literal["model", "recording"]
 LOOKED = {"model": "the model", "recording": "a recorded answer"}
 """Who looks at pictures."""
 ALIKE = 1.25
-"""By what factor a wall's thickness may differ from the stated one before anybody is told."""
+"""By what factor a wall's thickness may differ from the stated one before it is reported."""
 FAR = 2.5
-"""By what factor a size may differ from the usual one before anybody is told."""
+"""By what factor a size may differ from the usual one before it is reported."""
 
 
 def part_words(answer: MaterialsAnswer, by: Asked, names: Vocabulary) -> list[PartWords]:
@@ -48,7 +48,7 @@ def part_words(answer: MaterialsAnswer, by: Asked, names: Vocabulary) -> list[Pa
     }
     return [
         replace(
-            as_said(PartWords(part.part, None), ways_of(part, names), by),
+            in_likeliest_way(PartWords(part.part, None), ways_of(part, names), by),
             volume_share=_share(part.volume_share, total[0]),
             surface_share=_share(part.surface_share, total[1]),
             inside=part.inside or "",
@@ -59,9 +59,9 @@ def part_words(answer: MaterialsAnswer, by: Asked, names: Vocabulary) -> list[Pa
     ]
 
 
-def ways_of(said: PartAnswer, names: Vocabulary) -> tuple[Hypothesis, ...]:
+def ways_of(answer: PartAnswer, names: Vocabulary) -> tuple[Hypothesis, ...]:
     """Return the ways a part may be, likeliest first; probabilities add up to 1 at most."""
-    total = max(sum(way.probability for way in said.ways), 1.0)
+    total = max(sum(way.probability for way in answer.ways), 1.0)
     ways = [
         Hypothesis(
             material=None if way.material is None else names.material(way.material),
@@ -73,14 +73,14 @@ def ways_of(said: PartAnswer, names: Vocabulary) -> tuple[Hypothesis, ...]:
             reading=way.reading.strip().lower(),
             reason=way.reason,
         )
-        for way in said.ways
+        for way in answer.ways
         if way.probability > 0
     ]
     return tuple(sorted(ways, key=lambda way: -way.probability))
 
 
-def as_said(words: PartWords, ways: tuple[Hypothesis, ...], by: Asked) -> PartWords:
-    """Let the likeliest way speak for a part, and keep all of them."""
+def in_likeliest_way(words: PartWords, ways: tuple[Hypothesis, ...], by: Asked) -> PartWords:
+    """Describe a part by its likeliest way, and keep all of them."""
     return replace(
         in_way(words, ways[0]),
         answered_by=by if ways[0].material else "unknown",
@@ -90,13 +90,13 @@ def as_said(words: PartWords, ways: tuple[Hypothesis, ...], by: Asked) -> PartWo
     )
 
 
-def _share(said: float | None, total: float) -> float:
-    """Make shares add up to 1 exactly; a part that shares with nobody has the whole."""
-    return 1.0 if said is None or total <= 0 else said / total
+def _share(stated: float | None, total: float) -> float:
+    """Make shares add up to 1 exactly; a part by itself has the whole."""
+    return 1.0 if stated is None or total <= 0 else stated / total
 
 
 def gathered(name: str, pieces: Sequence[PartWords]) -> PartWords:
-    """Let the largest piece whose material is known speak for the mesh that all of them share."""
+    """Describe a mesh that several pieces share by the largest one whose material is known."""
     if len(pieces) == 1:
         return replace(pieces[0], name=name)
     known = [p for p in pieces if p.material is not None] or list(pieces)
@@ -117,36 +117,40 @@ def gathered(name: str, pieces: Sequence[PartWords]) -> PartWords:
     )
 
 
-def resolved(said: PartWords, file: PartWords, walled: Callable[[str], bool]) -> PartWords:
-    """Let the file name the material that a model could not, and keep all else that it said.
+def resolved(answered: PartWords, file: PartWords, walled: Callable[[str], bool]) -> PartWords:
+    """Let the file name the material that a model could not, and keep the rest of its answer.
 
     Args:
-        said: What the model said.
-        file: What the file's own words say of the same part.
+        answered: What the model answered.
+        file: What the file's metadata says of the same part.
         walled: Tells whether walls of a material were ever measured.
 
     """
-    if said.material is not None:
-        return said
-    why = f"{said.reason.rstrip('. ')}. " if said.reason else ""
+    if answered.material is not None:
+        return answered
+    why = f"{answered.reason.rstrip('. ')}. " if answered.reason else ""
     own = file
-    if said.structure == "solid":
+    if answered.structure == "solid":
         own = replace(file, structure="solid", thickness=None, contents=None, fill=None)
-        own = replace(own, built_by=said.built_by)
-    elif said.structure and (file.thickness or file.material is None or walled(file.material)):
-        kept = {"structure": said.structure, "contents": said.contents, "fill": said.fill}
-        own = replace(file, **kept, built_by=said.built_by)
+        own = replace(own, built_by=answered.built_by)
+    elif answered.structure and (file.thickness or file.material is None or walled(file.material)):
+        kept = {
+            "structure": answered.structure,
+            "contents": answered.contents,
+            "fill": answered.fill,
+        }
+        own = replace(file, **kept, built_by=answered.built_by)
     return replace(
         own,
-        name=said.name,
+        name=answered.name,
         reason=f"The pictures do not show what it is made of: {why}{file.reason}",
-        hypotheses=_completed(said.hypotheses, own),
-        volume_share=said.volume_share,
-        surface_share=said.surface_share,
-        inside=said.inside,
-        inner_share=said.inner_share,
-        missing=said.missing,
-        pieces=tuple(resolved(piece, file, walled) for piece in said.pieces),
+        hypotheses=_completed(answered.hypotheses, own),
+        volume_share=answered.volume_share,
+        surface_share=answered.surface_share,
+        inside=answered.inside,
+        inner_share=answered.inner_share,
+        missing=answered.missing,
+        pieces=tuple(resolved(piece, file, walled) for piece in answered.pieces),
     )
 
 
@@ -166,12 +170,12 @@ def _completed(ways: Sequence[Hypothesis], file: PartWords) -> tuple[Hypothesis,
     )
 
 
-def evidence_of(said: MassAnswer, by: Asked) -> Evidence:
-    """Turn what was said of an object's mass into SI."""
+def evidence_of(answer: MassAnswer, by: Asked) -> Evidence:
+    """Convert an answer about an object's mass to SI."""
     printed = tuple(
-        PrintedFact(fact.kind, _si(fact.number, fact.unit), fact.words) for fact in said.printed
+        PrintedFact(fact.kind, _si(fact.number, fact.unit), fact.words) for fact in answer.printed
     )
-    return Evidence(said.low_kg, said.likely_kg, said.high_kg, said.reason, printed, by)
+    return Evidence(answer.low_kg, answer.likely_kg, answer.high_kg, answer.reason, printed, by)
 
 
 def _si(number: float | None, unit: str) -> float | None:
@@ -189,18 +193,20 @@ def against(words: PartWords, material: str | None, wall: float | None, put: flo
         put: How thick the model put its wall [m].
 
     """
-    stated, said = [], []
+    stated, answered = [], []
     if material not in (None, words.material) and words.answered_by in LOOKED:
-        stated, said = [str(material)], [str(words.material)]
+        stated, answered = [str(material)], [str(words.material)]
     other = words.structure == "solid" if wall else words.structure != "solid"
     apart = bool(wall and put and not 1 / ALIKE <= put / wall <= ALIKE)
     if wall is not None and words.built_by in LOOKED and (other or apart):
         stated.append(f"a wall {wall * 1e3:.3g} mm thick" if wall else "solid")
-        said.append(f"a wall {put * 1e3:.3g} mm thick" if apart and put else str(words.structure))
+        answered.append(
+            f"a wall {put * 1e3:.3g} mm thick" if apart and put else str(words.structure)
+        )
     if not stated:
         return ""
     who = LOOKED[words.answered_by if words.answered_by in LOOKED else words.built_by]
-    return f"the file states {', '.join(stated)} for {words.name}, {who} said {', '.join(said)}"
+    return f"the file states {', '.join(stated)} for {words.name}, {who} said {', '.join(answered)}"
 
 
 def another(name: str, number: int) -> str:

@@ -24,8 +24,8 @@ from corporeal.evaluation.judge.told_facts import facts
 from corporeal.findings import Audit
 from corporeal.materials import named
 from corporeal.pipeline import FOLDERS
-from corporeal.trajectory.audit import ALLOWED, passage
 from corporeal.trajectory.audit_file import read_audit
+from corporeal.trajectory.audit_words import ALLOWED, passage
 from corporeal.trajectory.played import Played
 from corporeal.vlm import NOBODY
 

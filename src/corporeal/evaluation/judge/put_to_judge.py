@@ -53,8 +53,7 @@ def put_to_judge(
         UserError: Nobody judges, it costs more than was agreed to, or answers are absent.
 
     """
-    check_judging(config)
-    asking = judge or _connected(config)
+    asking = _somebody(judge or connected(config))
     jobs = distinct(films.asked)
     reckoned = price(jobs, config.judge)
     say(price_words(reckoned, config))
@@ -89,8 +88,18 @@ def _named(asked: FilmAsked) -> tuple[str, int, str]:
     return asked.question.scene, asked.look, asked.question.prompt
 
 
-def _connected(config: JudgeConfig) -> Vlm:
-    model = connect(config.judge, config.record)
+def connected(config: JudgeConfig) -> Vlm | None:
+    """Connect to who judges; None: nobody was asked for.
+
+    Raises:
+        UserError: A setting cannot be right, the name is unknown, or its key is not set.
+
+    """
+    check_judging(config)
+    return connect(config.judge, config.record)
+
+
+def _somebody(model: Vlm | None) -> Vlm:
     if model is None:
         raise UserError(
             "Nobody judges. Say who: --judge openai:MODEL, ask:FOLDER or replay:FOLDER."

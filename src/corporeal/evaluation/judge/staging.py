@@ -1,6 +1,6 @@
 """When and from where a scene is looked at: the same for all of its films, from the reference."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import cached_property
 
 import numpy as np
@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from corporeal.playback import cast_of
 from corporeal.render.camera import Aim, place
-from corporeal.render.camera_track import Contact, Reel, track
+from corporeal.render.camera_track import Contact, Reel
 from corporeal.stages.film import reel_of
 from corporeal.trajectory.played import Played
 from corporeal.types import Ledger, Vector
@@ -23,6 +23,8 @@ TURNS = (0.0, -25.0, 25.0)
 """Turn of the camera about the vertical in each look [degrees]."""
 FILL = 0.80
 """Share of a picture that the reference's motion takes."""
+NEAR_FILL = 0.45
+"""Share of a close-up that an object takes."""
 JUST_AFTER = 0.03
 """A close-up shows a contact so long after it began [s]."""
 
@@ -60,9 +62,19 @@ class Staging:
         return place(self.reel.boxes, SIZE, turned(self.view, TURNS[look]), FILL)
 
     def near(self, close: CloseUp, look: int) -> Aim:
-        """Return the camera of a close-up."""
-        about = replace(self.reel, contact=close.contact)
-        return track("close", about, SIZE, turned(self.view, TURNS[look])).at(close.time)
+        """Return the camera of a close-up: the smaller of two that touch, or what moves most.
+
+        Sizes and places are those of the reference at the close-up's time.
+        """
+        now = self.reel.boxes[int(np.abs(self.reel.time - close.time).argmin())]
+        extent = np.linalg.norm(now[:, 1] - now[:, 0], axis=1)
+        if close.contact is not None:
+            chosen = min(close.contact.objects, key=lambda b: np.nan_to_num(extent[b], nan=np.inf))
+        else:
+            way = np.nan_to_num(np.abs(self.reel.boxes - self.reel.boxes[:1])).max(axis=(0, 2, 3))
+            chosen = int(way.argmax())
+        box = now[chosen] if np.isfinite(now[chosen]).all() else self.reel.boxes[0, chosen]
+        return place(box[None, None], SIZE, turned(self.view, TURNS[look]), NEAR_FILL)
 
 
 def stage_scene(reference: Played) -> Staging:

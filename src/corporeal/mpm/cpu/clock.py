@@ -22,7 +22,7 @@ def body_loads(
         problem: What to simulate.
         rigid: States of rigid bodies.
         rows: Body of every row of each field's table of materials, in order.
-        paths: Of bodies that move as told; they must stay alive.
+        paths: Of bodies with prescribed motion; they must stay alive.
 
     """
     records = np.zeros(len(problem.bodies), BODY_LOAD.dtype)

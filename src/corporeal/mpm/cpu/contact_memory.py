@@ -1,4 +1,4 @@
-"""Memory that the native contact piece works in, and what it is told of the problem."""
+"""Memory that the native contact piece works in, and the parameters it takes from the problem."""
 
 import numpy as np
 

@@ -35,6 +35,7 @@ from corporeal.mpm.cpu.layout import (
     REPORT,
     RHO,
     ST,
+    STIFFENING,
     STRAYED,
     SUMS,
     VE,
@@ -197,10 +198,9 @@ class CpuEngine(Interaction):
 
     def _rest_speed(self, field: int) -> float:
         """Fastest wave of a field at rest [m/s]."""
-        table, stiffening = self.material[field].table, self.material[field].stiffening
-        self.field["stiffening"][field] = stiffening
-        modulus = table[:, LAMBDA].astype(np.float64) + 2.0 * table[:, MU]
-        return float(np.sqrt(modulus / table[:, RHO]).max()) * stiffening
+        table = self.material[field].table.astype(np.float64)
+        modulus = (table[:, LAMBDA] + 2.0 * table[:, MU]) * table[:, STIFFENING]
+        return float(np.sqrt(modulus / table[:, RHO]).max())
 
     def connect(self) -> None:
         """List the tasks and point the native structs to where everything is."""

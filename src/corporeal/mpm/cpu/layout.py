@@ -37,9 +37,10 @@ LAW, MU, LAMBDA, YIELD, HARD, CONE, APEX, DRAG, INDEX, KEEP, RHO, RIGID = range(
 """Columns of the table of materials: the law's number, μ, λ, σ_y, H [Pa], cone slope α, apex strain
 p₀/K, of a liquid K_c/dtⁿ in this step [Pa] and n, forgetting rate [1/s], ρ [kg/m³], 1 where
 rigid."""
-SHEAR, BULK, KEPT, FRESH, TIME, PUSH, CONSISTENCY = 12, 14, 16, 18, 20, 22, 25
+SHEAR, BULK, KEPT, FRESH, TIME, PUSH, CONSISTENCY, STIFFENING = 12, 14, 16, 18, 20, 22, 25, 26
 """And of each Maxwell branch G, K [Pa], what this step leaves of old and of new strain, T [s]; this
-step's push [m/s] (3); K_c of a liquid [Pa sⁿ]."""
+step's push [m/s] (3); K_c of a liquid [Pa sⁿ]; how many times stiffer waves find it with branches
+than without [-]."""
 MATERIAL = 32
 """Columns with room to spare: a row is two cache lines."""
 
@@ -86,7 +87,7 @@ LIGHT, HEAVY, NEXT = 54, 55, 64
 """First columns of a rigid state, after its mass: centre (3), rotation (9), inverse inertia at rest
 (9), velocity (3), angular momentum (3), inverse inertia now (9), spin (3), radius, kick (3); while
 a frame holds soft nodes its own mass and centre (4); lowest and highest corner of the box around
-its particles in its own frame (6). Then 1/M in contact (0: it moves as told), and of what does its
+its particles in its own frame (6). Then 1/M in contact (0: prescribed motion), and of what does its
 inertia at rest (9) and its rotation at the end of the step (9)."""
 RIGID_STATE = 80
 """Columns with room to spare."""
@@ -175,7 +176,7 @@ FIELD = Record(
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
     ("double", "spacing"),  # rigid: of its surface points
-    ("double", "mass stiffening"),  # stiffening: how much faster waves run with Maxwell branches
+    ("double", "mass"),
     ("int[3]", "origin dim"),  # in blocks; the window's corner and size
     ("int", "blocks pool rigids points surfaces pushed swells flows relaxes"),
     ("int", "floor"),  # the only plane that the window reaches, or -1

@@ -27,6 +27,7 @@ from corporeal.mpm.cpu.layout import (
     SHEAR,
     SPEED,
     SPIN,
+    STIFFENING,
     TIME,
     TURN,
     VE,
@@ -54,8 +55,6 @@ class Materials:
     """Whether any of it has Maxwell branches."""
     pours: bool
     """Whether any of it is a liquid."""
-    stiffening: float
-    """How much faster waves run with what branches resist than without, at most [-]."""
 
     @classmethod
     def of(cls, substances: Substances) -> "Materials":
@@ -66,6 +65,7 @@ class Materials:
         numbers = (s.mu, s.lam, s.yield_stress, s.hardening, s.cone, s.apex, none, s.flow_index)
         table[:, :SHEAR] = np.column_stack([s.law, *numbers, s.forgetting, s.density, s.rigid])
         table[:, CONSISTENCY] = s.consistency
+        table[:, STIFFENING] = s.stiffening**2
         branches = s.branches
         for first, column in (
             (SHEAR, branches.shear),
@@ -75,7 +75,7 @@ class Materials:
             table[:, first : first + BRANCHES] = column
         kinds = (bool(s.swells.all()), bool(s.flows.any()), bool(s.relaxes.any()))
         pours = bool(np.isin(s.law, laws.LIQUID).any() and not s.rigid.all())
-        return cls(table, s.body, *kinds, pours, float(s.stiffening.max()))
+        return cls(table, s.body, *kinds, pours)
 
 
 def particle_rows(

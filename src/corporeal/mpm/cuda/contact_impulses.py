@@ -444,7 +444,7 @@ def hand_back(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
 
 @wp.func
 def react(c: Contacts, r: Rigid, s: Sheet, t: int, field: int, J: wp.vec3d):
-    """Book what a contact's impulse on a body that moves as told takes of its mover."""
+    """Book what a contact's impulse on a body that has a prescribed motion takes of its mover."""
     if r.path_count[field] > 0:
         work = wp.dot(J, speed_at(r, field, c.point[t]))
         wp.atomic_add(s.loss, PUSHING, t % LANES, -work)

@@ -245,7 +245,7 @@ class Rigid:
     """Rows of each body's path; 0: it moves freely."""
     path_arm: wp.array(dtype=wp.vec3d)
     heavy: wp.array(dtype=wp.mat33d)
-    """Inertia at the start of what moves as told [kg m²] …"""
+    """Inertia at the start of what has a prescribed motion [kg m²] …"""
     heading: wp.array(dtype=wp.mat33d)
     """… and how it is turned when the step ends."""
     centre: wp.array(dtype=wp.vec3d)

@@ -68,7 +68,7 @@ def guide(r: Rigid, s: Sheet, b: int):
 
 @wp.kernel
 def force(r: Rigid, s: Sheet):
-    """Give rigid bodies gravity and push; steer those that move as told."""
+    """Give rigid bodies gravity and push; steer those with prescribed motion."""
     b = wp.tid()
     if s.flag[FULL] == 2:
         return

@@ -1,4 +1,4 @@
-"""Prescribed motion: a rigid body that moves as told, whatever it meets.
+"""Prescribed motion: a rigid body that follows a given path, whatever it meets.
 
 In contact it is as heavy as a wall, with the velocity that takes it, in this step, to where its
 path says. Whatever that takes is booked: its momentum and energy change by what contacts give it
@@ -54,7 +54,7 @@ def rows_of(path: Keyframes, pivot: Vector) -> Float[np.ndarray, "N K"]:
     """Write a path from a point [m] as engines read it: cubics for each interval, see ``KEY_ROW``.
 
     Monotone cubics (Fritsch and Carlson 1980): they pass through every row and overshoot nowhere,
-    so that what is told to rest rests.
+    so that a body prescribed to rest rests.
     """
     time = np.array(path.time, float)
     if len(time) == 1:
@@ -186,7 +186,7 @@ def _refuse(body: Body, jointed: bool, single: bool) -> None:
 
 
 def longest_step(problem: Problem) -> float:
-    """Longest step [s] in which no body that moves as told goes farther than a rigid one may."""
+    """Longest step [s] in which no such body goes farther than a rigid one may."""
     speeds = [guide.fastest for guide in guides(problem).values()]
     fastest = max(speeds, default=0.0)
     return RIGID_COURANT * problem.cell / fastest if fastest > 0.0 else float("inf")

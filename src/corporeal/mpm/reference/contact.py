@@ -109,7 +109,7 @@ class Scene:
         bodies = len(self.problem.bodies)
         still = np.zeros((len(self.problem.planes), 3))
         stiff = np.array([self.is_rigid(b) for b in range(bodies)])
-        # What moves as told is as heavy as a wall.
+        # A body with prescribed motion is as heavy as a wall.
         free = stiff & [body.path is None for body in self.problem.bodies]
         inertia = np.zeros((self.wall_mover + len(still), 3, 3))
         inertia[:bodies] = np.where(
@@ -297,7 +297,7 @@ def _common(
 
 
 def _walls(scene: Scene, field: int) -> range:
-    """Planes that a field meets on nodes: none when it has surface points or moves as told."""
+    """Planes that a field meets on nodes: none with surface points or prescribed motion."""
     body = scene.problem.bodies[field]
     spared = scene.is_rigid(field) and (len(body.surface) > 0 or body.path is not None)
     return range(0 if spared else len(scene.problem.planes))

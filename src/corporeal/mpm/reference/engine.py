@@ -259,13 +259,13 @@ class ReferenceEngine(Interaction):
 
     def _lost(self, state: State) -> np.ndarray:
         """Mark particles that are not finite, far away or deep inside a wall."""
-        cell, told = self.problem.cell, np.isin(self.matter.body, list(self.guides.guide))
+        cell, prescribed = self.problem.cell, np.isin(self.matter.body, list(self.guides.guide))
         finite = np.isfinite(state.position).all(axis=1) & np.isfinite(state.F).all(axis=(1, 2))
         with np.errstate(invalid="ignore"):
             inside = finite & (np.abs(state.position) < FARTHEST * cell).all(axis=1)
             for plane in self.problem.planes:
                 height = state.position @ np.array(plane.normal) - plane.offset
-                inside &= (height > -SUNK * cell) | told
+                inside &= (height > -SUNK * cell) | prescribed
         return np.logical_not(inside)
 
     def _book_step(

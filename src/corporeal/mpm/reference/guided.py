@@ -12,7 +12,7 @@ from corporeal.mpm.state import Matter, State
 
 
 class Guides:
-    """The bodies of a problem that move as told."""
+    """The bodies of a problem with prescribed motion."""
 
     def __init__(self, problem: Problem) -> None:
         self.guide: dict[int, Guide] = guides(problem)
@@ -32,7 +32,7 @@ class Guides:
         return replace(state, speed=speed, spin_momentum=momentum), found
 
     def place(self, state: State, matter: Matter, guided: dict[int, Guided]) -> State:
-        """Turn bodies exactly as told, at the end of a step; they keep their spin."""
+        """Turn bodies exactly as prescribed, at the end of a step; they keep their spin."""
         if not guided:
             return state
         rotation, momentum = state.rotation.copy(), state.spin_momentum.copy()

@@ -26,7 +26,7 @@ struct Pace {
       int bad = 0, astray = 0;
       for (int i = 0; i < w->tasks; i++) {
         const double *r = w->report + REPORT * i;
-        double rate = sqrt(r[WAVE2]) * w->field[w->task[4 * i]].stiffening;
+        double rate = sqrt(r[WAVE2]);
         bad |= !(r[SPEED2] < mpm::VAST_DOUBLE) | !(rate < mpm::VAST_DOUBLE);
         astray |= r[ASTRAY] != 0;
         if (r[SPEED2] > speed2) speed2 = r[SPEED2];

@@ -1,0 +1,225 @@
+"""Real photographs: poses, quality, up, size and silhouettes of every set in a folder.
+
+    python benchmarks/real_photographs.py FOLDER [--only axe] [--cases all bare] [--training draft]
+        [--out runs/real] [--json FILE] [--docs]
+
+Each folder in FOLDER with ``images`` and a COLMAP model, ``sparse/0``, is a set; it may have
+``masks``. It is reconstructed in up to four cases: with all that it has, without its masks, without
+its poses, and from the photographs alone (bare). Measured are: photographs registered, of these the
+share within 1.5° and 3 % of the given poses, and the medians; quality on photographs held out,
+whole and on objects; the angle between up and the normal of the plane with the most sparse points,
+where the object is known to stand on one; size against what ``real_sets.toml`` states; intersection
+over union of the closed surfaces' silhouettes with the masks of the set, mean and worst; minutes of
+the processor, all threads together. A set that is refused or fails is a row that says why. Rows
+that are there already are kept, and a training or a search for poses that was interrupted is
+continued.
+"""
+
+import argparse
+import json
+import shutil
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Literal, get_args
+
+import numpy as np
+import real_measures as measure
+
+from corporeal import store
+from corporeal.errors import UserError
+from corporeal.poses.pose import POSES
+from corporeal.stages.reconstruct import ReconstructConfig, Reconstructed, reconstruct
+from corporeal.terminal import progress_bars, show_table
+
+Case = Literal["all", "unmasked", "unposed", "bare"]
+WORDS: dict[Case, str] = {
+    "all": "as given",
+    "unmasked": "no masks",
+    "unposed": "no poses",
+    "bare": "photographs alone",
+}
+HEADS = (
+    "set", "given", "registered", "right", "rotation off", "place off", "held out, thing [dB]",
+    "up off", "size off", "IoU, worst", "one closed piece", "minutes", "why not",
+)  # fmt: skip
+DOCS = Path(__file__).parents[1] / "docs" / "real-photographs.md"
+ROW = "row.json"
+EVERY = 2.0
+"""Between two readings of the clock that are kept [s]."""
+Progress = Callable[[float, str], None]
+
+
+class Clock:
+    """Seconds of the processor, all threads together, also those before an interruption."""
+
+    def __init__(self, path: Path) -> None:
+        self.path, self.start = path, time.process_time()
+        self.before = store.read_json(path)["seconds"] if path.exists() else 0.0
+        self.written = self.seconds
+
+    @property
+    def seconds(self) -> float:
+        """Spent so far [s]."""
+        return self.before + time.process_time() - self.start
+
+    def beside(self, progress: Progress) -> Progress:
+        """Tell as before, and write down now and then how long it took."""
+
+        def told(fraction: float, words: str) -> None:
+            if self.seconds > self.written + EVERY:
+                self.written = self.seconds
+                store.write_json(self.path, {"seconds": self.written})
+            progress(fraction, words)
+
+        return told
+
+
+def cases_of(folder: Path) -> list[Case]:
+    """Return in which ways a set can be given, none twice."""
+    masked = (folder / "masks").is_dir()
+    return ["all", "unmasked", "unposed", "bare"] if masked else ["all", "bare"]
+
+
+def given_as(folder: Path, case: Case, place: Path) -> Path:
+    """Copy of a set what a case gives."""
+    photos = place / folder.name
+    wanted = ["images"]
+    wanted += ["masks"] if case in ("all", "unposed") else []
+    wanted += ["sparse"] if case in ("all", "unmasked") else []
+    for name in wanted:
+        if (folder / name).is_dir() and not (photos / name).exists():
+            shutil.copytree(folder / name, photos / name)
+    return photos
+
+
+def row_of(folder: Path, case: Case, training: str, out: Path) -> dict[str, Any]:
+    """Reconstruct a set in one case; return a row of the table."""
+    place = out / f"{folder.name}-{case}"
+    if (place / ROW).exists():
+        return json.loads((place / ROW).read_text(encoding="utf-8"))
+    photos, work = given_as(folder, case, place), place / training
+    row: dict[str, Any] = {"set": folder.name, "case": case, "training": training}
+    clock = Clock(place / "seconds.json")
+    facts = measure.known(folder.name)
+    posed = case in ("all", "unmasked")
+    unit = facts.unit if posed else None
+    config = ReconstructConfig(training=training, metres_per_unit=unit)  # type: ignore[arg-type]
+    with progress_bars() as bars:
+        try:
+            told = clock.beside(bars(f"{folder.name} {case}"))
+            made = reconstruct(photos, config, folder=work, progress=told)
+            row |= results(made, folder, None if posed else work / POSES)
+        except UserError as problem:
+            row["why"] = str(problem).replace(str(photos), folder.name)
+            row |= {} if posed else poses_row(folder, work / POSES)
+        except Exception as problem:  # a row says that it failed; the other sets go on
+            row["why"] = f"failed: {type(problem).__name__}: {problem}"
+    row["seconds"] = clock.seconds
+    store.write_json(place / ROW, row)
+    return row
+
+
+def poses_row(folder: Path, poses: Path) -> dict[str, Any]:
+    """Compare poses that were found, if there are some, with those given."""
+    if not (poses / "sparse" / "0").is_dir():
+        return {}
+    given = measure.model_of(folder)
+    found = measure.pose_errors(measure.model_of(poses), given)
+    return {
+        "registered": found.registered,
+        "right": found.right / found.given,
+        "angle_deg": found.angle,
+        "place": found.place,
+    }
+
+
+def results(made: Reconstructed, folder: Path, poses: Path | None) -> dict[str, Any]:
+    """Measure a reconstruction; poses: where those lie that were found."""
+    given, facts, way = measure.model_of(folder), measure.known(folder.name), np.eye(4)
+    row: dict[str, Any] = {"registered": len(given.images)}
+    if poses is not None:
+        way = measure.pose_errors(measure.model_of(poses), given).given_from_found
+        row = poses_row(folder, poses)
+    result = measure.came(made, way)
+    row |= measure.held_out(made) | measure.whole(result) | measure.sizes(result, facts)
+    row |= measure.silhouettes(result, folder, given)
+    if facts.floor:
+        normal = measure.floor_normal(given, np.random.default_rng(0))
+        row["up_off_deg"] = float(np.degrees(np.arccos(np.clip(normal @ result.up, -1, 1))))
+    return row | {"warnings": list(made.found.warnings)}
+
+
+def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
+    """Return a row of the table."""
+
+    def shown(form: str, *keys: str) -> str:
+        values = [row.get(key) for key in keys]
+        return "–" if values[0] is None else ", ".join(form.format(v) for v in values if v)
+
+    registered = f"{row['registered']}/{pictures}" if "registered" in row else "–"
+    good = "–"
+    if "watertight" in row:
+        pieces = row["things"] == 1 and row["pieces"] == [1]
+        good = "yes" if row["watertight"] and pieces else f"{row['things']} things"
+    return (
+        row["set"],
+        WORDS[row["case"]],
+        registered,
+        shown("{:.0%}", "right"),
+        shown("{:.2f}°", "angle_deg"),
+        shown("{:.2%}", "place"),
+        shown("{:.1f}", "psnr", "psnr_thing"),
+        shown("{:.1f}°", "up_off_deg"),
+        shown("{:+.1%}", "size_off"),
+        shown("{:.2f}", "iou", "iou_worst"),
+        good,
+        f"{row['seconds'] / 60:.1f}",
+        row.get("why", ""),
+    )
+
+
+def write_docs(rows: list[tuple[str, ...]], said: str) -> None:
+    """Write the table as a page."""
+    about = (__doc__ or "").split("\n\n")
+    lines = ["# Real photographs", "", f"Written by `{said}`."]
+    lines += [" ".join(about[2].replace("``", "`").split()), ""]
+    lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
+    lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows]
+    DOCS.write_text("\n".join(lines) + "\n", encoding="utf-8")
+
+
+def main() -> None:
+    """Reconstruct all sets asked for."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--only", nargs="*", help="sets, by the names of their folders")
+    parser.add_argument("--cases", nargs="*", choices=get_args(Case))
+    parser.add_argument("--training", default="draft")
+    parser.add_argument("--out", type=Path, default=Path("runs/real"))
+    parser.add_argument("--json", type=Path, help="rows as data")
+    parser.add_argument("--docs", action="store_true", help=f"write docs/{DOCS.name}")
+    asked = parser.parse_args()
+    folders = sorted(p.parent.parent for p in asked.folder.glob("*/sparse/0") if p.is_dir())
+    rows, table = [], []
+    for folder in folders:
+        if asked.only and folder.name not in asked.only:
+            continue
+        pictures = sum(1 for _ in (folder / "images").iterdir())
+        for case in cases_of(folder):
+            if asked.cases and case not in asked.cases:
+                continue
+            rows.append(row_of(folder, case, asked.training, asked.out))
+            table.append(cells(rows[-1], pictures))
+            show_table(HEADS, table[-1:])
+    if asked.json:
+        store.write_json(asked.json, rows)
+    if asked.docs:
+        more = "" if asked.training == "draft" else f" --training {asked.training}"
+        write_docs(table, f"python benchmarks/real_photographs.py FOLDER{more} --docs")
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""Material fields of other methods: read, registered with a scene, and summed up per part."""

@@ -1,0 +1,96 @@
+"""The generalised winding number by a plumb line and the edges that are walked more one way.
+
+Dropped from a point, a line meets faces: into the shape or out of it. That sum is the winding
+number where no edge is open. From there on it counts what a curtain, hung from every open edge down
+to infinity, would close; seen from the point that is a triangle of directions to the edge's ends
+and straight down, whose solid angle is known. Equal to Jacobson et al. 2013, *Robust inside-outside
+segmentation using generalized winding numbers*, exactly; and it asks few faces of many.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from corporeal.geometry import kernels_plumb as kernels
+from corporeal.geometry.mesh import Mesh
+
+ENTRIES = 8
+"""Places in the table of faces, per face, at most."""
+
+
+@dataclass(frozen=True)
+class PlumbLines:
+    """A mesh, ready to be asked; C cells of a table of faces by where they lie across."""
+
+    mesh: Mesh
+    low: Float[np.ndarray, " 2"]
+    """Of the table [m]."""
+    width: float
+    """Of a cell [m]."""
+    counts: Int[np.ndarray, " 2"]
+    first: Int[np.ndarray, " C1"]
+    """Of each cell, in ``face``."""
+    face: Int[np.ndarray, " F"]
+    rim: Int[np.ndarray, "E 2"]
+    """Edges that are walked more often one way than the other."""
+    excess: Int[np.ndarray, " E"]
+    """How many times more, from the first vertex to the second."""
+
+    def winding(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
+        """Winding number of the mesh about points."""
+        found = np.zeros(len(points))
+        points = np.ascontiguousarray(points, dtype=np.float64)
+        table = self.low, self.width, self.counts, self.first, self.face
+        kernels.drop(points, self.mesh.vertices, self.mesh.triangles, table, found)
+        if len(self.rim):
+            kernels.hang(points, self.mesh.vertices, self.rim, self.excess, found)
+        return found
+
+
+def plumb_lines(mesh: Mesh) -> PlumbLines:
+    """Sort the faces of a mesh by where they lie across, and find its open edges."""
+    rim, excess = unbalanced(mesh)
+    flat = mesh.corners[:, :, :2]
+    low, high = flat.min(axis=1), flat.max(axis=1)
+    start, span = low.min(axis=0), np.maximum(np.ptp(flat, axis=(0, 1)), 1e-300)
+    # About one face a cell; fewer cells where faces are long, so that the table stays small.
+    width = float(max(np.sqrt(np.prod(span) / len(flat)), span.max() / len(flat)))
+    while True:
+        from_cell = ((low - start) / width).astype(np.int64)
+        to_cell = ((high - start) / width).astype(np.int64)
+        if (np.prod(to_cell - from_cell + 1, axis=1)).sum() <= ENTRIES * len(flat):
+            break
+        width *= 2
+    counts = to_cell.max(axis=0) + 1
+    first, face = _entered(from_cell, to_cell, counts)
+    return PlumbLines(mesh, start, width, counts, first, face, rim, excess)
+
+
+def unbalanced(mesh: Mesh) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, " E"]]:
+    """Edges that are walked more often one way than the other, and how many times more."""
+    f = mesh.triangles
+    ends = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
+    lower, upper = ends.min(axis=1), ends.max(axis=1)
+    key, edge = np.unique(lower * len(mesh.vertices) + upper, return_inverse=True)
+    excess = np.zeros(len(key), np.int64)
+    np.add.at(excess, edge.reshape(-1), np.where(ends[:, 0] == lower, 1, -1))
+    odd = excess != 0
+    pairs = np.column_stack([key // len(mesh.vertices), key % len(mesh.vertices)])
+    return np.ascontiguousarray(pairs[odd]), excess[odd]
+
+
+def _entered(
+    from_cell: np.ndarray, to_cell: np.ndarray, counts: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """List the faces whose boxes touch each cell, cell by cell."""
+    wide = to_cell - from_cell + 1
+    many = np.prod(wide, axis=1)
+    face = np.repeat(np.arange(len(many)), many)
+    within = np.arange(len(face)) - np.repeat(np.cumsum(many) - many, many)
+    column = from_cell[face, 0] + within // wide[face, 1]
+    row = from_cell[face, 1] + within % wide[face, 1]
+    cell = column * counts[1] + row
+    order = np.argsort(cell, kind="stable")
+    held = np.bincount(cell, minlength=int(np.prod(counts)))
+    return np.concatenate([[0], np.cumsum(held)]), face[order]

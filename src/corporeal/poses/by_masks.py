@@ -1,0 +1,90 @@
+"""What masks say of poses: whether silhouettes are those of one object that stood still.
+
+A pattern that repeats puts a camera on the wrong one of its pieces, and an object that was turned
+over between two rounds leaves all cameras right about the floor alone. Neither shows in the
+reprojection error.
+"""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import UInt8
+from PIL import Image
+
+from corporeal.formats.colmap import ColmapImage, ColmapModel, read_colmap
+from corporeal.formats.photographs import MASKS
+from corporeal.geometry.silhouette_outliers import FEWEST, outliers
+from corporeal.geometry.silhouettes import coherence
+from corporeal.poses.attempt import Attempt, require
+from corporeal.types import Camera
+
+LONGEST = 320
+"""Side of the masks that are compared [px]."""
+
+
+def checked_by_masks(told: Attempt, folder: Path, place: Path) -> Attempt:
+    """Take pictures whose masks contradict the others out of a model; return what is left of it.
+
+    Lenses are taken for straight: what they bend is less than a pixel of these masks.
+
+    Args:
+        told: What came of the attempt.
+        folder: Holds ``masks`` where somebody gave some; else nothing is done.
+        place: Holds the model, which is changed.
+
+    """
+    masks = folder / MASKS[0]
+    if not told.registered or not masks.is_dir():
+        return told
+    model = read_colmap(place)
+    shown = [image for image in model.images if (masks / _mask_of(image)).exists()]
+    if len(shown) < FEWEST:
+        return told
+    sizes = {_small(model, image) for image in shown}
+    if len(sizes) > 1:  # held level and upright: each at its own size
+        sizes = {(LONGEST, LONGEST)}
+    (size,) = sizes
+    cameras = tuple(_camera(model, image, size) for image in shown)
+    drawn = np.stack([_mask(masks / _mask_of(image), size) for image in shown])
+    wrong = outliers(drawn, cameras)
+    right = [k for k in range(len(shown)) if k not in wrong]
+    filled = coherence(drawn[right], tuple(cameras[k] for k in right))
+    astray = tuple(sorted(shown[k].name for k in wrong))
+    left = _without(place, astray) if astray else (told.registered, told.points)
+    return replace(
+        told,
+        registered=left[0],
+        points=left[1],
+        astray=astray,
+        filled=round(filled, 3),
+    )
+
+
+def _without(place: Path, names: tuple[str, ...]) -> tuple[int, int]:
+    """Drop pictures from a model; return how many pictures and points are left."""
+    model = require().Reconstruction(str(place))
+    for image in [i for i in model.images.values() if i.name in names]:
+        model.deregister_frame(image.frame_id)
+    model.write_text(str(place))
+    return model.num_reg_images(), model.num_points3D()
+
+
+def _mask_of(image: ColmapImage) -> str:
+    return f"{Path(image.name).stem}.png"
+
+
+def _small(model: ColmapModel, image: ColmapImage) -> tuple[int, int]:
+    lens = model.lens(image)
+    share = min(1.0, LONGEST / max(lens.width, lens.height))
+    return round(lens.width * share), round(lens.height * share)
+
+
+def _camera(model: ColmapModel, image: ColmapImage, size: tuple[int, int]) -> Camera:
+    lens = model.lens(image).resized(*size)
+    return Camera(lens.K, image.world_from_camera, *size)
+
+
+def _mask(path: Path, size: tuple[int, int]) -> UInt8[np.ndarray, "H W"]:
+    with Image.open(path) as mask:
+        return np.asarray(mask.convert("L").resize(size, Image.Resampling.BOX))

@@ -1,0 +1,59 @@
+"""A view that shows the object elsewhere than all others is found by its silhouette."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from corporeal.geometry.silhouette_outliers import outliers, overlaps
+from corporeal.render.camera import camera_of
+from corporeal.render.embree import Stage, identify
+from patterned_scene import OF_SLAB, patterned, ring
+
+COUNT = 16
+
+
+@pytest.fixture(scope="module")
+def seen():
+    """Masks of a block from all around, and their cameras."""
+    stage, aims = Stage(patterned()), ring(np.arange(COUNT) * 360 / COUNT, (160, 120))
+    masks = [np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB) for aim in aims]
+    return np.stack(masks), tuple(camera_of(aim) for aim in aims)
+
+
+def test_right_views_are_kept(seen):
+    overlap = overlaps(*seen)
+    assert overlap.min() > 0.85 * np.median(overlap) and np.median(overlap) > 0.8
+    assert outliers(*seen) == ()
+
+
+def test_views_that_were_put_elsewhere_are_found(seen):
+    masks, cameras = seen
+    shift = np.eye(4)
+    shift[:3, 3] = 0.05, 0.05, 0.0  # as on the next piece of a carpet's pattern: half a block
+    put = list(cameras)
+    for k in (3, 10):
+        put[k] = replace(cameras[k], world_from_camera=shift @ cameras[k].world_from_camera)
+    assert outliers(masks, tuple(put)) == (3, 10)
+
+
+def test_an_inverted_mask_is_found(seen):
+    masks, cameras = seen
+    masks = masks.copy()
+    masks[5] = 255 - masks[5]
+    assert outliers(masks, cameras) == (5,)
+
+
+def test_an_empty_mask_says_nothing(seen):
+    masks, cameras = seen
+    masks = masks.copy()
+    masks[5] = 0
+    assert np.isnan(overlaps(masks, cameras)[5])
+    assert outliers(masks, cameras) == ()
+
+
+def test_nobody_is_blamed_where_half_contradict_the_others_or_few_look(seen):
+    masks, cameras = seen
+    turned = np.concatenate([masks[: COUNT // 2], masks[COUNT // 2 :][::-1, ::-1]])
+    assert outliers(turned, cameras) == ()
+    assert outliers(masks[:7], cameras[:7]) == ()

@@ -1,0 +1,49 @@
+"""Photographs of a painted ball on a mottled floor, made by a test."""
+
+import numpy as np
+
+from corporeal.render.camera import Aim, camera_of
+from corporeal.types import Views
+
+WIDE, HIGH = 96, 72
+RADIUS, FLOOR = 0.5, -0.5
+RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
+
+
+def scene(ball=RED, ground=GREY, seed=0, count=14):
+    """Photographs of a ball on a mottled floor, its true masks, and points on both."""
+    random = np.random.default_rng(seed)
+    mottled = random.uniform(-1, 1, (64, 64, 64))
+    turns = 2.4 * np.arange(count)
+    eyes = np.stack([2.6 * np.cos(turns), 2.6 * np.sin(turns), np.linspace(0.5, 2.0, count)], -1)
+    cameras = tuple(camera_of(Aim(tuple(e), (0.0, 0.0, 0.0), 48.0, WIDE, HIGH)) for e in eyes)
+    pictures, masks, seen = [], [], []
+    for camera in cameras:
+        v, u = np.mgrid[:HIGH, :WIDE] + 0.5
+        local = np.stack([u, v, np.ones_like(u)], axis=-1) @ np.linalg.inv(camera.K).T
+        rays = local @ camera.world_from_camera[:3, :3].T
+        rays /= np.linalg.norm(rays, axis=-1, keepdims=True)
+        eye = camera.world_from_camera[:3, 3]
+        b = rays @ eye
+        inside = b * b - (eye @ eye - RADIUS**2)
+        on = inside > 0
+        with np.errstate(divide="ignore"):
+            down = np.where(rays[..., 2] < 0, (FLOOR - eye[2]) / rays[..., 2], 30.0)
+        far = np.where(on, -b - np.sqrt(np.maximum(inside, 0)), np.minimum(down, 30.0))
+        place = eye + far[..., None] * rays
+        at = (np.floor(place * 16).astype(int) % 64).reshape(-1, 3).T
+        tone = mottled[tuple(at)].reshape(HIGH, WIDE)
+        colour = np.where(on[..., None], ball, ground) * (1 + 0.15 * tone[..., None])
+        light = np.where(on, 0.75 + 0.25 * place[..., 2] / RADIUS, 1.0)
+        noisy = colour * light[..., None] + random.normal(scale=0.01, size=colour.shape)
+        pictures.append(np.round(255 * np.clip(noisy, 0, 1)).astype(np.uint8))
+        masks.append(on)
+        near = np.abs(place).max(axis=-1) < 2
+        seen.append(place[near][random.permutation(near.sum())[:60]])
+    return Views(np.stack(pictures), cameras), np.stack(masks), np.concatenate(seen)
+
+
+def agreement(inside, masks):
+    made = inside > 0.5
+    both, either = (made & masks).sum(axis=(1, 2)), (made | masks).sum(axis=(1, 2))
+    return both / np.maximum(either, 1)

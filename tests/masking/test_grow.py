@@ -1,0 +1,81 @@
+"""Masks grown of a painted ball on a floor of another colour."""
+
+import numpy as np
+import pytest
+from painted_scene import GREY, agreement, scene
+
+from corporeal.errors import UserError
+from corporeal.masking.doubt import doubt
+from corporeal.masking.grow import grow
+from corporeal.masking.pointed import Spot, cut_around, pointed_at
+from corporeal.masking.seeds import looked_at
+from corporeal.masking.total_variation import Cutter
+from corporeal.types import Views
+
+
+@pytest.mark.parametrize("known", [True, False], ids=["points", "no points"])
+def test_what_all_cameras_look_at_is_found(known):
+    views, masks, points = scene()
+    grown = grow(views, looked_at(views, points if known else None))
+    assert grown is not None and doubt(grown) is None
+    assert agreement(grown.inside, masks).mean() > 0.93
+    assert agreement(grown.inside, masks).min() > 0.85
+
+
+def test_what_looks_like_all_around_it_is_doubted():
+    """Without a colour of its own no outline is to be believed."""
+    views, _, _ = scene(ball=GREY)
+    assert doubt(grow(views, looked_at(views, None))) is not None
+
+
+def test_nothing_is_doubted():
+    assert doubt(None) is not None
+
+
+@pytest.mark.parametrize("how", ["point", "box"])
+def test_what_is_pointed_at_in_one_photograph_is_found_in_all(how):
+    views, masks, points = scene()
+    rows, columns = np.nonzero(masks[3])
+    corners = np.array([[columns.mean(), rows.mean()]])
+    if how == "box":
+        low, high = (columns.min() - 4, rows.min() - 4), (columns.max() + 5, rows.max() + 5)
+        corners = np.array([low, high], float)
+    grown = grow(views, pointed_at(views, points, Spot(3, corners)))
+    assert grown is not None
+    assert agreement(grown.inside, masks).mean() > 0.9
+
+
+def test_a_box_leaves_out_what_is_beside_it():
+    """Two balls alike: the box says which one is meant."""
+    picture = np.full((60, 90, 3), 120, np.uint8)
+    v, u = np.mgrid[:60, :90]
+    left, right = np.hypot(u - 25, v - 30) < 12, np.hypot(u - 65, v - 30) < 12
+    picture[left | right] = 200, 40, 30
+    found = cut_around(picture, np.array([[10.0, 15.0], [40.0, 45.0]]))
+    np.testing.assert_array_equal(found, left)
+
+
+def test_pointing_at_what_is_everywhere_is_refused():
+    views = scene()[0]
+    plain = Views(np.full_like(views.rgb, 90), views.cameras)
+    with pytest.raises(UserError, match="cannot be told from what is around it"):
+        pointed_at(plain, None, Spot(0, np.array([[40.0, 30.0], [50.0, 40.0]])))
+
+
+def test_a_cut_is_the_cheapest_of_all():
+    """Against every other mask of a small picture: evidence and outline cost least."""
+    random = np.random.default_rng(3)
+    picture = np.full((1, 3, 4, 3), 100, np.uint8)
+    evidence = random.normal(scale=4.0, size=(1, 3, 4)).astype(np.float32)
+    cutter = Cutter(picture)
+    below, beside = cutter.weights[0]
+
+    def cost(mask):
+        mask = mask.astype(float)
+        outline = (below[:-1] * np.abs(np.diff(mask, axis=0))).sum()
+        outline += (beside[:, :-1] * np.abs(np.diff(mask, axis=1))).sum()
+        return (evidence[0] * mask).sum() + outline
+
+    every = ((np.arange(4096)[:, None] >> np.arange(12)) & 1).reshape(-1, 3, 4)
+    best = min(cost(mask) for mask in every)
+    assert cost(cutter.cut(evidence)[0] > 0.5) == pytest.approx(best, abs=1e-3)

@@ -1,0 +1,161 @@
+"""Masks of a folder of photographs: written, corrected, pointed at, refused."""
+
+import json
+
+import numpy as np
+import pytest
+from painted_scene import GREY, HIGH, WIDE, agreement, scene
+from PIL import Image
+
+from corporeal.cli import main
+from corporeal.errors import UserError
+from corporeal.formats.mask_files import corrected
+from corporeal.formats.photographs import read_photographs
+from corporeal.formats.transforms import write_views
+from corporeal.masking.grown_masks import grown_masks
+from corporeal.masking.pointed import Pointed
+from corporeal.pipeline import Settings, _Run, quiet
+from corporeal.stages.reconstruct import ReconstructConfig, _masks, validate
+from corporeal.types import Views
+
+
+@pytest.fixture
+def photos(tmp_path):
+    views, masks, _ = scene()
+    write_views(tmp_path / "photos", views)
+    return tmp_path / "photos", masks
+
+
+def test_masks_are_written_and_read_as_given_ones(photos, tmp_path):
+    folder, masks = photos
+    made = grown_masks(folder, tmp_path / "made")
+    assert made.folder is not None
+    read = read_photographs(folder, WIDE, made.folder)
+    assert agreement(read.masks / 255, masks).mean() > 0.93
+    assert read_photographs(folder, WIDE, made.folder / "masks").masks is not None
+    assert len(list((made.folder / "masks").glob("*.png"))) == len(masks)
+
+
+def test_masks_lie_on_the_photograph_as_it_is_stored(photos, tmp_path):
+    """With a lens that bends, what is written is bent as the photograph is."""
+    folder, masks = photos
+    file = folder / "transforms.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | {"k1": -0.25}))
+    made = grown_masks(folder, tmp_path / "made")
+    assert made.folder is not None
+    written = [np.asarray(Image.open(p)) for p in sorted((made.folder / "masks").glob("*.png"))]
+    assert agreement(np.stack(written) / 255, masks).mean() > 0.9, "the pixels were not bent"
+
+
+def test_what_was_corrected_is_kept_and_makes_results_stale(photos, tmp_path):
+    folder, _ = photos
+    run = _Run([folder], tmp_path, Settings(), quiet)
+    before = run._borrowed("reconstruct")
+    made = grown_masks(folder, tmp_path / "0-reconstruct")
+    assert run._borrowed("reconstruct") == before, "what was made is no correction"
+    mask = made.folder / "masks" / "0003.png"
+    Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(mask)
+    assert list(corrected(made.folder)) == ["masks/0003.png"]
+    assert run._borrowed("reconstruct") != before
+    again = grown_masks(folder, tmp_path / "0-reconstruct")
+    assert again.said[-1] == "1 of the masks were corrected by hand."
+    assert np.asarray(Image.open(mask)).min() == 255
+
+
+def test_what_cannot_be_told_is_not_written(tmp_path):
+    write_views(tmp_path / "photos", scene(ball=GREY)[0])
+    made = grown_masks(tmp_path / "photos", tmp_path / "made")
+    assert made.folder is None and "No masks were grown" in made.said[0]
+    assert not (tmp_path / "made" / "masks").exists()
+    again = grown_masks(tmp_path / "photos", tmp_path / "made")
+    assert again == made
+
+
+@pytest.mark.parametrize(
+    ("pointed", "words"),
+    [
+        (Pointed("", (200.0, 3.0)), "does not lie in"),
+        (Pointed("", None, (30.0, 30.0, 20.0, 40.0)), "the upper left corner first"),
+        (Pointed("other.png", (2.0, 3.0)), "no photograph 'other.png'"),
+    ],
+)
+def test_a_place_that_is_not_there_is_named(photos, tmp_path, pointed, words):
+    with pytest.raises(UserError, match=words):
+        grown_masks(photos[0], tmp_path / "made", pointed)
+
+
+@pytest.mark.parametrize("lens", [{}, {"k1": -0.2}], ids=["straight", "bent"])
+def test_a_point_is_in_the_pixels_of_the_photograph(photos, tmp_path, lens):
+    folder, masks = photos
+    file = folder / "transforms.json"
+    file.write_text(json.dumps(json.loads(file.read_text()) | lens))
+    rows, columns = np.nonzero(masks[5])
+    made = grown_masks(folder, tmp_path / "made", Pointed("0005", (columns.mean(), rows.mean())))
+    written = [np.asarray(Image.open(p)) for p in sorted((made.folder / "masks").glob("*.png"))]
+    assert agreement(np.stack(written) / 255, masks).mean() > 0.85
+
+
+def type_in(monkeypatch, *words):
+    monkeypatch.setattr("sys.argv", ["corporeal", *map(str, words)])
+    try:
+        main()
+    except SystemExit as end:
+        return end.code or 0
+    return 0
+
+
+def test_the_command_says_how_to_go_on(photos, tmp_path, monkeypatch, capsys):
+    out = tmp_path / "masks"
+    assert type_in(monkeypatch, "masks", photos[0], "--out", out) == 0
+    assert f"corporeal run {photos[0]} --masks {out}" in capsys.readouterr().out.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [
+        (("--at", "1", "2", "--box", "1", "2", "3", "4"), "not both"),
+        (("--at", "999", "2"), "does not lie in"),
+    ],
+)
+def test_bad_words_get_one_sentence(photos, monkeypatch, capsys, words, said):
+    assert type_in(monkeypatch, "masks", photos[0], *words) == 2
+    assert said in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_photographs_without_poses_are_referred(tmp_path, monkeypatch, capsys):
+    views = scene(count=4)[0]
+    (tmp_path / "bare").mkdir()
+    for k, picture in enumerate(views.rgb):
+        Image.fromarray(picture).save(tmp_path / "bare" / f"{k}.png")
+    assert type_in(monkeypatch, "masks", tmp_path / "bare") == 2
+    assert "has no poses" in capsys.readouterr().err.replace("\n", " ")
+
+
+def test_a_run_grows_masks_where_there_are_none(photos, tmp_path):
+    """Unless it was told not to, or there are some."""
+
+    def asked(masks, source=photos[0]):
+        config = ReconstructConfig(masks=masks)
+        return _masks(config, source, tmp_path / "run", lambda fraction, words: None)
+
+    grown = asked("auto")
+    assert grown.grown and grown.folder == tmp_path / "run"
+    assert "There were no masks." in grown.warnings[0]
+    assert asked("none").folder is None
+    assert asked(str(grown.folder)).folder == grown.folder
+    views, masks, _ = scene()
+    owners = np.where(masks, 0, -1).astype(np.int32)
+    write_views(tmp_path / "masked", Views(views.rgb, views.cameras, object_of_pixel=owners))
+    assert asked("auto", tmp_path / "masked").folder is None
+
+
+def test_masks_that_cannot_be_are_refused_before_anything_is_learned(tmp_path):
+    with pytest.raises(UserError, match="There is no folder"):
+        validate(ReconstructConfig(masks=str(tmp_path / "nowhere")))
+
+
+def test_a_folder_without_masks_of_these_photographs_is_refused(photos, tmp_path):
+    (tmp_path / "empty").mkdir()
+    Image.fromarray(np.zeros((HIGH, WIDE), np.uint8)).save(tmp_path / "empty" / "other.png")
+    with pytest.raises(UserError, match="no mask with the name of a photograph"):
+        read_photographs(photos[0], WIDE, tmp_path / "empty")

@@ -1,0 +1,86 @@
+"""A folder of two places is told from one that is seen from all around, before a long search."""
+
+import shutil
+
+import numpy as np
+import pytest
+
+from corporeal.errors import BadFileError
+from corporeal.poses.gather import gather
+from corporeal.poses.groups import SHARED, Groups, groups_of, shared_points
+from corporeal.poses.pose import pose
+from patterned_scene import patterned, photographs, ring
+
+
+def silent(*_):
+    pass
+
+
+def circle(count, reach=3):
+    """Pictures each of which shares points with its neighbours on both sides."""
+    apart = np.abs(np.subtract.outer(np.arange(count), np.arange(count)))
+    apart = np.minimum(apart, count - apart)
+    return np.where((apart > 0) & (apart <= reach), 100, 0)
+
+
+def beside(*blocks):
+    sizes = [len(b) for b in blocks]
+    whole = np.zeros((sum(sizes), sum(sizes)), np.int64)
+    for block, at in zip(blocks, np.cumsum([0, *sizes[:-1]]), strict=True):
+        whole[at : at + len(block), at : at + len(block)] = block
+    return whole
+
+
+def test_one_circle_is_one_place():
+    found = groups_of(circle(40))
+    assert [len(g) for g in found.certain] == [40] and not found.mixed and found.beside == ()
+
+
+def test_two_circles_are_two_places_unless_one_link_joins_them():
+    shared = beside(circle(30), circle(20))
+    found = groups_of(shared)
+    assert found.mixed and [len(g) for g in found.certain] == [30, 20] and found.beside == ()
+    shared[3, 40] = shared[40, 3] = SHARED
+    assert not groups_of(shared).mixed
+
+
+def test_a_small_other_place_is_left_out():
+    found = groups_of(beside(circle(40), circle(8)))
+    assert not found.mixed and found.beside == tuple(range(40, 48))
+
+
+def test_pictures_that_share_little_say_nothing():
+    """As 16 of a banana on a carpet, in groups of 7, 4 and 3 when small: COLMAP places 15."""
+    found = groups_of(beside(circle(7, 1), circle(4, 1), circle(3, 1), np.zeros((2, 2), int)))
+    assert found == Groups(())
+
+
+@pytest.fixture(scope="module")
+def two_places(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("places") / "photos"
+    for k, count in enumerate((14, 12)):
+        aims = ring(np.arange(count) * 20, (320, 240))
+        photographs(folder / f"own{k}", aims, patterned(seed=10 * k))
+        for file in sorted((folder / f"own{k}").iterdir()):
+            shutil.move(file, folder / f"{'ab'[k]}_{file.name}")
+        (folder / f"own{k}").rmdir()
+    return folder
+
+
+def test_two_places_in_one_folder_are_refused_in_one_sentence(two_places, tmp_path):
+    pytest.importorskip("pycolmap")
+    told = "show 2 things or places .* 14 like a_photo_000.jpg, 12 like b_photo_000.jpg"
+    with pytest.raises(BadFileError, match=told) as error:
+        pose(two_places, tmp_path / "poses", silent)
+    assert "folder of their own" in str(error.value) and "\n" not in str(error.value)
+    assert not (tmp_path / "poses" / "plain").exists(), "before the long search"
+
+
+def test_points_are_shared_within_a_place_alone(two_places, tmp_path):
+    pytest.importorskip("pycolmap")
+    gathered = gather(two_places, tmp_path, silent)
+    shared = shared_points(tmp_path, gathered, silent)
+    assert (shared == shared.T).all() and (shared[:14, 14:] < SHARED).all()
+    assert (np.diagonal(shared[:14, :14], 1) >= SHARED).all()
+    again = shared_points(tmp_path, gathered, silent)
+    assert (again == shared).all(), "seeded"

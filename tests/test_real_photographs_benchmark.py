@@ -1,0 +1,89 @@
+"""The table of real photographs: what is measured of a set whose truth is known, and what fails."""
+
+import json
+
+import numpy as np
+import pytest
+import real_measures as measure
+import real_photographs as benchmark
+from PIL import Image
+
+from corporeal.formats.colmap import read_colmap, write_colmap
+from corporeal.geometry.similarity import moved_cameras, similarity
+from corporeal.render.embree import Stage, identify
+from corporeal.splats import training_schedule
+from corporeal.types import Camera
+from patterned_scene import OF_SLAB, patterned, photographs, ring
+
+COUNT = 16
+FACTS = measure.Known(unit=0.5, floor=True, sides=(0.08, 0.1, 0.12), height=0.12)
+
+
+@pytest.fixture(scope="module")
+def sets(tmp_path_factory):
+    """A set of a block whose poses are turned and twice as large; one whose poses are broken."""
+    folder = tmp_path_factory.mktemp("sets")
+    good, bad = folder / "block", folder / "broken"
+    aims = ring(np.arange(COUNT) * 360 / COUNT, (160, 120), height=0.25, away=0.35)
+    cameras = photographs(good / "images", aims)
+    stage = Stage(patterned())
+    for name in ("masks", "sparse/0"):
+        (good / name).mkdir(parents=True)
+    for k, aim in enumerate(aims):
+        mask = np.uint8(255) * (identify(stage, aim)[0] >= OF_SLAB)
+        Image.fromarray(mask).save(good / "masks" / f"photo_{k:03d}.png")
+    rng = np.random.default_rng(0)
+    slab = np.concatenate([rng.uniform(-0.2, 0.2, (400, 2)), np.zeros((400, 1))], axis=1)
+    turn = similarity(np.array([[1, 0, 0], [0, 0, -1], [0, 1.0, 0]]), 2.0, (1.0, 2.0, 3.0))
+    names = tuple(f"photo_{k:03d}.jpg" for k in range(COUNT))
+    seen = slab @ turn[:3, :3].T + turn[:3, 3], np.full((400, 3), 90, np.uint8)
+    write_colmap(good / "sparse" / "0", moved_cameras(cameras, turn), names, *seen)
+    for name in ("images", "sparse/0"):
+        (bad / name).mkdir(parents=True)
+    (bad / "sparse" / "0" / "cameras.txt").write_text("nothing\n")
+    (bad / "sparse" / "0" / "images.txt").write_text("nothing\n")
+    return folder
+
+
+@pytest.mark.slow
+def test_a_row_measures_what_is_known_and_is_kept(sets, tmp_path, monkeypatch):
+    small = training_schedule.Preset(3000, 1, 120, 160)
+    monkeypatch.setitem(training_schedule.PRESETS, "preview", small)
+    monkeypatch.setattr(measure, "known", lambda name: FACTS)
+    row = benchmark.row_of(sets / "block", "all", "preview", tmp_path)
+    assert "why" not in row, row
+    assert row["registered"] == COUNT and row["watertight"] and row["things"] == 1
+    assert row["iou"] > 0.7 and row["up_off_deg"] < 5, row
+    assert abs(row["size_off"]) < 0.2 and row["psnr_thing"] > 12, row
+    monkeypatch.setattr(benchmark, "reconstruct", None)
+    again = benchmark.row_of(sets / "block", "all", "preview", tmp_path)
+    assert again == json.loads(json.dumps(row)), "kept"
+    shown = benchmark.cells(row, COUNT)
+    assert len(shown) == len(benchmark.HEADS) and shown[2] == "16/16" and shown[-1] == ""
+
+
+def test_a_set_that_fails_is_a_row_that_says_why(sets, tmp_path):
+    row = benchmark.row_of(sets / "broken", "all", "preview", tmp_path)
+    assert "sparse/0" in row["why"] or "images" in row["why"]
+    shown = benchmark.cells(row, 0)
+    assert shown[-1] == row["why"] and shown[2] == "–"
+
+
+def test_errors_of_poses_do_not_see_a_similarity_but_a_wrong_camera(sets, tmp_path):
+    given = read_colmap(sets / "block" / "sparse" / "0")
+    cameras = [given.lens(i) for i in given.images]
+    poses = [i.world_from_camera.copy() for i in given.images]
+    poses[3][:3, 3] += 0.5
+    way = similarity(np.array([[0, -1, 0], [1, 0, 0], [0, 0, 1.0]]), 0.3, (4.0, 5.0, 6.0))
+    made = [Camera(s.K, w, s.width, s.height) for s, w in zip(cameras, poses, strict=True)]
+    write_colmap(tmp_path, moved_cameras(made, way), tuple(i.name for i in given.images))
+    found = measure.pose_errors(read_colmap(tmp_path), given)
+    assert found.registered == COUNT and found.right == COUNT - 1
+    assert found.angle < 1e-3 and found.place < 1e-4
+    np.testing.assert_allclose(found.given_from_found @ way, np.eye(4), atol=1e-3)
+
+
+def test_the_floor_is_the_plane_with_most_points(sets):
+    given = read_colmap(sets / "block" / "sparse" / "0")
+    normal = measure.floor_normal(given, np.random.default_rng(0))
+    np.testing.assert_allclose(normal, (0, -1, 0), atol=1e-6)
