@@ -69,7 +69,7 @@ def _check_part(leaf, said, placed):
     if made["material"] is None:
         assert words.answered_by in ("metadata", "unknown")
         by = "typical" if words.material else "fallback"
-        # What the file names and nobody could choose from a list has its values placed all the same.
+        # What the file names, and no list offers, has its values placed all the same.
         spoken = {"recording"} if placed is not None and words.material else set()
         assert {g.chosen_by for g in material.grounds.values()} == {by} | spoken
     else:
