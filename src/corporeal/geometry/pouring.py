@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import distance_transform_edt
 from skimage.measure import marching_cubes
 
 from corporeal.geometry.mesh import Mesh
@@ -49,6 +50,9 @@ def pool(anatomy: Anatomy, member: Member, thickness: float, volume: float) -> P
     axes = [np.arange(a - 1.5 * step, b + 2 * step, step) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     depth = hollow(anatomy, member, thickness, points.reshape(-1, 3)).reshape(points.shape[:3])
+    # The other face of a thin wall is no part of the hollow, however near it is to a sample.
+    away = distance_transform_edt(depth <= 0.0) - 1.0
+    depth = np.where(depth > 0.0, depth, np.minimum(depth, -step * away))
     height = points[..., 2]
     if volume <= 0.0 or taken(depth, step) < volume:
         return None
