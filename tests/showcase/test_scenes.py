@@ -60,7 +60,7 @@ def test_nothing_starts_below_the_floor(scene, name):
 def test_every_substance_is_in_the_library(scene, library, name):
     for surface in scene.surfaces:
         assert surface.extras["substance"] in library
-        assert surface.extras["shell_thickness_m"] >= 0
+        assert surface.extras.get("shell_thickness_m", 0.0) >= 0
 
 
 @pytest.mark.parametrize("name", NAMES)

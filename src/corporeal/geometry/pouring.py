@@ -4,6 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
+from scipy.ndimage import distance_transform_edt
 from skimage.measure import marching_cubes
 
 from corporeal.geometry.mesh import Mesh
@@ -25,14 +26,12 @@ class Pool:
     """Closed; normals outward."""
     volume: float
     """That it is to have [m³]."""
-    room: float
-    """Of the whole hollow [m³]."""
     level: float
     """Height of its surface [m]."""
 
 
-def pool(anatomy: Anatomy, member: Member, thickness: float, fill: float) -> Pool | None:
-    """Fill a share of a vessel's hollow from its bottom; None: it has no hollow.
+def pool(anatomy: Anatomy, member: Member, thickness: float, volume: float) -> Pool | None:
+    """Fill a vessel's hollow from its bottom; None: it has no room for so much.
 
     The hollow is sampled as a signed distance from the vessel's matter, cut off at the level, and
     meshed where it changes its sign (marching cubes: Lorensen and Cline 1987). What lies nearer to
@@ -42,7 +41,7 @@ def pool(anatomy: Anatomy, member: Member, thickness: float, fill: float) -> Poo
         anatomy: The object.
         member: The part whose wall holds it.
         thickness: Of the wall where the mesh shows its outside only [m].
-        fill: Share of the hollow that is taken up, in (0, 1).
+        volume: Of what is in it [m³].
 
     """
     corners = corners_of(member)
@@ -51,18 +50,20 @@ def pool(anatomy: Anatomy, member: Member, thickness: float, fill: float) -> Poo
     axes = [np.arange(a - 1.5 * step, b + 2 * step, step) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     depth = hollow(anatomy, member, thickness, points.reshape(-1, 3)).reshape(points.shape[:3])
+    # The other face of a thin wall is no part of the hollow, however near it is to a sample.
+    away = distance_transform_edt(depth <= 0.0) - 1.0
+    depth = np.where(depth > 0.0, depth, np.minimum(depth, -step * away))
     height = points[..., 2]
-    room = taken(depth, step)
-    if room <= 0.0:
+    if volume <= 0.0 or taken(depth, step) < volume:
         return None
-    level = level_of(depth, height, step, fill * room)
+    level = level_of(depth, height, step, volume)
     inside = np.minimum(depth, level - height)
     vertices, triangles, _, _ = marching_cubes(
         inside, 0.0, spacing=(step,) * 3, gradient_direction="ascent"
     )
     first = np.array([axis[0] for axis in axes])
     mesh = Mesh(np.asarray(vertices, np.float64) + first, np.asarray(triangles, np.int64))
-    return Pool(mesh, fill * room, room, level)
+    return Pool(mesh, volume, level)
 
 
 def hollow(

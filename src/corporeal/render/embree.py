@@ -107,21 +107,19 @@ class Stage:
             there.scene = there._built()
         return there
 
-    def with_liquids(
-        self, gone: np.ndarray, liquids: Sequence[tuple[LiquidSurface, int]]
-    ) -> "Stage":
+    def with_liquids(self, gone: np.ndarray, liquids: Sequence[LiquidSurface]) -> "Stage":
         """Return the stage with surfaces of liquids in place of some of its triangles.
 
         Args:
             gone: Of each triangle (T,), whether it is a liquid's at rest.
-            liquids: New surfaces, behind all that stay, each with its finish.
+            liquids: New surfaces, behind all that stay.
 
         """
         there, first, look = copy(self), len(self.vertices), self.look
         vertices, normals, triangles, finish = [self.vertices], [self.normals], [], []
-        for surface, number in liquids:
+        for surface in liquids:
             triangles.append(surface.triangles.astype(np.int32) + first)
-            finish.append(np.full(len(surface.triangles), number, np.int32))
+            finish.append(np.full(len(surface.triangles), surface.finish, np.int32))
             vertices.append((surface.vertices - self.origin).astype(np.float32))
             normals.append(surface.normals.astype(np.float32))
             first += len(surface.vertices)

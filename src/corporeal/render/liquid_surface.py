@@ -34,6 +34,8 @@ class LiquidSurface:
     normals: Float[np.ndarray, "V 3"]
     """Unit, outward."""
     triangles: Int[np.ndarray, "T 3"]
+    finish: int = 0
+    """Index into the scene's finishes."""
 
 
 NOTHING = LiquidSurface(np.zeros((0, 3)), np.zeros((0, 3)), np.zeros((0, 3), np.int64))

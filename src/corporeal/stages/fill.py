@@ -22,10 +22,10 @@ from corporeal.geometry.sizes import in_scene, is_scaled, scale_of_part
 from corporeal.geometry.survey import Anatomy
 from corporeal.materials import find
 from corporeal.mpm.physics.prescribed import start_velocity
+from corporeal.treatment.loose_contents import in_vessels, pour_out, wetted
 from corporeal.treatment.object_masses import as_heavy_as_stated, implausible_masses
 from corporeal.treatment.plan import Plan, Quality
 from corporeal.treatment.resolution import Accuracy, Bodies, resolve
-from corporeal.treatment.vessels import in_vessels, pour_out, wetted
 from corporeal.types import Material, MaterialField, Particles, Parts, Scene, Treatment
 
 

@@ -11,7 +11,7 @@ ray caster are fixed per pixel, so that nothing flickers.
 import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -249,19 +249,17 @@ class Liquids:
     spacing: float
     """Between particles [m]."""
 
-    def at(self, position: Float[np.ndarray, "P 3"]) -> list[tuple[LiquidSurface, int]]:
-        """Return the surfaces where particles are at some places [m], each with its finish."""
+    def at(self, position: Float[np.ndarray, "P 3"]) -> list[LiquidSurface]:
+        """Return the surfaces where particles are at some places [m]."""
         return [
-            (surface_of(position[mine].astype(np.float64), self.spacing), finish)
+            replace(surface_of(position[mine].astype(np.float64), self.spacing), finish=finish)
             for mine, finish in self.bodies
         ]
 
-    def nearest(
-        self, position: np.ndarray, surfaces: list[tuple[LiquidSurface, int]]
-    ) -> Int[np.ndarray, " N"]:
+    def nearest(self, position: np.ndarray, surfaces: list[LiquidSurface]) -> Int[np.ndarray, " N"]:
         """Particle next to each triangle of those surfaces."""
         found = [np.zeros(0, np.int64)]
-        for (surface, _), (mine, _) in zip(surfaces, self.bodies, strict=True):
+        for surface, (mine, _) in zip(surfaces, self.bodies, strict=True):
             corner = surface.vertices[surface.triangles[:, 0]]
             if len(corner):
                 found.append(mine[KDTree(np.nan_to_num(position[mine])).query(corner)[1]])

@@ -68,14 +68,15 @@ def pour(
             for m in anatomy.members
         }
         member = next(m for m in anatomy.members if m.part == k)
-        lies = pool(anatomy, member, makes[k].thickness, field.structures[k].fill)
+        load, inner = makes[k].held, field.structures[k].contents
+        if load is None or inner is None:
+            continue
+        volume = load.room * field.structures[k].fill
+        lies = pool(anatomy, member, makes[k].thickness, volume)
         if lies is None:
             continue
-        inner = field.structures[k].contents
-        assert inner is not None
-        mass = inner.density * lies.volume
-        load = makes[k].held
-        rest = sum(m.mass for m in makes.values()) - (load.mass if load else 0.0)
+        mass = inner.density * volume
+        rest = sum(m.mass for m in makes.values()) - load.mass
         things[number] = holder = _holder(things[number], mass, rest)
         friction = [combine(inner.friction, mu) for mu in (*own, field.friction[-1, -1])]
         own.append(inner.friction)
