@@ -51,7 +51,7 @@ def pool(anatomy: Anatomy, member: Member, thickness: float, volume: float) -> P
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     depth = hollow(anatomy, member, thickness, points.reshape(-1, 3)).reshape(points.shape[:3])
     # The other face of a thin wall is no part of the hollow, however near it is to a sample.
-    away = distance_transform_edt(depth <= 0.0) - 1.0
+    away = np.asarray(distance_transform_edt(depth <= 0.0)) - 1.0
     depth = np.where(depth > 0.0, depth, np.minimum(depth, -step * away))
     height = points[..., 2]
     if volume <= 0.0 or taken(depth, step) < volume:
