@@ -22,7 +22,7 @@ from corporeal.formats.glb_writer import write_glb
 from corporeal.pool.asset import Asset
 from corporeal.pool.index import index
 from corporeal.settle.mass_properties import MassProperties
-from corporeal.showcase.models import MODELS
+from corporeal.showcase.models import PROPS
 from corporeal.showcase.props import prop
 from corporeal.vlm.sizes import real_extent, usual_sizes
 
@@ -36,7 +36,7 @@ def assets(folders: Sequence[Path], below: Path) -> list[Asset]:
     """Make a pool of the props and of what the folders hold."""
     props = below / "props"
     props.mkdir(parents=True, exist_ok=True)
-    for name in MODELS:
+    for name in PROPS:
         write_glb(props / f"{name}.glb", prop(name))
     return list(index([props, *folders], below / "pool").assets)
 

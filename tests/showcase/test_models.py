@@ -26,6 +26,10 @@ TABLE = {
     "book": (954.2, (158, 210, 32)),
     "mug": (139.2, (113, 82, 94)),
     "cushion": (17630, (469, 469, 154)),
+    "tumbler": (84.9, (70, 70, 100)),
+    "honey": (110.2, (40, 40, 90)),
+    "ketchup": (164.1, (60, 60, 60)),
+    "wooden_ball": (65.2, (50, 50, 50)),
 }
 
 
@@ -33,7 +37,7 @@ def picture_bytes(part):
     return b"" if part.finish.texture is None else part.finish.texture.tobytes()
 
 
-def test_the_menu_has_the_eighteen_props():
+def test_the_menu_has_all_props():
     assert set(MODELS) == set(TABLE)
 
 

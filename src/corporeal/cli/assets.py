@@ -168,14 +168,14 @@ def _count(number: int, word: str, words: str = "") -> str:
 
 
 def _props() -> None:
-    """Write the showcase's own eighteen models as files: something to make a first pool of.
+    """Write the showcase's own twenty models as files: something to make a first pool of.
 
     corporeal assets props props/
     corporeal assets index props/
     corporeal assemble --from pool/ --seed 7
     """
     from corporeal.formats.glb_writer import write_glb
-    from corporeal.showcase.models import MODELS
+    from corporeal.showcase.models import PROPS
     from corporeal.showcase.props import prop
     from corporeal.store import writing
 
@@ -186,10 +186,10 @@ def _props() -> None:
     asked = parse(Props, "assets props", _props.__doc__, words=2)
     with progress_bars() as tell, writing(asked.folder):
         progress = tell("props")
-        for k, name in enumerate(MODELS):
-            progress(k / len(MODELS), name)
+        for k, name in enumerate(PROPS):
+            progress(k / len(PROPS), name)
             path = asked.folder / name.replace("_", " ") / f"{name}.glb"
             path.parent.mkdir(parents=True, exist_ok=True)
             write_glb(path, prop(name))
-    print(f"{len(MODELS)} models in {asked.folder}. Go on with: corporeal assets index "
+    print(f"{len(PROPS)} models in {asked.folder}. Go on with: corporeal assets index "
           f"{asked.folder}")  # fmt: skip

@@ -7,13 +7,15 @@ from jaxtyping import Float
 from scipy.ndimage import distance_transform_edt
 from skimage.measure import marching_cubes
 
-from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.room import corners_of, is_vessel, reachable
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.survey import Anatomy, Member
 
 ACROSS = 48
 """Samples along the longest side of the vessel."""
+CORRECTIONS = 3
+"""Of the level, by the volume of the mesh below it."""
 HALVINGS = 40
 """Of the interval that the level is looked for in."""
 
@@ -57,13 +59,22 @@ def pool(anatomy: Anatomy, member: Member, thickness: float, volume: float) -> P
     if volume <= 0.0 or taken(depth, step) < volume:
         return None
     level = level_of(depth, height, step, volume)
-    inside = np.minimum(depth, level - height)
+    first = np.array([axis[0] for axis in axes])
+    for _ in range(CORRECTIONS):
+        # Corners of the samples' cubes are cut off by the mesh: its level makes up for them.
+        mesh = _meshed(np.minimum(depth, level - height), step, first)
+        wide = taken(np.minimum(depth, level + step - height), step) - volume
+        level += step * (volume - signed_volume(mesh)) / wide if wide > 0.0 else 0.0
+    mesh = _meshed(np.minimum(depth, level - height), step, first)
+    return Pool(mesh, volume, level)
+
+
+def _meshed(inside: np.ndarray, step: float, first: Float[np.ndarray, "3"]) -> Mesh:
+    """Surface where samples change their sign, ``step`` [m] apart from ``first`` [m] on."""
     vertices, triangles, _, _ = marching_cubes(
         inside, 0.0, spacing=(step,) * 3, gradient_direction="ascent"
     )
-    first = np.array([axis[0] for axis in axes])
-    mesh = Mesh(np.asarray(vertices, np.float64) + first, np.asarray(triangles, np.int64))
-    return Pool(mesh, volume, level)
+    return Mesh(np.asarray(vertices, np.float64) + first, np.asarray(triangles, np.int64))
 
 
 def hollow(

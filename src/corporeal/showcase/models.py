@@ -29,3 +29,6 @@ MODELS: dict[str, Callable[[], Model]] = {
     "ketchup": tableware.ketchup,
     "wooden_ball": tableware.wooden_ball,
 }
+POURED = ("honey", "ketchup")
+"""Models of what has no shape of its own: they are no props of a pool."""
+PROPS = {name: build for name, build in MODELS.items() if name not in POURED}
