@@ -5,7 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from corporeal.geometry.silhouette_outliers import outliers, overlaps
+from corporeal.geometry.silhouette_outliers import compare, outliers
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
 from patterned_scene import OF_SLAB, patterned, ring
@@ -22,7 +22,7 @@ def seen():
 
 
 def test_right_views_are_kept(seen):
-    overlap = overlaps(*seen)
+    overlap = compare(*seen).overlap
     assert overlap.min() > 0.85 * np.median(overlap) and np.median(overlap) > 0.8
     assert outliers(*seen) == ()
 
@@ -48,7 +48,7 @@ def test_an_empty_mask_says_nothing(seen):
     masks, cameras = seen
     masks = masks.copy()
     masks[5] = 0
-    assert np.isnan(overlaps(masks, cameras)[5])
+    assert np.isnan(compare(masks, cameras).overlap[5])
     assert outliers(masks, cameras) == ()
 
 
@@ -57,3 +57,21 @@ def test_nobody_is_blamed_where_half_contradict_the_others_or_few_look(seen):
     turned = np.concatenate([masks[: COUNT // 2], masks[COUNT // 2 :][::-1, ::-1]])
     assert outliers(turned, cameras) == ()
     assert outliers(masks[:7], cameras[:7]) == ()
+
+
+def test_no_holes_are_seen_where_a_step_of_the_grid_is_more_than_a_pixel(seen):
+    """The object fills the picture; with pictures of 128 pixels up to 8 % of a mask were holes."""
+    masks, cameras = seen
+    rows, columns = np.nonzero(masks.any(axis=0))
+    low, high = np.array([columns.min(), rows.min()]), np.array([columns.max(), rows.max()]) + 1
+    closer = masks[:, low[1] : high[1], low[0] : high[0]]
+    closer = np.repeat(np.repeat(closer, 4, axis=1), 4, axis=2)
+    assert compare(closer, tuple(_cut(c, low, high, 4) for c in cameras)).filled.min() > 0.96
+
+
+def _cut(camera, low, high, finer):
+    """Give the camera of a part of its picture, with more pixels."""
+    K = np.diag([finer, finer, 1.0]) @ camera.K
+    K[:2, 2] -= finer * low
+    width, height = (finer * (high - low)).tolist()
+    return replace(camera, K=K, width=width, height=height)
