@@ -1,5 +1,6 @@
 """Runs of a showcase scene with one known fault: simulated, or made from the frames of a run."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -17,7 +18,7 @@ FIXED = ("centre", "momentum", "gap")
 
 
 @dataclass
-class Changed:
+class Changed(Sequence):
     """Frames of a trajectory, changed one by one when they are read."""
 
     frames: object
