@@ -423,7 +423,7 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
         Demand(
             "The ketchup stays a heap: its height",
             of("ketchup", "height_m"),
-            0.016,
+            0.018,
             0.027,
             "mm",
             "squashed",
