@@ -13,7 +13,7 @@ from corporeal.findings import Audit, Expectation, Outcome
 from corporeal.mpm.constants import PARTICLE_RADIUS
 from corporeal.pipeline import FOLDERS, Settings
 from corporeal.showcase.expectations import expect
-from corporeal.store import DATA, load, read_meta
+from corporeal.store import read_meta
 from corporeal.trajectory.audit import believed
 from corporeal.trajectory.audit_file import read_audit
 from corporeal.trajectory.frames import read_trajectory
@@ -62,10 +62,11 @@ def tell(name: str, folder: Path, settings: Settings) -> Told:
     silent = lambda verb: lambda fraction, words: None  # noqa: E731
     pipeline.run([scene], folder, settings, silent, until="simulate")
     simulated = folder / FOLDERS["simulate"]
+    prepared = pipeline.read_back(folder).prepared  # with what lies in vessels
     return Told(
         name,
-        load(folder / FOLDERS["assemble"] / DATA),
-        load(folder / FOLDERS["fill"] / DATA),
+        prepared.scene,
+        prepared.particles,
         read_trajectory(simulated),
         read_audit(simulated),
         read_meta(simulated).seconds,
