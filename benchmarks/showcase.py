@@ -86,7 +86,7 @@ def page(rows: list[dict], details: list[str]) -> None:
     first = [r for r in rows if r["detail"] == details[0]]
     tables = (
         f"At detail {details[0]}, seed 0:\n\n{seen_table(first)}\n\n"
-        f"What it cost, on {cores()} core{"s" if cores() > 1 else ""}:\n\n{cost_table(rows)}\n"
+        f"What it cost, on {cores()} core{'s' if cores() > 1 else ''}:\n\n{cost_table(rows)}\n"
     )
     PAGE.write_text(f"{before}{BEGIN}\n\n{tables}\n{END}{after}", encoding="utf-8")
 
