@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from corporeal.mpm.constants import SWEEPS
-from corporeal.mpm.physics import contact
+from corporeal.mpm.physics import contact, contact_impulses
 from corporeal.mpm.problem import Problem
 from corporeal.mpm.reference.engine import ReferenceEngine
 from laws.bodies import RUBBER, Stuff, ball, body, disc, problem, walls
@@ -97,11 +97,11 @@ def crowded_node(bodies: int, trials: int, sweeps: int = SWEEPS) -> NodeSolve:
         mass = 10 ** rng.uniform(-2, 2, bodies)
         before = rng.standard_normal((bodies, 3))
         still = np.zeros((bodies, 3))
-        movers = contact.Movers(
+        movers = contact_impulses.Movers(
             1 / mass, np.zeros((bodies, 3, 3)), still, before.copy(), still.copy()
         )
         contacts = _all_pairs(bodies, rng)
-        contact.solve(contacts, movers, np.zeros(len(contacts.a)), sweeps)
+        contact_impulses.solve(contacts, movers, np.zeros(len(contacts.a)), sweeps)
         after, energy = movers.velocity, mass @ np.sum(before**2, axis=1)
         left = np.sum(contacts.approach(movers) * contacts.normal, axis=1).max()
         found.append(
@@ -115,12 +115,12 @@ def crowded_node(bodies: int, trials: int, sweeps: int = SWEEPS) -> NodeSolve:
     return NodeSolve(float(momentum.max()), float(kinetic.max()), float(residual.mean()))
 
 
-def _all_pairs(bodies: int, rng: np.random.Generator) -> contact.Contacts:
+def _all_pairs(bodies: int, rng: np.random.Generator) -> contact_impulses.Contacts:
     a, c = np.triu_indices(bodies, 1)
     n = len(a)
     own = contact.unit(rng.standard_normal((bodies, 3)))
     normal = contact.unit(own[a] - own[c])
-    return contact.Contacts(a, c, np.zeros((n, 3)), normal, np.zeros(n), np.full(n, 0.3))
+    return contact_impulses.Contacts(a, c, np.zeros((n, 3)), normal, np.zeros(n), np.full(n, 0.3))
 
 
 def node_of_many_bodies(quick: bool = False) -> Outcome:

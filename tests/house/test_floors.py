@@ -54,6 +54,7 @@ TWINS = {
     "inclusions.py": "the solver's rooms mirror one another",
     "rigid.py": "the solver's rooms mirror one another",
     "contact.py": "the solver's rooms mirror one another; the library has measured pairs",
+    "contact_impulses.py": "the solver's rooms mirror one another",
     # What a verb does stands in stages, how a person asks for it in cli.
     "export.py": "a verb, and how it is asked for",
     "assemble.py": "a verb, how it is asked for, and the same for a corpus",

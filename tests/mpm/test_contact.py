@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from corporeal.mpm.physics import contact
+from corporeal.mpm.physics import contact, contact_impulses
 
 RNG = np.random.default_rng
 
@@ -116,7 +116,7 @@ def some_movers(count, rng, rigid=False):
     velocity[-1], spin[-1] = 0.0, 0.0
     if not rigid:
         spin[:] = 0.0
-    return contact.Movers(
+    return contact_impulses.Movers(
         np.append(1.0 / 10 ** rng.uniform(-2, 2, count), 0.0),
         inertia,
         rng.standard_normal((count + 1, 3)),
@@ -133,7 +133,7 @@ def some_contacts(movers, rng, wall=False, friction=0.6):
     n = len(pairs)
     normal = contact.unit(rng.standard_normal((n, 3)))
     point = np.tile(rng.standard_normal(3), (n, 1))
-    return contact.Contacts(a, c, point, normal, np.zeros(n), np.full(n, friction))
+    return contact_impulses.Contacts(a, c, point, normal, np.zeros(n), np.full(n, friction))
 
 
 def kinetic(movers):
@@ -157,7 +157,7 @@ def test_any_bodies_in_one_node_conserve_momentum_and_never_gain_energy(count, s
     contacts = some_contacts(movers, rng)
     before, energy = momentum(movers), kinetic(movers)
     scale = np.sum(np.abs(movers.velocity[:-1]) / movers.inverse_mass[:-1, None])
-    impulse = contact.solve(contacts, movers, np.zeros(len(contacts.a)), 10)
+    impulse = contact_impulses.solve(contacts, movers, np.zeros(len(contacts.a)), 10)
     assert np.abs(momentum(movers) - before).max() < 1e-12 * scale
     assert kinetic(movers) <= energy * (1 + 1e-12)
     normal = np.sum(impulse * contacts.normal, axis=1)
@@ -172,7 +172,7 @@ def test_rigid_bodies_and_a_wall_solved_together_never_gain_energy(seed):
     movers = some_movers(3, rng, rigid=True)
     contacts = some_contacts(movers, rng, wall=True)
     energy = kinetic(movers)
-    contact.solve(contacts, movers, np.zeros(len(contacts.a)), 50)
+    contact_impulses.solve(contacts, movers, np.zeros(len(contacts.a)), 50)
     assert kinetic(movers) <= energy * (1 + 1e-12)
     assert np.all(movers.velocity[-1] == 0.0) and np.all(movers.spin[-1] == 0.0)
 
@@ -191,20 +191,20 @@ def test_rigid_bodies_keep_their_angular_momentum_together():
         return total.sum(axis=0) + np.sum(own, axis=0)
 
     before = angular()
-    contact.solve(contacts, movers, np.zeros(len(contacts.a)), 20)
+    contact_impulses.solve(contacts, movers, np.zeros(len(contacts.a)), 20)
     assert np.abs(angular() - before).max() < 1e-11 * np.abs(before).max()
 
 
 def test_a_pair_shares_velocity_along_the_normal_as_their_masses_say():
     """J_n = m_r u·n, J_t = min(μ J_n, m_r |u_t|)."""
-    movers = contact.Movers(
+    movers = contact_impulses.Movers(
         np.array([1.0, 0.25, 0.0]),
         np.zeros((3, 3, 3)),
         np.zeros((3, 3)),
         np.array([[1.0, 2.0, 0.0], [0.0, 0.0, 0.0], [0.0, 0.0, 0.0]]),
         np.zeros((3, 3)),
     )
-    contacts = contact.Contacts(
+    contacts = contact_impulses.Contacts(
         np.array([0]),
         np.array([1]),
         np.zeros((1, 3)),
@@ -212,7 +212,7 @@ def test_a_pair_shares_velocity_along_the_normal_as_their_masses_say():
         np.zeros(1),
         np.array([0.5]),
     )
-    impulse = contact.solve(contacts, movers, np.zeros(1), 1)
+    impulse = contact_impulses.solve(contacts, movers, np.zeros(1), 1)
     reduced = 4.0 / 5.0
     assert impulse[0] == pytest.approx([reduced, 0.5 * reduced, 0.0])
     assert movers.velocity[0, 0] == pytest.approx(movers.velocity[1, 0])
@@ -224,12 +224,12 @@ def test_bodies_that_move_apart_are_left_alone():
     contacts = some_contacts(movers, rng)
     apart = contacts._replace(normal=-contact.unit(contacts.approach(movers)))
     before = movers.velocity.copy()
-    assert not contact.solve(apart, movers, np.zeros(1), 5).any()
+    assert not contact_impulses.solve(apart, movers, np.zeros(1), 5).any()
     assert np.array_equal(movers.velocity, before)
 
 
 def test_an_open_gap_may_close_but_not_overlap():
-    contacts = contact.Contacts(
+    contacts = contact_impulses.Contacts(
         np.zeros(3, int),
         np.ones(3, int),
         np.zeros((3, 3)),
@@ -237,15 +237,15 @@ def test_an_open_gap_may_close_but_not_overlap():
         np.array([0.01, -0.005, 0.5]),
         np.zeros(3),
     )
-    soft = contact.Rebound(np.zeros(3, int), *np.zeros((3, 3)))
-    target, hit = contact.target_speeds(contacts, np.full(3, 2.0), soft, 0.1, 0.01)
+    soft = contact_impulses.Rebound(np.zeros(3, int), *np.zeros((3, 3)))
+    target, hit = contact_impulses.target_speeds(contacts, np.full(3, 2.0), soft, 0.1, 0.01)
     assert target == pytest.approx([1.0, 0.0, 50.0])
     assert not hit.any()
 
 
 def test_one_impact_is_one_event_for_all_near_contacts_of_a_rigid_pair():
     cell, dt, e = 0.1, 0.01, 0.8
-    contacts = contact.Contacts(
+    contacts = contact_impulses.Contacts(
         np.zeros(4, int),
         np.ones(4, int),
         np.zeros((4, 3)),
@@ -253,15 +253,15 @@ def test_one_impact_is_one_event_for_all_near_contacts_of_a_rigid_pair():
         np.array([0.0, 0.009, 0.05, 0.0]),
         np.zeros(4),
     )
-    rebound = contact.Rebound(np.array([0, 0, 0, 1]), np.full(4, e), *np.zeros((2, 4)))
+    rebound = contact_impulses.Rebound(np.array([0, 0, 0, 1]), np.full(4, e), *np.zeros((2, 4)))
     approach = np.array([0.5, 0.5, 0.5, 0.04])  # the other pair is too slow to bounce
-    target, hit = contact.target_speeds(contacts, approach, rebound, cell, dt)
+    target, hit = contact_impulses.target_speeds(contacts, approach, rebound, cell, dt)
     assert hit.tolist() == [True, True, True, False]
     assert target == pytest.approx([-0.4, -0.4, 5.0, 0.0])
 
 
 def test_nothing_rebounds_from_the_gravity_of_a_single_step():
-    contacts = contact.Contacts(
+    contacts = contact_impulses.Contacts(
         np.zeros(1, int),
         np.ones(1, int),
         np.zeros((1, 3)),
@@ -269,33 +269,35 @@ def test_nothing_rebounds_from_the_gravity_of_a_single_step():
         np.zeros(1),
         np.zeros(1),
     )
-    rebound = contact.Rebound(np.zeros(1, int), np.ones(1), np.array([0.3]), np.zeros(1))
-    target, hit = contact.target_speeds(contacts, np.array([0.33]), rebound, 0.1, 0.01)
+    rebound = contact_impulses.Rebound(np.zeros(1, int), np.ones(1), np.array([0.3]), np.zeros(1))
+    target, hit = contact_impulses.target_speeds(contacts, np.array([0.33]), rebound, 0.1, 0.01)
     assert not hit.any() and target[0] == 0.0
 
 
 def test_what_rolls_on_its_points_does_not_bounce_on_the_next_one():
-    contacts = contact.Contacts(
+    contacts = contact_impulses.Contacts(
         np.zeros(1, int), np.ones(1, int), *np.zeros((1, 1, 3)), np.array([[0.0, 0.0, -1.0]]),
         np.zeros(1), np.zeros(1),
     )  # fmt: skip
     for feigned, rebounds in ((0.2, True), (0.3, False)):
-        rebound = contact.Rebound(
+        rebound = contact_impulses.Rebound(
             np.zeros(1, int), *np.ones((1, 1)), np.zeros(1), np.array([feigned])
         )
-        _, hit = contact.target_speeds(contacts, np.array([0.3]), rebound, 0.1, 0.01)
+        _, hit = contact_impulses.target_speeds(contacts, np.array([0.3]), rebound, 0.1, 0.01)
         assert hit[0] == rebounds
 
 
 def balls_that_touch(count):
     """Balls of 1 kg side by side along x, contacts between neighbours, and how they rebound."""
     still = np.zeros((count, 3))
-    movers = contact.Movers(
+    movers = contact_impulses.Movers(
         np.ones(count), np.zeros((count, 3, 3)), still, still.copy(), still.copy()
     )
     first, n = np.arange(count - 1), count - 1
     along = np.tile([1.0, 0.0, 0.0], (n, 1))
-    contacts = contact.Contacts(first, first + 1, np.zeros((n, 3)), along, np.zeros(n), np.zeros(n))
+    contacts = contact_impulses.Contacts(
+        first, first + 1, np.zeros((n, 3)), along, np.zeros(n), np.zeros(n)
+    )
     return movers, contacts
 
 
@@ -309,10 +311,10 @@ def test_a_blow_runs_through_a_row_of_touching_balls_to_the_last(e):
     count = 6
     movers, contacts = balls_that_touch(count)
     movers.velocity[0, 0] = 2.0
-    rebound = contact.Rebound(
+    rebound = contact_impulses.Rebound(
         np.arange(count - 1), np.full(count - 1, e), *np.zeros((2, count - 1))
     )
-    impulse = contact.solve_impacts(contacts, movers, rebound, 0.1, 1e-3)
+    impulse = contact_impulses.solve_impacts(contacts, movers, rebound, 0.1, 1e-3)
     u = movers.velocity[:, 0] / 2.0
     assert u.sum() == pytest.approx(1.0, rel=1e-12)
     assert np.diff(u).min() * 2.0 > -0.05
@@ -326,7 +328,7 @@ def test_solved_at_once_a_row_of_touching_balls_would_share_the_blow():
     """The control: all five balls rebound in one solve."""
     movers, contacts = balls_that_touch(5)
     movers.velocity[0, 0] = 1.0
-    contact.solve(contacts, movers, np.array([-1.0, 0.0, 0.0, 0.0]), 2000)
+    contact_impulses.solve(contacts, movers, np.array([-1.0, 0.0, 0.0, 0.0]), 2000)
     assert movers.velocity[:, 0] == pytest.approx([-0.6, 0.4, 0.4, 0.4, 0.4], abs=1e-6)
 
 
@@ -337,8 +339,8 @@ def test_a_ball_that_hits_two_at_once_pushes_both_alike():
     normal = np.array([[np.cos(angle), s * np.sin(angle), 0.0] for s in (1, -1)])
     contacts = contacts._replace(a=np.zeros(2, int), normal=normal)
     movers.velocity[0, 0] = 1.0
-    rebound = contact.Rebound(np.arange(2), np.ones(2), *np.zeros((2, 2)))
-    contact.solve_impacts(contacts, movers, rebound, 0.1, 1e-3)
+    rebound = contact_impulses.Rebound(np.arange(2), np.ones(2), *np.zeros((2, 2)))
+    contact_impulses.solve_impacts(contacts, movers, rebound, 0.1, 1e-3)
     size = np.linalg.norm(movers.velocity[1:], axis=1)
     expected = 2.0 * np.cos(angle) / (1.0 + 2.0 * np.cos(angle) ** 2)
     assert size == pytest.approx([expected] * 2, rel=1e-9)
@@ -353,9 +355,9 @@ def test_the_friction_loss_is_the_energy_that_is_missing():
         normal=contact.unit(contacts.approach(movers) + rng.standard_normal((1, 3)) * 0.3)
     )
     before, energy = contacts.approach(movers), kinetic(movers)
-    impulse = contact.solve(contacts, movers, np.zeros(1), 5)
+    impulse = contact_impulses.solve(contacts, movers, np.zeros(1), 5)
     after = contacts.approach(movers)
-    tangential = contact.friction_loss(impulse, contacts.normal, before, after)
+    tangential = contact_impulses.friction_loss(impulse, contacts.normal, before, after)
     along = np.sum(impulse * contacts.normal) * np.sum((before + after) * contacts.normal) / 2
     assert impulse.any() and tangential > 0
     assert energy - kinetic(movers) == pytest.approx(tangential + along, rel=1e-12)

@@ -7,7 +7,7 @@ import pytest
 
 from corporeal.mpm import constants, formulas
 from corporeal.mpm.formulas import one_lane
-from corporeal.mpm.physics import contact, grips, rigid, spline, springs, wind
+from corporeal.mpm.physics import contact, contact_impulses, grips, rigid, spline, springs, wind
 from corporeal.mpm.warp_start import wp
 
 wp.set_module_options(formulas.options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast"))
@@ -195,7 +195,7 @@ def test_one_projection_onto_coulombs_cone_is_that_of_numpy(rng):
     heavy, mu = rng.uniform(0.5, 2.0, COUNT), rng.uniform(0.0, 1.5, COUNT)
     exact = np.empty((COUNT, 3))
     for i in range(COUNT):
-        movers = contact.Movers(
+        movers = contact_impulses.Movers(
             np.array([1.0 / heavy[i], 0.0]),
             np.zeros((2, 3, 3)),
             np.zeros((2, 3)),
@@ -204,8 +204,10 @@ def test_one_projection_onto_coulombs_cone_is_that_of_numpy(rng):
         )
         # ``solve`` begins with no impulse: from u + J/m the first projection gives J's next value.
         pair = (np.array([value]) for value in (0, 1))
-        one = contact.Contacts(*pair, np.zeros((1, 3)), n[i : i + 1], np.zeros(1), mu[i : i + 1])
-        exact[i] = contact.solve(one, movers, np.array([0.1]), 1)[0]
+        one = contact_impulses.Contacts(
+            *pair, np.zeros((1, 3)), n[i : i + 1], np.zeros(1), mu[i : i + 1]
+        )
+        exact[i] = contact_impulses.solve(one, movers, np.array([0.1]), 1)[0]
     numbers = [sent(value, wp.float64) for value in (1.0 / heavy, mu)]
     found = run(
         projections,
@@ -236,12 +238,12 @@ def test_what_rebounds_and_how_fast_is_as_in_numpy(rng):
     u, kick = rng.uniform(-0.3, 1.0, COUNT), rng.uniform(-0.1, 0.1, COUNT)
     e = rng.uniform(0.1, 1.0, COUNT) * (rng.uniform(size=COUNT) > 0.2)
     gap = rng.uniform(-0.2, 0.2, COUNT) * dx
-    contacts = contact.Contacts(
+    contacts = contact_impulses.Contacts(
         *[np.zeros((COUNT, *shape)) for shape in [()] * 2 + [(3,)] * 2 + [()] * 2]
     )
     feigned = rng.uniform(0.0, 0.2, COUNT)
-    rebound = contact.Rebound(np.arange(COUNT), e, kick, feigned)
-    exact, hit = contact.target_speeds(contacts._replace(gap=gap), u, rebound, dx, dt)
+    rebound = contact_impulses.Rebound(np.arange(COUNT), e, kick, feigned)
+    exact, hit = contact_impulses.target_speeds(contacts._replace(gap=gap), u, rebound, dx, dt)
     assert 0.1 < hit.mean() < 0.9 and (exact[hit] < 0.0).all() and (exact[~hit] >= 0.0).all()
     given = [sent(value, wp.float64) for value in (e, u, kick, feigned, gap)]
     found = run(targets, *given, dt, dx, out=(COUNT, wp.float64))

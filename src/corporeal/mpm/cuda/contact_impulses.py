@@ -5,7 +5,7 @@ projected Gauss–Seidel. Rigid bodies couple many nodes. There every sweep is a
 a body with n busy contacts lends each of them an n-th of its mass (mass splitting, Tonge et al.
 2012, "Mass splitting for jitter-free parallel rigid body simulation"): it converges whatever the
 order of threads, and each impulse moves the whole body, so momentum is exact. Impacts of rigid
-bodies come first, in rounds of such sweeps: see ``physics.contact.solve_impacts``.
+bodies come first, in rounds of such sweeps: see ``physics.contact_impulses.solve_impacts``.
 """
 
 from corporeal.mpm import constants, formulas

@@ -1,16 +1,14 @@
-"""Contact between fields on grid nodes: where a face lies, which way it looks, what it transmits.
+"""Contact between fields on grid nodes: where a face lies, and which way it looks.
 
 A pair of fields (a, c) meets at a node; n points from a to c. Every field shows itself there by
-its mean offset X̄ from the node and by its outward volume gradient g. Walls are half spaces.
+its mean offset X̄ from the node and by its outward volume gradient g. Walls are half spaces. What
+is transmitted: ``contact_impulses``.
 """
 
-from dataclasses import dataclass
-from math import gcd
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
-from numba import njit
+from jaxtyping import Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.mpm.constants import (
@@ -18,18 +16,12 @@ from corporeal.mpm.constants import (
     FACE_STEPS,
     FIRST_BIAS,
     HELD_BY_WALL,
-    IMPACTS,
     LATTICE_GAP,
     LATTICE_SLOPE,
     LATTICE_START,
     LIKE_HALF_SPACE,
     OTHER_BIAS,
-    PATCH,
-    SCATTER,
-    SLOWEST_BOUNCE,
-    SMALLEST_SLIP,
     SMALLEST_WEIGHT,
-    SWEEPS_OF_A_HIT,
     TINY,
     WALL_REACH,
     WETTED_FACES,
@@ -264,258 +256,3 @@ def smooth_normals(normal: Vectors, weight: Scalars, index: Int[np.ndarray, "E 3
         found = flat[other] == there
         mean += np.where(found, weight[other], 0.0)[:, None] * normal[other]
     return unit(mean)
-
-
-# ---------------------------------------------------------------- what it transmits
-
-
-@dataclass
-class Movers:
-    """D things that impulses move: grid nodes (no inertia), rigid bodies, one immovable wall."""
-
-    inverse_mass: Float[np.ndarray, " D"]
-    """[1/kg]; 0: immovable."""
-    inverse_inertia: Float[np.ndarray, "D 3 3"]
-    """World frame [1/(kg m²)]; 0 for a node."""
-    centre: Float[np.ndarray, "D 3"]
-    """[m]"""
-    velocity: Float[np.ndarray, "D 3"]
-    """Of the centre [m/s]; changed by ``solve``."""
-    spin: Float[np.ndarray, "D 3"]
-    """[rad/s]; changed by ``solve``."""
-
-    def velocity_at(
-        self, mover: Int[np.ndarray, " E"], point: Float[np.ndarray, "E 3"]
-    ) -> Float[np.ndarray, "E 3"]:
-        """V + ω × r of each mover at a point [m/s]."""
-        arm = point - self.centre[mover]
-        return self.velocity[mover] + np.cross(self.spin[mover], arm)
-
-
-class Contacts(NamedTuple):
-    """E places where two movers touch or are about to."""
-
-    a: Indices
-    """Mover the normal points away from."""
-    c: Indices
-    """Mover the normal points to."""
-    point: Vectors
-    """[m]"""
-    normal: Vectors
-    """Unit, a → c."""
-    gap: Scalars
-    """Open distance at the start of the step [m]."""
-    friction: Scalars
-    """Coulomb μ."""
-    group: Indices | None = None
-    """Contacts of one pair of bodies, found in one way, are swept together, groups one after the
-    other; None: all are one group."""
-
-    def approach(self, movers: Movers) -> Vectors:
-        """Slip and approach together: u = v_a - v_c [m/s]."""
-        return movers.velocity_at(self.a, self.point) - movers.velocity_at(self.c, self.point)
-
-    def repeated(self, times: int) -> "Contacts":
-        """Say everything several times, one block after the other."""
-        columns = {k: column for k, column in self._asdict().items() if column is not None}
-        return Contacts(**{k: np.concatenate([column] * times) for k, column in columns.items()})
-
-
-class Rebound(NamedTuple):
-    """What decides whether rigid contacts bounce in this step."""
-
-    pair: Indices
-    """Which pair of bodies the contact belongs to."""
-    restitution: Scalars
-    """Newton's e; 0 unless both partners are rigid or a wall."""
-    kick: Scalars
-    """Approach speed that gravity and pushes added in this step [m/s]."""
-    feigned: Scalars
-    """Speed at which a body that rolls on its surface points meets the next one [m/s]: its spin
-    times their distance. What closes no faster than that and .05 m/s does not rebound."""
-
-
-def target_speeds(
-    contacts: Contacts, speed: Scalars, rebound: Rebound, cell: float, dt: float
-) -> tuple[Scalars, Bool[np.ndarray, " E"]]:
-    """Give the normal speed each contact may keep [m/s], and whose pairs are in an impact.
-
-    An open gap may close within the step, max(g, 0)/dt. Where one contact of a rigid pair closes
-    with v_app > .05 m/s, all its contacts within .1 dx or closing get -e v_app: one impact is one
-    event. v_app leaves out this step's gravity, so that nothing rebounds faster than it fell.
-
-    Args:
-        contacts: Where things touch.
-        speed: At which they approach along n [m/s].
-        rebound: How they rebound.
-        cell: dx [m].
-        dt: [s]
-
-    """
-    approach = speed - np.maximum(rebound.kick, 0.0)
-    closing = speed * dt > contacts.gap
-    fast = (approach > SLOWEST_BOUNCE + rebound.feigned) & (rebound.restitution > 0.0)
-    hit = np.isin(rebound.pair, rebound.pair[closing & fast])
-    bounces = hit & fast & (closing | (contacts.gap < PATCH * cell))
-    target = np.maximum(contacts.gap, 0.0) / dt
-    return np.where(bounces, -rebound.restitution * approach, target), hit
-
-
-def solve_impacts(
-    contacts: Contacts, movers: Movers, rebound: Rebound, cell: float, dt: float
-) -> Vectors:
-    """Let rigid pairs that are hit rebound, one impact after the other, and move the movers.
-
-    What is hit passes the blow on to what it touches: in every round the pairs that approach now
-    rebound together and all others wait (generalized reflections: Smith, Kaufman, Vouga, Tamstorf
-    and Grinspun 2012, "Reflections on simultaneous impact"). Solved at once, all pairs of a row of
-    touching balls would share the blow; in rounds it runs through to the last.
-
-    Returns:
-        Impulses J [N s], as of ``solve``.
-
-    """
-    total = np.zeros((len(contacts.a), 3))
-    for _ in range(IMPACTS):
-        speed = np.sum(contacts.approach(movers) * contacts.normal, axis=1)
-        target, hit = target_speeds(contacts, speed, rebound, cell, dt)
-        if not hit.any():
-            break
-        total += solve(contacts, movers, target, SWEEPS_OF_A_HIT, hit)
-    return total
-
-
-def solve(
-    contacts: Contacts,
-    movers: Movers,
-    target: Scalars,
-    sweeps: int,
-    only: Bool[np.ndarray, " E"] | None = None,
-) -> Vectors:
-    """Find all impulses J [N s], -J on a and +J on c, and move the movers.
-
-    Projected Gauss–Seidel on accumulated impulses: J_n ≥ 0 removes the approach speed above its
-    target, |J_t| ≤ μ J_n opposes the slip. Each impulse moves its two movers at once through
-    their true effective mass 1/M + (r × d)ᵀ I⁻¹ (r × d), along the normal and along the slip.
-    Conserves momentum to round-off and never adds kinetic energy where targets are ≥ 0. Contacts
-    that are not among ``only``, whole groups, wait.
-    """
-    impulse = np.zeros((len(contacts.a), 3))
-    orders = _orders(contacts, movers, sweeps)
-    if only is not None:
-        orders = np.stack([order[only[order]] for order in orders])
-    _sweep(
-        (contacts.a, contacts.c, contacts.point, contacts.normal, contacts.friction, target),
-        (movers.inverse_mass, movers.inverse_inertia, movers.centre),
-        (movers.velocity, movers.spin),
-        impulse,
-        orders,
-    )
-    return impulse
-
-
-def _orders(contacts: Contacts, movers: Movers, sweeps: int) -> Int[np.ndarray, "S E"]:
-    """Give the order of every sweep: scattered, and to and fro where rigid bodies are stacked.
-
-    In the order in which the contacts of a rigid body lie next to one another the first would carry
-    more, and what rests on many points would tilt and sink; with one order for all sweeps stacks
-    creep. Nodes without a rigid body have few contacts each, which stay as they are.
-    """
-    rigid = np.any(movers.inverse_inertia != 0.0, axis=(1, 2))
-    either = np.logical_or(rigid[contacts.a], rigid[contacts.c])
-    held = movers.inverse_mass[contacts.c] == 0.0
-    stacked = bool(np.any(rigid[contacts.a] & rigid[contacts.c]))
-    turns = rigid[contacts.a] & (rigid[contacts.c] | (held & stacked))
-    group = np.zeros(len(either), np.int64) if contacts.group is None else contacts.group
-    forward = [np.flatnonzero(np.logical_not(either))]
-    backward = [*forward]
-    for number in np.unique(group[either]):
-        own = np.flatnonzero(either & (group == number))
-        own = own[scattered(len(own))]
-        forward.append(own)
-        backward.append(own[::-1] if turns[own].all() else own)
-    to, fro = np.concatenate(forward), np.concatenate(backward)
-    return np.stack([to, fro] * ((sweeps + 1) // 2))[:sweeps]
-
-
-def scattered(count: int) -> Int[np.ndarray, " E"]:
-    """Give numbers in strides of the golden section of how many they are, modulo that many."""
-    stride = max(1, int(SCATTER * count))
-    while stride > 1 and gcd(stride, count) > 1:
-        stride -= 1
-    return np.arange(count) * stride % max(count, 1)
-
-
-@njit(cache=True)
-def _cross(p, q):
-    return np.array(
-        [p[1] * q[2] - p[2] * q[1], p[2] * q[0] - p[0] * q[2], p[0] * q[1] - p[1] * q[0]]
-    )
-
-
-@njit(cache=True)
-def _softness(inverse_mass, inverse_inertia, arm, direction):
-    """1/m_eff of one mover at an arm, along a direction."""
-    lever = _cross(arm, direction)
-    return inverse_mass + np.dot(lever, np.dot(inverse_inertia, lever))
-
-
-@njit(cache=True)
-def _tangential(impulse, slip, softness, limit):
-    """Push against the slip, at most to the Coulomb limit."""
-    if softness > 0.0:
-        impulse = impulse + slip / softness
-    size = np.sqrt(np.dot(impulse, impulse))
-    return impulse * (limit / size) if size > limit else impulse
-
-
-@njit(cache=True)
-def _sweep(contacts, masses, motion, impulse, orders):
-    """Gauss–Seidel sweeps over all contacts, in given orders; changes motion and impulse."""
-    first, second, point, normals, friction, target = contacts
-    inverse_mass, inverse_inertia, centre = masses
-    velocity, spin = motion
-    for order in orders:
-        for e in order:
-            a, c, n, old = first[e], second[e], normals[e], impulse[e].copy()
-            arm_a, arm_c = point[e] - centre[a], point[e] - centre[c]
-            slip = velocity[a] + _cross(spin[a], arm_a) - velocity[c] - _cross(spin[c], arm_c)
-            along_n = _softness(inverse_mass[a], inverse_inertia[a], arm_a, n)
-            along_n += _softness(inverse_mass[c], inverse_inertia[c], arm_c, n)
-            speed, old_n = np.dot(slip, n), np.dot(old, n)
-            new_n = max(0.0, old_n + (speed - target[e]) / along_n) if along_n > 0.0 else 0.0
-            if new_n == 0.0 and old_n == 0.0:
-                continue
-            slip = slip - speed * n
-            size, along_d = np.sqrt(np.dot(slip, slip)), 0.0
-            if size > SMALLEST_SLIP:
-                along_d = _softness(inverse_mass[a], inverse_inertia[a], arm_a, slip / size)
-                along_d += _softness(inverse_mass[c], inverse_inertia[c], arm_c, slip / size)
-            push = _tangential(old - old_n * n, slip, along_d, friction[e] * new_n)
-            impulse[e] = new_n * n + push
-            change = impulse[e] - old
-            velocity[a] -= inverse_mass[a] * change
-            velocity[c] += inverse_mass[c] * change
-            spin[a] -= np.dot(inverse_inertia[a], _cross(arm_a, change))
-            spin[c] += np.dot(inverse_inertia[c], _cross(arm_c, change))
-
-
-def impact_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> float:
-    """Kinetic energy [J] that the normal impulses took: Σ J_n · ½ (u_before + u_after).
-
-    Of a rigid rebound ½ m (1 - e²) v². Matter that is soft stops at a node at once, half a cell of
-    it: so much the more, the coarser the grid.
-    """
-    along = np.sum(impulse * normal, axis=1, keepdims=True) * normal
-    return float(np.sum(along * 0.5 * (before + after)))
-
-
-def friction_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> float:
-    """Kinetic energy [J] that the tangential impulses took: Σ J_t · ½ (u_before + u_after).
-
-    ``before`` is the relative velocity as the step began, before its forces: then the works of
-    stress, gravity and contact, each at the mean velocity of the step, add up to what the kinetic
-    energy gained. After the forces, a contact that only holds against them would seem to slip.
-    """
-    tangential = impulse - np.sum(impulse * normal, axis=1, keepdims=True) * normal
-    return float(np.sum(tangential * 0.5 * (before + after)))

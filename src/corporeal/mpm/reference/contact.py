@@ -22,7 +22,7 @@ from corporeal.mpm.constants import (
     WALL_REACH,
 )
 from corporeal.mpm.laws.kinematics import determinant
-from corporeal.mpm.physics import contact, rigid
+from corporeal.mpm.physics import contact, contact_impulses, rigid
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.problem import Problem, WettedSurface
 from corporeal.mpm.state import Matter, State
@@ -31,7 +31,7 @@ from corporeal.mpm.state import Matter, State
 class Stand(Protocol):
     """Something that moves in a rigid body's stead."""
 
-    def act(self, movers: contact.Movers) -> None:
+    def act(self, movers: contact_impulses.Movers) -> None:
         """Take the body's place among what contact can move."""
         ...
 
@@ -104,7 +104,7 @@ class Scene:
         field = self.grid.field[slot]
         return np.where(stiff[field], field, bodies + slot)
 
-    def movers(self, velocity: Float[np.ndarray, "A 3"]) -> contact.Movers:
+    def movers(self, velocity: Float[np.ndarray, "A 3"]) -> contact_impulses.Movers:
         """Everything that an impulse can move, with its velocity after forces."""
         bodies = len(self.problem.bodies)
         still = np.zeros((len(self.problem.planes), 3))
@@ -118,7 +118,7 @@ class Scene:
         spin = np.zeros((self.wall_mover + len(still), 3))
         spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
         light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, TINY_DOUBLE), 0.0)
-        movers = contact.Movers(
+        movers = contact_impulses.Movers(
             np.concatenate([np.where(free, 1.0 / self.matter.total, 0.0), light, still[:, 0]]),
             inertia,
             np.concatenate([self.state.centre, self.grid.index * self.problem.cell, still]),
@@ -129,7 +129,7 @@ class Scene:
             composite.act(movers)
         return movers
 
-    def movers_before_forces(self) -> contact.Movers:
+    def movers_before_forces(self) -> contact_impulses.Movers:
         """Everything that an impulse can move, with the velocity it had as the step began."""
         movers = self.movers(self.old)
         for b in filter(self.is_rigid, range(len(self.problem.bodies))):
@@ -168,7 +168,7 @@ class Meeting:
     spin: Float[np.ndarray, "B 3"]
     """Of rigid bodies [rad/s]."""
     pair: Int[np.ndarray, "E 2"]
-    contacts: contact.Contacts
+    contacts: contact_impulses.Contacts
     impulse: Float[np.ndarray, "E 3"]
     """-J on the first and +J on the second of each pair [N s]."""
     friction_loss: float
@@ -183,7 +183,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     problem = scene.problem
     pair = np.array([t.pair for t in touches for _ in range(len(t.gap))], dtype=np.int64)
     pair = pair.reshape(-1, 2)
-    contacts = contact.Contacts(
+    contacts = contact_impulses.Contacts(
         *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _COLUMNS),
         friction=_friction(problem)[pair[:, 0], pair[:, 1]]
         * _joined([t.grips for t in touches], (0,)).astype(np.float64),
@@ -192,10 +192,10 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     movers = scene.movers(velocity)
     # Impacts of rigid bodies first, one after the other; then all that touches, together.
     rebound = _rebound(scene, pair, contacts)
-    struck = contact.solve_impacts(contacts, movers, rebound, problem.cell, dt)
+    struck = contact_impulses.solve_impacts(contacts, movers, rebound, problem.cell, dt)
     target = np.maximum(contacts.gap, 0.0) / dt
     sweeps = _sweeps(scene, contacts, bool(struck.any()))
-    impulse = struck + contact.solve(contacts, movers, target, sweeps)
+    impulse = struck + contact_impulses.solve(contacts, movers, target, sweeps)
     before, after = contacts.approach(scene.movers_before_forces()), contacts.approach(movers)
     bodies = len(problem.bodies)
     return Meeting(
@@ -205,12 +205,12 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         pair=pair,
         contacts=contacts,
         impulse=impulse,
-        friction_loss=contact.friction_loss(impulse, contacts.normal, before, after),
-        impact_loss=contact.impact_loss(impulse, contacts.normal, before, after),
+        friction_loss=contact_impulses.friction_loss(impulse, contacts.normal, before, after),
+        impact_loss=contact_impulses.impact_loss(impulse, contacts.normal, before, after),
     )
 
 
-def _sweeps(scene: Scene, contacts: contact.Contacts, hit: bool) -> int:
+def _sweeps(scene: Scene, contacts: contact_impulses.Contacts, hit: bool) -> int:
     """One sweep is exact where nothing that can move has more than one contact.
 
     Rigid bodies on one another have only each other to yield: with few sweeps stacks creep.
@@ -251,15 +251,15 @@ def _friction(problem: Problem) -> Float[np.ndarray, "N N"]:
 
 
 def _rebound(
-    scene: Scene, pair: Int[np.ndarray, "E 2"], contacts: contact.Contacts
-) -> contact.Rebound:
+    scene: Scene, pair: Int[np.ndarray, "E 2"], contacts: contact_impulses.Contacts
+) -> contact_impulses.Rebound:
     problem = scene.problem
     bodies, planes = len(problem.bodies), len(problem.planes)
     stiff = np.array([scene.is_rigid(b) for b in range(bodies)] + [True] * planes)
     kick = np.concatenate([scene.kick, np.zeros((planes, 3))])
     first, second = pair.T
     both = stiff[first] & stiff[second]
-    return contact.Rebound(
+    return contact_impulses.Rebound(
         pair=first * (bodies + planes) + second,
         restitution=np.where(both, np.asarray(problem.restitution)[first, second], 0.0),
         kick=np.sum((kick[first] - kick[second]) * contacts.normal, axis=1),

@@ -7,7 +7,7 @@ from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import HELD_SHARE
 from corporeal.mpm.physics import rigid
-from corporeal.mpm.physics.contact import Movers
+from corporeal.mpm.physics.contact_impulses import Movers
 from corporeal.mpm.physics.inclusions import densities
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.problem import Problem
