@@ -45,12 +45,12 @@ from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.similarity import moved_points
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.pipeline import Settings, opened, write_showcase
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.results import Results
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.capture import CaptureConfig, capture
 from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.fill import FillConfig
-from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.terminal import progress_bars, show_table
 from corporeal.types import MaterialField, Reconstruction, Scene, Views
 

@@ -6,9 +6,9 @@ import pytest
 from corporeal import pipeline, run_files, store
 from corporeal.errors import UserError
 from corporeal.pipeline import Settings, reopen, run
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.fill import FillConfig
-from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.types import Inventory, ObjectWords
 from handmade import plain, scene
 

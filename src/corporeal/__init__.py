@@ -36,6 +36,7 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.pipeline import Settings, run
     from corporeal.pool.index import index as index_pool
     from corporeal.pool.index import read_pool
+    from corporeal.reconstruction.reconstruct_config import ReconstructConfig
     from corporeal.scene_building import Solid, ball, box, build_scene, cylinder, solid
     from corporeal.showcase.scenes import build as showcase_scene
     from corporeal.stages.assemble import AssembleConfig, assemble
@@ -45,7 +46,7 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.stages.fill import FillConfig, fill
     from corporeal.stages.film import FilmConfig, film
     from corporeal.stages.ground import GroundConfig, ground
-    from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
+    from corporeal.stages.reconstruct import reconstruct
     from corporeal.stages.report import report
     from corporeal.stages.segment import SegmentConfig, segment
     from corporeal.stages.simulate import SimulateConfig, simulate
@@ -84,7 +85,7 @@ _HOME = {
     "CaptureConfig": "stages.capture:CaptureConfig",
     "write_views": "formats.transforms:write_views",
     "reconstruct": "stages.reconstruct:reconstruct",
-    "ReconstructConfig": "stages.reconstruct:ReconstructConfig",
+    "ReconstructConfig": "reconstruction.reconstruct_config:ReconstructConfig",
     "describe": "stages.describe:describe",
     "DescribeConfig": "stages.describe:DescribeConfig",
     "segment": "stages.segment:segment",

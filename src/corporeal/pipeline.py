@@ -27,6 +27,7 @@ from corporeal.formats.words import safe
 from corporeal.geometry.gaussians import axis
 from corporeal.mixture import ground_weighed
 from corporeal.poses.pose import FIGURE, POSES
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.results import Results
 from corporeal.run_files import FILES, Spent, write_results
 from corporeal.showcase.scenes import build
@@ -35,7 +36,7 @@ from corporeal.stages.describe import DescribeConfig, describe
 from corporeal.stages.fill import FillConfig, fill
 from corporeal.stages.film import FilmConfig, film
 from corporeal.stages.ground import GroundConfig
-from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
+from corporeal.stages.reconstruct import reconstruct
 from corporeal.stages.segment import SegmentConfig, segment
 from corporeal.stages.simulate import SimulateConfig, as_kept, simulate
 from corporeal.trajectory.audit_file import read_audit
