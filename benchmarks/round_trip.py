@@ -31,6 +31,7 @@ from scipy.spatial.distance import cdist
 from skimage.color import rgb2lab
 
 from corporeal import store
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.formats.scene_file import (
     ObjectEntry,
     SceneFile,
@@ -49,7 +50,6 @@ from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.results import Results
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.capture import CaptureConfig, capture
-from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.fill import FillConfig
 from corporeal.terminal import progress_bars, show_table
 from corporeal.types import MaterialField, Reconstruction, Scene, Views

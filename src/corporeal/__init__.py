@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.corpus.plan import CorpusConfig
     from corporeal.corpus.report import report_corpus
     from corporeal.corpus.run import RunConfig, run_corpus
+    from corporeal.description.describe_config import DescribeConfig
     from corporeal.errors import SimulationError, UserError
     from corporeal.evaluation.ensemble import ensemble
     from corporeal.export.export import export as export_scene
@@ -42,7 +43,7 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.stages.assemble import AssembleConfig, assemble
     from corporeal.stages.capture import CaptureConfig, capture
     from corporeal.stages.compose import ComposeConfig, compose
-    from corporeal.stages.describe import DescribeConfig, describe
+    from corporeal.stages.describe import describe
     from corporeal.stages.fill import FillConfig, fill
     from corporeal.stages.film import FilmConfig, film
     from corporeal.stages.ground import GroundConfig, ground
@@ -87,7 +88,7 @@ _HOME = {
     "reconstruct": "stages.reconstruct:reconstruct",
     "ReconstructConfig": "reconstruction.reconstruct_config:ReconstructConfig",
     "describe": "stages.describe:describe",
-    "DescribeConfig": "stages.describe:DescribeConfig",
+    "DescribeConfig": "description.describe_config:DescribeConfig",
     "segment": "stages.segment:segment",
     "SegmentConfig": "stages.segment:SegmentConfig",
     "ground": "stages.ground:ground",

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from corporeal import store
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UserError
 from corporeal.features import MENU as ENCODERS
 from corporeal.features.maskers import MENU as MASKERS
@@ -32,7 +33,7 @@ from corporeal.results import Results
 from corporeal.run_files import FILES, Spent, write_results
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import AssembleConfig, assemble
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.fill import FillConfig, fill
 from corporeal.stages.film import FilmConfig, film
 from corporeal.stages.ground import GroundConfig

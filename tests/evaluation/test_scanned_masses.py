@@ -7,9 +7,9 @@ from pathlib import Path
 
 import pytest
 
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.evaluation.mass import MassConfig, compare, predict_all
 from corporeal.evaluation.truth import read_truth
-from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.ground import GroundConfig
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"

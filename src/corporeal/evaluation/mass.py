@@ -15,6 +15,7 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from corporeal import store
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UserError
 from corporeal.evaluation.baselines import constant, hull_fit, solid_water
 from corporeal.evaluation.metrics import Errors, coverage, errors
@@ -22,7 +23,7 @@ from corporeal.evaluation.truth import Weighed
 from corporeal.geometry.arrangement import life_sized
 from corporeal.mixture import DRAWS, HIGH, LOW, Scale, weighed
 from corporeal.stages.assemble import assemble
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.ground import GroundConfig
 from corporeal.stages.segment import segment
 from corporeal.types import Inventory, MassMixture, PartWords, Scene
