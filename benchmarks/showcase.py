@@ -1,38 +1,42 @@
 """Simulate the showcase's scenes and say what was seen, what the audit found, how long it took.
 
-    python benchmarks/showcase.py [SCENE ...] [--detail draft normal ...] [--json FILE] [--docs]
+    python benchmarks/showcase.py [SCENE ...] [--detail draft normal ...] [--no-run] [--json FILE]
+                                  [--docs]
 
-``--docs`` writes the tables into docs/showcase.md; it needs all scenes. Runs that lie in
-``--folder`` already are not repeated: remove it to measure again.
+``--docs`` writes the tables into docs/showcase.md; it needs all scenes at the first detail. Runs
+that lie in ``--folder`` already are not repeated: remove it to measure again. They lie there as
+``corporeal evaluate dynamics showcase`` lays its own out, so that ``--folder dynamics`` tells of
+those; with ``--no-run`` what was not run yet is left out.
 """
 
 import argparse
 import json
+from collections.abc import Iterator
 from dataclasses import asdict
 from pathlib import Path
 from typing import get_args
 
 from rich.console import Console
-from stories import Told, tell
+from stories import Told, tell, told
 
+from corporeal import store
+from corporeal.evaluation.dynamics.places import OURS, reference_folder, run_folder
 from corporeal.findings import Audit
 from corporeal.machine import cores
-from corporeal.pipeline import Settings
+from corporeal.pipeline import FOLDERS, Settings
 from corporeal.showcase.expectations import EXPECTED
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.fill import FillConfig
+from corporeal.trajectory.audit_words import breaches, passage
 from corporeal.treatment.plan import Detail
 
 PAGE = Path(__file__).parents[1] / "docs" / "showcase.md"
 BEGIN, END = "<!-- made by benchmarks/showcase.py -->", "<!-- end -->"
-MOMENTUM, ENERGY = 1e-4, 0.05
-"""Largest share of momentum that may go astray, and of energy that may come from nowhere."""
 
 
-def clean(audit: Audit) -> bool:
-    """Say whether the simulation kept its books."""
-    lost = audit.nan_count + audit.particles_out_of_domain
-    return bool(lost == 0 and audit.momentum_residual < MOMENTUM and audit.energy_growth < ENERGY)
+def faults(audit: Audit) -> list[str]:
+    """Say which bounds of the audit are exceeded, and who passed through whom."""
+    return [*breaches(audit), *(f"{passage(pair)}." for pair in audit.surfaces if pair.passed)]
 
 
 def row(told: Told, detail: str) -> dict:
@@ -45,35 +49,46 @@ def row(told: Told, detail: str) -> dict:
         "particles": audit.particles,
         "steps": audit.steps,
         "momentum_residual": audit.momentum_residual,
-        "energy_growth": audit.energy_growth,
+        "mechanical_growth": audit.mechanical_growth,
         "penetration_dx": audit.max_penetration_dx,
-        "clean": clean(audit),
+        "faults": faults(audit),
         "seconds": told.seconds,
     }
 
 
-def seen_table(rows: list[dict]) -> str:
-    """Tell what must be seen in every scene, and whether it was."""
-    lines = ["| scene | must show | target | measured | | must fail |", "|---|---|---|---|---|---|"]
-    for number, found in enumerate(rows, 1):
-        demands = EXPECTED[found["scene"]]
-        for k, (e, demand) in enumerate(zip(found["expectations"], demands, strict=True)):
-            scene = "" if k else f"{number} {found['scene']}"
-            met = "✓" if e["met"] else "missed"
-            said = (scene, e["sentence"], e["target"], e["value"], met, demand.spoiled_by)
+def seen_table(rows: list[dict], details: list[str]) -> str:
+    """Tell what must be seen in every scene, and at which detail it was; –: it was not run."""
+    heads = ("scene", "must show", "target", *details, "must fail")
+    lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
+    found = {(r["scene"], r["detail"]): r["expectations"] for r in rows}
+    for number, name in enumerate(SCENES, 1):
+        for k, demand in enumerate(EXPECTED[name]):
+            mine = [found[name, d][k] if (name, d) in found else None for d in details]
+            asked = next(e for e in mine if e is not None)
+            scene = "" if k else f"{number} {name}"
+            measured = map(measured_cell, mine)
+            said = (scene, asked["sentence"], asked["target"], *measured, demand.spoiled_by)
             lines.append(f"| {' | '.join(said)} |")
     return "\n".join(lines)
 
 
+def measured_cell(expectation: dict | None) -> str:
+    """Write what was measured, and whether it is within its target."""
+    if expectation is None:
+        return "–"
+    return f"{expectation['value']} {'✓' if expectation['met'] else '**missed**'}"
+
+
 def cost_table(rows: list[dict]) -> str:
     """Tell what every scene cost and what its audit says."""
-    heads = ("scene", "detail", "particles", "steps", "momentum astray", "energy gained")
+    heads = ("scene", "detail", "particles", "steps", "momentum astray", "mechanical energy gained")
     heads += ("deepest overlap [cells]", "audit", "simulated in [s]")
     lines = [f"| {' | '.join(heads)} |", "|" + "---|" * len(heads)]
     lines += [
         f"| {r['scene']} | {r['detail']} | {r['particles']:,} | {r['steps']:,} "
-        f"| {r['momentum_residual']:.0e} | {r['energy_growth']:.1%} | {r['penetration_dx']:.2f} "
-        f"| {'clean' if r['clean'] else 'not clean'} | {r['seconds']:.0f} |"
+        f"| {r['momentum_residual']:.0e} | {r['mechanical_growth']:.0e} "
+        f"| {r['penetration_dx']:.2f} "
+        f"| {' '.join(r['faults']) or 'clean'} | {r['seconds']:.0f} |"
         for r in rows
     ]
     return "\n".join(lines)
@@ -83,12 +98,37 @@ def page(rows: list[dict], details: list[str]) -> None:
     """Put the tables between the marks in the page."""
     text = PAGE.read_text(encoding="utf-8")
     before, after = text.split(BEGIN)[0], text.split(END)[1]
-    first = [r for r in rows if r["detail"] == details[0]]
     tables = (
-        f"At detail {details[0]}, seed 0:\n\n{seen_table(first)}\n\n"
+        f"Measured at detail {' and '.join(details)}, seed 0:\n\n{seen_table(rows, details)}\n\n"
         f"What it cost, on {cores()} core{'s' if cores() > 1 else ''}:\n\n{cost_table(rows)}\n"
     )
     PAGE.write_text(f"{before}{BEGIN}\n\n{tables}\n{END}{after}", encoding="utf-8")
+
+
+def place(folder: Path, name: str, detail: Detail) -> Path:
+    """Return where a run lies: as an evaluation of dynamics lays out ours and its references."""
+    if detail == "draft":
+        return run_folder(folder, name, OURS)
+    return reference_folder(folder, name, detail)
+
+
+def measured(name: str, folder: Path, detail: Detail, run: bool) -> dict | None:
+    """Measure one scene; None: it was not run yet, and is not to be."""
+    if run:
+        return row(tell(name, folder, Settings(fill=FillConfig(detail=detail))), detail)
+    done = (folder / FOLDERS["simulate"] / store.META).exists()
+    return row(told(name, folder), detail) if done else None
+
+
+def measured_rows(asked: argparse.Namespace) -> Iterator[dict]:
+    """Measure every scene at every detail, and print it."""
+    console = Console()
+    for detail in asked.detail:
+        for name in asked.scene or SCENES:
+            found = measured(name, place(asked.folder, name, detail), detail, not asked.no_run)
+            if found is not None:
+                console.print_json(json.dumps(found), indent=None)
+                yield found
 
 
 def main() -> None:
@@ -99,6 +139,7 @@ def main() -> None:
     parser.add_argument("scene", nargs="*", help=f"among {', '.join(SCENES)}; none: all")
     parser.add_argument("--detail", nargs="+", choices=get_args(Detail), default=["draft"])
     parser.add_argument("--folder", type=Path, default=Path("runs/showcase"), help="of the runs")
+    parser.add_argument("--no-run", action="store_true", help="only what lies in the folder")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     parser.add_argument("--docs", action="store_true", help=f"write the tables into {PAGE.name}")
     asked = parser.parse_args()
@@ -107,13 +148,9 @@ def main() -> None:
         parser.error(f"no scene {sorted(unknown)[0]!r}: choose among {', '.join(SCENES)}")
     if asked.docs and asked.scene:
         parser.error("--docs needs all scenes: name none")
-    rows = []
-    console = Console()
-    for detail in asked.detail:
-        for name in asked.scene or SCENES:
-            settings = Settings(fill=FillConfig(detail=detail))
-            rows.append(row(tell(name, asked.folder / f"{name}-{detail}", settings), detail))
-            console.print_json(json.dumps(rows[-1]), indent=None)
+    rows = list(measured_rows(asked))
+    if asked.docs and len([r for r in rows if r["detail"] == asked.detail[0]]) < len(SCENES):
+        parser.error(f"--docs needs all scenes at detail {asked.detail[0]}")
     if asked.json:
         asked.json.write_text(json.dumps(rows, indent=1), encoding="utf-8")
     if asked.docs:

@@ -59,8 +59,12 @@ class Told:
 def tell(name: str, folder: Path, settings: Settings) -> Told:
     """Simulate a scene of the showcase; what lies in ``folder`` already is used again."""
     scene = pipeline.write_showcase(name, folder / "input")
-    silent = lambda verb: lambda fraction, words: None  # noqa: E731
-    pipeline.run([scene], folder, settings, silent, until="simulate")
+    pipeline.run([scene], folder, settings, pipeline.quiet, until="simulate")
+    return told(name, folder)
+
+
+def told(name: str, folder: Path) -> Told:
+    """Read back a scene of the showcase that was simulated."""
     simulated = folder / FOLDERS["simulate"]
     prepared = pipeline.read_back(folder).prepared  # with what lies in vessels
     return Told(

@@ -16,6 +16,7 @@ from corporeal.corpus.collect import RIGID, collect, measures
 from corporeal.corpus.manifest import Row
 from corporeal.corpus.plan import CorpusConfig, plan, write_plan
 from corporeal.corpus.report import report_corpus
+from corporeal.corpus.report_docs import write_docs
 from corporeal.errors import UserError
 from corporeal.findings import Expectation
 from corporeal.settle.certificate import Certificate
@@ -161,8 +162,12 @@ def test_groups_count_scenes_and_objects_and_give_median_and_worst(tmp_path):
     law = {line.group: line for line in groups["law"]}
     assert set(law) == {RIGID, "Neo-Hookean"}, "no law acts in what is rigid"
     assert (law[RIGID].objects, law[RIGID].at_rest, law["Neo-Hookean"].at_rest) == (4, 4, 0)
-    group = {line.group: line.objects for line in groups["material class"]}
-    assert group == {"metal": 4, "elastomer": 4}
+    group = {line.group: line for line in groups["material class"]}
+    assert {name: line.objects for name, line in group.items()} == {"metal": 4, "elastomer": 4}
+    assert group["metal"].materials == ("steel",), "only of the parts that are metal"
+    assert whole.materials[0] == "steel", "the heaviest first"
+    peaks = [s.numbers.peak_memory_mb for s in corpus.run if s.numbers]
+    assert group["metal"].memory_worst_mb == max(peaks)
 
 
 def test_the_page_the_table_and_the_data_tell_of_every_scene(tmp_path):
@@ -187,6 +192,30 @@ def test_the_page_the_table_and_the_data_tell_of_every_scene(tmp_path):
     data = json.loads(written[2].read_text())
     assert data["total"]["scenes"] == 3 and data["total"]["clean"] == 2
     assert data["scenes"][3]["error"] == "run: the <grid> is too wide"
+
+
+def test_the_page_for_the_documentation_names_what_went_wrong_and_what_was_not_run(tmp_path):
+    made = a_corpus(
+        tmp_path, [audit(), audit(max_penetration_dx=1.7), audit()], failed=["the grid is too wide"]
+    )
+    (tmp_path / "runs" / made.scenes[2].name / store.META).unlink()
+    page = tmp_path / "page.md"
+    write_docs(collect(tmp_path), page)
+    text = page.read_text()
+    assert "4 scenes, 4 assembled, 2 run at detail draft. 1 of 2 have a clean audit" in text
+    wrong = text.split("## What went wrong")[1].split("##")[0]
+    assert f"{made.scenes[1].name}: Objects penetrate" in wrong
+    assert f"{made.scenes[3].name}: failed: run: the grid is too wide" in wrong
+    assert f"Not run yet: {made.scenes[2].name}." in wrong
+    tables = [line for line in text.splitlines() if line.startswith("|")]
+    assert all(len(row.split("|")) in (12 + 1, 9 + 2) for row in tables)
+
+
+def test_the_page_for_the_documentation_says_where_nothing_was_run(tmp_path):
+    write_plan(tmp_path, plan(pool(4), CorpusConfig(scenes=3)))
+    write_docs(collect(tmp_path), tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text()
+    assert "3 scenes, 0 assembled, 0 run." in text and "Every scene" not in text
 
 
 def test_every_model_that_was_used_is_credited_once(tmp_path):

@@ -117,15 +117,22 @@ def _run() -> None:
 
 def _report() -> None:
     """Write CORPUS/report.html, report.csv and report.json of what was run so far."""
+    from corporeal.corpus.collect import collect
     from corporeal.corpus.report import report_corpus
+    from corporeal.corpus.report_docs import write_docs
 
     @dataclass(frozen=True)
     class Report:
         corpus: Corpus
+        docs: Path | None = None
+        """File for the measured rows as a page of documentation (Markdown)."""
 
     asked = parse(Report, "corpus report", _report.__doc__, words=2)
     with progress_bars() as tell:
         written = report_corpus(asked.corpus, tell("report"))
+    if asked.docs is not None:
+        write_docs(collect(asked.corpus), asked.docs)
+        written.append(asked.docs)
     print(*written, sep="\n")
 
 

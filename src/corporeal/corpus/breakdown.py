@@ -42,6 +42,10 @@ class Line:
     penetration_worst: float
     seconds_median: float
     """Of computing, one scene."""
+    memory_worst_mb: float
+    """Largest of a process."""
+    materials: tuple[str, ...]
+    """Of its parts, the heaviest in all first."""
 
 
 def breakdowns(corpus: Collected) -> dict[str, list[Line]]:
@@ -80,15 +84,17 @@ def _by_part(
         mine = [p for p in parts if key(p) == name]
         within = {p.scene for p in mine}
         objects = {(p.scene, p.object): p.at_rest for p in mine}
-        lines.append(_line(name, [s for s in scenes if s.name in within], objects))
+        lines.append(_line(name, [s for s in scenes if s.name in within], mine, objects))
     return sorted(lines, key=lambda line: (-line.objects, line.group))
 
 
 def _line(
     group: str,
     scenes: Sequence[SceneRecord],
+    parts: Sequence[PartRecord] | None = None,
     objects: Mapping[tuple[str, str], bool] | None = None,
 ) -> Line:
+    own = [p for s in scenes for p in s.parts] if parts is None else parts
     numbers = [s.numbers for s in scenes if s.numbers is not None]
 
     def add(name: str) -> int:
@@ -117,6 +123,8 @@ def _line(
         penetration_median=middle("max_penetration_dx"),
         penetration_worst=worst("max_penetration_dx"),
         seconds_median=middle("seconds"),
+        memory_worst_mb=worst("peak_memory_mb"),
+        materials=tuple(_by_mass(own)),
     )
 
 
@@ -156,8 +164,12 @@ def _row(scene: SceneRecord) -> dict[str, Any]:
 
 def materials_of(scene: SceneRecord) -> list[str]:
     """Name the materials of a scene, the heaviest first."""
+    return _by_mass(scene.parts)
+
+
+def _by_mass(parts: Iterable[PartRecord]) -> list[str]:
     mass: dict[str, float] = {}
-    for part in scene.parts:
+    for part in parts:
         mass[part.material] = mass.get(part.material, 0.0) + part.mass
     return [name.replace("_", " ") for name in sorted(mass, key=lambda m: -mass[m])]
 

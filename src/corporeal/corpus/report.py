@@ -39,6 +39,8 @@ NUMBERS = (
     "energy",
     "penetration [dx]",
     "time [s]",
+    "memory [MB]",
+    "materials",
 )
 
 
@@ -171,6 +173,8 @@ def _line(line: Line, style: str = "") -> str:
         f"{_small(line.energy_median)} | {_small(line.energy_worst)}",
         f"{line.penetration_median:.2f} | {line.penetration_worst:.2f}",
         f"{line.seconds_median:.0f}",
+        f"{line.memory_worst_mb:,.0f}",
+        f"<small>{safe(', '.join(line.materials))}</small>",
     )
     return (
         f'<tr class="{style}"><td>{safe(line.group)}</td>'
