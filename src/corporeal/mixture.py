@@ -188,6 +188,41 @@ def weighed(scale: Scale, inventory: Inventory, samples: int) -> Believed:
     return Believed(replace(inventory, objects=tuple(objects)), tuple(mixtures))
 
 
+def summed(mixtures: Sequence[MassMixture]) -> MassMixture:
+    """Return what several objects weigh together; of one, what it weighs.
+
+    The interval of a sum is at most the sum of the intervals. There is outside evidence of the sum
+    where there is some of every object.
+    """
+    if len(mixtures) == 1:
+        return mixtures[0]
+
+    def total(name: str) -> float:
+        return sum(getattr(m, name) for m in mixtures)
+
+    return MassMixture(
+        object=", ".join(m.object for m in mixtures),
+        mass=total("mass"),
+        low=total("low"),
+        high=total("high"),
+        mass_without=total("mass_without"),
+        low_without=total("low_without"),
+        high_without=total("high_without"),
+        evidence=_of_all([m.evidence for m in mixtures if m.evidence], len(mixtures)),
+        warning=" ".join(m.warning for m in mixtures if m.warning),
+    )
+
+
+def _of_all(said: Sequence[Evidence], count: int) -> Evidence | None:
+    """Add up what was said of ``count`` objects, where something was said of each."""
+    if not said or len(said) < count:
+        return None
+    low, likely, high = (
+        sum(row) for row in zip(*((e.low, e.likely, e.high) for e in said), strict=True)
+    )
+    return Evidence(low, likely, high, " ".join(e.reason for e in said))
+
+
 def drawn_given(
     inventory: Inventory,
     mixtures: Sequence[MassMixture],
