@@ -15,6 +15,7 @@ from corporeal.errors import BadFileError, UserError
 from corporeal.formats.colmap import write_colmap
 from corporeal.formats.photographs import read_photographs
 from corporeal.formats.sources import kind_of, photographs_in, sources, unposed
+from corporeal.masking.grown_masks import GrownMasks
 from corporeal.poses import film_frames
 from corporeal.poses import pose as posing
 from corporeal.poses.attempt import Attempt
@@ -22,11 +23,13 @@ from corporeal.poses.by_masks import checked_by_masks
 from corporeal.poses.film_frames import choose, write_frames
 from corporeal.poses.gather import gather
 from corporeal.poses.judge import FILLED, doubts, names_of, unseen_side
-from corporeal.poses.pose import FIGURE, pose
+from corporeal.poses.pose import FIGURE, moved_within, pose, pose_object
 from corporeal.poses.standstill import Standstill
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
 from corporeal.render.video import reel
+from corporeal.stages import reconstruct as reconstructing
+from corporeal.stages.reconstruct import ReconstructConfig
 from patterned_scene import (
     OF_SLAB,
     blots,
@@ -151,6 +154,51 @@ def test_masks_that_nothing_agrees_with_are_a_warning(turned_over, tmp_path):
     assert tried == ["plain", "masked"], "what is plainly believed needs no thorough attempt"
     assert "masks alone" not in found.statements[0] and len(found.warnings) >= 1
     assert "turned over between the pictures, or masks miss parts" in found.warnings[-1]
+
+
+def test_masks_that_were_grown_later_find_an_object_that_was_turned_over(turned_over, tmp_path):
+    """Nobody drew masks: those that are grown under the slab's poses contradict each other."""
+    folder, models, _ = turned_over
+    by_block = models.pop("masked")
+    by_slab = pose(folder, tmp_path / "poses", silent)
+    masks = folder / "masks"
+    why = moved_within(by_slab, masks)
+    assert why is not None and "moved or turned over between the pictures" in why
+    assert pose_object(by_slab, masks, tmp_path / "nothing", silent) is None
+    models["masked"] = by_block
+    assert pose_object(by_slab, masks, tmp_path / "nothing", silent) is None, "it is remembered"
+    found = pose_object(by_slab, masks, tmp_path / "object", silent)
+    assert found is not None and not (found.folder / "masks").exists()
+    assert moved_within(found, masks) is None
+    angle, place = pose_errors(read_photographs(found.folder).views.cameras, by_block)
+    assert angle.max() < 0.01 and place.max() < 1e-4
+
+
+@pytest.mark.parametrize("how", ["refused", "forced", "found", "still"])
+def test_a_run_does_not_believe_poses_of_the_background(turned_over, tmp_path, how, monkeypatch):
+    folder, models, _ = turned_over
+    by_block = models.pop("masked")
+    if how == "still":
+        models["plain"][COUNT:] = models["plain"][:COUNT]
+    shutil.copytree(folder / "masks", tmp_path / "grown" / "masks")
+    if how == "still":
+        for k in range(COUNT):
+            first = tmp_path / "grown" / "masks" / f"0_{k:02d}.png"
+            shutil.copy(first, first.with_name(f"1_{k:02d}.png"))
+    by_slab = pose(folder, tmp_path / "poses", silent)
+    models["masked"] = by_block if how == "found" else []
+    monkeypatch.setattr(reconstructing, "pose", lambda *what: by_slab)
+    monkeypatch.setattr(reconstructing, "has_masks", lambda shots: False)
+    grown = GrownMasks(tmp_path / "grown", ())
+    monkeypatch.setattr(reconstructing, "grown_masks", lambda *what, **more: grown)
+    config = ReconstructConfig(force=how == "forced")
+    if how == "refused":
+        with pytest.raises(BadFileError, match="turned over between the pictures, and it has"):
+            reconstructing._posed(folder, config, tmp_path / "run", silent)
+        return
+    found = reconstructing._posed(folder, config, tmp_path / "run", silent)
+    assert (found.folder == by_slab.folder) == (how != "found")
+    assert (found.warnings != by_slab.warnings) == (how != "still")
 
 
 def test_a_picture_on_the_wrong_piece_of_a_pattern_is_left_out(taken, tmp_path):

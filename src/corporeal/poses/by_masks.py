@@ -5,7 +5,7 @@ over between two rounds leaves all cameras right about the floor alone. Neither 
 reprojection error.
 """
 
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -37,16 +37,10 @@ def checked_by_masks(told: Attempt, folder: Path, place: Path) -> Attempt:
     masks = folder / MASKS[0]
     if not told.registered or not masks.is_dir():
         return told
-    model = read_colmap(place)
-    shown = [image for image in model.images if (masks / _mask_of(image)).exists()]
-    if len(shown) < FEWEST:
+    compared = _compared(place, masks)
+    if compared is None:
         return told
-    sizes = {_small(model, image) for image in shown}
-    if len(sizes) > 1:  # held level and upright: each at its own size
-        sizes = {(LONGEST, LONGEST)}
-    (size,) = sizes
-    cameras = tuple(_camera(model, image, size) for image in shown)
-    drawn = np.stack([_mask(masks / _mask_of(image), size) for image in shown])
+    shown, cameras, drawn = compared.shown, compared.cameras, compared.drawn
     wrong = outliers(drawn, cameras)
     right = [k for k in range(len(shown)) if k not in wrong]
     filled = coherence(drawn[right], tuple(cameras[k] for k in right))
@@ -59,6 +53,41 @@ def checked_by_masks(told: Attempt, folder: Path, place: Path) -> Attempt:
         astray=astray,
         filled=round(filled, 3),
     )
+
+
+def filled_share(place: Path, masks: Path) -> float:
+    """Return which share of a mask the visual hull of all fills, the median; 1: too few to tell.
+
+    Args:
+        place: Holds the model.
+        masks: PNG pictures with the names of its pictures.
+
+    """
+    compared = _compared(place, masks)
+    return 1.0 if compared is None else coherence(compared.drawn, compared.cameras)
+
+
+@dataclass(frozen=True)
+class _Compared:
+    shown: list[ColmapImage]
+    """Pictures that have masks."""
+    cameras: tuple[Camera, ...]
+    drawn: UInt8[np.ndarray, "V H W"]
+
+
+def _compared(place: Path, masks: Path) -> _Compared | None:
+    """Read a model's cameras with their masks at one size; None: there are too few."""
+    model = read_colmap(place)
+    shown = [image for image in model.images if (masks / _mask_of(image)).exists()]
+    if len(shown) < FEWEST:
+        return None
+    sizes = {_small(model, image) for image in shown}
+    if len(sizes) > 1:  # held level and upright: each at its own size
+        sizes = {(LONGEST, LONGEST)}
+    (size,) = sizes
+    cameras = tuple(_camera(model, image, size) for image in shown)
+    drawn = np.stack([_mask(masks / _mask_of(image), size) for image in shown])
+    return _Compared(shown, cameras, drawn)
 
 
 def _without(place: Path, names: tuple[str, ...]) -> tuple[int, int]:

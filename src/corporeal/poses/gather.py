@@ -82,6 +82,15 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     return Gathered(tuple(names), tuple(names.values()), tuple(said))
 
 
+def as_gathered(folder: Path) -> Gathered:
+    """Return what was gathered into a folder before."""
+    sizes = {}
+    for file in sorted((folder / IMAGES).iterdir()):
+        with Image.open(file, formats=FORMATS) as picture:
+            sizes[file.name] = picture.size
+    return Gathered(tuple(sizes), tuple(sizes.values()), ())
+
+
 def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad]) -> None:
     if good >= max(FEWEST, asked / 2):
         return

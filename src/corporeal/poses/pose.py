@@ -10,12 +10,12 @@ from corporeal.errors import BadFileError
 from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
 from corporeal.poses.attempt import Attempt, Way, attempt, require
-from corporeal.poses.by_masks import checked_by_masks
+from corporeal.poses.by_masks import checked_by_masks, filled_share
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
-from corporeal.poses.gather import Gathered, gather
+from corporeal.poses.gather import IMAGES, Gathered, as_gathered, gather
 from corporeal.poses.groups import SORT_THEM, groups_of, shared_points, told_apart, without
-from corporeal.poses.judge import WHAT_TO_DO, doubt_of_masks, doubts, names_of, unseen_side
+from corporeal.poses.judge import FILLED, WHAT_TO_DO, doubt_of_masks, doubts, names_of, unseen_side
 from corporeal.typed import typed
 
 Progress = Callable[[float, str], None]
@@ -86,6 +86,59 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
     if kept.refused:
         raise BadFileError(source, kept.refused, kept.what_to_do)
     return Posed(folder, kept.statements, kept.warnings)
+
+
+def moved_within(posed: Posed, masks: Path) -> str | None:
+    """Say in a clause that an object did not keep its place in what is around it; None: it did.
+
+    Args:
+        posed: Poses that were found from whole pictures.
+        masks: Of the object, under the names of these.
+
+    """
+    share = filled_share(posed.folder / "sparse" / "0", masks)
+    if share >= FILLED:
+        return None
+    return (
+        "the pictures fit together by what is around the object, but its outlines contradict one "
+        f"another (together they leave {share:.0%} of what each shows): it was moved or turned "
+        "over between the pictures"
+    )
+
+
+def pose_object(posed: Posed, masks: Path, folder: Path, progress: Progress) -> Posed | None:
+    """Find the poses again, from points on the object alone.
+
+    Args:
+        posed: What was found from whole pictures.
+        masks: Of the object, under the names of these.
+        folder: Gets pictures and model. What is there of the same is not done again.
+        progress: Told the fraction done and what is being done.
+
+    Returns:
+        Poses that can be believed and that masks agree with; None: there are none.
+
+    """
+    begun = {"source": store.digest(posed.folder), "masks": store.digest(masks), "method": METHOD}
+    if not (folder / BEGUN).exists() or store.read_json(folder / BEGUN) != begun:
+        shutil.rmtree(folder, ignore_errors=True)
+        store.write_json(folder / BEGUN, begun)
+    if (folder / FOUND).exists():
+        kept = typed(_Kept, store.read_json(folder / FOUND))
+    else:
+        for name, place in ((IMAGES, posed.folder / IMAGES), (MASKS[0], masks)):
+            shutil.copytree(place, folder / name, dirs_exist_ok=True)
+        gathered = as_gathered(folder)
+        told = attempt(folder, folder / "masked", gathered, "masked", progress)
+        told = checked_by_masks(told, folder, folder / "masked" / "sparse" / "0")
+        why = [*doubts(told), *filter(None, [doubt_of_masks(told)])]
+        shutil.rmtree(folder / MASKS[0])  # they were grown under other poses
+        if why:
+            kept = _Kept((), (), "; ".join(why), (told,))
+        else:
+            kept = _told(folder, gathered, (), (told,), told)
+        store.write_json(folder / FOUND, kept)
+    return None if kept.refused else Posed(folder, kept.statements, kept.warnings)
 
 
 def _found(source: Path, folder: Path, progress: Progress) -> _Kept:

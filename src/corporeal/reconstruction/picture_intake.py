@@ -4,12 +4,13 @@ import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+from corporeal.errors import BadFileError
 from corporeal.features.learned_masks import learned_masks
 from corporeal.features.maskers import connect_masker, split
-from corporeal.formats.photographs import has_masks, listed
+from corporeal.formats.photographs import MASKS, has_masks, listed
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
-from corporeal.poses.pose import POSES, Posed, pose
+from corporeal.poses.pose import POSES, Posed, pose, pose_object
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
 from corporeal.splats.intake import Intake, take_in
 from corporeal.splats.training_schedule import TrainConfig
@@ -18,6 +19,14 @@ POSED = 0.5
 """Share of learning from pictures that is done when poses that nobody gave are found."""
 MASKED = 0.1
 """The same, of finding masks."""
+WHOLE = 0.7
+"""Share of finding poses that is done when whole pictures fit together."""
+SEEN, OBJECT_POSES = "poses-seen", "poses-object"
+"""Folders of masks that found poses are tested by, and of poses that are found from them."""
+STAND_STILL = (
+    "Photograph it while neither it nor what is around it moves, give masks (a folder 'masks' with "
+    "the names of the pictures), or go on all the same with --force."
+)
 CORRECT = (
     "They lie in 0-reconstruct/masks of the run: what is corrected there is taken by the next run."
 )
@@ -37,7 +46,7 @@ def take_pictures(
     instances = config.apart == "masks"
     if kind_of([source]) == "splat":
         return take_in(source, training, kept, progress, instances), False
-    posed = _posed(source, folder, progress)
+    posed = _posed(source, config, folder, progress)
     begun = 0.0 if posed is None else POSED
     posed = posed or Posed(source, (), ())
     found = masks_for(config, posed.folder, folder, within(progress, begun, begun + MASKED))
@@ -84,12 +93,36 @@ def masks_for(
     )
 
 
-def _posed(source: Path, folder: Path | None, progress: Progress) -> Posed | None:
-    """Find where pictures were taken from; None: that is known, or there are none."""
+def _posed(
+    source: Path, config: ReconstructConfig, folder: Path | None, progress: Progress
+) -> Posed | None:
+    """Find where pictures were taken from; None: that is known, or there are none.
+
+    Raises:
+        BadFileError: It cannot be found, or is right about what is around the object alone.
+
+    """
     if not unposed(source):
         return None
     place = Path(tempfile.mkdtemp(prefix="corporeal-")) if folder is None else folder
-    return pose(source, place / POSES, within(progress, 0.0, POSED))
+    posed = pose(source, place / POSES, within(progress, 0.0, POSED * WHOLE))
+    if config.masks != AUTO or has_masks(listed(posed.folder).shots):
+        return posed
+    later = within(progress, POSED * WHOLE, POSED)
+    grown = grown_masks(posed.folder, place / SEEN, progress=later)
+    if grown.folder is None:
+        return posed
+    masks = grown.folder / MASKS[0]
+    if (why := movedwithin(posed, masks)) is None:
+        return posed
+    again = pose_object(posed, masks, place / OBJECT_POSES, later)
+    said = f"{why[0].upper()}{why[1:]}"
+    if again is not None:
+        how = f"{said}. Where each was taken from was found from points on the object alone."
+        return replace(again, warnings=(how, *again.warnings))
+    if not config.force:
+        raise BadFileError(source, f"{why}, and it has too few points of its own.", STAND_STILL)
+    return replace(posed, warnings=(f"{said}.", *posed.warnings))
 
 
 def within(progress: Progress, begin: float, end: float) -> Progress:
