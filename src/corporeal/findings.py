@@ -233,7 +233,7 @@ class PairSurfaces:
 
 @dataclass(frozen=True)
 class Breakage:
-    """What the hardest first blow does to a brittle part, which the simulation keeps whole."""
+    """What the hardest first blow does to a brittle part."""
 
     object: str
     part: str
@@ -248,6 +248,8 @@ class Breakage:
     ratio: float
     """Over what half of such parts bear [-]."""
     word: Literal["holds", "may break", "would break"]
+    pieces: int = 0
+    """That it broke into; 0: the simulation keeps it whole."""
 
 
 @dataclass(frozen=True)

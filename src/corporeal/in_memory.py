@@ -150,4 +150,4 @@ def play(
         raise
     if folder is None:
         weakref.finalize(trajectory.frames, shutil.rmtree, place, ignore_errors=True)
-    return Played(ready, trajectory)
+    return Played(ready.broken(trajectory.breaks), trajectory)

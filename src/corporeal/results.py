@@ -3,7 +3,8 @@
 from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
-from corporeal.geometry.contents import Whole, with_contents
+from corporeal.geometry.broken import Filled, with_breaks
+from corporeal.geometry.contents import with_contents
 from corporeal.geometry.followed import followed
 from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
@@ -44,8 +45,8 @@ class Results:
 
     @property
     def scene(self) -> Scene:
-        """From assemble, and once it is filled with what moves in its vessels."""
-        return self._whole.scene if self._pours else _made(self.assemble, "assemble")
+        """From assemble; later with what moves in its vessels, and the pieces of what broke."""
+        return self._filled.whole.scene if self._changes else _made(self.assemble, "assemble")
 
     @property
     def assembled(self) -> Whole:
@@ -54,12 +55,17 @@ class Results:
         return Whole(scene, parts, _made(self.ground, "ground"))
 
     @property
-    def _pours(self) -> bool:
-        return self.fill is not None and len(self.fill.contents) > 0
+    def _changes(self) -> bool:
+        pours = self.fill is not None and len(self.fill.contents) > 0
+        return pours or (self.simulate is not None and len(self.simulate.breaks) > 0)
 
     @property
-    def _whole(self) -> Whole:
-        return with_contents(*self.assembled.all, self.particles.contents)
+    def _filled(self) -> Filled:
+        """With what moves in vessels, and the pieces of what broke."""
+        particles = _made(self.fill, "fill")
+        whole = with_contents(*self.assembled.all, particles.contents)
+        breaks = () if self.simulate is None else self.simulate.breaks
+        return with_breaks(whole, particles, breaks)
 
     @property
     def inventory(self) -> Inventory:
@@ -69,17 +75,17 @@ class Results:
     @property
     def parts(self) -> Parts:
         """From segment."""
-        return self._whole.parts if self._pours else _made(self.segment, "segment")
+        return self._filled.whole.parts if self._changes else _made(self.segment, "segment")
 
     @property
     def field(self) -> MaterialField:
         """From ground."""
-        return self._whole.field if self._pours else _made(self.ground, "ground")
+        return self._filled.whole.field if self._changes else _made(self.ground, "ground")
 
     @property
     def particles(self) -> Particles:
-        """From fill."""
-        return _made(self.fill, "fill")
+        """From fill, and once it is simulated with the pieces of what broke."""
+        return self._filled.particles if self._changes else _made(self.fill, "fill")
 
     @property
     def trajectory(self) -> Trajectory:

@@ -919,6 +919,32 @@ class Ledger:
 
 
 @dataclass(frozen=True)
+class Break:
+    """A brittle rigid object that broke: N pieces, made as it was struck."""
+
+    object: int
+    """Which; its first piece keeps its number, the others come after all objects there are."""
+    part: int
+    """Its one part; likewise."""
+    time: float
+    """[s]"""
+    energy: float
+    """Taken from the motion [J]: what it bears until it breaks."""
+    ratio: float
+    """Energy of the blow over that [-]."""
+    by: str
+    """The other body, or the floor."""
+    speed: float
+    """Along the blow [m/s]."""
+    blow: float
+    """Energy of the blow [J]."""
+    piece: Int[np.ndarray, " P"]
+    """Which piece each of its particles belongs to."""
+    surfaces: tuple[Surface, ...]
+    """One per piece, where it was at the start."""
+
+
+@dataclass(frozen=True)
 class Trajectory:
     """The scene over time. Frames stay on disk and are read one by one."""
 
@@ -930,6 +956,8 @@ class Trajectory:
     """Per frame: energies [J], momentum per object [kg m/s], impulses [N s], penetration [m]."""
     frames: Sequence[Frame]
     """Reads frame i from disk when asked for."""
+    breaks: tuple[Break, ...] = ()
+    """What broke, in order; its pieces are objects in every frame."""
 
 
 @dataclass(frozen=True)

@@ -40,7 +40,7 @@ SOLVER = [
     {"formulas", "substance"},
     {"state"},
     {"measure"},
-    {"interaction"},
+    {"interaction", "splitting"},
     {"reference", "cpu", "cuda"},
 ]
 """Floors within ``mpm``: engines stand side by side and know nothing of one another."""

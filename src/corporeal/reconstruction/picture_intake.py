@@ -113,7 +113,7 @@ def _posed(
     if grown.folder is None:
         return posed
     masks = grown.folder / MASKS[0]
-    if (why := movedwithin(posed, masks)) is None:
+    if (why := moved_within(posed, masks)) is None:
         return posed
     again = pose_object(posed, masks, place / OBJECT_POSES, later)
     said = f"{why[0].upper()}{why[1:]}"

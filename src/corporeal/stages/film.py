@@ -57,6 +57,9 @@ LOOKS = 60
 """Frames that the camera's place is chosen by, at most."""
 STRAYS = 0.4
 """Percent of an object's particles, at either end, that need not be in the picture."""
+CORE = 0.5
+"""Share of an object's mass that says how large it is [-]: what flies off as drops or grains does
+not make it larger."""
 NEAR = 0.1
 """Gaussians nearer than this share of the way to the scene are haze, and not drawn."""
 FAR = 2.5
@@ -195,25 +198,55 @@ def reel_of(skin: Skin, scene: Scene, particles: Particles, trajectory: Trajecto
     """Return what moves, for the camera: boxes of the start's surfaces, then of particles."""
     count = len(trajectory.frames)
     numbers = np.unique(np.linspace(0, count - 1, min(count, LOOKS)).round().astype(int))
+    members = [np.flatnonzero(particles.object == k) for k in range(len(scene.objects))]
+    fullness = [_fullness(particles.position[mine], particles.mass[mine]) for mine in members]
     boxes = [_surface_boxes(skin, scene)]
-    boxes += [
-        _boxes(trajectory.frames[int(k)].position, particles.object, len(scene.objects))
-        for k in numbers
-    ]
+    for k in numbers:
+        place = trajectory.frames[int(k)].position
+        boxes.append(
+            np.array(
+                [
+                    _box(place[mine], particles.mass[mine], full)
+                    for mine, full in zip(members, fullness, strict=True)
+                ]
+            )
+        )
     time = np.concatenate([trajectory.time[:1], trajectory.time[numbers]])
     contact = first_contact(trajectory.ledger, len(scene.objects))
     return Reel(time, _near(np.array(boxes)), contact)
 
 
-def _boxes(points: np.ndarray, owner: np.ndarray, objects: int) -> np.ndarray:
-    """Corners (B, 2, 3) of all but a few stray points of each object [m]."""
-    out = np.full((objects, 2, 3), np.nan)
-    for k in range(objects):
-        mine = points[owner == k]
-        mine = mine[np.isfinite(mine).all(axis=1)]
-        if len(mine):
-            out[k] = np.percentile(mine, (STRAYS, 100 - STRAYS), axis=0)
-    return out
+def _core(points: np.ndarray, mass: np.ndarray) -> tuple[np.ndarray, float]:
+    """Median place of an object's particles, and the radius of most of its mass [m]."""
+    middle = np.median(points, axis=0)
+    away = np.linalg.norm(points - middle, axis=1)
+    order = np.argsort(away)
+    share = np.cumsum(mass[order]) / mass.sum()
+    return middle, float(away[order][min(np.searchsorted(share, CORE), len(away) - 1)])
+
+
+def _fullness(points: np.ndarray, mass: np.ndarray) -> float:
+    """How far an object reaches at the start over the radius of most of its mass [-]."""
+    if len(points) == 0:
+        return 1.0
+    middle, core = _core(points, mass)
+    return float(np.linalg.norm(points - middle, axis=1).max()) / core if core > 0.0 else np.inf
+
+
+def _box(points: np.ndarray, mass: np.ndarray, fullness: float) -> np.ndarray:
+    """Corners (2, 3) of an object [m], of which a few stray points are left out.
+
+    It is as large about its middle as it was at the start, for how far most of its mass reaches:
+    what keeps its shape is seen whole, and of what scatters where half of it is.
+    """
+    here = np.isfinite(points).all(axis=1)
+    points, mass = points[here], mass[here]
+    if len(points) == 0:
+        return np.full((2, 3), np.nan)
+    low, high = np.percentile(points, (STRAYS, 100 - STRAYS), axis=0)
+    middle, core = _core(points, mass)
+    reach = core * fullness if core > 0.0 else np.inf
+    return np.array([np.maximum(low, middle - reach), np.minimum(high, middle + reach)])
 
 
 def _surface_boxes(skin: Skin, scene: Scene) -> np.ndarray:

@@ -16,16 +16,25 @@ from typing import Literal
 import numpy as np
 
 from corporeal import backends, store
-from corporeal.errors import SimulationError
+from corporeal.errors import SimulationError, UserError
 from corporeal.findings import Settled, SettledObject
+from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import MENU, Engine, Problem
 from corporeal.trajectory.audit import audit
 from corporeal.trajectory.audit_file import write_audit
+from corporeal.trajectory.breaking import (
+    Stage,
+    break_up,
+    layout,
+    next_blow,
+    retell,
+    stage_at_start,
+)
 from corporeal.trajectory.checkpoint import Checkpoints, fingerprint
 from corporeal.trajectory.energy_gain import EnergyWatch
 from corporeal.trajectory.frames import (
+    BREAKS,
     FOLDER,
-    Layout,
     frame_path,
     gather,
     write_frame,
@@ -36,7 +45,7 @@ from corporeal.trajectory.static_equilibrium import Balance, Relaxation, before
 from corporeal.trajectory.stress import VonMises
 from corporeal.treatment.problem_from_scene import Posed, pose, standing
 from corporeal.typed import typed
-from corporeal.types import Frame, MaterialField, Particles, Scene, Trajectory
+from corporeal.types import Break, Frame, MaterialField, Particles, Scene, Trajectory
 from corporeal.version import __version__
 
 SETTLING = "settling.json"
@@ -57,6 +66,9 @@ class SimulateConfig:
     contact: Literal["multi", "single"] = "multi"
     """multi: one velocity field per object, with friction between them; single: one field for all,
     a control in which touching objects stick together."""
+    breaking: bool = False
+    """Brittle things that are struck with ten times the energy that they bear break into pieces;
+    else they stay whole, and it is said what would break."""
 
     def __post_init__(self) -> None:
         """Take the former name of an engine for its present one, and say so."""
@@ -81,6 +93,11 @@ def as_kept(config: SimulateConfig) -> SimulateConfig:
 
 def validate(config: SimulateConfig) -> None:
     """Raise UserError where there is no engine as asked for, whatever the scene."""
+    if config.breaking and (config.engine, config.contact) != ("cpu", "multi"):
+        raise UserError(
+            "--breaking works with the engine cpu and with contact multi alone. Leave out "
+            "--engine and --contact."
+        )
     if config.engine == "cuda":
         backends.load("engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:present"})("cuda")
 
@@ -110,6 +127,7 @@ def simulate(
         DiskError: The disk is full; the frames so far are kept.
 
     """
+    validate(config)
     posed = pose(scene, particles, field, config.contact)
     build: Build = backends.load("engine", config.engine, MENU)
     times = frame_times(scene)
@@ -120,11 +138,13 @@ def simulate(
     with store.writing(folder):
         kept, slept = Checkpoints(folder, name), Checkpoints(folder / "settling", name)
         relax = partial(relaxed, scene, posed, lying, build, slept, progress)
-        run = Run(build(posed.problem), posed, folder, times, kept)
+        begun = stage_at_start(scene, particles, field, posed)
+        run = Run(build(posed.problem), begun, folder, times, kept, config.breaking)
         run.through(progress, lying, relax)
         trajectory = gather(folder, len(times))
         found = typed(Settled, store.read_json(folder / SETTLING)) if lying else None
-        write_audit(folder, audit(scene, particles, field, trajectory, found))
+        end = run.stage
+        write_audit(folder, audit(end.scene, end.particles, end.field, trajectory, found))
         kept.forget()
         slept.forget()
     return trajectory
@@ -205,20 +225,27 @@ class Run:
     def __init__(
         self,
         engine: Engine,
-        posed: Posed,
+        stage: Stage,
         folder: Path,
         times: np.ndarray,
         checkpoints: Checkpoints,
+        breaking: bool = False,
     ) -> None:
-        self.engine, self.posed, self.folder = engine, posed, folder
+        self.engine, self.folder, self.breaking = engine, folder, breaking
         self.times, self.checkpoints = times, checkpoints
-        self.place = np.empty_like(posed.order)
-        self.place[posed.order] = np.arange(len(posed.order))
-        bodies = posed.problem.bodies
-        owner = np.repeat(np.arange(len(bodies)), [len(b.position) for b in bodies])
-        self.layout = Layout(object=owner[self.place], rigid=posed.rigid)
-        self.watch = EnergyWatch.of(posed.problem)
-        self.stress = VonMises(posed.problem)
+        self.breaks: tuple[Break, ...] = ()
+        self.whole: set[int] = set()
+        self._take(stage)
+
+    def _take(self, stage: Stage) -> None:
+        """Keep the books of what is simulated now."""
+        self.stage, self.posed = stage, stage.posed
+        order = stage.posed.order
+        self.place = np.empty_like(order)
+        self.place[order] = np.arange(len(order))
+        self.layout = layout(stage.posed)
+        self.watch = EnergyWatch.of(stage.posed.problem)
+        self.stress = VonMises(stage.posed.problem)
 
     def through(self, progress: Progress, lying: tuple[int, ...], relax: Relax) -> None:
         """Step to the end, writing every frame as it comes.
@@ -233,19 +260,53 @@ class Run:
         saved = self.engine.save()
         try:
             for number in range(done, len(self.times)):
+                since = self.engine.time
                 self.engine.advance(float(self.times[number]))
                 self.keep_frame(number)
+                if self.breaking:
+                    self._break(number, since, saved)
                 saved, done = self.engine.save(), number + 1
-                if self.checkpoints.due:
+                # From a break on a run that was cut off begins anew.
+                if self.checkpoints.due and not self.breaks:
                     self.checkpoints.keep(saved, done)
                 progress(done / len(self.times), self.words())
         except KeyboardInterrupt:
-            self.checkpoints.keep(saved, done)
+            if not self.breaks:
+                self.checkpoints.keep(saved, done)
             raise
         except SimulationError as error:
             raise SimulationError(
                 f"{error} {done} of {len(self.times)} frames are in {self.folder}."
             ) from error
+
+    def _break(self, number: int, since: float, saved: dict[str, np.ndarray]) -> None:
+        """Break what was struck too hard since the last frame, and simulate from there again.
+
+        Args:
+            number: Of the frame that was written last.
+            since: Time of the one before it [s].
+            saved: The state then.
+
+        """
+        while True:
+            blow = next_blow(self.stage, self.breaks, self.whole, self.folder, number, since)
+            if blow is None:
+                return
+            self.engine.restore(saved)
+            assert isinstance(self.engine, CpuEngine)
+            broken = break_up(self.stage, self.engine, blow, self.breaks)
+            if broken is None:
+                # What cannot be cut stays whole.
+                self.whole.add(blow.object)
+            else:
+                self.checkpoints.forget()
+                retell(self.folder, number, self.stage, broken.stage, broken.breaks[-1])
+                self.engine, self.breaks = broken.engine, broken.breaks
+                self._take(broken.stage)
+                store.save(self.folder / BREAKS, self.breaks)
+                since, saved = self.engine.time, self.engine.save()
+            self.engine.advance(float(self.times[number]))
+            self.keep_frame(number)
 
     def begin(self, lying: tuple[int, ...], relax: Relax) -> int:
         """Go back to the newest checkpoint, or write the first frame; return how many are done."""
@@ -261,6 +322,7 @@ class Run:
             if int(frame.stem) >= done:
                 frame.unlink()
         if not done:
+            (self.folder / BREAKS).unlink(missing_ok=True)
             write_layout(self.folder, self.layout)
             self.keep_frame(0)
         frame = frame_path(self.folder, 0).stat().st_size
@@ -276,7 +338,9 @@ class Run:
         """Write the present as frame ``number``, particles in their own order."""
         now, measure = self.engine.snapshot(), self.engine.measure()
         rigid = self.posed.rigid[self.layout.object]
-        motion = np.where(rigid[:, None, None], now.deformation[self.place], now.motion[self.place])
+        # A rigid piece has turned before it was one.
+        turned = now.deformation[self.place] @ self.stage.turned[self.layout.object]
+        motion = np.where(rigid[:, None, None], turned, now.motion[self.place])
         stress = self.stress.at(now)[self.place]
         frame = Frame(now.time, now.position[self.place], motion, stress)
         row = ledger_row(self.posed.problem, now, measure, self.engine.steps)

@@ -77,11 +77,13 @@ def surface_warnings(pairs: Iterable[PairSurfaces]) -> list[str]:
 
 def breakage_words(found: Breakage) -> str:
     """Say in a sentence what a blow does to a brittle part."""
-    return (
-        f"{found.object}: {found.part} {found.word}: {found.by} strikes it at "
-        f"{found.speed:.2g} m/s, with {found.ratio:.2g} times the energy that half of such parts "
-        "bear; the simulation keeps it whole."
+    blow = (
+        f"{found.by} strikes it at {found.speed:.2g} m/s, with {found.ratio:.2g} times the energy "
+        "that half of such parts bear"
     )
+    if found.pieces:
+        return f"{found.object}: {found.part} breaks into {found.pieces} pieces: {blow}."
+    return f"{found.object}: {found.part} {found.word}: {blow}; the simulation keeps it whole."
 
 
 SAGGED, SEEN = 1.0, 0.1

@@ -1,11 +1,12 @@
 """What would break: every brittle rigid part at its first blow from each other body.
 
-The simulation keeps such parts whole. Here the energy of the blow is compared with what half of
-such parts bear (``fracture``). Blows after the first of a pair are not looked at: a vase that falls
-over where it stood, and what bounces, are judged by their first touch.
+The simulation keeps such parts whole, unless it is told to break them (``breaking``). Here the
+energy of the blow is compared with what half of such parts bear (``fracture``). Blows after the
+first of a pair are not looked at: a vase that falls over where it stood, and what bounces, are
+judged by their first touch.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -17,7 +18,7 @@ from corporeal.geometry.mesh import joined
 from corporeal.materials import find
 from corporeal.mpm.physics.springs import turn_of
 from corporeal.trajectory.fracture import Brittle, Elastic, Form, word
-from corporeal.types import Frame, MaterialField, Particles, Scene, Trajectory
+from corporeal.types import Break, Frame, MaterialField, Particles, Scene, Trajectory
 
 HARD_FLOOR = "concrete"
 """What the floor and walls count as."""
@@ -52,13 +53,28 @@ class _Mover:
         return self.inverse_mass + float(lever @ self.inverse_inertia @ lever)
 
 
+@dataclass(frozen=True)
+class Blow:
+    """The first blow of another body, or of a plane, on a brittle part."""
+
+    object: int
+    part: int
+    other: int | None
+    """The other object; None: a plane."""
+    point: Float[np.ndarray, "3"]
+    """Where it struck [m]."""
+    away: Float[np.ndarray, "3"]
+    """Unit: how it pushes the part."""
+    found: Breakage
+
+
 STILL = _Mover(np.zeros(3), 0.0, np.zeros((3, 3)), np.zeros(3))
 
 
 def breakage(
     scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
 ) -> tuple[Breakage, ...]:
-    """Judge every brittle rigid part by the hardest of its first blows.
+    """Judge every brittle rigid part by the hardest of its first blows; of what broke, by that.
 
     Args:
         scene: What was simulated.
@@ -67,13 +83,43 @@ def breakage(
         trajectory: How they moved, with the ledger.
 
     """
+    found = {one.part: told(one, scene, field) for one in trajectory.breaks}
+    pieces = pieces_of(trajectory.breaks, len(scene.objects))
+    for blow in blows(scene, particles, field, trajectory):
+        known = found.get(blow.part)
+        if blow.object not in pieces and (known is None or blow.found.ratio > known.ratio):
+            found[blow.part] = blow.found
+    return tuple(found[k] for k in sorted(found))
+
+
+def told(one: Break, scene: Scene, field: MaterialField) -> Breakage:
+    """Say what broke."""
+    return Breakage(
+        object=scene.objects[one.object].name,
+        part=field.words[one.part].name,
+        by=one.by,
+        time=one.time,
+        speed=one.speed,
+        energy=one.blow,
+        ratio=one.ratio,
+        word=word(one.ratio),
+        pieces=len(one.surfaces),
+    )
+
+
+def pieces_of(breaks: Sequence[Break], objects: int) -> set[int]:
+    """Return the objects that are pieces of what broke, which break no more."""
+    more = sum(len(one.surfaces) - 1 for one in breaks)
+    return {one.object for one in breaks} | set(range(objects - more, objects))
+
+
+def blows(
+    scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
+) -> tuple[Blow, ...]:
+    """Find every first blow on a brittle rigid part."""
     if not _brittle(particles, field).any():
         return ()
-    found: dict[int, Breakage] = {}
-    for part, blow in _Blows(scene, particles, field, trajectory).all():
-        if part not in found or blow.ratio > found[part].ratio:
-            found[part] = blow
-    return tuple(found[k] for k in sorted(found))
+    return tuple(_Blows(scene, particles, field, trajectory).all())
 
 
 def _brittle(particles: Particles, field: MaterialField) -> np.ndarray:
@@ -98,8 +144,8 @@ class _Blows:
         hard = find(HARD_FLOOR).ranges
         self.floor = Elastic(hard["young"].typical, hard["poisson"].typical)
 
-    def all(self) -> Iterator[tuple[int, Breakage]]:
-        """Every first blow on a brittle part, and which part it is."""
+    def all(self) -> Iterator[Blow]:
+        """Every first blow on a brittle part."""
         first = self.ledger.first_contact[-1]
         objects = len(self.scene.objects)
         for a in range(objects):
@@ -109,7 +155,7 @@ class _Blows:
                     if found is not None:
                         yield found
 
-    def _blow(self, a: int, c: int, time: float) -> tuple[int, Breakage] | None:
+    def _blow(self, a: int, c: int, time: float) -> Blow | None:
         """Judge the first touch of an object with another or a plane; None: it is not brittle."""
         objects = len(self.scene.objects)
         k = max(0, int(np.searchsorted(self.ledger.time, time, side="right")) - 1)
@@ -124,13 +170,14 @@ class _Blows:
             material = self.field.materials[self._struck(frame, c, point)]
             partner = Elastic(material.young, material.poisson)
         mine, normal = self._mover(frame, k, a, time, point), self._normal(a, c, k)
-        speed = abs(float((mine.velocity - other.velocity) @ normal))
+        closing = float((mine.velocity - other.velocity) @ normal)
+        speed = abs(closing)
         softness = mine.softness(normal) + other.softness(normal)
         energy = 0.5 * speed**2 / softness if softness > 0.0 else 0.0
         struck = self._form(part, self._roundness(c, point, frame))
         ratio = energy / struck.breaking_energy(partner)
         names = [thing.name for thing in self.scene.objects]
-        return part, Breakage(
+        said = Breakage(
             object=names[a],
             part=self.field.words[part].name,
             by=names[c] if c < objects else FLOOR,
@@ -140,6 +187,8 @@ class _Blows:
             ratio=ratio,
             word=word(ratio),
         )
+        away = -normal if closing > 0.0 else normal
+        return Blow(a, part, c if c < objects else None, point, away, said)
 
     # ------------------------------------------------------------ how they met
 
@@ -227,7 +276,7 @@ class _Blows:
             radius = other_radius if np.isfinite(other_radius) else thickness / 2.0
             other_radius = np.inf
         elif wall > 0.0:
-            closed = long < ROUND * short and self._closed(owner)
+            closed = long < ROUND * short and encloses(self.scene, owner)
             form = "closed" if closed else "tube"
             length = long if long > 1.2 * middle else short
             thickness, radius = wall, middle / 2.0
@@ -235,23 +284,27 @@ class _Blows:
         return Brittle(form, solid, strength, radius, thickness, length, other_radius)
 
     def _sides(self, k: int) -> list[float]:
-        """Sides of a part's box at the start [m], shortest first."""
+        """Sides of a part's box at the start [m], shortest first: along the axes, or as it lies."""
         mine = self.particles.part == k
         spacing = float(np.mean(self.particles.volume[mine] ** (1.0 / 3.0)))
-        return sorted((np.ptp(self.particles.position[mine], axis=0) + spacing).tolist())
+        place = self.particles.position[mine]
+        own = np.linalg.svd(place - place.mean(axis=0), full_matrices=False)[2].T
+        boxes = [np.ptp(place @ frame, axis=0) + spacing for frame in (np.eye(3), own)]
+        return sorted(min(boxes, key=np.prod).tolist())
 
-    def _closed(self, number: int) -> bool:
-        """Whether an object's surface closes about a room, as an egg's and a duck's do."""
-        mesh = joined([s for s in self.scene.surfaces if s.object == number])
-        fine = SAME * float(np.ptp(mesh.vertices, axis=0).max())
-        _, one = np.unique(np.round(mesh.vertices / fine), axis=0, return_inverse=True)
-        faces = one.reshape(-1)[mesh.triangles]
-        edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), 1)
-        if np.any(np.unique(edges, axis=0, return_counts=True)[1] % 2):
-            return False
-        corner = mesh.vertices[mesh.triangles] - mesh.vertices.mean(axis=0)
-        volume = float(np.sum(corner[:, 0] * np.cross(corner[:, 1], corner[:, 2]))) / 6.0
-        try:
-            return volume > FULL * float(ConvexHull(mesh.vertices).volume)
-        except QhullError:
-            return False
+
+def encloses(scene: Scene, number: int) -> bool:
+    """Whether an object's surface closes about a room, as an egg's and a duck's do."""
+    mesh = joined([s for s in scene.surfaces if s.object == number])
+    fine = SAME * float(np.ptp(mesh.vertices, axis=0).max())
+    _, one = np.unique(np.round(mesh.vertices / fine), axis=0, return_inverse=True)
+    faces = one.reshape(-1)[mesh.triangles]
+    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), 1)
+    if np.any(np.unique(edges, axis=0, return_counts=True)[1] % 2):
+        return False
+    corner = mesh.vertices[mesh.triangles] - mesh.vertices.mean(axis=0)
+    volume = float(np.sum(corner[:, 0] * np.cross(corner[:, 1], corner[:, 2]))) / 6.0
+    try:
+        return volume > FULL * float(ConvexHull(mesh.vertices).volume)
+    except QhullError:
+        return False

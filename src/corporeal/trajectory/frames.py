@@ -18,12 +18,15 @@ from typing import Any, overload
 import numpy as np
 from jaxtyping import Bool, Int
 
+from corporeal import store
 from corporeal.errors import BadFileError
 from corporeal.types import Frame, Ledger, Trajectory
 
 FOLDER = "frames"
 LAYOUT = "layout.npz"
 LEDGER = "ledger.npz"
+BREAKS = "breaks.npz"
+"""What broke, where something did."""
 PREFIX = "ledger."
 DAMAGE = (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipFile)
 """What reading a damaged npz raises."""
@@ -193,5 +196,6 @@ def read_trajectory(folder: Path) -> Trajectory:
     """
     path = folder / LEDGER
     ledger = _ledger(path, read_arrays(path))
-    frames = Frames(folder, len(ledger.time))
-    return Trajectory(folder=folder, time=ledger.time, ledger=ledger, frames=frames)
+    frames, broken = Frames(folder, len(ledger.time)), folder / BREAKS
+    breaks = store.load(broken) if broken.exists() else ()
+    return Trajectory(folder, ledger.time, ledger, frames, breaks)

@@ -1,11 +1,15 @@
 """A scene made ready to simulate, and the same scene with how it moved."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cached_property
 
 from corporeal.findings import Outcome
+from corporeal.geometry.broken import with_breaks
+from corporeal.geometry.contents import Whole
 from corporeal.trajectory.outcome import outcome
 from corporeal.types import (
+    Break,
     Inventory,
     MaterialField,
     Particles,
@@ -27,6 +31,12 @@ class Prepared:
     field: MaterialField
     """What every part is made of, with ranges and sources."""
     particles: Particles
+
+    def broken(self, breaks: Sequence[Break]) -> "Prepared":
+        """Return it with the pieces of what broke as objects."""
+        filled = with_breaks(Whole(self.scene, self.parts, self.field), self.particles, breaks)
+        scene, parts, field = filled.whole.all
+        return Prepared(scene, self.inventory, parts, field, filled.particles)
 
 
 @dataclass(frozen=True)

@@ -58,6 +58,7 @@ from corporeal.mpm.physics.grips import Grip
 from corporeal.mpm.physics.rigid import RigidBody
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, Steps
+from corporeal.mpm.splitting import Heirs
 from corporeal.mpm.state import Motion
 from corporeal.mpm.substance import Substances
 
@@ -383,6 +384,20 @@ class CpuEngine(Interaction):
         self.lost[:] = False
         self.connect()
 
+    def inherit(self, saved: dict[str, np.ndarray], heirs: Heirs) -> None:
+        """Go on from the ``save`` of an engine of whose bodies one is several here.
+
+        The pieces are where the problem says; all else is as it was, and so are the books.
+        """
+        own, split = self.save(), np.bincount(heirs.parent)
+        kept = {b for b, parent in enumerate(heirs.parent) if b == parent and split[b] == 1}
+        names = [f"field{b}." for b in kept if b not in self.rigid]
+        names += [f"rigid{b}" for b in kept if b in self.rigid]
+        own |= {k: v for k, v in saved.items() if k in names or k.startswith(_fields(names))}
+        book = {name: saved[f"ledger.{name}"] for name in self.ledger.as_arrays()}
+        own |= {f"ledger.{name}": v for name, v in heirs.inherited(book).items()}
+        self.restore(own | {"clock": saved["clock"]})
+
     # ------------------------------------------------------------ accessors of what is common
 
     def _particles(self) -> Snapshot:
@@ -480,6 +495,10 @@ class CpuEngine(Interaction):
         wave = float(saved["clock"][-1])
         self.clock["wave"] = max(float(self.clock["wave"][0]), wave)
         self.connect()
+
+
+def _fields(names: list[str]) -> tuple[str, ...]:
+    return tuple(name for name in names if name.endswith("."))
 
 
 def _of(head: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
