@@ -34,3 +34,4 @@ def test_the_ladder_of_what_is_known_on_scanned_things(shared_assets):
     assert result.coverage["all"] >= 0.85
     assert result.coverage_without["all"] >= 0.85
     assert result.width["all"] <= 2.2
+    assert result.width_without["all"] <= 2.2
