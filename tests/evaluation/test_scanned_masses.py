@@ -29,12 +29,33 @@ class Measured:
     covered: float
     """Share of the measured masses inside the 90 % interval."""
     covered_without: float
+    within_2: float = 1.0
+    """Share of the masses that are right within a factor of two."""
+    ladder: tuple[str, ...] = (
+        "hull_fit",
+        "solid_usual",
+        "built_usual",
+        "placed",
+        "mixture",
+        "mass",
+    )
+    """Steps of which each has less error than the one before."""
 
 
 SETS = [
     Measured("scanned_a", mixture=0.22, mass=0.18, ape=0.18, covered=0.85, covered_without=0.85),
-    # Misses the targets that the first set meets (.22, .18, 85 %): the page says so.
-    Measured("scanned_b", mixture=0.33, mass=0.22, ape=0.21, covered=0.7, covered_without=0.8),
+    # Misses the targets that the first set meets (.22, .18, 85 %), and all ways together do not
+    # beat the likeliest one: the page says so.
+    Measured(
+        "scanned_b",
+        mixture=0.33,
+        mass=0.22,
+        ape=0.21,
+        covered=0.7,
+        covered_without=0.8,
+        within_2=0.94,
+        ladder=("hull_fit", "solid_usual", "built_usual", "placed", "mass"),
+    ),
 ]
 
 
@@ -47,14 +68,14 @@ def test_the_ladder_of_what_is_known_on_scanned_things(shared_assets, measured):
     result = compare(predict_all(things, answered, GroundConfig(), config))
     every = result.metrics["all"]
     assert every["mass"].count == 19
-    ladder = ["hull_fit", "solid_usual", "built_usual", "placed", "mixture", "mass"]
-    errors = [every[step].alde for step in ladder]
+    errors = [every[step].alde for step in measured.ladder]
     assert errors == sorted(errors, reverse=True)
     assert every["hull_fit"].alde == pytest.approx(0.747, abs=0.03)
     assert every["mixture"].alde <= measured.mixture
     assert every["mass"].alde <= measured.mass
     assert every["mass"].ape <= measured.ape
-    assert every["mass"].within_2 == 1.0
+    assert every["mass"].within_2 >= measured.within_2
     assert result.coverage["all"] >= measured.covered
     assert result.coverage_without["all"] >= measured.covered_without
     assert result.width["all"] <= 2.2
+    assert result.width_without["all"] <= 2.2
