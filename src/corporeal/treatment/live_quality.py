@@ -1,18 +1,21 @@
 """What a simulation that runs while somebody watches can afford."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from corporeal.mpm.constants import COURANT
 from corporeal.treatment.plan import QUALITIES, Detail, Quality
-from corporeal.treatment.step_budget import OUTRUN, counted
+from corporeal.treatment.step_budget import counted
 from corporeal.types import Particles
 
 CELLS = (8, 7, 6, 5, 4)
 """Cells across the smallest deformable object, the finest first."""
 SHARE = 0.7
 """Of the threads' time that steps may take, as they cost before anything touches."""
-FEWEST = 3e3
-"""Steps per simulated second below which coarser cells are better."""
+OUTRUN = 5.0
+"""Waves run at least so many times faster than anything moves [-]: half of what a run asks. At 10
+the duck on mud takes twice the steps; what is softer for it is said in the page."""
+FEWEST = 500.0
+"""Steps per simulated second that any scene gets."""
 MOST = 20e3
 """Steps per simulated second beyond which no draft goes either."""
 
@@ -83,4 +86,21 @@ def live_quality(demand: Demand, threads: int) -> Quality:
     steps = min(max(steps_at(cells) / demand.stiffened, FEWEST), MOST)
     coarse = QUALITIES["draft"]
     along = coarse.cells_along * cells // coarse.cells_across
-    return Quality(cells, along, coarse.particles, steps, float("inf"))
+    return Quality(cells, along, coarse.particles, steps, float("inf"), OUTRUN)
+
+
+def held(quality: Quality, demand: Demand, cell: float, threads: int) -> Quality:
+    """Return a quality with fewer steps where its cells turned out finer than it asked for.
+
+    What is rigid is at least a cell wide, whatever the budget: then only steps can be saved.
+
+    Args:
+        quality: From ``live_quality``.
+        demand: Of the scene as it was filled before.
+        cell: dx that it led to [m].
+        threads: Of the engine.
+
+    """
+    fits = SHARE * threads / (demand.cost * (demand.cell / cell) ** 3)
+    steps = max(fits / demand.stiffened, FEWEST)
+    return replace(quality, steps_per_second=min(quality.steps_per_second, steps))
