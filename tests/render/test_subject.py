@@ -30,6 +30,7 @@ PARTS = SimpleNamespace(
         ("lid: lid is of unknown material.", [3]),
         ("6 of 7 parts are simulated softer than they are.", []),
         ("somebody said can_0x.", []),
+        ("Object 2 of the scene is only 3.1 cells across.", [2]),
     ],
 )
 def test_the_parts_that_a_sentence_names(sentence, parts):

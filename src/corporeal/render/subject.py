@@ -8,8 +8,8 @@ from corporeal.types import Parts, Scene
 def parts_named(sentence: str, scene: Scene, parts: Parts) -> list[int]:
     """Return the parts that a sentence is about.
 
-    Those that it names as "object: part"; or else all parts of the objects that it names. A name
-    counts where no letter, digit or underscore stands beside it.
+    Those that it names as "object: part"; or else all parts of the objects that it names, also as
+    "Object 2 of the scene". A name counts where no letter, digit or underscore stands beside it.
     """
     owners = [scene.objects[part.object].name for part in parts.catalogue]
     named = [
@@ -17,7 +17,12 @@ def parts_named(sentence: str, scene: Scene, parts: Parts) -> list[int]:
         for k, (owner, part) in enumerate(zip(owners, parts.catalogue, strict=True))
         if _says(sentence, f"{owner}: {part.name}")
     ]
-    return named or [k for k, owner in enumerate(owners) if _says(sentence, owner)]
+    counted = {int(number) - 1 for number in re.findall(r"Object (\d+) of the scene", sentence)}
+    return named or [
+        k
+        for k, (owner, part) in enumerate(zip(owners, parts.catalogue, strict=True))
+        if _says(sentence, owner) or part.object in counted
+    ]
 
 
 def _says(sentence: str, name: str) -> bool:

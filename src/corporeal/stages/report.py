@@ -380,7 +380,7 @@ def _ground_row(name: str, ground: Ground, of: str = "") -> str:
     scale = " (log)" if logarithmic(ground.range) else ""
     return (
         f"<tr><td>{label}</td><td>{si(ground.value, unit)}</td>"
-        f"<td>{si(low, unit)} {bar} {si(high, unit)}{scale}</td>"
+        f'<td class="place">{si(low, unit)} {bar} {si(high, unit)}{scale}</td>'
         f"<td>{safe(CHOSEN.get(ground.chosen_by, ground.chosen_by))}</td>"
         f"<td>{safe(ground.reason)}</td><td>{safe(ground.range.source)}</td></tr>"
     )

@@ -21,6 +21,7 @@ from corporeal.treatment.part import (
 )
 from corporeal.treatment.rigidity import judge
 from corporeal.treatment.step_budget import (
+    OUTRUN,
     calm_trinkets,
     cap,
     fit_budget,
@@ -60,6 +61,8 @@ class Quality:
     """At most so many steps per simulated second …"""
     work: float
     """… and so many particles times steps, but never below two fifths of those steps."""
+    outrun: float = OUTRUN
+    """Waves run at least so many times faster than anything moves [-]."""
 
     def steps(self, particles: float) -> float:
         """Say how many steps per simulated second a scene of so many particles may take."""
@@ -155,7 +158,7 @@ def _plan(
     else:
         unslowed = calm_trinkets(parts, treatments, cell)
         steps = quality.steps(particles_needed(parts, cell))
-        fitted = fit_budget(unslowed, cell, steps)
+        fitted = fit_budget(unslowed, cell, steps, quality.outrun)
         treatments = fitted.treatments
         warnings.extend(fitted.warnings)
     chosen = Plan(cell=cell, treatments=tuple(treatments), warnings=tuple(warnings))

@@ -59,7 +59,7 @@ STIFFENED = 1.6
 
 
 OUTRUN = 10.0
-"""How many times faster than anything moves a wave must be, whatever the budget [-]."""
+"""How many times faster than anything moves a wave is, whatever the budget [-]."""
 
 
 def counted(treatment: Treatment) -> float:
@@ -72,13 +72,15 @@ def counted(treatment: Treatment) -> float:
     return treatment.wave_speed / min(STIFFENED, free)
 
 
-def fit_budget(treatments: Sequence[Treatment], cell: float, steps: float) -> Fitted:
+def fit_budget(
+    treatments: Sequence[Treatment], cell: float, steps: float, outrun: float = OUTRUN
+) -> Fitted:
     """Compress stiffness where the step budget would be exceeded; its order is kept.
 
     σ_y falls with √(E_sim/E), which keeps the impact speed at which a part yields.
     """
     motion = max((t.impact_speed for t in treatments), default=0.0)
-    limit = max(COURANT * cell * steps - motion, OUTRUN * motion)
+    limit = max(COURANT * cell * steps - motion, outrun * motion)
     treatments = [soften_bulk(t, limit, cell) for t in treatments]
     fastest = max(map(counted, treatments), default=0.0)
     # A part whose bulk gave way runs at the limit, but for rounding.

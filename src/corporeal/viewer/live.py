@@ -17,7 +17,7 @@ from corporeal.render.take import Cast, stress_bytes
 from corporeal.stages.fill import fill
 from corporeal.trajectory.played import Prepared
 from corporeal.trajectory.stress import VonMises
-from corporeal.treatment.live_quality import Demand, live_quality
+from corporeal.treatment.live_quality import Demand, held, live_quality
 from corporeal.treatment.problem_from_scene import pose
 from corporeal.types import Frame, Scene, Wind
 from corporeal.viewer.hands import Hands
@@ -38,6 +38,8 @@ MOST_TOUCHES = 100_000
 """Of a record: then it is only kept that it is not whole."""
 HEAD = "<u4"
 MOST_THREADS = 4
+WORTH = 0.8
+"""Share of the steps below which filling once more pays."""
 TRIED = 20
 """Steps by which the cost of one is measured."""
 
@@ -57,6 +59,9 @@ def live_scene(made: Made, threads: int) -> Prepared:
     quality = live_quality(demand, threads)
     # Contents of vessels are poured anew: fill is given the scene without them.
     particles = fill(scene, assembled.parts, assembled.field, quality=quality)
+    slower = held(quality, demand, particles.cell, threads)
+    if slower.steps_per_second < WORTH * quality.steps_per_second:
+        particles = fill(scene, assembled.parts, assembled.field, quality=slower)
     return replace(old, assemble=scene, fill=particles).prepared
 
 
@@ -118,6 +123,8 @@ class Live:
         self.playing = self.closed = self.whole = False
         self.done, self.rate, self.top = 0, 0.0, 1.0
         self.spent = {"step": 0.0, "show": 0.0}
+        self.worked = {"step": 0.0, "show": 0.0}
+        """CPU seconds of the two threads since the beginning, without the engine's other ones."""
         self.reset(single=False)
         self.threads_of = (
             threading.Thread(target=self._run, name="live", daemon=True),
@@ -161,11 +168,12 @@ class Live:
         """Obey and step; what there is to see is handed over, and nobody waited for."""
         self._hand_over()
         while not self.closed:
-            begun = time.perf_counter()
+            begun, worked = time.perf_counter(), time.thread_time()
             touched = self._obey()
             moved = self.playing and self._advance()
             if moved or touched:
                 self._hand_over()
+            self.worked["step"] += time.thread_time() - worked
             self._keep_pace(time.perf_counter() - begun, moved)
             time.sleep(max(1 / FPS - (time.perf_counter() - begun), 0.001))
             passed = time.perf_counter() - begun
@@ -187,8 +195,9 @@ class Live:
                 self.taken.wait_for(lambda: self.instant is not None or self.closed)
                 instant, self.instant = self.instant, None
             if instant is not None:
-                begun = time.perf_counter()
+                begun, worked = time.perf_counter(), time.thread_time()
                 picture = self.picture(instant)
+                self.worked["show"] += time.thread_time() - worked
                 self.spent["show"] = time.perf_counter() - begun
                 with self.news:
                     self.latest, self.number = picture, self.number + 1

@@ -6,7 +6,7 @@ in the same folder from where it was.
 
 import signal
 import threading
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Literal
@@ -95,6 +95,8 @@ class Queue:
             busy = [e for e in self.entries if e.state in ("waiting", "running")]
             if any(e.name == asked.name for e in busy):
                 raise UserError(f"{asked.name} is in the queue already.")
+            # What became of the run before is told by what becomes of it now.
+            self.entries = [e for e in self.entries if e.name != asked.name]
             self.settings[asked.id] = settings
             self.entries.append(asked)
             self._write()
@@ -204,7 +206,7 @@ class Queue:
         progress = self.progress.get(entry.id, JobProgress())
         row = {"id": entry.id, "name": entry.name, "state": entry.state, "error": entry.error}
         running = entry.state == "running"
-        bars = {v: progress.verbs.get(v, 0.0) for v in self._verbs(entry)} if running else {}
+        bars = _bars(self._verbs(entry), progress.verbs) if running else {}
         return row | {
             "until": entry.until,
             "verbs": bars,
@@ -231,3 +233,9 @@ class Queue:
         self.entries = [e for e in self.entries if e.id not in old]
         rows = [{"asked": e, "settings": self.settings[e.id]} for e in self.entries]
         store.write_json(self.runs / FILE, rows)
+
+
+def _bars(every: Sequence[str], told: Mapping[str, float]) -> dict[str, float]:
+    """Return how far every verb is; before one that is told of, all are done, maybe long ago."""
+    last = max((every.index(verb) for verb in told if verb in every), default=0)
+    return {v: 1.0 if k < last else told.get(v, 0.0) for k, v in enumerate(every)}

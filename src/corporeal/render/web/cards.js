@@ -130,11 +130,15 @@ export function table(rows, head = null) {
 
 // ---------------------------------------------------------------- two runs
 
+// A part's name, and whose it is where others are called so too.
+const called = (header, part) => header.parts.filter(p => p.name === part.name).length > 1
+  ? `${spoken(part.name)} of ${spoken(header.objects[part.object].name)}` : spoken(part.name)
+
 // What differs between the parts of two runs, as rows.
 export function differences(a, b) {
   const rows = [], ofB = new Map(b.parts.map(p => [`${b.objects[p.object].name}/${p.name}`, p]))
   for (const part of a.parts) {
-    const name = `${a.objects[part.object].name}/${part.name}`, other = ofB.get(name), said = spoken(part.name)
+    const name = `${a.objects[part.object].name}/${part.name}`, other = ofB.get(name), said = called(a, part)
     ofB.delete(name)
     if (!other) { rows.push([said, 'part', 'present', 'absent']); continue }
     if (part.material !== other.material) rows.push([said, 'material', spoken(part.material), spoken(other.material)])
@@ -155,10 +159,10 @@ export function differences(a, b) {
   })
   for (const part of a.parts) {
     const other = b.parts.find(p => p.name === part.name && b.objects[p.object].name === a.objects[part.object].name)
-    if (other?.mass_kg && Math.abs(part.mass_kg - other.mass_kg) > 1e-3 * part.mass_kg) rows.push([spoken(part.name), 'mass', si(part.mass_kg, 'kg'), si(other.mass_kg, 'kg')])
+    if (other?.mass_kg && Math.abs(part.mass_kg - other.mass_kg) > 1e-3 * part.mass_kg) rows.push([called(a, part), 'mass', si(part.mass_kg, 'kg'), si(other.mass_kg, 'kg')])
   }
   for (const [name, unit] of [['cell', 'm'], ['particles', '-'], ['duration', 's']]) {
     if (a[name] !== b[name]) rows.push(['scene', name, si(a[name], unit), si(b[name], unit)])
   }
-  return rows
+  return rows.map((row, k) => k && rows[k - 1][0] === row[0] ? ['', ...row.slice(1)] : row)
 }
