@@ -1,6 +1,6 @@
 """What a substep costs: nanoseconds and bytes per particle, ours and genesis-world's side by side.
 
-    python benchmarks/engine.py [--quick] [--json FILE] [--docs] [--peer DIR] [--peer-install DIR]
+    python benchmarks/engine.py [--quick] [--json FILE] [--history FILE] [--docs] [--peer DIR]
 
 Cubes of one material drop on the floor and slide. All contestants take turns, batch by batch, and
 the best of five batches counts, so that all of them meet the same machine.
@@ -17,7 +17,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import warp as wp
-from cost import page
+from cost import history, page
 from cost.blocks import Drop, drop_of
 from cost.contest import Contestant, Ours, contest
 from cost.peer import Peer, install
@@ -112,6 +112,7 @@ def main() -> None:
     parser.add_argument("--quick", action="store_true", help="fewer particles and substeps")
     parser.add_argument("--json", type=Path, help="write the rows to this file")
     parser.add_argument("--docs", action="store_true", help="write docs/benchmarks.md")
+    parser.add_argument("--history", type=Path, help="add what each cost to this CSV")
     parser.add_argument("--peer", type=Path, help="virtual environment with genesis-world")
     parser.add_argument("--peer-install", type=Path, help="make that environment here, and stop")
     chosen = parser.parse_args()
@@ -123,6 +124,8 @@ def main() -> None:
     if chosen.json:
         rows = [result.row() for result in results if result.drop.floor and not result.drop.heap]
         chosen.json.write_text(json.dumps(rows, indent=1) + "\n", encoding="utf-8")
+    if chosen.history:
+        history.append(chosen.history, results)
     if chosen.docs:
         flags = {"--quick": chosen.quick, "--docs": True, "--peer DIR": chosen.peer}
         command = " ".join(["python benchmarks/engine.py", *(f for f, on in flags.items() if on)])

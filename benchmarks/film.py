@@ -193,7 +193,7 @@ def main() -> None:
     )
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN")
     parser.add_argument("--against", type=Path, required=True, help="the other checkout")
-    parser.add_argument("--frames", type=int, default=4, help="pictures of each run")
+    parser.add_argument("--frames", type=int, default=2, help="pictures of each run")
     parser.add_argument("--rounds", type=int, default=3)
     asked = parser.parse_args()
     print("| run | picture | time [s] | ratio | error [of 255] |\n|---|---|---|---|---|")

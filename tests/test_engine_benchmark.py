@@ -1,5 +1,6 @@
 """The benchmark of the engine: rows as promised, nothing forgotten when memory is counted."""
 
+import csv
 import json
 import sys
 from pathlib import Path
@@ -30,6 +31,7 @@ def test_rows_and_page_are_made_from_one_run(engine, tmp_path, monkeypatch):
     monkeypatch.setattr(engine, "QUICK", tiny)
     monkeypatch.setattr(engine, "DOCS", tmp_path)
     words = ["engine.py", "--quick", "--docs", "--json", str(tmp_path / "rows.json")]
+    words += ["--history", str(tmp_path / "history.csv")]
     monkeypatch.setattr(sys, "argv", words)
     engine.main()
     rows = json.loads((tmp_path / "rows.json").read_text())
@@ -39,6 +41,10 @@ def test_rows_and_page_are_made_from_one_run(engine, tmp_path, monkeypatch):
     }  # fmt: skip
     assert {row["objects"] for row in rows} >= {1, 2}
     assert all(row["ns_per_particle_substep"] > 0 for row in rows)
+    kept = list(csv.DictReader((tmp_path / "history.csv").open(encoding="utf-8")))
+    assert len(kept) == len(rows) + 2, "so are they in the history"
+    assert kept[0]["ratio"] == "1.000"
+    assert all(float(row["ratio"]) > 0 for row in kept)
     page = (tmp_path / "benchmarks.md").read_text()
     assert page.count("| corporeal |") == len(rows) + 2, "a heap and a free flight are shown too"
     assert len(list((tmp_path / "images").glob("benchmarks-*.png"))) == 3

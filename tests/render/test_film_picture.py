@@ -5,6 +5,7 @@ from test_embree import RED, ball, front, scene, sheet
 from corporeal.render.camera import Aim
 from corporeal.render.embree import Stage, render
 from corporeal.render.film_picture import FilmCaster
+from corporeal.render.liquid_surface import LiquidSurface
 from corporeal.types import Finish
 
 LEAF = Finish(
@@ -68,3 +69,18 @@ def test_surfaces_that_are_not_shown_still_throw_shadows():
     shown = FilmCaster().picture(stage("a red ball"), front(), "draft", 1).astype(int)
     assert (bare - hidden).max() > 30
     assert hidden[25, 48].max() - hidden[25, 48].min() < 60 < np.ptp(shown[25, 48])
+
+
+def test_liquids_that_replace_surfaces_are_seen_where_they_went(monkeypatch):
+    before = stage("a mirror beside a ball")
+    gone = np.repeat([False, True], len(before.look.triangles) // 2)
+    there = ball((-0.8, -0.4, 0.3), 0.25)
+    assert there.normals is not None
+    liquid = LiquidSurface(there.vertices, there.normals, there.triangles, 0)
+    after = before.with_liquids(gone, [liquid])
+    made = FilmCaster().picture(after, front(), "draft", 1)
+    assert (made != FilmCaster().picture(before, front(), "draft", 1)).mean() > 0.02
+    everywhere = np.array([[[-1e3] * 3, [1e3] * 3]], np.float32)
+    monkeypatch.setattr(Stage, "boxes", lambda self: everywhere)
+    every = FilmCaster().picture(after, front(), "draft", 1)
+    assert np.abs(made.astype(int) - every).max() <= 1
