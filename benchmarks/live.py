@@ -11,22 +11,35 @@ import argparse
 import threading
 import time
 
-import corporeal as co
-from corporeal.machine import cores
+from corporeal.mixture import ground_weighed
+from corporeal.pipeline import Settings
 from corporeal.results import Results
 from corporeal.showcase.scenes import SCENES, build
-from corporeal.viewer.live import MOST_THREADS, Live, live_scene
+from corporeal.stages.describe import describe
+from corporeal.stages.fill import fill
+from corporeal.stages.segment import segment
+from corporeal.viewer.live import Live, live_scene, threads_here
 from corporeal.viewer.orders import Order
 from corporeal.viewer.shelf import Made
 
-HEADS = ("scene", "× real time", "pictures/s", "kB", "step ms", "show ms", "order ms p95", "slowed")
+HEADS = (
+    *("scene", "× real time", "simulated s per CPU s", "pictures/s", "kB"),
+    *("step ms", "show ms", "order ms p95", "slowed"),
+)
 
 
 def results_of(name):
     """Prepare a scene as a run does, up to fill."""
-    p = co.prepare(build(name))
+    scene = build(name)
+    inventory = describe(scene)
+    parts = segment(scene, inventory)
+    field = ground_weighed(scene, parts, inventory, Settings().ground)
     return Results(
-        assemble=p.scene, describe=p.inventory, segment=p.parts, ground=p.field, fill=p.particles
+        assemble=scene,
+        describe=inventory,
+        segment=parts,
+        ground=field,
+        fill=fill(scene, parts, field),
     )
 
 
@@ -68,16 +81,18 @@ def measure(name, seconds, threads):
     visitor.order(Order("play", 1))
     time.sleep(2.0)  # until the pace is found
     begun, start, before = time.perf_counter(), live.hands.engine.time, len(visitor.sizes)
+    worked = time.process_time()
     spent = pull(live, visitor, begun + seconds)
     passed = time.perf_counter() - begun
-    rate = (live.hands.engine.time - start) / passed
+    done, worked = live.hands.engine.time - start, time.process_time() - worked
     pictures = (len(visitor.sizes) - before) / passed
     visitor.leave()
     live.close()
     late = sorted(visitor.late)[int(0.95 * (len(visitor.late) - 1))]
     step, show = (1e3 * sum(s[k] for s in spent) / len(spent) for k in ("step", "show"))
     size = sum(visitor.sizes) / len(visitor.sizes) / 1e3
-    numbers = f"{rate:.2f} {pictures:.1f} {size:.0f} {step:.1f} {show:.1f} {1e3 * late:.0f}".split()
+    rates = f"{done / passed:.2f} {done / worked:.2f} {pictures:.1f}"
+    numbers = f"{rates} {size:.0f} {step:.1f} {show:.1f} {1e3 * late:.0f}".split()
     stopped = f" [stopped: {live.message}]" if live.message else ""
     return (name, *numbers, live.hello()["honest"] + stopped)
 
@@ -101,7 +116,7 @@ def main():
     wanted = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     wanted.add_argument("scenes", nargs="*", metavar="SCENE")
     wanted.add_argument("--seconds", type=float, default=8.0)
-    wanted.add_argument("--threads", type=int, default=min(MOST_THREADS, cores()))
+    wanted.add_argument("--threads", type=int, default=threads_here())
     asked = wanted.parse_args()
     print("|", " | ".join(HEADS), "|")
     print("|", " | ".join("---" for _ in HEADS), "|")

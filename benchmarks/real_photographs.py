@@ -29,7 +29,8 @@ import real_measures as measure
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.poses.pose import POSES
-from corporeal.stages.reconstruct import ReconstructConfig, Reconstructed, reconstruct
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.stages.reconstruct import Reconstructed, reconstruct
 from corporeal.terminal import progress_bars, show_table
 
 Case = Literal["all", "unmasked", "unposed", "bare"]

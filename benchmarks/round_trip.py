@@ -31,6 +31,7 @@ from scipy.spatial.distance import cdist
 from skimage.color import rgb2lab
 
 from corporeal import store
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.formats.scene_file import (
     ObjectEntry,
     SceneFile,
@@ -45,12 +46,11 @@ from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.similarity import moved_points
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.pipeline import Settings, opened, write_showcase
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.results import Results
 from corporeal.showcase.scenes import SCENES
 from corporeal.stages.capture import CaptureConfig, capture
-from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.fill import FillConfig
-from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.terminal import progress_bars, show_table
 from corporeal.types import MaterialField, Reconstruction, Scene, Views
 

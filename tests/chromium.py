@@ -50,7 +50,7 @@ def browser(folder: Path, size=(1280, 800)):
 
         with urllib.request.urlopen(f"http://127.0.0.1:{port}/json/list") as answer:
             target = next(t for t in json.load(answer) if t["type"] == "page")
-        with connect(target["webSocketDebuggerUrl"], max_size=None) as socket:
+        with connect(target["webSocketDebuggerUrl"], max_size=None, ping_interval=None) as socket:
             yield Page(socket, size)
     finally:
         process.terminate()

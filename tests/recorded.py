@@ -6,8 +6,9 @@ from pathlib import Path
 import pytest
 
 from corporeal import materials
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.materials.shipped import citation
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.ground import UNFIT, ground
 from corporeal.stages.segment import segment
 

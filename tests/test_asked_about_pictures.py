@@ -9,12 +9,12 @@ import numpy as np
 import pytest
 
 from corporeal.cli.validate import validate
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.formats.splat_ply import write_splat
 from corporeal.geometry.gaussians import placed
 from corporeal.pipeline import Settings, opened
 from corporeal.splats import solid
 from corporeal.stages import reconstruct as stage
-from corporeal.stages.describe import DescribeConfig
 from gaussian_boxes import DOWN, box, together
 from oracle import decomposed, part, weighs
 

@@ -4,11 +4,11 @@ from pathlib import Path
 import pytest
 
 from corporeal import pipeline, run_files, store
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UserError
 from corporeal.pipeline import Settings, reopen, run
-from corporeal.stages.describe import DescribeConfig
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.stages.fill import FillConfig
-from corporeal.stages.reconstruct import ReconstructConfig
 from corporeal.types import Inventory, ObjectWords
 from handmade import plain, scene
 

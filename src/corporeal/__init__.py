@@ -15,6 +15,7 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.corpus.plan import CorpusConfig
     from corporeal.corpus.report import report_corpus
     from corporeal.corpus.run import RunConfig, run_corpus
+    from corporeal.description.describe_config import DescribeConfig
     from corporeal.errors import SimulationError, UserError
     from corporeal.evaluation.ensemble import ensemble
     from corporeal.export.export import export as export_scene
@@ -36,16 +37,17 @@ if TYPE_CHECKING:  # the names of ``_HOME`` once more, for type checkers: a test
     from corporeal.pipeline import Settings, run
     from corporeal.pool.index import index as index_pool
     from corporeal.pool.index import read_pool
+    from corporeal.reconstruction.reconstruct_config import ReconstructConfig
     from corporeal.scene_building import Solid, ball, box, build_scene, cylinder, solid
     from corporeal.showcase.scenes import build as showcase_scene
     from corporeal.stages.assemble import AssembleConfig, assemble
     from corporeal.stages.capture import CaptureConfig, capture
     from corporeal.stages.compose import ComposeConfig, compose
-    from corporeal.stages.describe import DescribeConfig, describe
+    from corporeal.stages.describe import describe
     from corporeal.stages.fill import FillConfig, fill
     from corporeal.stages.film import FilmConfig, film
     from corporeal.stages.ground import GroundConfig, ground
-    from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
+    from corporeal.stages.reconstruct import reconstruct
     from corporeal.stages.report import report
     from corporeal.stages.segment import SegmentConfig, segment
     from corporeal.stages.simulate import SimulateConfig, simulate
@@ -84,9 +86,9 @@ _HOME = {
     "CaptureConfig": "stages.capture:CaptureConfig",
     "write_views": "formats.transforms:write_views",
     "reconstruct": "stages.reconstruct:reconstruct",
-    "ReconstructConfig": "stages.reconstruct:ReconstructConfig",
+    "ReconstructConfig": "reconstruction.reconstruct_config:ReconstructConfig",
     "describe": "stages.describe:describe",
-    "DescribeConfig": "stages.describe:DescribeConfig",
+    "DescribeConfig": "description.describe_config:DescribeConfig",
     "segment": "stages.segment:segment",
     "SegmentConfig": "stages.segment:SegmentConfig",
     "ground": "stages.ground:ground",

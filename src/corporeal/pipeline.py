@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from corporeal import store
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UserError
 from corporeal.features import MENU as ENCODERS
 from corporeal.features.maskers import MENU as MASKERS
@@ -27,15 +28,16 @@ from corporeal.formats.words import safe
 from corporeal.geometry.gaussians import axis
 from corporeal.mixture import ground_weighed
 from corporeal.poses.pose import FIGURE, POSES
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.results import Results
 from corporeal.run_files import FILES, Spent, write_results
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import AssembleConfig, assemble
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.fill import FillConfig, fill
 from corporeal.stages.film import FilmConfig, film
 from corporeal.stages.ground import GroundConfig
-from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
+from corporeal.stages.reconstruct import reconstruct
 from corporeal.stages.segment import SegmentConfig, segment
 from corporeal.stages.simulate import SimulateConfig, as_kept, simulate
 from corporeal.trajectory.audit_file import read_audit

@@ -48,13 +48,18 @@ class Results:
         return self._whole.scene if self._pours else _made(self.assemble, "assemble")
 
     @property
+    def assembled(self) -> Whole:
+        """Scene, parts and materials as fill is given them: contents still in their vessels."""
+        scene, parts = _made(self.assemble, "assemble"), _made(self.segment, "segment")
+        return Whole(scene, parts, _made(self.ground, "ground"))
+
+    @property
     def _pours(self) -> bool:
         return self.fill is not None and len(self.fill.contents) > 0
 
     @property
     def _whole(self) -> Whole:
-        scene, parts = _made(self.assemble, "assemble"), _made(self.segment, "segment")
-        return with_contents(scene, parts, _made(self.ground, "ground"), self.particles.contents)
+        return with_contents(*self.assembled.all, self.particles.contents)
 
     @property
     def inventory(self) -> Inventory:

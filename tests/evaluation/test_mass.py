@@ -11,6 +11,7 @@ import numpy as np
 import pytest
 import trimesh
 
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import BadFileError, UserError
 from corporeal.evaluation.baselines import constant, hull_fit, solid_water
 from corporeal.evaluation.mass import MassConfig, anonymous, compare, predict_all
@@ -20,7 +21,6 @@ from corporeal.evaluation.truth import models_of, objects, read_abo, read_truth
 from corporeal.formats.glb_writer import write_glb
 from corporeal.materials import find
 from corporeal.stages.assemble import assemble
-from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.ground import GroundConfig
 from corporeal.types import Finish, Scene, SceneObject, Surface
 from oracle import Oracle, part, weighs, whole

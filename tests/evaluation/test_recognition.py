@@ -6,10 +6,10 @@ import sys
 import pytest
 
 from corporeal import cli
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import BadFileError, UserError
 from corporeal.evaluation.recognition import judge, read_truth, record
 from corporeal.formats.glb_writer import write_glb
-from corporeal.stages.describe import DescribeConfig
 from handmade import plain, scene
 
 TRUTH = """

@@ -3,23 +3,47 @@
 The answers were written from anonymous pictures before anybody looked the masses up.
 """
 
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.evaluation.mass import MassConfig, compare, predict_all
 from corporeal.evaluation.truth import read_truth
-from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.ground import GroundConfig
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"
 
 
+@dataclass(frozen=True)
+class Measured:
+    """What a set of answers must not fall behind, as docs/evaluation.md has it."""
+
+    recordings: str
+    mixture: float
+    """ALDE of all ways a part may be, without outside evidence."""
+    mass: float
+    """ALDE with outside evidence."""
+    ape: float
+    covered: float
+    """Share of the measured masses inside the 90 % interval."""
+    covered_without: float
+
+
+SETS = [
+    Measured("scanned_a", mixture=0.22, mass=0.18, ape=0.18, covered=0.85, covered_without=0.85),
+    # Misses the targets that the first set meets (.22, .18, 85 %): the page says so.
+    Measured("scanned_b", mixture=0.33, mass=0.22, ape=0.21, covered=0.7, covered_without=0.8),
+]
+
+
 @pytest.mark.slow
-def test_the_ladder_of_what_is_known_on_scanned_things(shared_assets):
+@pytest.mark.parametrize("measured", SETS, ids=[one.recordings for one in SETS])
+def test_the_ladder_of_what_is_known_on_scanned_things(shared_assets, measured):
     things = read_truth(shared_assets / "ycb", shared_assets / "mass_truth.csv")
-    answered = DescribeConfig(vlm=f"replay:{RECORDINGS / 'scanned_a'}")
-    config = MassConfig(anonymous=True, samples=200)
+    answered = DescribeConfig(vlm=f"replay:{RECORDINGS / measured.recordings}")
+    config = MassConfig(anonymous=True)
     result = compare(predict_all(things, answered, GroundConfig(), config))
     every = result.metrics["all"]
     assert every["mass"].count == 19
@@ -27,10 +51,10 @@ def test_the_ladder_of_what_is_known_on_scanned_things(shared_assets):
     errors = [every[step].alde for step in ladder]
     assert errors == sorted(errors, reverse=True)
     assert every["hull_fit"].alde == pytest.approx(0.747, abs=0.03)
-    assert every["mixture"].alde <= 0.22
-    assert every["mass"].alde <= 0.18
-    assert every["mass"].ape <= 0.18
+    assert every["mixture"].alde <= measured.mixture
+    assert every["mass"].alde <= measured.mass
+    assert every["mass"].ape <= measured.ape
     assert every["mass"].within_2 == 1.0
-    assert result.coverage["all"] >= 0.85
-    assert result.coverage_without["all"] >= 0.85
+    assert result.coverage["all"] >= measured.covered
+    assert result.coverage_without["all"] >= measured.covered_without
     assert result.width["all"] <= 2.2

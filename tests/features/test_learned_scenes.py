@@ -6,9 +6,10 @@ from box_scenes import on_faces
 from tiny_models import needs_models, save_clip, save_dinov2
 
 from corporeal.formats.splat_ply import write_splat
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.splats import hull, radiance, solid
 from corporeal.stages import reconstruct as stage
-from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
+from corporeal.stages.reconstruct import reconstruct
 from corporeal.stages.segment import segment
 from corporeal.types import Gaussians, Inventory, ObjectWords, PartWords
 from corporeal.vlm.seen_objects import SeenObject, Viewer

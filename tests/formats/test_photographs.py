@@ -74,6 +74,24 @@ def keep_binary(folder, cameras, names, points, model=1):
 POINTS = np.random.default_rng(0).normal(size=(7, 3))
 
 
+def test_colmap_says_in_which_pictures_points_are_seen(tmp_path, views):
+    write_colmap(tmp_path / "text", views.cameras, NAMES, POINTS)
+    file = tmp_path / "text" / "points3D.txt"
+    lines = file.read_text(encoding="utf-8").splitlines()
+    lines[2] += " 4 0 2 7 4 9 77 1"  # images 4 and 2, the first of them twice; 77 is not there
+    lines[4] += " 1 5"
+    file.write_text("\n".join(lines), encoding="utf-8")
+    assert read_colmap(tmp_path / "text").sightings.tolist() == [[0, 4], [1, 2], [3, 2]]
+    keep_binary(tmp_path / "binary", views.cameras, NAMES, POINTS)
+    rows = (tmp_path / "binary" / "points3D.bin").read_bytes()
+    seen = rows.replace(struct.pack("<II", 1, 2), struct.pack("<II", 7, 2))
+    (tmp_path / "binary" / "points3D.bin").write_bytes(seen)
+    # Images are numbered 9, 8, 7 … there; of every three points the last two are seen.
+    assert read_colmap(tmp_path / "binary").sightings.tolist() == [[2, 1], [2, 2], [2, 4], [2, 5]]
+    write_colmap(tmp_path / "none", views.cameras, NAMES, POINTS)
+    assert read_colmap(tmp_path / "none").sightings.shape == (0, 2)
+
+
 def keep_as(kind, folder, views):
     """Write pictures and poses in one of the formats."""
     if kind == "transforms":

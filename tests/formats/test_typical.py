@@ -38,6 +38,8 @@ def test_a_file_in_artists_units_is_said_to_be_implausible():
 
 
 SOLID = [
+    ("fitness equipment", 220.0, (0.91, 1.05, 1.11)),
+    ("tree", 16300.0, (3.87, 4.43, 7.58)),
     ("dumpster", 36.7e3, (1.6, 1.6, 1.9)),
     ("refrigerator", 5.5e3, (0.6, 0.65, 1.8)),
     ("wooden cabinet", 540.0, (0.5, 1.0, 1.8)),
@@ -73,9 +75,30 @@ TRUE = [
     ("guitar", 2.5, (0.11, 0.4, 1.0)),
     ("brick", 2.5, (0.065, 0.1, 0.215)),
     ("anvil", 45.0, (0.12, 0.25, 0.45)),
+    ("drill", 1.6, (0.08, 0.2, 0.22)),
+    ("hammer", 0.7, (0.03, 0.13, 0.33)),
+    ("hammer", 0.45, (0.06, 0.11, 0.32)),
+    ("tv", 15.0, (0.07, 0.71, 1.23)),
+    ("tv", 21.0, (0.48, 0.48, 0.52)),
+    ("fitness equipment", 28.0, (0.9, 1.05, 1.2)),
+    ("couch", 85.0, (0.85, 2.4, 2.4)),
+    ("tree", 250.0, (3.9, 4.4, 7.5)),
+    ("oak tree", 4000.0, (7.0, 8.0, 9.0)),
     ("thingamajig", 7.0, (0.1, 0.1, 0.1)),
     ("thingamajig", 900.0, (1.0, 1.0, 1.0)),
 ]
+
+
+LIGHT = [
+    ("cordless drill", 0.274, (0.19, 0.205, 0.254)),
+    ("couch", 28.7, (0.965, 2.42, 2.45)),
+]
+"""Machines weighed as empty cases, and what is foam all through."""
+
+
+@pytest.mark.parametrize(("what", "mass", "sides"), LIGHT)
+def test_what_lacks_most_of_its_mass_is_doubted(what, mass, sides):
+    assert doubt_mass("it_0", what, mass, sides) is not None
 
 
 @pytest.mark.parametrize(("what", "mass", "sides"), SOLID)

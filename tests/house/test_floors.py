@@ -18,7 +18,7 @@ FLOORS = [
     {"formats"},
     {"materials", "vlm", "render", "showcase", "pool", "settle"}
     | {"splats", "features", "regions", "poses", "masking"},
-    {"treatment", "fields"},
+    {"treatment", "fields", "reconstruction", "description"},
     {"trajectory"},
     {"stages"},
     {"mixture"},

@@ -15,7 +15,8 @@ from corporeal.formats.transforms import write_views
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.masking.pointed import Pointed
 from corporeal.pipeline import Settings, _Run, quiet
-from corporeal.stages.reconstruct import ReconstructConfig, _masks, validate
+from corporeal.reconstruction.picture_intake import masks_for
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate
 from corporeal.types import Views
 
 
@@ -136,7 +137,7 @@ def test_a_run_grows_masks_where_there_are_none(photos, tmp_path):
 
     def asked(masks, source=photos[0]):
         config = ReconstructConfig(masks=masks)
-        return _masks(config, source, tmp_path / "run", lambda fraction, words: None)
+        return masks_for(config, source, tmp_path / "run", lambda fraction, words: None)
 
     grown = asked("auto")
     assert grown.grown and grown.folder == tmp_path / "run"

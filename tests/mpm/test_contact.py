@@ -74,6 +74,18 @@ def test_a_wall_is_a_half_space_that_touches_like_one():
     assert np.isinf(high)
 
 
+@pytest.mark.parametrize("height", [-1.1, -0.7, -0.3, 0.0, 0.2, 0.4, 0.5])
+def test_a_field_at_rest_touches_a_thin_body_where_it_is(height):
+    """Taken for two fields, up to .13 cells too early."""
+    layer = height - (np.arange(40) + 0.5) / 2
+    w = spline(layer)
+    mean, up = np.array([[0.0, 0.0, w @ layer / w.sum()]]), np.array([[0.0, 0.0, 1.0]])
+    at = np.array([height])
+    assert contact.gap_to_thin(mean, at, up, 1.0) == pytest.approx(0.0, abs=1e-12)
+    above = contact.gap_to_thin(mean, at + 0.01, up, 1.0)[0]
+    assert 0.003 < above < 0.011
+
+
 def test_of_three_candidates_the_one_that_separates_is_chosen():
     outward_a = np.array([[1.0, 0.0, 1.0]])  # an edge of a small block
     outward_c = np.array([[0.0, 0.0, -1.0]])  # the flat floor below it

@@ -31,7 +31,7 @@ def described(written):
         raise AssertionError("a replay takes no pictures")
 
     with pytest.MonkeyPatch.context() as patched:
-        patched.setattr("corporeal.stages.describe.portraits", refused)
+        patched.setattr("corporeal.description.asking.portraits", refused)
         return {name: (s, *grounded(s, "showcase")) for name, s in written.items()}
 
 

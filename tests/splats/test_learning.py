@@ -183,7 +183,7 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
     masks = np.stack([disc] * 40)
     views, _ = pictured(blobs(), cameras)
     with ThreadPool(1) as pool:
-        points = on_hull(views, masks, 3000, RNG(0), pool, 0.2)
+        points = on_hull(hull.outlines_of(views, masks, None, pool), 3000, RNG(0), pool, 0.2)
         distance, faint = np.linalg.norm(points.position, axis=1), points.opacity < start.OPAQUE
         assert len(distance) == 3000 and faint.sum() == 600
         on, within = distance[~faint], distance[faint]
@@ -191,7 +191,7 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
         # Evenly: the share within a radius grows as its cube.
         np.testing.assert_allclose(np.median(within), 0.5 * 0.5 ** (1 / 3), atol=0.02)
         with pytest.raises(UserError, match="inside all masks"):
-            on_hull(views, np.zeros_like(masks), 10, RNG(0), pool)
+            hull.outlines_of(views, np.zeros_like(masks), None, pool)
 
 
 @pytest.fixture(scope="module")

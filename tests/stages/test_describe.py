@@ -7,11 +7,12 @@ import pytest
 from recognition.facts import facts, judge
 
 from corporeal import materials
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.formats.glb import read_glb
 from corporeal.geometry.identity import identify
 from corporeal.render.portrait import portraits
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.ground import ground
 from corporeal.stages.segment import segment
 from corporeal.vlm.metadata import matter_hint
@@ -510,7 +511,7 @@ def test_a_recording_outlives_a_longer_library_and_not_a_word_that_is_gone(
     ask(Oracle(materials=made_of(part("vase", "porcelain"))), VASE, record=tmp_path)
     replayed = replay(tmp_path)
     monkeypatch.setattr(
-        "corporeal.stages.describe.substances_offered", lambda library: "- new: unobtainium"
+        "corporeal.description.asking.substances_offered", lambda library: "- new: unobtainium"
     )
     assert words(describe(scene(VASE), replayed))[("vase_0", "vase")].material == "porcelain"
     with pytest.raises(UserError, match="'porcelain' is not in the list of materials"):
@@ -532,7 +533,7 @@ def test_questions_wait_for_a_person_and_go_on_with_their_answers(tmp_path, monk
         taken.append(args)
         return portraits(*args)
 
-    monkeypatch.setattr("corporeal.stages.describe.portraits", counted)
+    monkeypatch.setattr("corporeal.description.asking.portraits", counted)
     rounds = 0
     while rounds < 6:
         rounds += 1

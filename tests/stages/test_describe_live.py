@@ -8,9 +8,10 @@ from pathlib import Path
 import pytest
 
 from corporeal import materials
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import assemble
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.ground import ground
 from corporeal.stages.segment import segment
 from oracle import decomposed, part, weighs

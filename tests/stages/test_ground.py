@@ -5,8 +5,9 @@ import numpy as np
 import pytest
 
 from corporeal import materials
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import OutOfRangeError, UserError
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.ground import GroundConfig, doubts, ground
 from corporeal.stages.segment import segment
 from corporeal.types import Law, PartWords, Placement

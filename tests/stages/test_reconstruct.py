@@ -15,9 +15,10 @@ from corporeal.geometry.followed import followed
 from corporeal.geometry.gaussians import placed
 from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.similarity import moved_points
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.splats import hull, radiance, solid
 from corporeal.stages import reconstruct as stage
-from corporeal.stages.reconstruct import ReconstructConfig, reconstruct
+from corporeal.stages.reconstruct import reconstruct
 from corporeal.vlm.seen_objects import SeenObject, Viewer
 from gaussian_boxes import DOWN, box, together
 

@@ -8,6 +8,7 @@ import pytest
 import trimesh
 
 from corporeal import materials
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.evaluation.mass import MassConfig, predict
 from corporeal.evaluation.truth import Weighed
 from corporeal.formats.glb_merge import Member, merge
@@ -18,7 +19,7 @@ from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.sizes import how_heavy, how_scaled, in_scene, scale_of_part
 from corporeal.showcase.scenes import build
 from corporeal.stages.assemble import assemble
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.fill import fill
 from corporeal.stages.ground import GroundConfig, ground
 from corporeal.stages.report import Story, report

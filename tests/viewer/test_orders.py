@@ -5,7 +5,14 @@ import json
 import pytest
 
 from corporeal.errors import UserError
-from corporeal.treatment.live_quality import CELLS, COST, FEWEST, MOST, SHARE, live_quality
+from corporeal.treatment.live_quality import (
+    CELLS,
+    FEWEST,
+    MOST,
+    SHARE,
+    Demand,
+    live_quality,
+)
 from corporeal.viewer.orders import FARTHEST, FIRMEST, STRONGEST, Order, parsed
 
 
@@ -42,13 +49,22 @@ def test_numbers_are_bounded():
     assert order(do="grab", firm=1e5).firm == FIRMEST
 
 
+EACH = 1.5e-7
+"""CPU seconds per particle and step."""
+
+
+def demand(count, motion=0.0, steps=MOST):
+    """A draft of so many particles, in cells of 1 cm."""
+    return Demand(EACH * count, 8, 0.01, steps, motion, stiffened=1.0)
+
+
 @pytest.mark.parametrize("count", [10, 2_000, 20_000, 400_000])
 @pytest.mark.parametrize("threads", [1, 4])
 def test_a_live_quality_fits_into_its_share_of_the_threads(count, threads):
-    found = live_quality(count, "draft", threads)
+    found = live_quality(demand(count), threads)
     assert found.cells_across in CELLS
     particles = count * (found.cells_across / 8) ** 3
-    cost = COST * particles * found.steps_per_second
+    cost = EACH * particles * found.steps_per_second
     assert FEWEST <= found.steps_per_second <= MOST
     assert cost <= SHARE * threads * 1.001 or (
         found.cells_across == CELLS[-1] and found.steps_per_second == FEWEST
@@ -56,8 +72,17 @@ def test_a_live_quality_fits_into_its_share_of_the_threads(count, threads):
 
 
 def test_spare_time_buys_cells_and_then_steps():
-    few, many = live_quality(500, "draft", 2), live_quality(30_000, "draft", 2)
-    assert few.cells_across == CELLS[0] and few.steps_per_second == MOST
+    few, many = live_quality(demand(500), 4), live_quality(demand(30_000), 2)
+    assert few.cells_across == CELLS[0] and few.steps_per_second > 2 * FEWEST
     assert many.cells_across < few.cells_across
-    finer = live_quality(30_000, "draft", 4)
+    finer = live_quality(demand(30_000), 4)
     assert (finer.cells_across, finer.steps_per_second) > (many.cells_across, 0)
+
+
+def test_what_moves_fast_is_simulated_coarser_as_its_steps_cannot_be_saved():
+    slow, fast = live_quality(demand(2_000), 2), live_quality(demand(2_000, motion=5.0), 2)
+    assert fast.cells_across < slow.cells_across
+
+
+def test_what_takes_few_steps_as_it_is_needs_no_coarser_cells():
+    assert live_quality(demand(4_000, motion=5.0, steps=500.0), 2).cells_across == CELLS[0]

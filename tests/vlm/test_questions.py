@@ -39,7 +39,7 @@ def old():
 
 @pytest.fixture
 def new():
-    folder = files("corporeal.stages").joinpath("prompts")
+    folder = files("corporeal.description").joinpath("prompts")
     found = [p for p in folder.iterdir() if p.name.endswith(".md")]
     prompts = {p.name.removesuffix(".md"): p.read_text(encoding="utf-8") for p in found}
     shapes = {"PartsAnswer": PartsAnswer, "MaterialsAnswer": MaterialsAnswer}

@@ -254,7 +254,7 @@ VERBS: dict[str, Callable[[], None]] = {
 }
 FIRST = {
     "reconstruct": ("things", "count", "up", "metres-per-unit", "training", "apart"),
-    "assemble": ("drop", "stack", "extent", "duration", "fps", "objects"),
+    "assemble": ("drop", "lift", "velocity", "extent", "stack", "duration"),
     "describe": ("vlm", "annotations", "record", "critic", "views", "parallel"),
     "film": ("quality", "width", "height", "speed", "view", "colour-by"),
 }

@@ -48,8 +48,8 @@ def evaluate_mass() -> None:
     (solid, hollow, full), by which errors are grouped. Without --truth masses are
     predicted only. A folder in the layout of ABO-500 needs no CSV: choose its --split.
     """
+    from corporeal.description.describe_config import DescribeConfig
     from corporeal.evaluation import mass, mass_report, truth
-    from corporeal.stages.describe import DescribeConfig
     from corporeal.stages.ground import GroundConfig
 
     @dataclass(frozen=True)
@@ -87,8 +87,8 @@ def evaluate_materials() -> None:
     FOLDER holds models; the table lists, per file and part, the accepted materials, the likeliest
     first.
     """
+    from corporeal.description.describe_config import DescribeConfig
     from corporeal.evaluation import recognition
-    from corporeal.stages.describe import DescribeConfig
     from corporeal.stages.ground import GroundConfig
 
     @dataclass(frozen=True)
@@ -122,9 +122,9 @@ def evaluate_parts() -> None:
     without FOLDER, four models of the showcase are used. --structural dinov2 --semantic clip
     selects learned features.
     """
+    from corporeal.description.describe_config import DescribeConfig
     from corporeal.evaluation import parts, parts_figure
     from corporeal.regions.parts import PartsConfig
-    from corporeal.stages.describe import DescribeConfig
 
     @dataclass(frozen=True)
     class PartsAsked:

@@ -2,6 +2,7 @@
 
 from pathlib import Path
 
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline import RUN, Settings, reopen
 from corporeal.stages import assemble, describe, fill, film, ground, reconstruct, segment, simulate
 from corporeal.vlm import connect, critic_of
@@ -29,7 +30,7 @@ def validate(folder: Path, settings: Settings) -> None:
         reconstruct.validate(settings.reconstruct)
 
 
-def _validate_answers(config: describe.DescribeConfig) -> None:
+def _validate_answers(config: DescribeConfig) -> None:
     describe.validate(config)
     if config.annotations is not None:
         mapping_of(config.annotations)

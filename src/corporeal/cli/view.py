@@ -54,6 +54,7 @@ def verb_view() -> None:
 
 
 def _show(asked: View) -> None:
+    from corporeal.viewer.exports import Exports
     from corporeal.viewer.live import Room
     from corporeal.viewer.serve import Address, door_of, listening, serve, where
     from corporeal.viewer.shelf import Shelf
@@ -68,7 +69,7 @@ def _show(asked: View) -> None:
     shelf = Shelf(asked.runs, None if asked.runs else asked.out)
     room = Room(shelf.made)
     work = None if asked.read_only or asked.runs else Work(shelf, asked.out)
-    more = () if asked.read_only else (live_route(room),)
+    more = () if asked.read_only else (live_route(room), *Exports(shelf).routes())
     more = more if work is None else (*more, *work.routes())
     app = site(Shown(shelf, names, asked.read_only, work is not None), door, more)
     try:
@@ -92,5 +93,20 @@ def _names(asked: View) -> tuple[str, ...]:
     if len(set(names)) < len(names):
         raise UserError("Two runs have the same name. Name two different ones.")
     if not asked.runs and not asked.out.is_dir():
-        raise UserError(f"{asked.out} is no folder. Name a run, or a folder of runs with --out.")
+        _begin(asked)
     return names
+
+
+def _begin(asked: View) -> None:
+    """Make the folder of all runs: the first upload will be the first run.
+
+    Raises:
+        UserError: Nothing may be changed, or the folder cannot be made.
+
+    """
+    if asked.read_only or asked.out.exists():
+        raise UserError(f"{asked.out} is no folder. Name a run, or a folder of runs with --out.")
+    try:
+        asked.out.mkdir(parents=True)
+    except OSError as error:
+        raise UserError(f"{asked.out} cannot be made: {error.strerror}. Choose --out.") from error

@@ -15,17 +15,18 @@ import numpy as np
 from scipy.spatial import ConvexHull
 
 from corporeal import store
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UserError
 from corporeal.evaluation.baselines import constant, hull_fit, solid_water
 from corporeal.evaluation.metrics import Errors, coverage, errors
 from corporeal.evaluation.truth import Weighed
 from corporeal.geometry.arrangement import life_sized
-from corporeal.mixture import DRAWS, HIGH, LOW, Scale, weighed
+from corporeal.mixture import DRAWS, HIGH, LOW, Scale, summed, weighed
 from corporeal.stages.assemble import assemble
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.ground import GroundConfig
 from corporeal.stages.segment import segment
-from corporeal.types import Inventory, MassMixture, PartWords, Scene
+from corporeal.types import Inventory, PartWords, Scene
 from corporeal.vlm import LIVE
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.together import together
@@ -155,7 +156,7 @@ def predict(
     inventory = describe(scene, describing, grounding.library)
     parts = segment(scene, inventory)
     scale = Scale(scene, parts, grounding, config.seed)
-    mixture = _summed(weighed(scale, inventory, config.samples).mixtures)
+    mixture = summed(weighed(scale, inventory, config.samples).mixtures)
     everything = np.concatenate([a.vertices for a in scale.anatomies])
     return Prediction(
         object=obj.name,
@@ -171,45 +172,12 @@ def predict(
         mixture=mixture.mass_without,
         mixture_low=mixture.low_without,
         mixture_high=mixture.high_without,
-        direct=mixture.direct,
+        direct=mixture.evidence.likely if mixture.evidence else None,
         warning=mixture.warning,
         volume_m3=scale.volume,
         hull_m3=float(ConvexHull(everything).volume),
         described=_told(inventory),
         asked_as=scene.name,
-    )
-
-
-@dataclass(frozen=True)
-class _Sum:
-    """What the objects of one file weigh together [kg]."""
-
-    mass: float
-    low: float
-    high: float
-    mass_without: float
-    low_without: float
-    high_without: float
-    direct: float | None
-    warning: str
-
-
-def _summed(mixtures: Sequence[MassMixture]) -> _Sum:
-    """Add up; the interval of a sum is at most the sum of the intervals."""
-
-    def total(name: str) -> float:
-        return sum(getattr(m, name) for m in mixtures)
-
-    said = [m.evidence.likely for m in mixtures if m.evidence]
-    return _Sum(
-        mass=total("mass"),
-        low=total("low"),
-        high=total("high"),
-        mass_without=total("mass_without"),
-        low_without=total("low_without"),
-        high_without=total("high_without"),
-        direct=sum(said) if len(said) == len(mixtures) else None,
-        warning=" ".join(m.warning for m in mixtures if m.warning),
     )
 
 

@@ -16,6 +16,7 @@ import numpy as np
 from jaxtyping import Int
 
 from corporeal import features
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import BadFileError, UserError
 from corporeal.evaluation.overlap import best_names, matched_iou, named_iou, roc_area
 from corporeal.evaluation.result_table import Table
@@ -30,7 +31,7 @@ from corporeal.regions.parts import PartsConfig, parts
 from corporeal.showcase.scenes import alone
 from corporeal.stages.assemble import assemble
 from corporeal.stages.capture import CaptureConfig, capture
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 from corporeal.stages.segment import segment
 from corporeal.types import Cloud, Inventory, PartWords, Scene, Views
 

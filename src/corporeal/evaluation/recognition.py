@@ -9,12 +9,13 @@ from pathlib import Path
 import numpy as np
 
 from corporeal import materials
+from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import BadFileError, UserError
 from corporeal.evaluation.overlap import roc_area
 from corporeal.evaluation.result_table import Table
 from corporeal.formats.sources import models_in
 from corporeal.stages.assemble import assemble
-from corporeal.stages.describe import DescribeConfig, describe
+from corporeal.stages.describe import describe
 
 BANDS = (0.0, 0.35, 0.45, 0.6, 1.01)
 """Edges of the margins that are looked at together."""

@@ -11,7 +11,7 @@ from pathlib import Path
 from typing import NoReturn
 
 import numpy as np
-from jaxtyping import Float, UInt8
+from jaxtyping import Bool, Float, Int, UInt8
 
 from corporeal import store
 from corporeal.errors import BadFileError
@@ -54,6 +54,8 @@ class ColmapModel:
     images: tuple[ColmapImage, ...]
     points: Float[np.ndarray, "N 3"]
     colours: UInt8[np.ndarray, "N 3"]
+    sightings: Int[np.ndarray, "S 2"]
+    """Which of the images shows which of the points; none, where the file does not list them."""
 
     def lens(self, image: ColmapImage) -> Lens:
         """Return the lens of an image.
@@ -91,16 +93,31 @@ def read_colmap(folder: Path) -> ColmapModel:
     rows = _from_bytes(folder) if binary else _from_text(folder)
     if not rows.images:
         raise BadFileError(folder, "the COLMAP model holds no images.", AGAIN)
-    places = np.array([p[:3] for p in rows.points], np.float64).reshape(-1, 3)
-    colours = np.array([p[3:] for p in rows.points], np.float64).reshape(-1, 3)
+    places = np.array([p.row[:3] for p in rows.points], np.float64).reshape(-1, 3)
+    colours = np.array([p.row[3:] for p in rows.points], np.float64).reshape(-1, 3)
     good = np.isfinite(places).all(axis=1)
     return ColmapModel(
         folder,
         rows.cameras,
-        tuple(rows.images),
+        tuple(image for _, image in rows.images),
         places[good],
         np.clip(colours[good], 0, 255).astype("u1"),
+        _sightings(rows, good),
     )
+
+
+def _sightings(rows: "_Rows", good: Bool[np.ndarray, " N"]) -> Int[np.ndarray, "S 2"]:
+    """Return which image shows which of the good points; images that are not there show none."""
+    image_of = {number: k for k, (number, _) in enumerate(rows.images)}
+    kept = np.cumsum(good) - 1
+    pairs = {
+        (image_of[number], int(kept[k]))
+        for k, point in enumerate(rows.points)
+        if good[k]
+        for number in point.seen_in
+        if number in image_of
+    }
+    return np.array(sorted(pairs), np.int64).reshape(-1, 2)
 
 
 def lens_of(folder: Path, camera: ColmapCamera) -> Lens:
@@ -152,20 +169,29 @@ class _Rows:
     """What the three files of a model list."""
 
     cameras: dict[int, ColmapCamera]
-    images: list[ColmapImage]
-    points: list[tuple[float, ...]]
+    images: list[tuple[int, ColmapImage]]
+    """With their numbers in the file."""
+    points: "list[_PointRow]"
+
+
+@dataclass(frozen=True)
+class _PointRow:
+    row: tuple[float, ...]
     """x, y, z [the model's unit], red, green, blue [0–255]."""
+    seen_in: tuple[int, ...]
+    """Numbers of images."""
 
 
 def _from_bytes(folder: Path) -> _Rows:
     path = folder / "images.bin"
     cameras = {k: ColmapCamera(*row) for k, row in camera_rows(Reader(folder / "cameras.bin"))}
     images = [
-        ColmapImage(name, camera, world_from_camera(path, name, turn, shift))
-        for name, camera, turn, shift in image_rows(Reader(path))
+        (number, ColmapImage(name, camera, world_from_camera(path, name, turn, shift)))
+        for number, name, camera, turn, shift in image_rows(Reader(path))
     ]
-    points = folder / "points3D.bin"
-    return _Rows(cameras, images, point_rows(Reader(points)) if points.is_file() else [])
+    file = folder / "points3D.bin"
+    points = [_PointRow(*row) for row in point_rows(Reader(file))] if file.is_file() else []
+    return _Rows(cameras, images, points)
 
 
 def _from_text(folder: Path) -> _Rows:
@@ -178,20 +204,32 @@ def _from_text(folder: Path) -> _Rows:
             cameras[int(numbers[0])] = ColmapCamera(words[1], *size, tuple(numbers[3:]))
     path = folder / "points3D.txt"
     lines = _lines(path) if path.is_file() else iter(())
-    points = [tuple(_numbers(path, w, range(1, 7), least=7)) for w in lines if w]
+    points = [
+        _PointRow(tuple(_numbers(path, w, range(1, 7), least=7)), _seen_in(path, w))
+        for w in lines
+        if w
+    ]
     return _Rows(cameras, list(_images(folder / "images.txt")), points)
 
 
-def _images(path: Path) -> Iterator[ColmapImage]:
-    """Yield images: of every two lines the first; the second lists points and may be empty."""
+def _seen_in(path: Path, words: list[str]) -> tuple[int, ...]:
+    """Return the images of a point's track: after its error, every other number."""
+    return tuple(int(n) for n in _numbers(path, words, range(8, len(words) - 1, 2), least=7))
+
+
+def _images(path: Path) -> Iterator[tuple[int, ColmapImage]]:
+    """Yield images and their numbers.
+
+    Of every two lines the first; the second lists points and may be empty.
+    """
     lines = _lines(path)
     for words in lines:
         if not words:
             continue
-        n = _numbers(path, words, range(1, 9), least=10)
+        n = _numbers(path, words, range(9), least=10)
         name = " ".join(words[9:])
-        pose = world_from_camera(path, name, tuple(n[:4]), tuple(n[4:7]))
-        yield ColmapImage(name, int(n[7]), pose)
+        pose = world_from_camera(path, name, tuple(n[1:5]), tuple(n[5:8]))
+        yield int(n[0]), ColmapImage(name, int(n[8]), pose)
         next(lines, None)
 
 

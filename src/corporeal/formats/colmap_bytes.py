@@ -77,19 +77,18 @@ def camera_rows(file: Reader) -> Iterator[tuple[int, tuple]]:
         yield number, (MODELS[model], width, height, file.take(f"{PARAMETERS[model]}d"))
 
 
-def image_rows(file: Reader) -> Iterator[tuple[str, int, tuple, tuple]]:
-    """Yield name, camera, quaternion (w, x, y, z) and shift."""
+def image_rows(file: Reader) -> Iterator[tuple[int, str, int, tuple, tuple]]:
+    """Yield number, name, camera, quaternion (w, x, y, z) and shift."""
     for _ in range(file.count(least=73)):
         numbers = file.take("I7dI")
         name = file.name()
         file.skip(SEEN * file.count(SEEN))
-        yield name, numbers[8], numbers[1:5], numbers[5:8]
+        yield numbers[0], name, numbers[8], numbers[1:5], numbers[5:8]
 
 
-def point_rows(file: Reader) -> list[tuple[float, ...]]:
-    """Return x, y, z, r, g, b of every point."""
-    rows = []
+def point_rows(file: Reader) -> Iterator[tuple[tuple[float, ...], tuple[int, ...]]]:
+    """Yield x, y, z, r, g, b of every point, and the numbers of the images that it was seen in."""
     for _ in range(file.count(least=51)):
-        rows.append(tuple(float(x) for x in file.take("Q3d3Bd")[1:7]))
-        file.skip(TRACK * file.count(TRACK))
-    return rows
+        row = tuple(float(x) for x in file.take("Q3d3Bd")[1:7])
+        seen = file.count(TRACK)
+        yield row, file.take(f"{2 * seen}I")[::2]

@@ -17,6 +17,7 @@ from corporeal.formats.resources import beside
 from corporeal.formats.shots import Shot, develop
 from corporeal.formats.transforms_frame import FILE, Frame, frames_of
 from corporeal.geometry.lens import Lens
+from corporeal.geometry.lines_of_sight import LinesOfSight
 from corporeal.types import Views
 
 TRANSFORMS = (FILE, "transforms_train.json")
@@ -59,6 +60,8 @@ class Photographs:
     """Sparse points of the scene, where the file holds some, in the unit of the poses."""
     colours: UInt8[np.ndarray, "N 3"] | None = None
     """Of the points, sRGB."""
+    lines: LinesOfSight | None = None
+    """Which pictures show which points; None: nobody says."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
 
@@ -71,7 +74,9 @@ class Photographs:
             object_of_pixel=None if own is None else own[chosen],
         )
         masks = None if self.masks is None else self.masks[chosen]
-        return replace(self, views=views, names=tuple(self.names[k] for k in chosen), masks=masks)
+        lines = None if self.lines is None else self.lines.only(chosen)
+        names = tuple(self.names[k] for k in chosen)
+        return replace(self, views=views, names=names, masks=masks, lines=lines)
 
 
 @dataclass(frozen=True)
@@ -121,8 +126,17 @@ def read_photographs(
         masks=done.masks,
         points=seen.points if seen else None,
         colours=seen.colours if seen else None,
+        lines=None if seen is None else _lines_of(seen, done.names),
         warnings=done.warnings,
     )
+
+
+def _lines_of(model: ColmapModel, names: tuple[str, ...]) -> LinesOfSight | None:
+    """Return which of the named pictures show which points."""
+    number = {image.name: k for k, image in enumerate(model.images)}
+    image, point = model.sightings.T
+    lines = LinesOfSight(model.points, image, point).only([number[name] for name in names])
+    return lines if len(lines.view) else None
 
 
 def listed(path: Path) -> Listed:

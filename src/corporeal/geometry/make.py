@@ -138,22 +138,24 @@ def compose(
     return with_contents(made, member, [h for h in holds if h])
 
 
-def weight(member: Member, field: MaterialField, room: float) -> float:
+def weight(member: Member, field: MaterialField, room: float, larger: float = 1.0) -> float:
     """Mass of a part with what is in it [kg], as ``compose`` finds it.
 
     Args:
         member: The part.
         field: What it is made of.
         room: What goes into it, if it is a vessel [m³].
+        larger: Factor of the volume that its surface encloses [-], where the mesh leaves that open:
+            of solids and of what is behind a closed wall. Walls go with the area.
 
     """
     total = 0.0
     for piece in pieces_of(member.part, field):
         made = decide(member, piece)
         structure = piece.structure
-        total += made.mass
+        total += made.mass * (larger if structure.kind == "solid" else 1.0)
         if structure.contents is not None:
-            inner = behind(member, made, piece, room)
+            inner = behind(member, made, piece, room) * (1.0 if is_vessel(member) else larger)
             total += structure.contents.density * structure.fill * inner
     return total
 

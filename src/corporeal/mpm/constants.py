@@ -95,6 +95,8 @@ LATTICE_SLOPE = 0.25
 """… and what they add per cell once the face is farther than … [-]"""
 LATTICE_START = 0.7
 """… this from the node [cells]; all three fitted to flat faces at that density."""
+LATTICE_ROWS = 6
+"""Rows of such a lattice within a node's spline."""
 THIN = 2.0
 """A rigid body thinner than this [cells] fills no half space around a node: its surface points say
 where it begins."""

@@ -14,7 +14,7 @@ from typing import Literal
 import numpy as np
 from embreex.mesh_construction import TriangleMesh
 from embreex.rtcore_scene import EmbreeScene
-from jaxtyping import Float32
+from jaxtyping import Float, Float32, Int
 
 from corporeal.geometry.srgb import linear
 from corporeal.machine import cores
@@ -37,6 +37,10 @@ from corporeal.types import Scene, Vector
 Quality = Literal["draft", "normal", "fine"]
 BAND = 32
 """Rows of pixels cast together, at least: bands overlap by a dozen."""
+BOXES = 12
+"""About what can be hit, for rays that need not be cast."""
+GROWN = 1e-3
+"""Of the scene: how much larger they are, so that no rounding matters."""
 LAYERS = 4
 """Of see-through surfaces, one behind the other."""
 
@@ -94,6 +98,9 @@ class Stage:
         self.see_through = sees_through(self.look)
         self.vertices = (rest - self.origin).astype(np.float32)
         self.normals = vertex_normals(scene).astype(np.float32)
+        counts = [len(s.triangles) for s in scene.surfaces]
+        self.starts = np.cumsum([0, *counts[:-1]])
+        """First triangle of each surface."""
         self.scene = self._built()
         self.shown = True
 
@@ -123,6 +130,8 @@ class Stage:
             vertices.append((surface.vertices - self.origin).astype(np.float32))
             normals.append(surface.normals.astype(np.float32))
             first += len(surface.vertices)
+        starts = np.cumsum([(~gone).sum(), *(len(t) for t in triangles)])
+        there.starts = np.concatenate([np.cumsum([0, *~gone])[self.starts], starts])
         there.look = grown(look, ~gone, np.concatenate(triangles), np.concatenate(finish), first)
         there.vertices = np.ascontiguousarray(np.concatenate(vertices))
         there.normals = np.ascontiguousarray(np.concatenate(normals))
@@ -135,6 +144,12 @@ class Stage:
         shades, number = np.unique(colours, axis=0, return_inverse=True)
         there.look = painted(self.look, shades, number.reshape(-1))
         there.light, there.see_through = light, False
+        return there
+
+    def cleared(self) -> "Stage":
+        """Return the stage with nothing on it."""
+        there = copy(self)
+        there.look = self.look._replace(triangles=self.look.triangles[:0])
         return there
 
     def shadows(self) -> "Stage":
@@ -150,6 +165,18 @@ class Stage:
             # Embree builds at the first ray; several threads must not be the first at once.
             scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
         return scene
+
+    def boxes(self) -> Float[np.ndarray, "B 2 3"]:
+        """Corners of a few boxes about all that can be hit, in the stage's frame [m]."""
+        corner = self.vertices[self.look.triangles]
+        if not len(corner):
+            return np.zeros((0, 2, 3), np.float32)
+        cuts = np.unique(self.starts[self.starts < len(corner)])
+        cuts = cuts[:: -(-len(cuts) // BOXES)]
+        low = np.minimum.reduceat(corner.min(axis=1), cuts)
+        high = np.maximum.reduceat(corner.max(axis=1), cuts)
+        margin = np.float32(GROWN * self.size)
+        return np.stack([low - margin, high + margin], axis=1)
 
     def hit(self, o: np.ndarray, d: np.ndarray) -> tuple[np.ndarray, ...]:
         """Nearest triangle (-1: none), barycentric u, v and distance of each ray."""
@@ -177,7 +204,7 @@ class Stage:
             on = kernels.passes(self.look, prim, u, v, ray[alive], depth)
             if not on.any():
                 break
-            o = _beyond(o[on], d[on], t[on], self.size)
+            o = beyond(o[on], d[on], t[on], self.size)
             d, alive = np.ascontiguousarray(d[on]), alive[on]
         return free
 
@@ -186,7 +213,7 @@ def render(
     stage: Stage, camera: Aim, quality: Quality = "normal", threads: int | None = None
 ) -> np.ndarray:
     """One picture (height, width, 3) uint8. Equal input gives equal bytes."""
-    job = _Job(stage, camera, SAMPLING[quality])
+    job = Job(stage, camera, SAMPLING[quality])
     out = np.empty((camera.height, camera.width, 3), np.uint8)
     threads = threads or cores()
     band = max(BAND, -(-camera.height // (2 * threads)))
@@ -199,7 +226,7 @@ def render(
 
 def identify(stage: Stage, camera: Aim, grid: int = 1) -> tuple[np.ndarray, np.ndarray]:
     """For each sample, the triangle it sees (-1: none) and its depth [m]; rows first."""
-    job = _Job(stage, camera, Sampling(grid, 1, 1))
+    job = Job(stage, camera, Sampling(grid, 1, 1))
     rays = job.rays((0, camera.height))
     prim, _, _, t = stage.hit(rays.origin, rays.direction)
     shape = camera.height * grid, camera.width * grid
@@ -211,7 +238,7 @@ def first_seen(stage: Stage, camera: Aim) -> Samples:
 
     Depths [m] are along the ray; points are about the stage's origin.
     """
-    job = _Job(stage, camera, Sampling(1, 1, 1))
+    job = Job(stage, camera, Sampling(1, 1, 1))
     seen = kernels.samples(camera.width * camera.height)
     lines = max(1, WORTH_A_BATCH // camera.width)
     for row in range(0, camera.height, lines):
@@ -224,7 +251,8 @@ def first_seen(stage: Stage, camera: Aim) -> Samples:
     return seen
 
 
-def _beyond(o: np.ndarray, d: np.ndarray, t: np.ndarray, size: float) -> np.ndarray:
+def beyond(o: np.ndarray, d: np.ndarray, t: np.ndarray, size: float) -> np.ndarray:
+    """Where rays go on behind what they met at distance t, a little past it."""
     return np.ascontiguousarray(o + (t + np.float32(2e-5 * size))[:, None] * d, dtype=np.float32)
 
 
@@ -255,7 +283,7 @@ def lamps(stage: Stage, camera: Aim) -> Lamps:
 
 
 @dataclass(frozen=True)
-class _Rays:
+class Rays:
     """R rays from the camera, or from behind what they passed."""
 
     origin: Float32[np.ndarray, "R 3"]
@@ -265,7 +293,7 @@ class _Rays:
 
 
 @dataclass(frozen=True)
-class _Block:
+class Block:
     """Some rows of a picture's samples."""
 
     first: int
@@ -273,8 +301,20 @@ class _Block:
     rows: int
     columns: int
 
+    def places(self, index: np.ndarray) -> "Places":
+        """Say where in the picture some samples are."""
+        return Places(index // self.columns + self.first, index % self.columns)
 
-class _Job:
+
+@dataclass(frozen=True)
+class Places:
+    """Rows and columns of samples in the picture; their dice hang on them."""
+
+    row: Int[np.ndarray, " N"]
+    column: Int[np.ndarray, " N"]
+
+
+class Job:
     """One picture being taken."""
 
     def __init__(self, stage: Stage, camera: Aim, sampling: Sampling) -> None:
@@ -284,10 +324,12 @@ class _Job:
         self.tangent = float(np.tan(np.radians(camera.field_of_view) / 2))
         self.lamps = lamps(stage, camera)
         self.pixel = 2 * self.tangent / (camera.height * sampling.grid)
+        """What textures are filtered over, as an angle [rad]."""
 
-    def rays(self, rows: tuple[int, int]) -> _Rays:
+    def rays(self, rows: tuple[int, int]) -> Rays:
+        """Return those of all samples in some rows of the picture."""
         size, grid = (self.camera.width, self.camera.height), self.sampling.grid
-        return _Rays(*kernels.rays(self.eye, self.frame, self.tangent, size, rows, grid))
+        return Rays(*kernels.rays(self.eye, self.frame, self.tangent, size, rows, grid))
 
     def band(self, rows: tuple[int, int], out: np.ndarray) -> None:
         """Cast some rows with as many more above and below as the light filter looks at."""
@@ -306,7 +348,7 @@ class _Job:
         looked = kernels.worth(hit[0], shape, every)
         index = np.flatnonzero(looked)
         hit = tuple(x[index] for x in hit)
-        self.layer(rays, index, _Block(wide[0] * grid, *shape), light, hit)
+        self.layer(rays, index, Block(wide[0] * grid, *shape), light, hit)
         kernels.fill(light, looked, shape, every)
         # Develop the band's own rows only, without the halo.
         line = width * grid * grid
@@ -315,9 +357,9 @@ class _Job:
 
     def layer(
         self,
-        rays: _Rays,
+        rays: Rays,
         index: np.ndarray,
-        block: _Block,
+        block: Block,
         light: np.ndarray,
         hit: tuple[np.ndarray, ...],
         depth: int = 0,
@@ -327,28 +369,46 @@ class _Job:
         s = self.meet(o, d, index, hit)
         thin = index[s.traits[index, 4] < 1]
         if len(thin) and depth < LAYERS:
-            behind = _beyond(s.point[thin], d[thin], np.zeros(1, np.float32), self.stage.size)
-            start = np.zeros_like(o)
-            start[thin] = behind
-            beyond = self.stage.hit(behind, d[thin])
-            self.layer(_Rays(start, d), thin, block, light, beyond, depth + 1)
+            self.behind(rays, s, thin, block, light, depth)
         on = index[s.kind[index] != NOTHING]
         arriving = self.gather(s, d, on, block)
-        near = np.zeros_like(light)
+        near = np.zeros(light.shape, np.float32)
         kernels_light.shade(s, on, d, arriving, self.lamps, near)
         kernels_light.blend(s, on, near, self.lamps, light)
 
+    def behind(
+        self,
+        rays: Rays,
+        s: Samples,
+        thin: np.ndarray,
+        block: Block,
+        light: np.ndarray,
+        depth: int,
+    ) -> None:
+        """Shade what is to be seen through surfaces that rays ``thin`` met."""
+        start = np.zeros(rays.origin.shape, np.float32)
+        d = rays.direction
+        past = beyond(s.point[thin], d[thin], np.zeros(1, np.float32), self.stage.size)
+        start[thin] = past
+        hit = self.stage.hit(past, d[thin])
+        self.layer(Rays(start, d), thin, block, light, hit, depth + 1)
+
     def meet(
-        self, o: np.ndarray, d: np.ndarray, index: np.ndarray, hit: tuple[np.ndarray, ...]
+        self,
+        o: np.ndarray,
+        d: np.ndarray,
+        index: np.ndarray,
+        hit: tuple[np.ndarray, ...],
+        grid: int = 1,
     ) -> Samples:
-        """First surface that is not a hole."""
+        """First surface that is not a hole; of samples so many times finer in each direction."""
         stage, s = self.stage, kernels.samples(len(o))
         o, e = o[index], d[index]
         walked = np.zeros(len(index), np.float32)
         for _ in range(4 * LAYERS):
             prim, u, v, t = hit
             kernels.meet(
-                stage.look, stage.vertices, stage.normals, self.lamps.floor, self.pixel,
+                stage.look, stage.vertices, stage.normals, self.lamps.floor, self.pixel / grid,
                 o, e, prim, u, v, t, index, s,
             )  # fmt: skip
             if walked.any():
@@ -356,12 +416,12 @@ class _Job:
             hole = (s.traits[index, 4] == 0) & (prim >= 0)
             if not hole.any():
                 break
-            o, e = _beyond(o[hole], e[hole], t[hole], stage.size), np.ascontiguousarray(e[hole])
+            o, e = beyond(o[hole], e[hole], t[hole], stage.size), np.ascontiguousarray(e[hole])
             index, walked = index[hole], walked[hole] + t[hole]
             hit = stage.hit(o, e)
         return s
 
-    def gather(self, s: Samples, d: np.ndarray, on: np.ndarray, block: _Block) -> np.ndarray:
+    def gather(self, s: Samples, d: np.ndarray, on: np.ndarray, block: Block) -> np.ndarray:
         """Light (G, CHANNELS) that arrives at the samples ``on``."""
         first, height, width = block.first, block.rows, block.columns
         every = self.sampling.every
@@ -372,7 +432,7 @@ class _Job:
         present[on] = True
         active = present[chosen]
         lattice = np.zeros((len(chosen), CHANNELS), np.float32)
-        lattice[active] = self.ask(s, d, chosen[active], block, self.sampling.sky)
+        lattice[active] = self.ask(s, d, chosen[active], block.places(chosen[active]))
         normal = s.normal[chosen].reshape(*shape, 3)
         depth = np.log(np.maximum(s.depth[chosen], 1e-12)).reshape(shape)
         grid = active.reshape(shape)
@@ -383,31 +443,35 @@ class _Job:
             s, on, (height, width), lattice, normal, depth, grid, every, light
         )
         lone = np.flatnonzero(missing)
-        light[lone] = self.ask(s, d, lone, block, 2 * self.sampling.sky)
+        light[lone] = self.ask(s, d, lone, block.places(lone), 2)
         sharp = on[(s.traits[on, 1] <= SHARP) & (s.kind[on] == kernels.THING)]
         if len(sharp):
             self.reflect(s, d, sharp, np.zeros(len(sharp), np.int64), light, sharp)
         return light
 
     def ask(
-        self, s: Samples, d: np.ndarray, index: np.ndarray, block: _Block, sky: int
+        self, s: Samples, d: np.ndarray, index: np.ndarray, places: Places, times: int = 1
     ) -> np.ndarray:
-        """Send rays to sky and sun and along the mirrored direction."""
-        stage, every = self.stage, self.sampling.every
-        row, column = index // block.columns + block.first, index % block.columns
+        """Send rays to sky (so many times the usual) and sun and along the mirrored direction."""
+        every, sky = self.sampling.every, times * self.sampling.sky
+        row, column = places.row, places.column
         cells = ((row // every % 4) * 4 + column // every % 4) * 7 % 16
         pixels = row * 65536 + column
         light = np.zeros((len(index), CHANNELS), np.float32)
         o, w = (np.empty((len(index), 3), np.float32) for _ in range(2))
         for number in range(sky):
             kernels_light.sky_rays(s, index, cells, self.lamps, number, sky, o, w)
-            free = stage.free(o, w, pixels + number)
+            free = self.free(o, w, pixels + number)
             kernels_light.gather_sky(s, index, w, free, self.lamps, np.float32(1 / sky), light)
         ask = np.empty(len(index), np.bool_)
         kernels_light.sun_rays(s, index, cells, pixels, self.lamps, o, w, ask)
-        light[ask, 3] = stage.free(o[ask], w[ask], pixels[ask])
+        light[ask, 3] = self.free(o[ask], w[ask], pixels[ask])
         self.reflect(s, d, index, cells, light, np.arange(len(index)))
         return light
+
+    def free(self, o: np.ndarray, w: np.ndarray, ray: np.ndarray) -> np.ndarray:
+        """Whether each ray gets away."""
+        return self.stage.free(o, w, ray)
 
     def reflect(
         self,

@@ -91,7 +91,8 @@ def _bilinear(texels, offset, h, w, x, y, out):
     for di in range(2):
         for dj in range(2):
             weight = (b if di else 1 - b) * (a if dj else 1 - a)
-            t = texels[offset + ((i + di) % h) * w + (j + dj) % w]
+            # Sides are powers of two.
+            t = texels[offset + ((i + di) & (h - 1)) * w + ((j + dj) & (w - 1))]
             for c in range(3):
                 out[c] += weight * LINEAR[t[c]]
             out[3] += weight * t[3] * np.float32(1 / 255)
@@ -99,7 +100,10 @@ def _bilinear(texels, offset, h, w, x, y, out):
 
 @numba.njit(**JIT)
 def texture(look, k, u, v, level, out):
-    """Linear RGBA of texture ``k``; level 0 is the finest (pyramid: Williams 1983)."""
+    """Linear RGBA of texture ``k``; level 0 is the finest (pyramid: Williams 1983).
+
+    out: 8 numbers, of which the last four are spare.
+    """
     last = 0
     while look.levels[k, last + 1, 1] > 0:
         last += 1
@@ -109,7 +113,7 @@ def texture(look, k, u, v, level, out):
     offset, h, w = look.levels[k, n]
     _bilinear(look.texels, offset, h, w, u, v, out)
     if share > 0.02 and n < last:
-        more = np.empty(4, np.float32)
+        more = out[4:]
         offset, h, w = look.levels[k, n + 1]
         _bilinear(look.texels, offset, h, w, u, v, more)
         for c in range(4):
@@ -118,7 +122,10 @@ def texture(look, k, u, v, level, out):
 
 @numba.njit(**JIT)
 def colour(look, tri, u, v, footprint, out):
-    """Linear RGBA of triangle ``tri`` at barycentric (u, v); ``footprint`` [m] is a sample's."""
+    """Linear RGBA of triangle ``tri`` at barycentric (u, v); ``footprint`` [m] is a sample's.
+
+    out: as of ``texture``.
+    """
     f = look.finish[look.finish_of_triangle[tri]]
     a, b, c = look.triangles[tri]
     w = 1 - u - v
@@ -227,7 +234,7 @@ def _lift(vertices, normals, tri, bary, flat, p):
 @numba.njit(**JIT)
 def meet(look, vertices, normals, floor, pixel, o, d, prim, u, v, t, index, out):
     """Fill ``out`` at ``index`` from Embree's answers; ``pixel`` is a sample's angle [rad]."""
-    rgba = np.empty(4, np.float32)
+    rgba = np.empty(8, np.float32)
     bary = np.empty(3, np.float32)
     for k in range(len(index)):
         g = index[k]
@@ -328,7 +335,7 @@ def passes(look, prim, u, v, ray, depth):
     Glass still holds back a third of the light, so that it has a shadow.
     """
     out = np.zeros(len(prim), np.bool_)
-    rgba = np.empty(4, np.float32)
+    rgba = np.empty(8, np.float32)
     for k in range(len(prim)):
         if prim[k] < 0:
             continue

@@ -174,7 +174,7 @@ def _studio(w, blur, lamps, out):
 @numba.njit(**JIT)
 def mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first):
     """Write what was mirrored into light[:, first:first+3]: objects roughly lit, or the studio."""
-    rgba = np.empty(4, np.float32)
+    rgba = np.empty(8, np.float32)
     for k in range(len(index)):
         rough = s.traits[index[k], 1]
         _studio(w[k], max(rough - 0.15, 0.0) ** 2, lamps, light[k, first : first + 3])

@@ -217,7 +217,13 @@ def take(
         "low": low.tolist(),
         "high": high.tolist(),
         "objects": [
-            {"name": o.name, "rigid": bool(r), "vertices": len(v)}
+            {
+                "name": o.name,
+                "rigid": bool(r),
+                "vertices": len(v),
+                "velocity": list(o.velocity),
+                "height": float(cast.skin.rest[v, 2].min()) if len(v) else 0.0,
+            }
             for o, r, v in zip(scene.objects, cast.rigid, cast.vertices, strict=True)
         ],
         "surfaces": _surfaces(scene, parts, cast, block),

@@ -146,7 +146,9 @@ def take_in(
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
     doubt, points = _doubt(source, shown), _points(shown)
-    start = points if masks is None else None  # sparse points are worse than what masks carve
+    # With masks, where sparse points are says less than what masks carve; what they are seen
+    # through is empty.
+    start = points if masks is None else shown.lines
     try:
         trained = train(shown.views, masks, start, training, checkpoint, progress)
     except UserError as problem:

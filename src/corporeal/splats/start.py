@@ -3,16 +3,16 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 from scipy.ndimage import binary_erosion
 from scipy.spatial import KDTree
 
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.region import region
-from corporeal.splats.hull import tight, witnessed
+from corporeal.splats.hull import Outlines, witnessed
 from corporeal.splats.parameters import COLOUR, MEAN, OPACITY, ROTATION, SCALE, Parameters
 from corporeal.splats.thread_pool import ThreadPool
-from corporeal.types import Camera, Views
+from corporeal.types import Camera
 
 OPAQUE, FAINT = 0.5, 0.3
 """Opacity of Gaussians where they begin, on the hull and inside."""
@@ -76,23 +76,19 @@ def clearance(cameras: tuple[Camera, ...]) -> Float[np.ndarray, " V"]:
 
 
 def on_hull(
-    views: Views,
-    masks: Bool[np.ndarray, "V H W"],
+    outlines: Outlines,
     count: int,
     rng: np.random.Generator,
     pool: ThreadPool,
     within: float = 0.0,
 ) -> Points:
-    """Return points on the visual hull, the surface of what all masks allow.
+    """Return points on the visual hull, the surface of what masks and lines of sight allow.
 
     within: share of them that is inside, as small as those on the hull: wide ones would show
     through plain faces.
 
-    Raises:
-        UserError: Nothing is inside all masks.
-
     """
-    fine = tight(views, masks, pool)
+    views, masks, fine = outlines.views, outlines.masks, outlines.hull
     shell = fine.cells[fine.inside & np.logical_not(binary_erosion(fine.inside))]
     deep = round(within * count)
     on = count - deep

@@ -14,7 +14,9 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool, Float32
 
+from corporeal.geometry.lines_of_sight import LinesOfSight
 from corporeal.splats import densification, exposure, limits, saved
+from corporeal.splats.hull import outlines_of
 from corporeal.splats.kernels_learn import adam
 from corporeal.splats.limits import Limits
 from corporeal.splats.loss import goal, loss
@@ -81,7 +83,7 @@ class Trained:
 def train(
     views: Views,
     masks: Masks | None = None,
-    points: Points | None = None,
+    points: Points | LinesOfSight | None = None,
     config: TrainConfig = DEFAULT,
     checkpoint: Path | None = None,
     progress: Progress = lambda fraction, words: None,
@@ -90,6 +92,7 @@ def train(
 
     masks: what belongs to the objects; only that is learned then. points: where to start, too, or
     with masks instead of their visual hull; without masks a plane sweep finds where objects are.
+    Lines of sight in their place empty the visual hull where they pass.
     checkpoint: a file that is written now and then; a training that was cut off goes on from it,
     and one that was finished is not done again.
 
@@ -111,7 +114,8 @@ def train(
             progress(fraction, words)
     if checkpoint is not None:
         saved.keep(checkpoint, schedule.name, vars(training))
-    made = gaussians_of(training.theta[opacity(training.theta) > densification.DEAD])
+    left = (opacity(training.theta) > densification.DEAD) & ~_in_empty(training.theta, schedule)
+    made = gaussians_of(training.theta[left])
     behind = None if masks is None else GREY
     apart = exposure.differ(training.gains)
     held = schedule.held_out
@@ -147,25 +151,30 @@ def _begun(
     """Return the state to go on from: a checkpoint's, or that of a fresh start."""
     rng = np.random.default_rng([schedule.seed, 0])
     preset, points = schedule.preset, schedule.points
+    lines = points if isinstance(points, LinesOfSight) else None
+    points = points if isinstance(points, Points) else None
     views, masks = _of(schedule.views, schedule.masks, schedule.learned)
     if masks is None:
         found = swept(views, preset.gaussians, rng, pool)
         schedule.surfaces = found.surfaces
         points = found.points if points is None else joined(points, found.points)
+    if points is None and masks is not None:
+        own = None if lines is None else lines.only(schedule.learned)
+        schedule.outlines = outlines_of(views, masks, own, pool)
     state = saved.kept(checkpoint, schedule.name) if checkpoint is not None else {}
     if state:
         learned = state["theta"], state["first"], state["second"]
         rest = state["limits"], state["gains"], float(state["widest"]), float(state["ahead"])
         return TrainingState(*learned, *rest, int(state["step"]), float(state["seconds"]))
     widest, ahead, begin = limits.REACH * schedule.radius, np.nan, schedule.config.begin
-    if points is None and masks is not None:
-        ahead = _tried(schedule, views, masks, progress) if begin == "auto" else np.nan
+    if schedule.outlines is not None:
+        ahead = _tried(schedule, progress) if begin == "auto" else np.nan
         inside = begin == "inside" or ahead > GAIN
         if inside:
             # As far as so many are apart on a sphere. One that is wider shows all of a plain face
             # from below it, and costs less of PULL than those that lie on it.
             widest = schedule.radius * np.sqrt(4 * np.pi / preset.gaussians)
-        points = on_hull(views, masks, preset.gaussians, rng, pool, WITHIN * inside)
+        points = on_hull(schedule.outlines, preset.gaussians, rng, pool, WITHIN * inside)
     assert points is not None
     theta = seeded(points, preset.gaussians, preset.degree, rng)
     bounds, _ = _bounds(theta, widest, schedule, pool)
@@ -174,14 +183,17 @@ def _begun(
     return TrainingState(theta, *moments, bounds, gains, float(widest), ahead)
 
 
-def _tried(schedule: TrainingSchedule, views: Views, masks: Masks, progress: Progress) -> float:
+def _tried(schedule: TrainingSchedule, progress: Progress) -> float:
     """Return how much better a small training is that begins inside the hull [dB]; nan: unknown."""
     if schedule.preset.steps <= TRIAL["steps"]:
         return np.nan  # it is no larger itself
     progress(0.0, "finding where to begin")
     small = replace(schedule.config, **TRIAL)
     tries = [replace(small, begin=begin) for begin in ("inside", "hull")]
-    inside, hull_alone = (train(views, masks, config=c).quality for c in tries)
+    views, masks = _of(schedule.views, schedule.masks, schedule.learned)
+    lines = schedule.points
+    lines = lines.only(schedule.learned) if isinstance(lines, LinesOfSight) else None
+    inside, hull_alone = (train(views, masks, lines, c).quality for c in tries)
     if inside is None or hull_alone is None:
         return np.nan  # too few views to tell
     assert inside.psnr_things is not None and hull_alone.psnr_things is not None
@@ -248,6 +260,7 @@ def _stir(
     growing = begin < training.step < end * schedule.preset.steps
     if training.step % ROUND == 0 and growing:
         _, haze = _bounds(training.theta, training.widest, schedule, pool)
+        haze |= _in_empty(training.theta, schedule)
         training.theta[haze, OPACITY] = GONE
         moments = [training.first, training.second]
         most = schedule.preset.gaussians
@@ -267,6 +280,13 @@ def _bounds(
     if schedule.surfaces is None:
         return limits.even(theta, widest), np.zeros(len(theta), np.bool_)
     return limits.strict(theta, schedule.radius, schedule.surfaces, pool)
+
+
+def _in_empty(theta: Parameters, schedule: TrainingSchedule) -> Bool[np.ndarray, " N"]:
+    """Tell which Gaussians are where lines of sight pass."""
+    if schedule.outlines is None:
+        return np.zeros(len(theta), np.bool_)
+    return schedule.outlines.emptied(theta[:, MEAN:ROTATION])
 
 
 def _rates(schedule: TrainingSchedule, training: TrainingState) -> Float32[np.ndarray, " D"]:

@@ -8,8 +8,10 @@ from jaxtyping import Bool, UInt8
 
 from corporeal.backends import load
 from corporeal.errors import UserError
+from corporeal.geometry.lines_of_sight import LinesOfSight
 from corporeal.geometry.region import region
 from corporeal.splats import saved
+from corporeal.splats.hull import Outlines
 from corporeal.splats.kernels_project import Pinhole
 from corporeal.splats.raster import pinhole
 from corporeal.splats.start import Points, clearance
@@ -88,7 +90,11 @@ class TrainingSchedule:
     """What each step of a training looks at, and how: pictures in two sizes."""
 
     def __init__(
-        self, views: Views, masks: Masks | None, points: Points | None, config: TrainConfig
+        self,
+        views: Views,
+        masks: Masks | None,
+        points: Points | LinesOfSight | None,
+        config: TrainConfig,
     ) -> None:
         check(views, masks)
         preset = PRESETS[config.preset]
@@ -114,6 +120,7 @@ class TrainingSchedule:
         factor = -(-max(views.rgb.shape[1:3]) // self.preset.longest)
         halves = min(views.rgb.shape[1:3]) // factor >= SMALLEST
         self.surfaces: Surfaces | None = None
+        self.outlines: Outlines | None = None
         self.coarse = (COARSE_WHOLE if masks is None else COARSE) * self.preset.steps
         self.sizes = [_Size(self, factor)] + ([_Size(self, 2 * factor)] if halves else [])
 

@@ -24,6 +24,7 @@ from corporeal.geometry.arrangement import (
     resized,
     scaled,
 )
+from corporeal.geometry.beginnings import begun, said_lift, said_velocity
 from corporeal.geometry.gaussians import Up
 from corporeal.geometry.sizes import said_extent
 from corporeal.types import Objects, Scene, SceneObject
@@ -45,6 +46,10 @@ class AssembleConfig:
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
     """Raise each object above what it stands on by this many times its own size."""
+    lift: tuple[str, ...] = ()
+    """Raise an object above where it stands, such as "duck=0.5" [m]."""
+    velocity: tuple[str, ...] = ()
+    """An object's initial velocity, such as "duck=1,0,-2" [m/s]."""
     extent: tuple[str, ...] = ()
     """Largest real extent of an object, such as "duck=0.1" [m]."""
     unit: Unit = "auto"
@@ -92,7 +97,7 @@ def assemble(
     blocks = _sized(_named(_read(plan, config.objects, frame)), config.extent)
     scene = _merged(plan, _placed(blocks, plan, config.stack))
     scene = _at_working_extent(scene, config.working_extent)
-    scene = _dropped(scene, config.drop)
+    scene = begun(_dropped(scene, config.drop), config.lift, config.velocity)
     return _timed(_with_overlaps_named(scene), blocks, plan, config)
 
 
@@ -104,6 +109,10 @@ def validate(config: AssembleConfig) -> None:
     check_range("The fps", config.fps, 1, 1000)
     for text in config.extent:
         said_extent(text, "it")
+    for text in config.lift:
+        said_lift(text)
+    for text in config.velocity:
+        said_velocity(text)
 
 
 # ---------------------------------------------------------------- what the files hold
@@ -355,7 +364,8 @@ def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: Assemble
         fps=config.fps or plan.fps or (own.fps if own else FPS),
         settled=(own or scene).settled if plan.settled is None else plan.settled,
     )
-    known = own.duration if own and not config.drop else None  # what is dropped needs its time
+    raised = config.drop or config.lift  # what is dropped needs its time
+    known = own.duration if own and not raised else None
     stated = config.duration or plan.duration or known
     return replace(scene, duration=stated or _watched(scene))
 

@@ -1,52 +1,86 @@
 """What a simulation that runs while somebody watches can afford."""
 
-from collections.abc import Mapping
+from dataclasses import dataclass
 
+from corporeal.mpm.constants import COURANT
 from corporeal.treatment.plan import QUALITIES, Detail, Quality
+from corporeal.treatment.step_budget import OUTRUN, counted
 from corporeal.types import Particles
 
-CELLS = (8, 6, 5, 4)
+CELLS = (8, 7, 6, 5, 4)
 """Cells across the smallest deformable object, the finest first."""
 SHARE = 0.7
-"""Of the threads' time that steps may take; the rest shows pictures."""
-COST = 1.0e-7
-"""CPU seconds per deformable particle and step: 50 to 160 ns were measured on seven scenes."""
+"""Of the threads' time that steps may take, as they cost before anything touches."""
 FEWEST = 3e3
 """Steps per simulated second below which coarser cells are better."""
 MOST = 20e3
 """Steps per simulated second beyond which no draft goes either."""
 
 
-def live_quality(deformable: int, detail: Detail, threads: int) -> Quality:
+@dataclass(frozen=True)
+class Demand:
+    """What a filled scene asks of whoever steps it."""
+
+    cost: float
+    """CPU seconds of a step, as it was filled: measured, as few particles in many cells cost more
+    each than many in few."""
+    cells: int
+    """Across the smallest deformable object, as it was filled."""
+    cell: float
+    """dx, as it was filled [m]."""
+    steps: float
+    """Per simulated second, as it was filled; 0: nothing in it deforms."""
+    motion: float
+    """Fastest that anything is expected to move [m/s]."""
+    stiffened: float
+    """Wave speed over the one that the step budget counts [-]: what loss adds."""
+
+    @classmethod
+    def of(cls, particles: Particles, detail: Detail, cost: float) -> "Demand":
+        """Look at what was filled with a detail, of which a step costs so many CPU seconds."""
+        treatments = particles.treatments
+        waving = [t for t in treatments if t.wave_speed > 0]
+        return cls(
+            cost,
+            QUALITIES[detail].cells_across,
+            particles.cell,
+            max((1 / t.step for t in waving), default=0.0),
+            max((t.impact_speed for t in treatments), default=0.0),
+            max((t.wave_speed / counted(t) for t in waving), default=1.0),
+        )
+
+    def step_cost(self, cells: int) -> float:
+        """Return what a step costs with so many cells [CPU s]."""
+        return self.cost * (cells / self.cells) ** 3
+
+    def least_steps(self, cells: int) -> float:
+        """Return the steps per simulated second that no budget goes below.
+
+        Waves must outrun what moves, whatever the budget (``step_budget.fit_budget``).
+        """
+        cell = self.cell * self.cells / cells
+        outrun = (OUTRUN * self.stiffened + 1) * self.motion / (COURANT * cell)
+        return min(max(outrun, FEWEST), self.steps * cells / self.cells)
+
+
+def live_quality(demand: Demand, threads: int) -> Quality:
     """Choose the finest cells whose predicted cost is real time, and as many steps as fit.
 
     Spare time buys stiffness: the step budget keeps the order of stiffness.
 
     Args:
-        deformable: Particles that deform in the scene as it was filled.
-        detail: With which it was filled.
+        demand: Of the scene as it was filled.
         threads: Of the engine.
 
     """
-    filled: Mapping[str, Quality] = QUALITIES
-    across = filled[detail].cells_across
 
     def steps_at(cells: int) -> float:
         """Return the steps per simulated second that fit."""
-        count = max(deformable * (cells / across) ** 3, 1.0)
-        return SHARE * threads / (COST * count)
+        return SHARE * threads / demand.step_cost(cells)
 
-    cells = next((c for c in CELLS if steps_at(c) >= FEWEST), CELLS[-1])
-    steps = min(max(steps_at(cells), FEWEST), MOST)
-    coarse = filled["draft"]
+    cells = next((c for c in CELLS if steps_at(c) >= demand.least_steps(c)), CELLS[-1])
+    # Loss stiffens: that many more steps are taken than the budget counts.
+    steps = min(max(steps_at(cells) / demand.stiffened, FEWEST), MOST)
+    coarse = QUALITIES["draft"]
     along = coarse.cells_along * cells // coarse.cells_across
     return Quality(cells, along, coarse.particles, steps, float("inf"))
-
-
-def deformable(particles: Particles) -> int:
-    """Count the particles that deform."""
-    return sum(
-        int((particles.part == k).sum())
-        for k, t in enumerate(particles.treatments)
-        if t.kind != "rigid"
-    )

@@ -58,6 +58,10 @@ STIFFENED = 1.6
 """How many times more steps than without loss lossy matter may take [-], before stiffness pays."""
 
 
+OUTRUN = 10.0
+"""How many times faster than anything moves a wave must be, whatever the budget [-]."""
+
+
 def counted(treatment: Treatment) -> float:
     """Wave speed that the step budget counts [m/s].
 
@@ -74,8 +78,7 @@ def fit_budget(treatments: Sequence[Treatment], cell: float, steps: float) -> Fi
     σ_y falls with √(E_sim/E), which keeps the impact speed at which a part yields.
     """
     motion = max((t.impact_speed for t in treatments), default=0.0)
-    # A wave must outrun what moves by far, whatever the budget.
-    limit = max(COURANT * cell * steps - motion, 10 * motion)
+    limit = max(COURANT * cell * steps - motion, OUTRUN * motion)
     treatments = [soften_bulk(t, limit, cell) for t in treatments]
     fastest = max(map(counted, treatments), default=0.0)
     # A part whose bulk gave way runs at the limit, but for rounding.

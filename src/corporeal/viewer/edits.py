@@ -12,10 +12,12 @@ import yaml
 
 from corporeal.errors import UserError
 from corporeal.formats.words import safe
+from corporeal.geometry.beginnings import said_lift, said_velocity
 from corporeal.materials.library import find
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.pipeline import Settings, reopen
 from corporeal.results import Results
+from corporeal.stages.assemble import AssembleConfig
 from corporeal.stages.assemble import validate as validate_assemble
 from corporeal.viewer.queue import Asked
 
@@ -49,7 +51,8 @@ def changed(run: Path, made: Results, asked: Mapping[str, Any]) -> tuple[Asked, 
         run: The other one's folder; not changed.
         made: What its verbs made.
         asked: ``parts``: number of a part → ``material`` and ``values`` (field → SI); ``detail``;
-            ``drop`` in sizes of the object.
+            ``drop`` in sizes of the object; ``objects``: number of an object → ``lift`` [m] and
+            ``velocity`` [m/s].
 
     Raises:
         UserError: Something asked is not known, or a value lies outside its measured range.
@@ -61,7 +64,7 @@ def changed(run: Path, made: Results, asked: Mapping[str, Any]) -> tuple[Asked, 
     settings = replace(
         settings,
         fill=replace(settings.fill, detail=_detail(asked.get("detail", settings.fill.detail))),
-        assemble=replace(settings.assemble, drop=_drop(asked, settings.assemble.drop)),
+        assemble=_beginning(made, asked, settings.assemble),
     )
     validate_assemble(settings.assemble)
     name = new_name(runs, run.name)
@@ -83,10 +86,42 @@ def _detail(word: Any) -> Any:
     return word
 
 
-def _drop(asked: Mapping[str, Any], before: float) -> float:
-    value = asked.get("drop", before)
+def _beginning(made: Results, asked: Mapping[str, Any], before: AssembleConfig) -> AssembleConfig:
+    """Return how objects begin: what is not asked for is as it was."""
+    changes = asked.get("objects", {})
+    if not isinstance(changes, dict):
+        raise UserError("The changes of objects are no table.")
+    lift, velocity = dict(map(said_lift, before.lift)), dict(map(said_velocity, before.velocity))
+    objects = made.assembled.scene.objects
+    for name, change in changes.items():
+        k = int(name) if str(name).isdecimal() else -1
+        if not 0 <= k < len(objects) or not isinstance(change, dict):
+            raise UserError(f"There is no object {name!r}.")
+        if "lift" in change:
+            lift[objects[k].name] = number(change["lift"], "The lift")
+        if "velocity" in change:
+            said = change["velocity"]
+            if not isinstance(said, list) or len(said) != 3:
+                raise UserError("A velocity is no three numbers.")
+            x, y, z = (number(x, "A velocity") for x in said)
+            velocity[objects[k].name] = (x, y, z)
+    return replace(
+        before,
+        drop=number(asked.get("drop", before.drop), "The drop"),
+        lift=tuple(f"{name}={metres:g}" for name, metres in lift.items()),
+        velocity=tuple(f"{name}={x:g},{y:g},{z:g}" for name, (x, y, z) in velocity.items()),
+    )
+
+
+def number(value: Any, what: str) -> float:
+    """Return a finite number that a page sent; ``what`` names it.
+
+    Raises:
+        UserError: It is none.
+
+    """
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
-        raise UserError("The drop is no number.")
+        raise UserError(f"{what} is no number.")
     return float(value)
 
 
@@ -96,10 +131,10 @@ def _annotations(made: Results, parts: Mapping[str, Any]) -> dict[str, dict[str,
     if not isinstance(parts, dict):
         raise UserError("The changes of parts are no table.")
     annotations: dict[str, dict[str, Any]] = {}
-    for number, change in parts.items():
-        k = int(number) if str(number).isdecimal() else -1
+    for name, change in parts.items():
+        k = int(name) if str(name).isdecimal() else -1
         if not 0 <= k < len(catalogue.catalogue) or not isinstance(change, dict):
-            raise UserError(f"There is no part {number!r}.")
+            raise UserError(f"There is no part {name!r}.")
         part = catalogue.catalogue[k]
         material = find(str(change.get("material", field.materials[k].name))).name
         annotation: dict[str, Any] = {"material": material}

@@ -1,22 +1,23 @@
-"""A simulation that runs while pages watch and touch it: one thread, the newest picture only."""
+"""A simulation that runs while pages watch and touch it: of pictures, the newest only."""
 
 import threading
 import time
 from collections import deque
 from collections.abc import Callable
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from corporeal.errors import UserError
 from corporeal.machine import cores
+from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import Snapshot
 from corporeal.playback import cast_of, slowed
 from corporeal.render.take import Cast, stress_bytes
 from corporeal.stages.fill import fill
 from corporeal.trajectory.played import Prepared
 from corporeal.trajectory.stress import VonMises
-from corporeal.treatment.live_quality import deformable, live_quality
+from corporeal.treatment.live_quality import Demand, live_quality
 from corporeal.treatment.problem_from_scene import pose
 from corporeal.types import Frame, Scene, Wind
 from corporeal.viewer.hands import Hands
@@ -37,20 +38,60 @@ MOST_TOUCHES = 100_000
 """Of a record: then it is only kept that it is not whole."""
 HEAD = "<u4"
 MOST_THREADS = 4
+TRIED = 20
+"""Steps by which the cost of one is measured."""
+
+
+def threads_here() -> int:
+    """Return how many threads step: a core stays for pictures, at which no step has to wait."""
+    return max(1, min(MOST_THREADS, cores() - 1))
 
 
 def live_scene(made: Made, threads: int) -> Prepared:
     """Fill a scene again for what can be simulated in real time."""
-    old = made.results.prepared
+    old, assembled = made.results, made.results.assembled
     air = Wind((CALM, 0.0, 0.0))
-    objects = tuple(o if o.wind else replace(o, wind=air) for o in old.scene.objects)
-    scene: Scene = replace(old.scene, objects=objects)
-    quality = live_quality(deformable(old.particles), made.detail, threads)
-    return replace(old, scene=scene, particles=fill(scene, old.parts, old.field, quality=quality))
+    objects = tuple(o if o.wind else replace(o, wind=air) for o in assembled.scene.objects)
+    scene: Scene = replace(assembled.scene, objects=objects)
+    demand = Demand.of(old.particles, made.detail, cost_of_step(old.prepared))
+    quality = live_quality(demand, threads)
+    # Contents of vessels are poured anew: fill is given the scene without them.
+    particles = fill(scene, assembled.parts, assembled.field, quality=quality)
+    return replace(old, assemble=scene, fill=particles).prepared
+
+
+def cost_of_step(prepared: Prepared) -> float:
+    """Measure what a step of a scene costs as it is filled [CPU s of one thread]."""
+    problem = pose(prepared.scene, prepared.particles, prepared.field).problem
+    engine = CpuEngine(problem, 1)
+    engine.step(engine.stable_step())
+    begun = time.process_time()
+    for _ in range(TRIED):
+        engine.step(engine.stable_step())
+    return (time.process_time() - begun) / TRIED
+
+
+@dataclass(frozen=True)
+class Instant:
+    """What there is to show, as it was between two advances."""
+
+    now: Snapshot
+    held: np.ndarray | None
+    """Where the hand holds [m]; None: it holds nothing."""
+    force: float
+    """Of the hand [N]."""
+    done: int
+    """Number of the last order."""
+    playing: bool
+    rate: float
+    """Simulated over real time."""
 
 
 class Live:
-    """One live simulation. Orders come in from any thread; pictures are ``latest``."""
+    """One live simulation. Orders come in from any thread; pictures are ``latest``.
+
+    One thread steps, another makes pictures of the newest instant: neither waits for the other.
+    """
 
     def __init__(self, prepared: Prepared, threads: int) -> None:
         """Begin at time 0, paused.
@@ -71,12 +112,17 @@ class Live:
         self.orders: deque[Order] = deque(maxlen=1000)
         self.news = threading.Condition()
         self.latest, self.number = b"", 0
+        self.instant: Instant | None = None
+        self.taken = threading.Condition()
         self.message: str = ""
         self.playing = self.closed = self.whole = False
         self.done, self.rate, self.top = 0, 0.0, 1.0
         self.spent = {"step": 0.0, "show": 0.0}
         self.reset(single=False)
-        self.thread = threading.Thread(target=self._run, name="live", daemon=True)
+        self.threads_of = (
+            threading.Thread(target=self._run, name="live", daemon=True),
+            threading.Thread(target=self._show, name="live pictures", daemon=True),
+        )
 
     def hello(self) -> dict:
         """Say what pictures will hold, and how honest they are."""
@@ -96,31 +142,57 @@ class Live:
         self.message, self.whole = "", True
 
     def start(self) -> None:
-        """Let it run in its thread."""
-        self.thread.start()
+        """Let it run in its threads."""
+        for thread in self.threads_of:
+            thread.start()
 
     def close(self) -> None:
-        """End the thread."""
+        """End the threads."""
         self.closed = True
-        if self.thread.is_alive():
-            self.thread.join(10.0)
+        with self.taken:
+            self.taken.notify_all()
+        for thread in self.threads_of:
+            if thread.is_alive():
+                thread.join(10.0)
 
-    # ---------------------------------------------------------------- the thread
+    # ---------------------------------------------------------------- two threads
 
     def _run(self) -> None:
-        self.publish()
+        """Obey and step; what there is to see is handed over, and nobody waited for."""
+        self._hand_over()
         while not self.closed:
             begun = time.perf_counter()
             touched = self._obey()
             moved = self.playing and self._advance()
-            stepped = time.perf_counter()
             if moved or touched:
-                self.publish()
-            shown = time.perf_counter()
-            self._keep_pace(stepped - begun, shown - stepped, moved)
-            time.sleep(max(1 / FPS - (shown - begun), 0.001))
+                self._hand_over()
+            self._keep_pace(time.perf_counter() - begun, moved)
+            time.sleep(max(1 / FPS - (time.perf_counter() - begun), 0.001))
             passed = time.perf_counter() - begun
             self.rate += SMOOTH * (self.pace * moved / passed - self.rate)
+
+    def _hand_over(self) -> None:
+        """Let the other thread show the present; an instant that it did not get to is lost."""
+        now = self.hands.engine.snapshot()
+        held = self.hands.grip(now.position)
+        force = self.hands.force(now.position)
+        with self.taken:
+            self.instant = Instant(now, held, force, self.done, self.playing, self.rate)
+            self.taken.notify_all()
+
+    def _show(self) -> None:
+        """Make a picture of the newest instant, again and again."""
+        while not self.closed:
+            with self.taken:
+                self.taken.wait_for(lambda: self.instant is not None or self.closed)
+                instant, self.instant = self.instant, None
+            if instant is not None:
+                begun = time.perf_counter()
+                picture = self.picture(instant)
+                self.spent["show"] = time.perf_counter() - begun
+                with self.news:
+                    self.latest, self.number = picture, self.number + 1
+                    self.news.notify_all()
 
     def _obey(self) -> bool:
         """Do the orders that have come; a bad one is refused and the simulation goes on."""
@@ -157,23 +229,14 @@ class Live:
             self.whole = False
         return True
 
-    def _keep_pace(self, stepping: float, showing: float, moved: bool) -> None:
+    def _keep_pace(self, stepping: float, moved: bool) -> None:
         """As much simulated time a picture as the machine can do, at most real time."""
-        self.spent = {"step": stepping, "show": showing}
+        self.spent["step"] = stepping
         if moved:
             self.cost += SMOOTH * (stepping / self.pace - self.cost)
-            room = max(1 / FPS - showing, 0.3 / FPS)
-            self.pace = float(np.clip(room / max(self.cost, 1e-3), LEAST, 1 / FPS))
+            self.pace = float(np.clip(1 / FPS / max(self.cost, 1e-3), LEAST, 1 / FPS))
 
     # ---------------------------------------------------------------- pictures
-
-    def publish(self) -> None:
-        """Make the present the newest picture."""
-        now = self.hands.engine.snapshot()
-        picture = self.picture(now)
-        with self.news:
-            self.latest, self.number = picture, self.number + 1
-            self.news.notify_all()
 
     def wait(self, seen: int, patience: float) -> int:
         """Wait until there is a newer picture than number ``seen``; return its number."""
@@ -181,7 +244,7 @@ class Live:
             self.news.wait_for(lambda: self.number > seen or self.closed, patience)
             return self.number
 
-    def picture(self, now: Snapshot) -> bytes:
+    def picture(self, instant: "Instant") -> bytes:
         """One instant: a head of 40 bytes, then every object in order.
 
         Head: the last order's number (uint32), simulated over real time, force of the hand [N],
@@ -189,26 +252,25 @@ class Live:
         (3 × float32, nan: none), playing (uint32). An object: pose (12 × float32); one that
         deforms, then residuals (3 × int16 a vertex), normals (2 × int8), stress (uint8).
         """
-        place = self.place
+        place, now = self.place, instant.now
         motion = np.where(self.stiff[:, None, None], now.deformation, now.motion)[place]
         stress = self.stress.at(now)[place]
         self.top = max(self.top, float(np.percentile(stress, TOP)))
         frame = Frame(now.time, now.position[place], motion, stress)
-        at = self.hands.grip(now.position)
-        held = np.full(3, np.nan) if at is None else at
-        numbers = [self.rate, self.hands.force(now.position), self.top]
+        held = np.full(3, np.nan) if instant.held is None else instant.held
+        numbers = [instant.rate, instant.force, self.top]
         out = [
-            np.array([self.done], HEAD).tobytes(),
+            np.array([instant.done], HEAD).tobytes(),
             np.array(numbers, "<f4").tobytes(),
             np.array([now.time], "<f8").tobytes(),
             np.asarray(held, "<f4").tobytes(),
-            np.array([self.playing], HEAD).tobytes(),
+            np.array([instant.playing], HEAD).tobytes(),
         ]
-        for instant in self.cast.at(frame):
-            out.append(instant.pose.astype("<f4").tobytes())
-            if instant.residual is not None and instant.normal is not None:
-                shade = stress_bytes(instant.stress, self.top)  # type: ignore[arg-type]
-                body = instant.residual.astype("<i2").tobytes() + instant.normal.tobytes()
+        for seen in self.cast.at(frame):
+            out.append(seen.pose.astype("<f4").tobytes())
+            if seen.residual is not None and seen.normal is not None:
+                shade = stress_bytes(seen.stress, self.top)  # type: ignore[arg-type]
+                body = seen.residual.astype("<i2").tobytes() + seen.normal.tobytes()
                 body += shade.tobytes()
                 out += [body, b"\0" * (-len(body) % 4)]
         return b"".join(out)
@@ -240,7 +302,7 @@ class Room:
         with self.lock:
             if self.live is None or self.name != name:
                 self._clear()
-                threads = min(MOST_THREADS, cores())
+                threads = threads_here()
                 self.live = Live(live_scene(self.read(name), threads), threads)
                 self.name = name
                 self.live.start()

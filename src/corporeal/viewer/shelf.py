@@ -9,6 +9,7 @@ from typing import Any
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.findings import RunAudit
+from corporeal.geometry.beginnings import said_lift
 from corporeal.pipeline import FOLDERS, RUN, read_back, reopen
 from corporeal.playback import cast_of, playback, recorded
 from corporeal.results import Results
@@ -16,6 +17,9 @@ from corporeal.trajectory.audit_file import AUDIT
 from corporeal.treatment.plan import Detail
 from corporeal.typed import typed
 
+INBOX = ".inbox"
+"""Folder of uploads, among the runs."""
+UPLOADED = "uploaded"
 KEPT = 4
 """Runs that are held in memory, the latest."""
 NEEDED = "fill"
@@ -101,6 +105,18 @@ class Shelf:
         """
         return Made(self.open(name).made, reopen(self.path(name)).settings.fill.detail)
 
+    def asked(self, name: str) -> dict[str, Any]:
+        """Say how a run was asked to begin: detail, drop; lift and velocity of every object."""
+        settings = reopen(self.path(name)).settings
+        lift = dict(map(said_lift, settings.assemble.lift))
+        objects = self.open(name).made.assembled.scene.objects
+        return {
+            "detail": settings.fill.detail,
+            "drop": settings.assemble.drop,
+            "lift": [lift.get(o.name, 0.0) for o in objects],
+            "velocity": [list(o.velocity) for o in objects],
+        }
+
 
 def read(run: Path) -> Read:
     """Read a run and make it ready to be played.
@@ -130,12 +146,17 @@ def _row(name: str, run: Path) -> dict[str, Any]:
         "name": name,
         "state": kept.get("state", ""),
         "error": kept.get("error", ""),
-        "input": ", ".join(path.name for path in asked.inputs),
+        "input": ", ".join(map(_called, asked.inputs)),
         "detail": asked.settings.fill.detail,
         "shown": (run / FOLDERS[NEEDED] / store.META).exists(),
         "picture": (run / FOLDERS["film"] / THUMBNAIL).exists(),
         "report": (run / "report.html").exists(),
     }
+
+
+def _called(path: Path) -> str:
+    """Return what to call an input; names of uploads are ours and tell nobody anything."""
+    return UPLOADED if INBOX in path.parts else path.name
 
 
 def _changed(run: Path) -> float:

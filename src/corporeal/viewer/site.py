@@ -21,7 +21,16 @@ from corporeal.viewer.guard import POLICY_OF_REPORT, Door, Guard
 from corporeal.viewer.shelf import THUMBNAIL, Shelf
 
 KINDS = {".js": "text/javascript", ".css": "text/css", ".html": "text/html"}
-FILES = (*MODULES, "touch.js", "change.js", "start.js", "home.js", "viewer.css", "home.css")
+FILES = (
+    *MODULES,
+    "touch.js",
+    "change.js",
+    "export.js",
+    "start.js",
+    "home.js",
+    "viewer.css",
+    "home.css",
+)
 """All that a page may load of the package."""
 
 

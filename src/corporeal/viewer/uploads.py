@@ -13,10 +13,9 @@ from starlette.responses import JSONResponse, Response
 from starlette.routing import Route
 
 from corporeal.errors import UserError
+from corporeal.viewer.shelf import INBOX
 from corporeal.viewer.unpack import unpack
 
-INBOX = ".inbox"
-"""Folder of uploads, among the runs."""
 LARGEST = 1 << 30
 """Of one file [bytes]."""
 ALL = 4 << 30

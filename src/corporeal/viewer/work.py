@@ -12,8 +12,9 @@ from starlette.routing import BaseRoute, Route
 
 from corporeal.errors import UserError
 from corporeal.materials.library import library
-from corporeal.pipeline import Settings
-from corporeal.viewer.edits import DETAILS, changed, new_name
+from corporeal.pipeline import Settings, reopen
+from corporeal.stages.assemble import validate as validate_assemble
+from corporeal.viewer.edits import DETAILS, changed, new_name, number
 from corporeal.viewer.queue import Asked, Queue
 from corporeal.viewer.shelf import Shelf
 from corporeal.viewer.site import answered
@@ -36,24 +37,40 @@ class Work:
             upload_route(self.inbox),
             Route("/jobs", self._jobs),
             Route("/materials", self._materials),
+            Route("/asked/{name}", self._asked),
             Route("/jobs/start", answered(self.start), methods=["POST"]),
             Route("/jobs/stop", answered(self.stop), methods=["POST"]),
             Route("/jobs/go-on", answered(self.go_on), methods=["POST"]),
+            Route("/jobs/run", answered(self.simulate), methods=["POST"]),
             Route("/jobs/change", answered(self.change), methods=["POST"]),
         )
 
     def start(self, asked: dict[str, Any]) -> dict[str, Any]:
-        """Run an upload: ``upload``, ``name``, ``detail``, ``first`` (only as far as materials)."""
+        """Run an upload: ``upload``, ``name``, ``detail``, ``drop``, ``first``.
+
+        ``drop`` is in sizes of the objects; ``first``: only as far as materials.
+        """
         source = self.inbox.find(str(asked.get("upload", "")))
         detail = asked.get("detail", DETAILS[0])
         if detail not in DETAILS:
             raise UserError(f"Unknown detail. Choose one of: {', '.join(DETAILS)}.")
-        settings = _with_detail(Settings(), detail)
+        usual = Settings()
+        raised = replace(usual.assemble, drop=number(asked.get("drop", 0.0), "The drop"))
+        validate_assemble(raised)
+        settings = replace(usual, assemble=raised, fill=replace(usual.fill, detail=detail))
         name = new_name(self.runs, str(asked.get("name", ""))[:80])
         (self.runs / name).mkdir()
         until = FIRST if asked.get("first") is True else "report"
         job = Asked(secrets.token_hex(8), name, (str(source.resolve()),), until)
         return {"id": self.queue.add(job, settings).id, "name": name}
+
+    def simulate(self, asked: dict[str, Any]) -> dict[str, Any]:
+        """Let a run that ended before its report go on to it: ``run`` names it."""
+        name = str(asked.get("run", ""))
+        before = reopen(self.shelf.path(name))
+        inputs = tuple(str(path) for path in before.inputs)
+        job = Asked(secrets.token_hex(8), name, inputs)
+        return {"id": self.queue.add(job, before.settings).id, "name": name}
 
     def change(self, asked: dict[str, Any]) -> dict[str, Any]:
         """Run another run again with something changed: see ``edits.changed``; ``run`` names it."""
@@ -79,10 +96,9 @@ class Work:
         rows = [{"name": e.name, "group": e.group} for e in library().values()]
         return JSONResponse({"materials": rows})
 
+    async def _asked(self, request: Request) -> Response:
+        return JSONResponse(await run_in_threadpool(self.shelf.asked, request.path_params["name"]))
+
     def close(self) -> None:
         """End what runs; it goes on with the next server."""
         self.queue.close()
-
-
-def _with_detail(settings: Settings, detail: Any) -> Settings:
-    return replace(settings, fill=replace(settings.fill, detail=detail))

@@ -94,6 +94,7 @@ def gaps(table: Floats, a: Floats, c: Floats, h: Floats, out: wp.array2d(dtype=w
     i = wp.tid()
     out[0, i] = one_lane.gap_between(table, a[i], c[i])
     out[1, i] = one_lane.gap_to_plane(a[i], h[i])
+    out[2, i] = one_lane.gap_to_thin(a[i], h[i])
 
 
 @wp.func_native("""
@@ -101,6 +102,7 @@ def gaps(table: Floats, a: Floats, c: Floats, h: Floats, out: wp.array2d(dtype=w
   const double *p = (const double *)a.data, *q = (const double *)c.data;
   to[i] = mpm::Face<double>::gap((const double *)table.data, p[i], q[i]);
   to[n + i] = mpm::Face<double>::gap_to_plane(p[i], ((const double *)h.data)[i]);
+  to[2 * n + i] = mpm::Face<double>::gap_to_thin(p[i], ((const double *)h.data)[i]);
 """)
 def gaps_double(
     table: Doubles, a: Doubles, c: Doubles, h: Doubles, n: int, i: int, out: Doubles
@@ -124,15 +126,16 @@ def test_open_distances_are_those_of_numpy_in_either_precision(dtype, rng):
         [
             contact.gap_between(*mean, normal, 1.0),
             contact.gap_to_wall(mean[0], h.astype(np.float64), normal, 1.0),
+            contact.gap_to_thin(mean[0], h.astype(np.float64), normal, 1.0),
         ]
     )
     if dtype == np.float32:
         given = [sent(value, wp.float32) for value in (table, a, c, h)]
-        found = run(gaps, *given, out=((2, COUNT), wp.float32))
+        found = run(gaps, *given, out=((3, COUNT), wp.float32))
     else:
         given = [sent(value, wp.float64) for value in (table, a, c, h)]
-        found = run(gaps_in_double, *given, COUNT, out=(2 * COUNT, wp.float64)).reshape(2, COUNT)
-        assert np.abs(found[1] - exact[1]).max() < DOUBLE
+        found = run(gaps_in_double, *given, COUNT, out=(3 * COUNT, wp.float64)).reshape(3, COUNT)
+        assert np.abs(found[1:] - exact[1:]).max() < DOUBLE
     assert np.abs(found - exact).max() < SINGLE
 
 

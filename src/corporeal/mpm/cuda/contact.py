@@ -32,6 +32,7 @@ from corporeal.mpm.formulas.one_lane import (
     gap_of_liquid,
     gap_to_plane,
     gap_to_surface,
+    gap_to_thin,
     reach_of,
     slopes,
     splines,
@@ -275,9 +276,9 @@ def gap_of(c: Contacts, r: Rigid, s: Sheet, t: int, xa: wp.float32, xc: wp.float
     if r.thin[a] == 0 and r.thin[b] == 0:
         gap = gap_between(c.face, xa, xc)
     elif r.points[a] == 0:
-        gap = gap_to_surface(xa, begins(r, s, b, c.point[t], c.normal[t]))
+        gap = gap_to_thin(xa, begins(r, s, b, c.point[t], c.normal[t]))
     elif r.points[b] == 0:
-        gap = gap_to_surface(-xc, begins(r, s, a, c.point[t], -c.normal[t]))
+        gap = gap_to_thin(-xc, begins(r, s, a, c.point[t], -c.normal[t]))
     else:
         n = c.normal[t]
         gap = begins(r, s, b, c.point[t], n) + begins(r, s, a, c.point[t], -n)

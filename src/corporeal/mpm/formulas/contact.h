@@ -20,6 +20,18 @@ template <class R> struct Face {
     if (s > 0) weight = R(1.0) - weight;
     return weight > R(SMALLEST_WEIGHT) ? moment / weight : n;
   }
+  // The same of a lattice of two points per cell and axis, the first a quarter of a cell behind the face.
+  CUDA_CALLABLE static inline R lattice(R s) {
+    s = s > R(1.5) ? R(1.5) : s;
+    R weight = 0, moment = 0;
+    for (int k = 0; k < LATTICE_ROWS; k++) {
+      const R u = s - R(PARTICLE_RADIUS) * R(1 + 2 * k), a = u < 0 ? -u : u, t = R(1.5) - a;
+      const R w = a < R(0.5) ? R(0.75) - a * a : a < R(1.5) ? R(0.5) * t * t : R(0.0);
+      weight += w;
+      moment += w * u;
+    }
+    return weight > R(SMALLEST_WEIGHT) ? moment / weight : s - R(PARTICLE_RADIUS);
+  }
   // Where the face lies: the inverse of mean, from a table of FACE_STEPS + 1 values over [-1.5, 0].
   CUDA_CALLABLE static inline R place(const R *table, R p) {
     R f = ((p < R(-1.5) ? R(-1.5) : p > R(0.0) ? R(0.0) : p) + R(1.5)) * R(FACE_STEPS / 1.5);
@@ -49,6 +61,8 @@ template <class R> struct Face {
   CUDA_CALLABLE static inline R gap_to_surface(R a, R h) {
     return h > R(WALL_REACH) ? R(VAST) : gap_to_plane(a, h);
   }
+  // The same to what is thin: its surface is exact, and the field a lattice.
+  CUDA_CALLABLE static inline R gap_to_thin(R a, R h) { return h > R(WALL_REACH) ? R(VAST) : lattice(h) - a; }
 };
 // Where the surface of a thin rigid body begins along n, seen from x: the least (p - x) . n of its points
 // around that line; of none, that of the point nearest to the line. Points three by three, in its frame.

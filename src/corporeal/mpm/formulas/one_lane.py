@@ -139,6 +139,10 @@ def gap_to_plane(mean: wp.float32, height: wp.float32) -> wp.float32: ...
 def gap_to_surface(mean: wp.float32, height: wp.float32) -> wp.float32: ...
 
 
+@wp.func_native("return mpm::Face<float>::gap_to_thin(mean, height);")
+def gap_to_thin(mean: wp.float32, height: wp.float32) -> wp.float32: ...
+
+
 @wp.func_native("""
   const double *from = (const double *)points.data + 3 * first;
   return mpm::Surface::begins(from, count, &x.c[0], &n.c[0], around);

@@ -17,10 +17,12 @@ from corporeal.mpm.constants import (
     FIRST_BIAS,
     HELD_BY_WALL,
     LATTICE_GAP,
+    LATTICE_ROWS,
     LATTICE_SLOPE,
     LATTICE_START,
     LIKE_HALF_SPACE,
     OTHER_BIAS,
+    PARTICLE_RADIUS,
     SMALLEST_WEIGHT,
     TINY,
     WALL_REACH,
@@ -55,6 +57,22 @@ def half_space_mean(face: np.ndarray) -> np.ndarray:
     )
     weight = np.where(s > 0.0, 1.0 - weight, weight)
     return np.where(weight > SMALLEST_WEIGHT, moment / np.maximum(weight, SMALLEST_WEIGHT), near)
+
+
+def lattice_mean(face: np.ndarray) -> np.ndarray:
+    """Mean offset [dx] of a lattice that fills the half space u < s, two points per cell and axis.
+
+    The first row lies a quarter of a cell behind the face. It is what a field at rest shows of
+    itself, where e(s) is what a continuum would: up to .05 dx less from s = -½ on, and nothing for
+    s = ½.
+    """
+    s = np.minimum(np.asarray(face, dtype=np.float64), 1.5)
+    u = s[..., None] - PARTICLE_RADIUS * (1.0 + 2.0 * np.arange(LATTICE_ROWS))
+    tail = 0.5 * np.maximum(1.5 - np.abs(u), 0.0) ** 2
+    w = np.where(np.abs(u) < 0.5, 0.75 - u**2, tail)
+    weight = w.sum(axis=-1)
+    found = (w * u).sum(axis=-1) / np.maximum(weight, SMALLEST_WEIGHT)
+    return np.where(weight > SMALLEST_WEIGHT, found, s - PARTICLE_RADIUS)
 
 
 _FACES = np.linspace(-1.5, 1.5, 6001)
@@ -130,6 +148,16 @@ def surface_begins(points: Vectors, node: Vectors, normal: Vectors, around: floa
 def gap_to_surface(mean: Vectors, begins: Scalars, normal: Vectors, cell: float) -> Scalars:
     """Open distance along n [m] of a field to a surface that begins there [m] beyond the node."""
     return gap_to_wall(mean, begins, normal, cell)
+
+
+def gap_to_thin(mean: Vectors, begins: Scalars, normal: Vectors, cell: float) -> Scalars:
+    """Open distance along n [m] of a field to a thin rigid body that begins there [m].
+
+    Its surface is exact, and the field that touches it a lattice: g = e_lattice(h) - X̄·n.
+    """
+    xi = np.sum(mean * normal, axis=1) / cell
+    gap = (lattice_mean(begins / cell) - xi) * cell
+    return np.where(begins > WALL_REACH * cell, np.inf, gap)
 
 
 def gap_of_liquid(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -> Scalars:

@@ -432,9 +432,9 @@ def _between_surfaces(
         found.append(contact.surface_begins(points, node, way, around) if shown else None)
     first, second = found
     if first is None and second is not None:
-        return contact.gap_to_surface(look.mean[slots[0]], second, normal, cell)
+        return contact.gap_to_thin(look.mean[slots[0]], second, normal, cell)
     if first is not None and second is None:
-        return contact.gap_to_surface(look.mean[slots[1]], first, -normal, cell)
+        return contact.gap_to_thin(look.mean[slots[1]], first, -normal, cell)
     return np.asarray(first) + np.asarray(second)
 
 

@@ -7,7 +7,7 @@ export const NAMES = {
   restitution: 'restitution e', loss: 'loss factor η', shell_thickness: 'wall thickness',
 }
 const ANSWERED = {annotation: 'your annotation', recording: 'a recorded answer', model: 'a model', metadata: 'metadata of the file',
-  unknown: 'unknown: neutral material'}
+  unknown: 'nobody: a neutral material'}
 
 // An element with properties and children; strings become text nodes.
 export function el(tag, props = {}, ...children) {
@@ -24,6 +24,7 @@ export function el(tag, props = {}, ...children) {
 
 export function si(value, unit) {
   if (value == null || Number.isNaN(value)) return '–'
+  if (unit === 'kg') return Math.abs(value) >= .9995 ? `${+value.toPrecision(4)} kg` : si(1e3 * value, 'g')
   if (unit === 'rad') return `${+(value * 180 / Math.PI).toPrecision(3)}°`
   const bare = unit === '-' ? '' : unit
   if (!['Pa', 'm', 'N', 'm/s', 's'].includes(unit) || value === 0) return `${+value.toPrecision(4)} ${bare}`.trim()
@@ -40,10 +41,10 @@ export function card(part, header) {
   return el('div', {class: 'card'},
     el('h3', {}, spoken(part.name), el('small', {}, ` of ${spoken(header.objects[part.object].name)}`)),
     el('p', {class: 'material'}, el('b', {}, spoken(part.material)), ` · ${spoken(part.law)} · ${built(part.structure)}`),
-    part.mass_kg == null ? null : el('p', {}, `Mass ${si(1e3 * part.mass_kg, 'g')} in the scene`,
-      Math.abs(part.scale - 1) > 1e-3 ? `, ${si(1e3 * part.real_mass_kg, 'g')} of the real object` : ''),
+    part.mass_kg == null ? null : el('p', {}, `Mass ${si(part.mass_kg, 'kg')} in the scene`,
+      Math.abs(part.scale - 1) > 1e-3 ? `, ${si(part.real_mass_kg, 'kg')} of the real object` : ''),
     el('p', {class: 'note'}, simulated(s)),
-    el('p', {}, el('small', {}, `${part.reason} ${ANSWERED[part.answered_by] ?? part.answered_by}; margin ${part.margin.toFixed(2)}.`,
+    el('p', {}, el('small', {}, `${part.reason} Said by ${ANSWERED[part.answered_by] ?? part.answered_by}; ${Math.round(100 * part.margin)} % ahead of the next guess.`,
       alternatives.length ? ` Alternatives: ${alternatives.join(', ')}.` : '')),
     ...Object.entries(part.values).map(([name, value]) => valueRow(name, value)),
     el('p', {}, el('small', {}, `${part.structure.reason} ${part.fill}`)))
@@ -102,7 +103,10 @@ const NUMBERS = {
 
 export function auditOf(header, openPart) {
   const audit = header.audit
-  if (!audit) return el('p', {}, 'This run has no report yet. Write it with: corporeal report RUN.')
+  if (!audit) {
+    return el('p', {}, header.film ? 'The audit comes with the report, which this run does not have yet.'
+      : 'Nothing has been simulated yet: the audit says afterwards what energy, momentum and contacts did.')
+  }
   const warnings = audit.warnings.map(w => el('li', {}, w.text, ' ',
     w.parts.map(k => el('button', {class: 'link', onclick: () => openPart(k)}, `show ${spoken(header.parts[k].name)}`))))
   return el('div', {},
@@ -143,6 +147,16 @@ export function differences(a, b) {
     else if (s.kind !== 'rigid' && Math.abs(s.young - t.young) > 1e-3 * s.young) rows.push([said, 'E simulated', si(s.young, 'Pa'), si(t.young, 'Pa')])
   }
   for (const part of ofB.values()) rows.push([spoken(part.name), 'part', 'absent', 'present'])
+  const fast = o => (o?.velocity ?? []).map(v => +v.toPrecision(3)).join(', ')
+  a.objects.forEach((one, k) => {
+    const other = b.objects[k]
+    if (other && fast(one) !== fast(other)) rows.push([spoken(one.name), 'initial velocity [m/s]', fast(one), fast(other)])
+    if (other && Math.abs(one.height - other.height) > 1e-4) rows.push([spoken(one.name), 'height of its underside', si(one.height, 'm'), si(other.height, 'm')])
+  })
+  for (const part of a.parts) {
+    const other = b.parts.find(p => p.name === part.name && b.objects[p.object].name === a.objects[part.object].name)
+    if (other?.mass_kg && Math.abs(part.mass_kg - other.mass_kg) > 1e-3 * part.mass_kg) rows.push([spoken(part.name), 'mass', si(part.mass_kg, 'kg'), si(other.mass_kg, 'kg')])
+  }
   for (const [name, unit] of [['cell', 'm'], ['particles', '-'], ['duration', 's']]) {
     if (a[name] !== b[name]) rows.push(['scene', name, si(a[name], unit), si(b[name], unit)])
   }

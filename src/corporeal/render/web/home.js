@@ -7,6 +7,9 @@ const LOOK_AGAIN = 1000 // [ms]
 const root = document.getElementById('home'), picked = new Set()
 const address = (...names) => `/view/${names.map(encodeURIComponent).join('/')}`
 let seen = ''
+const SAYS = {reconstruct: 'a model is trained on the pictures', assemble: 'the files become one scene in metres', describe: 'every object and part is recognised',
+  segment: 'the parts are found on the surfaces', ground: 'materials get numbers from measured ranges', fill: 'surfaces are filled with matter',
+  simulate: 'it moves', film: 'a film is drawn', report: 'the report is written'}
 
 // ---------------------------------------------------------------- runs
 
@@ -25,7 +28,7 @@ function card(run) {
     compare()
   }})
   const image = run.picture ? el('img', {src: `/picture/${encodeURIComponent(run.name)}`, alt: `a frame of ${run.name}`, loading: 'lazy'})
-    : el('div', {class: 'blank'}, run.shown ? 'no film yet' : run.state || 'not begun')
+    : el('div', {class: 'blank'}, run.shown ? 'not simulated yet' : run.state || 'not begun')
   return el('div', {class: 'run'}, run.shown ? el('a', {href: address(run.name)}, image) : image,
     el('div', {class: 'words'}, el('b', {}, run.name), el('p', {class: 'soft'}, [run.input, spoken(run.detail), run.state].filter(Boolean).join(' · ')),
       run.error ? el('p', {class: 'bad'}, run.error) : null,
@@ -34,17 +37,20 @@ function card(run) {
         run.shown ? el('label', {class: 'pick'}, box, ' compare') : null)))
 }
 
-const list = el('div', {class: 'runs'}), none = el('p', {class: 'soft', hidden: true}, 'No runs yet. Make one: corporeal demo')
+const list = el('div', {class: 'runs'}), none = el('p', {class: 'soft', hidden: true}, 'No runs yet. Drop a file above, or try the first showcase scene: corporeal demo')
 
 // ---------------------------------------------------------------- uploads
 
-const said = el('p', {class: 'bad', role: 'alert'}), coming = el('progress', {max: 1, value: 0, hidden: true})
+const said = el('div', {class: 'bad', role: 'alert'}), progress = el('p', {class: 'soft', 'aria-live': 'polite'}), coming = el('progress', {max: 1, value: 0, hidden: true})
 const detail = el('select', {'aria-label': 'detail'}, ['draft', 'normal', 'fine'].map(d => el('option', {}, d)))
+const raise = el('select', {'aria-label': 'how it begins'}, [[0, 'as in the file'], [.5, 'raised by half its size'], [1, 'raised by its size']].map(([size, words]) =>
+  el('option', {value: size, selected: size === .5}, words)))
 const first = el('input', {type: 'checkbox', checked: true})
 const chooser = el('input', {type: 'file', hidden: true, accept: '.glb,.ply,.zip', onchange: () => take(chooser.files)})
 const drop = el('div', {class: 'drop'}, el('p', {}, 'Drop a GLB, a Gaussian splat (PLY) or a zip of photographs here, or ',
   el('button', {onclick: () => chooser.click()}, 'choose a file')), chooser, coming,
-  el('p', {class: 'soft'}, 'detail ', detail, ' ', el('label', {}, first, ' look at the materials first')), said)
+  el('p', {class: 'soft'}, el('label', {}, 'it begins ', raise), '  ', el('label', {}, 'detail ', detail), '  ', el('label', {}, first, ' stop to look at the materials first')),
+  el('p', {class: 'soft'}, 'At most 1 GB. The file stays on the machine that this page comes from.'), progress, said)
 for (const kind of ['dragenter', 'dragover']) drop.addEventListener(kind, event => { event.preventDefault(); drop.classList.add('over') })
 for (const kind of ['dragleave', 'drop']) drop.addEventListener(kind, event => { event.preventDefault(); drop.classList.remove('over') })
 drop.addEventListener('drop', event => take(event.dataTransfer.files))
@@ -55,7 +61,10 @@ function sent(file) {
     const request = new XMLHttpRequest()
     request.open('PUT', '/files')
     request.setRequestHeader('X-Corporeal', '1')
-    request.upload.onprogress = event => { if (event.lengthComputable) coming.value = event.loaded / event.total }
+    request.upload.onprogress = event => { if (!event.lengthComputable) return
+      coming.value = event.loaded / event.total
+      progress.textContent = event.loaded < event.total ? `${file.name}: ${Math.round(100 * coming.value)} % sent` : `${file.name}: sent, being looked at …`
+    }
     request.onload = () => { try { resolve(JSON.parse(request.responseText)) } catch { reject(new Error(`The server answered ${request.status}.`)) } }
     request.onerror = () => reject(new Error('The file did not arrive.'))
     request.send(file)
@@ -63,15 +72,16 @@ function sent(file) {
 }
 
 async function take(files) {
-  said.textContent = ''
+  said.replaceChildren()
   for (const file of files) {
     coming.hidden = false
     try {
       const upload = await sent(file)
-      const job = upload.error ? upload : await post('/jobs/start', {upload: upload.id, name: file.name.replace(/\.[^.]*$/, ''), detail: detail.value, first: first.checked})
-      if (job.error) said.textContent = `${file.name}: ${job.error}`
-    } catch (error) { said.textContent = `${file.name}: ${error.message}` }
+      const job = upload.error ? upload : await post('/jobs/start', {upload: upload.id, name: file.name.replace(/\.[^.]*$/, ''), detail: detail.value, drop: +raise.value, first: first.checked})
+      if (job.error) said.append(el('p', {}, `${file.name}: ${job.error}`))
+    } catch (error) { said.append(el('p', {}, `${file.name}: ${error.message}`)) }
     coming.hidden = true
+    progress.textContent = ''
   }
   chooser.value = ''
   await refresh()
@@ -83,18 +93,18 @@ const queue = el('div', {'aria-live': 'polite'})
 
 async function order(path, id) {
   const answer = await post(path, {id})
-  said.textContent = answer.error ?? ''
+  said.replaceChildren(answer.error ?? '')
   await refresh()
 }
 
 function row(job) {
   const over = ['finished', 'failed', 'stopped'].includes(job.state), partly = job.state === 'finished' && job.until !== 'report'
   const button = !over ? el('button', {onclick: () => order('/jobs/stop', job.id)}, 'Stop')
-    : job.state !== 'finished' || partly ? el('button', {onclick: () => order('/jobs/go-on', job.id)}, partly ? 'Run it' : 'Go on') : null
-  return el('div', {class: 'job'}, el('div', {class: 'row'}, el('b', {}, job.name), el('span', {class: 'soft'}, job.state, job.words ? ` · ${job.words}` : ''),
+    : job.state !== 'finished' || partly ? el('button', {onclick: () => order('/jobs/go-on', job.id)}, partly ? 'Simulate it as it is' : 'Go on') : null
+  return el('div', {class: 'job'}, el('div', {class: 'row'}, el('b', {}, job.name), el('span', {class: 'soft'}, partly ? 'materials are found, not simulated yet' : job.state === 'running' && !job.words ? 'running · starting' : job.state, job.words ? ` · ${job.words}` : ''),
     job.state === 'finished' ? el('a', {href: address(job.name)}, partly ? 'see what it is taken for' : 'Look') : null, button),
   job.error ? el('p', {class: 'bad'}, job.error) : null,
-  el('div', {class: 'verbs'}, Object.entries(job.verbs).map(([verb, share]) => el('label', {}, verb, el('progress', {max: 1, value: share})))))
+  el('div', {class: 'verbs'}, Object.entries(job.verbs).map(([verb, share]) => el('label', {title: SAYS[verb] ?? ''}, verb, el('progress', {max: 1, value: share})))))
 }
 
 // ---------------------------------------------------------------- the page
@@ -116,7 +126,7 @@ root.replaceChildren(el('h1', {}, 'Runs'), upper, el('h2', {}, 'All runs'), comp
 
 async function watch() {
   let busy = false
-  try { busy = await refresh() } catch { said.textContent = 'The server does not answer.' }
+  try { busy = await refresh() } catch { said.replaceChildren('The server does not answer. Was it ended?') }
   setTimeout(watch, busy ? LOOK_AGAIN : 4 * LOOK_AGAIN)
 }
 await watch()

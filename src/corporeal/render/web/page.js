@@ -11,7 +11,7 @@ const PAUSE = .4 // at the end of a recording, before it starts again [s]
 const STILL = 300 // a picture that does not change for so long is drawn again with all pixels [ms]
 const SPEEDS = [1, .5, .25, .1]
 const HELP = [['space', 'play or pause'], ['← →', 'one picture back or on'], ['Home End', 'to the start or the end'], ['0', 'the first view again'],
-  ['click a part', 'its card'], ['drag', 'look around'], ['wheel, pinch', 'nearer or farther'], ['right drag, two fingers', 'move sideways'],
+  ['click a part', 'its card'], ['Escape', 'closes the card'], ['drag', 'look around'], ['wheel, pinch', 'nearer or farther'], ['right drag, two fingers', 'move sideways'],
   ['?', 'this list']]
 
 export class Viewer {
@@ -50,7 +50,8 @@ export class Viewer {
       'This browser shows no 3D (WebGL 2 is off). Everything else on this page works.'), this.hud, this.legend, this.help,
       this.takes.length > 1 ? this.takes.map((take, k) => el('div', {class: `caption of${k}`}, this.options.names?.[k] ?? take.header.name)) : null)
     this.names = this.takes.map((take, k) => el('b', {}, this.options.names?.[k] ?? take.header.name))
-    this.state = el('span', {class: 'state'}, first.film ? 'recorded' : 'not simulated')
+    this.rest = first.film ? 'recorded' : 'not simulated yet' // what is shown while nobody touches
+    this.state = el('span', {class: 'state'}, this.rest)
     this.honest = el('span', {class: 'honest'}, first.honest)
     this.panel = el('div', {class: 'panel'})
     this.tabs = el('div', {class: 'tabs', role: 'tablist'})
@@ -101,7 +102,8 @@ export class Viewer {
           `${spoken(part.name)}: `, el('b', {}, spoken(part.material)))))
     })
     const two = this.takes.length > 1 ? differences(...this.takes.map(t => t.header)) : []
-    return el('div', {}, el('label', {class: 'line'}, 'colour by', this.by), ...objects,
+    return el('div', {}, film ? null : this.options.unmoved?.() ?? el('p', {class: 'note'}, 'This has not been simulated yet: it stands as it will begin.'),
+      el('label', {class: 'line'}, 'colour by', this.by), el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'), ...objects,
       this.takes.length > 1 ? [el('h3', {}, 'What differs'), two.length ? table(two, ['part', '', ...this.takes.map((t, k) => this.options.names?.[k] ?? t.header.name)])
         : el('p', {}, 'Nothing that was asked for differs.')] : null,
       this.card)
@@ -110,6 +112,8 @@ export class Viewer {
   timeline() {
     const button = (words, title, act) => el('button', {title, 'aria-label': title, onclick: act}, words)
     this.playButton = button('', 'play or pause (space)', () => this.toggle())
+    this.stepButton = button('▶|', 'one picture on (→)', () => this.step(1))
+    this.startButton = button('|◀', 'to the start (Home)', () => this.toStart())
     this.at = el('input', {type: 'range', min: 0, max: 1000, value: 0, 'aria-label': 'time', oninput: () => {
       this.pause(); this.clock = this.length * this.at.value / 1000 }})
     this.clockWords = el('span', {class: 'clock'}, '0.00 s')
@@ -119,9 +123,18 @@ export class Viewer {
     const ticks = marks.map(m => el('button', {class: 'tick', title: `${spoken(m.what)}, ${m.time.toFixed(3)} s`, 'aria-label': `${spoken(m.what)}, ${m.time.toFixed(3)} s`,
       style: {left: `${100 * m.time / (this.length || 1)}%`}, onclick: () => { this.pause(); this.clock = m.time }}))
     this.say()
-    return el('div', {class: 'time'}, this.playButton, button('▶|', 'one picture on (→)', () => this.step(1)),
-      button('|◀', 'to the start (Home)', () => this.toStart()), el('div', {class: 'track'}, this.at, ticks),
+    this.mayPlay()
+    return el('div', {class: 'time'}, this.playButton, this.stepButton, this.startButton, el('div', {class: 'track'}, this.at, ticks),
       this.clockWords, this.pace)
+  }
+
+  // Without a recording there is nothing to play; what runs live has its own pace.
+  mayPlay() {
+    const stands = !this.live && !this.takes.some(take => take.times.length > 1)
+    for (const button of [this.playButton, this.stepButton, this.startButton]) button.disabled = stands
+    if (stands) { this.playing = false; this.say() }
+    this.at.disabled = stands || Boolean(this.live)
+    this.pace.disabled = stands || Boolean(this.live)
   }
 
   openPart(which, part) {
@@ -278,7 +291,7 @@ export class Viewer {
 
   toStart() { if (this.live) this.live.tell({do: 'reset'}); else this.clock = 0 }
 
-  toggle() { if (this.playing) this.pause(); else this.resume() }
+  toggle() { if (this.playButton.disabled) return; if (this.playing) this.pause(); else this.resume() }
 
   pause() { if (this.playing) { this.playing = false; this.live?.tell({do: 'pause'}); this.say() } }
 

@@ -130,6 +130,16 @@ export class Stage {
     }
   }
 
+  // As everything stands before it has moved.
+  begin() {
+    this.frame = -1
+    for (const mesh of this.meshes) {
+      mesh.matrix.identity()
+      mesh.matrixWorldNeedsUpdate = true
+      if (mesh.deformed) this.undo(mesh)
+    }
+  }
+
   // A rigid object looks as it does at rest.
   undo(mesh) {
     const {position, normal} = mesh.geometry.attributes

@@ -2,7 +2,8 @@
 
 import { Take } from './take.js'
 import { Viewer } from './page.js'
-import { Change } from './change.js'
+import { Change, follow, post } from './change.js'
+import { Export } from './export.js'
 import { Touch } from './touch.js'
 import { el } from './cards.js'
 
@@ -14,6 +15,18 @@ async function fetched(name) {
   return new Take(await answer.arrayBuffer())
 }
 
+// What stands there of a run that has not been simulated.
+function simulateIt() {
+  const holder = el('div', {'aria-live': 'polite'}), button = el('button', {class: 'do', onclick: async () => {
+    button.hidden = true
+    const answer = await post('/jobs/run', {run: names[0]})
+    if (answer.error) { holder.replaceChildren(el('p', {class: 'bad', role: 'alert'}, answer.error)); button.hidden = false }
+    else follow(answer.id, holder, location.pathname, 'Show it', () => {})
+  }}, 'Simulate it as it is')
+  return el('div', {class: 'note'}, el('p', {}, el('b', {}, 'Not simulated yet.'), ' This is what it is taken for, and how it will begin. Check the materials; wrong ones are changed in the tab Change.'),
+    button, holder)
+}
+
 try {
   document.title = `${names.join(' beside ')} · corporeal`
   const [takes, {read_only, works}] = await Promise.all([Promise.all(names.map(fetched)), fetch('/runs').then(a => a.json())])
@@ -21,10 +34,11 @@ try {
   const tabs = viewer => {
     if (read_only || names.length > 1) return []
     touch = new Touch(viewer, names[0])
-    return [['Touch', touch.content], ...(works ? [['Change', new Change(viewer, names[0]).content]] : [])]
+    return [['Touch', touch.content], ...(works ? [['Change', new Change(viewer, names[0]).content]] : []), ['Export', new Export(names[0]).content]]
   }
   const opened = name => { if (name === 'Touch') touch?.enter(); else touch?.leave() }
-  window.viewer = new Viewer(root, takes, {names, home: '/home', tabs, opened})
+  const unmoved = works && names.length === 1 ? simulateIt : null
+  window.viewer = new Viewer(root, takes, {names, home: '/home', tabs, opened, unmoved})
 } catch (error) {
   root.replaceChildren(el('div', {class: 'failed', role: 'alert'}, el('h1', {}, 'This run cannot be shown'), el('p', {}, error.message),
     el('p', {}, el('a', {href: '/home'}, 'All runs'))))

@@ -27,12 +27,12 @@ export class Touch {
     }
     this.wind.onchange = blow
     this.single = el('select', {'aria-label': 'contact', onchange: () => { this.single.value === 'single' ? this.tell({do: 'contact', single: true}) : this.tell({do: 'contact'}) }},
-      el('option', {value: 'multi'}, 'a velocity field per object'), el('option', {value: 'single'}, 'one for all (control)'))
+      el('option', {value: 'multi'}, 'objects slide and part'), el('option', {value: 'single'}, 'all stick: one grid (control)'))
     this.said = el('p', {class: 'bad', role: 'alert'})
     this.honest = el('p', {class: 'note'}, 'Starting …')
     this.card = el('div', {class: 'picked'})
     this.content = el('div', {}, this.honest, this.said,
-      el('p', {}, 'Drag an object to pull at it. Drag beside it to look around. A click opens its card. Wind blows away from you.'),
+      el('p', {}, 'Drag an object to pull at it, drag beside it to look around. A click opens its card. Wind blows away from you. What you do here does not change the run.'),
       el('label', {class: 'line'}, 'spring', this.firm),
       el('label', {class: 'line'}, 'gravity', this.pull, this.gravityWords),
       el('label', {class: 'line'}, 'wind on', this.who, this.wind),
@@ -51,7 +51,6 @@ export class Touch {
     if (viewer.live) return
     viewer.live = this
     viewer.state.textContent = 'live'
-    viewer.at.disabled = true
     if (viewer.by.value === 'speed') { viewer.by.value = 'itself'; viewer.paint('itself') }
     this.socket = new WebSocket(`${location.protocol === 'https:' ? 'wss' : 'ws'}://${location.host}/live/${encodeURIComponent(this.name)}`)
     this.socket.binaryType = 'arraybuffer'
@@ -59,6 +58,9 @@ export class Touch {
     this.socket.onclose = () => { if (viewer.live === this) { viewer.state.textContent = 'stopped'; this.said.textContent ||= 'The simulation has ended.' } }
     viewer.playing = true
     viewer.say()
+    viewer.mayPlay()
+    this.said.textContent = ''
+    viewer.hud.textContent = 'Filling the scene again for real time …'
     this.socket.onopen = () => this.tell({do: 'play'})
   }
 
@@ -70,11 +72,11 @@ export class Touch {
     this.news = this.rigid = null
     this.line.visible = false
     viewer.stages[0].liveTop = null
-    viewer.state.textContent = 'recorded'
-    viewer.at.disabled = false
+    viewer.state.textContent = viewer.rest
+    viewer.mayPlay()
     viewer.honest.textContent = viewer.takes[0].header.honest
     viewer.hud.replaceChildren()
-    viewer.stages[0].frame = -1
+    viewer.stages[0].begin()
     viewer.shownAt = null
     viewer.touch()
   }

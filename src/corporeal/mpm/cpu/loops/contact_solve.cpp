@@ -19,8 +19,8 @@ struct Solver {
     }
     if (!F.thin && !G.thin) return Face::gap(w->face, pa, pc);
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
-    if (!F.surfaces) return Face::gap_to_surface(pa, sc);
-    return G.surfaces ? sc - sa : Face::gap_to_surface(-pc, -sa);
+    if (!F.surfaces) return Face::gap_to_thin(pa, sc);
+    return G.surfaces ? sc - sa : Face::gap_to_thin(-pc, -sa);
   }
   // Whether a liquid meets a rigid body that says where liquids touch it.
   static inline bool liquid(const Field &F, const Field &G) {

@@ -1,0 +1,205 @@
+"""What a picture of a film costs, here and in another checkout, and how far both are from exact.
+
+    git worktree add ../before COMMIT
+    python benchmarks/film.py RUN [RUN ...] --against ../before [--frames N] [--rounds N]
+
+RUN is the folder of a finished run. Each checkout poses and casts the same surfaces before the same
+camera in a process of its own, on one thread; the two take turns, so both meet the same machine.
+Given is processor time per picture, this checkout at 1280 × 720 and at 640 × 480, the other one at
+640 × 480, and the ratio is the median over rounds. The error is the root mean square difference, in
+steps of 255, from a picture of 3 × 3 samples a pixel that each send 16 rays to the sky.
+"""
+
+import argparse
+import json
+import pickle
+import subprocess
+import sys
+import time
+from collections.abc import Callable
+from dataclasses import asdict, dataclass, fields
+from pathlib import Path
+from statistics import median
+from tempfile import TemporaryDirectory
+from typing import Any
+
+import numpy as np
+
+HERE = Path(__file__).resolve().parents[1]
+SMALL, LARGE = (640, 480), (1280, 720)
+
+
+@dataclass(frozen=True)
+class Set:
+    """Surfaces in some poses, and a camera for each, as both checkouts understand them."""
+
+    finishes: list[dict[str, Any]]
+    surfaces: list[dict[str, Any]]
+    poses: list[tuple[np.ndarray, np.ndarray]]
+    """Vertices [m] and normals."""
+    aims: list[dict[str, Any]]
+    """For ``SMALL``; the height of what is seen is that of ``LARGE``, too."""
+
+
+def taken(run: Path, frames: int) -> Set:
+    """Read a run and pose its surfaces as its film does, evenly over its time."""
+    from corporeal.pipeline import read_back
+    from corporeal.render.camera_track import track
+    from corporeal.render.skin import bind
+    from corporeal.results import Results
+    from corporeal.stages.film import reel_of
+    from corporeal.trajectory.moving_gaussians import granular
+
+    results: Results = read_back(run)
+    prepared, trajectory = results.prepared, results.trajectory
+    scene = prepared.scene
+    skin = bind(scene, prepared.parts, prepared.particles, granular(prepared.field))
+    camera = track("wide", reel_of(skin, scene, prepared.particles, trajectory), SMALL, None)
+    chosen = np.linspace(0, len(trajectory.frames) - 1, frames + 2)[1:-1].round().astype(int)
+    moments = [trajectory.frames[int(k)] for k in chosen]
+    return Set(
+        [_plain(f) for f in scene.finishes],
+        [_plain(s) for s in scene.surfaces],
+        [skin.pose(frame) for frame in moments],
+        [asdict(camera.at(frame.time)) for frame in moments],
+    )
+
+
+def _plain(record: Any) -> dict[str, Any]:
+    return {f.name: getattr(record, f.name) for f in fields(record)}
+
+
+class Checkout:
+    """The same pictures in one checkout, in a process of its own."""
+
+    def __init__(self, root: Path, file: Path) -> None:
+        self.process = subprocess.Popen(
+            [sys.executable, __file__, "--serve", str(root), str(file)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            text=True,
+        )
+
+    def ask(self, size: tuple[int, int], kept: Path, quality: str = "draft") -> float:
+        """Take all pictures at a size and keep them; return what one cost [s of CPU time]."""
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self.process.stdin.write(json.dumps([*size, str(kept), quality]) + "\n")
+        self.process.stdin.flush()
+        line = self.process.stdout.readline()
+        if not line:
+            sys.exit("One of the checkouts did not run: see above.")
+        return json.loads(line)
+
+    def close(self) -> None:
+        """End the process."""
+        self.process.communicate()
+
+
+def serve(root: str, file: str) -> None:
+    """Answer one line of standard input after the other with the cost of a picture."""
+    sys.path[:1] = [f"{root}/src"]
+    from corporeal.render import embree
+    from corporeal.render.camera import Aim
+
+    made: Set = pickle.loads(Path(file).read_bytes())
+    stage = _stage(made)
+    embree.SAMPLING["exact"] = embree.Sampling(3, 1, 16)
+    casts: dict[int, Callable[..., np.ndarray]] = {}
+    for line in sys.stdin:
+        width, height, kept, quality = json.loads(line)
+        aims = [_fit(Aim, {**aim, "width": width, "height": height}) for aim in made.aims]
+        exactly: Callable[..., np.ndarray] = embree.render
+        cast = exactly if quality == "exact" else casts.setdefault(width, _caster())
+        start = time.process_time()
+        poses = zip(made.poses, aims, strict=True)
+        pictures = [cast(stage.posed(*pose), aim, quality, 1) for pose, aim in poses]
+        spent = (time.process_time() - start) / len(aims)
+        np.save(kept, np.array(pictures))
+        sys.stdout.write(json.dumps(spent) + "\n")
+        sys.stdout.flush()
+
+
+def _stage(made: Set) -> Any:
+    from corporeal.render.embree import Stage
+    from corporeal.types import Finish, Scene, SceneObject, Surface
+
+    surfaces = tuple(_fit(Surface, s) for s in made.surfaces)
+    count = 1 + max(s.object for s in surfaces)
+    objects = tuple(SceneObject(f"object_{k}", "thing", 1.0) for k in range(count))
+    finishes = tuple(_fit(Finish, f) for f in made.finishes)
+    return Stage(Scene("film", "", objects, surfaces, finishes))
+
+
+def _caster() -> Callable[..., np.ndarray]:
+    """Return what casts the pictures of one film."""
+    try:
+        from corporeal.render.film_picture import FilmCaster
+    except ImportError:  # the other checkout may be older than that
+        from corporeal.render.embree import render
+
+        return render
+    return FilmCaster().picture
+
+
+def _fit(kind: type, values: dict[str, Any]) -> Any:
+    """Make a record of what this checkout knows of."""
+    return kind(**{f.name: values[f.name] for f in fields(kind) if f.name in values})
+
+
+def error(pictures: Path, exact: Path) -> float:
+    """Root mean square difference [steps of 255]."""
+    a, b = (np.load(p).astype(np.float64) for p in (pictures, exact))
+    return float(np.sqrt(((a - b) ** 2).mean()))
+
+
+def measure(run: Path, other: Path, frames: int, rounds: int) -> None:
+    """Print the rows of one run."""
+    with TemporaryDirectory() as folder:
+        below = Path(folder)
+        (below / "set").write_bytes(pickle.dumps(taken(run, frames)))
+        here, there = Checkout(HERE, below / "set"), Checkout(other, below / "set")
+        exact = {size: below / f"exact{size[0]}.npy" for size in (SMALL, LARGE)}
+        for size, path in exact.items():
+            here.ask(size, path, "exact")
+        # A first round compiles, and is not counted.
+        rows = [("here", here, LARGE), ("here", here, SMALL), ("there", there, SMALL)]
+        kept = [below / f"{k}.npy" for k in range(len(rows))]
+        taken_up: list[list[float]] = []
+        for _ in range(rounds + 1):
+            taken_up.append(
+                [who.ask(size, path) for (_, who, size), path in zip(rows, kept, strict=True)]
+            )
+        for k, (name, _, size) in enumerate(rows):
+            cost = [round_[k] for round_ in taken_up[1:]]
+            ratio = median(round_[k] / round_[-1] for round_ in taken_up[1:])
+            off = error(kept[k], exact[size])
+            print(
+                f"| {run.name} | {name}, {size[0]} × {size[1]} | {min(cost):.3f} | {ratio:.2f} "
+                f"| {off:.2f} |",
+                flush=True,
+            )
+        here.close()
+        there.close()
+
+
+def main() -> None:
+    """Measure, and print a table."""
+    if sys.argv[1:2] == ["--serve"]:
+        serve(*sys.argv[2:])
+        return
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("runs", nargs="+", type=Path, metavar="RUN")
+    parser.add_argument("--against", type=Path, required=True, help="the other checkout")
+    parser.add_argument("--frames", type=int, default=4, help="pictures of each run")
+    parser.add_argument("--rounds", type=int, default=3)
+    asked = parser.parse_args()
+    print("| run | picture | time [s] | ratio | error [of 255] |\n|---|---|---|---|---|")
+    for run in asked.runs:
+        measure(run, asked.against.resolve(), asked.frames, asked.rounds)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,1 @@
+"""What is said of a scene: by its file, by a person, by a model."""

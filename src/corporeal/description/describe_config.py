@@ -1,0 +1,51 @@
+"""Who is asked what is in a scene, and how."""
+
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from corporeal.errors import check_range
+from corporeal.render.portrait import DIRECTIONS
+
+
+@dataclass(frozen=True)
+class DescribeConfig:
+    """What recognises parts and materials."""
+
+    annotations: Path | None = None
+    """YAML file with materials of parts; it takes precedence over every other answer."""
+    vlm: str = "metadata"
+    """"metadata": names and materials in the file. "openai:MODEL", "anthropic:MODEL",
+    "google:MODEL", "ollama:MODEL", or "openai:MODEL@http://host/v1" for any compatible server.
+    "ask:FOLDER": you answer. "replay:FOLDER": recorded answers."""
+    critic: str = ""
+    """Model that ranks proposed decompositions into parts, as --vlm; "": the same model, or a
+    cheaper one of OpenAI's."""
+    record: Path | None = None
+    """Folder to record every answer in, for --vlm replay:FOLDER."""
+    sampling: Literal["fraction", "value"] = "fraction"
+    """Ask a model for fractions of the measured ranges, or for values, which are then checked."""
+    views: int = 4
+    """Pictures of each object, out of 8 around it; one more shows its parts in colours."""
+    view_size: int = 512
+    """Their height and width [px]."""
+    view_seed: int = 0
+    """Chooses the views."""
+    direct: bool = True
+    """Also ask a model, without the library, what is printed on each object and what it weighs.
+    This reweights the ways it may be, and sets no value."""
+    parallel: int = 4
+    """Number of objects that a model is asked about at the same time."""
+
+
+DEFAULT = DescribeConfig()
+
+
+def validate(config: DescribeConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    for name, value, low, high in (
+        ("--views", config.views, 1, DIRECTIONS),
+        ("--view-size", config.view_size, 16, 2048),
+        ("--parallel", config.parallel, 1, 64),
+    ):
+        check_range(name, value, low, high)

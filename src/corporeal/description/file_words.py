@@ -1,0 +1,109 @@
+"""What names and statements in the file say of each part."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from functools import partial
+
+from corporeal import materials
+from corporeal.errors import UnknownChoiceError, UserError
+from corporeal.geometry.identity import Identity
+from corporeal.materials.placement import (
+    entry_of,
+)
+from corporeal.materials.quantities import QUANTITIES
+from corporeal.types import (
+    Ground,
+    ObjectWords,
+    PartWords,
+    Scene,
+    Surface,
+)
+from corporeal.vlm.metadata import (
+    as_stated,
+    evidence,
+    hollowed,
+    recognise,
+    sealed,
+    stated_inflation,
+    stated_substance,
+    stated_thickness,
+    stated_values,
+    usual_inflation,
+    walled,
+)
+
+OPEN = ("sheet", "metadata")
+"""What an open vessel is by its name, and who says so."""
+
+
+def words_of_file(
+    scene: Scene, identity: Identity, library: str, from_pictures: bool
+) -> list[list[PartWords]]:
+    """Return what the file says of each part of each object: stated, or recognised by its names.
+
+    Raises:
+        UserError: A number in the file can be no material's.
+
+    """
+    words: list[list[PartWords]] = [[] for _ in scene.objects]
+    walls = partial(has_wall, library)
+    for entry, seen in zip(identity.catalogue, evidence(scene, identity), strict=True):
+        found = stated_material(list(seen.surfaces), library) or hollowed(
+            recognise(seen), seen, walls, from_pictures
+        )
+        by = "metadata" if found.material else "unknown"
+        found = replace(found, name=entry.name, answered_by=by)
+        found = walled(found, stated_thickness(seen.surfaces))
+        found = replace(as_stated(found, seen.surfaces), stated=_stated_values(seen.surfaces))
+        found = sealed(found, stated_inflation(seen.surfaces), usual_inflation(seen))
+        built_by = "metadata" if found.structure else "unknown"
+        words[entry.object].append(replace(found, built_by=built_by))
+    return words
+
+
+def open_ware(objects: Sequence[ObjectWords]) -> tuple[str, ...]:
+    """Say of which objects from pictures the name decided that they are no solids."""
+    made = [o.name for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN]
+    return tuple(
+        f"{name}: pictures need not show how deep it is inside. By its name it is taken for open "
+        "ware, with a wall as thick as its material usually has; annotate structure and "
+        "thickness_mm if that is wrong."
+        for name in made
+    )
+
+
+def has_wall(library: str, name: str) -> bool:
+    """Whether a library has a wall thickness for a material."""
+    return "shell_thickness" in entry_of(name, library).ranges
+
+
+def _stated_values(surfaces: Sequence[Surface]) -> dict[str, Ground]:
+    """Return the numbers that the file states, of quantities that there are.
+
+    Raises:
+        UserError: One of them can be no material's.
+
+    """
+    found = {n: g for n, g in stated_values(surfaces).items() if n in QUANTITIES}
+    for name, ground in found.items():
+        quantity = QUANTITIES[name]
+        if not quantity.low <= ground.value <= quantity.high:
+            unit = "" if quantity.unit == "-" else f" {quantity.unit}"
+            raise UserError(
+                f"{surfaces[0].name}: {quantity.words.lower()} {ground.value:.4g}{unit} "
+                f"({ground.range.source}): no material has less than {quantity.low:g} or more than "
+                f"{quantity.high:g}{unit}. Correct the file, or its units of length and mass."
+            )
+    return found
+
+
+def stated_material(surfaces: list[Surface], library: str) -> PartWords | None:
+    """Return the material that the file states outright; None: none that the library has."""
+    substance = stated_substance(surfaces)
+    if substance is None:
+        return None
+    try:
+        entry = materials.named(substance, library)
+    except UnknownChoiceError:
+        return None  # not in the library: names may still identify it
+    return PartWords("", entry.name, margin=1.0, reason=f"The file states it: {substance!r}.")

@@ -1,0 +1,97 @@
+"""What pictures or a splat give: poses and masks where nobody gave them, and Gaussians."""
+
+import tempfile
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+from corporeal.features.learned_masks import learned_masks
+from corporeal.features.maskers import connect_masker, split
+from corporeal.formats.photographs import has_masks, listed
+from corporeal.formats.sources import kind_of, unposed
+from corporeal.masking.grown_masks import grown_masks
+from corporeal.poses.pose import POSES, Posed, pose
+from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
+from corporeal.splats.intake import Intake, take_in
+from corporeal.splats.training_schedule import TrainConfig
+
+POSED = 0.5
+"""Share of learning from pictures that is done when poses that nobody gave are found."""
+MASKED = 0.1
+"""The same, of finding masks."""
+CORRECT = (
+    "They lie in 0-reconstruct/masks of the run: what is corrected there is taken by the next run."
+)
+
+
+def take_pictures(
+    source: Path, config: ReconstructConfig, folder: Path | None, progress: Progress
+) -> tuple[Intake, bool]:
+    """Read a splat, or learn Gaussians from pictures, whose poses are found if nobody gave any.
+
+    Returns:
+        What there is, and whether somebody said which pixels are objects.
+
+    """
+    training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
+    kept = None if folder is None else folder / "training.npz"
+    instances = config.apart == "masks"
+    if kind_of([source]) == "splat":
+        return take_in(source, training, kept, progress, instances), False
+    posed = _posed(source, folder, progress)
+    begun = 0.0 if posed is None else POSED
+    posed = posed or Posed(source, (), ())
+    found = masks_for(config, posed.folder, folder, within(progress, begun, begun + MASKED))
+    later = within(progress, begun + MASKED, 1.0)
+    taken = take_in(posed.folder, training, kept, later, instances, found.folder)
+    made = replace(
+        taken,
+        statements=(*posed.statements, *found.statements, *taken.statements),
+        warnings=(*posed.warnings, *found.warnings, *taken.warnings),
+    )
+    return made, taken.masks is not None and not found.grown
+
+
+@dataclass(frozen=True)
+class _Masks:
+    """Where masks are, if they are not beside the photographs."""
+
+    folder: Path | None = None
+    statements: tuple[str, ...] = ()
+    warnings: tuple[str, ...] = ()
+    grown: bool = False
+    """Whether nobody, and no model, said what an object is."""
+
+
+def masks_for(
+    config: ReconstructConfig, source: Path, folder: Path | None, progress: Progress
+) -> _Masks:
+    """Take masks from a folder, find them with a model, or grow them where there are none."""
+    if config.masks not in (AUTO, NONE) and split(config.masks) is None:
+        return _Masks(Path(config.masks))
+    shots = listed(source).shots
+    if config.masks == NONE or (config.masks == AUTO and has_masks(shots)):
+        return _Masks()
+    place = folder or Path(tempfile.mkdtemp(prefix="corporeal-"))
+    if config.masks != AUTO:
+        masker = connect_masker(config.masks)
+        learned = learned_masks(source, place, masker, config.things, progress)
+        return _Masks(learned.folder, (*learned.said, CORRECT))
+    grown = grown_masks(source, place, progress=progress)
+    if grown.folder is None:
+        return _Masks(warnings=grown.said)
+    return _Masks(
+        grown.folder, (), (" ".join(("There were no masks.", *grown.said, CORRECT)),), True
+    )
+
+
+def _posed(source: Path, folder: Path | None, progress: Progress) -> Posed | None:
+    """Find where pictures were taken from; None: that is known, or there are none."""
+    if not unposed(source):
+        return None
+    place = Path(tempfile.mkdtemp(prefix="corporeal-")) if folder is None else folder
+    return pose(source, place / POSES, within(progress, 0.0, POSED))
+
+
+def within(progress: Progress, begin: float, end: float) -> Progress:
+    """Tell of a part of the work as of the whole."""
+    return lambda fraction, words: progress(begin + (end - begin) * fraction, words)

@@ -1,0 +1,108 @@
+"""How photographs or a splat are made objects, and which settings cannot be right."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Literal
+
+from corporeal.errors import UserError, check_range
+from corporeal.features import connect
+from corporeal.features.maskers import MENU as MASKERS
+from corporeal.features.maskers import connect_masker, split
+from corporeal.geometry.gaussians import LARGEST, AskedUp
+from corporeal.geometry.metric import MetricScale, TwoPoints, measured
+from corporeal.regions.instance_assignment import Rule
+from corporeal.splats import training_schedule
+from corporeal.vlm.seen_objects import (
+    PERSON,
+    check_extents,
+    usual,
+)
+
+Progress = Callable[[float, str], None]
+AUTO, NONE = "auto", "none"
+
+
+@dataclass(frozen=True)
+class ReconstructConfig:
+    """Reconstruction from photographs or a splat; of a model only ``up`` is used."""
+
+    things: tuple[str, ...] = ()
+    """Names of the objects, the largest first, such as "armchair" "soda can"."""
+    count: int | None = None
+    """Number of objects; by default as many as --things names, else it is estimated."""
+    apart: Rule = "auto"
+    """What objects are segmented by; auto: instance masks where there are any, else appearance
+    features and concavity (look)."""
+    masks: str = "auto"
+    """Masks of the objects: a folder of them; "sam3:FOLDER", "sam2:FOLDER" or "birefnet:FOLDER"
+    with weights of such a model; auto: those beside the photographs, else grown from what all
+    cameras look at; none: objects are what stands on the floor."""
+    up: AskedUp = "auto"
+    """Axis of the file that points up, also of a mesh; auto: from the file or the cameras."""
+    floor_at: float | None = None
+    """Height of the floor along the up axis, in the file's unit; by default a plane is fitted, or,
+    where there is none, the floor is put below the lowest object."""
+    metres_per_unit: float | None = None
+    """Length of one unit of the file [m]; by default it follows from the sizes of the objects."""
+    known_distance: TwoPoints | None = None
+    """Two points of the file, x y z x y z, and their true distance [m]."""
+    training: Literal["preview", "draft", "normal"] = "normal"
+    """Length of training on photographs: seconds, about one minute, or four, on two cores."""
+    rasteriser: Literal["numba", "gsplat"] = "numba"
+    """Rasteriser for training: numba on the processor, or gsplat on a CUDA card."""
+    semantic: str = "descriptor"
+    """Features that classes of points are found by: "clip", "clip:FOLDER", or "descriptor", which
+    needs no weights."""
+    structural: str = "descriptor"
+    """Features that parts are segmented by: "dinov2", "dinov2:FOLDER", or "descriptor"."""
+    lifting: Literal["uplift", "back-projection", "radiance"] = "uplift"
+    """How image features are lifted to points: to Gaussians by their blending weights (uplift) or
+    by back-projection, or to points of a radiance field, which is then trained as well."""
+    force: bool = False
+    """Continue where objects are as large as the room, or photographs are reproduced badly."""
+    training_seed: int = 0
+    """Seed of all random numbers."""
+
+
+DEFAULT = ReconstructConfig()
+
+
+def validate(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool = False) -> None:
+    """Raise UserError where a setting cannot be right, whatever the pictures.
+
+    asked: whether somebody will be asked what there is.
+    """
+    check_range("--count", config.count, 1, 1000)
+    check_range("--training-seed", config.training_seed, 0, 2**63)
+    check_range("--floor-at", config.floor_at, -LARGEST, LARGEST)
+    if config.count and config.things and config.count != len(config.things):
+        raise UserError(
+            f"--count says {config.count} objects, --things names {len(config.things)}. Leave "
+            "--count out, or name all of them."
+        )
+    if config.things or not asked:
+        check_extents(extents, [usual(name) for name in config.things])
+    for spec in (config.semantic, config.structural):
+        connect(spec)  # who is to look must be there before anything is learned
+    training_schedule.validate(config.rasteriser)
+    _check_masks(config)
+    metric_scale(config)
+
+
+def _check_masks(config: ReconstructConfig) -> None:
+    if config.masks in (AUTO, NONE):
+        return
+    if split(config.masks) is None:
+        if not Path(config.masks).expanduser().is_dir():
+            raise UserError(
+                f"There is no folder {config.masks} for --masks. Name a folder of masks, or "
+                f"{', '.join(f'{kind}:FOLDER' for kind in MASKERS)}."
+            )
+    elif connect_masker(config.masks).needs_words and not config.things:
+        raise UserError("These masks are found by words: name the objects with --things.")
+
+
+def metric_scale(config: ReconstructConfig) -> MetricScale | None:
+    """Return the scale that the settings state; None: they state none."""
+    return measured(config.metres_per_unit, config.known_distance, PERSON)

@@ -1,0 +1,344 @@
+"""Pictures of a film: one ray a pixel, more at edges, and none where nothing stands.
+
+Most of a film is floor and backdrop: where no ray to sky or sun could meet a box about an object, a
+pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
+still. What is left is seen by one ray a pixel, and neighbours on one surface share the light that
+they found. Pixels beside which another surface is seen in another colour are cast again, finer.
+Nothing hangs on the picture before: equal input gives equal bytes, and what does not move does not
+flicker.
+"""
+
+from collections.abc import Callable
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import dataclass
+
+import numpy as np
+from jaxtyping import Bool, Float32, UInt8
+
+from corporeal.machine import cores
+from corporeal.render import cull, kernels, kernels_film, kernels_light
+from corporeal.render.camera import Aim
+from corporeal.render.embree import (
+    BAND,
+    LAYERS,
+    Block,
+    Job,
+    Places,
+    Quality,
+    Rays,
+    Sampling,
+    Stage,
+    beyond,
+    render,
+)
+from corporeal.render.kernels import NOTHING, Samples
+from corporeal.render.kernels_light import CHANNELS, SHARP
+
+REACH = 7
+"""Pixels over which the light filter spreads what one of them met."""
+FILTER = 0.6
+"""Pixels that textures are filtered over: their pyramid's levels are blurred as they are."""
+
+
+@dataclass(frozen=True)
+class _Plan:
+    """How finely a film is cast."""
+
+    sky: int
+    """Rays to the sky where light is asked for."""
+    finer: int
+    """Samples of a pixel at an edge: finer × finer."""
+
+
+PLANS: dict[Quality, _Plan] = {"draft": _Plan(2, 3)}
+"""What is not here is cast evenly."""
+
+
+@dataclass(frozen=True)
+class _Empty:
+    """The studio with nothing in it, before one camera."""
+
+    aim: Aim
+    wall: Float32[np.ndarray, "P 3"]
+    """Light of the backdrop, without the floor."""
+    printed: UInt8[np.ndarray, "H W 3"]
+
+
+class FilmCaster:
+    """Takes a film's pictures one after the other; keeps the empty studio of the last camera."""
+
+    def __init__(self) -> None:
+        self._empty: _Empty | None = None
+
+    def picture(
+        self, stage: Stage, camera: Aim, quality: Quality, threads: int | None = None
+    ) -> UInt8[np.ndarray, "H W 3"]:
+        """Cast one picture of a film.
+
+        Args:
+            stage: Surfaces in one pose; all pictures of a caster are of one scene in one light.
+            camera: Where from.
+            quality: How finely.
+            threads: At once; None: as many as there are cores.
+
+        """
+        if quality not in PLANS:
+            return render(stage, camera, quality, threads)
+        threads = threads or cores()
+        band = max(BAND, -(-camera.height // (2 * threads)))
+        rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
+        with ThreadPoolExecutor(threads) as pool:
+            if self._empty is None or self._empty.aim != camera:
+                self._empty = _emptied(stage, camera, PLANS[quality], rows, pool)
+            empty = self._empty
+            out = empty.printed.copy()
+            job = _Picture(stage, camera, PLANS[quality], empty)
+            for _ in pool.map(lambda r: job.band(r, out), rows):
+                pass
+        return out
+
+
+def _emptied(
+    stage: Stage,
+    camera: Aim,
+    plan: _Plan,
+    rows: list[tuple[int, int]],
+    pool: ThreadPoolExecutor,
+) -> _Empty:
+    """Cast the studio without objects."""
+    pixels = camera.width * camera.height
+    wall = np.empty((pixels, 3), np.float32)
+    printed = np.empty((camera.height, camera.width, 3), np.uint8)
+    made = _Empty(camera, wall, printed)
+    job = _Picture(stage.cleared(), camera, plan, made)
+    for _ in pool.map(job.empty_band, rows):
+        pass
+    return made
+
+
+class _Picture(Job):
+    """One picture being taken."""
+
+    def __init__(self, stage: Stage, camera: Aim, plan: _Plan, empty: _Empty) -> None:
+        super().__init__(stage, camera, Sampling(1, 1, plan.sky))
+        self.pixel *= FILTER
+        self.plan, self.empty, self.boxes = plan, empty, stage.boxes()
+        self.ways = cull.ways(self.lamps, plan.sky)
+        self.blur = np.float32(cull.blur(self.lamps, self.boxes))
+
+    def wide(self, rows: tuple[int, int]) -> tuple[int, int]:
+        """Rows with those above and below that the light filter looks at."""
+        halo = 2 * REACH - 1
+        return max(rows[0] - halo, 0), min(rows[1] + halo, self.camera.height)
+
+    def empty_band(self, rows: tuple[int, int]) -> None:
+        """Cast rows of the empty studio."""
+        width, height = self.camera.width, self.camera.height
+        wide = self.wide(rows)
+        rays = self.rays(wide)
+        light = np.empty((len(rays.origin), 3), np.float32)
+        kernels_light.backdrop(self.lamps, wide, height, width, 1, light)
+        wall = light.copy()
+        block = Block(wide[0], wide[1] - wide[0], width)
+        index = np.arange(len(light))
+        self.layer(rays, index, block, light, self.stage.missed(rays.origin))
+        toned = np.empty_like(light)
+        kernels_film.tone(light, index, toned)
+        mine = slice((rows[0] - wide[0]) * width, (rows[1] - wide[0]) * width)
+        self.empty.wall[rows[0] * width : rows[1] * width] = wall[mine]
+        size = width, height
+        kernels_film.printed(toned, index, wide[0], size, rows, self.empty.printed)
+
+    def band(self, rows: tuple[int, int], out: np.ndarray) -> None:
+        """Cast some rows of a picture where it differs from the empty studio."""
+        width = self.camera.width
+        wide = self.wide(rows)
+        rays = self.rays(wide)
+        block = Block(wide[0], wide[1] - wide[0], width)
+        shape = block.rows, width
+        # What is seen, and where light differs: on things, and where they may be in its way.
+        hit = self.seen(rays, block)
+        differs, known = self.changed(rays, hit[0], block)
+        active = np.flatnonzero(differs)
+        if not len(active):
+            return
+        here = slice(wide[0] * width, wide[1] * width)
+        light, toned = (np.empty((len(differs), 3), np.float32) for _ in range(2))
+        light[active] = self.empty.wall[here][active]
+        s, arrived = self.cast(rays, active, known, block, light, hit)
+        kernels_film.tone(light, active, toned)
+        # Once more, finer, beside other surfaces of another colour.
+        edge = np.zeros(len(light), np.bool_)
+        inner = max(rows[0] - wide[0] - 1, 0), min(rows[1] - wide[0] + 1, shape[0])
+        kernels_film.edges(s, toned, differs, shape, inner, edge)
+        pixels = np.flatnonzero(edge)
+        if len(pixels):
+            self.refine(pixels, block, arrived, toned)
+        size = width, self.camera.height
+        kernels_film.printed(toned, active, wide[0], size, rows, out)
+
+    def seen(self, rays: Rays, block: Block) -> tuple[np.ndarray, ...]:
+        """Nearest triangle and where, of each pixel; rays that could hit nothing are not cast."""
+        hit = self.stage.missed(rays.origin)
+        if not self.stage.shown:
+            return hit
+        asked = np.zeros((block.rows, block.columns), np.bool_)
+        size = self.camera.width, self.camera.height
+        seen = cull.outlines(self.boxes, self.eye, self.frame, self.tangent, size)
+        for top, bottom, left, right in seen:
+            asked[max(top - block.first, 0) : max(bottom - block.first, 0), left:right] = True
+        index = np.flatnonzero(asked)
+        found = self.stage.hit(rays.origin[index], rays.direction[index])
+        full = tuple(whole.copy() for whole in hit)
+        for whole, part in zip(full, found, strict=True):
+            whole[index] = part
+        return full
+
+    def changed(
+        self, rays: Rays, prim: np.ndarray, block: Block
+    ) -> tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, "h w"]]:
+        """Say which pixels may differ from the empty studio, and whose light they need."""
+        shape = block.rows, block.columns
+        touched = prim >= 0
+        eye, floor = self.eye.astype(np.float32), np.float32(self.lamps.floor[3])
+        kernels_film.stains(
+            rays.direction, eye, floor, self.ways, self.boxes, self.blur, shape, touched
+        )
+        touched = touched.reshape(shape)
+        differs = kernels_film.widened(touched, REACH).ravel()
+        return differs, kernels_film.widened(touched, 2 * REACH - 1)
+
+    def cast(
+        self,
+        rays: Rays,
+        active: np.ndarray,
+        known: Bool[np.ndarray, "h w"],
+        block: Block,
+        light: np.ndarray,
+        hit: tuple[np.ndarray, ...],
+    ) -> tuple[Samples, "_Arrived"]:
+        """Shade what pixels ``active`` see into light; return that, and the light that arrived."""
+        d, index = rays.direction, np.flatnonzero(known)
+        s = self.meet(rays.origin, d, index, tuple(x[index] for x in hit))
+        thin = active[s.traits[active, 4] < 1]
+        if len(thin):
+            self.behind(rays, s, thin, block, light, 0)
+        # Light is asked for at every pixel, and smoothed over each surface.
+        on = index[s.kind[index] != NOTHING]
+        arriving = np.zeros((len(light), CHANNELS), np.float32)
+        arriving[on] = self.ask(s, d, on, block.places(on))
+        lit = np.zeros(len(light), np.bool_)
+        lit[on] = True
+        log = np.zeros(len(light), np.float32)
+        log[on] = np.log(s.depth[on])
+        shape = block.rows, block.columns
+        arrived = _Arrived(
+            arriving.reshape(*shape, CHANNELS),
+            s.normal.reshape(*shape, 3),
+            s.depth.reshape(shape),
+            lit.reshape(shape),
+        )
+        kernels_light.smooth(arrived.light, arrived.normal, log.reshape(shape), arrived.known)
+        self.reflect_sharply(s, d, on, arriving)
+        seen = active[lit[active]]
+        near = np.zeros(light.shape, np.float32)
+        kernels_light.shade(s, seen, d, arriving, self.lamps, near)
+        kernels_light.blend(s, seen, near, self.lamps, light)
+        return s, arrived
+
+    def reflect_sharply(self, s: Samples, d: np.ndarray, on: np.ndarray, light: np.ndarray) -> None:
+        """Let each smooth surface mirror what it sees itself, instead of its neighbours."""
+        sharp = on[(s.traits[on, 1] <= SHARP) & (s.kind[on] == kernels.THING)]
+        if len(sharp):
+            self.reflect(s, d, sharp, np.zeros(len(sharp), np.int64), light, sharp)
+
+    def refine(
+        self, pixels: np.ndarray, block: Block, arrived: "_Arrived", toned: np.ndarray
+    ) -> None:
+        """Replace pixels by the mean of finer samples."""
+        grid, count = self.plan.finer, self.plan.finer**2
+        total = len(pixels) * count
+        o, d = (np.empty((total, 3), np.float32) for _ in range(2))
+        row, column = (np.empty(total, np.float32) for _ in range(2))
+        size, view = (self.camera.width, self.camera.height), (self.eye, self.frame, self.tangent)
+        kernels_film.finer_rays(*view, size, block.first, pixels, grid, o, d, row, column)
+        light = np.repeat(self.empty.wall[block.first * block.columns + pixels], count, axis=0)
+        # Dice hang on the sample's place in a picture of so many samples.
+        places = Places(
+            ((row + block.first + 0.5) * grid).astype(np.int64),
+            ((column + 0.5) * grid).astype(np.int64),
+        )
+        lit = np.zeros((total, CHANNELS), np.float32)
+
+        def known(s: Samples) -> Bool[np.ndarray, " S"]:
+            return kernels_film.share(
+                s, row, column, arrived.light, arrived.normal, arrived.depth, arrived.known, lit
+            )
+
+        self.look_closely(Rays(o, d), places, light, lit, known)
+        kernels_film.tone_means(light, pixels, count, toned)
+
+    def look_closely(
+        self,
+        rays: Rays,
+        places: Places,
+        light: np.ndarray,
+        lit: np.ndarray,
+        known: Callable[[Samples], np.ndarray],
+        depth: int = 0,
+    ) -> None:
+        """Shade what each ray hits over what is behind it, into light.
+
+        Args:
+            rays: All of them.
+            places: Of each, for its dice.
+            light: Behind everything (S, 3); then what the eye gets.
+            lit: Room for the light that arrives (S, CHANNELS).
+            known: Fills ``lit`` where light is known already, and says where it is not.
+            depth: Surfaces that were looked through.
+
+        """
+        o, d = rays.origin, rays.direction
+        hit = self.stage.hit(o, d) if self.stage.shown else self.stage.missed(o)
+        s = self.meet(o, d, np.arange(len(o)), hit, self.plan.finer)
+        thin = np.flatnonzero(s.traits[:, 4] < 1)
+        if len(thin) and depth < LAYERS:
+            past = beyond(s.point[thin], d[thin], np.zeros(1, np.float32), self.stage.size)
+            there, deeper = Places(places.row[thin], places.column[thin]), light[thin]
+            further = Rays(past, np.ascontiguousarray(d[thin]))
+            room = np.zeros((len(thin), CHANNELS), np.float32)
+            self.look_closely(further, there, deeper, room, _unknown, depth + 1)
+            light[thin] = deeper
+        on = np.flatnonzero(s.kind != NOTHING)
+        lone = on[known(s)[on]]
+        lit[lone] = self.ask(s, d, lone, Places(places.row[lone], places.column[lone]), 2)
+        self.reflect_sharply(s, d, on, lit)
+        near = np.zeros(light.shape, np.float32)
+        kernels_light.shade(s, on, d, lit, self.lamps, near)
+        kernels_light.blend(s, on, near, self.lamps, light)
+
+    def free(self, o: np.ndarray, w: np.ndarray, ray: np.ndarray) -> np.ndarray:
+        """Whether each ray gets away; only those are cast that could meet something."""
+        could = np.empty(len(o), np.bool_)
+        kernels_film.could_meet(o, w, self.boxes, could)
+        index = np.flatnonzero(could)
+        if len(index) == len(o):
+            return self.stage.free(o, w, ray)
+        free = np.ones(len(o), np.bool_)
+        free[index] = self.stage.free(o[index], w[index], ray[index])
+        return free
+
+
+def _unknown(s: Samples) -> Bool[np.ndarray, " S"]:
+    return np.ones(len(s.kind), np.bool_)
+
+
+@dataclass(frozen=True)
+class _Arrived:
+    """Light that arrived at the pixels of a band."""
+
+    light: Float32[np.ndarray, "h w channels"]
+    normal: Float32[np.ndarray, "h w 3"]
+    depth: Float32[np.ndarray, "h w"]
+    """[m]"""
+    known: Bool[np.ndarray, "h w"]

@@ -1,0 +1,298 @@
+"""What a film's pictures need besides: what no object can darken, where edges are, shared light.
+
+Loops compiled by numba, over the P pixels of a band.
+"""
+
+import numba
+import numpy as np
+
+from corporeal.render.kernels import JIT, dot, hash01
+
+FARTHEST = 0.02
+"""Of the depth: what differs by more is another surface."""
+ALIKE = 0.92
+"""Cosine between normals of what still counts as one surface."""
+FINE = np.float32(1e-12)
+TILE = 8
+"""Sides of the squares of pixels that are told from the empty studio together."""
+HORIZON = np.float32(1e-4)
+"""Sine below the horizon from which on the floor is seen, as ``kernels`` has it."""
+STEP = 6
+"""Grey levels (of 255) between neighbours that are worth more samples."""
+PATCH = 0.1
+"""Steps of albedo from which on two triangles are painted apart."""
+
+
+@numba.njit(**JIT)
+def meets_box(o, w, boxes):
+    """Whether a ray from ``o`` along ``w`` meets any of the boxes (B, 2, 3): slabs, Kay 1986."""
+    for b in range(len(boxes)):
+        near, far = np.float32(0), np.float32(np.inf)
+        for a in range(3):
+            slope = 1 / w[a] if abs(w[a]) > FINE else np.float32(1e12)
+            first = (boxes[b, 0, a] - o[a]) * slope
+            second = (boxes[b, 1, a] - o[a]) * slope
+            near = max(near, min(first, second))
+            far = min(far, max(first, second))
+        if near <= far:
+            return True
+    return False
+
+
+@numba.njit(**JIT)
+def could_meet(o, w, boxes, out):
+    """For each ray, whether it could meet what is in the boxes."""
+    for k in range(len(o)):
+        out[k] = meets_box(o[k], w[k], boxes)
+
+
+@numba.njit(**JIT)
+def stains(d, eye, floor, ways, boxes, blur, shape, out):
+    """Mark the pixels of tiles that see a floor which boxes could darken.
+
+    Args:
+        d: Directions of the pixels (P, 3).
+        eye: Where they come from [m].
+        floor: Its height [m].
+        ways: All that pixels on the floor look along: to the sky and, last, to the sun (S, 3).
+        boxes: About what objects (B, 2, 3) [m].
+        blur: How far the sun's softness spreads a shadow on the floor [m].
+        shape: Rows and columns of pixels.
+        out: Marks (P,).
+
+    """
+    h, w = shape
+    p = np.empty(3, np.float32)
+    wide = boxes.copy()
+    p[2] = floor
+    for top in range(0, h, TILE):
+        for left in range(0, w, TILE):
+            bottom, right = min(top + TILE, h) - 1, min(left + TILE, w) - 1
+            radius, seen = _patch(d, eye, floor, w, (top, bottom, left, right), p)
+            if not seen:
+                continue
+            marked = False
+            for k in range(len(ways)):
+                more = radius + (blur if k == len(ways) - 1 else np.float32(0))
+                for b in range(len(boxes)):
+                    for a in range(2):
+                        wide[b, 0, a] = boxes[b, 0, a] - more
+                        wide[b, 1, a] = boxes[b, 1, a] + more
+                if meets_box(p, ways[k], wide):
+                    marked = True
+                    break
+            if marked:
+                for i in range(top, bottom + 1):
+                    for j in range(left, right + 1):
+                        out[i * w + j] = True
+
+
+@numba.njit(**JIT)
+def _patch(d, eye, floor, w, tile, centre):
+    """Middle and radius [m] of the floor that a tile of pixels sees, and whether it sees any."""
+    top, bottom, left, right = tile
+    if d[bottom * w + left, 2] > -HORIZON and d[bottom * w + right, 2] > -HORIZON:
+        return np.float32(0), False
+    low = np.full(2, np.float32(np.inf))
+    high = np.full(2, np.float32(-np.inf))
+    for i in (top, bottom):
+        for j in (left, right):
+            e = d[i * w + j]
+            t = (floor - eye[2]) / min(e[2], -HORIZON)
+            for a in range(2):
+                low[a] = min(low[a], eye[a] + t * e[a])
+                high[a] = max(high[a], eye[a] + t * e[a])
+    for a in range(2):
+        centre[a] = (low[a] + high[a]) / 2
+    return max(high[0] - low[0], high[1] - low[1]) / 2, True
+
+
+@numba.njit(**JIT)
+def widened(mask, reach):
+    """Mark all within ``reach`` rows and columns of what is marked."""
+    h, w = mask.shape
+    across = np.zeros((h, w), np.bool_)
+    for i in range(h):
+        last = -reach - 1
+        for j in range(w + reach):
+            if j < w and mask[i, j]:
+                last = j
+            if j >= reach and j - last <= 2 * reach:
+                across[i, j - reach] = True
+    out = np.zeros((h, w), np.bool_)
+    for j in range(w):
+        last = -reach - 1
+        for i in range(h + reach):
+            if i < h and across[i, j]:
+                last = i
+            if i >= reach and i - last <= 2 * reach:
+                out[i - reach, j] = True
+    return out
+
+
+@numba.njit(**JIT)
+def share(s, row, column, light, normal, depth, known, out):
+    """Give each sample the light of the pixels about it that see the same surface.
+
+    The four around are weighed by nearness. Returns where there is none: True asks for rays of
+    its own.
+
+    Args:
+        s: What samples met.
+        row: Where each of them is among the pixels; may be between them.
+        column: The same.
+        light: Of the pixels (rows, columns, channels).
+        normal: Of the pixels.
+        depth: Of the pixels.
+        known: Which pixels know their light.
+        out: Light of every sample.
+
+    """
+    missing = np.zeros(len(s.kind), np.bool_)
+    h, w, channels = light.shape
+    for g in range(len(s.kind)):
+        i, j = int(np.floor(row[g])), int(np.floor(column[g]))
+        a, b = np.float32(row[g] - i), np.float32(column[g] - j)
+        total = np.float32(0)
+        for di in range(2):
+            for dj in range(2):
+                y, x = i + di, j + dj
+                if y < 0 or y >= h or x < 0 or x >= w or not known[y, x]:
+                    continue
+                if abs(s.depth[g] - depth[y, x]) >= FARTHEST * s.depth[g]:
+                    continue
+                if dot(s.normal[g], normal[y, x]) <= ALIKE:
+                    continue
+                weight = (a if di else 1 - a) * (b if dj else 1 - b)
+                total += weight
+                for c in range(channels):
+                    out[g, c] += weight * light[y, x, c]
+        missing[g] = total == 0
+        if total > 0:
+            for c in range(channels):
+                out[g, c] /= total
+    return missing
+
+
+@numba.njit(**JIT)
+def filmic(v):
+    """Filmic curve (Narkowicz 2016) of one linear value, 0 to 1."""
+    v = max(v, np.float32(0)) * np.float32(0.74)
+    v = (v * (2.51 * v + 0.03)) / (v * (2.43 * v + 0.59) + 0.14)
+    return min(max(v, 0.0), 1.0)
+
+
+@numba.njit(**JIT)
+def edges(s, picture, active, shape, inner, out):
+    """Mark pixels beside which another surface is seen in another colour.
+
+    Args:
+        s: What pixels met.
+        picture: Filmic light of the pixels (P, 3), 0 to 1.
+        active: Which pixels differ from the empty studio (P,).
+        shape: Rows and columns.
+        inner: The first row to answer for and the one after the last.
+        out: The answer (P,).
+
+    """
+    w = shape[1]
+    for i in range(inner[0], inner[1]):
+        for j in range(w):
+            g = i * w + j
+            for k in range(2):
+                y, x = i + k, j + 1 - k
+                if y >= shape[0] or x >= w:
+                    continue
+                q = y * w + x
+                if not (active[g] and active[q]):
+                    continue
+                # Behind what both look through there may be anything.
+                clear = s.traits[g, 4] < 1 and s.traits[q, 4] < 1
+                if not clear and (s.triangle[g] == s.triangle[q] or _one_surface(s, g, q)):
+                    continue
+                step = np.float32(0)
+                for c in range(3):
+                    step = max(step, abs(picture[g, c] - picture[q, c]))
+                # The display's curve is steeper where it is dark.
+                if step * 255 > STEP * (0.2 + min(picture[g, 1], picture[q, 1])):
+                    out[g] = True
+                    out[q] = True
+
+
+@numba.njit(**JIT)
+def _one_surface(s, g, q):
+    """Whether two pixels see one smooth surface of one colour."""
+    if s.kind[g] != s.kind[q] or abs(s.depth[g] - s.depth[q]) >= FARTHEST * s.depth[g]:
+        return False
+    far = np.float32(0)
+    for c in range(3):
+        far = max(far, abs(s.albedo[g, c] - s.albedo[q, c]))
+    return dot(s.normal[g], s.normal[q]) > ALIKE and far < PATCH
+
+
+@numba.njit(**JIT)
+def tone(light, index, out):
+    """Filmic light of some pixels."""
+    for g in index:
+        for c in range(3):
+            out[g, c] = filmic(light[g, c])
+
+
+@numba.njit(**JIT)
+def tone_means(light, index, count, out):
+    """Mean filmic light of so many samples for each of some pixels."""
+    for k in range(len(index)):
+        for c in range(3):
+            total = np.float32(0)
+            for n in range(count):
+                total += filmic(light[k * count + n, c])
+            out[index[k], c] = total / count
+
+
+@numba.njit(**JIT)
+def printed(picture, index, row, size, first, out):
+    """Write pixels in sRGB, 0 to 255, with a faint vignette and a fixed grain.
+
+    Args:
+        picture: Filmic light of a band (P, 3).
+        index: Its pixels to be written.
+        row: The picture's row that the band begins with.
+        size: Of the picture: width, height.
+        first: Pixels of the band before this row are left out.
+        out: The picture (height, width, 3).
+
+    """
+    width, height = size
+    for g in index:
+        i, j = g // width + row, g % width
+        if i < first[0] or i >= first[1]:
+            continue
+        y, x = 2 * i / (height - 1) - 1, 2 * j / (width - 1) - 1
+        rim = min(max(x * x + y * y - 0.5, 0.0), 2.0) / 1.5
+        grain = hash01(i, j) - np.float32(0.5)
+        for c in range(3):
+            v = picture[g, c] * np.float32(1 - 0.10 * rim)
+            if v <= 0.0031308:
+                v = 12.92 * v
+            else:
+                v = 1.055 * v ** np.float32(1 / 2.4) - 0.055
+            out[i, j, c] = np.uint8(min(max(v * 255 + 0.5 + 0.9 * grain, 0.0), 255.0))
+
+
+@numba.njit(**JIT)
+def finer_rays(eye, frame, tangent, size, first, pixels, grid, o, d, row, column):
+    """Origins, directions and places of grid × grid samples of some pixels of a band."""
+    width, height = size
+    for k in range(len(pixels)):
+        i, j = pixels[k] // width, pixels[k] % width
+        for n in range(grid * grid):
+            y = i + (n // grid + 0.5) / grid - 0.5
+            x = j + (n % grid + 0.5) / grid - 0.5
+            m = k * grid * grid + n
+            row[m], column[m] = y, x
+            up = (1 - (first + y + 0.5) / height * 2) * tangent
+            right = ((x + 0.5) / width * 2 - 1) * tangent * width / height
+            length = np.sqrt(right * right + up * up + 1)
+            for a in range(3):
+                d[m, a] = (right * frame[0, a] + up * frame[1, a] - frame[2, a]) / length
+                o[m, a] = eye[a]
