@@ -31,7 +31,7 @@ from corporeal.evaluation.judge.judge_scenes import (
 from corporeal.evaluation.judge.judge_tables import CANNOT, record, tables, weigh_judge
 from corporeal.evaluation.judge.put_to_judge import check_judging, put_to_judge
 from corporeal.evaluation.judge.simulated_controls import SIMULATED, exchanged
-from corporeal.evaluation.judge.staging import SIZE, TURNS, stage_scene
+from corporeal.evaluation.judge.staging import SIZE, TURNS, close_ups, stage_scene
 from corporeal.evaluation.judge.subquestions import catalogue
 from corporeal.evaluation.judge.told_facts import facts
 from corporeal.pipeline import Settings
@@ -182,6 +182,16 @@ def test_close_ups_show_the_first_contacts_and_the_end(played, staging):
     assert 0 < first.time - met < 0.05 and second.time >= first.time
     assert {first.contact.objects, second.contact.objects} == {(0,), (1,)}
     assert last.time == staging.end
+
+
+def test_a_close_up_of_what_touches_nothing_is_nearer_than_the_dated_pictures(staging):
+    reel = staging.reel
+    still = replace(reel, boxes=reel.boxes[:1, :1], time=reel.time[:1])
+    by_itself = replace(staging, reel=still, closes=close_ups([], staging.end))
+    for close in by_itself.closes:
+        aims = (by_itself.near(close, 0), by_itself.wide(0))
+        near, wide = (np.linalg.norm(np.subtract(aim.eye, aim.target)) for aim in aims)
+        assert near < wide
 
 
 def test_a_film_is_sixteen_pictures_and_looks_come_from_other_sides(played, staging, told):

@@ -1,12 +1,15 @@
 """What must be seen is a number with a target on both sides, and it can fail."""
 
 from dataclasses import replace
-from math import inf
+from math import inf, pi
 
+import numpy as np
 import pytest
+from scipy.optimize import brentq
 
 from corporeal.showcase.expectations import EXPECTED, SPOILERS, Demand, expect
 from corporeal.showcase.scenes import SCENES
+from corporeal.trajectory.outcome import height, reach
 from made_findings import object_outcome, outcome, pair_outcome
 
 
@@ -168,3 +171,33 @@ def test_an_imprint_is_deeper_than_a_cell_and_swallows_nobody(depth, cell, seen)
         "rubber_duck_0": object_outcome(fall_m=1.2),
     }
     assert met("duck-on-mud", outcome(objects)) == [True, seen, True]
+
+
+def heap(squashed=1.0):
+    """Sample Nye's profile of 164 cm³ of ketchup of 25 Pa, as ``showcase.scenes`` has it."""
+    b, volume = 25 / 1120 / 9.81, 1.64e-4
+    k = 0.5 * pi * b
+
+    def profile(r, radius):
+        return k + np.sqrt(k**2 + 2 * b * (radius - r))
+
+    def excess(radius):
+        r = np.linspace(0, radius, 1000)
+        return np.trapezoid(2 * pi * r * profile(r, radius), r) - volume
+
+    radius = brentq(excess, 0.03, 0.12)
+    dice = np.random.default_rng(0)
+    x, y = dice.uniform(-radius, radius, (2, 200_000))
+    z = dice.uniform(0, profile(0, radius), len(x))
+    inside = (np.hypot(x, y) < radius) & (z < profile(np.minimum(np.hypot(x, y), radius), radius))
+    return np.column_stack([x, y, squashed * z])[inside]
+
+
+@pytest.mark.parametrize(("squashed", "met"), [(1.0, True), (0.7, False)])
+def test_the_heap_of_theory_meets_what_is_expected_of_ketchup_and_a_flat_one_does_not(
+    squashed, met
+):
+    points = heap(squashed)
+    found = object_outcome(reach_m=reach(points, 0.0), height_m=height(points, 0.0))
+    radius, volume = expect("ketchup-stops", outcome({"ketchup_0": found}, {}, []))
+    assert radius.met and volume.met is met

@@ -8,7 +8,7 @@ names a run that must not meet it: one of ``SPOILERS``, each the same scene with
 from collections.abc import Callable
 from dataclasses import dataclass
 from itertools import pairwise
-from math import inf
+from math import inf, pi
 from operator import attrgetter
 from typing import Any, Literal
 
@@ -105,6 +105,18 @@ def only(outcome: Outcome, thing: str) -> ObjectOutcome:
 def of(thing: str, measure: str) -> Measure:
     """Read one field of ``ObjectOutcome`` of the only object of its kind."""
     return lambda outcome: attrgetter(measure)(only(outcome, thing))
+
+
+def heaped(thing: str, volume: float) -> Measure:
+    """Return height times round area of what lies in a heap, over its volume [m³]; 1: a cake."""
+
+    def measure(outcome: Outcome) -> float | None:
+        found = only(outcome, thing)
+        if found.height_m is None or found.reach_m is None:
+            return None
+        return found.height_m * pi * found.reach_m**2 / volume
+
+    return measure
 
 
 def named(thing: str, measure: str) -> Measure:
@@ -419,13 +431,14 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
             "mm",
             "halfgravity",
         ),
-        # 0.021 m by theory; squashed to seven tenths it stands below 0.018 m.
+        # 1.19 for the profile of ``showcase.scenes``: 98 % of it lie within 16.5 mm of its 21 mm
+        # and 61.3 mm of its middle. A tenth to either side; squashed to seven tenths it is below 1.
         Demand(
-            "The ketchup stays a heap: its height",
-            of("ketchup", "height_m"),
-            0.018,
-            0.027,
-            "mm",
+            "The ketchup keeps its volume (height times area, over its volume)",
+            heaped("ketchup", 1.64e-4),
+            1.07,
+            1.31,
+            "",
             "squashed",
         ),
     ),

@@ -24,7 +24,9 @@ TURNS = (0.0, -25.0, 25.0)
 FILL = 0.80
 """Share of a picture that the reference's motion takes."""
 NEAR_FILL = 0.45
-"""Share of a close-up that an object takes."""
+"""Share of a close-up of a contact that the smaller object takes, so that the other is seen too."""
+ALONE_FILL = 0.95
+"""The same where nothing touches: nearer than the dated pictures, with nothing else to be seen."""
 JUST_AFTER = 0.03
 """A close-up shows a contact so long after it began [s]."""
 
@@ -74,7 +76,8 @@ class Staging:
             way = np.nan_to_num(np.abs(self.reel.boxes - self.reel.boxes[:1])).max(axis=(0, 2, 3))
             chosen = int(way.argmax())
         box = now[chosen] if np.isfinite(now[chosen]).all() else self.reel.boxes[0, chosen]
-        return place(box[None, None], SIZE, turned(self.view, TURNS[look]), NEAR_FILL)
+        fill = ALONE_FILL if close.contact is None else NEAR_FILL
+        return place(box[None, None], SIZE, turned(self.view, TURNS[look]), fill)
 
 
 def stage_scene(reference: Played) -> Staging:
