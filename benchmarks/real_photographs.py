@@ -29,8 +29,7 @@ import real_measures as measure
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.poses.pose import POSES
-from corporeal.reconstruction.reconstruct_config import ReconstructConfig
-from corporeal.stages.reconstruct import Reconstructed, reconstruct
+from corporeal.stages.reconstruct import OBJECT_POSES, ReconstructConfig, Reconstructed, reconstruct
 from corporeal.terminal import progress_bars, show_table
 
 Case = Literal["all", "unmasked", "unposed", "bare"]
@@ -110,15 +109,21 @@ def row_of(folder: Path, case: Case, training: str, out: Path) -> dict[str, Any]
         try:
             told = clock.beside(bars(f"{folder.name} {case}"))
             made = reconstruct(photos, config, folder=work, progress=told)
-            row |= results(made, folder, None if posed else work / POSES)
+            row |= results(made, folder, None if posed else poses_in(work))
         except UserError as problem:
             row["why"] = str(problem).replace(str(photos), folder.name)
-            row |= {} if posed else poses_row(folder, work / POSES)
+            row |= {} if posed else poses_row(folder, poses_in(work))
         except Exception as problem:  # a row says that it failed; the other sets go on
             row["why"] = f"failed: {type(problem).__name__}: {problem}"
     row["seconds"] = clock.seconds
     store.write_json(place / ROW, row)
     return row
+
+
+def poses_in(work: Path) -> Path:
+    """Return where the poses lie that a reconstruction used: of the object alone, or of all."""
+    alone = work / OBJECT_POSES
+    return alone if (alone / "sparse" / "0").is_dir() else work / POSES
 
 
 def poses_row(folder: Path, poses: Path) -> dict[str, Any]:

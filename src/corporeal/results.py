@@ -4,7 +4,7 @@ from dataclasses import dataclass, replace
 from typing import Any, TypeVar
 
 from corporeal.geometry.broken import Filled, with_breaks
-from corporeal.geometry.contents import with_contents
+from corporeal.geometry.contents import Whole, with_contents
 from corporeal.geometry.followed import followed
 from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (

@@ -197,6 +197,7 @@ def test_a_run_does_not_believe_poses_of_the_background(turned_over, tmp_path, h
             reconstructing._posed(folder, config, tmp_path / "run", silent)
         return
     found = reconstructing._posed(folder, config, tmp_path / "run", silent)
+    assert found is not None
     assert (found.folder == by_slab.folder) == (how != "found")
     assert (found.warnings != by_slab.warnings) == (how != "still")
 

@@ -55,7 +55,7 @@ class LinesOfSight:
         cameras: Sequence[Camera],
         low: Float[np.ndarray, "3"],
         side: float,
-        shape: tuple[int, int, int],
+        shape: tuple[int, ...],
     ) -> Bool[np.ndarray, "X Y Z"]:
         """Tell which cubic cells lines of several views pass through, or next to.
 
@@ -63,7 +63,7 @@ class LinesOfSight:
             cameras: Of the views.
             low: Middle of the first cell.
             side: Of a cell.
-            shape: How many cells there are along each axis.
+            shape: How many cells there are along x, y and z.
 
         """
         votes = np.zeros(shape, np.int32)

@@ -87,8 +87,7 @@ def outlines_of(
     hull = tight(views, masks, pool)
     empty, low = np.zeros(hull.inside.shape, np.bool_), hull.cells[0, 0, 0]
     if lines is not None:
-        x, y, z = empty.shape
-        empty = lines.emptied(views.cameras, low, hull.side, (x, y, z))
+        empty = lines.emptied(views.cameras, low, hull.side, empty.shape)
     left = hull.inside & ~empty
     if not left.any():  # lines of poses that masks contradict
         return Outlines(views, masks, hull, np.zeros_like(empty))
