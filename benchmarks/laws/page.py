@@ -22,8 +22,6 @@ MISSED = {
     "which makes both faces sink alike, by 5.97 mm, or with .15 of it, by 5.74 and 5.60, "
     "but 9 and 14 % too far on a grid plane; .05 dx more or less of it, 5.50 and 7.86; "
     "walls that reach .75 dx, 4.64.",
-    "19": "The gap depends on how the slab lies on the grid: −.06 to .36 R over five positions, "
-    ".16 R in the mean. The case's position is the worst of them.",
 }
 """Why a target is missed where it is, and what was tried."""
 

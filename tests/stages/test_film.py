@@ -224,7 +224,7 @@ def test_a_camera_goes_by_where_most_of_a_thing_is_and_sees_all_of_what_keeps_it
     ball *= (0.05 * rng.uniform(size=(2000, 1)) ** (1 / 3)) / np.linalg.norm(ball, axis=1)[:, None]
     mass = np.ones(2000)
     full = _fullness(ball, mass)
-    low, high = _box([*ball, 3.0, 0.0, 0.1], mass, full)
+    low, high = _box(ball + np.array([3.0, 0.0, 0.1]), mass, full)
     assert high - low == pytest.approx(np.full(3, 0.1), rel=0.12)
     # A fifth of it flies off as drops.
     scattered = ball.copy()
