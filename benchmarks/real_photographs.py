@@ -29,7 +29,9 @@ import real_measures as measure
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.poses.pose import POSES
-from corporeal.stages.reconstruct import OBJECT_POSES, ReconstructConfig, Reconstructed, reconstruct
+from corporeal.reconstruction.picture_intake import OBJECT_POSES
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.stages.reconstruct import Reconstructed, reconstruct
 from corporeal.terminal import progress_bars, show_table
 
 Case = Literal["all", "unmasked", "unposed", "bare"]

@@ -95,7 +95,7 @@ def read_colmap(folder: Path) -> ColmapModel:
         raise BadFileError(folder, "the COLMAP model holds no images.", AGAIN)
     places = np.array([p.row[:3] for p in rows.points], np.float64).reshape(-1, 3)
     colours = np.array([p.row[3:] for p in rows.points], np.float64).reshape(-1, 3)
-    good = np.isfinite(places).all(axis=1)
+    good = np.asarray(np.isfinite(places).all(axis=1))
     return ColmapModel(
         folder,
         rows.cameras,

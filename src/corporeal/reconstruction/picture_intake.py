@@ -10,7 +10,7 @@ from corporeal.features.maskers import connect_masker, split
 from corporeal.formats.photographs import MASKS, has_masks, listed
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
-from corporeal.poses.pose import POSES, Posed, pose, pose_object
+from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
 from corporeal.splats.intake import Intake, take_in
 from corporeal.splats.training_schedule import TrainConfig
