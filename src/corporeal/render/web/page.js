@@ -1,7 +1,7 @@
 // The viewer: pictures of one or two runs with one camera and one timeline, and what is known of them beside it.
 
 import * as THREE from './three.min.js'
-import { Stage, graphics } from './stage.js'
+import { Stage, graphics, squareOf } from './stage.js'
 import { auditOf, card, differences, el, key, si, spoken, table } from './cards.js'
 
 const VIEW = [.8, -.62, .36] // three-quarter view, as the film's
@@ -103,7 +103,8 @@ export class Viewer {
     })
     const two = this.takes.length > 1 ? differences(...this.takes.map(t => t.header)) : []
     return el('div', {}, film ? null : this.options.unmoved?.() ?? el('p', {class: 'note'}, 'This has not been simulated yet: it stands as it will begin.'),
-      el('label', {class: 'line'}, 'colour by', this.by), el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'), ...objects,
+      el('label', {class: 'line'}, 'colour by', this.by), el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'),
+      el('p', {class: 'hint'}, `Squares on the floor are ${si(squareOf(Math.max(...this.stages.map(s => s.size))), 'm')} wide.`), ...objects,
       this.takes.length > 1 ? [el('h3', {}, 'What differs'), two.length ? table(two, ['part', '', ...this.takes.map((t, k) => this.options.names?.[k] ?? t.header.name)])
         : el('p', {}, 'Nothing that was asked for differs.')] : null,
       this.card)
@@ -176,7 +177,10 @@ export class Viewer {
     this.renderer.shadowMap.enabled = shadows
     this.renderer.autoClear = false
     const size = Math.max(...this.stages.map(stage => stage.size))
-    for (const stage of this.stages) stage.fade(size)
+    for (const stage of this.stages) {
+      stage.fade(size)
+      stage.rule(squareOf(size))
+    }
     this.eye = new THREE.PerspectiveCamera(ANGLE, 1, size / 200, size * 40)
     this.eye.up.set(0, 0, 1)
     this.orbit = new THREE.OrbitControls(this.eye, this.canvas)

@@ -6,6 +6,25 @@ import { unfold } from './take.js'
 const PAPER = 0xece9e2, GROUND = 0xcfcac0, ACCENT = 0x1f6f8b
 const SRGB = 2.2 // vertex colours are linear light
 const BARE = [.72, .72, .72]
+const TILE = 256 // pixels along a square of the floor's grid
+
+// Squares on the floor that fit a scene of this size [m]: 1, 10 … mm or m.
+export const squareOf = size => 10 ** Math.round(Math.log10(size / 8))
+
+// A picture of one square, to be repeated: two of its edges.
+function squarePicture() {
+  const canvas = Object.assign(document.createElement('canvas'), {width: TILE, height: TILE})
+  const pen = canvas.getContext('2d')
+  pen.fillStyle = '#fff'
+  pen.fillRect(0, 0, TILE, TILE)
+  pen.fillStyle = '#bdbdbd'
+  pen.fillRect(0, 0, TILE, 3)
+  pen.fillRect(0, 0, 3, TILE)
+  const picture = new THREE.CanvasTexture(canvas)
+  picture.wrapS = picture.wrapT = THREE.RepeatWrapping
+  picture.anisotropy = 8
+  return picture
+}
 
 export const linear = share => share ** SRGB
 export const rgbOf = hex => [1, 3, 5].map(k => linear(parseInt(hex.slice(k, k + 2), 16) / 255))
@@ -54,11 +73,18 @@ export class Stage {
       Object.assign(sun.shadow.camera, {left: -size, right: size, top: size, bottom: -size, near: .01 * size, far: 6 * size})
       sun.shadow.camera.updateProjectionMatrix()
     }
-    const ground = new THREE.Mesh(new THREE.PlaneGeometry(60 * size, 60 * size),
-      new THREE.MeshStandardMaterial({color: GROUND, roughness: 1}))
-    ground.position.set(mid[0], mid[1], -.0005 * size)
-    ground.receiveShadow = true
-    this.scene.add(ground)
+    this.ground = new THREE.Mesh(new THREE.PlaneGeometry(60 * size, 60 * size),
+      new THREE.MeshStandardMaterial({color: GROUND, roughness: 1, map: squarePicture()}))
+    this.ground.position.set(mid[0], mid[1], -.0005 * size)
+    this.ground.receiveShadow = true
+    this.scene.add(this.ground)
+  }
+
+  // Rule the floor in squares [m], one corner at the origin: what hangs above it is seen to.
+  rule(square) {
+    const {map} = this.ground.material, count = 60 * this.size / square
+    map.repeat.set(count, count)
+    map.offset.set(...this.middle.slice(0, 2).map(m => (m / square - count / 2) % 1))
   }
 
   // Let the floor end in haze, at distances of a scene of this size [m].
