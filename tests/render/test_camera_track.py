@@ -1,5 +1,7 @@
 """Where a film's camera stands, and when it is slow."""
 
+import warnings
+
 import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
@@ -70,6 +72,16 @@ def test_without_a_contact_close_is_close_to_what_moves():
     reel = falling()
     alone = track("close", Reel(TIME, reel.boxes[:, [0, 2]], None), SIZE, None)
     assert seen(alone.at(0.0), reel.boxes[0, 0])[0] > 0.3
+
+
+def test_pieces_that_are_not_there_before_something_breaks_are_waited_for():
+    reel = falling()
+    reel.boxes[:10, 1] = np.nan
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        for shot in ("wide", "close", "follow"):
+            aims = [track(shot, reel, SIZE, None).at(t) for t in TIME]
+            assert np.isfinite([[*aim.eye, *aim.target] for aim in aims]).all(), shot
 
 
 def test_the_first_contact_is_that_of_two_objects_or_else_with_the_floor():

@@ -128,9 +128,9 @@ def _extent(boxes: np.ndarray) -> np.ndarray:
 
 def _beside(reel: Reel, seen: list[int], size: tuple[int, int], view: Vector | None) -> Track:
     """Move along with some objects, in the direction in which they are hidden least."""
-    union = np.stack(
-        [np.nanmin(reel.boxes[:, seen, 0], axis=1), np.nanmax(reel.boxes[:, seen, 1], axis=1)], 1
-    )
+    # Pieces have no boxes before something breaks.
+    low, high = reel.boxes[:, seen, 0], reel.boxes[:, seen, 1]
+    union = np.stack([np.fmin.reduce(low, axis=1), np.fmax.reduce(high, axis=1)], 1)
     centre = _filled(union.mean(axis=1))
     steps = np.diff(reel.time)
     spread = SMOOTH / float(np.median(steps)) if len(steps) else 0.0
