@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
+from scipy.spatial.transform import Rotation
 from test_audit import CELL, TREATMENT, row
 
 from corporeal.geometry.mesh import Mesh
@@ -113,6 +114,17 @@ def test_a_ball_that_comes_back_or_goes_past_passes_through_nothing(film):
     assert pair.depth_m == pytest.approx(RADIUS - 0.004, abs=THICK)
     beside = film(plate_at(), straight((0.13, 0.02, 0.2), (0.13, 0.02, 0.02), 4))
     assert all(pair.passed is None for pair in beside)
+
+
+def test_what_spins_fast_between_two_frames_is_not_passed_through(film):
+    """A chord leads through the plate where the ball is farther off than its edge reaches."""
+    middle, beside = np.array((0.0, 0.0, 0.1)), (0.0, 0.121, 0.123)
+
+    def spun(points, k):
+        turn = Rotation.from_euler("x", 140.0 * k, degrees=True)
+        return turn.apply(points - middle) + middle
+
+    assert all(pair.passed is None for pair in film(plate_at(), [beside] * 4, spun))
 
 
 def test_a_ball_that_falls_through_a_ring_touches_nothing(film):

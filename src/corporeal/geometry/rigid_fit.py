@@ -23,7 +23,12 @@ class RigidFit:
     @property
     def angle(self) -> float:
         """How far the body turned [rad]."""
-        return float(np.arccos(np.clip((np.trace(self.rotation) - 1) / 2, -1, 1)))
+        return angle(self.rotation)
+
+
+def angle(rotation: Float[np.ndarray, "3 3"]) -> float:
+    """How far a rotation turns [rad]."""
+    return float(np.arccos(np.clip((np.trace(rotation) - 1) / 2, -1, 1)))
 
 
 def rigid_fit(

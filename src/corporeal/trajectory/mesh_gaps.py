@@ -13,10 +13,10 @@ from jaxtyping import Bool, Float, Int
 
 from corporeal.findings import PairSurfaces
 from corporeal.geometry.mesh import Mesh, joined
+from corporeal.geometry.rigid_fit import RigidFit, angle, rigid_fit
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import sample_surface
 from corporeal.render.skin import Skin, bind_points
-from corporeal.trajectory.residual_shape import RigidFit, rigid_fit
 from corporeal.types import Frame, Particles, Scene, Trajectory
 
 NEAR = 2.0
@@ -29,6 +29,8 @@ GRAINS = 60
 """Particles of an object whose ways through another one are followed."""
 STRIDE = 0.25
 """Their ways are looked at where one has gone farther than this [cells]."""
+MOST_TURN = np.radians(60.0)
+"""Where the other turned farther from one look to the next, nobody knows their ways [rad]."""
 PASSED = 0.5
 """An object has passed through another when more than this share of them has [-]."""
 HOVERS = 0.15
@@ -247,7 +249,9 @@ def _passages(
 class Walk:
     """How particles of one object go in the frame of another: in straight lines.
 
-    A line ends where something has moved by ``STRIDE``; what rests costs nothing.
+    A line ends where something has moved by ``STRIDE``; what rests costs nothing. Of what spins
+    so fast that it turns by more than ``MOST_TURN`` between frames (a shard), nothing is said: a
+    straight line in its frame would lead through it where the true arc leads past.
     """
 
     def __init__(self, walker: Coat, other: Coat, cell: float) -> None:
@@ -255,11 +259,14 @@ class Walk:
         self.passed = np.zeros(len(walker.grains), dtype=bool)
         self.last: np.ndarray | None = None
         """Where each grain was last outside, in the other's frame at the start [m]."""
+        self.turned: Float[np.ndarray, "3 3"] | None = None
+        """How the other was turned in the frame before."""
 
     def goes_on(self, frame: Frame) -> bool:
         """Whether some grain has come so far near the other that it must be looked at."""
         fit, there = self._there(frame)
-        if self.last is None:
+        turned, self.turned = self.turned, fit.rotation
+        if self.last is None or turned is None or angle(fit.rotation @ turned.T) > MOST_TURN:
             self.last = there
             return False
         box = fit.undo(frame.position[self.other.members].astype(float))
