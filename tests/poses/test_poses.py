@@ -25,11 +25,11 @@ from corporeal.poses.gather import gather
 from corporeal.poses.judge import FILLED, doubts, names_of, unseen_side
 from corporeal.poses.pose import FIGURE, moved_within, pose, pose_object
 from corporeal.poses.standstill import Standstill
+from corporeal.reconstruction import picture_intake as reconstructing
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
 from corporeal.render.video import reel
-from corporeal.stages import reconstruct as reconstructing
-from corporeal.stages.reconstruct import ReconstructConfig
 from patterned_scene import (
     OF_SLAB,
     blots,

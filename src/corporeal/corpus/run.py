@@ -86,8 +86,8 @@ def _job(folder: Path, scene: PlannedScene, settings: Settings, read: Sequence[s
     """Say what is to be done for one scene; ``read`` names the files that settings point to."""
     path = folder / SCENES / scene.name
     made = store.read_meta(path).key
-    asked, how = replace(settings.describe, record=None), as_kept(settings.simulate)
-    named = replace(settings, describe=asked, simulate=how)
+    asked = replace(settings, describe=replace(settings.describe, record=None))
+    named = {**store.plain(asked), "simulate": as_kept(settings.simulate)}
     return Job(
         name=scene.name,
         function=run_scene,

@@ -7,11 +7,10 @@ A scene declared as settled is brought to equilibrium first (``trajectory.static
 
 import logging
 from collections.abc import Callable
-from copy import copy
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
-from typing import Literal
+from typing import Any, Literal
 
 import numpy as np
 
@@ -80,15 +79,16 @@ class SimulateConfig:
 DEFAULT = SimulateConfig()
 
 
-def as_kept(config: SimulateConfig) -> SimulateConfig:
-    """Name the engine as results on disk do: they were first kept when `cpu` was called `warp`.
+def as_kept(config: SimulateConfig) -> dict[str, Any]:
+    """Return the settings as results on disk are named by them.
 
-    What is kept is named by its settings; so runs of that time stay what they are.
+    They were first kept when `cpu` was called `warp` and nothing could break; so runs of that time
+    stay what they are.
     """
-    kept = copy(config)
-    if config.engine == "cpu":
-        object.__setattr__(kept, "engine", "warp")
-    return kept
+    engine = "warp" if config.engine == "cpu" else config.engine
+    return {"engine": engine, "contact": config.contact} | (
+        {"breaking": True} if config.breaking else {}
+    )
 
 
 def validate(config: SimulateConfig) -> None:
