@@ -37,7 +37,9 @@ HOVERS = 0.15
 """A gap between objects that touch is visible beyond this share of the narrower one's
 middle side [-]."""
 FINEST = 40
-"""Edges of a surface that bends are at most its longest side over this, so that dents show."""
+"""Edges of a surface that bends are at most its longest side over this, so that dents show, …"""
+DENT = 1.0
+"""… or this, which is as fine as what it follows knows [cells]."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +123,8 @@ def _coat(scene: Scene, particles: Particles, number: int) -> Coat:
     members = np.flatnonzero(particles.object == number)
     bends = any(particles.treatments[k].kind != "rigid" for k in np.unique(particles.part[members]))
     if bends:
-        mesh = finer(mesh, float(np.ptp(mesh.vertices, axis=0).max()) / FINEST)
+        longest = float(np.ptp(mesh.vertices, axis=0).max())
+        mesh = finer(mesh, max(longest / FINEST, DENT * particles.cell))
     owner = np.full(len(mesh.vertices), number)
     skin = bind_points(mesh.vertices, owner, particles, np.zeros(0, dtype=bool))
     points, triangle = sample_surface(mesh, SAMPLES, rng)
@@ -145,7 +148,9 @@ def finer(mesh: Mesh, edge: float) -> Mesh:
     vertices, triangles = mesh.vertices, mesh.triangles
     while True:
         ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-        unique, of_side = np.unique(ends.reshape(-1, 2), axis=0, return_inverse=True)
+        # One number per edge: rows are sorted twenty times slower.
+        key, of_side = np.unique(ends[..., 0] * len(vertices) + ends[..., 1], return_inverse=True)
+        unique = np.stack(np.divmod(key, len(vertices)), axis=1)
         of_side = of_side.reshape(-1, 3)
         length = np.linalg.norm(vertices[unique[:, 0]] - vertices[unique[:, 1]], axis=1)
         if not (length > edge).any():
