@@ -1,6 +1,7 @@
 """What a substep costs: nanoseconds and bytes per particle, ours and genesis-world's side by side.
 
     python benchmarks/engine.py [--quick] [--json FILE] [--history FILE] [--docs] [--peer DIR]
+    python benchmarks/engine.py --phases [--quick]
 
 Cubes of one material drop on the floor and slide. All contestants take turns, batch by batch, and
 the best of five batches counts, so that all of them meet the same machine.
@@ -17,7 +18,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import warp as wp
-from cost import history, page
+from cost import history, page, phases
 from cost.blocks import Drop, drop_of
 from cost.contest import Contestant, Ours, contest
 from cost.peer import Peer, install
@@ -50,6 +51,10 @@ FULL = Size(
     (1, 2, 4),
 )
 QUICK = Size(20_000, (10_000, 100_000), (16,), (64, 256), 24, (1,))
+PHASED = ((100_000, 1), (100_000, 16), (16_000, 16))
+"""Particles and objects of what is timed phase by phase …"""
+PHASED_QUICK = ((20_000, 1), (16_000, 16))
+"""… and of a quick look."""
 DOCS = Path(__file__).parent.parent / "docs"
 WIDTHS = (16, 6, 2, 16, 10, 3, 24, 8, 8, 5)
 """Of the columns on the screen."""
@@ -115,7 +120,14 @@ def main() -> None:
     parser.add_argument("--history", type=Path, help="add what each cost to this CSV")
     parser.add_argument("--peer", type=Path, help="virtual environment with genesis-world")
     parser.add_argument("--peer-install", type=Path, help="make that environment here, and stop")
+    parser.add_argument(
+        "--phases", action="store_true", help="print where a substep's time goes, and stop"
+    )
     chosen = parser.parse_args()
+    if chosen.phases:
+        size = QUICK if chosen.quick else FULL
+        print(phases.table(PHASED_QUICK if chosen.quick else PHASED, size.substeps))
+        return
     if chosen.peer_install:
         install(chosen.peer_install)
         return

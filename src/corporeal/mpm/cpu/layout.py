@@ -118,10 +118,10 @@ POST = Record(  # one thread's, on a cache line of its own
 )
 THREAD_POOL = Record(
     "ThreadPool",
-    ("void *", "yield_core"),  # the system's sched_yield, or null
+    ("void *", "yield_core read_clock"),  # the system's sched_yield and clock_gettime, or null
     ("int *", "phase"),  # [phases][4]: piece, first task, how many, or where in World that stands
-    ("int", "phases threads now piece first count started spare"),
-    ("unsigned long long[2]", "fill0"),
+    ("double *", "spent"),  # [phases + 1], or null: see phase_clock.py
+    ("int", "phases threads now piece first count started clock_id"),
     ("int", "epoch stopped"),  # a line of their own
     ("unsigned long long[7]", "fill1"),
     ("int", "done spare2"),

@@ -43,6 +43,8 @@ START, MARK, FIND, STAND, LIST, LOOK, FACE, REACH, CHOOSE, SOLVE, RESOLVE = rang
 )
 TOUCHING = "start mark find stand list look face reach choose solve resolve"
 """Pieces of contact: ``loops/contact_NAME.cpp``."""
+NAMES = [*"lay move pace clear blow spring forces".split(), *TOUCHING.split()]
+"""Of all pieces, by number."""
 
 
 class Phase(NamedTuple):

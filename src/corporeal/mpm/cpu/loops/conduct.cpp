@@ -1,10 +1,22 @@
 // Hands one thread its next task, as piece << 24 | task, or -1 when the steps end. A phase is over when
 // its last task is done, so a thread that the system put to sleep between tasks holds nobody up.
+typedef int ReadClock(int, long long *);
 struct Conduct {
+  // The phase that ends took what passed on this thread's clock since it began.
+  static inline void note(ThreadPool *pool) {
+    long long now[2];   // seconds and nanoseconds
+    ((ReadClock *)pool->read_clock)(pool->clock_id, now);
+    const double read = (double)now[0] + 1e-9 * (double)now[1];
+    double *begun = pool->spent + pool->phases;
+    if (*begun > 0) pool->spent[pool->now] += read - *begun;
+    *begun = read;
+  }
   // The last task of a phase is done, or none was begun: open the next phase that has tasks.
   static inline void next_phase(World *world, ThreadPool *pool) {
+    if (pool->spent) note(pool);
     for (;;) {
       if (world->stop || world->full) {
+        if (pool->spent) pool->spent[pool->phases] = 0;
         __atomic_store_n(&pool->stopped, 1, __ATOMIC_RELEASE);
         return;
       }
