@@ -55,6 +55,15 @@ def test_pictures_that_share_little_say_nothing():
     assert found == Groups(())
 
 
+def test_a_folder_of_which_two_fifths_show_something_else_each_goes_on_without_these():
+    """As 500 photographs of which 200 are of other days; of fewer COLMAP leaves out its own."""
+    found = groups_of(beside(circle(60), np.zeros((40, 40), int)))
+    assert not found.mixed and found.beside == tuple(range(60, 100))
+    assert groups_of(beside(circle(60), np.zeros((20, 20), int))).beside == ()
+    few = groups_of(beside(circle(40), np.zeros((60, 60), int)))
+    assert few.beside == (), "nobody can say that the fewer are what is meant"
+
+
 @pytest.fixture(scope="module")
 def two_places(tmp_path_factory):
     folder = tmp_path_factory.mktemp("places") / "photos"

@@ -15,6 +15,7 @@ from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
 from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
+from corporeal.masking.floor_pattern import shows_floor
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds
 from corporeal.masking.total_variation import Cutter
@@ -26,6 +27,8 @@ Progress = Callable[[float, str], None]
 ROUGH, FINE = 192, 384
 """Longer side of the pictures that rounds look at, and of the masks that come out [px]."""
 ROUNDS = 4
+FLOOR = 6.0
+"""Evidence against a pixel that shows the floor's pattern: more than any colour's for it."""
 IN_HULL, BESIDE_HULL = -0.5, 2.0
 """Evidence against a pixel that is in the silhouette of the hull, and of one well beside it."""
 MARGIN = 0.03
@@ -96,8 +99,10 @@ def grow(
     """
     rough = reduced(views, ROUGH)
     side, room = _Side(rough), volume(rough.cameras, seeds.around, seeds.floor, seeds.cone)
+    floor = shows_floor(views, seeds.floor, seeds.around)
+    on_floor = np.float32(FLOOR) * _shrunk(floor, rough.rgb.shape[1:3])
     inside, outside = (histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
-    never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0))
+    never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0)) + on_floor
     state: _Round | None = None
     evidence, before = Evidence(inside, outside, never), seeds.never
     for turn in range(ROUNDS):
@@ -106,11 +111,12 @@ def grow(
         state = _round(side, room, evidence)
         if state is None:
             return None
-        evidence = state.evidence
+        on_floor = np.where(state.hiding, np.float32(0), on_floor)
+        evidence = replace(state.evidence, prior=state.evidence.prior + on_floor)
     assert state is not None
     progress(ROUNDS / (ROUNDS + 1), "drawing their outlines")
     return Grown(
-        inside=_drawn(views, evidence, state.silhouettes),
+        inside=_drawn(views, state, floor),
         coherence=_agreement(state.masks, state.silhouettes),
         settled=_agreement(state.masks, before),
         alike=overlap(evidence.inside, evidence.outside),
@@ -125,6 +131,8 @@ class _Round:
     masks: Bool[np.ndarray, "V H W"]
     silhouettes: Bool[np.ndarray, "V H W"]
     """Of the hull that masks leave."""
+    hiding: Bool[np.ndarray, "V H W"]
+    """Of what of the hull is high above the floor, which is not seen there."""
     outer: float
     """As in ``Grown``."""
     evidence: Evidence
@@ -144,15 +152,18 @@ def _round(side: _Side, room: Volume, evidence: Evidence) -> _Round | None:
     outside = histogram(side.bins, ~band | ~(seen | masks))
     prior = np.where(seen, IN_HULL, np.where(band, 0, BESIDE_HULL)).astype(np.float32)
     outer = float(room.outer[hull].mean())
-    return _Round(masks, seen, outer, Evidence(inside, outside, prior))
+    hiding = room.silhouettes(hull & room.tall)
+    return _Round(masks, seen, hiding, outer, Evidence(inside, outside, prior))
 
 
 def _drawn(
-    views: Views, evidence: Evidence, seen: Bool[np.ndarray, "V H W"]
+    views: Views, state: _Round, floor: Bool[np.ndarray, "V h w"]
 ) -> Float32[np.ndarray, "V h w"]:
     """Cut the pictures at their full size, and keep what hangs together with silhouettes."""
-    size = views.rgb.shape[1:3]
-    fine = replace(evidence, prior=_enlarged(evidence.prior, size))
+    size, seen = views.rgb.shape[1:3], state.silhouettes
+    floor = floor & (_enlarged(state.hiding.astype(np.float32), size) <= HALF)
+    prior = _enlarged(state.evidence.prior, size) + np.float32(FLOOR) * floor.astype(np.float32)
+    fine = replace(state.evidence, prior=prior)
     inside = _Side(views).cut(fine)
     for one, hull in zip(inside, _enlarged(seen.astype(np.float32), size), strict=True):
         pieces = label(one > HALF)
@@ -169,6 +180,16 @@ def _enlarged(
 ) -> Float32[np.ndarray, "V h w"]:
     wide = size[1], size[0]
     made = [Image.fromarray(p).resize(wide, Image.Resampling.BILINEAR) for p in pictures]
+    return np.stack([np.asarray(p) for p in made])
+
+
+def _shrunk(
+    pixels: Bool[np.ndarray, "V h w"], size: tuple[int, int]
+) -> Float32[np.ndarray, "V H W"]:
+    """Return which share of each larger pixel is marked."""
+    wide = size[1], size[0]
+    whole = pixels.astype(np.float32)
+    made = [Image.fromarray(p).resize(wide, Image.Resampling.BOX) for p in whole]
     return np.stack([np.asarray(p) for p in made])
 
 

@@ -24,6 +24,8 @@ from corporeal.masking.seeds import looked_at
 
 Progress = Callable[[float, str], None]
 
+METHOD = 2
+"""Raised when other masks would be grown: those of an older method are grown again."""
 GROWN = 0.8
 """Share of the work that is done when masks are grown."""
 
@@ -57,7 +59,7 @@ def grown_masks(
         UserError: The photographs cannot be used, or nothing is at the place that is pointed at.
 
     """
-    made_by = store.key("grown masks", pointed, [store.digest(source)])
+    made_by = store.key(f"grown masks {METHOD}", pointed, [store.digest(source)])
     record = read_record(folder)
     if record is not None and record.made_by == made_by:
         return GrownMasks(folder if record.digest_of else None, (*record.said, *_changes(folder)))

@@ -18,6 +18,8 @@ SEEN = 0.25
 """Share of the views that must see a cell."""
 PIECE = 0.1
 """Pieces of a hull smaller than that share of the largest are chance."""
+TALL = 0.15
+"""Height above the floor, in radii of the ball, of cells that surely hide the floor."""
 ON_FLOOR = 0.01
 """Height of the layer that is the floor, in radii of the ball."""
 
@@ -36,6 +38,8 @@ class Volume:
     """How far a cell reaches beside the pixel of its middle [px]."""
     outer: Bool[np.ndarray, " M"]
     """Whether a cell is at the edge of the ball."""
+    tall: Bool[np.ndarray, " M"]
+    """Whether a cell is so high above the floor that before it no floor is seen."""
 
     def carved(self, masks: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, " M"]:
         """Return which cells masks leave, without small pieces.
@@ -94,9 +98,10 @@ def volume(
     cells = np.stack(np.meshgrid(line, line, line, indexing="ij"), axis=-1).reshape(-1, 3)
     far = np.linalg.norm(cells, axis=1)
     places = np.array(around.centre) + around.radius * cells
-    good = far < 1
+    good, height = far < 1, np.zeros(len(cells))
     if floor is not None:
-        good &= places @ floor.normal - floor.offset > ON_FLOOR * around.radius
+        height = (places @ floor.normal - floor.offset) / around.radius
+        good &= height > ON_FLOOR
     index = np.flatnonzero(good)
     pixel = np.stack([pixels_of(places[index], c) for c in cameras])
     if cone is not None:
@@ -110,7 +115,8 @@ def volume(
     footprint = np.maximum(np.ceil(side / 2), 1).astype(np.int64)
     shape = len(cameras), cameras[0].height, cameras[0].width
     outer = far[index] > 1 - 4 / ACROSS
-    return Volume(index, pixel.astype(np.int32), shape, footprint, outer)
+    tall = height[index] > TALL
+    return Volume(index, pixel.astype(np.int32), shape, footprint, outer, tall)
 
 
 def pixels_of(points: Float[np.ndarray, "N 3"], camera: Camera) -> Int[np.ndarray, " N"]:

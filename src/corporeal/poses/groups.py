@@ -37,6 +37,9 @@ SORT_THEM = (
     "Put the photographs of each into a folder of their own. If all show one thing that was moved "
     "or turned over, give masks of it."
 )
+MOST_ALONE = 0.3
+"""Share of pictures that share points with no other, above which the rest is searched without
+them: COLMAP leaves out fewer itself, and of more it would seem that nothing fits together."""
 OUTWEIGHS = 3.0
 """So many times as large as the next, a group is what was meant."""
 
@@ -47,6 +50,8 @@ class Groups:
 
     certain: tuple[tuple[int, ...], ...]
     """Places of their own, the largest first."""
+    alone: tuple[int, ...] = ()
+    """Many pictures that share points with no other, beside a place that most of all show."""
 
     @property
     def mixed(self) -> bool:
@@ -56,7 +61,9 @@ class Groups:
     @property
     def beside(self) -> tuple[int, ...]:
         """Pictures of other places than the one that is meant."""
-        return () if self.mixed else tuple(k for group in self.certain[1:] for k in group)
+        if self.mixed:
+            return ()
+        return tuple(sorted([*(k for group in self.certain[1:] for k in group), *self.alone]))
 
 
 def groups_of(shared: Int[np.ndarray, "N N"]) -> Groups:
@@ -72,7 +79,11 @@ def groups_of(shared: Int[np.ndarray, "N N"]) -> Groups:
     members = [np.flatnonzero(label == k) for k in np.unique(label)]
     large = [m for m in members if len(m) >= least and np.median(joined[m].sum(axis=1)) >= JOINED]
     large.sort(key=len, reverse=True)
-    return Groups(tuple(tuple(m.tolist()) for m in large))
+    alone = np.concatenate([m for m in members if len(m) == 1] or [np.zeros(0, np.int64)])
+    most = bool(large) and len(large[0]) > len(shared) / 2
+    if not most or len(alone) <= MOST_ALONE * len(shared):
+        alone = alone[:0]
+    return Groups(tuple(tuple(m.tolist()) for m in large), tuple(np.sort(alone).tolist()))
 
 
 def told_apart(groups: Groups, names: Sequence[str]) -> str:
