@@ -3,7 +3,9 @@
 from dataclasses import replace
 from math import sqrt
 
+import numpy as np
 import pytest
+import trimesh
 
 import corporeal as co
 from corporeal.stages.fill import FillConfig
@@ -31,6 +33,20 @@ def test_a_plate_that_falls_flat_is_struck_as_fast_as_it_fell():
     mass = 0.16 * 0.12 * 0.004 * 2500
     assert found.energy <= 1.02 * mass * G * drop
     assert found.word == "may break"
+
+
+def test_a_plate_with_a_rim_is_as_thin_as_its_wall():
+    """Its box is 4 times as high, and would bear 13 times the energy."""
+    flat = [[0, 0], [0.12, 0], [0.12, 0.004], [0, 0.004]]
+    rim = [[0, 0], [0.06, 0], [0.12, 0.012], [0.12, 0.016], [0.06, 0.004], [0, 0.004]]
+    bears = []
+    for profile in (flat, rim):
+        shape = trimesh.creation.revolve(np.array(profile), sections=48)
+        shape.apply_transform(trimesh.transformations.rotation_matrix(1.57, (1, 0, 0)))
+        shape.apply_translation((0, 0, 0.13 - shape.bounds[0, 2]))
+        found = struck(co.solid("porcelain", shape.vertices, shape.faces, name="plate"))["plate"]
+        bears.append(found.energy / found.ratio)
+    assert bears[1] == pytest.approx(bears[0], rel=0.35)
 
 
 def test_what_is_not_brittle_is_not_judged():

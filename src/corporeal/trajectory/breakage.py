@@ -271,7 +271,7 @@ class _Blows:
         form: Form = "lump"
         thickness, length, radius = 0.0, short, short / 2.0
         if middle > FLAT * short:
-            form, thickness, length = "plate", wall or short, middle
+            form, thickness, length = "plate", wall or self._sheet(k, owner, short), middle
             # It is flat: what strikes it is round, or else its own edge.
             radius = other_radius if np.isfinite(other_radius) else thickness / 2.0
             other_radius = np.inf
@@ -282,6 +282,20 @@ class _Blows:
             thickness, radius = wall, middle / 2.0
         strength = material.strength_local
         return Brittle(form, solid, strength, radius, thickness, length, other_radius)
+
+    def _sheet(self, k: int, owner: int, short: float) -> float:
+        """Mean thickness of a solid sheet [m], 2 V/A with both faces in A.
+
+        A plate with a rim is thinner than its box is high. Where an object has several parts, the
+        area of one is not known, and the box's shortest side counts.
+        """
+        if np.any((self.particles.object == owner) & (self.particles.part != k)):
+            return short
+        mesh = joined([s for s in self.scene.surfaces if s.object == owner])
+        a, b, c = (mesh.vertices[mesh.triangles[:, i]] for i in range(3))
+        area = 0.5 * float(np.linalg.norm(np.cross(b - a, c - a), axis=1).sum())
+        volume = float(self.particles.volume[self.particles.part == k].sum())
+        return min(short, 2.0 * volume / area)
 
     def _sides(self, k: int) -> list[float]:
         """Sides of a part's box at the start [m], shortest first: along the axes, or as it lies."""
