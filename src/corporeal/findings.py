@@ -42,7 +42,8 @@ class ObjectOutcome:
     dent_from_contact_m: Mapping[str, float | None]
     """Other body → distance of the dent's centroid from where the two first touched [m]."""
     deepest_squeeze_m: float
-    """Largest displacement of a particle once rigid motion is removed, at any time [m]."""
+    """Displacement that a hundredth of the particles exceed once rigid motion is removed, at any
+    time [m]."""
     moved_m: Vector
     """Displacement of the centre of mass [m]."""
     moved_level_m: float

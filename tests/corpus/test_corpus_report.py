@@ -211,6 +211,16 @@ def test_the_page_for_the_documentation_names_what_went_wrong_and_what_was_not_r
     assert all(len(row.split("|")) in (12 + 1, 9 + 2) for row in tables)
 
 
+def test_the_page_for_the_documentation_names_who_touched_before_anything_happened(tmp_path):
+    together = HAPPENED.pairs | {"a_0|b_0": pair_outcome(first_contact_s=0.0)}
+    expected = (Expectation("It falls", "", "", False),)
+    quiet = audit(outcome=replace(HAPPENED, order=(), pairs=together), expectations=expected)
+    a_corpus(tmp_path, [quiet])
+    write_docs(collect(tmp_path), tmp_path / "page.md")
+    text = (tmp_path / "page.md").read_text()
+    assert "what was planned did not happen: a_0 and b_0 touched from the start." in text
+
+
 def test_the_page_for_the_documentation_says_where_nothing_was_run(tmp_path):
     write_plan(tmp_path, plan(pool(4), CorpusConfig(scenes=3)))
     write_docs(collect(tmp_path), tmp_path / "page.md")

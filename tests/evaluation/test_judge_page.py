@@ -1,12 +1,16 @@
 """The page of judged films, and where the films come from."""
 
+from dataclasses import replace
+from functools import partial
+
 import numpy as np
 import pytest
 
 from corporeal.errors import UserError
 from corporeal.evaluation.dynamics.places import reference_folder, run_folder
 from corporeal.evaluation.judge.film_question import FilmAsked, Price
-from corporeal.evaluation.judge.judge_page import cannot_tell, write_page
+from corporeal.evaluation.judge.judge_page import ROW, cannot_tell, write_page
+from corporeal.evaluation.judge.judge_pictures import TakenSingly
 from corporeal.evaluation.judge.judge_runs import scenes_in
 from corporeal.evaluation.judge.judge_scenes import Failed, Films
 from corporeal.evaluation.judge.judge_tables import weigh_judge
@@ -14,7 +18,7 @@ from corporeal.evaluation.judge.put_to_judge import Judged, distinct
 from corporeal.evaluation.judge.subquestions import catalogue
 from corporeal.evaluation.judge.telling import FilmVerdict
 from corporeal.pipeline import RUN
-from corporeal.vlm import Question
+from corporeal.vlm import Album, Question
 
 
 def asked(condition, motion):
@@ -53,6 +57,22 @@ def test_the_page_says_first_what_the_judge_cannot_tell_and_trusts_no_words(judg
     assert "energy grew by 12 %" in text and "default-src 'none'" in text
     assert text.count("<figure>") == 2
     assert "hover, pace" in text
+
+
+def test_the_page_renders_no_picture_that_it_does_not_show_and_none_twice(judged, tmp_path):
+    taken = []
+
+    def take(number):
+        taken.append(number)
+        return np.full((30, 40, 3), 200, np.uint8)
+
+    pictures = TakenSingly([partial(take, k) for k in range(16)])
+    one = Question("dynamics", "?", "film-1", pictures=Album(lambda: pictures))
+    both = [FilmAsked("balls", c, 0, one) for c in ("ours", "single")]
+    films = replace(judged.films, asked=both)
+    judged = replace(judged, films=films)
+    write_page(judged, weigh_judge(judged), tmp_path / "judge.html")
+    assert taken == sorted(set(taken)) and len(taken) == ROW < len(pictures)
 
 
 def test_without_controls_nothing_can_be_told(judged):

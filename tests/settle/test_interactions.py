@@ -12,6 +12,7 @@ from corporeal.mpm.physics import wind
 from corporeal.settle.body import FRICTION, Pose
 from corporeal.settle.breeze import FIRM, wind_that_moves
 from corporeal.settle.interactions import (
+    APART,
     BLOWS,
     FALL,
     KINDS,
@@ -101,6 +102,13 @@ def test_nothing_is_sent_through_what_stands_between():
         name, v = action.entries[0].name, action.entries[0].velocity
         assert (name, np.sign(v[0])) in (("a", 1), ("b", 1), ("b", -1), ("c", -1))
         assert "sent into" in action.words and not {"a", "c"} <= set(action.words.split())
+
+
+@pytest.mark.parametrize(("gap", "found"), [(0.9, False), (1.1, True)])
+def test_nothing_is_sent_into_what_its_own_weight_may_spread_onto(gap, found):
+    between = 0.1 + 0.15 + gap * APART * 0.3
+    pair = stood((cube("a", 0.2), 0, 0), (cube("b", 0.3), between, 0))
+    assert (begun(pair, "collision", 0) is not None) is found
 
 
 def test_wind_blows_on_everything_alike_along_the_floor_and_abates():

@@ -4,7 +4,14 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from corporeal.trajectory.residual_shape import dent, rigid_fit, shape_error, where_it_was
+from corporeal.trajectory.residual_shape import (
+    dent,
+    largest,
+    reached_by_share,
+    rigid_fit,
+    shape_error,
+    where_it_was,
+)
 
 RNG = np.random.default_rng(3)
 CUBE = RNG.uniform(-0.05, 0.05, (8000, 3))
@@ -80,3 +87,10 @@ def test_a_place_on_a_body_is_found_again_after_it_moved():
     place = np.array([0.02, 0.01, 0.04])
     then = where_it_was(TURN @ place + [1, 0, 0], CUBE @ TURN.T + [1, 0, 0], CUBE)
     np.testing.assert_allclose(then, place, atol=1e-9)
+
+
+def test_how_far_a_share_of_a_body_goes_does_not_grow_with_the_number_of_its_points():
+    """Leaves swing the farther the farther out they are: few swing far."""
+    few, many = (RNG.exponential(0.01, size=n) for n in (1250, 40_000))
+    assert reached_by_share(many) == pytest.approx(reached_by_share(few), rel=0.15)
+    assert largest(many) > 1.3 * largest(few), "the control: a fixed number of the largest"

@@ -298,7 +298,8 @@ def _judge(out: Path, how: "JudgeConfig", json: Path | None, page: Path | None) 
     if json is not None:
         store.write_json(json, judge_tables.record(found.judged, found.result))
     if page is not None:
-        judge_page.write_page(found.judged, found.result, page)
+        with progress_bars() as tell:
+            judge_page.write_page(found.judged, found.result, page, tell("page"))
 
 
 def _show(tables: Sequence[Table]) -> None:

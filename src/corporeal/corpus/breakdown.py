@@ -139,7 +139,8 @@ def rows(corpus: Collected) -> list[dict[str, Any]]:
 def _row(scene: SceneRecord) -> dict[str, Any]:
     planned, proof = scene.planned, scene.certificate
     numbers = asdict(scene.numbers) if scene.numbers else {}
-    words = {name: " | ".join(numbers.pop(name, ())) for name in ("breaches", "warnings")}
+    lists = ("breaches", "warnings", "touched_before", "met_in_order")
+    words = {name: " | ".join(numbers.pop(name, ())) for name in lists}
     return {
         "scene": planned.name,
         "interaction": planned.interaction,

@@ -9,7 +9,7 @@ from corporeal.corpus.manifest import Row, read_rows
 from corporeal.corpus.plan import Plan, PlannedScene, read_plan
 from corporeal.corpus.run import RUNS, SCENE, SCENES, VIEWS
 from corporeal.errors import UserError
-from corporeal.findings import Outcome, RunAudit
+from corporeal.findings import FLOOR, Outcome, RunAudit
 from corporeal.formats.scene_file import read_scene_file
 from corporeal.materials import named
 from corporeal.pipeline import Settings, reopen
@@ -53,6 +53,10 @@ class Numbers:
     """Of those, pairs that parted again."""
     seen: bool
     """What the interaction promises happened; in the showcase, all that is expected."""
+    touched_before: tuple[str, ...]
+    """Pairs of objects that touched from the start, in words: none of them can strike the other."""
+    met_in_order: tuple[str, ...]
+    """Pairs of objects that were apart and met, in words, by time."""
     expected: int
     """How much is expected of a scene of the showcase."""
     expected_met: int
@@ -222,6 +226,12 @@ def measures(audit: RunAudit, kind: Kind, sent: Sequence[str] = ()) -> Numbers:
         met=len(met),
         separated=sum(bool(p.separated) for p in met),
         seen=all(e.met for e in wanted) if wanted else _seen(kind, happened, landed, sent),
+        touched_before=tuple(
+            " and ".join(name.split("|"))
+            for name, pair in happened.pairs.items()
+            if not name.endswith(f"|{FLOOR}") and pair.first_contact_s == 0.0
+        ),
+        met_in_order=tuple(" and ".join(pair) for pair in happened.order),
         expected=len(wanted),
         expected_met=sum(e.met for e in wanted),
         largest_dent_dx=max((t.dent_depth_dx for t in objects), default=0.0),

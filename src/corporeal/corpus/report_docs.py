@@ -111,8 +111,12 @@ def _wrong(corpus: Collected) -> list[str]:
 def _faults(found: Numbers | None) -> list[str]:
     if found is None:
         return []
-    missed = [] if found.seen else ["what was planned did not happen."]
-    return [*found.breaches, *missed]
+    if found.seen:
+        return list(found.breaches)
+    touched, met = ", ".join(found.touched_before), ", then ".join(found.met_in_order)
+    seen = [f"{touched} touched from the start"] * bool(touched) + [f"{met} met"] * bool(met)
+    why = "; ".join(seen) or "no objects touched"
+    return [*found.breaches, f"what was planned did not happen: {why}."]
 
 
 def _table(heads: Sequence[str], rows: Iterable[Sequence[str]]) -> list[str]:

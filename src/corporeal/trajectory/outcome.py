@@ -11,7 +11,7 @@ from scipy.spatial import Delaunay
 
 from corporeal.findings import FLOOR, ObjectOutcome, Outcome, PairOutcome, pair_name
 from corporeal.geometry.rigid_fit import rigid_fit
-from corporeal.trajectory.residual_shape import Dent, dent, diagonal, largest, where_it_was
+from corporeal.trajectory.residual_shape import Dent, dent, diagonal, reached_by_share, where_it_was
 from corporeal.types import Particles, Scene, Trajectory, Vector
 
 REST = 0.3
@@ -76,7 +76,7 @@ class Bodies:
             fit = rigid_fit(start, now, np.ones(len(start)))
             shift = np.linalg.norm(fit.undo(now) - start, axis=1)
             self.error[k, b] = np.sqrt(np.mean(shift**2)) / diagonal(start)
-            self.squeeze[b] = max(self.squeeze[b], largest(shift))
+            self.squeeze[b] = max(self.squeeze[b], reached_by_share(shift))
             if keep:
                 self.last[b].append(now)
 

@@ -10,6 +10,8 @@ from corporeal.geometry.rigid_fit import RigidFit, rigid_fit
 
 ROUNDS, TRUSTED = 5, 0.7
 """The rigid fit is repeated on the trusted share of points that fitted best."""
+DEEPEST = 0.01
+"""Share of a body's particles that went farther than is reported as its squeeze."""
 NEIGHBOURS = 32
 """Particles around a place that tell where it was."""
 
@@ -45,6 +47,15 @@ def largest(size: Float[np.ndarray, " N"]) -> float:
     """Mean of the eight largest values: one cell's worth of particles."""
     few = min(8, len(size))
     return float(np.partition(size, len(size) - few)[-few:].mean())
+
+
+def reached_by_share(size: Float[np.ndarray, " N"]) -> float:
+    """Return what a hundredth of the values exceed.
+
+    A fixed number of largest values grows with how many there are: the mean of eight is 23 mm for
+    the leaves of a ficus of 1,238 particles and 40 mm of 3,094, this 21.5 and 21.9 mm.
+    """
+    return float(np.quantile(size, 1.0 - DEEPEST))
 
 
 @dataclass(frozen=True)

@@ -1,13 +1,12 @@
 """The page of a judged evaluation: first what the judge cannot tell, at the end every film."""
 
 import io
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 from PIL import Image
 
-from corporeal.evaluation.judge.film_question import FilmAsked
 from corporeal.evaluation.judge.judge_tables import JudgeResult, tables
 from corporeal.evaluation.judge.put_to_judge import Judged
 from corporeal.evaluation.judge.staging import DATED
@@ -16,14 +15,26 @@ from corporeal.evaluation.result_table import Table
 from corporeal.render.page import figure, held, page, safe
 from corporeal.store import write_bytes
 
+Progress = Callable[[float, str], None]
 ROW = 6
 """Pictures of a film on the page."""
 QUALITY = 80
 """Of their JPEG."""
 
 
-def write_page(judged: Judged, result: JudgeResult, path: Path) -> None:
-    """Write the page; the pictures of every film's first look are rendered for it.
+def write_page(
+    judged: Judged,
+    result: JudgeResult,
+    path: Path,
+    progress: Progress = lambda fraction, words: None,
+) -> None:
+    """Write the page; ``ROW`` pictures of every film's first look are rendered for it.
+
+    Args:
+        judged: What was said of which films.
+        result: What follows.
+        path: Of the page.
+        progress: Told the fraction done and which film is rendered.
 
     Raises:
         UserError: The file cannot be written.
@@ -31,7 +42,16 @@ def write_page(judged: Judged, result: JudgeResult, path: Path) -> None:
     """
     trusted = {q for questions in result.believed.values() for q in questions}
     looked = {(a.scene, a.condition): a for a in judged.films.asked if a.look == 0}
-    films = [_film(v, looked[v.scene, v.condition], trusted) for v in judged.verdicts]
+    films = []
+    strips: dict[tuple[str, str], bytes] = {}
+    for number, verdict in enumerate(judged.verdicts):
+        progress(number / len(judged.verdicts), f"{verdict.scene} {verdict.condition}")
+        question = looked[verdict.scene, verdict.condition].question
+        # A baseline that is also a control is one motion, and is rendered once.
+        motion = question.scene, question.prompt
+        if motion not in strips:
+            strips[motion] = _strip(question.pictures)
+        films.append(_film(verdict, strips[motion], trusted))
     text = page(
         "corporeal.evaluation.judge",
         "judge.html",
@@ -70,7 +90,7 @@ def _table(table: Table) -> str:
     return f"<h2>{safe(table.title)}</h2><table><tr>{heads}</tr>{rows}</table>"
 
 
-def _film(verdict: FilmVerdict, asked: FilmAsked, trusted: set[str]) -> str:
+def _film(verdict: FilmVerdict, row: bytes, trusted: set[str]) -> str:
     alarms = [
         f"<b>{safe(q)}</b>" if q in trusted else safe(q)
         for q, share in verdict.alarm.items()
@@ -78,7 +98,7 @@ def _film(verdict: FilmVerdict, asked: FilmAsked, trusted: set[str]) -> str:
     ]
     said = "; ".join(safe(words) for words in verdict.happens)
     name = f"{verdict.scene}: {verdict.condition}"
-    strip = figure(name, held(_strip(asked.question.pictures), "image/jpeg"))
+    strip = figure(name, held(row, "image/jpeg"))
     reported = ", ".join(alarms) or "no violation"
     return f"{strip}<p>{reported}; whole {verdict.whole:.1f} of 5. “{said}”</p>"
 

@@ -1,5 +1,9 @@
 """What a judge is shown of a film in one look."""
 
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
+
 import numpy as np
 from jaxtyping import UInt8
 
@@ -14,15 +18,35 @@ from corporeal.render.embree import Light, Stage, render
 PICTURES = DATED + CLOSE + 1
 
 
-def shown(
-    film: FilmedMotion, staging: Staging, look: int
-) -> tuple[UInt8[np.ndarray, "H W 3"], ...]:
-    """Render a film: dated pictures, close-ups, and the diagram of its paths.
+class TakenSingly(Sequence[np.ndarray]):
+    """Pictures each of which is rendered when somebody first looks at it."""
+
+    def __init__(self, takes: Sequence[Callable[[], np.ndarray]]) -> None:
+        self._takes = takes
+        self._taken: dict[int, np.ndarray] = {}
+
+    def __len__(self) -> int:
+        return len(self._takes)
+
+    def __getitem__(self, index) -> Any:
+        if isinstance(index, slice):
+            return [self[k] for k in range(*index.indices(len(self)))]
+        number = range(len(self))[index]
+        if number not in self._taken:
+            self._taken[number] = self._takes[number]()
+        return self._taken[number]
+
+
+def shown(film: FilmedMotion, staging: Staging, look: int) -> Sequence[UInt8[np.ndarray, "H W 3"]]:
+    """Show a film: dated pictures, close-ups, and the diagram of its paths.
 
     Args:
         film: What moves.
         staging: When and from where.
         look: Which of ``TURNS``.
+
+    Returns:
+        ``PICTURES`` pictures, each rendered when it is looked at.
 
     """
     stage = Stage(film.prepared.scene, Light(front=staging.view))
@@ -33,14 +57,14 @@ def shown(
         return key.caption(render(posed, camera, "draft", cores()), words)
 
     dated = [
-        picture(time, wide, f"{number}   t = {time:.3f} s")
+        partial(picture, time, wide, f"{number}   t = {time:.3f} s")
         for number, time in enumerate(staging.times.tolist(), 1)
     ]
     close = [
-        picture(c.time, staging.near(c, look), f"close   t = {c.time:.3f} s")
+        partial(picture, c.time, staging.near(c, look), f"close   t = {c.time:.3f} s")
         for c in staging.closes
     ]
-    return (*dated, *close, path_picture(film, staging, wide))
+    return TakenSingly([*dated, *close, partial(path_picture, film, staging, wide)])
 
 
 def how(look: int) -> str:
