@@ -132,3 +132,40 @@ def test_a_replay_that_nobody_asked_for_is_not_found(small_run):
             assert server.ask(path).status == 404
         assert server.order("/replay/stop", id="x").status == 400
         assert server.ask("/replay", "POST", b"{}").status == 403
+
+
+def test_of_several_pulls_between_two_advances_the_last_is_remembered(touched):
+    hands = Hands(touched.posed, touched.posed.problem, 1)
+    place = tuple(hands.start[0].tolist())
+    hands.obey(Order("grab", object=BALL, point=place, to=place))
+    for k in range(20):
+        hands.obey(Order("pull", to=(0.0, 0.0, 0.01 * k)))
+    hands.advance(0.01)
+    assert [t.order.do if t.order else "" for t in hands.touches] == [HOLD, "pull", ""]
+    again = Hands(touched.posed, touched.posed.problem, 1)
+    again.replay(hands.touches)
+    now, then = hands.engine.snapshot(), again.engine.snapshot()
+    np.testing.assert_array_equal(now.position, then.position)
+
+
+@pytest.mark.slow
+def test_touching_does_not_take_more_and_more_memory(made):
+    from pathlib import Path
+
+    if not Path("/proc/self/statm").exists():
+        pytest.skip("this system does not say how much memory a process holds")
+    live = Live(live_scene(made, 1), 1)
+    place = tuple(live.hands.start[0].tolist())
+    live._do(Order("grab", object=BALL, point=place, to=place))
+    pages = []
+    for k in range(600):  # twenty seconds of pictures
+        high = (place[0], place[1], place[2] + 0.05 + 0.0001 * k)
+        live._do(Order("pull", to=high))
+        live._both(1e-4)
+        live._hand_over()
+        assert live.instant is not None
+        live.picture(live.instant)
+        pages.append(int(Path("/proc/self/statm").read_text().split()[1]))
+    kept = len(live.hands.touches) * 600  # bytes, of the record
+    grown = (pages[-1] - pages[200]) * 4096
+    assert grown < kept + 2e6, f"{grown / 1e6:.1f} MB in 400 pictures"

@@ -16,7 +16,7 @@ HOLD = "hold"
 """What a record has in place of a page's "grab": its point is that of matter at the start [m]."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Touch:
     """What was done to an engine: an order, or an advance to a time."""
 
@@ -74,8 +74,11 @@ class Hands:
         self.engine.advance(until)
         self.touches.append(Touch(until=until))
 
-    def obey(self, order: Order) -> None:
+    def obey(self, order: Order) -> Order | None:
         """Do what an order says to bodies; ``Hands`` knows nothing of playing and pausing.
+
+        Returns:
+            What another engine is told to do the same; None: nothing was done.
 
         Raises:
             UserError: It cannot be done.
@@ -85,9 +88,14 @@ class Hands:
         acts |= {"gravity": self._gravity, "wind": self._wind}
         if order.do == "grab":
             order = self._at_rest(order)
-        if order.do in acts:
-            acts[order.do](order)
-            self.touches.append(Touch(order))
+        if order.do not in acts:
+            return None
+        acts[order.do](order)
+        # Of several pulls between two advances only the last is felt.
+        if self.touches and order.do == "pull" and _pulls(self.touches[-1]):
+            self.touches.pop()
+        self.touches.append(Touch(order))
+        return order
 
     def replay(self, touches: Sequence[Touch]) -> None:
         """Do again what was done to another engine of the same bodies."""
@@ -194,3 +202,7 @@ class Hands:
         if self.held is None or at is None:
             return 0.0
         return float(self.held.stiffness * np.linalg.norm(np.array(self.held.to) - at))
+
+
+def _pulls(touch: Touch) -> bool:
+    return touch.order is not None and touch.order.do == "pull"

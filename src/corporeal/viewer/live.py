@@ -19,11 +19,11 @@ from corporeal.stages.fill import fill
 from corporeal.trajectory.played import Prepared
 from corporeal.treatment.live_quality import Demand, held, live_quality
 from corporeal.treatment.problem_from_scene import pose
-from corporeal.viewer.still_air import in_air
 from corporeal.viewer.hands import Hands
 from corporeal.viewer.moments import Moments
 from corporeal.viewer.orders import Order
 from corporeal.viewer.shelf import Made
+from corporeal.viewer.still_air import in_air
 
 FPS = 30.0
 """Pictures a second, at most."""
@@ -229,10 +229,9 @@ class Live:
         elif order.do == "step":
             self._both(1 / FPS)
         else:
-            before = len(self.hands.touches)
-            self.hands.obey(order)
-            if self.twin:
-                self.twin.replay(self.hands.touches[before:])
+            done = self.hands.obey(order)
+            if self.twin and done:
+                self.twin.obey(done)
 
     def _both(self, seconds: float) -> None:
         """Simulate so much more [s], and the control beside to the same instant."""

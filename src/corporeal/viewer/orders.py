@@ -23,7 +23,7 @@ PER_SECOND = 200
 KINDS = ("grab", "pull", "drop", "gravity", "wind", "play", "pause", "step", "reset", "contact")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Order:
     """One order; what its kind does not need is 0."""
 

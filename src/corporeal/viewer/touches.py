@@ -21,9 +21,9 @@ from corporeal.trajectory.played import Prepared
 from corporeal.treatment.problem_from_scene import Posed, pose
 from corporeal.typed import typed
 from corporeal.types import Frame
-from corporeal.viewer.still_air import in_air
 from corporeal.viewer.hands import Hands, Touch
 from corporeal.viewer.moments import Moments
+from corporeal.viewer.still_air import in_air
 
 Progress = Callable[[float, str], None]
 Contact = Literal["multi", "single"]

@@ -9,6 +9,7 @@ const HEAD = 44 // bytes of a picture before its objects
 const WINDS = [0, 2, 5, 10, 20] // [m/s]
 const FIRMNESS = [['soft', 2], ['firm', 4], ['hard', 8]] // [Hz]
 const HAND = 0xb5482a
+const MOST_LAGS = 2000 // times from an order to its picture that are remembered
 const LOOK_AGAIN = 1000 // [ms]
 const BESIDE = ['objects slide and part', 'all stick: one grid']
 
@@ -141,6 +142,7 @@ export class Touch {
     })
     this.show(held, force)
     for (const [number, then] of this.sent) if (number <= done) { viewer.stats.lag.push(performance.now() - then); this.sent.delete(number) }
+    if (viewer.stats.lag.length > MOST_LAGS) viewer.stats.lag.splice(0, MOST_LAGS / 2)
     viewer.stats.frames++
     Object.assign(viewer.stats, {rate, force, time: viewer.clock})
     viewer.clockWords.textContent = `${viewer.clock.toFixed(2)} s`
