@@ -1,17 +1,25 @@
 """How close to real time the live simulation of the viewer runs, and how many pictures it sends.
 
-    python benchmarks/live.py [SCENE ...] [--seconds 8] [--threads N]
+    python benchmarks/live.py [SCENE ...] [--seconds 8] [--threads N] [--memory MINUTES]
 
 Prepares showcase scenes, fills them again at the quality of the page's tab Touch, and lets each run
 as the server does, with somebody who pulls at the first object and a visitor who takes every
 picture. The rate per CPU second of stepping (one engine thread) is what a core of its own would
 give on a machine that does nothing else; the rate seen is lower where others work. Aim on two quiet
 cores: .8 of real time and 20 pictures a second in all seven scenes.
+
+With ``--memory`` each scene is touched for so many minutes, and the memory that the process holds
+is told at the end of its first fifth and at its end. What is done is remembered, up to 100,000
+entries; nothing else may grow.
 """
 
 import argparse
+import os
 import threading
 import time
+from pathlib import Path
+
+import numpy as np
 
 from corporeal.mixture import ground_weighed
 from corporeal.pipeline import Settings
@@ -116,17 +124,62 @@ def pull(live, visitor, until):
     return spent
 
 
+def held():
+    """Memory of this process [MB]; Linux only."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * os.sysconf("SC_PAGE_SIZE") / 1e6
+
+
+def remember(name, minutes, threads):
+    """Touch one scene for so many minutes; return a row of the memory that it takes."""
+    live = Live(live_scene(Made(results_of(name), "draft"), threads), threads)
+    visitor = Visitor(live)
+    live.start()
+    visitor.order(Order("play", 1))
+    seconds = 60.0 * minutes
+    begun, early = time.perf_counter(), 0.0
+    place = tuple(live.hands.engine.snapshot().position[0].tolist())
+    visitor.order(Order("grab", 2, 0, place, place))
+    number = 2
+    while (passed := time.perf_counter() - begun) < seconds:
+        number += 1
+        if number % 600 == 0:  # what has come to rest is begun again, as a person does
+            visitor.order(Order("reset", number))
+            number += 1
+            visitor.order(Order("grab", number, 0, place, place))
+        turn = 2.0 * np.pi * passed / 3.0
+        away = 0.1 * np.array([np.cos(turn), np.sin(turn), 1.0])
+        visitor.order(Order("pull", number, to=tuple((np.array(place) + away).tolist())))
+        if not early and passed > seconds / 5:
+            early = held()
+        time.sleep(1 / 60)
+    late, kept = held(), len(live.hands.touches)
+    visitor.leave()
+    live.close()
+    rows = [name, f"{seconds:.0f}", str(number), str(len(visitor.sizes)), f"{early:.1f}"]
+    return (*rows, f"{late:.1f}", f"{late - early:+.1f}", str(kept))
+
+
+MEMORY = ("scene", "s", "orders", "pictures", "MB at a fifth", "MB at the end", "growth", "record")
+
+
 def main():
     """Print a row a scene."""
     wanted = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     wanted.add_argument("scenes", nargs="*", metavar="SCENE")
     wanted.add_argument("--seconds", type=float, default=8.0)
     wanted.add_argument("--threads", type=int, default=threads_here())
+    wanted.add_argument("--memory", type=float, metavar="MINUTES")
     asked = wanted.parse_args()
-    print("|", " | ".join(HEADS), "|")
-    print("|", " | ".join("---" for _ in HEADS), "|")
+    heads = MEMORY if asked.memory else HEADS
+    print("|", " | ".join(heads), "|")
+    print("|", " | ".join("---" for _ in heads), "|")
     for name in asked.scenes or SCENES:
-        print("|", " | ".join(measure(name, asked.seconds, asked.threads)), "|", flush=True)
+        if asked.memory:
+            row = remember(name, asked.memory, asked.threads)
+        else:
+            row = measure(name, asked.seconds, asked.threads)
+        print("|", " | ".join(row), "|", flush=True)
 
 
 if __name__ == "__main__":

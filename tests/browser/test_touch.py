@@ -13,8 +13,8 @@ MIDDLE = """(() => {
   mesh.geometry.computeBoundingBox()
   const w = mesh.geometry.boundingBox.getCenter(viewer.eye.position.clone())
   const z = w.applyMatrix4(mesh.matrix).z, c = w.project(viewer.eye)
-  const r = viewer.canvas.getBoundingClientRect()
-  return [r.left + (c.x + 1) / 2 * r.width, r.top + (1 - c.y) / 2 * r.height, z] })()"""
+  const r = viewer.canvas.getBoundingClientRect(), wide = r.width / viewer.stages.length
+  return [r.left + (c.x + 1) / 2 * wide, r.top + (1 - c.y) / 2 * r.height, z] })()"""
 RISEN = 0.1
 """[m]"""
 
@@ -78,3 +78,57 @@ def test_the_mouse_lifts_a_ball_and_the_force_at_rest_is_its_weight(small_run, t
             time.sleep(0.1)
         assert room.live is None
         assert tab.errors == []
+
+
+@pytest.mark.slow
+def test_the_control_runs_beside_and_what_was_touched_is_replayed_at_draft(small_run, tmp_path):
+    from corporeal.viewer.live import Room
+    from corporeal.viewer.replays import FOLDER, Replays
+    from corporeal.viewer.shelf import Shelf
+    from corporeal.viewer.site import Shown, site
+    from corporeal.viewer.socket import live_route
+    from viewer_served import LOCAL, serving
+
+    shelf = Shelf((), small_run.parent)
+    room = Room(shelf.made)
+    replays = Replays(shelf, room)
+    app = site(Shown(shelf), LOCAL, (live_route(room), *replays.routes()))
+    before = sorted(path.name for path in small_run.rglob("*"))
+    with serving(app) as server, browser(tmp_path) as tab:
+        tab.open(f"{server.address}/view/drop")
+        tab.until(READY)
+        # Before anything is simulated there is nothing to replay.
+        assert "nothing to replay" in server.order("/replay", run="drop").json["error"]
+        tab.run("viewer.openTab('Touch')")
+        tab.until("viewer.stats.got > 5")
+        tab.run("viewer.live.contact.value = 'both'; viewer.live.contact.onchange()")
+        tab.until("viewer.stages.length === 2 && viewer.stats.time > 0.01")
+        captions = "[...document.querySelectorAll('.caption')].map(c => c.innerText)"
+        assert tab.run(captions) == ["objects slide and part", "all stick: one grid"]
+        # The stone is lifted on the left, and rises on the right as well.
+        x, y, _ = tab.run(MIDDLE.replace("OBJECT", "1"))
+        tab.run("window.stone = k => viewer.stages[k].meshes.find(m => m.surface.object === 1)")
+        start = tab.run("stone(1).matrix.elements[14]")
+        tab.mouse("mouseMoved", x, y, button="none", buttons=0)
+        tab.mouse("mousePressed", x, y)
+        for k in range(15):
+            tab.mouse("mouseMoved", x, y - 10 * k)
+            time.sleep(0.03)
+        tab.until(f"stone(1).matrix.elements[14] > {start + 0.02}")
+        tab.mouse("mouseReleased", x, y - 140)
+        tab.press(" ")
+        tab.until("!viewer.playing")
+        tab.picture(tmp_path / "beside.png")
+        # Once more, at draft; then both beside each other on one timeline.
+        tab.run("viewer.live.replay.click()")
+        tab.until("!!viewer.live.again.querySelector('a')", 400.0)
+        tab.run("viewer.live.again.querySelector('a').click()")
+        tab.until("window.viewer?.takes?.length === 2 && viewer.stats.drawn > 2")
+        assert tab.run("viewer.names.map(n => n.textContent)")[1] == "all stick: one grid"
+        assert tab.run("viewer.takes.every(t => t.times.length > 2)")
+        tab.picture(tmp_path / "replayed.png")
+        assert tab.run("[...viewer.pages.keys()]") == ["Look", "Audit"]
+        assert tab.errors == []
+    # The run itself is as it was; the record lies beside it.
+    assert sorted(path.name for path in small_run.rglob("*")) == before
+    assert len(list((small_run.parent / FOLDER).glob("*.json"))) == 1

@@ -56,6 +56,7 @@ def verb_view() -> None:
 def _show(asked: View) -> None:
     from corporeal.viewer.exports import Exports
     from corporeal.viewer.live import Room
+    from corporeal.viewer.replays import Replays
     from corporeal.viewer.serve import Address, door_of, listening, serve, where
     from corporeal.viewer.shelf import Shelf
     from corporeal.viewer.site import Shown, site
@@ -69,7 +70,9 @@ def _show(asked: View) -> None:
     shelf = Shelf(asked.runs, None if asked.runs else asked.out)
     room = Room(shelf.made)
     work = None if asked.read_only or asked.runs else Work(shelf, asked.out)
-    more = () if asked.read_only else (live_route(room), *Exports(shelf).routes())
+    replays = Replays(shelf, room)
+    live = (live_route(room), *Exports(shelf).routes(), *replays.routes())
+    more = () if asked.read_only else live
     more = more if work is None else (*more, *work.routes())
     app = site(Shown(shelf, names, asked.read_only, work is not None), door, more)
     try:
@@ -77,6 +80,7 @@ def _show(asked: View) -> None:
         serve(app, listener, ready, addresses[0] if asked.browser else "")
     finally:
         room.close()
+        replays.close()
         if work is not None:
             work.close()
 

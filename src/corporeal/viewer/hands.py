@@ -1,7 +1,7 @@
 """An engine that obeys orders, and a record of them from which it does the same again."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -12,8 +12,11 @@ from corporeal.treatment.problem_from_scene import Posed
 from corporeal.types import Vector
 from corporeal.viewer.orders import Order
 
+HOLD = "hold"
+"""What a record has in place of a page's "grab": its point is that of matter at the start [m]."""
 
-@dataclass(frozen=True)
+
+@dataclass(frozen=True, slots=True)
 class Touch:
     """What was done to an engine: an order, or an advance to a time."""
 
@@ -33,6 +36,14 @@ class Held:
     """[m]"""
 
 
+@dataclass(frozen=True)
+class _Spot:
+    """A particle, and the body that it is of."""
+
+    body: int
+    row: int
+
+
 class Hands:
     """Acts on one engine; all that is done goes into ``touches``."""
 
@@ -48,6 +59,7 @@ class Hands:
         self.posed, self.engine = posed, CpuEngine(problem, threads)
         counts = [len(body.position) for body in problem.bodies]
         self.first = np.cumsum([0, *counts])
+        self.start = np.concatenate([body.position for body in problem.bodies])
         self.held: Held | None = None
         self.touches: list[Touch] = []
 
@@ -62,27 +74,41 @@ class Hands:
         self.engine.advance(until)
         self.touches.append(Touch(until=until))
 
-    def obey(self, order: Order) -> None:
+    def obey(self, order: Order) -> Order | None:
         """Do what an order says to bodies; ``Hands`` knows nothing of playing and pausing.
+
+        Returns:
+            What another engine is told to do the same; None: nothing was done.
 
         Raises:
             UserError: It cannot be done.
 
         """
-        acts = {"grab": self._grab, "pull": self._pull, "drop": self._drop}
+        acts = {HOLD: self._hold, "pull": self._pull, "drop": self._drop}
         acts |= {"gravity": self._gravity, "wind": self._wind}
-        if order.do in acts:
-            acts[order.do](order)
-            self.touches.append(Touch(order))
+        if order.do == "grab":
+            order = self._at_rest(order)
+        if order.do not in acts:
+            return None
+        acts[order.do](order)
+        # Of several pulls between two advances only the last is felt.
+        if self.touches and order.do == "pull" and _pulls(self.touches[-1]):
+            self.touches.pop()
+        self.touches.append(Touch(order))
+        return order
 
     def replay(self, touches: Sequence[Touch]) -> None:
-        """Do again what was done to another engine of the same problem."""
+        """Do again what was done to another engine of the same bodies."""
         for touch in touches:
-            if touch.order is not None:
-                self.obey(touch.order)
-            else:
-                self.engine.advance(touch.until)
-                self.touches.append(touch)
+            self.again(touch)
+
+    def again(self, touch: Touch) -> None:
+        """Do one thing again."""
+        if touch.order is not None:
+            self.obey(touch.order)
+        else:
+            self.engine.advance(touch.until)
+            self.touches.append(touch)
 
     # ---------------------------------------------------------------- orders
 
@@ -92,20 +118,47 @@ class Hands:
             raise UserError(f"There is no object {number}.")
         return found
 
-    def _grab(self, order: Order) -> None:
-        bodies, place = self._bodies(order.object), self.engine.snapshot().position
-        point = np.array(order.point)
+    def _nearest(self, bodies: Sequence[int], places: np.ndarray, point: Vector) -> _Spot:
+        """Find the particle of some bodies that is nearest to a point [m].
 
-        def away(b: int) -> float:
-            mine = place[self.first[b] : self.first[b + 1]]
-            return float(np.linalg.norm(mine - point, axis=1).min())
+        Args:
+            bodies: Among which.
+            places: Of all particles, now or at the start [m].
+            point: In the same.
 
-        body = min(bodies, key=away)
+        """
+        rows = np.concatenate([np.arange(self.first[b], self.first[b + 1]) for b in bodies])
+        row = int(rows[np.linalg.norm(places[rows] - np.array(point), axis=1).argmin()])
+        return _Spot(int(np.searchsorted(self.first, row, side="right")) - 1, row)
+
+    def _at_rest(self, order: Order) -> Order:
+        """Say of what is taken where it was at the start: so another engine finds it as well.
+
+        Of what is rigid the point is exact, of what deforms it is a particle's.
+        """
+        now = self.engine.snapshot()
+        spot = self._nearest(self._bodies(order.object), now.position, order.point)
+        rest = self.start[spot.row]
+        if self.posed.rigid[spot.body]:
+            away = np.array(order.point) - now.position[spot.row]
+            rest = rest + now.deformation[spot.row].T @ away
+        x, y, z = rest.tolist()
+        return replace(order, do=HOLD, point=(x, y, z))
+
+    def _hold(self, order: Order) -> None:
+        """Take hold of what was at a point at the start."""
+        now = self.engine.snapshot()
+        spot = self._nearest(self._bodies(order.object), self.start, order.point)
+        point = now.position[spot.row]
+        if self.posed.rigid[spot.body]:
+            away = np.array(order.point) - self.start[spot.row]
+            point = point + now.deformation[spot.row] @ away
         self._drop(order)
-        mass = float(self.engine.measure().mass[body])
+        mass = float(self.engine.measure().mass[spot.body])
         stiffness = mass * (2 * np.pi * order.firm) ** 2
-        self.engine.pull(body, order.point, order.to, stiffness)
-        self.held = Held(body, stiffness, order.to)
+        x, y, z = point.tolist()
+        self.engine.pull(spot.body, (x, y, z), order.to, stiffness)
+        self.held = Held(spot.body, stiffness, order.to)
 
     def _pull(self, order: Order) -> None:
         if self.held is not None:
@@ -149,3 +202,7 @@ class Hands:
         if self.held is None or at is None:
             return 0.0
         return float(self.held.stiffness * np.linalg.norm(np.array(self.held.to) - at))
+
+
+def _pulls(touch: Touch) -> bool:
+    return touch.order is not None and touch.order.do == "pull"

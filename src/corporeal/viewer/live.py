@@ -5,6 +5,7 @@ import time
 from collections import deque
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from itertools import chain
 
 import numpy as np
 
@@ -16,13 +17,13 @@ from corporeal.playback import cast_of, slowed
 from corporeal.render.take import Cast, stress_bytes
 from corporeal.stages.fill import fill
 from corporeal.trajectory.played import Prepared
-from corporeal.trajectory.stress import VonMises
 from corporeal.treatment.live_quality import Demand, held, live_quality
 from corporeal.treatment.problem_from_scene import pose
-from corporeal.types import Frame, Scene, Wind
 from corporeal.viewer.hands import Hands
+from corporeal.viewer.moments import Moments
 from corporeal.viewer.orders import Order
 from corporeal.viewer.shelf import Made
+from corporeal.viewer.still_air import in_air
 
 FPS = 30.0
 """Pictures a second, at most."""
@@ -32,8 +33,6 @@ SMOOTH = 0.1
 """Share of the newest cost in the smoothed one."""
 TOP = 99.5
 """Percentile of the stresses that the scale ends at."""
-CALM = 1e-3
-"""Air that hardly moves [m/s]: it gives every object its faces for a wind to come."""
 MOST_TOUCHES = 100_000
 """Of a record: then it is only kept that it is not whole."""
 HEAD = "<u4"
@@ -52,9 +51,7 @@ def threads_here() -> int:
 def live_scene(made: Made, threads: int) -> Prepared:
     """Fill a scene again for what can be simulated in real time."""
     old, assembled = made.results, made.results.assembled
-    air = Wind((CALM, 0.0, 0.0))
-    objects = tuple(o if o.wind else replace(o, wind=air) for o in assembled.scene.objects)
-    scene: Scene = replace(assembled.scene, objects=objects)
+    scene = in_air(assembled.scene)
     demand = Demand.of(old.particles, made.detail, cost_of_step(old.prepared))
     quality = live_quality(demand, threads)
     # Contents of vessels are poured anew: fill is given the scene without them.
@@ -62,7 +59,8 @@ def live_scene(made: Made, threads: int) -> Prepared:
     slower = held(quality, demand, particles.cell, threads)
     if slower.steps_per_second < WORTH * quality.steps_per_second:
         particles = fill(scene, assembled.parts, assembled.field, quality=slower)
-    return replace(old, assemble=scene, fill=particles).prepared
+    # What broke in the run is whole again.
+    return replace(old, assemble=scene, fill=particles, simulate=None).prepared
 
 
 def cost_of_step(prepared: Prepared) -> float:
@@ -81,6 +79,8 @@ class Instant:
     """What there is to show, as it was between two advances."""
 
     now: Snapshot
+    beside: Snapshot | None
+    """The control; None: it does not run."""
     held: np.ndarray | None
     """Where the hand holds [m]; None: it holds nothing."""
     force: float
@@ -109,11 +109,7 @@ class Live:
         self.prepared, self.threads = prepared, threads
         self.cast: Cast = cast_of(prepared)
         self.posed = pose(prepared.scene, prepared.particles, prepared.field)
-        self.stress = VonMises(self.posed.problem)
-        self.place = np.empty_like(self.posed.order)
-        self.place[self.posed.order] = np.arange(len(self.posed.order))
-        counts = [len(body.position) for body in self.posed.problem.bodies]
-        self.stiff = np.repeat(self.posed.rigid, counts)
+        self.moments = Moments(self.posed)
         self.orders: deque[Order] = deque(maxlen=1000)
         self.news = threading.Condition()
         self.latest, self.number = b"", 0
@@ -125,7 +121,7 @@ class Live:
         self.spent = {"step": 0.0, "show": 0.0}
         self.worked = {"step": 0.0, "show": 0.0}
         """CPU seconds of the two threads since the beginning, without the engine's other ones."""
-        self.reset(single=False)
+        self.begin(single=False, twin=False)
         self.threads_of = (
             threading.Thread(target=self._run, name="live", daemon=True),
             threading.Thread(target=self._show, name="live pictures", daemon=True),
@@ -140,11 +136,18 @@ class Live:
             "orders": "one hand; others watch",
         }
 
-    def reset(self, single: bool) -> None:
-        """Begin again at time 0; single: with one velocity field for all, the control."""
+    def begin(self, single: bool, twin: bool) -> None:
+        """Begin again at time 0.
+
+        Args:
+            single: With one velocity field for all, the control.
+            twin: With that control beside, to which the same is done.
+
+        """
         self.single = single
-        problem = replace(self.posed.problem, contact="single" if single else "multi")
-        self.hands = Hands(self.posed, problem, self.threads)
+        shared = replace(self.posed.problem, contact="single")
+        self.hands = Hands(self.posed, shared if single else self.posed.problem, self.threads)
+        self.twin = Hands(self.posed, shared, self.threads) if twin else None
         self.pace, self.cost = LEAST, 3.0
         self.message, self.whole = "", True
 
@@ -184,8 +187,9 @@ class Live:
         now = self.hands.engine.snapshot()
         held = self.hands.grip(now.position)
         force = self.hands.force(now.position)
+        beside = self.twin.engine.snapshot() if self.twin else None
         with self.taken:
-            self.instant = Instant(now, held, force, self.done, self.playing, self.rate)
+            self.instant = Instant(now, beside, held, force, self.done, self.playing, self.rate)
             self.taken.notify_all()
 
     def _show(self) -> None:
@@ -219,17 +223,26 @@ class Live:
         if order.do in ("play", "pause"):
             self.playing = order.do == "play"
         elif order.do == "reset":
-            self.reset(self.single)
+            self.begin(self.single, self.twin is not None)
         elif order.do == "contact":
-            self.reset(order.single)
+            self.begin(order.single and not order.twin, order.twin)
         elif order.do == "step":
-            self.hands.advance(1 / FPS)
+            self._both(1 / FPS)
         else:
-            self.hands.obey(order)
+            done = self.hands.obey(order)
+            if self.twin and done:
+                self.twin.obey(done)
+
+    def _both(self, seconds: float) -> None:
+        """Simulate so much more [s], and the control beside to the same instant."""
+        self.hands.advance(seconds)
+        if self.twin:
+            self.twin.again(self.hands.touches[-1])
+            self.twin.touches.clear()  # one record says it all
 
     def _advance(self) -> bool:
         try:
-            self.hands.advance(self.pace)
+            self._both(self.pace)
         except UserError as error:  # it is where it was before
             self.playing, self.message = False, f"{error} Begin again with reset."
             return False
@@ -254,28 +267,28 @@ class Live:
             return self.number
 
     def picture(self, instant: "Instant") -> bytes:
-        """One instant: a head of 40 bytes, then every object in order.
+        """One instant: a head of 44 bytes, then every object in order.
 
         Head: the last order's number (uint32), simulated over real time, force of the hand [N],
         end of the scale of stresses [Pa] (float32), time [s] (float64), the point that is held [m]
-        (3 × float32, nan: none), playing (uint32). An object: pose (12 × float32); one that
+        (3 × float32, nan: none), playing (uint32), 1 or, with the control after it, 2 (uint32). An
+        object: pose (12 × float32); one that
         deforms, then residuals (3 × int16 a vertex), normals (2 × int8), stress (uint8).
         """
-        place, now = self.place, instant.now
-        motion = np.where(self.stiff[:, None, None], now.deformation, now.motion)[place]
-        stress = self.stress.at(now)[place]
-        self.top = max(self.top, float(np.percentile(stress, TOP)))
-        frame = Frame(now.time, now.position[place], motion, stress)
+        shown = [now for now in (instant.now, instant.beside) if now is not None]
+        frames = [self.moments.frame(now) for now in shown]
+        tops = [float(np.percentile(f.stress, TOP)) for f in frames if f.stress is not None]
+        self.top = max(self.top, *tops)
         held = np.full(3, np.nan) if instant.held is None else instant.held
         numbers = [instant.rate, instant.force, self.top]
         out = [
             np.array([instant.done], HEAD).tobytes(),
             np.array(numbers, "<f4").tobytes(),
-            np.array([now.time], "<f8").tobytes(),
+            np.array([instant.now.time], "<f8").tobytes(),
             np.asarray(held, "<f4").tobytes(),
-            np.array([instant.playing], HEAD).tobytes(),
+            np.array([instant.playing, len(frames)], HEAD).tobytes(),
         ]
-        for seen in self.cast.at(frame):
+        for seen in chain.from_iterable(map(self.cast.at, frames)):
             out.append(seen.pose.astype("<f4").tobytes())
             if seen.residual is not None and seen.normal is not None:
                 shade = stress_bytes(seen.stress, self.top)  # type: ignore[arg-type]

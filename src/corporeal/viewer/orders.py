@@ -23,7 +23,7 @@ PER_SECOND = 200
 KINDS = ("grab", "pull", "drop", "gravity", "wind", "play", "pause", "step", "reset", "contact")
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, slots=True)
 class Order:
     """One order; what its kind does not need is 0."""
 
@@ -39,6 +39,8 @@ class Order:
     """Natural frequency on the hand's spring [Hz]."""
     single: bool = False
     """One velocity field for all: the control."""
+    twin: bool = False
+    """The control runs beside: the same touches, one velocity field for all."""
 
 
 def parsed(text: str) -> Order:
@@ -65,6 +67,7 @@ def parsed(text: str) -> Order:
         to=_vector(asked, "to", limit),
         firm=min(max(_number(asked.get("firm", 4.0)), SOFTEST), FIRMEST),
         single=asked.get("single") is True,
+        twin=asked.get("twin") is True,
     )
 
 

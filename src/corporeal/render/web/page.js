@@ -139,7 +139,7 @@ export class Viewer {
   }
 
   openPart(which, part) {
-    const header = this.takes[which].header
+    const header = this.stages[which].take.header
     this.picked = {which, part}
     this.stages.forEach((stage, k) => stage.mark(k === which ? part : null))
     if (!this.live) this.openTab('Look')
@@ -168,6 +168,31 @@ export class Viewer {
     this.legend.hidden = !made
     if (made) this.legend.replaceChildren(made)
     this.touch()
+  }
+
+  // ---------------------------------------------------------------- a control beside
+
+  // Show the first run's scene a second time, with a caption for each.
+  beside(words) {
+    if (this.stages.length > 1) return
+    const stage = new Stage(this.takes[0], this.renderer.shadowMap.enabled)
+    stage.changed = () => this.touch()
+    stage.rule(squareOf(stage.size))
+    for (const object of this.stages[0].hidden) stage.reveal(object, false)
+    this.stages.push(stage)
+    stage.paint(this.by.value)
+    this.captions = words.map((text, k) => el('div', {class: `caption of${k}`}, text))
+    this.see.append(...this.captions)
+    this.resize()
+  }
+
+  // Show one again.
+  alone() {
+    if (!this.captions) return
+    this.stages.pop().free()
+    for (const caption of this.captions) caption.remove()
+    this.captions = null
+    this.resize()
   }
 
   // ---------------------------------------------------------------- the picture

@@ -134,6 +134,12 @@ export class Stage {
     return mesh
   }
 
+  // Give back what the graphics card holds of it.
+  free() {
+    this.scene.traverse(thing => thing.geometry?.dispose())
+    for (const material of [...this.finishes, this.bare, this.ground.material]) { material.map?.dispose(); material.dispose() }
+  }
+
   // ---------------------------------------------------------------- one instant
 
   show(t) {

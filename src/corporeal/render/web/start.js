@@ -7,10 +7,13 @@ import { Export } from './export.js'
 import { Touch } from './touch.js'
 import { el } from './cards.js'
 
-const root = document.getElementById('view'), names = location.pathname.split('/').slice(2).map(decodeURIComponent)
+const root = document.getElementById('view'), asked = location.pathname.split('/').slice(2).map(decodeURIComponent)
+const replayed = location.pathname.startsWith('/replayed/')
+const names = replayed ? ['replayed: objects slide and part', 'all stick: one grid'] : asked
+const addresses = replayed ? ['multi', 'single'].map(how => `/replayed/${encodeURIComponent(asked[0])}/${how}`) : asked.map(name => `/take/${encodeURIComponent(name)}`)
 
-async function fetched(name) {
-  const answer = await fetch(`/take/${encodeURIComponent(name)}`)
+async function fetched(address) {
+  const answer = await fetch(address)
   if (!answer.ok) throw new Error((await answer.json()).error)
   return new Take(await answer.arrayBuffer())
 }
@@ -29,10 +32,10 @@ function simulateIt() {
 
 try {
   document.title = `${names.join(' beside ')} · corporeal`
-  const [takes, {read_only, works}] = await Promise.all([Promise.all(names.map(fetched)), fetch('/runs').then(a => a.json())])
+  const [takes, {read_only, works}] = await Promise.all([Promise.all(addresses.map(fetched)), fetch('/runs').then(a => a.json())])
   let touch = null
   const tabs = viewer => {
-    if (read_only || names.length > 1) return []
+    if (read_only || names.length > 1) return [] // nor of a replay
     touch = new Touch(viewer, names[0])
     return [['Touch', touch.content], ...(works ? [['Change', new Change(viewer, names[0]).content]] : []), ['Export', new Export(names[0]).content]]
   }

@@ -1,13 +1,17 @@
 // Touch: the run simulated now, on the server, while somebody pulls at it.
 
 import * as THREE from './three.min.js'
-import { key, el, si, spoken, table } from './cards.js'
+import { key, el, si, spoken } from './cards.js'
+import { post } from './change.js'
 
 const MOVED = 4 // a pointer that moves less is a click [px]
-const HEAD = 40 // bytes of a picture before its objects
+const HEAD = 44 // bytes of a picture before its objects
 const WINDS = [0, 2, 5, 10, 20] // [m/s]
 const FIRMNESS = [['soft', 2], ['firm', 4], ['hard', 8]] // [Hz]
 const HAND = 0xb5482a
+const MOST_LAGS = 2000 // times from an order to its picture that are remembered
+const LOOK_AGAIN = 1000 // [ms]
+const BESIDE = ['objects slide and part', 'all stick: one grid']
 
 export class Touch {
   constructor(viewer, name) {
@@ -26,8 +30,12 @@ export class Touch {
       this.tell({do: 'wind', object: +this.who.value, to: [w * d.x / level, w * d.y / level, 0]})
     }
     this.wind.onchange = blow
-    this.single = el('select', {'aria-label': 'contact', onchange: () => { this.single.value === 'single' ? this.tell({do: 'contact', single: true}) : this.tell({do: 'contact'}) }},
-      el('option', {value: 'multi'}, 'objects slide and part'), el('option', {value: 'single'}, 'all stick: one grid (control)'))
+    this.contact = el('select', {'aria-label': 'contact', onchange: () => {
+      const how = this.contact.value
+      this.tell({do: 'contact', single: how === 'single', twin: how === 'both'})
+    }}, el('option', {value: 'multi'}, BESIDE[0]), el('option', {value: 'both'}, 'both, beside each other'), el('option', {value: 'single'}, `${BESIDE[1]} (control)`))
+    this.again = el('div', {'aria-live': 'polite'})
+    this.replay = el('button', {class: 'do', onclick: () => this.replayIt()}, 'Replay at draft')
     this.said = el('p', {class: 'bad', role: 'alert'})
     this.honest = el('p', {class: 'note'}, 'Starting …')
     this.card = el('div', {class: 'picked'})
@@ -36,8 +44,10 @@ export class Touch {
       el('label', {class: 'line'}, 'spring', this.firm),
       el('label', {class: 'line'}, 'gravity', this.pull, this.gravityWords),
       el('label', {class: 'line'}, 'wind on', this.who, this.wind),
-      el('label', {class: 'line'}, 'contact', this.single),
-      el('button', {class: 'do', onclick: () => this.tell({do: 'reset'})}, 'Begin again'), this.card)
+      el('label', {class: 'line'}, 'contact', this.contact),
+      el('button', {class: 'do', onclick: () => this.tell({do: 'reset'})}, 'Begin again'), ' ', this.replay,
+      el('p', {class: 'hint'}, 'Replay at draft: what was done since the beginning is simulated once more, as finely as a draft, and the control beside it. It takes minutes.'),
+      this.again, this.card)
     this.line = new THREE.Line(new THREE.BufferGeometry().setAttribute('position', new THREE.BufferAttribute(new Float32Array(6), 3)),
       new THREE.LineBasicMaterial({color: HAND}))
     this.line.frustumCulled = this.line.visible = false
@@ -70,6 +80,8 @@ export class Touch {
     viewer.live = null
     this.socket?.close()
     this.news = this.rigid = null
+    viewer.alone()
+    this.contact.value = 'multi'
     this.line.visible = false
     viewer.stages[0].liveTop = null
     viewer.state.textContent = viewer.rest
@@ -109,13 +121,15 @@ export class Touch {
     const done = data.getUint32(0, true), rate = data.getFloat32(4, true), force = data.getFloat32(8, true), top = data.getFloat32(12, true)
     viewer.clock = data.getFloat64(16, true)
     const held = [24, 28, 32].map(at => data.getFloat32(at, true)), playing = data.getUint32(36, true) > 0
+    if (data.getUint32(40, true) > 1) viewer.beside(BESIDE)
+    else viewer.alone()
     if (playing !== viewer.playing) { viewer.playing = playing; viewer.say() }
-    if (!stage.liveTop || Math.abs(top / stage.liveTop - 1) > .02) {
-      stage.liveTop = top
+    if (!stage.liveTop || viewer.stages.some(shown => !shown.liveTop) || Math.abs(top / stage.liveTop - 1) > .02) {
+      for (const shown of viewer.stages) shown.liveTop = top
       if (stage.by === 'stress') viewer.legend.replaceChildren(key(stage))
     }
     let at = HEAD
-    viewer.takes[0].header.objects.forEach((object, k) => {
+    for (const shown of viewer.stages) viewer.takes[0].header.objects.forEach((object, k) => {
       const n = object.vertices, instant = {pose: new Float32Array(buffer, at, 12)}
       at += 48
       if (!this.rigid[k]) {
@@ -124,10 +138,11 @@ export class Touch {
         instant.stress = new Uint8Array(buffer, at + 8 * n, n)
         at += 4 * Math.ceil(9 * n / 4)
       }
-      stage.place(k, instant)
+      shown.place(k, instant)
     })
     this.show(held, force)
     for (const [number, then] of this.sent) if (number <= done) { viewer.stats.lag.push(performance.now() - then); this.sent.delete(number) }
+    if (viewer.stats.lag.length > MOST_LAGS) viewer.stats.lag.splice(0, MOST_LAGS / 2)
     viewer.stats.frames++
     Object.assign(viewer.stats, {rate, force, time: viewer.clock})
     viewer.clockWords.textContent = `${viewer.clock.toFixed(2)} s`
@@ -148,8 +163,8 @@ export class Touch {
 
   pressed(viewer, event) {
     if (event.button) return
-    const {hit} = viewer.meet(event)
-    if (!hit) return
+    const {which, hit} = viewer.meet(event)
+    if (!hit || which) return // the control is not touched by itself
     viewer.orbit.enabled = false
     const plane = new THREE.Plane().setFromNormalAndCoplanarPoint(viewer.eye.getWorldDirection(new THREE.Vector3()), hit.point)
     this.grip = {hit, plane, to: null}
@@ -178,5 +193,28 @@ export class Touch {
     const kind = grip.to ? 'pull' : 'grab'
     grip.to = spot.toArray()
     this.tell({do: kind, object: grip.hit.object, point: grip.hit.point.toArray(), to: grip.to, firm: +this.firm.value})
+  }
+
+  // ---------------------------------------------------------------- once more, finer
+
+  async replayIt() {
+    this.replay.disabled = true
+    const asked = await post('/replay', {run: this.name}).catch(() => ({error: 'The server does not answer.'}))
+    if (asked.error) { this.again.replaceChildren(el('p', {class: 'bad', role: 'alert'}, asked.error)); this.replay.disabled = false }
+    else this.follow(asked.id)
+  }
+
+  // Say how far a replay is until it ends, then where it is seen.
+  async follow(id) {
+    const {state, fraction, words} = await fetch(`/replays/${id}`).then(answer => answer.json())
+    if (state === 'running') {
+      const stop = el('button', {onclick: () => post('/replay/stop', {id})}, 'Stop it')
+      this.again.replaceChildren(el('label', {class: 'line'}, 'replay', el('progress', {max: 1, value: fraction})), el('p', {}, words, ' ', stop))
+      setTimeout(() => this.follow(id), LOOK_AGAIN)
+      return
+    }
+    this.replay.disabled = false
+    this.again.replaceChildren(state === 'finished' ? el('p', {}, el('a', {class: 'do', href: `/replayed/${id}`}, 'See the replay, the control beside it'))
+      : el('p', {class: 'bad', role: 'alert'}, words))
   }
 }
