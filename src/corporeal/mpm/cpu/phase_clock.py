@@ -1,4 +1,4 @@
-"""What each phase of a step takes on the processor: for benchmarks; a run without it pays nothing."""
+"""What each phase of a step takes on the processor. A run that nobody times pays nothing for it."""
 
 import ctypes
 import time
