@@ -9,14 +9,13 @@ median over the rounds of this checkout's batch to the other's batch beside it.
 """
 
 import argparse
-import json
-import subprocess
 import sys
 from dataclasses import dataclass
 from pathlib import Path
 from statistics import median
 
-HERE = Path(__file__).resolve().parents[1]
+from checkout import HERE, SERVE, Checkout, answer, import_from
+
 LAWS = ("COROTATED", "NEO_HOOKEAN", "HENCKY", "DRUCKER_PRAGER", "VON_MISES")
 
 
@@ -34,39 +33,9 @@ class Case:
         return f"{self.law.lower()}, {'a heap of 16' if self.objects > 1 else 'one body'}"
 
 
-class Checkout:
-    """The drop in one checkout, in a process of its own."""
-
-    def __init__(self, root: Path, case: Case) -> None:
-        """Start the process and wait until the engine is built."""
-        words = (str(root), case.law, str(case.objects), str(case.particles))
-        self.process = subprocess.Popen(
-            [sys.executable, __file__, "--serve", *words],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-        self.ask(4)
-
-    def ask(self, substeps: int) -> float:
-        """Take some substeps; return what each cost per particle [ns of CPU time]."""
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.process.stdin.write(f"{substeps}\n")
-        self.process.stdin.flush()
-        line = self.process.stdout.readline()
-        if not line:
-            sys.exit("One of the checkouts did not run: see above.")
-        return json.loads(line)
-
-    def close(self) -> None:
-        """End the process."""
-        self.process.communicate()
-
-
 def serve(root: str, law: str, objects: str, particles: str) -> None:
-    """Answer one line of standard input after the other with the cost of so many substeps."""
-    sys.path[:1] = [f"{root}/benchmarks", f"{root}/src"]
+    """Answer with what each of so many substeps costs per particle [ns of CPU time]."""
+    import_from(root)
     from cost.blocks import drop_of
     from cost.contest import Ours
 
@@ -74,14 +43,19 @@ def serve(root: str, law: str, objects: str, particles: str) -> None:
 
     many = int(objects)
     ours = Ours(drop_of(int(particles), law=Law[law], objects=many, heap=many > 1))
-    for line in sys.stdin:
-        sys.stdout.write(json.dumps(ours.batch(int(line)).cpu) + "\n")
-        sys.stdout.flush()
+    answer(lambda substeps: ours.batch(substeps).cpu)
+
+
+def _ready(root: Path, case: Case) -> Checkout:
+    """Start a checkout and wait until its engine is built."""
+    started = Checkout(__file__, root, case.law, case.objects, case.particles)
+    started.ask(4)
+    return started
 
 
 def compare(case: Case, other: Path, rounds: int, substeps: int) -> tuple[float, float, float]:
     """Return the least cost here and there [ns], and the median ratio of here to there."""
-    here, there = Checkout(HERE, case), Checkout(other, case)
+    here, there = _ready(HERE, case), _ready(other, case)
     pairs = []
     for k in range(rounds):
         # Who goes first changes, so that a machine that slows down favours nobody.
@@ -95,7 +69,7 @@ def compare(case: Case, other: Path, rounds: int, substeps: int) -> tuple[float,
 
 def main() -> None:
     """Compare, and print a line for each case."""
-    if sys.argv[1:2] == ["--serve"]:
+    if sys.argv[1:2] == [SERVE]:
         serve(*sys.argv[2:])
         return
     parser = argparse.ArgumentParser(

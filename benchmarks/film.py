@@ -11,9 +11,7 @@ steps of 255, from a picture of 3 × 3 samples a pixel that each send 16 rays to
 """
 
 import argparse
-import json
 import pickle
-import subprocess
 import sys
 import time
 from collections.abc import Callable
@@ -24,8 +22,8 @@ from tempfile import TemporaryDirectory
 from typing import Any
 
 import numpy as np
+from checkout import HERE, SERVE, Checkout, answer, import_from
 
-HERE = Path(__file__).resolve().parents[1]
 SMALL, LARGE = (640, 480), (1280, 720)
 
 
@@ -69,36 +67,9 @@ def _plain(record: Any) -> dict[str, Any]:
     return {f.name: getattr(record, f.name) for f in fields(record)}
 
 
-class Checkout:
-    """The same pictures in one checkout, in a process of its own."""
-
-    def __init__(self, root: Path, file: Path) -> None:
-        self.process = subprocess.Popen(
-            [sys.executable, __file__, "--serve", str(root), str(file)],
-            stdin=subprocess.PIPE,
-            stdout=subprocess.PIPE,
-            text=True,
-        )
-
-    def ask(self, size: tuple[int, int], kept: Path, quality: str = "draft") -> float:
-        """Take all pictures at a size and keep them; return what one cost [s of CPU time]."""
-        assert self.process.stdin is not None
-        assert self.process.stdout is not None
-        self.process.stdin.write(json.dumps([*size, str(kept), quality]) + "\n")
-        self.process.stdin.flush()
-        line = self.process.stdout.readline()
-        if not line:
-            sys.exit("One of the checkouts did not run: see above.")
-        return json.loads(line)
-
-    def close(self) -> None:
-        """End the process."""
-        self.process.communicate()
-
-
 def serve(root: str, file: str) -> None:
-    """Answer one line of standard input after the other with the cost of a picture."""
-    sys.path[:1] = [f"{root}/src"]
+    """Answer with what a picture costs [s of CPU time]: [width, height, where kept, quality]."""
+    import_from(root)
     from corporeal.render import embree
     from corporeal.render.camera import Aim
 
@@ -106,8 +77,9 @@ def serve(root: str, file: str) -> None:
     stage = _stage(made)
     embree.SAMPLING["exact"] = embree.Sampling(3, 1, 16)
     casts: dict[int, Callable[..., np.ndarray]] = {}
-    for line in sys.stdin:
-        width, height, kept, quality = json.loads(line)
+
+    def ask(question: tuple[int, int, str, str]) -> float:
+        width, height, kept, quality = question
         aims = [_fit(Aim, {**aim, "width": width, "height": height}) for aim in made.aims]
         exactly: Callable[..., np.ndarray] = embree.render
         cast = exactly if quality == "exact" else casts.setdefault(width, _caster())
@@ -116,8 +88,9 @@ def serve(root: str, file: str) -> None:
         pictures = [cast(stage.posed(*pose), aim, quality, 1) for pose, aim in poses]
         spent = (time.process_time() - start) / len(aims)
         np.save(kept, np.array(pictures))
-        sys.stdout.write(json.dumps(spent) + "\n")
-        sys.stdout.flush()
+        return spent
+
+    answer(ask)
 
 
 def _stage(made: Set) -> Any:
@@ -158,17 +131,20 @@ def measure(run: Path, other: Path, frames: int, rounds: int) -> None:
     with TemporaryDirectory() as folder:
         below = Path(folder)
         (below / "set").write_bytes(pickle.dumps(taken(run, frames)))
-        here, there = Checkout(HERE, below / "set"), Checkout(other, below / "set")
+        here, there = (Checkout(__file__, root, below / "set") for root in (HERE, other))
         exact = {size: below / f"exact{size[0]}.npy" for size in (SMALL, LARGE)}
         for size, path in exact.items():
-            here.ask(size, path, "exact")
+            here.ask((*size, str(path), "exact"))
         # A first round compiles, and is not counted.
         rows = [("here", here, LARGE), ("here", here, SMALL), ("there", there, SMALL)]
         kept = [below / f"{k}.npy" for k in range(len(rows))]
         taken_up: list[list[float]] = []
         for _ in range(rounds + 1):
             taken_up.append(
-                [who.ask(size, path) for (_, who, size), path in zip(rows, kept, strict=True)]
+                [
+                    who.ask((*size, str(path), "draft"))
+                    for (_, who, size), path in zip(rows, kept, strict=True)
+                ]
             )
         for k, (name, _, size) in enumerate(rows):
             cost = [round_[k] for round_ in taken_up[1:]]
@@ -185,7 +161,7 @@ def measure(run: Path, other: Path, frames: int, rounds: int) -> None:
 
 def main() -> None:
     """Measure, and print a table."""
-    if sys.argv[1:2] == ["--serve"]:
+    if sys.argv[1:2] == [SERVE]:
         serve(*sys.argv[2:])
         return
     parser = argparse.ArgumentParser(

@@ -55,10 +55,12 @@ def test_a_kick_gives_a_ball_its_impulse():
     assert example("07_push_and_pull.py") == pytest.approx(1.0, abs=1e-4)
 
 
+@pytest.mark.slow
 def test_photographs_of_a_box_become_a_body_of_about_its_volume():
     assert example("08_photographs_to_a_scene.py") == pytest.approx(1.0, abs=0.25)
 
 
+@pytest.mark.slow
 def test_an_ensemble_spreads_a_rebound_but_not_beyond_reason():
     assert 0.02 < example("09_vary_the_materials.py") < 0.8
 
@@ -67,5 +69,6 @@ def test_a_bar_of_a_law_of_ones_own_swings_at_its_period():
     assert example("11_write_a_law.py") == pytest.approx(1.0, abs=0.04)
 
 
+@pytest.mark.slow
 def test_a_corpus_of_two_scenes_keeps_its_momentum():
     assert example("10_make_a_corpus.py") < 1e-3

@@ -1,7 +1,9 @@
-"""The three lines of Python at the top of the README do what a reader expects of them."""
+"""What the README says of itself: its three lines of Python, and its counts."""
 
 import re
 from pathlib import Path
+
+from corporeal.materials import library
 
 ROOT = Path(__file__).parents[1]
 
@@ -20,3 +22,8 @@ def test_the_ball_of_the_readme_rebounds(capsys):
 
 def test_readme_and_api_page_begin_with_the_same_lines():
     assert first_python("README.md") == first_python("docs/api.md")
+
+
+def test_the_library_is_as_large_as_it_says():
+    said = {int(n) for n in re.findall(r"(\d+) materials", (ROOT / "README.md").read_text())}
+    assert said == {len(library("default"))}

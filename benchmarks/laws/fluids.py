@@ -3,7 +3,7 @@
 A slab two cells thick between walls without friction; what is rough holds what touches it.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 import numpy as np
@@ -106,6 +106,13 @@ class Tank:
     def started(self) -> Engine:
         """Build an engine with it."""
         return started(self.posed())
+
+
+def moved(given: Problem, shift: np.ndarray) -> Problem:
+    """Give a problem with all bodies and planes elsewhere on the grid, by ``shift`` [m]."""
+    bodies = tuple(replace(b, position=b.position + shift) for b in given.bodies)
+    planes = (Plane(p.normal, p.offset + float(shift @ np.array(p.normal))) for p in given.planes)
+    return replace(given, bodies=bodies, planes=tuple(planes))
 
 
 def front(run: Engine, tank: Tank) -> float:

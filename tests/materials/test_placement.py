@@ -114,6 +114,16 @@ def test_stiff_but_weak_and_light_but_stiff_do_not_fit():
         assert odd(foam, at(young=fraction, density=fraction)) == {}
 
 
+def test_nobody_is_told_to_mend_a_value_that_was_not_asked_for():
+    """Of the ways beside the likeliest only what a mass hangs on is asked."""
+    foam = PartWords("x", "packaging_foam", "solid")
+    assert set(choices(foam, weighing=True)) == {"density"}
+    for fraction in (0.0, 0.5, 1.0):
+        assert odd(foam, at(density=fraction)) == {}
+    stiff = PartWords("x", "packaging_foam", "solid", values={"young": 1e7})
+    assert odd(stiff, at(density=0.0))["young"].startswith("light but stiff")
+
+
 @pytest.mark.parametrize("entry", materials.library().values(), ids=lambda e: e.name)
 def test_what_is_usual_or_at_one_end_fits_in_every_material(entry):
     for end in ("low", "typical", "high"):

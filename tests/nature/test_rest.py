@@ -3,6 +3,7 @@
 import numpy as np
 import pytest
 from laws.bodies import Stuff, box, box_surface, floor, problem
+from laws.fluids import WATER, Tank, level, moved
 
 from corporeal.mpm.problem import Plane
 from corporeal.types import Law
@@ -105,3 +106,41 @@ def test_a_wall_holds_whichever_way_it_faces(patient_engine):
 @pytest.mark.slow
 def test_blocks_and_stacks_of_five_stay_and_the_floor_carries_them(holds):
     holds("11", quick=False)
+
+
+@pytest.mark.parametrize("walls_off", [0.0, 1.0])
+def test_water_stands_as_high_wherever_planes_lie_on_the_grid(fast_engine, walls_off):
+    """Six cells deep, the floor or the walls at ten places between nodes; level within 1 %."""
+    tank = Tank(WATER, 0.2, 0.1, 6, np.sqrt(G * 0.1), ramp=0.5)
+    for off in np.arange(10) / 10 * tank.cell:
+        sideways, up = off * walls_off, off * (1.0 - walls_off)
+        run = fast_engine(moved(tank.posed(), np.array([sideways, 0.0, up])))
+        run.advance(0.8)
+        assert level(run, tank) - up == pytest.approx(tank.height, rel=0.01)
+
+
+@pytest.mark.parametrize("rigid", [False, True])
+def test_a_block_lies_as_high_wherever_the_floor_is_on_the_grid(fast_engine, rigid):
+    """Ten places between nodes; a soft block's foot sinks by no more than its strain over ¾ dx."""
+    stuff = Stuff(young=2e5, loss=1.0)
+    strain = 1000.0 * G * SIZE[2] / stuff.young
+    for off in np.arange(10) / 10 * CELL:
+        centre = np.add(CENTRE, (0.0, 0.0, off))
+        surface = box_surface(tuple(centre), SIZE) if rigid else None
+        block = box(centre, SIZE, CELL / 2, stuff=stuff, rigid=rigid, surface=surface)
+        run = fast_engine(
+            problem(
+                block,
+                cell=CELL,
+                friction=0.5,
+                planes=[floor(off)],
+                gravity=DOWN,
+                gravity_ramp=0.05,
+            )
+        )
+        foot = run.snapshot().position[:, 2] < off + CELL / 2
+        start = run.snapshot().position[foot, 2].mean()
+        run.advance(0.3)
+        sunk = (start - run.snapshot().position[foot, 2].mean()) / CELL
+        # The foot's particles lie a quarter of a cell up: by Hooke a quarter of the strain.
+        assert -1e-3 < sunk < (1e-3 if rigid else strain * 1.25)

@@ -21,6 +21,7 @@ def test_a_wall_that_does_not_fall_on_nodes_holds_it_too(fast_engine):
     assert abs(level_error(run, glass)) < 0.03
 
 
+@pytest.mark.slow
 def test_through_a_thin_wall_water_leaks_but_for_its_true_surface(fast_engine):
     """A wall of .08 cells, half a second; control: it is met where the grid sees its points."""
     errors, leaks = [], []

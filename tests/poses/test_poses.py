@@ -156,6 +156,7 @@ def test_masks_that_nothing_agrees_with_are_a_warning(turned_over, tmp_path):
     assert "turned over between the pictures, or masks miss parts" in found.warnings[-1]
 
 
+@pytest.mark.slow
 def test_masks_that_were_grown_later_find_an_object_that_was_turned_over(turned_over, tmp_path):
     """Nobody drew masks: those that are grown under the slab's poses contradict each other."""
     folder, models, _ = turned_over
@@ -174,7 +175,13 @@ def test_masks_that_were_grown_later_find_an_object_that_was_turned_over(turned_
     assert angle.max() < 0.01 and place.max() < 1e-4
 
 
-@pytest.mark.parametrize("how", ["refused", "forced", "found", "still"])
+@pytest.mark.parametrize(
+    "how",
+    [
+        "refused",
+        *(pytest.param(how, marks=pytest.mark.slow) for how in ("forced", "found", "still")),
+    ],
+)
 def test_a_run_does_not_believe_poses_of_the_background(turned_over, tmp_path, how, monkeypatch):
     folder, models, _ = turned_over
     by_block = models.pop("masked")

@@ -121,12 +121,15 @@ def wall_put(words: PartWords, library_name: str = "default") -> float | None:
 def odd(
     words: PartWords, placements: Mapping[str, Placement], library_name: str = "default"
 ) -> dict[str, str]:
-    """Say which of a part's values do not fit each other: field → why, in a clause."""
+    """Say which of a part's values do not fit each other: field → why, in a clause.
+
+    Only what somebody placed or stated can be put right: what was not asked of a way, as the
+    stiffness of all but the likeliest, contradicts nothing.
+    """
     if words.material is None:
         return {}
     entry = entry_of(words.material, library_name)
-    values = {f: r.typical for f, r in entry.ranges.items()}
-    values |= {
+    chosen = {
         f: place(r, placements[f].fraction) for f, r in entry.ranges.items() if f in placements
     }
-    return contradictions(entry.group, entry.ranges, values | words.values)
+    return contradictions(entry.group, entry.ranges, chosen | words.values)

@@ -49,6 +49,12 @@ class Heirs:
         parent = np.append(np.arange(len(problem.bodies)), np.full(more, split.body))
         return cls(parent, share)
 
+    @property
+    def whole(self) -> set[int]:
+        """Bodies that are what they were."""
+        pieces = np.bincount(self.parent)
+        return {b for b, parent in enumerate(self.parent) if b == parent and pieces[b] == 1}
+
     def inherited(self, book: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
         """Share out what was booked of bodies and pairs, by the names of ``Ledger``.
 

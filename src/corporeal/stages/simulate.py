@@ -21,19 +21,15 @@ from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import MENU, Engine, Problem
 from corporeal.trajectory.audit import audit
 from corporeal.trajectory.audit_file import write_audit
-from corporeal.trajectory.breaking import (
-    Stage,
-    break_up,
-    layout,
-    next_blow,
-    retell,
-    stage_at_start,
-)
+from corporeal.trajectory.breaking import break_up, next_blow
+from corporeal.trajectory.breaking_stage import Stage
+from corporeal.trajectory.broken_books import retell
 from corporeal.trajectory.checkpoint import Checkpoints, fingerprint
 from corporeal.trajectory.energy_gain import EnergyWatch
 from corporeal.trajectory.frames import (
     BREAKS,
     FOLDER,
+    Layout,
     frame_path,
     gather,
     write_frame,
@@ -138,7 +134,7 @@ def simulate(
     with store.writing(folder):
         kept, slept = Checkpoints(folder, name), Checkpoints(folder / "settling", name)
         relax = partial(relaxed, scene, posed, lying, build, slept, progress)
-        begun = stage_at_start(scene, particles, field, posed)
+        begun = Stage.at_start(scene, particles, field, posed)
         run = Run(build(posed.problem), begun, folder, times, kept, config.breaking)
         run.through(progress, lying, relax)
         trajectory = gather(folder, len(times))
@@ -243,7 +239,7 @@ class Run:
         order = stage.posed.order
         self.place = np.empty_like(order)
         self.place[order] = np.arange(len(order))
-        self.layout = layout(stage.posed)
+        self.layout = Layout.of(stage.posed)
         self.watch = EnergyWatch.of(stage.posed.problem)
         self.stress = VonMises(stage.posed.problem)
 

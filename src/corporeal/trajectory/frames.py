@@ -20,6 +20,7 @@ from jaxtyping import Bool, Int
 
 from corporeal import store
 from corporeal.errors import BadFileError
+from corporeal.treatment.problem_from_scene import Posed
 from corporeal.types import Frame, Ledger, Trajectory
 
 FOLDER = "frames"
@@ -40,6 +41,14 @@ class Layout:
 
     object: Int[np.ndarray, " P"]
     rigid: Bool[np.ndarray, " B"]
+
+    @classmethod
+    def of(cls, posed: Posed) -> "Layout":
+        """Say which particle belongs to which object of a problem."""
+        bodies, place = posed.problem.bodies, np.empty_like(posed.order)
+        place[posed.order] = np.arange(len(posed.order))
+        owner = np.repeat(np.arange(len(bodies)), [len(b.position) for b in bodies])
+        return cls(object=owner[place], rigid=posed.rigid)
 
     @property
     def bends(self) -> Bool[np.ndarray, " P"]:

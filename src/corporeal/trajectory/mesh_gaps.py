@@ -37,15 +37,16 @@ HOVERS = 0.15
 """A gap between objects that touch is visible beyond this share of the narrower one's
 middle side [-]."""
 FINEST = 40
-"""Edges of a surface that bends are at most its longest side over this, so that dents show."""
+"""Edges of a surface that bends are at most its longest side over this, so that dents show, …"""
+DENT = 1.0
+"""… or this, which is as fine as what it follows knows [cells]."""
 
 
 @dataclass(frozen=True)
 class Coat:
     """The surface of one object and what it follows."""
 
-    surface: Shape
-    """At time 0."""
+    triangles: Int[np.ndarray, "T 3"]
     skin: Skin
     sample: Int[np.ndarray, " N"]
     """Triangle of each point that is asked, and …"""
@@ -59,11 +60,11 @@ class Coat:
 
     def shape(self, frame: Frame) -> Shape:
         """Give the surface at one instant."""
-        return self.surface.moved(self.skin.carried(frame)[0])
+        return Shape(Mesh(self.skin.carried(frame)[0], self.triangles))
 
     def points(self, shape: Shape) -> Float[np.ndarray, "N 3"]:
         """Give the points on it that are asked [m]."""
-        corners = shape.mesh.vertices[shape.mesh.triangles[self.sample]]
+        corners = shape.mesh.vertices[self.triangles[self.sample]]
         return np.einsum("nk,nkd->nd", self.weight, corners)
 
 
@@ -122,19 +123,19 @@ def _coat(scene: Scene, particles: Particles, number: int) -> Coat:
     members = np.flatnonzero(particles.object == number)
     bends = any(particles.treatments[k].kind != "rigid" for k in np.unique(particles.part[members]))
     if bends:
-        mesh = finer(mesh, float(np.ptp(mesh.vertices, axis=0).max()) / FINEST)
+        longest = float(np.ptp(mesh.vertices, axis=0).max())
+        mesh = finer(mesh, max(longest / FINEST, DENT * particles.cell))
     owner = np.full(len(mesh.vertices), number)
     skin = bind_points(mesh.vertices, owner, particles, np.zeros(0, dtype=bool))
     points, triangle = sample_surface(mesh, SAMPLES, rng)
-    surface = Shape(mesh)
     return Coat(
-        surface=surface,
+        triangles=mesh.triangles,
         skin=skin,
         sample=triangle,
         weight=_barycentric(points, mesh.corners[triangle]),
         grains=rng.permutation(members)[:GRAINS],
         members=members,
-        closed=surface.inside(particles.position[members].astype(float)).mean() > PASSED,
+        closed=Shape(mesh).inside(particles.position[members].astype(float)).mean() > PASSED,
     )
 
 
@@ -147,10 +148,10 @@ def finer(mesh: Mesh, edge: float) -> Mesh:
     vertices, triangles = mesh.vertices, mesh.triangles
     while True:
         ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-        # One number for both ends: rows would be sorted ten times as slowly.
-        low, high = ends.reshape(-1, 2).astype(np.int64).T
-        key, of_side = np.unique(low * len(vertices) + high, return_inverse=True)
-        unique, of_side = np.stack(np.divmod(key, len(vertices)), axis=1), of_side.reshape(-1, 3)
+        # One number per edge: rows are sorted twenty times slower.
+        key, of_side = np.unique(ends[..., 0] * len(vertices) + ends[..., 1], return_inverse=True)
+        unique = np.stack(np.divmod(key, len(vertices)), axis=1)
+        of_side = of_side.reshape(-1, 3)
         length = np.linalg.norm(vertices[unique[:, 0]] - vertices[unique[:, 1]], axis=1)
         if not (length > edge).any():
             return Mesh(vertices, triangles)

@@ -2,7 +2,8 @@
 
 import numpy as np
 
-from corporeal.mpm.constants import WALL_REACH, WETTED_REACH
+from corporeal.mpm import laws
+from corporeal.mpm.constants import HELD_BY_WALL, WALL_REACH, WETTED_REACH
 from corporeal.mpm.cpu import layout
 from corporeal.mpm.cpu.layout import BOX, CENTRE, PAIR, RADIUS
 from corporeal.mpm.ledger import Ledger
@@ -119,6 +120,8 @@ class ContactMemory:
 
     def __init__(self, world: np.ndarray, problem: Problem, ledger: Ledger) -> None:
         self.world, self.cell = world, problem.cell
+        poured = any(np.isin(body.law, laws.LIQUID).any() for body in problem.bodies)
+        self.reach = HELD_BY_WALL if poured else WALL_REACH
         walls = [[*plane.normal, plane.offset] for plane in problem.planes]
         self.plane = np.array(walls, float).reshape(-1, 4)
         self.friction, self.restitution = _pair_tables(problem)
@@ -152,7 +155,7 @@ class ContactMemory:
         ends = 4.0 * self.cell * np.stack([origin, origin + dim])
         normal = self.plane[:, :3]
         lowest = np.where(normal > 0.0, normal * ends[0], normal * ends[1]).sum(axis=1)
-        near = np.flatnonzero(lowest - self.plane[:, 3] <= WALL_REACH * self.cell)
+        near = np.flatnonzero(lowest - self.plane[:, 3] <= self.reach * self.cell)
         if len(near) != 1:
             return -1, np.zeros(3)
         return int(near[0]), normal[near[0]]

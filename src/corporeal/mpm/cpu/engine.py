@@ -45,6 +45,7 @@ from corporeal.mpm.cpu.layout import (
 )
 from corporeal.mpm.cpu.program import Program
 from corporeal.mpm.cpu.read import Reader
+from corporeal.mpm.cpu.saving import Saved, Saving, inherited
 from corporeal.mpm.cpu.shared_field import Carried
 from corporeal.mpm.cpu.sort import Sorter
 from corporeal.mpm.cpu.spring_records import Springs
@@ -63,8 +64,6 @@ from corporeal.mpm.state import Motion
 from corporeal.mpm.substance import Substances
 
 DEFAULT_THREADS = 4
-KEPT = ("count", "smallest", "largest", "speed", "wave")
-"""What the clock remembers from step to step."""
 
 
 class CpuEngine(Interaction):
@@ -137,6 +136,9 @@ class CpuEngine(Interaction):
         self.grips: dict[int, Grip] = {}
         self.bond, self.bonded = tables.bonds(problem)
         self._wind_clock()
+        self.saving = Saving(
+            self.ledger, self.window, self.rigid, self.contact, self.clock, self.world
+        )
         self.connect()
 
     def _fill_fields(self, sorter: Sorter) -> None:
@@ -356,47 +358,24 @@ class CpuEngine(Interaction):
 
     # ------------------------------------------------------------ reading and keeping
 
-    def save(self) -> dict[str, np.ndarray]:
+    def save(self) -> Saved:
         """Everything needed to go on later exactly as if nothing had happened."""
         self.book()
-        saved = {f"ledger.{k}": v for k, v in self.ledger.as_arrays().items()}
-        for f, window in self.window.items():
-            saved |= {f"field{f}.{k}": v for k, v in window.saved().items()}
-        saved |= {f"rigid{b}": state.copy() for b, state in self.rigid.items()}
-        saved["contact"] = self.contact.past
-        saved["clock"] = np.array([self.time, *(float(self.clock[k][0]) for k in KEPT)])
-        return saved
+        return self.saving.save()
 
-    def restore(self, saved: dict[str, np.ndarray]) -> None:
+    def restore(self, saved: Saved) -> None:
         """Go on from what ``save`` returned, on an engine built from the same problem."""
-        for name in self.ledger.as_arrays():
-            getattr(self.ledger, name)[...] = saved[f"ledger.{name}"]
-        for f, window in self.window.items():
-            window.restore(_of(f"field{f}.", saved))
-        for b, state in self.rigid.items():
-            state[:] = saved[f"rigid{b}"]
-        self.contact.past = saved["contact"]
-        time, *kept = saved["clock"].tolist()
-        self.world["time"] = time
-        for name, value in zip(KEPT, kept, strict=True):
-            self.clock[name] = value
+        self.saving.restore(saved)
         self._note_steps()
         self.lost[:] = False
         self.connect()
 
-    def inherit(self, saved: dict[str, np.ndarray], heirs: Heirs) -> None:
+    def inherit(self, saved: Saved, heirs: Heirs) -> None:
         """Go on from the ``save`` of an engine of whose bodies one is several here.
 
         The pieces are where the problem says; all else is as it was, and so are the books.
         """
-        own, split = self.save(), np.bincount(heirs.parent)
-        kept = {b for b, parent in enumerate(heirs.parent) if b == parent and split[b] == 1}
-        names = [f"field{b}." for b in kept if b not in self.rigid]
-        names += [f"rigid{b}" for b in kept if b in self.rigid]
-        own |= {k: v for k, v in saved.items() if k in names or k.startswith(_fields(names))}
-        book = {name: saved[f"ledger.{name}"] for name in self.ledger.as_arrays()}
-        own |= {f"ledger.{name}": v for name, v in heirs.inherited(book).items()}
-        self.restore(own | {"clock": saved["clock"]})
+        self.restore(inherited(self.save(), saved, heirs))
 
     # ------------------------------------------------------------ accessors of what is common
 
@@ -482,25 +461,11 @@ class CpuEngine(Interaction):
         """Void nodes that were laid with other velocities."""
         self.clock["laid"] = 0
 
-    def _place_as(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
+    def _place_as(self, saved: Saved, bodies: Collection[int]) -> None:
         """Take bodies over with their fields: in one that all share, every particle comes along."""
-        for f, window in self.window.items():
-            if not set(bodies).isdisjoint(self.members[f]):
-                window.restore(_of(f"field{f}.", saved))
-                # What it was strained by there was long ago: branches have forgotten it.
-                window.relax(self.material[f])
-        for b in self.rigid.keys() & set(bodies):
-            self.rigid[b][:] = saved[f"rigid{b}"]
-        self.contact.past = saved["contact"]
-        wave = float(saved["clock"][-1])
-        self.clock["wave"] = max(float(self.clock["wave"][0]), wave)
+        fields = [f for f in self.window if not set(bodies).isdisjoint(self.members[f])]
+        self.saving.place_as(saved, fields, bodies)
+        for f in fields:
+            # What it was strained by there was long ago: branches have forgotten it.
+            self.window[f].relax(self.material[f])
         self.connect()
-
-
-def _fields(names: list[str]) -> tuple[str, ...]:
-    return tuple(name for name in names if name.endswith("."))
-
-
-def _of(head: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:
-    """Choose what stands under names with that head, and take it off."""
-    return {k.removeprefix(head): v for k, v in saved.items() if k.startswith(head)}

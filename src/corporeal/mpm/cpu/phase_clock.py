@@ -1,4 +1,4 @@
-"""What each phase of a step takes on the processor. A run that nobody times pays nothing for it."""
+"""What each phase of a step takes on the processor, for benchmarks; others pay nothing."""
 
 import ctypes
 import time

@@ -14,7 +14,7 @@ from corporeal.mpm.constants import (
     VAST,
     WALL_REACH,
 )
-from corporeal.mpm.cuda.contact_nodes import height_of, wets
+from corporeal.mpm.cuda.contact_nodes import height_of, slides, wets
 from corporeal.mpm.cuda.grid import block_of, find, node_of
 from corporeal.mpm.cuda.layout import (
     FULL,
@@ -297,7 +297,13 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             n = c.normal[t]
             h = height_of(s, -1 - other, c.at[c.meet[t]])
             xi = wp.dot(c.mean[a], n) / (g.node[c.slot[a]][0] * s.cell)
-            c.gap[t] = gap_to_plane(xi, h) * s.cell
+            gap = gap_to_plane(xi, h)
+            if slides(c, r, c.fa[t], c.fc[t]):
+                gap = gap_of_liquid(xi, h)
+                if h > WALL_REACH:
+                    c.slips[t] = 1
+            if gap < VAST:
+                c.gap[t] = gap * s.cell
         elif wets(r, c.fa[t], c.fc[t]) > 0:
             # The liquid's mean place, and a face of the body that it has there.
             which = wets(r, c.fa[t], c.fc[t])

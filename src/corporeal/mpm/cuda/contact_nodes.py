@@ -4,7 +4,14 @@ Same rules as ``reference.contact.find``.
 """
 
 from corporeal.mpm import constants
-from corporeal.mpm.constants import FIELDS_AT_NODE, VAST, WALL_REACH, WETTED_FACES
+from corporeal.mpm.constants import (
+    FIELDS_AT_NODE,
+    HELD_BY_WALL,
+    STICKS,
+    VAST,
+    WALL_REACH,
+    WETTED_FACES,
+)
 from corporeal.mpm.cuda.layout import (
     BLOCKS,
     FULL,
@@ -59,13 +66,29 @@ def there(g: Grid, node: int):
 
 
 @wp.func
-def walls_near(s: Sheet, r: Rigid, field: int, at: wp.vec3i):
+def slides(c: Contacts, r: Rigid, field: int, other: int):
+    """Whether a field is a liquid that slides along a plane."""
+    return r.pours[field] == 1 and c.friction[field, other] < D(STICKS)
+
+
+@wp.func
+def near_wall(c: Contacts, s: Sheet, r: Rigid, field: int, w: int, at: wp.vec3i, alone: bool):
+    """Whether a node of a field may touch a plane; with others there a body may lie between."""
+    if r.pointed[field] == 1:
+        return False
+    reach = WALL_REACH
+    if alone and slides(c, r, field, s.bodies + w):
+        reach = HELD_BY_WALL
+    return height_of(s, w, at) <= reach
+
+
+@wp.func
+def walls_near(c: Contacts, s: Sheet, r: Rigid, field: int, at: wp.vec3i, alone: bool):
     """How many planes a field meets at a node."""
     n = int(0)
-    if r.pointed[field] == 0:
-        for w in range(s.planes):
-            if height_of(s, w, at) <= WALL_REACH:
-                n += 1
+    for w in range(s.planes):
+        if near_wall(c, s, r, field, w, at, alone):
+            n += 1
     return n
 
 
@@ -114,7 +137,7 @@ def add_touches(c: Contacts, s: Sheet, r: Rigid, k: int, room: int):
         f = c.field[k * FIELDS_AT_NODE + a]
         for b in range(a + 1, n):
             total += faces_of(r, f, c.field[k * FIELDS_AT_NODE + b]) - 1
-        total += walls_near(s, r, c.field[k * FIELDS_AT_NODE + a], c.at[k])
+        total += walls_near(c, s, r, c.field[k * FIELDS_AT_NODE + a], c.at[k], n == 1)
     t = wp.atomic_add(s.flag, TOUCHES, total)
     c.first[k] = t
     c.last[k] = t
@@ -136,7 +159,7 @@ def add_touches(c: Contacts, s: Sheet, r: Rigid, k: int, room: int):
                 c.facet[t] = facet
                 t += 1
         for w in range(s.planes):
-            if r.pointed[f] == 0 and height_of(s, w, c.at[k]) <= WALL_REACH:
+            if near_wall(c, s, r, f, w, c.at[k], n == 1):
                 add_touch(c, t, k, k * FIELDS_AT_NODE + a, -1 - w)
                 c.point[t] = x
                 c.fa[t] = f
@@ -168,7 +191,7 @@ def list_meets(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
                 if g.field[other] < g.field[b]:
                     several = -1
                     break
-        if several < 0 or (several == 0 and walls_near(s, r, g.field[b], at) == 0):
+        if several < 0 or (several == 0 and walls_near(c, s, r, g.field[b], at, True) == 0):
             continue
         k = wp.atomic_add(s.flag, MEETS, 1)
         if k >= c.room:

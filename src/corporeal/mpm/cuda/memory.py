@@ -171,7 +171,7 @@ class Memory:
         r.wetted = self.put(np.concatenate(rows), wp.vec3d)
         r.wetted_first = self.put(np.cumsum(count) - count, wp.int32)
         r.wetted_count = self.put(count, wp.int32)
-        liquid = matter.body[np.isin(matter.law, laws.LIQUID)]
+        liquid = matter.body[np.isin(matter.law, laws.LIQUID)] * (problem.contact == "multi")
         pours = np.isin(np.arange(len(stiff)), liquid) & ~stiff
         r.pours = self.put(pours, wp.int32)
 

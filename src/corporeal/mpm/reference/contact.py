@@ -13,6 +13,7 @@ from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm import laws
 from corporeal.mpm.constants import (
+    HELD_BY_WALL,
     POINT_REACH,
     SHOWN_AROUND,
     STICKS,
@@ -83,8 +84,13 @@ class Scene:
 
     def pours(self, field: int) -> bool:
         """Whether a field holds a liquid."""
-        mine = self.matter.law[self.matter.body == field]
+        mine = self.matter.law[self.single | (self.matter.body == field)]
         return not self.is_rigid(field) and bool(np.isin(mine, laws.LIQUID).any())
+
+    def slides(self, field: int, wall: int) -> bool:
+        """Whether a field is a liquid that slides along a plane: all that it presses holds it."""
+        friction = _friction(self.problem)[field, len(self.problem.bodies) + wall]
+        return self.pours(field) and bool(friction < STICKS)
 
     def thinness(self, field: int) -> int:
         """How thin a rigid body is against the cell; 0 for what deforms."""
@@ -277,9 +283,11 @@ def find(scene: Scene) -> list[Touch]:
     bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
     apart = [p for p in combinations(fields, 2) if p not in bonded]
     pairs = {p: _common(scene.grid, rows, p) for p in apart}
-    walls = {(f, w): _near(scene, rows[f], w) for f in fields for w in _walls(scene, f)}
-    shown = [slot for both in pairs.values() for slot in both] + list(walls.values())
-    look = Look.at(scene, np.concatenate([np.zeros(0, np.int64), *shown]))
+    shared = [np.zeros(0, np.int64), *(slot for both in pairs.values() for slot in both)]
+    alone = np.setdiff1d(np.arange(scene.grid.count), np.concatenate(shared))
+    walls = {(f, w): _near(scene, rows[f], alone, (f, w)) for f in fields for w in _walls(scene, f)}
+    shown = [*shared, *walls.values()]
+    look = Look.at(scene, np.concatenate(shown))
     touches = [_between(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])]
     touches += [_on_wall(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
     return touches + _points_on_walls(scene)
@@ -303,9 +311,19 @@ def _walls(scene: Scene, field: int) -> range:
     return range(0 if spared else len(scene.problem.planes))
 
 
-def _near(scene: Scene, slot: np.ndarray, wall: int) -> np.ndarray:
-    reach = WALL_REACH * scene.problem.cell
-    return slot[_height(scene, slot, wall) <= reach]
+def _near(
+    scene: Scene, slot: np.ndarray, alone: np.ndarray, pair: tuple[int, int]
+) -> Int[np.ndarray, " E"]:
+    """Slots of a field that a plane may touch.
+
+    Pressure of a liquid that slides along it pushes all nodes whose splines reach it. Where fields
+    meet, there may be a body between, and only the nodes near the plane count.
+    """
+    height = _height(scene, slot, pair[1]) / scene.problem.cell
+    near = height <= WALL_REACH
+    if scene.slides(*pair):
+        near |= (height <= HELD_BY_WALL) & np.isin(slot, alone)
+    return slot[near]
 
 
 def _height(scene: Scene, slot: np.ndarray, wall: int) -> np.ndarray:
@@ -443,10 +461,13 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     field, wall = pair
     cell, bodies = scene.problem.cell, len(scene.problem.bodies)
     normal = np.tile(-np.array(scene.problem.planes[wall].normal), (len(slot), 1))
-    gap = contact.gap_to_wall(look.mean[slot], _height(scene, slot, wall), normal, cell)
+    measure = contact.gap_of_liquid if scene.slides(field, wall) else contact.gap_to_wall
+    height = _height(scene, slot, wall)
+    gap = measure(look.mean[slot], height, normal, cell)
     point = scene.grid.index[slot] * cell
     there = np.full(len(slot), scene.wall_mover + wall)
-    return Touch((field, bodies + wall), scene.mover_of_slot(slot), there, point, normal, gap)
+    movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell
+    return Touch((field, bodies + wall), movers, there, point, normal, gap, slips)
 
 
 def _points_on_walls(scene: Scene) -> list[Touch]:

@@ -82,7 +82,7 @@ for (int f = 0; f < fields; f++) {
     const double *P = world->plane + 4 * w;
     if (pointed)
       points += Vec::dot(P, F.rigid + CENTRE) - P[3] > F.rigid[RADIUS] + mpm::POINT_REACH * dx ? 0 : F.surfaces;
-    else if (F.floor < 0 && Find::lowest(P, F, dx) <= mpm::WALL_REACH * dx)
+    else if (F.floor < 0 && Find::lowest(P, F, dx) <= Grid::reach(world, f, w) * dx)
       wall_of[walls++] = w;
   }
   if (lone && !walls) continue;
@@ -101,7 +101,8 @@ for (int f = 0; f < fields; f++) {
       J.block[J.fields++] = other;
     }
     bool low = false;
-    for (int i = 0; i < walls; i++) low |= !Grid::over(world->plane + 4 * wall_of[i], J.at, dx);
+    for (int i = 0; i < walls; i++)
+      low |= !Grid::over(world->plane + 4 * wall_of[i], J.at, dx, Grid::reach(world, f, wall_of[i]));
     if (J.fields < 2 && !low) continue;
     J.mask = J.several = 0;
     int found = 0;
@@ -128,21 +129,17 @@ for (int f = 0; f < fields; f++) {
       }
     J.mask = J.several;
     // Planes, where a field may touch more than one; else they cost nothing but here: contact_stand.
-    u64 wall[WALLS];
-    int floors = 0;
-    for (int v = 0; v < planes && floors < WALLS; v++) {
-      const double *P = world->plane + 4 * v;
-      if (!Grid::over(P, J.at, dx)) wall[floors++] = Grid::wall(P, J.at, dx);
-    }
+    const Walls wall(world, J.at);
     for (int q = 0; q < J.fields; q++) {
       const Field &G = world->field[J.field[q]];
       if (G.floor >= 0 || (G.rigids && G.surfaces)) continue;
-      for (int v = 0; v < floors; v++) J.mask |= wall[v] & J.have[q];
+      for (int v = 0; v < wall.count; v++) J.mask |= wall.of(world, J.field[q], v, J.several) & J.have[q];
     }
     for (int q = 0; q < J.fields; q++) {
       const Field &G = world->field[J.field[q]];
       if (G.rigids && G.surfaces) continue;
-      for (int v = 0; v < floors; v++) found += Grid::count(wall[v] & J.have[q] & J.mask);
+      for (int v = 0; v < wall.count; v++)
+        found += Grid::count(wall.of(world, J.field[q], v, J.several) & J.have[q] & J.mask);
     }
     if (!J.mask) continue;
     J.meet = meet;

@@ -35,14 +35,7 @@ int from = (int)((long long)stage->junctions * index / PARTS),
 for (int j = from; j < to; j++) {
   const Junction &J = junctions[j];
   int k = J.meet, s = J.side, t = J.touch;
-  u64 wall[WALLS];
-  int walls[WALLS], near = 0;
-  for (int w = 0; w < planes && near < WALLS; w++) {
-    const double *P = world->plane + 4 * w;
-    if (Grid::over(P, J.at, dx)) continue;
-    walls[near] = w;
-    wall[near++] = Grid::wall(P, J.at, dx);
-  }
+  const Walls wall(world, J.at);
   for (u64 left = J.mask; left; left &= left - 1) {
     int i = __builtin_ctzll(left);
     Meet &M = meets[k];
@@ -74,14 +67,14 @@ for (int j = from; j < to; j++) {
     for (int a = 0; a < M.sides; a++) {
       const Side &A = sides[M.side + a];
       const Field &F = world->field[A.field];
-      for (int c = a + 1; c < M.sides + near; c++) {
+      for (int c = a + 1; c < M.sides + wall.count; c++) {
         int w = c - M.sides, faces = 1;
         Touch &T = touches[t];
         T.face = 0;
         if (w >= 0) {
-          if (!(wall[w] >> i & 1) || (F.rigids && F.surfaces)) continue;
-          T.c = -1 - walls[w];
-          T.fc = fields + walls[w];
+          if (!(wall.of(world, A.field, w, J.several) >> i & 1) || (F.rigids && F.surfaces)) continue;
+          T.c = -1 - wall.plane[w];
+          T.fc = fields + wall.plane[w];
         } else {
           T.c = M.side + c;
           T.fc = sides[T.c].field;

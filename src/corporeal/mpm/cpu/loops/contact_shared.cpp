@@ -49,18 +49,28 @@ struct Grid {
               z[3] = {0x8888888888888888ull, ~0ull, 0x1111111111111111ull};
     return x[n / 9] & y[n / 3 % 3] & z[n % 3];
   }
+  // Whether a field is a liquid that slides along a plane: its pressure pushes every node whose spline
+  // reaches the plane.
+  static inline bool slides(const World *w, int field, int plane) {
+    const int all = w->fields + w->planes;
+    return w->field[field].pours && w->friction[field * all + w->fields + plane] < mpm::STICKS;
+  }
+  // How high nodes of a field can touch a plane [cells].
+  static inline double reach(const World *w, int field, int plane) {
+    return slides(w, field, plane) ? mpm::HELD_BY_WALL : mpm::WALL_REACH;
+  }
   // Whether a block lies so high over a plane that none of its nodes can touch it.
-  static inline bool over(const double *P, const int *at, double dx) {
+  static inline bool over(const double *P, const int *at, double dx, double reach) {
     double h = -P[3];
     for (int d = 0; d < 3; d++) h += P[d] * (4.0 * at[d] + (P[d] > 0 ? 0 : 3)) * dx;
-    return h > mpm::WALL_REACH * dx;
+    return h > reach * dx;
   }
   // Nodes of a block that a plane may touch.
-  static inline u64 wall(const double *P, const int *at, double dx) {
+  static inline u64 wall(const double *P, const int *at, double dx, double reach) {
     double h[3][4];
     for (int d = 0; d < 3; d++)
       for (int k = 0; k < 4; k++) h[d][k] = P[d] * (4 * at[d] + k) * dx;
-    const double top = P[3] + mpm::WALL_REACH * dx;
+    const double top = P[3] + reach * dx;
     u64 mask = 0;
     for (int i = 0; i < 4; i++)
       for (int j = 0; j < 4; j++) {
@@ -70,6 +80,25 @@ struct Grid {
         mask |= row << (16 * i + 4 * j);
       }
     return mask;
+  }
+};
+
+// The planes that a block of nodes may touch, and its nodes that may.
+struct Walls {
+  int plane[WALLS], count;
+  u64 near[WALLS], wide[WALLS];   // of liquids that slide
+  Walls(const World *w, const int *at) : count(0) {
+    for (int v = 0; v < w->planes && count < WALLS; v++) {
+      const double *P = w->plane + 4 * v;
+      if (Grid::over(P, at, w->dx, mpm::HELD_BY_WALL)) continue;
+      near[count] = Grid::wall(P, at, w->dx, mpm::WALL_REACH);
+      wide[count] = Grid::wall(P, at, w->dx, mpm::HELD_BY_WALL);
+      plane[count++] = v;
+    }
+  }
+  // Which nodes of a field a plane may touch; where fields meet there may be a body between.
+  inline u64 of(const World *w, int field, int number, u64 several) const {
+    return near[number] | (Grid::slides(w, field, plane[number]) ? wide[number] & ~several : 0);
   }
 };
 

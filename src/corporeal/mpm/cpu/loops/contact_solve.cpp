@@ -8,7 +8,7 @@ struct Solver {
     if (T.c < 0) {
       const double *P = w->plane + 4 * (-1 - T.c);
       double h = (Vec::dot(P, T.x) - P[3]) * inv;
-      return Face::gap_to_plane(pa, h);
+      return Grid::slides(w, A.field, -1 - T.c) ? Face::gap_of_liquid(pa, h) : Face::gap_to_plane(pa, h);
     }
     const Side &C = sides[T.c];
     const Field &F = w->field[A.field], &G = w->field[C.field];
@@ -21,6 +21,12 @@ struct Solver {
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
     if (!F.surfaces) return Face::gap_to_thin(pa, sc);
     return G.surfaces ? sc - sa : Face::gap_to_thin(-pc, -sa);
+  }
+  // How high the node of a liquid is over what it slides along [m]; 0 for what is no liquid.
+  static inline double height(const World *w, const Touch &T) {
+    if (T.c >= 0) return liquid(w->field[T.fa], w->field[T.fc]) ? T.gap : 0.0;
+    const double *P = w->plane + 4 * (-1 - T.c);
+    return Grid::slides(w, T.fa, -1 - T.c) ? Vec::dot(P, T.x) - P[3] : 0.0;
   }
   // Whether a liquid meets a rigid body that says where liquids touch it.
   static inline bool liquid(const Field &F, const Field &G) {
@@ -257,13 +263,13 @@ if (from < to) {
         if (!T.active) continue;
         double u[3];
         Solver::slip(sides, T, u);
-        const bool slips = T.c >= 0 && T.gap > mpm::WALL_REACH * dx &&
-                           Solver::liquid(world->field[T.fa], world->field[T.fc]);
+        const bool slips = Solver::height(world, T) > mpm::WALL_REACH * dx;
         T.mu = world->friction[T.fa * all + T.fc];
         T.gap = Solver::gap(world, sides, T, inv) * dx;
+        T.active = T.gap < mpm::VAST * dx;   // else no contact at all
+        if (!T.active) continue;
         T.target = Impact::closing(T.gap, dt);
         if (slips) T.mu = 0.0;
-        T.active = 1;
         if (M.stiff) continue;
         T.inverse = sides[T.a].inverse + (T.c < 0 ? 0.0 : sides[T.c].inverse);
         if (M.touches == 1) T.active = Vec::dot(u, T.normal) > T.target;

@@ -7,11 +7,13 @@ book = Entry{task[0], fields + F.floor, 0, {0, 0, 0}, {0, 0, 0}, 0};
 if (F.floor >= 0) {
   const double *P = world->plane + 4 * F.floor;
   const double mu = world->friction[task[0] * all + fields + F.floor], per = 1.0 / dt;
+  const bool slides = Grid::slides(world, task[0], F.floor);
+  const double reach = Grid::reach(world, task[0], F.floor);
   for (int b = task[1]; b < task[2]; b++) {
     const int *w = F.where + 4 * b;
     const int at[3] = {w[0] + F.origin[0], w[1] + F.origin[1], w[2] + F.origin[2]};
-    if (Grid::over(P, at, dx)) continue;
-    u64 left = Grid::wall(P, at, dx);
+    if (Grid::over(P, at, dx, reach)) continue;
+    u64 left = Grid::wall(P, at, dx, reach);
     if (w[3]) left &= ~junctions[w[3] - 1].mask;
     for (; left; left &= left - 1) {
       const int i = __builtin_ctzll(left);
@@ -22,7 +24,7 @@ if (F.floor >= 0) {
       const double x[3] = {(4 * at[0] + (i >> 4)) * dx, (4 * at[1] + (i >> 2 & 3)) * dx,
                            (4 * at[2] + (i & 3)) * dx};
       const double h = (Vec::dot(P, x) - P[3]) * inv;
-      const double gap = Face::gap_to_plane(-node[7], h) * dx;
+      const double gap = (slides ? Face::gap_of_liquid(-node[7], h) : Face::gap_to_plane(-node[7], h)) * dx;
       const double jn = m * (fall - (gap > 0 ? gap * per : 0.0));
       if (jn <= 0) continue;
       double slip[3], size = 0, u[3], was[3];
@@ -31,7 +33,7 @@ if (F.floor >= 0) {
         size += slip[d] * slip[d];
       }
       size = sqrt(size) * m;
-      const double scale = Coulomb::share(size, mu * jn);
+      const double scale = Coulomb::share(size, h > mpm::WALL_REACH ? 0.0 : mu * jn);
       book.normal += jn;
       for (int d = 0; d < 3; d++) {
         const double t = scale * m * slip[d], J = t - jn * P[d];
