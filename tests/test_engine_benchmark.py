@@ -95,3 +95,29 @@ def test_a_checkout_costs_what_it_costs(engine):
     here, there, ratio = against.compare(case, against.HERE, rounds=3, substeps=4)
     assert here > 0 and there > 0
     assert 0.2 < ratio < 5.0
+
+
+def test_phases_of_a_heap_add_up_and_contact_costs_nothing_where_there_is_none(engine):
+    from cost import phases
+
+    lines = phases.table(((1000, 1), (4000, 8)), 4).splitlines()
+    rows = {line.split("|")[1].strip(): line.split("|")[2:-1] for line in lines[2:]}
+    values = {name: [float(cell) for cell in cells] for name, cells in rows.items()}
+    whole, ratio = values.pop("all"), values.pop("against the first")
+    for column in range(2):
+        parts = sum(value[column] for value in values.values())
+        assert parts == pytest.approx(whole[column], abs=0.05 * len(values))
+    assert values["move"][0] > 0.5 * whole[0]
+    assert values["reach"][0] == 0.0 < values["reach"][1]
+    assert ratio[0] == 1.0 < ratio[1]
+
+
+def test_phases_are_not_timed_on_several_threads():
+    from corporeal.errors import UserError
+    from corporeal.mpm.cpu.phase_clock import PhaseClock
+
+    class OnTwo:
+        threads = 2
+
+    with pytest.raises(UserError, match="one thread, not 2"):
+        PhaseClock(OnTwo())

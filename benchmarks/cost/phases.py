@@ -8,7 +8,7 @@ from cost.contest import ROUNDS, Ours
 
 REST = ("list", "face", "choose", "find", "resolve")
 """Pieces of contact that are shown as one row: each is small."""
-ROWS = ("move", "reach", "prove", "solve", "look", REST)
+ROWS = ("move", "reach", "solve", "look", REST)
 
 
 class Watched:

@@ -78,3 +78,13 @@ def test_a_tree_answers_where_many_edges_are_open(rng):
 def test_nothing_winds_around_nobody():
     nothing = Shape(Mesh(np.zeros((0, 3)), np.zeros((0, 3), dtype=np.int64)))
     assert not nothing.winding(np.zeros((4, 3))).any()
+
+
+def test_a_shape_that_moved_answers_as_one_made_there(rng):
+    mesh = shown(BODIES["ball"])
+    holed = Mesh(mesh.vertices, mesh.triangles[3:])
+    there = holed.vertices * [1.0, 2.0, 0.5] + [0.3, 0.0, -0.1]
+    points = rng.uniform(-1.0, 1.0, (200, 3))
+    moved, made = Shape(holed).moved(there), Shape(Mesh(there, holed.triangles))
+    assert np.array_equal(moved.winding(points), made.winding(points))
+    assert not np.array_equal(moved.winding(points), Shape(holed).winding(points))

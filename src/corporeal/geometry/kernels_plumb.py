@@ -108,8 +108,10 @@ def drop(points, vertices, triangles, table, found):
             continue
         cell = i * counts[1] + j
         for k in range(first[cell], first[cell + 1]):
-            # What lies aside has no say, and what lies above is not met.
-            if x < box[k, 0] or x > box[k, 1] or y < box[k, 2] or y > box[k, 3] or z <= box[k, 4]:
+            # What lies above is not met, nor is what follows; what lies aside has no say.
+            if z <= box[k, 4]:
+                break
+            if x < box[k, 0] or x > box[k, 1] or y < box[k, 2] or y > box[k, 3]:
                 continue
             triangle = triangles[face[k]]
             around = covers(vertices, triangle, x, y)

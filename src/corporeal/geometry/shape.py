@@ -10,7 +10,7 @@ from jaxtyping import Bool, Float, Int
 from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from corporeal.geometry.mesh import Mesh, boundary
-from corporeal.geometry.winding import PlumbLines, plumb_lines
+from corporeal.geometry.winding import OpenEdges, PlumbLines, plumb_lines, unbalanced
 
 FEW_OPEN = 1000
 """Open edges up to which their solid angles are added up one by one: 20 ns each, where a tree of
@@ -29,8 +29,19 @@ class Shape:
         return not len(boundary(self.mesh)[0])
 
     @cached_property
+    def open_edges(self) -> OpenEdges:
+        """Edges that are walked more often one way than the other."""
+        return unbalanced(self.mesh)
+
+    def moved(self, vertices: Float[np.ndarray, "V 3"]) -> "Shape":
+        """Give the same triangles with their vertices elsewhere, which have the same open edges."""
+        other = Shape(Mesh(vertices, self.mesh.triangles))
+        other.__dict__["open_edges"] = self.open_edges
+        return other
+
+    @cached_property
     def _plumb_lines(self) -> PlumbLines:
-        return plumb_lines(self.mesh)
+        return plumb_lines(self.mesh, self.open_edges)
 
     @cached_property
     def _winding(self) -> igl.FastWindingNumberBVH:

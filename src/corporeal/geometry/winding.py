@@ -8,6 +8,7 @@ segmentation using generalized winding numbers*, exactly; and it asks few faces 
 """
 
 from dataclasses import dataclass
+from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -33,7 +34,8 @@ class PlumbLines:
     """Of each cell, in ``face``."""
     face: Int[np.ndarray, " F"]
     box: Float[np.ndarray, "F 5"]
-    """Of each, as it stands in ``face``: least and greatest x, then y, and least height [m]."""
+    """Of each, as it stands in ``face``: least and greatest x, then y, and least height [m], by
+    which they are in order within a cell."""
     rim: Int[np.ndarray, "E 2"]
     """Edges that are walked more often one way than the other."""
     excess: Int[np.ndarray, " E"]
@@ -50,9 +52,24 @@ class PlumbLines:
         return found
 
 
-def plumb_lines(mesh: Mesh) -> PlumbLines:
-    """Sort the faces of a mesh by where they lie across, and find its open edges."""
-    rim, excess = unbalanced(mesh)
+class OpenEdges(NamedTuple):
+    """Edges that are walked more often one way than the other; E of them."""
+
+    rim: Int[np.ndarray, "E 2"]
+    excess: Int[np.ndarray, " E"]
+    """How many times more, from the first vertex to the second."""
+
+
+def plumb_lines(mesh: Mesh, open_edges: OpenEdges | None = None) -> PlumbLines:
+    """Sort the faces of a mesh by where they lie across.
+
+    Args:
+        mesh: The mesh.
+        open_edges: Its own, from ``unbalanced``, where they are known already: they depend on its
+            triangles alone.
+
+    """
+    known = unbalanced(mesh) if open_edges is None else open_edges
     flat = mesh.corners[:, :, :2]
     low, high = flat.min(axis=1), flat.max(axis=1)
     start, span = low.min(axis=0), np.maximum(np.ptp(flat, axis=(0, 1)), 1e-300)
@@ -65,13 +82,13 @@ def plumb_lines(mesh: Mesh) -> PlumbLines:
             break
         width *= 2
     counts = to_cell.max(axis=0) + 1
-    first, face = _entered(from_cell, to_cell, counts)
     lowest = mesh.corners[:, :, 2].min(axis=1)
+    first, face = _entered(from_cell, to_cell, counts, lowest)
     box = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1], lowest], axis=1)[face]
-    return PlumbLines(mesh, start, width, counts, first, face, box, rim, excess)
+    return PlumbLines(mesh, start, width, counts, first, face, box, *known)
 
 
-def unbalanced(mesh: Mesh) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, " E"]]:
+def unbalanced(mesh: Mesh) -> OpenEdges:
     """Edges that are walked more often one way than the other, and how many times more."""
     f = mesh.triangles
     ends = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
@@ -81,15 +98,18 @@ def unbalanced(mesh: Mesh) -> tuple[Int[np.ndarray, "E 2"], Int[np.ndarray, " E"
     np.add.at(excess, edge.reshape(-1), np.where(ends[:, 0] == lower, 1, -1))
     odd = excess != 0
     pairs = np.column_stack([key // len(mesh.vertices), key % len(mesh.vertices)])
-    return np.ascontiguousarray(pairs[odd]), excess[odd]
+    return OpenEdges(np.ascontiguousarray(pairs[odd]), excess[odd])
 
 
 def _entered(
-    from_cell: np.ndarray, to_cell: np.ndarray, counts: np.ndarray
+    from_cell: np.ndarray, to_cell: np.ndarray, counts: np.ndarray, lowest: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """List the faces whose boxes touch each cell, cell by cell."""
+    """List the faces whose boxes touch each cell, cell by cell, from the lowest up."""
     wide = to_cell - from_cell + 1
     many = np.prod(wide, axis=1)
+    # Ordered by height before they are spread: what follows keeps that order within a cell.
+    upwards = np.argsort(lowest, kind="stable")
+    from_cell, wide, many = from_cell[upwards], wide[upwards], many[upwards]
     face = np.repeat(np.arange(len(many)), many)
     within = np.arange(len(face)) - np.repeat(np.cumsum(many) - many, many)
     column = from_cell[face, 0] + within // wide[face, 1]
@@ -97,4 +117,4 @@ def _entered(
     cell = column * counts[1] + row
     order = np.argsort(cell, kind="stable")
     held = np.bincount(cell, minlength=int(np.prod(counts)))
-    return np.concatenate([[0], np.cumsum(held)]), face[order]
+    return np.concatenate([[0], np.cumsum(held)]), upwards[face[order]]

@@ -44,4 +44,4 @@ def inline_view(take: bytes) -> str:
 
 
 def _packed(data: bytes) -> str:
-    return b64encode(zlib.compress(data, 9)).decode()
+    return b64encode(zlib.compress(data, 6)).decode()
