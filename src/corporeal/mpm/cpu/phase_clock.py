@@ -26,7 +26,7 @@ class PhaseClock:
         self.pool = watched.thread_pool
         phases = len(program.SCHEDULE)
         self.spent = np.zeros(phases + 1)
-        """Of each phase [s]; then the reading at which the present one began, 0: none does."""
+        """Of each phase [ns]; then the reading at which the present one began, 0: none does."""
         self.pool["clock_id"] = time.CLOCK_THREAD_CPUTIME_ID
         self.pool["read_clock"] = _address_of("clock_gettime")
         self.pool["spent"] = self.spent.ctypes.data
@@ -40,7 +40,7 @@ class PhaseClock:
         found: dict[str, float] = {}
         for phase, spent in zip(program.SCHEDULE, self.spent[:-1].tolist(), strict=True):
             name = program.NAMES[phase.piece]
-            found[name] = found.get(name, 0.0) + spent
+            found[name] = found.get(name, 0.0) + spent / 10**9
         return found
 
 

@@ -1,13 +1,12 @@
 // Hands one thread its next task, as piece << 24 | task, or -1 when the steps end. A phase is over when
 // its last task is done, so a thread that the system put to sleep between tasks holds nobody up.
 typedef int ReadClock(int, long long *);
-constexpr double NANOSECOND = 1e-9;   // [s]
 struct Conduct {
   // The phase that ends took what passed on this thread's clock since it began.
   static inline void note(ThreadPool *pool) {
     long long now[2];   // seconds and nanoseconds
     ((ReadClock *)pool->read_clock)(pool->clock_id, now);
-    const double read = (double)now[0] + NANOSECOND * (double)now[1];
+    const double read = (double)(now[0] * 1000000000 + now[1]);   // [ns]
     double *begun = pool->spent + pool->phases;
     if (*begun > 0) pool->spent[pool->now] += read - *begun;
     *begun = read;
