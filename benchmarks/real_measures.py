@@ -43,6 +43,8 @@ class Known:
     sides: tuple[float, ...] = ()
     height: float | None = None
     volume: tuple[float, ...] = ()
+    note: str = ""
+    """What a reader of the figures should know, in sentences."""
 
 
 def known(name: str) -> Known:

@@ -1,7 +1,7 @@
 """Real photographs: poses, quality, up, size and silhouettes of every set in a folder.
 
-    python benchmarks/real_photographs.py FOLDER [--only axe] [--cases all bare] [--training draft]
-        [--out runs/real] [--json FILE] [--docs]
+    python benchmarks/real_photographs.py FOLDER [--only axe] [--cases all bare]
+        [--training draft normal] [--out runs/real] [--json FILE] [--docs]
 
 Each folder in FOLDER with ``images`` and a COLMAP model, ``sparse/0``, is a set; it may have
 ``masks``. It is reconstructed in up to four cases: with all that it has, without its masks, without
@@ -12,7 +12,8 @@ where the object is known to stand on one; size against what ``real_sets.toml`` 
 over union of the closed surfaces' silhouettes with the masks of the set, mean and worst; minutes of
 the processor, all threads together. A set that is refused or fails is a row that says why. Rows
 that are there already are kept, and a training or a search for poses that was interrupted is
-continued.
+continued. The page is written whole from rows: the table, what is known of each set, and what the
+runs from photographs alone said.
 """
 
 import argparse
@@ -42,11 +43,11 @@ WORDS: dict[Case, str] = {
     "bare": "photographs alone",
 }
 HEADS = (
-    "set", "given", "registered", "right", "rotation off", "place off", "held out, thing [dB]",
-    "up off", "size off", "IoU, worst", "one closed piece", "minutes", "why not",
+    "set", "given", "training", "registered", "right", "rotation off", "place off",
+    "held out, thing [dB]", "up off", "size off", "IoU, worst", "one closed piece", "minutes",
+    "why not",
 )  # fmt: skip
 DOCS = Path(__file__).parents[1] / "docs" / "real-photographs.md"
-ROW = "row.json"
 EVERY = 2.0
 """Between two readings of the clock that are kept [s]."""
 Progress = Callable[[float, str], None]
@@ -98,11 +99,12 @@ def given_as(folder: Path, case: Case, place: Path) -> Path:
 def row_of(folder: Path, case: Case, training: str, out: Path) -> dict[str, Any]:
     """Reconstruct a set in one case; return a row of the table."""
     place = out / f"{folder.name}-{case}"
-    if (place / ROW).exists():
-        return json.loads((place / ROW).read_text(encoding="utf-8"))
+    kept = place / f"{training}.json"
+    if kept.exists():
+        return json.loads(kept.read_text(encoding="utf-8"))
     photos, work = given_as(folder, case, place), place / training
     row: dict[str, Any] = {"set": folder.name, "case": case, "training": training}
-    clock = Clock(place / "seconds.json")
+    clock = Clock(place / f"{training}-seconds.json")
     facts = measure.known(folder.name)
     posed = case in ("all", "unmasked")
     unit = facts.unit if posed else None
@@ -118,7 +120,7 @@ def row_of(folder: Path, case: Case, training: str, out: Path) -> dict[str, Any]
         except Exception as problem:  # a row says that it failed; the other sets go on
             row["why"] = f"failed: {type(problem).__name__}: {problem}"
     row["seconds"] = clock.seconds
-    store.write_json(place / ROW, row)
+    store.write_json(kept, row)
     return row
 
 
@@ -173,6 +175,7 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     return (
         row["set"],
         WORDS[row["case"]],
+        row["training"],
         registered,
         shown("{:.0%}", "right"),
         shown("{:.2f}°", "angle_deg"),
@@ -187,13 +190,22 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     )
 
 
-def write_docs(rows: list[tuple[str, ...]], said: str) -> None:
-    """Write the table as a page."""
+def write_docs(rows: list[dict[str, Any]], table: list[tuple[str, ...]], said: str) -> None:
+    """Write the page, whole."""
     about = (__doc__ or "").split("\n\n")
     lines = ["# Real photographs", "", f"Written by `{said}`."]
     lines += [" ".join(about[2].replace("``", "`").split()), ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
-    lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in rows]
+    lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in table]
+    lines += ["", "## What is known of the sets", ""]
+    names = dict.fromkeys(row["set"] for row in rows)
+    notes = {name: measure.known(name).note for name in names}
+    lines += [f"- *{name}*: {note}" for name, note in notes.items() if note]
+    lines += ["", "## What runs from photographs alone said", ""]
+    for row in rows:
+        if row["case"] == "bare":
+            warnings = " ".join(row.get("warnings", [])) or row.get("why", "Nothing.")
+            lines += [f"- *{row['set']}* at {row['training']}: {warnings}"]
     DOCS.write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
@@ -205,7 +217,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*", help="sets, by the names of their folders")
     parser.add_argument("--cases", nargs="*", choices=get_args(Case))
-    parser.add_argument("--training", default="draft")
+    parser.add_argument("--training", nargs="+", default=["draft"])
     parser.add_argument("--out", type=Path, default=Path("runs/real"))
     parser.add_argument("--json", type=Path, help="rows as data")
     parser.add_argument("--docs", action="store_true", help=f"write docs/{DOCS.name}")
@@ -219,14 +231,15 @@ def main() -> None:
         for case in cases_of(folder):
             if asked.cases and case not in asked.cases:
                 continue
-            rows.append(row_of(folder, case, asked.training, asked.out))
-            table.append(cells(rows[-1], pictures))
-            show_table(HEADS, table[-1:])
+            for training in asked.training:
+                rows.append(row_of(folder, case, training, asked.out))
+                table.append(cells(rows[-1], pictures))
+                show_table(HEADS, table[-1:])
     if asked.json:
         store.write_json(asked.json, rows)
     if asked.docs:
-        more = "" if asked.training == "draft" else f" --training {asked.training}"
-        write_docs(table, f"python benchmarks/real_photographs.py FOLDER{more} --docs")
+        more = "" if asked.training == ["draft"] else f" --training {' '.join(asked.training)}"
+        write_docs(rows, table, f"python benchmarks/real_photographs.py FOLDER{more} --docs")
 
 
 if __name__ == "__main__":

@@ -59,14 +59,14 @@ def test_a_row_measures_what_is_known_and_is_kept(sets, tmp_path, monkeypatch):
     again = benchmark.row_of(sets / "block", "all", "preview", tmp_path)
     assert again == json.loads(json.dumps(row)), "kept"
     shown = benchmark.cells(row, COUNT)
-    assert len(shown) == len(benchmark.HEADS) and shown[2] == "16/16" and shown[-1] == ""
+    assert len(shown) == len(benchmark.HEADS) and shown[3] == "16/16" and shown[-1] == ""
 
 
 def test_a_set_that_fails_is_a_row_that_says_why(sets, tmp_path):
     row = benchmark.row_of(sets / "broken", "all", "preview", tmp_path)
     assert "sparse/0" in row["why"] or "images" in row["why"]
     shown = benchmark.cells(row, 0)
-    assert shown[-1] == row["why"] and shown[2] == "–"
+    assert shown[-1] == row["why"] and shown[3] == "–"
 
 
 def test_errors_of_poses_do_not_see_a_similarity_but_a_wrong_camera(sets, tmp_path):
