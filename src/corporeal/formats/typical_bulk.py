@@ -4,6 +4,7 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
+from typing import Any, Literal
 
 from corporeal.formats.typical_extents import joined, nouns
 
@@ -16,20 +17,38 @@ LARGE = 0.5
 """Longest side from which a thing counts as large [m]: a smaller one may be a block of metal."""
 
 
+Measure = Literal["box", "face"]
+"""Mass is held against the volume of the smallest box around a thing, or against that box's
+largest side where it goes with that: of what is flat, whose depth is a stand's, and of what is
+inflated."""
+MEASURES: tuple[Measure, ...] = ("box", "face")
+UNIT = {"box": "kg per cubic metre of its box", "face": "kg per square metre of its largest side"}
+
+
 @dataclass(frozen=True)
 class TypicalBulk:
-    """Mass over the volume of the box around it, of one class of objects [kg/m³]."""
+    """How heavy one class of objects is for its size."""
 
     words: str
     low: float
+    """[kg/m³], or [kg/m²] of a face."""
     high: float
+    measure: Measure = "box"
+    longer: float = 0.0
+    """For things whose longest side is longer than this [m]."""
 
 
-def typical_bulk(class_name: str) -> TypicalBulk | None:
-    """Return the entry of the name's last known noun, the one with the most words that fit."""
+def typical_bulk(class_name: str, longest: float) -> TypicalBulk | None:
+    """Return the entry of the name's last known noun, the one with the most words that fit.
+
+    Args:
+        class_name: What somebody calls a thing.
+        longest: Its longest side [m].
+
+    """
     named = nouns(class_name, _compounds())
-    found = [e for e in _table() if set(e.words.split()) <= set(named)]
-    return max(found, key=lambda e: _fit(e, named), default=None)
+    found = [e for e in _table() if set(e.words.split()) <= set(named) and longest >= e.longer]
+    return max(found, key=lambda e: (*_fit(e, named), e.longer), default=None)
 
 
 def doubt_mass(
@@ -44,33 +63,48 @@ def doubt_mass(
         sides: Of the smallest box around it [m].
 
     """
-    room = sides[0] * sides[1] * sides[2]
+    across, deep = sorted(sides)[1:]
+    room, face = sides[0] * sides[1] * sides[2], across * deep
     if room <= 0.0:
         return None  # a sheet has no box
-    known, bulk = typical_bulk(class_name), mass / room
+    known, bulk = typical_bulk(class_name, deep), mass / room
     if known is None:
-        heavy = max(sides) >= LARGE and bulk > HEAVIEST
-        return f"{_weighs(name, mass, bulk)}, more than nearly all things. {ADVICE}" * heavy or None
-    if known.low / MARGIN <= bulk <= known.high * MARGIN:
+        heavy = deep >= LARGE and bulk > HEAVIEST
+        found = _weighs(name, mass, bulk, "box")
+        return f"{found}, more than nearly all things. {ADVICE}" * heavy or None
+    found = bulk if known.measure == "box" else mass / face
+    if known.low / MARGIN <= found <= known.high * MARGIN:
         return None
     article = "an" if known.words[0] in "aeiou" else "a"
-    usual = f"{article} {known.words} has {known.low:g} to {known.high:g}"
-    return f"{_weighs(name, mass, bulk)}, and {usual}. {ADVICE}"
+    large = f" longer than {known.longer:g} m" if known.longer else ""
+    usual = f"{article} {known.words}{large} has {known.low:g} to {known.high:g}"
+    return f"{_weighs(name, mass, found, known.measure)}, and {usual}. {ADVICE}"
 
 
 ADVICE = "Check how large it is (--extent), what it is made of and whether it is hollow."
 
 
-def _weighs(name: str, mass: float, bulk: float) -> str:
+def _weighs(name: str, mass: float, found: float, measure: Measure) -> str:
     weight = f"{mass / 1000:.3g} t" if mass >= 1000 else f"{mass:.3g} kg"
-    return f"{name} weighs {weight}: {bulk:.3g} kg per cubic metre of its box"
+    return f"{name} weighs {weight}: {found:.3g} {UNIT[measure]}"
 
 
 @cache
 def _table() -> tuple[TypicalBulk, ...]:
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    rows = tomllib.loads(text).items()
-    return tuple(TypicalBulk(words, float(low), float(high)) for words, (low, high) in rows)
+    return tuple(e for words, row in tomllib.loads(text).items() for e in _entries(words, row))
+
+
+def _entries(words: str, row: Any) -> list[TypicalBulk]:
+    """Read a row: low and high of the box, or these by measure, and from which length on."""
+    by_measure: dict[str, Any] = {"box": row} if isinstance(row, list) else row
+    found = []
+    for measure in MEASURES:
+        if measure in by_measure:
+            low, high = by_measure[measure]
+            longer = float(by_measure.get(f"{measure}_from", 0.0))
+            found.append(TypicalBulk(words, float(low), float(high), measure, longer))
+    return found
 
 
 @cache

@@ -23,7 +23,11 @@ from corporeal.geometry.survey import Anatomy
 from corporeal.materials import find
 from corporeal.mpm.physics.prescribed import start_velocity
 from corporeal.treatment.loose_contents import in_vessels, pour_out, wetted
-from corporeal.treatment.object_masses import as_heavy_as_stated, implausible_masses
+from corporeal.treatment.object_masses import (
+    as_heavy_as_stated,
+    implausible_masses,
+    walls_drawn_too_thick,
+)
 from corporeal.treatment.plan import Plan, Quality
 from corporeal.treatment.resolution import Accuracy, Bodies, resolve
 from corporeal.types import Material, MaterialField, Particles, Parts, Scene, Treatment
@@ -90,7 +94,8 @@ def fill(
     packings = keep_apart(packed(bodies, chosen, config.seed), chosen.cell, together)
     particles = wetted(gather(parts, bodies, chosen, packings), bodies, config.seed)
     doubted = implausible_masses(scene, anatomies, particles.mass_real)
-    told = (*particles.warnings, *drawn, *heavy, *doubted)
+    thick = walls_drawn_too_thick(scene, anatomies, makes, field)
+    told = (*particles.warnings, *drawn, *heavy, *thick, *doubted)
     particles = replace(particles, warnings=told, contents=contents)
     return planted(scene, particles, anatomies, field, tissue)
 

@@ -5,13 +5,17 @@ from collections.abc import Mapping, Sequence
 from corporeal.errors import UserError
 from corporeal.formats.typical_bulk import doubt_mass
 from corporeal.geometry.extent import oriented_size
-from corporeal.geometry.make import Make, heavier
+from corporeal.geometry.make import DRAWN, Make, heavier
 from corporeal.geometry.survey import Anatomy
 from corporeal.materials.quantities import QUANTITIES
-from corporeal.types import Scene
+from corporeal.types import Material, MaterialField, PartWords, Scene, SceneObject
 
 NOTABLE = 0.01
 """Relative difference between a stated mass and the computed one that is reported."""
+THICK = 1.5
+"""A wall that is drawn thicker than the thickest of its material, times this, is reported."""
+UNSEEN = ("metadata", "unknown")
+"""Who recognises a material without having looked at the object."""
 
 
 def as_heavy_as_stated(
@@ -63,16 +67,60 @@ def implausible_masses(
     Args:
         scene: The objects, with what they are.
         anatomies: One per object.
-        masses: Of every part [kg].
+        masses: Of every part, as large as it is in the scene [kg].
 
     """
     doubts = (
         doubt_mass(
             obj.name,
             obj.class_name or obj.name,
-            sum(masses[m.part] for m in anatomy.members),
-            oriented_size(anatomy.vertices),
+            sum(masses[m.part] for m in anatomy.members) / obj.scale**3,
+            _real(oriented_size(anatomy.vertices), obj.scale),
         )
         for obj, anatomy in zip(scene.objects, anatomies, strict=True)
     )
     return [sentence for sentence in doubts if sentence]
+
+
+def _real(sides: tuple[float, float, float], scale: float) -> tuple[float, float, float]:
+    """Return lengths in the scene as they are in life [m]."""
+    a, b, c = sides
+    return a / scale, b / scale, c / scale
+
+
+def walls_drawn_too_thick(
+    scene: Scene, anatomies: Sequence[Anatomy], makes: Mapping[int, Make], field: MaterialField
+) -> list[str]:
+    """Say which walls weigh too much, because nobody but the mesh said how thick they are.
+
+    Artists draw walls as thick as looks well: a bin of polypropylene had 9 mm.
+
+    Args:
+        scene: The objects.
+        anatomies: One per object.
+        makes: How every part is made.
+        field: What it is made of, with walls as thick as in the scene.
+
+    """
+    doubts = (
+        _thick_wall(obj, makes[m.part], field.words[m.part], field.materials[m.part])
+        for obj, anatomy in zip(scene.objects, anatomies, strict=True)
+        for m in anatomy.members
+    )
+    return [sentence for sentence in doubts if sentence]
+
+
+def _thick_wall(obj: SceneObject, made: Make, words: PartWords, material: Material) -> str:
+    """Say that a part's wall is implausibly thick, where only its mesh says so; "": it is not."""
+    ground = material.grounds.get("shell_thickness")
+    if made.whose != DRAWN or ground is None or words.answered_by not in UNSEEN:
+        return ""
+    drawn, usual = made.thickness / obj.scale, ground.range
+    if drawn <= usual.high * THICK:
+        return ""
+    low, typical, high = (f"{1e3 * x:.2g}" for x in (usual.low, usual.typical, usual.high))
+    return (
+        f"{obj.name}: the mesh of {words.name} draws a wall {1e3 * drawn:.2g} mm thick, and such "
+        f"walls of {material.name} have {low} to {high} mm, usually {typical}: it may be "
+        f"{drawn / usual.typical:.2g} times too heavy. Say how thick it is with --annotations."
+    )
