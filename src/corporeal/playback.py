@@ -14,7 +14,7 @@ from corporeal.render.figures import Names, Numbers, panels, shades
 from corporeal.render.skin import bind
 from corporeal.render.subject import parts_named
 from corporeal.render.take import Cast, Recording, record, take
-from corporeal.trajectory.moving_gaussians import granular
+from corporeal.trajectory.moving_gaussians import fluid, granular
 from corporeal.trajectory.played import Prepared
 from corporeal.types import Scene, Trajectory
 
@@ -29,7 +29,7 @@ FAST = 30.0
 def cast_of(prepared: Prepared) -> Cast:
     """Bind the surfaces of a scene to its particles."""
     p = prepared
-    skin = bind(p.scene, p.parts, p.particles, granular(p.field))
+    skin = bind(p.scene, p.parts, p.particles, granular(p.field), fluid(p.field))
     return Cast.of(p.scene, p.particles, skin)
 
 

@@ -3,7 +3,7 @@ import pytest
 import trimesh
 
 from corporeal.render.look import positions
-from corporeal.render.skin import bind, bounded
+from corporeal.render.skin import Facets, bind, bounded
 from corporeal.types import Frame, Part, Particles, Parts, Scene, SceneObject, Surface
 
 
@@ -171,3 +171,20 @@ def test_one_lost_particle_leaves_no_hole_in_the_picture(block):
     frame.deformation[7] = np.nan
     place, normals = skin.pose(frame)
     assert np.isfinite(place).all() and np.isfinite(normals).all()
+
+
+def test_normals_of_a_fluid_are_those_of_the_surface_that_is_shown():
+    """A wall that leans over looks upward, however its file winds it; F of a fluid says nothing."""
+    wall = np.array([[0, 0, 0], [0, 1, 0], [0, 1, 1], [0, 0, 1]], dtype=float)
+    triangles = np.array([[0, 1, 2], [0, 2, 3]])
+    leaning = wall - wall[:, 2:] * [1.0, 0.0, 0.0]
+    expected = np.array([1.0, 0.0, 1.0]) / np.sqrt(2.0)
+    for wound, side in ((triangles, 1.0), (triangles[:, ::-1], -1.0)):
+        facets = Facets(wound, np.arange(4), np.full(4, side))
+        assert np.allclose(facets.normals(wall), [1.0, 0.0, 0.0])
+        assert np.allclose(facets.normals(leaning), expected)
+
+
+def test_a_vertex_without_a_triangle_gets_no_normal_of_facets():
+    facets = Facets(np.array([[0, 1, 2]]), np.arange(4), np.array([1.0, 1.0, 1.0, 0.0]))
+    assert not facets.normals(np.eye(4, 3)).any(axis=1)[3]

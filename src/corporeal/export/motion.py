@@ -14,7 +14,7 @@ from corporeal.export.solids import Solid
 from corporeal.mpm.physics.rigid import mass_of
 from corporeal.render.skin import Skin, bind
 from corporeal.trajectory.frames import Frames
-from corporeal.trajectory.moving_gaussians import granular
+from corporeal.trajectory.moving_gaussians import fluid, granular
 from corporeal.trajectory.played import Played, Prepared
 from corporeal.treatment.problem_from_scene import pose
 from corporeal.types import Frame, Particles, Scene, Trajectory
@@ -277,7 +277,8 @@ def _particle_velocity(particles: Particles, trajectory: Trajectory, now: int) -
 
 
 def _skin(prepared: Prepared) -> Skin:
-    return bind(prepared.scene, prepared.parts, prepared.particles, granular(prepared.field))
+    field, parts = prepared.field, prepared.parts
+    return bind(prepared.scene, parts, prepared.particles, granular(field), fluid(field))
 
 
 # ---------------------------------------------------------------- of a scene before any simulation

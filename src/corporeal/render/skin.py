@@ -4,12 +4,13 @@ Weights depend on position and part only, so vertices doubled along a texture se
 and a rigid object, whose particles all share one rotation, moves exactly.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
+from corporeal.geometry.mesh import joined
 from corporeal.render import kernels_skin
 from corporeal.render.look import positions, vertex_normals
 from corporeal.types import Frame, Particles, Parts, Scene
@@ -19,6 +20,29 @@ STRETCH = (0.3, 3.0)
 """A picture shows no more than this principal stretch of a particle's surroundings [-]."""
 LOOSE = (0.7, 1.4)
 """The same for granular matter, whose neighbours part and whose F says little of a surface."""
+
+
+@dataclass(frozen=True)
+class Facets:
+    """Triangles whose normals follow from their corners: F of a fluid knows volume only."""
+
+    triangles: Int[np.ndarray, "T 3"]
+    """Vertices of the skin."""
+    point: Int[np.ndarray, " V"]
+    """Number of each vertex's place: vertices doubled along a seam share one."""
+    side: Float[np.ndarray, " V"]
+    """1, or -1 where the file's normal is opposite to the winding; 0 of what has no triangle."""
+
+    def normals(self, place: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "V 3"]:
+        """Return unit normals, means by area over the triangles around each place."""
+        a, b, c = (place[self.triangles[:, k]] for k in range(3))
+        across = np.cross(b - a, c - a)
+        total = np.zeros((int(self.point.max()) + 1, 3))
+        for corner in range(3):
+            np.add.at(total, self.point[self.triangles[:, corner]], across)
+        length = np.linalg.norm(total, axis=1, keepdims=True)
+        unit = np.divide(total, length, out=np.zeros_like(total), where=length > 0)
+        return self.side[:, None] * unit[self.point]
 
 
 @dataclass(frozen=True)
@@ -35,6 +59,8 @@ class Skin:
     start: Float[np.ndarray, "P 3"]
     """Particles' first positions [m]."""
     loose: Bool[np.ndarray, " P"]
+    flowing: Facets | None = None
+    """Of fluids; None: there are none."""
 
     def pose(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
         """Vertices (V, 3) [m] and unit normals (V, 3) at one instant."""
@@ -43,6 +69,9 @@ class Skin:
         kernels_skin.carry(
             self.rest, self.normals, self.near, self.weight, self.start, *moved, place, turned
         )
+        if self.flowing is not None:
+            fresh = self.flowing.normals(place)
+            turned = np.where(np.any(fresh, axis=1)[:, None], fresh, turned)
         return place, turned
 
     def carried(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
@@ -72,13 +101,41 @@ class _Owners:
     object: Int[np.ndarray, " V"]
 
 
-def bind(scene: Scene, parts: Parts, particles: Particles, loose: Bool[np.ndarray, " K"]) -> Skin:
+def bind(
+    scene: Scene,
+    parts: Parts,
+    particles: Particles,
+    loose: Bool[np.ndarray, " K"],
+    fluid: Bool[np.ndarray, " K"] | None = None,
+) -> Skin:
     """Bind every vertex to the nearest particles of its own part, or else of its own object.
 
-    loose: which parts are granular.
+    Args:
+        scene: With surfaces.
+        parts: Which part each triangle is of.
+        particles: What carries the surfaces.
+        loose: Which parts are granular or liquid.
+        fluid: Which parts are fluids, whose normals are those of the posed surface; None: none.
+
     """
     owners = _owners(scene, parts)
-    return _bound(positions(scene), vertex_normals(scene), owners, particles, loose)
+    skin = _bound(positions(scene), vertex_normals(scene), owners, particles, loose)
+    if fluid is None or not fluid.any():
+        return skin
+    return replace(skin, flowing=_facets(scene, parts, skin, fluid))
+
+
+def _facets(scene: Scene, parts: Parts, skin: Skin, fluid: np.ndarray) -> Facets:
+    """Take the triangles of fluid parts, welded by place."""
+    part = np.asarray(parts.part_of_point)
+    mine = (part >= 0) & fluid[np.maximum(part, 0)]
+    triangles = np.asarray(joined(scene.surfaces).triangles)[mine]
+    _, point = np.unique(np.round(skin.rest, 7), axis=0, return_inverse=True)
+    touched = np.zeros(len(skin.rest))
+    touched[triangles] = 1.0
+    wound = Facets(triangles, point.reshape(-1), touched)
+    opposite = np.einsum("vi,vi->v", wound.normals(skin.rest), skin.normals) < 0
+    return replace(wound, side=np.where(opposite, -touched, touched))
 
 
 def bind_points(

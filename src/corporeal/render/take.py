@@ -88,7 +88,7 @@ class Cast:
         row = np.full(len(owner), -1, dtype=np.int64)
         row[keep] = np.arange(len(keep))
         names = ("rest", "normals", "near", "weight")
-        soft = replace(skin, **{name: getattr(skin, name)[keep] for name in names})
+        soft = replace(skin, flowing=None, **{n: getattr(skin, n)[keep] for n in names})
         vertices = tuple(np.flatnonzero(owner == k) for k in range(count))
         return cls(skin, vertices, members, rigid, soft, row)
 

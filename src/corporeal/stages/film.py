@@ -34,7 +34,7 @@ from corporeal.render.pace import between, instants, is_slow
 from corporeal.render.skin import Skin, bind
 from corporeal.splats import raster
 from corporeal.store import writing
-from corporeal.trajectory.moving_gaussians import MovingGaussians, granular, moving_gaussians
+from corporeal.trajectory.moving_gaussians import MovingGaussians, fluid, granular, moving_gaussians
 from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
     Film,
@@ -137,7 +137,8 @@ def film(
     if count == 0:
         raise UserError(f"{trajectory.folder} holds no frames. Run corporeal simulate again.")
     progress(0.0, "placing the camera")
-    skin = bind(scene, prepared.parts, prepared.particles, granular(prepared.field))
+    field = prepared.field
+    skin = bind(scene, prepared.parts, prepared.particles, granular(field), fluid(field))
     reel = reel_of(skin, scene, prepared.particles, trajectory)
     size = config.width, config.height
     camera = track(config.shot, reel, size, config.view)

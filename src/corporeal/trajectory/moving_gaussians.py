@@ -10,7 +10,7 @@ from corporeal.mpm.laws import MENU
 from corporeal.render.skin import Skin, bind_points
 from corporeal.splats.deform import deformed
 from corporeal.trajectory.played import Prepared
-from corporeal.types import Frame, Gaussians, MaterialField, Reconstruction
+from corporeal.types import Frame, Gaussians, Law, MaterialField, Reconstruction
 
 ARRAYS = ("mean", "rotation", "scale", "opacity", "sh")
 
@@ -55,3 +55,8 @@ def moving_gaussians(found: Reconstruction, prepared: Prepared) -> MovingGaussia
 def granular(field: MaterialField) -> np.ndarray:
     """Which parts are made of grains or liquid: their neighbours part."""
     return np.array([MENU[m.law].loose for m in field.materials], dtype=bool)
+
+
+def fluid(field: MaterialField) -> np.ndarray:
+    """Which parts are fluids: their deformation gradient knows nothing but the change of volume."""
+    return np.array([m.law is Law.FLUID for m in field.materials], dtype=bool)
