@@ -183,7 +183,7 @@ export class Viewer {
     stage.paint(this.by.value)
     this.captions = words.map((text, k) => el('div', {class: `caption of${k}`}, text))
     this.see.append(...this.captions)
-    this.resize()
+    this.refit()
   }
 
   // Show one again.
@@ -192,7 +192,15 @@ export class Viewer {
     this.stages.pop().free()
     for (const caption of this.captions) caption.remove()
     this.captions = null
+    this.refit()
+  }
+
+  // Pictures have another shape now: go back or nearer, so that as much is seen from side to side.
+  refit() {
+    const before = this.eye.aspect
     this.resize()
+    this.eye.position.sub(this.orbit.target).multiplyScalar(before / this.eye.aspect).add(this.orbit.target)
+    this.orbit.update()
   }
 
   // ---------------------------------------------------------------- the picture
