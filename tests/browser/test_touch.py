@@ -126,6 +126,7 @@ def test_the_control_runs_beside_and_what_was_touched_is_replayed_at_draft(small
         tab.until("window.viewer?.takes?.length === 2 && viewer.stats.drawn > 2")
         assert tab.run("viewer.names.map(n => n.textContent)")[1] == "all stick: one grid"
         assert tab.run("viewer.takes.every(t => t.times.length > 2)")
+        assert "Contact alone" in tab.run("viewer.panel.innerText")
         tab.picture(tmp_path / "replayed.png")
         assert tab.run("[...viewer.pages.keys()]") == ["Look", "Audit"]
         assert tab.errors == []

@@ -106,7 +106,7 @@ export class Viewer {
       el('label', {class: 'line'}, 'colour by', this.by), el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'),
       el('p', {class: 'hint'}, `Squares on the floor are ${si(squareOf(Math.max(...this.stages.map(s => s.size))), 'm')} wide.`), ...objects,
       this.takes.length > 1 ? [el('h3', {}, 'What differs'), two.length ? table(two, ['part', '', ...this.takes.map((t, k) => this.options.names?.[k] ?? t.header.name)])
-        : el('p', {}, 'Nothing that was asked for differs.')] : null,
+        : el('p', {}, this.options.differs ?? 'Nothing that was asked for differs.')] : null,
       this.card)
   }
 
