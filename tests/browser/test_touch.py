@@ -107,14 +107,14 @@ def test_the_control_runs_beside_and_what_was_touched_is_replayed_at_draft(small
         assert tab.run(captions) == ["objects slide and part", "all stick: one grid"]
         # The stone is lifted on the left, and rises on the right as well.
         x, y, _ = tab.run(MIDDLE.replace("OBJECT", "1"))
-        tab.run("window.stone = k => viewer.stages[k].meshes.find(m => m.surface.object === 1)")
-        start = tab.run("stone(1).matrix.elements[14]")
+        beside = MIDDLE.replace("OBJECT", "1").replace("stages[0]", "stages[1]")
+        start = tab.run(beside)[2]
         tab.mouse("mouseMoved", x, y, button="none", buttons=0)
         tab.mouse("mousePressed", x, y)
         for k in range(15):
             tab.mouse("mouseMoved", x, y - 10 * k)
             time.sleep(0.03)
-        tab.until(f"stone(1).matrix.elements[14] > {start + 0.02}")
+        tab.until(f"{beside}[2] > {start + 0.02}")
         tab.mouse("mouseReleased", x, y - 140)
         tab.press(" ")
         tab.until("!viewer.playing")
@@ -126,6 +126,7 @@ def test_the_control_runs_beside_and_what_was_touched_is_replayed_at_draft(small
         tab.until("window.viewer?.takes?.length === 2 && viewer.stats.drawn > 2")
         assert tab.run("viewer.names.map(n => n.textContent)")[1] == "all stick: one grid"
         assert tab.run("viewer.takes.every(t => t.times.length > 2)")
+        assert "Contact alone" in tab.run("viewer.panel.innerText")
         tab.picture(tmp_path / "replayed.png")
         assert tab.run("[...viewer.pages.keys()]") == ["Look", "Audit"]
         assert tab.errors == []

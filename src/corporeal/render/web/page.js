@@ -106,7 +106,7 @@ export class Viewer {
       el('label', {class: 'line'}, 'colour by', this.by), el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'),
       el('p', {class: 'hint'}, `Squares on the floor are ${si(squareOf(Math.max(...this.stages.map(s => s.size))), 'm')} wide.`), ...objects,
       this.takes.length > 1 ? [el('h3', {}, 'What differs'), two.length ? table(two, ['part', '', ...this.takes.map((t, k) => this.options.names?.[k] ?? t.header.name)])
-        : el('p', {}, 'Nothing that was asked for differs.')] : null,
+        : el('p', {}, this.options.differs ?? 'Nothing that was asked for differs.')] : null,
       this.card)
   }
 
@@ -183,7 +183,7 @@ export class Viewer {
     stage.paint(this.by.value)
     this.captions = words.map((text, k) => el('div', {class: `caption of${k}`}, text))
     this.see.append(...this.captions)
-    this.resize()
+    this.refit()
   }
 
   // Show one again.
@@ -192,7 +192,15 @@ export class Viewer {
     this.stages.pop().free()
     for (const caption of this.captions) caption.remove()
     this.captions = null
+    this.refit()
+  }
+
+  // Pictures have another shape now: go back or nearer, so that as much is seen from side to side.
+  refit() {
+    const before = this.eye.aspect
     this.resize()
+    this.eye.position.sub(this.orbit.target).multiplyScalar(before / this.eye.aspect).add(this.orbit.target)
+    this.orbit.update()
   }
 
   // ---------------------------------------------------------------- the picture

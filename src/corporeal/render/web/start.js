@@ -40,8 +40,9 @@ try {
     return [['Touch', touch.content], ...(works ? [['Change', new Change(viewer, names[0]).content]] : []), ['Export', new Export(names[0]).content]]
   }
   const opened = name => { if (name === 'Touch') touch?.enter(); else touch?.leave() }
+  const differs = replayed ? 'Contact alone: on the right all objects share one velocity field, and what touches sticks.' : undefined
   const unmoved = works && names.length === 1 ? simulateIt : null
-  window.viewer = new Viewer(root, takes, {names, home: '/home', tabs, opened, unmoved})
+  window.viewer = new Viewer(root, takes, {names, home: '/home', tabs, opened, unmoved, differs})
 } catch (error) {
   root.replaceChildren(el('div', {class: 'failed', role: 'alert'}, el('h1', {}, 'This run cannot be shown'), el('p', {}, error.message),
     el('p', {}, el('a', {href: '/home'}, 'All runs'))))
