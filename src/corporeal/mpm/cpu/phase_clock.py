@@ -7,6 +7,7 @@ import numpy as np
 
 from corporeal.errors import UserError
 from corporeal.mpm.cpu import program
+from corporeal.mpm.cpu.layout import NANOSECONDS
 
 
 class PhaseClock:
@@ -26,7 +27,7 @@ class PhaseClock:
         self.pool = watched.thread_pool
         phases = len(program.SCHEDULE)
         self.spent = np.zeros(phases + 1)
-        """Of each phase [s]; then the reading at which the present one began, 0: none does."""
+        """Of each phase [ns]; then the reading at which the present one began, 0: none does."""
         self.pool["clock_id"] = time.CLOCK_THREAD_CPUTIME_ID
         self.pool["read_clock"] = _address_of("clock_gettime")
         self.pool["spent"] = self.spent.ctypes.data
@@ -38,7 +39,8 @@ class PhaseClock:
     def seconds(self) -> dict[str, float]:
         """Processor time since the last ``clear`` by piece [s], in the order of a step."""
         found: dict[str, float] = {}
-        for phase, spent in zip(program.SCHEDULE, self.spent[:-1].tolist(), strict=True):
+        seconds = (self.spent[:-1] / NANOSECONDS).tolist()
+        for phase, spent in zip(program.SCHEDULE, seconds, strict=True):
             name = program.NAMES[phase.piece]
             found[name] = found.get(name, 0.0) + spent
         return found
