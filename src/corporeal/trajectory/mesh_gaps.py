@@ -46,7 +46,8 @@ DENT = 1.0
 class Coat:
     """The surface of one object and what it follows."""
 
-    triangles: Int[np.ndarray, "T 3"]
+    surface: Shape
+    """At time 0."""
     skin: Skin
     sample: Int[np.ndarray, " N"]
     """Triangle of each point that is asked, and …"""
@@ -60,11 +61,11 @@ class Coat:
 
     def shape(self, frame: Frame) -> Shape:
         """Give the surface at one instant."""
-        return Shape(Mesh(self.skin.carried(frame)[0], self.triangles))
+        return self.surface.moved(self.skin.carried(frame)[0])
 
     def points(self, shape: Shape) -> Float[np.ndarray, "N 3"]:
         """Give the points on it that are asked [m]."""
-        corners = shape.mesh.vertices[self.triangles[self.sample]]
+        corners = shape.mesh.vertices[shape.mesh.triangles[self.sample]]
         return np.einsum("nk,nkd->nd", self.weight, corners)
 
 
@@ -128,14 +129,15 @@ def _coat(scene: Scene, particles: Particles, number: int) -> Coat:
     owner = np.full(len(mesh.vertices), number)
     skin = bind_points(mesh.vertices, owner, particles, np.zeros(0, dtype=bool))
     points, triangle = sample_surface(mesh, SAMPLES, rng)
+    surface = Shape(mesh)
     return Coat(
-        triangles=mesh.triangles,
+        surface=surface,
         skin=skin,
         sample=triangle,
         weight=_barycentric(points, mesh.corners[triangle]),
         grains=rng.permutation(members)[:GRAINS],
         members=members,
-        closed=Shape(mesh).inside(particles.position[members].astype(float)).mean() > PASSED,
+        closed=surface.inside(particles.position[members].astype(float)).mean() > PASSED,
     )
 
 

@@ -67,6 +67,8 @@ REPORT = 8
 """Columns with room to spare: a row is a cache line."""
 REACHED, STRAYED, PAUSED, INFINITE = 1, 2, 3, 4
 """Why steps ended: time is up; a particle left its block; enough for now; something overflowed."""
+NANOSECONDS = 1_000_000_000
+"""Of a second: what phases are timed in."""
 MOST_THREADS = 64
 """That may share tasks."""
 SURVEY, COUNT, RANK, COPY = range(4)

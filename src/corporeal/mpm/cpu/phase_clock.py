@@ -7,6 +7,7 @@ import numpy as np
 
 from corporeal.errors import UserError
 from corporeal.mpm.cpu import program
+from corporeal.mpm.cpu.layout import NANOSECONDS
 
 
 class PhaseClock:
@@ -38,9 +39,10 @@ class PhaseClock:
     def seconds(self) -> dict[str, float]:
         """Processor time since the last ``clear`` by piece [s], in the order of a step."""
         found: dict[str, float] = {}
-        for phase, spent in zip(program.SCHEDULE, self.spent[:-1].tolist(), strict=True):
+        seconds = (self.spent[:-1] / NANOSECONDS).tolist()
+        for phase, spent in zip(program.SCHEDULE, seconds, strict=True):
             name = program.NAMES[phase.piece]
-            found[name] = found.get(name, 0.0) + spent / 10**9
+            found[name] = found.get(name, 0.0) + spent
         return found
 
 

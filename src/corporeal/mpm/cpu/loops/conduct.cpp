@@ -6,7 +6,7 @@ struct Conduct {
   static inline void note(ThreadPool *pool) {
     long long now[2];   // seconds and nanoseconds
     ((ReadClock *)pool->read_clock)(pool->clock_id, now);
-    const double read = (double)(now[0] * 1000000000 + now[1]);   // [ns]
+    const double read = (double)now[0] * NANOSECONDS + (double)now[1];
     double *begun = pool->spent + pool->phases;
     if (*begun > 0) pool->spent[pool->now] += read - *begun;
     *begun = read;
