@@ -3,6 +3,7 @@ import os
 import threading
 import time
 from contextlib import ExitStack
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -129,3 +130,24 @@ def test_who_has_patience_waits_until_a_folder_is_let_go_of(tmp_path):
         start = time.monotonic()
         with store.alone(tmp_path, 20.0):
             assert 0.1 < time.monotonic() - start < 10.0
+
+
+@dataclass(frozen=True)
+class OfOld:
+    size: int = 3
+    words: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class OfToday(OfOld):
+    turned: float = field(default=0.0, metadata=store.LATER)
+
+
+def test_a_setting_that_was_added_renames_nothing_until_it_is_used():
+    before = store.key("stage", OfOld(), ["a"])
+    assert store.key("stage", OfToday(), ["a"]) == before
+    assert store.key("stage", OfToday(turned=0.5), ["a"]) != before
+    assert store.key("stage", {"stage": OfToday()}, []) == store.key(
+        "stage", {"stage": OfOld()}, []
+    )
+    assert store.key("stage", OfToday(size=4), ["a"]) != before

@@ -315,9 +315,32 @@ def _built(kind: type, given: dict[str, Any]) -> Any:
 # ---------------------------------------------------------------- stage folders
 
 
+LATER = {"later": True}
+"""Metadata of a setting that was added when results were already kept under names."""
+
+
+def kept(config: Any) -> Any:
+    """Return settings as results are named by them.
+
+    What was added ``LATER`` is left out at its default: results from before keep their names.
+    """
+    if is_dataclass(config) and not isinstance(config, type):
+        told = [(f, getattr(config, f.name)) for f in fields(config)]
+        return {
+            f.name: kept(value)
+            for f, value in told
+            if "later" not in f.metadata or value != f.default
+        }
+    if isinstance(config, Mapping):
+        return {str(k): kept(v) for k, v in config.items()}
+    if isinstance(config, list | tuple):
+        return [kept(v) for v in config]
+    return plain(config)
+
+
 def key(stage: str, config: Any, inputs: list[str]) -> str:
     """Name a result by all it depends on: the stage, its configuration, what came before."""
-    text = json.dumps([__version__, stage, plain(config), inputs], sort_keys=True)
+    text = json.dumps([__version__, stage, kept(config), inputs], sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:20]
 
 

@@ -87,7 +87,7 @@ def _job(folder: Path, scene: PlannedScene, settings: Settings, read: Sequence[s
     path = folder / SCENES / scene.name
     made = store.read_meta(path).key
     asked = replace(settings, describe=replace(settings.describe, record=None))
-    named = {**store.plain(asked), "simulate": as_kept(settings.simulate)}
+    named = {**store.kept(asked), "simulate": as_kept(settings.simulate)}
     return Job(
         name=scene.name,
         function=run_scene,

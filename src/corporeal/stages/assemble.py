@@ -2,12 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Literal
 
 import numpy as np
 
+from corporeal import store
 from corporeal.errors import BadFileError, UserError, check_range
 from corporeal.formats.any_model import READ, Frame, Unit, read_model
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
@@ -46,9 +47,9 @@ class AssembleConfig:
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
     """Raise each object above what it stands on by this many times its own size."""
-    lift: tuple[str, ...] = ()
+    lift: tuple[str, ...] = field(default=(), metadata=store.LATER)
     """Raise an object above where it stands, such as "duck=0.5" [m]."""
-    velocity: tuple[str, ...] = ()
+    velocity: tuple[str, ...] = field(default=(), metadata=store.LATER)
     """An object's initial velocity, such as "duck=1,0,-2" [m/s]."""
     extent: tuple[str, ...] = ()
     """Largest real extent of an object, such as "duck=0.1" [m]."""

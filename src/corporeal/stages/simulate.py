@@ -7,7 +7,7 @@ A scene declared as settled is brought to equilibrium first (``trajectory.static
 
 import logging
 from collections.abc import Callable
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Literal
@@ -61,7 +61,7 @@ class SimulateConfig:
     contact: Literal["multi", "single"] = "multi"
     """multi: one velocity field per object, with friction between them; single: one field for all,
     a control in which touching objects stick together."""
-    breaking: bool = False
+    breaking: bool = field(default=False, metadata=store.LATER)
     """Brittle things that are struck with ten times the energy that they bear break into pieces;
     else they stay whole, and it is said what would break."""
 
@@ -76,15 +76,12 @@ DEFAULT = SimulateConfig()
 
 
 def as_kept(config: SimulateConfig) -> dict[str, Any]:
-    """Return the settings as results on disk are named by them.
+    """Return the settings as results on disk are named by them (``store.kept``).
 
-    They were first kept when `cpu` was called `warp` and nothing could break; so runs of that time
-    stay what they are.
+    The first were kept when the engine `cpu` was called `warp`; they stay what they are.
     """
     engine = "warp" if config.engine == "cpu" else config.engine
-    return {"engine": engine, "contact": config.contact} | (
-        {"breaking": True} if config.breaking else {}
-    )
+    return store.kept(config) | {"engine": engine}
 
 
 def validate(config: SimulateConfig) -> None:

@@ -58,7 +58,7 @@ def _job(scene: SceneInput, folder: Path, settings: Settings) -> Job:
     configs = [getattr(settings, f.name) for f in fields(Settings)]
     read = [name for config in configs for name in pipeline.files_read(config)]
     asked = replace(settings, describe=replace(settings.describe, record=None))
-    named = {**store.plain(asked), "simulate": as_kept(settings.simulate)}
+    named = {**store.kept(asked), "simulate": as_kept(settings.simulate)}
     return Job(
         name=f"{scene.name}.{folder.name}",
         function=run_and_measure,
