@@ -31,6 +31,8 @@ struct Hand {
   }
   // Work of an impulse on one node, of which it gets this share.
   static inline double done(const World *w, const float *node, double share, const double *J) {
+    // A particle half way between nodes has no share in the outermost ones, which may bear no mass.
+    if (node[0] <= 0) return 0;
     double work = 0, lighter = 1.0 / node[0];
     for (int d = 0; d < 3; d++) {
       double momentum = node[1 + d] + w->dt * node[4 + d];
