@@ -203,6 +203,14 @@ def test_momentum_from_nowhere_is_found(story):
     assert momentum_residual(ledger, SCENE, CELL) == pytest.approx(0.02 / 2)
 
 
+def test_a_booked_number_that_is_none_makes_a_run_invalid(story):
+    ledger = deepcopy(story[3].ledger)
+    ledger.push_work[20:] = np.nan
+    found = audit(*story[:3], replace(story[3], ledger=ledger))
+    assert found.nan_count == STEPS - 20
+    assert any("not finite" in sentence for sentence in found.warnings)
+
+
 def test_energy_from_nowhere_is_found_and_dissipation_is_not_mistaken_for_it(story):
     known = story[3].ledger
     fall = np.linspace(0, 1.0, STEPS)[:, None] * [0, 2.0]
