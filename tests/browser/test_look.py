@@ -53,6 +53,7 @@ def test_a_report_plays_from_a_file_and_a_click_opens_the_card(report, tmp_path)
         # It plays, holds, and goes on picture by picture.
         tab.run("viewer.resume()")
         tab.until("viewer.stats.frames > 3")
+        assert tab.run("viewer.canvas.getBoundingClientRect().height") > 400
         tab.run("viewer.pause(), viewer.clock = 0, viewer.canvas.focus()")
         tab.press("ArrowRight")
         tab.until("viewer.stages[0].frame === 1")
