@@ -39,10 +39,12 @@ def test_a_sliding_block_stops_where_coulomb_says():
     assert example("03_slide_a_block.py") == pytest.approx(1.0, abs=0.03)
 
 
+@pytest.mark.slow
 def test_a_column_of_sand_runs_out_as_far_as_in_experiments():
     assert example("04_collapse_sand.py") == pytest.approx(1.24, rel=0.25)
 
 
+@pytest.mark.slow
 def test_a_model_becomes_a_report_and_no_momentum_goes_astray():
     assert example("05_run_a_model.py") < 1e-3
 

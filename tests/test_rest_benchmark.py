@@ -84,6 +84,7 @@ def post_on_toy(folder):
     return path
 
 
+@pytest.mark.slow
 def test_a_settled_scene_with_something_soft_is_at_rest_and_without_settling_it_is_not(
     rest, tmp_path
 ):

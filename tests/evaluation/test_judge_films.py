@@ -235,6 +235,7 @@ def test_motions_that_differ_are_named_differently(played, staging):
     assert digest(nudged(0.01), staging) != digest(nudged(0.0), staging)
 
 
+@pytest.mark.slow
 def test_no_condition_is_named_in_a_question_or_on_its_page(run, tmp_path, edited_only):
     films = gather_films(
         [SceneRuns("balls", {REFERENCE: run, "single": run})], tmp_path, JudgeConfig()

@@ -65,6 +65,7 @@ def complete(run_folder, tmp_path_factory):
     return {k: v for k, v in files(out).items() if k != "export.json"}
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("targets", ORDERS, ids=["in the first", "in the second"])
 def test_killed_at_any_time_leaves_whole_targets_or_none(run_folder, tmp_path, complete, targets):
     """SIGKILL while one target is written: those before are whole, that one is not there."""
@@ -118,6 +119,7 @@ def sentences(said):
     return [line for line in said.splitlines() if line.startswith("corporeal: ")]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("target", ["usd", "h5", "abc"])
 def test_a_full_disk_is_one_sentence(run_folder, tmp_path, target):
     """A real one, of 64 kB."""

@@ -250,6 +250,7 @@ asset inputs:file = @FILE@
 color3f outputs:rgb"""
 
 
+@pytest.mark.slow
 def test_a_picture_comes_from_the_files_own_folder_only(tmp_path):
     pytest.importorskip("pxr")
     (tmp_path / "own").mkdir()
@@ -285,6 +286,7 @@ def test_a_layer_from_elsewhere_is_refused_before_it_is_opened(tmp_path):
             read_mesh(tmp_path / "own" / "a.usda")
 
 
+@pytest.mark.slow
 def test_instances_of_instances_end_at_the_deadline(tmp_path, monkeypatch):
     pytest.importorskip("pxr")
     lines = ['#usda 1.0\nclass "c0" {\ndef Mesh "m" {\npoint3f[] points = [(0, 0, 0)]\n}\n}\n']

@@ -54,6 +54,7 @@ def outcome(read, path):
     return scene
 
 
+@pytest.mark.slow
 def test_every_file_gives_a_scene_or_one_sentence(hostile):
     scenes = [p for p in hostile if isinstance(outcome(lambda f: assemble([f]), p), Scene)]
     assert len(scenes) > 25

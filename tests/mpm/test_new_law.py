@@ -107,6 +107,7 @@ def test_the_tests_of_laws_and_formulas_hold_for_it(larger):
     assert done.stdout.count(".") >= 12
 
 
+@pytest.mark.slow
 def test_a_law_that_dispatch_forgets_fails_them(tmp_path):
     place = copied(tmp_path)
     menu = place / "corporeal" / "mpm" / "formulas" / "__init__.py"
@@ -120,7 +121,7 @@ def test_a_law_that_dispatch_forgets_fails_them(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "engine", ["reference", "cpu", pytest.param("cuda", marks=pytest.mark.slow)]
+    "engine", ["reference", *(pytest.param(e, marks=pytest.mark.slow) for e in ("cpu", "cuda"))]
 )
 def test_a_bar_of_it_swings_as_theory_and_rubber_do_in_every_engine(engine, larger):
     """On 16 cells a bar seems 3 % longer, whatever its law; an unstressed one would not turn."""

@@ -63,6 +63,7 @@ def changes(film, mine):
     return max(error), max(squeeze)
 
 
+@pytest.mark.slow
 def test_a_chair_with_a_stiff_frame_and_a_soft_cushion_deforms_only_in_the_cushion(thrown):
     shape = thrown("true")
     frame_error, frame_squeeze = shape["frame"]

@@ -76,6 +76,7 @@ def two_places(tmp_path_factory):
     return folder
 
 
+@pytest.mark.slow
 def test_two_places_in_one_folder_are_refused_in_one_sentence(two_places, tmp_path):
     pytest.importorskip("pycolmap")
     told = "show 2 things or places .* 14 like a_photo_000.jpg, 12 like b_photo_000.jpg"
@@ -85,6 +86,7 @@ def test_two_places_in_one_folder_are_refused_in_one_sentence(two_places, tmp_pa
     assert not (tmp_path / "poses" / "plain").exists(), "before the long search"
 
 
+@pytest.mark.slow
 def test_points_are_shared_within_a_place_alone(two_places, tmp_path):
     pytest.importorskip("pycolmap")
     gathered = gather(two_places, tmp_path, silent)

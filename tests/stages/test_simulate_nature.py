@@ -131,6 +131,7 @@ def test_a_steel_ball_rebounds_by_its_coefficient_of_restitution(tmp_path):
     assert row.shape_error_max < 1e-6
 
 
+@pytest.mark.slow
 def test_a_ball_dropped_upright_bounces_upright(tmp_path):
     """Its middle is where its mass is; with points that all weigh alike it goes aside."""
     sphere = trimesh.creation.icosphere(4, SIZE / 2)

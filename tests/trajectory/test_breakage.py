@@ -58,6 +58,7 @@ def test_a_marble_holds():
     assert found.word == "holds"
 
 
+@pytest.mark.slow
 def test_a_ball_of_steel_may_break_a_tile_that_a_ball_of_foam_does_not():
     tile = co.box("terracotta", size=(0.15, 0.15, 0.006), at=(0, 0, 0.003), name="tile")
 

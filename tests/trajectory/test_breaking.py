@@ -37,6 +37,7 @@ def audited(broken):
     return audit(prepared.scene, prepared.particles, prepared.field, broken.trajectory)
 
 
+@pytest.mark.slow
 def test_what_is_struck_far_too_hard_becomes_pieces(broken):
     (one,) = broken.trajectory.breaks
     assert one.ratio > 10
@@ -50,6 +51,7 @@ def test_what_is_struck_far_too_hard_becomes_pieces(broken):
     assert max(np.abs(a - last[0]).max() for a in last) > 0.01
 
 
+@pytest.mark.slow
 def test_pieces_have_the_mass_and_move_with_the_momentum_of_the_whole(broken, audited):
     ledger = broken.trajectory.ledger
     assert np.ptp(ledger.mass.sum(axis=1)) < 1e-12
@@ -61,6 +63,7 @@ def test_pieces_have_the_mass_and_move_with_the_momentum_of_the_whole(broken, au
     assert sum(prepared.particles.mass_real) == pytest.approx(ledger.mass[0].sum(), rel=0.02)
 
 
+@pytest.mark.slow
 def test_before_the_blow_the_pieces_move_as_one(broken):
     (one,) = broken.trajectory.breaks
     before = [f for f in broken.trajectory.frames if f.time < one.time]
@@ -70,6 +73,7 @@ def test_before_the_blow_the_pieces_move_as_one(broken):
     assert np.abs(way - way[0]).max() < 1e-6
 
 
+@pytest.mark.slow
 def test_the_report_says_into_how_many_pieces(broken, audited):
     (said,) = audited.breakage
     assert said.pieces == len(broken.trajectory.breaks[0].surfaces)
