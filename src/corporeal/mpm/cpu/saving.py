@@ -86,7 +86,7 @@ def inherited(own: Saved, saved: Saved, heirs: Heirs) -> Saved:
 def joined(own: Saved, saved: Saved, who: Joined, shared: bool) -> Saved:
     """Return the state of an engine with more bodies: their own, of all else what was saved before.
 
-    In a field that all share, particles are taken over by number afterwards: ``Window.continue_as``.
+    In a field that all share, ``Window.continue_as`` takes particles over by number afterwards.
 
     Args:
         own: Of the engine as it was built, with those that join where they are.
