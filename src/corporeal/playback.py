@@ -1,6 +1,6 @@
 """What the viewer shows of a run: how its objects move, and what is known of them."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -14,9 +14,10 @@ from corporeal.render.figures import Names, Numbers, panels, shades
 from corporeal.render.skin import bind
 from corporeal.render.subject import parts_named
 from corporeal.render.take import Cast, Recording, record, take
+from corporeal.render.take_splats import splats_of
 from corporeal.trajectory.moving_gaussians import fluid, granular
 from corporeal.trajectory.played import Prepared
-from corporeal.types import Scene, Trajectory
+from corporeal.types import Reconstruction, Scene, Trajectory
 
 RAMP = 17
 """Colours that the page mixes all others of a scale from."""
@@ -55,7 +56,7 @@ def playback(
     happened: Outcome | None = None,
     recording: Recording | None = None,
     audit: RunAudit | None = None,
-    since: Mapping[int, float] | None = None,
+    found: Reconstruction | None = None,
 ) -> bytes:
     """Return all that a page needs to play a run: see ``render.take``.
 
@@ -65,7 +66,7 @@ def playback(
         happened: What happened in it; None: it has not been simulated.
         recording: From ``recorded``; None: as for ``happened``.
         audit: Warnings and numbers, where the run has been reported on.
-        since: From when on an object is there [s]; None: all are from the start.
+        found: Gaussians that the scene was made of, to be looked at; None: its surfaces alone.
 
     """
     summary = summary_of(prepared)
@@ -73,9 +74,8 @@ def playback(
         summary["marks"] = marks(happened)
     if audit is not None:
         summary["audit"] = audit_of(audit, prepared)
-    if since:
-        summary["since"] = {str(number): time for number, time in since.items()}
-    return take(prepared.scene, prepared.parts, cast, recording, summary)
+    splats = None if found is None or not found.gaussians.count else splats_of(found, cast)
+    return take(prepared.scene, prepared.parts, cast, recording, summary, splats)
 
 
 def summary_of(prepared: Prepared) -> dict[str, Any]:

@@ -2,14 +2,17 @@
 
 import io
 
+import numpy as np
 import pytest
 from PIL import Image
 
 from chromium import browser
+from corporeal.geometry.harmonics import DC
 from corporeal.pipeline import read_back
 from corporeal.playback import cast_of, playback, recorded
 from corporeal.render.page import page, safe
 from corporeal.render.viewer_page import inline_view
+from corporeal.types import Cloud, Gaussians, Reconstruction
 
 READY = "window.viewer?.stats.ready && viewer.stats.drawn > 2"
 MIDDLE = """(() => {
@@ -94,4 +97,71 @@ def test_two_runs_stand_beside_each_other_under_one_policy(small_run, tmp_path):
         tab.until("window.home?.ready")
         assert tab.run("document.querySelectorAll('.run').length") == 1
         assert all(r.startswith((server.address, "data:", "blob:")) for r in tab.requests)
+        assert tab.errors == []
+
+
+def clothed(made, count=4000):
+    """Gaussians all over the first object, red, as if it had been reconstructed from pictures."""
+    rng = np.random.default_rng(0)
+    surface = next(s for s in made.scene.surfaces if s.object == 0)
+    rows = rng.integers(len(surface.vertices), size=count)
+    axes = rng.normal(size=(count, 4))
+    gaussians = Gaussians(
+        mean=surface.vertices[rows] + 0.001 * rng.normal(size=(count, 3)),
+        rotation=axes / np.linalg.norm(axes, axis=1, keepdims=True),
+        scale=np.full((count, 3), [0.004, 0.003, 0.001]),
+        opacity=np.full(count, 0.9),
+        sh=np.tile((np.array([0.9, 0.05, 0.05]) - 0.5) / DC, (count, 1, 1)),
+    )
+    cloud = Cloud(gaussians.mean, gaussians.mean, axes, axes, np.ones(count, dtype=np.int64))
+    owner, box = np.zeros(count, dtype=np.int64), np.zeros((1, 2, 3))
+    return Reconstruction(gaussians, owner, cloud, owner, ("ball",), box, 1.0, np.eye(4))
+
+
+RED = """(() => { const box = document.createElement('canvas'), from = viewer.canvas
+  viewer.draw()
+  box.width = from.width; box.height = from.height
+  const pen = box.getContext('2d'); pen.drawImage(from, 0, 0)
+  const data = pen.getImageData(0, 0, box.width, box.height).data, found = [0, 0]
+  for (let i = 0; i < data.length; i += 4) {
+    if (data[i] > 150 && data[i + 1] < 90) { found[0]++; found[1] += (i / 4 / box.width) | 0 }
+  }
+  return [found[0], found[1] / Math.max(found[0], 1) / box.height] })()"""
+
+
+@pytest.mark.slow
+def test_gaussians_stand_for_surfaces_and_move_with_them(small_run, tmp_path):
+    made = read_back(small_run)
+    cast = cast_of(made.prepared)
+    found = clothed(made)
+    take = playback(made.prepared, cast, made.played.outcome, recorded(cast, made.trajectory),
+                    found=found)  # fmt: skip
+    path = tmp_path / "view.html"
+    path.write_text(f"<!doctype html><meta charset=utf-8><body>{inline_view(take)}")
+    with browser(tmp_path) as tab:
+        tab.open(path.as_uri())
+        tab.until(READY)
+        tab.run("viewer.pause(), viewer.clock = 0")
+        tab.until("viewer.stages[0].frame === 0")
+        # A software renderer, like a telephone, begins with surfaces.
+        assert not tab.run("viewer.soft.checked") and tab.run(RED)[0] == 0
+        tab.run("viewer.soft.click()")
+        tab.until("viewer.stages[0].splats && !viewer.dirty")
+        many, high = tab.run(RED)
+        assert many > 200
+        tab.picture(tmp_path / "splats.png")
+        # They fall with the ball, and a click on it opens its card all the same.
+        tab.run("viewer.clock = viewer.length")
+        tab.until("viewer.stages[0].frame > 3 && !viewer.dirty")
+        less, low = tab.run(RED)
+        assert low > high + 0.02 and less > 0.5 * many
+        tab.click(*tab.run(MIDDLE.replace("OBJECT", "0")))
+        assert "E real" in tab.until("document.querySelector('.picked').textContent")
+        tab.run("viewer.by.value = 'stress', viewer.paint('stress')")
+        assert tab.run("viewer.stages[0].splats") is None
+        # Hidden with their object.
+        tab.run("viewer.by.value = 'itself', viewer.paint('itself')")
+        assert tab.run(RED)[0] > 100
+        tab.run("viewer.stages[0].reveal(0, false)")
+        assert tab.run(RED)[0] == 0
         assert tab.errors == []

@@ -12,7 +12,7 @@ import io
 import json
 from base64 import b64encode
 from collections.abc import Iterable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -133,6 +133,24 @@ class Cast:
 
 
 @dataclass(frozen=True)
+class Splats:
+    """N Gaussians at rest, those of one object after those of another."""
+
+    mean: Float[np.ndarray, "N 3"]
+    """[m]"""
+    covariance: Float[np.ndarray, "N 6"]
+    """xx, xy, xz, yy, yz, zz [m²]."""
+    colour: UInt8[np.ndarray, "N 4"]
+    """sRGB and opacity."""
+    object: Int[np.ndarray, " N"]
+    """-1: of none, it stands still."""
+    vertex: Int[np.ndarray, " N"]
+    """Of its object: the one that it follows."""
+    all: int
+    """How many there were."""
+
+
+@dataclass(frozen=True)
 class Recording:
     """What happened, frame by frame."""
 
@@ -140,10 +158,13 @@ class Recording:
     """[s]"""
     objects: tuple[tuple[Instant, ...], ...]
     """Per object, its frames."""
+    since: Mapping[int, float] = field(default_factory=dict)
+    """From when on an object is there [s], of those that are not from the start."""
 
     def every(self, step: int) -> "Recording":
         """Leave frames out: keep one of ``step``."""
-        return Recording(self.time[::step], tuple(frames[::step] for frames in self.objects))
+        objects = tuple(frames[::step] for frames in self.objects)
+        return Recording(self.time[::step], objects, self.since)
 
     @property
     def largest_stress(self) -> float:
@@ -197,6 +218,7 @@ def take(
     cast: Cast,
     recording: Recording | None,
     summary: Mapping[str, Any],
+    splats: Splats | None = None,
 ) -> bytes:
     """Return the whole block.
 
@@ -206,6 +228,7 @@ def take(
         cast: From ``Cast.of``.
         recording: From ``record``; None: frames come later, from a simulation that runs.
         summary: What the page shows of the run: goes into the header as it is.
+        splats: Of a scene that was made of Gaussians.
 
     """
     block = Block()
@@ -229,8 +252,21 @@ def take(
         "surfaces": _surfaces(scene, parts, cast, block),
         "finishes": [_finish(f) for f in scene.finishes],
         "film": None if recording is None else _film(recording, block),
+        "splats": None if splats is None else _splats(splats, block),
     }
     return block.under({**header, **summary})
+
+
+def _splats(splats: Splats, block: Block) -> dict:
+    return {
+        "count": len(splats.mean),
+        "all": splats.all,
+        "mean": block.add(splats.mean.astype("<f4")),
+        "covariance": block.add(splats.covariance.astype("<f4")),
+        "colour": block.add(splats.colour),
+        "object": block.add(splats.object.astype("<i2")),
+        "vertex": block.add(splats.vertex.astype("<u4")),
+    }
 
 
 def _room(cast: Cast, recording: Recording | None) -> tuple[np.ndarray, np.ndarray]:
@@ -290,6 +326,7 @@ def _film(recording: Recording, block: Block) -> dict:
         "time": recording.time.tolist(),
         "stress": top,
         "out_of_reach": recording.out_of_reach,
+        "since": {str(number): time for number, time in recording.since.items()},
         "objects": [_reel(frames, top, block) for frames in recording.objects],
     }
 

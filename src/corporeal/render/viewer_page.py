@@ -5,7 +5,7 @@ import zlib
 from base64 import b64encode
 from importlib.resources import files
 
-MODULES = ("three.min.js", "take.js", "stage.js", "cards.js", "page.js")
+MODULES = ("three.min.js", "take.js", "splats.js", "stage.js", "cards.js", "page.js")
 """Of the view, each after those that it imports."""
 ALONE = """<div id="view"></div>
 <script type="text/plain" id="view-modules">{modules}</script>

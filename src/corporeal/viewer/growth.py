@@ -21,6 +21,8 @@ from corporeal.viewer.still_air import in_air
 
 MOST = 12
 """Things that are added to one scene."""
+ROOMY = 100
+"""Times the particles that a scene may have: what could not be filled even with thin walls."""
 HIGHEST = 2.0
 """From which something is dropped [m]."""
 Find = Callable[[str], Whole]
@@ -118,8 +120,10 @@ class Growth:
                 f"{1e3 * cell:.3g} mm. Drop something larger."
             )
         need = 8 * float(np.prod(high - low)) / cell**3
-        if need > 20 * self.quality.particles:
-            raise UserError(f"{thing} is too large for the cells of this scene. Drop less.")
+        if need > ROOMY * self.quality.particles:
+            raise UserError(
+                f"{thing} is too large for the cells of this scene. Drop something smaller."
+            )
         # As it falls, so hard it strikes: that decides how it is treated.
         lifted = moved(scene, np.array([0.0, 0.0, height]) - _foot(scene))
         particles = fill(lifted, whole.parts, whole.field, quality=self.quality)

@@ -134,11 +134,14 @@ def read(run: Path) -> Read:
         raise UserError(f"{run} has no {NEEDED} yet: nothing of it can be shown in 3D.")
     cast = cast_of(made.prepared)
     if made.simulate is None:
-        return Read(made, playback(made.prepared, cast))
+        return Read(made, playback(made.prepared, cast, found=made.reconstruction))
     audit = run / AUDIT
     whole = typed(RunAudit, store.read_json(audit)) if audit.exists() else None
     recording = recorded(cast, made.trajectory, SMOOTH)
-    return Read(made, playback(made.prepared, cast, made.played.outcome, recording, whole))
+    shown = playback(
+        made.prepared, cast, made.played.outcome, recording, whole, found=made.reconstruction
+    )
+    return Read(made, shown)
 
 
 def _row(name: str, run: Path) -> dict[str, Any]:

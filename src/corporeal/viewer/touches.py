@@ -86,7 +86,8 @@ def takes(
     for k, contact in enumerate(CONTACTS):
         tell = partial(_tell, progress, k, contact)
         recording = record(cast, replayed(growth, contact, done, tell))
-        take = playback(whole, cast, recording=recording, since=appears(growth, done))
+        recording = replace(recording, since=appears(growth, done))
+        take = playback(whole, cast, recording=recording)
         (place / f"{contact}.take").write_bytes(take)
 
 

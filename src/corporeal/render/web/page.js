@@ -34,6 +34,8 @@ export class Viewer {
     for (const stage of this.stages) stage.changed = () => this.touch()
     this.build(gpu)
     if (gpu) this.open(hard, shadows)
+    // Telephones and software renderers begin with surfaces.
+    if (hard && takes.some(take => take.header.splats) && matchMedia('(min-width: 800px) and (pointer: fine)').matches) this.soft.click()
     this.paint('itself')
     this.stats.ready = true
   }
@@ -101,9 +103,14 @@ export class Viewer {
         parts.map(([part, p]) => el('button', {class: 'part', 'data-part': p, onclick: () => this.openPart(0, p)},
           `${spoken(part.name)}: `, el('b', {}, spoken(part.material)))))
     })
+    const splats = this.takes.map(take => take.header.splats).find(Boolean)
+    this.soft = el('input', {type: 'checkbox', onchange: () => { if (this.soft.checked) this.by.value = 'itself'; this.paint(this.by.value) }})
+    const many = splats && (splats.count < splats.all ? `the ${splats.count.toLocaleString('en')} of ${splats.all.toLocaleString('en')} Gaussians that cover most` : `${splats.count.toLocaleString('en')} Gaussians`)
     const two = this.takes.length > 1 ? differences(...this.takes.map(t => t.header)) : []
     return el('div', {}, film ? null : this.options.unmoved?.() ?? el('p', {class: 'note'}, 'This has not been simulated yet: it stands as it will begin.'),
-      el('label', {class: 'line'}, 'colour by', this.by), el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'),
+      el('label', {class: 'line'}, 'colour by', this.by), splats ? [el('label', {class: 'line'}, 'as in the pictures', this.soft), el('p', {class: 'hint'},
+        `${many} in place of the surfaces. They move and turn with the objects; only the film stretches them, too.`)] : null,
+      el('p', {class: 'hint'}, 'Click a part, here or in the picture, for its material, mass and measured ranges.'),
       el('p', {class: 'hint'}, `Squares on the floor are ${si(squareOf(Math.max(...this.stages.map(s => s.size))), 'm')} wide.`), ...objects,
       this.takes.length > 1 ? [el('h3', {}, 'What differs'), two.length ? table(two, ['part', '', ...this.takes.map((t, k) => this.options.names?.[k] ?? t.header.name)])
         : el('p', {}, this.options.differs ?? 'Nothing that was asked for differs.')] : null,
@@ -163,7 +170,7 @@ export class Viewer {
       const top = Math.max(...this.stages.map(stage => stage.topOf(by)))
       for (const stage of this.stages) stage.tops[by] = top // one scale for both
     }
-    for (const stage of this.stages) stage.paint(by)
+    for (const stage of this.stages) { stage.clad(by === 'itself' && this.soft.checked); stage.paint(by) }
     const made = key(this.stages[0])
     this.legend.hidden = !made
     if (made) this.legend.replaceChildren(made)
@@ -238,6 +245,7 @@ export class Viewer {
     this.orbit.maxPolarAngle = .995 * Math.PI / 2
     this.orbit.addEventListener('change', () => this.touch())
     this.ray = new THREE.Raycaster()
+    this.ray.layers.enable(1) // surfaces that Gaussians stand for
     new ResizeObserver(() => this.resize()).observe(this.see)
     this.resize()
     this.look()
@@ -297,6 +305,7 @@ export class Viewer {
       this.renderer.setViewport(...box)
       this.renderer.setScissor(...box)
       this.renderer.clear()
+      this.stages[k].splats?.aim(this.eye, box[2] * this.ratio, box[3] * this.ratio)
       this.renderer.render(this.stages[k].scene, this.eye)
     })
     this.stats.drawn++

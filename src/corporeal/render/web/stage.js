@@ -2,10 +2,12 @@
 
 import * as THREE from './three.min.js'
 import { unfold } from './take.js'
+import { Splats } from './splats.js'
 
 const PAPER = 0xece9e2, GROUND = 0xcfcac0, ACCENT = 0x1f6f8b
 const SRGB = 2.2 // vertex colours are linear light
 const BARE = [.72, .72, .72]
+const UNSEEN = 1 // layer of what a ray meets and no picture shows
 const TILE = 256 // pixels along a square of the floor's grid
 
 // Squares on the floor that fit a scene of this size [m]: 1, 10 … mm or m.
@@ -54,6 +56,18 @@ export class Stage {
     this.liveTop = null // of the stresses of a simulation that runs [Pa]
     this.tops = {} // where scales of colours end, if not at this run's own largest value
     this.changed = () => {}
+    this.splats = null // where Gaussians are shown in place of surfaces
+  }
+
+  // Show the Gaussians of a scene that was made of them, or its surfaces again, which a ray meets all the same.
+  clad(on) {
+    if (on === Boolean(this.splats) || !this.take.header.splats) return
+    if (on) this.scene.add((this.splats = new Splats(this.take)).mesh)
+    else { this.scene.remove(this.splats.mesh); this.splats.free(); this.splats = null }
+    for (const mesh of this.meshes) { if (on) mesh.layers.set(UNSEEN); else mesh.layers.set(0) }
+    const t = this.frame
+    this.frame = -1
+    if (t >= 0) this.show(t)
   }
 
   light(shadows) {
@@ -136,6 +150,7 @@ export class Stage {
 
   // Give back what the graphics card holds of it.
   free() {
+    this.splats?.free()
     this.scene.traverse(thing => thing.geometry?.dispose())
     for (const material of [...this.finishes, this.bare, this.ground.material]) { material.map?.dispose(); material.dispose() }
   }
@@ -146,12 +161,13 @@ export class Stage {
     if (t === this.frame) return
     this.frame = t
     this.take.header.objects.forEach((_, k) => this.place(k, this.take.instant(k, t)))
-    if (this.take.header.since) this.unveil()
+    if (Object.keys(this.take.header.film.since).length) this.unveil()
     if (this.by === 'speed') this.paintSpeed(t)
   }
 
   // Every object stands in its pose; vertices of one that deforms are at rest + residual in the pose's frame.
   place(k, {pose, residual, normal, stress}) {
+    this.splats?.place(k, {pose, residual}, this.take.step, !this.seen(k))
     for (const mesh of this.meshes) {
       if (mesh.surface.object !== k) continue
       mesh.matrix.set(pose[0], pose[1], pose[2], pose[9], pose[3], pose[4], pose[5], pose[10],
@@ -282,11 +298,13 @@ export class Stage {
 
   // What was dropped into a scene is not there before.
   seen(object) {
-    const since = this.take.header.since?.[object]
+    const since = this.take.header.film?.since[object]
     return !this.hidden.has(object) && !(since > (this.take.times[this.frame] ?? 0) - 1e-9)
   }
 
-  unveil() { for (const mesh of [...this.meshes, ...this.overlay]) mesh.visible = this.seen(mesh.surface.object) }
+  unveil() {
+    if (this.splats && this.frame >= 0) this.take.header.objects.forEach((_, k) => this.splats.place(k, this.take.instant(k, this.frame), this.take.step, !this.seen(k)))
+    for (const mesh of [...this.meshes, ...this.overlay]) mesh.visible = this.seen(mesh.surface.object) }
 
   // Lay a tint over one part; null: over none.
   mark(part) {
