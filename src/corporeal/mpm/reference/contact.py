@@ -466,8 +466,7 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     gap = measure(look.mean[slot], height, normal, cell)
     point = scene.grid.index[slot] * cell
     there = np.full(len(slot), scene.wall_mover + wall)
-    movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell
-    return Touch((field, bodies + wall), movers, there, point, normal, gap, slips)
+    return Touch((field, bodies + wall), scene.mover_of_slot(slot), there, point, normal, gap)
 
 
 def _points_on_walls(scene: Scene) -> list[Touch]:
