@@ -1,6 +1,6 @@
 """What the viewer shows of a run: how its objects move, and what is known of them."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from typing import Any
 
@@ -55,6 +55,7 @@ def playback(
     happened: Outcome | None = None,
     recording: Recording | None = None,
     audit: RunAudit | None = None,
+    since: Mapping[int, float] | None = None,
 ) -> bytes:
     """Return all that a page needs to play a run: see ``render.take``.
 
@@ -64,6 +65,7 @@ def playback(
         happened: What happened in it; None: it has not been simulated.
         recording: From ``recorded``; None: as for ``happened``.
         audit: Warnings and numbers, where the run has been reported on.
+        since: From when on an object is there [s]; None: all are from the start.
 
     """
     summary = summary_of(prepared)
@@ -71,6 +73,8 @@ def playback(
         summary["marks"] = marks(happened)
     if audit is not None:
         summary["audit"] = audit_of(audit, prepared)
+    if since:
+        summary["since"] = {str(number): time for number, time in since.items()}
     return take(prepared.scene, prepared.parts, cast, recording, summary)
 
 

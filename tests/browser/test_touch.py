@@ -133,3 +133,55 @@ def test_the_control_runs_beside_and_what_was_touched_is_replayed_at_draft(small
     # The run itself is as it was; the record lies beside it.
     assert sorted(path.name for path in small_run.rglob("*")) == before
     assert len(list((small_run.parent / FOLDER).glob("*.json"))) == 1
+
+
+@pytest.mark.slow
+def test_a_thing_from_the_pool_is_dropped_where_one_clicks(small_run, tmp_path):
+    from corporeal.viewer.live import Room
+    from corporeal.viewer.pool import pool_routes
+    from corporeal.viewer.shelf import Shelf
+    from corporeal.viewer.site import Shown, site
+    from corporeal.viewer.socket import live_route
+    from corporeal.viewer.things import Things
+    from viewer_served import LOCAL, serving
+
+    shelf = Shelf((), small_run.parent)
+    things = Things(shelf)
+    room = Room(shelf.made, things.find)
+    app = site(Shown(shelf), LOCAL, (live_route(room), *pool_routes(things, room)))
+    with serving(app) as server, browser(tmp_path) as tab:
+        tab.open(f"{server.address}/view/drop")
+        tab.until(READY)
+        tab.run("viewer.openTab('Touch')")
+        tab.until("viewer.stats.got > 5 && viewer.live.thing.options.length > 10")
+        groups = tab.run("[...viewer.live.thing.querySelectorAll('optgroup')].map(g => g.label)")
+        assert groups == ["this run", "models of corporeal"]
+        assert tab.run("viewer.live.thing.value") == "corporeal/rubber_ball"
+        names = "viewer.stages[0].take.header.objects.map(o => o.name)"
+        assert tab.run(names) == ["ball", "stone"]
+        x, y, _ = tab.run(MIDDLE.replace("OBJECT", "1"))
+        # Onto the stone: the foam ball of the run itself, from above it.
+        tab.run("viewer.live.thing.value = 'drop/ball'; viewer.live.dropIt.click()")
+        tab.mouse("mouseMoved", x, y, button="none", buttons=0)
+        tab.mouse("mousePressed", x, y)
+        tab.mouse("mouseReleased", x, y)
+        tab.until(f"{names}.length === 3", 60.0)
+        tab.until("viewer.live.rigid.length === 3")
+        over = MIDDLE.replace("OBJECT", "2")
+        high = tab.run(over)[2]
+        tab.picture(tmp_path / "dropped.png")
+        tab.until(f"{over}[2] < {high} - 0.05")
+        live = room.live
+        assert live is not None
+        wait(lambda: live.hands.engine.measure().first_contact[1, 2] > 0)
+        assert tab.run("viewer.live.said.textContent + viewer.live.dropWords.textContent") == ""
+        assert tab.run("[...viewer.live.who.options].map(o => o.text)")[2] == "ball 1"
+        # What is asked for wrongly is said, and goes on.
+        tab.run("viewer.live.tell({do: 'add', thing: 'corporeal/whale', point: [0, 0, 0]})")
+        tab.until("viewer.live.said.textContent.includes('whale')")
+        # Beginning again takes it away, and so does going back to what was recorded.
+        tab.run("viewer.live.tell({do: 'reset'})")
+        tab.until(f"{names}.length === 2")
+        tab.run("viewer.openTab('Look')")
+        tab.until("viewer.stages[0].frame >= 0 && viewer.stages[0].take === viewer.takes[0]")
+        assert tab.errors == []

@@ -40,7 +40,7 @@ SOLVER = [
     {"formulas", "substance"},
     {"state"},
     {"measure"},
-    {"interaction", "splitting"},
+    {"interaction", "joining", "splitting"},
     {"reference", "cpu", "cuda"},
 ]
 """Floors within ``mpm``: engines stand side by side and know nothing of one another."""

@@ -7,9 +7,11 @@ import numpy as np
 import pytest
 
 from corporeal.stages.fill import FillConfig
-from corporeal.treatment.problem_from_scene import pose
+from corporeal.stages.ground import GroundConfig
+from corporeal.treatment.plan import QUALITIES
+from corporeal.viewer.growth import Growth
 from corporeal.viewer.hands import HOLD, Hands, Touch
-from corporeal.viewer.live import Live, live_scene
+from corporeal.viewer.live import Live, live_scene, no_things
 from corporeal.viewer.orders import Order
 from corporeal.viewer.shelf import Shelf
 from corporeal.viewer.touches import Record, as_draft, read_record, replayed, takes, write_record
@@ -65,10 +67,10 @@ def test_a_replay_at_draft_lifts_the_ball_too_and_is_the_same_every_time(made, t
     done = Record("drop", tuple(touched.hands.touches))
     prepared = as_draft(made.results, FillConfig())
     assert prepared.particles.count != len(touched.hands.start)
-    posed = pose(prepared.scene, prepared.particles, prepared.field)
+    growth = Growth(prepared, QUALITIES["draft"], no_things, GroundConfig())
     told = []
-    frames = list(replayed(posed, "multi", done, told.append))
-    again = list(replayed(posed, "multi", done, told.append))
+    frames = list(replayed(growth, "multi", done, told.append))
+    again = list(replayed(growth, "multi", done, told.append))
     assert told[-1] == 1.0 and frames[0].time == 0.0 and frames[-1].time == done.seconds
     mine = prepared.particles.object == BALL
     risen = frames[-1].position[mine].mean(axis=0) - frames[0].position[mine].mean(axis=0)
@@ -77,7 +79,7 @@ def test_a_replay_at_draft_lifts_the_ball_too_and_is_the_same_every_time(made, t
         np.testing.assert_array_equal(one.position, other.position)
     # Without the hand it falls.
     idle = Record("drop", tuple(t for t in done.touches if t.order is None))
-    *_, last = replayed(posed, "multi", idle, told.append)
+    *_, last = replayed(growth, "multi", idle, told.append)
     assert last.position[mine, 2].mean() < frames[0].position[mine, 2].mean()
 
 

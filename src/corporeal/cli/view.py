@@ -56,11 +56,13 @@ def verb_view() -> None:
 def _show(asked: View) -> None:
     from corporeal.viewer.exports import Exports
     from corporeal.viewer.live import Room
+    from corporeal.viewer.pool import pool_routes
     from corporeal.viewer.replays import Replays
     from corporeal.viewer.serve import Address, door_of, listening, serve, where
     from corporeal.viewer.shelf import Shelf
     from corporeal.viewer.site import Shown, site
     from corporeal.viewer.socket import live_route
+    from corporeal.viewer.things import Things
     from corporeal.viewer.work import Work
 
     names = _names(asked)
@@ -68,12 +70,16 @@ def _show(asked: View) -> None:
     door, listener = door_of(address), listening(address)
     addresses = where(address, listener.getsockname()[1], door)
     shelf = Shelf(asked.runs, None if asked.runs else asked.out)
-    room = Room(shelf.made)
+    room = Room(shelf.made, (things := Things(shelf)).find)
     work = None if asked.read_only or asked.runs else Work(shelf, asked.out)
     replays = Replays(shelf, room)
-    live = (live_route(room), *Exports(shelf).routes(), *replays.routes())
-    more = () if asked.read_only else live
-    more = more if work is None else (*more, *work.routes())
+    live = (
+        live_route(room),
+        *Exports(shelf).routes(),
+        *replays.routes(),
+        *pool_routes(things, room),
+    )
+    more = () if asked.read_only else (*live, *(work.routes() if work else ()))
     app = site(Shown(shelf, names, asked.read_only, work is not None), door, more)
     try:
         ready = partial(print, *addresses, "Ctrl-C ends.", sep="\n", flush=True)

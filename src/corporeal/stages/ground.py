@@ -1,8 +1,10 @@
 """Ground: turn a material's name into numbers, inside the range that somebody measured."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
+from jaxtyping import Float
 
 from corporeal import materials
 from corporeal.errors import UserError
@@ -86,22 +88,17 @@ def ground(
     words = tuple(_words(inventory, part.object, part.name) for part in parts.catalogue)
     entries = [_entry(w, config) for w in words]
     made = tuple(_material(e, w) for e, w in zip(entries, words, strict=True))
-    floor = entry_of(config.floor, config.library)
-    surfaces, bodies = [*entries, floor], [*made, floor.pick(floor.typical())]
     structures = tuple(
         with_air(_structure(m, w, config), m, w, radius(scene, part.object))
         for m, w, part in zip(made, words, parts.catalogue, strict=True)
     )
-    solid = [*(s.kind == "solid" for s in structures), True]
-    strikers = [materials.Striker(*s) for s in zip(surfaces, bodies, solid, strict=True)]
+    touching = pairs(words, made, structures, config)
     found = MaterialField(
         materials=made,
         structures=structures,
         words=words,
-        friction=_matrix(len(bodies), lambda a, b: _friction(surfaces, bodies, a, b)),
-        restitution=_matrix(
-            len(bodies), lambda a, b: materials.restitution(strikers[a], strikers[b]).value
-        ),
+        friction=touching.friction,
+        restitution=touching.restitution,
         pieces=tuple(tuple(_piece(p, config) for p in w.pieces) for w in words),
     )
     return impose(found, scene, parts, config.field)
@@ -334,6 +331,40 @@ def _flows(entry: Entry) -> bool:
 
 
 # ---------------------------------------------------------------- pairs
+
+
+@dataclass(frozen=True)
+class Pairs:
+    """What happens where parts touch; see ``MaterialField``."""
+
+    friction: Float[np.ndarray, "K1 K1"]
+    restitution: Float[np.ndarray, "K1 K1"]
+
+
+def pairs(
+    words: Sequence[PartWords],
+    made: Sequence[Material],
+    structures: Sequence[Structure],
+    config: GroundConfig = DEFAULT,
+) -> Pairs:
+    """Look up friction and restitution of all pairs of parts, and of each with the floor.
+
+    Args:
+        words: Of every part.
+        made: Its material.
+        structures: How it is built.
+        config: Which library, and what the floor is made of.
+
+    """
+    floor = entry_of(config.floor, config.library)
+    surfaces, bodies = [_entry(w, config) for w in words], [*made, floor.pick(floor.typical())]
+    surfaces.append(floor)
+    solid = [*(s.kind == "solid" for s in structures), True]
+    strikers = [materials.Striker(*s) for s in zip(surfaces, bodies, solid, strict=True)]
+    return Pairs(
+        _matrix(len(bodies), lambda a, b: _friction(surfaces, bodies, a, b)),
+        _matrix(len(bodies), lambda a, b: materials.restitution(strikers[a], strikers[b]).value),
+    )
 
 
 def _friction(surfaces: list[Entry], bodies: list[Material], a: int, b: int) -> float:

@@ -63,6 +63,8 @@ class Quality:
     """… and so many particles times steps, but never below two fifths of those steps."""
     outrun: float = OUTRUN
     """Waves run at least so many times faster than anything moves [-]."""
+    cell: float | None = None
+    """Grid spacing of a scene that runs, for what joins it [m]; None: it is chosen."""
 
     def steps(self, particles: float) -> float:
         """Say how many steps per simulated second a scene of so many particles may take."""
@@ -137,7 +139,7 @@ def _plan(
         not v.rigid or (capped and not p.prescribed) for v, p in zip(verdicts, parts, strict=True)
     ]
     soft = [p for p, deforms in zip(parts, yields, strict=True) if deforms]
-    cell = choose_cell(parts, soft, quality)
+    cell = quality.cell or choose_cell(parts, soft, quality)
     # What deforms decides whether what does not is a body of its own or a frame within one.
     leafy = {parts[k].object for k in crowns}
     mixed = {p.object for p in soft} - leafy

@@ -10,10 +10,16 @@ from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import Problem
 from corporeal.treatment.problem_from_scene import Posed
 from corporeal.types import Vector
+from corporeal.viewer.growth import HIGHEST, Added, Growth
 from corporeal.viewer.orders import Order
 
 HOLD = "hold"
 """What a record has in place of a page's "grab": its point is that of matter at the start [m]."""
+
+JOIN = "join"
+"""What a record has in place of a page's "add": its point is where the thing begins."""
+LEAST_ROOM = 2.0
+"""Between what is added and what is under it, at least [cells]: no contact is felt so far away."""
 
 
 @dataclass(frozen=True, slots=True)
@@ -47,21 +53,28 @@ class _Spot:
 class Hands:
     """Acts on one engine; all that is done goes into ``touches``."""
 
-    def __init__(self, posed: Posed, problem: Problem, threads: int) -> None:
+    def __init__(
+        self, posed: Posed, problem: Problem, threads: int, growth: Growth | None = None
+    ) -> None:
         """Begin at time 0.
 
         Args:
             posed: Which objects the bodies belong to.
             problem: Its own, or the control with one velocity field.
             threads: Of the engine.
+            growth: Gives the scene with things that are added; None: nothing can be.
 
         """
-        self.posed, self.engine = posed, CpuEngine(problem, threads)
-        counts = [len(body.position) for body in problem.bodies]
-        self.first = np.cumsum([0, *counts])
-        self.start = np.concatenate([body.position for body in problem.bodies])
+        self.engine, self.growth = CpuEngine(problem, threads), growth
+        self.added: tuple[Added, ...] = ()
+        self._know(posed)
         self.held: Held | None = None
         self.touches: list[Touch] = []
+
+    def _know(self, posed: Posed) -> None:
+        self.posed, bodies = posed, posed.problem.bodies
+        self.first = np.cumsum([0, *(len(body.position) for body in bodies)])
+        self.start = np.concatenate([body.position for body in bodies])
 
     def advance(self, seconds: float) -> None:
         """Simulate so much more [s].
@@ -85,7 +98,7 @@ class Hands:
 
         """
         acts = {HOLD: self._hold, "pull": self._pull, "drop": self._drop}
-        acts |= {"gravity": self._gravity, "wind": self._wind}
+        acts |= {"gravity": self._gravity, "wind": self._wind, JOIN: self._join}
         if order.do == "grab":
             order = self._at_rest(order)
         if order.do not in acts:
@@ -178,6 +191,46 @@ class Hands:
             if len(self.engine.problem.bodies[body].faces.area):
                 self.engine.blow(body, order.to)
 
+    # ---------------------------------------------------------------- things that are added
+
+    def top(self, order: Order) -> float:
+        """Return how high matter reaches under a thing that is to be added [m].
+
+        Args:
+            order: Which thing; it points at the middle.
+
+        """
+        low, high = self._growing.reach(order.thing, falls(order))
+        wide, place = LEAST_ROOM * self.engine.problem.cell, self.engine.snapshot().position
+        away = place[:, :2] - np.array(order.point[:2])
+        under = ((away > low[:2] - wide) & (away < high[:2] + wide)).all(axis=1)
+        return max(order.point[2], float(place[under, 2].max(initial=0.0)))
+
+    def above(self, order: Order, top: float) -> Order:
+        """Say where a thing that is to be added begins, over what reaches up to ``top`` [m]."""
+        room = max(falls(order), LEAST_ROOM * self.engine.problem.cell)
+        x, y, _ = order.point
+        return replace(order, do=JOIN, point=(x, y, top + room), to=(0.0, 0.0, falls(order)))
+
+    def _join(self, order: Order) -> None:
+        one = Added(order.thing, order.point, falls(order))
+        low, high = self._growing.reach(one.thing, one.height)
+        away = self.engine.snapshot().position - np.array(one.foot)
+        near = 0.5 * self.engine.problem.cell
+        if ((away > low - near) & (away < high + near)).all(axis=1).any():
+            raise UserError(f"There is no room for {one.thing} there: something is in the way.")
+        added = (*self.added, one)
+        posed = self._growing.at(added).posed
+        self.engine = self.engine.joined_by(posed.problem)
+        self.added = added
+        self._know(posed)
+
+    @property
+    def _growing(self) -> Growth:
+        if self.growth is None:
+            raise UserError("Nothing can be added to this simulation.")
+        return self.growth
+
     # ---------------------------------------------------------------- the hand
 
     def grip(self, position: np.ndarray) -> np.ndarray | None:
@@ -202,6 +255,11 @@ class Hands:
         if self.held is None or at is None:
             return 0.0
         return float(self.held.stiffness * np.linalg.norm(np.array(self.held.to) - at))
+
+
+def falls(order: Order) -> float:
+    """Return how high above all that is under it a thing begins [m]."""
+    return min(max(order.to[2], 0.0), HIGHEST)
 
 
 def _pulls(touch: Touch) -> bool:

@@ -10,16 +10,18 @@ from itertools import chain
 import numpy as np
 
 from corporeal.errors import UserError
+from corporeal.geometry.contents import Whole
 from corporeal.machine import cores
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import Snapshot
-from corporeal.playback import cast_of, slowed
+from corporeal.playback import cast_of, playback, slowed
 from corporeal.render.take import Cast, stress_bytes
 from corporeal.stages.fill import fill
 from corporeal.trajectory.played import Prepared
 from corporeal.treatment.live_quality import Demand, held, live_quality
 from corporeal.treatment.problem_from_scene import pose
-from corporeal.viewer.hands import Hands
+from corporeal.viewer.growth import Find, Grown, Growth
+from corporeal.viewer.hands import Hands, falls
 from corporeal.viewer.moments import Moments
 from corporeal.viewer.orders import Order
 from corporeal.viewer.shelf import Made
@@ -48,8 +50,20 @@ def threads_here() -> int:
     return max(1, min(MOST_THREADS, cores() - 1))
 
 
-def live_scene(made: Made, threads: int) -> Prepared:
-    """Fill a scene again for what can be simulated in real time."""
+def no_things(name: str) -> Whole:
+    """Find nothing."""
+    raise UserError("Nothing can be added to this simulation.")
+
+
+def live_scene(made: Made, threads: int, find: Find = no_things) -> Growth:
+    """Fill a scene again for what can be simulated in real time.
+
+    Args:
+        made: The run.
+        threads: Of the engine.
+        find: Gives by its name what may be dropped into it.
+
+    """
     old, assembled = made.results, made.results.assembled
     scene = in_air(assembled.scene)
     demand = Demand.of(old.particles, made.detail, cost_of_step(old.prepared))
@@ -58,9 +72,11 @@ def live_scene(made: Made, threads: int) -> Prepared:
     particles = fill(scene, assembled.parts, assembled.field, quality=quality)
     slower = held(quality, demand, particles.cell, threads)
     if slower.steps_per_second < WORTH * quality.steps_per_second:
-        particles = fill(scene, assembled.parts, assembled.field, quality=slower)
+        quality = slower
+        particles = fill(scene, assembled.parts, assembled.field, quality=quality)
     # What broke in the run is whole again.
-    return replace(old, assemble=scene, fill=particles, simulate=None).prepared
+    prepared = replace(old, assemble=scene, fill=particles, simulate=None).prepared
+    return Growth(prepared, quality, find, made.ground)
 
 
 def cost_of_step(prepared: Prepared) -> float:
@@ -74,9 +90,39 @@ def cost_of_step(prepared: Prepared) -> float:
     return (time.process_time() - begun) / TRIED
 
 
+class Face:
+    """What a scene looks like: its surfaces bound to its particles, and what a page knows of it."""
+
+    def __init__(self, grown: Grown, generation: int) -> None:
+        """Bind them.
+
+        Args:
+            grown: The scene.
+            generation: Another for every scene, so that pictures are not put on a wrong one.
+
+        """
+        self.prepared, self.generation = grown.prepared, generation
+        self.cast: Cast = cast_of(grown.prepared)
+        self.moments = Moments(grown.posed)
+
+    def hello(self) -> dict:
+        """Say what pictures will hold, and how honest they are."""
+        return {
+            "generation": self.generation,
+            "honest": slowed(self.prepared),
+            "rigid": self.cast.rigid.tolist(),
+        }
+
+    def take(self) -> bytes:
+        """Return the scene as it begins, with all that was added: a take without a recording."""
+        return playback(self.prepared, self.cast)
+
+
 @dataclass(frozen=True)
 class Instant:
     """What there is to show, as it was between two advances."""
+
+    face: Face
 
     now: Snapshot
     beside: Snapshot | None
@@ -98,18 +144,19 @@ class Live:
     One thread steps, another makes pictures of the newest instant: neither waits for the other.
     """
 
-    def __init__(self, prepared: Prepared, threads: int) -> None:
+    def __init__(self, growth: Growth, threads: int) -> None:
         """Begin at time 0, paused.
 
         Args:
-            prepared: From ``live_scene``.
+            growth: From ``live_scene``.
             threads: Of the engine.
 
         """
-        self.prepared, self.threads = prepared, threads
-        self.cast: Cast = cast_of(prepared)
-        self.posed = pose(prepared.scene, prepared.particles, prepared.field)
-        self.moments = Moments(self.posed)
+        self.growth, self.threads = growth, threads
+        self.prepared = growth.at(()).prepared
+        self.posed = growth.at(()).posed
+        self.face = self.bare = Face(growth.at(()), 0)
+        self.faces = 1
         self.orders: deque[Order] = deque(maxlen=1000)
         self.news = threading.Condition()
         self.latest, self.number = b"", 0
@@ -128,13 +175,23 @@ class Live:
         )
 
     def hello(self) -> dict:
-        """Say what pictures will hold, and how honest they are."""
-        return {
-            "honest": slowed(self.prepared),
-            "rigid": self.cast.rigid.tolist(),
-            "gravity": list(self.prepared.scene.gravity),
-            "orders": "one hand; others watch",
-        }
+        """Say what pictures will hold, how honest they are, and how heavy things are."""
+        return self.face.hello() | {"gravity": list(self.prepared.scene.gravity)}
+
+    def ask(self, order: Order) -> None:
+        """Let an order be obeyed; a thing that is to be added is filled first, beside the rest."""
+        if order.do != "add":
+            self.orders.append(order)
+            return
+        threading.Thread(target=self._make_ready, args=(order,), daemon=True).start()
+
+    def _make_ready(self, order: Order) -> None:
+        try:
+            self.growth.ready(order.thing, falls(order))
+        except UserError as error:
+            self.message = str(error)
+        else:
+            self.orders.append(order)
 
     def begin(self, single: bool, twin: bool) -> None:
         """Begin again at time 0.
@@ -146,8 +203,11 @@ class Live:
         """
         self.single = single
         shared = replace(self.posed.problem, contact="single")
-        self.hands = Hands(self.posed, shared if single else self.posed.problem, self.threads)
-        self.twin = Hands(self.posed, shared, self.threads) if twin else None
+        problem = shared if single else self.posed.problem
+        self.growth.forget()
+        self.face = self.bare
+        self.hands = Hands(self.posed, problem, self.threads, self.growth)
+        self.twin = Hands(self.posed, shared, self.threads, self.growth) if twin else None
         self.pace, self.cost = LEAST, 3.0
         self.message, self.whole = "", True
 
@@ -189,7 +249,9 @@ class Live:
         force = self.hands.force(now.position)
         beside = self.twin.engine.snapshot() if self.twin else None
         with self.taken:
-            self.instant = Instant(now, beside, held, force, self.done, self.playing, self.rate)
+            self.instant = Instant(
+                self.face, now, beside, held, force, self.done, self.playing, self.rate
+            )
             self.taken.notify_all()
 
     def _show(self) -> None:
@@ -228,10 +290,24 @@ class Live:
             self.begin(order.single and not order.twin, order.twin)
         elif order.do == "step":
             self._both(1 / FPS)
+        elif order.do == "add":
+            self._add(order)
         else:
             done = self.hands.obey(order)
             if self.twin and done:
                 self.twin.obey(done)
+
+    def _add(self, order: Order) -> None:
+        """Drop a thing, into the control beside as well: over what is highest in either."""
+        every = [hands for hands in (self.hands, self.twin) if hands]
+        self.message = ""
+        begins = self.hands.above(order, max(hands.top(order) for hands in every))
+        for hands in every:
+            hands.obey(begins)
+        if self.twin:
+            self.twin.touches.clear()
+        self.face = Face(self.growth.at(self.hands.added), self.faces)
+        self.faces += 1
 
     def _both(self, seconds: float) -> None:
         """Simulate so much more [s], and the control beside to the same instant."""
@@ -267,16 +343,17 @@ class Live:
             return self.number
 
     def picture(self, instant: "Instant") -> bytes:
-        """One instant: a head of 44 bytes, then every object in order.
+        """One instant: a head of 48 bytes, then every object in order.
 
         Head: the last order's number (uint32), simulated over real time, force of the hand [N],
         end of the scale of stresses [Pa] (float32), time [s] (float64), the point that is held [m]
-        (3 × float32, nan: none), playing (uint32), 1 or, with the control after it, 2 (uint32). An
-        object: pose (12 × float32); one that
-        deforms, then residuals (3 × int16 a vertex), normals (2 × int8), stress (uint8).
+        (3 × float32, nan: none), playing (uint32), 1 or, with the control after it, 2 (uint32), the
+        scene's generation (uint32). An object: pose (12 × float32); one that deforms, then
+        residuals (3 × int16 a vertex), normals (2 × int8), stress (uint8).
         """
         shown = [now for now in (instant.now, instant.beside) if now is not None]
-        frames = [self.moments.frame(now) for now in shown]
+        face = instant.face
+        frames = [face.moments.frame(now) for now in shown]
         tops = [float(np.percentile(f.stress, TOP)) for f in frames if f.stress is not None]
         self.top = max(self.top, *tops)
         held = np.full(3, np.nan) if instant.held is None else instant.held
@@ -286,9 +363,9 @@ class Live:
             np.array(numbers, "<f4").tobytes(),
             np.array([instant.now.time], "<f8").tobytes(),
             np.asarray(held, "<f4").tobytes(),
-            np.array([instant.playing, len(frames)], HEAD).tobytes(),
+            np.array([instant.playing, len(frames), face.generation], HEAD).tobytes(),
         ]
-        for seen in chain.from_iterable(map(self.cast.at, frames)):
+        for seen in chain.from_iterable(map(face.cast.at, frames)):
             out.append(seen.pose.astype("<f4").tobytes())
             if seen.residual is not None and seen.normal is not None:
                 shade = stress_bytes(seen.stress, self.top)  # type: ignore[arg-type]
@@ -301,14 +378,15 @@ class Live:
 class Room:
     """The one live simulation of a server, of whichever run was asked for last."""
 
-    def __init__(self, read: Callable[[str], Made]) -> None:
+    def __init__(self, read: Callable[[str], Made], find: Find = no_things) -> None:
         """Hold none yet.
 
         Args:
             read: Gives by its name what a run's verbs made.
+            find: Gives by its name what may be dropped.
 
         """
-        self.read, self.lock = read, threading.Lock()
+        self.read, self.find, self.lock = read, find, threading.Lock()
         self.name = ""
         self.live: Live | None = None
         self.visitors = 0
@@ -325,7 +403,7 @@ class Room:
             if self.live is None or self.name != name:
                 self._clear()
                 threads = threads_here()
-                self.live = Live(live_scene(self.read(name), threads), threads)
+                self.live = Live(live_scene(self.read(name), threads, self.find), threads)
                 self.name = name
                 self.live.start()
                 self.visitors = 0

@@ -20,7 +20,10 @@ STORM = 40.0
 LONGEST = 4096
 """Of one order [bytes]."""
 PER_SECOND = 200
+LONGEST_NAME = 300
+"""Of a thing [letters]."""
 KINDS = ("grab", "pull", "drop", "gravity", "wind", "play", "pause", "step", "reset", "contact")
+KINDS += ("add",)
 
 
 @dataclass(frozen=True, slots=True)
@@ -32,15 +35,19 @@ class Order:
     """The page's number of it, sent back with the pictures that show it."""
     object: int = 0
     point: Vector = (0.0, 0.0, 0.0)
-    """Where an object is taken [m]."""
+    """Where an object is taken; what is pointed at, or in a record the middle of the underside of
+    a thing that is added [m]."""
     to: Vector = (0.0, 0.0, 0.0)
-    """Where it is pulled [m]; gravity [m/s²]; wind [m/s]."""
+    """Where it is pulled [m]; gravity [m/s²]; wind [m/s]; in its last place, how high above all
+    that is under it a thing that is added begins [m]."""
     firm: float = 4.0
     """Natural frequency on the hand's spring [Hz]."""
     single: bool = False
     """One velocity field for all: the control."""
     twin: bool = False
     """The control runs beside: the same touches, one velocity field for all."""
+    thing: str = ""
+    """What is added: see ``Things``."""
 
 
 def parsed(text: str) -> Order:
@@ -68,6 +75,7 @@ def parsed(text: str) -> Order:
         firm=min(max(_number(asked.get("firm", 4.0)), SOFTEST), FIRMEST),
         single=asked.get("single") is True,
         twin=asked.get("twin") is True,
+        thing=_name(asked.get("thing", "")),
     )
 
 
@@ -75,6 +83,12 @@ def _number(value: Any) -> float:
     if isinstance(value, bool) or not isinstance(value, int | float) or not math.isfinite(value):
         raise UserError("A number of an order is not finite.")
     return float(value)
+
+
+def _name(value: Any) -> str:
+    if not isinstance(value, str) or len(value) > LONGEST_NAME:
+        raise UserError("The thing of an order is no name.")
+    return value
 
 
 def _whole(asked: Mapping[str, Any], name: str) -> int:

@@ -20,7 +20,8 @@ from corporeal.render.viewer_page import web_file
 from corporeal.viewer.live import Room
 from corporeal.viewer.shelf import Shelf
 from corporeal.viewer.site import answered
-from corporeal.viewer.touches import CONTACTS, MOST_THREADS, Record, takes, write_record
+from corporeal.viewer.things import OURS, Key
+from corporeal.viewer.touches import CONTACTS, MOST_THREADS, Record, dropped, takes, write_record
 
 FOLDER = ".touches"
 """Of records and replays, among the runs."""
@@ -64,6 +65,7 @@ class Replays:
         name = str(asked.get("run", ""))
         run = self.shelf.path(name)
         done = self._record(name)
+        beside = self._beside(done)
         with self.lock:
             if any(replay.state == "running" for replay in self.replays.values()):
                 raise UserError("A replay is running already. Wait for it, or stop it.")
@@ -72,7 +74,8 @@ class Replays:
             folder.mkdir(exist_ok=True)
             kept = folder / f"{number}.json"
             write_record(kept, done)
-            job = Job(number, takes, folder / number, number, {"run": run, "kept": kept})
+            given = {"run": run, "kept": kept, "beside": beside}
+            job = Job(number, takes, folder / number, number, given)
             self.replays[number] = Replay(number, folder / number, words="starting")
             self.workers = LocalWorkers(1, min(MOST_THREADS, cores()), folder)
             self.workers.start(job)
@@ -108,6 +111,11 @@ class Replays:
         if done.seconds == 0.0:
             raise UserError("Nothing has happened yet that could be replayed.")
         return done
+
+    def _beside(self, done: Record) -> list[Path]:
+        """Find the runs whose objects were dropped."""
+        places = {Key.of(one.thing).place for _, one in dropped(done)} - {OURS}
+        return [self.shelf.path(place) for place in sorted(places)]
 
     def _follow(self, workers: LocalWorkers) -> None:
         while workers.process:

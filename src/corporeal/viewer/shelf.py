@@ -13,6 +13,7 @@ from corporeal.geometry.beginnings import said_lift
 from corporeal.pipeline import FOLDERS, RUN, read_back, reopen
 from corporeal.playback import cast_of, playback, recorded
 from corporeal.results import Results
+from corporeal.stages.ground import DEFAULT, GroundConfig
 from corporeal.trajectory.audit_file import AUDIT
 from corporeal.treatment.plan import Detail
 from corporeal.typed import typed
@@ -45,6 +46,8 @@ class Made:
     results: Results
     detail: Detail
     """With which it was filled."""
+    ground: GroundConfig = DEFAULT
+    """From which its materials came."""
 
 
 class Shelf:
@@ -103,7 +106,8 @@ class Shelf:
             UserError: There is no such run, it cannot be read, or it is not filled yet.
 
         """
-        return Made(self.open(name).made, reopen(self.path(name)).settings.fill.detail)
+        settings = reopen(self.path(name)).settings
+        return Made(self.open(name).made, settings.fill.detail, settings.ground)
 
     def asked(self, name: str) -> dict[str, Any]:
         """Say how a run was asked to begin: detail, drop; lift and velocity of every object."""

@@ -58,19 +58,22 @@ async def _hear(socket: WebSocket, room: Room, live: Live) -> None:
             order = parsed(text)
             if not room.takes(socket):
                 raise UserError("Another page has the hand: this one watches.")
-            live.orders.append(order)
+            live.ask(order)
         except UserError as error:
             await socket.send_json({"said": str(error)})
 
 
 async def _show(socket: WebSocket, live: Live) -> None:
     """Send the newest picture, never a queue of old ones: a slow line misses some."""
-    seen, message = 0, ""
+    seen, message, face = 0, "", live.face
     while not live.closed:
         seen, before = await run_in_threadpool(live.wait, seen, PATIENCE), seen
         if live.message != message:
             message = live.message
             await socket.send_json({"said": message})
+        if live.face is not face:
+            face = live.face
+            await socket.send_json(face.hello())
         if seen > before:
             await socket.send_bytes(live.latest)
     await socket.send_json({"said": "Another run is simulated now.", "over": True})

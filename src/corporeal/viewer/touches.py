@@ -4,11 +4,13 @@ The record holds every order and the instant of every advance. What was taken ho
 where its matter was at the start, so that a scene filled more finely obeys it as well.
 """
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Literal
+
+import numpy as np
 
 from corporeal import store
 from corporeal.machine import cores
@@ -18,12 +20,15 @@ from corporeal.render.take import record
 from corporeal.results import Results
 from corporeal.stages.fill import FillConfig, fill
 from corporeal.trajectory.played import Prepared
-from corporeal.treatment.problem_from_scene import Posed, pose
+from corporeal.treatment.plan import QUALITIES
 from corporeal.typed import typed
-from corporeal.types import Frame
-from corporeal.viewer.hands import Hands, Touch
+from corporeal.types import Frame, Particles
+from corporeal.viewer.growth import Added, Growth
+from corporeal.viewer.hands import JOIN, Hands, Touch, falls
 from corporeal.viewer.moments import Moments
+from corporeal.viewer.shelf import Shelf
 from corporeal.viewer.still_air import in_air
+from corporeal.viewer.things import Things
 
 Progress = Callable[[float, str], None]
 Contact = Literal["multi", "single"]
@@ -57,7 +62,9 @@ def read_record(path: Path) -> Record:
     return typed(Record, store.read_json(path))
 
 
-def takes(place: Path, progress: Progress, run: Path, kept: Path) -> None:
+def takes(
+    place: Path, progress: Progress, run: Path, kept: Path, beside: Sequence[Path] = ()
+) -> None:
     """Do again what a record says with both contacts; write ``multi.take``, ``single.take``.
 
     Args:
@@ -65,17 +72,21 @@ def takes(place: Path, progress: Progress, run: Path, kept: Path) -> None:
         progress: Told the fraction done and what is done.
         run: That was touched.
         kept: File of the record.
+        beside: Runs whose objects were dropped.
 
     """
     done = read_record(kept)
     progress(0.0, "filling the scene as finely as a draft")
-    prepared = as_draft(read_back(run), reopen(run).settings.fill)
-    cast = cast_of(prepared)
-    posed = pose(prepared.scene, prepared.particles, prepared.field)
+    settings = reopen(run).settings
+    prepared = as_draft(read_back(run), settings.fill)
+    things = Things(Shelf(tuple(beside)))
+    growth = Growth(prepared, QUALITIES["draft"], things.find, settings.ground)
+    whole = growth.at(tuple(one for _, one in dropped(done))).prepared
+    cast = cast_of(whole)
     for k, contact in enumerate(CONTACTS):
         tell = partial(_tell, progress, k, contact)
-        recording = record(cast, replayed(posed, contact, done, tell))
-        take = playback(prepared, cast, recording=recording)
+        recording = record(cast, replayed(growth, contact, done, tell))
+        take = playback(whole, cast, recording=recording, since=appears(growth, done))
         (place / f"{contact}.take").write_bytes(take)
 
 
@@ -88,29 +99,71 @@ def as_draft(made: Results, config: FillConfig) -> Prepared:
     return replace(made, assemble=scene, fill=particles, simulate=None).prepared
 
 
+def dropped(done: Record) -> list[tuple[float, Added]]:
+    """Return when something was dropped, and what."""
+    found, now = [], 0.0
+    for touch in done.touches:
+        now = max(now, touch.until)
+        if touch.order is not None and touch.order.do == JOIN:
+            found.append((now, Added(touch.order.thing, touch.order.point, falls(touch.order))))
+    return found
+
+
+def appears(growth: Growth, done: Record) -> dict[int, float]:
+    """Return from when on an object is there [s], of those that were dropped."""
+    found, added = {}, ()
+    for now, one in dropped(done):
+        before = len(growth.at(added).prepared.scene.objects)
+        added = (*added, one)
+        after = len(growth.at(added).prepared.scene.objects)
+        found |= dict.fromkeys(range(before, after), now)
+    return found
+
+
 def replayed(
-    posed: Posed, contact: Contact, done: Record, tell: Callable[[float], None]
+    growth: Growth, contact: Contact, done: Record, tell: Callable[[float], None]
 ) -> Iterator[Frame]:
     """Do again what a record says; yield frames, its first and last instant among them.
 
+    All frames hold all that is there in the end: until it is dropped, a thing waits where it will
+    begin, and a page hides it.
+
     Args:
-        posed: The scene.
+        growth: The scene.
         contact: As in life, or the control.
         done: What to do.
         tell: Told the fraction done.
 
     """
+    posed = growth.at(()).posed
+    whole = growth.at(tuple(one for _, one in dropped(done))).prepared.particles
     problem = replace(posed.problem, contact=contact)
-    hands = Hands(posed, problem, min(MOST_THREADS, cores()))
+    hands = Hands(posed, problem, min(MOST_THREADS, cores()), growth)
     moments, shown = Moments(posed), 0.0
-    yield moments.frame(hands.engine.snapshot())
+    yield waiting(moments.frame(hands.engine.snapshot()), whole)
     for touch in done.touches:
         hands.again(touch)
+        if touch.order is not None and touch.order.do == JOIN:
+            moments = Moments(hands.posed)
         due = touch.until >= min(shown + 1 / FAST, done.seconds)
         if touch.order is None and due:
             shown = touch.until
             tell(shown / done.seconds)
-            yield moments.frame(hands.engine.snapshot())
+            yield waiting(moments.frame(hands.engine.snapshot()), whole)
+
+
+def waiting(frame: Frame, particles: Particles) -> Frame:
+    """Return a frame with what is not there yet, at rest where it will begin."""
+    more = particles.count - len(frame.position)
+    if not more:
+        return frame
+    assert frame.stress is not None
+    return replace(
+        frame,
+        position=np.concatenate([frame.position, particles.position[-more:]]),
+        deformation=np.concatenate([frame.deformation, np.tile(np.eye(3), (more, 1, 1))]),
+        stress=np.append(frame.stress, np.zeros(more)),
+    )
 
 
 def _tell(progress: Progress, k: int, contact: Contact, share: float) -> None:

@@ -45,13 +45,14 @@ from corporeal.mpm.cpu.layout import (
 )
 from corporeal.mpm.cpu.program import Program
 from corporeal.mpm.cpu.read import Reader
-from corporeal.mpm.cpu.saving import Saved, Saving, inherited
+from corporeal.mpm.cpu.saving import Saved, Saving, inherited, joined
 from corporeal.mpm.cpu.shared_field import Carried
 from corporeal.mpm.cpu.sort import Sorter
 from corporeal.mpm.cpu.spring_records import Springs
 from corporeal.mpm.cpu.wind_records import Blows
 from corporeal.mpm.cpu.window import POINTED, Window, node_tasks, particle_tasks, too_wide
 from corporeal.mpm.interaction import Interaction
+from corporeal.mpm.joining import Joined, as_it_runs
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measure import Sums
 from corporeal.mpm.physics import prescribed
@@ -376,6 +377,29 @@ class CpuEngine(Interaction):
         The pieces are where the problem says; all else is as it was, and so are the books.
         """
         self.restore(inherited(self.save(), saved, heirs))
+
+    def joined_by(self, problem: Problem) -> "CpuEngine":
+        """Return an engine that goes on from here with more bodies.
+
+        Forces of contacts are looked for anew in the first step. What is held stays held. The
+        potential energy of those that join is booked as work from outside.
+
+        Args:
+            problem: With those that join after all others, which are as at the start.
+
+        """
+        who = Joined(len(self.problem.bodies), len(problem.bodies))
+        after = CpuEngine(as_it_runs(problem, self.problem), self.threads)
+        saved, shared = self.save(), after.problem.contact == "single"
+        after.restore(joined(after.save(), saved, who, shared))
+        if shared:
+            after.window[0].continue_as(self.window[0], after.material[0])
+            after.connect()
+        after.grips = dict(self.grips)
+        after._take_grips()
+        added = after.measure().potential[who.before :]
+        after._enter(who.before, np.zeros(3), float(added.sum()))
+        return after
 
     # ------------------------------------------------------------ accessors of what is common
 

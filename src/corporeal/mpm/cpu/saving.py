@@ -8,6 +8,7 @@ import numpy as np
 
 from corporeal.mpm.cpu.contact_memory import ContactMemory
 from corporeal.mpm.cpu.window import Window
+from corporeal.mpm.joining import Joined
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.splitting import Heirs
 
@@ -78,9 +79,35 @@ def inherited(own: Saved, saved: Saved, heirs: Heirs) -> Saved:
         heirs: Who comes of whom.
 
     """
-    book = {k.removeprefix("ledger."): v for k, v in saved.items() if k.startswith("ledger.")}
-    books = {f"ledger.{name}": v for name, v in heirs.inherited(book).items()}
+    books = {f"ledger.{name}": v for name, v in heirs.inherited(_books(saved)).items()}
     return own | _of_bodies(saved, heirs.whole) | books | {"clock": saved["clock"]}
+
+
+def joined(own: Saved, saved: Saved, who: Joined, shared: bool) -> Saved:
+    """Return the state of an engine with more bodies: their own, of all else what was saved before.
+
+    In a field that all share, ``Window.continue_as`` takes particles over by number afterwards.
+
+    Args:
+        own: Of the engine as it was built, with those that join where they are.
+        saved: Of the engine before.
+        who: Which bodies were there.
+        shared: Whether all bodies share one field.
+
+    """
+    books = who.inherited(_books(saved))
+    clock, mine = saved["clock"].copy(), own["clock"]
+    for name in ("speed", "wave"):  # of whoever is fastest
+        k = 1 + CLOCKED.index(name)
+        clock[k] = max(clock[k], mine[k])
+    kept = _of_bodies(saved, who.whole)
+    if shared:
+        kept = {name: value for name, value in kept.items() if not name.startswith("field0.")}
+    return own | kept | {f"ledger.{k}": v for k, v in books.items()} | {"clock": clock}
+
+
+def _books(saved: Saved) -> Saved:
+    return {k.removeprefix("ledger."): v for k, v in saved.items() if k.startswith("ledger.")}
 
 
 def _of_bodies(saved: Saved, bodies: Collection[int]) -> Saved:

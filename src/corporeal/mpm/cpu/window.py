@@ -8,6 +8,7 @@ from functools import cached_property
 
 import numpy as np
 
+from corporeal.errors import SimulationError
 from corporeal.mpm.cpu.layout import (
     BLOCK,
     CHANNELS,
@@ -19,6 +20,7 @@ from corporeal.mpm.cpu.layout import (
     MT,
     OWN_BLOCK,
     PLACE,
+    TM,
     VE,
     XI,
 )
@@ -68,6 +70,8 @@ class Window:
     dim: np.ndarray
     """Size of the table."""
     fits: bool
+    relieves: bool
+    """Whether the history, where there is any, is that of nearly incompressible matter."""
 
     def __init__(
         self, place: np.ndarray, rows: np.ndarray, material: Materials, sorter: Sorter
@@ -95,6 +99,7 @@ class Window:
         batches = -(-len(rows) // 8)
         self.part = aligned((batches, CHANNELS, 8), np.float32)
         self.part.transpose(0, 2, 1)[np.arange(len(rows)) // 8, np.arange(len(rows)) % 8] = rows
+        self.relieves = not material.flows
         recalls = material.flows or material.swells
         self.history = aligned((batches if recalls else 0, HISTORY, 8), np.float32)
         self.relax(material)
@@ -135,6 +140,35 @@ class Window:
         self.node = aligned((blocks, 64, 8), np.float32)
         self.next = aligned((blocks, 64, 8), np.float32)
         self.near = np.zeros(2 * blocks, np.uint64)
+
+    def continue_as(self, before: "Window", material: Materials) -> None:
+        """Take place, motion, strain and memory of the particles of another window, by number.
+
+        Args:
+            before: Of the first of this one's particles.
+            material: What this one's are made of.
+
+        """
+        slot = np.empty(self.count, np.int64)
+        slot[self.number] = self.slot
+        to, at = slot[before.number], before.slot
+        rows = before._rows(before.part)
+        shift = 4 * (before.origin.astype(np.int64) - self.origin) << PLACE
+        rows[:, XI : XI + 3] = _moved(rows[:, XI : XI + 3], shift)
+        kept = [k for k in range(CHANNELS) if k not in (MT, ID)]
+        for k in kept:  # what they are made of is counted anew
+            self.part[to // 8, k, to % 8] = rows[:, k]
+        if material.flows:
+            # Where nothing flowed, the motion so far is the strain.
+            past = np.zeros((before.count, HISTORY), np.float32)
+            past[:, TM : TM + 9] = rows[:, DE : DE + 9]
+            if len(before.history) and not before.relieves:
+                past = before._rows(before.history)
+            for k in range(HISTORY):
+                self.history[to // 8, k, to % 8] = past[:, k]
+        if len(before.branch):
+            self.branch[to // 8, :, to % 8] = before.branch[at // 8, :, at % 8]
+        self.sort()
 
     # ------------------------------------------------------------ reading
 
@@ -209,6 +243,14 @@ class Window:
         self.fits = True
         self.__dict__.pop("slot", None)
         self._make_room()
+
+
+def _moved(place: np.ndarray, shift: np.ndarray) -> np.ndarray:
+    """Shift fixed-point places, which float32 channels hold."""
+    fixed = np.ascontiguousarray(place).view(np.int32).astype(np.int64) + shift
+    if (np.abs(fixed) >= 2**31).any():
+        raise SimulationError("What joins is too far from all else for one grid. Drop it nearer.")
+    return fixed.astype(np.int32).view(np.float32)
 
 
 def too_wide(problem: Problem, bodies: list[int], time: float) -> str:

@@ -175,7 +175,7 @@ export class Viewer {
   // Show the first run's scene a second time, with a caption for each.
   beside(words) {
     if (this.stages.length > 1) return
-    const stage = new Stage(this.takes[0], this.renderer.shadowMap.enabled)
+    const stage = new Stage(this.stages[0].take, this.renderer.shadowMap.enabled)
     stage.changed = () => this.touch()
     stage.rule(squareOf(stage.size))
     for (const object of this.stages[0].hidden) stage.reveal(object, false)
@@ -184,6 +184,24 @@ export class Viewer {
     this.captions = words.map((text, k) => el('div', {class: `caption of${k}`}, text))
     this.see.append(...this.captions)
     this.refit()
+  }
+
+  // Show another scene in all pictures, as it begins.
+  swap(take) {
+    const size = this.stages[0].size
+    this.stages = this.stages.map(old => {
+      const stage = new Stage(take, this.renderer?.shadowMap.enabled)
+      stage.changed = () => this.touch()
+      stage.fade(size)
+      stage.rule(squareOf(size))
+      stage.liveTop = old.liveTop
+      for (const object of old.hidden) stage.reveal(object, false)
+      old.free()
+      return stage
+    })
+    this.picked = null
+    for (const holder of [this.card, this.live?.card]) holder?.replaceChildren()
+    this.paint(this.by.value)
   }
 
   // Show one again.

@@ -146,6 +146,7 @@ export class Stage {
     if (t === this.frame) return
     this.frame = t
     this.take.header.objects.forEach((_, k) => this.place(k, this.take.instant(k, t)))
+    if (this.take.header.since) this.unveil()
     if (this.by === 'speed') this.paintSpeed(t)
   }
 
@@ -276,8 +277,16 @@ export class Stage {
 
   reveal(object, on) {
     if (on) this.hidden.delete(object); else this.hidden.add(object)
-    for (const mesh of [...this.meshes, ...this.overlay]) mesh.visible = !this.hidden.has(mesh.surface.object)
+    this.unveil()
   }
+
+  // What was dropped into a scene is not there before.
+  seen(object) {
+    const since = this.take.header.since?.[object]
+    return !this.hidden.has(object) && !(since > (this.take.times[this.frame] ?? 0) - 1e-9)
+  }
+
+  unveil() { for (const mesh of [...this.meshes, ...this.overlay]) mesh.visible = this.seen(mesh.surface.object) }
 
   // Lay a tint over one part; null: over none.
   mark(part) {
@@ -296,7 +305,7 @@ export class Stage {
       tint.surface = mesh.surface
       tint.matrix = mesh.matrix
       tint.frustumCulled = tint.matrixAutoUpdate = false
-      tint.visible = !this.hidden.has(mesh.surface.object)
+      tint.visible = this.seen(mesh.surface.object)
       this.overlay.push(tint)
       this.scene.add(tint)
     }
