@@ -119,19 +119,6 @@ def test_water_stands_as_high_wherever_planes_lie_on_the_grid(fast_engine, walls
         assert level(run, tank) - up == pytest.approx(tank.height, rel=0.01)
 
 
-@pytest.mark.parametrize("off", [0.0, 0.3, 0.6, 0.9])
-def test_a_plane_drags_on_a_liquid_by_all_that_it_carries(fast_engine, off):
-    """A layer that slides is slowed by μ times what the plane carries, wherever the plane is."""
-    stuff = Stuff(law=Law.FLUID, young=1e4, poisson=0.49)
-    up, size = off * CELL, (16 * CELL, 8 * CELL, 4 * CELL)
-    layer = box((0.0, 0.0, up + size[2] / 2), size, CELL / 2, stuff=stuff, velocity=(5.0, 0, 0))
-    run = fast_engine(problem(layer, cell=CELL, friction=0.1, planes=[floor(up)], gravity=DOWN))
-    run.advance(0.1)
-    along, _, press = run.measure().plane_impulse[0, 0]
-    assert press > 0.05 * run.measure().mass[0] * G
-    assert abs(along) == pytest.approx(0.1 * press, rel=0.01)
-
-
 @pytest.mark.parametrize("rigid", [False, True])
 def test_a_block_lies_as_high_wherever_the_floor_is_on_the_grid(fast_engine, rigid):
     """Ten places between nodes; a soft block's foot sinks by no more than its strain over ¾ dx."""

@@ -159,8 +159,7 @@ SOUND_OVER_SPEED = 10.0
 LIQUID_SHEAR = 0.125
 """G/K of a liquid's Maxwell branch [-]."""
 HELD_BY_WALL = 1.5
-"""Nodes of a liquid up to this high over a wall are held too (over a body's without friction),
-where … [cells]"""
+"""Nodes of a liquid up to this high over a wall are held too, without friction, where … [cells]"""
 LIKE_HALF_SPACE = 0.15
 """… its mean place there is that of a half space within this [cells]: pressure pushes them all, and
 the wall answers behind its face alone."""

@@ -300,6 +300,8 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             gap = gap_to_plane(xi, h)
             if slides(c, r, c.fa[t], c.fc[t]):
                 gap = gap_of_liquid(xi, h)
+                if h > WALL_REACH:
+                    c.slips[t] = 1
             if gap < VAST:
                 c.gap[t] = gap * s.cell
         elif wets(r, c.fa[t], c.fc[t]) > 0:

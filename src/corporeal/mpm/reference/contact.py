@@ -466,7 +466,8 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     gap = measure(look.mean[slot], height, normal, cell)
     point = scene.grid.index[slot] * cell
     there = np.full(len(slot), scene.wall_mover + wall)
-    return Touch((field, bodies + wall), scene.mover_of_slot(slot), there, point, normal, gap)
+    movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell
+    return Touch((field, bodies + wall), movers, there, point, normal, gap, slips)
 
 
 def _points_on_walls(scene: Scene) -> list[Touch]:

@@ -263,7 +263,7 @@ if (from < to) {
         if (!T.active) continue;
         double u[3];
         Solver::slip(sides, T, u);
-        const bool slips = T.c >= 0 && Solver::height(world, T) > mpm::WALL_REACH * dx;
+        const bool slips = Solver::height(world, T) > mpm::WALL_REACH * dx;
         T.mu = world->friction[T.fa * all + T.fc];
         T.gap = Solver::gap(world, sides, T, inv) * dx;
         T.active = T.gap < mpm::VAST * dx;   // else no contact at all

@@ -33,7 +33,7 @@ if (F.floor >= 0) {
         size += slip[d] * slip[d];
       }
       size = sqrt(size) * m;
-      const double scale = Coulomb::share(size, mu * jn);
+      const double scale = Coulomb::share(size, h > mpm::WALL_REACH ? 0.0 : mu * jn);
       book.normal += jn;
       for (int d = 0; d < 3; d++) {
         const double t = scale * m * slip[d], J = t - jn * P[d];
