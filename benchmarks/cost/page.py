@@ -214,6 +214,13 @@ def _targets(results: list[Result]) -> list[tuple[str, ...]]:
     if peer[1]:
         gain = peer[1][0].cpu / cost[1][0].cpu
         rows.append(_judged("the same on one thread, in time of the processor", gain, "×", 12.0))
+    return rows + _together(results) + _linear(results)
+
+
+def _together(results: list[Result]) -> list[tuple[str, ...]]:
+    """Compare sixteen objects with one, and their threads with one thread."""
+    usual = _find(results, law=Law.COROTATED, threads=1)[0]
+    rows = []
     for heap, words, most in ((False, "side by side", 1.2), (True, "in a heap, touching", 1.5)):
         many = {t: _find(results, objects=16, heap=heap, threads=t) for t in (1, 2, 4)}
         if many[1]:
@@ -223,7 +230,7 @@ def _targets(results: list[Result]) -> list[tuple[str, ...]]:
             if many[threads]:
                 gain = many[1][0].cost / many[threads][0].cost
                 rows.append(_judged(f"that, {threads} threads against one", gain, "×"))
-    return rows + _linear(results)
+    return rows
 
 
 def _linear(results: list[Result]) -> list[tuple[str, ...]]:
