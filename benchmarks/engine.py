@@ -70,6 +70,8 @@ def rivals(size: Size) -> list[Drop]:
         for count in size.objects
         for heap in (False, True)
     ]
+    many = drop_of(size.particles, objects=size.objects[-1], heap=True)
+    heaps += [replace(many, threads=t) for t in (2, 4) if t <= free]
     spread = [drop_of(size.particles, objects=8, extent=cells) for cells in size.extents]
     cards = [replace(plain, law=law, device=card) for law in Law for card in cuda_devices()]
     return [*laws, *heaps, *spread, *cards, replace(plain, floor=False)]

@@ -5,7 +5,7 @@ The floor is always there, at z = 0; +Z is up. All lengths are in metres.
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 import trimesh
@@ -14,7 +14,9 @@ from jaxtyping import Float, Int
 from corporeal.errors import UserError
 from corporeal.formats.words import unique
 from corporeal.geometry.arrangement import intersecting
+from corporeal.geometry.creases import creased
 from corporeal.materials import Entry, find
+from corporeal.materials.looks import finish_of
 from corporeal.types import Finish, Keyframes, Push, Scene, SceneObject, Surface, Vector, Wind
 
 STILL: Vector = (0.0, 0.0, 0.0)
@@ -26,8 +28,6 @@ SECTIONS = 48
 """Sides of a cylinder: its volume is 0.3 % too small."""
 SUNK = 1e-6
 """Depth below the floor that is round-off [m]."""
-GREY = (0.6, 0.6, 0.6, 1.0)
-"""Linear RGBA of what has no colour of its own."""
 
 
 @dataclass(frozen=True)
@@ -50,8 +50,10 @@ class Solid:
     wind: Wind | None = None
     path: Keyframes | None = None
     """Prescribed motion, as one rigid body."""
-    colour: tuple[float, float, float, float] = GREY
-    """Linear RGBA."""
+    colour: tuple[float, float, float, float] | None = None
+    """Linear RGBA; None: as the material looks."""
+    finish: Finish = field(default=Finish("plain"), kw_only=True)
+    """How the material looks."""
 
 
 def ball(
@@ -206,7 +208,7 @@ def build_scene(
         source="built in Python",
         objects=tuple(_object(one, called) for one, called in zip(solids, names, strict=True)),
         surfaces=tuple(_surface(one, k) for k, one in enumerate(solids)),
-        finishes=tuple(Finish(one.name, one.colour) for one in solids),
+        finishes=tuple(_finish(one) for one in solids),
         gravity=gravity,
         duration=float(duration),
         fps=fps,
@@ -224,7 +226,12 @@ def _placed(
         vertices=np.array(shape.vertices, float) + _vector(name, "at", at),
         triangles=np.array(shape.faces, np.int64),
         velocity=_vector(name, "velocity", velocity),
+        finish=finish_of(*entry.kin),
     )
+
+
+def _finish(one: Solid) -> Finish:
+    return one.finish if one.colour is None else Finish(one.name, one.colour)
 
 
 def _object(one: Solid, name: str) -> SceneObject:
@@ -242,7 +249,8 @@ def _object(one: Solid, name: str) -> SceneObject:
 
 def _surface(one: Solid, number: int) -> Surface:
     stated = {"substance": one.material}
-    return Surface(one.name, number, number, one.vertices, one.triangles, extras=stated)
+    bare = Surface(one.name, number, number, one.vertices, one.triangles, extras=stated)
+    return creased(bare)
 
 
 def _with_overlaps_told(scene: Scene) -> Scene:

@@ -417,6 +417,9 @@ class PartWords:
     of a scanned screwdriver. The words above are then those of the piece that matters most."""
     built_by: Speaker = "unknown"
     """The source of how it is built; ``answered_by``: of what it is made of."""
+    wall_unseen: bool = False
+    """Whether its surface need not show the inner face of its wall, as pictures do not where that
+    is plain: how thick the surface draws it tells nothing."""
 
     @property
     def alternatives(self) -> tuple[tuple[str, float], ...]:

@@ -14,6 +14,7 @@ from PIL import Image
 from corporeal.formats.glb import read_glb
 from corporeal.formats.glb_writer import encode_glb, write_glb
 from corporeal.geometry.arrangement import boxes_of
+from corporeal.geometry.creases import creased
 from corporeal.types import Finish, Push, Scene, SceneObject, Surface, Wind
 from glb_maker import CUBE, CUBE_TRIANGLES, Maker, cube
 
@@ -51,8 +52,8 @@ def scene():
         colours=rng.random((8, 4)),
         extras={"substance": "rubber", "shell_thickness_m": 0.002},
     )  # fmt: skip
-    lid = Surface("lid", 0, 1, vertices + np.array([0, 0, 1]), triangles)
-    stone = Surface("stone", 1, 2, vertices * 0.25 + [2, 0, 0], triangles)
+    lid = creased(Surface("lid", 0, 1, vertices + np.array([0, 0, 1]), triangles))
+    stone = creased(Surface("stone", 1, 2, vertices * 0.25 + [2, 0, 0], triangles))
     return Scene(
         name="two_things",
         source="made",
@@ -253,7 +254,16 @@ def test_a_texture_and_its_transform_are_kept(tmp_path):
     scene = read_glb(made.save(tmp_path / "a.glb"))
     assert np.array_equal(scene.finishes[0].texture, picture)
     # Anticlockwise to the eye, with v down: a quarter turn takes (u, v) to (v, -u).
-    assert np.allclose(scene.surfaces[0].uv, np.stack([0.5 + uv[:, 1], 0.25 - 2 * uv[:, 0]], 1))
+    turned = np.stack([0.5 + uv[:, 1], 0.25 - 2 * uv[:, 0]], 1)
+    (seen,) = scene.surfaces
+    assert seen.uv is not None
+    assert np.allclose(seen.uv[seen.triangles], turned[CUBE_TRIANGLES])
+
+
+def test_a_file_without_normals_gets_some_with_sharp_edges(tmp_path):
+    (seen,) = read_glb(cube().save(tmp_path / "a.glb")).surfaces
+    assert seen.normals is not None
+    assert len(np.unique(np.round(seen.normals, 6), axis=0)) == 6
 
 
 @pytest.mark.parametrize("image", [b"", b"\x89PNG\r\n\x1a\nrubbish", b"hello"])

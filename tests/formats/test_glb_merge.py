@@ -297,7 +297,7 @@ def test_a_model_that_occurs_twice_is_stored_once(tmp_path):
     assert path.stat().st_size - one < 600
     assert len(json_of(path)["meshes"]) == 1
     a, b = read_glb(path).surfaces
-    np.testing.assert_allclose(b.vertices - a.vertices, [[2, 0, 0]] * 8, atol=1e-12)
+    np.testing.assert_allclose(b.vertices - a.vertices, [[2, 0, 0]] * 24, atol=1e-12)
 
 
 def test_what_nobody_uses_is_left_out(tmp_path):

@@ -172,7 +172,7 @@ def test_colours_of_vertices_are_kept_as_linear_light(tmp_path):
     (tmp_path / "a.ply").write_bytes(mesh.export(file_type="ply"))
     (surface,) = read_mesh(tmp_path / "a.ply").scene.surfaces
     wanted = [*linear(np.array([1, 128 / 255, 0])), 1]
-    np.testing.assert_allclose(surface.colours, np.tile(wanted, (8, 1)), atol=1e-6)
+    np.testing.assert_allclose(surface.colours, np.tile(wanted, (24, 1)), atol=1e-6)
 
 
 def test_named_things_are_objects_where_asked(tmp_path):

@@ -6,7 +6,7 @@ from scipy.spatial import KDTree
 from corporeal.geometry.filling import fill_body, fill_wall, match_moments
 from corporeal.geometry.mesh import Mesh, weld
 from corporeal.geometry.shape import Shape
-from corporeal.geometry.spread import repel, sample_surface, scatter, thin_out
+from corporeal.geometry.spread import repel, sample_surface, scatter, scattered, thin_out
 
 TILT = trimesh.transformations.rotation_matrix(0.4, (1, 2, 3))
 
@@ -50,6 +50,23 @@ def test_what_fills_a_pot_to_its_walls_has_its_whole_volume(rng):
     )
     assert len(both.triangles) == 36
     assert len(scatter(Shape(both), 0.06, rng)) * 0.06**3 == pytest.approx(8.0, rel=0.01)
+
+
+@pytest.mark.parametrize("missing", [1, 6])
+def test_a_small_hole_leaves_out_only_what_is_outside(missing):
+    """Near the hole as far from it: what the winding number says, of the whole ball's points."""
+    ball = trimesh.creation.icosphere(4)
+    ball.apply_transform(TILT)
+    whole = shaped(ball)
+    torn = Shape(Mesh(whole.mesh.vertices, whole.mesh.triangles[missing:]))
+    assert not torn.closed
+    points, expected = (
+        np.concatenate(list(scattered(shape, 0.03, np.random.default_rng(3))))
+        for shape in (torn, whole)
+    )
+    expected = expected[torn.inside(expected)]
+    assert len(points) > 100_000
+    assert np.array_equal(points[np.lexsort(points.T)], expected[np.lexsort(expected.T)])
 
 
 def test_points_lie_evenly(tilted_cube):

@@ -7,7 +7,7 @@ import pytest
 
 from corporeal.errors import BadFileError
 from corporeal.poses.gather import gather
-from corporeal.poses.groups import SHARED, Groups, groups_of, shared_points
+from corporeal.poses.groups import SHARED, Groups, groups_of, not_found, shared_points
 from corporeal.poses.pose import pose
 from patterned_scene import patterned, photographs, ring
 
@@ -95,3 +95,9 @@ def test_points_are_shared_within_a_place_alone(two_places, tmp_path):
     assert (np.diagonal(shared[:14, :14], 1) >= SHARED).all()
     again = shared_points(tmp_path, gathered, silent)
     assert (again == shared).all(), "seeded"
+
+
+def test_who_is_refused_hears_how_many_pictures_show_something_else():
+    why = not_found(["only 54 of 86 pictures fit together"], 34)
+    assert why.endswith("only 54 of 86 pictures fit together; 34 more show another place.")
+    assert not_found(["only 54 of 86 pictures fit together"], 0).endswith("fit together.")

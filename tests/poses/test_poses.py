@@ -292,7 +292,7 @@ def test_of_very_many_photographs_some_are_used(tmp_path):
         Image.fromarray(picture).resize((64, 48)).save(tmp_path / "photos" / f"{k:03d}.png")
     found = gather(tmp_path / "photos", tmp_path / "poses", silent)
     assert len(found.names) == 84
-    assert "Every 3. of 250 photographs was used." in found.said
+    assert "Of 250 photographs, one in 3 was used." in found.said
 
 
 def test_masks_are_turned_with_their_photographs(tmp_path):

@@ -201,3 +201,8 @@ def test_the_heap_of_theory_meets_what_is_expected_of_ketchup_and_a_flat_one_doe
     found = object_outcome(reach_m=reach(points, 0.0), height_m=height(points, 0.0))
     radius, volume = expect("ketchup-stops", outcome({"ketchup_0": found}, {}, []))
     assert radius.met and volume.met is met
+
+
+def test_a_glass_whose_water_does_not_move_by_itself_spills_none():
+    one = expect("water-knocked-over", outcome({"tumbler_0": object_outcome()}, {}, []))
+    assert [(e.value, e.met) for e in one[1:]] == [("it did not happen", False)] * 2

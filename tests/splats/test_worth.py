@@ -7,7 +7,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
 from corporeal.splats.quality import Quality
-from corporeal.splats.worth import GREY, not_worth, unlike_masks
+from corporeal.splats.worth import GREY, goes_beyond, not_worth, unlike_masks
 from patterned_scene import OF_SLAB, patterned, ring
 from patterned_scene import box as made_box
 
@@ -41,6 +41,17 @@ def test_without_masks_a_thing_that_fills_the_pictures_is_all_there_is():
     why = refused(box(0.6, 0.2))
     assert why is not None and "as long as the ball" in why and "--floor-at" in why
     assert refused(box(0.6, 0.2), masked=True) is None, "somebody said that it is the thing"
+
+
+def test_what_pictures_cut_off_is_the_room():
+    masks = np.zeros((20, 60, 80), bool)
+    masks[:, 20:40, 30:50] = True
+    assert goes_beyond(masks) is None
+    masks[:10, 20:40] = True
+    assert goes_beyond(masks) is None, "many photographs may be from near"
+    masks[10, 20:40] = True
+    why = goes_beyond(masks)
+    assert why is not None and "11 of 20 photographs show but a part" in why and "--force" in why
 
 
 def test_pictures_no_better_than_grey_are_no_shape():

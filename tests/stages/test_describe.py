@@ -47,7 +47,7 @@ def test_open_ware_from_pictures_is_no_solid_and_that_is_said():
     bowl = scene(("bowl_0", [("mesh", plain(), {})]))
     made = describe(bowl, from_pictures=True)
     said = words(made)[("bowl_0", "bowl")]
-    assert (said.structure, said.built_by) == ("sheet", "metadata")
+    assert (said.structure, said.built_by, said.wall_unseen) == ("sheet", "metadata", True)
     assert "By its name it is taken for open ware" in made.warnings[0]
     drawn = describe(bowl)
     assert words(drawn)[("bowl_0", "bowl")].structure is None and not drawn.warnings

@@ -552,6 +552,16 @@ def test_a_thickness_that_a_person_states_outranks_the_mesh():
     assert "1 mm thick as your annotation says (its mesh draws 3.93 mm)" in told
 
 
+def test_open_ware_from_pictures_has_the_usual_wall_not_the_one_that_is_drawn():
+    outline = [(0, 0), (0.05, 0), (0.05, 0.1), (0.046, 0.1), (0.046, 0.004), (0, 0.004)]
+    cup = put(trimesh.creation.revolve(np.array(outline), sections=64), 0.5)
+    scene, parts, field = inputs(thing((cup, STEEL, Structure("shell", 1e-3))))
+    words = replace(field.words[0], structure="sheet", wall_unseen=True)
+    particles = fill(scene, parts, replace(field, words=(words,)))
+    assert "1 mm thick as such walls usually are (its mesh draws 3.93 mm)" in particles.fills[0]
+    assert particles.mass_real[0] == pytest.approx(7850 * cup.area / 2 * 1e-3, rel=0.01)
+
+
 def test_what_a_soft_cup_holds_is_as_light_as_it_is():
     outline = [(0, 0), (0.05, 0), (0.05, 0.1), (0.046, 0.1), (0.046, 0.004), (0, 0.004)]
     cup = put(trimesh.creation.revolve(np.array(outline), sections=64), 0.5)

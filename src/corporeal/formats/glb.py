@@ -17,6 +17,7 @@ from corporeal.formats.gltf_nodes import Placed, walk
 from corporeal.formats.gltf_pose import Skeletons, posed
 from corporeal.formats.gltf_primitives import Piece, read_primitive
 from corporeal.formats.words import everyday, numbered, safe, unique
+from corporeal.geometry.creases import creased
 from corporeal.types import Objects, Scene, Surface
 
 READABLE = (
@@ -227,7 +228,7 @@ def _extent(shapes: list[_Shape]) -> float:
 
 def _surface(shape: _Shape, k: int) -> Surface:
     piece = shape.piece
-    return Surface(
+    made = Surface(
         name=shape.name,
         object=k,
         finish=shape.finish,
@@ -238,3 +239,4 @@ def _surface(shape: _Shape, k: int) -> Surface:
         colours=piece.colours,
         extras=shape.extras,
     )
+    return creased(made)

@@ -25,6 +25,7 @@ from corporeal.formats.mesh_suffixes import MOST_MEMORY, MOST_SECONDS
 from corporeal.formats.resources import beside
 from corporeal.formats.stated_bodies import with_bodies, with_scene
 from corporeal.formats.words import everyday, numbered, safe
+from corporeal.geometry.creases import creased
 from corporeal.geometry.gaussians import Up, upright
 from corporeal.types import Objects, Scene, SceneObject, Surface
 
@@ -191,7 +192,7 @@ def _check(path: Path, raw: RawMesh) -> None:
 
 
 def _turned(raw: RawMesh, turn: np.ndarray, unit: float) -> list[Surface]:
-    return [replace(s, vertices=unit * s.vertices @ turn.T) for s in raw.surfaces]
+    return [creased(replace(s, vertices=unit * s.vertices @ turn.T)) for s in raw.surfaces]
 
 
 def _owners(surfaces: list[Surface], nodes: bool) -> list[str]:

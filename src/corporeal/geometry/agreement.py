@@ -28,7 +28,10 @@ HOPELESS = 0.1
 """Share of good matches below which the poses are certainly wrong, whether or not it is known what
 would put them right."""
 BETTER = 1.4
-"""A change must raise the share by this factor; right poses cannot be bettered by 1.1."""
+"""A change must raise the share by this factor; right poses cannot be bettered by 1.1 …"""
+SURE = 3.0
+"""… and the number of matches that agree by this many of its standard deviations: of few matches
+several agree with any poses by chance, and nine changes are tried."""
 LIKELY = 0.45
 """Share of a pair's matches that some cameras explain: then they are good matches, whatever the
 poses. Of random ones some cameras explain 0.1 to 0.4."""
@@ -154,7 +157,9 @@ def _better(pairs: list[_Pair], views: Views, share: float) -> str | None:
         cameras = tuple(change(c) for c in views.cameras)
         shares[name] = _share(_errors(pairs, cameras), cameras)
     best = max(shares, key=lambda name: shares[name])
-    needed = max(AGREES, BETTER * share)
+    count = sum(len(p.x) for p in pairs)
+    spread = np.sqrt((shares[best] + share) / count)
+    needed = max(AGREES, BETTER * share, share + SURE * spread)
     return best if shares[best] >= needed else None
 
 

@@ -228,9 +228,10 @@ def decide(member: Member, piece: Specified) -> Make:
     area A of one face: not of the inside of a shade, whose outside counts; about ρ A t where it is
     thin. n says how its outside closes in (``Member.closing``). A wall whose mesh shows both faces
     is 2 V / A thick unless somebody stated or judged otherwise: thin walls are drawn too thick, in
-    scans as in models. Open sheets weigh ρ A t. Of a piece, its shares of V and A count, less the
-    volume of what lies inside it; a piece that the mesh lacks is not bounded by the mesh. Of what
-    is packed of parts and air, the share that is matter counts.
+    scans as in models; of open ware from pictures, whose inside may be plain, only where nobody
+    knows how thick such walls usually are. Open sheets weigh ρ A t. Of a piece, its shares of V and
+    A count, less the volume of what lies inside it; a piece that the mesh lacks is not bounded by
+    the mesh. Of what is packed of parts and air, the share that is matter counts.
     """
     structure, material, words = piece.structure, piece.material, piece.words
     wall = member.build is Build.WALL
@@ -241,7 +242,8 @@ def decide(member: Member, piece: Specified) -> Make:
     sheet = (words.thickness or stated or guess) if member.sheet_area or only_sheet else 0.0
     thickness, whose, walled = 0.0, "", structure.kind != "solid"
     if walled:
-        thickness, whose = wall_of(structure, words, shown, stated or 0.0, guess)
+        drawn = 0.0 if words.wall_unseen and stated else shown
+        thickness, whose = wall_of(structure, words, drawn, stated or 0.0, guess)
     elif wall:
         thickness, whose = shown, DRAWN
     face = (member.face_area if walled or wall else member.body_area) * words.surface_share

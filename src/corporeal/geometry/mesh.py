@@ -167,10 +167,11 @@ def boundary(
     """Edges that an odd number of triangles (of one patch) share, and a triangle of each."""
     f = mesh.triangles
     edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]])
-    key = np.sort(edges, axis=1)
+    # One number per edge: rows are sorted twenty times slower.
+    key = edges.min(axis=1) * len(mesh.vertices) + edges.max(axis=1)
     if patch is not None:
-        key = np.column_stack([key, np.tile(patch, 3)])
-    _, edge, count = np.unique(key, axis=0, return_inverse=True, return_counts=True)
+        key = np.tile(patch, 3) * len(mesh.vertices) ** 2 + key
+    _, edge, count = np.unique(key, return_inverse=True, return_counts=True)
     odd = np.flatnonzero(count[edge.reshape(-1)] % 2 == 1)
     return edges[odd], odd % len(f)
 

@@ -14,6 +14,7 @@ from jaxtyping import Bool, Float, Float32
 from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
+from corporeal.geometry.cropped import cropped
 from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
 from corporeal.masking.floor_pattern import shows_floor
 from corporeal.masking.reduced import reduced
@@ -38,8 +39,6 @@ HALF = 0.5
 """Of a pixel: from here on it is inside."""
 CRUMB = 0.02
 """Pieces of a mask that fill less of its silhouette, against the one that fills most, are noise."""
-BORDER = 0.1
-"""Share of a side of the picture that masks fill where objects are cropped."""
 
 
 @dataclass(frozen=True)
@@ -121,7 +120,7 @@ def grow(
         settled=_agreement(state.masks, before),
         alike=overlap(evidence.inside, evidence.outside),
         outer=state.outer,
-        cropped=_cropped(state.masks),
+        cropped=float(cropped(state.masks).mean()),
         share=float(state.masks.mean()),
     )
 
@@ -201,10 +200,3 @@ def _widened(seen: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, "V H W"]:
 def _agreement(a: Bool[np.ndarray, "V H W"], b: Bool[np.ndarray, "V H W"]) -> float:
     both, either = (a & b).sum(axis=(1, 2)), (a | b).sum(axis=(1, 2))
     return float(np.median(both / np.maximum(either, 1)))
-
-
-def _cropped(masks: Bool[np.ndarray, "V H W"]) -> float:
-    """Return in which share of the pictures masks fill much of a border."""
-    sides = masks[:, 0], masks[:, -1], masks[:, :, 0], masks[:, :, -1]
-    most = np.max([side.mean(axis=1) for side in sides], axis=0)
-    return float((most > BORDER).mean())

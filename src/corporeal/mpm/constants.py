@@ -162,7 +162,10 @@ HELD_BY_WALL = 1.5
 """Nodes of a liquid up to this high over a wall are held too, without friction, where … [cells]"""
 LIKE_HALF_SPACE = 0.15
 """… its mean place there is that of a half space within this [cells]: pressure pushes them all, and
-the wall answers behind its face alone."""
+the wall answers behind its face alone …"""
+FILLED = 0.4
+"""… and it fills this share of what the node sees [-]: what is thin lies on the wall itself. Where
+a second wall passes through the node, .42 are left."""
 STICKS = 0.5
 """Where friction is at least this, what lies at the wall is not squeezed along it, and higher nodes
 are not held: a layer that sticks could not thin [-]."""

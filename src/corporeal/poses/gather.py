@@ -76,7 +76,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
         _write(picture, folder / IMAGES / name)
         for kinds in (MASKS, INSTANCES):
             _copy_mask(file, source, kinds, folder, name)
-    said = [f"Every {step}. of {len(found)} photographs was used."] if step > 1 else []
+    said = [f"Of {len(found)} photographs, one in {step} was used."] if step > 1 else []
     said += left_out(len(taken), bad)
     _refuse_few(source, len(names), len(taken), bad)
     return Gathered(tuple(names), tuple(names.values()), tuple(said))

@@ -95,6 +95,12 @@ def told_apart(groups: Groups, names: Sequence[str]) -> str:
     )
 
 
+def not_found(doubts: Sequence[str], others: int) -> str:
+    """Say why poses were not found, and how many pictures of other places were not looked at."""
+    why = f"where the pictures were taken from cannot be found: {'; '.join(doubts)}"
+    return f"{why}; {others} more show another place." if others else f"{why}."
+
+
 def without(gathered: Gathered, beside: tuple[int, ...]) -> Gathered:
     """Leave out what shows another place, and say so."""
     kept = [k for k in range(len(gathered.names)) if k not in beside]

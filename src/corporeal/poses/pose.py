@@ -14,7 +14,14 @@ from corporeal.poses.by_masks import checked_by_masks, filled_share
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
 from corporeal.poses.gather import IMAGES, Gathered, as_gathered, gather
-from corporeal.poses.groups import SORT_THEM, groups_of, shared_points, told_apart, without
+from corporeal.poses.groups import (
+    SORT_THEM,
+    groups_of,
+    not_found,
+    shared_points,
+    told_apart,
+    without,
+)
 from corporeal.poses.judge import FILLED, WHAT_TO_DO, doubt_of_masks, doubts, names_of, unseen_side
 from corporeal.typed import typed
 
@@ -166,8 +173,8 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
         best = max(believed, key=lambda told: told.filled)
         return _told(folder, gathered, tuple(said), tuple(tried), best)
     best = max(tried, key=lambda told: told.registered)
-    why = f"where the pictures were taken from cannot be found: {'; '.join(doubts(best))}."
-    return _Kept((), (), why, tuple(tried))
+    others = 0 if groups is None else len(groups.beside)
+    return _Kept((), (), not_found(doubts(best), others), tuple(tried))
 
 
 def _worth_trying(way: Way, folder: Path, tried: list[Attempt]) -> bool:

@@ -8,6 +8,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
+from corporeal.geometry.creases import SHARP
 from corporeal.geometry.srgb import linear
 from corporeal.render.look import (
     ALPHA,
@@ -23,7 +24,7 @@ from corporeal.render.look import (
 
 JIT = {"nogil": True, "cache": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
 LINEAR = linear(np.arange(256) / 255).astype(np.float32)
-CREASE = 0.77
+CREASE = float(np.cos(np.radians(SHARP)))
 """Cosine of the largest angle over which made normals are smoothed."""
 NOTHING, FLOOR, THING = 0, 1, 2
 

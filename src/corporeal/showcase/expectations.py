@@ -120,8 +120,13 @@ def heaped(thing: str, volume: float) -> Measure:
 
 
 def named(thing: str, measure: str) -> Measure:
-    """Read one field of ``ObjectOutcome`` of an object by its whole name."""
-    return lambda outcome: attrgetter(measure)(outcome.objects[thing])
+    """Read one field of ``ObjectOutcome`` of an object by its whole name; None: there is none."""
+
+    def found(outcome: Outcome) -> float | None:
+        one = outcome.objects.get(thing)
+        return None if one is None else attrgetter(measure)(one)
+
+    return found
 
 
 def left(contents: str) -> Measure:

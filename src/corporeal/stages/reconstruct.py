@@ -32,8 +32,8 @@ from corporeal.reconstruction.reconstruct_config import (
 from corporeal.regions.instance_assignment import assign_instances
 from corporeal.render.camera import cameras_around
 from corporeal.splats.closed import closed
-from corporeal.splats.intake import turned_upright
-from corporeal.splats.worth import not_worth, unlike_masks
+from corporeal.splats.intake import Intake, turned_upright
+from corporeal.splats.worth import goes_beyond, not_worth, unlike_masks
 from corporeal.types import Camera, Finish, Reconstruction, Scene, SceneObject, Surface
 from corporeal.vlm.seen_objects import (
     SeenObject,
@@ -89,7 +89,7 @@ def reconstruct(
     validate(config, extents, asked=viewer.model is not None)
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
     taken, masked = take_pictures(source, config, folder, within(progress, 0.0, TRAINED))
-    taken = turned_upright(taken, config.up, config.floor_at)
+    taken = _upright(source, taken, config)
     photographers = taken.cameras
     if not taken.cameras:
         taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
@@ -124,6 +124,20 @@ def reconstruct(
     statements = (*taken.statements, *placed.statements, split.statement, scale.reason)
     result = _in_metres(found, names, scale, statements, tuple(dict.fromkeys(warnings)))
     return Reconstructed(result, _scene(source, found, names, objects, scale))
+
+
+def _upright(source: Path, taken: Intake, config: ReconstructConfig) -> Intake:
+    """Turn what was learned upright, and tell objects in photographs that have no masks.
+
+    Raises:
+        UserError: These are the room.
+
+    """
+    made = turned_upright(taken, config.up, config.floor_at)
+    cut_out = None if taken.masks is not None else made.masks
+    if cut_out is not None and not config.force and (why := goes_beyond(cut_out)):
+        raise UserError(f"{source}: {why}")
+    return made
 
 
 def _why_not(found: FoundObjects, photographers: Sequence[Camera], masked: bool) -> str | None:

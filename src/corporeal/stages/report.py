@@ -63,7 +63,7 @@ WHO = {
 }
 CHOSEN = {
     "typical": "typical value",
-    "fallback": "typical value: the model's answer was not usable",
+    "fallback": "typical value: no answer that could be used",
     "model": "a model",
     "recording": "a recorded answer",
     "annotation": "your annotation",

@@ -273,7 +273,7 @@ def hollowed(
     if words.structure is not None or not (words.material is None or walled(words.material)):
         return words
     if from_pictures and any(open_ware(name.words) for name in evidence.general):
-        return replace(words, structure="sheet")
+        return replace(words, structure="sheet", wall_unseen=True)
     is_hollow = any(hollow(name.words) for name in evidence.general)
     return replace(words, structure="shell") if is_hollow else words
 

@@ -29,10 +29,13 @@ def faces(
 
 @wp.kernel
 def gaps(
-    mean: wp.array(dtype=wp.float32), h: wp.array(dtype=wp.float32), out: wp.array(dtype=wp.float32)
+    mean: wp.array(dtype=wp.float32),
+    h: wp.array(dtype=wp.float32),
+    full: wp.array(dtype=wp.float32),
+    out: wp.array(dtype=wp.float32),
 ):
     i = wp.tid()
-    out[i] = one_lane.gap_of_liquid(mean[i], h[i])
+    out[i] = one_lane.gap_of_liquid(mean[i], h[i], full[i])
 
 
 @pytest.fixture
@@ -72,9 +75,11 @@ def test_faces_of_a_corner_are_found_alike_and_never_the_other_side_of_a_wall(co
 def test_gaps_of_liquids_are_as_in_numpy():
     rng = np.random.default_rng(1)
     mean, height = rng.uniform(-1.2, 0.3, 500), rng.uniform(-1.4, 1.8, 500)
+    full = rng.uniform(0.2, 1.0, 500)
     out = np.tile([0.0, 0.0, 1.0], (500, 1))
-    exact = contact.gap_of_liquid(mean[:, None] * out, height, out, 1.0)
-    sent = [wp.array(x.astype(np.float32), dtype=wp.float32, device="cpu") for x in (mean, height)]
+    exact = contact.gap_of_liquid(mean[:, None] * out, height, out, full, 1.0)
+    given = (mean, height, full)
+    sent = [wp.array(x.astype(np.float32), dtype=wp.float32, device="cpu") for x in given]
     found = wp.zeros(500, dtype=wp.float32, device="cpu")
     wp.launch(gaps, 500, sent, outputs=[found], device="cpu")
     near = np.isfinite(exact)

@@ -56,6 +56,7 @@ from corporeal.mpm.joining import Joined, as_it_runs
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measure import Sums
 from corporeal.mpm.physics import prescribed
+from corporeal.mpm.physics.contact import full_cell
 from corporeal.mpm.physics.grips import Grip
 from corporeal.mpm.physics.rigid import RigidBody
 from corporeal.mpm.physics.springs import longest_step
@@ -257,6 +258,7 @@ class CpuEngine(Interaction):
         record["blocks"], record["pool"] = len(window.block), len(window.where)
         record["flows"], record["relaxes"] = self.material[f].flows, len(window.branch) > 0
         record["swells"], record["pours"] = self.material[f].swells, self.material[f].pours
+        record["full"] = full_cell(self.problem.bodies[f], self.problem.cell)
         # One lane of a node says how high mass lies over a floor.
         record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
 

@@ -178,7 +178,7 @@ FIELD = Record(
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
     ("double", "spacing"),  # rigid: of its surface points
-    ("double", "mass"),
+    ("double", "mass full"),  # full: of a cell full of it
     ("int[3]", "origin dim"),  # in blocks; the window's corner and size
     ("int", "blocks pool rigids points surfaces pushed swells flows relaxes"),
     ("int", "floor"),  # the only plane that the window reaches, or -1

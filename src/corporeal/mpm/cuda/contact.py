@@ -299,7 +299,7 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             xi = wp.dot(c.mean[a], n) / (g.node[c.slot[a]][0] * s.cell)
             gap = gap_to_plane(xi, h)
             if slides(c, r, c.fa[t], c.fc[t]):
-                gap = gap_of_liquid(xi, h)
+                gap = gap_of_liquid(xi, h, g.node[c.slot[a]][0] / r.full[c.fa[t]])
                 if h > WALL_REACH:
                     c.slips[t] = 1
             if gap < VAST:
@@ -308,13 +308,16 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             # The liquid's mean place, and a face of the body that it has there.
             which = wets(r, c.fa[t], c.fc[t])
             liquid = a
+            field = c.fa[t]
             body = c.fc[t]
             way = float(-1.0)
             if which == 1:
                 liquid = other
+                field = c.fc[t]
                 body = c.fa[t]
                 way = 1.0
-            mean = c.mean[liquid] / g.node[c.slot[liquid]][0]
+            mass = g.node[c.slot[liquid]][0]
+            mean = c.mean[liquid] / mass
             face = face_of(r, s, body, c.point[t], mean, c.facet[t])
             if face[3] < VAST:
                 out = wp.vec3(face[0], face[1], face[2])
@@ -322,7 +325,7 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
                 xi = -wp.dot(mean, out) / s.cell
                 gap = gap_to_surface(xi, face[3])
                 if c.friction[c.fa[t], c.fc[t]] < wp.float64(STICKS):
-                    gap = gap_of_liquid(xi, face[3])
+                    gap = gap_of_liquid(xi, face[3], mass / r.full[field])
                 if face[3] > WALL_REACH:
                     c.slips[t] = 1
                 if gap < VAST:

@@ -292,6 +292,8 @@ class Rigid:
     """… and how many it has."""
     pours: wp.array(dtype=wp.int32)
     """1: the body is liquid."""
+    full: wp.array(dtype=wp.float32)
+    """Mass of a cell full of the body [kg]."""
 
 
 @wp.struct

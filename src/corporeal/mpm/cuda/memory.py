@@ -9,7 +9,7 @@ from corporeal.mpm.constants import FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP
 from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.layout import Contacts, Grid, Particles, Rigid, Sheet, wp
 from corporeal.mpm.physics import prescribed
-from corporeal.mpm.physics.contact import face_table
+from corporeal.mpm.physics.contact import face_table, full_cell
 from corporeal.mpm.physics.rigid import thinness
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem
@@ -174,6 +174,8 @@ class Memory:
         liquid = matter.body[np.isin(matter.law, laws.LIQUID)] * (problem.contact == "multi")
         pours = np.isin(np.arange(len(stiff)), liquid) & ~stiff
         r.pours = self.put(pours, wp.int32)
+        full = [full_cell(body, problem.cell) for body in problem.bodies]
+        r.full = self.put(np.array(full), wp.float32)
 
     # ------------------------------------------------------------ contacts
 

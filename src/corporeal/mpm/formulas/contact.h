@@ -51,10 +51,11 @@ template <class R> struct Face {
   }
   // The same to a plane, h below the node.
   CUDA_CALLABLE static inline R gap_to_plane(R a, R h) { return -mean(-h) - a - touching(h); }
-  // The same to a wall of a liquid that fills the half space above it as far as the node tells.
-  CUDA_CALLABLE static inline R gap_of_liquid(R a, R h) {
+  // The same to a wall of a liquid that fills the half space above it as far as the node tells; full: the
+  // node's mass over that of a full cell.
+  CUDA_CALLABLE static inline R gap_of_liquid(R a, R h, R full) {
     const R off = mean(h) - a;
-    const bool like = off < R(LIKE_HALF_SPACE) && off > R(-LIKE_HALF_SPACE);
+    const bool like = full >= R(FILLED) && off < R(LIKE_HALF_SPACE) && off > R(-LIKE_HALF_SPACE);
     return h > R(WALL_REACH) && (h > R(HELD_BY_WALL) || !like) ? R(VAST) : gap_to_plane(a, h);
   }
   // The same to a surface; what is deep inside of a field does not feel it.

@@ -176,8 +176,8 @@ def wetted_face(
 ) -> wp.vec4d: ...
 
 
-@wp.func_native("return mpm::Face<float>::gap_of_liquid(mean, height);")
-def gap_of_liquid(mean: wp.float32, height: wp.float32) -> wp.float32: ...
+@wp.func_native("return mpm::Face<float>::gap_of_liquid(mean, height, full);")
+def gap_of_liquid(mean: wp.float32, height: wp.float32, full: wp.float32) -> wp.float32: ...
 
 
 @wp.func_native("return mpm::Support<float>::reach(&F.data[0][0], n[0], n[1], n[2], radius);")

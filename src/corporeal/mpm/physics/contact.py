@@ -14,6 +14,7 @@ from scipy.spatial import KDTree
 from corporeal.mpm.constants import (
     DEEPEST,
     FACE_STEPS,
+    FILLED,
     FIRST_BIAS,
     HELD_BY_WALL,
     LATTICE_GAP,
@@ -31,7 +32,7 @@ from corporeal.mpm.constants import (
     WETTED_REACH,
     WETTED_TURN,
 )
-from corporeal.mpm.problem import WettedSurface
+from corporeal.mpm.problem import Body, WettedSurface
 
 Vectors = Float[np.ndarray, "E 3"]
 Scalars = Float[np.ndarray, " E"]
@@ -160,17 +161,25 @@ def gap_to_thin(mean: Vectors, begins: Scalars, normal: Vectors, cell: float) ->
     return np.where(begins > WALL_REACH * cell, np.inf, gap)
 
 
-def gap_of_liquid(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -> Scalars:
+def full_cell(body: Body, cell: float) -> float:
+    """Mass of a cell that is full of a body [kg]."""
+    return float(body.volume @ body.density / body.volume.sum()) * cell**3
+
+
+def gap_of_liquid(
+    mean: Vectors, height: Scalars, normal: Vectors, full: Scalars, cell: float
+) -> Scalars:
     """Open distance [m] along n of a liquid to a surface that lies ``height`` [m] below the node.
 
     Pressure pushes every node whose spline reaches the surface, and a wall that answers behind its
     face alone would let the first layer of a liquid be squeezed along it. So nodes up to
     ``HELD_BY_WALL`` above are in contact too, where the liquid fills the half space up to the face
-    as far as the node can tell; what is thinner than a cell is not.
+    as far as the node can tell: by its mean place, and by how ``full`` the node is, its mass over
+    that of a full cell. A sheet or a drop would hover at such a node otherwise.
     """
     h, xi = height / cell, np.sum(mean * normal, axis=1) / cell
     deep = (-half_space_mean(-h) - xi - touching_distance(h)) * cell
-    like = np.abs(half_space_mean(h) - xi) < LIKE_HALF_SPACE
+    like = (np.abs(half_space_mean(h) - xi) < LIKE_HALF_SPACE) & (full >= FILLED)
     held = (h > WALL_REACH) & (h <= HELD_BY_WALL) & like
     return np.where(held, deep, gap_to_wall(mean, height, normal, cell))
 

@@ -87,6 +87,11 @@ class Scene:
         mine = self.matter.law[self.single | (self.matter.body == field)]
         return not self.is_rigid(field) and bool(np.isin(mine, laws.LIQUID).any())
 
+    def full(self, field: int, slot: Int[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
+        """Masses of a field's nodes over that of a cell full of its body [-]."""
+        body = self.problem.bodies[field]
+        return self.mass[slot] / contact.full_cell(body, self.problem.cell)
+
     def slides(self, field: int, wall: int) -> bool:
         """Whether a field is a liquid that slides along a plane: all that it presses holds it."""
         friction = _friction(self.problem)[field, len(self.problem.bodies) + wall]
@@ -425,8 +430,11 @@ def _wet(
     face = contact.wetted_faces(surface, node, node + mean, cell)
     k, out = face.node, face.outward
     sticks = scene.problem.friction[pair] >= STICKS
-    measure = contact.gap_to_surface if sticks else contact.gap_of_liquid
-    gap = measure(mean[k], face.height, -out, cell)
+    if sticks:
+        gap = contact.gap_to_surface(mean[k], face.height, -out, cell)
+    else:
+        full = scene.full(pair[liquid_side], slot)[k]
+        gap = contact.gap_of_liquid(mean[k], face.height, -out, full, cell)
     normal = out if rigid_side == 0 else -out
     movers = scene.mover_of_slot(slots[0][k]), scene.mover_of_slot(slots[1][k])
     slips = face.height > WALL_REACH * cell
@@ -461,9 +469,12 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     field, wall = pair
     cell, bodies = scene.problem.cell, len(scene.problem.bodies)
     normal = np.tile(-np.array(scene.problem.planes[wall].normal), (len(slot), 1))
-    measure = contact.gap_of_liquid if scene.slides(field, wall) else contact.gap_to_wall
     height = _height(scene, slot, wall)
-    gap = measure(look.mean[slot], height, normal, cell)
+    if scene.slides(field, wall):
+        full = scene.full(field, slot)
+        gap = contact.gap_of_liquid(look.mean[slot], height, normal, full, cell)
+    else:
+        gap = contact.gap_to_wall(look.mean[slot], height, normal, cell)
     point = scene.grid.index[slot] * cell
     there = np.full(len(slot), scene.wall_mover + wall)
     movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell

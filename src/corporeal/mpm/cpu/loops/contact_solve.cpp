@@ -1,6 +1,8 @@
 // Normals smoothed over neighbours, gaps, and the impulses of nodes that move no rigid body; those
 // are independent of one another. A part: some blocks of nodes.
 struct Solver {
+  // Mass of a node over that of a full cell.
+  static inline double filled(const World *w, const Side &S) { return S.m / w->field[S.field].full; }
   static inline double gap(const World *w, const Side *sides, const Touch &T, double inv) {
     const double *n = T.normal;
     const Side &A = sides[T.a];
@@ -8,14 +10,14 @@ struct Solver {
     if (T.c < 0) {
       const double *P = w->plane + 4 * (-1 - T.c);
       double h = (Vec::dot(P, T.x) - P[3]) * inv;
-      return Grid::slides(w, A.field, -1 - T.c) ? Face::gap_of_liquid(pa, h) : Face::gap_to_plane(pa, h);
+      return Grid::slides(w, A.field, -1 - T.c) ? Face::gap_of_liquid(pa, h, filled(w, A)) : Face::gap_to_plane(pa, h);
     }
     const Side &C = sides[T.c];
     const Field &F = w->field[A.field], &G = w->field[C.field];
     double pc = C.mean[0] * n[0] + C.mean[1] * n[1] + C.mean[2] * n[2];
     if (liquid(F, G)) {
-      const double mean = F.rigids ? -pc : pa, h = T.gap * inv;
-      return T.mu < mpm::STICKS ? Face::gap_of_liquid(mean, h) : Face::gap_to_surface(mean, h);
+      const double mean = F.rigids ? -pc : pa, h = T.gap * inv, full = filled(w, F.rigids ? C : A);
+      return T.mu < mpm::STICKS ? Face::gap_of_liquid(mean, h, full) : Face::gap_to_surface(mean, h);
     }
     if (!F.thin && !G.thin) return Face::gap(w->face, pa, pc);
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;

@@ -24,7 +24,7 @@ if (F.floor >= 0) {
       const double x[3] = {(4 * at[0] + (i >> 4)) * dx, (4 * at[1] + (i >> 2 & 3)) * dx,
                            (4 * at[2] + (i & 3)) * dx};
       const double h = (Vec::dot(P, x) - P[3]) * inv;
-      const double gap = (slides ? Face::gap_of_liquid(-node[7], h) : Face::gap_to_plane(-node[7], h)) * dx;
+      const double gap = (slides ? Face::gap_of_liquid(-node[7], h, node[0] / F.full) : Face::gap_to_plane(-node[7], h)) * dx;
       const double jn = m * (fall - (gap > 0 ? gap * per : 0.0));
       if (jn <= 0) continue;
       double slip[3], size = 0, u[3], was[3];

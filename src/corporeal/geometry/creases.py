@@ -1,0 +1,74 @@
+"""Shading normals of meshes that come without: smooth across edges that are not sharp."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from corporeal.types import Surface
+
+SHARP = 40.0
+"""Faces that meet at a larger angle have an edge between them [deg]: sixteen sides look round."""
+FAN = 64
+"""More triangles around a point than this keep their own normals: the tip of a cone."""
+
+
+def creased(surface: Surface) -> Surface:
+    """Return a surface with normals; vertices on sharp edges are split, one copy for each side.
+
+    A corner's normal is the mean by area over those triangles around its place that are not turned
+    from its own triangle by more than ``SHARP``. A surface that has normals is returned as it is.
+    """
+    if surface.normals is not None or not len(surface.triangles):
+        return surface
+    a, b, c = (surface.vertices[surface.triangles[:, k]] for k in range(3))
+    area = np.cross(b - a, c - a)
+    flat = _unit(area)
+    _, place = np.unique(surface.vertices, axis=0, return_inverse=True)
+    total = area.repeat(3, axis=0)
+    for corner, other in _around(place.reshape(-1)[surface.triangles].reshape(-1)):
+        mine, its = corner // 3, other // 3
+        smooth = np.einsum("pi,pi->p", flat[mine], flat[its]) > np.cos(np.radians(SHARP))
+        np.add.at(total, corner[smooth], area[its[smooth]])
+    return _split(surface, _unit(total))
+
+
+def _around(place: Int[np.ndarray, " C"]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
+    """Yield all pairs of different corners at one place, those of every distance in turn."""
+    order = np.argsort(place, kind="stable")
+    sorted_place = place[order]
+    crowded = np.bincount(place)[sorted_place] > FAN
+    for step in range(1, FAN):
+        same = (sorted_place[step:] == sorted_place[:-step]) & ~crowded[step:]
+        if not same.any():
+            return
+        first, second = order[:-step][same], order[step:][same]
+        yield np.concatenate([first, second]), np.concatenate([second, first])
+
+
+def _split(surface: Surface, normals: Float[np.ndarray, "C 3"]) -> Surface:
+    """Give every corner its normal: corners of one vertex with one normal stay one vertex."""
+    vertex = surface.triangles.reshape(-1)
+    used, first, own = np.unique(vertex, return_index=True, return_inverse=True)
+    # Most vertices have one normal; of the others, one copy for every further one.
+    more = np.flatnonzero(np.abs(normals - normals[first[own]]).max(axis=1) > 1e-4)
+    rows = np.concatenate([vertex[more, None], np.round(normals[more] * 1e4)], axis=1)
+    _, extra, copy = np.unique(rows, axis=0, return_index=True, return_inverse=True)
+    own[more] = len(used) + copy.reshape(-1)
+    chosen = np.concatenate([first, more[extra]])
+    kept = vertex[chosen]
+    return replace(
+        surface,
+        vertices=surface.vertices[kept],
+        triangles=own.reshape(-1, 3).astype(surface.triangles.dtype),
+        normals=normals[chosen],
+        uv=None if surface.uv is None else surface.uv[kept],
+        colours=None if surface.colours is None else surface.colours[kept],
+    )
+
+
+def _unit(rows: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "N 3"]:
+    """Return unit vectors; upwards where there is no length."""
+    length = np.linalg.norm(rows, axis=1, keepdims=True)
+    return np.where(length > 0, rows / np.maximum(length, np.finfo(float).tiny), (0.0, 0.0, 1.0))
