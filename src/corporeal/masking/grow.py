@@ -17,6 +17,7 @@ from scipy.ndimage import binary_dilation, label
 from corporeal.geometry.cropped import cropped
 from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
 from corporeal.masking.floor_pattern import shows_floor
+from corporeal.masking.holes import closed
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds
 from corporeal.masking.total_variation import Cutter
@@ -115,7 +116,7 @@ def grow(
     assert state is not None
     progress(ROUNDS / (ROUNDS + 1), "drawing their outlines")
     return Grown(
-        inside=_drawn(views, state, floor),
+        inside=closed(_drawn(views, state, floor), rough.cameras, room),
         coherence=_agreement(state.masks, state.silhouettes),
         settled=_agreement(state.masks, before),
         alike=overlap(evidence.inside, evidence.outside),
