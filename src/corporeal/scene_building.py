@@ -231,7 +231,9 @@ def _placed(
 
 
 def _finish(one: Solid) -> Finish:
-    return one.finish if one.colour is None else Finish(one.name, one.colour)
+    return (
+        replace(one.finish, name=one.name) if one.colour is None else Finish(one.name, one.colour)
+    )
 
 
 def _object(one: Solid, name: str) -> SceneObject:

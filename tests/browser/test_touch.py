@@ -22,14 +22,17 @@ RISEN = 0.1
 @pytest.mark.slow
 def test_the_mouse_lifts_a_ball_and_the_force_at_rest_is_its_weight(small_run, tmp_path):
     from corporeal.viewer.live import Room
+    from corporeal.viewer.pool import pool_routes
     from corporeal.viewer.shelf import Shelf
     from corporeal.viewer.site import Shown, site
     from corporeal.viewer.socket import live_route
+    from corporeal.viewer.things import Things
     from viewer_served import LOCAL, serving
 
     shelf = Shelf((), small_run.parent)
-    room = Room(shelf.made)
-    app = site(Shown(shelf), LOCAL, (live_route(room),))
+    things = Things(shelf)
+    room = Room(shelf.made, things.find)
+    app = site(Shown(shelf), LOCAL, (live_route(room), *pool_routes(things, room)))
     with serving(app) as server, browser(tmp_path) as tab:
         tab.open(f"{server.address}/view/drop")
         tab.until(READY)
@@ -83,16 +86,20 @@ def test_the_mouse_lifts_a_ball_and_the_force_at_rest_is_its_weight(small_run, t
 @pytest.mark.slow
 def test_the_control_runs_beside_and_what_was_touched_is_replayed_at_draft(small_run, tmp_path):
     from corporeal.viewer.live import Room
+    from corporeal.viewer.pool import pool_routes
     from corporeal.viewer.replays import FOLDER, Replays
     from corporeal.viewer.shelf import Shelf
     from corporeal.viewer.site import Shown, site
     from corporeal.viewer.socket import live_route
+    from corporeal.viewer.things import Things
     from viewer_served import LOCAL, serving
 
     shelf = Shelf((), small_run.parent)
-    room = Room(shelf.made)
+    things = Things(shelf)
+    room = Room(shelf.made, things.find)
     replays = Replays(shelf, room)
-    app = site(Shown(shelf), LOCAL, (live_route(room), *replays.routes()))
+    routes = (live_route(room), *pool_routes(things, room), *replays.routes())
+    app = site(Shown(shelf), LOCAL, routes)
     before = sorted(path.name for path in small_run.rglob("*"))
     with serving(app) as server, browser(tmp_path) as tab:
         tab.open(f"{server.address}/view/drop")

@@ -135,9 +135,12 @@ def test_real_models_keep_their_shapes_and_looks(shared_assets, tmp_path):
             before = read_glb(m.file, "one")
             mine = [s for s in after.surfaces if s.object == k]
             for a, b in zip(mine, before.surfaces, strict=True):
-                assert np.abs(a.vertices - placed(b.vertices, m)).max() <= 1e-6
-                np.testing.assert_array_equal(a.triangles, b.triangles)
-                np.testing.assert_array_equal(a.uv, b.uv)
+                # By corners: normals that are made split vertices, in either pose a few others.
+                was = placed(b.vertices, m)[b.triangles]
+                assert np.abs(a.vertices[a.triangles] - was).max() <= 1e-6
+                assert (a.uv is None) == (b.uv is None)
+                if a.uv is not None and b.uv is not None:
+                    np.testing.assert_array_equal(a.uv[a.triangles], b.uv[b.triangles])
                 worn, old = after.finishes[a.finish], before.finishes[b.finish]
                 np.testing.assert_array_equal(worn.texture, old.texture)
                 same = ("colour", "alpha_mode", "roughness", "metallic", "transmission", "glow")

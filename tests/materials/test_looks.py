@@ -31,7 +31,7 @@ def test_the_name_decides_before_the_group():
 def test_a_solid_looks_like_its_material_unless_it_has_a_colour(material):
     one = co.ball(material, 0.1)
     (seen,) = co.build_scene(one).finishes
-    assert seen == finish_of(*co.material(material).kin)
+    assert seen == replace(finish_of(*co.material(material).kin), name="ball")
     blue = (0.0, 0.0, 1.0, 1.0)
     (seen,) = co.build_scene(replace(one, colour=blue)).finishes
     assert seen == Finish("ball", blue)

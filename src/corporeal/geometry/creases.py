@@ -55,8 +55,10 @@ def _split(surface: Surface, normals: Float[np.ndarray, "C 3"]) -> Surface:
     more = np.flatnonzero(np.abs(normals - normals[first[own]]).max(axis=1) > 1e-4)
     rows = np.concatenate([vertex[more, None], np.round(normals[more] * 1e4)], axis=1)
     _, extra, copy = np.unique(rows, axis=0, return_index=True, return_inverse=True)
-    own[more] = len(used) + copy.reshape(-1)
-    chosen = np.concatenate([first, more[extra]])
+    # In the order of the triangles, which no rotation of the mesh changes.
+    order = np.argsort(extra)
+    own[more] = len(used) + np.argsort(order)[copy.reshape(-1)]
+    chosen = np.concatenate([first, more[extra[order]]])
     kept = vertex[chosen]
     return replace(
         surface,

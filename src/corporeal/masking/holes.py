@@ -64,7 +64,9 @@ def _seen_through(
         looks = there >= 0
         if not (here == number).any():
             continue  # smaller than a cell: noise
-        met = np.take_along_axis(masks.reshape(len(masks), holes.size), np.maximum(there, 0), axis=1)
+        met = np.take_along_axis(
+            masks.reshape(len(masks), holes.size), np.maximum(there, 0), axis=1
+        )
         if not looks.any() or met[looks].mean() < COVERED:
             open_ |= piece == number
     return open_
