@@ -35,6 +35,17 @@ def test_a_run_does_not_differ_from_itself():
     assert (same.shape, same.rebound, same.parted, same.dent) == (0, 0, None, None)
 
 
+def test_contents_that_one_run_alone_has_are_left_out():
+    """With one material for all, the water in a glass is no object of its own."""
+    glass, both = [body("glass")], [body("glass"), body("glass_water", velocity=(1.0, 0.0, 0.0))]
+    bare, filled = run(glass), run(both, pairs={"glass|glass_water": pair(0.2)})
+    found = difference(bare, filled)
+    assert (found.path, found.contacts, found.parted) == (0, 0, None)
+    assert difference(filled, bare).path == 0
+    with pytest.raises(ValueError, match="two scenes"):
+        difference(run([body("duck")]), bare)
+
+
 def test_the_distance_of_paths_is_in_diagonals_of_the_object():
     """Apart by t [m] from 0 to 1 s: the root mean square is 1/√3 m, over a diagonal of 2 m."""
     still, moving = run([body(diagonal=2.0)]), run([body(diagonal=2.0, velocity=(1.0, 0.0, 0.0))])
@@ -216,6 +227,16 @@ def test_all_runs_are_rows_and_groups_and_ranks(evaluated):
     assert found.ranks[0].stiffness.tau == 1
     text = dynamics_tables.missing_references(found)
     assert text == ["rolls: no reference (not run yet)"]
+
+
+def test_a_baseline_without_contents_of_their_own_has_ranks(evaluated):
+    scenes, comparison = evaluated
+    for job in jobs(scenes, comparison):
+        if job.name == "rolls.single":
+            finish(job, run([body("duck_0")], pairs={"duck_0|floor": pair(0.3)}))
+    found = summary(scenes, comparison, {})
+    assert found.row("rolls", "single").numbers is not None
+    assert [r.method for r in found.ranks] == ["ours", "single"]
 
 
 def test_a_reference_that_gained_energy_is_refused(evaluated):

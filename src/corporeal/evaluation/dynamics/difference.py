@@ -44,12 +44,16 @@ class Difference:
 def difference(run: RunNumbers, reference: RunNumbers) -> Difference:
     """Compare a run with its reference, object by object and pair by pair.
 
+    Contents that move by themselves in the reference alone are left out.
+
     Raises:
-        KeyError: They are not of one scene.
+        ValueError: They are not of one scene.
 
     """
     mine = {body.name: body for body in run.bodies}
-    couples = [(mine[theirs.name], theirs) for theirs in reference.bodies]
+    couples = [(mine[b.name], b) for b in reference.bodies if b.name in mine]
+    if not couples:
+        raise ValueError("The runs are of two scenes: no object of one is in the other.")
     met, wanted = _touched(run.outcome), _touched(reference.outcome)
     either = met | wanted
     times = [
@@ -106,7 +110,7 @@ def _parted(mine: Outcome, theirs: Outcome) -> float | None:
     alike = [
         float(bool(mine.pairs[name].separated) == bool(pair.separated))
         for name, pair in theirs.pairs.items()
-        if not name.endswith(f"|{FLOOR}") and name in _touched(theirs)
+        if not name.endswith(f"|{FLOOR}") and name in _touched(theirs) and name in mine.pairs
     ]
     return _mean(alike)
 
@@ -118,7 +122,7 @@ def _factor(mine: float, theirs: float) -> float:
 def _dents(mine: Outcome, theirs: Outcome) -> float | None:
     found = []
     for name, wanted in theirs.objects.items():
-        place = mine.objects[name].dent_place
+        place = mine.objects[name].dent_place if name in mine.objects else None
         if wanted.dent_place is None or wanted.dent_depth_dx < DENTED or place is None:
             continue
         away = np.linalg.norm(np.array(place) - np.array(wanted.dent_place))

@@ -250,10 +250,12 @@ def _ranks(
             continue
         touched = _touched(numbers)
         happened = numbers.outcome.objects
+        # Contents that move by themselves in ours alone are left out.
+        bodies = [b for b in ours.bodies if b.name in happened]
         stiff.append(
-            [(b.young, -happened[b.name].shape_error_max) for b in ours.bodies if b.name in touched]
+            [(b.young, -happened[b.name].shape_error_max) for b in bodies if b.name in touched]
         )
-        ratios = [(b.restitution, happened[b.name].rebound_ratio) for b in ours.bodies]
+        ratios = [(b.restitution, happened[b.name].rebound_ratio) for b in bodies]
         bouncy.append([(e, ratio) for e, ratio in ratios if ratio is not None])
     return Ranks(method, rank_correlation(stiff), rank_correlation(bouncy))
 
