@@ -17,6 +17,7 @@ from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, fields, is_dataclass
 from enum import Enum
+from functools import cache
 from pathlib import Path
 from typing import IO, Any, get_type_hints
 
@@ -368,6 +369,8 @@ class Meta:
     """What it took [s]."""
     version: str = ""
     """Of this package."""
+    source: str = ""
+    """Names the state of the package's code that made it; empty: older than this entry."""
 
 
 def read_meta(folder: Path) -> Meta:
@@ -390,7 +393,19 @@ def fresh(folder: Path, wanted: str) -> bool:
 
 def finish(folder: Path, wanted: str, config: Any, seconds: float) -> None:
     """Declare the folder finished."""
-    write_json(folder / META, Meta(wanted, config, round(seconds, 3), __version__))
+    made = Meta(wanted, config, round(seconds, 3), __version__, source())
+    write_json(folder / META, made)
+
+
+@cache
+def source() -> str:
+    """Name the state of this package's code: a digest of all of its files, kernels and data."""
+    package = Path(__file__).parent
+    total = hashlib.sha256()
+    for file in sorted(p for p in package.rglob("*") if p.is_file()):
+        if "__pycache__" not in file.parts:
+            total.update(f"{file.relative_to(package)}\n{digest(file)}\n".encode())
+    return total.hexdigest()[:20]
 
 
 def begin(folder: Path) -> None:

@@ -264,6 +264,16 @@ def test_what_was_run_with_other_settings_does_not_count(evaluated):
     assert found.row("falls", "ours").error == "not run yet"
 
 
+def test_runs_of_an_earlier_state_of_the_code_are_counted(evaluated):
+    scenes, comparison = evaluated
+    said = dynamics_page.summed(summary(scenes, comparison, {}))
+    assert "4 of 4 runs, references included, were made by an earlier state of the code" in said
+    for job in jobs(scenes, comparison):
+        if job.done:
+            finish(job, replace(read_numbers(job.folder), source=store.source()))
+    assert "earlier state" not in dynamics_page.summed(summary(scenes, comparison, {}))
+
+
 def test_json_page_figure_and_docs_tell_the_same_twice(evaluated, tmp_path):
     found, again = summary(*evaluated, {}), summary(*evaluated, {})
     assert json.dumps(record(found)) == json.dumps(record(again))

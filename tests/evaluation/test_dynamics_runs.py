@@ -10,7 +10,7 @@ from pathlib import Path
 import pytest
 
 import corporeal as co
-from corporeal import pipeline
+from corporeal import pipeline, store
 from corporeal.corpus.local import local_hands
 from corporeal.errors import UserError
 from corporeal.evaluation.dynamics import run_evaluation
@@ -53,6 +53,7 @@ def test_a_run_keeps_what_is_compared(tmp_path):
     assert ball.groups == ("metal",) and ball.laws == ("rigid body",)
     assert numbers.outcome.pair("ball", "block").first_contact_s is not None
     assert not numbers.faults and numbers.steps > 10
+    assert numbers.source == store.source() != ""
     assert pipeline.status(folder)[-1].state == "not yet"  # the report, as of the film
 
 

@@ -78,8 +78,18 @@ def summed(found: Summary) -> str:
     said = "; ".join(f"{m}: {WORDS[m]}" for m in found.methods)
     return (
         f"{len(run)} of {len(found.rows)} runs of {scenes} scenes at {found.detail} are done, "
-        f"{failed} failed, against ours at {found.reference}. {said}."
+        f"{failed} failed, against ours at {found.reference}. {said}.{_older(found)}"
     )
+
+
+def _older(found: Summary) -> str:
+    """Say how many runs the present code has not made; a finished run is kept when it changes."""
+    numbers = [r.numbers for r in (*found.rows, *found.references) if r.numbers is not None]
+    older = sum(n.source != store.source() for n in numbers)
+    if not older:
+        return ""
+    which = f"{older} of {len(numbers)} runs, references included,"
+    return f" {which} were made by an earlier state of the code."
 
 
 def borrowed(found: Summary) -> list[str]:

@@ -65,6 +65,8 @@ class RunNumbers:
     steps: int
     notes: tuple[str, ...] = ()
     """What was borrowed, in sentences."""
+    source: str = ""
+    """Names the state of the code that simulated it; empty: not known."""
 
 
 def measure(folder: Path) -> RunNumbers:
@@ -94,6 +96,7 @@ def measure(folder: Path) -> RunNumbers:
         particles=audit.particles,
         steps=audit.steps,
         notes=made.field.notes,
+        source=store.read_meta(simulated).source,
     )
 
 
