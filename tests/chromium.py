@@ -68,6 +68,18 @@ def wait(done, patience=PATIENCE):
     raise AssertionError("waited too long")
 
 
+class RefusedError(AssertionError):
+    """A command that the browser answered with an error."""
+
+
+# What the browser answers to a question about a page that it is just leaving.
+LEAVING = (
+    "Inspected target navigated or closed",
+    "Cannot find context with specified id",
+    "Execution context was destroyed",
+)
+
+
 class Page:
     """One tab."""
 
@@ -85,7 +97,8 @@ class Page:
         while True:
             message = json.loads(self.socket.recv(PATIENCE))
             if message.get("id") == self.number:
-                assert "error" not in message, message
+                if "error" in message:
+                    raise RefusedError(message["error"]["message"])
                 return message["result"]
             self._note(message)
 
@@ -119,7 +132,17 @@ class Page:
         return answer["result"].get("value")
 
     def until(self, script, patience=PATIENCE):
-        return wait(lambda: self.run(script), patience)
+        """Wait until an expression holds, also across a change of page."""
+
+        def holds():
+            try:
+                return self.run(script)
+            except RefusedError as refusal:
+                if not any(words in str(refusal) for words in LEAVING):
+                    raise
+                return None
+
+        return wait(holds, patience)
 
     def mouse(self, kind, x, y, **more):
         """Move, press or release: kind is mouseMoved, mousePressed, mouseReleased."""
