@@ -19,13 +19,33 @@ struct Bonds {
     const int in[3] = {slot >> 4 & 3, slot >> 2 & 3, slot & 3};
     for (int i = 0; i < 3; i++) x[i] = (4 * (w[i] + S.origin[i]) + in[i]) * world->dx;
   }
-  // Slot of a node of the world in a field; -1: none.
-  static inline int slot(const Field &S, int x, int y, int z) {
-    int c[3] = {x - 4 * S.origin[0], y - 4 * S.origin[1], z - 4 * S.origin[2]}, out = 0;
-    for (int i = 0; i < 3; i++) out |= c[i] < 0 || c[i] >> 2 >= S.dim[i];
-    int b = out ? -1 : S.table[((c[0] >> 2) * S.dim[1] + (c[1] >> 2)) * S.dim[2] + (c[2] >> 2)];
-    return b < 0 ? -1 : b * 64 + (c[0] & 3) * 16 + (c[1] & 3) * 4 + (c[2] & 3);
-  }
+  // Blocks of a field that the 27 nodes from base on lie in; whether there is any.
+  struct Blocks {
+    int in[3], block[8];   // the first node within its block, and two blocks along each axis
+    inline bool find(const Field &S, const int *base) {
+      int first[3], last[3];
+      bool some = false;
+      for (int i = 0; i < 3; i++) {
+        const int c = base[i] - 4 * S.origin[i];
+        first[i] = c >> 2, last[i] = (c + 2) >> 2, in[i] = c & 3;
+        if (last[i] < 0 || first[i] >= S.dim[i]) return false;
+      }
+      for (int n = 0; n < 8; n++) {
+        const int a[3] = {n >> 2 ? last[0] : first[0], n >> 1 & 1 ? last[1] : first[1], n & 1 ? last[2] : first[2]};
+        bool out = false;
+        for (int i = 0; i < 3; i++) out |= a[i] < 0 || a[i] >= S.dim[i];
+        block[n] = out ? -1 : S.table[(a[0] * S.dim[1] + a[1]) * S.dim[2] + a[2]];
+        some |= block[n] >= 0;
+      }
+      return some;
+    }
+    // Slot of one of the nodes where it has mass; -1: it has none.
+    inline int slot(const Field &S, int x, int y, int z) const {
+      x += in[0], y += in[1], z += in[2];
+      const int b = block[(x >> 2) * 4 + (y >> 2) * 2 + (z >> 2)], at = (x & 3) * 16 + (y & 3) * 4 + (z & 3);
+      return b < 0 || !(S.have[b] >> at & 1) ? -1 : b * 64 + at;
+    }
+  };
   // The frame's volume on the soft field's nodes, by slot; lists those that it reaches.
   static inline void spread(const World *world, Bond &B) {
     const Field &S = world->field[B.soft];
@@ -34,20 +54,24 @@ struct Bonds {
     for (int p = 0; p < B.points; p++) {
       const double *q = B.point + 4 * p;
       int base[3];
-      float w[3][3];
+      double c[3];
       for (int i = 0; i < 3; i++) {
         double r = s[TURN + 3 * i] * q[0] + s[TURN + 3 * i + 1] * q[1] + s[TURN + 3 * i + 2] * q[2];
-        double c = (s[CENTRE + i] + r) / world->dx;
-        base[i] = (int)floor(c - 0.5);
-        mpm::Spline<float>::weights((float)(c - base[i]), w[i]);
+        c[i] = (s[CENTRE + i] + r) / world->dx;
+        base[i] = (int)floor(c[i] - 0.5);
       }
-      for (int i = 0; i < 27; i++) {
-        int e = slot(S, base[0] + i / 9, base[1] + i / 3 % 3, base[2] + i % 3);
-        if (e < 0) continue;
-        float *node = S.node + (size_t)e * 8;
-        if (!(node[0] > 0)) continue;
-        if (B.volume[e] == 0) B.slot[B.count++] = e;
-        B.volume[e] += (float)q[3] * w[0][i / 9] * w[1][i / 3 % 3] * w[2][i % 3] + (float)mpm::TINY;
+      Blocks near;
+      if (!near.find(S, base)) continue;   // most points of a frame have nothing soft around
+      float w[3][3];
+      for (int i = 0; i < 3; i++) mpm::Spline<float>::weights((float)(c[i] - base[i]), w[i]);
+      for (int i = 0; i < 9; i++) {
+        const float column = (float)q[3] * w[0][i / 3] * w[1][i % 3];
+        for (int z = 0; z < 3; z++) {
+          const int e = near.slot(S, i / 3, i % 3, z);
+          if (e < 0) continue;
+          if (B.volume[e] == 0) B.slot[B.count++] = e;
+          B.volume[e] += column * w[2][z] + (float)mpm::TINY;
+        }
       }
     }
   }
