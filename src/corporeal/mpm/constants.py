@@ -171,6 +171,8 @@ STICKS = 0.5
 are not held: a layer that sticks could not thin [-]."""
 WETTED_REACH = 2.0
 """A liquid looks for the surface of a rigid body no farther than this [cells]."""
+WETTED_SLACK = 1.001
+"""How much farther it looks in single precision first, which passes over most points [-]."""
 WETTED_PATCH = 0.5
 """Points of it count that are farther than the nearest by no more than this [cells] …"""
 WETTED_TURN = 0.7

@@ -3,9 +3,9 @@
 import numpy as np
 
 from corporeal.mpm import laws
-from corporeal.mpm.constants import HELD_BY_WALL, WALL_REACH, WETTED_REACH
+from corporeal.mpm.constants import HELD_BY_WALL, VAST, WALL_REACH, WETTED_REACH
 from corporeal.mpm.cpu import layout
-from corporeal.mpm.cpu.layout import BOX, CENTRE, PAIR, RADIUS
+from corporeal.mpm.cpu.layout import BOX, CENTRE, LANES, PAIR, RADIUS
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.contact import face_table
@@ -57,6 +57,8 @@ def rigid_grid(
         surface = np.zeros((1, 3))
     points, clumps = _clumped(points, 4.0 * cell)
     wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
+    places = np.full((3, len(wetted) + LANES), VAST, np.float32)
+    places[:, : len(wetted)] = wetted[:, :3].T
     state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
     arrays = {
         "node": np.zeros((across**3, 64, 8), np.float32),
@@ -69,12 +71,14 @@ def rigid_grid(
         "surface": np.ascontiguousarray(surface),
         "wetted": wetted,
         "patch": patches,
+        "places": places,
         "rigid": state,
     }
     point(record, **arrays)
     record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
     record["clumps"], record["patches"] = len(clumps), len(patches)
+    record["wets"] = places.shape[1]
     record["spacing"] = rigid.spacing(body.surface)
     record["thin"] = rigid.thinness(body.surface, cell)
     return arrays

@@ -58,6 +58,8 @@ LAYER = 66
 """Nodes from one layer of an arena of 8 x 8 x 8 to the next: with 64, what is read in the third
 layer would wait for what was just written in the first, 4096 bytes before."""
 ARENA = 8 * LAYER
+LANES = 8
+"""Numbers in a vector, in single precision."""
 COLOURS = 8
 """Tasks on particles are pieces of columns of blocks. Those of one colour, the parities of their x,
 y and number in the column, never overlap."""
@@ -176,6 +178,7 @@ FIELD = Record(
     ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
     ("double *", "wetted"),  # rigid: [..][6] points that liquids touch, and their normals
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
+    ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
     ("double", "spacing"),  # rigid: of its surface points
     ("double", "mass full"),  # full: of a cell full of it
@@ -184,7 +187,7 @@ FIELD = Record(
     ("int", "floor"),  # the only plane that the window reaches, or -1
     ("float[3]", "level"),  # its normal, or 0
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
-    ("int", "patches spare"),
+    ("int", "patches wets"),
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )
 BLOW = Record(  # a body in the wind: see wind_records.py

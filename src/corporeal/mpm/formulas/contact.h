@@ -93,28 +93,28 @@ struct Wetted {
     const double a = p[0] - X[0], b = p[1] - X[1], c = p[2] - X[2];
     return a * a + b * b + c * c;
   }
-  // Whether a row may belong to one more face than those known: it looks another way, at the liquid.
-  static CUDA_CALLABLE inline bool other(const double *p, const double *X, const Wetted *known, int count) {
-    for (int f = 0; f < count; f++)
-      if (dot(p + 3, known[f].normal) > WETTED_TURN) return false;
-    return !count || dot(X, p + 3) > dot(p, p + 3);
+  // Whether a row may belong to another face than a known one: it looks another way, at the liquid.
+  static CUDA_CALLABLE inline bool other(const double *p, const double *X, const Wetted &known) {
+    return dot(p + 3, known.normal) <= WETTED_TURN && dot(X, p + 3) > dot(p, p + 3);
   }
-  // Find the faces around X, the nearest first; how many.
-  static CUDA_CALLABLE inline int faces(const double *rows, int count, const double *x, const double *X,
-                                        double dx, Wetted *face) {
+  // Find the faces around X, the nearest first; how many. Rows gives each row, how far it lies from X,
+  // squared, and whether it may belong to a face that is not yet known.
+  template <class Rows>
+  static CUDA_CALLABLE inline int faces(Rows &rows, const double *x, const double *X, double dx, Wetted *face) {
     for (int f = 0; f < WETTED_FACES; f++) {
       double near = WETTED_REACH * dx * WETTED_REACH * dx;
       const double *first = 0;
-      for (int i = 0; i < count; i++) {
-        const double d = square(rows + 6 * i, X);
-        if (d < near && other(rows + 6 * i, X, face, f)) near = d, first = rows + 6 * i;
+      rows.know(X, face, f);
+      for (int i = 0; i < rows.count; i++) {
+        const double d = rows.square(i);
+        if (d < near && rows.open(i)) near = d, first = rows.at(i);
       }
       if (!first) return f;
       const double root = sqrt(near) + WETTED_PATCH * dx, far = root * root;
       double n[3] = {0, 0, 0}, above = 0, weight = 0;
-      for (int i = 0; i < count; i++) {
-        const double *p = rows + 6 * i, d = square(p, X);
-        if (d > far || dot(p + 3, first + 3) < WETTED_TURN || !other(p, X, face, f)) continue;
+      for (int i = 0; i < rows.count; i++) {
+        const double *p = rows.at(i), d = rows.square(i);
+        if (d > far || dot(p + 3, first + 3) < WETTED_TURN || !rows.open(i)) continue;
         const double u = 1.0 - (d - near) / (far - near), w = u * u;
         for (int k = 0; k < 3; k++) n[k] += w * p[3 + k], above += w * (x[k] - p[k]) * p[3 + k];
         weight += w;
@@ -124,6 +124,37 @@ struct Wetted {
       face[f].height = above / weight;
     }
     return WETTED_FACES;
+  }
+};
+// All rows of a surface, one after the other, in no memory of their own.
+struct AllWetted {
+  const double *row, *X;
+  int count, known;
+  const Wetted *face;
+  CUDA_CALLABLE inline const double *at(int i) const { return row + 6 * i; }
+  CUDA_CALLABLE inline double square(int i) const { return Wetted::square(row + 6 * i, X); }
+  CUDA_CALLABLE inline void know(const double *, const Wetted *faces, int many) { face = faces, known = many; }
+  CUDA_CALLABLE inline bool open(int i) const {
+    for (int f = 0; f < known; f++)
+      if (!Wetted::other(row + 6 * i, X, face[f])) return false;
+    return true;
+  }
+};
+// Those that are near, with how far they are: what belongs to a known face is dropped.
+struct NearWetted {
+  const double *row[WETTED_ROWS];
+  double away[WETTED_ROWS];
+  int count;
+  inline void add(const double *p, double d) { row[count] = p, away[count++] = d; }
+  inline const double *at(int i) const { return row[i]; }
+  inline double square(int i) const { return away[i]; }
+  inline bool open(int) const { return true; }
+  inline void know(const double *X, const Wetted *face, int many) {
+    if (!many) return;
+    const int before = count;
+    count = 0;
+    for (int i = 0; i < before; i++)
+      if (Wetted::other(row[i], X, face[many - 1])) add(row[i], away[i]);
   }
 };
 // How far a particle reaches along n: r0 |Ft n|.

@@ -49,13 +49,16 @@ template <> struct Lanes<f8> {
   static inline f8 high(f8 a, f8 b) { return a > b ? a : b; }
   static inline f8 low(f8 a, f8 b) { return a < b ? a : b; }
   static inline f8 size(f8 a) { return (f8)((i8)a & 0x7fffffff); }
-  static inline bool any(i8 m) {      // of a mask
+  static inline int which(i8 m) {     // of a mask: a bit each
 #if defined(__AVX__)
     return __builtin_ia32_movmskps256((f8)m);
 #else
-    return m[0] | m[1] | m[2] | m[3] | m[4] | m[5] | m[6] | m[7];
+    int bits = 0;
+    for (int i = 0; i < 8; i++) bits |= (m[i] & 1) << i;
+    return bits;
 #endif
   }
+  static inline bool any(i8 m) { return which(m); }
   static inline f8 flo(i8 a) { return __builtin_convertvector(a, f8); }
   static inline i8 whole(f8 a) { return __builtin_convertvector(a, i8); }
   static inline i8 bits(f8 a) { return (i8)a; }

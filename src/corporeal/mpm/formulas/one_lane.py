@@ -160,7 +160,8 @@ def surface_begins(
 @wp.func_native("""
   const double *from = (const double *)rows.data + 6 * first;
   mpm::Wetted face[mpm::WETTED_FACES];
-  const int found = mpm::Wetted::faces(from, count, &x.c[0], &place.c[0], dx, face);
+  mpm::AllWetted all = {from, &place.c[0], count, 0, face};
+  const int found = mpm::Wetted::faces(all, &x.c[0], &place.c[0], dx, face);
   if (number >= found) return wp::vec4d(0.0, 0.0, 0.0, (double)mpm::VAST);
   const double *n = face[number].normal;
   return wp::vec4d(n[0], n[1], n[2], face[number].height);
