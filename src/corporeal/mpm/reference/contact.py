@@ -4,7 +4,7 @@ Order: list the nodes; look at the surfaces there; choose normals; measure gaps;
 impulses together, rigid bodies and walls included.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import combinations
 from typing import Protocol
 
@@ -26,6 +26,7 @@ from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import contact, contact_impulses, rigid
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.problem import Problem, WettedSurface
+from corporeal.mpm.reference.kept_choices import KeptChoices
 from corporeal.mpm.state import Matter, State
 
 
@@ -51,6 +52,8 @@ class Scene:
     """Velocity that gravity and push gave each body in this step [m/s]."""
     old: Float[np.ndarray, "A 3"]
     """Velocity of every slot before this step's forces [m/s]."""
+    kept: KeptChoices
+    """Candidate normals that were taken in the last step; none: all are looked at anew."""
     composites: tuple["Stand", ...] = ()
     """Rigid bodies that move as one with what they hold."""
 
@@ -161,6 +164,8 @@ class Touch:
     gap: Float[np.ndarray, " E"]
     slips: Bool[np.ndarray, " E"] | None = None
     """Which of them transmit no friction; None: all do."""
+    kept: KeptChoices = field(default_factory=KeptChoices.none)
+    """Candidate normals that were taken, where they are kept."""
 
     @property
     def grips(self) -> Float[np.ndarray, " E"]:
@@ -186,11 +191,14 @@ class Meeting:
     """[J]"""
     impact_loss: float
     """[J]"""
+    kept: KeptChoices
+    """For the next step."""
 
 
 def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meeting:
     """Let everything that touches exchange impulses."""
-    touches = [_possible(touch) for touch in find(scene)]
+    possible = find(scene)
+    touches = [_possible(touch) for touch in possible]
     problem = scene.problem
     pair = np.array([t.pair for t in touches for _ in range(len(t.gap))], dtype=np.int64)
     pair = pair.reshape(-1, 2)
@@ -218,6 +226,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         impulse=impulse,
         friction_loss=contact_impulses.friction_loss(impulse, contacts.normal, before, after),
         impact_loss=contact_impulses.impact_loss(impulse, contacts.normal, before, after),
+        kept=KeptChoices.of_all(touch.kept for touch in possible),
     )
 
 
@@ -240,7 +249,7 @@ def _possible(touch: Touch) -> Touch:
     real = np.isfinite(touch.gap)
     columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
     slips = None if touch.slips is None else touch.slips[real]
-    return Touch(touch.pair, **columns, slips=slips)
+    return replace(touch, **columns, slips=slips)
 
 
 _COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
@@ -400,7 +409,13 @@ def _between(
         candidates[:, [0, 1 if thin[0] == 2 else 2]] = 0.0
     reach_a = look.reach(scene, a, candidates)
     reach_c = -look.reach(scene, c, -candidates)
-    normal = contact.separating_normal(candidates, reach_a, reach_c, cell)
+    which = contact.widest(candidates, reach_a, reach_c, cell)
+    kept = KeptChoices.none()
+    if not any(scene.is_rigid(body) for body in pair):
+        known = scene.kept.of(pair, index)
+        which = np.where(known >= 0, known, which)
+        kept = KeptChoices.of_pair(pair, index, which)
+    normal = contact.taken(candidates, which)
     normal = contact.smooth_normals(normal, np.minimum(scene.mass[a], scene.mass[c]), index)
     if max(thin) > 0:
         gap = _between_surfaces(scene, look, pair, slots, normal)
@@ -408,7 +423,7 @@ def _between(
         gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
     movers = scene.mover_of_slot(a), scene.mover_of_slot(c)
-    return Touch(pair, *movers, index * cell, normal, gap)
+    return Touch(pair, *movers, index * cell, normal, gap, kept=kept)
 
 
 def _wet(

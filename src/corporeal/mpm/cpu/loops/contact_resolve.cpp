@@ -386,6 +386,7 @@ for (int j = 0; j < stage->junctions; j++)
     }
   }
 Bonds::part(world);
+Kept::keep(stage);
 // Rigid bodies move; the angular momentum is exact, the turn follows it at mid-step.
 for (int f = 0; f < fields; f++) {
   const Field &F = world->field[f];
