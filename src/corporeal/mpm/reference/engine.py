@@ -31,12 +31,13 @@ from corporeal.mpm.physics.grips import Grip
 from corporeal.mpm.physics.spline import Stencil, stencil
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, Steps
-from corporeal.mpm.reference.contact import Meeting, Scene, resolve
+from corporeal.mpm.reference.contact import Meeting, resolve
 from corporeal.mpm.reference.forces import Drive
 from corporeal.mpm.reference.guided import Guides
 from corporeal.mpm.reference.inclusions import Bonds, without
 from corporeal.mpm.reference.kept_choices import KeptChoices
 from corporeal.mpm.reference.mean_dilatation import Clusters, clusters
+from corporeal.mpm.reference.scene import Scene
 from corporeal.mpm.reference.springs import struck
 from corporeal.mpm.state import (
     Matter,
@@ -145,7 +146,7 @@ class ReferenceEngine(Interaction):
         return float(min(min(limits), LONGEST_STEP))
 
     def _kept_choices(self, dt: float) -> KeptChoices:
-        """Candidate normals of the last step; none, now and then, so that all are looked at anew."""
+        """Candidate normals of the last step; none where all are looked at anew."""
         soft = ~self.matter.rigid
         speed = np.linalg.norm(self.state.velocity[soft], axis=1).max(initial=0.0)
         anew = self.steps.count % contact.steps_kept(speed * dt / self.problem.cell) == 0

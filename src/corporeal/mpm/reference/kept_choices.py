@@ -1,4 +1,4 @@
-"""Which candidate normals won where two fields met in the last step: the reference's memory of it."""
+"""Which candidate normals won where two fields met in the last step."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass, fields
