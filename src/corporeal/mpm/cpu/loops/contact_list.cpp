@@ -102,6 +102,7 @@ for (int j = from; j < to; j++) {
         leans[t] = Lean{{0, 0, 0}, (unsigned char)here[a], (unsigned char)(w >= 0 ? 255 : here[c]), (unsigned char)i,
                         (unsigned char)pick};
         T.choice = pair < 0 ? -1 : J.choice + pair;
+        for (int b = 0; b < 2 && pick; b++) choices[T.choice].bits[b] |= (u64)(pick >> b & 1) << i;
         T.meet = k;
         T.a = M.side + a;
         T.fa = A.field;

@@ -169,6 +169,7 @@ for (int f = 0; f < fields; f++) {
       Touch &T = touches[nt++];
       T.meet = -1;
       T.face = 0;
+      T.choice = -1;
       T.a = p;
       T.c = -1 - w;
       T.fa = f;
