@@ -102,6 +102,10 @@ THIN = 2.0
 where it begins."""
 SHOWN_AROUND = 1.0
 """They are looked at this far from the normal through the node [cells]."""
+KEPT_STEPS = 8
+"""Which candidate normal is widest is looked at anew in every so manieth step (decision 52) …"""
+KEPT_TRAVEL = 0.5
+"""… or two, four or eight times as often, where something moves farther meanwhile [cells]."""
 FACE_STEPS = 4096
 """Intervals of the table that says where the face of a half space lies, from 1½ cells to none."""
 FIRST_BIAS, OTHER_BIAS = 0.10, 0.05

@@ -181,6 +181,20 @@ def test_particles_reach_as_far_as_their_stretch_says_at_both_widths(rng):
 
 
 @wp.kernel
+def steps_kept_in_native_text(travel: Doubles, out: wp.array(dtype=wp.int32)):
+    out[wp.tid()] = one_lane.steps_kept(travel[wp.tid()])
+
+
+def test_normals_of_what_moves_farther_in_a_step_are_chosen_more_often():
+    eighth = constants.KEPT_TRAVEL / constants.KEPT_STEPS
+    travel = np.array([0.0, eighth, 1.01 * eighth, 2.5 * eighth, 7.5 * eighth, 1e3])
+    out = ((len(travel),), wp.int32)
+    found = run(steps_kept_in_native_text, sent(travel, D), out=out, threads=len(travel))
+    assert found.tolist() == [8, 8, 4, 2, 1, 1]
+    assert [contact.steps_kept(v) for v in travel.tolist()] == found.tolist()
+
+
+@wp.kernel
 def projections(
     J: Vectors64, u: Vectors64, n: Vectors64, soft: Doubles, mu: Doubles, out: Vectors64
 ):

@@ -18,6 +18,8 @@ LISTS = {
     "touch": layout.TOUCH,
     "aim": layout.AIM,
     "lean": layout.LEAN,
+    "choice": layout.CHOICE,
+    "kept": layout.CHOICE,
     "entry": layout.ENTRY,
     "line": layout.LINE,
     "past": layout.PAST,
@@ -145,7 +147,9 @@ class ContactMemory:
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
         moves = problem.contact == "multi" and any(body.rigid for body in problem.bodies)
         self.lines = 8 if moves else 0
-        self.room, self.lists = 256, {"past": np.zeros(0, np.uint8)}
+        nothing = np.zeros(0, np.uint8)
+        self.room = 256
+        self.lists = {"past": nothing, "choice": nothing, "kept": nothing}
         self.lengthen()
 
     def watched(self, origin: np.ndarray, dim: np.ndarray) -> tuple[int, np.ndarray]:
@@ -182,6 +186,24 @@ class ContactMemory:
         self.lists["past"][: len(bytes_)] = bytes_
         self.stage["pasts"] = len(bytes_) // BYTES["past"]
 
+    @property
+    def kept(self) -> np.ndarray:
+        """Choices of candidate normals in the last step, as bytes: what the next one keeps."""
+        which = self._list_of_kept()
+        return self.lists[which][: int(self.stage["kepts"][0]) * BYTES["kept"]].copy()
+
+    @kept.setter
+    def kept(self, bytes_: np.ndarray) -> None:
+        while len(bytes_) > len(self.lists["kept"]):
+            self.lengthen()
+        self.lists[self._list_of_kept()][: len(bytes_)] = bytes_
+        self.stage["kepts"] = len(bytes_) // BYTES["kept"]
+
+    def _list_of_kept(self) -> str:
+        """Name the list of the last step: it takes turns with that of this step."""
+        turned = self.stage["kept"][0] == self.lists["choice"].ctypes.data
+        return "choice" if turned else "kept"
+
     def lengthen(self) -> None:
         """Make every list half as long again."""
         self.room += self.room // 2
@@ -192,17 +214,26 @@ class ContactMemory:
             "touch": 8 * self.room,
             "aim": 8 * self.room,
             "lean": 8 * self.room,
+            "choice": 8 * self.room,
+            "kept": 8 * self.room,
             "entry": 8 * self.room,
             "line": self.lines * self.room,
             "past": self.lines * self.room,
         }
-        past = self.past
+        past, kept = self.past, self.kept
         self.lists = {name: np.zeros(n * BYTES[name], np.uint8) for name, n in room.items()}
         self.order = np.zeros(room["line"] + 3 * self.friction.size + 1, np.int32)
         self.slot = np.zeros(1 << (4 * room["past"]).bit_length(), np.int32)
+        self.kept_slot = np.zeros(1 << (2 * room["kept"]).bit_length(), np.int32)
         self.stage["slots"] = len(self.slot)
-        point(self.stage, order=self.order, slot=self.slot, **self.lists)
-        self.past = past
+        point(
+            self.stage,
+            order=self.order,
+            slot=self.slot,
+            kept_slot=self.kept_slot,
+            **self.lists,
+        )
+        self.past, self.kept = past, kept
         self.stage["most_junctions"], self.stage["most_meets"] = room["junction"], room["meet"]
         self.stage["most_sides"], self.stage["most_touches"] = room["side"], room["touch"]
 

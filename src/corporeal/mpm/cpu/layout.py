@@ -244,6 +244,7 @@ WORLD = Record(
     (f"int[{COLOURS}]", "bare"),
     ("int", "stands parts"),  # tasks on nodes that may stand on a plane; on contacts
     (f"int[{COLOURS}]", "looks"),  # tasks on particles for contact; 0 without any
+    (f"int[{COLOURS}]", "reaches"),  # the same where a normal is chosen anew
     ("int", "rigids turns"),  # fields, where some are rigid; tasks to look at those
 )
 STEP = (POST, THREAD_POOL, BOND, BODY_LOAD, CLOCK, FIELD, BLOW, TETHER, JOINT, GRIP, WORLD)
@@ -253,9 +254,10 @@ STEP = (POST, THREAD_POOL, BOND, BODY_LOAD, CLOCK, FIELD, BLOW, TETHER, JOINT, G
 JUNCTION = Record(  # a block of nodes where fields meet each other or a plane
     "Junction",
     ("int[3]", "at"),
-    ("int", "fields meet side touch last"),
+    ("int", "fields meet side touch last choice spare"),
     (f"int[{FIELDS_IN_BLOCK}]", "field block"),
     ("unsigned long long", "mask several"),
+    ("unsigned long long", "chosen"),  # nodes at which some normal is chosen anew
     (f"unsigned long long[{FIELDS_IN_BLOCK}]", "have"),
     (f"int[{FIELDS_IN_BLOCK}]", "met"),  # of the fields here, those that each may meet: bits
 )
@@ -282,13 +284,21 @@ LEAN = (
     Record(  # of a possible contact, what its neighbours read: weighted normal, node in its block,
         "Lean",  # and which of the fields there; c: 255 for a plane
         ("float[3]", "u"),
-        ("unsigned char", "a c node spare"),
+        ("unsigned char", "a c node"),
+        ("unsigned char", "known"),  # 1 + the candidate that is kept; 0: chosen anew
     )
+)
+CHOICE = Record(  # which candidates won where two fields meet in a block: see physics/contact.py
+    "Choice",
+    ("int[3]", "at"),
+    ("int", "a c spare"),  # fields
+    ("unsigned long long[2]", "bits"),  # low and high bit of 1 + candidate, node by node; 0: none
 )
 TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - c
     "Touch",
     ("int", "meet a c fa fc active"),
-    ("int", "face spare"),  # which face of a rigid body a liquid meets
+    ("int", "face"),  # which face of a rigid body a liquid meets
+    ("int", "choice"),  # where its candidate is kept; -1: nowhere
     ("double[3]", "x normal"),
     ("double", "gap target inverse mu"),
     ("double[3]", "J before"),
@@ -328,12 +338,15 @@ STAGE = Record(
     ("double *", "pair"),  # [fields and planes][fields and planes][PAIR]
     ("int *", "order"),
     ("Lean *", "lean"),
+    ("Choice *", "choice kept"),  # of this step, and of the last one
+    ("int *", "kept_slot"),  # where each of those stands, by block and pair
     ("int", "most_junctions most_meets most_sides most_touches"),
     ("int", "slots pasts sweeps"),
     ("int", "junctions meets sides touches points"),
+    ("int", "choices kepts kept_slots anew"),  # kept_slots: a power of two
     (f"int[{PARTS}]", "entries"),
 )
-CONTACT = (JUNCTION, MEET, SIDE, AIM, LEAN, TOUCH, ENTRY, PAST, LINE, STAGE)
+CONTACT = (JUNCTION, MEET, SIDE, AIM, LEAN, CHOICE, TOUCH, ENTRY, PAST, LINE, STAGE)
 
 # ---------------------------------------------------------------- sorting and reading
 

@@ -73,7 +73,7 @@ SCHEDULE = (
     Phase(LIST, "parts"),
     *(Phase(LOOK, "looks", colour) for colour in range(COLOURS)),
     Phase(FACE, "parts"),
-    *(Phase(REACH, "looks", colour) for colour in range(COLOURS)),
+    *(Phase(REACH, "reaches", colour) for colour in range(COLOURS)),
     Phase(REACH, "turns"),
     Phase(CHOOSE, "parts"),
     Phase(SOLVE, "parts"),
@@ -207,7 +207,7 @@ class Program:
     def divide(self, first: list[int], tasks: int, particles: int) -> None:
         """Say where each colour's tasks begin, and how many tasks and particles there are."""
         for row, phase in zip(self.phase, SCHEDULE, strict=True):
-            if phase.count in ("bare", "colour", "looks"):
+            if phase.count in ("bare", "colour", "looks", "reaches"):
                 row[1] = first[phase.which]
             elif phase.count == "turns":
                 row[1] = tasks

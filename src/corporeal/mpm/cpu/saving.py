@@ -37,7 +37,7 @@ class Saving:
         for f, window in self.window.items():
             saved |= {f"field{f}.{k}": v for k, v in window.saved().items()}
         saved |= {f"rigid{b}": state.copy() for b, state in self.rigid.items()}
-        saved["contact"] = self.contact.past
+        saved["contact"], saved["choices"] = self.contact.past, self.contact.kept
         time = float(self.world["time"][0])
         saved["clock"] = np.array([time, *(float(self.clock[k][0]) for k in CLOCKED)])
         return saved
@@ -55,6 +55,7 @@ class Saving:
     def place_as(self, saved: Saved, fields: Collection[int], bodies: Collection[int]) -> None:
         """Take over some fields and rigid bodies, and how fast waves were there."""
         self._restore_bodies(saved, fields, self.rigid.keys() & set(bodies))
+        self.contact.kept = np.zeros(0, np.uint8)  # who is here stands elsewhere there
         wave = float(saved["clock"][1 + CLOCKED.index("wave")])
         self.clock["wave"] = max(float(self.clock["wave"][0]), wave)
 
@@ -68,6 +69,8 @@ class Saving:
         for b in bodies:
             self.rigid[b][:] = saved[f"rigid{b}"]
         self.contact.past = saved["contact"]
+        # A checkpoint of before they were kept has none: then all are made anew.
+        self.contact.kept = saved.get("choices", np.zeros(0, np.uint8))
 
 
 def inherited(own: Saved, saved: Saved, heirs: Heirs) -> Saved:

@@ -17,7 +17,9 @@ from corporeal.mpm.constants import (
 from corporeal.mpm.cuda.contact_nodes import height_of, slides, wets
 from corporeal.mpm.cuda.grid import block_of, find, node_of
 from corporeal.mpm.cuda.layout import (
+    ASKED,
     FULL,
+    KEPT,
     MEETS,
     TOUCHES,
     Contacts,
@@ -108,8 +110,42 @@ def unit(v: wp.vec3):
 
 
 @wp.kernel
-def propose(c: Contacts, r: Rigid, s: Sheet, stride: int):
-    """Candidates n1 = g_a - g_c, n2 = g_a, n3 = -g_c, normalised.
+def recall(g: Grid, c: Contacts, s: Sheet, stride: int):
+    """Tell nodes where the choices of the last step are."""
+    for t in range(wp.tid(), s.flag[KEPT], stride):
+        at = c.kept_at[t]
+        f = c.kept_fa[t]
+        first = int(1)
+        if t > 0:
+            if c.kept_fa[t - 1] == f and c.kept_at[t - 1] == at:
+                first = 0
+        if first == 1 and f >= 0:
+            slot = find(g, f, block_of(at))
+            if slot >= 0:
+                g.was[64 * slot + 16 * (at[0] & 3) + 4 * (at[1] & 3) + (at[2] & 3)] = t + 1
+
+
+@wp.func
+def kept_pick(g: Grid, c: Contacts, s: Sheet, t: int):
+    """Candidate that a touch took in the last step; -1: none is known."""
+    at = c.at[c.meet[t]]
+    o = g.was[c.slot[c.a[t]]] - 1
+    found = int(-1)
+    while found < 0 and o >= 0:
+        if o >= s.flag[KEPT]:
+            o = -1
+        elif c.kept_fa[o] != c.fa[t] or not (c.kept_at[o] == at):
+            o = -1
+        else:
+            if c.kept_fc[o] == c.fc[t]:
+                found = c.kept_pick[o]
+            o += 1
+    return found
+
+
+@wp.kernel
+def propose(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Candidates n1 = g_a - g_c, n2 = g_a, n3 = -g_c, normalised; which one is kept.
 
     What is small against the cell has no face of its own.
     """
@@ -127,6 +163,9 @@ def propose(c: Contacts, r: Rigid, s: Sheet, stride: int):
                 both = wp.vec3(0.0)
                 b = wp.vec3(0.0)
             c.candidate[t] = wp.matrix_from_rows(both, a, -b)
+            c.pick[t] = kept_pick(g, c, s, t)
+            if c.pick[t] < 0:
+                s.flag[ASKED] = 1
 
 
 @wp.func
@@ -134,7 +173,8 @@ def reach_from(c: Contacts, e: int, field: int, r: wp.vec3, F: wp.mat33, radius:
     """Let a particle at r [m] from a node push its field's support there outwards."""
     k = e // FIELDS_AT_NODE
     for t in range(c.first[k], c.last[k]):
-        if c.c[t] >= 0 and (c.fa[t] == field or c.fc[t] == field):
+        asked = c.c[t] >= 0 and c.pick[t] < 0
+        if asked and (c.fa[t] == field or c.fc[t] == field):
             for q in range(3):
                 n = wp.vec3(c.candidate[t][q, 0], c.candidate[t][q, 1], c.candidate[t][q, 2])
                 along = wp.dot(r, n)
@@ -173,7 +213,7 @@ def reach(
 @wp.kernel
 def reach_particles(p: Particles, g: Grid, c: Contacts, s: Sheet, stride: int):
     """Supports of what can deform."""
-    if s.flag[FULL] == 2 or s.flag[MEETS] == 0:
+    if s.flag[FULL] == 2 or s.flag[ASKED] == 0:
         return
     for i in range(wp.tid(), p.count, stride):
         if g.aware[p.home[i]] == 2:
@@ -184,7 +224,7 @@ def reach_particles(p: Particles, g: Grid, c: Contacts, s: Sheet, stride: int):
 @wp.kernel
 def reach_rigid(r: Rigid, g: Grid, c: Contacts, s: Sheet, stride: int):
     """Supports of rigid bodies."""
-    if s.flag[FULL] == 2 or s.flag[MEETS] == 0:
+    if s.flag[FULL] == 2 or s.flag[ASKED] == 0:
         return
     for i in range(wp.tid(), r.count, stride):
         if g.aware[r.home[i]] == 2:
@@ -196,24 +236,53 @@ def reach_rigid(r: Rigid, g: Grid, c: Contacts, s: Sheet, stride: int):
 
 
 @wp.kernel
-def choose(c: Contacts, s: Sheet, stride: int):
-    """Take the candidate along which the two fields are farthest apart."""
+def choose(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Take the candidate along which the two fields are farthest apart, or the one that is kept.
+
+    Pairs with a rigid body are looked at in every step.
+    """
     if s.flag[FULL] == 2:
         return
     for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        keep = int(-1)
+        k = c.meet[t]
         if c.c[t] >= 0:
-            best = float(-2.0 * VAST)
-            for q in range(3):
-                n = wp.vec3(c.candidate[t][q, 0], c.candidate[t][q, 1], c.candidate[t][q, 2])
-                bias = OTHER_BIAS
-                if q == 0:
-                    bias = FIRST_BIAS
-                wide = c.far_c[3 * t + q] - c.far_a[3 * t + q] + bias * s.cell
-                if wp.length_sq(n) > 0.0 and wide > best:
-                    best = wide
-                    c.chosen[t] = n
-            if best < -VAST:
-                c.chosen[t] = wp.vec3(0.0)
+            pick = c.pick[t]
+            if pick < 0:
+                pick = widest(c, s, t)
+            c.chosen[t] = candidate_of(c, t, pick)
+            if r.stiff[c.fa[t]] == 0 and r.stiff[c.fc[t]] == 0:
+                keep = pick
+        c.kept_pick[t] = keep
+        c.kept_at[t] = c.at[k]
+        c.kept_fa[t] = c.fa[t]
+        if t < c.first[k] or t >= c.last[k]:
+            c.kept_fa[t] = -1  # room that a bonded pair did not need
+        c.kept_fc[t] = c.fc[t]
+    if wp.tid() == 0:
+        s.flag[KEPT] = s.flag[TOUCHES]
+
+
+@wp.func
+def candidate_of(c: Contacts, t: int, q: int):
+    """One of the three candidate normals of a touch."""
+    return wp.vec3(c.candidate[t][q, 0], c.candidate[t][q, 1], c.candidate[t][q, 2])
+
+
+@wp.func
+def widest(c: Contacts, s: Sheet, t: int):
+    """Number of the candidate along which the two fields are farthest apart."""
+    best = float(-2.0 * VAST)
+    pick = int(0)
+    for q in range(3):
+        bias = OTHER_BIAS
+        if q == 0:
+            bias = FIRST_BIAS
+        wide = c.far_c[3 * t + q] - c.far_a[3 * t + q] + bias * s.cell
+        if wp.length_sq(candidate_of(c, t, q)) > 0.0 and wide > best:
+            best = wide
+            pick = q
+    return pick
 
 
 @wp.func

@@ -177,7 +177,17 @@ class CudaEngine(Interaction):
         if what == 1:
             self.arrays.grid = self.memory.grid(self.problem, 2 * self.arrays.grid.room)
         else:
-            self.arrays.contacts = self.memory.contacts(self.problem, 2 * self.arrays.contacts.room)
+            self._make_room_for_contacts(2 * self.arrays.contacts.room)
+
+    def _make_room_for_contacts(self, room: int) -> None:
+        kept = self._choices()
+        self.arrays.contacts = self.memory.contacts(self.problem, room)
+        self.memory.put_choices(self.arrays.contacts, kept)
+
+    def _choices(self) -> np.ndarray:
+        """Candidate normals that contacts took in the last step."""
+        count = int(self.arrays.sheet.flag.numpy()[layout.KEPT])
+        return self.memory.choices(self.arrays.contacts, count)
 
     def _arrange(self) -> None:
         """Sort particles, and give every block that they reach a slot."""
@@ -211,7 +221,8 @@ class CudaEngine(Interaction):
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything needed to go on later exactly as if nothing had happened."""
-        return {name: array.numpy().copy() for name, array in self.kept.items()}
+        saved = {name: array.numpy().copy() for name, array in self.kept.items()}
+        return saved | {"choices": self._choices()}
 
     def restore(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from what ``save`` returned, on an engine built from the same problem."""
@@ -219,6 +230,12 @@ class CudaEngine(Interaction):
             array.assign(saved[name])
         self.lost[:] = False
         self.arrays.sheet.flag.zero_()
+        choices, room = saved["choices"], self.arrays.contacts.room
+        if len(choices) > 2 * room:
+            self.program.forget()
+            self._make_room_for_contacts(len(choices))
+        self.memory.put_choices(self.arrays.contacts, choices)
+        memory.change(self.arrays.sheet.flag, np.array([layout.KEPT]), len(choices))
         self._arrange()
         self._read_steps()
 
@@ -355,6 +372,7 @@ class CudaEngine(Interaction):
         for name in ("cell", "place"):
             memory.change(getattr(r, name), riding, saved[f"rigid.{name}"][riding])
         self._note_fast(3, saved["sheet.fast"][3])
+        memory.change(self.arrays.sheet.flag, np.array([layout.KEPT]), 0)
         self._arrange()
 
 

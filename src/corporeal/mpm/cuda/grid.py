@@ -194,6 +194,7 @@ def clear(g: Grid, s: Sheet, stride: int):
         g.node[i] = wp.vec4(0.0)
         g.old[i] = wp.vec4(0.0)
         g.meet[i] = 0
+        g.was[i] = 0
         g.held[i] = 0
     for b in range(wp.tid(), blocks, stride):
         g.seen[b] = 0

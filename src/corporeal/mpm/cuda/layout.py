@@ -39,7 +39,11 @@ STRUCK = wp.constant(12)
 ROUND = wp.constant(13)
 """Rounds of this step so far."""
 LAST_ROUND = wp.constant(14)
-FLAGS = 15
+KEPT = wp.constant(15)
+"""Choices of candidate normals of the last step; 0 where all are made anew."""
+ASKED = wp.constant(16)
+"""1: some are made anew in this step."""
+FLAGS = 17
 # What ``Contacts.active`` says, where it is not 0: not in this step.
 WAITING = wp.constant(1)
 """Not in this round of impacts."""
@@ -224,6 +228,8 @@ class Grid:
     nearly incompressible matter."""
     meet: wp.array(dtype=wp.int32)
     """1 + the field's entry where it meets others; 0: nobody."""
+    was: wp.array(dtype=wp.int32)
+    """1 + the first kept choice of the field's node; 0: none."""
     held: wp.array(dtype=wp.int32)
     """1 + the frame that holds the node; 0: none."""
 
@@ -426,7 +432,16 @@ class Contacts:
     candidate: wp.array(dtype=wp.mat33)
     far_a: wp.array(dtype=wp.float32)
     far_c: wp.array(dtype=wp.float32)
+    pick: wp.array(dtype=wp.int32)
+    """The candidate that is kept from the last step; -1: none is."""
     chosen: wp.array(dtype=wp.vec3)
+    kept_at: wp.array(dtype=wp.vec3i)
+    """Choices that the next step finds, those of a node and field next to one another: node …"""
+    kept_fa: wp.array(dtype=wp.int32)
+    kept_fc: wp.array(dtype=wp.int32)
+    """… fields …"""
+    kept_pick: wp.array(dtype=wp.int32)
+    """… and candidate; -1: it is not kept."""
     normal: wp.array(dtype=wp.vec3)
     gap: wp.array(dtype=wp.float32)
     fa: wp.array(dtype=wp.int32)

@@ -15,6 +15,8 @@ from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem
 from corporeal.mpm.state import Matter, State
 
+KEPT_COLUMNS = ("at", "fa", "fc", "pick")
+"""Of what ``layout.Contacts`` keeps of choices."""
 Struct = Any
 """A Warp struct: pyright cannot read them."""
 
@@ -83,7 +85,8 @@ class Memory:
         g.seen, g.aware = self.zeros(room, wp.int32), self.zeros(room, wp.int32)
         g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec4)
         g.pool = self.zeros(8 * room, wp.vec3)
-        g.meet, g.held = self.zeros(64 * room, wp.int32), self.zeros(64 * room, wp.int32)
+        for name in ("meet", "held", "was"):
+            setattr(g, name, self.zeros(64 * room, wp.int32))
         return g
 
     # ------------------------------------------------------------ rigid bodies
@@ -190,7 +193,10 @@ class Memory:
         c.field, c.slot = self.zeros(entries, wp.int32), self.zeros(entries, wp.int32)
         c.mean, c.outward = self.zeros(entries, wp.vec3), self.zeros(entries, wp.vec3)
         c.velocity, c.light = self.zeros(entries, wp.vec3d), self.zeros(entries, wp.float64)
-        for name in ("meet", "a", "c", "fa", "fc", "active", "facet", "slips"):
+        for name in ("meet", "a", "c", "fa", "fc", "active", "facet", "slips", "pick"):
+            setattr(c, name, self.zeros(touches, wp.int32))
+        c.kept_at = self.zeros(touches, wp.vec3i)
+        for name in ("kept_fa", "kept_fc", "kept_pick"):
             setattr(c, name, self.zeros(touches, wp.int32))
         c.candidate = self.zeros(touches, wp.mat33)
         c.far_a, c.far_c = self.zeros(3 * touches, wp.float32), self.zeros(3 * touches, wp.float32)
@@ -212,6 +218,18 @@ class Memory:
         c.apart = self.put(apart, wp.int32)
         c.face = self.put(face_table(), wp.float32)
         return c
+
+    def choices(self, contacts: Struct, count: int) -> np.ndarray:
+        """Copy the first choices of candidate normals, (N, 6): node, two fields, candidate."""
+        columns = [getattr(contacts, f"kept_{name}").numpy()[:count] for name in KEPT_COLUMNS]
+        return np.column_stack(columns).astype(np.int32)
+
+    def put_choices(self, contacts: Struct, rows: np.ndarray) -> None:
+        """Write choices that ``choices`` gave; there must be room."""
+        at, fa, fc, pick = np.split(rows, [3, 4, 5], axis=1)
+        for name, values in zip(KEPT_COLUMNS, (at, fa[:, 0], fc[:, 0], pick[:, 0]), strict=True):
+            if len(values):
+                change(getattr(contacts, f"kept_{name}"), np.arange(len(values)), values)
 
     # ------------------------------------------------------------ what a step shares
 

@@ -116,6 +116,8 @@ class Program:
         a = self.arrays
         self._each(grids.link, a.grid, a.sheet)
         self._each(grids.clear, a.grid, a.sheet)
+        if self.touching:
+            self._each(contact.recall, a.grid, a.contacts, a.sheet)
         self._load()
         if self.swelling:
             self._each(dilatation.empty, a.grid, a.sheet)
@@ -190,11 +192,11 @@ class Program:
         self._each(contact.show_particles, a.particles, a.grid, a.contacts, a.sheet)
         if a.rigid.count:
             self._each(contact.show_rigid, a.rigid, a.grid, a.contacts, a.sheet)
-        self._each(contact.propose, a.contacts, a.rigid, a.sheet)
+        self._each(contact.propose, a.grid, a.contacts, a.rigid, a.sheet)
         self._each(contact.reach_particles, a.particles, a.grid, a.contacts, a.sheet)
         if a.rigid.count:
             self._each(contact.reach_rigid, a.rigid, a.grid, a.contacts, a.sheet)
-        self._each(contact.choose, a.contacts, a.sheet)
+        self._each(contact.choose, a.contacts, a.rigid, a.sheet)
         self._each(contact.measure_gaps, a.grid, a.contacts, a.rigid, a.sheet)
         if a.rigid.surfaces:
             self._each(meets.list_points, a.rigid, a.contacts, a.sheet)

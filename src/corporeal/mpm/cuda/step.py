@@ -8,6 +8,7 @@ from corporeal.mpm.constants import FARTHEST_STEP, SUNK, VAST
 from corporeal.mpm.cuda.grid import block_of, claim_around, find, node_of
 from corporeal.mpm.cuda.layout import (
     APEX,
+    ASKED,
     BODY,
     BRANCH,
     BRANCHES,
@@ -24,6 +25,7 @@ from corporeal.mpm.cuda.layout import (
     HARD,
     HITS,
     INDEX,
+    KEPT,
     LAMBDA,
     LANES,
     LARGEST,
@@ -73,6 +75,7 @@ from corporeal.mpm.formulas.one_lane import (
     remembers,
     respond,
     splines,
+    steps_kept,
 )
 
 wp.set_module_options(formulas.options(max_unroll=0))
@@ -130,6 +133,10 @@ def plan(s: Sheet, r: Rigid):
     s.flag[HITS] = 0
     s.flag[ROUND] = 0
     s.flag[STRUCK] = 0
+    s.flag[ASKED] = 0
+    # Now and then all contacts are looked at anew: see physics/contact.py.
+    if int(s.clock[COUNT]) % steps_kept(D(s.fast[2]) * dt / s.dx) == 0:
+        s.flag[KEPT] = 0
     s.flag[GOING] = 1
     return 0
 

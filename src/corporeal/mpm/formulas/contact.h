@@ -165,6 +165,14 @@ template <class R> struct Support {
     return r0 * Lanes<R>::root(a * a + b * b + c * c);
   }
 };
+// For how many steps a choice of candidate normals is kept, at a speed of so many cells a step.
+struct Keep {
+  CUDA_CALLABLE static inline int steps(double speed) {
+    int n = KEPT_STEPS;
+    while (n > 1 && n * speed > KEPT_TRAVEL) n /= 2;
+    return n;
+  }
+};
 // In which order contacts are swept: number k is k times the stride, modulo their number.
 struct Scatter {
   CUDA_CALLABLE static inline int stride(int count) {

@@ -206,6 +206,10 @@ def impact_target(
 ) -> wp.float64: ...
 
 
+@wp.func_native("return mpm::Keep::steps(travel);")
+def steps_kept(travel: wp.float64) -> int: ...
+
+
 @wp.func_native("return mpm::Impact::closing(gap, dt);")
 def closing_speed(gap: wp.float64, dt: wp.float64) -> wp.float64: ...
 

@@ -17,6 +17,8 @@ from corporeal.mpm.constants import (
     FILLED,
     FIRST_BIAS,
     HELD_BY_WALL,
+    KEPT_STEPS,
+    KEPT_TRAVEL,
     LATTICE_GAP,
     LATTICE_ROWS,
     LATTICE_SLOPE,
@@ -255,7 +257,22 @@ def separating_normal(
     reach_c: Float[np.ndarray, "E 3"],
     cell: float,
 ) -> Vectors:
-    """Choose the candidate along which the two fields are farthest apart (separating axis).
+    """Take the candidate along which the two fields are farthest apart (separating axis)."""
+    return taken(candidates, widest(candidates, reach_a, reach_c, cell))
+
+
+def taken(candidates: Float[np.ndarray, "E 3 3"], which: Indices) -> Vectors:
+    """Take one of three candidate normals at every node."""
+    return np.take_along_axis(candidates, which[:, None, None], axis=1)[:, 0]
+
+
+def widest(
+    candidates: np.ndarray,
+    reach_a: Float[np.ndarray, "E 3"],
+    reach_c: Float[np.ndarray, "E 3"],
+    cell: float,
+) -> Indices:
+    """Say along which candidate the two fields are farthest apart.
 
     Args:
         candidates: Unit normals (E, 3, 3), three per pair; zero: absent.
@@ -267,8 +284,19 @@ def separating_normal(
     bias = np.array([FIRST_BIAS, OTHER_BIAS, OTHER_BIAS]) * cell
     absent = np.all(candidates == 0.0, axis=2)
     width = np.where(absent, -np.inf, reach_c - reach_a + bias)
-    best = np.argmax(width, axis=1)[:, None, None]
-    return np.take_along_axis(candidates, best, axis=1)[:, 0]
+    return np.argmax(width, axis=1)
+
+
+def steps_kept(travel: float) -> int:
+    """For how many steps what is widest is kept, where something moves so far in a step [cells].
+
+    Candidates themselves follow their fields in every step, and contacts that are new are looked
+    at at once: what may be out of date is only which of three is taken (decision 52).
+    """
+    count = KEPT_STEPS
+    while count > 1 and count * travel > KEPT_TRAVEL:
+        count //= 2
+    return count
 
 
 def smooth_normals(normal: Vectors, weight: Scalars, index: Int[np.ndarray, "E 3"]) -> Vectors:

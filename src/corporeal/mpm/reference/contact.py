@@ -4,14 +4,12 @@ Order: list the nodes; look at the surfaces there; choose normals; measure gaps;
 impulses together, rigid bodies and walls included.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field, replace
 from itertools import combinations
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.mpm import laws
 from corporeal.mpm.constants import (
     HELD_BY_WALL,
     POINT_REACH,
@@ -19,133 +17,13 @@ from corporeal.mpm.constants import (
     STICKS,
     SWEEPS,
     SWEEPS_OF_A_HIT,
-    TINY_DOUBLE,
     WALL_REACH,
 )
 from corporeal.mpm.laws.kinematics import determinant
-from corporeal.mpm.physics import contact, contact_impulses, rigid
+from corporeal.mpm.physics import contact, contact_impulses
 from corporeal.mpm.physics.spline import Stencil
-from corporeal.mpm.problem import Problem, WettedSurface
-from corporeal.mpm.state import Matter, State
-
-
-class Stand(Protocol):
-    """Something that moves in a rigid body's stead."""
-
-    def act(self, movers: contact_impulses.Movers) -> None:
-        """Take the body's place among what contact can move."""
-        ...
-
-
-@dataclass(frozen=True)
-class Scene:
-    """One step's stage."""
-
-    problem: Problem
-    matter: Matter
-    state: State
-    grid: Stencil
-    mass: Float[np.ndarray, " A"]
-    """Of every slot [kg]."""
-    kick: Float[np.ndarray, "B 3"]
-    """Velocity that gravity and push gave each body in this step [m/s]."""
-    old: Float[np.ndarray, "A 3"]
-    """Velocity of every slot before this step's forces [m/s]."""
-    composites: tuple["Stand", ...] = ()
-    """Rigid bodies that move as one with what they hold."""
-
-    @property
-    def single(self) -> bool:
-        """Whether all bodies share one field."""
-        return self.problem.contact == "single"
-
-    def is_rigid(self, field: int) -> bool:
-        """Whether a field moves with six degrees of freedom."""
-        return not self.single and self.problem.bodies[field].rigid
-
-    @property
-    def feigned(self) -> Float[np.ndarray, " B"]:
-        """Spin of each rigid body times the distance of its surface points [m/s]."""
-        return np.linalg.norm(self.state.spin(self.matter), axis=1) * self.matter.spacing
-
-    def surface(self, body: int) -> Float[np.ndarray, "S 3"]:
-        """Surface points of a rigid body now [m]."""
-        turned = self.matter.surface[body] @ self.state.rotation[body].T
-        return self.state.centre[body] + turned
-
-    def wetted(self, body: int) -> WettedSurface | None:
-        """Where liquids touch a rigid body now; None: as everything else does."""
-        given = self.problem.bodies[body].wetted
-        if given is None or not self.is_rigid(body):
-            return None
-        R = self.state.rotation[body].T
-        point = self.state.centre[body] + (given.point - self.matter.centre[body]) @ R
-        return WettedSurface(point, given.normal @ R)
-
-    def pours(self, field: int) -> bool:
-        """Whether a field holds a liquid."""
-        mine = self.matter.law[self.single | (self.matter.body == field)]
-        return not self.is_rigid(field) and bool(np.isin(mine, laws.LIQUID).any())
-
-    def full(self, field: int, slot: Int[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
-        """Masses of a field's nodes over that of a cell full of its body [-]."""
-        body = self.problem.bodies[field]
-        return self.mass[slot] / contact.full_cell(body, self.problem.cell)
-
-    def slides(self, field: int, wall: int) -> bool:
-        """Whether a field is a liquid that slides along a plane: all that it presses holds it."""
-        friction = _friction(self.problem)[field, len(self.problem.bodies) + wall]
-        return self.pours(field) and bool(friction < STICKS)
-
-    def thinness(self, field: int) -> int:
-        """How thin a rigid body is against the cell; 0 for what deforms."""
-        if not self.is_rigid(field):
-            return 0
-        return rigid.thinness(self.matter.surface[field], self.problem.cell)
-
-    @property
-    def wall_mover(self) -> int:
-        """Movers are the bodies, then the slots, then the planes, of which this is the first."""
-        return len(self.problem.bodies) + self.grid.count
-
-    def mover_of_slot(self, slot: Int[np.ndarray, " E"]) -> Int[np.ndarray, " E"]:
-        """Give the rigid body that owns the slot, or the slot itself."""
-        bodies = len(self.problem.bodies)
-        stiff = np.array([self.is_rigid(f) for f in range(bodies)])
-        field = self.grid.field[slot]
-        return np.where(stiff[field], field, bodies + slot)
-
-    def movers(self, velocity: Float[np.ndarray, "A 3"]) -> contact_impulses.Movers:
-        """Everything that an impulse can move, with its velocity after forces."""
-        bodies = len(self.problem.bodies)
-        still = np.zeros((len(self.problem.planes), 3))
-        stiff = np.array([self.is_rigid(b) for b in range(bodies)])
-        # A body with prescribed motion is as heavy as a wall.
-        free = stiff & [body.path is None for body in self.problem.bodies]
-        inertia = np.zeros((self.wall_mover + len(still), 3, 3))
-        inertia[:bodies] = np.where(
-            free[:, None, None], self.state.inverse_inertia(self.matter), 0.0
-        )
-        spin = np.zeros((self.wall_mover + len(still), 3))
-        spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
-        light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, TINY_DOUBLE), 0.0)
-        movers = contact_impulses.Movers(
-            np.concatenate([np.where(free, 1.0 / self.matter.total, 0.0), light, still[:, 0]]),
-            inertia,
-            np.concatenate([self.state.centre, self.grid.index * self.problem.cell, still]),
-            np.concatenate([self.state.speed, velocity, still]),
-            spin,
-        )
-        for composite in self.composites:
-            composite.act(movers)
-        return movers
-
-    def movers_before_forces(self) -> contact_impulses.Movers:
-        """Everything that an impulse can move, with the velocity it had as the step began."""
-        movers = self.movers(self.old)
-        for b in filter(self.is_rigid, range(len(self.problem.bodies))):
-            movers.velocity[b] -= self.kick[b]
-        return movers
+from corporeal.mpm.reference.kept_choices import KeptChoices
+from corporeal.mpm.reference.scene import Scene, friction_table
 
 
 @dataclass(frozen=True)
@@ -161,6 +39,8 @@ class Touch:
     gap: Float[np.ndarray, " E"]
     slips: Bool[np.ndarray, " E"] | None = None
     """Which of them transmit no friction; None: all do."""
+    kept: KeptChoices = field(default_factory=KeptChoices.none)
+    """Candidate normals that were taken, where they are kept."""
 
     @property
     def grips(self) -> Float[np.ndarray, " E"]:
@@ -186,17 +66,20 @@ class Meeting:
     """[J]"""
     impact_loss: float
     """[J]"""
+    kept: KeptChoices
+    """For the next step."""
 
 
 def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meeting:
     """Let everything that touches exchange impulses."""
-    touches = [_possible(touch) for touch in find(scene)]
+    possible = find(scene)
+    touches = [_possible(touch) for touch in possible]
     problem = scene.problem
     pair = np.array([t.pair for t in touches for _ in range(len(t.gap))], dtype=np.int64)
     pair = pair.reshape(-1, 2)
     contacts = contact_impulses.Contacts(
         *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _COLUMNS),
-        friction=_friction(problem)[pair[:, 0], pair[:, 1]]
+        friction=friction_table(problem)[pair[:, 0], pair[:, 1]]
         * _joined([t.grips for t in touches], (0,)).astype(np.float64),
         group=np.repeat(np.arange(len(touches)), [len(t.gap) for t in touches]),
     )
@@ -218,6 +101,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         impulse=impulse,
         friction_loss=contact_impulses.friction_loss(impulse, contacts.normal, before, after),
         impact_loss=contact_impulses.impact_loss(impulse, contacts.normal, before, after),
+        kept=KeptChoices.of_all(touch.kept for touch in possible),
     )
 
 
@@ -240,7 +124,7 @@ def _possible(touch: Touch) -> Touch:
     real = np.isfinite(touch.gap)
     columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
     slips = None if touch.slips is None else touch.slips[real]
-    return Touch(touch.pair, **columns, slips=slips)
+    return replace(touch, **columns, slips=slips)
 
 
 _COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
@@ -250,15 +134,6 @@ def _joined(columns: list[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
     if not columns:
         return np.zeros(empty, dtype=np.int64 if empty == (0,) else np.float64)
     return np.concatenate(columns)
-
-
-def _friction(problem: Problem) -> Float[np.ndarray, "N N"]:
-    """μ of every pair; a single field has the mean of its bodies against a plane."""
-    friction = np.array(problem.friction, dtype=np.float64)
-    if problem.contact == "single":
-        bodies = len(problem.bodies)
-        friction[:bodies, bodies:] = friction[:bodies, bodies:].mean(axis=0, keepdims=True)
-    return friction
 
 
 def _rebound(
@@ -400,7 +275,13 @@ def _between(
         candidates[:, [0, 1 if thin[0] == 2 else 2]] = 0.0
     reach_a = look.reach(scene, a, candidates)
     reach_c = -look.reach(scene, c, -candidates)
-    normal = contact.separating_normal(candidates, reach_a, reach_c, cell)
+    which = contact.widest(candidates, reach_a, reach_c, cell)
+    kept = KeptChoices.none()
+    if not any(scene.is_rigid(body) for body in pair):
+        known = scene.kept.of(pair, index)
+        which = np.where(known >= 0, known, which)
+        kept = KeptChoices.of_pair(pair, index, which)
+    normal = contact.taken(candidates, which)
     normal = contact.smooth_normals(normal, np.minimum(scene.mass[a], scene.mass[c]), index)
     if max(thin) > 0:
         gap = _between_surfaces(scene, look, pair, slots, normal)
@@ -408,7 +289,7 @@ def _between(
         gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
     movers = scene.mover_of_slot(a), scene.mover_of_slot(c)
-    return Touch(pair, *movers, index * cell, normal, gap)
+    return Touch(pair, *movers, index * cell, normal, gap, kept=kept)
 
 
 def _wet(

@@ -25,17 +25,19 @@ from corporeal.mpm.constants import (
 from corporeal.mpm.interaction import Interaction
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measure import Energy, Sums
-from corporeal.mpm.physics import rigid
+from corporeal.mpm.physics import contact, rigid
 from corporeal.mpm.physics.branches import follow
 from corporeal.mpm.physics.grips import Grip
 from corporeal.mpm.physics.spline import Stencil, stencil
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, Steps
-from corporeal.mpm.reference.contact import Meeting, Scene, resolve
+from corporeal.mpm.reference.contact import Meeting, resolve
 from corporeal.mpm.reference.forces import Drive
 from corporeal.mpm.reference.guided import Guides
 from corporeal.mpm.reference.inclusions import Bonds, without
+from corporeal.mpm.reference.kept_choices import KeptChoices
 from corporeal.mpm.reference.mean_dilatation import Clusters, clusters
+from corporeal.mpm.reference.scene import Scene
 from corporeal.mpm.reference.springs import struck
 from corporeal.mpm.state import (
     Matter,
@@ -62,6 +64,7 @@ class ReferenceEngine(Interaction):
         self.bonds = Bonds(problem)
         self.guides = Guides(problem)
         self.grips: dict[int, Grip] = {}
+        self.kept = KeptChoices.none()
         self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
         self.lost = np.zeros(len(self.matter.mass), dtype=bool)
 
@@ -91,8 +94,10 @@ class ReferenceEngine(Interaction):
         loaded, damped = drive.act((mass, new), (kick, push), dt)
         state, new = loaded.state, loaded.velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))
-        stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, held)
+        kept = self._kept_choices(dt)
+        stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, kept, held)
         meeting = resolve(stage, new, dt)
+        self.kept = meeting.kept
         for composite in held:
             meeting = composite.split(meeting)
         moved, viscous_work = self._from_grid(grid, groups, old, meeting.velocity, dt)
@@ -139,6 +144,13 @@ class ReferenceEngine(Interaction):
         limits += [FALL * np.sqrt(cell / max(strongest, TINY)), longest_step(self.problem)]
         limits.append(self.guides.longest_step)
         return float(min(min(limits), LONGEST_STEP))
+
+    def _kept_choices(self, dt: float) -> KeptChoices:
+        """Candidate normals of the last step; none where all are looked at anew."""
+        soft = ~self.matter.rigid
+        speed = np.linalg.norm(self.state.velocity[soft], axis=1).max(initial=0.0)
+        anew = self.steps.count % contact.steps_kept(speed * dt / self.problem.cell) == 0
+        return KeptChoices.none() if anew else self.kept
 
     # ------------------------------------------------------------ forces
 
@@ -311,6 +323,7 @@ class ReferenceEngine(Interaction):
         return (
             state
             | {f"ledger.{k}": v for k, v in self.ledger.as_arrays().items()}
+            | {f"kept.{k}": v for k, v in self.kept.as_arrays().items()}
             | {"steps": steps}
         )
 
@@ -318,6 +331,7 @@ class ReferenceEngine(Interaction):
         """Go on from what ``save`` returned, on an engine built from the same problem."""
         self.state = State(**_of("state.", saved))
         self.ledger = Ledger(**_of("ledger.", saved))
+        self.kept = KeptChoices(**_of("kept.", saved))
         count, smallest, largest = saved["steps"].tolist()
         self.steps = Steps(int(count), smallest, largest)
         self.lost = self._lost(self.state)
@@ -379,6 +393,7 @@ class ReferenceEngine(Interaction):
     def _place_as(self, saved: dict[str, np.ndarray], bodies: Collection[int]) -> None:
         there = State(**_of("state.", saved))
         self.state = self.state.placed_as(there, self.matter, bodies)
+        self.kept = KeptChoices.none()
 
 
 def _of(kind: str, saved: dict[str, np.ndarray]) -> dict[str, np.ndarray]:

@@ -1,15 +1,21 @@
-// Of three candidates, the one along which two fields are farthest apart.
-int from = (int)((long long)stage->touches * index / PARTS),
-    to = (int)((long long)stage->touches * (index + 1) / PARTS);
-for (int t = from; t < to; t++) {
-  Aim &A = aims[t];
-  if (A.fa < 0) continue;
-  float best = -(float)mpm::VAST;
-  int pick = 0;
-  for (int q = 0; q < 3; q++) {
-    if (A.n[0][q] == 0 && A.n[1][q] == 0 && A.n[2][q] == 0) continue;
-    float wide = (float)(q == 0 ? mpm::FIRST_BIAS : mpm::OTHER_BIAS) - A.far[0][q] - A.far[1][q];
-    if (wide > best) best = wide, pick = q;
+// Of three candidates, the one along which two fields are farthest apart, unless one is kept.
+const int begun = (int)((long long)stage->junctions * index / PARTS),
+          ended = (int)((long long)stage->junctions * (index + 1) / PARTS);
+for (int j = begun; j < ended; j++) {
+  const Junction &J = junctions[j];
+  for (int t = J.touch; t < J.last && J.chosen; t++) {
+    const Aim &A = aims[t];
+    if (A.fa < 0 || leans[t].known) continue;
+    float best = -(float)mpm::VAST;
+    int pick = 0;
+    for (int q = 0; q < 3; q++) {
+      if (A.n[0][q] == 0 && A.n[1][q] == 0 && A.n[2][q] == 0) continue;
+      float wide = (float)(q == 0 ? mpm::FIRST_BIAS : mpm::OTHER_BIAS) - A.far[0][q] - A.far[1][q];
+      if (wide > best) best = wide, pick = q;
+    }
+    for (int d = 0; d < 3; d++) leans[t].u[d] = A.weight * A.n[d][pick];
+    if (touches[t].choice < 0) continue;
+    u64 *bits = choices[touches[t].choice].bits;
+    for (int k = 0; k < 2; k++) bits[k] |= (u64)((pick + 1) >> k & 1) << leans[t].node;
   }
-  for (int d = 0; d < 3; d++) leans[t].u[d] = A.weight * A.n[d][pick];
 }

@@ -1,4 +1,14 @@
-// Candidate normals where two fields meet: g_a - g_c, g_a and -g_c.
+// Candidate normals where two fields meet: g_a - g_c, g_a and -g_c; only the one that is kept, where
+// one is.
+struct Candidate {
+  static inline void unit(const Side &A, const Side &C, int which, float *n) {
+    double v[3];
+    for (int d = 0; d < 3; d++)
+      v[d] = which == 0 ? A.out[d] - C.out[d] : which == 1 ? A.out[d] : -C.out[d];
+    Vec::unit(v);
+    for (int d = 0; d < 3; d++) n[d] = (float)v[d];
+  }
+};
 int from = (int)((long long)stage->sides * index / PARTS),
     to = (int)((long long)stage->sides * (index + 1) / PARTS);
 for (int s = from; s < to; s++)
@@ -12,21 +22,22 @@ for (int t = from; t < to; t++) {
   aim.fc = T.c < 0 ? -1 : T.fc;
   if (T.c < 0) continue;
   const Side &A = sides[T.a], &C = sides[T.c];
-  float n[3][3];
-  for (int d = 0; d < 3; d++) {
-    n[0][d] = A.out[d] - C.out[d];
-    n[1][d] = A.out[d];
-    n[2][d] = -C.out[d];
+  aim.weight = A.m < C.m ? A.m : C.m;
+  float n[3];
+  if (leans[t].known) {
+    Candidate::unit(A, C, leans[t].known - 1, n);
+    for (int d = 0; d < 3; d++) leans[t].u[d] = aim.weight * n[d];
+    continue;
   }
   // What is small against the cell has no face of its own.
   const bool point = world->field[T.fa].thin == 2, other = world->field[T.fc].thin == 2;
-  for (int d = 0; d < 3 && point != other; d++) n[0][d] = n[point ? 1 : 2][d] = 0;
   for (int q = 0; q < 4; q++) {
-    double v[3] = {0, 0, 0};
-    for (int d = 0; d < 3 && q < 3; d++) v[d] = n[q][d];
-    Vec::unit(v);
-    for (int d = 0; d < 3; d++) aim.n[d][q] = (float)v[d];
+    const bool none = q == 3 || (point != other && (q == 0 || q == (point ? 1 : 2)));
+    if (none)
+      n[0] = n[1] = n[2] = 0;
+    else
+      Candidate::unit(A, C, q, n);
+    for (int d = 0; d < 3; d++) aim.n[d][q] = n[d];
     aim.far[0][q] = aim.far[1][q] = (float)(q < 3 ? -mpm::VAST : mpm::VAST);
   }
-  aim.weight = A.m < C.m ? A.m : C.m;
 }

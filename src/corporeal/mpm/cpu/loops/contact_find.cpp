@@ -59,7 +59,7 @@ struct Around {
 };
 Bonds::hold(world);
 const double meanwhile = 2.0 * world->clock->speed * dt * inv;
-int count = 0, meet = 0, side = 0, touch = 0, points = 0;
+int count = 0, meet = 0, side = 0, touch = 0, points = 0, choice = 0;
 for (int f = 0; f < fields; f++) {
   Field &F = world->field[f];
   int near[64], nears = 0, wall_of[WALLS], walls = 0;
@@ -108,7 +108,7 @@ for (int f = 0; f < fields; f++) {
     int found = 0;
     for (int q = 0; q < J.fields; q++) J.have[q] = Find::have(world->field[J.field[q]], J.block[q]);
     Around box[FIELDS_IN_BLOCK];
-    int known = 0;
+    int known = 0, pairs = 0;
     for (int q = 0; q < J.fields; q++) J.met[q] = 0;
     for (int a = 0; a < J.fields; a++)
       for (int c = a + 1; c < J.fields; c++) {
@@ -123,6 +123,7 @@ for (int f = 0; f < fields; f++) {
           if (Around::apart(A, box[a], C, box[c], meanwhile)) continue;
         }
         J.met[a] |= 1 << c;
+        pairs += !A.rigids && !C.rigids;
         J.several |= both;
         const bool wet = (A.patches && C.pours) || (C.patches && A.pours);
         found += Grid::count(both) * (wet ? mpm::WETTED_FACES : 1);
@@ -145,6 +146,8 @@ for (int f = 0; f < fields; f++) {
     J.meet = meet;
     J.side = side;
     J.touch = touch;
+    J.choice = choice;
+    choice += pairs;
     meet += Grid::count(J.mask);
     for (int q = 0; q < J.fields; q++) side += Grid::count(J.mask & J.have[q]);
     touch += found;
@@ -168,6 +171,13 @@ stage->junctions = world->full ? 0 : count;
 stage->meets = world->full ? 0 : meet;
 stage->sides = world->full ? 0 : side;
 stage->touches = world->full ? 0 : touch;
+stage->choices = world->full ? 0 : choice;
 world->parts = stage->junctions ? PARTS : 0;
 world->turns = stage->junctions ? world->rigids : 0;
-for (int k = 0; k < COLOURS; k++) world->looks[k] = stage->junctions ? world->colour[k] : 0;
+for (int k = 0; k < COLOURS; k++) {
+  world->looks[k] = stage->junctions ? world->colour[k] : 0;
+  world->reaches[k] = 0;   // until somebody asks: contact_list
+}
+// Whether all normals are chosen anew: see physics/contact.py.
+stage->anew = world->clock->count % mpm::Keep::steps(world->clock->speed * dt * inv) == 0;
+Kept::enter(stage);

@@ -32,9 +32,23 @@ struct Near {
 };
 int from = (int)((long long)stage->junctions * index / PARTS),
     to = (int)((long long)stage->junctions * (index + 1) / PARTS);
+bool asked = false;
 for (int j = from; j < to; j++) {
-  const Junction &J = junctions[j];
+  Junction &J = junctions[j];
   int k = J.meet, s = J.side, t = J.touch;
+  int choice_of[FIELDS_IN_BLOCK][FIELDS_IN_BLOCK];
+  u64 bits[FIELDS_IN_BLOCK * (FIELDS_IN_BLOCK - 1) / 2][2];   // what is known of each pair
+  for (int a = 0, p = 0; a < J.fields; a++)
+    for (int c = a + 1; c < J.fields; c++) {
+      choice_of[a][c] = -1;
+      if (!(J.met[a] >> c & 1) || world->field[J.field[a]].rigids || world->field[J.field[c]].rigids) continue;
+      Choice &mine = choices[J.choice + p];
+      mine = Choice{{J.at[0], J.at[1], J.at[2]}, J.field[a], J.field[c], 0, {0, 0}};
+      const Choice *before = Kept::find(stage, mine);
+      for (int k = 0; k < 2; k++) bits[p][k] = before ? before->bits[k] : 0;
+      choice_of[a][c] = p++;
+    }
+  J.chosen = 0;
   const Walls wall(world, J.at);
   for (u64 left = J.mask; left; left &= left - 1) {
     int i = __builtin_ctzll(left);
@@ -82,7 +96,13 @@ for (int j = from; j < to; j++) {
           const Field &G = world->field[T.fc];
           if ((F.patches && G.pours) || (G.patches && F.pours)) faces = mpm::WETTED_FACES;
         }
-        leans[t] = Lean{{0, 0, 0}, (unsigned char)here[a], (unsigned char)(w >= 0 ? 255 : here[c]), (unsigned char)i, 0};
+        const int pair = w >= 0 ? -1 : choice_of[here[a]][here[c]];
+        const int pick = pair < 0 ? 0 : (int)(bits[pair][0] >> i & 1) | (int)(bits[pair][1] >> i & 1) << 1;
+        if (w < 0 && !pick) J.chosen |= 1ull << i;
+        leans[t] = Lean{{0, 0, 0}, (unsigned char)here[a], (unsigned char)(w >= 0 ? 255 : here[c]), (unsigned char)i,
+                        (unsigned char)pick};
+        T.choice = pair < 0 ? -1 : J.choice + pair;
+        for (int b = 0; b < 2 && pick; b++) choices[T.choice].bits[b] |= (u64)(pick >> b & 1) << i;
         T.meet = k;
         T.a = M.side + a;
         T.fa = A.field;
@@ -108,4 +128,7 @@ for (int j = from; j < to; j++) {
     Near::mark(F, J.block[q], J.mask & J.have[q], 0);
     if (J.several & J.have[q]) Near::mark(F, J.block[q], J.several & J.have[q], 1);
   }
+  asked |= J.chosen != 0;
 }
+for (int k = 0; k < COLOURS && asked; k++)
+  __atomic_store_n(world->reaches + k, world->colour[k], __ATOMIC_RELAXED);

@@ -1,5 +1,20 @@
 // Second look at the particles around listed nodes, and only them: where a field's mass lies there,
 // and its outward gradient of volume. One task: a run of blocks in one plane of one field.
+struct Marked {
+  // Which lanes stand in cells of their block that are marked: a bit for each.
+  static inline int of(u64 cells, i8 bit, i8 on) {
+    const i8 none = i8{0, 0, 0, 0, 0, 0, 0, 0};
+    const i8 half = bit > 31 ? none + (int)(cells >> 32) : none + (int)cells;
+    const i8 in = on & ((half >> (bit & 31) & 1) != 0);
+#if defined(__AVX__)
+    return __builtin_ia32_movmskps256((f8)in);
+#else
+    int lanes = 0;
+    for (int l = 0; l < 8; l++) lanes |= (in[l] & 1) << l;
+    return lanes;
+#endif
+  }
+};
 int *task = world->task + 4 * index;
 Field &field = world->field[task[0]];
 alignas(64) f8 arena[512];
@@ -21,7 +36,17 @@ for (int b = task[1]; b < task[2]; b++) {
       place = place * 8 + (cell[d] - (4 * record[2 + d] - 1));
     }
     *(i8 *)home = place;
-    for (int l = 0; l < live; l++) {
+    const i8 on = i8{0, 1, 2, 3, 4, 5, 6, 7} < live;
+    i8 strayed = i8{0, 0, 0, 0, 0, 0, 0, 0}, bit = strayed;
+    for (int d = 0; d < 3; d++) {
+      strayed |= (cell[d] >> 2) != record[2 + d];
+      bit = bit * 4 + (cell[d] & 3);
+    }
+    if (!Simd::any(strayed & on)) {
+      lanes = Marked::of(field.near[2 * record[OWN_BLOCK]], bit, on);
+      if (lanes) several = Marked::of(field.near[2 * record[OWN_BLOCK] + 1], bit, on);
+    }
+    for (int l = 0; l < live && Simd::any(strayed & on); l++) {
       int x = low[0][l], y = low[1][l], z = low[2][l];
       const int *near = record + NEIGHBOURS + (((x >> 2) - record[2] + 1) * 3 + (y >> 2) - record[3] + 1) * 3 +
                         (z >> 2) - record[4] + 1;

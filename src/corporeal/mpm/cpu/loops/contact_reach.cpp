@@ -104,12 +104,12 @@ for (int b = task[1]; b < task[2]; b++) {
     u64 have = 0;
     for (int q = 0; q < J.fields; q++) have |= J.field[q] == task[0] ? J.have[q] : 0;
     int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
-    for (u64 left = J.several & have & mine; left; left &= left - 1) {
+    for (u64 left = J.chosen & have & mine; left; left &= left - 1) {
       int i = __builtin_ctzll(left), begin = owns;
       const Meet &M = meets[Grid::meet(J, i)];
       for (int t = M.touch; t < M.touch + M.touches; t++) {
         const Aim &A = aims[t];
-        if (A.fa != task[0] && A.fc != task[0]) continue;
+        if (leans[t].known || (A.fa != task[0] && A.fc != task[0])) continue;
         Own &O = own[owns++];
         const float sign = A.fa == task[0] ? 1.0f : -1.0f;
         for (int d = 0; d < 3; d++)

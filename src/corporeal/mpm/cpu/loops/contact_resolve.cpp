@@ -169,6 +169,7 @@ for (int f = 0; f < fields; f++) {
       Touch &T = touches[nt++];
       T.meet = -1;
       T.face = 0;
+      T.choice = -1;
       T.a = p;
       T.c = -1 - w;
       T.fa = f;
@@ -386,6 +387,7 @@ for (int j = 0; j < stage->junctions; j++)
     }
   }
 Bonds::part(world);
+Kept::keep(stage);
 // Rigid bodies move; the angular momentum is exact, the turn follows it at mid-step.
 for (int f = 0; f < fields; f++) {
   const Field &F = world->field[f];

@@ -157,6 +157,44 @@ struct Reached {
   inline u64 nodes(int n) const { return axis[0][n / 9] & axis[1][n / 3 % 3] & axis[2][n % 3]; }
 };
 
+// Choices of the last step, by block and pair.
+struct Kept {
+  static inline int first(const Stage *stage, const Choice &C) {
+    u64 key = 0;
+    const int parts[5] = {C.at[0], C.at[1], C.at[2], C.a, C.c};
+    for (int i = 0; i < 5; i++) key = (key ^ (u64)(unsigned)parts[i]) * 0x9e3779b97f4a7c15ull;
+    return (int)(key >> 32) & (stage->kept_slots - 1);
+  }
+  static inline const Choice *find(const Stage *stage, const Choice &C) {
+    if (!stage->kepts) return 0;
+    for (int at = first(stage, C);; at = (at + 1) & (stage->kept_slots - 1)) {
+      if (!stage->kept_slot[at]) return 0;
+      const Choice &K = stage->kept[stage->kept_slot[at] - 1];
+      if (K.a == C.a && K.c == C.c && K.at[0] == C.at[0] && K.at[1] == C.at[1] && K.at[2] == C.at[2]) return &K;
+    }
+  }
+  // Keep this step's choices for the next one.
+  static inline void keep(Stage *stage) {
+    Choice *free = stage->kept;
+    stage->kept = stage->choice;
+    stage->choice = free;
+    stage->kepts = stage->choices;
+  }
+  // Let them be found, or none if all are made anew.
+  static inline void enter(Stage *stage) {
+    if (stage->anew) stage->kepts = 0;
+    if (!stage->kepts) return;
+    stage->kept_slots = 64;
+    while (stage->kept_slots < 2 * stage->kepts) stage->kept_slots *= 2;
+    for (int i = 0; i < stage->kept_slots; i++) stage->kept_slot[i] = 0;
+    for (int k = 0; k < stage->kepts; k++) {
+      int at = first(stage, stage->kept[k]);
+      while (stage->kept_slot[at]) at = (at + 1) & (stage->kept_slots - 1);
+      stage->kept_slot[at] = k + 1;
+    }
+  }
+};
+
 Stage *stage = (Stage *)world->contact_memory;
 const double dx = world->dx, dt = world->dt, inv = 1.0 / dx;
 const int fields = world->fields, planes = world->planes, all = fields + planes;
@@ -166,3 +204,4 @@ Side *sides = stage->side;
 Touch *touches = stage->touch;
 Aim *aims = stage->aim;
 Lean *leans = stage->lean;
+Choice *choices = stage->choice;

@@ -13,8 +13,9 @@ struct Solver {
       return Grid::slides(w, A.field, -1 - T.c) ? Face::gap_of_liquid(pa, h, filled(w, A)) : Face::gap_to_plane(pa, h);
     }
     const Side &C = sides[T.c];
-    const Field &F = w->field[A.field], &G = w->field[C.field];
     double pc = C.mean[0] * n[0] + C.mean[1] * n[1] + C.mean[2] * n[2];
+    if (T.choice >= 0) return Face::gap(w->face, pa, pc);   // neither is rigid
+    const Field &F = w->field[A.field], &G = w->field[C.field];
     if (liquid(F, G)) {
       const double mean = F.rigids ? -pc : pa, h = T.gap * inv, full = filled(w, F.rigids ? C : A);
       return T.mu < mpm::STICKS ? Face::gap_of_liquid(mean, h, full) : Face::gap_to_surface(mean, h);
@@ -26,6 +27,7 @@ struct Solver {
   }
   // How high the node of a liquid is over what it slides along [m]; 0 for what is no liquid.
   static inline double height(const World *w, const Touch &T) {
+    if (T.choice >= 0) return 0.0;
     if (T.c >= 0) return liquid(w->field[T.fa], w->field[T.fc]) ? T.gap : 0.0;
     const double *P = w->plane + 4 * (-1 - T.c);
     return Grid::slides(w, T.fa, -1 - T.c) ? Vec::dot(P, T.x) - P[3] : 0.0;
@@ -261,7 +263,7 @@ if (from < to) {
         T.active = 0;
         if (T.c < 0) {
           for (int d = 0; d < 3; d++) T.normal[d] = -world->plane[4 * (-1 - T.c) + d];
-        } else if (Solver::liquid(world->field[T.fa], world->field[T.fc])) {
+        } else if (T.choice < 0 && Solver::liquid(world->field[T.fa], world->field[T.fc])) {
           if (T.face == 0) faces = Solver::wet(world, sides, T.x, T, face);
           if (T.face >= faces) continue;
           for (int d = 0; d < 3; d++) T.normal[d] = face[T.face].normal[d];
