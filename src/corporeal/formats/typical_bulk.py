@@ -77,11 +77,15 @@ def doubt_mass(
     if known.low / MARGIN <= found <= known.high * MARGIN:
         return None
     article = "an" if known.words[0] in "aeiou" else "a"
+    what, has = f"{article} {known.words}", "has"
+    if known.words in PLURALS:
+        what, has = known.words, "have"
     large = f" longer than {known.longer:g} m" if known.longer else ""
-    usual = f"{article} {known.words}{large} has {known.low:g} to {known.high:g}"
+    usual = f"{what}{large} {has} {known.low:g} to {known.high:g}"
     return f"{_weighs(name, mass, found, known.measure)}, and {usual}. {ADVICE}"
 
 
+PLURALS = ("scissors", "pliers")
 ADVICE = "Check how large it is (--extent), what it is made of and whether it is hollow."
 
 
