@@ -118,9 +118,8 @@ COVERED = {
 }
 COVERED_BY_NOTHING = json.loads(json.dumps(COVERED))
 COVERED_BY_NOTHING["parts"][1]["surface_share"] = 0.0
-FULL = part(
-    "jar", "glass", "filled", contents="sauce", fill=0.9, volume_share=0.9, surface_share=0.9
-)
+MOST = {"volume_share": 0.9, "surface_share": 0.9}
+FULL = part("jar", "glass", "filled", contents="sauce", fill=0.9, **MOST)
 CONTENTS = {"parts": [FULL, part("sauce", "soft_plastic", volume_share=0.1, surface_share=0.1)]}
 ASKED_AGAIN = {
     "density in g/cm3": ("placement", lambda text: json.dumps(values(text, 1e-3)), "density is"),
