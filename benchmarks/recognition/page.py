@@ -39,6 +39,8 @@ vocabulary as written; then two rules of language were added, and no words: the 
 compound is the object (a shoe rack is no shoe), and a word that occurs in the names of all parts
 does not describe one of them. The fourth set was listed after that, and nothing was changed any
 more. It is mostly food and kitchenware, and mostly unknown; its answers are as reliable as before.
+In November 2026 some thirty words of things were added for the sake of their walls; one of them,
+the cannon ball, was read among the wrong answers below. Until then 44 % were right, 3 % wrong.
 """
 
 

@@ -263,10 +263,10 @@ def test_a_library_that_is_gone_is_missed_and_one_that_is_small_leaves_the_rest_
         collect(tmp_path)
     own.write_text(
         '[steel]\ngroup = "mineral"\nlaw = "von_mises"\n'
-        'young_GPa = { low = 200, typical = 207, high = 216, source = "kaye-laby" }\n'
-        'poisson = { low = 0.28, typical = 0.29, high = 0.3, source = "kaye-laby" }\n'
-        'density_kg_m3 = { low = 7800, typical = 7850, high = 7900, source = "kaye-laby" }\n'
-        'yield_MPa = { low = 250, typical = 300, high = 400, source = "kaye-laby" }\n'
+        'young_GPa = { low = 200, typical = 207, high = 216, source = "elastic-tables" }\n'
+        'poisson = { low = 0.28, typical = 0.29, high = 0.3, source = "elastic-tables" }\n'
+        'density_kg_m3 = { low = 7800, typical = 7850, high = 7900, source = "elastic-tables" }\n'
+        'yield_MPa = { low = 250, typical = 300, high = 400, source = "elastic-tables" }\n'
     )
     (scene,) = collect(tmp_path).scenes
     assert [p.group for p in scene.parts] == ["mineral", "elastomer"]

@@ -17,8 +17,8 @@ cite = "Our tensile test of 2026-03-14, five specimens"
 law = "von_mises"
 group = "metal"
 young_GPa = { low = 195, typical = 205, high = 210, source = "my-bench" }
-poisson = { low = 0.28, typical = 0.29, high = 0.3, source = "kaye-laby" }
-density_kg_m3 = { low = 7800, typical = 7850, high = 7900, source = "my-bench+kaye-laby" }
+poisson = { low = 0.28, typical = 0.29, high = 0.3, source = "elastic-tables" }
+density_kg_m3 = { low = 7800, typical = 7850, high = 7900, source = "my-bench+elastic-tables" }
 yield_MPa = { low = 240, typical = 260, high = 300, source = "my-bench" }
 shell_thickness_mm = { low = 0.5, typical = 0.8, high = 1, source = "my-bench" }
 """
@@ -41,7 +41,7 @@ PLANTED = {
         ('source = "my-bench" }\npoisson', 'source = "" }\npoisson'),
         "young_GPa: has no source. Say who measured it",
     ),
-    "hearsay": (('"kaye-laby"', '"hearsay"'), "cites 'hearsay', which nothing explains."),
+    "hearsay": (('"elastic-tables"', '"hearsay"'), "cites 'hearsay', which nothing explains."),
     "GPa for MPa": (("yield_MPa", "yield_GPa"), "In MPa it would fit: check the unit."),
     "MPa for GPa": (("young_GPa", "young_MPa"), "In GPa it would fit: check the unit."),
     "grams for kilograms": (
@@ -242,4 +242,4 @@ def test_a_source_of_ones_own_is_written_out(tmp_path):
     assert materials.citation(ranges["young"].source).startswith("Our tensile test")
     both = materials.citation(ranges["density"].source)
     assert both.startswith("Our tensile test")
-    assert both.endswith(materials.citation("kaye-laby"))
+    assert both.endswith(materials.citation("elastic-tables"))

@@ -244,7 +244,7 @@ def test_what_is_filled_has_contents_from_the_library(tmp_path):
     sauce = materials.find("sauce")
     assert can.contents.name == "sauce"
     assert can.contents.density == sauce.ranges["density"].typical
-    assert can.contents.grounds["density"].range.source == "fao-density"
+    assert can.contents.grounds["density"].range.source == "porous-foods+ketchup-grades"
     assert (pillow.contents.name, pillow.fill, pillow.loose) == ("fibre_fill", 1.0, False)
     assert "taken as full" in pillow.reason
 

@@ -257,7 +257,12 @@ def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
         ("refrigerator", "shell"),
         ("kitchen cabinet", "shell"),
         ("container", "shell"),
+        ("trash can green large", "shell"),
+        ("bucket wooden old", "shell"),
+        ("Kleiderschrank", "shell"),
+        ("toilet", "shell"),
         ("box spring", None),
+        ("bucket hat", None),
         ("wooden chair", None),
         ("thing", None),
     ],
@@ -265,6 +270,18 @@ def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
 def test_what_is_hollow_by_what_it_is_has_a_wall(thing, structure):
     known = about("mesh", thing)
     assert hollowed(recognise(known), known, lambda _: True).structure == structure
+
+
+def test_a_large_statue_of_metal_is_cast_around_a_core():
+    def built(name, size):
+        known = replace(about("mesh", name), thing=SceneObject("it_0", name, size))
+        said = recognise(known)
+        return said.material, hollowed(said, known, lambda _: True).structure
+
+    assert built("bronze bust", 0.5) == ("bronze", "shell")
+    assert built("bronze bust", 0.12) == ("bronze", None), "small ones are cast solid"
+    assert built("marble bust", 0.5) == ("marble", None)
+    assert built("bust", 0.5) == ("granite", None)
 
 
 def test_a_hollow_thing_of_what_has_no_walls_is_left_alone():

@@ -17,12 +17,13 @@ LARGE = 0.5
 """Longest side from which a thing counts as large [m]: a smaller one may be a block of metal."""
 
 
-Measure = Literal["box", "face"]
+Measure = Literal["box", "large", "face"]
 """Mass is held against the volume of the smallest box around a thing, or against that box's
 largest side where it goes with that: of what is flat, whose depth is a stand's, and of what is
-inflated."""
-MEASURES: tuple[Measure, ...] = ("box", "face")
-UNIT = {"box": "kg per cubic metre of its box", "face": "kg per square metre of its largest side"}
+inflated. "large" is the box of things from some length on, where small ones are denser."""
+MEASURES: tuple[Measure, ...] = ("box", "large", "face")
+BOX, FACE = "kg per cubic metre of its box", "kg per square metre of its largest side"
+UNIT = {"box": BOX, "large": BOX, "face": FACE}
 
 
 @dataclass(frozen=True)
@@ -72,15 +73,19 @@ def doubt_mass(
         heavy = deep >= LARGE and bulk > HEAVIEST
         found = _weighs(name, mass, bulk, "box")
         return f"{found}, more than nearly all things. {ADVICE}" * heavy or None
-    found = bulk if known.measure == "box" else mass / face
+    found = mass / face if known.measure == "face" else bulk
     if known.low / MARGIN <= found <= known.high * MARGIN:
         return None
     article = "an" if known.words[0] in "aeiou" else "a"
+    what, has = f"{article} {known.words}", "has"
+    if known.words in PLURALS:
+        what, has = known.words, "have"
     large = f" longer than {known.longer:g} m" if known.longer else ""
-    usual = f"{article} {known.words}{large} has {known.low:g} to {known.high:g}"
+    usual = f"{what}{large} {has} {known.low:g} to {known.high:g}"
     return f"{_weighs(name, mass, found, known.measure)}, and {usual}. {ADVICE}"
 
 
+PLURALS = ("scissors", "pliers")
 ADVICE = "Check how large it is (--extent), what it is made of and whether it is hollow."
 
 
@@ -91,8 +96,9 @@ def _weighs(name: str, mass: float, found: float, measure: Measure) -> str:
 
 @cache
 def _table() -> tuple[TypicalBulk, ...]:
-    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    return tuple(e for words, row in tomllib.loads(text).items() for e in _entries(words, row))
+    rows = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    named = [(words, row) for row in rows.pop("alike") for words in row["words"]]
+    return tuple(e for words, row in (*rows.items(), *named) for e in _entries(words, row))
 
 
 def _entries(words: str, row: Any) -> list[TypicalBulk]:

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
+from corporeal.formats.other_languages import in_english
+
 MARGIN = 1.5
 """How far beyond the table an object may be before it is reported."""
 SMALLEST, LARGEST = 0.005, 20.0
@@ -38,14 +40,15 @@ def typical_extent(class_name: str) -> TypicalExtent | None:
 
 
 def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str]:
-    """Return a name's words in the singular; a compound that is known counts as its words.
+    """Return a name's words, in English and the singular; a known compound counts as its words.
 
     Args:
-        class_name: What somebody calls a thing: "golfball".
+        class_name: What somebody calls a thing: "golfball", "Kühlschrank".
         compounds: A known compound → the words that it is made of.
 
     """
-    tokens = (_singular(w) for w in re.findall(r"[a-zà-ÿ]+", class_name.lower()))
+    said = in_english(re.findall(r"[^\W\d_]+", class_name.lower()))
+    tokens = (_singular(w) for w in said)
     return [part for word in tokens for part in compounds.get(word, (word,))]
 
 

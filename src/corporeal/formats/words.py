@@ -1,6 +1,7 @@
 """Everyday words out of file, node and mesh names."""
 
 import re
+import unicodedata
 
 VENDORS = frozenset(
     "khronos smallhouse kenney gazebo kaolin polyhaven market gso playcanvas bullet aws robomaker "
@@ -17,8 +18,8 @@ FILLERS = frozenset(
 def everyday(name: str) -> str:
     """Return the words of a name that say what an object is: "soda can coke"; may be empty."""
     name = re.sub(r"\.[A-Za-z0-9]{2,4}$", "", name)
-    name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
-    words = [w.lower() for w in re.split(r"[^A-Za-zÀ-ÿ]+", name)]
+    name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", unicodedata.normalize("NFC", name))
+    words = [w.lower() for w in re.split(r"[\W\d_]+", name)]
     kept = [w for w in words if len(w) > 1 and w not in VENDORS and w not in FILLERS]
     return " ".join(kept)[:60].strip()
 

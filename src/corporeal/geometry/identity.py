@@ -1,6 +1,7 @@
 """Which surfaces make one part: what the file itself says, by node, mesh and material."""
 
 import re
+import unicodedata
 import zlib
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
@@ -19,7 +20,7 @@ NOISE = frozenset(
     "textures untitled uv vert visual collision wire x y z".split()
 )
 """Words that exporters write whatever the object is."""
-SPLIT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+")
+SPLIT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|[^\W\d_A-Za-z]+")
 
 Hint = Callable[[Surface, Finish], str]
 
@@ -40,10 +41,16 @@ class Identity:
 def words(name: str) -> list[str]:
     """Split a name into lower-case words, without what exporters write.
 
-    ``"M_LeatherParts.001"`` gives ``["leather", "parts"]``.
+    ``"M_LeatherParts.001"`` gives ``["leather", "parts"]``, ``"Mülltonne"`` ``["mulltonne"]``.
     """
-    found = [w.lower() for w in SPLIT.findall(name)]
+    found = [w.lower() for w in SPLIT.findall(plain(name))]
     return [w for w in found if len(w) > 1 and w not in NOISE]
+
+
+def plain(text: str) -> str:
+    """Return a text without accents: "Mülltonne" as "Mulltonne"."""
+    apart = unicodedata.normalize("NFKD", text.replace("ß", "ss"))
+    return "".join(c for c in apart if not unicodedata.combining(c))
 
 
 def identify(scene: Scene, hint: Hint = lambda surface, finish: "") -> Identity:

@@ -47,7 +47,7 @@ cite = "Our tensile test of 2026-03-14, five specimens"
 law = "von_mises"                # %(laws)s
 group = "metal"
 young_GPa = { low = 195, typical = 205, high = 210, source = "my-bench" }
-poisson = { low = 0.28, typical = 0.29, high = 0.30, source = "kaye-laby" }
+poisson = { low = 0.28, typical = 0.29, high = 0.30, source = "elastic-tables" }
 density_kg_m3 = { low = 7800, typical = 7850, high = 7900, source = "my-bench" }
 yield_MPa = { low = 240, typical = 260, high = 300, source = "my-bench" }
 ```

@@ -5,12 +5,14 @@ from math import isclose
 
 from corporeal.formats.typical_extents import typical_extent
 from corporeal.vlm.answers import (
+    KILOGRAMS,
     ExtentsAnswer,
     FractionAnswer,
     MassAnswer,
     MaterialsAnswer,
     PartAnswer,
     PartsAnswer,
+    Printed,
     RankingAnswer,
     RegionsAnswer,
     SizeAnswer,
@@ -125,6 +127,7 @@ def _held_problems(answer: MaterialsAnswer, names: Vocabulary) -> list[str]:
         held = {names.contents(w.contents) for w in box.ways if w.contents} - {None}
         for part in answer.parts:
             made = {names.contents(w.material) for w in part.ways if w.material}
+            made.add(names.contents(part.part))
             if part is not box and held & made:
                 found.append(
                     f"{part.part} is what {box.part} holds, and would weigh twice: as the contents "
@@ -190,7 +193,7 @@ def shaky(answer: MaterialsAnswer) -> list[str]:
 
 
 def mass_complaints(answer: MassAnswer, box: float) -> list[str]:
-    """Check the order, and that masses are in kilograms.
+    """Check the order, and that masses, judged and printed, are in the units they are said in.
 
     Args:
         answer: What was answered.
@@ -199,14 +202,27 @@ def mass_complaints(answer: MassAnswer, box: float) -> list[str]:
     """
     if not answer.low_kg <= answer.likely_kg <= answer.high_kg:
         return ["low_kg, likely_kg and high_kg must be in this order."]
+    said = [(answer.likely_kg, "Answer in kilograms.")]
+    said += [(_weight(fact), f"Check the unit of {fact.words!r}.") for fact in answer.printed]
+    return [problem for mass, advice in said if (problem := _too_dense(mass, box, advice))]
+
+
+def _weight(fact: Printed) -> float | None:
+    """Weight [kg] that is printed on an object, or None where it is something else."""
+    factor = KILOGRAMS.get(fact.unit) if fact.kind in ("net weight", "total weight") else None
+    return fact.number * factor if fact.number and factor else None
+
+
+def _too_dense(mass: float | None, box: float, advice: str) -> str:
+    """Say that nothing of a mass [kg] fits a box [m³], or is so light; "": it may be."""
     low, high = DENSITIES
-    mean = answer.likely_kg / box if box > 0 else low
+    mean = mass / box if mass is not None and box > 0 else low
     if low <= mean <= high:
-        return []
-    return [
-        f"{answer.likely_kg:g} kg in a box of {1e6 * box:.4g} cm³ would be {mean:.3g} kg/m³, which "
-        f"no object has ({low:g} to {high:g}). Answer in kilograms."
-    ]
+        return ""
+    return (
+        f"{mass:g} kg in a box of {1e6 * box:.4g} cm³ would be {mean:.3g} kg/m³, which "
+        f"no object has ({low:g} to {high:g}). {advice}"
+    )
 
 
 def placement_complaints(

@@ -7,6 +7,7 @@ from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.resources import files
 
+from corporeal.formats.other_languages import in_english
 from corporeal.geometry.identity import words
 from corporeal.types import Finish
 
@@ -110,8 +111,9 @@ def _by_first_word() -> dict[str, list[Term]]:
 
 @lru_cache(maxsize=10_000)
 def tokens_of(name: str) -> tuple[str, ...]:
-    """Return the words of a name in the singular, without what exporters write."""
-    return tuple(singular(part) for w in words(name) for part in _apart(singular(w)))
+    """Return a name's words in English and the singular, without what exporters write."""
+    said = in_english(words(name))
+    return tuple(singular(part) for w in said for part in _apart(singular(w)))
 
 
 def _apart(word: str) -> tuple[str, ...]:
@@ -145,12 +147,32 @@ def _single(kind: str) -> frozenset[str]:
 
 def hollow(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name is that of something hollow: its last noun is what it names."""
-    return any(tokens[-len(phrase) :] == phrase for phrase in _listed("hollow"))
+    return _is_one(tokens, "hollow")
 
 
 def open_ware(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name is that of an open vessel: its last noun is what it names."""
-    return any(tokens[-len(phrase) :] == phrase for phrase in _listed("open"))
+    return _is_one(tokens, "open")
+
+
+def cast(tokens: tuple[str, ...]) -> bool:
+    """Tell whether a name is that of what is cast hollow where it is large and of metal."""
+    return _is_one(tokens, "cast")
+
+
+def _is_one(tokens: tuple[str, ...], table: str) -> bool:
+    """Tell whether a name's last noun stands in a table: "bin" in "bin old green"."""
+    while tokens and tokens[-1] in _describing():
+        if any(tokens[-len(phrase) :] == phrase for phrase in _listed(table)):
+            return True
+        tokens = tokens[:-1]
+    return any(tokens[-len(phrase) :] == phrase for phrase in _listed(table))
+
+
+@cache
+def _describing() -> frozenset[str]:
+    """Return words after a noun that only say what it is like: of what, how large, how old."""
+    return _single("substance") | frozenset(map(singular, _table()["describing"])) | emptied()
 
 
 @cache

@@ -22,6 +22,7 @@ from corporeal.vlm.lexicon import (
     KINDS,
     Name,
     Term,
+    cast,
     emptied,
     heads,
     hollow,
@@ -39,6 +40,8 @@ METALLIC = 0.5
 """Metallic value from which most of a surface is metal: a picture's value is its mean."""
 LONGEST_WALL = 10.0
 """No wall of an object is thicker [m]."""
+LARGEST_SOLID_CASTING = 0.2
+"""Statues of metal that are larger are cast around a core [m]."""
 UNKNOWN = PartWords("", None, reason="No name in the file says what this is made of.")
 
 
@@ -275,6 +278,9 @@ def hollowed(
     if from_pictures and any(open_ware(name.words) for name in evidence.general):
         return replace(words, structure="sheet", wall_unseen=True)
     is_hollow = any(hollow(name.words) for name in evidence.general)
+    is_cast = words.material in metals() and evidence.thing.real_extent > LARGEST_SOLID_CASTING
+    if is_cast and any(cast(name.words) for name in evidence.general):
+        is_hollow = True
     return replace(words, structure="shell") if is_hollow else words
 
 
@@ -403,10 +409,11 @@ def _strongest(
     around = {w for name in thing for w in name.words}
     nameless = thing and not any(_names_a_thing(name) for name in (*names, *thing))
     shiny = any(f.metallic > METALLIC for f in finishes)
+    of_metal = {t.metallic for name in thing for t in heads(name.words) if t.metallic}
     for name in names:
         for term in _adjectives(name):
             if term.colour and not shiny:
-                if not (term.seldom and nameless):
+                if not (term.seldom and (nameless or term.material in of_metal)):
                     continue
                 term = replace(term, margin=term.margin * WEAKER)
             if term.kind in kinds and _fits(term, finishes, around | set(name.words)):

@@ -1,0 +1,74 @@
+"""Names in other languages, as far as they name everyday things and what these are made of."""
+
+import tomllib
+from collections.abc import Iterator, Sequence
+from functools import cache
+from pathlib import Path
+
+from corporeal.geometry.identity import plain
+
+OF = frozenset("de del di du des da do della dello en".split())
+"""What stands between a thing and what belongs to it: "caja de carton" is a box of cardboard."""
+UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
+SHORTEST = 3
+"""Letters before the last word of a compound."""
+
+
+def in_english(words: Sequence[str]) -> list[str]:
+    """Return the words of a name with those of other languages in English, the thing last.
+
+    ``["seau", "de", "plage"]`` gives ``["plage", "bucket"]``, ``["holzstuhl"]`` ``["wood",
+    "chair"]``; what is not known stays as it is.
+
+    Args:
+        words: Of a name, in lower case.
+
+    """
+    found = [_translated(plain(word)) for word in words]
+    known = [part for k, word in enumerate(words) for part in found[k] or (word,)]
+    where = next((k for k, word in enumerate(words) if word in OF and k and found[k - 1]), None)
+    if where is None:
+        return known
+    before = [part for k in range(where) for part in found[k] or (words[k],)]
+    return in_english(words[where + 1 :]) + before
+
+
+@cache
+def _translated(word: str) -> tuple[str, ...]:
+    """Return what a word, or a compound that ends with it, is in English; (): not known."""
+    whole = _words().get(word) or _words().get(word.removesuffix("s"))
+    if whole or not word.isascii():
+        return whole or ()
+    for cut in range(SHORTEST, len(word) - SHORTEST):
+        last = _ends().get(word[cut:])
+        if last:
+            first = word[:cut]
+            return (*(_words().get(first) or (first,)), *last)
+    return ()
+
+
+@cache
+def _words() -> dict[str, tuple[str, ...]]:
+    """Return every word that stands by itself → its English words."""
+    return {s: english for word, english in _rows() if word[0] != "-" for s in _spelt(word)}
+
+
+@cache
+def _ends() -> dict[str, tuple[str, ...]]:
+    """Return every word that ends compounds → its English words."""
+    ends = [(word, english) for word, english in _rows() if word[0] == "-" or word[-1] == "*"]
+    return {s: english for word, english in ends for s in _spelt(word)}
+
+
+def _spelt(word: str) -> set[str]:
+    """Return the ways in which a word of the table is written without accents."""
+    bare = word.strip("-*")
+    return {plain(bare), plain(bare.translate(UMLAUTS))}
+
+
+def _rows() -> Iterator[tuple[str, tuple[str, ...]]]:
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    for table in tomllib.loads(text).values():
+        for english, words in table.items():
+            for word in words:
+                yield word, tuple(english.split())
