@@ -45,6 +45,7 @@ BALLS, BALL, AWAY = 7, 0.09, 0.6
 """Number, radius and distance from the middle of balls around the things, in these distances."""
 LIT = 0.9
 """Distance, in these distances, at which flash light is as bright as the room's."""
+GREY = (0.66, 0.65, 0.63)
 OAK, PAPER, STRIPE = (0.62, 0.46, 0.32), (0.70, 0.72, 0.66), (0.45, 0.52, 0.56)
 
 
@@ -54,8 +55,10 @@ def noise(points: np.ndarray, wave: float, seed: int) -> np.ndarray:
     return map_coordinates(cells, (points / wave).T % 48, order=1, mode="grid-wrap")
 
 
-def paint(points: np.ndarray, floor: np.ndarray, size: float) -> np.ndarray:
-    """Return the colours of places on floor or walls (N, 3)."""
+def paint(points: np.ndarray, floor: np.ndarray, size: float, plain: bool = False) -> np.ndarray:
+    """Return the colours of places on floor or walls (N, 3); plain: both have one colour each."""
+    if plain:
+        return np.where(floor[:, None], GREY, PAPER)
     x, y, z = points.T
     plank = np.floor(y / (0.06 * size))
     tone = np.sin(12.9898 * plank + 78.2 * np.floor(x / (0.5 * size) + 0.37 * plank)) * 43758.5
@@ -71,6 +74,22 @@ def paint(points: np.ndarray, floor: np.ndarray, size: float) -> np.ndarray:
 
 
 @dataclass(frozen=True)
+class Look:
+    """How badly pictures are taken, and where."""
+
+    seed: int = 0
+    pictures: int | None = None
+    wall: bool = False
+    clutter: bool = False
+    flash: bool = False
+    rolled: bool = False
+    plain: bool = False
+    """Whether floor and walls have one colour each."""
+    grid: int = GRID
+    """Looks per pixel along x and y."""
+
+
+@dataclass(frozen=True)
 class Room:
     """Around the things."""
 
@@ -80,15 +99,17 @@ class Room:
     """Whether the wall at +y is near."""
     balls: np.ndarray
     """Middle and radius of each ball (B, 4) [m]."""
+    plain: bool = False
+    grid: int = GRID
 
 
 def backdrop(camera: Camera, room: Room) -> tuple[np.ndarray, np.ndarray]:
     """Return what a camera sees of a room without the things (H, W, 3), and how far away (H, W)."""
-    size = room.size
+    size, grid = room.size, room.grid
     half = np.full((2, 2), ROOM * size)
     half[1, 1] = CLOSE * size if room.wall else half[1, 1]
-    h, w = camera.height * GRID, camera.width * GRID
-    v, u = (np.indices((h, w)).reshape(2, -1) + 0.5) / GRID
+    h, w = camera.height * grid, camera.width * grid
+    v, u = (np.indices((h, w)).reshape(2, -1) + 0.5) / grid
     K, pose = camera.K, camera.world_from_camera
     local = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(h * w)], axis=1)
     ray, eye = local @ pose[:3, :3].T, pose[:3, 3]
@@ -98,15 +119,15 @@ def backdrop(camera: Camera, room: Room) -> tuple[np.ndarray, np.ndarray]:
         out = np.min(ahead / ray[:, :2], axis=1)
     far = np.minimum(down, out)
     there = eye + far[:, None] * ray
-    colours = paint(there, down < out, size)
+    colours = paint(there, down < out, size, room.plain)
     for k, (*middle, radius) in enumerate(room.balls):
         met = _met(eye - middle, ray, radius)
         near = met < far
         far[near] = met[near]
         tone = 0.8 + 0.2 * noise(eye + far[near, None] * ray[near], 0.03 * size, 5 + k)
         colours[near] = np.random.default_rng(k).uniform(0.1, 0.9, 3) * tone[:, None]
-    colours = colours.reshape(camera.height, GRID, camera.width, GRID, 3)
-    far = far.reshape(camera.height, GRID, camera.width, GRID)
+    colours = colours.reshape(camera.height, grid, camera.width, grid, 3)
+    far = far.reshape(camera.height, grid, camera.width, grid)
     return colours.mean(axis=(1, 3)), far.mean(axis=(1, 3))
 
 
@@ -132,7 +153,7 @@ def photographed(rgb: np.ndarray, k: int, rng: np.random.Generator) -> np.ndarra
     return np.asarray(Image.open(raw))
 
 
-def degraded(views: Views, asked: argparse.Namespace) -> Views:
+def degraded(views: Views, asked: Look) -> Views:
     """Return the views with a room behind the things, photographed."""
     if views.object_of_pixel is None or views.depth is None:
         raise SystemExit("These views do not say where things are.")
@@ -143,7 +164,8 @@ def degraded(views: Views, asked: argparse.Namespace) -> Views:
     views = _some(views, before[np.linspace(0, len(before) - 1, count).round().astype(int)])
     assert views.object_of_pixel is not None and views.depth is not None
     rng, rgb = np.random.default_rng(asked.seed), views.rgb.copy()
-    room = Room(size, asked.wall, _balls(size, rng) if asked.clutter else np.zeros((0, 4)))
+    balls = _balls(size, rng) if asked.clutter else np.zeros((0, 4))
+    room = Room(size, asked.wall, balls, asked.plain, asked.grid)
     plain = np.median(views.rgb[views.object_of_pixel < 0].mean(axis=-1))
     for k, camera in enumerate(views.cameras):
         real = views.rgb[k] / 255
@@ -206,7 +228,8 @@ def main() -> None:
     for name in ("wall", "clutter", "flash", "rolled"):
         parser.add_argument(f"--{name}", action="store_true")
     asked = parser.parse_args()
-    write_views(asked.out / "views", degraded(read_views(asked.scene / "views"), asked))
+    look = Look(asked.seed, asked.pictures, asked.wall, asked.clutter, asked.flash, asked.rolled)
+    write_views(asked.out / "views", degraded(read_views(asked.scene / "views"), look))
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 import trimesh
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from PIL import Image
 
 from corporeal.formats.colmap import ColmapModel, read_colmap
@@ -20,13 +20,15 @@ from corporeal.stages.reconstruct import Reconstructed
 from corporeal.typed import typed
 from corporeal.types import Camera
 
-KNOWN = Path(__file__).parent / "real_sets.toml"
+KNOWN, FACTS = Path(__file__).parent / "real_sets.toml", "known.toml"
 GOOD_ANGLE, GOOD_PLACE = 1.5, 0.03
 """A pose is right within so many degrees, and this share of the cameras' mean distance."""
 ROUNDS = 5
 """Of fitting to what agrees."""
 FAR = 3.0
 """Medians from which on a camera is not fitted to."""
+SIMILARITIES = 500
+"""Tried through three places, of which the one that most agree with is where fitting begins."""
 TRIALS, NEAR = 2000, 0.01
 """Planes tried through three sparse points; distance that is on one, over the cameras' radius."""
 AGREED = re.compile(r"agree with (\d+) photographs .* to ([\d.]+) dB(?:, ([\d.]+) dB on objects)?")
@@ -43,13 +45,26 @@ class Known:
     sides: tuple[float, ...] = ()
     height: float | None = None
     volume: tuple[float, ...] = ()
+    up: tuple[float, ...] = ()
+    """Direction in the frame of the given poses, where it is known."""
     note: str = ""
     """What a reader of the figures should know, in sentences."""
 
 
-def known(name: str) -> Known:
-    """Return what ``real_sets.toml`` says of a set; of others nothing is known."""
-    return typed(Known, tomllib.loads(KNOWN.read_text(encoding="utf-8")).get(name, {}))
+def known(folder: Path) -> Known:
+    """Return what a set's ``known.toml``, or ``real_sets.toml``, says of it; else nothing is."""
+    own = folder / FACTS
+    said = tomllib.loads((own if own.exists() else KNOWN).read_text(encoding="utf-8"))
+    return typed(Known, said if own.exists() else said.get(folder.name, {}))
+
+
+def up_off(result: "Came", folder: Path, given: ColmapModel) -> dict[str, Any]:
+    """Return the angle between up and what is known of it [deg], if anything is."""
+    facts = known(folder)
+    if not facts.up and not facts.floor:
+        return {}
+    true = np.array(facts.up) if facts.up else floor_normal(given, np.random.default_rng(0))
+    return {"up_off_deg": float(np.degrees(np.arccos(np.clip(true @ result.up, -1, 1))))}
 
 
 # ---------------------------------------------------------------- poses
@@ -75,8 +90,9 @@ def pose_errors(found: ColmapModel, given: ColmapModel) -> PoseErrors:
     ours, theirs = ({Path(i.name).stem: i for i in m.images} for m in (found, given))
     names = sorted(ours.keys() & theirs.keys())
     a, b = (np.stack([p[n].world_from_camera for n in names]) for p in (ours, theirs))
-    way, kept, off = np.eye(4), np.ones(len(names), bool), np.zeros(len(names))
     reach = np.linalg.norm(b[:, :3, 3] - b[:, :3, 3].mean(axis=0), axis=1).mean()
+    kept = _agreeing(a[:, :3, 3], b[:, :3, 3], GOOD_PLACE * reach)
+    way, off = np.eye(4), np.zeros(len(names))
     for _ in range(ROUNDS):
         way = _onto(a[kept, :3, 3], b[kept, :3, 3])
         off = np.linalg.norm((a @ [0, 0, 0, 1]) @ way.T - b @ [0, 0, 0, 1], axis=1) / reach
@@ -87,6 +103,21 @@ def pose_errors(found: ColmapModel, given: ColmapModel) -> PoseErrors:
     right = int(((angle < GOOD_ANGLE) & (off < GOOD_PLACE)).sum())
     middle = float(np.median(angle)), float(np.median(off))
     return PoseErrors(len(ours), right, len(theirs), *middle, way)
+
+
+def _agreeing(
+    a: Float[np.ndarray, "N 3"], b: Float[np.ndarray, "N 3"], near: float
+) -> Bool[np.ndarray, " N"]:
+    """Return which places agree with most others, of similarities through three places each."""
+    rng, best = np.random.default_rng(0), np.ones(len(a), bool)
+    most = 0
+    for _ in range(SIMILARITIES if len(a) > 3 else 0):
+        few = rng.choice(len(a), 3, replace=False)
+        way = _onto(a[few], b[few])
+        on = np.linalg.norm(a @ way[:3, :3].T + way[:3, 3] - b, axis=1) < near
+        if on.sum() > max(most, 3):
+            best, most = on, int(on.sum())
+    return best
 
 
 def _onto(a: Float[np.ndarray, "N 3"], b: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, "4 4"]:

@@ -1,14 +1,16 @@
 """Real photographs: poses, quality, up, size and silhouettes of every set in a folder.
 
     python benchmarks/real_photographs.py FOLDER [--only axe] [--cases all bare]
-        [--training draft normal] [--out runs/real] [--json FILE] [--docs]
+        [--training draft normal] [--out runs/real] [--json FILE] [--docs [made]]
 
 Each folder in FOLDER with ``images`` and a COLMAP model, ``sparse/0``, is a set; it may have
 ``masks``. It is reconstructed in up to four cases: with all that it has, without its masks, without
-its poses, and from the photographs alone (bare). Measured are: photographs registered, of these the
+its poses, and from the photographs alone (bare); or, where it has ``film.mp4`` whose frames have
+the numbers of its images, from the film. Measured are: photographs registered, of these the
 share within 1.5° and 3 % of the given poses, and the medians; quality on photographs held out,
 whole and on objects; the angle between up and the normal of the plane with the most sparse points,
-where the object is known to stand on one; size against what ``real_sets.toml`` states; intersection
+where the object is known to stand on one; size against what the set's ``known.toml`` or
+``real_sets.toml`` states; intersection
 over union of the closed surfaces' silhouettes with the masks of the set, mean and worst; minutes of
 the processor, all threads together. A set that is refused or fails is a row that says why. Rows
 that are there already are kept, and a training or a search for poses that was interrupted is
@@ -35,19 +37,24 @@ from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.stages.reconstruct import Reconstructed, reconstruct
 from corporeal.terminal import progress_bars, show_table
 
-Case = Literal["all", "unmasked", "unposed", "bare"]
+Case = Literal["all", "unmasked", "unposed", "bare", "film"]
 WORDS: dict[Case, str] = {
     "all": "as given",
     "unmasked": "no masks",
     "unposed": "no poses",
     "bare": "photographs alone",
+    "film": "a film alone",
 }
+ALONE: tuple[Case, ...] = ("bare", "film")
+FILM = "film.mp4"
 HEADS = (
     "set", "given", "training", "registered", "right", "rotation off", "place off",
     "held out, thing [dB]", "up off", "size off", "IoU, worst", "one closed piece", "minutes",
     "why not",
 )  # fmt: skip
-DOCS = Path(__file__).parents[1] / "docs" / "real-photographs.md"
+DOCS = Path(__file__).parents[1] / "docs"
+TITLES = {"real": "Real photographs", "made": "Made photographs"}
+"""Of the pages, each ``docs/KIND-photographs.md``."""
 EVERY = 2.0
 """Between two readings of the clock that are kept [s]."""
 Progress = Callable[[float, str], None]
@@ -80,12 +87,17 @@ class Clock:
 
 def cases_of(folder: Path) -> list[Case]:
     """Return in which ways a set can be given, none twice."""
+    if (folder / FILM).exists():
+        return ["film"]
     masked = (folder / "masks").is_dir()
     return ["all", "unmasked", "unposed", "bare"] if masked else ["all", "bare"]
 
 
 def given_as(folder: Path, case: Case, place: Path) -> Path:
     """Copy of a set what a case gives."""
+    if case == "film":
+        place.mkdir(parents=True, exist_ok=True)
+        return Path(shutil.copy(folder / FILM, place / f"{folder.name}.mp4"))
     photos = place / folder.name
     wanted = ["images"]
     wanted += ["masks"] if case in ("all", "unposed") else []
@@ -105,7 +117,7 @@ def row_of(folder: Path, case: Case, training: str, out: Path) -> dict[str, Any]
     photos, work = given_as(folder, case, place), place / training
     row: dict[str, Any] = {"set": folder.name, "case": case, "training": training}
     clock = Clock(place / f"{training}-seconds.json")
-    facts = measure.known(folder.name)
+    facts = measure.known(folder)
     posed = case in ("all", "unmasked")
     unit = facts.unit if posed else None
     config = ReconstructConfig(training=training, metres_per_unit=unit)  # type: ignore[arg-type]
@@ -146,17 +158,14 @@ def poses_row(folder: Path, poses: Path) -> dict[str, Any]:
 
 def results(made: Reconstructed, folder: Path, poses: Path | None) -> dict[str, Any]:
     """Measure a reconstruction; poses: where those lie that were found."""
-    given, facts, way = measure.model_of(folder), measure.known(folder.name), np.eye(4)
+    given, facts, way = measure.model_of(folder), measure.known(folder), np.eye(4)
     row: dict[str, Any] = {"registered": len(given.images)}
     if poses is not None:
         way = measure.pose_errors(measure.model_of(poses), given).given_from_found
         row = poses_row(folder, poses)
     result = measure.came(made, way)
     row |= measure.held_out(made) | measure.whole(result) | measure.sizes(result, facts)
-    row |= measure.silhouettes(result, folder, given)
-    if facts.floor:
-        normal = measure.floor_normal(given, np.random.default_rng(0))
-        row["up_off_deg"] = float(np.degrees(np.arccos(np.clip(normal @ result.up, -1, 1))))
+    row |= measure.silhouettes(result, folder, given) | measure.up_off(result, folder, given)
     return row | {"warnings": list(made.found.warnings)}
 
 
@@ -190,23 +199,28 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     )
 
 
-def write_docs(rows: list[dict[str, Any]], table: list[tuple[str, ...]], said: str) -> None:
+def write_docs(
+    rows: list[dict[str, Any]],
+    table: list[tuple[str, ...]],
+    folders: list[Path],
+    kind: str,
+    said: str,
+) -> None:
     """Write the page, whole."""
     about = (__doc__ or "").split("\n\n")
-    lines = ["# Real photographs", "", f"Written by `{said}`."]
+    lines = [f"# {TITLES[kind]}", "", f"Written by `{said}`."]
     lines += [" ".join(about[2].replace("``", "`").split()), ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
     lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in table]
     lines += ["", "## What is known of the sets", ""]
-    names = dict.fromkeys(row["set"] for row in rows)
-    notes = {name: measure.known(name).note for name in names}
+    notes = {folder.name: measure.known(folder).note for folder in folders}
     lines += [f"- *{name}*: {note}" for name, note in notes.items() if note]
     lines += ["", "## What runs from photographs alone said", ""]
     for row in rows:
-        if row["case"] == "bare":
+        if row["case"] in ALONE:
             warnings = " ".join(row.get("warnings", [])) or row.get("why", "Nothing.")
             lines += [f"- *{row['set']}* at {row['training']}: {warnings}"]
-    DOCS.write_text("\n".join(lines) + "\n", encoding="utf-8")
+    (DOCS / f"{kind}-photographs.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
 def main() -> None:
@@ -220,13 +234,12 @@ def main() -> None:
     parser.add_argument("--training", nargs="+", default=["draft"])
     parser.add_argument("--out", type=Path, default=Path("runs/real"))
     parser.add_argument("--json", type=Path, help="rows as data")
-    parser.add_argument("--docs", action="store_true", help=f"write docs/{DOCS.name}")
+    parser.add_argument("--docs", nargs="?", const="real", choices=TITLES, help="write its page")
     asked = parser.parse_args()
     folders = sorted(p.parent.parent for p in asked.folder.glob("*/sparse/0") if p.is_dir())
+    folders = [f for f in folders if not asked.only or f.name in asked.only]
     rows, table = [], []
     for folder in folders:
-        if asked.only and folder.name not in asked.only:
-            continue
         pictures = sum(1 for _ in (folder / "images").iterdir())
         for case in cases_of(folder):
             if asked.cases and case not in asked.cases:
@@ -239,7 +252,9 @@ def main() -> None:
         store.write_json(asked.json, rows)
     if asked.docs:
         more = "" if asked.training == ["draft"] else f" --training {' '.join(asked.training)}"
-        write_docs(rows, table, f"python benchmarks/real_photographs.py FOLDER{more} --docs")
+        more += " --docs" if asked.docs == "real" else f" --docs {asked.docs}"
+        said = f"python benchmarks/real_photographs.py FOLDER{more}"
+        write_docs(rows, table, folders, asked.docs, said)
 
 
 if __name__ == "__main__":

@@ -49,7 +49,7 @@ def sets(tmp_path_factory):
 def test_a_row_measures_what_is_known_and_is_kept(sets, tmp_path, monkeypatch):
     small = training_schedule.Preset(3000, 1, 120, 160)
     monkeypatch.setitem(training_schedule.PRESETS, "preview", small)
-    monkeypatch.setattr(measure, "known", lambda name: FACTS)
+    monkeypatch.setattr(measure, "known", lambda folder: FACTS)
     row = benchmark.row_of(sets / "block", "all", "preview", tmp_path)
     assert "why" not in row, row
     assert row["registered"] == COUNT and row["watertight"] and row["things"] == 1

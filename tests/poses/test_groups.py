@@ -4,10 +4,18 @@ import shutil
 
 import numpy as np
 import pytest
+from PIL import Image
 
 from corporeal.errors import BadFileError
 from corporeal.poses.gather import gather
-from corporeal.poses.groups import SHARED, Groups, groups_of, not_found, shared_points
+from corporeal.poses.groups import (
+    SHARED,
+    Groups,
+    groups_of,
+    hopeless,
+    not_found,
+    shared_points,
+)
 from corporeal.poses.pose import pose
 from patterned_scene import patterned, photographs, ring
 
@@ -62,6 +70,29 @@ def test_a_folder_of_which_two_fifths_show_something_else_each_goes_on_without_t
     assert groups_of(beside(circle(60), np.zeros((20, 20), int))).beside == ()
     few = groups_of(beside(circle(40), np.zeros((60, 60), int)))
     assert few.beside == (), "nobody can say that the fewer are what is meant"
+
+
+def test_a_search_is_in_vain_where_few_pictures_share_anything():
+    assert hopeless(np.zeros((20, 20), int)) == "none of 20 pictures share points with any other"
+    few = beside(circle(4, 1), np.zeros((16, 16), int))
+    assert hopeless(few) == "only 4 of 20 pictures share points with any other"
+    banana = beside(circle(7, 1), circle(4, 1), circle(3, 1), np.zeros((2, 2), int))
+    assert hopeless(banana) is None, "in groups when small, and yet 15 of 16 are placed"
+
+
+def test_pictures_of_nothing_alike_are_refused_before_the_long_search(tmp_path):
+    pytest.importorskip("pycolmap")
+    photos = tmp_path / "photos"
+    photos.mkdir()
+    for k in range(10):
+        noise = np.random.default_rng(k).integers(0, 255, (30, 40, 3), dtype=np.uint8)
+        picture = Image.fromarray(noise).resize((320, 240), Image.Resampling.BICUBIC)
+        picture.save(photos / f"{k}.jpg", quality=95)
+    told = "cannot be found: none of 10 pictures share points with any other[.]"
+    with pytest.raises(BadFileError, match=told) as error:
+        pose(photos, tmp_path / "poses", silent)
+    assert "newspaper" in str(error.value) and "\n" not in str(error.value)
+    assert not (tmp_path / "poses" / "plain").exists(), "before the long search"
 
 
 @pytest.fixture(scope="module")

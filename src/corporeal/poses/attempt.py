@@ -6,7 +6,7 @@ no vocabulary tree (loop detection).
 """
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass
 from functools import partial
@@ -68,6 +68,11 @@ class Attempt:
     bent: float = 0.0
     """Largest |k1| of its lens [-]."""
     left_out: tuple[str, ...] = ()
+    misplaced: tuple[str, ...] = ()
+    """Registered pictures beside others that they share too little with, as another side that looks
+    alike does. They were taken out of the model, as were the next."""
+    parted: tuple[int, ...] = ()
+    """The same of so many pictures that nobody can say who is right: sizes of their groups."""
     astray: tuple[str, ...] = ()
     """Registered pictures in which masks say that the object is elsewhere."""
     filled: float = 1.0
@@ -135,6 +140,15 @@ def _watched(pycolmap: Any, work: Callable[[Any], None]) -> None:
             token.cancel()
             raise
         doing.result()
+
+
+def without_pictures(place: Path, names: Collection[str]) -> tuple[int, int]:
+    """Drop pictures from a model; return how many pictures and points are left."""
+    model = require().Reconstruction(str(place))
+    for image in [i for i in model.images.values() if i.name in names]:
+        model.deregister_frame(image.frame_id)
+    model.write_text(str(place))
+    return model.num_reg_images(), model.num_points3D()
 
 
 def pairs_of(total: int) -> list[tuple[int, int]]:

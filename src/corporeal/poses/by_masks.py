@@ -16,7 +16,7 @@ from corporeal.formats.colmap import ColmapImage, ColmapModel, read_colmap
 from corporeal.formats.photographs import MASKS
 from corporeal.geometry.silhouette_outliers import FEWEST, outliers
 from corporeal.geometry.silhouettes import coherence
-from corporeal.poses.attempt import Attempt, require
+from corporeal.poses.attempt import Attempt, without_pictures
 from corporeal.types import Camera
 
 LONGEST = 320
@@ -45,7 +45,7 @@ def checked_by_masks(told: Attempt, folder: Path, place: Path) -> Attempt:
     right = [k for k in range(len(shown)) if k not in wrong]
     filled = coherence(drawn[right], tuple(cameras[k] for k in right))
     astray = tuple(sorted(shown[k].name for k in wrong))
-    left = _without(place, astray) if astray else (told.registered, told.points)
+    left = without_pictures(place, astray) if astray else (told.registered, told.points)
     return replace(
         told,
         registered=left[0],
@@ -88,15 +88,6 @@ def _compared(place: Path, masks: Path) -> _Compared | None:
     cameras = tuple(_camera(model, image, size) for image in shown)
     drawn = np.stack([_mask(masks / _mask_of(image), size) for image in shown])
     return _Compared(shown, cameras, drawn)
-
-
-def _without(place: Path, names: tuple[str, ...]) -> tuple[int, int]:
-    """Drop pictures from a model; return how many pictures and points are left."""
-    model = require().Reconstruction(str(place))
-    for image in [i for i in model.images.values() if i.name in names]:
-        model.deregister_frame(image.frame_id)
-    model.write_text(str(place))
-    return model.num_reg_images(), model.num_points3D()
 
 
 def _mask_of(image: ColmapImage) -> str:

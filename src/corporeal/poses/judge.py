@@ -40,7 +40,10 @@ def doubts(told: Attempt) -> list[str]:
         return ["no two pictures share enough points"]
     found = []
     if told.registered < SHARE * told.pictures:
-        found.append(f"only {told.registered} of {told.pictures} pictures fit together")
+        beside = ""
+        if told.misplaced:
+            beside = f" ({len(told.misplaced)} more only where another side looks alike)"
+        found.append(f"only {told.registered} of {told.pictures} pictures fit together{beside}")
     if told.points < POINTS * told.registered:
         each = told.points / told.registered
         found.append(f"there are {each:.0f} points per picture, too few to trust")
@@ -53,6 +56,17 @@ def doubts(told: Attempt) -> list[str]:
         groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])
         found.append(f"the pictures fall into groups of {groups} that share nothing")
     return found
+
+
+def doubt_of_neighbours(told: Attempt) -> str:
+    """Say in a clause that pictures stand side by side that share too little; "": they do not."""
+    if not told.parted:
+        return ""
+    sizes = " and ".join(str(n) for n in told.parted[:3])
+    return (
+        f"pictures that would have been taken side by side, in groups of {sizes}, share too little "
+        "of what both show: two sides look alike, or something was moved"
+    )
 
 
 def doubt_of_masks(told: Attempt) -> str | None:

@@ -16,13 +16,24 @@ from corporeal.poses.film_frames import write_frames
 from corporeal.poses.gather import IMAGES, Gathered, as_gathered, gather
 from corporeal.poses.groups import (
     SORT_THEM,
+    Groups,
     groups_of,
+    hopeless,
     not_found,
     shared_points,
     told_apart,
     without,
 )
-from corporeal.poses.judge import FILLED, WHAT_TO_DO, doubt_of_masks, doubts, names_of, unseen_side
+from corporeal.poses.judge import (
+    FILLED,
+    WHAT_TO_DO,
+    doubt_of_masks,
+    doubt_of_neighbours,
+    doubts,
+    names_of,
+    unseen_side,
+)
+from corporeal.poses.look_alikes import checked_by_neighbours
 from corporeal.typed import typed
 
 Progress = Callable[[float, str], None]
@@ -35,7 +46,7 @@ SAID: dict[Way, str] = {
     "thorough": ", at the thorough attempt",
 }
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
-METHOD = 2
+METHOD = 3
 """Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
@@ -54,6 +65,8 @@ class Posed:
     """Holds ``images`` and a COLMAP model, ``sparse/0``."""
     statements: tuple[str, ...]
     warnings: tuple[str, ...]
+    doubt: str = ""
+    """Why they are to be believed only if masks agree with them, in a clause."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +79,7 @@ class _Kept:
     """Why there are no poses; "": there are."""
     attempts: tuple[Attempt, ...]
     what_to_do: str = WHAT_TO_DO
+    doubt: str = ""
 
 
 def pose(source: Path, folder: Path, progress: Progress) -> Posed:
@@ -92,7 +106,7 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
         store.write_json(folder / FOUND, kept)
     if kept.refused:
         raise BadFileError(source, kept.refused, kept.what_to_do)
-    return Posed(folder, kept.statements, kept.warnings)
+    return Posed(folder, kept.statements, kept.warnings, kept.doubt)
 
 
 def moved_within(posed: Posed, masks: Path) -> str | None:
@@ -136,8 +150,9 @@ def pose_object(posed: Posed, masks: Path, folder: Path, progress: Progress) -> 
         for name, place in ((IMAGES, posed.folder / IMAGES), (MASKS[0], masks)):
             shutil.copytree(place, folder / name, dirs_exist_ok=True)
         gathered = as_gathered(folder)
-        told = attempt(folder, folder / "masked", gathered, "masked", progress)
-        told = checked_by_masks(told, folder, folder / "masked" / "sparse" / "0")
+        told = _checked(
+            attempt(folder, folder / "masked", gathered, "masked", progress), folder, gathered
+        )
         why = [*doubts(told), *filter(None, [doubt_of_masks(told)])]
         shutil.rmtree(folder / MASKS[0])  # they were grown under other poses
         if why:
@@ -150,13 +165,10 @@ def pose_object(posed: Posed, masks: Path, folder: Path, progress: Progress) -> 
 
 def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     said, gathered = _gathered(source, folder, _within(progress, 0.0, GATHERED))
-    groups = None
-    if not (folder / MASKS[0]).is_dir():  # what was turned over shares nothing, and masks help
-        look = _within(progress, GATHERED, LOOKED)
-        groups = groups_of(shared_points(folder, gathered, lambda f: look(f, LOOKING)))
-    if groups is not None and groups.mixed:
-        return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
-    if groups is not None and groups.beside:
+    groups = _places(folder, gathered, _within(progress, GATHERED, LOOKED))
+    if isinstance(groups, _Kept):
+        return groups
+    if groups.beside:
         gathered = without(gathered, groups.beside)
     tried: list[Attempt] = []
     before = LOOKED
@@ -165,7 +177,7 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
         if not _worth_trying(way, folder, tried):
             continue
         told = attempt(folder, folder / way, gathered, way, _within(progress, *share))
-        tried.append(checked_by_masks(told, folder, folder / way / "sparse" / "0"))
+        tried.append(_checked(told, folder, gathered))
         if not doubts(tried[-1]) and doubt_of_masks(tried[-1]) is None:
             break
     believed = [told for told in tried if not doubts(told)]
@@ -173,8 +185,26 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
         best = max(believed, key=lambda told: told.filled)
         return _told(folder, gathered, tuple(said), tuple(tried), best)
     best = max(tried, key=lambda told: told.registered)
-    others = 0 if groups is None else len(groups.beside)
-    return _Kept((), (), not_found(doubts(best), others), tuple(tried))
+    return _Kept((), (), not_found(doubts(best), len(groups.beside)), tuple(tried))
+
+
+def _places(folder: Path, gathered: Gathered, progress: Progress) -> Groups | _Kept:
+    """Look at small copies: which photographs show one place, or why the long search is in vain."""
+    if (folder / MASKS[0]).is_dir():  # what was turned over shares nothing, and masks help
+        return Groups(())
+    shared = shared_points(folder, gathered, lambda f: progress(f, LOOKING))
+    if (why := hopeless(shared)) is not None:
+        return _Kept((), (), not_found([why], 0), ())
+    groups = groups_of(shared)
+    if groups.mixed:
+        return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
+    return groups
+
+
+def _checked(told: Attempt, folder: Path, gathered: Gathered) -> Attempt:
+    """Take out of a model which pictures cannot be where it has them, by neighbours and masks."""
+    place = folder / told.way / "sparse" / "0"
+    return checked_by_masks(checked_by_neighbours(told, place, gathered.names), folder, place)
 
 
 def _worth_trying(way: Way, folder: Path, tried: list[Attempt]) -> bool:
@@ -226,6 +256,11 @@ def _told(
             f"{len(last.left_out)} of {last.pictures} photographs do not fit the others and were "
             f"left out: {names_of(last.left_out)}."
         )
+    if last.misplaced:
+        warnings.append(
+            f"{len(last.misplaced)} photographs look like others that were taken from another side "
+            f"of what looks alike, and were left out: {names_of(last.misplaced)}."
+        )
     if last.astray:
         warnings.append(
             f"{len(last.astray)} photographs fit the others by what is around the object, but not "
@@ -236,4 +271,6 @@ def _told(
     seen = read_photographs(folder, longest=64)
     cameras_figure(seen, folder / FIGURE)
     unseen = unseen_side(seen.views.cameras, seen.names)
-    return _Kept((*said, statement), (*warnings, *filter(None, [unseen])), "", tried)
+    warnings += filter(None, [unseen])
+    doubt = doubt_of_neighbours(last)
+    return _Kept((*said, statement), tuple(warnings), "", tried, doubt=doubt)

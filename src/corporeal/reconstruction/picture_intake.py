@@ -111,7 +111,7 @@ def _posed(
     later = within(progress, POSED * WHOLE, POSED)
     grown = grown_masks(posed.folder, place / SEEN, progress=later)
     if grown.folder is None:
-        return posed
+        return _doubted(source, posed, config.force)
     masks = grown.folder / MASKS[0]
     if (why := moved_within(posed, masks)) is None:
         return posed
@@ -123,6 +123,21 @@ def _posed(
     if not config.force:
         raise BadFileError(source, f"{why}, and it has too few points of its own.", STAND_STILL)
     return replace(posed, warnings=(f"{said}.", *posed.warnings))
+
+
+def _doubted(source: Path, posed: Posed, force: bool) -> Posed:
+    """Refuse poses that want masks to be believed, where there are none.
+
+    Raises:
+        BadFileError: They are such, and ``force`` is not set.
+
+    """
+    if not posed.doubt:
+        return posed
+    if not force:
+        raise BadFileError(source, f"{posed.doubt}.", STAND_STILL)
+    said = f"{posed.doubt[0].upper()}{posed.doubt[1:]}."
+    return replace(posed, warnings=(said, *posed.warnings))
 
 
 def within(progress: Progress, begin: float, end: float) -> Progress:

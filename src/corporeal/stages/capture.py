@@ -4,7 +4,7 @@ The cameras stand evenly about the upper half of a sphere, each as near as it ca
 every object whole. Nothing is left to chance.
 """
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from typing import Literal
@@ -58,14 +58,30 @@ def capture(
     """
     _check(scene, config)
     progress(0.0, "placing the cameras")
+    aims = around(boxes_of(scene)[None], config.views, config.size, FILL)
+    return pictures(scene, aims, config, progress)
+
+
+def pictures(
+    scene: Scene,
+    aims: Sequence[Aim],
+    config: CaptureConfig = DEFAULT,
+    progress: Progress = lambda fraction, words: None,
+) -> Views:
+    """Picture a scene from where somebody stands; all pictures have one size.
+
+    Args:
+        scene: At rest.
+        aims: Of the cameras, which take the place of ``views`` and ``size`` of the configuration.
+        config: Quality and threads.
+        progress: Told the fraction done and what is being done.
+
+    """
     stage = Stage(scene, Light(front=VIEW))  # shadows stay where they are from view to view
-    boxes = boxes_of(scene)[None]
-    aims = around(boxes, config.views, config.size, FILL)
-    cameras = tuple(camera_of(aim) for aim in aims)
-    shape = (config.views, config.size[1], config.size[0])
+    shape = (len(aims), aims[0].height, aims[0].width)
     views = Views(
         rgb=np.empty((*shape, 3), np.uint8),
-        cameras=cameras,
+        cameras=tuple(camera_of(aim) for aim in aims),
         depth=np.empty(shape, np.float32),
         normals=np.empty((*shape, 3), np.float32),
         object_of_pixel=np.empty(shape, np.int32),

@@ -1,0 +1,147 @@
+"""Sets of photographs of models, as a stranger takes them: walking around, in a furnished room.
+
+    python benchmarks/made_sets.py MODEL OUT [--pictures 30] [--rounds 20 45] [--size 640 480]
+        [--seed 0] [--plain] [--wall] [--clutter] [--flash] [--rolled] [--film]
+
+MODEL is what ``corporeal run`` takes. Somebody walks around it once for each of the rounds, at such
+an angle above the floor [deg], with unsteady hands and at no constant pace. The room and how badly
+the pictures are taken are those of ``as_photographed.py``; with ``--plain`` floor and walls have
+one colour each. With ``--wall`` half of each round is walked, before it.
+OUT is a set for ``real_photographs.py``: ``images``, true ``masks``, true poses in ``sparse/0``,
+and ``known.toml`` with up and the sides of what is seen. With ``--film`` the way is walked
+once, in frames of a film, ``film.mp4``, whose numbers are those of the images.
+"""
+
+import argparse
+from pathlib import Path
+
+import imageio_ffmpeg
+import numpy as np
+from as_photographed import Look, degraded
+from PIL import Image
+
+from corporeal.formats.colmap import write_colmap
+from corporeal.geometry.arrangement import boxes_of
+from corporeal.render.camera import Aim
+from corporeal.stages.assemble import assemble
+from corporeal.stages.capture import pictures
+from corporeal.types import Views
+
+FIELD = 48.0
+"""Vertical field of view [deg]: a telephone's, held level."""
+FILLED = 0.55
+"""Share of the picture's height that the thing takes, about."""
+PACE, REACH, HEIGHT, AIM = 0.25, 0.06, 3.0, 0.04
+"""Standard deviations: of steps along the way, in steps; of distances, in distances; of angles
+above the floor [deg]; of where hands point, in distances."""
+RATE = 10.0
+"""Frames of a film a second."""
+QUALITY = 92
+"""Of the photographs."""
+
+
+def way_around(
+    low: np.ndarray, high: np.ndarray, asked: argparse.Namespace, rng: np.random.Generator
+) -> list[Aim]:
+    """Return where somebody stands and looks who walks around a box (3,), (3,) [m]."""
+    middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2
+    away = radius / (FILLED * np.tan(np.radians(FIELD / 2)))
+    count, rounds = asked.pictures, asked.rounds
+    steps = np.arange(count) + (0 if asked.film else PACE) * rng.normal(size=count)
+    turn = 2 * np.pi * len(rounds) * steps / count
+    if asked.wall:  # it is behind the thing: there and back, before it
+        turn = np.pi + np.abs((turn + np.pi) % (2 * np.pi) - np.pi)
+    slant = np.array(rounds)[np.minimum(np.arange(count) * len(rounds) // count, len(rounds) - 1)]
+    shaken = [_unsteady(count, asked.film, rng) for _ in range(5)]
+    slant = np.radians(slant + HEIGHT * shaken[0])
+    far = away * (1 + REACH * shaken[1])
+    flat = np.cos(slant)
+    where = np.stack([flat * np.cos(turn), flat * np.sin(turn), np.sin(slant)], axis=1)
+    eyes = middle + far[:, None] * where
+    at = middle + AIM * away * np.stack(shaken[2:], axis=1)
+    return [
+        Aim(tuple(eye.tolist()), tuple(target.tolist()), FIELD, *asked.size)
+        for eye, target in zip(eyes, at, strict=True)
+    ]
+
+
+def _unsteady(count: int, smooth: bool, rng: np.random.Generator) -> np.ndarray:
+    """Return how far off hands are for each picture: from one frame to the next not by much."""
+    if not smooth:
+        return rng.normal(size=count)
+    knots = rng.normal(size=max(count // 12, 2) + 1)
+    return np.interp(np.linspace(0, len(knots) - 1, count), np.arange(len(knots)), knots)
+
+
+def sides_of(views: Views) -> np.ndarray:
+    """Return the extent (3,) of all that is seen of things [m]."""
+    assert views.depth is not None and views.object_of_pixel is not None
+    low, high = np.full(3, np.inf), np.full(3, -np.inf)
+    for k, camera in enumerate(views.cameras):
+        v, u = np.nonzero((views.object_of_pixel[k] >= 0) & np.isfinite(views.depth[k]))
+        K, pose = camera.K, camera.world_from_camera
+        x, y = (u + 0.5 - K[0, 2]) / K[0, 0], (v + 0.5 - K[1, 2]) / K[1, 1]
+        there = views.depth[k][v, u][:, None] * np.stack([x, y, np.ones(len(x))], axis=1)
+        there = there @ pose[:3, :3].T + pose[:3, 3]
+        low, high = np.minimum(low, there.min(axis=0)), np.maximum(high, there.max(axis=0))
+    return high - low
+
+
+def write_set(out: Path, views: Views, sides: np.ndarray, film: bool) -> None:
+    """Write what ``real_photographs.py`` reads."""
+    assert views.object_of_pixel is not None
+    names = tuple(f"{'frame' if film else 'img'}_{k:05d}" for k in range(len(views.cameras)))
+    for name in ("images", "masks"):
+        (out / name).mkdir(parents=True, exist_ok=True)
+    for name, rgb, owner in zip(names, views.rgb, views.object_of_pixel, strict=True):
+        Image.fromarray(rgb).save(out / "images" / f"{name}.jpg", quality=QUALITY, subsampling=0)
+        Image.fromarray(np.uint8(255) * (owner >= 0)).save(out / "masks" / f"{name}.png")
+    write_colmap(out / "sparse" / "0", views.cameras, tuple(f"{name}.jpg" for name in names))
+    shown = ", ".join(f"{side:.4f}" for side in sides)
+    facts = f"unit = 1.0\nup = [0.0, 0.0, 1.0]\nsides = [{shown}]\n"
+    (out / "known.toml").write_text(facts, encoding="utf-8")
+    if film:
+        _write_film(out / "film.mp4", views.rgb)
+
+
+def _write_film(path: Path, frames: np.ndarray) -> None:
+    size = frames.shape[2], frames.shape[1]
+    writer = imageio_ffmpeg.write_frames(str(path), size, fps=RATE, quality=8, macro_block_size=2)
+    writer.send(None)
+    for frame in frames:
+        writer.send(np.ascontiguousarray(frame))
+    writer.close()
+
+
+def main() -> None:
+    """Walk around, take pictures, write."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("model", type=Path, nargs="+")
+    parser.add_argument("out", type=Path)
+    parser.add_argument("--pictures", type=int, default=30)
+    parser.add_argument("--rounds", type=float, nargs="+", default=[20.0, 45.0])
+    parser.add_argument("--size", type=int, nargs=2, default=[640, 480])
+    parser.add_argument("--seed", type=int, default=0)
+    for name in ("plain", "wall", "clutter", "flash", "rolled", "film"):
+        parser.add_argument(f"--{name}", action="store_true")
+    asked = parser.parse_args()
+    scene, rng = assemble(asked.model), np.random.default_rng(asked.seed)
+    boxes = boxes_of(scene)
+    aims = way_around(boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0), asked, rng)
+    views = pictures(scene, aims)
+    look = Look(
+        seed=asked.seed,
+        wall=asked.wall,
+        clutter=asked.clutter,
+        flash=asked.flash,
+        rolled=asked.rolled,
+        plain=asked.plain,
+        grid=1,
+    )
+    write_set(asked.out, degraded(views, look), sides_of(views), asked.film)
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,58 @@
+"""Sets of made photographs: what they say of themselves is true."""
+
+from argparse import Namespace
+from pathlib import Path
+
+import numpy as np
+import pytest
+import real_measures as measure
+from as_photographed import Look, degraded
+from made_sets import sides_of, way_around, write_set
+
+from corporeal.formats.colmap import read_colmap
+from corporeal.stages.capture import pictures
+from patterned_scene import patterned
+
+SIDES = np.array([0.6, 0.6, 0.14])
+"""Of a block on a slab [m]."""
+
+
+@pytest.fixture(scope="module")
+def walked():
+    asked = Namespace(pictures=8, rounds=[20.0, 45.0], size=[160, 120], wall=False, film=False)
+    low, high = np.array([-0.3, -0.3, -0.02]), np.array([0.3, 0.3, 0.12])
+    return pictures(patterned(), way_around(low, high, asked, np.random.default_rng(0)))
+
+
+def test_what_is_seen_is_as_large_as_the_thing(walked):
+    off = sides_of(walked) - SIDES
+    assert (off < 1e-3).all() and (off > [-0.02, -0.02, -0.03]).all(), off
+
+
+def test_somebody_walks_around_at_two_heights(walked):
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in walked.cameras])
+    slant = np.degrees(np.arctan2(eyes[:, 2], np.linalg.norm(eyes[:, :2], axis=1)))
+    assert slant[:4].max() < slant[4:].min()
+    turn = np.sort(np.degrees(np.arctan2(eyes[:, 1], eyes[:, 0])))
+    assert np.ptp(turn) > 250
+    seen = walked.object_of_pixel >= 0
+    assert (seen.mean(axis=(1, 2)) > 0.03).all(), "a flat thing, seen from 20° and 45°"
+    assert not seen[:, [0, -1]].any() and not seen[:, :, [0, -1]].any(), "whole"
+
+
+@pytest.mark.parametrize("look", [Look(grid=1), Look(grid=1, plain=True, flash=True, clutter=True)])
+def test_a_set_is_read_as_it_was_written(walked, look, tmp_path):
+    write_set(tmp_path / "block", degraded(walked, look), SIDES, film=False)
+    facts = measure.known(tmp_path / "block")
+    assert facts.unit == 1 and facts.up == (0, 0, 1)
+    np.testing.assert_allclose(facts.sides, SIDES, atol=1e-4)
+    given = read_colmap(tmp_path / "block" / "sparse" / "0")
+    names = [image.name for image in given.images]
+    assert names == sorted(p.name for p in (tmp_path / "block" / "images").iterdir())
+    assert len(list((tmp_path / "block" / "masks").iterdir())) == len(names) == 8
+    errors = measure.pose_errors(given, given)
+    assert errors.right == 8
+
+
+def test_what_nobody_described_is_not_known():
+    assert measure.known(Path("nobody-knows-this")) == measure.Known()
