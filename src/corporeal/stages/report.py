@@ -142,6 +142,7 @@ def _summary(story: Story) -> str:
     sentences += [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
     settled = equilibrium_words(story.audit.settling)
     sentences += filter(None, [safe(how_scaled(scene.objects)), safe(settled)])
+    sentences += map(safe, story.audit.hints)
     if unknown:
         sentences.append(
             f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got the "
