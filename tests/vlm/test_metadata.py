@@ -82,6 +82,11 @@ def test_two_materials_in_one_name_make_neither():
     assert "rubber and wood" in answer.reason
 
 
+def test_a_marble_of_glass_is_a_toy_and_no_stone():
+    assert seen("marble", "marble", Finish("glass")).material == "glass"
+    assert seen("marble", "table").material == "marble"
+
+
 def test_a_particular_metal_stands_before_metal():
     assert seen("Metal.Bronze", "guitar", Finish("x", metallic=1.0)).material == "bronze"
 
