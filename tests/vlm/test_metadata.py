@@ -87,6 +87,15 @@ def test_a_marble_of_glass_is_a_toy_and_no_stone():
     assert seen("marble", "table").material == "marble"
 
 
+@pytest.mark.parametrize(
+    ("finish", "material"),
+    [("beech wood", "hardwood"), ("Oak_Wood", "hardwood"), ("pine wood", "softwood"),
+     ("wood", "wood"), ("wooden planks of spruce", "softwood"), ("plywood sheet", "plywood")],
+)  # fmt: skip
+def test_a_particular_wood_stands_before_wood(finish, material):
+    assert seen("stool", "stool", Finish(finish)).material == material
+
+
 def test_a_particular_metal_stands_before_metal():
     assert seen("Metal.Bronze", "guitar", Finish("x", metallic=1.0)).material == "bronze"
 
