@@ -265,6 +265,7 @@ def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
     ("thing", "structure"),
     [
         ("trash can", "shell"),
+        ("paper lantern", "shell"),
         ("storage box", "shell"),
         ("wooden crate", "shell"),
         ("dumpster", "shell"),

@@ -59,7 +59,7 @@ def clear_view(
 
 
 def _places(object_of_vertex: np.ndarray) -> list[np.ndarray]:
-    """Some vertices of each object."""
+    """Choose some vertices of each object."""
     members = [np.flatnonzero(object_of_vertex == k) for k in np.unique(object_of_vertex)]
     return [m[np.linspace(0, len(m) - 1, min(len(m), POINTS)).astype(int)] for m in members]
 
