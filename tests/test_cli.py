@@ -1,5 +1,7 @@
 import json
 import resource
+import subprocess
+import sys
 
 import numpy as np
 import pytest
@@ -9,6 +11,7 @@ from corporeal.formats.glb_writer import write_glb
 from corporeal.pipeline import Settings
 from corporeal.render import figures
 from corporeal.types import Finish, Scene, SceneObject, Surface
+from corporeal.version import __version__
 
 CORNERS = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], float)
 QUADS = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 4, 5, 1], [2, 3, 7, 6], [0, 2, 6, 4], [1, 5, 7, 3]]
@@ -68,6 +71,24 @@ def test_a_box_falls_and_the_run_tells_everything(typed, tmp_path):
     assert "not yet" in text.out or "unfinished" in text.out
     assert typed("report", "runs/box")[0] == 0
     assert (folder / "report.html").exists()
+
+
+def test_a_run_says_in_the_terminal_what_it_was_taken_for_and_that_nothing_moves(typed, tmp_path):
+    write_glb(tmp_path / "box.glb", a_box(height=0.0))
+    code, text = typed("run", "box.glb", *SMALL)
+    assert code == 0, text.err
+    row = next(line for line in text.err.splitlines() if line.strip().startswith("box_0"))
+    assert row.split()[:3] == ["box_0", "box", "rubber"]
+    assert "hint: Nothing moves" in text.err and "--drop 0.5" in text.err
+    page = (tmp_path / "runs" / "box" / "report.html").read_text()
+    assert "Nothing moves: everything stands at rest" in page
+
+
+def test_the_package_runs_as_a_module():
+    said = subprocess.run(
+        [sys.executable, "-m", "corporeal", "--version"], capture_output=True, text=True, check=True
+    )
+    assert said.stdout.strip() == __version__
 
 
 def test_an_unknown_verb_shows_the_menu(typed):

@@ -1,15 +1,25 @@
 """What can go wrong for a user. Each error says what happened, where, and what to do next."""
 
+from collections.abc import Sequence
+from difflib import get_close_matches
+
 
 class UserError(Exception):
     """Something the user can put right; the CLI prints it in one line and exits with code 2."""
 
 
+NEAR = 3
+"""Most choices that are named as what may have been meant."""
+
+
 class UnknownChoiceError(UserError):
     """A name that is not on the menu."""
 
-    def __init__(self, kind: str, given: str, menu: list[str]) -> None:
-        super().__init__(f"Unknown {kind} {given!r}. Choose one of: {', '.join(sorted(menu))}.")
+    def __init__(self, kind: str, given: str, menu: list[str], near: Sequence[str] = ()) -> None:
+        near = near or get_close_matches(given, menu, NEAR)
+        meant = f" Did you mean {' or '.join(near)}?" if near else ""
+        every = f"Choose one of: {', '.join(sorted(menu))}."
+        super().__init__(f"Unknown {kind} {given!r}. {every}{meant}")
 
 
 class OutOfRangeError(UserError):

@@ -333,3 +333,5 @@ class RunAudit(Audit):
     """What the report says of them: detail, stiffness, contact, engine."""
     questions: Usage
     """What questions to models took."""
+    hints: tuple[str, ...] = field(default=(), kw_only=True)
+    """What may not be as expected though nothing is wrong, with the option that changes it."""

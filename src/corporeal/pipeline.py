@@ -426,7 +426,8 @@ class _Run:
     def _report(self, folder: Path, progress: Progress) -> None:
         progress(0.0, "writing the report")
         audit = read_audit(self.folder / FOLDERS["simulate"])
-        spent = Spent(_spoken(self.settings), self.seconds)
+        divided = self.settings.assemble.objects != "auto"
+        spent = Spent(_spoken(self.settings), self.seconds, divided)
         seen = self.folder / FOLDERS["reconstruct"] / POSES / FIGURE
         more = {"Where the photographs were taken from": seen} if seen.exists() else {}
         write_results(self.folder, self.made, audit, spent, progress, more)

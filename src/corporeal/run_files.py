@@ -21,6 +21,7 @@ from corporeal.stages.ground import doubts
 from corporeal.stages.report import Story, report
 from corporeal.trajectory.audit import believed
 from corporeal.trajectory.audit_file import AUDIT, write_audit
+from corporeal.trajectory.hints import hints
 from corporeal.types import Film, Inventory, Scene
 
 Progress = Callable[[float, str], None]
@@ -47,6 +48,8 @@ class Spent:
     """What the report says of them."""
     seconds: dict[str, float]
     """Verb → what it took [s]; the report's own are added before they are written down."""
+    divided: bool = False
+    """Whether it was asked for which nodes of a file are objects."""
 
 
 def write_results(
@@ -146,6 +149,7 @@ def run_audit(
         peak_memory_mb=peak_memory_mb(),
         settings=spent.settings,
         questions=made.inventory.usage,
+        hints=hints(made.assembled.scene, happened, spent.divided),
     )
 
 

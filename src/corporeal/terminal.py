@@ -15,10 +15,20 @@ def show_table(
     heads: Sequence[str], rows: Sequence[Sequence[str]], title: str | None = None
 ) -> None:
     """Print a table whose words are taken as they are."""
+    print_table(heads, rows, Console(), title)
+
+
+def print_table(
+    heads: Sequence[str],
+    rows: Sequence[Sequence[str]],
+    where: Console,
+    title: str | None = None,
+) -> None:
+    """Print a table whose words are taken as they are, to a certain console."""
     table = Table(*map(escape, heads), title=title and escape(title), box=None)
     for row in rows:
         table.add_row(*map(escape, row))
-    Console().print(table)
+    where.print(table)
 
 
 @contextmanager

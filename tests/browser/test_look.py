@@ -78,6 +78,7 @@ def test_a_report_plays_from_a_file_and_a_click_opens_the_card(report, tmp_path)
         tab.resize(390, 800, mobile=True)
         tab.until("viewer.see.clientWidth > 300 && viewer.see.clientHeight > 150")
         assert tab.run("document.documentElement.scrollWidth") <= 390
+        assert tab.run("document.querySelector('.track').clientWidth") > 250
         assert tab.errors == []
 
 

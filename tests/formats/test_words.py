@@ -2,6 +2,7 @@ import pytest
 
 from corporeal.formats.typical_extents import doubt, typical_extent
 from corporeal.formats.words import everyday, numbered, safe, unique
+from corporeal.geometry.identity import words
 
 
 @pytest.mark.parametrize(
@@ -18,10 +19,37 @@ from corporeal.formats.words import everyday, numbered, safe, unique
         ("Sketchfab_model", ""),
         ("42", ""),
         ("", ""),
+        ("мяч_01.glb", "мяч"),
+        ("椅子.glb", "椅子"),
+        ("木", "木"),
+        ("Plu\u0308schKatze", "plüsch katze"),
+        ("कुर्सी 2", "कुर्सी"),
+        ("كرسي", "كرسي"),
+        ("Ørsted Łódź", "ørsted łódź"),
     ],
 )
 def test_a_file_name_is_reduced_to_everyday_words(name, words):
     assert everyday(name) == words
+
+
+def test_a_name_of_any_alphabet_is_kept_in_paths_and_numbered():
+    assert safe("Plu\u0308sch/कुर्सी") == "Plüsch_कुर्सी"
+    assert numbered(["мяч", "мяч", "椅子"]) == ["мяч_0", "мяч_1", "椅子_0"]
+
+
+@pytest.mark.parametrize(
+    ("name", "found"),
+    [
+        ("M_LeatherParts.001", ["leather", "parts"]),
+        ("Plüschkatze", ["plüschkatze"]),
+        ("ГрибШляпа_2", ["гриб", "шляпа"]),
+        ("木", ["木"]),
+        ("TVStand", ["tv", "stand"]),
+        ("é", []),
+    ],
+)
+def test_parts_are_named_in_any_alphabet(name, found):
+    assert words(name) == found
 
 
 def test_names_can_stand_in_a_path():

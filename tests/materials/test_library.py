@@ -65,6 +65,8 @@ def test_spelling_does_not_matter(name):
 def test_an_unknown_material_shows_the_menu():
     with pytest.raises(UnknownChoiceError, match=r"Unknown material 'stel'.*steel"):
         materials.find("stel")
+    with pytest.raises(UnknownChoiceError, match=r"Did you mean steel.*\?$"):
+        materials.find("stel")
     with pytest.raises(UnknownChoiceError, match="Unknown material library 'mine'"):
         materials.library("mine")
 
@@ -258,3 +260,11 @@ def test_what_is_inside_is_in_materials_json_with_its_grounds():
     said = materials.materials_json(field, parts)["parts"][0]["structure"]
     assert (said["contents"], said["fill"]) == ("sauce", 0.9)
     assert said["contents_values"]["density"]["range"] == [1000, 1250]
+
+
+def test_coffee_is_a_drink_or_a_powder_and_nobody_guesses_which():
+    with pytest.raises(UnknownChoiceError) as refused:
+        materials.find("coffee")
+    assert str(refused.value).endswith("Did you mean ground_coffee or 'coffee drink' (water)?")
+    assert materials.find("coffee drink").name == "water"
+    assert materials.find("coffee powder").name == "ground_coffee"

@@ -91,6 +91,10 @@ def test_no_label_covers_another(tmp_path, monkeypatch, coarse):
 
 def test_a_material_has_the_same_colour_in_every_scene():
     assert np.allclose(colours.of_material("steel"), STEEL, atol=2e-3)
+    # Hardwood and paper are two blues by themselves; the later one gives way.
+    wood, paper, again = colours.apart(["hardwood", "paper", "hardwood"])
+    assert wood == again == colours.of_material("hardwood") and paper != wood
+    assert np.linalg.norm(np.subtract(wood, paper)) > 0.3
     names = ("steel", "rubber", "hardwood", "glass", "mud", "ceramic")
     for a, b in itertools.combinations(names, 2):
         assert np.linalg.norm(np.subtract(colours.of_material(a), colours.of_material(b))) > 0.08

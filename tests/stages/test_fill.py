@@ -10,7 +10,7 @@ from scipy.spatial import KDTree
 from corporeal.errors import UserError
 from corporeal.geometry.scene_survey import examine
 from corporeal.mpm.problem import Plane
-from corporeal.stages.fill import FillConfig, fill
+from corporeal.stages.fill import FillConfig, by_name, fill
 from corporeal.stages.simulate import SimulateConfig, simulate
 from corporeal.trajectory.ledger_row import object_of_body
 from corporeal.treatment.impact_speeds import motions
@@ -601,3 +601,9 @@ def test_what_is_filled_falls_as_one_and_its_audit_is_clean(tmp_path):
     assert np.isfinite(trajectory.ledger.centre).all()
     mass = trajectory.ledger.mass[0]
     assert mass[0] == pytest.approx(particles.mass_real[0], rel=1e-6)
+
+
+def test_what_the_treatment_counts_is_warned_of_by_name():
+    scene, _, _ = inputs(thing((ball(), STEEL)), thing((ball(), STEEL), name="sheet"))
+    said = by_name(["Object 2 of the scene is only 0.5 cells across.", "All is well."], scene)
+    assert said == ("sheet_1 is only 0.5 cells across.", "All is well.")

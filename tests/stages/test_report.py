@@ -168,3 +168,12 @@ def test_margin_is_explained_and_an_estimate_is_no_measurement(page):
     assert "the usual value in the estimated range" in wall
     (density,) = re.findall("<tr><td>density.*?</tr>", told)
     assert "the usual value in the measured range" in density
+
+
+def test_a_long_reason_that_all_values_share_is_said_once(page):
+    told = page(PartWords("", None))
+    reason = "Nobody knows what this part is made of"
+    assert told.count(f"Reason where none is stated: {reason}") == 1
+    assert told.count(reason) == 1
+    usual = page(PartWords("", "steel", answered_by="metadata"))
+    assert "Reason where none" not in usual and usual.count("the usual value in the") > 3

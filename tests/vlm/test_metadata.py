@@ -82,6 +82,20 @@ def test_two_materials_in_one_name_make_neither():
     assert "rubber and wood" in answer.reason
 
 
+def test_a_marble_of_glass_is_a_toy_and_no_stone():
+    assert seen("marble", "marble", Finish("glass")).material == "glass"
+    assert seen("marble", "table").material == "marble"
+
+
+@pytest.mark.parametrize(
+    ("finish", "material"),
+    [("beech wood", "hardwood"), ("Oak_Wood", "hardwood"), ("pine wood", "softwood"),
+     ("wood", "wood"), ("wooden planks of spruce", "softwood"), ("plywood sheet", "plywood")],
+)  # fmt: skip
+def test_a_particular_wood_stands_before_wood(finish, material):
+    assert seen("stool", "stool", Finish(finish)).material == material
+
+
 def test_a_particular_metal_stands_before_metal():
     assert seen("Metal.Bronze", "guitar", Finish("x", metallic=1.0)).material == "bronze"
 
@@ -251,6 +265,7 @@ def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
     ("thing", "structure"),
     [
         ("trash can", "shell"),
+        ("paper lantern", "shell"),
         ("storage box", "shell"),
         ("wooden crate", "shell"),
         ("dumpster", "shell"),

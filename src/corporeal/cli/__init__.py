@@ -17,6 +17,7 @@ from corporeal.cli.evaluate import verb_evaluate
 from corporeal.cli.export import verb_export
 from corporeal.cli.grow_masks import verb_masks
 from corporeal.cli.parse import parse
+from corporeal.cli.run_summary import show_summary
 from corporeal.cli.view import verb_view
 from corporeal.errors import UserError
 from corporeal.terminal import console, progress_bars, show_table
@@ -299,6 +300,7 @@ def _go(
     with progress_bars() as tell:
         run(inputs, folder, settings, tell, until)
     if until == "report":
+        show_summary(folder)
         print(folder / "report.html")
         print(folder / "film.mp4")
     else:
@@ -306,7 +308,10 @@ def _go(
 
 
 def _usage() -> str:
-    lines = [f"corporeal {__version__}: gives reconstructed scenes a body.", ""]
+    lines = [
+        f"corporeal {__version__}: measured materials for 3D scenes, and their simulation.",
+        "",
+    ]
     for name, verb in VERBS.items():
         first = (verb.__doc__ or "").strip().splitlines()[0]
         lines.append(f"  corporeal {name:10} {first}")

@@ -1,7 +1,8 @@
 """Everyday words out of file, node and mesh names."""
 
 import re
-import unicodedata
+
+from corporeal.geometry.letters import composed, is_letter, letter_runs, says_something
 
 VENDORS = frozenset(
     "khronos smallhouse kenney gazebo kaolin polyhaven market gso playcanvas bullet aws robomaker "
@@ -16,18 +17,21 @@ FILLERS = frozenset(
 
 
 def everyday(name: str) -> str:
-    """Return the words of a name that say what an object is: "soda can coke"; may be empty."""
+    """Return the words of a name that say what an object is: "soda can coke"; may be empty.
+
+    Of any alphabet: what no table of ours knows still tells objects apart for its reader.
+    """
     name = re.sub(r"\.[A-Za-z0-9]{2,4}$", "", name)
-    name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", unicodedata.normalize("NFC", name))
-    words = [w.lower() for w in re.split(r"[\W\d_]+", name)]
-    kept = [w for w in words if len(w) > 1 and w not in VENDORS and w not in FILLERS]
+    name = re.sub(r"(?<=[a-z])(?=[A-Z])", " ", name)
+    words = [w.lower() for w in letter_runs(name)]
+    kept = [w for w in words if says_something(w) and w not in VENDORS and w not in FILLERS]
     return " ".join(kept)[:60].strip()
 
 
 def safe(name: str) -> str:
     """Return a name that can stand in a path or a table: word characters, spaces, dots, dashes."""
-    kept = re.sub(r"[^\w .()-]+", "_", name).strip(" .")
-    return kept[:80]
+    plain = (c if is_letter(c) or re.match(r"[\w .()-]", c) else "\0" for c in composed(name))
+    return re.sub("\0+", "_", "".join(plain)).strip(" .")[:80]
 
 
 def writable(text: str) -> str:

@@ -5,10 +5,12 @@ import unicodedata
 import zlib
 from collections.abc import Callable, Hashable
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from jaxtyping import Int
 
+from corporeal.geometry.letters import letter_runs, says_something
 from corporeal.types import SUBSTANCE, Finish, Part, Scene, Surface
 
 NOISE = frozenset(
@@ -20,7 +22,8 @@ NOISE = frozenset(
     "textures untitled uv vert visual collision wire x y z".split()
 )
 """Words that exporters write whatever the object is."""
-SPLIT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+|[^\W\d_A-Za-z]+")
+SPLIT = re.compile(r"[A-Z]+(?=[A-Z][a-z])|[A-Z]?[a-z]+|[A-Z]+")
+"""Of a run of Latin letters without accents; in other runs a capital begins a word."""
 
 Hint = Callable[[Surface, Finish], str]
 
@@ -41,10 +44,19 @@ class Identity:
 def words(name: str) -> list[str]:
     """Split a name into lower-case words, without what exporters write.
 
-    ``"M_LeatherParts.001"`` gives ``["leather", "parts"]``, ``"Mülltonne"`` ``["mulltonne"]``.
+    ``"M_LeatherParts.001"`` gives ``["leather", "parts"]``.
     """
-    found = [w.lower() for w in SPLIT.findall(plain(name))]
-    return [w for w in found if len(w) > 1 and w not in NOISE]
+    found = [w.lower() for run in letter_runs(name) for w in _cut(run)]
+    return [w for w in found if says_something(w) and w not in NOISE]
+
+
+def _cut(run: str) -> list[str]:
+    """Cut a run of letters where a capital stands behind a small letter."""
+    if run.isascii():
+        return SPLIT.findall(run)
+    inner = range(1, len(run))
+    cuts = [0, *(k for k in inner if run[k - 1].islower() and run[k].isupper()), len(run)]
+    return [run[a:b] for a, b in pairwise(cuts)]
 
 
 def plain(text: str) -> str:

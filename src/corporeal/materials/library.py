@@ -4,11 +4,12 @@ A user's file replaces the default library; one that starts with ``extends = "de
 into it. Merging is by material: a table of the file replaces its namesake whole.
 """
 
+import re
 import tomllib
 from functools import lru_cache
 from pathlib import Path
 
-from corporeal.errors import BadFileError, UnknownChoiceError, UserError
+from corporeal.errors import NEAR, BadFileError, UnknownChoiceError, UserError
 from corporeal.materials.entry import Entry, entries, plain
 from corporeal.materials.lint import RESERVED, Problem, inspect
 from corporeal.materials.shipped import SHIPPED, shipped, source_table
@@ -56,7 +57,20 @@ def find(name: str, library_name: str = "default") -> Entry:
     also = [e for e in known.values() if wanted in map(plain, e.aliases)]
     if named or also:
         return (named or also)[-1]
-    raise UnknownChoiceError("material", name, list(known))
+    raise UnknownChoiceError("material", name, list(known), _near(wanted, known))
+
+
+def _near(wanted: str, known: dict[str, Entry]) -> list[str]:
+    """Return the entries that have a word in their name or in an alias, as a person reads them."""
+    found = [e.name for e in known.values() if wanted in _words(e.name)]
+    for entry in known.values():
+        also = [alias for alias in entry.aliases if wanted in _words(alias)]
+        found += [f"{alias!r} ({entry.name})" for alias in also if entry.name not in found]
+    return found[:NEAR]
+
+
+def _words(name: str) -> list[str]:
+    return [plain(word) for word in re.split(r"[\s_-]+", name)]
 
 
 def named(name: str, library_name: str) -> Entry:

@@ -15,6 +15,9 @@ SALT = "s41605"
 HUES = 30
 TIERS = ((0.52, 0.115), (0.66, 0.125), (0.79, 0.105), (0.40, 0.085))
 """Lightness and chroma of OKLCH."""
+ALIKE = 0.08
+"""Colours nearer than this in OKLab are taken for one another."""
+TRIES = 60
 BRIGHT = ("#4477aa", "#228833", "#66ccee", "#ccbb44", "#aa3377", "#ee6677")
 """Tol's bright scheme, without its grey."""
 LAWS = {law: (MENU[law].name, BRIGHT[law.value % len(BRIGHT)]) for law in Law}
@@ -36,10 +39,34 @@ def of_hex(text: str) -> Colour:
 
 def of_material(name: str) -> Colour:
     """Give a library name its colour, the same in every scene, on every machine."""
+    return of_oklch(*_own(name))
+
+
+def apart(names: Sequence[str]) -> list[Colour]:
+    """Give every name its own colour; the later of two that look alike takes another one.
+
+    Shaded surfaces differ in lightness by themselves, so that it counts half.
+    """
+    taken: dict[str, tuple[float, float, float]] = {}
+    for name in dict.fromkeys(names):
+        tries = [_own(name), *(_own(f"{name} {k}") for k in range(1, TRIES))]
+        far = [min((_away(own, other) for other in taken.values()), default=1.0) for own in tries]
+        clear = next((k for k, d in enumerate(far) if d >= ALIKE), int(np.argmax(far)))
+        taken[name] = tries[clear]
+    return [of_oklch(*taken[name]) for name in names]
+
+
+def _own(name: str) -> tuple[float, float, float]:
+    """Lightness, chroma and hue [rad] of a name."""
     number = int.from_bytes(hashlib.sha256(f"{SALT} {name}".encode()).digest()[:6], "big")
     lightness, chroma = TIERS[number % len(TIERS)]
-    hue = 2 * np.pi * ((number // len(TIERS)) % HUES) / HUES
-    return of_oklch(lightness, chroma, hue)
+    return lightness, chroma, 2 * np.pi * ((number // len(TIERS)) % HUES) / HUES
+
+
+def _away(one: tuple[float, float, float], other: tuple[float, float, float]) -> float:
+    """How far apart two colours look."""
+    (a, b), (p, q) = ((c * np.cos(h), c * np.sin(h)) for _, c, h in (one, other))
+    return float(np.hypot((one[0] - other[0]) / 2, np.hypot(a - p, b - q)))
 
 
 def of_oklch(lightness: float, chroma: float, hue: float) -> Colour:

@@ -166,7 +166,7 @@ def panels(scene: Scene, parts: Parts, field: MaterialField) -> dict[Quantity, N
         "material": Names(
             "Material",
             [m.name.replace("_", " ") for m in made],
-            [colours.of_material(m.name) for m in made],
+            colours.apart([m.name for m in made]),
         ),
         "law": Names(
             "Constitutive law", [n for n, _ in laws], [colours.of_hex(c) for _, c in laws]

@@ -1,5 +1,7 @@
 """Fill every part with material points: solids, walls and sheets, with their true masses."""
 
+import re
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from typing import Literal
 
@@ -46,6 +48,8 @@ class FillConfig:
 
 
 DEFAULT = FillConfig()
+COUNTED = re.compile(r"Object (\d+) of the scene")
+"""As the treatment, which knows no names, calls an object."""
 
 
 def validate(config: FillConfig) -> None:
@@ -95,9 +99,16 @@ def fill(
     particles = wetted(gather(parts, bodies, chosen, packings), bodies, config.seed)
     doubted = implausible_masses(scene, anatomies, particles.mass_real)
     thick = walls_drawn_too_thick(scene, anatomies, makes, field)
-    told = (*particles.warnings, *drawn, *heavy, *thick, *doubted)
+    told = (*by_name(particles.warnings, scene), *drawn, *heavy, *thick, *doubted)
     particles = replace(particles, warnings=told, contents=contents)
     return planted(scene, particles, anatomies, field, tissue)
+
+
+def by_name(warnings: Iterable[str], scene: Scene) -> tuple[str, ...]:
+    """Return sentences with the names of objects in place of their numbers."""
+    return tuple(
+        COUNTED.sub(lambda found: scene.objects[int(found[1]) - 1].name, w) for w in warnings
+    )
 
 
 # ------------------------------------------------------------------ how it is made

@@ -31,6 +31,7 @@ from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, ro
 from corporeal.render.film_picture import FilmCaster
 from corporeal.render.liquid_surface import LiquidSurface, surface_of
 from corporeal.render.pace import between, instants, is_slow
+from corporeal.render.sightlines import clear_view
 from corporeal.render.skin import Skin, bind
 from corporeal.splats import raster
 from corporeal.store import writing
@@ -55,6 +56,8 @@ MOMENTS = (-0.03, 0.0, 0.02, 0.05, 0.12, 0.4)
 """Pictures of the close-up, from the first contact on [s]."""
 LOOKS = 60
 """Frames that the camera's place is chosen by, at most."""
+SOUNDED = (0.0, 0.35, 0.7, 1.0)
+"""Instants at which it is seen what hides, as shares of the film."""
 STRAYS = 0.4
 """Percent of an object's particles, at either end, that need not be in the picture."""
 CORE = 0.5
@@ -141,6 +144,8 @@ def film(
     skin = bind(scene, prepared.parts, prepared.particles, granular(field), fluid(field))
     reel = reel_of(skin, scene, prepared.particles, trajectory)
     size = config.width, config.height
+    if config.view is None:
+        config = replace(config, view=_clear_view(scene, skin, reel, trajectory, size))
     camera = track(config.shot, reel, size, config.view)
     fps = max(round(scene.fps * config.speed), 1)
     credit = "; ".join(dict.fromkeys(o.credit for o in scene.objects if o.credit))
@@ -160,6 +165,19 @@ def film(
             progress((number + 1) / len(places), f"frame {number + 1} of {len(places)}")
     _close_up(troupe, reel, trajectory, config, folder)
     return Film(folder / FILM, fps, *size, times=tuple(times))
+
+
+def _clear_view(
+    scene: Scene, skin: Skin, reel: Reel, trajectory: Trajectory, size: tuple[int, int]
+) -> Vector | None:
+    """Return a direction in which objects do not hide behind or inside of one another."""
+    if len(scene.objects) < 2:
+        return None
+    last, stage = len(trajectory.frames) - 1, Stage(scene)
+    numbers = dict.fromkeys(round(share * last) for share in SOUNDED)
+    stages = [stage.posed(*skin.pose(trajectory.frames[k])) for k in numbers]
+    owner = np.repeat([s.object for s in scene.surfaces], [len(s.vertices) for s in scene.surfaces])
+    return clear_view(stages, owner, reel.boxes, size)
 
 
 def _close_up(

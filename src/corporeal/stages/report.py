@@ -5,6 +5,7 @@ range it was chosen from and where that range was read.
 """
 
 import math
+from collections import Counter
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,6 +72,8 @@ CHOSEN = {
     "field": "another method",
     "borrowed": "ours, which the other method does not tell",
 }
+LONG_REASON = 60
+"""Letters of a reason that is not printed at every value."""
 WAYS_SHOWN = 2
 """Ways an object may be, of those that were drawn."""
 
@@ -142,6 +145,7 @@ def _summary(story: Story) -> str:
     sentences += [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
     settled = equilibrium_words(story.audit.settling)
     sentences += filter(None, [safe(how_scaled(scene.objects)), safe(settled)])
+    sentences += map(safe, story.audit.hints)
     if unknown:
         sentences.append(
             f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got the "
@@ -279,7 +283,8 @@ def _part_row(story: Story, k: int) -> str:
         how_heavy(story.particles.mass_real[k], story.scene.objects[part.object].scale),
     )
     cells = (
-        _cells(*map(safe, names), f"<b>{safe(material.name)}</b>"),
+        _cells(*map(safe, names), wrap=True),
+        _cells(f"<b>{safe(material.name)}</b>"),
         _cells(WHO[words.answered_by], MENU[material.law].full_name, wrap=True),
         _cells(*numbers),
         _cells(safe(built(story.field.structures[k])), safe(treatment.kind), wrap=True),
@@ -346,18 +351,27 @@ def _walled(particles: Particles, k: int, usual: float) -> bool:
 
 def _values(material: Material, structure: Structure, walled: bool) -> str:
     """Lay out every value that is used with its range, who chose it, why, and its source."""
-    rows = "".join(
-        _ground_row(name, ground)
+    shown = [
+        (name, ground, "")
         for name, ground in material.grounds.items()
         if name in UNITS and (walled or name != "shell_thickness")
-    )
+    ]
     inner = structure.contents
     if inner is not None and "density" in inner.grounds:
-        rows += _ground_row("density", inner.grounds["density"], f" of the {inner.name} in it")
+        shown.append(("density", inner.grounds["density"], f" of the {inner.name} in it"))
+    shared = _shared_reason([ground.reason for _, ground, _ in shown])
+    rows = "".join(_ground_row(name, ground, of, shared) for name, ground, of in shown)
+    above = f"<p>Reason where none is stated: {safe(shared)}</p>" if shared else ""
     return (
-        "<table><tr><th>quantity</th><th>value</th><th>position in range</th>"
+        f"{above}<table><tr><th>quantity</th><th>value</th><th>position in range</th>"
         f"<th>chosen by</th><th>reason</th><th>source of range</th></tr>{rows}</table>"
     )
+
+
+def _shared_reason(reasons: Sequence[str]) -> str:
+    """Return a long reason that several values have: it is said once, above their table."""
+    often, count = Counter(reasons).most_common(1)[0] if reasons else ("", 0)
+    return often if count > 1 and len(often) > LONG_REASON else ""
 
 
 def others(words: PartWords) -> str:
@@ -371,7 +385,7 @@ def others(words: PartWords) -> str:
     return safe(rest + (f" Components: {'; '.join(pieces)}." if pieces else ""))
 
 
-def _ground_row(name: str, ground: Ground, of: str = "") -> str:
+def _ground_row(name: str, ground: Ground, of: str, shared: str) -> str:
     label, unit = UNITS[name]
     label += safe(of)
     low, high = ground.range.low, ground.range.high
@@ -382,7 +396,8 @@ def _ground_row(name: str, ground: Ground, of: str = "") -> str:
         f"<tr><td>{label}</td><td>{si(ground.value, unit)}</td>"
         f'<td class="place">{si(low, unit)} {bar} {si(high, unit)}{scale}</td>'
         f"<td>{safe(CHOSEN.get(ground.chosen_by, ground.chosen_by))}</td>"
-        f"<td>{safe(ground.reason)}</td><td>{safe(ground.range.source)}</td></tr>"
+        f"<td>{'' if ground.reason == shared else safe(ground.reason)}</td>"
+        f"<td>{safe(ground.range.source)}</td></tr>"
     )
 
 

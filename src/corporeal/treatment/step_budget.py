@@ -98,10 +98,12 @@ def fit_budget(
         for t in treatments
     ]
     changed = sum(a.young != b.young for a, b in zip(treatments, fitted, strict=True))
+    softer = (
+        "is simulated softer than it is" if changed == 1 else "are simulated softer than they are"
+    )
     warning = (
-        f"{changed} of {len(fitted)} parts are simulated softer than they are, to stay within "
-        f"{steps:,.0f} steps per second; the order of stiffness is kept. "
-        "A finer detail has a larger budget."
+        f"{changed} of {len(fitted)} parts {softer}, to stay within {steps:,.0f} steps per second; "
+        "what is stiffer stays stiffer. A finer --detail has a larger budget."
     )
     return Fitted(fitted, (warning,))
 

@@ -1,0 +1,41 @@
+"""What a finished run says in the terminal: what everything was taken for, and what to look at."""
+
+from collections.abc import Sequence
+from pathlib import Path
+
+from corporeal.findings import PartAudit
+from corporeal.terminal import console, print_table
+from corporeal.trajectory.audit_file import read_run_audit
+
+MOST_PARTS = 12
+"""Rows of the table; a scene of more parts is in the report."""
+MOST_WARNINGS = 5
+"""Warnings that are printed whole."""
+HEADS = ("object", "part", "material", "mass", "simulated as")
+
+
+def show_summary(folder: Path) -> None:
+    """Print what the parts of a finished run were taken for, its warnings and hints."""
+    audit = read_run_audit(folder)
+    rows = [_row(part) for part in audit.parts]
+    print_table(HEADS, rows[:MOST_PARTS], console)
+    if len(rows) > MOST_PARTS:
+        _say(f"and {len(rows) - MOST_PARTS} parts more: see the report.")
+    _listed("warning", audit.warnings)
+    for hint in audit.hints:
+        _say(f"hint: {hint}")
+
+
+def _row(part: PartAudit) -> tuple[str, ...]:
+    return (part.object or "", part.name, part.material, f"{part.mass_kg:.3g} kg", part.treatment)
+
+
+def _listed(word: str, sentences: Sequence[str]) -> None:
+    for sentence in sentences[:MOST_WARNINGS]:
+        _say(f"{word}: {sentence}")
+    if len(sentences) > MOST_WARNINGS:
+        _say(f"and {len(sentences) - MOST_WARNINGS} {word}s more: see the report.")
+
+
+def _say(line: str) -> None:
+    console.print(line, markup=False, highlight=False, soft_wrap=True)

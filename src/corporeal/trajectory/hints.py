@@ -1,0 +1,69 @@
+"""What may not be as expected though nothing is wrong, with the option that changes it.
+
+Warnings say why a result may not be trusted; hints say what else could have been asked for.
+"""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from corporeal.findings import ObjectOutcome, Outcome
+from corporeal.geometry.identity import words
+from corporeal.types import Scene
+
+STILL = 0.01
+"""Of an object's length: what moves or bends less cannot be seen [-]."""
+STILL_TURN = 1.0
+"""The same of its turning [degrees]."""
+START = "Let it fall (--drop 0.5), throw it (--velocity NAME=1,0,0) or push it (scene.toml)."
+
+
+def hints(scene: Scene, happened: Outcome, divided: bool) -> tuple[str, ...]:
+    """Return what a person may want to know before the next run, in sentences.
+
+    Args:
+        scene: What was simulated.
+        happened: What was seen.
+        divided: Whether it was asked for which nodes of a file are objects of their own.
+
+    """
+    joined = () if divided else _joined(scene)
+    return (*joined, *_motionless(scene, happened))
+
+
+def _joined(scene: Scene) -> Iterator[str]:
+    """Say of a file with several named pieces that they are one object."""
+    names = dict.fromkeys(s.name for s in scene.surfaces if words(s.name))
+    if len(scene.objects) != 1 or len(names) < 2:
+        return
+    shown = ", ".join(list(names)[:3]) + (", …" if len(names) > 3 else "")
+    yield (
+        f"The file is one object: its {len(names)} named pieces ({shown}) stay together. "
+        "With --objects nodes each of its nodes is an object."
+    )
+
+
+def _motionless(scene: Scene, happened: Outcome) -> Iterator[str]:
+    """Say that nothing moves, or that a push or a wind does not move what it acts on."""
+    held = [o for o in scene.objects if _is_still(happened.objects.get(o.name))]
+    pushed = [o.name for o in held if o.push is not None]
+    blown = [o.name for o in held if o.wind is not None]
+    if pushed:
+        is_ = "is" if len(pushed) == 1 else "are"
+        yield (
+            f"{', '.join(pushed)} {is_} pushed and yet not moved: friction, or what stands in the "
+            "way, holds as much. The acceleration of a push has to exceed friction coefficient "
+            "times gravity."
+        )
+    if blown:
+        yield f"{', '.join(blown)}: the wind is too weak to move it visibly."
+    if len(held) == len(scene.objects) and not pushed and not blown:
+        yield f"Nothing moves: everything stands at rest, as in the file. {START}"
+
+
+def _is_still(what: ObjectOutcome | None) -> bool:
+    if what is None:
+        return False
+    far = float(np.linalg.norm(what.moved_m))
+    turns = what.turned_deg > STILL_TURN
+    return not turns and far < STILL * what.length_m and what.shape_error_max < STILL
