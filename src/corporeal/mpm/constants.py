@@ -102,6 +102,8 @@ THIN = 2.0
 where it begins."""
 SHOWN_AROUND = 1.0
 """They are looked at this far from the normal through the node [cells]."""
+RUN_ACROSS = 6.0
+"""Width of a run of them that is passed over together, over their spacing [-]: some forty."""
 FACE_STEPS = 4096
 """Intervals of the table that says where the face of a half space lies, from 1½ cells to none."""
 FIRST_BIAS, OTHER_BIAS = 0.10, 0.05

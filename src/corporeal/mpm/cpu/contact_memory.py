@@ -3,7 +3,7 @@
 import numpy as np
 
 from corporeal.mpm import laws
-from corporeal.mpm.constants import HELD_BY_WALL, WALL_REACH, WETTED_REACH
+from corporeal.mpm.constants import HELD_BY_WALL, RUN_ACROSS, SHOWN_AROUND, WALL_REACH, WETTED_REACH
 from corporeal.mpm.cpu import layout
 from corporeal.mpm.cpu.layout import BOX, CENTRE, PAIR, RADIUS
 from corporeal.mpm.ledger import Ledger
@@ -57,6 +57,10 @@ def rigid_grid(
         surface = np.zeros((1, 3))
     points, clumps = _clumped(points, 4.0 * cell)
     wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
+    thin, spacing = rigid.thinness(body.surface, cell), rigid.spacing(body.surface)
+    # Many nodes ask where a thin body's surface begins: runs of points that are near each other.
+    width = max(SHOWN_AROUND * cell, RUN_ACROSS * spacing)
+    shown, shows = _clumped(surface if thin else surface[:0], width)
     state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
     arrays = {
         "node": np.zeros((across**3, 64, 8), np.float32),
@@ -69,14 +73,16 @@ def rigid_grid(
         "surface": np.ascontiguousarray(surface),
         "wetted": wetted,
         "patch": patches,
+        "shown": shown,
+        "show": shows,
         "rigid": state,
     }
     point(record, **arrays)
     record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
-    record["clumps"], record["patches"] = len(clumps), len(patches)
-    record["spacing"] = rigid.spacing(body.surface)
-    record["thin"] = rigid.thinness(body.surface, cell)
+    record["clumps"], record["patches"], record["shows"] = len(clumps), len(patches), len(shows)
+    record["spacing"] = spacing
+    record["thin"] = thin
     return arrays
 
 
