@@ -102,6 +102,8 @@ THIN = 2.0
 where it begins."""
 SHOWN_AROUND = 1.0
 """They are looked at this far from the normal through the node [cells]."""
+RUN_ACROSS = 6.0
+"""Width of a run of them that is passed over together, over their spacing [-]: some forty."""
 KEPT_STEPS = 8
 """Which candidate normal is widest is looked at anew in every so manieth step (decision 52) …"""
 KEPT_TRAVEL = 0.5

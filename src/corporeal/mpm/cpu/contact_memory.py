@@ -3,7 +3,14 @@
 import numpy as np
 
 from corporeal.mpm import laws
-from corporeal.mpm.constants import HELD_BY_WALL, VAST, WALL_REACH, WETTED_REACH
+from corporeal.mpm.constants import (
+    HELD_BY_WALL,
+    RUN_ACROSS,
+    SHOWN_AROUND,
+    VAST,
+    WALL_REACH,
+    WETTED_REACH,
+)
 from corporeal.mpm.cpu import layout
 from corporeal.mpm.cpu.layout import BOX, CENTRE, LANES, PAIR, RADIUS
 from corporeal.mpm.ledger import Ledger
@@ -61,6 +68,10 @@ def rigid_grid(
     wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
     places[:, : len(wetted)] = wetted[:, :3].T
+    thin, spacing = rigid.thinness(body.surface, cell), rigid.spacing(body.surface)
+    # Many nodes ask where a thin body's surface begins: runs of points that are near each other.
+    width = max(SHOWN_AROUND * cell, RUN_ACROSS * spacing)
+    shown, shows = _clumped(surface if thin else surface[:0], width)
     state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
     arrays = {
         "node": np.zeros((across**3, 64, 8), np.float32),
@@ -74,15 +85,17 @@ def rigid_grid(
         "wetted": wetted,
         "patch": patches,
         "places": places,
+        "shown": shown,
+        "show": shows,
         "rigid": state,
     }
     point(record, **arrays)
     record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
-    record["clumps"], record["patches"] = len(clumps), len(patches)
+    record["clumps"], record["patches"], record["shows"] = len(clumps), len(patches), len(shows)
     record["wets"] = places.shape[1]
-    record["spacing"] = rigid.spacing(body.surface)
-    record["thin"] = rigid.thinness(body.surface, cell)
+    record["spacing"] = spacing
+    record["thin"] = thin
     return arrays
 
 

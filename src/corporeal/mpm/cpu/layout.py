@@ -180,6 +180,7 @@ FIELD = Record(
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
+    ("double *", "shown show"),  # thin: surface points in order of place; [shows][6] as of clumps
     ("double", "spacing"),  # rigid: of its surface points
     ("double", "mass full"),  # full: of a cell full of it
     ("int[3]", "origin dim"),  # in blocks; the window's corner and size
@@ -187,7 +188,7 @@ FIELD = Record(
     ("int", "floor"),  # the only plane that the window reaches, or -1
     ("float[3]", "level"),  # its normal, or 0
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
-    ("int", "patches wets"),
+    ("int", "patches wets shows spare"),
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )
 BLOW = Record(  # a body in the wind: see wind_records.py
