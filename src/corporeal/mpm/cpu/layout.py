@@ -179,6 +179,7 @@ FIELD = Record(
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
     ("double", "spacing"),  # rigid: of its surface points
     ("double", "mass full"),  # full: of a cell full of it
+    ("double[3]", "flows_by"),  # of a liquid at a wall: yield stress [Pa], K/d^n [Pa (s/m)^n], n
     ("int[3]", "origin dim"),  # in blocks; the window's corner and size
     ("int", "blocks pool rigids points surfaces pushed swells flows relaxes"),
     ("int", "floor"),  # the only plane that the window reaches, or -1
@@ -287,7 +288,7 @@ TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - 
     ("int", "meet a c fa fc active"),
     ("int", "face spare"),  # which face of a rigid body a liquid meets
     ("double[3]", "x normal"),
-    ("double", "gap target inverse mu"),
+    ("double", "gap target inverse mu span"),  # span: over which a wall drags on a liquid [m² s]
     ("double[3]", "J before"),
 )
 ENTRY = Record(  # what some contacts of one pair add to the books
@@ -303,10 +304,11 @@ PAST = Record(  # force of a contact in the last step
 LINE = Record(  # a contact in the list of those that move rigid bodies
     "Line",
     ("double *", "a c"),  # velocity of a node or state of a rigid body; 0: a plane
+    ("double *", "flows_by"),  # flow curve of a liquid that a wall drags on over a span
     ("double", "ma mc"),  # inverse masses of nodes; negative: a rigid body
     ("double[3]", "n ra rc"),
     ("double[6]", "K"),
-    ("double", "inverse target mu e"),  # e: of restitution
+    ("double", "inverse target mu e span"),  # e: of restitution; span: as of its touch
     ("double[3]", "J"),
     ("unsigned long long", "key"),
     ("int", "touch group waits spare"),  # waits: not in this round of impacts

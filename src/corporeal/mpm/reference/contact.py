@@ -6,146 +6,23 @@ impulses together, rigid bodies and walls included.
 
 from dataclasses import dataclass
 from itertools import combinations
-from typing import Protocol
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.mpm import laws
 from corporeal.mpm.constants import (
     HELD_BY_WALL,
     POINT_REACH,
     SHOWN_AROUND,
-    STICKS,
     SWEEPS,
     SWEEPS_OF_A_HIT,
-    TINY_DOUBLE,
+    VAST,
     WALL_REACH,
 )
 from corporeal.mpm.laws.kinematics import determinant
-from corporeal.mpm.physics import contact, contact_impulses, rigid
+from corporeal.mpm.physics import contact, contact_impulses
 from corporeal.mpm.physics.spline import Stencil
-from corporeal.mpm.problem import Problem, WettedSurface
-from corporeal.mpm.state import Matter, State
-
-
-class Stand(Protocol):
-    """Something that moves in a rigid body's stead."""
-
-    def act(self, movers: contact_impulses.Movers) -> None:
-        """Take the body's place among what contact can move."""
-        ...
-
-
-@dataclass(frozen=True)
-class Scene:
-    """One step's stage."""
-
-    problem: Problem
-    matter: Matter
-    state: State
-    grid: Stencil
-    mass: Float[np.ndarray, " A"]
-    """Of every slot [kg]."""
-    kick: Float[np.ndarray, "B 3"]
-    """Velocity that gravity and push gave each body in this step [m/s]."""
-    old: Float[np.ndarray, "A 3"]
-    """Velocity of every slot before this step's forces [m/s]."""
-    composites: tuple["Stand", ...] = ()
-    """Rigid bodies that move as one with what they hold."""
-
-    @property
-    def single(self) -> bool:
-        """Whether all bodies share one field."""
-        return self.problem.contact == "single"
-
-    def is_rigid(self, field: int) -> bool:
-        """Whether a field moves with six degrees of freedom."""
-        return not self.single and self.problem.bodies[field].rigid
-
-    @property
-    def feigned(self) -> Float[np.ndarray, " B"]:
-        """Spin of each rigid body times the distance of its surface points [m/s]."""
-        return np.linalg.norm(self.state.spin(self.matter), axis=1) * self.matter.spacing
-
-    def surface(self, body: int) -> Float[np.ndarray, "S 3"]:
-        """Surface points of a rigid body now [m]."""
-        turned = self.matter.surface[body] @ self.state.rotation[body].T
-        return self.state.centre[body] + turned
-
-    def wetted(self, body: int) -> WettedSurface | None:
-        """Where liquids touch a rigid body now; None: as everything else does."""
-        given = self.problem.bodies[body].wetted
-        if given is None or not self.is_rigid(body):
-            return None
-        R = self.state.rotation[body].T
-        point = self.state.centre[body] + (given.point - self.matter.centre[body]) @ R
-        return WettedSurface(point, given.normal @ R)
-
-    def pours(self, field: int) -> bool:
-        """Whether a field holds a liquid."""
-        mine = self.matter.law[self.single | (self.matter.body == field)]
-        return not self.is_rigid(field) and bool(np.isin(mine, laws.LIQUID).any())
-
-    def full(self, field: int, slot: Int[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
-        """Masses of a field's nodes over that of a cell full of its body [-]."""
-        body = self.problem.bodies[field]
-        return self.mass[slot] / contact.full_cell(body, self.problem.cell)
-
-    def slides(self, field: int, wall: int) -> bool:
-        """Whether a field is a liquid that slides along a plane: all that it presses holds it."""
-        friction = _friction(self.problem)[field, len(self.problem.bodies) + wall]
-        return self.pours(field) and bool(friction < STICKS)
-
-    def thinness(self, field: int) -> int:
-        """How thin a rigid body is against the cell; 0 for what deforms."""
-        if not self.is_rigid(field):
-            return 0
-        return rigid.thinness(self.matter.surface[field], self.problem.cell)
-
-    @property
-    def wall_mover(self) -> int:
-        """Movers are the bodies, then the slots, then the planes, of which this is the first."""
-        return len(self.problem.bodies) + self.grid.count
-
-    def mover_of_slot(self, slot: Int[np.ndarray, " E"]) -> Int[np.ndarray, " E"]:
-        """Give the rigid body that owns the slot, or the slot itself."""
-        bodies = len(self.problem.bodies)
-        stiff = np.array([self.is_rigid(f) for f in range(bodies)])
-        field = self.grid.field[slot]
-        return np.where(stiff[field], field, bodies + slot)
-
-    def movers(self, velocity: Float[np.ndarray, "A 3"]) -> contact_impulses.Movers:
-        """Everything that an impulse can move, with its velocity after forces."""
-        bodies = len(self.problem.bodies)
-        still = np.zeros((len(self.problem.planes), 3))
-        stiff = np.array([self.is_rigid(b) for b in range(bodies)])
-        # A body with prescribed motion is as heavy as a wall.
-        free = stiff & [body.path is None for body in self.problem.bodies]
-        inertia = np.zeros((self.wall_mover + len(still), 3, 3))
-        inertia[:bodies] = np.where(
-            free[:, None, None], self.state.inverse_inertia(self.matter), 0.0
-        )
-        spin = np.zeros((self.wall_mover + len(still), 3))
-        spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
-        light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, TINY_DOUBLE), 0.0)
-        movers = contact_impulses.Movers(
-            np.concatenate([np.where(free, 1.0 / self.matter.total, 0.0), light, still[:, 0]]),
-            inertia,
-            np.concatenate([self.state.centre, self.grid.index * self.problem.cell, still]),
-            np.concatenate([self.state.speed, velocity, still]),
-            spin,
-        )
-        for composite in self.composites:
-            composite.act(movers)
-        return movers
-
-    def movers_before_forces(self) -> contact_impulses.Movers:
-        """Everything that an impulse can move, with the velocity it had as the step began."""
-        movers = self.movers(self.old)
-        for b in filter(self.is_rigid, range(len(self.problem.bodies))):
-            movers.velocity[b] -= self.kick[b]
-        return movers
+from corporeal.mpm.reference.contact_scene import Scene, friction_table
 
 
 @dataclass(frozen=True)
@@ -161,11 +38,18 @@ class Touch:
     gap: Float[np.ndarray, " E"]
     slips: Bool[np.ndarray, " E"] | None = None
     """Which of them transmit no friction; None: all do."""
+    layer: Float[np.ndarray, "E 4"] | None = None
+    """Where a wall drags on a liquid that sticks: see ``contact_impulses.Contacts``."""
 
     @property
     def grips(self) -> Float[np.ndarray, " E"]:
         """Share of the pair's friction that each transmits [-]."""
         return np.ones(len(self.gap)) if self.slips is None else 1.0 - self.slips
+
+    @property
+    def layers(self) -> Float[np.ndarray, "E 4"]:
+        """The layer of each, without a span where none drags."""
+        return np.zeros((len(self.gap), 4)) if self.layer is None else self.layer
 
 
 @dataclass(frozen=True)
@@ -196,9 +80,10 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     pair = pair.reshape(-1, 2)
     contacts = contact_impulses.Contacts(
         *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _COLUMNS),
-        friction=_friction(problem)[pair[:, 0], pair[:, 1]]
+        friction=friction_table(problem)[pair[:, 0], pair[:, 1]]
         * _joined([t.grips for t in touches], (0,)).astype(np.float64),
         group=np.repeat(np.arange(len(touches)), [len(t.gap) for t in touches]),
+        layer=_joined([t.layers for t in touches], (0, 4)),
     )
     movers = scene.movers(velocity)
     # Impacts of rigid bodies first, one after the other; then all that touches, together.
@@ -236,11 +121,13 @@ def _sweeps(scene: Scene, contacts: contact_impulses.Contacts, hit: bool) -> int
 
 
 def _possible(touch: Touch) -> Touch:
-    """Leave out what is no contact at all."""
-    real = np.isfinite(touch.gap)
+    """Leave out what is no contact at all; what only drags never pushes."""
+    drags = touch.layers[:, 0] > 0.0
+    real = np.isfinite(touch.gap) | drags
     columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
+    columns["gap"] = np.minimum(columns["gap"], VAST)
     slips = None if touch.slips is None else touch.slips[real]
-    return Touch(touch.pair, **columns, slips=slips)
+    return Touch(touch.pair, **columns, slips=slips, layer=touch.layers[real])
 
 
 _COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
@@ -250,15 +137,6 @@ def _joined(columns: list[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
     if not columns:
         return np.zeros(empty, dtype=np.int64 if empty == (0,) else np.float64)
     return np.concatenate(columns)
-
-
-def _friction(problem: Problem) -> Float[np.ndarray, "N N"]:
-    """μ of every pair; a single field has the mean of its bodies against a plane."""
-    friction = np.array(problem.friction, dtype=np.float64)
-    if problem.contact == "single":
-        bodies = len(problem.bodies)
-        friction[:bodies, bodies:] = friction[:bodies, bodies:].mean(axis=0, keepdims=True)
-    return friction
 
 
 def _rebound(
@@ -321,12 +199,13 @@ def _near(
 ) -> Int[np.ndarray, " E"]:
     """Slots of a field that a plane may touch.
 
-    Pressure of a liquid that slides along it pushes all nodes whose splines reach it. Where fields
-    meet, there may be a body between, and only the nodes near the plane count.
+    Pressure of a liquid that slides along it pushes all nodes whose splines reach it, and a plane
+    drags on all such nodes of one that sticks. Where fields meet, there may be a body between, and
+    only the nodes near the plane count.
     """
     height = _height(scene, slot, pair[1]) / scene.problem.cell
     near = height <= WALL_REACH
-    if scene.slides(*pair):
+    if scene.pours(pair[0]):
         near |= (height <= HELD_BY_WALL) & np.isin(slot, alone)
     return slot[near]
 
@@ -429,16 +308,17 @@ def _wet(
     node, mean = scene.grid.index[slot] * cell, look.mean[slot]
     face = contact.wetted_faces(surface, node, node + mean, cell)
     k, out = face.node, face.outward
-    sticks = scene.problem.friction[pair] >= STICKS
-    if sticks:
+    liquid, layer = pair[liquid_side], None
+    if scene.sticks(liquid, pair[rigid_side]):
         gap = contact.gap_to_surface(mean[k], face.height, -out, cell)
+        layer = scene.layer(liquid, slot[k], mean[k], face.height, -out)
     else:
-        full = scene.full(pair[liquid_side], slot)[k]
+        full = scene.full(liquid, slot)[k]
         gap = contact.gap_of_liquid(mean[k], face.height, -out, full, cell)
     normal = out if rigid_side == 0 else -out
     movers = scene.mover_of_slot(slots[0][k]), scene.mover_of_slot(slots[1][k])
     slips = face.height > WALL_REACH * cell
-    return Touch(pair, *movers, node[k], normal, gap, slips)
+    return Touch(pair, *movers, node[k], normal, gap, slips, layer)
 
 
 def _between_surfaces(
@@ -469,7 +349,9 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     field, wall = pair
     cell, bodies = scene.problem.cell, len(scene.problem.bodies)
     normal = np.tile(-np.array(scene.problem.planes[wall].normal), (len(slot), 1))
-    height = _height(scene, slot, wall)
+    height, layer = _height(scene, slot, wall), None
+    if scene.sticks(field, bodies + wall):
+        layer = scene.layer(field, slot, look.mean[slot], height, normal)
     if scene.slides(field, wall):
         full = scene.full(field, slot)
         gap = contact.gap_of_liquid(look.mean[slot], height, normal, full, cell)
@@ -478,7 +360,7 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     point = scene.grid.index[slot] * cell
     there = np.full(len(slot), scene.wall_mover + wall)
     movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell
-    return Touch((field, bodies + wall), movers, there, point, normal, gap, slips)
+    return Touch((field, bodies + wall), movers, there, point, normal, gap, slips, layer)
 
 
 def _points_on_walls(scene: Scene) -> list[Touch]:

@@ -31,7 +31,8 @@ from corporeal.mpm.physics.grips import Grip
 from corporeal.mpm.physics.spline import Stencil, stencil
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, Steps
-from corporeal.mpm.reference.contact import Meeting, Scene, resolve
+from corporeal.mpm.reference.contact import Meeting, resolve
+from corporeal.mpm.reference.contact_scene import Scene
 from corporeal.mpm.reference.forces import Drive
 from corporeal.mpm.reference.guided import Guides
 from corporeal.mpm.reference.inclusions import Bonds, without
@@ -91,7 +92,7 @@ class ReferenceEngine(Interaction):
         loaded, damped = drive.act((mass, new), (kick, push), dt)
         state, new = loaded.state, loaded.velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))
-        stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, held)
+        stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, dt, held)
         meeting = resolve(stage, new, dt)
         for composite in held:
             meeting = composite.split(meeting)

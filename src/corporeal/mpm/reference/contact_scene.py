@@ -1,0 +1,167 @@
+"""What contact works on in one step: the reference engine's bodies, nodes and rules of contact."""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from jaxtyping import Float, Int
+
+from corporeal.mpm import laws
+from corporeal.mpm.constants import STICKS, TINY_DOUBLE
+from corporeal.mpm.physics import contact, contact_impulses, rigid, wall_stress
+from corporeal.mpm.physics.spline import Stencil
+from corporeal.mpm.problem import Problem, WettedSurface
+from corporeal.mpm.state import Matter, State
+
+
+class Stand(Protocol):
+    """Something that moves in a rigid body's stead."""
+
+    def act(self, movers: contact_impulses.Movers) -> None:
+        """Take the body's place among what contact can move."""
+        ...
+
+
+@dataclass(frozen=True)
+class Scene:
+    """One step's stage."""
+
+    problem: Problem
+    matter: Matter
+    state: State
+    grid: Stencil
+    mass: Float[np.ndarray, " A"]
+    """Of every slot [kg]."""
+    kick: Float[np.ndarray, "B 3"]
+    """Velocity that gravity and push gave each body in this step [m/s]."""
+    old: Float[np.ndarray, "A 3"]
+    """Velocity of every slot before this step's forces [m/s]."""
+    dt: float
+    """[s]"""
+    composites: tuple["Stand", ...] = ()
+    """Rigid bodies that move as one with what they hold."""
+
+    @property
+    def single(self) -> bool:
+        """Whether all bodies share one field."""
+        return self.problem.contact == "single"
+
+    def is_rigid(self, field: int) -> bool:
+        """Whether a field moves with six degrees of freedom."""
+        return not self.single and self.problem.bodies[field].rigid
+
+    @property
+    def feigned(self) -> Float[np.ndarray, " B"]:
+        """Spin of each rigid body times the distance of its surface points [m/s]."""
+        return np.linalg.norm(self.state.spin(self.matter), axis=1) * self.matter.spacing
+
+    def surface(self, body: int) -> Float[np.ndarray, "S 3"]:
+        """Surface points of a rigid body now [m]."""
+        turned = self.matter.surface[body] @ self.state.rotation[body].T
+        return self.state.centre[body] + turned
+
+    def wetted(self, body: int) -> WettedSurface | None:
+        """Where liquids touch a rigid body now; None: as everything else does."""
+        given = self.problem.bodies[body].wetted
+        if given is None or not self.is_rigid(body):
+            return None
+        R = self.state.rotation[body].T
+        point = self.state.centre[body] + (given.point - self.matter.centre[body]) @ R
+        return WettedSurface(point, given.normal @ R)
+
+    def pours(self, field: int) -> bool:
+        """Whether a field holds a liquid."""
+        mine = self.matter.law[self.single | (self.matter.body == field)]
+        return not self.is_rigid(field) and bool(np.isin(mine, laws.LIQUID).any())
+
+    def full(self, field: int, slot: Int[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
+        """Masses of a field's nodes over that of a cell full of its body [-]."""
+        body = self.problem.bodies[field]
+        return self.mass[slot] / contact.full_cell(body, self.problem.cell)
+
+    def slides(self, field: int, wall: int) -> bool:
+        """Whether a field is a liquid that slides along a plane: all that it presses holds it."""
+        return self.pours(field) and not self.sticks(field, len(self.problem.bodies) + wall)
+
+    def sticks(self, field: int, other: int) -> bool:
+        """Whether a field is a liquid on which a body, or B + plane, drags by a viscous stress."""
+        return self.pours(field) and bool(friction_table(self.problem)[field, other] >= STICKS)
+
+    def layer(
+        self, field: int, slot: np.ndarray, mean: np.ndarray, height: np.ndarray, normal: np.ndarray
+    ) -> Float[np.ndarray, "E 4"]:
+        """How a wall drags on a liquid that sticks to it: span [m² s] and flow curve, per node.
+
+        Args:
+            field: The liquid.
+            slot: Its nodes.
+            mean: Its mean offset from each [m].
+            height: Of the nodes over the wall [m].
+            normal: Into the wall.
+
+        """
+        body, cell = self.problem.bodies[field], self.problem.cell
+        full = contact.full_cell(body, cell)
+        span = wall_stress.span(self.mass[slot], full, height, cell, self.dt)
+        touches = wall_stress.touches(mean, height, normal, cell)
+        curve = np.tile(wall_stress.flow_curve(body, cell), (len(slot), 1))
+        return np.column_stack([np.where(touches, span, 0.0), curve])
+
+    def thinness(self, field: int) -> int:
+        """How thin a rigid body is against the cell; 0 for what deforms."""
+        if not self.is_rigid(field):
+            return 0
+        return rigid.thinness(self.matter.surface[field], self.problem.cell)
+
+    @property
+    def wall_mover(self) -> int:
+        """Movers are the bodies, then the slots, then the planes, of which this is the first."""
+        return len(self.problem.bodies) + self.grid.count
+
+    def mover_of_slot(self, slot: Int[np.ndarray, " E"]) -> Int[np.ndarray, " E"]:
+        """Give the rigid body that owns the slot, or the slot itself."""
+        bodies = len(self.problem.bodies)
+        stiff = np.array([self.is_rigid(f) for f in range(bodies)])
+        field = self.grid.field[slot]
+        return np.where(stiff[field], field, bodies + slot)
+
+    def movers(self, velocity: Float[np.ndarray, "A 3"]) -> contact_impulses.Movers:
+        """Everything that an impulse can move, with its velocity after forces."""
+        bodies = len(self.problem.bodies)
+        still = np.zeros((len(self.problem.planes), 3))
+        stiff = np.array([self.is_rigid(b) for b in range(bodies)])
+        # A body with prescribed motion is as heavy as a wall.
+        free = stiff & [body.path is None for body in self.problem.bodies]
+        inertia = np.zeros((self.wall_mover + len(still), 3, 3))
+        inertia[:bodies] = np.where(
+            free[:, None, None], self.state.inverse_inertia(self.matter), 0.0
+        )
+        spin = np.zeros((self.wall_mover + len(still), 3))
+        spin[:bodies] = np.where(stiff[:, None], self.state.spin(self.matter), 0.0)
+        light = np.where(self.mass > 0.0, 1.0 / np.maximum(self.mass, TINY_DOUBLE), 0.0)
+        movers = contact_impulses.Movers(
+            np.concatenate([np.where(free, 1.0 / self.matter.total, 0.0), light, still[:, 0]]),
+            inertia,
+            np.concatenate([self.state.centre, self.grid.index * self.problem.cell, still]),
+            np.concatenate([self.state.speed, velocity, still]),
+            spin,
+        )
+        for composite in self.composites:
+            composite.act(movers)
+        return movers
+
+    def movers_before_forces(self) -> contact_impulses.Movers:
+        """Everything that an impulse can move, with the velocity it had as the step began."""
+        movers = self.movers(self.old)
+        for b in filter(self.is_rigid, range(len(self.problem.bodies))):
+            movers.velocity[b] -= self.kick[b]
+        return movers
+
+
+def friction_table(problem: Problem) -> Float[np.ndarray, "N N"]:
+    """μ of every pair; a single field has the mean of its bodies against a plane."""
+    friction = np.array(problem.friction, dtype=np.float64)
+    if problem.contact == "single":
+        bodies = len(problem.bodies)
+        friction[:bodies, bodies:] = friction[:bodies, bodies:].mean(axis=0, keepdims=True)
+    return friction
