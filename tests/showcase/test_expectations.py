@@ -198,9 +198,18 @@ def test_the_heap_of_theory_meets_what_is_expected_of_ketchup_and_a_flat_one_doe
     squashed, met
 ):
     points = heap(squashed)
-    found = object_outcome(reach_m=reach(points, 0.0), height_m=height(points, 0.0))
+    found = object_outcome(reach_m=reach(points, 0.0), height_m=height(points, points, 0.0))
     radius, volume = expect("ketchup-stops", outcome({"ketchup_0": found}, {}, []))
     assert radius.met and volume.met is met
+
+
+@pytest.mark.parametrize("flat", [1.0, 0.2])
+def test_a_column_that_lies_flat_is_as_high_as_its_matter(flat):
+    """Sixteen rows, half a cell each: 8 cells high, of which 98 % count."""
+    x, y, z = np.meshgrid(*3 * [(np.arange(16) + 0.5) * 0.5], indexing="ij")
+    column = np.column_stack([x.ravel(), y.ravel(), z.ravel()])
+    lying = column * [flat**-0.5, flat**-0.5, flat]
+    assert height(lying, column, 1.0) == pytest.approx(8.0 * flat, rel=1e-9)
 
 
 def test_a_glass_whose_water_does_not_move_by_itself_spills_none():

@@ -175,6 +175,11 @@ a second wall passes through the node, .42 are left."""
 STICKS = 0.5
 """Where friction is at least this, what lies at the wall is not squeezed along it, and higher nodes
 are not held: a layer that sticks could not thin [-]."""
+WALL_LAYER = 1.0 / 3.0
+"""Thickness of the layer through which a wall drags on a liquid that sticks to it [cells], where
+its stress is shared among nodes by their splines' weights on the wall (decision 55)."""
+LIQUID_TOUCHES = 0.15
+"""It does so where the liquid's face is nearer than this by its mean place [cells]."""
 WETTED_REACH = 2.0
 """A liquid looks for the surface of a rigid body no farther than this [cells]."""
 WETTED_SLACK = 1.001

@@ -80,13 +80,15 @@ class Ledger:
         """
         bodies = len(self.external_impulse)
         size = np.sum(impulse * normal, axis=1)
-        for a, c in np.unique(pair[size > 0.0], axis=0):
+        for a, c in np.unique(pair[np.any(impulse != 0.0, axis=1)], axis=0):
             mine = np.flatnonzero((pair[:, 0] == a) & (pair[:, 1] == c))
             if c >= bodies:
                 self.plane_impulse[c - bodies, a] -= impulse[mine].sum(axis=0)
             else:
                 self.pair_impulse[a, c] += size[mine].sum()
                 self.pair_impulse[c, a] = self.pair_impulse[a, c]
+            if not np.any(size[mine] > 0.0):  # a wall that only drags on a liquid is no blow
+                continue
             if np.isnan(self.first_contact[a, c]):
                 place = np.average(point[mine], axis=0, weights=size[mine])
                 self.first_contact[[a, c], [c, a]] = time

@@ -132,7 +132,7 @@ def object_row(body: int, names: list[str], bodies: Bodies) -> ObjectOutcome:
         rebound_m=bounced.rebound,
         rebound_ratio=bounced.ratio,
         reach_m=reach(bodies.last[body][-1], cell),
-        height_m=height(bodies.last[body][-1], cell),
+        height_m=height(bodies.last[body][-1], start, cell),
         left_vessel=left_vessel(body, bodies),
     )
 
@@ -144,11 +144,27 @@ def reach(points: Float[np.ndarray, "N 3"], cell: float) -> float:
     return float(np.quantile(np.hypot(*aside.T), MOST)) + cell / 4
 
 
-def height(points: Float[np.ndarray, "N 3"], cell: float) -> float:
-    """Extent of most points along z [m]."""
+def height(points: Float[np.ndarray, "N 3"], start: Float[np.ndarray, "N 3"], cell: float) -> float:
+    """Extent of most matter along z [m]: of the points, and half a row above and below them.
+
+    A row is half a cell high at the start. What is squeezed flat has rows as much lower: a puddle
+    that was a column would else be taken for half a cell higher than it is.
+
+    Args:
+        points: Now [m].
+        start: At the start [m].
+        cell: dx [m].
+
+    """
+    now, before = _along_z(points), _along_z(start)
+    squeezed = min(1.0, now / before) if before > 0.0 else 1.0
+    return now + 0.5 * cell * squeezed
+
+
+def _along_z(points: Float[np.ndarray, "N 3"]) -> float:
     points = points[np.isfinite(points).all(axis=1)]
     low, high = np.quantile(points[:, 2], (1 - MOST, MOST))
-    return float(high - low) + cell / 2
+    return float(high - low)
 
 
 def left_vessel(body: int, bodies: "Bodies") -> float | None:

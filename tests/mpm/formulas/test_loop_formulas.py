@@ -7,7 +7,16 @@ import pytest
 
 from corporeal.mpm import constants, formulas
 from corporeal.mpm.formulas import one_lane
-from corporeal.mpm.physics import contact, contact_impulses, grips, rigid, spline, springs, wind
+from corporeal.mpm.physics import (
+    contact,
+    contact_impulses,
+    grips,
+    rigid,
+    spline,
+    springs,
+    wall_stress,
+    wind,
+)
 from corporeal.mpm.warp_start import wp
 
 wp.set_module_options(formulas.options(cpu_compiler_flags="-march=native -O3 -ffp-contract=fast"))
@@ -237,6 +246,45 @@ def test_one_projection_onto_coulombs_cone_is_that_of_numpy(rng):
     assert (along == 0.0).any() and (rubbed < 0.99 * mu * along).any()
     assert (rubbed <= mu * along * (1.0 + DOUBLE) + DOUBLE).all()
     assert np.abs(found - exact).max() < 1e-12
+
+
+@wp.kernel
+def spans(m: Doubles, h: Doubles, full: D, dx: D, dt: D, out: Doubles):
+    i = wp.tid()
+    out[i] = one_lane.wall_span(m[i], full, h[i], dx, dt)
+
+
+@wp.kernel
+def drags(
+    span: Doubles, soft: Doubles, curve: Vectors64, n: Vectors64, t: Vectors64, out: Vectors64
+):
+    i = wp.tid()
+    out[i] = one_lane.dragged(soft[i], span[i], curve[i], D(0.25), n[i], t[i])
+
+
+def test_what_a_wall_drags_on_a_liquid_is_that_of_numpy(rng):
+    dx, dt, full = 0.01, 2e-4, 1.1e-3
+    mass, height = rng.uniform(0.0, full, COUNT), rng.uniform(-1.45, 1.5, COUNT) * dx
+    exact = wall_stress.span(mass, full, height, dx, dt)
+    given = [sent(mass, wp.float64), sent(height / dx, wp.float64)]
+    found = run(spans, *given, full, dx, dt, out=(COUNT, wp.float64))
+    assert np.abs(found - exact).max() < 1e-12 * exact.max()
+    index = np.where(rng.uniform(size=COUNT) < 0.3, 1.0, rng.uniform(0.2, 1.5, COUNT))
+    curve = np.column_stack([rng.uniform(0, 2e4, COUNT), rng.uniform(0, 1e4, COUNT), index])
+    soft, n = rng.uniform(100.0, 1e4, COUNT), unit_vectors(rng)
+    t = np.cross(n, rng.normal(size=(COUNT, 3))) * 1e-4
+    layers = np.column_stack([exact, curve])
+    drag = np.array([wall_stress.drag(*row) for row in zip(t, soft, layers, strict=True)])
+    given = [sent(a, wp.float64) for a in (exact, soft)]
+    found = run(drags, *given, *(sent(a, wp.vec3d) for a in (curve, n, t)), out=(COUNT, wp.vec3d))
+    assert np.abs(found - (0.25 * n + drag)).max() < 1e-9 * np.abs(t).max()
+    left = np.linalg.norm(t - drag, axis=1) * soft
+    stress = curve[:, 0] + curve[:, 1] * left ** curve[:, 2]
+    moves = left > 1e-12
+    pull = np.linalg.norm(drag, axis=1)
+    assert 0.05 < moves.mean() < 0.95
+    assert pull[moves] == pytest.approx((exact * stress)[moves], rel=1e-6)
+    assert (pull <= exact * stress * (1.0 + 1e-6)).all()
 
 
 @wp.kernel

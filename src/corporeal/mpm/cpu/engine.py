@@ -55,7 +55,7 @@ from corporeal.mpm.interaction import Interaction
 from corporeal.mpm.joining import Joined, as_it_runs
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measure import Sums
-from corporeal.mpm.physics import prescribed
+from corporeal.mpm.physics import prescribed, wall_stress
 from corporeal.mpm.physics.contact import full_cell
 from corporeal.mpm.physics.grips import Grip
 from corporeal.mpm.physics.rigid import RigidBody
@@ -259,6 +259,7 @@ class CpuEngine(Interaction):
         record["flows"], record["relaxes"] = self.material[f].flows, len(window.branch) > 0
         record["swells"], record["pours"] = self.material[f].swells, self.material[f].pours
         record["full"] = full_cell(self.problem.bodies[f], self.problem.cell)
+        record["flows_by"] = wall_stress.flow_curve(self.problem.bodies[f], self.problem.cell)
         # One lane of a node says how high mass lies over a floor.
         record["floor"], record["level"] = self.contact.watched(window.origin, window.dim)
 

@@ -183,6 +183,7 @@ FIELD = Record(
     ("double *", "shown show"),  # thin: surface points in order of place; [shows][6] as of clumps
     ("double", "spacing"),  # rigid: of its surface points
     ("double", "mass full"),  # full: of a cell full of it
+    ("double[3]", "flows_by"),  # of a liquid at a wall: yield stress [Pa], K/d^n [Pa (s/m)^n], n
     ("int[3]", "origin dim"),  # in blocks; the window's corner and size
     ("int", "blocks pool rigids points surfaces pushed swells flows relaxes"),
     ("int", "floor"),  # the only plane that the window reaches, or -1
@@ -301,7 +302,7 @@ TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - 
     ("int", "face"),  # which face of a rigid body a liquid meets
     ("int", "choice"),  # where its candidate is kept; -1: nowhere
     ("double[3]", "x normal"),
-    ("double", "gap target inverse mu"),
+    ("double", "gap target inverse mu span"),  # span: over which a wall drags on a liquid [m² s]
     ("double[3]", "J before"),
 )
 ENTRY = Record(  # what some contacts of one pair add to the books
@@ -317,10 +318,11 @@ PAST = Record(  # force of a contact in the last step
 LINE = Record(  # a contact in the list of those that move rigid bodies
     "Line",
     ("double *", "a c"),  # velocity of a node or state of a rigid body; 0: a plane
+    ("double *", "flows_by"),  # flow curve of a liquid that a wall drags on over a span
     ("double", "ma mc"),  # inverse masses of nodes; negative: a rigid body
     ("double[3]", "n ra rc"),
     ("double[6]", "K"),
-    ("double", "inverse target mu e"),  # e: of restitution
+    ("double", "inverse target mu e span"),  # e: of restitution; span: as of its touch
     ("double[3]", "J"),
     ("unsigned long long", "key"),
     ("int", "touch group waits spare"),  # waits: not in this round of impacts

@@ -7,6 +7,8 @@ from corporeal.mpm import formulas
 from corporeal.mpm.constants import (
     FIELDS_AT_NODE,
     FIRST_BIAS,
+    HELD_BY_WALL,
+    LIQUID_TOUCHES,
     OTHER_BIAS,
     SHOWN_AROUND,
     STICKS,
@@ -14,15 +16,17 @@ from corporeal.mpm.constants import (
     VAST,
     WALL_REACH,
 )
-from corporeal.mpm.cuda.contact_nodes import height_of, slides, wets
+from corporeal.mpm.cuda.contact_nodes import height_of, slides, sticks, wets
 from corporeal.mpm.cuda.grid import block_of, find, node_of
 from corporeal.mpm.cuda.layout import (
     ASKED,
+    DT,
     FULL,
     KEPT,
     MEETS,
     TOUCHES,
     Contacts,
+    D,
     Grid,
     Particles,
     Rigid,
@@ -39,6 +43,7 @@ from corporeal.mpm.formulas.one_lane import (
     slopes,
     splines,
     surface_begins,
+    wall_span,
     wetted_face,
 )
 
@@ -354,6 +359,15 @@ def gap_of(c: Contacts, r: Rigid, s: Sheet, t: int, xa: wp.float32, xc: wp.float
     return gap
 
 
+@wp.func
+def span_of(s: Sheet, xi: wp.float32, h: wp.float32, mass: wp.float32, full: wp.float32):
+    """Over which a wall drags on a node of a liquid that sticks to it [m² s]; xi, h [cells]."""
+    span = D(0.0)
+    if h <= HELD_BY_WALL and gap_to_plane(xi, h) < LIQUID_TOUCHES:
+        span = wall_span(D(mass), D(full), D(h), s.dx, s.clock[DT])
+    return span
+
+
 @wp.kernel
 def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
     """Smooth normals, and measure the open distance along them."""
@@ -366,11 +380,15 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
             n = c.normal[t]
             h = height_of(s, -1 - other, c.at[c.meet[t]])
             xi = wp.dot(c.mean[a], n) / (g.node[c.slot[a]][0] * s.cell)
-            gap = gap_to_plane(xi, h)
+            mass = g.node[c.slot[a]][0]
+            gap = gap_to_surface(xi, h)
             if slides(c, r, c.fa[t], c.fc[t]):
-                gap = gap_of_liquid(xi, h, g.node[c.slot[a]][0] / r.full[c.fa[t]])
+                gap = gap_of_liquid(xi, h, mass / r.full[c.fa[t]])
                 if h > WALL_REACH:
                     c.slips[t] = 1
+            if sticks(c, r, c.fa[t], c.fc[t]):
+                c.slips[t] = 1
+                c.span[t] = span_of(s, xi, h, mass, r.full[c.fa[t]])
             if gap < VAST:
                 c.gap[t] = gap * s.cell
         elif wets(r, c.fa[t], c.fc[t]) > 0:
@@ -395,7 +413,9 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
                 gap = gap_to_surface(xi, face[3])
                 if c.friction[c.fa[t], c.fc[t]] < wp.float64(STICKS):
                     gap = gap_of_liquid(xi, face[3], mass / r.full[field])
-                if face[3] > WALL_REACH:
+                else:
+                    c.span[t] = span_of(s, xi, face[3], mass, r.full[field])
+                if face[3] > WALL_REACH or c.span[t] > D(0.0):
                     c.slips[t] = 1
                 if gap < VAST:
                     c.gap[t] = gap * s.cell

@@ -49,6 +49,7 @@ from corporeal.mpm.cuda.rigid import softness_at, speed_at
 from corporeal.mpm.formulas.one_lane import (
     approach_of,
     closing_speed,
+    dragged,
     impact_begins,
     impact_target,
     push_of,
@@ -121,6 +122,16 @@ def give(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int, J: wp.
 
 
 @wp.func
+def curve_of(c: Contacts, r: Rigid, s: Sheet, t: int):
+    """Flow curve of the liquid of a contact, at its wall."""
+    liquid = c.fa[t]
+    if c.fc[t] < s.bodies:
+        if r.pours[c.fc[t]] == 1:
+            liquid = c.fc[t]
+    return r.flows_by[liquid]
+
+
+@wp.func
 def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
     """One projection of one contact onto its Coulomb cone; by how much it changed [m/s]."""
     u = slip_of(c, r, s, t)
@@ -131,15 +142,19 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
     soft = softness_of(c, r, s, t, n)
     new = push_of(old, un, c.target[t], soft)
     c.turn[t] = D(0.0)
-    if new == D(0.0) and wp.length_sq(J) == D(0.0):
+    if new == D(0.0) and wp.length_sq(J) == D(0.0) and c.span[t] == D(0.0):
         return float(0.0)
     slide = u - un * n
     rub = J - old * n
     size = wp.length(slide)
+    along = soft
     if size > SMALLEST_SLIP:
-        rub = rub + slide / softness_of(c, r, s, t, slide / size)
+        along = softness_of(c, r, s, t, slide / size)
+        rub = rub + slide / along
     grip = c.friction[c.fa[t], c.fc[t]] * D(1 - c.slips[t])
     given = within_cone(grip, new, n, rub)
+    if c.span[t] > D(0.0):
+        given = dragged(along, c.span[t], curve_of(c, r, s, t), new, n, rub)
     change = given - J
     c.impulse[t] = given
     c.turn[t] = -wp.dot(change, given - c.last_impulse[t]) * soft
@@ -166,7 +181,7 @@ def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, stride: int):
         return
     dt = s.clock[DT]
     for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        if c.gap[t] >= VAST:
+        if c.gap[t] >= VAST and c.span[t] == D(0.0):
             continue
         gap = D(c.gap[t])
         fa = c.fa[t]
@@ -331,7 +346,7 @@ def count(c: Contacts, r: Rigid, s: Sheet, t: int):
         fa = c.fa[t]
         fc = c.fc[t]
         n = wp.vec3d(c.normal[t])
-        busy = wp.length_sq(c.impulse[t]) > D(0.0)
+        busy = wp.length_sq(c.impulse[t]) > D(0.0) or c.span[t] > D(0.0)
         busy = busy or wp.dot(slip_of(c, r, s, t), n) > c.target[t]
         if busy and r.stiff[fa] == 1:
             wp.atomic_add(r.busy, fa, 1)
@@ -461,7 +476,7 @@ def note(c: Contacts, r: Rigid, s: Sheet, stride: int):
         n = wp.vec3d(c.normal[t])
         J = c.impulse[t] + c.struck[t]
         size = wp.dot(J, n)
-        if c.active[t] > 0 and size > D(0.0):
+        if c.active[t] > 0 and (size > D(0.0) or c.span[t] > D(0.0)):
             fa = c.fa[t]
             fc = c.fc[t]
             mean = D(0.5) * (c.before[t] + slip_of(c, r, s, t))

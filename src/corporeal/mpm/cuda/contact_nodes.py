@@ -72,12 +72,18 @@ def slides(c: Contacts, r: Rigid, field: int, other: int):
 
 
 @wp.func
+def sticks(c: Contacts, r: Rigid, field: int, other: int):
+    """Whether a field is a liquid on which a body or a plane drags by a viscous stress."""
+    return r.pours[field] == 1 and c.friction[field, other] >= D(STICKS)
+
+
+@wp.func
 def near_wall(c: Contacts, s: Sheet, r: Rigid, field: int, w: int, at: wp.vec3i, alone: bool):
     """Whether a node of a field may touch a plane; with others there a body may lie between."""
     if r.pointed[field] == 1:
         return False
     reach = WALL_REACH
-    if alone and slides(c, r, field, s.bodies + w):
+    if alone and r.pours[field] == 1:
         reach = HELD_BY_WALL
     return height_of(s, w, at) <= reach
 
@@ -102,6 +108,7 @@ def add_touch(c: Contacts, t: int, k: int, a: int, other: int):
     c.gap[t] = VAST
     c.facet[t] = 0
     c.slips[t] = 0
+    c.span[t] = D(0.0)
     c.impulse[t] = wp.vec3d(D(0.0))
     c.last_impulse[t] = wp.vec3d(D(0.0))
     for q in range(3):

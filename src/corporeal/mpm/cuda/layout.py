@@ -300,6 +300,8 @@ class Rigid:
     """1: the body is liquid."""
     full: wp.array(dtype=wp.float32)
     """Mass of a cell full of the body [kg]."""
+    flows_by: wp.array(dtype=wp.vec3d)
+    """Flow curve of a liquid at a wall: see ``physics.wall_stress``."""
 
 
 @wp.struct
@@ -451,6 +453,8 @@ class Contacts:
     """Which face of a rigid body a liquid meets."""
     slips: wp.array(dtype=wp.int32)
     """1: there is no friction in it."""
+    span: wp.array(dtype=wp.float64)
+    """Over which a wall drags on a liquid that sticks to it [m² s]; 0: Coulomb's friction."""
     point: wp.array(dtype=wp.vec3d)
     active: wp.array(dtype=wp.int32)
     """0: not in this step; ``WAITING`` or ``SWEPT_NOW``."""

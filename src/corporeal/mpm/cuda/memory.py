@@ -12,6 +12,7 @@ from corporeal.mpm.physics import prescribed
 from corporeal.mpm.physics.contact import face_table, full_cell
 from corporeal.mpm.physics.rigid import thinness
 from corporeal.mpm.physics.springs import longest_step
+from corporeal.mpm.physics.wall_stress import flow_curve
 from corporeal.mpm.problem import Problem
 from corporeal.mpm.state import Matter, State
 
@@ -179,6 +180,8 @@ class Memory:
         r.pours = self.put(pours, wp.int32)
         full = [full_cell(body, problem.cell) for body in problem.bodies]
         r.full = self.put(np.array(full), wp.float32)
+        curves = [flow_curve(body, problem.cell) for body in problem.bodies]
+        r.flows_by = self.put(np.array(curves), wp.vec3d)
 
     # ------------------------------------------------------------ contacts
 
@@ -202,7 +205,7 @@ class Memory:
         c.far_a, c.far_c = self.zeros(3 * touches, wp.float32), self.zeros(3 * touches, wp.float32)
         c.chosen, c.normal = self.zeros(touches, wp.vec3), self.zeros(touches, wp.vec3)
         c.gap = self.zeros(touches, wp.float32)
-        c.target = self.zeros(touches, wp.float64)
+        c.target, c.span = self.zeros(touches, wp.float64), self.zeros(touches, wp.float64)
         c.last_velocity, c.turn = self.zeros(entries, wp.vec3d), self.zeros(touches, wp.float64)
         for name in ("point", "before", "impulse", "last_impulse", "struck"):
             setattr(c, name, self.zeros(touches, wp.vec3d))

@@ -6,18 +6,22 @@ namespace mpm {
 namespace {
 // Half spaces as a node sees them through its quadratic spline; R: double or float.
 template <class R> struct Face {
+  // Share of a node's spline that the half space u < s fills.
+  CUDA_CALLABLE static inline R filled(R s) {
+    s = s < R(-1.5) ? R(-1.5) : s > R(1.5) ? R(1.5) : s;
+    const R n = s > 0 ? -s : s, w = n + R(1.5);
+    const R weight = n < R(-0.5) ? w * w * w / R(6.0) : R(0.5) + R(0.75) * n - n * n * n / R(3.0);
+    const R all = s > 0 ? R(1.0) - weight : weight;
+    return all > R(SMALLEST_WEIGHT) ? all : R(SMALLEST_WEIGHT);
+  }
   // Mean offset e(s) of the half space u < s.
   CUDA_CALLABLE static inline R mean(R s) {
     s = s < R(-1.5) ? R(-1.5) : s > R(1.5) ? R(1.5) : s;
-    R n = s > 0 ? -s : s, w = n + R(1.5), weight, moment;
-    if (n < R(-0.5)) {
-      weight = w * w * w / R(6.0);
+    R n = s > 0 ? -s : s, w = n + R(1.5), weight = filled(s), moment;
+    if (n < R(-0.5))
       moment = w * w * w * w / R(8.0) - w * w * w / R(4.0);
-    } else {
-      weight = R(0.5) + R(0.75) * n - n * n * n / R(3.0);
+    else
       moment = R(-13.0 / 64.0) + R(0.375) * n * n - R(0.25) * n * n * n * n;
-    }
-    if (s > 0) weight = R(1.0) - weight;
     return weight > R(SMALLEST_WEIGHT) ? moment / weight : n;
   }
   // The same of a lattice of two points per cell and axis, the first a quarter of a cell behind the face.
@@ -224,6 +228,42 @@ struct Impact {
   // Speed at which a gap may close within a step.
   CUDA_CALLABLE static inline double closing(double gap, double dt) {
     return (gap > 0 ? gap : 0.0) / dt;
+  }
+};
+// How a liquid flows at a wall: yield stress [Pa]; drag = K/d^n [Pa (s/m)^n]; index n.
+struct FlowCurve {
+  double yield, drag, index;
+};
+// What a liquid that sticks bears on a wall: twin of physics/wall_stress.py. Herschel and Bulkley's flow curve
+// tau = yield + K (u/d)^n of a layer d = WALL_LAYER dx thick whose other side slips by u.
+struct WallStress {
+  // Area of the wall times time [m^2 s] that acts on a node of mass m, h cells over the wall: its spline's
+  // weight on the wall over that of the half space above it; full: mass of a full cell.
+  CUDA_CALLABLE static inline double span(double m, double full, double h, double dx, double dt) {
+    const double a = h < 0 ? -h : h, t = 1.5 - a, on = a < 0.5 ? 0.75 - a * a : t > 0 ? 0.5 * t * t : 0.0;
+    return m / full * on / Face<double>::filled(h) * dx * dx * dt;
+  }
+  // Slip u that is left of one of `free` [m/s]: u + softness span tau(u) = free.
+  CUDA_CALLABLE static inline double slip(double free, double softness, double span, const FlowCurve &f) {
+    const double s = softness * span, q = free - s * f.yield, drag = s * f.drag;
+    if (q <= 0) return 0.0;
+    if (f.index == 1 || drag == 0) return q / (1.0 + drag);
+    double u = 0.5 * q, other = pow(0.5 * q / drag, 1.0 / f.index);   // from below, where it stays and rises
+    if (other < u) u = other;
+    if (u < TINY) u = TINY;
+    for (int k = 0; k < 12; k++) {
+      const double power = drag * pow(u, f.index);
+      u -= (u + power - q) / (1.0 + f.index * power / u);
+      if (u < TINY) u = TINY;
+    }
+    return u;
+  }
+  // J = J_n n + J_t, from a tangential impulse t that would end the slip.
+  CUDA_CALLABLE static inline void drag(double softness, double span, const FlowCurve &f, double jn,
+                                        const double *n, const double *t, double *J) {
+    const double free = softness * sqrt(t[0] * t[0] + t[1] * t[1] + t[2] * t[2]);
+    const double scale = free > 0 ? 1.0 - slip(free, softness, span, f) / free : 0.0;
+    for (int i = 0; i < 3; i++) J[i] = jn * n[i] + scale * t[i];
   }
 };
 // One projection of one contact onto its Coulomb cone; n points from a to c, and so does what a

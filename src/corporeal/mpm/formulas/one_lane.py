@@ -228,6 +228,28 @@ def push_of(
 def within_cone(friction: wp.float64, push: wp.float64, n: wp.vec3d, rub: wp.vec3d) -> wp.vec3d: ...
 
 
+@wp.func_native("return mpm::WallStress::span(mass, full, height, dx, dt);")
+def wall_span(
+    mass: wp.float64, full: wp.float64, height: wp.float64, dx: wp.float64, dt: wp.float64
+) -> wp.float64: ...
+
+
+@wp.func_native("""
+  wp::vec_t<3, wp::float64> J;
+  const mpm::FlowCurve flow{curve.c[0], curve.c[1], curve.c[2]};
+  mpm::WallStress::drag(softness, span, flow, push, &n.c[0], &rub.c[0], &J.c[0]);
+  return J;
+""")
+def dragged(
+    softness: wp.float64,
+    span: wp.float64,
+    curve: wp.vec3d,
+    push: wp.float64,
+    n: wp.vec3d,
+    rub: wp.vec3d,
+) -> wp.vec3d: ...
+
+
 # ---------------------------------------------------------------- rigid bodies
 
 

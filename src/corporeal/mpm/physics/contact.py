@@ -44,6 +44,15 @@ Indices = Int[np.ndarray, " E"]
 # ---------------------------------------------------------------- where the face lies
 
 
+def half_space_weight(face: np.ndarray) -> np.ndarray:
+    """∫ N(u) du over u < s: share of the quadratic B-spline at 0 that a half space fills [-]."""
+    s = np.clip(face, -1.5, 1.5)
+    near = -np.abs(s)
+    inner = 0.5 + 0.75 * near - near**3 / 3.0
+    weight = np.where(near < -0.5, (near + 1.5) ** 3 / 6.0, inner)
+    return np.where(s > 0.0, 1.0 - weight, weight)
+
+
 def half_space_mean(face: np.ndarray) -> np.ndarray:
     """e(s): mean offset [dx] of the half space u < s weighted by the quadratic B-spline at 0.
 
@@ -52,13 +61,10 @@ def half_space_mean(face: np.ndarray) -> np.ndarray:
     """
     s = np.clip(face, -1.5, 1.5)
     near = -np.abs(s)
-    tail = near < -0.5
     w = near + 1.5
-    weight = np.where(tail, w**3 / 6.0, 0.5 + 0.75 * near - near**3 / 3.0)
-    moment = np.where(
-        tail, w**4 / 8.0 - w**3 / 4.0, -13.0 / 64.0 + 0.375 * near**2 - 0.25 * near**4
-    )
-    weight = np.where(s > 0.0, 1.0 - weight, weight)
+    inner = -13.0 / 64.0 + 0.375 * near**2 - 0.25 * near**4
+    moment = np.where(near < -0.5, w**4 / 8.0 - w**3 / 4.0, inner)
+    weight = half_space_weight(s)
     return np.where(weight > SMALLEST_WEIGHT, moment / np.maximum(weight, SMALLEST_WEIGHT), near)
 
 
@@ -121,10 +127,15 @@ def gap_to_wall(mean: Vectors, height: Scalars, normal: Vectors, cell: float) ->
 
     The wall is a half space in the same formula; nodes high above it are never in contact.
     """
+    gap = gap_to_plane(mean, height, normal, cell)
+    return np.where(height > WALL_REACH * cell, np.inf, gap)
+
+
+def gap_to_plane(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -> Scalars:
+    """Give the same at nodes however high above the wall [m]."""
     h = height / cell
     xi = np.sum(mean * normal, axis=1) / cell
-    gap = (-half_space_mean(-h) - xi - touching_distance(h)) * cell
-    return np.where(h > WALL_REACH, np.inf, gap)
+    return (-half_space_mean(-h) - xi - touching_distance(h)) * cell
 
 
 def surface_begins(points: Vectors, node: Vectors, normal: Vectors, around: float) -> Scalars:
@@ -180,7 +191,7 @@ def gap_of_liquid(
     that of a full cell. A sheet or a drop would hover at such a node otherwise.
     """
     h, xi = height / cell, np.sum(mean * normal, axis=1) / cell
-    deep = (-half_space_mean(-h) - xi - touching_distance(h)) * cell
+    deep = gap_to_plane(mean, height, normal, cell)
     like = (np.abs(half_space_mean(h) - xi) < LIKE_HALF_SPACE) & (full >= FILLED)
     held = (h > WALL_REACH) & (h <= HELD_BY_WALL) & like
     return np.where(held, deep, gap_to_wall(mean, height, normal, cell))

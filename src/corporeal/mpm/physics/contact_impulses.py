@@ -20,6 +20,7 @@ from corporeal.mpm.constants import (
     SWEEPS_OF_A_HIT,
 )
 from corporeal.mpm.physics.contact import Indices, Scalars, Vectors
+from corporeal.mpm.physics.wall_stress import drag
 
 
 @dataclass
@@ -63,6 +64,9 @@ class Contacts(NamedTuple):
     group: Indices | None = None
     """Contacts of one pair of bodies, found in one way, are swept together, groups one after the
     other; None: all are one group."""
+    layer: Float[np.ndarray, "E 4"] | None = None
+    """Of walls that drag on a liquid (``wall_stress``): span [m² s], yield stress [Pa], drag and
+    index; without a span it is Coulomb's friction. None: none does."""
 
     def approach(self, movers: Movers) -> Vectors:
         """Slip and approach together: u = v_a - v_c [m/s]."""
@@ -157,8 +161,10 @@ def solve(
     orders = _orders(contacts, movers, sweeps)
     if only is not None:
         orders = np.stack([order[only[order]] for order in orders])
+    layer = np.zeros((len(target), 4)) if contacts.layer is None else contacts.layer
     _sweep(
-        (contacts.a, contacts.c, contacts.point, contacts.normal, contacts.friction, target),
+        (contacts.a, contacts.c, contacts.point, contacts.normal),
+        (contacts.friction, target, layer),
         (movers.inverse_mass, movers.inverse_inertia, movers.centre),
         (movers.velocity, movers.spin),
         impulse,
@@ -214,18 +220,22 @@ def _softness(inverse_mass, inverse_inertia, arm, direction):
 
 
 @njit(cache=True)
-def _tangential(impulse, slip, softness, limit):
-    """Push against the slip, at most to the Coulomb limit."""
-    if softness > 0.0:
-        impulse = impulse + slip / softness
+def _tangential(impulse, slip, softness, limit, layer):
+    """Push against the slip, at most to the Coulomb limit; or as a viscous layer does."""
+    along_n, along_slip = softness
+    if along_slip > 0.0:
+        impulse = impulse + slip / along_slip
+    if layer[0] > 0.0:
+        return drag(impulse, along_slip if along_slip > 0.0 else along_n, layer)
     size = np.sqrt(np.dot(impulse, impulse))
     return impulse * (limit / size) if size > limit else impulse
 
 
 @njit(cache=True)
-def _sweep(contacts, masses, motion, impulse, orders):
+def _sweep(contacts, rules, masses, motion, impulse, orders):
     """Gauss–Seidel sweeps over all contacts, in given orders; changes motion and impulse."""
-    first, second, point, normals, friction, target = contacts
+    first, second, point, normals = contacts
+    friction, target, layer = rules
     inverse_mass, inverse_inertia, centre = masses
     velocity, spin = motion
     for order in orders:
@@ -237,14 +247,15 @@ def _sweep(contacts, masses, motion, impulse, orders):
             along_n += _softness(inverse_mass[c], inverse_inertia[c], arm_c, n)
             speed, old_n = np.dot(slip, n), np.dot(old, n)
             new_n = max(0.0, old_n + (speed - target[e]) / along_n) if along_n > 0.0 else 0.0
-            if new_n == 0.0 and old_n == 0.0:
+            if new_n == 0.0 and old_n == 0.0 and layer[e, 0] == 0.0:
                 continue
             slip = slip - speed * n
             size, along_d = np.sqrt(np.dot(slip, slip)), 0.0
             if size > SMALLEST_SLIP:
                 along_d = _softness(inverse_mass[a], inverse_inertia[a], arm_a, slip / size)
                 along_d += _softness(inverse_mass[c], inverse_inertia[c], arm_c, slip / size)
-            push = _tangential(old - old_n * n, slip, along_d, friction[e] * new_n)
+            limit = friction[e] * new_n
+            push = _tangential(old - old_n * n, slip, (along_n, along_d), limit, layer[e])
             impulse[e] = new_n * n + push
             change = impulse[e] - old
             velocity[a] -= inverse_mass[a] * change

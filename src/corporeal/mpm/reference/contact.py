@@ -14,16 +14,16 @@ from corporeal.mpm.constants import (
     HELD_BY_WALL,
     POINT_REACH,
     SHOWN_AROUND,
-    STICKS,
     SWEEPS,
     SWEEPS_OF_A_HIT,
+    VAST,
     WALL_REACH,
 )
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import contact, contact_impulses
 from corporeal.mpm.physics.spline import Stencil
+from corporeal.mpm.reference.contact_scene import Scene, friction_table
 from corporeal.mpm.reference.kept_choices import KeptChoices
-from corporeal.mpm.reference.scene import Scene, friction_table
 
 
 @dataclass(frozen=True)
@@ -39,6 +39,8 @@ class Touch:
     gap: Float[np.ndarray, " E"]
     slips: Bool[np.ndarray, " E"] | None = None
     """Which of them transmit no friction; None: all do."""
+    layer: Float[np.ndarray, "E 4"] | None = None
+    """Where a wall drags on a liquid that sticks: see ``contact_impulses.Contacts``."""
     kept: KeptChoices = field(default_factory=KeptChoices.none)
     """Candidate normals that were taken, where they are kept."""
 
@@ -46,6 +48,11 @@ class Touch:
     def grips(self) -> Float[np.ndarray, " E"]:
         """Share of the pair's friction that each transmits [-]."""
         return np.ones(len(self.gap)) if self.slips is None else 1.0 - self.slips
+
+    @property
+    def layers(self) -> Float[np.ndarray, "E 4"]:
+        """The layer of each, without a span where none drags."""
+        return np.zeros((len(self.gap), 4)) if self.layer is None else self.layer
 
 
 @dataclass(frozen=True)
@@ -82,6 +89,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         friction=friction_table(problem)[pair[:, 0], pair[:, 1]]
         * _joined([t.grips for t in touches], (0,)).astype(np.float64),
         group=np.repeat(np.arange(len(touches)), [len(t.gap) for t in touches]),
+        layer=_joined([t.layers for t in touches], (0, 4)),
     )
     movers = scene.movers(velocity)
     # Impacts of rigid bodies first, one after the other; then all that touches, together.
@@ -120,11 +128,13 @@ def _sweeps(scene: Scene, contacts: contact_impulses.Contacts, hit: bool) -> int
 
 
 def _possible(touch: Touch) -> Touch:
-    """Leave out what is no contact at all."""
-    real = np.isfinite(touch.gap)
+    """Leave out what is no contact at all; what only drags never pushes."""
+    drags = touch.layers[:, 0] > 0.0
+    real = np.isfinite(touch.gap) | drags
     columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
+    columns["gap"] = np.minimum(columns["gap"], VAST)
     slips = None if touch.slips is None else touch.slips[real]
-    return replace(touch, **columns, slips=slips)
+    return replace(touch, **columns, slips=slips, layer=touch.layers[real])
 
 
 _COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))
@@ -196,12 +206,13 @@ def _near(
 ) -> Int[np.ndarray, " E"]:
     """Slots of a field that a plane may touch.
 
-    Pressure of a liquid that slides along it pushes all nodes whose splines reach it. Where fields
-    meet, there may be a body between, and only the nodes near the plane count.
+    Pressure of a liquid that slides along it pushes all nodes whose splines reach it, and a plane
+    drags on all such nodes of one that sticks. Where fields meet, there may be a body between, and
+    only the nodes near the plane count.
     """
     height = _height(scene, slot, pair[1]) / scene.problem.cell
     near = height <= WALL_REACH
-    if scene.slides(*pair):
+    if scene.pours(pair[0]):
         near |= (height <= HELD_BY_WALL) & np.isin(slot, alone)
     return slot[near]
 
@@ -310,16 +321,17 @@ def _wet(
     node, mean = scene.grid.index[slot] * cell, look.mean[slot]
     face = contact.wetted_faces(surface, node, node + mean, cell)
     k, out = face.node, face.outward
-    sticks = scene.problem.friction[pair] >= STICKS
-    if sticks:
+    liquid, layer = pair[liquid_side], None
+    if scene.sticks(liquid, pair[rigid_side]):
         gap = contact.gap_to_surface(mean[k], face.height, -out, cell)
+        layer = scene.layer(liquid, slot[k], mean[k], face.height, -out)
     else:
-        full = scene.full(pair[liquid_side], slot)[k]
+        full = scene.full(liquid, slot)[k]
         gap = contact.gap_of_liquid(mean[k], face.height, -out, full, cell)
     normal = out if rigid_side == 0 else -out
     movers = scene.mover_of_slot(slots[0][k]), scene.mover_of_slot(slots[1][k])
     slips = face.height > WALL_REACH * cell
-    return Touch(pair, *movers, node[k], normal, gap, slips)
+    return Touch(pair, *movers, node[k], normal, gap, slips, layer)
 
 
 def _between_surfaces(
@@ -350,7 +362,9 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     field, wall = pair
     cell, bodies = scene.problem.cell, len(scene.problem.bodies)
     normal = np.tile(-np.array(scene.problem.planes[wall].normal), (len(slot), 1))
-    height = _height(scene, slot, wall)
+    height, layer = _height(scene, slot, wall), None
+    if scene.sticks(field, bodies + wall):
+        layer = scene.layer(field, slot, look.mean[slot], height, normal)
     if scene.slides(field, wall):
         full = scene.full(field, slot)
         gap = contact.gap_of_liquid(look.mean[slot], height, normal, full, cell)
@@ -359,7 +373,7 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     point = scene.grid.index[slot] * cell
     there = np.full(len(slot), scene.wall_mover + wall)
     movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell
-    return Touch((field, bodies + wall), movers, there, point, normal, gap, slips)
+    return Touch((field, bodies + wall), movers, there, point, normal, gap, slips, layer)
 
 
 def _points_on_walls(scene: Scene) -> list[Touch]:

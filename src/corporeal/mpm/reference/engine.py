@@ -32,12 +32,12 @@ from corporeal.mpm.physics.spline import Stencil, stencil
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.problem import Problem, Snapshot, Steps
 from corporeal.mpm.reference.contact import Meeting, resolve
+from corporeal.mpm.reference.contact_scene import Scene
 from corporeal.mpm.reference.forces import Drive
 from corporeal.mpm.reference.guided import Guides
 from corporeal.mpm.reference.inclusions import Bonds, without
 from corporeal.mpm.reference.kept_choices import KeptChoices
 from corporeal.mpm.reference.mean_dilatation import Clusters, clusters
-from corporeal.mpm.reference.scene import Scene
 from corporeal.mpm.reference.springs import struck
 from corporeal.mpm.state import (
     Matter,
@@ -94,9 +94,19 @@ class ReferenceEngine(Interaction):
         loaded, damped = drive.act((mass, new), (kick, push), dt)
         state, new = loaded.state, loaded.velocity
         held = tuple(self.bonds.compose(matter, state, grid, mass, new))
-        kept = self._kept_choices(dt)
-        stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, kept, held)
-        meeting = resolve(stage, new, dt)
+        scene = Scene(
+            self.problem,
+            matter,
+            state,
+            grid,
+            without(mass, held),
+            kick,
+            old,
+            dt,
+            self._kept_choices(dt),
+            held,
+        )
+        meeting = resolve(scene, new, dt)
         self.kept = meeting.kept
         for composite in held:
             meeting = composite.split(meeting)

@@ -82,7 +82,7 @@ for (int f = 0; f < fields; f++) {
     const double *P = world->plane + 4 * w;
     if (pointed)
       points += Vec::dot(P, F.rigid + CENTRE) - P[3] > F.rigid[RADIUS] + mpm::POINT_REACH * dx ? 0 : F.surfaces;
-    else if (F.floor < 0 && Find::lowest(P, F, dx) <= Grid::reach(world, f, w) * dx)
+    else if (F.floor < 0 && Find::lowest(P, F, dx) <= Grid::reach(world, f) * dx)
       wall_of[walls++] = w;
   }
   if (lone && !walls) continue;
@@ -102,7 +102,7 @@ for (int f = 0; f < fields; f++) {
     }
     bool low = false;
     for (int i = 0; i < walls; i++)
-      low |= !Grid::over(world->plane + 4 * wall_of[i], J.at, dx, Grid::reach(world, f, wall_of[i]));
+      low |= !Grid::over(world->plane + 4 * wall_of[i], J.at, dx, Grid::reach(world, f));
     if (J.fields < 2 && !low) continue;
     J.mask = J.several = 0;
     int found = 0;

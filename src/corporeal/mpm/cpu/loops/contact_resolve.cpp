@@ -52,17 +52,21 @@ struct List {
     slip(R, u);
     double un = Vec::dot(u, R.n), old = Vec::dot(R.J, R.n), d[3], t[3];
     double jn = Coulomb::push(old, un, R.target, R.inverse), next[3];
-    if (jn == 0 && old == 0) return 0;
+    if (jn == 0 && old == 0 && R.span == 0) return 0;
     for (int i = 0; i < 3; i++) {
       d[i] = u[i] - un * R.n[i];
       t[i] = R.J[i] - old * R.n[i];
     }
-    double size = sqrt(Vec::dot(d, d));
+    double size = sqrt(Vec::dot(d, d)), soft = R.inverse;
     if (size > mpm::SMALLEST_SLIP) {
-      double e[3] = {d[0] / size, d[1] / size, d[2] / size}, soft = along(R.K, e);
+      double e[3] = {d[0] / size, d[1] / size, d[2] / size};
+      soft = along(R.K, e);
       for (int i = 0; i < 3; i++) t[i] += d[i] / soft;
     }
-    Coulomb::limit(R.mu, jn, R.n, t, next);
+    if (R.span > 0)
+      WallStress::drag(soft, R.span, *(const mpm::FlowCurve *)R.flows_by, jn, R.n, t, next);
+    else
+      Coulomb::limit(R.mu, jn, R.n, t, next);
     for (int i = 0; i < 3; i++) {
       d[i] = next[i] - R.J[i];
       R.J[i] = next[i];
@@ -176,6 +180,7 @@ for (int f = 0; f < fields; f++) {
       T.fc = fields + w;
       T.gap = gap;
       T.active = 1;
+      T.span = 0;
       T.mu = world->friction[T.fa * all + T.fc];
       T.target = Impact::closing(gap, dt);
       for (int d = 0; d < 3; d++) {
@@ -201,6 +206,8 @@ for (int t = 0; t < nt; t++) {
   else
     for (int i = 0; i < 3; i++) R.key |= (u64)((meets[T.meet].at[i] + 0x8000) & 0xffff) << (32 - 16 * i);
   R.mu = T.mu;
+  R.span = T.span;
+  R.flows_by = world->field[T.fc < fields && world->field[T.fc].pours ? T.fc : T.fa].flows_by;
   for (int i = 0; i < 6; i++) R.K[i] = 0;
   for (int i = 0; i < 3; i++) {
     R.n[i] = T.normal[i];
@@ -321,6 +328,7 @@ struct Books {
     *w->clock->push_work -= sign * Vec::dot(J, v);
     for (int i = 0; i < 3; i++) w->clock->external_impulse[3 * body + i] -= sign * J[i];
   }
+  static inline bool any(const Entry &e) { return e.normal > 0 || Vec::dot(e.J, e.J) > 0; }
   static inline void enter(World *w, double *pair, int all, const Entry &e) {
     double *row = pair + (e.a * all + e.c) * PAIR;
     row[1] += e.normal;
@@ -336,7 +344,7 @@ struct Books {
 for (int i = 0; i < all * all; i++)
   for (int d = 1; d < 5; d++) pair[PAIR * i + d] = 0;
 for (int i = 0; i < world->stands; i++)
-  if (stage->stand[i].normal > 0) Books::enter(world, pair, all, stage->stand[i]);
+  if (Books::any(stage->stand[i])) Books::enter(world, pair, all, stage->stand[i]);
 for (int p = 0; p < world->parts; p++) {
   int from = (int)((long long)stage->junctions * p / PARTS);
   for (int e = 0; e < stage->entries[p]; e++)
@@ -345,7 +353,7 @@ for (int p = 0; p < world->parts; p++) {
 for (int i = 0; i < n; i++) {
   const Touch &T = touches[lines[i].touch];
   double jn = Vec::dot(T.J, T.normal), u[3];
-  if (jn <= 0) continue;
+  if (jn <= 0 && lines[i].span == 0) continue;
   List::slip(lines[i], u);
   Entry e{T.fa, T.fc, jn, {jn * T.x[0], jn * T.x[1], jn * T.x[2]}, {T.J[0], T.J[1], T.J[2]}, 0};
   for (int d = 0; d < 3; d++) e.loss += (T.J[d] - jn * T.normal[d]) * 0.5 * (T.before[d] + u[d]);

@@ -10,6 +10,7 @@ typedef mpm::Face<double> Face;
 using mpm::Coulomb;
 using mpm::Impact;
 using mpm::Scatter;
+using mpm::WallStress;
 struct Body6 {            // a rigid body's state
   // What moves as told keeps the spin that it was given.
   static inline void spin_up(double *s) {
@@ -55,9 +56,13 @@ struct Grid {
     const int all = w->fields + w->planes;
     return w->field[field].pours && w->friction[field * all + w->fields + plane] < mpm::STICKS;
   }
+  // Whether a liquid sticks to another field or to a plane, which then drags on it.
+  static inline bool sticks(const World *w, int field, int other) {
+    return w->field[field].pours && w->friction[field * (w->fields + w->planes) + other] >= mpm::STICKS;
+  }
   // How high nodes of a field can touch a plane [cells].
-  static inline double reach(const World *w, int field, int plane) {
-    return slides(w, field, plane) ? mpm::HELD_BY_WALL : mpm::WALL_REACH;
+  static inline double reach(const World *w, int field) {
+    return w->field[field].pours ? mpm::HELD_BY_WALL : mpm::WALL_REACH;
   }
   // Whether a block lies so high over a plane that none of its nodes can touch it.
   static inline bool over(const double *P, const int *at, double dx, double reach) {
@@ -86,7 +91,7 @@ struct Grid {
 // The planes that a block of nodes may touch, and its nodes that may.
 struct Walls {
   int plane[WALLS], count;
-  u64 near[WALLS], wide[WALLS];   // of liquids that slide
+  u64 near[WALLS], wide[WALLS];   // wide: of liquids
   Walls(const World *w, const int *at) : count(0) {
     for (int v = 0; v < w->planes && count < WALLS; v++) {
       const double *P = w->plane + 4 * v;
@@ -98,7 +103,7 @@ struct Walls {
   }
   // Which nodes of a field a plane may touch; where fields meet there may be a body between.
   inline u64 of(const World *w, int field, int number, u64 several) const {
-    return near[number] | (Grid::slides(w, field, plane[number]) ? wide[number] & ~several : 0);
+    return near[number] | (w->field[field].pours ? wide[number] & ~several : 0);
   }
 };
 

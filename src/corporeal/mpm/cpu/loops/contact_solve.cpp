@@ -10,7 +10,8 @@ struct Solver {
     if (T.c < 0) {
       const double *P = w->plane + 4 * (-1 - T.c);
       double h = (Vec::dot(P, T.x) - P[3]) * inv;
-      return Grid::slides(w, A.field, -1 - T.c) ? Face::gap_of_liquid(pa, h, filled(w, A)) : Face::gap_to_plane(pa, h);
+      if (Grid::slides(w, A.field, -1 - T.c)) return Face::gap_of_liquid(pa, h, filled(w, A));
+      return Face::gap_to_surface(pa, h);
     }
     const Side &C = sides[T.c];
     double pc = C.mean[0] * n[0] + C.mean[1] * n[1] + C.mean[2] * n[2];
@@ -25,12 +26,27 @@ struct Solver {
     if (!F.surfaces) return Face::gap_to_thin(pa, sc);
     return G.surfaces ? sc - sa : Face::gap_to_thin(-pc, -sa);
   }
-  // How high the node of a liquid is over what it slides along [m]; 0 for what is no liquid.
+  // How high the node of a liquid is over a wall [m]; 0 for what is no liquid.
   static inline double height(const World *w, const Touch &T) {
     if (T.choice >= 0) return 0.0;
     if (T.c >= 0) return liquid(w->field[T.fa], w->field[T.fc]) ? T.gap : 0.0;
     const double *P = w->plane + 4 * (-1 - T.c);
-    return Grid::slides(w, T.fa, -1 - T.c) ? Vec::dot(P, T.x) - P[3] : 0.0;
+    return w->field[T.fa].pours ? Vec::dot(P, T.x) - P[3] : 0.0;
+  }
+  // Which side of a contact is a liquid that sticks to a wall, whose normal and height are known: 0: none.
+  static inline int sticks(const World *w, const Touch &T) {
+    if (T.c < 0) return Grid::sticks(w, T.fa, T.fc) ? 1 : 0;
+    if (!liquid(w->field[T.fa], w->field[T.fc])) return 0;
+    return Grid::sticks(w, T.fa, T.fc) ? 1 : Grid::sticks(w, T.fc, T.fa) ? 2 : 0;
+  }
+  // Over what area and time such a wall drags on the node; 0 where the liquid does not touch it. h: of
+  // the node over the wall [cells].
+  static inline double span(const World *w, const Side *sides, const Touch &T, int side, double h) {
+    const Side &S = sides[side == 1 ? T.a : T.c];
+    const double sign = side == 1 ? 1.0 : -1.0;
+    const double mean = sign * (S.mean[0] * T.normal[0] + S.mean[1] * T.normal[1] + S.mean[2] * T.normal[2]);
+    if (h > mpm::HELD_BY_WALL || Face::gap_to_plane(mean, h) >= mpm::LIQUID_TOUCHES) return 0.0;
+    return WallStress::span(S.m, w->field[S.field].full, h, w->dx, w->dt);
   }
   // Whether a liquid meets a rigid body that says where liquids touch it.
   static inline bool liquid(const Field &F, const Field &G) {
@@ -136,18 +152,25 @@ struct Solver {
   static inline void slip(const Side *sides, const Touch &T, double *u) {
     for (int i = 0; i < 3; i++) u[i] = sides[T.a].v[i] - (T.c < 0 ? 0.0 : sides[T.c].v[i]);
   }
+  // Flow curve of the liquid of a contact, at its wall.
+  static inline const mpm::FlowCurve &flows(const World *w, const Touch &T) {
+    return *(const mpm::FlowCurve *)w->field[T.c >= 0 && w->field[T.fc].pours ? T.fc : T.fa].flows_by;
+  }
   // One projection of one contact onto its Coulomb cone; whether it changed anything.
-  static inline bool relax(Side *sides, Touch &T) {
+  static inline bool relax(const World *w, Side *sides, Touch &T) {
     double u[3], d[3], t[3], next[3];
     slip(sides, T, u);
     double un = Vec::dot(u, T.normal), old = Vec::dot(T.J, T.normal);
     double jn = Coulomb::push(old, un, T.target, T.inverse);
-    if (jn == 0 && old == 0) return false;
+    if (jn == 0 && old == 0 && T.span == 0) return false;
     for (int i = 0; i < 3; i++) {
       d[i] = u[i] - un * T.normal[i];
       t[i] = T.J[i] - old * T.normal[i] + d[i] / T.inverse;
     }
-    Coulomb::limit(T.mu, jn, T.normal, t, next);
+    if (T.span > 0)
+      WallStress::drag(T.inverse, T.span, flows(w, T), jn, T.normal, t, next);
+    else
+      Coulomb::limit(T.mu, jn, T.normal, t, next);
     bool moved = false;
     for (int i = 0; i < 3; i++) {
       d[i] = next[i] - T.J[i];
@@ -289,7 +312,7 @@ if (from < to) {
         double u[3];
         Solver::slip(sides, T, u);
         T.active = 1;
-        nears |= Vec::dot(u, T.normal) > 0;
+        nears |= Vec::dot(u, T.normal) > 0 || Solver::sticks(world, T);
       }
       // Where nobody comes nearer nobody pushes, and then nobody is pushed.
       for (int t = M.touch; t < M.touch + M.touches; t++) {
@@ -298,23 +321,25 @@ if (from < to) {
         if (!T.active) continue;
         double u[3];
         Solver::slip(sides, T, u);
-        const bool slips = Solver::height(world, T) > mpm::WALL_REACH * dx;
+        const double high = Solver::height(world, T);
+        const int sticks = Solver::sticks(world, T);
         T.mu = world->friction[T.fa * all + T.fc];
         T.gap = Solver::gap(world, sides, T, inv) * dx;
-        T.active = T.gap < mpm::VAST * dx;   // else no contact at all
+        T.span = sticks ? Solver::span(world, sides, T, sticks, high * inv) : 0.0;
+        T.active = T.gap < mpm::VAST * dx || T.span > 0;   // else no contact at all
         if (!T.active) continue;
         T.target = Impact::closing(T.gap, dt);
-        if (slips) T.mu = 0.0;
+        if (sticks || high > mpm::WALL_REACH * dx) T.mu = 0.0;
         if (M.stiff) continue;
         T.inverse = sides[T.a].inverse + (T.c < 0 ? 0.0 : sides[T.c].inverse);
-        if (M.touches == 1) T.active = Vec::dot(u, T.normal) > T.target;
+        if (M.touches == 1) T.active = T.span > 0 || Vec::dot(u, T.normal) > T.target;
         active += T.active;
       }
       if (!active) continue;
       for (int s = 0; s < (active == 1 ? 1 : mpm::SWEEPS); s++) {   // one alone is solved at once
         bool moved = false;
         for (int t = M.touch; t < M.touch + M.touches; t++)
-          if (touches[t].active && Solver::relax(sides, touches[t])) moved = true;
+          if (touches[t].active && Solver::relax(world, sides, touches[t])) moved = true;
         if (!moved) break;
       }
       for (int s = M.side; s < M.side + M.sides; s++) {
@@ -324,7 +349,7 @@ if (from < to) {
       for (int t = M.touch; t < M.touch + M.touches; t++) {
         const Touch &T = touches[t];
         double jn = T.active ? Vec::dot(T.J, T.normal) : 0.0;
-        if (jn <= 0) continue;
+        if (jn <= 0 && (!T.active || T.span == 0)) continue;
         int e = entries - 1, last = entries > ENTRIES ? entries - ENTRIES : 0;
         while (e >= last && (book[e].a != T.fa || book[e].c != T.fc)) e--;
         if (e < last) {

@@ -7,8 +7,8 @@ book = Entry{task[0], fields + F.floor, 0, {0, 0, 0}, {0, 0, 0}, 0};
 if (F.floor >= 0) {
   const double *P = world->plane + 4 * F.floor;
   const double mu = world->friction[task[0] * all + fields + F.floor], per = 1.0 / dt;
-  const bool slides = Grid::slides(world, task[0], F.floor);
-  const double reach = Grid::reach(world, task[0], F.floor);
+  const bool sticks = Grid::sticks(world, task[0], fields + F.floor), slides = F.pours && !sticks;
+  const double reach = Grid::reach(world, task[0]);
   for (int b = task[1]; b < task[2]; b++) {
     const int *w = F.where + 4 * b;
     const int at[3] = {w[0] + F.origin[0], w[1] + F.origin[1], w[2] + F.origin[2]};
@@ -20,20 +20,28 @@ if (F.floor >= 0) {
       float *node = F.node + ((size_t)b * 64 + i) * 8;
       if (!(node[0] > 0)) continue;
       const double m = node[0], v[3] = {node[1], node[2], node[3]}, fall = -Vec::dot(P, v);
-      if (fall <= 0) continue;
+      if (fall <= 0 && !sticks) continue;
       const double x[3] = {(4 * at[0] + (i >> 4)) * dx, (4 * at[1] + (i >> 2 & 3)) * dx,
                            (4 * at[2] + (i & 3)) * dx};
       const double h = (Vec::dot(P, x) - P[3]) * inv;
-      const double gap = (slides ? Face::gap_of_liquid(-node[7], h, node[0] / F.full) : Face::gap_to_plane(-node[7], h)) * dx;
-      const double jn = m * (fall - (gap > 0 ? gap * per : 0.0));
-      if (jn <= 0) continue;
-      double slip[3], size = 0, u[3], was[3];
+      const double near = Face::gap_to_plane(-node[7], h);
+      const double gap = (slides ? Face::gap_of_liquid(-node[7], h, node[0] / F.full)
+                          : h > mpm::WALL_REACH ? mpm::VAST : near) * dx;
+      const double push = m * (fall - (gap > 0 ? gap * per : 0.0)), jn = push > 0 ? push : 0.0;
+      const bool drags = sticks && near < mpm::LIQUID_TOUCHES;
+      if (jn <= 0 && !drags) continue;
+      double slip[3], size = 0, u[3], was[3], scale;
       for (int d = 0; d < 3; d++) {
         slip[d] = v[d] + fall * P[d];
         size += slip[d] * slip[d];
       }
-      size = sqrt(size) * m;
-      const double scale = Coulomb::share(size, h > mpm::WALL_REACH ? 0.0 : mu * jn);
+      size = sqrt(size);
+      if (drags) {
+        const double span = WallStress::span(m, F.full, h, dx, dt);
+        scale = size > 0 ? 1.0 - WallStress::slip(size, 1.0 / m, span, *(const mpm::FlowCurve *)F.flows_by) / size : 0.0;
+      } else {
+        scale = sticks ? 0.0 : Coulomb::share(size * m, h > mpm::WALL_REACH ? 0.0 : mu * jn);
+      }
       book.normal += jn;
       for (int d = 0; d < 3; d++) {
         const double t = scale * m * slip[d], J = t - jn * P[d];

@@ -1,4 +1,4 @@
-"""What contact finds in one step: bodies, grid, velocities, and what moves in whose stead."""
+"""What contact works on in one step: the reference engine's bodies, nodes and rules of contact."""
 
 from dataclasses import dataclass
 from typing import Protocol
@@ -8,7 +8,7 @@ from jaxtyping import Float, Int
 
 from corporeal.mpm import laws
 from corporeal.mpm.constants import STICKS, TINY_DOUBLE
-from corporeal.mpm.physics import contact, contact_impulses, rigid
+from corporeal.mpm.physics import contact, contact_impulses, rigid, wall_stress
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.problem import Problem, WettedSurface
 from corporeal.mpm.reference.kept_choices import KeptChoices
@@ -37,6 +37,8 @@ class Scene:
     """Velocity that gravity and push gave each body in this step [m/s]."""
     old: Float[np.ndarray, "A 3"]
     """Velocity of every slot before this step's forces [m/s]."""
+    dt: float
+    """[s]"""
     kept: KeptChoices
     """Candidate normals that were taken in the last step; none: all are looked at anew."""
     composites: tuple["Stand", ...] = ()
@@ -82,8 +84,31 @@ class Scene:
 
     def slides(self, field: int, wall: int) -> bool:
         """Whether a field is a liquid that slides along a plane: all that it presses holds it."""
-        friction = friction_table(self.problem)[field, len(self.problem.bodies) + wall]
-        return self.pours(field) and bool(friction < STICKS)
+        return self.pours(field) and not self.sticks(field, len(self.problem.bodies) + wall)
+
+    def sticks(self, field: int, other: int) -> bool:
+        """Whether a field is a liquid on which a body, or B + plane, drags by a viscous stress."""
+        return self.pours(field) and bool(friction_table(self.problem)[field, other] >= STICKS)
+
+    def layer(
+        self, field: int, slot: np.ndarray, mean: np.ndarray, height: np.ndarray, normal: np.ndarray
+    ) -> Float[np.ndarray, "E 4"]:
+        """How a wall drags on a liquid that sticks to it: span [m² s] and flow curve, per node.
+
+        Args:
+            field: The liquid.
+            slot: Its nodes.
+            mean: Its mean offset from each [m].
+            height: Of the nodes over the wall [m].
+            normal: Into the wall.
+
+        """
+        body, cell = self.problem.bodies[field], self.problem.cell
+        full = contact.full_cell(body, cell)
+        span = wall_stress.span(self.mass[slot], full, height, cell, self.dt)
+        touches = wall_stress.touches(mean, height, normal, cell)
+        curve = np.tile(wall_stress.flow_curve(body, cell), (len(slot), 1))
+        return np.column_stack([np.where(touches, span, 0.0), curve])
 
     def thinness(self, field: int) -> int:
         """How thin a rigid body is against the cell; 0 for what deforms."""
