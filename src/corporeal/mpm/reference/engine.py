@@ -97,13 +97,13 @@ class ReferenceEngine(Interaction):
         kept = self._kept_choices(dt)
         stage = Scene(self.problem, matter, state, grid, without(mass, held), kick, old, kept, held)
         meeting = resolve(stage, new, dt)
-        self.kept = meeting.kept
         for composite in held:
             meeting = composite.split(meeting)
         moved, viscous_work = self._from_grid(grid, groups, old, meeting.velocity, dt)
         settled, plastic_loss = flowed(matter, moved, dt)
         turned = self.guides.place(self._move_rigid(settled, meeting, dt), matter, guided)
         self._check(turned)
+        self.kept = meeting.kept
         self.ledger.plastic_loss += plastic_loss
         self.ledger.viscous_loss += viscous_work + damped
         self._book_step(meeting, grid, kick, push)
