@@ -107,13 +107,13 @@ class ReferenceEngine(Interaction):
             held,
         )
         meeting = resolve(scene, new, dt)
-        self.kept = meeting.kept
         for composite in held:
             meeting = composite.split(meeting)
         moved, viscous_work = self._from_grid(grid, groups, old, meeting.velocity, dt)
         settled, plastic_loss = flowed(matter, moved, dt)
         turned = self.guides.place(self._move_rigid(settled, meeting, dt), matter, guided)
         self._check(turned)
+        self.kept = meeting.kept
         self.ledger.plastic_loss += plastic_loss
         self.ledger.viscous_loss += viscous_work + damped
         self._book_step(meeting, grid, kick, push)
