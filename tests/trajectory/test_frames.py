@@ -6,6 +6,7 @@ from scipy.spatial.transform import Rotation
 
 from corporeal.errors import BadFileError
 from corporeal.trajectory.frames import (
+    Frames,
     Layout,
     frame_path,
     gather,
@@ -60,10 +61,24 @@ def test_an_unfinished_or_damaged_trajectory_is_named(tmp_path):
     with pytest.raises(BadFileError, match="ledger"):
         read_trajectory(tmp_path)
     written(tmp_path)
-    trajectory = gather(tmp_path, 3)
+    gather(tmp_path, 3)
     frame_path(tmp_path, 1).write_bytes(b"PK\x03\x04 half a file")
     with pytest.raises(BadFileError, match="00001"):
-        trajectory.frames[1]
+        Frames(tmp_path, 3)[1]
+
+
+def test_a_frame_that_was_read_is_kept_as_long_as_there_is_room(tmp_path, monkeypatch):
+    written(tmp_path)
+    size = sum(a.nbytes for a in read_arrays(frame_path(tmp_path, 0), without="ledger.").values())
+    monkeypatch.setattr("corporeal.trajectory.frames.ROOM", 2 * size)
+    frames = Frames(tmp_path, 3)
+    before = [frame.position for frame in frames]
+    frames[0].position[:] = np.nan
+    for k in range(3):
+        frame_path(tmp_path, k).unlink()
+    assert all(np.array_equal(frames[k].position, before[k]) for k in range(2))
+    with pytest.raises(BadFileError, match="00002"):
+        frames[2]
 
 
 @pytest.mark.parametrize("gone", ["overlap", "dt_max"])

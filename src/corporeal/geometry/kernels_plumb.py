@@ -138,3 +138,23 @@ def hang(points, vertices, rim, excess, found):
                 angle = -abs(angle)
             total += excess[k] * angle
         found[n] += total / (2 * np.pi)
+
+
+@numba.njit(cache=True, nogil=True)
+def count(low, high, columns, out):
+    """Count the faces whose boxes (N, 2), from cell ``low`` to cell ``high``, touch each cell."""
+    for n in range(len(low)):
+        for i in range(low[n, 0], high[n, 0] + 1):
+            for j in range(low[n, 1], high[n, 1] + 1):
+                out[i * columns + j] += 1
+
+
+@numba.njit(cache=True, nogil=True)
+def lay(low, high, columns, order, place, out):
+    """Write those faces into each cell in an order; ``place``: where the next of a cell goes."""
+    for n in order:
+        for i in range(low[n, 0], high[n, 0] + 1):
+            for j in range(low[n, 1], high[n, 1] + 1):
+                cell = i * columns + j
+                out[place[cell]] = n
+                place[cell] += 1

@@ -70,19 +70,19 @@ def plumb_lines(mesh: Mesh, open_edges: OpenEdges | None = None) -> PlumbLines:
 
     """
     known = unbalanced(mesh) if open_edges is None else open_edges
-    flat = mesh.corners[:, :, :2]
-    low, high = flat.min(axis=1), flat.max(axis=1)
-    start, span = low.min(axis=0), np.maximum(np.ptp(flat, axis=(0, 1)), 1e-300)
+    a, b, c = (mesh.vertices[mesh.triangles[:, k]] for k in range(3))
+    lowest, highest = (f(f(a, b), c) for f in (np.minimum, np.maximum))
+    low, high, lowest = lowest[:, :2], highest[:, :2], lowest[:, 2]
+    start, span = low.min(axis=0), np.maximum(high.max(axis=0) - low.min(axis=0), 1e-300)
     # About one face a cell; fewer cells where faces are long, so that the table stays small.
-    width = float(max(np.sqrt(np.prod(span) / len(flat)), span.max() / len(flat)))
+    width = float(max(np.sqrt(np.prod(span) / len(low)), span.max() / len(low)))
     while True:
         from_cell = ((low - start) / width).astype(np.int64)
         to_cell = ((high - start) / width).astype(np.int64)
-        if (np.prod(to_cell - from_cell + 1, axis=1)).sum() <= ENTRIES * len(flat):
+        if (np.prod(to_cell - from_cell + 1, axis=1)).sum() <= ENTRIES * len(low):
             break
         width *= 2
     counts = to_cell.max(axis=0) + 1
-    lowest = mesh.corners[:, :, 2].min(axis=1)
     first, face = _entered(from_cell, to_cell, counts, lowest)
     box = np.stack([low[:, 0], high[:, 0], low[:, 1], high[:, 1], lowest], axis=1)[face]
     return PlumbLines(mesh, start, width, counts, first, face, box, *known)
@@ -105,16 +105,11 @@ def _entered(
     from_cell: np.ndarray, to_cell: np.ndarray, counts: np.ndarray, lowest: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
     """List the faces whose boxes touch each cell, cell by cell, from the lowest up."""
-    wide = to_cell - from_cell + 1
-    many = np.prod(wide, axis=1)
-    # Ordered by height before they are spread: what follows keeps that order within a cell.
+    held = np.zeros(int(np.prod(counts)), np.int64)
+    kernels.count(from_cell, to_cell, int(counts[1]), held)
+    first = np.concatenate([[0], np.cumsum(held)])
+    face = np.empty(int(first[-1]), np.int64)
+    # Within a cell the order is that in which faces are laid into it: from the lowest up.
     upwards = np.argsort(lowest, kind="stable")
-    from_cell, wide, many = from_cell[upwards], wide[upwards], many[upwards]
-    face = np.repeat(np.arange(len(many)), many)
-    within = np.arange(len(face)) - np.repeat(np.cumsum(many) - many, many)
-    column = from_cell[face, 0] + within // wide[face, 1]
-    row = from_cell[face, 1] + within % wide[face, 1]
-    cell = column * counts[1] + row
-    order = np.argsort(cell, kind="stable")
-    held = np.bincount(cell, minlength=int(np.prod(counts)))
-    return np.concatenate([[0], np.cumsum(held)]), upwards[face[order]]
+    kernels.lay(from_cell, to_cell, int(counts[1]), upwards, first[:-1].copy(), face)
+    return first, face

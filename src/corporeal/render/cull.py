@@ -3,15 +3,14 @@
 import numpy as np
 from jaxtyping import Float, Float32
 
-from corporeal.render import kernels, kernels_light
+from corporeal.render import kernels, kernels_ask
+from corporeal.render.kernels_ask import WAYS
 from corporeal.render.kernels_light import Lamps
 
 LOWEST = 1e-3
 """Sine of the lowest sun whose shadows are followed."""
 NEAREST = 1e-3
 """Of the way to a box: a corner that is nearer to the eye, or behind it, may be seen anywhere."""
-CELLS = 16
-"""Of a tile of pixels: each looks along directions of its own."""
 
 
 def outlines(
@@ -49,15 +48,11 @@ def outlines(
 
 def ways(lamps: Lamps, sky: int) -> Float32[np.ndarray, "ways 3"]:
     """Where pixels of the floor look: to the sky, and last to the sun."""
-    s = kernels.samples(CELLS)
+    s = kernels.samples(1)
     s.normal[:, 2] = s.flat[:, 2] = 1.0
-    index = np.arange(CELLS)
-    ways = []
-    o, w = (np.empty((CELLS, 3), np.float32) for _ in range(2))
-    for number in range(sky):
-        kernels_light.sky_rays(s, index, index, lamps, number, sky, o, w)
-        ways.append(w.copy())
-    return np.concatenate([*ways, lamps.sun[None]])
+    up = np.empty((WAYS * sky, 3), np.float32)
+    kernels_ask.look_up(s, sky, up)
+    return np.concatenate([up, lamps.sun[None]])
 
 
 def blur(lamps: Lamps, boxes: np.ndarray) -> float:

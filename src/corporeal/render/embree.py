@@ -495,4 +495,4 @@ class Job:
         kernels_light.mirrored(
             stage.look, stage.normals, self.lamps, s, index, w, prim, u, v, t, seen, 0
         )
-        light[rows, 4:] = seen
+        light[rows, 4:CHANNELS] = seen

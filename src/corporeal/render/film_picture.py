@@ -16,7 +16,7 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
 from corporeal.machine import cores
-from corporeal.render import cull, kernels, kernels_film, kernels_light
+from corporeal.render import cull, kernels, kernels_ask, kernels_film, kernels_floor, kernels_light
 from corporeal.render.camera import Aim
 from corporeal.render.embree import (
     BAND,
@@ -32,10 +32,15 @@ from corporeal.render.embree import (
     render,
 )
 from corporeal.render.kernels import NOTHING, Samples
+from corporeal.render.kernels_ask import WIDE
+from corporeal.render.kernels_film import ABOUT, FINER
+from corporeal.render.kernels_floor import AROUND, FAR, NEAR, TILE, UNTOUCHED
 from corporeal.render.kernels_light import CHANNELS, SHARP
 
 REACH = 7
 """Pixels over which the light filter spreads what one of them met."""
+HALO = AROUND + 2
+"""Tiles above and below a band that what is seen in it hangs on."""
 FILTER = 0.6
 """Pixels that textures are filtered over: their pyramid's levels are blurred as they are."""
 
@@ -46,11 +51,9 @@ class _Plan:
 
     sky: int
     """Rays to the sky where light is asked for."""
-    finer: int
-    """Samples of a pixel at an edge: finer × finer."""
 
 
-PLANS: dict[Quality, _Plan] = {"draft": _Plan(2, 3)}
+PLANS: dict[Quality, _Plan] = {"draft": _Plan(2)}
 """What is not here is cast evenly."""
 
 
@@ -61,6 +64,8 @@ class _Empty:
     aim: Aim
     wall: Float32[np.ndarray, "P 3"]
     """Light of the backdrop, without the floor."""
+    mirrored: Float32[np.ndarray, "P 3"]
+    """What the floor mirrors."""
     printed: UInt8[np.ndarray, "H W 3"]
 
 
@@ -85,7 +90,8 @@ class FilmCaster:
         if quality not in PLANS:
             return render(stage, camera, quality, threads)
         threads = threads or cores()
-        band = max(BAND, -(-camera.height // (2 * threads)))
+        lines = camera.height if threads == 1 else max(BAND, -(-camera.height // (2 * threads)))
+        band = -(-lines // TILE) * TILE
         rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
         with ThreadPoolExecutor(threads) as pool:
             if self._empty is None or self._empty.aim != camera:
@@ -107,9 +113,9 @@ def _emptied(
 ) -> _Empty:
     """Cast the studio without objects."""
     pixels = camera.width * camera.height
-    wall = np.empty((pixels, 3), np.float32)
+    wall, mirrored = (np.empty((pixels, 3), np.float32) for _ in range(2))
     printed = np.empty((camera.height, camera.width, 3), np.uint8)
-    made = _Empty(camera, wall, printed)
+    made = _Empty(camera, wall, mirrored, printed)
     job = _Picture(stage.cleared(), camera, plan, made)
     for _ in pool.map(job.empty_band, rows):
         pass
@@ -123,12 +129,13 @@ class _Picture(Job):
         super().__init__(stage, camera, Sampling(1, 1, plan.sky))
         self.pixel *= FILTER
         self.plan, self.empty, self.boxes = plan, empty, stage.boxes()
-        self.ways = cull.ways(self.lamps, plan.sky)
+        self.ways = cull.ways(self.lamps, 1)
+        self.open = 1.0, float(cull.ways(self.lamps, plan.sky)[:-1, 2].mean())
         self.blur = np.float32(cull.blur(self.lamps, self.boxes))
 
     def wide(self, rows: tuple[int, int]) -> tuple[int, int]:
         """Rows with those above and below that the light filter looks at."""
-        halo = 2 * REACH - 1
+        halo = HALO * TILE
         return max(rows[0] - halo, 0), min(rows[1] + halo, self.camera.height)
 
     def empty_band(self, rows: tuple[int, int]) -> None:
@@ -141,11 +148,15 @@ class _Picture(Job):
         wall = light.copy()
         block = Block(wide[0], wide[1] - wide[0], width)
         index = np.arange(len(light))
-        self.layer(rays, index, block, light, self.stage.missed(rays.origin))
+        everywhere = np.ones((block.rows, width), np.bool_)
+        missed = self.stage.missed(rays.origin)
+        _, arrived = self.cast(rays, index, everywhere, block, light, missed)
         toned = np.empty_like(light)
         kernels_film.tone(light, index, toned)
         mine = slice((rows[0] - wide[0]) * width, (rows[1] - wide[0]) * width)
-        self.empty.wall[rows[0] * width : rows[1] * width] = wall[mine]
+        here = slice(rows[0] * width, rows[1] * width)
+        self.empty.wall[here] = wall[mine]
+        self.empty.mirrored[here] = arrived.light.reshape(-1, WIDE)[mine, 4:CHANNELS]
         size = width, height
         kernels_film.printed(toned, index, wide[0], size, rows, self.empty.printed)
 
@@ -158,24 +169,30 @@ class _Picture(Job):
         shape = block.rows, width
         # What is seen, and where light differs: on things, and where they may be in its way.
         hit = self.seen(rays, block)
-        differs, known = self.changed(rays, hit[0], block)
-        active = np.flatnonzero(differs)
-        if not len(active):
+        tiles = self.tiles(rays, hit[0], block)
+        kind = np.repeat(np.repeat(tiles, TILE, axis=0), TILE, axis=1)[: shape[0], :width]
+        if not kind.any():
             return
         here = slice(wide[0] * width, wide[1] * width)
-        light, toned = (np.empty((len(differs), 3), np.float32) for _ in range(2))
+        light, toned = (np.empty((len(rays.origin), 3), np.float32) for _ in range(2))
+        self.soften(tiles, block, here, toned)
+        near = kind == NEAR
+        near[: max(rows[0] - wide[0] - 1, 0)] = near[rows[1] - wide[0] + 1 :] = False
+        active = np.flatnonzero(near)
         light[active] = self.empty.wall[here][active]
+        known = kernels_film.widened(near, REACH)
         s, arrived = self.cast(rays, active, known, block, light, hit)
         kernels_film.tone(light, active, toned)
         # Once more, finer, beside other surfaces of another colour.
         edge = np.zeros(len(light), np.bool_)
         inner = max(rows[0] - wide[0] - 1, 0), min(rows[1] - wide[0] + 1, shape[0])
-        kernels_film.edges(s, toned, differs, shape, inner, edge)
+        kernels_film.edges(s, toned, near.ravel(), shape, inner, edge)
         pixels = np.flatnonzero(edge)
         if len(pixels):
             self.refine(pixels, block, arrived, toned)
         size = width, self.camera.height
-        kernels_film.printed(toned, active, wide[0], size, rows, out)
+        changed = np.flatnonzero(kind != UNTOUCHED)
+        kernels_film.printed(toned, changed, wide[0], size, rows, out)
 
     def seen(self, rays: Rays, block: Block) -> tuple[np.ndarray, ...]:
         """Nearest triangle and where, of each pixel; rays that could hit nothing are not cast."""
@@ -194,19 +211,38 @@ class _Picture(Job):
             whole[index] = part
         return full
 
-    def changed(
+    def tiles(
         self, rays: Rays, prim: np.ndarray, block: Block
-    ) -> tuple[Bool[np.ndarray, " P"], Bool[np.ndarray, "h w"]]:
-        """Say which pixels may differ from the empty studio, and whose light they need."""
+    ) -> UInt8[np.ndarray, "rows columns"]:
+        """Tell the tiles apart: what they show is as it was, darkened softly, or to be cast."""
         shape = block.rows, block.columns
-        touched = prim >= 0
-        eye, floor = self.eye.astype(np.float32), np.float32(self.lamps.floor[3])
-        kernels_film.stains(
-            rays.direction, eye, floor, self.ways, self.boxes, self.blur, shape, touched
+        things = np.zeros([-(-n // TILE) for n in shape], np.bool_)
+        kernels_floor.things(prim, shape, things)
+        near, far = kernels_floor.grown(things, AROUND), np.zeros_like(things)
+        eye = self.eye.astype(np.float32)
+        kernels_floor.stains(
+            rays.direction, eye, self.lamps, self.ways, self.boxes, self.blur, shape, near, far
         )
-        touched = touched.reshape(shape)
-        differs = kernels_film.widened(touched, REACH).ravel()
-        return differs, kernels_film.widened(touched, 2 * REACH - 1)
+        # Smoothing carries light into the tile beside.
+        near = kernels_floor.grown(near, 1)
+        return np.where(near, NEAR, np.where(far, FAR, UNTOUCHED)).astype(np.uint8)
+
+    def soften(self, tiles: np.ndarray, block: Block, here: slice, toned: np.ndarray) -> None:
+        """Shade the tiles of floor from which things hide a little of the sky."""
+        height, width = tiles.shape
+        size = self.camera.width, self.camera.height
+        view = self.eye, self.frame, self.tangent, size, block.first
+        room = kernels_floor.corners(tiles) * (len(self.ways) - 1)
+        o, w = (np.empty((room, 3), np.float32) for _ in range(2))
+        asker = np.empty(room, np.int64)
+        n = kernels_floor.at_corners(tiles, *view, self.lamps, self.ways, self.boxes, o, w, asker)
+        free = self.stage.free(o[:n], w[:n], asker[:n])
+        sky = np.full((height + 1, width + 1, 2), self.open, np.float32)
+        kernels_floor.hidden(asker, free, self.ways, width + 1, sky)
+        empty, shape = self.empty, (block.rows, block.columns)
+        kernels_floor.softly(
+            tiles, *view, shape, self.lamps, sky, empty.mirrored[here], empty.wall[here], toned
+        )
 
     def cast(
         self,
@@ -223,28 +259,55 @@ class _Picture(Job):
         thin = active[s.traits[active, 4] < 1]
         if len(thin):
             self.behind(rays, s, thin, block, light, 0)
-        # Light is asked for at every pixel, and smoothed over each surface.
+        # Every second pixel asks for light, which is smoothed over each surface.
         on = index[s.kind[index] != NOTHING]
-        arriving = np.zeros((len(light), CHANNELS), np.float32)
-        arriving[on] = self.ask(s, d, on, block.places(on))
+        shape = block.rows, block.columns
+        asks = np.zeros(len(light), np.bool_)
+        kernels_ask.chosen(s, on, known, block.first, asks)
+        asking = np.flatnonzero(asks)
+        arriving = np.zeros((len(light), WIDE), np.float32)
+        arriving[asking] = self.arriving(s, d, asking, block.places(asking))
         lit = np.zeros(len(light), np.bool_)
         lit[on] = True
         log = np.zeros(len(light), np.float32)
         log[on] = np.log(s.depth[on])
-        shape = block.rows, block.columns
         arrived = _Arrived(
-            arriving.reshape(*shape, CHANNELS),
+            arriving.reshape(*shape, WIDE),
             s.normal.reshape(*shape, 3),
             s.depth.reshape(shape),
             lit.reshape(shape),
         )
-        kernels_light.smooth(arrived.light, arrived.normal, log.reshape(shape), arrived.known)
+        kernels_ask.smooth(
+            arrived.light, arrived.normal, log.reshape(shape), arrived.known, asks.reshape(shape)
+        )
         self.reflect_sharply(s, d, on, arriving)
         seen = active[lit[active]]
         near = np.zeros(light.shape, np.float32)
         kernels_light.shade(s, seen, d, arriving, self.lamps, near)
         kernels_light.blend(s, seen, near, self.lamps, light)
         return s, arrived
+
+    def arriving(
+        self, s: Samples, d: np.ndarray, index: np.ndarray, places: Places, times: int = 1
+    ) -> Float32[np.ndarray, "N channels"]:
+        """Light that arrives at some samples, from so many times as many rays to the sky."""
+        stage, sky, many = self.stage, times * self.sampling.sky, len(index)
+        where = index, places.row, places.column
+        light = np.zeros((many, WIDE), np.float32)
+        o, w = (np.empty((many * (sky + 1) + 1, 3), np.float32) for _ in range(2))
+        ray, asker = (np.empty(len(o), np.int64) for _ in range(2))
+        n = kernels_ask.ask(s, *where, self.lamps, sky, self.boxes, o, w, ray, asker, light)
+        free = stage.free(o[:n], w[:n], ray[:n])
+        kernels_ask.answered(s, index, w, asker, free, self.lamps, sky, light)
+        n = kernels_ask.mirror(s, *where, d, self.lamps, o, w, asker, light)
+        if n:
+            seen, who = np.empty((n, 3), np.float32), asker[:n]
+            kernels_light.mirrored(
+                stage.look, stage.normals, self.lamps, s, index[who], w,
+                *stage.hit(o[:n], w[:n]), seen, 0
+            )  # fmt: skip
+            light[who, 4:CHANNELS] = seen
+        return light
 
     def reflect_sharply(self, s: Samples, d: np.ndarray, on: np.ndarray, light: np.ndarray) -> None:
         """Let each smooth surface mirror what it sees itself, instead of its neighbours."""
@@ -256,19 +319,19 @@ class _Picture(Job):
         self, pixels: np.ndarray, block: Block, arrived: "_Arrived", toned: np.ndarray
     ) -> None:
         """Replace pixels by the mean of finer samples."""
-        grid, count = self.plan.finer, self.plan.finer**2
+        count = len(ABOUT)
         total = len(pixels) * count
         o, d = (np.empty((total, 3), np.float32) for _ in range(2))
         row, column = (np.empty(total, np.float32) for _ in range(2))
         size, view = (self.camera.width, self.camera.height), (self.eye, self.frame, self.tangent)
-        kernels_film.finer_rays(*view, size, block.first, pixels, grid, o, d, row, column)
+        kernels_film.finer_rays(*view, size, block.first, pixels, o, d, row, column)
         light = np.repeat(self.empty.wall[block.first * block.columns + pixels], count, axis=0)
         # Dice hang on the sample's place in a picture of so many samples.
         places = Places(
-            ((row + block.first + 0.5) * grid).astype(np.int64),
-            ((column + 0.5) * grid).astype(np.int64),
+            ((row + block.first + 0.5) * FINER).astype(np.int64),
+            ((column + 0.5) * FINER).astype(np.int64),
         )
-        lit = np.zeros((total, CHANNELS), np.float32)
+        lit = np.zeros((total, WIDE), np.float32)
 
         def known(s: Samples) -> Bool[np.ndarray, " S"]:
             return kernels_film.share(
@@ -276,7 +339,7 @@ class _Picture(Job):
             )
 
         self.look_closely(Rays(o, d), places, light, lit, known)
-        kernels_film.tone_means(light, pixels, count, toned)
+        kernels_film.tone_means(light, pixels, toned)
 
     def look_closely(
         self,
@@ -293,25 +356,26 @@ class _Picture(Job):
             rays: All of them.
             places: Of each, for its dice.
             light: Behind everything (S, 3); then what the eye gets.
-            lit: Room for the light that arrives (S, CHANNELS).
+            lit: Room for the light that arrives (S, WIDE).
             known: Fills ``lit`` where light is known already, and says where it is not.
             depth: Surfaces that were looked through.
 
         """
         o, d = rays.origin, rays.direction
         hit = self.stage.hit(o, d) if self.stage.shown else self.stage.missed(o)
-        s = self.meet(o, d, np.arange(len(o)), hit, self.plan.finer)
+        s = self.meet(o, d, np.arange(len(o)), hit, FINER)
         thin = np.flatnonzero(s.traits[:, 4] < 1)
         if len(thin) and depth < LAYERS:
             past = beyond(s.point[thin], d[thin], np.zeros(1, np.float32), self.stage.size)
             there, deeper = Places(places.row[thin], places.column[thin]), light[thin]
             further = Rays(past, np.ascontiguousarray(d[thin]))
-            room = np.zeros((len(thin), CHANNELS), np.float32)
+            room = np.zeros((len(thin), WIDE), np.float32)
             self.look_closely(further, there, deeper, room, _unknown, depth + 1)
             light[thin] = deeper
         on = np.flatnonzero(s.kind != NOTHING)
         lone = on[known(s)[on]]
-        lit[lone] = self.ask(s, d, lone, Places(places.row[lone], places.column[lone]), 2)
+        there = Places(places.row[lone], places.column[lone])
+        lit[lone] = self.arriving(s, d, lone, there, 2)
         self.reflect_sharply(s, d, on, lit)
         near = np.zeros(light.shape, np.float32)
         kernels_light.shade(s, on, d, lit, self.lamps, near)

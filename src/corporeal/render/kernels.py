@@ -27,6 +27,7 @@ LINEAR = linear(np.arange(256) / 255).astype(np.float32)
 CREASE = float(np.cos(np.radians(SHARP)))
 """Cosine of the largest angle over which made normals are smoothed."""
 NOTHING, FLOOR, THING = 0, 1, 2
+FLOOR_ROUGHNESS = 0.9
 
 
 class Samples(NamedTuple):
@@ -285,7 +286,7 @@ def _meet_floor(floor, o, d, g, out):
         out.albedo[g, a] = floor[a]
     out.point[g, 2] = floor[3]
     out.traits[g] = 0
-    out.traits[g, 1] = 0.9
+    out.traits[g, 1] = FLOOR_ROUGHNESS
     out.traits[g, 4] = 1
 
 

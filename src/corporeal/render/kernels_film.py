@@ -13,12 +13,14 @@ FARTHEST = 0.02
 ALIKE = 0.92
 """Cosine between normals of what still counts as one surface."""
 FINE = np.float32(1e-12)
-TILE = 8
-"""Sides of the squares of pixels that are told from the empty studio together."""
 HORIZON = np.float32(1e-4)
 """Sine below the horizon from which on the floor is seen, as ``kernels`` has it."""
 STEP = 6
 """Grey levels (of 255) between neighbours that are worth more samples."""
+FINER = 3
+"""How much finer in each direction pixels are looked at where there is an edge."""
+ABOUT = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) / FINER
+"""Samples about the middle of such a pixel, which is known: rows and columns."""
 PATCH = 0.1
 """Steps of albedo from which on two triangles are painted apart."""
 
@@ -44,67 +46,6 @@ def could_meet(o, w, boxes, out):
     """For each ray, whether it could meet what is in the boxes."""
     for k in range(len(o)):
         out[k] = meets_box(o[k], w[k], boxes)
-
-
-@numba.njit(**JIT)
-def stains(d, eye, floor, ways, boxes, blur, shape, out):
-    """Mark the pixels of tiles that see a floor which boxes could darken.
-
-    Args:
-        d: Directions of the pixels (P, 3).
-        eye: Where they come from [m].
-        floor: Its height [m].
-        ways: All that pixels on the floor look along: to the sky and, last, to the sun (S, 3).
-        boxes: About what objects (B, 2, 3) [m].
-        blur: How far the sun's softness spreads a shadow on the floor [m].
-        shape: Rows and columns of pixels.
-        out: Marks (P,).
-
-    """
-    h, w = shape
-    p = np.empty(3, np.float32)
-    wide = boxes.copy()
-    p[2] = floor
-    for top in range(0, h, TILE):
-        for left in range(0, w, TILE):
-            bottom, right = min(top + TILE, h) - 1, min(left + TILE, w) - 1
-            radius, seen = _patch(d, eye, floor, w, (top, bottom, left, right), p)
-            if not seen:
-                continue
-            marked = False
-            for k in range(len(ways)):
-                more = radius + (blur if k == len(ways) - 1 else np.float32(0))
-                for b in range(len(boxes)):
-                    for a in range(2):
-                        wide[b, 0, a] = boxes[b, 0, a] - more
-                        wide[b, 1, a] = boxes[b, 1, a] + more
-                if meets_box(p, ways[k], wide):
-                    marked = True
-                    break
-            if marked:
-                for i in range(top, bottom + 1):
-                    for j in range(left, right + 1):
-                        out[i * w + j] = True
-
-
-@numba.njit(**JIT)
-def _patch(d, eye, floor, w, tile, centre):
-    """Middle and radius [m] of the floor that a tile of pixels sees, and whether it sees any."""
-    top, bottom, left, right = tile
-    if d[bottom * w + left, 2] > -HORIZON and d[bottom * w + right, 2] > -HORIZON:
-        return np.float32(0), False
-    low = np.full(2, np.float32(np.inf))
-    high = np.full(2, np.float32(-np.inf))
-    for i in (top, bottom):
-        for j in (left, right):
-            e = d[i * w + j]
-            t = (floor - eye[2]) / min(e[2], -HORIZON)
-            for a in range(2):
-                low[a] = min(low[a], eye[a] + t * e[a])
-                high[a] = max(high[a], eye[a] + t * e[a])
-    for a in range(2):
-        centre[a] = (low[a] + high[a]) / 2
-    return max(high[0] - low[0], high[1] - low[1]) / 2, True
 
 
 @numba.njit(**JIT)
@@ -239,14 +180,15 @@ def tone(light, index, out):
 
 
 @numba.njit(**JIT)
-def tone_means(light, index, count, out):
-    """Mean filmic light of so many samples for each of some pixels."""
+def tone_means(light, index, out):
+    """Replace the filmic light of some pixels by its mean with the samples about them."""
+    count = len(ABOUT)
     for k in range(len(index)):
         for c in range(3):
-            total = np.float32(0)
+            total = out[index[k], c]
             for n in range(count):
                 total += filmic(light[k * count + n, c])
-            out[index[k], c] = total / count
+            out[index[k], c] = total / (count + 1)
 
 
 @numba.njit(**JIT)
@@ -280,19 +222,26 @@ def printed(picture, index, row, size, first, out):
 
 
 @numba.njit(**JIT)
-def finer_rays(eye, frame, tangent, size, first, pixels, grid, o, d, row, column):
-    """Origins, directions and places of grid × grid samples of some pixels of a band."""
+def way_of(eye, frame, tangent, size, row, column, e):
+    """Write the unit direction of a place in the picture."""
     width, height = size
+    up = (1 - (row + 0.5) / height * 2) * tangent
+    right = ((column + 0.5) / width * 2 - 1) * tangent * width / height
+    length = np.sqrt(right * right + up * up + 1)
+    for a in range(3):
+        e[a] = (right * frame[0, a] + up * frame[1, a] - frame[2, a]) / length
+
+
+@numba.njit(**JIT)
+def finer_rays(eye, frame, tangent, size, first, pixels, o, d, row, column):
+    """Origins, directions and places of the samples about the middle of some pixels of a band."""
+    width = size[0]
+    count = len(ABOUT)
     for k in range(len(pixels)):
         i, j = pixels[k] // width, pixels[k] % width
-        for n in range(grid * grid):
-            y = i + (n // grid + 0.5) / grid - 0.5
-            x = j + (n % grid + 0.5) / grid - 0.5
-            m = k * grid * grid + n
-            row[m], column[m] = y, x
-            up = (1 - (first + y + 0.5) / height * 2) * tangent
-            right = ((x + 0.5) / width * 2 - 1) * tangent * width / height
-            length = np.sqrt(right * right + up * up + 1)
+        for n in range(count):
+            m = k * count + n
+            row[m], column[m] = i + ABOUT[n, 0], j + ABOUT[n, 1]
+            way_of(eye, frame, tangent, size, first + i + ABOUT[n, 0], j + ABOUT[n, 1], d[m])
             for a in range(3):
-                d[m, a] = (right * frame[0, a] + up * frame[1, a] - frame[2, a]) / length
                 o[m, a] = eye[a]

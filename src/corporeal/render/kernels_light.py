@@ -50,103 +50,138 @@ def _normalised(x, y, z, out):
 
 
 @numba.njit(**JIT)
-def sky_rays(s, index, cells, lamps, number, count, o, w):
-    """Cosine-weighted directions: a point of the unit sphere added to the normal.
+def sky_way(s, g, u, v, w):
+    """Write the cosine-weighted direction of a place (u, v) in the unit square.
 
-    The R2 sequence (Roberts 2018) spreads 16 × count directions over a tile.
+    It is a point of the unit sphere plus the normal.
     """
+    z = 1 - 2 * u
+    phi = 2 * np.pi * v
+    r = 0.999 * np.sqrt(1 - z * z)
+    n = s.normal[g]
+    _normalised(n[0] + r * np.cos(phi), n[1] + r * np.sin(phi), n[2] + 0.999 * z, w)
+    side = dot(w, s.flat[g])
+    if side < 0.01:
+        # Below the facet, though not below the smooth surface: lift it out.
+        f = s.flat[g]
+        c = 0.01 - side
+        _normalised(w[0] + c * f[0], w[1] + c * f[1], w[2] + c * f[2], w)
+
+
+@numba.njit(**JIT)
+def sky_rays(s, index, cells, lamps, number, count, o, w):
+    """One ray to the sky each: the R2 sequence (Roberts 2018) spreads 16 × count over a tile."""
     gap = np.float32(2e-4 * lamps.size)
     for k in range(len(index)):
         g = index[k]
         q = cells[k] * count + number
-        z = 1 - 2 * ((q * 0.7548776662 + 0.37) % 1)
-        phi = 2 * np.pi * ((q * 0.5698402910 + 0.71) % 1)
-        r = 0.999 * np.sqrt(1 - z * z)
-        n = s.normal[g]
-        _normalised(n[0] + r * np.cos(phi), n[1] + r * np.sin(phi), n[2] + 0.999 * z, w[k])
-        side = dot(w[k], s.flat[g])
-        if side < 0.01:
-            # Below the facet, though not below the smooth surface: lift it out.
-            f = s.flat[g]
-            c = 0.01 - side
-            _normalised(w[k, 0] + c * f[0], w[k, 1] + c * f[1], w[k, 2] + c * f[2], w[k])
+        u, v = (q * 0.7548776662 + 0.37) % 1, (q * 0.5698402910 + 0.71) % 1
+        sky_way(s, g, u, v, w[k])
         for a in range(3):
             o[k, a] = s.point[g, a] + gap * s.flat[g, a]
 
 
 @numba.njit(**JIT)
-def gather_sky(s, index, w, free, lamps, share, light):
-    """Add what one ray per sample saw: open sky, or the sunlit floor below the horizon."""
-    for k in range(len(index)):
-        if not free[k]:
-            continue
-        g = index[k]
-        if w[k, 2] > 0:
-            light[k, 0] += share
-            light[k, 1] += share * w[k, 2]
-        else:
-            # The floor is darker right under objects.
-            gap = min(max((s.point[g, 2] - lamps.floor[3]) / (0.1 * lamps.size), 0), 1)
-            light[k, 2] += share * (0.35 + 0.75 * gap)
+def open_way(s, g, w, lamps, share, light):
+    """Add what a ray sees that gets away: open sky, or the sunlit floor below the horizon."""
+    if w[2] > 0:
+        light[0] += share
+        light[1] += share * w[2]
+    else:
+        # The floor is darker right under objects.
+        gap = min(max((s.point[g, 2] - lamps.floor[3]) / (0.1 * lamps.size), 0), 1)
+        light[2] += share * (0.35 + 0.75 * gap)
 
 
 @numba.njit(**JIT)
-def sun_rays(s, index, cells, pixels, lamps, o, w, ask):
-    """One ray each to one of 16 × 16 places on the sun's disc; leaves also look through."""
-    sun = lamps.sun
-    e = np.empty(3, np.float32)
+def gather_sky(s, index, w, free, lamps, share, light):
+    """Add what one ray per sample saw."""
+    for k in range(len(index)):
+        if free[k]:
+            open_way(s, index[k], w[k], lamps, share, light[k])
+
+
+@numba.njit(**JIT)
+def across(sun, e):
+    """Write a unit vector across the sun's direction into ``e``; return the one across both."""
     if abs(sun[2]) < 0.999:
         _normalised(sun[1], -sun[0], np.float32(0), e)
     else:
         e[0], e[1], e[2] = 1, 0, 0
-    h = np.array(
+    return np.array(
         [
             sun[1] * e[2] - sun[2] * e[1],
             sun[2] * e[0] - sun[0] * e[2],
             sun[0] * e[1] - sun[1] * e[0],
         ]
     )
+
+
+@numba.njit(**JIT)
+def sun_way(i, pixel, lamps, e, h, w):
+    """Write the direction of one of 16 × 16 places on the sun's disc."""
+    sun = lamps.sun
+    j = int(hash01(pixel, 7) * 16)
+    a = (i % 4 + (j % 4 + hash01(pixel, 5)) / 4) / 4
+    b = (i // 4 + (j // 4 + hash01(pixel, 3)) / 4) / 4
+    r, phi = np.sqrt(a) * lamps.softness, 2 * np.pi * b
+    x, y = r * np.cos(phi), r * np.sin(phi)
+    _normalised(
+        sun[0] + x * e[0] + y * h[0],
+        sun[1] + x * e[1] + y * h[1],
+        sun[2] + x * e[2] + y * h[2],
+        w,
+    )
+
+
+@numba.njit(**JIT)
+def sunlit(s, g, lamps, o):
+    """Say whether the sun may reach a sample, and write where its ray begins.
+
+    Leaves look through, too.
+    """
+    front = dot(s.normal[g], lamps.sun) > 0
+    gap = np.float32(2e-4 if front else -2e-3) * lamps.size
+    for c in range(3):
+        o[c] = s.point[g, c] + gap * s.flat[g, c]
+    return front or s.traits[g, 2] > 0
+
+
+@numba.njit(**JIT)
+def sun_rays(s, index, cells, pixels, lamps, o, w, ask):
+    """One ray each to the sun."""
+    e = np.empty(3, np.float32)
+    h = across(lamps.sun, e)
     for k in range(len(index)):
-        g = index[k]
-        i = cells[k]
-        j = int(hash01(pixels[k], 7) * 16)
-        a = (i % 4 + (j % 4 + hash01(pixels[k], 5)) / 4) / 4
-        b = (i // 4 + (j // 4 + hash01(pixels[k], 3)) / 4) / 4
-        r, phi = np.sqrt(a) * lamps.softness, 2 * np.pi * b
-        x, y = r * np.cos(phi), r * np.sin(phi)
-        _normalised(
-            sun[0] + x * e[0] + y * h[0],
-            sun[1] + x * e[1] + y * h[1],
-            sun[2] + x * e[2] + y * h[2],
-            w[k],
-        )
-        front = dot(s.normal[g], sun) > 0
-        ask[k] = front or s.traits[g, 2] > 0
-        gap = np.float32(2e-4 if front else -2e-3) * lamps.size
-        for c in range(3):
-            o[k, c] = s.point[g, c] + gap * s.flat[g, c]
+        sun_way(cells[k], pixels[k], lamps, e, h, w[k])
+        ask[k] = sunlit(s, index[k], lamps, o[k])
+
+
+@numba.njit(**JIT)
+def mirror_way(s, g, e, q, w):
+    """Write the direction in which a sample mirrors view ``e``, spread by roughness."""
+    n, f = s.normal[g], s.flat[g]
+    c = 2 * dot(e, n)
+    spread = s.traits[g, 1] ** 2 * 0.8
+    z = 1 - 2 * ((q * 0.7548776662 + 0.21) % 1)
+    phi = 2 * np.pi * ((q * 0.5698402910 + 0.13) % 1)
+    r = np.sqrt(1 - z * z)
+    x = e[0] - c * n[0] + spread * r * np.cos(phi)
+    y = e[1] - c * n[1] + spread * r * np.sin(phi)
+    z = e[2] - c * n[2] + spread * z
+    down = min(x * f[0] + y * f[1] + z * f[2] - 0.02, 0.0)
+    _normalised(x - down * f[0], y - down * f[1], z - down * f[2], w)
 
 
 @numba.njit(**JIT)
 def mirror_rays(s, index, d, cells, lamps, o, w):
-    """Mirrored directions, spread by roughness within a tile."""
+    """Mirrored directions, spread within a tile."""
     gap = np.float32(2e-4 * lamps.size)
     for k in range(len(index)):
         g = index[k]
-        n, f, e = s.normal[g], s.flat[g], d[g]
-        c = 2 * dot(e, n)
-        spread = s.traits[g, 1] ** 2 * 0.8
-        q = cells[k]
-        z = 1 - 2 * ((q * 0.7548776662 + 0.21) % 1)
-        phi = 2 * np.pi * ((q * 0.5698402910 + 0.13) % 1)
-        r = np.sqrt(1 - z * z)
-        x = e[0] - c * n[0] + spread * r * np.cos(phi)
-        y = e[1] - c * n[1] + spread * r * np.sin(phi)
-        z = e[2] - c * n[2] + spread * z
-        down = min(x * f[0] + y * f[1] + z * f[2] - 0.02, 0.0)
-        _normalised(x - down * f[0], y - down * f[1], z - down * f[2], w[k])
+        mirror_way(s, g, d[g], cells[k], w[k])
         for a in range(3):
-            o[k, a] = s.point[g, a] + gap * f[a]
+            o[k, a] = s.point[g, a] + gap * s.flat[g, a]
 
 
 @numba.njit(**JIT)
@@ -156,7 +191,7 @@ def _ramp(x):
 
 
 @numba.njit(**JIT)
-def _studio(w, blur, lamps, out):
+def studio(w, blur, lamps, out):
     """Floor, sky, a softbox at the sun and a strip light; blurred for rough surfaces."""
     up = w[2]
     high = min(max(up, 0.0), 1.0)
@@ -177,7 +212,7 @@ def mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first):
     rgba = np.empty(8, np.float32)
     for k in range(len(index)):
         rough = s.traits[index[k], 1]
-        _studio(w[k], max(rough - 0.15, 0.0) ** 2, lamps, light[k, first : first + 3])
+        studio(w[k], max(rough - 0.15, 0.0) ** 2, lamps, light[k, first : first + 3])
         # A facet must not mirror its own neighbours: the smooth surface it stands for would not.
         if prim[k] < 0 or t[k] < 0.02 * lamps.size:
             continue
@@ -254,44 +289,60 @@ def spread(s, index, shape, lattice, normal, depth, on, every, out):
 
 
 @numba.njit(**JIT)
-def shade(s, index, d, light, lamps, out):
-    """Linear light towards the eye [N, 3] of the samples in ``index``; multiplied by opacity.
+def shade_one(n, e, tint, traits, light, lamps, room, out):
+    """Linear light towards the eye of one sample; multiplied by opacity.
 
     GGX highlight (Walter 2007), Schlick's Fresnel term, interreflection after Jimenez 2016.
+
+    Args:
+        n: Normal.
+        e: Unit direction from the eye.
+        tint: Albedo, linear.
+        traits: As of ``Samples``.
+        light: That arrives (CHANNELS).
+        lamps: The studio.
+        room: Scratch (2, 3).
+        out: The light (3,).
+
     """
-    h = np.empty(3, np.float32)
-    sky = np.empty(3, np.float32)
+    h, sky, sun = room[0], room[1], lamps.sun
+    metal, rough, through, glow, solid = traits[0], traits[1], traits[2], traits[3], traits[4]
+    for c in range(3):
+        sky[c] = (
+            light[0] * lamps.horizon[c]
+            + light[1] * (lamps.zenith[c] - lamps.horizon[c])
+            + light[2] * lamps.floor[c]
+        )
+    free = min(max((sky[0] + sky[1] + sky[2]) / 3, 0.0), 1.0)
+    cos = dot(n, sun)
+    lit = max(cos, 0.0) + through * max(-cos, 0.0)
+    _normalised(sun[0] - e[0], sun[1] - e[1], sun[2] - e[2], h)
+    alpha = max(rough * rough, 0.02)
+    nh = min(max(dot(n, h), 0.0), 1.0)
+    ggx = alpha**2 / (np.pi * (nh * nh * (alpha**2 - 1) + 1) ** 2)
+    shine = min(ggx * 0.25, 12.0) * light[3] * max(cos, 0.0)
+    graze = (1 - min(max(-dot(n, e), 0.0), 1.0)) ** 5
+    hidden = min(max(free * 1.3, 0.1), 1.0)
+    for c in range(3):
+        albedo = tint[c]
+        a, b = 2.0404 * albedo - 0.3324, -4.7951 * albedo + 0.6417
+        bounce = ((free * a + b) * free + 2.7552 * albedo + 0.6903) * free
+        bounce = max(free, bounce) / max(free, 1e-3)
+        f0 = 0.04 * (1 - metal) + albedo * metal
+        fresnel = f0 + (max(1 - rough, f0) - f0) * graze
+        sunlight = lamps.sun_colour[c] * light[3] * lit * (1.25 / np.pi)
+        body = albedo * (0.5 * sky[c] * bounce + sunlight) * (1 - metal) * (1 - fresnel)
+        gleam = fresnel * light[4 + c] * hidden + f0 * shine * lamps.sun_colour[c]
+        out[c] = solid * (body + albedo * glow) + min(solid * 4, 1.0) * gleam
+
+
+@numba.njit(**JIT)
+def shade(s, index, d, light, lamps, out):
+    """Linear light towards the eye [N, 3] of the samples in ``index``; see ``shade_one``."""
+    room = np.empty((2, 3), np.float32)
     for k in range(len(index)):
         g = index[k]
-        n, e, sun = s.normal[g], d[g], lamps.sun
-        metal, rough, through, glow, solid, _ = s.traits[g]
-        for c in range(3):
-            sky[c] = (
-                light[g, 0] * lamps.horizon[c]
-                + light[g, 1] * (lamps.zenith[c] - lamps.horizon[c])
-                + light[g, 2] * lamps.floor[c]
-            )
-        free = min(max((sky[0] + sky[1] + sky[2]) / 3, 0.0), 1.0)
-        cos = dot(n, sun)
-        lit = max(cos, 0.0) + through * max(-cos, 0.0)
-        _normalised(sun[0] - e[0], sun[1] - e[1], sun[2] - e[2], h)
-        alpha = max(rough * rough, 0.02)
-        nh = min(max(dot(n, h), 0.0), 1.0)
-        ggx = alpha**2 / (np.pi * (nh * nh * (alpha**2 - 1) + 1) ** 2)
-        shine = min(ggx * 0.25, 12.0) * light[g, 3] * max(cos, 0.0)
-        graze = (1 - min(max(-dot(n, e), 0.0), 1.0)) ** 5
-        hidden = min(max(free * 1.3, 0.1), 1.0)
-        for c in range(3):
-            albedo = s.albedo[g, c]
-            a, b = 2.0404 * albedo - 0.3324, -4.7951 * albedo + 0.6417
-            bounce = ((free * a + b) * free + 2.7552 * albedo + 0.6903) * free
-            bounce = max(free, bounce) / max(free, 1e-3)
-            f0 = 0.04 * (1 - metal) + albedo * metal
-            fresnel = f0 + (max(1 - rough, f0) - f0) * graze
-            sunlight = lamps.sun_colour[c] * light[g, 3] * lit * (1.25 / np.pi)
-            body = albedo * (0.5 * sky[c] * bounce + sunlight) * (1 - metal) * (1 - fresnel)
-            gleam = fresnel * light[g, 4 + c] * hidden + f0 * shine * lamps.sun_colour[c]
-            out[g, c] = solid * (body + albedo * glow) + min(solid * 4, 1.0) * gleam
+        shade_one(s.normal[g], d[g], s.albedo[g], s.traits[g], light[g], lamps, room, out[g])
 
 
 @numba.njit(**JIT)
@@ -306,6 +357,12 @@ def backdrop(lamps, rows, height, width, grid, out):
 
 
 @numba.njit(**JIT)
+def fading(away, lamps):
+    """Share of the floor so far away [m] from the scene that is seen before the backdrop."""
+    return min(max(1.35 - away / (3 * lamps.size), 0.0), 1.0) ** 1.5
+
+
+@numba.njit(**JIT)
 def blend(s, index, near, lamps, behind):
     """Lay nearer light over what is behind it; the floor fades into the backdrop far away."""
     for k in range(len(index)):
@@ -313,8 +370,7 @@ def blend(s, index, near, lamps, behind):
         if s.kind[g] == FLOOR:
             x = s.point[g, 0] - lamps.centre[0]
             y = s.point[g, 1] - lamps.centre[1]
-            away = np.sqrt(x * x + y * y) / (3 * lamps.size)
-            fade = min(max(1.35 - away, 0.0), 1.0) ** 1.5
+            fade = fading(np.sqrt(x * x + y * y), lamps)
             for c in range(3):
                 behind[g, c] = near[g, c] * fade + behind[g, c] * (1 - fade)
         elif s.kind[g] == THING:

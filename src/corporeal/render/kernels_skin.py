@@ -79,3 +79,20 @@ def carry(rest, normals, near, weight, start, now, F, place, turned):
         length = np.sqrt(length)
         for a in range(3):
             turned[v, a] = turned[v, a] / length if length > 1e-12 else normals[v, a]
+
+
+@numba.njit(**JIT)
+def strained(F, limit, out):
+    """Mark gradients with ‖FᵀF - 1‖² > ``limit``, and those that mirror."""
+    for p in range(len(F)):
+        norm = 0.0
+        for a in range(3):
+            for b in range(3):
+                c = F[p, 0, a] * F[p, 0, b] + F[p, 1, a] * F[p, 1, b] + F[p, 2, a] * F[p, 2, b]
+                c -= 1.0 if a == b else 0.0
+                norm += c * c
+        volume = 0.0
+        for a in range(3):
+            b, c = (a + 1) % 3, (a + 2) % 3
+            volume += F[p, 2, a] * (F[p, 0, b] * F[p, 1, c] - F[p, 0, c] * F[p, 1, b])
+        out[p] = norm > limit or volume <= 0

@@ -178,13 +178,12 @@ def bounded(
 ) -> Float[np.ndarray, "P 3 3"]:
     """F with its principal stretches within limits; a mirrored or broken F becomes a rotation."""
     low, high = limits
-    finite = np.all(np.isfinite(F), axis=(1, 2))
-    F = np.where(finite[:, None, None], F, np.eye(3))
+    finite = np.isfinite(F)
+    if not finite.all():
+        F = np.where(finite.all(axis=(1, 2))[:, None, None], F, np.eye(3))
     # |σ² - 1| ≤ ‖FᵀF - 1‖, so that small strains need no decomposition.
-    strain = np.einsum("pki,pkj->pij", F, F) - np.eye(3)
-    mirrored = np.einsum("pi,pi->p", np.cross(F[:, 0], F[:, 1]), F[:, 2]) <= 0
-    outside = np.einsum("pij,pij->p", strain, strain) > min(1 - low**2, high**2 - 1) ** 2
-    outside |= mirrored
+    outside = np.empty(len(F), np.bool_)
+    kernels_skin.strained(F, min(1 - low**2, high**2 - 1) ** 2, outside)
     if of is not None:
         outside &= of
     if outside.any():

@@ -33,6 +33,8 @@ DAMAGE = (OSError, ValueError, KeyError, EOFError, RuntimeError, zipfile.BadZipF
 """What reading a damaged npz raises."""
 HALF = 6e4
 """Largest stretch that float16 can hold [-]."""
+ROOM = 2**26
+"""Of frames that are kept in memory once they have been read [bytes]: 60 of 30,000 particles."""
 
 
 @dataclass(frozen=True)
@@ -75,8 +77,8 @@ def write_arrays(path: Path, arrays: dict[str, Any]) -> None:
         partial.unlink(missing_ok=True)
 
 
-def read_arrays(path: Path, start: str = "") -> dict[str, np.ndarray]:
-    """Read the arrays of an npz whose names begin with ``start``.
+def read_arrays(path: Path, start: str = "", without: str = "\0") -> dict[str, np.ndarray]:
+    """Read the arrays of an npz whose names begin with ``start``, and not with ``without``.
 
     Raises:
         BadFileError: The file is absent or damaged.
@@ -84,7 +86,8 @@ def read_arrays(path: Path, start: str = "") -> dict[str, np.ndarray]:
     """
     try:
         with np.load(path, allow_pickle=False) as file:
-            return {name: file[name] for name in file.files if name.startswith(start)}
+            names = [n for n in file.files if n.startswith(start) and not n.startswith(without)]
+            return {name: file[name] for name in names}
     except DAMAGE as error:
         raise BadFileError(
             path, f"cannot be read ({error}).", "Run corporeal simulate again."
@@ -124,7 +127,11 @@ def write_frame(folder: Path, number: int, frame: Frame, layout: Layout, ledger:
 def read_frame(folder: Path, number: int, layout: Layout) -> Frame:
     """Read one frame; a rigid object's deformation is its exact rotation."""
     path = frame_path(folder, number)
-    found = read_arrays(path)
+    return _frame(path, read_arrays(path, without=PREFIX), layout)
+
+
+def _frame(path: Path, found: dict[str, np.ndarray], layout: Layout) -> Frame:
+    """Unpack a frame; the arrays found at ``path`` stay as they are."""
     try:
         deformation = np.empty((len(layout.object), 3, 3), dtype=np.float32)
         deformation[layout.bends] = found["motion"]
@@ -133,7 +140,7 @@ def read_frame(folder: Path, number: int, layout: Layout) -> Frame:
         if "stress" in found:
             stress = np.zeros(len(layout.object), dtype=np.float32)
             stress[layout.bends] = found["stress"].astype(np.float32) ** 2
-        return Frame(float(found["time"]), found["position"], deformation, stress)
+        return Frame(float(found["time"]), found["position"].copy(), deformation, stress)
     except (KeyError, ValueError, IndexError) as error:
         raise BadFileError(
             path, f"is not a frame of this run ({error}).", "Run corporeal simulate again."
@@ -167,11 +174,16 @@ def _ledger(path: Path, found: dict[str, np.ndarray]) -> Ledger:
 
 
 class Frames(Sequence[Frame]):
-    """The frames of one trajectory, read from disk when asked for."""
+    """The frames of one trajectory, read from disk when asked for; the first ones only once.
+
+    Audit, film and report each read most of them. What is beyond ``ROOM`` is read again.
+    """
 
     def __init__(self, folder: Path, count: int) -> None:
         self.folder, self.length = folder, count
         self.layout = read_layout(folder)
+        self._kept: dict[int, dict[str, np.ndarray]] = {}
+        self._room = ROOM
 
     def __len__(self) -> int:
         return self.length
@@ -186,7 +198,15 @@ class Frames(Sequence[Frame]):
         number = index + self.length if index < 0 else index
         if not 0 <= number < self.length:
             raise IndexError(f"frame {index} of {self.length}")
-        return read_frame(self.folder, number, self.layout)
+        path = frame_path(self.folder, number)
+        found = self._kept.get(number)
+        if found is None:
+            found = read_arrays(path, without=PREFIX)
+            size = sum(array.nbytes for array in found.values())
+            if size <= self._room:
+                self._room -= size
+                self._kept[number] = found
+        return _frame(path, found, self.layout)
 
 
 def gather(folder: Path, count: int) -> Trajectory:

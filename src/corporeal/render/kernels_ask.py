@@ -1,0 +1,230 @@
+"""Light at the hits of a film's pixels: where to ask for it, with which rays, and how it is shared.
+
+Pixels of a checkerboard ask; the others take their neighbours' light. The 72 that ask in 12 × 12
+pixels look along as many different directions, and it is 12 × 12 pixels that light is smoothed
+over: wherever these begin, each direction is in them once. Loops compiled by numba.
+"""
+
+import numba
+import numpy as np
+
+from corporeal.render.kernels import JIT, NOTHING, THING, dot
+from corporeal.render.kernels_film import ALIKE, FARTHEST, meets_box
+from corporeal.render.kernels_light import (
+    GLOSSY,
+    SHARP,
+    across,
+    mirror_way,
+    open_way,
+    sky_way,
+    studio,
+    sunlit,
+)
+
+WIDE = 8
+"""Channels of light, one more than there are: loops over them fill whole registers."""
+WAYS = 72
+"""Directions of pixels that ask."""
+GRAZING = 0.04
+"""Of the light of the sky that comes from right above the horizon, and is taken from higher up:
+shadows of so little would reach far over the floor."""
+ENOUGH = 2
+"""Neighbours of the same surface whose light is a pixel's, too."""
+
+
+@numba.njit(**JIT)
+def chosen(s, on, known, first, out):
+    """Mark the pixels that ask for light: every second one, and what has few alike beside it.
+
+    Args:
+        s: What pixels met.
+        on: Pixels that met something.
+        known: Which pixels were looked at (rows, columns).
+        first: The picture's row of the first one.
+        out: Marks (P,).
+
+    """
+    h, w = known.shape
+    for g in on:
+        i, j = g // w, g % w
+        if (i + first + j) % 2 == 0:
+            out[g] = True
+            continue
+        alike = 0
+        for n in range(4):
+            y, x = i + (1 - n if n % 2 == 0 else 0), j + (2 - n if n % 2 == 1 else 0)
+            if 0 <= y < h and 0 <= x < w and known[y, x]:
+                q = y * w + x
+                near = abs(s.depth[g] - s.depth[q]) < FARTHEST * s.depth[g]
+                if s.kind[q] != NOTHING and near and dot(s.normal[g], s.normal[q]) > ALIKE:
+                    alike += 1
+        out[g] = alike < ENOUGH
+
+
+@numba.njit(**JIT)
+def number_of(row, column):
+    """Which of ``WAYS`` directions a pixel looks along: 8 in each tile of 4 × 4, in 3 × 3 tiles."""
+    tile = (row // 4 % 3) * 3 + column // 4 % 3
+    return tile * 8 + (row % 4) * 2 + column % 4 // 2
+
+
+@numba.njit(**JIT)
+def _look_up(s, g, q, w):
+    """Write a direction to the sky: the R2 sequence (Roberts 2018) spreads them."""
+    u, v = (q * 0.7548776662 + 0.37) % 1, (q * 0.5698402910 + 0.71) % 1
+    sky_way(s, g, u * (1 - GRAZING), v, w)
+
+
+@numba.njit(**JIT)
+def _sun_way(q, lamps, e, h, w):
+    """Write the direction of one of ``WAYS`` places on the sun's disc."""
+    r = np.sqrt((q * 0.7548776662 + 0.29) % 1) * lamps.softness
+    phi = 2 * np.pi * ((q * 0.5698402910 + 0.83) % 1)
+    x, y = r * np.cos(phi), r * np.sin(phi)
+    length = np.sqrt(1 + r * r)
+    for a in range(3):
+        w[a] = (lamps.sun[a] + x * e[a] + y * h[a]) / length
+
+
+@numba.njit(**JIT)
+def ask(s, index, row, column, lamps, count, boxes, o, w, ray, asker, light):
+    """Add the light of all rays that meet no box; write down the others, to be cast.
+
+    Args:
+        s: What samples met.
+        index: Those that ask (N,).
+        row: Where in the picture they are (N,).
+        column: The same.
+        lamps: The studio.
+        count: Rays to the sky of each.
+        boxes: About all that can be met (B, 2, 3) [m].
+        o: Origins of rays (R, 3), room for N × (count + 1).
+        w: Their directions.
+        ray: Their dice.
+        asker: Of each ray, whose it is among N; those to the sun are counted from N on.
+        light: What arrived (N, channels).
+
+    Returns:
+        How many rays are to be cast.
+
+    """
+    gap, share = np.float32(2e-4 * lamps.size), np.float32(1 / count)
+    e = np.empty(3, np.float32)
+    h = across(lamps.sun, e)
+    many, n = len(index), 0
+    for k in range(many):
+        g, q = index[k], number_of(row[k], column[k])
+        pixel = row[k] * 65536 + column[k]
+        for number in range(count):
+            _look_up(s, g, q * count + number, w[n])
+            for a in range(3):
+                o[n, a] = s.point[g, a] + gap * s.flat[g, a]
+            if meets_box(o[n], w[n], boxes):
+                ray[n], asker[n] = pixel + number, k
+                n += 1
+            else:
+                open_way(s, g, w[n], lamps, share, light[k])
+        if not sunlit(s, g, lamps, o[n]):
+            continue
+        _sun_way(q, lamps, e, h, w[n])
+        if meets_box(o[n], w[n], boxes):
+            ray[n], asker[n] = pixel, many + k
+            n += 1
+        else:
+            light[k, 3] = 1
+    return n
+
+
+@numba.njit(**JIT)
+def look_up(s, count, w):
+    """Write all directions that pixels of one surface look along (WAYS × count, 3)."""
+    for q in range(WAYS * count):
+        _look_up(s, 0, q, w[q])
+
+
+@numba.njit(**JIT)
+def answered(s, index, w, asker, free, lamps, count, light):
+    """Add the light of rays that were cast and got away; see ``ask``."""
+    share, many = np.float32(1 / count), len(index)
+    for n in range(len(free)):
+        if not free[n]:
+            continue
+        k = asker[n]
+        if k < many:
+            open_way(s, index[k], w[n], lamps, share, light[k])
+        else:
+            light[k - many, 3] = 1
+
+
+@numba.njit(**JIT)
+def mirror(s, index, row, column, d, lamps, o, w, asker, light):
+    """Write what samples mirror of the studio; return how many may mirror objects, too.
+
+    Those rays are written down as in ``ask``. Sharp mirrors follow rays of their own.
+    """
+    gap, n = np.float32(2e-4 * lamps.size), 0
+    for k in range(len(index)):
+        g = index[k]
+        rough, thing = s.traits[g, 1], s.kind[g] == THING
+        if thing and rough <= SHARP:
+            continue
+        mirror_way(s, g, d[g], number_of(row[k], column[k]), w[n])
+        if thing and rough < GLOSSY:
+            for a in range(3):
+                o[n, a] = s.point[g, a] + gap * s.flat[g, a]
+            asker[n] = k
+            n += 1
+        else:
+            studio(w[n], max(rough - 0.15, 0.0) ** 2, lamps, light[k, 4:7])
+    return n
+
+
+@numba.njit(**JIT)
+def _pass(data, normal, depth, on, has, steps, stride, out, had):
+    """Mean over like pixels that have light; ``stride`` (rows, columns) says which way."""
+    h, w = on.shape
+    total = np.empty(WIDE, np.float32)
+    for i in range(h):
+        for j in range(w):
+            if not on[i, j]:
+                continue
+            weight = np.float32(0)
+            for c in range(WIDE):
+                total[c] = 0
+            for step in steps:
+                y, x = i + step * stride[0], j + step * stride[1]
+                if y < 0 or y >= h or x < 0 or x >= w or not has[y, x]:
+                    continue
+                alike = step == 0 or (
+                    abs(depth[i, j] - depth[y, x]) < 0.02
+                    and dot(normal[i, j], normal[y, x]) > ALIKE
+                )
+                if alike:
+                    weight += 1
+                    for c in range(WIDE):
+                        total[c] += data[y, x, c]
+            had[i, j] = weight > 0
+            if weight > 0:
+                share = 1 / weight
+                for c in range(WIDE):
+                    out[i, j, c] = share * total[c]
+
+
+@numba.njit(**JIT)
+def smooth(data, normal, depth, on, has):
+    """Mean over 4 pixels down, 4 across, then once more over thrice that, of like surfaces.
+
+    Args:
+        data: Light of the pixels that have any; then that of all (rows, columns, ``WIDE``).
+        normal: Of what pixels met.
+        depth: Its logarithm.
+        on: Which of them met something.
+        has: Which of them have light; then all that could be given some.
+
+    """
+    spare, had = np.empty_like(data), np.zeros_like(has)
+    near, far = (-2, -1, 0, 1), (-4, 0, 4)
+    _pass(data, normal, depth, on, has, near, (1, 0), spare, had)
+    _pass(spare, normal, depth, on, had, near, (0, 1), data, has)
+    _pass(data, normal, depth, on, has, far, (1, 0), spare, had)
+    _pass(spare, normal, depth, on, had, far, (0, 1), data, has)

@@ -1,0 +1,235 @@
+"""The floor of a film's pictures: which of it objects darken, and how, where they do so softly.
+
+Tiles of 8 × 8 pixels are told apart. Near objects and in their shadow pixels ask for light
+themselves; farther away objects only hide a little of the sky, which is asked at the corners of
+tiles and changes evenly between. Loops compiled by numba, over a band of pixels.
+"""
+
+import numba
+import numpy as np
+
+from corporeal.render.kernels import FLOOR_ROUGHNESS, JIT
+from corporeal.render.kernels_film import HORIZON, filmic, meets_box, way_of
+from corporeal.render.kernels_light import fading, shade_one
+
+TILE = 8
+"""Sides of a tile [px]."""
+UNTOUCHED, FAR, NEAR = 0, 1, 2
+"""As in the empty studio; darkened softly; to be cast pixel by pixel."""
+AROUND = 2
+"""Tiles about one that shows an object that are near it."""
+
+
+@numba.njit(**JIT)
+def things(prim, shape, out):
+    """Mark the tiles in which objects are seen."""
+    h, w = shape
+    for i in range(h):
+        for j in range(w):
+            if prim[i * w + j] >= 0:
+                out[i // TILE, j // TILE] = True
+
+
+@numba.njit(**JIT)
+def grown(mask, reach):
+    """Mark all tiles within ``reach`` of those that are marked."""
+    h, w = mask.shape
+    out = np.zeros((h, w), np.bool_)
+    for i in range(h):
+        for j in range(w):
+            if mask[i, j]:
+                out[max(i - reach, 0) : i + reach + 1, max(j - reach, 0) : j + reach + 1] = True
+    return out
+
+
+@numba.njit(**JIT)
+def stains(d, eye, lamps, ways, boxes, blur, shape, near, far):
+    """Mark the tiles of floor that the sun's and the sky's light may not reach.
+
+    Args:
+        d: Directions of the pixels (P, 3).
+        eye: Where they come from [m].
+        lamps: The studio.
+        ways: All that pixels on the floor look along: to the sky and, last, to the sun (S, 3).
+        boxes: About what objects (B, 2, 3) [m].
+        blur: How far the sun's softness spreads a shadow on the floor [m].
+        shape: Rows and columns of pixels.
+        near: Marks of tiles (rows, columns): the sun, or some of a tile is above the horizon.
+        far: The sky.
+
+    """
+    h, w = shape
+    p = np.empty(3, np.float32)
+    wide, dark = boxes.copy(), boxes.copy()
+    p[2] = lamps.floor[3]
+    for top in range(0, h, TILE):
+        for left in range(0, w, TILE):
+            bottom, right = min(top + TILE, h) - 1, min(left + TILE, w) - 1
+            radius, seen = _patch(d, eye, lamps.floor[3], w, (top, bottom, left, right), p)
+            away = np.hypot(p[0] - lamps.centre[0], p[1] - lamps.centre[1]) - 2 * radius
+            if not seen or fading(away, lamps) == 0:
+                continue
+            for b in range(len(boxes)):
+                for a in range(2):
+                    wide[b, 0, a], wide[b, 1, a] = boxes[b, 0, a] - radius, boxes[b, 1, a] + radius
+                    dark[b, 0, a] = wide[b, 0, a] - blur
+                    dark[b, 1, a] = wide[b, 1, a] + blur
+            i, j = top // TILE, left // TILE
+            near[i, j] = near[i, j] or meets_box(p, ways[len(ways) - 1], dark)
+            for k in range(len(ways) - 1):
+                if near[i, j] or meets_box(p, ways[k], wide):
+                    far[i, j] = True
+                    break
+            # Corners above the horizon have no floor to ask.
+            if far[i, j] and d[top * w + left, 2] > -HORIZON:
+                near[i, j] = True
+
+
+@numba.njit(**JIT)
+def _patch(d, eye, floor, w, tile, centre):
+    """Middle and radius [m] of the floor that a tile of pixels sees, and whether it sees any."""
+    top, bottom, left, right = tile
+    if d[bottom * w + left, 2] > -HORIZON and d[bottom * w + right, 2] > -HORIZON:
+        return np.float32(0), False
+    low = np.full(2, np.float32(np.inf))
+    high = np.full(2, np.float32(-np.inf))
+    for i in (top, bottom):
+        for j in (left, right):
+            e = d[i * w + j]
+            t = (floor - eye[2]) / min(e[2], -HORIZON)
+            for a in range(2):
+                low[a] = min(low[a], eye[a] + t * e[a])
+                high[a] = max(high[a], eye[a] + t * e[a])
+    for a in range(2):
+        centre[a] = (low[a] + high[a]) / 2
+    return max(high[0] - low[0], high[1] - low[1]) / 2, True
+
+
+@numba.njit(**JIT)
+def _corner(tiles, i, j):
+    """Whether a corner is one of a far tile."""
+    wanted = False
+    for a in range(max(i - 1, 0), min(i + 1, len(tiles))):
+        for b in range(max(j - 1, 0), min(j + 1, tiles.shape[1])):
+            wanted = wanted or tiles[a, b] == FAR
+    return wanted
+
+
+@numba.njit(**JIT)
+def corners(tiles):
+    """Count the corners of far tiles."""
+    count = 0
+    for i in range(tiles.shape[0] + 1):
+        for j in range(tiles.shape[1] + 1):
+            count += _corner(tiles, i, j)
+    return count
+
+
+@numba.njit(**JIT)
+def at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, o, w, asker):
+    """Write down rays from the corners of far tiles that could meet something.
+
+    Args:
+        tiles: Kinds (rows, columns).
+        eye: Where the camera is [m].
+        frame: Its axes.
+        tangent: Of half its field of view.
+        size: Of the picture: width, height.
+        first: The picture's row that tiles begin with.
+        lamps: The studio.
+        ways: All that corners look along, to the sky and, last, to the sun (S, 3).
+        boxes: About what objects (B, 2, 3) [m].
+        o: Origins of rays, as many as there is room for.
+        w: Their directions.
+        asker: Of each, the number of its corner × (S - 1) + that of its direction.
+
+    Returns:
+        How many rays are to be cast.
+
+    """
+    h, width = tiles.shape
+    n, many = 0, len(ways) - 1
+    e, p = np.empty(3), np.empty(3, np.float32)
+    for i in range(h + 1):
+        for j in range(width + 1):
+            if not _corner(tiles, i, j):
+                continue
+            way_of(eye, frame, tangent, size, first + i * TILE, j * TILE, e)
+            t = (lamps.floor[3] - eye[2]) / min(e[2], -HORIZON)
+            p[0], p[1] = eye[0] + t * e[0], eye[1] + t * e[1]
+            p[2] = lamps.floor[3] + 2e-4 * lamps.size
+            for k in range(many):
+                if meets_box(p, ways[k], boxes):
+                    o[n], w[n], asker[n] = p, ways[k], (i * (width + 1) + j) * many + k
+                    n += 1
+    return n
+
+
+@numba.njit(**JIT)
+def hidden(asker, free, ways, columns, light):
+    """Take the sky of rays that were cast from corners and met something.
+
+    Args:
+        asker: From ``at_corners``.
+        free: Which rays got away.
+        ways: All that corners look along, as there.
+        columns: Of corners.
+        light: At the corners (rows, columns, 2): sky, its height.
+
+    """
+    many = len(ways) - 1
+    for n in range(len(free)):
+        if not free[n]:
+            corner, k = asker[n] // many, asker[n] % many
+            i, j = corner // columns, corner % columns
+            light[i, j, 0] -= np.float32(1 / many)
+            light[i, j, 1] -= ways[k, 2] / many
+
+
+@numba.njit(**JIT)
+def softly(tiles, eye, frame, tangent, size, first, shape, lamps, sky, mirrored, wall, out):
+    """Write the filmic light of the pixels of far tiles.
+
+    Args:
+        tiles: Kinds (rows, columns).
+        eye: Where the camera is [m].
+        frame: Its axes.
+        tangent: Of half its field of view.
+        size: Of the picture: width, height.
+        first: The picture's row that the band begins with.
+        shape: Rows and columns of pixels.
+        lamps: The studio.
+        sky: At the corners of tiles, from ``at_corners``.
+        mirrored: What each pixel of the band mirrors in the empty studio (P, 3).
+        wall: Light of the backdrop (P, 3).
+        out: Of the band (P, 3).
+
+    """
+    h, w = shape
+    e, up = np.empty(3, np.float32), np.array([0, 0, 1], np.float32)
+    light, near = np.zeros(7, np.float32), np.empty(3, np.float32)
+    room = np.empty((2, 3), np.float32)
+    traits = np.array([0, FLOOR_ROUGHNESS, 0, 0, 1, 0], np.float32)
+    light[3] = 1
+    for i in range(h):
+        a, fy = i // TILE, np.float32(i % TILE / TILE)
+        for j in range(w):
+            b = j // TILE
+            if tiles[a, b] != FAR:
+                continue
+            g, fx = i * w + j, np.float32(j % TILE / TILE)
+            way_of(eye, frame, tangent, size, first + i, j, e)
+            t = (lamps.floor[3] - eye[2]) / min(e[2], -HORIZON)
+            away = np.hypot(
+                eye[0] + t * e[0] - lamps.centre[0], eye[1] + t * e[1] - lamps.centre[1]
+            )
+            for c in range(2):
+                above = (1 - fx) * sky[a, b, c] + fx * sky[a, b + 1, c]
+                below = (1 - fx) * sky[a + 1, b, c] + fx * sky[a + 1, b + 1, c]
+                light[c] = (1 - fy) * above + fy * below
+            for c in range(3):
+                light[4 + c] = mirrored[g, c]
+            shade_one(up, e, lamps.floor, traits, light, lamps, room, near)
+            fade = fading(away, lamps)
+            for c in range(3):
+                out[g, c] = filmic(near[c] * fade + wall[g, c] * (1 - fade))
