@@ -630,6 +630,9 @@ class Structure:
     inflated: bool = False
     """Whether wall and contents, sealed air, are one soft solid: of mass over volume all through.
     """
+    gauge: float | None = None
+    """Pressure of air sealed behind an elastic wall that bears more than the air does, above that
+    around it [Pa]; None: there is none, or the air bears more."""
     solidity: float = 1.0
     """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
     holds: str = ""

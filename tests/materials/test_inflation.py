@@ -1,12 +1,21 @@
 """Sealed air: a soft solid that presses and bounces as a limp ball full of it does."""
 
+from dataclasses import replace
 from math import pi, sqrt
 
 import numpy as np
 import pytest
 
 from corporeal.materials import find
-from corporeal.materials.inflated import SQUEEZE, air_bears, pressed, sealed_air
+from corporeal.materials.inflated import (
+    SQUEEZE,
+    SealedBall,
+    air_bears,
+    pressed,
+    sealed_air,
+    sealed_ball,
+    struck,
+)
 from corporeal.materials.rebound import rebound
 
 
@@ -77,3 +86,40 @@ def test_the_loss_is_that_of_the_restitution_and_every_number_has_its_range():
     for name, ground in air.grounds.items():
         assert ground.value in ground.range
         assert getattr(air, name) == ground.value
+
+
+def racquetball(gauge=0.0):
+    rubber = find("rubber").pick(find("rubber").typical())
+    return SealedBall(gauge, rubber, 0.0036, 0.0286)
+
+
+def test_a_blow_is_stored_in_wall_and_air_where_a_ball_turns():
+    """By stepping m x'' = -(k x + p A), with the air compressed adiabatically."""
+    ball, mass, speed = racquetball(), 0.04, 6.9
+
+    def force(x):
+        return ball.spring * x + limp_force(ball.gauge, ball.radius, x)
+
+    x, v, dt = 0.0, speed, 1e-6
+    while v > 0.0:
+        v -= dt * force(x) / mass
+        x += dt * v
+    energy = 0.5 * mass * speed**2
+    assert ball.squeeze(energy) == pytest.approx(x / ball.radius, rel=0.01)
+    solid = replace(sealed_ball(ball), young=struck(ball, energy).young)
+    assert hertz(solid, ball.radius)(x) == pytest.approx(force(x), rel=0.02)
+
+
+def test_the_harder_a_sealed_ball_is_struck_the_more_the_air_bears_which_loses_nothing():
+    ball = racquetball()
+    losses = [struck(ball, energy).loss for energy in (0.0, 0.3, 1.0, 3.0)]
+    assert losses[0] < ball.skin.loss
+    assert np.all(np.diff(losses) < 0)
+    assert losses[-1] > 0.3 * ball.skin.loss
+
+
+def test_a_thick_wall_is_dented_no_less_than_a_solid_ball():
+    rubber = racquetball().skin
+    solid = SealedBall(0.0, rubber, 0.0286, 0.0286)
+    depth = SQUEEZE * solid.radius
+    assert solid.spring * depth < 1.05 * hertz(rubber, solid.radius)(depth)

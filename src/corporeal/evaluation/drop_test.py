@@ -41,7 +41,7 @@ def scene_of(row: Rebound) -> Scene:
     """Put the ball just above what it strikes, as fast as its fall has made it there."""
     radius, gap = 0.5 * row.diameter, GAP * row.diameter
     ground = row.on.size[2] if row.on else 0.0
-    speed = np.sqrt(2.0 * 9.81 * max(row.drop - gap, 0.0))
+    speed = np.sqrt(max(row.speed**2 - 2.0 * 9.81 * gap, 0.0))
     material = row.material or "rubber"
     thing = ball(material, radius, (0.0, 0.0, ground + gap + radius), (0.0, 0.0, -speed), row.name)
     below = [box(row.on.material, row.on.size, name="block")] if row.on else []
@@ -69,7 +69,7 @@ def drop(row: Rebound, settings: Settings) -> Drop:
     problem = pose_problem(prepared, settings)
     engine = build_engine(problem)
     first = engine.measure()
-    speed = float(np.sqrt(2.0 * 9.81 * row.drop))
+    speed = row.speed
     last = bounce(engine, row.diameter / speed / LOOKS * 10, 30.0 * row.diameter / speed)
     treatment = prepared.particles.treatments[0]
     met = touch(last)

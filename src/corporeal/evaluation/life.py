@@ -4,8 +4,16 @@ import tomllib
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
+from math import exp, pi, sqrt
 
 from corporeal.errors import BadFileError
+
+GRAVITY = 9.81
+"""[m/s²]"""
+AIR = 1.2
+"""Density of air [kg/m³]."""
+SPHERE_DRAG = 0.47
+"""Drag coefficient of a smooth sphere at Reynolds numbers from 1e3 to 2e5 (Achenbach 1972) [-]."""
 
 
 @dataclass(frozen=True)
@@ -30,8 +38,8 @@ class Rebound:
     """Gauge pressure of the air in it [Pa]."""
     diameter: float
     """[m]"""
-    drop: float
-    """Height of the fall [m]."""
+    speed: float
+    """At which it strikes [m/s]."""
     floor: str
     on: Block | None
     low: float
@@ -68,7 +76,9 @@ def rebounds() -> tuple[Rebound, ...]:
 
 
 def _rebound(row: dict) -> Rebound:
-    low, high = row["e"]
+    air = _Air(1e-3 * row["diameter_mm"], 1e-3 * row["mass_g"] if "mass_g" in row else None)
+    speed = air.struck_at(row["drop_m"])
+    low, high = row["e"] if "e" in row else (air.left_at(rise) / speed for rise in row["rise_m"])
     if not 0.0 <= low < high <= 1.0 or row["source"] not in _table()["source"]:
         raise BadFileError("life.toml", f"{row['name']}: no range with a source.", "Mend the row.")
     on, wall, pressure = row.get("on"), row.get("wall_mm"), row.get("inflation_kPa")
@@ -79,10 +89,40 @@ def _rebound(row: dict) -> Rebound:
         wall=None if wall is None else 1e-3 * wall,
         inflation=None if pressure is None else 1e3 * pressure,
         diameter=1e-3 * row["diameter_mm"],
-        drop=row["drop_m"],
+        speed=speed,
         floor=row.get("floor", "concrete"),
         on=Block(on["material"], (x, y, z)) if on else None,
         low=low,
         high=high,
         source=row["source"],
     )
+
+
+@dataclass(frozen=True)
+class _Air:
+    """What air does to a ball that falls and rises: d(v²)/dh = ±2 g (1 ± v²/v_t²)."""
+
+    diameter: float
+    """[m]"""
+    mass: float | None
+    """[kg]; None: as in a vacuum."""
+
+    @property
+    def terminal(self) -> float:
+        """Square of the speed at which drag bears the weight, v_t² = 2 m g/(ρ c A) [m²/s²]."""
+        area = 0.25 * pi * self.diameter**2
+        return 2.0 * (self.mass or 0.0) * GRAVITY / (AIR * SPHERE_DRAG * area)
+
+    def struck_at(self, height: float) -> float:
+        """Speed after a fall from rest [m/s]."""
+        free = 2.0 * GRAVITY * height
+        if self.mass is None:
+            return sqrt(free)
+        return sqrt(self.terminal * (1.0 - exp(-free / self.terminal)))
+
+    def left_at(self, height: float) -> float:
+        """Speed with which it rises so high [m/s]."""
+        free = 2.0 * GRAVITY * height
+        if self.mass is None:
+            return sqrt(free)
+        return sqrt(self.terminal * (exp(free / self.terminal) - 1.0))

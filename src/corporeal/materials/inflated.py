@@ -7,12 +7,17 @@ limp ball's from a light bounce to a kick. On a grid the skin itself would be te
 it would stretch, or dent by itself as stiffly as the air does.
 
 Where the skin dents less easily than the air behind it is pressed (Reissner's k = 4 E t²/(R √(3 (1
-- ν²))) against 2π R p), it stays a wall: a rubber duck, a table tennis ball.
+- ν²))) against 2π R p) but is elastic, a racquetball, both are springs side by side, and air bears
+the more of a blow the harder it is: ``struck``. What flows when it is dented, a table tennis ball,
+and what leaks, a rubber duck, stays a wall.
 """
 
+from dataclasses import dataclass
 from math import pi, sqrt
 
-from corporeal.materials.rebound import loss_of
+from scipy.optimize import brentq
+
+from corporeal.materials.rebound import loss_of, rebound
 from corporeal.mpm.constants import AIR_DENSITY
 from corporeal.types import Ground, Law, Material, Range
 
@@ -22,22 +27,50 @@ SQUEEZE = 0.2
 """Depth over radius at which air and solid press alike [-]."""
 MODULUS_OVER_PRESSURE = 9.0
 """E/p [-]"""
+DEEPEST = 0.9
+"""Deepest dent over the radius that is reckoned with [-]."""
 POISSON = 0.2
+BALL_SPRING = 0.8
+"""Force over depth of a solid ball, over E R [-]: Hertz's 4/3 √SQUEEZE/(1 - ν²) of rubber."""
 HEAT_RATIO = 1.4
 """γ of air [-]."""
 RESTITUTION = 0.8
-"""Of inflated balls on a hard floor [-]: the middle of what rules ask of footballs (.79–.88) and
-basketballs (.82–.87) and of tennis balls (.73–.76)."""
+"""Of inflated balls on a hard floor [-]: the middle of what rules ask, with the drag of air taken
+off: footballs .86–.92, basketballs .75–.83, korfballs .72–.80, tennis balls .75–.79."""
 SOURCE = "engineering-estimate"
 
 
-def pressed(gauge: float) -> float:
-    """Gauge pressure [Pa] behind the skin of a ball pressed flat by ``SQUEEZE`` of its radius.
+def lost_share(squeeze: float) -> float:
+    """Share of its volume that a ball loses when it is pressed flat by x: V = π x² (R - x/3) [-].
 
-    The cap V = π x² (R - x/3) is lost, adiabatically: p V^γ. Air at no gauge pressure resists too.
+    Args:
+        squeeze: x/R [-].
+
     """
-    lost = 0.75 * SQUEEZE**2 * (1.0 - SQUEEZE / 3.0)
-    return (ATMOSPHERE + gauge) * (1.0 - lost) ** -HEAT_RATIO - ATMOSPHERE
+    return 0.75 * squeeze**2 * (1.0 - squeeze / 3.0)
+
+
+def pressed(gauge: float, squeeze: float = SQUEEZE) -> float:
+    """Gauge pressure [Pa] behind the skin of a ball that is pressed flat.
+
+    The cap is lost adiabatically: p V^γ. Air at no gauge pressure resists too.
+
+    Args:
+        gauge: Before [Pa].
+        squeeze: Depth over radius [-].
+
+    """
+    return (ATMOSPHERE + gauge) * (1.0 - lost_share(squeeze)) ** -HEAT_RATIO - ATMOSPHERE
+
+
+def wall_spring(skin: Material, thickness: float, radius: float) -> float:
+    """Force over depth where a spherical wall is dented, k = 4 E t²/(R √(3 (1 - ν²))) [N/m].
+
+    Reissner, Stresses and small displacements of shallow spherical shells, J. Math. Phys. 25
+    (1946). A thick wall is dented where it is touched, too: never more than ``BALL_SPRING`` E R.
+    """
+    thin = 4.0 * skin.young * thickness**2 / (radius * sqrt(3.0 * (1.0 - skin.poisson**2)))
+    return thin / (1.0 + thin / (BALL_SPRING * skin.young * radius))
 
 
 def air_bears(gauge: float, skin: Material, thickness: float, radius: float) -> bool:
@@ -50,8 +83,94 @@ def air_bears(gauge: float, skin: Material, thickness: float, radius: float) -> 
         radius: Of the ball [m].
 
     """
-    wall = 4.0 * skin.young * thickness**2 / (radius * sqrt(3.0 * (1.0 - skin.poisson**2)))
-    return 2.0 * pi * radius * pressed(gauge) > wall
+    return 2.0 * pi * radius * pressed(gauge) > wall_spring(skin, thickness, radius)
+
+
+@dataclass(frozen=True)
+class SealedBall:
+    """A ball with an elastic wall and air sealed in it."""
+
+    gauge: float
+    """Pressure above that of the air around it [Pa]."""
+    skin: Material
+    thickness: float
+    """Of the wall [m]."""
+    radius: float
+    """[m]"""
+
+    @property
+    def spring(self) -> float:
+        """Of the wall [N/m]."""
+        return wall_spring(self.skin, self.thickness, self.radius)
+
+    def wall_energy(self, squeeze: float) -> float:
+        """Return what the wall stores at a depth over the radius [J]."""
+        return 0.5 * self.spring * (squeeze * self.radius) ** 2
+
+    def air_energy(self, squeeze: float) -> float:
+        """Return the work on the air inside less that of the air outside [J]."""
+        volume, lost = 4.0 / 3.0 * pi * self.radius**3, lost_share(squeeze)
+        inside = (ATMOSPHERE + self.gauge) * ((1.0 - lost) ** (1.0 - HEAT_RATIO) - 1.0)
+        return volume * (inside / (HEAT_RATIO - 1.0) - ATMOSPHERE * lost)
+
+    def squeeze(self, energy: float) -> float:
+        """Depth over radius at which a blow of so much energy [J] is stored."""
+
+        def excess(squeeze: float) -> float:
+            return self.wall_energy(squeeze) + self.air_energy(squeeze) - energy
+
+        if excess(DEEPEST) <= 0.0:
+            return DEEPEST
+        return float(brentq(excess, 0.0, DEEPEST))  # pyright: ignore[reportArgumentType]
+
+
+@dataclass(frozen=True)
+class Struck:
+    """The soft solid that a sealed ball is in one blow."""
+
+    young: float
+    """[Pa]"""
+    loss: float
+    """[-]"""
+
+
+def struck(ball: SealedBall, energy: float) -> Struck:
+    """Young's modulus and loss factor of the solid that resists a blow as wall and air do.
+
+    Hertz's force 4/3 E* √R x^(3/2) is that of wall and air, k x + p A, at the depth at which both
+    have stored the blow (of a light one: at ``SQUEEZE``). Air loses nothing; the wall loses of what
+    it stores.
+
+    Args:
+        ball: What is struck.
+        energy: Of the blow [J].
+
+    """
+    depth = max(ball.squeeze(energy), SQUEEZE)
+    flat = pi * ball.radius**2 * (2.0 * depth - depth**2)
+    force = ball.spring * depth * ball.radius + pressed(ball.gauge, depth) * flat
+    plane = force / (4.0 / 3.0 * ball.radius**2 * depth**1.5)
+    wall, air = ball.wall_energy(depth), ball.air_energy(depth)
+    return Struck(plane * (1.0 - POISSON**2), ball.skin.loss * wall / (wall + air))
+
+
+def sealed_ball(ball: SealedBall) -> Material:
+    """Return the soft solid that a sealed ball with an elastic wall is, struck lightly.
+
+    How hard a blow changes it says ``struck``.
+    """
+    light, skin = struck(ball, 0.0), ball.skin
+    density = AIR_DENSITY * (1.0 + ball.gauge / ATMOSPHERE)
+    bounces = rebound(light.loss)
+    why = f"wall of {skin.name} and air at {ball.gauge / 1e3:.3g} kPa press side by side"
+    values = {
+        "young": (0.5 * light.young, light.young, 1.5 * light.young, why),
+        "poisson": (0.1, POISSON, 0.3, "as of a ball full of air"),
+        "density": (density, density, density, "air at this pressure"),
+        "restitution": (0.0, bounces, 1.0, "what the wall loses of what it stores"),
+        "loss": (0.0, light.loss, max(skin.loss, light.loss), "of the wall, air loses nothing"),
+    }
+    return _material(f"air at {ball.gauge / 1e3:.3g} kPa behind {skin.name}", values)
 
 
 def sealed_air(gauge: float) -> Material:
@@ -71,11 +190,14 @@ def sealed_air(gauge: float) -> Material:
         "restitution": (0.73, RESTITUTION, 0.88, "what rules of sports ask of inflated balls"),
         "loss": (loss_of(0.88), loss_of(RESTITUTION), loss_of(0.73), "from the restitution"),
     }
+    return _material(f"air at {gauge / 1e3:.3g} kPa", values)
+
+
+def _material(name: str, values: dict[str, tuple[float, float, float, str]]) -> Material:
+    """Give a material these values, with their ranges and reasons."""
     grounds = {
-        name: Ground(usual, Range(low, usual, high, SOURCE), "typical", reason)
-        for name, (low, usual, high, reason) in values.items()
+        key: Ground(usual, Range(low, usual, high, SOURCE), "typical", reason)
+        for key, (low, usual, high, reason) in values.items()
     }
-    numbers = {name: ground.value for name, ground in grounds.items()}
-    return Material(
-        name=f"air at {gauge / 1e3:.3g} kPa", law=Law.NEO_HOOKEAN, grounds=grounds, **numbers
-    )
+    numbers = {key: ground.value for key, ground in grounds.items()}
+    return Material(name=name, law=Law.NEO_HOOKEAN, grounds=grounds, **numbers)

@@ -12,7 +12,7 @@ from corporeal.fields.impose import impose
 from corporeal.fields.specification import asked
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
-from corporeal.materials.inflated import air_bears, sealed_air
+from corporeal.materials.inflated import SealedBall, air_bears, sealed_air, sealed_ball
 from corporeal.materials.placement import CONTENTS, entry_of, held
 from corporeal.materials.scale import place
 from corporeal.mpm.laws import MENU
@@ -265,7 +265,7 @@ def radius(scene: Scene, number: int) -> float:
 def with_air(
     structure: Structure, material: Material, words: PartWords, radius: float
 ) -> Structure:
-    """Put sealed air behind a wall that dents more easily than the air is pressed.
+    """Make a wall with sealed air behind it a soft solid, unless it flows when it is dented.
 
     Args:
         structure: How the part is built.
@@ -281,7 +281,13 @@ def with_air(
         f"{structure.reason} Air at {gauge / 1e3:.3g} kPa above its surroundings is sealed in it"
     )
     if not air_bears(gauge, material, structure.thickness, radius):
-        return replace(structure, reason=f"{sealed}, which dents it less than its wall resists.")
+        if MENU[material.law].flows:
+            reason = f"{sealed}, which dents it less than its wall resists."
+            return replace(structure, reason=reason)
+        reason = f"{sealed}: wall and air bounce side by side, as one soft solid."
+        inner = sealed_ball(SealedBall(gauge, material, structure.thickness, radius))
+        built = Structure("filled", structure.thickness, reason, inner, 1.0, inflated=True)
+        return replace(built, gauge=gauge)
     reason = f"{sealed}: it bounces as a soft solid, nine times as stiff as the pressure."
     return Structure("filled", structure.thickness, reason, sealed_air(gauge), 1.0, inflated=True)
 

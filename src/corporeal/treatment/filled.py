@@ -8,7 +8,9 @@ wall's mass around it.
 
 from collections.abc import Callable
 from dataclasses import replace
+from math import pi
 
+from corporeal.materials.inflated import SealedBall, struck
 from corporeal.treatment.part import Motion, PartGeometry, Verdict
 from corporeal.types import Material, Structure, Treatment
 
@@ -24,15 +26,31 @@ def as_wall(part: PartGeometry) -> PartGeometry:
     return replace(part, material=loaded, structure=structure)
 
 
-def as_contents(part: PartGeometry) -> PartGeometry:
-    """Take what is behind the wall alone, spread through the whole; other parts as they are."""
+def as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
+    """Take what is behind the wall alone, spread through the whole; other parts as they are.
+
+    Args:
+        part: Which.
+        speed: At which it is struck [m/s]: a sealed ball is the stiffer the harder.
+
+    """
     inner = part.structure.contents
     if inner is None:
         return part
     inflated = part.structure.inflated
     density = mean_density(part) if inflated else inner.density * part.structure.fill
     spread = replace(inner, density=density)
+    if part.structure.gauge is not None:
+        blow = struck(sealed(part), 0.5 * density * part.volume * speed**2)
+        spread = replace(spread, young=blow.young, loss=blow.loss)
     return replace(part, material=spread, structure=Structure("solid"), diameter=0.0)
+
+
+def sealed(part: PartGeometry) -> SealedBall:
+    """Return the ball of its volume that a part with air sealed behind an elastic wall is."""
+    structure = part.structure
+    radius = (0.75 * part.volume / pi) ** (1.0 / 3.0)
+    return SealedBall(structure.gauge or 0.0, part.material, structure.thickness or 0.0, radius)
 
 
 def masses(part: PartGeometry) -> tuple[float, float]:
@@ -56,7 +74,9 @@ def judge_filled(
     structure, inner = part.structure, part.structure.contents
     assert inner is not None
     if structure.inflated:
-        inside = judge(as_contents(part), motion)
+        inside = judge(as_contents(part, motion.impact_speed), motion)
+        if structure.gauge is not None:
+            return replace(inside, reason=f"{inside.reason}; its wall and the air in it bounce")
         return replace(inside, reason=f"{inside.reason}; its wall is as limp as its {inner.name}")
     wall = judge(as_wall(part), motion)
     if wall.rigid:

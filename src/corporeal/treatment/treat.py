@@ -76,7 +76,7 @@ def treat(
     if role == "crown":
         return crown(part, verdict, motion)
     soft = role in ("soft", "trinket")
-    part = as_contents(part) if soft else part
+    part = as_contents(part, motion.impact_speed) if soft else part
     material, structure = part.material, part.structure
     thicker = thickened(part, role, 2 * cell)
     density = mean_density(part) * thicker.density
