@@ -114,7 +114,7 @@ def _posed(
         return _doubted(source, posed, config.force)
     masks = grown.folder / MASKS[0]
     if (why := moved_within(posed, masks)) is None:
-        return posed
+        return _doubted(source, posed, force=True)
     again = pose_object(posed, masks, place / OBJECT_POSES, later)
     said = f"{why[0].upper()}{why[1:]}"
     if again is not None:
@@ -126,10 +126,15 @@ def _posed(
 
 
 def _doubted(source: Path, posed: Posed, force: bool) -> Posed:
-    """Refuse poses that want masks to be believed, where there are none.
+    """Refuse poses in which neighbours share too little, or say so in a warning.
+
+    Args:
+        source: The photographs.
+        posed: Where they were taken from.
+        force: Whether masks agree with that, or somebody wants to go on.
 
     Raises:
-        BadFileError: They are such, and ``force`` is not set.
+        BadFileError: They are such, and nothing speaks for them.
 
     """
     if not posed.doubt:
