@@ -103,6 +103,10 @@ def test_a_run_needs_a_scene(typed):
     refused(typed("run"), "scene")
 
 
+def test_a_folder_that_is_not_there_is_said_to_be_missing(typed):
+    refused(typed("status", "runs/nowhere"), "runs/nowhere is not a run", "no such folder")
+
+
 def test_a_folder_that_is_no_run_is_refused(typed, tmp_path):
     (tmp_path / "x").mkdir()
     refused(typed("film", "x"), "not a run")

@@ -168,6 +168,8 @@ def reopen(folder: Path) -> Asked:
         UserError: The folder is not a run.
 
     """
+    if not folder.exists():
+        raise UserError(f"{folder} is not a run: there is no such folder. Check the path.")
     if not (folder / RUN).exists():
         raise UserError(f"{folder} is not a run: it has no {RUN}. Start one with: corporeal run.")
     return typed(Asked, store.read_json(folder / RUN))

@@ -59,6 +59,12 @@ def test_names_can_stand_in_a_path():
 
 def test_names_are_counted_within_their_class():
     assert numbered(["duck", "soda can", "duck"]) == ["duck_0", "soda_can_0", "duck_1"]
+    # The file's own numbers are kept where each has one: a scene file means them.
+    blocks = [f"block_{number}" for number in (10, 11, 20)]
+    assert numbered(["block"] * 3, blocks) == blocks
+    assert numbered(["duck", "duck"], ["Duck", "Duck.001"]) == ["duck_0", "duck_1"]
+    assert numbered(["duck", "duck"], ["duck 1", "mallard 1"]) == ["duck_0", "duck_1"]
+    assert numbered(["apple"], ["013_apple_7"]) == ["apple_0"], "one alone is the first"
     assert unique(["duck_0", "duck_0", "duck_0"]) == ["duck_0", "duck_1", "duck_2"]
     assert len(set(unique(["a", "a", "a_1", "a"]))) == 4
 

@@ -9,7 +9,8 @@ from scipy.spatial.transform import Rotation
 import corporeal as co
 from corporeal.playback import cast_of, playback, recorded
 from corporeal.render.deltas import in_time, octahedral, unfolded
-from corporeal.render.take import STEP, Cast, record, stress_bytes
+from corporeal.render.take import STEP, Cast, record, stress_bytes, take
+from corporeal.showcase.scenes import SCENES
 from corporeal.types import Frame
 
 NEAR = 0.5 * STEP * np.sqrt(3) + 1e-6
@@ -58,24 +59,57 @@ def test_vertices_and_normals_of_the_take_are_those_of_the_film(played):
     cast = cast_of(played.prepared)
     recording = recorded(cast, played.trajectory)
     header, data = read(playback(played.prepared, cast, played.outcome, recording))
-    frames = len(recording.time)
     assert header["film"]["time"] == recording.time.tolist()
     assert [o["rigid"] for o in header["objects"]] == [False, True]
+    times = played.trajectory.time
+    numbers = [int(np.argmin(np.abs(times - time))) for time in recording.time]
+    assert_played(cast, [played.trajectory.frames[k] for k in numbers], header, data)
+
+
+def assert_played(cast, frames, header, data):
+    """The page's vertices lie within .05 mm of the film's, its normals within 1.5 degrees."""
+    count = len(frames)
+    posed = [cast.skin.pose(frame) for frame in frames]
     for k, (told, mine) in enumerate(zip(header["film"]["objects"], cast.vertices, strict=True)):
-        pose = array(told["pose"], data).reshape(frames, 12).astype(float)
-        shift, normal = np.zeros((frames, len(mine), 3)), None
+        pose = array(told["pose"], data).reshape(count, 12).astype(float)
+        shift, normal = np.zeros((count, len(mine), 3)), None
         if "residual" in told:
-            shift = STEP * summed(array(told["residual"], data), frames, 3, "<i2")
-            normal = summed(array(told["normal"], data), frames, 2, "<i1")
-        for t, time in enumerate(recording.time):
-            number = int(np.argmin(np.abs(played.trajectory.time - time)))
-            place, turned = cast.skin.pose(played.trajectory.frames[number])
+            shift = STEP * summed(array(told["residual"], data), count, 3, "<i2")
+            normal = summed(array(told["normal"], data), count, 2, "<i1")
+        for t, (place, turned) in enumerate(posed):
             R = pose[t, :9].reshape(3, 3)
             found = (cast.skin.rest[mine] + shift[t]) @ R.T + pose[t, 9:]
             assert np.abs(found - place[mine]).max() < NEAR, (k, t)
             if normal is not None:
                 cosine = ((unfolded(normal[t]) @ R.T) * turned[mine]).sum(axis=1)
-                assert np.degrees(np.arccos(np.clip(cosine.min(), -1, 1))) < 1.5
+                assert np.degrees(np.arccos(np.clip(cosine.min(), -1, 1))) < 1.5, (k, t)
+
+
+def bent(particles, time):
+    """What is soft is twisted and squeezed, what is rigid turned: all of it falls."""
+    out, deformed = particles.position.copy(), np.zeros((particles.count, 3, 3))
+    rigid = np.array([t.kind == "rigid" for t in particles.treatments])[particles.part]
+    for k in np.unique(particles.object):
+        mine = particles.object == k
+        middle = out[mine].mean(axis=0)
+        stretch = np.eye(3) if rigid[mine].all() else np.diag([1 + 0.3 * time, 1, 1 - 0.3 * time])
+        F = Rotation.from_rotvec([0.4 * time, 0.9 * time, -0.5 * time]).as_matrix() @ stretch
+        out[mine] = (out[mine] - middle) @ F.T + middle - [0, 0, 0.1 * time]
+        deformed[mine] = F
+    return Frame(time, out, deformed)
+
+
+SEVEN = tuple(SCENES)[:7]
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("name", SEVEN)
+def test_the_page_plays_every_scene_of_the_showcase_as_its_film_does(name):
+    prepared = co.prepare(co.showcase_scene(name))
+    cast = cast_of(prepared)
+    frames = [bent(prepared.particles, t) for t in (0.0, 0.5, 1.0)]
+    header, data = read(take(prepared.scene, prepared.parts, cast, record(cast, frames), {}, None))
+    assert_played(cast, frames, header, data)
 
 
 def test_a_recording_thins_out_and_keeps_its_beginning(played):

@@ -208,7 +208,9 @@ def _scene(
     for shape in shapes:
         groups.setdefault(owner[shape.node], []).append(shape)
     things = [object_of_extras(document, nodes[h], _extent(g)) for h, g in groups.items()]
-    counted = numbered([t.class_name for t in things])
+    heads = [nodes[h] for h in groups]
+    titles = [head.text("name") if head else "" for head in heads]
+    counted = numbered([t.class_name for t in things], titles)
     names = unique([t.name or n for t, n in zip(things, counted, strict=True)])
     return Scene(
         name=safe(document.path.stem) or "scene",

@@ -227,7 +227,7 @@ def _scene(path: Path, surfaces: list[Surface], owners: list[str], raw: RawMesh)
     name, names = safe(path.stem) or "object", list(dict.fromkeys(owners))
     words = [everyday(owner.rsplit("/", 1)[-1]) for owner in names]  # a path, or a name
     classes = [name or everyday(path.stem) or "object" for name in words]
-    called = [name] if names == [""] else numbered(classes)
+    called = [name] if names == [""] else numbered(classes, names)
     things = []
     for owner, own_name, kind in zip(names, called, classes, strict=True):
         places = np.concatenate([s.vertices for s, o in _pairs(surfaces, owners) if o == owner])

@@ -1,6 +1,7 @@
 """Everyday words out of file, node and mesh names."""
 
 import re
+from collections.abc import Sequence
 
 from corporeal.geometry.letters import composed, is_letter, letter_runs, says_something
 
@@ -53,12 +54,25 @@ def unique(names: list[str]) -> list[str]:
     return result
 
 
-def numbered(classes: list[str]) -> list[str]:
-    """Return a node name ``<class>_<k>`` for each class, k counting within the class."""
-    counts: dict[str, int] = {}
-    names = []
-    for words in classes:
-        stem = safe(words).replace(" ", "_") or "object"
-        k = counts[stem] = counts.get(stem, -1) + 1
-        names.append(f"{stem}_{k}")
+def numbered(classes: Sequence[str], titles: Sequence[str] = ()) -> list[str]:
+    """Return a node name ``<class>_<k>`` for each class.
+
+    Args:
+        classes: What each thing is, in words.
+        titles: What each is called in its file. Where all of a class end in numbers of their own
+            ("block_10", "block_11"), these are kept: a scene file that names them means them.
+            Otherwise k counts from 0.
+
+    """
+    stems = [safe(words).replace(" ", "_") or "object" for words in classes]
+    own = [re.search(r"(\d{1,6})$", title) for title in titles] or [None] * len(stems)
+    members: dict[str, list[int]] = {}
+    for k, stem in enumerate(stems):
+        members.setdefault(stem, []).append(k)
+    names = list(stems)
+    for stem, mine in members.items():
+        ends = [int(found[1]) for k in mine if (found := own[k]) is not None]
+        kept = len(mine) > 1 and len(set(ends)) == len(mine)
+        for k, number in zip(mine, ends if kept else range(len(mine)), strict=True):
+            names[k] = f"{stem}_{number}"
     return unique(names)

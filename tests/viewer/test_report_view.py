@@ -1,0 +1,32 @@
+"""How much room the 3D view may take in a report."""
+
+import pytest
+
+from corporeal import run_files
+from corporeal.pipeline import read_back
+from made_findings import run_audit
+
+
+@pytest.fixture(scope="module")
+def made(small_run):
+    return read_back(small_run)
+
+
+def view(made):
+    happened = made.played.outcome
+    return run_files._view(made, run_audit(outcome=happened))
+
+
+def test_what_is_too_large_has_half_the_pictures_and_then_none(made, monkeypatch):
+    whole = len(view(made))
+    assert whole < run_files.LARGEST
+    monkeypatch.setattr(run_files, "LARGEST", whole - 1)
+    thin = view(made)
+    assert 0 < len(thin) < whole and "<script" in thin
+    monkeypatch.setattr(run_files, "LARGEST", 1000)
+    said = view(made)
+    assert "would take more than" in said and "corporeal view RUN" in said
+
+
+def test_a_view_of_two_balls_with_three_js_takes_less_than_two_and_a_half_megabytes(made):
+    assert len(view(made)) < 2_500_000
