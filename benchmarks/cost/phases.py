@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 
+from corporeal.mpm.constants import KEPT_STEPS
 from corporeal.mpm.cpu.phase_clock import PhaseClock
 from cost.blocks import drop_of
 from cost.contest import ROUNDS, Ours
@@ -38,9 +39,10 @@ def table(sizes: Sequence[tuple[int, int]], substeps: int) -> str:
 
     Args:
         sizes: Particles and objects of each column; the first is what the last row divides by.
-        substeps: Of one batch.
+        substeps: Of one batch, at least: whole rounds of those of which one looks at all contacts.
 
     """
+    substeps = -(-substeps // KEPT_STEPS) * KEPT_STEPS
     watched = [Watched(*size) for size in sizes]
     for one in watched:
         one.ours.batch(substeps)
