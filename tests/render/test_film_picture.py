@@ -5,6 +5,8 @@ from test_embree import RED, ball, front, scene, sheet
 from corporeal.render.camera import Aim
 from corporeal.render.embree import Stage, render
 from corporeal.render.film_picture import FilmCaster
+from corporeal.render.kernels_ask import WAYS, number_of
+from corporeal.render.kernels_floor import NEAR
 from corporeal.render.liquid_surface import LiquidSurface
 from corporeal.types import Finish
 
@@ -84,3 +86,23 @@ def test_liquids_that_replace_surfaces_are_seen_where_they_went(monkeypatch):
     monkeypatch.setattr(Stage, "boxes", lambda self: everywhere)
     every = FilmCaster().picture(after, front(), "draft", 1)
     assert np.abs(made.astype(int) - every).max() <= 1
+
+
+@pytest.mark.parametrize("corner", [(0, 0), (3, 5), (7, 2)])
+def test_pixels_that_are_smoothed_over_look_along_every_direction_once(corner):
+    top, left = corner
+    places = [(i, j) for i in range(top, top + 12) for j in range(left, left + 12)]
+    asked = sorted(number_of(i, j) for i, j in places if (i + j) % 2 == 0)
+    assert asked == list(range(WAYS))
+
+
+def test_floor_that_only_some_sky_is_hidden_from_is_darkened_evenly(monkeypatch):
+    """Asked at the corners of tiles or by every second pixel: the same to two grey levels."""
+    aim = Aim((0.0, -6.0, 3.0), (0.0, 0.0, 0.2), 40.0, 320, 240)
+    tall = stage("a red ball")
+    soft = FilmCaster().picture(tall, aim, "draft", 1).astype(int)
+    bare = FilmCaster().picture(stage("nothing"), aim, "draft", 1).astype(int)
+    monkeypatch.setattr("corporeal.render.film_picture.FAR", NEAR)
+    cast = FilmCaster().picture(tall, aim, "draft", 1).astype(int)
+    assert np.abs(soft - cast).max() <= 2
+    assert 0 < np.abs(soft - cast).mean() < 0.1 < np.abs(bare - cast).mean()

@@ -2,8 +2,10 @@
 
 Most of a film is floor and backdrop: where no ray to sky or sun could meet a box about an object, a
 pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
-still. What is left is seen by one ray a pixel, and neighbours on one surface share the light that
-they found. Pixels beside which another surface is seen in another colour are cast again, finer.
+still. Where objects are far and hide only some of the sky, the sky is asked at the corners of tiles.
+What is left is seen by one ray a pixel; every second pixel asks for light, and neighbours on one
+surface share what they found. Pixels beside which another surface is seen in another colour are
+cast again, finer.
 Nothing hangs on the picture before: equal input gives equal bytes, and what does not move does not
 flicker.
 """
@@ -302,10 +304,10 @@ class _Picture(Job):
         n = kernels_ask.mirror(s, *where, d, self.lamps, o, w, asker, light)
         if n:
             seen, who = np.empty((n, 3), np.float32), asker[:n]
+            prim, u, v, t = stage.hit(o[:n], w[:n])
             kernels_light.mirrored(
-                stage.look, stage.normals, self.lamps, s, index[who], w,
-                *stage.hit(o[:n], w[:n]), seen, 0
-            )  # fmt: skip
+                stage.look, stage.normals, self.lamps, s, index[who], w, prim, u, v, t, seen, 0
+            )
             light[who, 4:CHANNELS] = seen
         return light
 

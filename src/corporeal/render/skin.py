@@ -180,7 +180,7 @@ def bounded(
     low, high = limits
     finite = np.isfinite(F)
     if not finite.all():
-        F = np.where(finite.all(axis=(1, 2))[:, None, None], F, np.eye(3))
+        F = np.where(np.all(finite, axis=(1, 2))[:, None, None], F, np.eye(3))
     # |σ² - 1| ≤ ‖FᵀF - 1‖, so that small strains need no decomposition.
     outside = np.empty(len(F), np.bool_)
     kernels_skin.strained(F, min(1 - low**2, high**2 - 1) ** 2, outside)
