@@ -35,6 +35,9 @@ FARTHEST, APART = 0.1, 0.05
 """No thing may be farther from its range, and draft from normal [-]."""
 INSIDE = 0.85
 """Least share of rows inside."""
+AT_FIRST = 6
+"""So many of the blind rows were in their range ± ``LEEWAY`` when they were tried first, at draft
+(decision 54)."""
 UNBOOKED = 0.08
 """Most that may be lost unbooked at draft, over the energy of the blow [-]."""
 
@@ -170,8 +173,21 @@ nothing set but the detail, {len(SEEDS)} seeds each. *e* is the speed after over
 *spread* how far the seeds are apart, *off* the distance from the published range, *E* the simulated
 over the real modulus (of a thickened wall much less), *unbooked* what the blow lost to transfers
 between particles and grid, and to no loss that is booked. Rigid things rebound by the
-coefficient of restitution that was measured of the pair, else by those of their materials. Ranges
-and sources: `src/corporeal/evaluation/life.toml`."""
+coefficient of restitution that was measured of the pair, else by those of their materials. Where a
+height was published, the range is of speeds at the floor: the drag of a sphere in air is taken off
+on both ways. Ranges and sources: `src/corporeal/evaluation/life.toml`."""
+
+
+def blind(found: Sequence[Result]) -> str:
+    """Say how what was written down before it was tried came out, at first and now."""
+    rows = [r for r in found if r.row.blind and r.detail == "draft"]
+    names = ", ".join(r.row.name for r in rows)
+    inside = sum(r.off <= LEEWAY for r in rows)
+    return (
+        f"{len(rows)} of the things were written down before they were tried ({names}): {AT_FIRST} "
+        f"were in their range ± {LEEWAY} at draft at the first try, before anything was changed; "
+        f"{inside} are now ([decision 54](decisions/0054-heights-fall-through-air.md))."
+    )
 
 
 def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
@@ -186,6 +202,7 @@ def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
         "",
         *(f"- {'met' if good else '**missed**'}: {sentence}" for sentence, good in met),
         "",
+        *((blind(found), "") if any(r.row.blind for r in found) else ()),
         "| " + " | ".join((*HEADS, "source")) + " |",
         "|---|---|" + "---:|" * 5 + "---|---:|---:|---:|",
         *(

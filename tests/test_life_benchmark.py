@@ -42,3 +42,13 @@ def test_the_page_holds_every_row_with_its_source():
     page = life.page(found, life.verdicts(found, []))
     assert "| rubber ball | draft | 0.70–0.85 | 0.750 |" in page
     assert "1. Collected from textbooks" in page
+
+
+def test_the_page_says_how_many_rows_were_met_before_anything_was_changed():
+    row = ROWS["lacrosse ball"]
+    assert row.blind
+    for speed, now in ((0.8, 1), (0.6, 0)):
+        found = list(life.results([row], [a_drop(row.name, "draft", speed)]))
+        said = life.page(found, life.verdicts(found, []))
+        assert "1 of the things were written down before they were tried (lacrosse ball): 6" in said
+        assert f"{now} are now" in said

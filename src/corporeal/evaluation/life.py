@@ -48,6 +48,8 @@ class Rebound:
     """Greatest [-]."""
     source: str
     """Key of ``sources``."""
+    blind: bool = False
+    """Whether it was written down before it was tried for the first time."""
 
     def off(self, restitution: float) -> float:
         """Say how far a restitution is from the range [-]; 0 in it."""
@@ -95,6 +97,7 @@ def _rebound(row: dict) -> Rebound:
         low=low,
         high=high,
         source=row["source"],
+        blind=row.get("blind", False),
     )
 
 
