@@ -233,9 +233,13 @@ def stopped_length(area: float, depth: float) -> float:
 
 
 def stopped_paste(yield_shear: float, cells: int, seconds: float = 3.0) -> tuple[float, float]:
-    """Let a paste slump until it stops: error of its length [-], and its speed then [m/s]."""
+    """Let a paste slump until it stops: error of its length [-], and its speed then [m/s].
+
+    5 Pa s are enough for it to creep to where it stops, as the theory has it: of 1 Pa s it would
+    come down so fast that it slides on by a tenth.
+    """
     side, density = 0.05, 1100.0
-    paste = Liquid(density, 1.0, yield_shear)
+    paste = Liquid(density, 5.0, yield_shear)
     tank = Tank(paste, side, side, cells, 1.0, room=0.3, rough=True)
     run = tank.started()
     run.advance(seconds)

@@ -408,7 +408,7 @@ EXPECTED: dict[str, tuple[Demand | Fact, ...]] = {
         ),
     ),
     "honey-poured": (
-        # Huppert 1982: 0.063 m after 1 s; layers of two cells end short by a quarter.
+        # Huppert 1982: 0.063 m after 1 s.
         Demand(
             "The honey spreads (radius)",
             of("honey", "reach_m"),

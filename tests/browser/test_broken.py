@@ -1,0 +1,60 @@
+"""A run in which a thing broke, in a real browser: its pieces are seen, and touched it is whole."""
+
+import pytest
+import trimesh
+
+import corporeal as co
+from chromium import browser
+from corporeal.formats.glb_writer import write_glb
+from corporeal.pipeline import Settings, run
+from corporeal.stages.simulate import SimulateConfig
+
+READY = "window.viewer?.stats.ready && viewer.stats.drawn > 2"
+OBJECTS = "viewer.stages[0].meshes.map(m => m.surface.object)"
+PLACES = "viewer.stages[0].meshes.map(m => [...m.matrix.elements].slice(0, 16))"
+
+
+@pytest.fixture(scope="module")
+def broken_run(tmp_path_factory):
+    folder = tmp_path_factory.mktemp("broken")
+    tile = trimesh.creation.box((0.1, 0.1, 0.004))
+    tile.apply_transform(trimesh.transformations.euler_matrix(0.1, 0.07, 0.0))
+    tile.apply_translation((0, 0, 0.3))
+    thing = co.solid("terracotta", tile.vertices, tile.faces, (0, 0, -14.0), "tile")
+    write_glb(folder / "tile.glb", co.build_scene(thing, duration=0.04, fps=120))
+    settings = Settings(simulate=SimulateConfig(breaking=True))
+    return run([folder / "tile.glb"], folder / "runs" / "tile", settings, until="simulate")
+
+
+@pytest.mark.slow
+def test_the_page_shows_the_pieces_and_what_is_touched_is_whole(broken_run, tmp_path):
+    from corporeal.pipeline import read_back
+    from corporeal.viewer.live import Room
+    from corporeal.viewer.shelf import Shelf
+    from corporeal.viewer.site import Shown, site
+    from corporeal.viewer.socket import live_route
+    from viewer_served import LOCAL, serving
+
+    pieces = len(read_back(broken_run).trajectory.breaks[0].surfaces)
+    assert pieces > 5
+    shelf = Shelf((), broken_run.parent)
+    room = Room(shelf.made)
+    with (
+        serving(site(Shown(shelf), LOCAL, (live_route(room),))) as server,
+        browser(tmp_path) as tab,
+    ):
+        tab.open(f"{server.address}/view/tile")
+        tab.until(READY)
+        tab.run("viewer.pause(), viewer.clock = 0")
+        tab.until("viewer.clock === 0")
+        assert sorted(tab.run(OBJECTS)) == list(range(pieces))
+        whole = tab.run(PLACES)
+        assert all(place == pytest.approx(whole[0], abs=1e-4) for place in whole)
+        seen = tab.run("viewer.stats.drawn")
+        tab.run("viewer.clock = 0.04")
+        tab.until(f"viewer.stats.drawn > {seen} + 1")
+        apart = tab.run(PLACES)
+        assert sum(place != pytest.approx(apart[0], abs=1e-3) for place in apart) > pieces / 2
+        tab.run("viewer.openTab('Touch')")
+        tab.until(f"viewer.stats.got > 3 && {OBJECTS}.length === 1")
+        assert tab.run(OBJECTS) == [0]
