@@ -13,6 +13,8 @@ once, in frames of a film, ``film.mp4``, whose numbers are those of the images.
 """
 
 import argparse
+import json
+import sys
 from pathlib import Path
 
 import imageio_ffmpeg
@@ -87,8 +89,8 @@ def sides_of(views: Views) -> np.ndarray:
     return high - low
 
 
-def write_set(out: Path, views: Views, sides: np.ndarray, film: bool) -> None:
-    """Write what ``real_photographs.py`` reads."""
+def write_set(out: Path, views: Views, sides: np.ndarray, note: str, film: bool) -> None:
+    """Write what ``real_photographs.py`` reads; note: how it was made."""
     assert views.object_of_pixel is not None
     names = tuple(f"{'frame' if film else 'img'}_{k:05d}" for k in range(len(views.cameras)))
     for name in ("images", "masks"):
@@ -98,7 +100,7 @@ def write_set(out: Path, views: Views, sides: np.ndarray, film: bool) -> None:
         Image.fromarray(np.uint8(255) * (owner >= 0)).save(out / "masks" / f"{name}.png")
     write_colmap(out / "sparse" / "0", views.cameras, tuple(f"{name}.jpg" for name in names))
     shown = ", ".join(f"{side:.4f}" for side in sides)
-    facts = f"unit = 1.0\nup = [0.0, 0.0, 1.0]\nsides = [{shown}]\n"
+    facts = f"unit = 1.0\nup = [0.0, 0.0, 1.0]\nsides = [{shown}]\nnote = {json.dumps(note)}\n"
     (out / "known.toml").write_text(facts, encoding="utf-8")
     if film:
         _write_film(out / "film.mp4", views.rgb)
@@ -140,7 +142,9 @@ def main() -> None:
         plain=asked.plain,
         grid=1,
     )
-    write_set(asked.out, degraded(views, look), sides_of(views), asked.film)
+    options = [word for word in sys.argv[1:] if word not in map(str, (*asked.model, asked.out))]
+    note = f"{', '.join(p.name for p in asked.model)}, {' '.join(options)}"
+    write_set(asked.out, degraded(views, look), sides_of(views), note, asked.film)
 
 
 if __name__ == "__main__":

@@ -42,9 +42,9 @@ def test_somebody_walks_around_at_two_heights(walked):
 
 @pytest.mark.parametrize("look", [Look(grid=1), Look(grid=1, plain=True, flash=True, clutter=True)])
 def test_a_set_is_read_as_it_was_written(walked, look, tmp_path):
-    write_set(tmp_path / "block", degraded(walked, look), SIDES, film=False)
+    write_set(tmp_path / "block", degraded(walked, look), SIDES, "a block", film=False)
     facts = measure.known(tmp_path / "block")
-    assert facts.unit == 1 and facts.up == (0, 0, 1)
+    assert facts.note == "a block" and facts.unit == 1 and facts.up == (0, 0, 1)
     np.testing.assert_allclose(facts.sides, SIDES, atol=1e-4)
     given = read_colmap(tmp_path / "block" / "sparse" / "0")
     names = [image.name for image in given.images]

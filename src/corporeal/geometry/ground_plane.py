@@ -62,6 +62,9 @@ class Search:
     """Of the scene."""
     eyes: Float[np.ndarray, "V 3"]
     """Where cameras are; none may be."""
+    middle: Float[np.ndarray, "3"] | None = None
+    """What objects are about. Then it is enough that the ground carries what is within one radius
+    of it: a wall behind stands beside the patch that is seen of the floor."""
 
 
 def ground_plane(
@@ -170,4 +173,10 @@ def _carries(points: np.ndarray, plane: Plane, search: Search) -> bool:
     except (QhullError, ValueError):
         return False
     rim = above @ hull.equations[:, :2].T + hull.equations[:, 2]
-    return bool((rim.max(axis=1) <= 0).mean() >= CARRIED)
+    carried = rim.max(axis=1) <= 0
+    if carried.mean() >= CARRIED:
+        return True
+    if search.middle is None:
+        return False
+    near = np.linalg.norm(points[heights > 2 * half] - search.middle, axis=1) < search.radius
+    return bool(near.any() and carried[near].mean() >= CARRIED)

@@ -83,7 +83,7 @@ def floor_of(
     if not length:
         return None
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
-    search = Search(up / length, float(TILT), around.radius, eyes)
+    search = Search(up / length, float(TILT), around.radius, eyes, np.array(around.centre))
     return ground_plane(known, search, np.random.default_rng(0))
 
 
