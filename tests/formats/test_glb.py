@@ -195,6 +195,15 @@ def test_points_and_lines_are_left_out_and_told(tmp_path):
     assert any("points" in w for w in scene.warnings)
 
 
+def test_a_mesh_that_the_scene_does_not_place_is_left_out_and_told(tmp_path):
+    made = cube()
+    made.node(root=False, mesh=0, name="plank")
+    scene = read_glb(made.save(tmp_path / "a.glb"))
+    assert len(scene.surfaces) == 1
+    assert scene.warnings == ("a.glb: 1 node with a mesh is not in its scene and left out: plank.",)
+    assert read_glb(cube().save(tmp_path / "b.glb")).warnings == ()
+
+
 def test_quantised_positions_are_the_same_shape(tmp_path):
     made = Maker()
     stored = (CUBE * 65535).astype(np.uint16)

@@ -110,6 +110,7 @@ def test_a_scene_file_says_that_things_had_come_to_rest(tmp_path, said, meant):
         (WALL + "point = [1, 0, 0]\nnormal = [1, 0, inf]", "three numbers"),
         (WALL + "friction = 2", "wall 1: unknown key 'friction'"),
         ("file = ", "not valid TOML"),
+        ("[[object]\n", "An object begins with [[object]]"),
         ("", "names no model"),
     ],
 )

@@ -111,6 +111,7 @@ def _shapes(document: Document, tree: list[Placed], wardrobe: Wardrobe) -> list[
     """Return every primitive at every place where the scene shows it."""
     if document.root.has("animations"):
         document.warn("is animated; its rest pose is used.")
+    _say_what_is_not_shown(document, tree)
     shown = [(p, m) for p in tree if (m := p.node.refer("mesh", "meshes")) is not None]
     meshes = {m.pointer: m for _, m in shown}
     pieces = {pointer: _pieces(m, wardrobe) for pointer, m in meshes.items()}
@@ -128,6 +129,18 @@ def _shapes(document: Document, tree: list[Placed], wardrobe: Wardrobe) -> list[
             kept = dict(extras) if isinstance(extras, dict) else {}
             shapes.append(_Shape(placed.number, name, dressed.finish, there, kept))
     return shapes
+
+
+def _say_what_is_not_shown(document: Document, tree: list[Placed]) -> None:
+    """Warn of meshes that no node of the file's scene places."""
+    placed = {p.number for p in tree}
+    nodes = enumerate(document.entries("nodes"))
+    left = [n for k, n in nodes if k not in placed and "mesh" in n.value]
+    if left:
+        names = ", ".join(safe(n.text("name")) or "nameless" for n in left[:3])
+        more = ", …" if len(left) > 3 else ""
+        are = "nodes with meshes are" if len(left) > 1 else "node with a mesh is"
+        document.warn(f"{len(left)} {are} not in its scene and left out: {names}{more}.")
 
 
 def _check_total(document: Document, shown: list[list[_Dressed]]) -> None:

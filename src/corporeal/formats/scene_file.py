@@ -290,7 +290,7 @@ def _parsed(path: Path, data: bytes) -> dict[str, Any]:
     try:
         return tomllib.loads(data.decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError, RecursionError) as problem:
-        step = "See the example in the documentation."
+        step = "An object begins with [[object]], and then for example: file = 'duck.glb'."
         raise BadFileError(path, f"is not valid TOML ({str(problem)[:100]}).", step) from None
 
 
