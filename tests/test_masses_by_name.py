@@ -10,6 +10,8 @@ import numpy as np
 import pytest
 import trimesh
 from trimesh.creation import box, icosphere, revolve
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
 
 from corporeal.geometry.scene_survey import examine
 from corporeal.in_memory import load_scene
@@ -120,9 +122,9 @@ def weigh(tmp_path_factory):
     def weighed(name):
         _, shape, _, unit = next(t for t in THINGS if t[0] == name)
         path = tmp_path_factory.mktemp("made") / f"{name}.glb"
-        plain = trimesh.visual.material.PBRMaterial(name="material", metallicFactor=0.0)
+        plain = PBRMaterial(name="material", metallicFactor=0.0)
         mesh = shape.copy().apply_transform(UP).apply_scale(1 / unit)
-        mesh.visual = trimesh.visual.TextureVisuals(material=plain)
+        mesh.visual = TextureVisuals(material=plain)
         trimesh.Scene({"mesh": mesh}).export(path)
         scene = load_scene(path)
         inventory = describe(scene)
