@@ -164,11 +164,13 @@ def sealed_ball(ball: SealedBall) -> Material:
     bounces = rebound(light.loss)
     why = f"wall of {skin.name} and air at {ball.gauge / 1e3:.3g} kPa press side by side"
     values = {
-        "young": (0.5 * light.young, light.young, 1.5 * light.young, why),
-        "poisson": (0.1, POISSON, 0.3, "as of a ball full of air"),
-        "density": (density, density, density, "air at this pressure"),
-        "restitution": (0.0, bounces, 1.0, "what the wall loses of what it stores"),
-        "loss": (0.0, light.loss, max(skin.loss, light.loss), "of the wall, air loses nothing"),
+        "young": _ground(0.5 * light.young, light.young, 1.5 * light.young, why),
+        "poisson": _ground(0.1, POISSON, 0.3, "as of a ball full of air"),
+        "density": _ground(density, density, density, "air at this pressure"),
+        "restitution": _ground(0.0, bounces, 1.0, "what the wall loses of what it stores"),
+        "loss": _ground(
+            0.0, light.loss, max(skin.loss, light.loss), "of the wall, air loses nothing"
+        ),
     }
     return _material(f"air at {ball.gauge / 1e3:.3g} kPa behind {skin.name}", values)
 
@@ -184,20 +186,22 @@ def sealed_air(gauge: float) -> Material:
     density = AIR_DENSITY * (1.0 + gauge / ATMOSPHERE)
     why = f"a limp ball at {gauge / 1e3:.3g} kPa presses as a solid of nine times the pressure does"
     values = {
-        "young": (0.85 * young, young, 1.15 * young, why),
-        "poisson": (0.1, POISSON, 0.3, "air lets itself be pressed together"),
-        "density": (density, density, density, "air at this pressure"),
-        "restitution": (0.73, RESTITUTION, 0.88, "what rules of sports ask of inflated balls"),
-        "loss": (loss_of(0.88), loss_of(RESTITUTION), loss_of(0.73), "from the restitution"),
+        "young": _ground(0.85 * young, young, 1.15 * young, why),
+        "poisson": _ground(0.1, POISSON, 0.3, "air lets itself be pressed together"),
+        "density": _ground(density, density, density, "air at this pressure"),
+        "restitution": _ground(
+            0.73, RESTITUTION, 0.88, "what rules of sports ask of inflated balls"
+        ),
+        "loss": _ground(loss_of(0.88), loss_of(RESTITUTION), loss_of(0.73), "from the restitution"),
     }
     return _material(f"air at {gauge / 1e3:.3g} kPa", values)
 
 
-def _material(name: str, values: dict[str, tuple[float, float, float, str]]) -> Material:
-    """Give a material these values, with their ranges and reasons."""
-    grounds = {
-        key: Ground(usual, Range(low, usual, high, SOURCE), "typical", reason)
-        for key, (low, usual, high, reason) in values.items()
-    }
+def _ground(low: float, usual: float, high: float, reason: str) -> Ground:
+    return Ground(usual, Range(low, usual, high, SOURCE), "typical", reason)
+
+
+def _material(name: str, grounds: dict[str, Ground]) -> Material:
+    """Give a material these values."""
     numbers = {key: ground.value for key, ground in grounds.items()}
     return Material(name=name, law=Law.NEO_HOOKEAN, grounds=grounds, **numbers)
