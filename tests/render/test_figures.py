@@ -8,6 +8,7 @@ from PIL import Image
 from corporeal.errors import UserError
 from corporeal.render import colours, figures, video
 from corporeal.render.figures import fields_figure, si, strip
+from corporeal.render.glyphs import drawable
 from corporeal.types import (
     Film,
     Finish,
@@ -138,3 +139,8 @@ def test_a_short_film_gives_a_short_strip_and_a_broken_one_a_clear_sentence(tmp_
     path.write_bytes(b"not a film")
     with pytest.raises(UserError, match="Make it again"):
         strip(Film(path, 10, 64, 48), tmp_path / "strip.png")
+
+
+def test_a_name_that_the_font_cannot_write_is_a_number():
+    assert drawable("мяч 0", "object 1") == "мяч 0"
+    assert drawable("椅子 0", "object 2") == "object 2"

@@ -7,6 +7,7 @@ from matplotlib.figure import Figure
 
 from corporeal.evaluation.ensemble import QUANTITIES, Ensemble
 from corporeal.evaluation.figure import keep
+from corporeal.render.glyphs import drawable
 
 HEADS = ("object", "quantity", "as chosen", "5 %", "median", "95 %", "members")
 STILL = 1e-9
@@ -59,7 +60,8 @@ def spread_figure(result: Ensemble, path: Path) -> None:
         axes.margins(x=0.12)
     for axes in panels[len(shown) :]:
         axes.axis("off")
-    panels[0].set_yticks(range(len(names)), [n.replace("_", " ") for n in names], fontsize=7)
+    called = [drawable(n.replace("_", " "), f"object {k + 1}") for k, n in enumerate(names)]
+    panels[0].set_yticks(range(len(names)), called, fontsize=7)
     panels[0].set_ylim(len(names) - 0.5, -0.5)
     keep(figure, path)
 

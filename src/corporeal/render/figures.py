@@ -19,6 +19,7 @@ from corporeal.geometry.srgb import linear
 from corporeal.render import colours, video
 from corporeal.render.camera import place
 from corporeal.render.embree import Light, Stage, identify, render
+from corporeal.render.glyphs import drawable
 from corporeal.store import writing
 from corporeal.types import Film, MaterialField, Parts, Scene
 
@@ -219,7 +220,8 @@ def _legend(axes: Axes, panel: Names, share: np.ndarray) -> None:
     """List names by how much is seen of them; as many as fit."""
     total: dict[str, float] = {}
     colour: dict[str, Any] = {}
-    for k, name in enumerate(panel.label):
+    for k, label in enumerate(panel.label):
+        name = drawable(label, f"{panel.title.lower()} {panel.label.index(label) + 1}")
         total[name] = total.get(name, 0) + float(share[k])
         colour[name] = panel.colour[k]
     ranked = sorted(total, key=lambda n: (-total[n], n))
