@@ -2,12 +2,11 @@
 
 Most of a film is floor and backdrop: where no ray to sky or sun could meet a box about an object, a
 pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
-still. Where objects are far and hide only some of the sky, the sky is asked at the corners of tiles.
-What is left is seen by one ray a pixel; every second pixel asks for light, and neighbours on one
-surface share what they found. Pixels beside which another surface is seen in another colour are
-cast again, finer.
-Nothing hangs on the picture before: equal input gives equal bytes, and what does not move does not
-flicker.
+still. Where objects are far and hide only some sky, the sky is asked at the corners of tiles. What
+is left is seen by one ray a pixel; every second pixel asks for light, and neighbours on one surface
+share what they found. Pixels beside which another surface is seen in another colour are cast again,
+finer. Nothing hangs on the picture before: equal input gives equal bytes, and what does not move
+does not flicker.
 """
 
 from collections.abc import Callable
@@ -34,7 +33,7 @@ from corporeal.render.embree import (
     render,
 )
 from corporeal.render.kernels import NOTHING, Samples
-from corporeal.render.kernels_ask import WIDE
+from corporeal.render.kernels_ask import SUNS, WIDE
 from corporeal.render.kernels_film import ABOUT, FINER
 from corporeal.render.kernels_floor import AROUND, FAR, NEAR, TILE, UNTOUCHED
 from corporeal.render.kernels_light import CHANNELS, SHARP
@@ -92,7 +91,7 @@ class FilmCaster:
         if quality not in PLANS:
             return render(stage, camera, quality, threads)
         threads = threads or cores()
-        lines = camera.height if threads == 1 else max(BAND, -(-camera.height // (2 * threads)))
+        lines = max(BAND, -(-camera.height // (2 * threads)))
         band = -(-lines // TILE) * TILE
         rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
         with ThreadPoolExecutor(threads) as pool:
@@ -296,7 +295,7 @@ class _Picture(Job):
         stage, sky, many = self.stage, times * self.sampling.sky, len(index)
         where = index, places.row, places.column
         light = np.zeros((many, WIDE), np.float32)
-        o, w = (np.empty((many * (sky + 1) + 1, 3), np.float32) for _ in range(2))
+        o, w = (np.empty((many * (sky + SUNS) + 1, 3), np.float32) for _ in range(2))
         ray, asker = (np.empty(len(o), np.int64) for _ in range(2))
         n = kernels_ask.ask(s, *where, self.lamps, sky, self.boxes, o, w, ray, asker, light)
         free = stage.free(o[:n], w[:n], ray[:n])

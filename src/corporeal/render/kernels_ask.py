@@ -25,6 +25,8 @@ WIDE = 8
 """Channels of light, one more than there are: loops over them fill whole registers."""
 WAYS = 72
 """Directions of pixels that ask."""
+SUNS = 2
+"""Rays to the sun of each: its shadows are the sharpest of all light that is smoothed."""
 GRAZING = 0.04
 """Of the light of the sky that comes from right above the horizon, and is taken from higher up:
 shadows of so little would reach far over the floor."""
@@ -77,7 +79,7 @@ def _look_up(s, g, q, w):
 
 @numba.njit(**JIT)
 def _sun_way(q, lamps, e, h, w):
-    """Write the direction of one of ``WAYS`` places on the sun's disc."""
+    """Write the direction of one of WAYS × SUNS places on the sun's disc."""
     r = np.sqrt((q * 0.7548776662 + 0.29) % 1) * lamps.softness
     phi = 2 * np.pi * ((q * 0.5698402910 + 0.83) % 1)
     x, y = r * np.cos(phi), r * np.sin(phi)
@@ -98,7 +100,7 @@ def ask(s, index, row, column, lamps, count, boxes, o, w, ray, asker, light):
         lamps: The studio.
         count: Rays to the sky of each.
         boxes: About all that can be met (B, 2, 3) [m].
-        o: Origins of rays (R, 3), room for N × (count + 1).
+        o: Origins of rays (R, 3), room for N × (count + SUNS) and one more.
         w: Their directions.
         ray: Their dice.
         asker: Of each ray, whose it is among N; those to the sun are counted from N on.
@@ -124,14 +126,16 @@ def ask(s, index, row, column, lamps, count, boxes, o, w, ray, asker, light):
                 n += 1
             else:
                 open_way(s, g, w[n], lamps, share, light[k])
-        if not sunlit(s, g, lamps, o[n]):
-            continue
-        _sun_way(q, lamps, e, h, w[n])
-        if meets_box(o[n], w[n], boxes):
-            ray[n], asker[n] = pixel, many + k
-            n += 1
-        else:
-            light[k, 3] = 1
+        for number in range(SUNS):
+            if not sunlit(s, g, lamps, o[n]):
+                break
+            # Tiles beside one another see parts of the sun that are far apart.
+            _sun_way((q % 8 * 9 + q // 8) * SUNS + number, lamps, e, h, w[n])
+            if meets_box(o[n], w[n], boxes):
+                ray[n], asker[n] = pixel + number, many + k
+                n += 1
+            else:
+                light[k, 3] += np.float32(1 / SUNS)
     return n
 
 
@@ -153,7 +157,7 @@ def answered(s, index, w, asker, free, lamps, count, light):
         if k < many:
             open_way(s, index[k], w[n], lamps, share, light[k])
         else:
-            light[k - many, 3] = 1
+            light[k - many, 3] += np.float32(1 / SUNS)
 
 
 @numba.njit(**JIT)
