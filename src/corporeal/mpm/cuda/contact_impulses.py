@@ -18,6 +18,7 @@ from corporeal.mpm.constants import (
     SWEEPS,
     VAST,
 )
+from corporeal.mpm.cuda.contact_nodes import curve_of, is_stiff
 from corporeal.mpm.cuda.layout import (
     DT,
     FULL,
@@ -122,16 +123,6 @@ def give(c: Contacts, r: Rigid, s: Sheet, t: int, entry: int, field: int, J: wp.
 
 
 @wp.func
-def curve_of(c: Contacts, r: Rigid, s: Sheet, t: int):
-    """Flow curve of the liquid of a contact, at its wall."""
-    liquid = c.fa[t]
-    if c.fc[t] < s.bodies:
-        if r.pours[c.fc[t]] == 1:
-            liquid = c.fc[t]
-    return r.flows_by[liquid]
-
-
-@wp.func
 def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
     """One projection of one contact onto its Coulomb cone; by how much it changed [m/s]."""
     u = slip_of(c, r, s, t)
@@ -164,14 +155,6 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
 
 
 # ---------------------------------------------------------------- before
-
-
-@wp.func
-def is_stiff(r: Rigid, s: Sheet, field: int):
-    """Whether a side is a rigid body or a plane."""
-    if field >= s.bodies:
-        return True
-    return r.stiff[field] == 1
 
 
 @wp.kernel

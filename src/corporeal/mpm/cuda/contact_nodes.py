@@ -78,6 +78,24 @@ def sticks(c: Contacts, r: Rigid, field: int, other: int):
 
 
 @wp.func
+def curve_of(c: Contacts, r: Rigid, s: Sheet, t: int):
+    """Flow curve of the liquid of a contact, at its wall."""
+    liquid = c.fa[t]
+    if c.fc[t] < s.bodies:
+        if r.pours[c.fc[t]] == 1:
+            liquid = c.fc[t]
+    return r.flows_by[liquid]
+
+
+@wp.func
+def is_stiff(r: Rigid, s: Sheet, field: int):
+    """Whether a side is a rigid body or a plane."""
+    if field >= s.bodies:
+        return True
+    return r.stiff[field] == 1
+
+
+@wp.func
 def near_wall(c: Contacts, s: Sheet, r: Rigid, field: int, w: int, at: wp.vec3i, alone: bool):
     """Whether a node of a field may touch a plane; with others there a body may lie between."""
     if r.pointed[field] == 1:

@@ -34,7 +34,7 @@ class FlowCurve(NamedTuple):
     """τ_y [Pa]"""
     drag: float
     """K/dⁿ [Pa (s/m)ⁿ]"""
-    index: float
+    exponent: float
     """n [-]"""
 
 

@@ -107,7 +107,7 @@ class Scene:
         full = contact.full_cell(body, cell)
         span = wall_stress.span(self.mass[slot], full, height, cell, self.dt)
         touches = wall_stress.touches(mean, height, normal, cell)
-        curve = np.tile(wall_stress.flow_curve(body, cell), (len(slot), 1))
+        curve = np.tile(np.array(wall_stress.flow_curve(body, cell)), (len(slot), 1))
         return np.column_stack([np.where(touches, span, 0.0), curve])
 
     def thinness(self, field: int) -> int:
