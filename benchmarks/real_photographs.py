@@ -56,7 +56,7 @@ DOCS = Path(__file__).parents[1] / "docs"
 TITLES = {"real": "Real photographs", "made": "Made photographs"}
 """Of the pages, each ``docs/KIND-photographs.md``."""
 MADE = (
-    "`python benchmarks/made_sets.py MODEL FOLDER/NAME …` makes the sets; models and options below."
+    "`python benchmarks/made_sets.py MODEL FOLDER/NAME …` makes sets; model and options are below."
 )
 EVERY = 2.0
 """Between two readings of the clock that are kept [s]."""
