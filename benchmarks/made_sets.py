@@ -36,7 +36,7 @@ FILLED = 0.55
 PACE, REACH, HEIGHT, AIM = 0.25, 0.06, 3.0, 0.04
 """Standard deviations: of steps along the way, in steps; of distances, in distances; of angles
 above the floor [deg]; of where hands point, in distances."""
-RATE = 10.0
+RATE = 10
 """Frames of a film a second."""
 QUALITY = 92
 """Of the photographs."""

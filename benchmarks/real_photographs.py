@@ -55,6 +55,9 @@ HEADS = (
 DOCS = Path(__file__).parents[1] / "docs"
 TITLES = {"real": "Real photographs", "made": "Made photographs"}
 """Of the pages, each ``docs/KIND-photographs.md``."""
+MADE = (
+    "`python benchmarks/made_sets.py MODEL FOLDER/NAME …` makes sets; model and options are below."
+)
 EVERY = 2.0
 """Between two readings of the clock that are kept [s]."""
 Progress = Callable[[float, str], None]
@@ -209,6 +212,7 @@ def write_docs(
     """Write the page, whole."""
     about = (__doc__ or "").split("\n\n")
     lines = [f"# {TITLES[kind]}", "", f"Written by `{said}`."]
+    lines += [MADE] * (kind == "made")
     lines += [" ".join(about[2].replace("``", "`").split()), ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
     lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in table]

@@ -36,7 +36,7 @@ def model_of(angles, floor_of):
         inside = ((pixel > 0) & (pixel < [camera.width, camera.height])).all(axis=1)
         mine = inside & np.isin(whose, (-1, floor_of[k])) & (rng.random(len(points)) < SEEN)
         sightings += [(k, int(p)) for p in np.flatnonzero(mine)]
-    lens = ColmapCamera("PINHOLE", 400, 300, (camera.K[0, 0], camera.K[1, 1], 200.0, 150.0))
+    lens = ColmapCamera("PINHOLE", 400, 300, (cameras[0].K[0, 0], cameras[0].K[1, 1], 200.0, 150.0))
     shades = np.zeros((len(points), 3), np.uint8)
     return ColmapModel(Path("model"), {1: lens}, tuple(images), points, shades, np.array(sightings))
 

@@ -60,6 +60,11 @@ def outliers(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> 
     return tuple(wrong.tolist()) if len(wrong) <= MOST * len(cameras) else ()
 
 
+def filled_by_others(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> float:
+    """Return which share of a mask the hull of the others fills, the median of all views."""
+    return float(np.nanmedian(compare(masks, cameras).filled))
+
+
 def compare(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> Compared:
     """Compare each mask with the hull of the others."""
     points = cube_around(masks, cameras)
