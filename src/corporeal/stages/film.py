@@ -75,9 +75,9 @@ Progress = Callable[[float, str], None]
 class FilmConfig:
     """Camera, size and quality of the film."""
 
-    width: int = 640
+    width: int = 1280
     """[px]"""
-    height: int = 480
+    height: int = 720
     """[px]"""
     quality: Literal["draft", "normal", "fine"] = "draft"
     """Rays per pixel; draft casts none where nothing moves, and more at edges."""
