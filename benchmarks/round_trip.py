@@ -161,10 +161,10 @@ def _piece(made: Results, views: Views, member: Member) -> Piece:
     """
     field, k = made.field, member.part
     said = _said(field, k)
-    if said["structure"] == "solid" and member.volume:
+    if said["structure"] in ("solid", "shell") and member.volume:
         rng = np.random.default_rng(0)
-        shared = inner_share(member.shape, member.body, member.size[0], rng)
-        if is_leafy(field.materials[k]) or shared > WALLED:
+        drawn = inner_share(member.shape, member.body, member.size[0], rng) > WALLED
+        if drawn or (said["structure"] == "solid" and is_leafy(field.materials[k])):
             thickness = 2e3 * member.volume / member.body_area
             said |= {"structure": "shell", "thickness_mm": thickness}
     triangles = [len(s.triangles) for s in made.scene.surfaces]
