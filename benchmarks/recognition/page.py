@@ -41,6 +41,8 @@ does not describe one of them. The fourth set was listed after that, and nothing
 more. It is mostly food and kitchenware, and mostly unknown; its answers are as reliable as before.
 In November 2026 some thirty words of things were added for the sake of their walls; one of them,
 the cannon ball, was read among the wrong answers below. Until then 44 % were right, 3 % wrong.
+The cricket ball's margin (third set) was lowered from 0.60 to 0.40 after it was seen to be wrong:
+margins of that set ordered .72 with the first, .87 with the second and before it had one.
 """
 
 
