@@ -10,7 +10,7 @@ import numpy as np
 
 from corporeal.evaluation.recognition import Row
 from corporeal.geometry.identity import Identity, identify, words
-from corporeal.stages.assemble import assemble
+from corporeal.stages.assemble import AssembleConfig, assemble
 from corporeal.types import Finish, Part, Scene, SceneObject, Surface
 from corporeal.vlm.metadata import Evidence, evidence, matter_hint, recognise
 
@@ -79,7 +79,7 @@ def record(folder: Path) -> list[dict]:
 
 def read(group: str, path: Path) -> dict:
     """Return what one file says of its parts."""
-    scene = assemble([path])
+    scene = assemble([path], AssembleConfig(objects="one"))
     identity = identify(scene, matter_hint)
     parts = []
     for number, part in enumerate(identity.catalogue):

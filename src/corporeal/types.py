@@ -174,6 +174,8 @@ class Scene:
     finds its balance before time 0, and pushes, winds and velocities begin there."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
+    hints: tuple[str, ...] = ()
+    """What was decided though it could be meant otherwise, and the option that says so."""
 
     @property
     def object_of_triangle(self) -> Int[np.ndarray, " T"]:

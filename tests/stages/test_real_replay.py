@@ -3,7 +3,7 @@
 import pytest
 
 from corporeal.geometry.identity import identify
-from corporeal.stages.assemble import assemble
+from corporeal.stages.assemble import AssembleConfig, assemble
 from corporeal.vlm.metadata import matter_hint
 from recorded import check_answered, check_chosen, grounded, rows
 
@@ -24,7 +24,8 @@ NAMES = (
 @pytest.fixture(scope="module")
 def described(shared_assets):
     """Name → (scene, inventory, field)."""
-    made = {name: assemble([shared_assets / "objects" / f"{name}.glb"]) for name in NAMES}
+    whole = AssembleConfig(objects="one")  # as they were when the questions were answered
+    made = {n: assemble([shared_assets / "objects" / f"{n}.glb"], whole) for n in NAMES}
     return {name: (scene, *grounded(scene, "real")) for name, scene in made.items()}
 
 

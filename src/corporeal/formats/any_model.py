@@ -1,6 +1,6 @@
 """Read a model of any kind: glTF, or a mesh file in a child process."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -9,6 +9,7 @@ from corporeal.formats import glb
 from corporeal.formats.glb import Model
 from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
 from corporeal.formats.meshes import read_mesh
+from corporeal.formats.own_objects import own_objects
 from corporeal.formats.sources import GLTF
 from corporeal.geometry.arrangement import in_unit
 from corporeal.geometry.gaussians import Up
@@ -45,14 +46,22 @@ def read_model(path: Path, objects: Objects = "auto", frame: Frame = AS_STATED) 
 
     Args:
         path: A model; its companions must lie beside it.
-        objects: As ``glb.read_glb`` has it; of mesh files only USD states bodies for "auto".
+        objects: As ``glb.read_glb`` has it; of mesh files only USD states bodies for "auto". Where
+            the file does not state its objects, "auto" finds them as ``own_objects`` has it.
         frame: Of mesh files; glTF states both.
 
     Raises:
         BadFileError: The file cannot be used, or is a glTF and ``frame`` says something.
 
     """
-    path = Path(path)
+    model = _read(Path(path), objects, frame)
+    if objects != "auto" or model.stated or len(model.scene.surfaces) == 1:
+        return model
+    pieces = _read(Path(path), "nodes", frame).scene
+    return replace(model, scene=own_objects(model.scene, pieces))
+
+
+def _read(path: Path, objects: Objects, frame: Frame) -> Model:
     if path.suffix.lower() in GLTF or not path.exists():
         if frame != AS_STATED:
             step = "Leave --up and --unit out; --extent gives things another size."
@@ -62,8 +71,9 @@ def read_model(path: Path, objects: Objects = "auto", frame: Frame = AS_STATED) 
         raise _not_read(path)
     mesh = read_mesh(path, objects, frame.up)
     if frame.unit == "auto":
-        return Model(mesh.scene, mesh.ours, mesh.metric)
-    return Model(in_unit(mesh.scene, METRES[frame.unit] / mesh.scene.metres_per_unit), ours=False)
+        return Model(mesh.scene, mesh.ours, mesh.metric, mesh.stated)
+    scene = in_unit(mesh.scene, METRES[frame.unit] / mesh.scene.metres_per_unit)
+    return Model(scene, ours=False, stated=mesh.stated)
 
 
 def _not_read(path: Path) -> BadFileError:

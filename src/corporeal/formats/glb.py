@@ -61,6 +61,8 @@ class Model:
     """Our writer made the file: gravity, duration, velocities and pushes are stated in it."""
     metric: bool = True
     """Whether the scene is in metres; else it is in the file's unit, which nobody states."""
+    stated: bool = False
+    """Whether the file itself says what its objects are."""
 
 
 def read_glb(path: Path, objects: Objects = "auto") -> Scene:
@@ -94,7 +96,9 @@ def read_model(path: Path, objects: Objects = "auto") -> Model:
     owner = _owners(tree, {s.node for s in shapes}, objects)
     scene = _scene(document, tree, shapes, owner)
     finishes, warnings = tuple(wardrobe.finishes), tuple(document.warnings)
-    return Model(replace(scene, finishes=finishes, warnings=warnings), written_by_us(document))
+    scene = replace(scene, finishes=finishes, warnings=warnings)
+    ours = written_by_us(document)
+    return Model(scene, ours, stated=ours or bool(_declared(tree)))
 
 
 def check_extensions(document: Document) -> None:

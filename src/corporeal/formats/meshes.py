@@ -51,6 +51,8 @@ class MeshFile:
     """Whether the file states its unit."""
     ours: bool = False
     """Our own exporter made it: gravity, duration and the like are stated in it."""
+    stated: bool = False
+    """Whether the file itself says what its objects are."""
 
 
 def read_mesh(path: Path, objects: Objects = "one", up: Up | None = None) -> MeshFile:
@@ -81,7 +83,8 @@ def read_mesh(path: Path, objects: Objects = "one", up: Up | None = None) -> Mes
     if bodies:
         scene = with_bodies(scene, list(dict.fromkeys(owners)), bodies, turn)
     ours = bool(raw.custom) and objects == "auto"
-    return MeshFile(with_scene(scene, raw.custom) if ours else scene, raw.unit is not None, ours)
+    scene = with_scene(scene, raw.custom) if ours else scene
+    return MeshFile(scene, raw.unit is not None, ours, stated=bool(raw.bodies))
 
 
 def companions(path: Path) -> list[Path]:

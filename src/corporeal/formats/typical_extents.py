@@ -34,9 +34,14 @@ def typical_extent(class_name: str) -> TypicalExtent | None:
 
     "soda can" for "soda can crushed", "cup" for "tea set cup": English puts the noun last.
     """
-    words = nouns(class_name, _compounds())
+    words = words_in(class_name)
     found = [e for e in _table() if set(e.words.split()) <= set(words)]
     return max(found, key=lambda e: _fit(e, words), default=None)
+
+
+def words_in(class_name: str) -> list[str]:
+    """Return a name's words as ``nouns`` has them, with the compounds of this table."""
+    return nouns(class_name, _compounds())
 
 
 def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str]:

@@ -98,10 +98,10 @@ def _scaled(point: Vector, factor: float) -> Vector:
 def intersecting(scene: Scene) -> list[tuple[int, int]]:
     """Return the pairs of objects of which one holds vertices of the other."""
     pairs = placing.overlapping(boxes_of(scene))
-    return [(a, b) for a, b in pairs if _inside(scene, a, b) or _inside(scene, b, a)]
+    return [(a, b) for a, b in pairs if inside(scene, a, b) or inside(scene, b, a)]
 
 
-def _inside(scene: Scene, a: int, b: int) -> bool:
+def inside(scene: Scene, a: int, b: int) -> bool:
     """Tell whether vertices of ``a`` lie within ``b``, deeper than what merely touches."""
     points = np.concatenate([s.vertices for s in _surfaces(scene, a)])
     points = points[:: max(1, len(points) // SAMPLES)]

@@ -41,8 +41,9 @@ class AssembleConfig:
     """How files become a scene."""
 
     objects: Literal["auto", "one", "nodes"] = "auto"
-    """What counts as one object within a file: the nodes that state a class, else the whole file
-    (auto); the whole file (one); every branch below the root (nodes)."""
+    """What counts as one object within a file: the nodes that state a class, else the pieces that
+    touch no other or are named as things of their own (auto); the whole file (one); every branch
+    below the root (nodes)."""
     stack: bool = False
     """Put the files above each other, the first at the bottom, instead of side by side."""
     drop: float = 0.0
@@ -329,13 +330,14 @@ def _with_overlaps_named(scene: Scene) -> Scene:
 
 
 def _merged(plan: SceneFile, blocks: list[_Block]) -> Scene:
-    objects, surfaces, finishes, warnings = [], [], [], []
+    objects, surfaces, finishes, warnings, hints = [], [], [], [], []
     for scene in (b.scene for b in blocks):
         o, f = len(objects), len(finishes)
         surfaces += [replace(s, object=s.object + o, finish=s.finish + f) for s in scene.surfaces]
         objects += scene.objects
         finishes += scene.finishes
         warnings += scene.warnings
+        hints += scene.hints
     return Scene(
         name=_title(plan, blocks),
         source=str(plan.path),
@@ -344,6 +346,7 @@ def _merged(plan: SceneFile, blocks: list[_Block]) -> Scene:
         finishes=tuple(finishes),
         walls=plan.walls,
         warnings=tuple(dict.fromkeys(warnings)),
+        hints=tuple(dict.fromkeys(hints)),
     )
 
 

@@ -28,7 +28,7 @@ def hints(scene: Scene, happened: Outcome, divided: bool) -> tuple[str, ...]:
 
     """
     joined = () if divided else _joined(scene)
-    return (*joined, *_motionless(scene, happened))
+    return (*scene.hints, *joined, *_motionless(scene, happened))
 
 
 def _joined(scene: Scene) -> Iterator[str]:
