@@ -5,6 +5,8 @@ NumPy code imports them, kernels on cards take them as they compile, and C++ tex
 constitutive law stand with the law, coefficients of a formula in the formula. A cell is dx long.
 """
 
+from corporeal import types
+
 # ---------------------------------------------------------------- how long a step may be
 
 COURANT = 0.4
@@ -89,6 +91,10 @@ WALL_REACH = 0.51
 Half a cell, and a hundredth so that rounding does not decide about nodes at exactly half a cell."""
 POINT_REACH = 0.3
 """Surface points of rigid bodies are watched this far above a wall [cells]."""
+ROUNDING = types.ROUNDING
+"""Numbers that say how a surface curves at a point."""
+SIDEWAYS = 0.1
+"""A direction whose part in the plane of an arc is shorter than this has none there [-]."""
 LATTICE_GAP = 0.05
 """What two particles per cell and axis add to the continuous touching distance [cells] …"""
 LATTICE_SLOPE = 0.25

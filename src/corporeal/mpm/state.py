@@ -12,8 +12,15 @@ from corporeal.mpm.constants import SMALLEST_VOLUME
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import branches, rigid
 from corporeal.mpm.physics.branches import Branches, Memory
-from corporeal.mpm.problem import Problem
+from corporeal.mpm.problem import Body, Problem
 from corporeal.mpm.substance import Substances
+from corporeal.types import ROUNDING
+
+
+def rounding_of(body: Body) -> Float[np.ndarray, "S 10"]:
+    """How a body's surface curves at its points; zeros where it was not told."""
+    known = len(body.rounding) == len(body.surface)
+    return body.rounding if known else np.zeros((len(body.surface), ROUNDING))
 
 
 @dataclass(frozen=True)
@@ -37,6 +44,8 @@ class Matter:
     """Position at the start, from the body's centre [m]."""
     surface: tuple[Float[np.ndarray, "S 3"], ...]
     """Surface points of each body at the start, from its centre [m]."""
+    rounding: tuple[Float[np.ndarray, "S 10"], ...]
+    """How the surface curves there at the start: see ``types.ROUNDING``; zero where it does not."""
 
     @classmethod
     def of(cls, problem: Problem) -> "Matter":
@@ -59,6 +68,7 @@ class Matter:
                 [b.position - m.centre for b, m in zip(bodies, masses, strict=True)]
             ),
             surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
+            rounding=tuple(rounding_of(b) for b in bodies),
         )
 
     @cached_property

@@ -17,6 +17,8 @@ from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.contact import face_table
 from corporeal.mpm.problem import Body, Problem
+from corporeal.mpm.state import rounding_of
+from corporeal.types import ROUNDING
 
 LISTS = {
     "junction": layout.JUNCTION,
@@ -60,10 +62,10 @@ def rigid_grid(
 
     """
     across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
-    surface = body.surface - state[CENTRE : CENTRE + 3]
+    surface, rounding = body.surface - state[CENTRE : CENTRE + 3], rounding_of(body)
     if body.path is not None:
         # It never meets a plane, neither on nodes nor on points of its own.
-        surface = np.zeros((1, 3))
+        surface, rounding = np.zeros((1, 3)), np.zeros((1, ROUNDING))
     points, clumps = _clumped(points, 4.0 * cell)
     wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
@@ -82,6 +84,7 @@ def rigid_grid(
         "point": points,
         "clump": clumps,
         "surface": np.ascontiguousarray(surface),
+        "rounding": np.ascontiguousarray(rounding),
         "wetted": wetted,
         "patch": patches,
         "places": places,

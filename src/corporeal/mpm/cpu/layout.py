@@ -176,6 +176,7 @@ FIELD = Record(
     ("double *", "point"),  # rigid: [points][5] place in the body's frame, mass, volume
     ("double *", "rigid"),  # rigid: its state
     ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
+    ("double *", "rounding"),  # rigid: [surfaces][ROUNDING], see types.ROUNDING
     ("double *", "wetted"),  # rigid: [..][6] points that liquids touch, and their normals
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast

@@ -3,7 +3,7 @@
 Same rules as ``reference.contact.find``.
 """
 
-from corporeal.mpm import constants
+from corporeal.mpm import constants, formulas
 from corporeal.mpm.constants import (
     FIELDS_AT_NODE,
     HELD_BY_WALL,
@@ -25,8 +25,9 @@ from corporeal.mpm.cuda.layout import (
     Sheet,
     wp,
 )
+from corporeal.mpm.formulas.one_lane import shift_to_contact
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 0})
+wp.set_module_options(formulas.options(max_unroll=0))
 
 POINT_REACH = wp.constant(D(constants.POINT_REACH))
 
@@ -257,9 +258,13 @@ def list_points(r: Rigid, c: Contacts, s: Sheet, stride: int):
     for i in range(wp.tid(), r.surfaces * s.planes, stride):
         w = i % s.planes
         b = r.surface_body[i // s.planes]
-        x = r.centre[b] + r.turn[b] * r.surface[i // s.planes]
+        p = i // s.planes
+        towards = -(wp.transpose(r.turn[b]) * s.plane[w])
+        shift = shift_to_contact(r.rounding, p, towards)
+        on = r.surface[p] + wp.vec3d(shift[0], shift[1], shift[2])
+        x = r.centre[b] + r.turn[b] * on
         gap = wp.dot(s.plane[w], x) - s.offset[w]
-        if gap < POINT_REACH * s.dx:
+        if gap < POINT_REACH * s.dx and shift[3] > D(0.0):
             t = wp.atomic_add(s.flag, TOUCHES, 1)
             wp.atomic_add(s.flag, STIFF, 1)
             if t >= 2 * c.room:

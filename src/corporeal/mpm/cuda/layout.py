@@ -282,6 +282,8 @@ class Rigid:
     surfaces: int
     surface_body: wp.array(dtype=wp.int32)
     surface: wp.array(dtype=wp.vec3d)
+    rounding: wp.array(dtype=wp.float64)
+    """How the surface curves at each, one row after the other: see ``types.ROUNDING``."""
     first: wp.array(dtype=wp.int32)
     """Of each body: its first surface point …"""
     points: wp.array(dtype=wp.int32)

@@ -157,6 +157,8 @@ class Memory:
         r.surfaces = sum(len(p) for p in points)
         r.surface_body = self.put(np.concatenate([np.zeros(0, int), *body]), wp.int32)
         r.surface = self.put(np.concatenate([np.zeros((0, 3)), *points]), wp.vec3d)
+        rows = [matter.rounding[b].reshape(-1) for b in stiff]
+        r.rounding = self.put(np.concatenate([np.zeros(0), *rows]), wp.float64)
         count, thin = np.zeros((2, len(matter.surface)), int)
         count[stiff] = [len(p) for p in points]
         thin[stiff] = [thinness(p, cell) for p in points]

@@ -99,6 +99,33 @@ struct Surface {
     return least < VAST ? least : there;
   }
 };
+// How far from a rounded surface point of a rigid body its surface goes on in a direction d: twin of
+// physics/rounding.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.ROUNDING.
+struct Round {
+  // Angle from the normal, no larger than that up to which a point stands for its surroundings.
+  CUDA_CALLABLE static inline double bounded(double angle, double reach, double radius, bool &beyond) {
+    const double half = 0.5 * 3.14159265358979323846, most = reach < half * radius ? reach / radius : half;
+    beyond |= angle > most || angle < -most;
+    return angle > most ? most : angle < -most ? -most : angle;
+  }
+  // Whether the point is the surface in that direction at all, and not its neighbours.
+  CUDA_CALLABLE static inline bool shift(const double *row, const double *d, double *out) {
+    bool beyond = false;
+    const double *n = row, *e = row + 3, ball = row[6], arc = row[7], reach = row[8];
+    double outward = 0, ahead = 0, aside[3], square = 0;
+    for (int i = 0; i < 3; i++) outward += d[i] * n[i], ahead += d[i] * e[i], out[i] = 0;
+    if (arc > 0 && sqrt(outward * outward + ahead * ahead) > SIDEWAYS) {
+      const double a = bounded(atan2(ahead, outward), reach, ball + arc, beyond);
+      for (int i = 0; i < 3; i++) out[i] += arc * (sin(a) * e[i] + (cos(a) - 1.0) * n[i]);
+    }
+    for (int i = 0; i < 3; i++) aside[i] = d[i] - outward * n[i], square += aside[i] * aside[i];
+    if (ball > 0 && square > 0) {
+      const double size = sqrt(square), a = bounded(atan2(size, outward), reach, ball, beyond);
+      for (int i = 0; i < 3; i++) out[i] += ball * (sin(a) * aside[i] / size + (cos(a) - 1.0) * n[i]);
+    }
+    return !beyond || row[9] == 0;
+  }
+};
 // Where the surface of a rigid body lies for a liquid: twin of physics/contact.py wetted_faces. Rows of
 // six: point and outward normal; X is the liquid's place, x the node.
 struct Wetted {

@@ -177,6 +177,17 @@ def wetted_face(
 ) -> wp.vec4d: ...
 
 
+@wp.func_native("""
+  wp::vec_t<4, wp::float64> out;
+  const double *row = (const double *)rows.data + mpm::ROUNDING * number;
+  out[3] = mpm::Round::shift(row, &towards.c[0], &out.c[0]) ? 1.0 : 0.0;
+  return out;
+""")
+def shift_to_contact(
+    rows: wp.array(dtype=wp.float64), number: int, towards: wp.vec3d
+) -> wp.vec4d: ...
+
+
 @wp.func_native("return mpm::Face<float>::gap_of_liquid(mean, height, full);")
 def gap_of_liquid(mean: wp.float32, height: wp.float32, full: wp.float32) -> wp.float32: ...
 

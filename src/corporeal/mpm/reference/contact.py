@@ -383,10 +383,10 @@ def _points_on_walls(scene: Scene) -> list[Touch]:
     for b in filter(scene.is_rigid, range(bodies)):
         if problem.bodies[b].path is not None:
             continue
-        point = scene.surface(b)
         for w, plane in enumerate(problem.planes):
+            point, own = scene.touching(b, -np.array(plane.normal))
             height = point @ np.array(plane.normal) - plane.offset
-            near = np.flatnonzero(height < POINT_REACH * problem.cell)
+            near = np.flatnonzero(own & (height < POINT_REACH * problem.cell))
             if len(near) == 0:
                 continue
             normal = np.tile(-np.array(plane.normal), (len(near), 1))

@@ -152,6 +152,22 @@ struct List {
     }
   }
 };
+struct Points {
+  // Where the rounded surface around point p ends in a direction, both in the body's frame, and the gap
+  // there, from that of the point itself; whether it is below reach.
+  static inline bool touching(const Field &F, int p, const double *towards, double reach, double &gap,
+                              double *at) {
+    const double *row = F.rounding + mpm::ROUNDING * p;
+    double shift[3] = {0, 0, 0};
+    if (row[6] + row[7] > 0) {
+      if (gap >= reach + 2 * row[8]) return false;   // neither part goes farther than the point's reach
+      if (!mpm::Round::shift(row, towards, shift)) return false;
+      gap -= Vec::dot(towards, shift);
+    }
+    for (int i = 0; i < 3; i++) at[i] = F.surface[3 * p + i] + shift[i];
+    return gap < reach;
+  }
+};
 Line *lines = stage->line;
 int nt = stage->touches, n = 0, stacked = 0;
 double *pair = stage->pair;   // [all][all][PAIR]
@@ -167,9 +183,10 @@ for (int f = 0; f < fields; f++) {
     double down[3];             // the plane's normal in the body's frame
     for (int i = 0; i < 3; i++)
       down[i] = P[0] * s[TURN + i] + P[1] * s[TURN + 3 + i] + P[2] * s[TURN + 6 + i];
+    const double towards[3] = {-down[0], -down[1], -down[2]};
     for (int p = 0; p < F.surfaces; p++) {
-      double gap = centre + Vec::dot(down, F.surface + 3 * p);
-      if (gap >= mpm::POINT_REACH * dx) continue;
+      double gap = centre + Vec::dot(down, F.surface + 3 * p), at[3];
+      if (!Points::touching(F, p, towards, mpm::POINT_REACH * dx, gap, at)) continue;
       Touch &T = touches[nt++];
       T.meet = -1;
       T.face = 0;
@@ -184,7 +201,7 @@ for (int f = 0; f < fields; f++) {
       T.mu = world->friction[T.fa * all + T.fc];
       T.target = Impact::closing(gap, dt);
       for (int d = 0; d < 3; d++) {
-        T.x[d] = s[CENTRE + d] + Vec::dot(s + TURN + 3 * d, F.surface + 3 * p);
+        T.x[d] = s[CENTRE + d] + Vec::dot(s + TURN + 3 * d, at);
         T.normal[d] = -P[d];
         T.J[d] = 0;
       }
