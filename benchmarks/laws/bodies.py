@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
-from corporeal.geometry.rounding import reach_of, surrounded
+from corporeal.geometry.roundness import reach_of, surrounded
 from corporeal.mpm.problem import Body, Plane, Problem
 from corporeal.types import Law
 

@@ -5,7 +5,7 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
 from corporeal.geometry.mesh import joined
-from corporeal.geometry.rounding import rounded
+from corporeal.geometry.roundness import rounded
 from corporeal.geometry.shape import sphere_directions
 from corporeal.geometry.spread import sample_surface, thin_out
 from corporeal.geometry.survey import Anatomy
@@ -30,7 +30,7 @@ def contact_points(
 
     Returns:
         The points, on the round surface that the mesh stands for, and how it curves there: see
-        ``geometry.rounding``.
+        ``geometry.roundness``.
 
     """
     corners = extremes(anatomy.vertices)

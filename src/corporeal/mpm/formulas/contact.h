@@ -104,7 +104,7 @@ struct Surface {
 struct Round {
   // Angle from the normal, no larger than that up to which a point stands for its surroundings.
   CUDA_CALLABLE static inline double bounded(double angle, double reach, double radius, bool &beyond) {
-    const double half = 0.5 * 3.14159265358979323846, most = reach < half * radius ? reach / radius : half;
+    const double most = reach < MOST_LEAN * radius ? reach / radius : MOST_LEAN;
     beyond |= angle > most || angle < -most;
     return angle > most ? most : angle < -most ? -most : angle;
   }
@@ -124,6 +124,40 @@ struct Round {
       for (int i = 0; i < 3; i++) out[i] += ball * (sin(a) * aside[i] / size + (cos(a) - 1.0) * n[i]);
     }
     return !beyond || row[9] == 0;
+  }
+};
+// A flat face of a rigid body, on which what is round rolls: twin of physics/facets.py. row: normal, offset;
+// middle and radius of its points; how far the face goes on from one; the first and last of them.
+struct Facet {
+  enum { OFFSET = 3, MIDDLE = 4, AROUND = 7, REACH = 8, FIRST = 9, LAST = 10 };
+  // Whether a ball of radius r around x comes near the face at all.
+  CUDA_CALLABLE static inline bool near(const double *row, const double *x, double r) {
+    double h = -row[OFFSET], square = 0;
+    for (int i = 0; i < 3; i++) {
+      const double d = x[i] - row[MIDDLE + i];
+      h += x[i] * row[i], square += d * d;
+    }
+    const double most = r + row[AROUND] + row[REACH];
+    return h < r && h > -r && square < most * most;
+  }
+  // Whether a place lies over the face: one of its points is no farther aside.
+  CUDA_CALLABLE static inline bool holds(const double *row, const double *points, const double *x) {
+    const double limit = row[REACH] * row[REACH];
+    for (int k = (int)row[FIRST]; k < (int)row[LAST]; k++) {
+      double along = 0, square = 0;
+      for (int i = 0; i < 3; i++) {
+        const double d = x[i] - points[3 * k + i];
+        along += d * row[i], square += d * d;
+      }
+      if (square - along * along <= limit) return true;
+    }
+    return false;
+  }
+  // Whether a contact on a node, apart from that on the face by d with normals that have this cosine, is
+  // the same as it; radius: of what is round.
+  CUDA_CALLABLE static inline bool replaces(const double *d, double cosine, double radius, double dx) {
+    const double reach = FACET_NODES * dx + sqrt(0.5 * radius * dx);
+    return cosine > FACET_ALIKE && d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < reach * reach;
   }
 };
 // Where the surface of a rigid body lies for a liquid: twin of physics/contact.py wetted_faces. Rows of

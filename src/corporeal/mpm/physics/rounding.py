@@ -3,7 +3,7 @@
 import numpy as np
 from jaxtyping import Bool, Float
 
-from corporeal.mpm.constants import SIDEWAYS
+from corporeal.mpm.constants import MOST_LEAN, SIDEWAYS, TINY_DOUBLE
 
 
 def shift_to_contact(
@@ -35,13 +35,13 @@ def shift_to_contact(
     size = np.linalg.norm(aside, axis=1)
     tilt = np.where((ball > 0.0) & (size > 0.0), np.arctan2(size, outward), 0.0)
     tilted = _bounded(tilt, reach, ball)
-    shift = shift + _arc(ball, tilted, aside / np.maximum(size, 1e-300)[:, None], normal)
+    shift = shift + _arc(ball, tilted, aside / np.maximum(size, TINY_DOUBLE)[:, None], normal)
     beyond = (turned != angle) | (tilted != tilt)
     return shift, ~beyond | (rounding[:, 9] == 0.0)
 
 
 def _bounded(angle: np.ndarray, reach: np.ndarray, radius: np.ndarray) -> np.ndarray:
-    limit = np.minimum(reach, 0.5 * np.pi * radius) / np.maximum(radius, 1e-300)
+    limit = np.minimum(reach / np.maximum(radius, TINY_DOUBLE), MOST_LEAN)
     return np.clip(angle, -limit, limit)
 
 

@@ -152,63 +152,13 @@ struct List {
     }
   }
 };
-struct Points {
-  // Where the rounded surface around point p ends in a direction, both in the body's frame, and the gap
-  // there, from that of the point itself; whether it is below reach.
-  static inline bool touching(const Field &F, int p, const double *towards, double reach, double &gap,
-                              double *at) {
-    const double *row = F.rounding + mpm::ROUNDING * p;
-    double shift[3] = {0, 0, 0};
-    if (row[6] + row[7] > 0) {
-      if (gap >= reach + 2 * row[8]) return false;   // neither part goes farther than the point's reach
-      if (!mpm::Round::shift(row, towards, shift)) return false;
-      gap -= Vec::dot(towards, shift);
-    }
-    for (int i = 0; i < 3; i++) at[i] = F.surface[3 * p + i] + shift[i];
-    return gap < reach;
-  }
-};
 Line *lines = stage->line;
 int nt = stage->touches, n = 0, stacked = 0;
 double *pair = stage->pair;   // [all][all][PAIR]
-// Surface points of rigid bodies on planes.
-for (int f = 0; f < fields; f++) {
-  const Field &F = world->field[f];
-  if (!F.rigids || !F.surfaces || F.rigid[LIGHT] == 0) continue;
-  const double *s = F.rigid;
-  for (int w = 0; w < planes; w++) {
-    const double *P = world->plane + 4 * w;
-    double centre = Vec::dot(P, s + CENTRE) - P[3];
-    if (centre > s[RADIUS] + mpm::POINT_REACH * dx) continue;
-    double down[3];             // the plane's normal in the body's frame
-    for (int i = 0; i < 3; i++)
-      down[i] = P[0] * s[TURN + i] + P[1] * s[TURN + 3 + i] + P[2] * s[TURN + 6 + i];
-    const double towards[3] = {-down[0], -down[1], -down[2]};
-    for (int p = 0; p < F.surfaces; p++) {
-      double gap = centre + Vec::dot(down, F.surface + 3 * p), at[3];
-      if (!Points::touching(F, p, towards, mpm::POINT_REACH * dx, gap, at)) continue;
-      Touch &T = touches[nt++];
-      T.meet = -1;
-      T.face = 0;
-      T.choice = -1;
-      T.a = p;
-      T.c = -1 - w;
-      T.fa = f;
-      T.fc = fields + w;
-      T.gap = gap;
-      T.active = 1;
-      T.span = 0;
-      T.mu = world->friction[T.fa * all + T.fc];
-      T.target = Impact::closing(gap, dt);
-      for (int d = 0; d < 3; d++) {
-        T.x[d] = s[CENTRE + d] + Vec::dot(s + TURN + 3 * d, at);
-        T.normal[d] = -P[d];
-        T.J[d] = 0;
-      }
-    }
-  }
-}
+nt += Points::on_planes(world, touches + nt);
+nt += Points::on_facets(world, touches + nt, stage->most_touches - nt);
 stage->points = nt - stage->touches;
+Points::instead_of_nodes(world, touches, stage->touches, nt);
 Bonds::join(world);
 for (int t = 0; t < nt; t++) {
   Touch &T = touches[t];
@@ -273,7 +223,7 @@ if (n) {
     for (int i = 0; i < n; i++) {
       const Touch &T = touches[lines[i].touch];
       if (lines[i].e <= 0) continue;
-      const double speed = List::closing(lines[i], T.meet < 0 ? &world->field[T.fa] : 0, approach);
+      const double speed = List::closing(lines[i], Points::rolls(world, T), approach);
       if (!Impact::begins(approach, speed, T.gap, dt)) continue;
       pair[PAIR * (T.fa * all + T.fc)] = hit = true;
     }
@@ -283,7 +233,7 @@ if (n) {
       const Touch &T = touches[R.touch];
       R.waits = pair[PAIR * (T.fa * all + T.fc)] == 0;
       if (R.waits) continue;
-      const double speed = List::closing(R, T.meet < 0 ? &world->field[T.fa] : 0, approach);
+      const double speed = List::closing(R, Points::rolls(world, T), approach);
       R.target = Impact::target(R.e, approach, speed, T.gap, dt, dx);
       for (int d = 0; d < 3; d++) R.J[d] = 0;
     }

@@ -5,7 +5,7 @@ import pytest
 import trimesh
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.rounding import is_round, rounded
+from corporeal.geometry.roundness import is_round, rounded
 from corporeal.geometry.spread import sample_surface
 
 
