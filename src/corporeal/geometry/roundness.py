@@ -53,7 +53,7 @@ def rounded(
         return points, np.zeros((len(points), ROUNDING))
     reach = reach_of(points)
     curved = Curvature(mesh)
-    at, vertex = KDTree(mesh.vertices).query(points)
+    at, vertex = map(np.asarray, KDTree(mesh.vertices).query(points))
     is_corner = at < SAME * mesh.extent
     inside = np.flatnonzero(~is_corner)
     found = [_on_faces(curved, points[inside], reach[inside])]

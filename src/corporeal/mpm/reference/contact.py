@@ -92,7 +92,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
 
 
 def _groups(touches: list[Touch]) -> Int[np.ndarray, " E"]:
-    """Number contacts by their pair, apart those on nodes and on surface points."""
+    """Give contacts of one pair one number, on nodes and on surface points another."""
     number: dict[tuple[tuple[int, int], bool], int] = {}
     found = [number.setdefault((t.pair, t.rolls >= 0), len(number)) for t in touches]
     return np.repeat(np.array(found, dtype=np.int64), [len(t.gap) for t in touches])

@@ -47,9 +47,9 @@ def on_facets(scene: Scene) -> list[Touch]:
             continue
         for at, normal, gap in _with_facets(scene, round_one, flat_one):
             if len(gap):
-                movers = (np.full(len(gap), b) for b in pair)
+                a, c = (np.full(len(gap), b) for b in pair)
                 out = normal if flat_one == pair[0] else -normal
-                found.append(Touch(pair, *movers, at, out, gap, rolls=round_one))
+                found.append(Touch(pair, a, c, at, out, gap, rolls=round_one))
     return _joined(found)
 
 

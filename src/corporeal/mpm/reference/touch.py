@@ -21,12 +21,12 @@ class Touch:
     gap: Float[np.ndarray, " E"]
     slips: Bool[np.ndarray, " E"] | None = None
     """Which of them transmit no friction; None: all do."""
-    rolls: int = -1
-    """The body whose surface points they are; -1: they are on nodes."""
     layer: Float[np.ndarray, "E 4"] | None = None
     """Where a wall drags on a liquid that sticks: see ``contact_impulses.Contacts``."""
     kept: KeptChoices = field(default_factory=KeptChoices.none)
     """Candidate normals that were taken, where they are kept."""
+    rolls: int = -1
+    """The body whose surface points they are; -1: they are on nodes."""
 
     @property
     def grips(self) -> Float[np.ndarray, " E"]:
