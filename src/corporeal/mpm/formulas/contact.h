@@ -129,7 +129,7 @@ struct Round {
 // A flat face of a rigid body, on which what is round rolls: twin of physics/facets.py. row: normal, offset;
 // middle and radius of its points; how far the face goes on from one; the first and last of them.
 struct Facet {
-  enum { OFFSET = 3, MIDDLE = 4, AROUND = 7, REACH = 8, FIRST = 9, LAST = 10 };
+  enum { OFFSET = 3, MIDDLE = 4, AROUND = 7, REACH = 8, BEGIN = 9, END = 10 };
   // Whether a ball of radius r around x comes near the face at all.
   CUDA_CALLABLE static inline bool near(const double *row, const double *x, double r) {
     double h = -row[OFFSET], square = 0;
@@ -143,7 +143,7 @@ struct Facet {
   // Whether a place lies over the face: one of its points is no farther aside.
   CUDA_CALLABLE static inline bool holds(const double *row, const double *points, const double *x) {
     const double limit = row[REACH] * row[REACH];
-    for (int k = (int)row[FIRST]; k < (int)row[LAST]; k++) {
+    for (int k = (int)row[BEGIN]; k < (int)row[END]; k++) {
       double along = 0, square = 0;
       for (int i = 0; i < 3; i++) {
         const double d = x[i] - points[3 * k + i];
