@@ -110,7 +110,7 @@ the next."""
 FACET_NODES = 2.0
 """What is round meets a flat face exactly, and not on nodes that are nearer to there than this
 [cells] and √(r dx/2): beyond, the gap of a ball of radius r is larger than what nodes misjudge …"""
-FACET_ALIKE = 0.7
+FACET_ALIKE = 0.95
 """… and on which they meet along nearly the same normal: the least cosine [-]."""
 LATTICE_GAP = 0.05
 """What two particles per cell and axis add to the continuous touching distance [cells] …"""

@@ -64,8 +64,8 @@ def rigid_grid(
     """
     across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
     surface, rounding = body.surface - state[CENTRE : CENTRE + 3], rounding_of(body)
-    if body.path is not None:
-        # It never meets a plane, neither on nodes nor on points of its own.
+    if body.path is not None and not len(surface):
+        # It never meets a plane: neither on points of its own nor, since it has one, on nodes.
         surface, rounding = np.zeros((1, 3)), np.zeros((1, ROUNDING))
     facets = facets_of(body.surface - state[CENTRE : CENTRE + 3], rounding_of(body))
     points, clumps = _clumped(points, 4.0 * cell)

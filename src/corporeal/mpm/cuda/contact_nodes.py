@@ -286,6 +286,8 @@ def list_points(r: Rigid, c: Contacts, s: Sheet, stride: int):
     for i in range(wp.tid(), r.surfaces * s.planes, stride):
         w = i % s.planes
         b = r.surface_body[i // s.planes]
+        if r.path_count[b] > 0:
+            continue
         p = i // s.planes
         towards = -(wp.transpose(r.turn[b]) * s.plane[w])
         shift = shift_to_contact(r.rounding, p, towards)
@@ -297,9 +299,9 @@ def list_points(r: Rigid, c: Contacts, s: Sheet, stride: int):
 
 
 @wp.func
-def is_round(r: Rigid, p: int):
-    """Whether a surface point is a round one's."""
-    return r.rounding[ROUNDING * p + 6] + r.rounding[ROUNDING * p + 7] > D(0.0)
+def radius_at(r: Rigid, p: int):
+    """Larger radius of curvature at a surface point [m]; 0 where it is not round."""
+    return r.rounding[ROUNDING * p + 6] + r.rounding[ROUNDING * p + 7]
 
 
 @wp.kernel
@@ -313,7 +315,7 @@ def list_facets(r: Rigid, c: Contacts, s: Sheet, stride: int):
         k = i % r.facets
         b = r.surface_body[p]
         other = r.facet_body[k]
-        if b == other or c.apart[b, other] == 1 or not is_round(r, p):
+        if r.path_count[b] > 0 or b == other or c.apart[b, other] == 1 or radius_at(r, p) <= D(0.0):
             continue
         back = wp.transpose(r.turn[other])
         centre = back * (r.centre[b] - r.centre[other])
@@ -325,7 +327,7 @@ def list_facets(r: Rigid, c: Contacts, s: Sheet, stride: int):
         on = r.surface[p] + wp.vec3d(shift[0], shift[1], shift[2])
         x = r.centre[b] + r.turn[b] * on
         gap = wp.dot(n, x - r.centre[other]) - r.facet[row + 3]
-        if shift[3] == D(0.0) or wp.abs(gap) >= reach:
+        if shift[3] == D(0.0) or wp.abs(gap) >= reach or gap <= -radius_at(r, p):
             continue
         if facet_holds(r.facet, k, r.facet_point, back * (x - r.centre[other])):
             if b < other:

@@ -118,7 +118,7 @@ class Memory:
         r.last_moment = self.zeros(len(stiff), wp.vec3d)
         r.busy, r.lost = self.zeros(len(stiff), wp.int32), self.zeros(len(stiff), wp.int32)
         self._rigid_particles(r, problem, matter, np.flatnonzero(stiff[matter.body]))
-        self._surfaces(r, matter, np.flatnonzero(stiff & ~prescribed), problem.cell)
+        self._surfaces(r, matter, np.flatnonzero(stiff), problem.cell)
         self._facets(r, matter, np.flatnonzero(stiff))
         self._wetted(r, problem, matter, stiff)
         self._paths(r, problem, matter)

@@ -59,14 +59,15 @@ def _with_facets(
     """Give places, normals out of the face and gaps for each face of a body."""
     state, matter = scene.state, scene.matter
     turn, centre = state.rotation[flat_one], state.centre[flat_one]
-    is_round = matter.rounding[round_one][:, 6] + matter.rounding[round_one][:, 7] > 0.0
     reach = POINT_REACH * scene.problem.cell
+    # What is round lies with its middle on this side of the face, or it is another one's.
+    deepest = np.minimum(reach, matter.rounding[round_one][:, 6:8].sum(axis=1))
     facets = matter.facets[flat_one]
-    for row in facets.row if is_round.any() else ():
+    for row in facets.row if deepest.any() else ():
         normal = turn @ row[:3]
         place, own = scene.touching(round_one, -normal)
         gap = (place - centre) @ normal - row[3]
-        near = np.flatnonzero(own & is_round & (np.abs(gap) < reach))
+        near = np.flatnonzero(own & (gap < reach) & (gap > -deepest) & (deepest > 0.0))
         held = facets.point[int(row[9]) : int(row[10])]
         near = near[on_facet(held, row[:3], row[8], (place[near] - centre) @ turn)]
         yield place[near], np.tile(normal, (len(near), 1)), gap[near]

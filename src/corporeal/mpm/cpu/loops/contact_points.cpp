@@ -106,7 +106,8 @@ struct Points {
       for (int p = 0; p < F.surfaces && count < room; p++) {
         const double *rounding = F.rounding + mpm::ROUNDING * p;
         double gap = height + Vec::dot(up, F.surface + 3 * p);
-        if (rounding[6] + rounding[7] <= 0 || !touching(F, p, towards, reach, gap, at) || gap <= -reach) continue;
+        const double radius = rounding[6] + rounding[7];   // its middle is on this side of the face
+        if (radius <= 0 || !touching(F, p, towards, reach, gap, at) || gap <= -reach || gap <= -radius) continue;
         turn(s, at, x);
         for (int i = 0; i < 3; i++) at[i] = x[i] + apart[i];
         turn_back(t, at, y);
