@@ -156,7 +156,7 @@ class Curvature:
         S e = ΔN along the edges by least squares (Rusinkiewicz 2004, "Estimating curvatures and
         their derivatives on triangle meshes").
         """
-        p, n = self.mesh.corners[triangle], self.normal[triangle]
+        p, n = self.mesh.vertices[self.mesh.triangles[triangle]], self.normal[triangle]
         u = _unit(p[:, 1] - p[:, 0])
         frame = np.stack([u, np.cross(self.flat[triangle], u)], axis=1)
         edge = np.einsum("tij,tkj->tki", frame, np.roll(p, -1, axis=1) - p)
@@ -196,7 +196,8 @@ def _on_faces(
     if not len(points):
         return points, np.zeros((0, ROUNDING))
     triangle = Shape(curved.mesh).closest(points)[1]
-    p, n = curved.mesh.corners[triangle], curved.normal[triangle]
+    p = curved.mesh.vertices[curved.mesh.triangles[triangle]]
+    n = curved.normal[triangle]
     share = _barycentric(points, p)
     rise = np.einsum("nkj,nkj->nk", p - points[:, None], n)
     lifted = points + 0.5 * np.einsum("nk,nk,nkj->nj", share, rise, n)
