@@ -7,6 +7,7 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import cKDTree
 
+from corporeal.geometry.roundness import reach_of, surrounded
 from corporeal.mpm.problem import Body, Plane, Problem
 from corporeal.types import Law
 
@@ -255,6 +256,24 @@ def ball_surface(centre: tuple, radius: float, count: int) -> Points:
     z, angle = 1 - 2 * k / count, np.pi * (1 + 5**0.5) * k
     r = np.sqrt(1 - z * z)
     return np.array(centre) + radius * np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
+
+
+def round_rows(
+    normal: Points, along: Points, ball: float, arc: float, surface: Points
+) -> Float[np.ndarray, "N 10"]:
+    """Say how a surface curves at points on it: see ``types.ROUNDING``."""
+    radii = np.tile([ball, arc], (len(surface), 1))
+    rows = np.column_stack([normal, along, radii, reach_of(surface), np.zeros(len(surface))])
+    rows[:, 9] = surrounded(rows, surface)
+    return rows
+
+
+def ball_rounding(centre: tuple, radius: float, surface: Points) -> Float[np.ndarray, "N 10"]:
+    """Say that points on a ball's surface stand for a ball."""
+    normal = (surface - np.array(centre)) / radius
+    along = np.cross(normal, [0.0, 0.0, 1.0])
+    along /= np.linalg.norm(along, axis=1, keepdims=True)
+    return round_rows(normal, along, radius, 0.0, surface)
 
 
 def box_surface(

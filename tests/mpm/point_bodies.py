@@ -42,6 +42,18 @@ def body(points, law=Law.NEO_HOOKEAN, velocity=(0, 0, 0), spacing=CELL / 2, **gi
     )
 
 
+def round_body(centre, radius=0.05, count=200, **given):
+    """A rigid ball that touches through rounded points (Fibonacci's spiral)."""
+    z = 1 - (2 * np.arange(count) + 1) / count
+    angle, r = np.pi * (1 + 5**0.5) * np.arange(count), np.sqrt(1 - z * z)
+    normal = np.stack([r * np.cos(angle), r * np.sin(angle), z], axis=1)
+    along = np.stack([-np.sin(angle), np.cos(angle), 0 * z], axis=1)
+    radii = np.tile([radius, 0.0, 0.4 * radius, 1.0], (count, 1))
+    rows = np.concatenate([normal, along, radii], axis=1)
+    surface = centre + radius * normal
+    return body(ball(centre, radius), rigid=True, surface=surface, rounding=rows, **given)
+
+
 def problem(*bodies, planes=(FLOOR,), friction=0.4, restitution=0.5, **given):
     count = len(bodies) + len(planes)
     return Problem(

@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from point_bodies import round_body
 from test_cpu import CELL, ball, body, problem, side_by_side
 
 from corporeal.mpm.cpu.engine import CpuEngine
@@ -41,6 +42,16 @@ def test_three_bodies_and_the_floor_meet_as_in_the_reference(stiff):
     assert (theirs.pair_impulse[2, :2] > 0).all()
     assert np.abs(fast.snapshot().position - sure.snapshot().position).max() < 2e-4 * CELL
     assert ours.pair_impulse == pytest.approx(theirs.pair_impulse, rel=1e-3)
+
+
+def test_what_is_rounded_rolls_on_planes_as_in_the_reference():
+    rolling = round_body((0, 0, 0.05), velocity=(0.4, 0.1, -0.2))
+    fast, sure = side_by_side(problem(rolling, planes=(FLOOR, WALL)), 60)
+    assert np.abs(fast.snapshot().position - sure.snapshot().position).max() < 2e-5 * CELL
+    ours, theirs = fast.measure(), sure.measure()
+    assert theirs.plane_impulse[0, 0, 2] > 0 and theirs.momentum[0, 0] > 0
+    assert ours.momentum == pytest.approx(theirs.momentum, rel=1e-9, abs=1e-12)
+    assert ours.angular_momentum == pytest.approx(theirs.angular_momentum, rel=1e-9, abs=1e-12)
 
 
 def test_lists_that_are_too_short_are_lengthened_and_nothing_changes():

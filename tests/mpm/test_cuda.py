@@ -4,7 +4,7 @@ from dataclasses import dataclass, fields
 
 import numpy as np
 import pytest
-from point_bodies import CELL, ball, body, problem, step_together
+from point_bodies import CELL, ball, body, problem, round_body, step_together
 
 from corporeal.errors import SimulationError, UserError
 from corporeal.mpm.cuda import program
@@ -95,6 +95,15 @@ def test_a_rigid_ball_on_a_soft_one_moves_as_in_the_reference(pointed):
     assert mine.momentum == pytest.approx(theirs.momentum, rel=1e-5, abs=1e-6)
     assert mine.angular_momentum == pytest.approx(theirs.angular_momentum, rel=1e-5, abs=1e-6)
     assert mine.friction_loss == pytest.approx(theirs.friction_loss, rel=1e-4)
+
+
+def test_what_is_rounded_rolls_as_in_the_reference():
+    ours, sure = side_by_side(problem(round_body((0, 0, 0.05), velocity=(0.4, 0.1, -0.2))), 40)
+    assert np.abs(ours.snapshot().position - sure.snapshot().position).max() < 2e-6 * CELL
+    mine, theirs = ours.measure(), sure.measure()
+    assert theirs.plane_impulse[0, 0, 2] > 0
+    assert mine.momentum == pytest.approx(theirs.momentum, rel=1e-5, abs=1e-7)
+    assert mine.angular_momentum == pytest.approx(theirs.angular_momentum, rel=1e-5, abs=1e-7)
 
 
 def test_one_shared_field_moves_as_in_the_reference():

@@ -4,6 +4,8 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
+from corporeal.geometry.mesh import joined
+from corporeal.geometry.roundness import rounded
 from corporeal.geometry.shape import sphere_directions
 from corporeal.geometry.spread import sample_surface, thin_out
 from corporeal.geometry.survey import Anatomy
@@ -16,7 +18,7 @@ stands on small faces, and it would roll on if some of their corners were missin
 
 def contact_points(
     anatomy: Anatomy, spacing: float, rng: np.random.Generator
-) -> Float[np.ndarray, "S 3"]:
+) -> tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S 10"]]:
     """Cover the outside evenly, at most ``MOST`` points, the farthest corners first [m].
 
     The corners in ``EXTREMES`` directions and the lowest make the object rest exactly.
@@ -25,6 +27,10 @@ def contact_points(
         anatomy: The object.
         spacing: Wanted between points [m]; larger where it takes too many.
         rng: Source of the samples.
+
+    Returns:
+        The points, on the round surface that the mesh stands for, and how it curves there: see
+        ``geometry.roundness``.
 
     """
     corners = extremes(anatomy.vertices)
@@ -38,7 +44,8 @@ def contact_points(
     points = np.concatenate(samples) if samples else np.zeros((0, 3))
     points = points[rng.permutation(len(points))]
     points = points[thin_out(points, distance, corners)]
-    return np.concatenate([corners, points])[:MOST]
+    points, rounding = rounded(joined(faces), np.concatenate([corners, points])[:MOST])
+    return points[:MOST], rounding[:MOST]
 
 
 def extremes(vertices: Float[np.ndarray, "V 3"]) -> Float[np.ndarray, "E 3"]:

@@ -5,6 +5,8 @@ NumPy code imports them, kernels on cards take them as they compile, and C++ tex
 constitutive law stand with the law, coefficients of a formula in the formula. A cell is dx long.
 """
 
+from corporeal import types
+
 # ---------------------------------------------------------------- how long a step may be
 
 COURANT = 0.4
@@ -89,6 +91,27 @@ WALL_REACH = 0.51
 Half a cell, and a hundredth so that rounding does not decide about nodes at exactly half a cell."""
 POINT_REACH = 0.3
 """Surface points of rigid bodies are watched this far above a wall [cells]."""
+ROUNDING = types.ROUNDING
+"""Numbers that say how a surface curves at a point."""
+SIDEWAYS = 0.1
+"""A direction whose part in the plane of an arc is shorter than this has none there [-]."""
+MOST_LEAN = 1.57
+"""Nothing stands for a surface that looks farther aside from its own normal than this [rad]."""
+FACET_ROW = 11
+"""Numbers of a rigid body's flat face: see ``physics/facets.py``."""
+FACET_TURN, SAME_PLANE = 0.9998, 0.02
+"""Points of one flat face have normals with at least this cosine [-], and differ in height by less
+than this, over how far it goes on from each [-]."""
+FEWEST_ON_FACET = 6
+"""Fewer points are no face on which anything rolls."""
+FACET_SPREAD = 0.5
+"""A face goes on from its points by this share of what they stand for [-]: a point's distance from
+the next."""
+FACET_NODES = 2.0
+"""What is round meets a flat face exactly, and not on nodes that are nearer to there than this
+[cells] and √(r dx/2): beyond, the gap of a ball of radius r is larger than what nodes misjudge …"""
+FACET_ALIKE = 0.95
+"""… and on which they meet along nearly the same normal: the least cosine [-]."""
 LATTICE_GAP = 0.05
 """What two particles per cell and axis add to the continuous touching distance [cells] …"""
 LATTICE_SLOPE = 0.25

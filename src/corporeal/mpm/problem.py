@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import COURANT, GRAVITY
-from corporeal.types import Keyframes, Push, Vector, Wind
+from corporeal.types import ROUNDING, Keyframes, Push, Vector, Wind
 
 
 @dataclass(frozen=True)
@@ -102,6 +102,8 @@ class Body:
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
+    rounding: Float[np.ndarray, "S2 10"] = field(default_factory=lambda: np.zeros((0, ROUNDING)))
+    """How the surface curves at those points, see ``types.ROUNDING``; none: they are corners."""
     wetted: WettedSurface | None = None
     """Of a rigid body: liquids touch it here; None: as everything else does."""
     push: Push | None = None

@@ -6,6 +6,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.mpm.problem import Body, Problem
+from corporeal.types import ROUNDING
 
 
 @dataclass(frozen=True)
@@ -100,6 +101,7 @@ def _piece(body: Body, split: Split, k: int) -> Body:
         position=split.position[mine],
         velocity=split.velocity[mine],
         surface=split.surfaces[k],
+        rounding=np.zeros((0, ROUNDING)),
         wetted=None,
         **{name: None if value is None else value[mine] for name, value in held.items()},
     )

@@ -12,8 +12,16 @@ from corporeal.mpm.constants import SMALLEST_VOLUME
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import branches, rigid
 from corporeal.mpm.physics.branches import Branches, Memory
-from corporeal.mpm.problem import Problem
+from corporeal.mpm.physics.facets import Facets, facets_of
+from corporeal.mpm.problem import Body, Problem
 from corporeal.mpm.substance import Substances
+from corporeal.types import ROUNDING
+
+
+def rounding_of(body: Body) -> Float[np.ndarray, "S 10"]:
+    """How a body's surface curves at its points; zeros where it was not told."""
+    known = len(body.rounding) == len(body.surface)
+    return body.rounding if known else np.zeros((len(body.surface), ROUNDING))
 
 
 @dataclass(frozen=True)
@@ -37,6 +45,8 @@ class Matter:
     """Position at the start, from the body's centre [m]."""
     surface: tuple[Float[np.ndarray, "S 3"], ...]
     """Surface points of each body at the start, from its centre [m]."""
+    rounding: tuple[Float[np.ndarray, "S 10"], ...]
+    """How the surface curves there at the start: see ``types.ROUNDING``; zero where it does not."""
 
     @classmethod
     def of(cls, problem: Problem) -> "Matter":
@@ -59,7 +69,20 @@ class Matter:
                 [b.position - m.centre for b, m in zip(bodies, masses, strict=True)]
             ),
             surface=tuple(b.surface - m.centre for b, m in zip(bodies, masses, strict=True)),
+            rounding=tuple(rounding_of(b) for b in bodies),
         )
+
+    @cached_property
+    def radius(self) -> Float[np.ndarray, " B"]:
+        """How far each body reaches from its centre of mass [m]."""
+        points = [(self.arm[self.body == b], s) for b, s in enumerate(self.surface)]
+        return np.array([np.linalg.norm(np.concatenate(p), axis=1).max() for p in points])
+
+    @cached_property
+    def facets(self) -> tuple[Facets, ...]:
+        """Flat faces of each body at the start, from its centre."""
+        both = zip(self.surface, self.rounding, strict=True)
+        return tuple(facets_of(points, rows) for points, rows in both)
 
     @cached_property
     def spacing(self) -> Float[np.ndarray, " B"]:

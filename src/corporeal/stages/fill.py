@@ -32,7 +32,7 @@ from corporeal.treatment.object_masses import (
 )
 from corporeal.treatment.plan import Plan, Quality
 from corporeal.treatment.resolution import Accuracy, Bodies, resolve
-from corporeal.types import Material, MaterialField, Particles, Parts, Scene, Treatment
+from corporeal.types import ROUNDING, Material, MaterialField, Particles, Parts, Scene, Treatment
 
 
 @dataclass(frozen=True)
@@ -195,8 +195,9 @@ def gather(parts: Parts, bodies: Bodies, chosen: Plan, packings: list[Packing]) 
         part=part,
         cell=chosen.cell,
         treatments=chosen.treatments,
-        surface=np.concatenate(surfaces),
-        object_of_surface=np.repeat(np.arange(len(surfaces)), [len(s) for s in surfaces]),
+        surface=np.concatenate([points for points, _ in surfaces]),
+        object_of_surface=np.repeat(np.arange(len(surfaces)), [len(s) for s, _ in surfaces]),
+        rounding=np.concatenate([rounding for _, rounding in surfaces]),
         face=np.concatenate([face for face, _ in windward]),
         particle_of_face=np.concatenate(
             [first + bearer for first, (_, bearer) in zip(firsts, windward, strict=True)]
@@ -208,11 +209,13 @@ def gather(parts: Parts, bodies: Bodies, chosen: Plan, packings: list[Packing]) 
     )
 
 
-def contact_surface(anatomy: Anatomy, chosen: Plan, number: int) -> Float[np.ndarray, "N 3"]:
-    """Points on the surface of what is rigid in object ``number`` [m]."""
+def contact_surface(
+    anatomy: Anatomy, chosen: Plan, number: int
+) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 10"]]:
+    """Points on the surface of what is rigid in object ``number`` [m], and how it curves there."""
     stiff = [m.part for m in anatomy.members if chosen.treatments[m.part].kind == "rigid"]
     if not stiff:
-        return np.zeros((0, 3))
+        return np.zeros((0, 3)), np.zeros((0, ROUNDING))
     outside = anatomy if is_rigid(anatomy, chosen) else anatomy.only(stiff)
     return contact_points(outside, chosen.cell / 3, np.random.default_rng([number, 3]))
 

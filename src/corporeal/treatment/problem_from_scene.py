@@ -229,6 +229,7 @@ def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Pie
         law=column.pop("law").astype(np.int64),
         rigid=piece.rigid,
         surface=particles.surface[piece.surface].astype(float),
+        rounding=rounding_of(particles, piece),
         wetted=wetted_of(particles, piece),
         push=obj.push,
         wind=obj.wind,
@@ -238,6 +239,12 @@ def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Pie
         pivot=STILL if obj.path is None else underside(scene, piece.object),
         **column,
     )
+
+
+def rounding_of(particles: Particles, piece: Piece) -> Float[np.ndarray, "S2 10"]:
+    """Give how its surface curves at a piece's surface points; none: it is not known."""
+    known = len(particles.rounding) == len(particles.surface)
+    return particles.rounding[piece.surface if known else []].astype(float)
 
 
 def wetted_of(particles: Particles, piece: Piece) -> WettedSurface | None:

@@ -16,7 +16,10 @@ from corporeal.mpm.cpu.layout import BOX, CENTRE, LANES, PAIR, RADIUS
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.contact import face_table
+from corporeal.mpm.physics.facets import facets_of
 from corporeal.mpm.problem import Body, Problem
+from corporeal.mpm.state import rounding_of
+from corporeal.types import ROUNDING
 
 LISTS = {
     "junction": layout.JUNCTION,
@@ -60,10 +63,11 @@ def rigid_grid(
 
     """
     across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
-    surface = body.surface - state[CENTRE : CENTRE + 3]
-    if body.path is not None:
-        # It never meets a plane, neither on nodes nor on points of its own.
-        surface = np.zeros((1, 3))
+    surface, rounding = body.surface - state[CENTRE : CENTRE + 3], rounding_of(body)
+    if body.path is not None and not len(surface):
+        # It never meets a plane: neither on points of its own nor, since it has one, on nodes.
+        surface, rounding = np.zeros((1, 3)), np.zeros((1, ROUNDING))
+    facets = facets_of(body.surface - state[CENTRE : CENTRE + 3], rounding_of(body))
     points, clumps = _clumped(points, 4.0 * cell)
     wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
@@ -82,6 +86,9 @@ def rigid_grid(
         "point": points,
         "clump": clumps,
         "surface": np.ascontiguousarray(surface),
+        "rounding": np.ascontiguousarray(rounding),
+        "facet": facets.row,
+        "facet_point": np.ascontiguousarray(facets.point),
         "wetted": wetted,
         "patch": patches,
         "places": places,
@@ -93,7 +100,8 @@ def rigid_grid(
     record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
     record["clumps"], record["patches"], record["shows"] = len(clumps), len(patches), len(shows)
-    record["wets"] = places.shape[1]
+    record["wets"], record["facets"] = places.shape[1], len(facets.row)
+    record["rolls"] = bool((rounding[:, 6:8] > 0.0).any())
     record["spacing"] = spacing
     record["thin"] = thin
     return arrays

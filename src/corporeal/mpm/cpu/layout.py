@@ -176,6 +176,8 @@ FIELD = Record(
     ("double *", "point"),  # rigid: [points][5] place in the body's frame, mass, volume
     ("double *", "rigid"),  # rigid: its state
     ("double *", "surface"),  # rigid: [surfaces][3] in the body's frame
+    ("double *", "facet facet_point"),  # rigid: [facets][FACET_ROW] flat faces; places on them
+    ("double *", "rounding"),  # rigid: [surfaces][ROUNDING], see types.ROUNDING
     ("double *", "wetted"),  # rigid: [..][6] points that liquids touch, and their normals
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast
@@ -189,7 +191,9 @@ FIELD = Record(
     ("int", "floor"),  # the only plane that the window reaches, or -1
     ("float[3]", "level"),  # its normal, or 0
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
-    ("int", "patches wets shows spare"),
+    ("int", "patches wets shows facets"),
+    ("int", "rolls"),  # rigid: whether any of its surface points is round
+    ("int", "spare"),
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )
 BLOW = Record(  # a body in the wind: see wind_records.py

@@ -221,6 +221,8 @@ def feigned(c: Contacts, r: Rigid, t: int):
     speed = D(0.0)
     if c.meet[t] < 0:
         b = c.fa[t]
+        if c.facet[t] == 1:
+            b = c.fc[t]
         speed = wp.length(r.spin[b]) * r.spacing[b]
     return speed
 

@@ -3,7 +3,7 @@
 Same rules as ``reference.contact.find``.
 """
 
-from corporeal.mpm import constants
+from corporeal.mpm import constants, formulas
 from corporeal.mpm.constants import (
     FIELDS_AT_NODE,
     HELD_BY_WALL,
@@ -16,6 +16,7 @@ from corporeal.mpm.cuda.layout import (
     BLOCKS,
     FULL,
     MEETS,
+    NODES,
     STIFF,
     TOUCHES,
     Contacts,
@@ -25,10 +26,18 @@ from corporeal.mpm.cuda.layout import (
     Sheet,
     wp,
 )
+from corporeal.mpm.formulas.one_lane import (
+    facet_holds,
+    facet_near,
+    facet_replaces,
+    shift_to_contact,
+)
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 0})
+wp.set_module_options(formulas.options(max_unroll=0))
 
 POINT_REACH = wp.constant(D(constants.POINT_REACH))
+ROUNDING = wp.constant(constants.ROUNDING)
+FACET_ROW = wp.constant(constants.FACET_ROW)
 
 
 @wp.func
@@ -249,6 +258,26 @@ def look_around(g: Grid, s: Sheet, stride: int):
         g.aware[b] = aware
 
 
+@wp.func
+def enter_point(
+    c: Contacts, s: Sheet, a: int, other: int, side: int, x: wp.vec3d, n: wp.vec3d, gap: D
+):
+    """Enter a contact on a surface point; side: whose point it is, 0 or 1."""
+    t = wp.atomic_add(s.flag, TOUCHES, 1)
+    wp.atomic_add(s.flag, STIFF, 1)
+    if t >= 2 * c.room:
+        s.flag[FULL] = 2
+    else:
+        add_touch(c, t, -1, -1, -1 - other)
+        c.fa[t] = a
+        c.fc[t] = other
+        c.facet[t] = side
+        c.point[t] = x
+        c.normal[t] = wp.vec3(n)
+        c.gap[t] = wp.float32(gap)
+    return 0
+
+
 @wp.kernel
 def list_points(r: Rigid, c: Contacts, s: Sheet, stride: int):
     """Contacts of rigid bodies with planes, on the bodies' surface points."""
@@ -257,17 +286,78 @@ def list_points(r: Rigid, c: Contacts, s: Sheet, stride: int):
     for i in range(wp.tid(), r.surfaces * s.planes, stride):
         w = i % s.planes
         b = r.surface_body[i // s.planes]
-        x = r.centre[b] + r.turn[b] * r.surface[i // s.planes]
+        if r.path_count[b] > 0:
+            continue
+        p = i // s.planes
+        towards = -(wp.transpose(r.turn[b]) * s.plane[w])
+        shift = shift_to_contact(r.rounding, p, towards)
+        on = r.surface[p] + wp.vec3d(shift[0], shift[1], shift[2])
+        x = r.centre[b] + r.turn[b] * on
         gap = wp.dot(s.plane[w], x) - s.offset[w]
-        if gap < POINT_REACH * s.dx:
-            t = wp.atomic_add(s.flag, TOUCHES, 1)
-            wp.atomic_add(s.flag, STIFF, 1)
-            if t >= 2 * c.room:
-                s.flag[FULL] = 2
+        if gap < POINT_REACH * s.dx and shift[3] > D(0.0):
+            enter_point(c, s, b, s.bodies + w, 0, x, -s.plane[w], gap)
+
+
+@wp.func
+def radius_at(r: Rigid, p: int):
+    """Larger radius of curvature at a surface point [m]; 0 where it is not round."""
+    return r.rounding[ROUNDING * p + 6] + r.rounding[ROUNDING * p + 7]
+
+
+@wp.kernel
+def list_facets(r: Rigid, c: Contacts, s: Sheet, stride: int):
+    """Contacts of rounded surface points with the flat faces of other rigid bodies."""
+    if s.flag[FULL] == 2:
+        return
+    reach = POINT_REACH * s.dx
+    for i in range(wp.tid(), r.surfaces * r.facets, stride):
+        p = i // r.facets
+        k = i % r.facets
+        b = r.surface_body[p]
+        other = r.facet_body[k]
+        if r.path_count[b] > 0 or b == other or c.apart[b, other] == 1 or radius_at(r, p) <= D(0.0):
+            continue
+        back = wp.transpose(r.turn[other])
+        centre = back * (r.centre[b] - r.centre[other])
+        if not facet_near(r.facet, k, centre, r.radius[b] + reach):
+            continue
+        row = FACET_ROW * k
+        n = r.turn[other] * wp.vec3d(r.facet[row], r.facet[row + 1], r.facet[row + 2])
+        shift = shift_to_contact(r.rounding, p, -(wp.transpose(r.turn[b]) * n))
+        on = r.surface[p] + wp.vec3d(shift[0], shift[1], shift[2])
+        x = r.centre[b] + r.turn[b] * on
+        gap = wp.dot(n, x - r.centre[other]) - r.facet[row + 3]
+        if shift[3] == D(0.0) or wp.abs(gap) >= reach or gap <= -radius_at(r, p):
+            continue
+        if facet_holds(r.facet, k, r.facet_point, back * (x - r.centre[other])):
+            if b < other:
+                enter_point(c, s, b, other, 0, x, -n, gap)
             else:
-                add_touch(c, t, -1, -1, -1 - w)
-                c.fa[t] = b
-                c.fc[t] = s.bodies + w
-                c.point[t] = x
-                c.normal[t] = -wp.vec3(s.plane[w])
-                c.gap[t] = wp.float32(gap)
+                enter_point(c, s, other, b, 1, x, n, gap)
+
+
+@wp.kernel
+def instead_of_nodes(r: Rigid, c: Contacts, s: Sheet, stride: int):
+    """Contacts on nodes that are those on flat faces, less well known, transmit nothing."""
+    if s.flag[FULL] == 2:
+        return
+    for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        if c.meet[t] < 0 or c.c[t] < 0:
+            continue
+        if r.stiff[c.fa[t]] == 0 or r.stiff[c.fc[t]] == 0:
+            continue
+        for q in range(s.flag[NODES], s.flag[TOUCHES]):
+            if c.fa[q] == c.fa[t] and c.fc[q] == c.fc[t]:
+                rolls = c.fa[q]
+                if c.facet[q] == 1:
+                    rolls = c.fc[q]
+                cosine = D(wp.dot(c.normal[t], c.normal[q]))
+                apart = c.point[t] - c.point[q]
+                if facet_replaces(apart, cosine, r.radius[rolls], s.dx):
+                    c.gap[t] = VAST
+
+
+@wp.kernel
+def count_nodes(s: Sheet):
+    """Remember how many contacts there are on nodes, before those on surface points."""
+    s.flag[NODES] = s.flag[TOUCHES]

@@ -29,7 +29,7 @@ from corporeal.mpm.state import Matter, Motion, branch_energy, strain_energy
 KNOWN = {
     Body: "name position velocity volume density law young poisson yield_stress hardening "
     "friction_angle cohesion loss vibration consistency flow_index "
-    "rigid surface wetted push wind faces tether path pivot",
+    "rigid surface rounding wetted push wind faces tether path pivot",
     Problem: "bodies cell friction restitution planes gravity gravity_ramp contact transfer "
     "courant bonds joints apart",
 }

@@ -43,7 +43,9 @@ KEPT = wp.constant(15)
 """Choices of candidate normals of the last step; 0 where all are made anew."""
 ASKED = wp.constant(16)
 """1: some are made anew in this step."""
-FLAGS = 17
+NODES = wp.constant(17)
+"""Contacts on nodes: those on surface points come after them."""
+FLAGS = 18
 # What ``Contacts.active`` says, where it is not 0: not in this step.
 WAITING = wp.constant(1)
 """Not in this round of impacts."""
@@ -282,6 +284,15 @@ class Rigid:
     surfaces: int
     surface_body: wp.array(dtype=wp.int32)
     surface: wp.array(dtype=wp.vec3d)
+    rounding: wp.array(dtype=wp.float64)
+    """How the surface curves at each, one row after the other: see ``types.ROUNDING``."""
+    facets: int
+    facet: wp.array(dtype=wp.float64)
+    """Flat faces of all bodies, one row after the other: see ``physics.facets`` …"""
+    facet_point: wp.array(dtype=wp.vec3d)
+    """… points on them …"""
+    facet_body: wp.array(dtype=wp.int32)
+    """… and whose each is."""
     first: wp.array(dtype=wp.int32)
     """Of each body: its first surface point …"""
     points: wp.array(dtype=wp.int32)

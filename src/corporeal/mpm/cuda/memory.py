@@ -5,7 +5,7 @@ from typing import Any
 import numpy as np
 
 from corporeal.mpm import laws
-from corporeal.mpm.constants import FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP
+from corporeal.mpm.constants import FACET_ROW, FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP
 from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.layout import Contacts, Grid, Particles, Rigid, Sheet, wp
 from corporeal.mpm.physics import prescribed
@@ -111,14 +111,15 @@ class Memory:
         r.speed = self.put(start.speed, wp.vec3d)
         r.moment = self.put(start.spin_momentum, wp.vec3d)
         r.spin = self.put(start.spin(matter), wp.vec3d)
-        r.radius = self.put(_radii(matter), wp.float64)
+        r.radius = self.put(matter.radius, wp.float64)
         r.speed_change = self.zeros(len(stiff), wp.vec3d)
         r.moment_change = self.zeros(len(stiff), wp.vec3d)
         r.last_speed = self.zeros(len(stiff), wp.vec3d)
         r.last_moment = self.zeros(len(stiff), wp.vec3d)
         r.busy, r.lost = self.zeros(len(stiff), wp.int32), self.zeros(len(stiff), wp.int32)
         self._rigid_particles(r, problem, matter, np.flatnonzero(stiff[matter.body]))
-        self._surfaces(r, matter, np.flatnonzero(stiff & ~prescribed), problem.cell)
+        self._surfaces(r, matter, np.flatnonzero(stiff), problem.cell)
+        self._facets(r, matter, np.flatnonzero(stiff))
         self._wetted(r, problem, matter, stiff)
         self._paths(r, problem, matter)
         return r
@@ -157,12 +158,29 @@ class Memory:
         r.surfaces = sum(len(p) for p in points)
         r.surface_body = self.put(np.concatenate([np.zeros(0, int), *body]), wp.int32)
         r.surface = self.put(np.concatenate([np.zeros((0, 3)), *points]), wp.vec3d)
+        rows = [matter.rounding[b].reshape(-1) for b in stiff]
+        r.rounding = self.put(np.concatenate([np.zeros(0), *rows]), wp.float64)
         count, thin = np.zeros((2, len(matter.surface)), int)
         count[stiff] = [len(p) for p in points]
         thin[stiff] = [thinness(p, cell) for p in points]
         r.spacing = self.put(matter.spacing, wp.float64)
         r.first = self.put(np.cumsum(count) - count, wp.int32)
         r.points, r.thin = self.put(count, wp.int32), self.put(thin, wp.int32)
+
+    def _facets(self, r: Struct, matter: Matter, stiff: np.ndarray) -> None:
+        rows, points, body, count = [np.zeros((0, FACET_ROW))], [np.zeros((0, 3))], [], 0
+        for b in stiff:
+            facets = matter.facets[b]
+            row = facets.row.copy()
+            row[:, -2:] += count
+            rows.append(row)
+            points.append(facets.point)
+            body += [b] * len(row)
+            count += len(facets.point)
+        r.facets = len(body)
+        r.facet = self.put(np.concatenate(rows).reshape(-1), wp.float64)
+        r.facet_point = self.put(np.concatenate(points), wp.vec3d)
+        r.facet_body = self.put(np.array(body, dtype=int), wp.int32)
 
     def _wetted(self, r: Struct, problem: Problem, matter: Matter, stiff: np.ndarray) -> None:
         rows, count = [np.zeros((0, 3))], np.zeros(len(stiff), int)
@@ -317,15 +335,6 @@ def _materials(matter: Matter) -> np.ndarray:
     table[:, layout.BODY], table[:, layout.RIGID] = s.body, s.rigid
     table[:, layout.SWELLS] = s.swells
     return table
-
-
-def _radii(matter: Matter) -> np.ndarray:
-    """How far each body reaches from its centre of mass [m]."""
-    out = []
-    for b, surface in enumerate(matter.surface):
-        points = np.concatenate([matter.arm[matter.body == b], surface.reshape(-1, 3)])
-        out.append(np.linalg.norm(points, axis=1).max())
-    return np.array(out)
 
 
 def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:

@@ -199,6 +199,10 @@ class Program:
         self._each(contact.choose, a.contacts, a.rigid, a.sheet)
         self._each(contact.measure_gaps, a.grid, a.contacts, a.rigid, a.sheet)
         if a.rigid.surfaces:
+            self._run(meets.count_nodes, 1, a.sheet, stride=False)
+            if a.rigid.facets:
+                self._each(meets.list_facets, a.rigid, a.contacts, a.sheet)
+                self._each(meets.instead_of_nodes, a.rigid, a.contacts, a.sheet)
             self._each(meets.list_points, a.rigid, a.contacts, a.sheet)
 
     def _touch(self) -> None:

@@ -99,6 +99,67 @@ struct Surface {
     return least < VAST ? least : there;
   }
 };
+// How far from a rounded surface point of a rigid body its surface goes on in a direction d: twin of
+// physics/rounding.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.ROUNDING.
+struct Round {
+  // Angle from the normal, no larger than that up to which a point stands for its surroundings.
+  CUDA_CALLABLE static inline double bounded(double angle, double reach, double radius, bool &beyond) {
+    const double most = reach < MOST_LEAN * radius ? reach / radius : MOST_LEAN;
+    beyond |= angle > most || angle < -most;
+    return angle > most ? most : angle < -most ? -most : angle;
+  }
+  // Whether the point is the surface in that direction at all, and not its neighbours.
+  CUDA_CALLABLE static inline bool shift(const double *row, const double *d, double *out) {
+    bool beyond = false;
+    const double *n = row, *e = row + 3, ball = row[6], arc = row[7], reach = row[8];
+    double outward = 0, ahead = 0, aside[3], square = 0;
+    for (int i = 0; i < 3; i++) outward += d[i] * n[i], ahead += d[i] * e[i], out[i] = 0;
+    if (arc > 0 && sqrt(outward * outward + ahead * ahead) > SIDEWAYS) {
+      const double a = bounded(atan2(ahead, outward), reach, ball + arc, beyond);
+      for (int i = 0; i < 3; i++) out[i] += arc * (sin(a) * e[i] + (cos(a) - 1.0) * n[i]);
+    }
+    for (int i = 0; i < 3; i++) aside[i] = d[i] - outward * n[i], square += aside[i] * aside[i];
+    if (ball > 0 && square > 0) {
+      const double size = sqrt(square), a = bounded(atan2(size, outward), reach, ball, beyond);
+      for (int i = 0; i < 3; i++) out[i] += ball * (sin(a) * aside[i] / size + (cos(a) - 1.0) * n[i]);
+    }
+    return !beyond || row[9] == 0;
+  }
+};
+// A flat face of a rigid body, on which what is round rolls: twin of physics/facets.py. row: normal, offset;
+// middle and radius of its points; how far the face goes on from one; the first and last of them.
+struct Facet {
+  enum { OFFSET = 3, MIDDLE = 4, AROUND = 7, REACH = 8, BEGIN = 9, END = 10 };
+  // Whether a ball of radius r around x comes near the face at all.
+  CUDA_CALLABLE static inline bool near(const double *row, const double *x, double r) {
+    double h = -row[OFFSET], square = 0;
+    for (int i = 0; i < 3; i++) {
+      const double d = x[i] - row[MIDDLE + i];
+      h += x[i] * row[i], square += d * d;
+    }
+    const double most = r + row[AROUND] + row[REACH];
+    return h < r && h > -r && square < most * most;
+  }
+  // Whether a place lies over the face: one of its points is no farther aside.
+  CUDA_CALLABLE static inline bool holds(const double *row, const double *points, const double *x) {
+    const double limit = row[REACH] * row[REACH];
+    for (int k = (int)row[BEGIN]; k < (int)row[END]; k++) {
+      double along = 0, square = 0;
+      for (int i = 0; i < 3; i++) {
+        const double d = x[i] - points[3 * k + i];
+        along += d * row[i], square += d * d;
+      }
+      if (square - along * along <= limit) return true;
+    }
+    return false;
+  }
+  // Whether a contact on a node, apart from that on the face by d with normals that have this cosine, is
+  // the same as it; radius: of what is round.
+  CUDA_CALLABLE static inline bool replaces(const double *d, double cosine, double radius, double dx) {
+    const double reach = FACET_NODES * dx + sqrt(0.5 * radius * dx);
+    return cosine > FACET_ALIKE && d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < reach * reach;
+  }
+};
 // Where the surface of a rigid body lies for a liquid: twin of physics/contact.py wetted_faces. Rows of
 // six: point and outward normal; X is the liquid's place, x the node.
 struct Wetted {

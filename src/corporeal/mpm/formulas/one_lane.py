@@ -177,6 +177,40 @@ def wetted_face(
 ) -> wp.vec4d: ...
 
 
+@wp.func_native("""
+  wp::vec_t<4, wp::float64> out;
+  const double *row = (const double *)rows.data + mpm::ROUNDING * number;
+  out[3] = mpm::Round::shift(row, &towards.c[0], &out.c[0]) ? 1.0 : 0.0;
+  return out;
+""")
+def shift_to_contact(
+    rows: wp.array(dtype=wp.float64), number: int, towards: wp.vec3d
+) -> wp.vec4d: ...
+
+
+@wp.func_native("""
+  return mpm::Facet::near((const double *)rows.data + mpm::FACET_ROW * number, &x.c[0], radius);
+""")
+def facet_near(
+    rows: wp.array(dtype=wp.float64), number: int, x: wp.vec3d, radius: wp.float64
+) -> bool: ...
+
+
+@wp.func_native("""
+  const double *row = (const double *)rows.data + mpm::FACET_ROW * number;
+  return mpm::Facet::holds(row, (const double *)points.data, &x.c[0]);
+""")
+def facet_holds(
+    rows: wp.array(dtype=wp.float64), number: int, points: wp.array(dtype=wp.vec3d), x: wp.vec3d
+) -> bool: ...
+
+
+@wp.func_native("return mpm::Facet::replaces(&apart.c[0], cosine, radius, dx);")
+def facet_replaces(
+    apart: wp.vec3d, cosine: wp.float64, radius: wp.float64, dx: wp.float64
+) -> bool: ...
+
+
 @wp.func_native("return mpm::Face<float>::gap_of_liquid(mean, height, full);")
 def gap_of_liquid(mean: wp.float32, height: wp.float32, full: wp.float32) -> wp.float32: ...
 

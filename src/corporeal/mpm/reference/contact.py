@@ -4,15 +4,14 @@ Order: list the nodes; look at the surfaces there; choose normals; measure gaps;
 impulses together, rigid bodies and walls included.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Float, Int
 
 from corporeal.mpm.constants import (
     HELD_BY_WALL,
-    POINT_REACH,
     SHOWN_AROUND,
     SWEEPS,
     SWEEPS_OF_A_HIT,
@@ -24,35 +23,13 @@ from corporeal.mpm.physics import contact, contact_impulses
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.reference.contact_scene import Scene, friction_table
 from corporeal.mpm.reference.kept_choices import KeptChoices
-
-
-@dataclass(frozen=True)
-class Touch:
-    """Some possible contacts of one pair; E of them."""
-
-    pair: tuple[int, int]
-    """Two bodies, or a body and B + plane."""
-    a: Int[np.ndarray, " E"]
-    c: Int[np.ndarray, " E"]
-    point: Float[np.ndarray, "E 3"]
-    normal: Float[np.ndarray, "E 3"]
-    gap: Float[np.ndarray, " E"]
-    slips: Bool[np.ndarray, " E"] | None = None
-    """Which of them transmit no friction; None: all do."""
-    layer: Float[np.ndarray, "E 4"] | None = None
-    """Where a wall drags on a liquid that sticks: see ``contact_impulses.Contacts``."""
-    kept: KeptChoices = field(default_factory=KeptChoices.none)
-    """Candidate normals that were taken, where they are kept."""
-
-    @property
-    def grips(self) -> Float[np.ndarray, " E"]:
-        """Share of the pair's friction that each transmits [-]."""
-        return np.ones(len(self.gap)) if self.slips is None else 1.0 - self.slips
-
-    @property
-    def layers(self) -> Float[np.ndarray, "E 4"]:
-        """The layer of each, without a span where none drags."""
-        return np.zeros((len(self.gap), 4)) if self.layer is None else self.layer
+from corporeal.mpm.reference.surface_points import (
+    in_order,
+    instead_of_nodes,
+    on_facets,
+    on_planes,
+)
+from corporeal.mpm.reference.touch import Touch
 
 
 @dataclass(frozen=True)
@@ -88,12 +65,13 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         *(_joined([getattr(t, name) for t in touches], shape) for name, shape in _COLUMNS),
         friction=friction_table(problem)[pair[:, 0], pair[:, 1]]
         * _joined([t.grips for t in touches], (0,)).astype(np.float64),
-        group=np.repeat(np.arange(len(touches)), [len(t.gap) for t in touches]),
+        group=_groups(touches),
         layer=_joined([t.layers for t in touches], (0, 4)),
     )
     movers = scene.movers(velocity)
     # Impacts of rigid bodies first, one after the other; then all that touches, together.
-    rebound = _rebound(scene, pair, contacts)
+    rolls = np.repeat([t.rolls for t in touches], [len(t.gap) for t in touches]).astype(np.int64)
+    rebound = _rebound(scene, pair, contacts, rolls)
     struck = contact_impulses.solve_impacts(contacts, movers, rebound, problem.cell, dt)
     target = np.maximum(contacts.gap, 0.0) / dt
     sweeps = _sweeps(scene, contacts, bool(struck.any()))
@@ -111,6 +89,13 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         impact_loss=contact_impulses.impact_loss(impulse, contacts.normal, before, after),
         kept=KeptChoices.of_all(touch.kept for touch in possible),
     )
+
+
+def _groups(touches: list[Touch]) -> Int[np.ndarray, " E"]:
+    """Give contacts of one pair one number, on nodes and on surface points another."""
+    number: dict[tuple[tuple[int, int], bool], int] = {}
+    found = [number.setdefault((t.pair, t.rolls >= 0), len(number)) for t in touches]
+    return np.repeat(np.array(found, dtype=np.int64), [len(t.gap) for t in touches])
 
 
 def _sweeps(scene: Scene, contacts: contact_impulses.Contacts, hit: bool) -> int:
@@ -147,7 +132,10 @@ def _joined(columns: list[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
 
 
 def _rebound(
-    scene: Scene, pair: Int[np.ndarray, "E 2"], contacts: contact_impulses.Contacts
+    scene: Scene,
+    pair: Int[np.ndarray, "E 2"],
+    contacts: contact_impulses.Contacts,
+    rolls: Int[np.ndarray, " E"],
 ) -> contact_impulses.Rebound:
     problem = scene.problem
     bodies, planes = len(problem.bodies), len(problem.planes)
@@ -159,7 +147,7 @@ def _rebound(
         pair=first * (bodies + planes) + second,
         restitution=np.where(both, np.asarray(problem.restitution)[first, second], 0.0),
         kick=np.sum((kick[first] - kick[second]) * contacts.normal, axis=1),
-        feigned=np.where(second >= bodies, scene.feigned[first], 0.0),
+        feigned=np.where(rolls >= 0, scene.feigned[rolls], 0.0),
     )
 
 
@@ -180,7 +168,8 @@ def find(scene: Scene) -> list[Touch]:
     look = Look.at(scene, np.concatenate(shown))
     touches = [_between(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])]
     touches += [_on_wall(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
-    return touches + _points_on_walls(scene)
+    faces = on_facets(scene)
+    return instead_of_nodes(scene, touches, faces) + in_order(faces + on_planes(scene))
 
 
 def _common(
@@ -374,22 +363,3 @@ def _on_wall(scene: Scene, look: Look, pair: tuple[int, int], slot: np.ndarray) 
     there = np.full(len(slot), scene.wall_mover + wall)
     movers, slips = scene.mover_of_slot(slot), height > WALL_REACH * cell
     return Touch((field, bodies + wall), movers, there, point, normal, gap, slips, layer)
-
-
-def _points_on_walls(scene: Scene) -> list[Touch]:
-    """Contacts of rigid bodies with planes, on the bodies' surface points."""
-    problem, bodies = scene.problem, len(scene.problem.bodies)
-    touches = []
-    for b in filter(scene.is_rigid, range(bodies)):
-        if problem.bodies[b].path is not None:
-            continue
-        point = scene.surface(b)
-        for w, plane in enumerate(problem.planes):
-            height = point @ np.array(plane.normal) - plane.offset
-            near = np.flatnonzero(height < POINT_REACH * problem.cell)
-            if len(near) == 0:
-                continue
-            normal = np.tile(-np.array(plane.normal), (len(near), 1))
-            mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover + w)
-            touches.append(Touch((b, bodies + w), mover, wall, point[near], normal, height[near]))
-    return touches

@@ -4,11 +4,12 @@ from dataclasses import dataclass
 from typing import Protocol
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm import laws
 from corporeal.mpm.constants import STICKS, TINY_DOUBLE
 from corporeal.mpm.physics import contact, contact_impulses, rigid, wall_stress
+from corporeal.mpm.physics.rounding import shift_to_contact
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.problem import Problem, WettedSurface
 from corporeal.mpm.reference.kept_choices import KeptChoices
@@ -62,6 +63,18 @@ class Scene:
         """Surface points of a rigid body now [m]."""
         turned = self.matter.surface[body] @ self.state.rotation[body].T
         return self.state.centre[body] + turned
+
+    def touching(
+        self, body: int, towards: Float[np.ndarray, "3"]
+    ) -> tuple[Float[np.ndarray, "S 3"], Bool[np.ndarray, " S"]]:
+        """Where the rounded surface around each surface point ends in a direction, now [m].
+
+        And whether it is that point's at all, and not its neighbours'.
+        """
+        R = self.state.rotation[body]
+        rows = self.matter.rounding[body]
+        shift, own = shift_to_contact(rows, np.tile(towards @ R, (len(rows), 1)))
+        return self.surface(body) + shift @ R.T, own
 
     def wetted(self, body: int) -> WettedSurface | None:
         """Where liquids touch a rigid body now; None: as everything else does."""

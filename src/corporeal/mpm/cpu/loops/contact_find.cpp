@@ -59,7 +59,8 @@ struct Around {
 };
 Bonds::hold(world);
 const double meanwhile = 2.0 * world->clock->speed * dt * inv;
-int count = 0, meet = 0, side = 0, touch = 0, points = 0, choice = 0;
+const int points = Points::most(world);
+int count = 0, meet = 0, side = 0, touch = 0, choice = 0;
 for (int f = 0; f < fields; f++) {
   Field &F = world->field[f];
   int near[64], nears = 0, wall_of[WALLS], walls = 0;
@@ -80,9 +81,7 @@ for (int f = 0; f < fields; f++) {
   const bool pointed = F.rigids && F.surfaces;
   for (int w = 0; w < planes && walls < WALLS; w++) {
     const double *P = world->plane + 4 * w;
-    if (pointed)
-      points += Vec::dot(P, F.rigid + CENTRE) - P[3] > F.rigid[RADIUS] + mpm::POINT_REACH * dx ? 0 : F.surfaces;
-    else if (F.floor < 0 && Find::lowest(P, F, dx) <= Grid::reach(world, f) * dx)
+    if (!pointed && F.floor < 0 && Find::lowest(P, F, dx) <= Grid::reach(world, f) * dx)
       wall_of[walls++] = w;
   }
   if (lone && !walls) continue;

@@ -155,43 +155,10 @@ struct List {
 Line *lines = stage->line;
 int nt = stage->touches, n = 0, stacked = 0;
 double *pair = stage->pair;   // [all][all][PAIR]
-// Surface points of rigid bodies on planes.
-for (int f = 0; f < fields; f++) {
-  const Field &F = world->field[f];
-  if (!F.rigids || !F.surfaces || F.rigid[LIGHT] == 0) continue;
-  const double *s = F.rigid;
-  for (int w = 0; w < planes; w++) {
-    const double *P = world->plane + 4 * w;
-    double centre = Vec::dot(P, s + CENTRE) - P[3];
-    if (centre > s[RADIUS] + mpm::POINT_REACH * dx) continue;
-    double down[3];             // the plane's normal in the body's frame
-    for (int i = 0; i < 3; i++)
-      down[i] = P[0] * s[TURN + i] + P[1] * s[TURN + 3 + i] + P[2] * s[TURN + 6 + i];
-    for (int p = 0; p < F.surfaces; p++) {
-      double gap = centre + Vec::dot(down, F.surface + 3 * p);
-      if (gap >= mpm::POINT_REACH * dx) continue;
-      Touch &T = touches[nt++];
-      T.meet = -1;
-      T.face = 0;
-      T.choice = -1;
-      T.a = p;
-      T.c = -1 - w;
-      T.fa = f;
-      T.fc = fields + w;
-      T.gap = gap;
-      T.active = 1;
-      T.span = 0;
-      T.mu = world->friction[T.fa * all + T.fc];
-      T.target = Impact::closing(gap, dt);
-      for (int d = 0; d < 3; d++) {
-        T.x[d] = s[CENTRE + d] + Vec::dot(s + TURN + 3 * d, F.surface + 3 * p);
-        T.normal[d] = -P[d];
-        T.J[d] = 0;
-      }
-    }
-  }
-}
+nt += Points::on_planes(world, touches + nt);
+nt += Points::on_facets(world, touches + nt, stage->most_touches - nt);
 stage->points = nt - stage->touches;
+Points::instead_of_nodes(world, touches, stage->touches, nt);
 Bonds::join(world);
 for (int t = 0; t < nt; t++) {
   Touch &T = touches[t];
@@ -256,7 +223,7 @@ if (n) {
     for (int i = 0; i < n; i++) {
       const Touch &T = touches[lines[i].touch];
       if (lines[i].e <= 0) continue;
-      const double speed = List::closing(lines[i], T.meet < 0 ? &world->field[T.fa] : 0, approach);
+      const double speed = List::closing(lines[i], Points::rolls(world, T), approach);
       if (!Impact::begins(approach, speed, T.gap, dt)) continue;
       pair[PAIR * (T.fa * all + T.fc)] = hit = true;
     }
@@ -266,7 +233,7 @@ if (n) {
       const Touch &T = touches[R.touch];
       R.waits = pair[PAIR * (T.fa * all + T.fc)] == 0;
       if (R.waits) continue;
-      const double speed = List::closing(R, T.meet < 0 ? &world->field[T.fa] : 0, approach);
+      const double speed = List::closing(R, Points::rolls(world, T), approach);
       R.target = Impact::target(R.e, approach, speed, T.gap, dt, dx);
       for (int d = 0; d < 3; d++) R.J[d] = 0;
     }

@@ -1,0 +1,148 @@
+// Contacts of rigid bodies on their surface points: with planes, and of what is round with flat faces of
+// others. Twin of reference/surface_points.py. Not in line: where nothing is rigid it costs 5 % of a heap.
+struct Points {
+  // Where the rounded surface around point p ends in a direction, both in the body's frame, and the gap
+  // there, from that of the point itself; whether it is below reach.
+  static inline bool touching(const Field &F, int p, const double *towards, double reach, double &gap,
+                              double *at) {
+    const double *row = F.rounding + mpm::ROUNDING * p;
+    double shift[3] = {0, 0, 0};
+    if (row[6] + row[7] > 0) {
+      if (gap >= reach + 2 * row[8]) return false;   // neither part goes farther than the point's reach
+      if (!mpm::Round::shift(row, towards, shift)) return false;
+      gap -= Vec::dot(towards, shift);
+    }
+    for (int i = 0; i < 3; i++) at[i] = F.surface[3 * p + i] + shift[i];
+    return gap < reach;
+  }
+  static inline void turn(const double *s, const double *v, double *out) {   // into the world
+    for (int i = 0; i < 3; i++) out[i] = Vec::dot(s + TURN + 3 * i, v);
+  }
+  static inline void turn_back(const double *s, const double *v, double *out) {
+    for (int i = 0; i < 3; i++) out[i] = v[0] * s[TURN + i] + v[1] * s[TURN + 3 + i] + v[2] * s[TURN + 6 + i];
+  }
+  // Enter a contact of a's with c's at a point; side: whose surface point it is, 0 or 1.
+  static inline void enter(const World *w, Touch &T, int number, int a, int c, int side, double gap) {
+    T.meet = -1;
+    T.face = side;
+    T.choice = -1;
+    T.a = number;
+    T.c = -1 - c;
+    T.fa = a;
+    T.fc = c;
+    T.gap = gap;
+    T.active = 1;
+    T.span = 0;
+    T.mu = w->friction[a * (w->fields + w->planes) + c];
+    T.target = Impact::closing(gap, w->dt);
+    for (int i = 0; i < 3; i++) T.J[i] = 0;
+  }
+  // The body that rolls on such a contact, if any does.
+  static inline const Field *rolls(const World *w, const Touch &T) {
+    return T.meet >= 0 ? 0 : &w->field[T.face ? T.fc : T.fa];
+  }
+  static inline bool has(const Field &F) { return F.rigids && F.surfaces && F.rigid[LIGHT] != 0; }
+  static inline bool low(const World *w, const Field &F, int v) {
+    const double *P = w->plane + 4 * v;
+    return Vec::dot(P, F.rigid + CENTRE) - P[3] <= F.rigid[RADIUS] + mpm::POINT_REACH * w->dx;
+  }
+  MPM_RARE static int on_planes(const World *w, Touch *list) {
+    const double reach = mpm::POINT_REACH * w->dx;
+    int count = 0;
+    for (int f = 0; f < w->fields; f++) {
+      const Field &F = w->field[f];
+      const double *s = F.rigid;
+      for (int v = 0; v < w->planes && has(F); v++) {
+        if (!low(w, F, v)) continue;
+        const double *P = w->plane + 4 * v, centre = Vec::dot(P, s + CENTRE) - P[3];
+        double up[3], at[3];             // the plane's normal in the body's frame
+        turn_back(s, P, up);
+        const double towards[3] = {-up[0], -up[1], -up[2]};
+        for (int p = 0; p < F.surfaces; p++) {
+          double gap = centre + Vec::dot(up, F.surface + 3 * p);
+          if (!touching(F, p, towards, reach, gap, at)) continue;
+          Touch &T = list[count++];
+          enter(w, T, p, f, w->fields + v, 0, gap);
+          turn(s, at, T.x);
+          for (int i = 0; i < 3; i++) T.x[i] += s[CENTRE + i], T.normal[i] = -P[i];
+        }
+      }
+    }
+    return count;
+  }
+  // Whether rounded points of body f may meet flat faces of body g.
+  static inline bool may(const World *w, int f, int g) {
+    const Field &F = w->field[f], &G = w->field[g];
+    if (f == g || !has(F) || !F.rolls || !G.rigids || !G.facets) return false;
+    if (w->friction[f * (w->fields + w->planes) + g] < 0) return false;   // never in contact
+    double square = 0, most = F.rigid[RADIUS] + G.rigid[RADIUS] + mpm::POINT_REACH * w->dx;
+    for (int i = 0; i < 3; i++) {
+      const double d = F.rigid[CENTRE + i] - G.rigid[CENTRE + i];
+      square += d * d;
+    }
+    return square < most * most;
+  }
+  MPM_RARE static int on_facets(const World *w, Touch *list, int room) {
+    int count = 0;
+    for (int f = 0; f < w->fields; f++)
+      for (int g = 0; g < w->fields; g++)
+        if (may(w, f, g)) count += with_facets(w, f, g, list + count, room - count);
+    return count;
+  }
+  MPM_RARE static int with_facets(const World *w, int f, int g, Touch *list, int room) {
+    const Field &F = w->field[f], &G = w->field[g];
+    const double *s = F.rigid, *t = G.rigid, reach = mpm::POINT_REACH * w->dx;
+    double apart[3], centre[3];
+    for (int i = 0; i < 3; i++) apart[i] = s[CENTRE + i] - t[CENTRE + i];
+    turn_back(t, apart, centre);
+    int count = 0;
+    for (int k = 0; k < G.facets; k++) {
+      const double *row = G.facet + mpm::FACET_ROW * k;
+      if (!mpm::Facet::near(row, centre, s[RADIUS] + reach)) continue;
+      double n[3], up[3], at[3], x[3], y[3];
+      turn(t, row, n);
+      turn_back(s, n, up);
+      const double towards[3] = {-up[0], -up[1], -up[2]}, height = Vec::dot(row, centre) - row[3];
+      for (int p = 0; p < F.surfaces && count < room; p++) {
+        const double *rounding = F.rounding + mpm::ROUNDING * p;
+        double gap = height + Vec::dot(up, F.surface + 3 * p);
+        const double radius = rounding[6] + rounding[7];   // its middle is on this side of the face
+        if (radius <= 0 || !touching(F, p, towards, reach, gap, at) || gap <= -reach || gap <= -radius) continue;
+        turn(s, at, x);
+        for (int i = 0; i < 3; i++) at[i] = x[i] + apart[i];
+        turn_back(t, at, y);
+        if (!mpm::Facet::holds(row, G.facet_point, y)) continue;
+        Touch &T = list[count++];
+        enter(w, T, k * F.surfaces + p, f < g ? f : g, f < g ? g : f, f > g, gap);
+        for (int i = 0; i < 3; i++) T.x[i] = x[i] + s[CENTRE + i], T.normal[i] = f < g ? -n[i] : n[i];
+      }
+    }
+    return count;
+  }
+  // How many contacts on points there may be.
+  MPM_RARE static int most(const World *w) {
+    int count = 0;
+    for (int f = 0; f < w->fields; f++) {
+      const Field &F = w->field[f];
+      if (!has(F)) continue;
+      for (int v = 0; v < w->planes; v++) count += low(w, F, v) ? F.surfaces : 0;
+      for (int g = 0; g < w->fields; g++) count += may(w, f, g) ? F.surfaces : 0;
+    }
+    return count;
+  }
+  // Contacts on nodes that are those on flat faces, less well known, transmit nothing.
+  MPM_RARE static void instead_of_nodes(const World *w, Touch *touches, int nodes, int all) {
+    for (int q = nodes; q < all; q++) {
+      const Touch &P = touches[q];
+      if (P.fc >= w->fields) continue;
+      const double radius = rolls(w, P)->rigid[RADIUS];
+      for (int t = 0; t < nodes; t++) {
+        Touch &T = touches[t];
+        if (!T.active || T.fa != P.fa || T.fc != P.fc) continue;
+        double d[3];
+        for (int i = 0; i < 3; i++) d[i] = T.x[i] - P.x[i];
+        if (mpm::Facet::replaces(d, Vec::dot(T.normal, P.normal), radius, w->dx)) T.active = 0;
+      }
+    }
+  }
+};

@@ -1,0 +1,63 @@
+"""Flat faces of a rigid body, on which what is round rolls: each is a plane with an end."""
+
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from corporeal.mpm.constants import FACET_ROW, FACET_SPREAD, FACET_TURN, FEWEST_ON_FACET, SAME_PLANE
+
+
+class Facets(NamedTuple):
+    """F faces of a body in its own frame, and N points on them, face after face."""
+
+    row: Float[np.ndarray, "F 11"]
+    """Outward unit normal (3) and offset along it [m]; middle (3) and radius [m] of a ball around
+    the points; how far from a point the face goes on [m]; its first and last point."""
+    point: Float[np.ndarray, "N 3"]
+    """[m]"""
+
+
+NONE = Facets(np.zeros((0, FACET_ROW)), np.zeros((0, 3)))
+
+
+def facets_of(surface: Float[np.ndarray, "S 3"], rounding: Float[np.ndarray, "S 10"]) -> Facets:
+    """Find the flat faces among a body's surface points: those that look alike and lie in a plane.
+
+    Args:
+        surface: In the body's frame [m].
+        rounding: See ``types.ROUNDING``.
+
+    """
+    known = np.any(rounding[:, :3] != 0.0, axis=1) & (rounding[:, 6] + rounding[:, 7] == 0.0)
+    left = np.flatnonzero(known)
+    rows, points, count = [], [np.zeros((0, 3))], 0
+    while len(left):
+        first, normal = surface[left[0]], rounding[left[0], :3]
+        reach = FACET_SPREAD * rounding[left[0], 8]
+        height = (surface[left] - first) @ normal
+        alike = rounding[left, :3] @ normal >= FACET_TURN
+        mine = alike & (np.abs(height) <= SAME_PLANE * reach)
+        if mine.sum() >= FEWEST_ON_FACET:
+            held = surface[left[mine]]
+            reach = FACET_SPREAD * float(np.median(rounding[left[mine], 8]))
+            middle = 0.5 * (held.min(axis=0) + held.max(axis=0))
+            radius = np.linalg.norm(held - middle, axis=1).max()
+            ends = count, count + len(held)
+            rows.append([*normal, first @ normal, *middle, radius, reach, *ends])
+            points.append(held)
+            count += len(held)
+        left = left[~mine]
+    return Facets(np.array(rows).reshape(-1, FACET_ROW), np.concatenate(points))
+
+
+def on_facet(
+    points: Float[np.ndarray, "N 3"],
+    normal: Float[np.ndarray, "3"],
+    reach: float,
+    place: Float[np.ndarray, "M 3"],
+) -> Bool[np.ndarray, " M"]:
+    """Whether places lie over a face: one of its points is no farther aside [m]."""
+    apart = place[:, None] - points
+    along = apart @ normal
+    return np.any(np.sum(apart**2, axis=2) - along**2 <= reach**2, axis=1)

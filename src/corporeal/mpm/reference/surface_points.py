@@ -1,0 +1,114 @@
+"""Contacts of rigid bodies on their surface points: with planes, and round ones with flat faces."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+from itertools import permutations
+
+import numpy as np
+from jaxtyping import Float
+
+from corporeal.mpm.constants import FACET_ALIKE, FACET_NODES, POINT_REACH
+from corporeal.mpm.physics.facets import on_facet
+from corporeal.mpm.reference.contact_scene import Scene
+from corporeal.mpm.reference.touch import Touch
+
+
+def on_planes(scene: Scene) -> list[Touch]:
+    """List contacts of rigid bodies with planes."""
+    problem, bodies = scene.problem, len(scene.problem.bodies)
+    touches = []
+    for b in filter(scene.is_rigid, range(bodies)):
+        if problem.bodies[b].path is not None:
+            continue
+        for w, plane in enumerate(problem.planes):
+            point, own = scene.touching(b, -np.array(plane.normal))
+            height = point @ np.array(plane.normal) - plane.offset
+            near = np.flatnonzero(own & (height < POINT_REACH * problem.cell))
+            if len(near) == 0:
+                continue
+            normal = np.tile(-np.array(plane.normal), (len(near), 1))
+            mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover + w)
+            at = point[near], normal, height[near]
+            touches.append(Touch((b, bodies + w), mover, wall, *at, rolls=b))
+    return touches
+
+
+def on_facets(scene: Scene) -> list[Touch]:
+    """List contacts of rounded surface points with the flat faces of other rigid bodies.
+
+    Each face is a plane that ends: exact, where nodes of the grid would be a road with bumps.
+    """
+    bodies = scene.problem.bodies
+    bonded = {tuple(sorted(bond)) for bond in scene.problem.never_touch}
+    found = []
+    for round_one, flat_one in permutations(filter(scene.is_rigid, range(len(bodies))), 2):
+        pair = min(round_one, flat_one), max(round_one, flat_one)
+        if pair in bonded or bodies[round_one].path is not None:
+            continue
+        for at, normal, gap in _with_facets(scene, round_one, flat_one):
+            if len(gap):
+                a, c = (np.full(len(gap), b) for b in pair)
+                out = normal if flat_one == pair[0] else -normal
+                found.append(Touch(pair, a, c, at, out, gap, rolls=round_one))
+    return _joined(found)
+
+
+def _with_facets(
+    scene: Scene, round_one: int, flat_one: int
+) -> Iterator[tuple[Float[np.ndarray, "E 3"], Float[np.ndarray, "E 3"], Float[np.ndarray, " E"]]]:
+    """Give places, normals out of the face and gaps for each face of a body."""
+    state, matter = scene.state, scene.matter
+    turn, centre = state.rotation[flat_one], state.centre[flat_one]
+    reach = POINT_REACH * scene.problem.cell
+    # What is round lies with its middle on this side of the face, or it is another one's.
+    deepest = np.minimum(reach, matter.rounding[round_one][:, 6:8].sum(axis=1))
+    facets = matter.facets[flat_one]
+    for row in facets.row if deepest.any() else ():
+        normal = turn @ row[:3]
+        place, own = scene.touching(round_one, -normal)
+        gap = (place - centre) @ normal - row[3]
+        near = np.flatnonzero(own & (gap < reach) & (gap > -deepest) & (deepest > 0.0))
+        held = facets.point[int(row[9]) : int(row[10])]
+        near = near[on_facet(held, row[:3], row[8], (place[near] - centre) @ turn)]
+        yield place[near], np.tile(normal, (len(near), 1)), gap[near]
+
+
+def instead_of_nodes(scene: Scene, nodes: list[Touch], faces: list[Touch]) -> list[Touch]:
+    """Leave out contacts on nodes that are those on flat faces, less well known."""
+    cell, kept = scene.problem.cell, []
+    for touch in nodes:
+        left = np.ones(len(touch.gap), dtype=bool)
+        for face in (f for f in faces if f.pair == touch.pair):
+            reach = FACET_NODES * cell + np.sqrt(0.5 * scene.matter.radius[face.rolls] * cell)
+            apart = np.linalg.norm(touch.point[:, None] - face.point, axis=2)
+            same = (touch.normal @ face.normal.T > FACET_ALIKE) & (apart < reach)
+            left &= ~same.any(axis=1)
+        kept.append(touch if left.all() else _some(touch, left))
+    return kept
+
+
+def in_order(touches: list[Touch]) -> list[Touch]:
+    """Sort by pair, as they are swept."""
+    return sorted(touches, key=lambda touch: touch.pair)
+
+
+def _joined(touches: list[Touch]) -> list[Touch]:
+    """Make one of all contacts of one body's points with another body's faces."""
+    joined: dict[tuple[tuple[int, int], int], list[Touch]] = {}
+    for touch in touches:
+        joined.setdefault((touch.pair, touch.rolls), []).append(touch)
+    return [replace(some[0], **_columns(some)) for some in joined.values()]
+
+
+def _columns(some: list[Touch]) -> dict[str, np.ndarray]:
+    return {name: np.concatenate([getattr(t, name) for t in some]) for name in _ALL}
+
+
+_ALL = ("a", "c", "point", "normal", "gap")
+
+
+def _some(touch: Touch, chosen: np.ndarray) -> Touch:
+    columns = {name: getattr(touch, name)[chosen] for name in _ALL}
+    slips = None if touch.slips is None else touch.slips[chosen]
+    layer = None if touch.layer is None else touch.layer[chosen]
+    return replace(touch, **columns, slips=slips, layer=layer)

@@ -1,0 +1,39 @@
+"""Some possible contacts of one pair, as the reference engine lists them."""
+
+from dataclasses import dataclass, field
+
+import numpy as np
+from jaxtyping import Bool, Float, Int
+
+from corporeal.mpm.reference.kept_choices import KeptChoices
+
+
+@dataclass(frozen=True)
+class Touch:
+    """Some possible contacts of one pair; E of them."""
+
+    pair: tuple[int, int]
+    """Two bodies, or a body and B + plane."""
+    a: Int[np.ndarray, " E"]
+    c: Int[np.ndarray, " E"]
+    point: Float[np.ndarray, "E 3"]
+    normal: Float[np.ndarray, "E 3"]
+    gap: Float[np.ndarray, " E"]
+    slips: Bool[np.ndarray, " E"] | None = None
+    """Which of them transmit no friction; None: all do."""
+    layer: Float[np.ndarray, "E 4"] | None = None
+    """Where a wall drags on a liquid that sticks: see ``contact_impulses.Contacts``."""
+    kept: KeptChoices = field(default_factory=KeptChoices.none)
+    """Candidate normals that were taken, where they are kept."""
+    rolls: int = -1
+    """The body whose surface points they are; -1: they are on nodes."""
+
+    @property
+    def grips(self) -> Float[np.ndarray, " E"]:
+        """Share of the pair's friction that each transmits [-]."""
+        return np.ones(len(self.gap)) if self.slips is None else 1.0 - self.slips
+
+    @property
+    def layers(self) -> Float[np.ndarray, "E 4"]:
+        """The layer of each, without a span where none drags."""
+        return np.zeros((len(self.gap), 4)) if self.layer is None else self.layer

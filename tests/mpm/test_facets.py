@@ -1,0 +1,94 @@
+"""What is round rolls on flat faces of rigid bodies: the engines agree, and nothing is lost."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from point_bodies import CELL, body, problem, round_body, step_together
+
+from corporeal.mpm.cpu.engine import CpuEngine
+from corporeal.mpm.cuda.engine import CudaEngine
+from corporeal.mpm.physics.facets import facets_of, on_facet
+from corporeal.mpm.reference.engine import ReferenceEngine
+from corporeal.types import Keyframes
+
+SIZE = np.array([0.4, 0.12, 0.06])
+TOP = 0.2
+ENGINES = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": lambda p: CudaEngine(p, "cpu")}
+
+
+def flat_faces(size, distance=0.012):
+    """Points inside the faces of a box around the origin, and rows that say which way they look."""
+    points, rows = [], []
+    for axis in range(3):
+        one, two = (
+            np.arange(-s / 2 + distance / 2, s / 2, distance) for s in np.delete(size, axis)
+        )
+        grid = np.stack(np.meshgrid(one, two, indexing="ij"), -1).reshape(-1, 2)
+        for side in (-1.0, 1.0):
+            points.append(np.insert(grid, axis, side * size[axis] / 2, axis=1))
+            row = np.zeros((len(grid), 10))
+            row[:, axis], row[:, 8] = side, 2.4 * distance
+            rows.append(row)
+    return np.concatenate(points), np.concatenate(rows)
+
+
+def board(middle, size=SIZE, **given):
+    axes = [np.arange(-s / 2 + CELL / 4, s / 2, CELL / 2) for s in size]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    surface, rows = flat_faces(size)
+    moved = {"surface": surface + middle, "rounding": rows}
+    return body(points + middle, rigid=True, name="board", density=8000.0, **moved, **given)
+
+
+def over(centre, **given):
+    """A ball over a heavy board that falls, in either order."""
+    return round_body(centre, **given), board(np.array([0.0, 0.0, TOP - SIZE[2] / 2]))
+
+
+def test_a_box_has_six_faces_that_end_at_its_edges():
+    surface, rows = flat_faces(SIZE)
+    facets = facets_of(surface, rows)
+    assert len(facets.row) == 6 and len(facets.point) == len(surface)
+    assert facets.row[:, 3] == pytest.approx(np.abs(facets.row[:, :3] @ SIZE) / 2)
+    top = facets.row[facets.row[:, 2] > 0.5][0]
+    mine = facets.point[int(top[9]) : int(top[10])]
+    along = np.array([0.0, 0.19, 0.2, 0.225])
+    held = on_facet(mine, top[:3], top[8], np.stack([along, 0 * along, 0.05 + 0 * along], axis=1))
+    assert held.tolist() == [True, True, True, False]
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["ball first", "board first"])
+@pytest.mark.parametrize("engine", ["cpu", "cuda"])
+def test_a_ball_on_a_board_moves_as_in_the_reference(engine, turned):
+    bodies = over((0.02, 0.01, TOP + 0.0505), velocity=(0.5, 0.1, -0.3))
+    given = problem(*(bodies[::-1] if turned else bodies), planes=(), gravity=(1.0, 0.0, -9.81))
+    ours, sure = ENGINES[engine](given), ReferenceEngine(given)
+    step_together(ours, sure, 25)
+    assert np.abs(ours.snapshot().position - sure.snapshot().position).max() < 2e-5 * CELL
+    mine, theirs = ours.measure(), sure.measure()
+    assert theirs.pair_impulse[0, 1] > 0
+    assert mine.momentum == pytest.approx(theirs.momentum, rel=1e-6, abs=1e-7)
+    assert mine.angular_momentum == pytest.approx(theirs.angular_momentum, rel=1e-6, abs=1e-7)
+    assert mine.friction_loss == pytest.approx(theirs.friction_loss, rel=1e-4, abs=1e-9)
+    moved = theirs.momentum.sum(axis=0) - theirs.external_impulse.sum(axis=0)
+    assert moved == pytest.approx(given.bodies[int(turned)].velocity[0] * theirs.mass[int(turned)])
+
+
+@pytest.mark.parametrize("known", [False, True], ids=["on nodes", "round"])
+@pytest.mark.parametrize("engine", ["cpu", "cuda"])
+def test_a_thin_board_that_is_moved_has_its_own_surface(engine, known):
+    """Fast engines took it for a point at its centre, and a ball bounced in the air beside it."""
+    up = Keyframes((0.0, 1.0), ((0.0, 0.0, 0.0), (0.0, 0.0, 0.3)), ((0.0, 0.0, 0.0),) * 2)
+    size = np.array([0.4, 0.12, 1.5 * CELL])
+    middle = np.array([0.0, 0.0, TOP - size[2] / 2])
+    moved = replace(board(middle, size), path=up, pivot=(0.0, 0.0, TOP - size[2]))
+    falling = round_body((0.12, 0.03, TOP + 0.06), velocity=(0.3, 0.1, -0.5))
+    if not known:
+        falling = replace(falling, rounding=np.zeros((0, 10)))
+    given = problem(falling, moved, planes=())
+    ours, sure = ENGINES[engine](given), ReferenceEngine(given)
+    step_together(ours, sure, 20)
+    assert sure.measure().pair_impulse[0, 1] > 0
+    apart = np.abs(ours.snapshot().position - sure.snapshot().position).max()
+    assert apart < (2e-4 if known else 0.05) * CELL
