@@ -37,6 +37,51 @@ def test_every_material_of_the_lexicon_is_in_the_library():
     assert all(0 < s.margin <= 1 for s in lexicon())
 
 
+def test_every_solid_of_the_library_is_known_by_its_name():
+    """A material that has a name there is not unknown, nor taken for another, in a file."""
+    cores = {"baseball_core", "golf_ball_core", "softball_core"}
+    elsewhere = {"aluminium_can_sheet", "leaf_tissue", "leaves-flowers", "battery_cell"}
+    colours = {"gold", "silver"}
+    only_held = {"liquid", "bulk", "food"}
+    said = {
+        name: seen(f"{name} surface", "thing").material
+        for name, entry in materials.library().items()
+        if entry.group not in only_held and name not in cores | elsewhere | colours
+    }
+    assert {name: found for name, found in said.items() if found != name} == {}
+
+
+@pytest.mark.parametrize(
+    ("name", "material"),
+    [
+        ("clay pot", "terracotta"),
+        ("clay ground", "soil_clay"),
+        ("modelling clay", "plasticine"),
+        ("pine shelf", "softwood"),
+        ("lead pipe", "lead"),
+        ("tin toy", "steel"),
+        ("steel stainless", "stainless_steel"),
+        ("memory foam pillow", "memory_foam"),
+        ("limestone block", "marble"),
+        ("polyester bag", "synthetic_textile"),
+        ("Tontopf", None),
+        ("Lehmziegel", "brick"),
+        ("mesa de roble", "hardwood"),
+        ("poele en fonte", "cast-iron"),
+    ],
+)
+def test_a_word_for_matter_says_what_it_is(name, material):
+    assert seen("mesh", name).material == material
+
+
+@pytest.mark.parametrize(
+    "name",
+    ["ice cream scoop", "napkin ring", "rubber stamp", "apple bowl", "bread plate", "soap dish"],
+)
+def test_what_is_before_a_noun_of_any_material_is_its_purpose(name):
+    assert seen("mesh", name).material is None
+
+
 def test_no_phrase_means_two_things():
     told = {}
     for s in lexicon():

@@ -39,6 +39,11 @@ def typical_extent(class_name: str) -> TypicalExtent | None:
     return max(found, key=lambda e: _fit(e, words), default=None)
 
 
+def classes() -> tuple[str, ...]:
+    """Return what is called every class that has a usual size."""
+    return tuple(e.words for e in _table())
+
+
 def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str]:
     """Return a name's words, in English and the singular; a known compound counts as its words.
 

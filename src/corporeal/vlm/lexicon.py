@@ -8,6 +8,7 @@ from functools import cache, lru_cache
 from importlib.resources import files
 
 from corporeal.formats.other_languages import in_english
+from corporeal.formats.typical_extents import classes
 from corporeal.geometry.identity import words
 from corporeal.types import Finish
 
@@ -95,10 +96,23 @@ def _after(tokens: tuple[str, ...], k: int, term: Term) -> str:
 
 
 def _standing_in(tokens: tuple[str, ...]) -> Iterator[tuple[int, Term]]:
+    hushed = _hushed(tokens)
     for k, token in enumerate(tokens):
         for term in _by_first_word().get(token, ()):
-            if tokens[k : k + len(term.phrase)] == term.phrase:
+            n = len(term.phrase)
+            if tokens[k : k + n] == term.phrase and not hushed & set(range(k, k + n)):
                 yield k, term
+
+
+def _hushed(tokens: tuple[str, ...]) -> set[int]:
+    """Return which words say nothing of matter where they stand: there is no ice in ice cream."""
+    return {
+        k + i
+        for phrase in _listed("silent")
+        for k in range(len(tokens))
+        if tokens[k : k + len(phrase)] == phrase
+        for i in range(len(phrase))
+    }
 
 
 @cache
@@ -172,7 +186,7 @@ def _is_one(tokens: tuple[str, ...], table: str) -> bool:
 @cache
 def _describing() -> frozenset[str]:
     """Return words after a noun that only say what it is like: of what, how large, how old."""
-    return _single("substance") | frozenset(map(singular, _table()["describing"])) | emptied()
+    return _single("substance") | _colours() | emptied()
 
 
 @cache
@@ -238,8 +252,19 @@ def lookbook() -> tuple[Look, ...]:
 
 @cache
 def _holders() -> frozenset[str]:
-    """Nouns that make the noun before them a mere purpose."""
-    return frozenset(map(singular, _table()["holders"]))
+    """Nouns that make the noun before them a mere purpose.
+
+    Beside those of the table every thing that has a usual size and no usual material: a bowl is a
+    bowl, whatever is in it.
+    """
+    single = {singular(name) for name in classes() if " " not in name}
+    material = {w for term in lexicon() for w in term.phrase if len(term.phrase) == 1}
+    return frozenset(map(singular, _table()["holders"])) | (single - material - _colours())
+
+
+@cache
+def _colours() -> frozenset[str]:
+    return frozenset(map(singular, _table()["describing"]))
 
 
 @cache
