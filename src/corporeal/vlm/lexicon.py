@@ -14,6 +14,10 @@ from corporeal.types import Finish
 
 SHORTEST = 3
 """Letters of the shortest word that a compound is taken apart into."""
+LOOSE = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
+"""What no container is made of: a compost bin has some in it."""
+OF_IT = frozenset(("block", "ring", "bag"))
+"""What is all of it even so: a bag of sand is sand."""
 KINDS = ("substance", "piece", "thing")
 """The most specific first: "oak", "table leg", "table"."""
 
@@ -79,15 +83,22 @@ def heads(tokens: tuple[str, ...]) -> list[Term]:
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
     standing = [
-        (k, term)
-        for k, term in _standing_in(tokens)
-        if term.kind == "substance" or _after(tokens, k, term) not in _holders()
+        (k, term) for k, term in _standing_in(tokens) if _is_of_it(term, _after(tokens, k, term))
     ]
     last: dict[int, int] = {}
     for k, term in standing:
         if term.kind == "thing":
             last[len(term.phrase)] = k
     return [s for k, s in standing if s.kind != "thing" or k == last[len(s.phrase)]]
+
+
+def _is_of_it(term: Term, following: str) -> bool:
+    """Tell whether what follows a word may be of what it names: a steel bin, but no sand bin."""
+    if following not in _holders():
+        return True
+    if term.kind != "substance":
+        return False
+    return term.material not in LOOSE or following in OF_IT
 
 
 def _after(tokens: tuple[str, ...], k: int, term: Term) -> str:
