@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from corporeal import materials
+from corporeal.materials.placement import choices, usual
 from corporeal.materials.scale import place
 from corporeal.mixture import (
     PACKAGING,
@@ -221,6 +222,51 @@ def test_a_thin_scan_leaves_its_volume_open_and_a_model_does_not():
     inventory = replace(describe(scene), objects=(ObjectWords("blade_0", "blade", (words,)),))
     (m,) = weighed(scale, inventory, 200).mixtures
     assert m.high / m.low > 1.5
+
+
+def scanned_bowl():
+    """A deep bowl as a scanner draws it, both faces of its wall: (scale, inventory)."""
+    wall, outside = 0.01, [(0, 0), (0.06, 0), (0.06, 0.15)]
+    profile = [*outside, (0.06 - wall, 0.15), (0.06 - wall, wall), (0, wall)]
+    bowl = trimesh.creation.revolve(profile, sections=60)
+    bowl = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(bowl.vertices, bowl.faces, 0.02))
+    bowl.merge_vertices()
+    points, triangles = np.asarray(bowl.vertices), np.asarray(bowl.faces, dtype=np.int64)
+    scene = Scene(
+        "one", "", (SceneObject("bowl_0", "bowl", 0.16),),
+        (Surface("bowl", 0, 0, points, triangles),), (Finish("plain"),),
+    )  # fmt: skip
+    inventory = describe(scene)
+    words = PartWords(inventory.objects[0].parts[0].name, "ceramic", "sheet")
+    words = replace(words, built_by="model", answered_by="model")
+    inventory = replace(inventory, objects=(ObjectWords("bowl_0", "bowl", (words,)),))
+    return Scale(scene, segment(scene, inventory), GroundConfig(), 0), inventory
+
+
+def test_a_wall_as_thick_as_a_scan_draws_it_is_as_open_as_the_scan():
+    """Noise moves both faces outwards: a drawn wall swells, one of a known thickness does not."""
+    scale, inventory = scanned_bowl()
+    field = ground(scale.scene, scale.parts, inventory, scale.grounding)
+    assert scale.of(field, [1.2])[0] == pytest.approx(1.2 * scale.of(field)[0], rel=1e-6)
+    (words,) = inventory.objects[0].parts
+    stated = replace(words, thickness=0.004)
+    inventory = replace(inventory, objects=(ObjectWords("bowl_0", "bowl", (stated,)),))
+    field = ground(scale.scene, scale.parts, inventory, scale.grounding)
+    assert scale.of(field, [1.2])[0] == pytest.approx(scale.of(field)[0], rel=1e-6)
+
+
+def test_a_wall_that_a_model_was_asked_for_in_vain_is_as_thick_as_such_walls_usually_are():
+    """The report says that the usual value was taken; so it is, not what the mesh draws."""
+    scale, inventory = scanned_bowl()
+    (words,) = inventory.objects[0].parts
+    entry = materials.find("ceramic")
+    places = usual(choices(words), "The model gave no usable answer: the usual value.")
+    unsaid = replace(words, placements=places)
+    inventory = replace(inventory, objects=(ObjectWords("bowl_0", "bowl", (unsaid,)),))
+    area = scale.members[0].face_area
+    wall = entry.ranges["shell_thickness"].typical
+    expected = entry.ranges["density"].typical * area * wall
+    assert scale.mass(inventory) == pytest.approx(expected, rel=0.05)
 
 
 def test_an_ensemble_draws_ways_as_often_as_the_evidence_leaves_them_likely():

@@ -10,11 +10,12 @@ from corporeal.formats.typical_extents import joined, nouns
 
 MARGIN = 2.0
 """How far beyond the table an object may be before it is reported, as a factor."""
-HEAVIEST = 2000.0
-"""What no large thing of a class that is not in the table exceeds [kg/m³ of its box]: stone and
-metal fill a part of theirs."""
-LARGE = 0.5
-"""Longest side from which a thing counts as large [m]: a smaller one may be a block of metal."""
+HEAVIEST, LARGE = 2000.0, 0.5
+"""What no thing exceeds [kg/m³ of its box] whose longest side is that long [m], if its class is not
+in the table: stone and metal fill a part of theirs."""
+SOLID, THICK = 3500.0, 0.15
+"""What none exceeds that is so thick [m], its middle side: more than stone is metal through and
+through. What is thinner may be a bar or a plate."""
 
 
 Measure = Literal["box", "large", "face"]
@@ -70,7 +71,7 @@ def doubt_mass(
         return None  # a sheet has no box
     known, bulk = typical_bulk(class_name, deep), mass / room
     if known is None:
-        heavy = deep >= LARGE and bulk > HEAVIEST
+        heavy = (deep >= LARGE and bulk > HEAVIEST) or (across >= THICK and bulk > SOLID)
         found = _weighs(name, mass, bulk, "box")
         return f"{found}, more than nearly all things. {ADVICE}" * heavy or None
     found = mass / face if known.measure == "face" else bulk

@@ -44,6 +44,11 @@ def words_in(class_name: str) -> list[str]:
     return nouns(class_name, _compounds())
 
 
+def classes() -> tuple[str, ...]:
+    """Return what is called every class that has a usual size."""
+    return tuple(e.words for e in _table())
+
+
 def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str]:
     """Return a name's words, in English and the singular; a known compound counts as its words.
 

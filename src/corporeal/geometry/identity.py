@@ -14,7 +14,7 @@ from corporeal.geometry.letters import letter_runs, says_something
 from corporeal.types import SUBSTANCE, Finish, Part, Scene, Surface
 
 NOISE = frozenset(
-    "a aws blinn camera circle collada common cone001 cube curve cylinder default defaultmaterial "
+    "a aws blinn circle collada common cone001 cube curve cylinder default defaultmaterial "
     "diffuse export fbx finish fx geom geometry glb gltf grp group high id imported instance "
     "lambert lib lod low lp mat material materials matte mesh meshes model models nd node none "
     "nurbspath obj object objects part phong piece plain plane poly prim primitive residential "

@@ -21,6 +21,7 @@ JUDGED = {
     "model": "as a model says",
     "metadata": "as the file's metadata says",
     "evidence": "as fits the estimate of its mass",
+    "fallback": "as such walls usually are, since a model was asked and did not say",
 }
 """The source of a wall's thickness."""
 ALIKE = 0.05
@@ -146,14 +147,16 @@ def weight(member: Member, field: MaterialField, room: float, larger: float = 1.
         field: What it is made of.
         room: What goes into it, if it is a vessel [m³].
         larger: Factor of the volume that its surface encloses [-], where the mesh leaves that open:
-            of solids and of what is behind a closed wall. Walls go with the area.
+            of solids, of what is behind a closed wall, and of a wall that is as thick as the mesh
+            draws it, between two faces that a scan has moved apart. Other walls go with the area.
 
     """
     total = 0.0
     for piece in pieces_of(member.part, field):
         made = decide(member, piece)
         structure = piece.structure
-        total += made.mass * (larger if structure.kind == "solid" else 1.0)
+        swells = structure.kind == "solid" or made.whose == DRAWN
+        total += made.mass * (larger if swells else 1.0)
         if structure.contents is not None:
             inner = behind(member, made, piece, room) * (1.0 if is_vessel(member) else larger)
             total += structure.contents.density * structure.fill * inner
@@ -346,7 +349,7 @@ def wall_of(
 
 
 def judge(words: PartWords) -> str:
-    """Return who stated the thickness having seen the object; "" for nobody."""
+    """Return who stated the thickness, or was asked for it, having seen the object; "": nobody."""
     if "shell_thickness" in words.values:
         return "annotation"
     placed = words.placements.get("shell_thickness")

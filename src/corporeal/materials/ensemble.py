@@ -44,6 +44,8 @@ POROUS = ("foam", "fibrous", "granular", "bulk", "food")
 """Groups in which the denser is also the stiffer (Gibson and Ashby 1997: E ∝ ρ²)."""
 FULLER = 0.1
 """How far from the truth a stated share of a container's room may be [-]."""
+HALF = 0.5
+"""How far it may be at most, over itself: what is nearly empty is no more often full [-]."""
 LOOSER = 0.25
 """Standard deviation of the logarithm of a solidity that was judged by eye [-]."""
 SHARES = 0.2
@@ -250,7 +252,8 @@ def _structure(
     fill = structure.fill
     if words.answered_by != "annotation":
         quantile = grades.quantile(owner, words.name, "fill", False)
-        fill = triangle(quantile, max(fill - FULLER, 0.0), fill, min(fill + FULLER, 1.0))
+        wide = min(FULLER, HALF * fill)
+        fill = triangle(quantile, fill - wide, fill, min(fill + wide, 1.0))
     inner = _material(structure.contents, owner, grades, library)
     return replace(structure, thickness=thickness, contents=inner, fill=fill)
 

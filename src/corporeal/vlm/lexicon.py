@@ -8,11 +8,16 @@ from functools import cache, lru_cache
 from importlib.resources import files
 
 from corporeal.formats.other_languages import in_english
+from corporeal.formats.typical_extents import classes
 from corporeal.geometry.identity import words
 from corporeal.types import Finish
 
 SHORTEST = 3
 """Letters of the shortest word that a compound is taken apart into."""
+LOOSE = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
+"""What no container is made of: a compost bin has some in it."""
+OF_IT = frozenset(("block", "ring", "bag"))
+"""What is all of it even so: a bag of sand is sand."""
 KINDS = ("substance", "piece", "thing")
 """The most specific first: "oak", "table leg", "table"."""
 
@@ -78,9 +83,7 @@ def heads(tokens: tuple[str, ...]) -> list[Term]:
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
     standing = [
-        (k, term)
-        for k, term in _standing_in(tokens)
-        if term.kind == "substance" or _after(tokens, k, term) not in _holders()
+        (k, term) for k, term in _standing_in(tokens) if _is_of_it(term, _after(tokens, k, term))
     ]
     last: dict[int, int] = {}
     for k, term in standing:
@@ -89,16 +92,38 @@ def heads(tokens: tuple[str, ...]) -> list[Term]:
     return [s for k, s in standing if s.kind != "thing" or k == last[len(s.phrase)]]
 
 
+def _is_of_it(term: Term, following: str) -> bool:
+    """Tell whether what follows a word may be of what it names: a steel bin, but no sand bin."""
+    if following not in _holders():
+        return True
+    if term.kind != "substance":
+        return False
+    return term.material not in LOOSE or following in OF_IT
+
+
 def _after(tokens: tuple[str, ...], k: int, term: Term) -> str:
     following = k + len(term.phrase)
     return tokens[following] if following < len(tokens) else ""
 
 
 def _standing_in(tokens: tuple[str, ...]) -> Iterator[tuple[int, Term]]:
+    hushed = _hushed(tokens)
     for k, token in enumerate(tokens):
         for term in _by_first_word().get(token, ()):
-            if tokens[k : k + len(term.phrase)] == term.phrase:
+            n = len(term.phrase)
+            if tokens[k : k + n] == term.phrase and not hushed & set(range(k, k + n)):
                 yield k, term
+
+
+def _hushed(tokens: tuple[str, ...]) -> set[int]:
+    """Return which words say nothing of matter where they stand: there is no ice in ice cream."""
+    return {
+        k + i
+        for phrase in _listed("silent")
+        for k in range(len(tokens))
+        if tokens[k : k + len(phrase)] == phrase
+        for i in range(len(phrase))
+    }
 
 
 @cache
@@ -172,7 +197,7 @@ def _is_one(tokens: tuple[str, ...], table: str) -> bool:
 @cache
 def _describing() -> frozenset[str]:
     """Return words after a noun that only say what it is like: of what, how large, how old."""
-    return _single("substance") | frozenset(map(singular, _table()["describing"])) | emptied()
+    return _single("substance") | _colours() | emptied()
 
 
 @cache
@@ -238,8 +263,19 @@ def lookbook() -> tuple[Look, ...]:
 
 @cache
 def _holders() -> frozenset[str]:
-    """Nouns that make the noun before them a mere purpose."""
-    return frozenset(map(singular, _table()["holders"]))
+    """Nouns that make the noun before them a mere purpose.
+
+    Beside those of the table every thing that has a usual size and no usual material: a bowl is a
+    bowl, whatever is in it.
+    """
+    single = {singular(name) for name in classes() if " " not in name}
+    material = {w for term in lexicon() for w in term.phrase if len(term.phrase) == 1}
+    return frozenset(map(singular, _table()["holders"])) | (single - material - _colours())
+
+
+@cache
+def _colours() -> frozenset[str]:
+    return frozenset(map(singular, _table()["describing"]))
 
 
 @cache

@@ -38,6 +38,8 @@ WEAKER = 0.6
 """Factor on the margin of what describes the whole object when the part is only one of several."""
 METALLIC = 0.5
 """Metallic value from which most of a surface is metal: a picture's value is its mean."""
+WORKS = "machinery"
+"""What a machine's case holds: no goods that somebody takes out."""
 LONGEST_WALL = 10.0
 """No wall of an object is thicker [m]."""
 LARGEST_SOLID_CASTING = 0.2
@@ -314,7 +316,8 @@ def _general_names(evidence: Evidence) -> PartWords | None:
     if not terms:
         return None
     if evidence.alone or terms[0].every:
-        return _answer(_of_metal(terms, evidence), name, 1.0)
+        packed = terms[0].contents == WORKS and not evidence.alone
+        return _answer(_of_metal(terms, evidence), name, WEAKER if packed else 1.0)
     named = {t.material for t in terms}
     if terms[0].kind != "substance" or named & evidence.claimed:
         return None  # only its colour says which of the parts this is
@@ -360,9 +363,10 @@ def _weighed(answer: PartWords, evidence: Evidence) -> PartWords:
 
 
 def _emptied(answer: PartWords, evidence: Evidence) -> PartWords:
-    """Leave contents only in goods that are one part and are not called empty."""
+    """Leave contents only in goods that are one part and are not called empty; and in machines."""
     named = {w for name in (*evidence.own, *evidence.general) for w in name.words}
-    if answer.contents is None or (evidence.alone and not named & emptied()):
+    whole = evidence.alone and not named & emptied()
+    if answer.contents in (None, WORKS) or whole:
         return answer
     return replace(answer, structure="shell", contents=None, fill=None)
 
