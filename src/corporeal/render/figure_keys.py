@@ -52,6 +52,24 @@ class Line:
 
 
 @dataclass(frozen=True)
+class Entry:
+    """A name in a legend."""
+
+    name: str
+    colour: Colour | None
+    """sRGB in [0, 1]; None: no colour stands beside it."""
+
+
+@dataclass(frozen=True)
+class Mark:
+    """A value on a scale."""
+
+    share: float
+    """Where along the bar, from 0 to 1."""
+    words: str
+
+
+@dataclass(frozen=True)
 class Swatch:
     """A rectangle of colours, from left to right."""
 
@@ -90,37 +108,35 @@ def font(size: int) -> ImageFont.FreeTypeFont:
     return ImageFont.truetype(path, size)
 
 
-def legend(entries: Sequence[tuple[str, Colour | None]], middle: float, top: float) -> Key:
+def legend(entries: Sequence[Entry], middle: float, top: float) -> Key:
     """List names beside their colours in two columns, the first filled first.
 
     Args:
-        entries: Names and their colours; None: the name has none.
+        entries: Names and their colours.
         middle: Of the panel, from the left [px].
         top: Where the key begins [px].
 
     """
     rows = -(-len(entries) // 2)
     columns = [c for c in (entries[:rows], entries[rows:]) if c]
-    wide = [INDENT + max(font(SMALL).getlength(name) for name, _ in c) for c in columns]
+    wide = [INDENT + max(font(SMALL).getlength(e.name) for e in c) for c in columns]
     left = middle - (sum(wide) + COLUMNS_APART * (len(columns) - 1)) / 2
     lines, swatches = [], []
     for column, width in zip(columns, wide, strict=True):
-        for row, (name, colour) in enumerate(column):
+        for row, entry in enumerate(column):
             y = top + row * PITCH
-            lines.append(Line(name, (left + INDENT, y + PITCH / 2), "lm"))
-            if colour is not None:
-                swatches.append(Swatch((left, y + 3), (SMALL, SMALL), np.array([colour])))
+            lines.append(Line(entry.name, (left + INDENT, y + PITCH / 2), "lm"))
+            if entry.colour is not None:
+                swatches.append(Swatch((left, y + 3), (SMALL, SMALL), np.array([entry.colour])))
         left += width + COLUMNS_APART
     return Key(tuple(lines), tuple(swatches))
 
 
-def scale(
-    marks: Sequence[tuple[float, str]], ramp: Float[np.ndarray, "N 3"], middle: float, top: float
-) -> Key:
+def scale(marks: Sequence[Mark], ramp: Float[np.ndarray, "N 3"], middle: float, top: float) -> Key:
     """Draw a bar of colours over some values.
 
     Args:
-        marks: Where along the bar, from 0 to 1, and the value there in words.
+        marks: Values along it.
         ramp: Colours from left to right, sRGB.
         middle: Of the panel, from the left [px].
         top: Where the key begins [px].
@@ -131,8 +147,8 @@ def scale(
     swatches = [Swatch((left, top), BAR, ramp)]
     tick = np.array([[int(TICK[k : k + 2], 16) / 255 for k in (1, 3, 5)]])
     lines = []
-    for share, words in marks:
-        x = left + share * width
+    for mark in marks:
+        x = left + mark.share * width
         swatches.append(Swatch((x, low), (1, MARK), tick))
-        lines.append(Line(words, (x, low + MARK + 3), "mt"))
+        lines.append(Line(mark.words, (x, low + MARK + 3), "mt"))
     return Key(tuple(lines), tuple(swatches))

@@ -15,7 +15,7 @@ from corporeal.geometry.srgb import linear
 from corporeal.render import colours, video
 from corporeal.render.camera import place
 from corporeal.render.embree import Light, Stage, identify, render
-from corporeal.render.figure_keys import INK, LARGE, Key, Line, legend, scale
+from corporeal.render.figure_keys import INK, LARGE, Entry, Key, Line, Mark, legend, scale
 from corporeal.render.glyphs import drawable
 from corporeal.store import writing
 from corporeal.types import Film, MaterialField, Parts, Scene
@@ -219,7 +219,7 @@ def _share(seen: np.ndarray, parts: Parts) -> np.ndarray:
     return np.bincount(part[part >= 0], minlength=len(parts.catalogue))
 
 
-def _entries(panel: Names, share: np.ndarray) -> list[tuple[str, colours.Colour | None]]:
+def _entries(panel: Names, share: np.ndarray) -> list[Entry]:
     """List names by how much is seen of them; as many as fit."""
     total: dict[str, float] = {}
     colour: dict[str, colours.Colour] = {}
@@ -229,23 +229,23 @@ def _entries(panel: Names, share: np.ndarray) -> list[tuple[str, colours.Colour 
         colour[name] = panel.colour[k]
     ranked = sorted(total, key=lambda n: (-total[n], n))
     shown = ranked if len(ranked) <= ENTRIES else ranked[: ENTRIES - 1]
-    rest = [(f"and {len(ranked) - len(shown)} more", None)] if len(ranked) > len(shown) else []
-    return [*((_cut(n), colour[n]) for n in shown), *rest]
+    rest = [Entry(f"and {len(ranked) - len(shown)} more", None)] if len(ranked) > len(shown) else []
+    return [*(Entry(_cut(n), colour[n]) for n in shown), *rest]
 
 
 def _cut(name: str) -> str:
     return name if len(name) <= LETTERS else name[: LETTERS - 1].rstrip() + "…"
 
 
-def _scale(panel: Numbers) -> tuple[list[tuple[float, str]], np.ndarray]:
+def _scale(panel: Numbers) -> tuple[list[Mark], np.ndarray]:
     """Give the lowest value, the highest and what lies between, and the colours along them."""
     _, low, high = colours.turbo(panel.value or [0.0], panel.log)
     ramp = colours.ramp(np.linspace(0, 1, 256))
     if high - low <= 1e-9 * max(abs(high), 1e-30):
-        return [(0.5, si(low, panel.unit))], np.repeat(ramp[128:129], 256, axis=0)
+        return [Mark(0.5, si(low, panel.unit))], np.repeat(ramp[128:129], 256, axis=0)
     middle = np.sqrt(low * high) if panel.log else (low + high) / 2
     marks = [(0.0, low), (0.5, float(middle)), (1.0, high)]
-    return [(x, si(value, panel.unit)) for x, value in marks], ramp
+    return [Mark(x, si(value, panel.unit)) for x, value in marks], ramp
 
 
 def _boxes(scene: Scene) -> np.ndarray:
