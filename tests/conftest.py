@@ -5,10 +5,13 @@ import socket
 import sys
 from pathlib import Path
 
+# Several processes run the tests, and threads of BLAS that wait for a core spin: a product of
+# 12,000 numbers took 8 ms of processor time, not .006. Workers of xdist read this before NumPy.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+os.environ.setdefault("NUMBA_THREADING_LAYER", "workqueue")
+
 import pytest
 from jaxtyping import install_import_hook
-
-os.environ.setdefault("NUMBA_THREADING_LAYER", "workqueue")
 
 # Kernels are excluded: neither Warp nor numba can read a wrapped function.
 install_import_hook(

@@ -21,6 +21,31 @@ def test_importing_the_package_imports_nothing_heavy():
     assert said.stdout.strip() == "[]"
 
 
+HELP = """
+import sys
+from corporeal import cli
+sys.argv = ["corporeal", "--help"]
+try:
+    cli.main()
+except SystemExit:
+    pass
+"""
+
+
+@pytest.mark.parametrize(
+    ("done", "unwanted"),
+    [
+        (HELP, "scipy numba warp trimesh matplotlib pydantic mujoco torch corporeal.pipeline"),
+        ("import corporeal.pipeline", "trimesh networkx matplotlib mujoco torch pydantic_ai"),
+        ("import corporeal.pipeline", "corporeal.splats.train corporeal.stages.reconstruct"),
+    ],
+)
+def test_what_is_not_needed_to_begin_is_not_imported(done, unwanted):
+    asked = f"{done}\nimport sys; print([m for m in {unwanted.split()} if m in sys.modules])"
+    said = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert said.stdout.splitlines()[-1] == "[]"
+
+
 def test_every_public_name_can_be_loaded_and_is_listed():
     assert all(getattr(co, name) is not None for name in co.__all__)
     assert set(co.__all__) <= set(dir(co))

@@ -37,7 +37,6 @@ from corporeal.stages.describe import describe
 from corporeal.stages.fill import FillConfig, fill
 from corporeal.stages.film import FilmConfig, film
 from corporeal.stages.ground import GroundConfig
-from corporeal.stages.reconstruct import reconstruct
 from corporeal.stages.segment import SegmentConfig, segment
 from corporeal.stages.simulate import SimulateConfig, as_kept, simulate
 from corporeal.trajectory.audit_file import read_audit
@@ -368,6 +367,8 @@ class _Run:
     # ------------------------------------------------------------ the verbs
 
     def _reconstruct(self, folder: Path, progress: Progress) -> Reconstruction:
+        from corporeal.stages.reconstruct import reconstruct  # with all that models need not import
+
         source, asked = pictured(self.inputs), self.settings.describe
         assert source is not None, "models need no reconstruction"
         config, extents = self.settings.reconstruct, self.settings.assemble.extent

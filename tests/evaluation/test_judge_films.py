@@ -9,7 +9,7 @@ import pytest
 
 from corporeal import pipeline
 from corporeal.errors import UserError
-from corporeal.evaluation.judge import judge_scenes
+from corporeal.evaluation.judge import judge_pictures, judge_scenes
 from corporeal.evaluation.judge.control_effect import (
     VISIBLE_PATH,
     VISIBLE_SHAPE,
@@ -235,8 +235,18 @@ def test_motions_that_differ_are_named_differently(played, staging):
     assert digest(nudged(0.01), staging) != digest(nudged(0.0), staging)
 
 
+@pytest.fixture
+def blank(monkeypatch):
+    """Take grey pictures: a hundred real ones cost 20 s, and only words are looked at."""
+    monkeypatch.setattr(
+        judge_pictures,
+        "render",
+        lambda stage, aim, *how: np.full((aim.height, aim.width, 3), 128, np.uint8),
+    )
+
+
 @pytest.mark.slow
-def test_no_condition_is_named_in_a_question_or_on_its_page(run, tmp_path, edited_only):
+def test_no_condition_is_named_in_a_question_or_on_its_page(run, tmp_path, edited_only, blank):
     films = gather_films(
         [SceneRuns("balls", {REFERENCE: run, "single": run})], tmp_path, JudgeConfig()
     )

@@ -1,5 +1,6 @@
 import itertools
 
+import matplotlib
 import numpy as np
 import pytest
 import trimesh
@@ -64,30 +65,57 @@ def test_the_figure_takes_any_number_of_parts(count, tmp_path, coarse):
     assert (edge == 255).all(), "nothing may run over the edge of the paper"
 
 
-def texts(axes):
-    found = [axes.title, axes._left_title, *(axes.get_xticklabels() if axes.axison else [])]
-    legend = axes.get_legend()
-    return [t for t in found + (legend.get_texts() if legend else []) if t.get_text()]
+def apart(one, other):
+    return one[2] <= other[0] or other[2] <= one[0] or one[3] <= other[1] or other[3] <= one[1]
 
 
-def test_no_label_covers_another(tmp_path, monkeypatch, coarse):
-    caught = []
+@pytest.mark.parametrize("count", [1, 2, 30])
+def test_no_label_covers_another(tmp_path, monkeypatch, coarse, count):
+    drawn, place = [], figures.key_of
     monkeypatch.setattr(
-        figures.Figure, "savefig", lambda self, path, **k: caught.append(self) or path.touch()
+        figures, "key_of", lambda *asked: drawn.append((asked[2], place(*asked))) or drawn[-1][1]
     )
-    fields_figure(*row_of_blocks(30), tmp_path / "fields.png")
-    figure = caught[0]
-    figure.canvas.draw()
-    every = [a for axes in figure.axes for a in (axes, *axes.child_axes)]
-    labels = [t.get_window_extent() for a in every for t in texts(a)]
-    pictures = [a.get_window_extent() for a in figure.axes]
-    assert len(labels) > 20
+    fields_figure(*row_of_blocks(count), tmp_path / "fields.png")
+    wide, high = figures.SHOWN
+    pictures = [(x, y, x + wide, y + high) for (x, y), _ in drawn]
+    labels = [line.box() for _, key in drawn for line in key.lines]
+    swatches = [(*s.corner, *np.add(s.corner, s.size)) for _, key in drawn for s in key.swatches]
+    assert len(pictures) == 6 and len(labels) > 12 * (count > 1)
     for a, b in itertools.combinations(labels, 2):
-        assert not a.overlaps(b)
-    for a, b in itertools.product(labels, pictures):
-        assert not a.overlaps(b)
-    page = figure.bbox
-    assert all(b.x0 >= 0 and b.y0 >= 0 and b.x1 <= page.x1 and b.y1 <= page.y1 for b in labels)
+        assert apart(a, b)
+    for a, b in itertools.product(labels, [*pictures, *swatches]):
+        assert apart(a, b)
+    for left, top, right, bottom in labels + swatches + pictures:
+        assert 0 <= left and 0 <= top
+        assert right <= figures.SHEET[0] and bottom <= figures.SHEET[1]
+
+
+def test_what_is_seen_most_leads_its_legend_beside_its_colour():
+    panel = figures.Names("Material", ["a", "b", "c"], [(1, 0, 0), (0, 1, 0), (0, 0, 1)])
+    key = figures.key_of(panel, np.array([1, 9, 4]), (0, 0))
+    title, *names = key.lines
+    assert title.text == "Material" and [line.text for line in names] == ["b", "c", "a"]
+    assert [s.colour.argmax() for s in key.swatches] == [1, 2, 0]
+    for line, swatch in zip(names, key.swatches, strict=True):
+        assert 0 < line.place[0] - swatch.corner[0] < 30
+        assert swatch.corner[1] < line.place[1] < swatch.corner[1] + swatch.size[1]
+
+
+def test_a_scale_says_its_ends_and_on_a_logarithmic_one_the_middle_of_the_decades():
+    panel = figures.Numbers("E", "Pa", [1e3, 1e9], log=True)
+    key = figures.key_of(panel, np.zeros(2), (0, 0))
+    assert [line.text for line in key.lines[1:]] == ["1 kPa", "1 MPa", "1 GPa"]
+    bar = key.swatches[0]
+    assert key.lines[2].place[0] == bar.corner[0] + bar.size[0] / 2
+    assert bar.colour[0, 2] > bar.colour[0, 0] and bar.colour[-1, 0] > bar.colour[-1, 2]
+    one = figures.key_of(figures.Numbers("ν", "", [0.3, 0.3]), np.zeros(2), (0, 0))
+    assert [line.text for line in one.lines] == ["ν", "0.3"]
+
+
+def test_colours_of_a_scale_are_those_of_matplotlib():
+    share = np.linspace(0, 1, 1001)
+    theirs = matplotlib.colormaps["turbo"](0.04 + 0.92 * share)[:, :3]
+    assert np.array_equal(colours.ramp(share), theirs)
 
 
 def test_a_material_has_the_same_colour_in_every_scene():

@@ -5,7 +5,7 @@ themselves are tried in scenes of some seconds; `corporeal evaluate judge` makes
 """
 
 import pytest
-from spoiled_runs import PLANTED, happened, sound_run, spoiled
+from spoiled_runs import PLANTED, happened, spoiled
 
 from corporeal import pipeline
 from corporeal.evaluation.judge.simulated_controls import SIMULATED
@@ -21,8 +21,8 @@ def test_faults_are_simulated_or_planted():
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", EXPECTED)
-def test_a_sound_run_meets_all_and_each_fault_fails_what_it_must(tmp_path, name):
-    ours = sound_run(name, tmp_path)
+def test_a_sound_run_meets_all_and_each_fault_fails_what_it_must(sound, name):
+    ours = sound(name)
     seen = expect(name, happened(pipeline.read_back(ours).played))
     assert [e for e in seen if not e.met] == []
     for fault in {d.spoiled_by for d in EXPECTED[name]}:

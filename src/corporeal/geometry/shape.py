@@ -2,15 +2,17 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import TYPE_CHECKING
 
 import igl
 import numpy as np
-import trimesh
 from jaxtyping import Bool, Float, Int
-from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 from corporeal.geometry.mesh import Mesh, boundary
 from corporeal.geometry.winding import OpenEdges, PlumbLines, plumb_lines, unbalanced
+
+if TYPE_CHECKING:
+    from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 FEW_OPEN = 1000
 """Open edges up to which their solid angles are added up one by one: 20 ns each, where a tree of
@@ -56,7 +58,10 @@ class Shape:
         return tree
 
     @cached_property
-    def _rays(self) -> RayMeshIntersector:
+    def _rays(self) -> "RayMeshIntersector":
+        import trimesh  # takes half a second, and not every shape is looked at along rays
+        from trimesh.ray.ray_pyembree import RayMeshIntersector
+
         mesh = trimesh.Trimesh(self.mesh.vertices, self.mesh.triangles, process=False)
         return RayMeshIntersector(mesh)
 

@@ -1,7 +1,7 @@
 """What happens between two surfaces: measured pairs first, then a stated rule."""
 
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -24,7 +24,7 @@ class Friction:
 
 def friction_between(a: Entry, b: Entry) -> Friction:
     """Sliding friction of ``a`` on ``b``: the most particular measured pair, else ``combine``."""
-    row = _closest(a, b, pairs())
+    row = _closest(a.kin, b.kin, pairs)
     if row is None:
         return _by_rule(a, b)
     low, typical, high = row["sliding"]
@@ -68,7 +68,7 @@ def restitution(a: Striker, b: Striker) -> Restitution:
     a person stated for one of the materials outranks it.
     """
     particular = not all(s.solid for s in (a, b)) or any(_stated(s.material) for s in (a, b))
-    row = None if particular else _closest(a.entry, b.entry, rebounds())
+    row = None if particular else _closest(a.entry.kin, b.entry.kin, rebounds)
     if row is None:
         return Restitution(restitution_between(a.material, b.material), None)
     low, typical, high = row["restitution"]
@@ -104,8 +104,15 @@ def _rows(table: str) -> dict[frozenset[str], dict]:
     return {frozenset(row["of"]): row for row in tomllib.loads(text)[table]}
 
 
-def _closest(a: Entry, b: Entry, known: Mapping[frozenset[str], dict]) -> dict | None:
-    """Return the most particular row that lists the two or their kin; None: there is none."""
+@cache
+def _closest(
+    a: tuple[str, ...], b: tuple[str, ...], table: Callable[[], Mapping[frozenset[str], dict]]
+) -> dict | None:
+    """Return the most particular row that lists the two or their kin; None: there is none.
+
+    Every draw of a mixture asks for the same few pairs.
+    """
+    known = table()
     rows = (known.get(frozenset(names)) for names in _by_closeness(a, b))
     return next((row for row in rows if row), None)
 
@@ -115,9 +122,9 @@ def _stated(material: Material) -> bool:
     return ground is not None and ground.chosen_by == "annotation"
 
 
-def _by_closeness(a: Entry, b: Entry) -> list[tuple[str, str]]:
+def _by_closeness(a: tuple[str, ...], b: tuple[str, ...]) -> list[tuple[str, str]]:
     """All pairs of names of the two, most particular first."""
-    ranked = [(i + j, one, other) for i, one in enumerate(a.kin) for j, other in enumerate(b.kin)]
+    ranked = [(i + j, one, other) for i, one in enumerate(a) for j, other in enumerate(b)]
     return [(one, other) for _, one, other in sorted(ranked, key=lambda r: r[0])]
 
 

@@ -223,7 +223,8 @@ def _dense(field: str, porous: bool) -> bool:
 
 def _drawn(ground: Ground, quantile: float) -> Ground:
     span = SPAN.get(ground.chosen_by, 1.0)
-    return replace(ground, value=_within(ground.range, ground.value, quantile, span))
+    value = _within(ground.range, ground.value, quantile, span)
+    return Ground(value, ground.range, ground.chosen_by, ground.reason, ground.margin)
 
 
 def _within(r: Range, chosen: float, quantile: float, span: float) -> float:

@@ -3,8 +3,6 @@
 from pathlib import Path
 
 import numpy as np
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
 
 from corporeal.formats.photographs import Photographs
 from corporeal.geometry.level import level
@@ -25,6 +23,9 @@ def cameras_figure(seen: Photographs, path: Path) -> None:
         path: A PNG.
 
     """
+    from matplotlib.backends.backend_agg import FigureCanvasAgg  # takes long to import
+    from matplotlib.figure import Figure
+
     cameras = seen.views.cameras
     up = level(cameras).up
     across = np.cross(up, np.eye(3)[np.abs(up).argmin()])

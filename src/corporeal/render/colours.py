@@ -2,8 +2,9 @@
 
 import hashlib
 from collections.abc import Sequence
+from functools import cache
+from pathlib import Path
 
-import matplotlib
 import numpy as np
 from jaxtyping import Float
 
@@ -105,6 +106,14 @@ def turbo(values: Sequence[float], log: bool) -> tuple[Float[np.ndarray, "N 3"],
     return ramp(share), low, high
 
 
-def ramp(share: Float[np.ndarray, " N"]) -> Float[np.ndarray, "N 3"]:
+def ramp(share: Float[np.ndarray, "*N"]) -> Float[np.ndarray, "*N 3"]:
     """Colours of shares from 0, the lowest, to 1, the highest: turbo without its dark ends."""
-    return matplotlib.colormaps["turbo"](0.04 + 0.92 * share)[:, :3]
+    table = _turbo_table()
+    place = (0.04 + 0.92 * np.clip(np.asarray(share), 0, 1)) * len(table)
+    return table[place.astype(int)]
+
+
+@cache
+def _turbo_table() -> Float[np.ndarray, "256 3"]:
+    """Mikhailov's 256 colours, sRGB in [0, 1]; as Matplotlib's, which takes long to import."""
+    return np.loadtxt(Path(__file__).with_name("turbo.csv"), delimiter=",")

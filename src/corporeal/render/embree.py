@@ -168,13 +168,14 @@ class Stage:
 
     def boxes(self) -> Float[np.ndarray, "B 2 3"]:
         """Corners of a few boxes about all that can be hit, in the stage's frame [m]."""
-        corner = self.vertices[self.look.triangles]
-        if not len(corner):
+        triangles = self.look.triangles
+        if not len(triangles):
             return np.zeros((0, 2, 3), np.float32)
-        cuts = np.unique(self.starts[self.starts < len(corner)])
+        cuts = np.unique(self.starts[self.starts < len(triangles)])
         cuts = cuts[:: -(-len(cuts) // BOXES)]
-        low = np.minimum.reduceat(corner.min(axis=1), cuts)
-        high = np.maximum.reduceat(corner.max(axis=1), cuts)
+        a, b, c = (self.vertices[triangles[:, k]] for k in range(3))
+        low = np.minimum.reduceat(np.minimum(np.minimum(a, b), c), cuts)
+        high = np.maximum.reduceat(np.maximum(np.maximum(a, b), c), cuts)
         margin = np.float32(GROWN * self.size)
         return np.stack([low - margin, high + margin], axis=1)
 

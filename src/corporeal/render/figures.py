@@ -1,17 +1,13 @@
 """Figures as papers show them: the scene coloured by what it is made of, and a film as a strip."""
 
 import os
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
-from matplotlib.axes import Axes
-from matplotlib.backends.backend_agg import FigureCanvasAgg
-from matplotlib.figure import Figure
-from matplotlib.patches import Patch
 from PIL import Image, ImageDraw, ImageFont
 
 from corporeal.errors import UserError
@@ -19,6 +15,7 @@ from corporeal.geometry.srgb import linear
 from corporeal.render import colours, video
 from corporeal.render.camera import place
 from corporeal.render.embree import Light, Stage, identify, render
+from corporeal.render.figure_keys import INK, LARGE, Entry, Key, Line, Mark, legend, scale
 from corporeal.render.glyphs import drawable
 from corporeal.store import writing
 from corporeal.types import Film, MaterialField, Parts, Scene
@@ -38,11 +35,15 @@ ENTRIES = 8
 LETTERS = 24
 """Of a name in a legend before it is cut."""
 PREFIXES = ((1e9, "G"), (1e6, "M"), (1e3, "k"), (1.0, ""), (1e-3, "m"))
-INK = "#222222"
-
+SHEET, SHOWN = (1485, 1045), (472, 354)
+"""The page of all panels, and the picture of each [px]."""
+FIRST, STEP = (18, 41), (489, 522)
+"""Left and top of the first picture, and from one to the next [px]."""
 
 Quantity = Literal["material", "law", "object", "part", "young", "poisson", "density"]
 """What parts can be coloured by."""
+ORDER: tuple[Quantity, ...] = ("material", "law", "young", "poisson", "density", "object")
+"""Panels of the figure, row by row."""
 
 
 @dataclass(frozen=True)
@@ -78,27 +79,34 @@ def fields_figure(scene: Scene, parts: Parts, field: MaterialField, path: Path) 
     camera = place(_boxes(scene), PANEL, fill=0.93)
     seen, _ = identify(stage, camera)
     share = _share(seen, parts)
-    figure = Figure(figsize=(13.5, 9.5), dpi=110, facecolor="white")
-    FigureCanvasAgg(figure)
+    sheet = Image.new("RGB", SHEET, "white")
     shown = panels(scene, parts, field)
-    order: tuple[Quantity, ...] = ("material", "law", "young", "poisson", "density", "object")
-    for k, panel in enumerate(shown[name] for name in order):
-        column, row = k % 3, k // 3
-        box = (0.012 + column * 0.329, 0.622 - row * 0.500, 0.318, 0.339)
-        axes = figure.add_axes(box)
-        picture, key = _coloured(panel)
-        axes.imshow(render(_painted(stage, parts, picture), camera, "draft"))
-        axes.set_axis_off()
-        axes.set_title(panel.title, fontsize=12.5, color=INK, pad=6, loc="left")
-        key(axes, share)
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f".{path.stem}.{os.getpid()}.part.png")
-        try:
-            figure.savefig(partial)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    for k, panel in enumerate(shown[name] for name in ORDER):
+        left, top = FIRST[0] + k % 3 * STEP[0], FIRST[1] + k // 3 * STEP[1]
+        picture = render(_painted(stage, parts, shades(panel)), camera, "draft")
+        small = Image.fromarray(picture).resize(SHOWN, Image.Resampling.LANCZOS)
+        sheet.paste(small, (left, top))
+        key_of(panel, share, (left, top)).draw(sheet)
+    _save(sheet, path)
+
+
+def key_of(panel: Names | Numbers, share: np.ndarray, corner: tuple[int, int]) -> Key:
+    """Place a panel's title, and below its picture what its colours mean.
+
+    Args:
+        panel: What is shown.
+        share: Pixels in which each part is seen.
+        corner: Left and top of its picture [px].
+
+    """
+    left, top = corner
+    middle, below = left + SHOWN[0] / 2, top + SHOWN[1]
+    if isinstance(panel, Names):
+        made = legend(_entries(panel, share), middle, below + 6)
+    else:
+        made = scale(*_scale(panel), middle, below + 19)
+    title = Line(panel.title, (left, top - 9), "ls", LARGE)
+    return Key((title, *made.lines), made.swatches)
 
 
 def strip(film: Film, path: Path, count: int = 6, width: int = 340) -> None:
@@ -137,11 +145,16 @@ def row_of(pictures: Sequence[np.ndarray], words: Sequence[str], path: Path) -> 
         row.paste(Image.fromarray(picture), (k * (width + gap), 0))
         middle = (k * (width + gap) + width / 2, height + foot / 2 + 1)
         draw.text(middle, label, fill=INK, font=font, anchor="mm")
+    _save(row, path)
+
+
+def _save(page: Image.Image, path: Path) -> None:
+    """Write a PNG whole or not at all."""
     with writing(path):
         path.parent.mkdir(parents=True, exist_ok=True)
         partial = path.with_name(f".{path.stem}.{os.getpid()}.part.png")
         try:
-            row.save(partial)
+            page.save(partial)
             partial.replace(path)
         finally:
             partial.unlink(missing_ok=True)
@@ -195,16 +208,6 @@ def shades(panel: Names | Numbers) -> Float[np.ndarray, "K 3"]:
     return colours.turbo(panel.value or [0.0], panel.log)[0]
 
 
-def _coloured(
-    panel: Names | Numbers,
-) -> tuple[np.ndarray, Callable[[Axes, np.ndarray], None]]:
-    """Give the colour of every part (K, 3) sRGB, and what draws the key."""
-    if isinstance(panel, Names):
-        return shades(panel), lambda axes, share: _legend(axes, panel, share)
-    _, low, high = colours.turbo(panel.value or [0.0], panel.log)
-    return shades(panel), lambda axes, share: _scale(axes, panel, low, high)
-
-
 def _painted(stage: Stage, parts: Parts, colour_of_part: np.ndarray) -> Stage:
     table = np.vstack([colour_of_part, [[0.75] * 3]])
     return stage.painted(linear(table)[parts.part_of_point], PAPER)
@@ -216,54 +219,33 @@ def _share(seen: np.ndarray, parts: Parts) -> np.ndarray:
     return np.bincount(part[part >= 0], minlength=len(parts.catalogue))
 
 
-def _legend(axes: Axes, panel: Names, share: np.ndarray) -> None:
+def _entries(panel: Names, share: np.ndarray) -> list[Entry]:
     """List names by how much is seen of them; as many as fit."""
     total: dict[str, float] = {}
-    colour: dict[str, Any] = {}
+    colour: dict[str, colours.Colour] = {}
     for k, label in enumerate(panel.label):
         name = drawable(label, f"{panel.title.lower()} {panel.label.index(label) + 1}")
         total[name] = total.get(name, 0) + float(share[k])
         colour[name] = panel.colour[k]
     ranked = sorted(total, key=lambda n: (-total[n], n))
     shown = ranked if len(ranked) <= ENTRIES else ranked[: ENTRIES - 1]
-    keys = [Patch(facecolor=colour[n], edgecolor="none", label=_cut(n)) for n in shown]
-    if len(ranked) > len(shown):
-        rest = f"and {len(ranked) - len(shown)} more"
-        keys.append(Patch(facecolor="none", edgecolor="none", label=rest))
-    axes.legend(
-        handles=keys,
-        loc="upper center",
-        bbox_to_anchor=(0.5, -0.01),
-        ncols=2 if len(keys) > 1 else 1,
-        frameon=False,
-        fontsize=10.5,
-        labelcolor=INK,
-        handlelength=1.0,
-        handleheight=1.0,
-        columnspacing=1.6,
-        labelspacing=0.35,
-    )
+    rest = [Entry(f"and {len(ranked) - len(shown)} more", None)] if len(ranked) > len(shown) else []
+    return [*(Entry(_cut(n), colour[n]) for n in shown), *rest]
 
 
 def _cut(name: str) -> str:
     return name if len(name) <= LETTERS else name[: LETTERS - 1].rstrip() + "…"
 
 
-def _scale(axes: Axes, panel: Numbers, low: float, high: float) -> None:
-    """Draw a bar of the colours with the lowest, the highest and what lies between."""
-    inset = axes.inset_axes((0.1, -0.1, 0.8, 0.045))
-    flat = high - low <= 1e-9 * max(abs(high), 1e-30)
-    middle = np.sqrt(low * high) if panel.log else (low + high) / 2
+def _scale(panel: Numbers) -> tuple[list[Mark], np.ndarray]:
+    """Give the lowest value, the highest and what lies between, and the colours along them."""
+    _, low, high = colours.turbo(panel.value or [0.0], panel.log)
     ramp = colours.ramp(np.linspace(0, 1, 256))
-    if flat:
-        ramp[:] = ramp[128]
-    inset.imshow(ramp[None], aspect="auto", extent=(0, 1, 0, 1))
-    marks = [(0.5, low)] if flat else [(0.0, low), (0.5, middle), (1.0, high)]
-    inset.set_yticks([])
-    inset.set_xticks([x for x, _ in marks], [si(v, panel.unit) for _, v in marks])
-    inset.tick_params(labelsize=10.5, length=3, color="#888888", labelcolor=INK)
-    for spine in inset.spines.values():
-        spine.set_visible(False)
+    if high - low <= 1e-9 * max(abs(high), 1e-30):
+        return [Mark(0.5, si(low, panel.unit))], np.repeat(ramp[128:129], 256, axis=0)
+    middle = np.sqrt(low * high) if panel.log else (low + high) / 2
+    marks = [(0.0, low), (0.5, float(middle)), (1.0, high)]
+    return [Mark(x, si(value, panel.unit)) for x, value in marks], ramp
 
 
 def _boxes(scene: Scene) -> np.ndarray:

@@ -89,7 +89,7 @@ def ground(
     entries = [_entry(w, config) for w in words]
     made = tuple(_material(e, w) for e, w in zip(entries, words, strict=True))
     structures = tuple(
-        with_air(_structure(m, w, config), m, w, radius(scene, part.object))
+        _built(m, w, config, scene, part.object)
         for m, w, part in zip(made, words, parts.catalogue, strict=True)
     )
     touching = pairs(words, made, structures, config)
@@ -254,6 +254,16 @@ def _structure(material: Material, words: PartWords, config: GroundConfig) -> St
     inner = inside.pick(_inner_grounds(inside, words))
     reason = f"{reason} It is filled with {inner.name}. {full}".strip()
     return Structure("filled", thickness, reason, inner, fill, loose=_flows(inside))
+
+
+def _built(
+    material: Material, words: PartWords, config: GroundConfig, scene: Scene, number: int
+) -> Structure:
+    """Say how a part of one object is built, and what air is sealed in it."""
+    bare = _structure(material, words, config)
+    if words.inflation is None:
+        return bare
+    return with_air(bare, material, words, radius(scene, number))
 
 
 def radius(scene: Scene, number: int) -> float:

@@ -21,10 +21,11 @@ def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) 
     mass = [b.volume * b.density for b in problem.bodies]
     found = {f.name: np.asarray(getattr(measure, f.name)) for f in fields(Measure)}
     found["lost"] = np.array(np.count_nonzero(measure.lost))
-    found["flow"] = np.array([m @ v for m, v in zip(mass, speed, strict=True)])
-    found["rms_speed"] = np.array(
-        [np.sqrt(m @ v**2 / m.sum()) for m, v in zip(mass, speed, strict=True)]
-    )
+    # Not ``@``: that is a sum of as many parts as BLAS has threads, which spin while they wait.
+    carried_on = [np.einsum("p,p->", m, v) for m, v in zip(mass, speed, strict=True)]
+    squares = [np.einsum("p,p->", m, v**2) for m, v in zip(mass, speed, strict=True)]
+    found["flow"] = np.array(carried_on)
+    found["rms_speed"] = np.sqrt(np.array(squares) / [m.sum() for m in mass])
     found["plane_depth"] = plane_depths(problem, now)
     # What has a prescribed motion may reach into walls, and into others that do.
     prescribed = np.array([body.path is not None for body in problem.bodies])
