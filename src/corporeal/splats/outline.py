@@ -137,12 +137,15 @@ def _leeway(mesh: Mesh) -> Float[np.ndarray, "2 N"]:
         met, ray, _ = rays.intersects_location(begin, way, multiple_hits=False)
         far[ray] = FARTHEST * np.linalg.norm(met - begin[ray], axis=1)
         np.minimum.at(room, mesh.triangles.ravel(), np.repeat(far, 3))
-        _evened(room, mesh)
+    _evened(out[0], mesh)
     return out
 
 
 def _evened(room: Float[np.ndarray, " N"], mesh: Mesh) -> None:
-    """Let no vertex move much farther than its neighbours may, so that no rim is folded over."""
+    """Let no vertex move much farther than its neighbours may, so that no rim is folded over.
+
+    That is asked of moves inwards: outwards rough surfaces have gaps everywhere, and would stay.
+    """
     f = mesh.triangles
     a, b = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]]).T
     wider = SLOPE * np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
