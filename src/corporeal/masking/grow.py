@@ -16,6 +16,7 @@ from scipy.ndimage import binary_dilation, label
 
 from corporeal.geometry.cropped import cropped
 from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
+from corporeal.masking.floor_colour import shaded_floor
 from corporeal.masking.floor_pattern import shows_floor
 from corporeal.masking.holes import closed
 from corporeal.masking.reduced import reduced
@@ -30,7 +31,8 @@ ROUGH, FINE = 192, 384
 """Longer side of the pictures that rounds look at, and of the masks that come out [px]."""
 ROUNDS = 4
 FLOOR = 6.0
-"""Evidence against a pixel that shows the floor's pattern: more than any colour's for it."""
+"""Evidence against a pixel that shows the floor's pattern, or a shade of its colour: more than any
+colour's for it."""
 IN_HULL, BESIDE_HULL = -0.5, 2.0
 """Evidence against a pixel that is in the silhouette of the hull, and of one well beside it."""
 MARGIN = 0.03
@@ -53,7 +55,8 @@ class Grown:
     settled: float
     """The same, of masks of the last round and the one before."""
     alike: float
-    """Overlap of the colours inside and outside, 0 to 1."""
+    """Overlap of the colours inside and outside, 0 to 1, times the share of the pixels next to the
+    outlines that colours alone tell."""
     outer: float
     """Share of the hull's cells at the edge of the ball that cameras look at."""
     cropped: float
@@ -100,6 +103,7 @@ def grow(
     rough = reduced(views, ROUGH)
     side, room = _Side(rough), volume(rough.cameras, seeds.around, seeds.floor, seeds.cone)
     floor = shows_floor(views, seeds.floor, seeds.around)
+    floor |= shaded_floor(views, seeds.floor, seeds.around)
     on_floor = np.float32(FLOOR) * _shrunk(floor, rough.rgb.shape[1:3])
     inside, outside = (histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
     never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0)) + on_floor
@@ -119,7 +123,7 @@ def grow(
         inside=closed(_drawn(views, state, floor), rough.cameras, room),
         coherence=_agreement(state.masks, state.silhouettes),
         settled=_agreement(state.masks, before),
-        alike=overlap(evidence.inside, evidence.outside),
+        alike=overlap(evidence.inside, evidence.outside) * (1 - _told(state.masks, on_floor)),
         outer=state.outer,
         cropped=float(cropped(state.masks).mean()),
         share=float(state.masks.mean()),
@@ -196,6 +200,12 @@ def _shrunk(
 def _widened(seen: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, "V H W"]:
     steps = max(1, round(MARGIN * seen.shape[2]))
     return np.stack([binary_dilation(one, iterations=steps) for one in seen])
+
+
+def _told(masks: Bool[np.ndarray, "V H W"], on_floor: Float32[np.ndarray, "V H W"]) -> float:
+    """Return the share of the pixels around masks that are on the floor for certain."""
+    around = _widened(masks) & ~masks
+    return float((on_floor[around] > 0).mean()) if around.any() else 0.0
 
 
 def _agreement(a: Bool[np.ndarray, "V H W"], b: Bool[np.ndarray, "V H W"]) -> float:

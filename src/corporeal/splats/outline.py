@@ -4,11 +4,14 @@ What carves space are depths, which are off by a pixel or two where an object is
 mostly all to the same side. Outlines are known to a tenth of a pixel. Wherever the surface's own
 outline differs from the object's, the surface there is moved along its normal by as much, and what
 lies between goes along (compare Kolev and Cremers 2008, who add outlines to stereo as constraints).
+No side of a wall, and none of a gap, is moved as far as its middle: else thin things would be
+turned inside out, and from then on every round would make them larger.
 """
 
 from dataclasses import dataclass
 
 import numpy as np
+import trimesh
 from jaxtyping import Bool, Float, Float32
 
 from corporeal.geometry.mesh import Mesh
@@ -18,7 +21,7 @@ from corporeal.splats.kernels_outline import outline, stray
 from corporeal.splats.thread_pool import ThreadPool
 
 REACH = 4
-"""Outlines may be so many pixels apart."""
+"""Outlines may be so many pixels apart, and nothing is moved farther."""
 STEEP = 0.35
 """Cosine between normal and view up to which a vertex may be on an outline: 20°."""
 EDGE = 0.6
@@ -31,6 +34,13 @@ SPREAD = 6
 """How often a move is shared with neighbours."""
 PRIOR = 0.05
 """Outlines that the median of all counts for, where the surface is seen."""
+FARTHEST = 0.4
+"""Share of a wall's thickness, and of a gap's width, that either side of it may be moved by."""
+SLOPE, RINGS = 0.5, 12
+"""How much farther a vertex may be moved than one beside it, in the length between, and up to how
+many vertices away that is looked at."""
+OFF = 1e-6
+"""Rays begin so far off the surface, in its longest sides, so as not to meet where they begin."""
 
 
 @dataclass(frozen=True)
@@ -84,6 +94,7 @@ def fitted(
     mean, out = means(mesh), np.empty((views, len(mesh.vertices)), np.float32)
     rule = np.array([STEEP, REACH, EDGE])
     lies = mesh.vertices[:, 2] < floor + ON
+    begun, leeway = mesh, np.minimum(_leeway(mesh), REACH * _pixel(mesh, outlines))
     for _ in range(ROUNDS):
         normals = mesh.vertex_normals
         rest = mesh.vertices, mesh.triangles, normals, outlines.cameras, outlines.distance
@@ -97,7 +108,57 @@ def fitted(
             total, count = mean @ total, mean @ count
         prior = PRIOR * seen
         move = (total + prior * median) / (count + PRIOR)
-        vertices = mesh.vertices + np.where(still, 0, move)[:, None] * normals
+        vertices = mesh.vertices + np.where(still, 0, move)[:, None] * begun.vertex_normals
         vertices[lies, 2] = floor
         mesh = smoothed(Mesh(vertices, mesh.triangles), floor, 2, mean)
+        mesh = _held(mesh, begun, leeway)
     return mesh
+
+
+def _pixel(mesh: Mesh, outlines: Outlines) -> float:
+    """Return how wide a pixel is at a surface, in the middle view [m]."""
+    pose = outlines.cameras[:, :12].reshape(-1, 3, 4)
+    ahead = pose[:, 2, :3] @ mesh.vertices.mean(axis=0) + pose[:, 2, 3]
+    return float(np.median(np.abs(ahead) / outlines.cameras[:, 12]))
+
+
+def _leeway(mesh: Mesh) -> Float[np.ndarray, "2 N"]:
+    """Return how far vertices may be moved inwards, and outwards [m]; inf: nothing is in the way.
+
+    So that both sides of a wall, or of a gap, may be moved at once.
+    """
+    rays = trimesh.Trimesh(mesh.vertices, mesh.triangles, process=False).ray
+    off = OFF * float(np.ptp(mesh.vertices, axis=0).max())
+    middles, normals = mesh.corners.mean(axis=1), mesh.area_vectors
+    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), np.finfo(float).tiny)
+    out = np.full((2, len(mesh.vertices)), np.inf)
+    for room, way in zip(out, (-normals, normals), strict=True):
+        begin, far = middles + off * way, np.full(len(middles), np.inf)
+        met, ray, _ = rays.intersects_location(begin, way, multiple_hits=False)
+        far[ray] = FARTHEST * np.linalg.norm(met - begin[ray], axis=1)
+        np.minimum.at(room, mesh.triangles.ravel(), np.repeat(far, 3))
+    _evened(out[0], mesh)
+    return out
+
+
+def _evened(room: Float[np.ndarray, " N"], mesh: Mesh) -> None:
+    """Let no vertex move much farther than its neighbours may, so that no rim is folded over.
+
+    That is asked of moves inwards: outwards rough surfaces have gaps everywhere, and would stay.
+    """
+    f = mesh.triangles
+    a, b = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]]).T
+    wider = SLOPE * np.linalg.norm(mesh.vertices[a] - mesh.vertices[b], axis=1)
+    for _ in range(RINGS):
+        np.minimum.at(room, a, room[b] + wider)
+        np.minimum.at(room, b, room[a] + wider)
+
+
+def _held(mesh: Mesh, begun: Mesh, leeway: Float[np.ndarray, "2 N"]) -> Mesh:
+    """Return a mesh no vertex of which is farther from where it began than it may be."""
+    moved = mesh.vertices - begun.vertices
+    inwards = (moved * begun.vertex_normals).sum(axis=1) < 0
+    room = np.where(inwards, *leeway)
+    far = np.linalg.norm(moved, axis=1)
+    share = np.minimum(1, room / np.maximum(far, np.finfo(float).tiny))
+    return Mesh(begun.vertices + share[:, None] * moved, mesh.triangles)
