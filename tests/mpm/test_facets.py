@@ -38,7 +38,7 @@ def board(middle, size=SIZE, **given):
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
     surface, rows = flat_faces(size)
     moved = {"surface": surface + middle, "rounding": rows}
-    return body(points + middle, rigid=True, name="board", density=8000.0, **moved, **given)
+    return body(points + middle, rigid=True, name="board", density=8000.0, **moved | given)
 
 
 def over(centre, **given):
@@ -92,3 +92,23 @@ def test_a_thin_board_that_is_moved_has_its_own_surface(engine, known):
     assert sure.measure().pair_impulse[0, 1] > 0
     apart = np.abs(ours.snapshot().position - sure.snapshot().position).max()
     assert apart < (2e-4 if known else 0.05) * CELL
+
+
+@pytest.mark.parametrize("engine", ["cpu", "cuda", "reference"])
+def test_a_tiny_ball_is_not_held_by_the_far_face_of_a_sheet(engine):
+    """That face lies less than the reach of contact behind its top, and looks the other way."""
+    radius, size = 0.05 * CELL, np.array([0.2, 0.12, 0.05 * CELL])
+    high = np.array([0.0, 0.0, TOP + radius])
+    model = round_body((0.0, 0.0, 0.0), count=40)
+    rows = model.rounding.copy()
+    rows[:, 6], rows[:, 8] = radius, 0.4 * radius
+    given = {"surface": high + radius * rows[:, :3], "rounding": rows, "velocity": (0.0, 0.0, 0.2)}
+    tiny = body(high[None], rigid=True, spacing=radius, **given)
+    surface, faces = flat_faces(size)
+    middle = np.array([0.0, 0.0, TOP - size[2] / 2])
+    sheet = board(middle, np.array([0.2, 0.12, CELL]), surface=surface + middle, rounding=faces)
+    engines = ENGINES | {"reference": ReferenceEngine}
+    run = engines[engine](problem(tiny, sheet, planes=(), gravity=(0.0, 0.0, 0.0)))
+    run.advance(2e-3)
+    found = run.measure()
+    assert found.momentum[0, 2] == pytest.approx(0.2 * found.mass[0], rel=1e-6)
