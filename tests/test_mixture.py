@@ -7,7 +7,6 @@ import pytest
 import trimesh
 
 from corporeal import materials
-from corporeal.materials.placement import choices, usual
 from corporeal.materials.scale import place
 from corporeal.mixture import (
     PACKAGING,
@@ -253,20 +252,6 @@ def test_a_wall_as_thick_as_a_scan_draws_it_is_as_open_as_the_scan():
     inventory = replace(inventory, objects=(ObjectWords("bowl_0", "bowl", (stated,)),))
     field = ground(scale.scene, scale.parts, inventory, scale.grounding)
     assert scale.of(field, [1.2])[0] == pytest.approx(scale.of(field)[0], rel=1e-6)
-
-
-def test_a_wall_that_a_model_was_asked_for_in_vain_is_as_thick_as_such_walls_usually_are():
-    """The report says that the usual value was taken; so it is, not what the mesh draws."""
-    scale, inventory = scanned_bowl()
-    (words,) = inventory.objects[0].parts
-    entry = materials.find("ceramic")
-    places = usual(choices(words), "The model gave no usable answer: the usual value.")
-    unsaid = replace(words, placements=places)
-    inventory = replace(inventory, objects=(ObjectWords("bowl_0", "bowl", (unsaid,)),))
-    area = scale.members[0].face_area
-    wall = entry.ranges["shell_thickness"].typical
-    expected = entry.ranges["density"].typical * area * wall
-    assert scale.mass(inventory) == pytest.approx(expected, rel=0.05)
 
 
 def test_an_ensemble_draws_ways_as_often_as_the_evidence_leaves_them_likely():

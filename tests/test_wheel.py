@@ -12,7 +12,7 @@ import corporeal
 
 ROOT = Path(__file__).resolve().parents[1]
 PACKAGE = Path(corporeal.__file__).parent
-READ = {".py", ".toml", ".html", ".css", ".js", ".txt", ".cpp", ".h", ".md"}
+READ = {".py", ".toml", ".html", ".css", ".js", ".txt", ".cpp", ".h", ".md", ".csv"}
 """Kinds of files that the package is made of."""
 SMALL = ("--duration", "0.1", "--fps", "10", "--width", "160", "--height", "120")
 

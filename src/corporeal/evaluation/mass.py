@@ -22,7 +22,7 @@ from corporeal.evaluation.metrics import Errors, coverage, errors
 from corporeal.evaluation.truth import Weighed
 from corporeal.geometry.arrangement import life_sized
 from corporeal.mixture import DRAWS, HIGH, LOW, Scale, summed, weighed
-from corporeal.stages.assemble import AssembleConfig, assemble
+from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import describe
 from corporeal.stages.ground import GroundConfig
 from corporeal.stages.segment import segment
@@ -150,7 +150,7 @@ def predict(
     obj: Weighed, describing: DescribeConfig, grounding: GroundConfig, config: MassConfig
 ) -> Prediction:
     """Predict one object's mass at its real size by every method that needs no other object."""
-    scene = life_sized(assemble([obj.file], AssembleConfig(objects="one")))
+    scene = life_sized(assemble([obj.file]))
     if config.anonymous:
         scene = anonymous(scene, obj.file)
     inventory = describe(scene, describing, grounding.library)

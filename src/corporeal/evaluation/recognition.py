@@ -14,7 +14,7 @@ from corporeal.errors import BadFileError, UserError
 from corporeal.evaluation.overlap import roc_area
 from corporeal.evaluation.result_table import Table
 from corporeal.formats.sources import models_in
-from corporeal.stages.assemble import AssembleConfig, assemble
+from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import describe
 
 BANDS = (0.0, 0.35, 0.45, 0.6, 1.01)
@@ -79,7 +79,7 @@ def judge(
     rows = []
     for number, path in enumerate(known):
         progress(number / len(known), path.stem)
-        told = describe(assemble([path], AssembleConfig(objects="one")), config, library)
+        told = describe(assemble([path]), config, library)
         words = {w.name: w for obj in told.objects for w in obj.parts}
         for part, accepted in truth[path.stem].items():
             if part not in words:

@@ -21,7 +21,6 @@ JUDGED = {
     "model": "as a model says",
     "metadata": "as the file's metadata says",
     "evidence": "as fits the estimate of its mass",
-    "fallback": "as such walls usually are, since a model was asked and did not say",
 }
 """The source of a wall's thickness."""
 ALIKE = 0.05
@@ -349,7 +348,7 @@ def wall_of(
 
 
 def judge(words: PartWords) -> str:
-    """Return who stated the thickness, or was asked for it, having seen the object; "": nobody."""
+    """Return who stated the thickness having seen the object; "" for nobody."""
     if "shell_thickness" in words.values:
         return "annotation"
     placed = words.placements.get("shell_thickness")
