@@ -9,13 +9,12 @@ grey has the ratios of everything grey and of every shade of it, and nothing is 
 """
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import map_coordinates, minimum_filter, uniform_filter
 
-from corporeal.geometry.epipolar import projection
 from corporeal.geometry.ground_plane import Plane
 from corporeal.geometry.region import Region
-from corporeal.masking.floor_square import WITNESSES, Square, met, partners, slants, square
+from corporeal.masking.floor_square import WITNESSES, Square, square, witnessed
 from corporeal.types import Camera, Views
 
 PATCH = 5
@@ -47,35 +46,28 @@ def shaded_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.n
         around: The ball that all look at.
 
     """
-    made = np.zeros(views.rgb.shape[:3], np.bool_)
+    nowhere = np.zeros(views.rgb.shape[:3], np.bool_)
     if floor is None or len(views.cameras) <= WITNESSES:
-        return made
+        return nowhere
     ground = square(views.cameras, floor, around)
     pairs = zip(views.rgb, views.cameras, strict=True)
     light, ratios = _parted(_evened(np.stack([_seen(rgb, c, ground) for rgb, c in pairs])))
     like = _like_floor(light, ratios)
-    slant = slants(views.cameras, floor, around)
-    for k, camera in enumerate(views.cameras):
-        others = partners(slant, k)
-        if like is None or len(others) < WITNESSES:
-            continue
+    if like is None:
+        return nowhere
+
+    def agreeing(k: int, others: Int[np.ndarray, " P"]) -> Bool[np.ndarray, "P n n"]:
         with np.errstate(invalid="ignore"):
             agreed = np.abs(light[others] - light[k]) < SHADE
             agreed &= (np.abs(ratios[others] - ratios[k]) < 2 * SHADE).all(axis=-1)
-        on_floor = like[k] & (agreed.sum(axis=0) >= WITNESSES)
-        cell = ground.cells(met(camera, floor)).reshape(made.shape[1:])
-        made[k] = (cell >= 0) & on_floor.ravel()[cell]
-    return made
+        return agreed & like[k]
+
+    return witnessed(views.cameras, floor, around, agreeing)
 
 
 def _seen(rgb: np.ndarray, camera: Camera, ground: Square) -> Float[np.ndarray, "n n 3"]:
     """Return the logarithm of the colour around each cell; nan: not in the picture."""
-    P = projection(camera)
-    u, v, depth = (ground.places() @ P[:, :3].T + P[:, 3]).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = np.stack([v / depth, u / depth]) - 0.5
-    at[:, depth <= 0] = -9
-    size = ground.count, ground.count
+    size, at = (ground.count, ground.count), ground.seen_by(camera)
     out = np.empty((*size, 3))
     for k in range(3):
         one = map_coordinates(rgb[..., k].astype(float), at, order=1, cval=np.nan).reshape(size)

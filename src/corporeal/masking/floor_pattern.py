@@ -9,13 +9,12 @@ above it. Patches are compared by normalised cross-correlation, which shadows le
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 from scipy.ndimage import map_coordinates, minimum_filter, uniform_filter
 
-from corporeal.geometry.epipolar import projection
 from corporeal.geometry.ground_plane import Plane
 from corporeal.geometry.region import Region
-from corporeal.masking.floor_square import WITNESSES, met, partners, slants, square
+from corporeal.masking.floor_square import WITNESSES, Square, square, witnessed
 from corporeal.types import Camera, Views
 
 PATCH = 7
@@ -35,24 +34,15 @@ def shows_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.nd
         around: The ball that all look at.
 
     """
-    made = np.zeros(views.rgb.shape[:3], np.bool_)
     if floor is None or len(views.cameras) <= WITNESSES:
-        return made
+        return np.zeros(views.rgb.shape[:3], np.bool_)
     ground = square(views.cameras, floor, around)
-    places = ground.places()
-    seen = [
-        _seen(rgb, c, places, ground.count) for rgb, c in zip(views.rgb, views.cameras, strict=True)
-    ]
-    slant = slants(views.cameras, floor, around)
-    for k, camera in enumerate(views.cameras):
-        others = partners(slant, k)
-        if len(others) < WITNESSES:
-            continue
-        agreed = [_correlation(seen[k], seen[p]) > AGREE for p in others]
-        on_floor = np.sum(agreed, axis=0) >= WITNESSES
-        cell = ground.cells(met(camera, floor)).reshape(made.shape[1:])
-        made[k] = (cell >= 0) & on_floor.ravel()[cell]
-    return made
+    seen = [_seen(rgb, c, ground) for rgb, c in zip(views.rgb, views.cameras, strict=True)]
+
+    def agreeing(k: int, others: Int[np.ndarray, " P"]) -> Bool[np.ndarray, "P n n"]:
+        return np.stack([_correlation(seen[k], seen[p]) > AGREE for p in others])
+
+    return witnessed(views.cameras, floor, around, agreeing)
 
 
 @dataclass(frozen=True)
@@ -66,14 +56,9 @@ class _Seen:
     """0: a part of the patch is not in the picture."""
 
 
-def _seen(rgb: np.ndarray, camera: Camera, places: np.ndarray, count: int) -> _Seen:
-    P = projection(camera)
-    u, v, depth = (places @ P[:, :3].T + P[:, 3]).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        at = np.stack([v / depth, u / depth]) - 0.5
-    at[:, depth <= 0] = -9
-    whole = rgb.mean(axis=-1)
-    grey = map_coordinates(whole, at, order=1, cval=np.nan).reshape(count, count)
+def _seen(rgb: np.ndarray, camera: Camera, ground: Square) -> _Seen:
+    size, at = (ground.count, ground.count), ground.seen_by(camera)
+    grey = map_coordinates(rgb.mean(axis=-1), at, order=1, cval=np.nan).reshape(size)
     shown = minimum_filter(np.isfinite(grey), PATCH)
     grey = np.nan_to_num(grey)  # running sums would carry what is no number along
     mean = uniform_filter(grey, PATCH)

@@ -1,10 +1,12 @@
 """The square of floor under what cameras look at, and where their rays meet it."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
+from corporeal.geometry.epipolar import projection
 from corporeal.geometry.ground_plane import Plane
 from corporeal.geometry.region import Region
 from corporeal.types import Camera
@@ -36,6 +38,15 @@ class Square:
         rows, columns = (x.ravel() for x in np.meshgrid(steps, steps, indexing="ij"))
         return self.corner + rows[:, None] * self.along[0] + columns[:, None] * self.along[1]
 
+    def seen_by(self, camera: Camera) -> Float[np.ndarray, "2 M"]:
+        """Row and column of a picture at which the middles of the cells are; -9: behind it."""
+        P = projection(camera)
+        u, v, depth = (self.places() @ P[:, :3].T + P[:, 3]).T
+        with np.errstate(divide="ignore", invalid="ignore"):
+            at = np.stack([v / depth, u / depth]) - 0.5
+        at[:, depth <= 0] = -9
+        return at
+
     def cells(self, places: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
         """Return in which cell places on the floor are; -1: beside the square."""
         away = np.where(np.isfinite(places), places - self.corner, -1.0)
@@ -56,6 +67,33 @@ def square(cameras: tuple[Camera, ...], floor: Plane, around: Region) -> Square:
     count = int(np.ceil(2 * around.radius / side))
     along = np.linalg.svd(floor.normal[None])[2][1:]
     return Square(foot - count * side / 2 * along.sum(axis=0), along, side, count)
+
+
+def witnessed(
+    cameras: tuple[Camera, ...],
+    floor: Plane,
+    around: Region,
+    agreeing: Callable[[int, Int[np.ndarray, " P"]], Bool[np.ndarray, "P n n"]],
+) -> Bool[np.ndarray, "V H W"]:
+    """Tell which pixels show a place of the floor about which enough views agree.
+
+    Args:
+        cameras: All of one size.
+        floor: The plane that objects stand on, its normal up.
+        around: The ball that all look at.
+        agreeing: Says of a view in which cells of the square others agree with it.
+
+    """
+    made = np.zeros((len(cameras), cameras[0].height, cameras[0].width), np.bool_)
+    ground, slant = square(cameras, floor, around), slants(cameras, floor, around)
+    for k, camera in enumerate(cameras):
+        others = partners(slant, k)
+        if len(others) < WITNESSES:
+            continue
+        on_floor = np.sum(agreeing(k, others), axis=0) >= WITNESSES
+        cell = ground.cells(met(camera, floor)).reshape(made.shape[1:])
+        made[k] = (cell >= 0) & on_floor.ravel()[cell]
+    return made
 
 
 def slants(cameras: tuple[Camera, ...], floor: Plane, around: Region) -> Float[np.ndarray, "V 2"]:
