@@ -41,13 +41,17 @@ VOLUME = 4 / 3 * np.pi * RADIUS**3
 MESH = trimesh.creation.icosphere(3, RADIUS)
 
 
+def one_thing(mesh, name, extent):
+    points, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+    return Scene(
+        "one", "", (SceneObject(f"{name}_0", name, extent),),
+        (Surface(name, 0, 0, points, triangles),), (Finish("plain"),),
+    )  # fmt: skip
+
+
 def a_ball(*ways, evidence=None, **said):
     """A ball of 10 cm that may be several things: (scale, inventory)."""
-    points, triangles = np.asarray(MESH.vertices), np.asarray(MESH.faces, dtype=np.int64)
-    scene = Scene(
-        "one", "", (SceneObject("ball_0", "ball", 0.1),),
-        (Surface("ball", 0, 0, points, triangles),), (Finish("plain"),),
-    )  # fmt: skip
+    scene = one_thing(MESH, "ball", 0.1)
     inventory = describe(scene)
     (part,) = inventory.objects[0].parts
     words = replace(in_way(PartWords(part.name, None), ways[0]), hypotheses=ways, **said)
@@ -230,11 +234,7 @@ def scanned_bowl():
     bowl = trimesh.creation.revolve(profile, sections=60)
     bowl = trimesh.Trimesh(*trimesh.remesh.subdivide_to_size(bowl.vertices, bowl.faces, 0.02))
     bowl.merge_vertices()
-    points, triangles = np.asarray(bowl.vertices), np.asarray(bowl.faces, dtype=np.int64)
-    scene = Scene(
-        "one", "", (SceneObject("bowl_0", "bowl", 0.16),),
-        (Surface("bowl", 0, 0, points, triangles),), (Finish("plain"),),
-    )  # fmt: skip
+    scene = one_thing(bowl, "bowl", 0.16)
     inventory = describe(scene)
     words = PartWords(inventory.objects[0].parts[0].name, "ceramic", "sheet")
     words = replace(words, built_by="model", answered_by="model")
