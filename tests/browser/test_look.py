@@ -15,6 +15,7 @@ from corporeal.render.viewer_page import inline_view
 from corporeal.types import Cloud, Gaussians, Reconstruction
 
 READY = "window.viewer?.stats.ready && viewer.stats.drawn > 2"
+CONTEXT = "viewer.renderer.getContext()"
 MIDDLE = """(() => {
   const stage = viewer.stages[0], mesh = stage.meshes.find(m => m.surface.object === OBJECT)
   mesh.geometry.computeBoundingBox()
@@ -162,7 +163,23 @@ def test_gaussians_stand_for_surfaces_and_move_with_them(small_run, tmp_path):
         assert tab.run("viewer.stages[0].splats") is None
         # Hidden with their object.
         tab.run("viewer.by.value = 'itself', viewer.paint('itself')")
-        assert tab.run(RED)[0] > 100
+        tab.until(f"{RED}[0] > 100")
         tab.run("viewer.stages[0].reveal(0, false)")
-        assert tab.run(RED)[0] == 0
+        tab.until(f"{RED}[0] === 0")
         assert tab.errors == []
+
+
+@pytest.mark.slow
+def test_a_lost_context_is_drawn_anew_without_a_touch(report, tmp_path):
+    with browser(tmp_path) as tab:
+        tab.open(report.as_uri())
+        tab.until(READY)
+        tab.run("viewer.pause()")
+        tab.until("!viewer.dirty && viewer.ratio > viewer.dense")
+        before = colours_in(tab.picture(tmp_path / "before.png"))
+        tab.run(f"window.lost = {CONTEXT}.getExtension('WEBGL_lose_context'), lost.loseContext()")
+        tab.until(f"{CONTEXT}.isContextLost()")
+        drawn = tab.run("viewer.stats.drawn")
+        tab.run("lost.restoreContext()")
+        tab.until(f"viewer.stats.drawn > {drawn} && !viewer.dirty")
+        assert colours_in(tab.picture(tmp_path / "after.png")) > 0.9 * before

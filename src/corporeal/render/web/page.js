@@ -251,6 +251,8 @@ export class Viewer {
     this.look()
     this.canvas.addEventListener('pointerdown', event => this.pressed(event), true)
     this.canvas.addEventListener('pointerup', event => this.released(event))
+    // A browser takes the graphics away when a laptop sleeps or a driver stalls, and gives them back empty.
+    this.canvas.addEventListener('webglcontextrestored', () => this.touch())
     this.last = performance.now()
     this.changed = this.last
     requestAnimationFrame(now => this.tick(now))
