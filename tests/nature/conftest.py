@@ -2,6 +2,7 @@
 
 from functools import cache, partial
 
+import jaxtyping
 import pytest
 from laws.suite import CASES
 
@@ -10,6 +11,17 @@ from corporeal.mpm.problem import MENU
 
 ROUND_OFF = {"reference": 1e-12, "cpu": 1e-5, "cuda": 1e-5}
 SLOWLY = {name: pytest.param(name, marks=pytest.mark.slow) for name in ROUND_OFF}
+
+
+@pytest.fixture(autouse=True)
+def unchecked():
+    """Leave shapes to the tests of each function: here the same ones come in every step.
+
+    A quarter of the reference's time went to checking them thousands of times.
+    """
+    jaxtyping.config.update("jaxtyping_disable", True)
+    yield
+    jaxtyping.config.update("jaxtyping_disable", False)
 
 
 @cache
