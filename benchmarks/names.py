@@ -1,10 +1,13 @@
 """Measure what a name and a plain shape become without a model: material, build, mass, warnings.
 
     python benchmarks/names.py [--list TOML] [--only NAME ...] [--json FILE] [--against FILE]
+    python benchmarks/names.py --units
 
 The list (recognition/names.toml) says of every thing what it may be made of and what it weighs in
 life. Each is written to a GLB whose name is all that tells what it is, and goes through the same
 functions as a run. ``--against`` names a file that ``--json`` wrote and prints what differs.
+``--units`` writes every file in centimetres, inches and millimetres instead, as if it were in
+metres, and prints the names about whose size and mass nothing is said.
 """
 
 import argparse
@@ -35,6 +38,8 @@ WITHIN = 2.5
 """Factor beyond the masses in life from which a mass is implausible."""
 UP = trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0))
 VERDICTS = ("right", "wrong", "unknown")
+UNITS = {"centimetres": 0.01, "inches": 0.0254, "millimetres": 0.001}
+"""Units of files that do not say so [m]."""
 
 
 @dataclass(frozen=True)
@@ -121,10 +126,14 @@ def main() -> None:
     parser.add_argument("--list", type=Path, default=LIST)
     parser.add_argument("--only", nargs="+", help="these names alone")
     parser.add_argument("--json", type=Path, help="keep what was found in this file")
+    parser.add_argument("--units", action="store_true", help="files in artists' units")
     parser.add_argument("--against", type=Path, help="print what differs from such a file")
     asked = parser.parse_args()
     rows = tomllib.loads(asked.list.read_text(encoding="utf-8"))["things"]
     rows = [r for r in rows if not asked.only or r["name"] in asked.only]
+    if asked.units:
+        print(in_wrong_units(rows))
+        return
     with TemporaryDirectory() as folder:
         found = [look_at(row, Path(folder)) for row in rows]
     for one in found:
@@ -136,6 +145,17 @@ def main() -> None:
         before = {row["name"]: Found(**row) for row in json.loads(asked.against.read_text())}
         differ = [f for f in found if f.name in before and _changed(before[f.name], f)]
         print("\n".join(f"- {_line(before[f.name])}\n+ {_line(f)}" for f in differ))
+
+
+def in_wrong_units(rows: Sequence[dict]) -> str:
+    """Say about which files in artists' units no warning is given."""
+    lines = []
+    for unit, metres in UNITS.items():
+        with TemporaryDirectory() as folder:
+            found = [look_at(row, Path(folder), metres) for row in rows]
+        silent = [f.name for f in found if not f.warned]
+        lines.append(f"in {unit}: nothing is said of {len(silent)} of {len(rows)}: {silent}")
+    return "\n".join(lines)
 
 
 def summary(found: Sequence[Found]) -> str:

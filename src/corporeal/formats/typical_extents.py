@@ -27,6 +27,8 @@ class TypicalExtent:
     low: float
     usual: float
     high: float
+    part: bool = False
+    """Usually found as a part of something else, such as what somebody wears."""
 
 
 def typical_extent(class_name: str) -> TypicalExtent | None:
@@ -35,7 +37,7 @@ def typical_extent(class_name: str) -> TypicalExtent | None:
     "soda can" for "soda can crushed", "cup" for "tea set cup": English puts the noun last.
     """
     words = words_in(class_name)
-    found = [e for e in _table() if set(e.words.split()) <= set(words)]
+    found = [e for e in _table() if set(singular_words(e.words)) <= set(words)]
     return max(found, key=lambda e: _fit(e, words), default=None)
 
 
@@ -62,9 +64,29 @@ def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str
     return [part for word in tokens for part in compounds.get(word, (word,))]
 
 
+PLURALS = frozenset(
+    "scissors pliers tongs tweezers handcuffs binoculars goggles sunglasses spectacles eyeglasses "
+    "jeans pants trousers tights".split()
+)
+"""Words that stand for one thing in the plural."""
+
+
+def one_of(words: str, has: str, have: str) -> str:
+    """Return a class with its article and verb: "an axe is", "scissors are"."""
+    if words.split()[-1] in PLURALS:
+        return f"{words} {have}"
+    return f"{'an' if words[0] in 'aeiou' else 'a'} {words} {has}"
+
+
+@cache
+def singular_words(phrase: str) -> tuple[str, ...]:
+    """Return the words of a class as they stand among ``nouns``."""
+    return tuple(_singular(w) for w in phrase.split())
+
+
 def joined(phrases: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return phrases of several words, by how they look when they are written as one."""
-    compounds = (tuple(phrase.split()) for phrase in phrases)
+    compounds = (singular_words(phrase) for phrase in phrases)
     return {"".join(words): words for words in compounds if len(words) > 1}
 
 
@@ -77,8 +99,7 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
     size = f"{name} is {_length(extent)} large"
     if known is None:
         return f"{size}: is the file in metres? Give its real size with --extent {name}=METRES."
-    article = "an" if known.words[0] in "aeiou" else "a"
-    usual = f"{article} {known.words} is usually about {_length(known.usual)}"
+    usual = f"{one_of(known.words, 'is', 'are')} usually about {_length(known.usual)}"
     return f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}."
 
 
@@ -122,8 +143,13 @@ def _normalised(extent: float, known: TypicalExtent | None) -> bool:
 
 @cache
 def _table() -> tuple[TypicalExtent, ...]:
-    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    return tuple(TypicalExtent(words, *sizes) for words, sizes in tomllib.loads(text).items())
+    rows = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    alike = [
+        TypicalExtent(words, *row["size"], part=row.get("part", False))
+        for row in rows.pop("alike")
+        for words in row["words"]
+    ]
+    return (*(TypicalExtent(words, *sizes) for words, sizes in rows.items()), *alike)
 
 
 @cache
@@ -132,7 +158,7 @@ def _compounds() -> dict[str, tuple[str, ...]]:
 
 
 def _fit(entry: TypicalExtent, words: list[str]) -> tuple[int, int]:
-    own = entry.words.split()
+    own = singular_words(entry.words)
     return max(words.index(w) for w in own), len(own)
 
 
