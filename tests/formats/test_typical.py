@@ -17,7 +17,7 @@ from corporeal.formats.typical_extents import doubt, typical_extent
         ("teddybear", "teddy bear"),
         ("cardboardbox", "cardboard box"),
         ("football", "football"),
-        ("carpet", None),
+        ("carpet", "carpet"),
         ("canister", None),
     ],
 )

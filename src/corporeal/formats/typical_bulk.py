@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from corporeal.formats.typical_extents import joined, nouns, one_of, singular_words
+from corporeal.formats.typical_extents import fit, joined, nouns, one_of, singular_words
 
 MARGIN = 2.0
 """How far beyond the table an object may be before it is reported, as a factor."""
@@ -51,7 +51,7 @@ def typical_bulk(class_name: str, longest: float) -> TypicalBulk | None:
     named = nouns(class_name, _compounds())
     known = [e for e in _table() if set(singular_words(e.words)) <= set(named)]
     found = [e for e in known if longest >= e.longer]
-    return max(found, key=lambda e: (*_fit(e, named), e.longer), default=None)
+    return max(found, key=lambda e: (*fit(e.words, named), e.longer), default=None)
 
 
 def doubt_mass(
@@ -114,8 +114,3 @@ def _entries(words: str, row: Any) -> list[TypicalBulk]:
 @cache
 def _compounds() -> dict[str, tuple[str, ...]]:
     return joined(e.words for e in _table())
-
-
-def _fit(entry: TypicalBulk, named: list[str]) -> tuple[int, int]:
-    own = singular_words(entry.words)
-    return max(named.index(w) for w in own), len(own)

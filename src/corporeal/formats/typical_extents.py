@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from corporeal.formats.other_languages import in_english
+from corporeal.formats.other_languages import in_english, substances
+from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt
 
 MARGIN = 1.5
 """How far beyond the table an object may be before it is reported."""
@@ -15,6 +16,8 @@ SMALLEST, LARGEST = 0.005, 20.0
 """Extents that would be remarkable for anything in a scene [m]."""
 UNITS = {"metres": 1.0, "centimetres": 1e-2, "millimetres": 1e-3, "inches": 0.0254}
 """What programs usually model in [m]."""
+AS_MATTER = ("marble", "brick", "stone", "rock", "sand", "snow", "mud", "foam", "paper", "glass")
+"""Classes that may be meant as matter where another is named, the least likely last."""
 PRINTED = ("millimetres", "metres", "centimetres", "inches")
 """In which order they are likely in files that are made for printing."""
 
@@ -60,7 +63,8 @@ def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str
 
     """
     said = in_english(re.findall(r"[^\W\d_]+", class_name.lower()))
-    tokens = (_singular(w) for w in said)
+    known = _vocabulary()
+    tokens = spelt([_singular(mended(w, known)) for w in said], known)
     return [part for word in tokens for part in compounds.get(word, (word,))]
 
 
@@ -145,11 +149,11 @@ def _normalised(extent: float, known: TypicalExtent | None) -> bool:
 def _table() -> tuple[TypicalExtent, ...]:
     rows = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     alike = [
-        TypicalExtent(words, *row["size"], part=row.get("part", False))
+        TypicalExtent(words, *map(float, row["size"]), part=row.get("part", False))
         for row in rows.pop("alike")
         for words in row["words"]
     ]
-    return (*(TypicalExtent(words, *sizes) for words, sizes in rows.items()), *alike)
+    return (*(TypicalExtent(words, *map(float, sizes)) for words, sizes in rows.items()), *alike)
 
 
 @cache
@@ -157,20 +161,31 @@ def _compounds() -> dict[str, tuple[str, ...]]:
     return joined(e.words for e in _table())
 
 
-def _fit(entry: TypicalExtent, words: list[str]) -> tuple[int, int]:
-    own = singular_words(entry.words)
-    return max(words.index(w) for w in own), len(own)
+@cache
+def _vocabulary() -> Vocabulary:
+    """Return the words of the table and for substances, for compounds and slips."""
+    things = {singular_words(name)[0] for name in classes() if " " not in name}
+    known = things | {w for name in classes() for w in singular_words(name)} | substances()
+    return Vocabulary(known, substances(), things, _compounds(), by_squeezing([*known, *_compounds()]))
+
+
+def _fit(entry: TypicalExtent, words: list[str]) -> tuple[int, int, int]:
+    return fit(entry.words, words)
+
+
+def fit(phrase: str, words: list[str]) -> tuple[int, int, int]:
+    """Tell how well a class fits a name that has all its words, best last.
+
+    What may be matter as well ("table glass", "lego brick") comes after what cannot; then the last
+    in the name, and the one of most words.
+    """
+    own = singular_words(phrase)
+    matter = AS_MATTER.index(own[0]) + 1 if len(own) == 1 and own[0] in AS_MATTER else 0
+    return -matter, max(words.index(w) for w in own), len(own)
 
 
 def _singular(word: str) -> str:
-    keep = word.endswith("ss") or word in (
-        "scissors",
-        "pliers",
-        "dice",
-        "cactus",
-        "ficus",
-        "fitness",
-    )
+    keep = word.endswith(("ss", "us", "is")) or word in ("scissors", "pliers", "dice")
     return word[:-1] if word.endswith("s") and not keep and len(word) > 3 else word
 
 

@@ -20,6 +20,7 @@ from corporeal.types import (
 )
 from corporeal.vlm.lexicon import (
     KINDS,
+    LOOSE,
     Name,
     Term,
     cast,
@@ -440,13 +441,20 @@ def _names_a_thing(name: Name) -> bool:
 
 
 def _adjectives(name: Name) -> list[Term]:
-    """Find what stands in a name; a substance right before an object is that of such an object."""
+    """Find what stands in a name; a substance right beside an object is that of such an object.
+
+    "Wooden chair", and as files are named "chair_wooden"; what lies loose is no thing's matter.
+    """
     standing = heads(name.words)
     things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
     for k, term in enumerate(standing):
-        behind = next((t for t in things if name.says(term.phrase + t.phrase)), None)
-        if term.kind == "substance" and behind and behind.material not in term.gives_way:
-            standing[k] = _made_as(term, behind)
+        if term.kind != "substance":
+            continue
+        beside = next((t for t in things if name.says(term.phrase + t.phrase)), None)
+        if beside is None and term.material not in LOOSE and not term.colour:
+            beside = next((t for t in things if name.says(t.phrase + term.phrase)), None)
+        if beside and beside.material not in term.gives_way:
+            standing[k] = _made_as(term, beside)
     return standing
 
 
