@@ -50,8 +50,10 @@ def _translated(word: str) -> tuple[str, ...]:
 
 
 def _pieced(word: str) -> tuple[str, ...]:
-    """Return the English of a word that is pieced together of known ones without a gap, as Chinese
-    and Japanese are written: 木箱 is a box of wood."""
+    """Return the English of known words that stand together without a gap; (): some are unknown.
+
+    Chinese and Japanese are written so: 木箱 is a box of wood.
+    """
     found: list[str] = []
     while word:
         known = next((k for k in range(len(word), 0, -1) if word[:k] in _words()), 0)

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 SHORTEST = 3
 """Letters of the shortest word that a compound is taken apart into."""
 LONGER = 4
-"""The same where both words are things: "car" and "pet" make no carpet."""
+"""The same of the first word where both are things: "car" and "pet" make no carpet."""
 DOUBTFUL = 5
 """Letters of the shortest word whose spelling is mended."""
 REAL = frozenset(("canon",))
@@ -88,8 +88,6 @@ def _apart(word: str, known: Vocabulary) -> tuple[str, ...]:
     cuts = [(word[:k], word[k:]) for k in range(SHORTEST, len(word) - SHORTEST + 1)]
     of_matter = ((a, b) for a, b in cuts if a in known.first and b in known.last)
     of_things = (
-        (a, b)
-        for a, b in cuts
-        if min(len(a), len(b)) >= LONGER and a in known.words and b in known.last
+        (a, b) for a, b in cuts if len(a) >= LONGER and a in known.words and b in known.last
     )
     return next(of_matter, None) or next(of_things, (word,))

@@ -166,7 +166,9 @@ def _vocabulary() -> Vocabulary:
     """Return the words of the table and for substances, for compounds and slips."""
     things = {singular_words(name)[0] for name in classes() if " " not in name}
     known = things | {w for name in classes() for w in singular_words(name)} | substances()
-    return Vocabulary(known, substances(), things, _compounds(), by_squeezing([*known, *_compounds()]))
+    return Vocabulary(
+        known, substances(), things, _compounds(), by_squeezing([*known, *_compounds()])
+    )
 
 
 def _fit(entry: TypicalExtent, words: list[str]) -> tuple[int, int, int]:

@@ -141,7 +141,7 @@ def _thick_block(obj: SceneObject, made: Make, words: PartWords, thickest: float
     if through <= LAYERS * thickest:
         return ""
     return (
-        f"{obj.name}: {words.name} is {words.material} all through, {100 * through:.2g} cm thick, and "
-        f"that comes in sheets of up to {1e3 * thickest:.2g} mm: it may be many times too heavy. Say "
-        f"what is behind the sheet with --annotations."
+        f"{obj.name}: {words.name} is {words.material} all through, {100 * through:.2g} cm thick, "
+        f"and that comes in sheets of up to {1e3 * thickest:.2g} mm: it may be many times too "
+        "heavy. Say what is behind the sheet with --annotations."
     )

@@ -15,6 +15,8 @@ from corporeal.types import Finish
 
 LOOSE = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
 """What no container is made of: a compost bin has some in it."""
+SHAPED = frozenset(("statue", "sculpture", "bust", "figure", "castle", "ball"))
+"""Things that are made of it: a snow shoe is not."""
 OF_IT = frozenset(("block", "ring", "bag"))
 """What is all of it even so: a bag of sand is sand."""
 KINDS = ("substance", "piece", "thing")
@@ -226,6 +228,11 @@ def _as_seen(light: float) -> float:
     """Linear light to sRGB (IEC 61966-2-1)."""
     c = min(max(light, 0.0), 1.0)
     return 12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055
+
+
+def kin(one: str, other: str) -> bool:
+    """Tell whether things of either of two materials have walls of the same thickness."""
+    return one == other or any({one, other} <= set(alike) for alike in _table()["kin"])
 
 
 @cache
