@@ -279,11 +279,11 @@ def hollowed(
         from_pictures: Whether its shape is from pictures, which need not show how deep a vessel is.
 
     """
-    bare = words.material is not None and not walled(words.material)
-    if bare and words.structure is not None and words.thickness is None:
-        return replace(words, structure=None, contents=None, fill=None)
-    if words.structure is not None or bare:
+    if words.structure is not None and words.thickness is not None:
         return words
+    bare = words.material is not None and not walled(words.material)
+    if words.structure is not None or bare:
+        return replace(words, structure=None, contents=None, fill=None) if bare else words
     if from_pictures and any(open_ware(name.words) for name in evidence.general):
         return replace(words, structure="sheet", wall_unseen=True)
     is_hollow = any(hollow(name.words) for name in evidence.general)
