@@ -68,7 +68,8 @@ def _pieced(word: str) -> tuple[str, ...]:
 def substances() -> frozenset[str]:
     """Return the English words for substances that other languages are put into, one word each."""
     text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    return frozenset(w for w in tomllib.loads(text)["substances"] if " " not in w)
+    tables = [table for name, table in tomllib.loads(text).items() if name == "substances"]
+    return frozenset(w for table in tables for w in table if " " not in w)
 
 
 @cache
