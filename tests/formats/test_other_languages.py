@@ -83,3 +83,9 @@ def test_most_things_have_a_usual_size_or_weight():
 def test_sizes_and_weights_are_found_by_foreign_names(found, words):
     assert found is not None
     assert found.words == words
+
+
+def test_words_without_gaps_between_them_are_pieced_apart():
+    assert in_english(["木箱"]) == ["wood", "box"]
+    assert in_english(["塑料瓶"]) == ["plastic", "bottle"]
+    assert in_english(["木星"]) == ["木星"]

@@ -61,3 +61,14 @@ def test_a_face_is_judged_as_large_as_it_is_in_life():
     assert said_of(scaled(ball, 0.1), "ball_0 weighs") == [life]
     golf = replace(ball.objects[0], class_name="golf ball")
     assert "cubic metre" in said_of(replace(ball, objects=(golf,)), "ball_0 weighs")[0]
+
+
+def test_a_block_of_what_comes_in_sheets_is_told():
+    """A pouf of leather weighed 70 kg without a word; a strap is as thick as it is drawn."""
+    for side, told in ((0.4, 1), (0.01, 0)):
+        mesh = trimesh.creation.box((0.4, side, side)).apply_translation((0, 0, side / 2))
+        points, triangles = np.asarray(mesh.vertices), np.asarray(mesh.faces, dtype=np.int64)
+        surface = Surface("thing", 0, 0, points, triangles)
+        thing = SceneObject("leather_thing_0", "leather thing", 0.4)
+        scene = Scene("one", "", (thing,), (surface,), (plain(),))
+        assert len(said_of(scene, "that comes in sheets of up to 5 mm")) == told

@@ -5,7 +5,7 @@ import pytest
 
 from corporeal import materials
 from corporeal.geometry.identity import identify
-from corporeal.types import Finish, SceneObject
+from corporeal.types import Finish, PartWords, SceneObject
 from corporeal.vlm.lexicon import lexicon, metals, tokens_of
 from corporeal.vlm.metadata import Evidence, evidence, hollowed, matter_hint, recognise
 from handmade import plain, scene
@@ -41,6 +41,7 @@ def test_every_solid_of_the_library_is_known_by_its_name():
     """A material that has a name there is not unknown, nor taken for another, in a file."""
     cores = {"baseball_core", "golf_ball_core", "softball_core"}
     elsewhere = {"aluminium_can_sheet", "leaf_tissue", "leaves-flowers", "battery_cell"}
+    elsewhere |= {"horn"}  # an instrument as often
     colours = {"gold", "silver"}
     only_held = {"liquid", "bulk", "food"}
     said = {
@@ -367,3 +368,39 @@ def test_what_is_said_of_how_it_is_built_outranks_what_it_is():
     known = about("mesh", "box")
     solid = replace(recognise(known), structure="solid")
     assert hollowed(solid, known, lambda _: True) == solid
+
+
+@pytest.mark.parametrize(
+    ("thing", "material"), [("snow globe", "hard_plastic"), ("sand barrel", "wood")]
+)
+def test_no_wall_is_made_of_what_lies_loose(thing, material):
+    """A snow globe ended the run: a shell of snow has no usual wall."""
+    assert seen("mesh", thing).material == material
+
+
+def test_what_has_no_usual_wall_is_no_shell_by_its_name():
+    words = PartWords("", "coal", structure="shell", reason="A barrel of coal.")
+    found = hollowed(words, about("mesh", "coal barrel"), lambda name: False)
+    assert found.structure is None
+    kept = replace(words, thickness=0.01)
+    assert hollowed(kept, about("mesh", "coal barrel"), lambda name: False) == kept
+
+
+@pytest.mark.parametrize(
+    ("thing", "material"),
+    [
+        ("dumbbel", "steel"),
+        ("SurfBoard", "rigid_foam"),
+        ("wineglas", "glass"),
+        ("treestump", "wood"),
+        ("canon", None),
+    ],
+)
+def test_slips_and_words_written_apart_or_together_are_known(thing, material):
+    assert seen("mesh", thing).material == material
+
+
+def test_a_substance_behind_the_thing_is_what_it_is_made_of():
+    found = seen("mesh", "watering can zinc")
+    assert (found.material, found.structure) == ("zinc", "shell")
+    assert seen("mesh", "bucket sand").structure is None

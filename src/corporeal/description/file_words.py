@@ -73,8 +73,11 @@ def open_ware(objects: Sequence[ObjectWords]) -> tuple[str, ...]:
 
 
 def has_wall(library: str, name: str) -> bool:
-    """Whether a library has a wall thickness for a material."""
-    return "shell_thickness" in entry_of(name, library).ranges
+    """Whether a library has a wall thickness for a material; where it has neither, nobody knows."""
+    try:
+        return "shell_thickness" in entry_of(name, library).ranges
+    except UserError:
+        return True
 
 
 def _stated_values(surfaces: Sequence[Surface]) -> dict[str, Ground]:

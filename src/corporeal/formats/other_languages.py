@@ -37,14 +37,39 @@ def in_english(words: Sequence[str]) -> list[str]:
 def _translated(word: str) -> tuple[str, ...]:
     """Return what a word, or a compound that ends with it, is in English; (): not known."""
     whole = _words().get(word) or _words().get(word.removesuffix("s"))
-    if whole or not word.isascii():
-        return whole or ()
+    if whole:
+        return whole
+    if not word.isascii():
+        return _pieced(word)
     for cut in range(SHORTEST, len(word) - SHORTEST):
         last = _ends().get(word[cut:])
         if last:
             first = word[:cut]
             return (*(_words().get(first) or (first,)), *last)
     return ()
+
+
+def _pieced(word: str) -> tuple[str, ...]:
+    """Return the English of known words that stand together without a gap; (): some are unknown.
+
+    Chinese and Japanese are written so: 木箱 is a box of wood.
+    """
+    found: list[str] = []
+    while word:
+        known = next((k for k in range(len(word), 0, -1) if word[:k] in _words()), 0)
+        if not known:
+            return ()
+        found += _words()[word[:known]]
+        word = word[known:]
+    return tuple(found)
+
+
+@cache
+def substances() -> frozenset[str]:
+    """Return the English words for substances that other languages are put into, one word each."""
+    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+    tables = [table for name, table in tomllib.loads(text).items() if name == "substances"]
+    return frozenset(w for table in tables for w in table if " " not in w)
 
 
 @cache

@@ -95,7 +95,7 @@ def _things(scene: Scene) -> list[bool]:
 
 def _is_thing(name: str, whole: frozenset[str]) -> bool:
     known, words = typical_extent(name), words_in(name)
-    if known is None or known.words in PARTS or whole & set(words):
+    if known is None or known.part or known.words in PARTS or whole & set(words):
         return False
     return words[-1] in known.words.split()  # the lid of a teapot is none
 

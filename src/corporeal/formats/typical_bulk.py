@@ -6,7 +6,7 @@ from functools import cache
 from pathlib import Path
 from typing import Any, Literal
 
-from corporeal.formats.typical_extents import joined, nouns
+from corporeal.formats.typical_extents import fit, joined, nouns, one_of, singular_words
 
 MARGIN = 2.0
 """How far beyond the table an object may be before it is reported, as a factor."""
@@ -49,8 +49,9 @@ def typical_bulk(class_name: str, longest: float) -> TypicalBulk | None:
 
     """
     named = nouns(class_name, _compounds())
-    found = [e for e in _table() if set(e.words.split()) <= set(named) and longest >= e.longer]
-    return max(found, key=lambda e: (*_fit(e, named), e.longer), default=None)
+    known = [e for e in _table() if set(singular_words(e.words)) <= set(named)]
+    found = [e for e in known if longest >= e.longer]
+    return max(found, key=lambda e: (*fit(e.words, named), e.longer), default=None)
 
 
 def doubt_mass(
@@ -77,16 +78,12 @@ def doubt_mass(
     found = mass / face if known.measure == "face" else bulk
     if known.low / MARGIN <= found <= known.high * MARGIN:
         return None
-    article = "an" if known.words[0] in "aeiou" else "a"
-    what, has = f"{article} {known.words}", "has"
-    if known.words in PLURALS:
-        what, has = known.words, "have"
-    large = f" longer than {known.longer:g} m" if known.longer else ""
-    usual = f"{what}{large} {has} {known.low:g} to {known.high:g}"
+    large = f"longer than {known.longer:g} m " if known.longer else ""
+    usual = one_of(known.words, f"{large}has", f"{large}have")
+    usual = f"{usual} {known.low:g} to {known.high:g}"
     return f"{_weighs(name, mass, found, known.measure)}, and {usual}. {ADVICE}"
 
 
-PLURALS = ("scissors", "pliers")
 ADVICE = "Check how large it is (--extent), what it is made of and whether it is hollow."
 
 
@@ -117,8 +114,3 @@ def _entries(words: str, row: Any) -> list[TypicalBulk]:
 @cache
 def _compounds() -> dict[str, tuple[str, ...]]:
     return joined(e.words for e in _table())
-
-
-def _fit(entry: TypicalBulk, named: list[str]) -> tuple[int, int]:
-    own = entry.words.split()
-    return max(named.index(w) for w in own), len(own)

@@ -7,7 +7,8 @@ from dataclasses import dataclass
 from functools import cache
 from pathlib import Path
 
-from corporeal.formats.other_languages import in_english
+from corporeal.formats.other_languages import in_english, substances
+from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt
 
 MARGIN = 1.5
 """How far beyond the table an object may be before it is reported."""
@@ -15,6 +16,8 @@ SMALLEST, LARGEST = 0.005, 20.0
 """Extents that would be remarkable for anything in a scene [m]."""
 UNITS = {"metres": 1.0, "centimetres": 1e-2, "millimetres": 1e-3, "inches": 0.0254}
 """What programs usually model in [m]."""
+AS_MATTER = ("marble", "brick", "stone", "rock", "sand", "snow", "mud", "foam", "paper", "glass")
+"""Classes that may be meant as matter where another is named, the least likely last."""
 PRINTED = ("millimetres", "metres", "centimetres", "inches")
 """In which order they are likely in files that are made for printing."""
 
@@ -27,6 +30,8 @@ class TypicalExtent:
     low: float
     usual: float
     high: float
+    part: bool = False
+    """Usually found as a part of something else, such as what somebody wears."""
 
 
 def typical_extent(class_name: str) -> TypicalExtent | None:
@@ -35,7 +40,7 @@ def typical_extent(class_name: str) -> TypicalExtent | None:
     "soda can" for "soda can crushed", "cup" for "tea set cup": English puts the noun last.
     """
     words = words_in(class_name)
-    found = [e for e in _table() if set(e.words.split()) <= set(words)]
+    found = [e for e in _table() if set(singular_words(e.words)) <= set(words)]
     return max(found, key=lambda e: _fit(e, words), default=None)
 
 
@@ -58,13 +63,34 @@ def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str
 
     """
     said = in_english(re.findall(r"[^\W\d_]+", class_name.lower()))
-    tokens = (_singular(w) for w in said)
+    known = _vocabulary()
+    tokens = spelt([_singular(mended(w, known)) for w in said], known)
     return [part for word in tokens for part in compounds.get(word, (word,))]
+
+
+PLURALS = frozenset(
+    "scissors pliers tongs tweezers handcuffs binoculars goggles sunglasses spectacles eyeglasses "
+    "jeans pants trousers tights".split()
+)
+"""Words that stand for one thing in the plural."""
+
+
+def one_of(words: str, has: str, have: str) -> str:
+    """Return a class with its article and verb: "an axe is", "scissors are"."""
+    if words.split()[-1] in PLURALS:
+        return f"{words} {have}"
+    return f"{'an' if words[0] in 'aeiou' else 'a'} {words} {has}"
+
+
+@cache
+def singular_words(phrase: str) -> tuple[str, ...]:
+    """Return the words of a class as they stand among ``nouns``."""
+    return tuple(_singular(w) for w in phrase.split())
 
 
 def joined(phrases: Iterable[str]) -> dict[str, tuple[str, ...]]:
     """Return phrases of several words, by how they look when they are written as one."""
-    compounds = (tuple(phrase.split()) for phrase in phrases)
+    compounds = (singular_words(phrase) for phrase in phrases)
     return {"".join(words): words for words in compounds if len(words) > 1}
 
 
@@ -77,8 +103,7 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
     size = f"{name} is {_length(extent)} large"
     if known is None:
         return f"{size}: is the file in metres? Give its real size with --extent {name}=METRES."
-    article = "an" if known.words[0] in "aeiou" else "a"
-    usual = f"{article} {known.words} is usually about {_length(known.usual)}"
+    usual = f"{one_of(known.words, 'is', 'are')} usually about {_length(known.usual)}"
     return f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}."
 
 
@@ -122,8 +147,13 @@ def _normalised(extent: float, known: TypicalExtent | None) -> bool:
 
 @cache
 def _table() -> tuple[TypicalExtent, ...]:
-    text = Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
-    return tuple(TypicalExtent(words, *sizes) for words, sizes in tomllib.loads(text).items())
+    rows = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
+    alike = [
+        TypicalExtent(words, *map(float, row["size"]), part=row.get("part", False))
+        for row in rows.pop("alike")
+        for words in row["words"]
+    ]
+    return (*(TypicalExtent(words, *map(float, sizes)) for words, sizes in rows.items()), *alike)
 
 
 @cache
@@ -131,20 +161,33 @@ def _compounds() -> dict[str, tuple[str, ...]]:
     return joined(e.words for e in _table())
 
 
-def _fit(entry: TypicalExtent, words: list[str]) -> tuple[int, int]:
-    own = entry.words.split()
-    return max(words.index(w) for w in own), len(own)
+@cache
+def _vocabulary() -> Vocabulary:
+    """Return the words of the table and for substances, for compounds and slips."""
+    things = {singular_words(name)[0] for name in classes() if " " not in name}
+    known = things | {w for name in classes() for w in singular_words(name)} | substances()
+    return Vocabulary(
+        known, substances(), things, _compounds(), by_squeezing([*known, *_compounds()])
+    )
+
+
+def _fit(entry: TypicalExtent, words: list[str]) -> tuple[int, int, int]:
+    return fit(entry.words, words)
+
+
+def fit(phrase: str, words: list[str]) -> tuple[int, int, int]:
+    """Tell how well a class fits a name that has all its words, best last.
+
+    What may be matter as well ("table glass", "lego brick") comes after what cannot; then the last
+    in the name, and the one of most words.
+    """
+    own = singular_words(phrase)
+    matter = AS_MATTER.index(own[0]) + 1 if len(own) == 1 and own[0] in AS_MATTER else 0
+    return -matter, max(words.index(w) for w in own), len(own)
 
 
 def _singular(word: str) -> str:
-    keep = word.endswith("ss") or word in (
-        "scissors",
-        "pliers",
-        "dice",
-        "cactus",
-        "ficus",
-        "fitness",
-    )
+    keep = word.endswith(("ss", "us", "is")) or word in ("scissors", "pliers", "dice")
     return word[:-1] if word.endswith("s") and not keep and len(word) > 3 else word
 
 

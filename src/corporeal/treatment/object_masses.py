@@ -14,6 +14,10 @@ NOTABLE = 0.01
 """Relative difference between a stated mass and the computed one that is reported."""
 THICK = 1.5
 """A wall that is drawn thicker than the thickest of its material, times this, is reported."""
+SHEETS = ("leather", "synthetic_leather", "aluminium_can_sheet")
+"""Materials that come in sheets alone."""
+LAYERS = 8.0
+"""So many of the thickest sheets on one another are reported."""
 UNSEEN = ("metadata", "unknown")
 """Who recognises a material without having looked at the object."""
 
@@ -93,7 +97,8 @@ def walls_drawn_too_thick(
 ) -> list[str]:
     """Say which walls weigh too much, because nobody but the mesh said how thick they are.
 
-    Artists draw walls as thick as looks well: a bin of polypropylene had 9 mm.
+    Artists draw walls as thick as looks well: a bin of polypropylene had 9 mm. What comes in sheets
+    and is a block, because nobody said that it covers something, is said, too.
 
     Args:
         scene: The objects.
@@ -113,7 +118,11 @@ def walls_drawn_too_thick(
 def _thick_wall(obj: SceneObject, made: Make, words: PartWords, material: Material) -> str:
     """Say that a part's wall is implausibly thick, where only its mesh says so; "": it is not."""
     ground = material.grounds.get("shell_thickness")
-    if made.whose != DRAWN or ground is None or words.answered_by not in UNSEEN:
+    if ground is None or words.answered_by not in UNSEEN:
+        return ""
+    if material.name in SHEETS and made.thickness == 0:
+        return _thick_block(obj, made, words, ground.range.high)
+    if made.whose != DRAWN:
         return ""
     drawn, usual = made.thickness / obj.scale, ground.range
     if drawn <= usual.high * THICK:
@@ -123,4 +132,16 @@ def _thick_wall(obj: SceneObject, made: Make, words: PartWords, material: Materi
         f"{obj.name}: the mesh of {words.name} draws a wall {1e3 * drawn:.2g} mm thick, and such "
         f"walls of {material.name} have {low} to {high} mm, usually {typical}: it may be "
         f"{drawn / usual.typical:.2g} times too heavy. Say how thick it is with --annotations."
+    )
+
+
+def _thick_block(obj: SceneObject, made: Make, words: PartWords, thickest: float) -> str:
+    """Say that what comes in sheets is a block; "": it may be some sheets on one another."""
+    through = 2.0 * made.volume / made.area / obj.scale if made.area > 0 else 0.0
+    if through <= LAYERS * thickest:
+        return ""
+    return (
+        f"{obj.name}: {words.name} is {words.material} all through, {100 * through:.2g} cm thick, "
+        f"and that comes in sheets of up to {1e3 * thickest:.2g} mm: it may be many times too "
+        "heavy. Say what is behind the sheet with --annotations."
     )

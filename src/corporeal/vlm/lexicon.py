@@ -8,14 +8,15 @@ from functools import cache, lru_cache
 from importlib.resources import files
 
 from corporeal.formats.other_languages import in_english
+from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt
 from corporeal.formats.typical_extents import classes
 from corporeal.geometry.identity import words
 from corporeal.types import Finish
 
-SHORTEST = 3
-"""Letters of the shortest word that a compound is taken apart into."""
 LOOSE = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
 """What no container is made of: a compost bin has some in it."""
+SHAPED = frozenset(("statue", "sculpture", "bust", "figure", "castle", "ball"))
+"""Things that are made of it: a snow shoe is not."""
 OF_IT = frozenset(("block", "ring", "bag"))
 """What is all of it even so: a bag of sand is sand."""
 KINDS = ("substance", "piece", "thing")
@@ -137,20 +138,23 @@ def _by_first_word() -> dict[str, list[Term]]:
 @lru_cache(maxsize=10_000)
 def tokens_of(name: str) -> tuple[str, ...]:
     """Return a name's words in English and the singular, without what exporters write."""
-    said = in_english(words(name))
-    return tuple(singular(part) for w in said for part in _apart(singular(w)))
+    known = _vocabulary()
+    said = [singular(mended(w, known)) for w in in_english(words(name))]
+    return tuple(spelt(said, known))
 
 
-def _apart(word: str) -> tuple[str, ...]:
-    """Take a compound apart: "golfball" is a golf ball, a "steelbucket" a bucket of steel."""
-    if word in _known() or len(word) < 2 * SHORTEST:
-        return (word,)
-    if word in _joined():
-        return _joined()[word]
-    made, things = _single("substance"), _single("thing")
-    cuts = range(SHORTEST, len(word) - SHORTEST + 1)
-    found = ((word[:k], word[k:]) for k in cuts if word[:k] in made and word[k:] in things)
-    return next(found, (word,))
+@cache
+def _vocabulary() -> Vocabulary:
+    """Return the words of the lexicon and of the tables of sizes, for compounds and slips."""
+    sizes = {singular(name) for name in classes() if " " not in name}
+    known, joined = _known() | sizes, _joined()
+    return Vocabulary(
+        words=known,
+        first=_single("substance"),
+        last=_single("thing") | _single("substance") | sizes,
+        joined=joined,
+        squeezed=by_squeezing([*known, *joined]),
+    )
 
 
 @cache
@@ -207,7 +211,8 @@ def _listed(table: str) -> frozenset[tuple[str, ...]]:
 
 def singular(word: str) -> str:
     """Cut a plural's s; it need not be English, only the same on both sides."""
-    return word[:-1] if len(word) > 3 and word.endswith("s") and not word.endswith("ss") else word
+    keep = len(word) <= 3 or word.endswith(("ss", "us", "is"))
+    return word[:-1] if word.endswith("s") and not keep else word
 
 
 def seen_as(look: Look, finish: Finish) -> bool:
@@ -223,6 +228,11 @@ def _as_seen(light: float) -> float:
     """Linear light to sRGB (IEC 61966-2-1)."""
     c = min(max(light, 0.0), 1.0)
     return 12.92 * c if c <= 0.0031308 else 1.055 * c ** (1 / 2.4) - 0.055
+
+
+def kin(one: str, other: str) -> bool:
+    """Tell whether things of either of two materials have walls of the same thickness."""
+    return one == other or any({one, other} <= set(alike) for alike in _table()["kin"])
 
 
 @cache

@@ -20,12 +20,16 @@ from corporeal.types import (
 )
 from corporeal.vlm.lexicon import (
     KINDS,
+    LOOSE,
+    OF_IT,
+    SHAPED,
     Name,
     Term,
     cast,
     emptied,
     heads,
     hollow,
+    kin,
     lookbook,
     metals,
     open_ware,
@@ -275,8 +279,11 @@ def hollowed(
         from_pictures: Whether its shape is from pictures, which need not show how deep a vessel is.
 
     """
-    if words.structure is not None or not (words.material is None or walled(words.material)):
+    if words.structure is not None and words.thickness is not None:
         return words
+    bare = words.material is not None and not walled(words.material)
+    if words.structure is not None or bare:
+        return replace(words, structure=None, contents=None, fill=None) if bare else words
     if from_pictures and any(open_ware(name.words) for name in evidence.general):
         return replace(words, structure="sheet", wall_unseen=True)
     is_hollow = any(hollow(name.words) for name in evidence.general)
@@ -440,19 +447,36 @@ def _names_a_thing(name: Name) -> bool:
 
 
 def _adjectives(name: Name) -> list[Term]:
-    """Find what stands in a name; a substance right before an object is that of such an object."""
+    """Find what stands in a name; a substance right beside an object is that of such an object.
+
+    "Wooden chair", and as files are named "chair_wooden"; what lies loose is no thing's matter: a
+    snow shoe, a snow globe.
+    """
     standing = heads(name.words)
     things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
     for k, term in enumerate(standing):
-        behind = next((t for t in things if name.says(term.phrase + t.phrase)), None)
-        if term.kind == "substance" and behind and behind.material not in term.gives_way:
-            standing[k] = _made_as(term, behind)
-    return standing
+        if term.kind != "substance":
+            continue
+        beside = next((t for t in things if name.says(term.phrase + t.phrase)), None)
+        if beside is None and term.material not in LOOSE and not term.colour:
+            beside = next((t for t in things if name.says(t.phrase + term.phrase)), None)
+        if beside and beside.material not in term.gives_way:
+            standing[k] = _made_as(term, beside)
+    return [s for s in standing if not _is_purpose(s, name, things)]
+
+
+def _is_purpose(term: Term, name: Name, things: Sequence[Term]) -> bool:
+    """Tell whether what lies loose stands before a thing that is for it, and not made of it."""
+    if term.kind != "substance" or term.material not in LOOSE:
+        return False
+    return any(
+        name.says(term.phrase + t.phrase) and t.phrase[-1] not in SHAPED | OF_IT for t in things
+    )
 
 
 def _made_as(substance: Term, thing: Term) -> Term:
     """Return a substance built as an object is; how thick depends on what it is usually made of."""
-    same = substance.material == thing.material
+    same = kin(substance.material, thing.material)
     return replace(
         substance,
         before=len(thing.phrase),

@@ -1,0 +1,188 @@
+"""Measure what a name and a plain shape become without a model: material, build, mass, warnings.
+
+    python benchmarks/names.py [--list TOML] [--only NAME ...] [--json FILE] [--against FILE]
+    python benchmarks/names.py --units
+
+The list (recognition/names.toml) says of every thing what it may be made of and what it weighs in
+life. Each is written to a GLB whose name is all that tells what it is, and goes through the same
+functions as a run. ``--against`` names a file that ``--json`` wrote and prints what differs.
+``--units`` writes every file in centimetres, inches and millimetres instead, as if it were in
+metres, and prints the names about whose size and mass nothing is said.
+"""
+
+import argparse
+import json
+import tomllib
+from collections.abc import Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from tempfile import TemporaryDirectory
+
+import numpy as np
+import trimesh
+from recognition.shapes import shape
+from trimesh.visual import TextureVisuals
+from trimesh.visual.material import PBRMaterial
+
+from corporeal.geometry.scene_survey import examine
+from corporeal.in_memory import load_scene
+from corporeal.materials import find
+from corporeal.stages.describe import describe
+from corporeal.stages.fill import composed
+from corporeal.stages.ground import ground
+from corporeal.stages.segment import segment
+from corporeal.treatment.object_masses import implausible_masses, walls_drawn_too_thick
+
+LIST = Path(__file__).parent / "recognition" / "names.toml"
+WITHIN = 2.5
+"""Factor beyond the masses in life from which a mass is implausible."""
+UP = trimesh.transformations.rotation_matrix(-np.pi / 2, (1, 0, 0))
+VERDICTS = ("right", "wrong", "unknown")
+UNITS = {"centimetres": 0.01, "inches": 0.0254, "millimetres": 0.001}
+"""Units of files that do not say so [m]."""
+
+
+@dataclass(frozen=True)
+class Found:
+    """What came out of one name."""
+
+    name: str
+    material: str | None
+    structure: str | None
+    verdict: str
+    mass: float
+    """[kg]"""
+    off: float
+    """Factor from the nearer end of the masses in life; 1 inside, below 1 where too light."""
+    warned: bool
+    """Of its size, its mass or its wall."""
+    false_alarm: bool
+    """Said to be implausible although it weighs what such things do."""
+
+    @property
+    def implausible(self) -> bool:
+        """Whether it weighs what no such thing does."""
+        return not 1 / WITHIN <= self.off <= WITHIN
+
+    @property
+    def silent(self) -> bool:
+        """Whether it is implausible, taken for known, and nothing is said."""
+        return self.implausible and not self.warned and self.verdict != "unknown"
+
+
+def look_at(row: dict, folder: Path, metres_per_unit: float = 1.0) -> Found:
+    """Take one thing through the pipeline's functions by its name and shape alone.
+
+    Args:
+        row: Of the list.
+        folder: Where its file is written.
+        metres_per_unit: In which unit its file is, which does not say so.
+
+    """
+    path = folder / f"{row['name']}.glb"
+    mesh = shape(row["shape"]).apply_transform(UP).apply_scale(1 / metres_per_unit)
+    mesh.visual = TextureVisuals(material=PBRMaterial(name="material", metallicFactor=0.0))
+    trimesh.Scene({"mesh": mesh}).export(path)
+    scene = load_scene(path)
+    inventory = describe(scene)
+    parts = segment(scene, inventory)
+    anatomies = examine(scene, parts, 0)
+    field, leaf = ground(scene, parts, inventory), find("leaf_tissue")
+    makes = composed(scene, anatomies, field, leaf.pick(leaf.typical()), 0)
+    masses = [makes[k].mass for k in range(len(parts.catalogue))]
+    words, mass = field.words[0], sum(masses)
+    weight = implausible_masses(scene, anatomies, masses)
+    size = [w for w in scene.warnings if "--extent" in w]
+    wall = walls_drawn_too_thick(scene, anatomies, makes, field)
+    off = _off(mass, row["kg"])
+    return Found(
+        row["name"],
+        words.material,
+        words.structure,
+        _verdict(words.material, row["of"].split()),
+        mass,
+        off,
+        bool(weight or size or wall),
+        bool(weight or (size and metres_per_unit == 1.0)) and off == 1.0,
+    )
+
+
+def _verdict(material: str | None, accepted: Sequence[str]) -> str:
+    if material is None:
+        return "unknown"
+    return "right" if material in accepted else "wrong"
+
+
+def _off(mass: float, life: Sequence[float]) -> float:
+    low, high = life
+    return mass / low if mass < low else mass / high if mass > high else 1.0
+
+
+def main() -> None:
+    """Measure every name of the list and print what came out."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--list", type=Path, default=LIST)
+    parser.add_argument("--only", nargs="+", help="these names alone")
+    parser.add_argument("--json", type=Path, help="keep what was found in this file")
+    parser.add_argument("--units", action="store_true", help="files in artists' units")
+    parser.add_argument("--against", type=Path, help="print what differs from such a file")
+    asked = parser.parse_args()
+    rows = tomllib.loads(asked.list.read_text(encoding="utf-8"))["things"]
+    rows = [r for r in rows if not asked.only or r["name"] in asked.only]
+    if asked.units:
+        print(in_wrong_units(rows))
+        return
+    with TemporaryDirectory() as folder:
+        found = [look_at(row, Path(folder)) for row in rows]
+    for one in found:
+        print(_line(one))
+    print(summary(found))
+    if asked.json:
+        asked.json.write_text(json.dumps([asdict(f) for f in found], indent=1, ensure_ascii=False))
+    if asked.against:
+        before = {row["name"]: Found(**row) for row in json.loads(asked.against.read_text())}
+        differ = [f for f in found if f.name in before and _changed(before[f.name], f)]
+        print("\n".join(f"- {_line(before[f.name])}\n+ {_line(f)}" for f in differ))
+
+
+def in_wrong_units(rows: Sequence[dict]) -> str:
+    """Say about which files in artists' units no warning is given."""
+    lines = []
+    for unit, metres in UNITS.items():
+        with TemporaryDirectory() as folder:
+            found = [look_at(row, Path(folder), metres) for row in rows]
+        silent = [f.name for f in found if not f.warned]
+        lines.append(f"in {unit}: nothing is said of {len(silent)} of {len(rows)}: {silent}")
+    return "\n".join(lines)
+
+
+def summary(found: Sequence[Found]) -> str:
+    """Count verdicts, implausible masses and false alarms."""
+    verdicts = ", ".join(f"{v} {sum(f.verdict == v for f in found)}" for v in VERDICTS)
+    implausible = sum(f.implausible for f in found)
+    return (
+        f"{len(found)} names: {verdicts}; mass implausible {implausible}, of these known and "
+        f"without a warning {sum(f.silent for f in found)}; false alarms "
+        f"{sum(f.false_alarm for f in found)}; inside the masses in life "
+        f"{sum(f.off == 1.0 for f in found)}"
+    )
+
+
+def _changed(before: Found, after: Found) -> bool:
+    keys = ("material", "structure", "warned")
+    same = all(getattr(before, k) == getattr(after, k) for k in keys)
+    return not same or abs(before.mass / after.mass - 1) > 0.01
+
+
+def _line(one: Found) -> str:
+    marks = " SILENT" * one.silent + " FALSE ALARM" * one.false_alarm + " warned" * one.warned
+    return (
+        f"{one.name:24} {one.verdict:7} {one.material or '-':18} {one.structure or '-':7} "
+        f"{one.mass:9.3g} kg, off x {one.off:.2g}{marks}"
+    )
+
+
+if __name__ == "__main__":
+    main()

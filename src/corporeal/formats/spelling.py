@@ -1,0 +1,93 @@
+"""Words that a name writes together, apart, or with a letter too few."""
+
+import re
+from collections.abc import Container, Mapping, Sequence
+from dataclasses import dataclass
+
+SHORTEST = 3
+"""Letters of the shortest word that a compound is taken apart into."""
+LONGER = 4
+"""The same of the first word where both are things: "car" and "pet" make no carpet."""
+DOUBTFUL = 5
+"""Letters of the shortest word whose spelling is mended."""
+REAL = frozenset(("canon",))
+"""Right words that a doubled letter would make another of."""
+
+
+@dataclass(frozen=True)
+class Vocabulary:
+    """Words that are known, in the singular."""
+
+    words: Container[str]
+    """All of them."""
+    first: Container[str]
+    """Substances: the first word of a compound such as "steelbucket"."""
+    last: Container[str]
+    """Things: its last word."""
+    joined: Mapping[str, tuple[str, ...]]
+    """Phrases by how they look when they are written as one word."""
+    squeezed: Mapping[str, str]
+    """Words and joined phrases by how they look without doubled letters; what two have is not in
+    it."""
+
+
+def squeezed(word: str) -> str:
+    """Return a word without doubled letters, where most slips are: "dumbbell" as "dumbel"."""
+    return re.sub(r"(.)\1+", r"\1", word)
+
+
+def by_squeezing(words: Sequence[str]) -> dict[str, str]:
+    """Return words by how they look without doubled letters; what two share says nothing."""
+    found: dict[str, str] = {}
+    for word in dict.fromkeys(words):
+        if len(word) >= DOUBTFUL:
+            found[squeezed(word)] = "" if squeezed(word) in found else word
+    return {short: word for short, word in found.items() if word}
+
+
+def spelt(words: Sequence[str], known: Vocabulary) -> list[str]:
+    """Return a name's words as a vocabulary has them.
+
+    ``["dumbbel"]`` gives ``["dumbbell"]``, ``["wineglas"]`` ``["wine", "glass"]``, ``["surf",
+    "board"]`` ``["surfboard"]``, ``["treestump"]`` ``["tree", "stump"]``.
+
+    Args:
+        words: In English, in the singular.
+        known: The words that there are.
+
+    """
+    right = [mended(word, known) for word in words]
+    return [part for word in _together(right, known) for part in _apart(word, known)]
+
+
+def mended(word: str, known: Vocabulary) -> str:
+    """Mend a doubled letter that was left out or is one too many."""
+    if len(word) < DOUBTFUL or word in known.words or word in known.joined or word in REAL:
+        return word
+    return known.squeezed.get(squeezed(word), word)
+
+
+def _together(words: Sequence[str], known: Vocabulary) -> list[str]:
+    """Join neighbours that are one known word, unless the phrase is known as two."""
+    found: list[str] = []
+    for word in words:
+        one = found[-1] + word if found else ""
+        if one and one in known.words and one not in known.joined:
+            found[-1] = one
+        else:
+            found.append(word)
+    return found
+
+
+def _apart(word: str, known: Vocabulary) -> tuple[str, ...]:
+    """Take a compound apart: "golfball" is a golf ball, a "steelbucket" a bucket of steel."""
+    if word in known.words or len(word) < 2 * SHORTEST:
+        return (word,)
+    if word in known.joined:
+        return known.joined[word]
+    cuts = [(word[:k], word[k:]) for k in range(SHORTEST, len(word) - SHORTEST + 1)]
+    of_matter = ((a, b) for a, b in cuts if a in known.first and b in known.last)
+    of_things = (
+        (a, b) for a, b in cuts if len(a) >= LONGER and a in known.words and b in known.last
+    )
+    return next(of_matter, None) or next(of_things, (word,))
