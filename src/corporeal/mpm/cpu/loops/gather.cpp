@@ -1,7 +1,7 @@
 // Material of each lane.
 struct LaneMaterial : mpm::Material<f8> {
   f8 keep, rho, rigid;   // as the columns that follow
-  static inline LaneMaterial of(const Field &field, const int *kind) {
+  MPM_INLINE static LaneMaterial of(const Field &field, const int *kind) {
     LaneMaterial t;
     f8 *to = &t.law;
     i8 all = *(const i8u *)kind;
@@ -51,8 +51,8 @@ struct Gather {
     x += c[2];
   }
   static inline void fill(const Field &field, const int *block, f8 *arena) {
-    int low[3], high[3], box[6];
-    Simd::range(field, block, low, high, box);
+    int low[3], high[3];
+    Simd::range(block, field.box + 6 * ((block - field.block) / BLOCK), low, high);   // as they were laid
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++) {
         const int *near = block + NEIGHBOURS + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;

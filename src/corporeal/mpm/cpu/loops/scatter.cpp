@@ -92,7 +92,9 @@ struct Scatter {
     int low[3], high[3];
     ClusterMean pressure;
     if (field.swells) sum(field, block, pressure);
-    Simd::range(field, block, low, high, field.box + 6 * (block - field.block) / BLOCK);
+    int *box = field.box + 6 * ((block - field.block) / BLOCK);
+    Simd::box(field, block, box);
+    Simd::range(block, box, low, high);
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++)
         for (int k = 0; k < 8; k++) arena[i * LAYER + j * 8 + k] = Simd::all(0.0f);

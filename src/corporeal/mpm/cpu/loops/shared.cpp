@@ -31,9 +31,8 @@ struct Simd : mpm::Lanes<f8> {
       r[i + 4] = __builtin_shufflevector(b[i], b[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
     }
   }
-  // Nodes of a block's arena that its particles reach, first and last along each axis; and the
-  // lowest and highest places of its particles, six.
-  static inline void range(const Field &field, const int *block, int *low, int *high, int *box) {
+  // Lowest and highest places of a block's particles, six.
+  static inline void box(const Field &field, const int *block, int *box) {
     for (int d = 0; d < 3; d++) {
       const i8 zero = i8{0, 0, 0, 0, 0, 0, 0, 0};
       i8 least = zero + 0x7fffffff, most = ~least;
@@ -45,6 +44,11 @@ struct Simd : mpm::Lanes<f8> {
       }
       box[d] = __builtin_reduce_min(least);
       box[3 + d] = __builtin_reduce_max(most);
+    }
+  }
+  // Nodes of a block's arena that particles in a box reach, first and last along each axis.
+  static inline void range(const int *block, const int *box, int *low, int *high) {
+    for (int d = 0; d < 3; d++) {
       const int first = 4 * block[2 + d] - 1;
       low[d] = ((box[d] - HALF) >> PLACE) - first;
       high[d] = ((box[3 + d] - HALF) >> PLACE) - first;
