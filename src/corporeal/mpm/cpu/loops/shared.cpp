@@ -9,6 +9,7 @@ typedef int i8u __attribute__((vector_size(32), aligned(4)));
 typedef unsigned long long u64;
 typedef float Row[8];
 typedef int Call(void);
+const int TOGETHER = 2;   // lanes in one cell that are moved at once
 constexpr float PER_UNIT = 1.0f / UNIT;
 
 struct Simd : mpm::Lanes<f8> {
@@ -55,6 +56,13 @@ struct Simd : mpm::Lanes<f8> {
       low[d] = low[d] < 0 ? 0 : low[d] > 5 ? 5 : low[d];
       high[d] = (high[d] < 0 ? 0 : high[d] > 5 ? 5 : high[d]) + 2;
     }
+  }
+  // Whether so many lanes from l on stand in one cell.
+  static inline bool together(const int *base, int l, int live) {
+    if (l + TOGETHER > live) return false;
+    bool same = true;
+    for (int n = 1; n < TOGETHER; n++) same &= base[l] == base[l + n];
+    return same;
   }
   // Of a batch in a block: distances from the first node, weights of 27 nodes, and the first node's
   // place in the block's arena of 8 x 8 x 8. Who strayed is kept inside: its step counts no more.
