@@ -1,10 +1,13 @@
 """What this process may use of the machine."""
 
 import os
+import platform
+import subprocess
+import sys
 
 import pytest
 
-from corporeal.machine import cores
+from corporeal.machine import cores, keep_freed_memory
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="Linux only")
@@ -35,3 +38,32 @@ def test_a_wish_in_the_environment_counts(tmp_path, monkeypatch, text, most):
     free = cores(tmp_path / "none")
     monkeypatch.setenv("OMP_NUM_THREADS", text)
     assert cores(tmp_path / "none") == min(most or free, free)
+
+
+FAULTS = """
+import resource, sys
+import numpy as np
+from corporeal.machine import keep_freed_memory
+if sys.argv[1] == "keep" and not keep_freed_memory():
+    sys.exit("no")
+np.ones(2_000_000)
+before = resource.getrusage(resource.RUSAGE_SELF).ru_minflt
+for _ in range(20):
+    np.ones(2_000_000)
+print(resource.getrusage(resource.RUSAGE_SELF).ru_minflt - before)
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="a setting of glibc's malloc")
+def test_an_array_takes_the_pages_that_the_last_one_freed():
+    quiet = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_")}
+    usual, kept = (
+        int(subprocess.check_output([sys.executable, "-c", FAULTS, how], env=quiet))
+        for how in ("usual", "keep")
+    )
+    assert kept < 0.1 * usual
+
+
+def test_a_setting_of_ones_own_for_memory_stays(monkeypatch):
+    monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "131072")
+    assert not keep_freed_memory()

@@ -1,5 +1,6 @@
 """What this process may use of the machine that it runs on."""
 
+import ctypes
 import os
 from math import ceil
 from pathlib import Path
@@ -7,6 +8,10 @@ from pathlib import Path
 QUOTA = Path("/sys/fs/cgroup/cpu.max")
 """Where a container's share of the processor stands, as "microseconds per-period" (Linux)."""
 UNLIMITED = 1 << 16
+KEPT = 1 << 26
+"""Memory that was freed and stays with the process [bytes]: some pictures of a film."""
+TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
+"""Numbers of these settings in glibc's ``malloc.h``."""
 
 
 def cores(quota: Path = QUOTA) -> int:
@@ -18,6 +23,22 @@ def cores(quota: Path = QUOTA) -> int:
     """
     allowed = len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count()
     return max(1, min(allowed or 1, _granted(quota), _wished()))
+
+
+def keep_freed_memory() -> bool:
+    """Let arrays reuse what others freed instead of asking the system for each; whether it does.
+
+    Usual is that every large array is fresh memory of the system, which has to empty each page of
+    it at the first touch. Where the C library is not glibc, or the environment has a
+    ``MALLOC_`` setting of its own, nothing is changed.
+    """
+    if any(name.startswith("MALLOC_") for name in os.environ):
+        return False
+    try:
+        mallopt = ctypes.CDLL(None).mallopt
+    except (AttributeError, OSError, TypeError):
+        return False
+    return all(mallopt(what, KEPT) == 1 for what in (MMAP_THRESHOLD, TRIM_THRESHOLD))
 
 
 def _granted(quota: Path) -> int:

@@ -20,6 +20,7 @@ from corporeal.cli.parse import parse
 from corporeal.cli.run_summary import show_summary
 from corporeal.cli.view import verb_view
 from corporeal.errors import UserError
+from corporeal.machine import keep_freed_memory
 from corporeal.terminal import console, progress_bars, show_table
 from corporeal.version import __version__
 
@@ -333,6 +334,7 @@ def main() -> None:
 
 def _do(verb: Callable[[], None]) -> int:
     """Return the exit code: 0, 1 a mistake of ours, 2 the person's, 130 stopped."""
+    keep_freed_memory()
     try:
         verb()
         return 0

@@ -14,9 +14,10 @@ from corporeal.errors import UserError
 from corporeal.geometry.srgb import linear
 from corporeal.render import colours, video
 from corporeal.render.camera import place
-from corporeal.render.embree import Light, Stage, identify, render
+from corporeal.render.embree import Light, Stage, identify
 from corporeal.render.figure_keys import INK, LARGE, Entry, Key, Line, Mark, legend, scale
 from corporeal.render.glyphs import drawable
+from corporeal.render.repainted import render_each
 from corporeal.store import writing
 from corporeal.types import Film, MaterialField, Parts, Scene
 
@@ -81,9 +82,10 @@ def fields_figure(scene: Scene, parts: Parts, field: MaterialField, path: Path) 
     share = _share(seen, parts)
     sheet = Image.new("RGB", SHEET, "white")
     shown = panels(scene, parts, field)
-    for k, panel in enumerate(shown[name] for name in ORDER):
+    chosen = [shown[name] for name in ORDER]
+    pictures = render_each([_painted(stage, parts, shades(p)) for p in chosen], camera, "draft")
+    for k, (panel, picture) in enumerate(zip(chosen, pictures, strict=True)):
         left, top = FIRST[0] + k % 3 * STEP[0], FIRST[1] + k // 3 * STEP[1]
-        picture = render(_painted(stage, parts, shades(panel)), camera, "draft")
         small = Image.fromarray(picture).resize(SHOWN, Image.Resampling.LANCZOS)
         sheet.paste(small, (left, top))
         key_of(panel, share, (left, top)).draw(sheet)

@@ -4,6 +4,7 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.mpm import laws
+from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.problem import Problem, Snapshot
 from corporeal.mpm.substance import Substances
 
@@ -13,6 +14,11 @@ def equivalent_stress(tau: Float[np.ndarray, "P 3 3"]) -> Float[np.ndarray, " P"
     mean = np.einsum("pii->p", tau) / 3.0
     deviator = tau - mean[:, None, None] * np.eye(3)
     return np.sqrt(1.5 * np.einsum("pij,pij->p", deviator, deviator))
+
+
+def equivalent_of_principal(tau: Float[np.ndarray, "P 3"]) -> Float[np.ndarray, " P"]:
+    """Give the same of principal stresses [Pa]."""
+    return np.sqrt(1.5 * np.sum((tau - tau.mean(axis=1, keepdims=True)) ** 2, axis=1))
 
 
 class VonMises:
@@ -34,7 +40,7 @@ class VonMises:
         """
         out = np.zeros(len(now.position))
         F = np.asarray(now.deformation[self.soft], dtype=np.float64)
-        tau = laws.tau(self.law, F, self.mu, self.lam)
-        volume = np.maximum(np.linalg.det(F), np.finfo(np.float32).tiny)
-        out[self.soft] = equivalent_stress(tau) / volume
+        tau = laws.principal_tau(self.law, F, self.mu, self.lam)
+        volume = np.maximum(determinant(F), np.finfo(np.float32).tiny)
+        out[self.soft] = equivalent_of_principal(tau) / volume
         return np.nan_to_num(out, nan=0.0, posinf=0.0)

@@ -58,6 +58,18 @@ def test_kirchhoff_stress_is_pk1_times_f_transposed_and_symmetric(law):
 
 
 @pytest.mark.parametrize("law", Law)
+def test_principal_stresses_are_those_of_the_kirchhoff_stress(law):
+    """At large strains, and at some of 1e-4, whose stresses nearly cancel."""
+    large = some_deformations()
+    for F in (large, np.eye(3) + 1e-4 * (large - np.eye(3))):
+        number = np.full(len(F), law.value)
+        found = laws.principal_tau(number, F, *constants(len(F)))
+        right = np.linalg.eigvalsh(laws.tau(number, F, *constants(len(F))))
+        error = np.abs(np.sort(found, axis=1) - right)
+        assert error.max() < 1e-5 * np.abs(right).max()
+
+
+@pytest.mark.parametrize("law", Law)
 def test_a_pure_rotation_costs_neither_stress_nor_energy(law):
     R = some_rotations(40, np.random.default_rng(1))
     assert np.abs(laws.MENU[law].tau(R, *constants(len(R)))).max() < 1e-11 * MU

@@ -81,7 +81,6 @@ def rigid_grid(
         "node": np.zeros((across**3, 64, 8), np.float32),
         "table": np.full(across**3, -1, np.int32),
         "where": np.zeros((across**3, 4), np.int32),
-        "near": np.zeros(2 * across**3, np.uint64),
         "block": np.zeros(len(points), np.int32),
         "point": points,
         "clump": clumps,

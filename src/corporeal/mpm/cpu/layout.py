@@ -170,7 +170,6 @@ FIELD = Record(
     ("float *", "part node next history branch material"),
     ("int *", "table block where"),
     ("int *", "used"),  # which of the two sets of nodes hold anything in a node block: bits
-    ("unsigned long long *", "near"),
     ("int *", "home box"),  # block of particles at a node block, -1: none; lowest, highest place
     ("unsigned long long *", "have"),  # nodes with mass of each node block, once forces have acted
     ("double *", "point"),  # rigid: [points][5] place in the body's frame, mass, volume

@@ -31,7 +31,7 @@ from corporeal.mpm.problem import Problem
 
 LONGEST = (1 << (31 - PLACE)) // 4 - 4
 """Blocks that a window may span before places overflow."""
-POINTED = tuple("part history branch node next table block where used near home box have".split())
+POINTED = tuple("part history branch node next table block where used home box have".split())
 """Arrays that the native pieces work in."""
 CHUNK = 32
 """Node blocks of one task."""
@@ -89,7 +89,6 @@ class Window:
         corner = np.floor(place.min(axis=0) / 4).astype(np.int64) - 1
         self.origin = corner.astype(np.int32)
         self.node = self.next = aligned((0, 64, 8), np.float32)
-        self.near = np.zeros(0, np.uint64)
         fixed = np.rint((place - 4 * corner) * (1 << PLACE)).astype(np.int64)
         self.fits = bool((np.abs(fixed) < 2**31).all())
         if not self.fits:
@@ -139,7 +138,6 @@ class Window:
         blocks = len(self.where) * 9 // 8
         self.node = aligned((blocks, 64, 8), np.float32)
         self.next = aligned((blocks, 64, 8), np.float32)
-        self.near = np.zeros(2 * blocks, np.uint64)
 
     def continue_as(self, before: "Window", material: Materials) -> None:
         """Take place, motion, strain and memory of the particles of another window, by number.

@@ -10,7 +10,7 @@ import numpy as np
 from jaxtyping import Bool, Int
 
 from corporeal.mpm.constants import BULK_ROUNDING, OWN_BULK
-from corporeal.mpm.laws.kinematics import Matrices, Scalars
+from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors, stretches
 from corporeal.mpm.laws.law import ConstitutiveLaw, Flow, Numbers
 from corporeal.types import Law
 
@@ -52,6 +52,17 @@ def tau(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     out = np.empty_like(F)
     for rule, k in _by_law(law):
         out[k] = rule.tau(F[k], mu[k], lam[k])
+    return out
+
+
+def principal_tau(law: Laws, F: Matrices, mu: Scalars, lam: Scalars) -> Vectors:
+    """Give the principal Kirchhoff stresses of ``tau`` [Pa], in no order, far faster."""
+    out = np.empty(F.shape[:2])
+    for rule, k in _by_law(law):
+        if rule.principal_tau is None:
+            out[k] = np.linalg.eigvalsh(rule.tau(F[k], mu[k], lam[k]))
+        else:
+            out[k] = rule.principal_tau(stretches(F[k]), mu[k], lam[k])
     return out
 
 

@@ -5,6 +5,7 @@ import numpy as np
 from corporeal.mpm.laws.kinematics import (
     Matrices,
     Scalars,
+    Vectors,
     determinant,
     inverse_transpose,
     isotropic,
@@ -30,6 +31,12 @@ def tau(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     return 2.0 * per(mu) * (F - polar(F)[0]) @ transpose(F) + isotropic(lam * J * (J - 1.0))
 
 
+def principal_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
+    """τ_i = 2μ (σ_i - 1) σ_i + λ J (J - 1)."""
+    J = np.prod(stretch, axis=1)
+    return 2.0 * mu[:, None] * (stretch - 1.0) * stretch + (lam * J * (J - 1.0))[:, None]
+
+
 def pk1(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """P = 2μ (F - R) + λ J (J - 1) F⁻ᵀ."""
     J = determinant(F)
@@ -48,6 +55,7 @@ LAW = ConstitutiveLaw(
     "elasticity",
     psi=psi,
     tau=tau,
+    principal_tau=principal_tau,
     pk1=pk1,
     wave_modulus=wave_modulus,
     volumetric=QUADRATIC,

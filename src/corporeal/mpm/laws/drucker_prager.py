@@ -74,6 +74,7 @@ LAW = ConstitutiveLaw(
     "animation; the slope after Davis 1968",
     psi=hencky.psi,
     tau=hencky.tau,
+    principal_tau=hencky.stretched_tau,
     pk1=hencky.pk1,
     wave_modulus=hencky.wave_modulus,
     flow=flow,

@@ -59,6 +59,7 @@ LAW = ConstitutiveLaw(
     source="Herschel and Bulkley 1926; Bingham 1922 (n = 1), Newton (and no yield stress)",
     psi=hencky.psi,
     tau=hencky.tau,
+    principal_tau=hencky.stretched_tau,
     pk1=hencky.pk1,
     wave_modulus=hencky.wave_modulus,
     flow=flow,

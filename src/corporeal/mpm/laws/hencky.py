@@ -24,6 +24,11 @@ def principal_tau(strain: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
     return 2.0 * mu[:, None] * strain + (lam * np.sum(strain, axis=1))[:, None]
 
 
+def stretched_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
+    """Give the same of principal stretches."""
+    return principal_tau(log_strain(stretch), mu, lam)
+
+
 def psi(F: Matrices, mu: Scalars, lam: Scalars) -> Scalars:
     """Ψ = μ ‖ε‖² + λ/2 (tr ε)²."""
     strain = log_strain(stretches(F))
@@ -52,6 +57,7 @@ LAW = ConstitutiveLaw(
     source="Hencky 1928, Über die Form des Elastizitätsgesetzes bei ideal elastischen Stoffen",
     psi=psi,
     tau=tau,
+    principal_tau=stretched_tau,
     pk1=pk1,
     wave_modulus=wave_modulus,
     volumetric=LOGARITHMIC,

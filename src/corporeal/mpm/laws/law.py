@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.mpm.laws.kinematics import Matrices, Scalars
+from corporeal.mpm.laws.kinematics import Matrices, Scalars, Vectors
 from corporeal.mpm.laws.volumetric import Volumetric
 
 Number = Float[np.ndarray, " P"] | float
@@ -89,6 +89,8 @@ class ConstitutiveLaw:
     """Bound on ρ₀ c² [Pa]: no ∂τᵢᵢ/∂ln σᵢ along a principal axis exceeds it."""
     volumetric: Volumetric | None = None
     """Its energy of volume; None: its pressure never comes from a mean, and it may lock."""
+    principal_tau: Callable[[Vectors, Scalars, Scalars], Vectors] | None = None
+    """τ along the principal axes from the stretches Σ, which is less work; None: as ``tau``."""
     flow: Callable[[Matrices, Numbers, Scalars, Scalars], Flow] | None = None
     """Return map of trial F: numbers, equivalent plastic strain and volume correction so far.
 

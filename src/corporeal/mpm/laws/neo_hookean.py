@@ -5,9 +5,11 @@ import numpy as np
 from corporeal.mpm.laws.kinematics import (
     Matrices,
     Scalars,
+    Vectors,
     inverse_transpose,
     isotropic,
     log_j,
+    log_strain,
     per,
     stretches,
     transpose,
@@ -28,6 +30,12 @@ def tau(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     return per(mu) * (F @ transpose(F)) + isotropic(lam * log_j(F) - mu)
 
 
+def principal_tau(stretch: Vectors, mu: Scalars, lam: Scalars) -> Vectors:
+    """τ_i = μ (σ_i² - 1) + λ ln J."""
+    swelling = np.sum(log_strain(stretch), axis=1)
+    return mu[:, None] * (stretch**2 - 1.0) + (lam * swelling)[:, None]
+
+
 def pk1(F: Matrices, mu: Scalars, lam: Scalars) -> Matrices:
     """P = μ (F - F⁻ᵀ) + λ ln J F⁻ᵀ."""
     inverse = inverse_transpose(F)
@@ -44,6 +52,7 @@ LAW = ConstitutiveLaw(
     source="Bonet and Wood 2008, Nonlinear Continuum Mechanics for Finite Element Analysis, ch. 6",
     psi=psi,
     tau=tau,
+    principal_tau=principal_tau,
     pk1=pk1,
     wave_modulus=wave_modulus,
     volumetric=LOGARITHMIC,

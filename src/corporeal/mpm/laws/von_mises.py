@@ -47,6 +47,7 @@ LAW = ConstitutiveLaw(
     source="Simo and Hughes 1998, Computational Inelasticity, box 3.1",
     psi=hencky.psi,
     tau=hencky.tau,
+    principal_tau=hencky.stretched_tau,
     pk1=hencky.pk1,
     wave_modulus=hencky.wave_modulus,
     flow=flow,

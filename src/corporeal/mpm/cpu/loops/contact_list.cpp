@@ -1,35 +1,4 @@
-// Write down the nodes of some blocks, the fields there and their possible contacts; mark the cells
-// whose particles reach them.
-struct Near {
-  // Cells whose particles reach the nodes of a mask, one axis at a time: two steps down, the
-  // second word for the neighbour below. A step moves by 1, 4 or 16 bits.
-  static inline void spread(u64 m, int step, u64 first, u64 &here, u64 &below) {
-    // first: bits whose coordinate along the axis is 0
-    u64 second = first << step;
-    here = m | ((m & ~first) >> step) | ((m & ~(first | second)) >> (2 * step));
-    below = ((m & first) << (3 * step)) | ((m & first) << (2 * step)) | ((m & second) << (2 * step));
-  }
-  static inline void mark(const Field &F, int block, u64 mask, int kind) {
-    const u64 X = 0xffffull, Y = 0x000f000f000f000full, Z = 0x1111111111111111ull;
-    const int *w = F.where + 4 * block;
-    u64 x[2], y[2], z[2];
-    spread(mask, 16, X, x[0], x[1]);
-    for (int i = 0; i < 2; i++) {
-      if (!x[i]) continue;
-      spread(x[i], 4, Y, y[0], y[1]);
-      for (int j = 0; j < 2; j++) {
-        if (!y[j]) continue;
-        spread(y[j], 1, Z, z[0], z[1]);
-        for (int k = 0; k < 2; k++) {
-          if (!z[k]) continue;
-          int at[3] = {w[0] + F.origin[0] - i, w[1] + F.origin[1] - j, w[2] + F.origin[2] - k};
-          int b = Grid::block(F, at);
-          if (b >= 0) __atomic_fetch_or(F.near + 2 * b + kind, z[k], __ATOMIC_RELAXED);
-        }
-      }
-    }
-  }
-};
+// Write down the nodes of some blocks, the fields there and their possible contacts.
 int from = (int)((long long)stage->junctions * index / PARTS),
     to = (int)((long long)stage->junctions * (index + 1) / PARTS);
 bool asked = false;
@@ -121,12 +90,6 @@ for (int j = from; j < to; j++) {
         ((int *)world->field[sides[q].field].node)[(size_t)sides[q].slot * 8 + 7] =
             (M.touch + 1) | M.touches << 24;
     k++;
-  }
-  for (int q = 0; q < J.fields; q++) {
-    const Field &F = world->field[J.field[q]];
-    if (F.rigids) continue;
-    Near::mark(F, J.block[q], J.mask & J.have[q], 0);
-    if (J.several & J.have[q]) Near::mark(F, J.block[q], J.several & J.have[q], 1);
   }
   asked |= J.chosen != 0;
 }

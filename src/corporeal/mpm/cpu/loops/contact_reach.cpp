@@ -89,8 +89,8 @@ f8 volume = Simd::all(0.0f);
 Support support;
 for (int b = task[1]; b < task[2]; b++) {
   const int *record = field.block + BLOCK * b;
-  u64 any = 0;
-  for (int i = 0; i < 27; i++) any |= field.near[2 * record[NEIGHBOURS + i] + 1];
+  int any = 0;
+  for (int i = 0; i < 27; i++) any |= field.where[4 * record[NEIGHBOURS + i] + 3];
   if (!any) continue;
   const Reached reached(field, record);
   for (int n = 0; n < 27;) {

@@ -351,16 +351,8 @@ for (int a = 0; a < fields; a++)
   }
 // Wipe the marks for the next step.
 for (int j = 0; j < stage->junctions; j++)
-  for (int q = 0; q < junctions[j].fields; q++) {
-    const Field &F = world->field[junctions[j].field[q]];
-    F.where[4 * junctions[j].block[q] + 3] = 0;
-    for (int i = 0; i < 8 && !F.rigids; i++) {
-      int at[3] = {junctions[j].at[0] - (i >> 2), junctions[j].at[1] - (i >> 1 & 1),
-                   junctions[j].at[2] - (i & 1)};
-      int b = Grid::block(F, at);
-      if (b >= 0) F.near[2 * b] = F.near[2 * b + 1] = 0;
-    }
-  }
+  for (int q = 0; q < junctions[j].fields; q++)
+    world->field[junctions[j].field[q]].where[4 * junctions[j].block[q] + 3] = 0;
 Bonds::part(world);
 Kept::keep(stage);
 // Rigid bodies move; the angular momentum is exact, the turn follows it at mid-step.

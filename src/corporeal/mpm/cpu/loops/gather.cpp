@@ -1,7 +1,7 @@
 // Material of each lane.
 struct LaneMaterial : mpm::Material<f8> {
   f8 keep, rho, rigid;   // as the columns that follow
-  static inline LaneMaterial of(const Field &field, const int *kind) {
+  MPM_INLINE static LaneMaterial of(const Field &field, const int *kind) {
     LaneMaterial t;
     f8 *to = &t.law;
     i8 all = *(const i8u *)kind;
@@ -50,9 +50,40 @@ struct Gather {
     u = c[0] + x;
     x += c[2];
   }
+  // The same of neighbours in one cell, from lane l on: each node is loaded once.
+  static inline void lanes(const f8 *g, const Row *W, int l, f8 *u, f8 *x, f8 *y, f8 *z) {
+    f8 c[TOGETHER][3];
+#pragma unroll
+    for (int i = 0; i < 3; i++) {
+      f8 s[TOGETHER][3];
+#pragma unroll
+      for (int j = 0; j < 3; j++) {
+        const f8 *h = g + i * LAYER + j * 8, h0 = h[0], h1 = h[1], h2 = h[2];
+        const Row *w = W + (i * 3 + j) * 3;
+#pragma unroll
+        for (int n = l; n < l + TOGETHER; n++) {
+          f8 b = w[2][n] * h2, t = w[1][n] * h1 + b;
+          s[n - l][j] = w[0][n] * h0 + t;
+          z[n] = (i || j) ? z[n] + (t + b) : t + b;
+        }
+      }
+#pragma unroll
+      for (int n = 0; n < TOGETHER; n++) {
+        f8 t = s[n][1] + s[n][2];
+        y[l + n] = i ? y[l + n] + (t + s[n][2]) : t + s[n][2];
+        c[n][i] = s[n][0] + t;
+      }
+    }
+#pragma unroll
+    for (int n = 0; n < TOGETHER; n++) {
+      x[l + n] = c[n][1] + c[n][2];
+      u[l + n] = c[n][0] + x[l + n];
+      x[l + n] += c[n][2];
+    }
+  }
   static inline void fill(const Field &field, const int *block, f8 *arena) {
-    int low[3], high[3], box[6];
-    Simd::range(field, block, low, high, box);
+    int low[3], high[3];
+    Simd::range(block, field.box + 6 * ((block - field.block) / BLOCK), low, high);   // as they were laid
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++) {
         const int *near = block + NEIGHBOURS + (((i + 3) >> 2) * 3 + ((j + 3) >> 2)) * 3;
@@ -115,7 +146,15 @@ struct Gather {
     f8 D[3], u[8], c0[8], c1[8], c2[8];
     Simd::weights(q, block, D, W, base);
     for (int l = live; l < 8; l++) u[l] = c0[l] = c1[l] = c2[l] = Simd::all(0.0f);
-    for (int l = 0; l < live; l++) lane(arena + base[l], W, l, u[l], c0[l], c1[l], c2[l]);
+    for (int l = 0; l < live;) {
+      if (Simd::together(base, l, live)) {
+        lanes(arena + base[l], W, l, u, c0, c1, c2);
+        l += TOGETHER;
+      } else {
+        lane(arena + base[l], W, l, u[l], c0[l], c1[l], c2[l]);
+        l++;
+      }
+    }
     Simd::turn(u);
     Simd::turn(c0);
     Simd::turn(c1);

@@ -34,6 +34,35 @@ struct Scatter {
       r0 += a0;
     }
   }
+  // The same of neighbours in one cell, from lane l on: sums stay in registers, in the same order.
+  static inline void lanes(f8 *g, const Row *W, int l, const f8 *r0, const f8 (*a)[8]) {
+    f8 first[TOGETHER], r[TOGETHER];
+#pragma unroll
+    for (int n = 0; n < TOGETHER; n++) first[n] = r0[l + n];
+#pragma unroll
+    for (int i = 0; i < 3; i++) {
+#pragma unroll
+      for (int n = 0; n < TOGETHER; n++) r[n] = first[n];
+#pragma unroll
+      for (int j = 0; j < 3; j++) {
+        f8 *h = g + i * LAYER + j * 8, h0 = h[0], h1 = h[1], h2 = h[2];
+        const Row *w = W + (i * 3 + j) * 3;
+#pragma unroll
+        for (int n = 0; n < TOGETHER; n++) {
+          f8 s = r[n] + a[2][l + n], t = s + a[2][l + n];
+          h0 += w[0][l + n] * r[n];
+          h1 += w[1][l + n] * s;
+          h2 += w[2][l + n] * t;
+          r[n] += a[1][l + n];
+        }
+        h[0] = h0;
+        h[1] = h1;
+        h[2] = h2;
+      }
+#pragma unroll
+      for (int n = 0; n < TOGETHER; n++) first[n] += a[0][l + n];
+    }
+  }
   static inline void batch(const World *world, const Field &field, const int *block, int s, f8 *arena,
                            const ClusterMean &pressure, double &work) {
     const float *q = field.part + (size_t)s * CHANNELS;
@@ -64,7 +93,15 @@ struct Scatter {
     }
     Simd::turn(r);
     for (int j = 0; j < 3; j++) Simd::turn(a[j]);
-    for (int l = 0; l < n; l++) lane(arena + base[l], W, l, r[l], a[0][l], a[1][l], a[2][l]);
+    for (int l = 0; l < n;) {
+      if (Simd::together(base, l, n)) {
+        lanes(arena + base[l], W, l, r, a);
+        l += TOGETHER;
+      } else {
+        lane(arena + base[l], W, l, r[l], a[0][l], a[1][l], a[2][l]);
+        l++;
+      }
+    }
   }
   // Node blocks that are no longer empty.
   static inline void mark(const Field &field, const int *block, const int *low, const int *high,
@@ -92,7 +129,9 @@ struct Scatter {
     int low[3], high[3];
     ClusterMean pressure;
     if (field.swells) sum(field, block, pressure);
-    Simd::range(field, block, low, high, field.box + 6 * (block - field.block) / BLOCK);
+    int *box = field.box + 6 * ((block - field.block) / BLOCK);
+    Simd::box(field, block, box);
+    Simd::range(block, box, low, high);
     for (int i = low[0]; i <= high[0]; i++)
       for (int j = low[1]; j <= high[1]; j++)
         for (int k = 0; k < 8; k++) arena[i * LAYER + j * 8 + k] = Simd::all(0.0f);

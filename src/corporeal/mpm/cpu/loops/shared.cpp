@@ -9,6 +9,7 @@ typedef int i8u __attribute__((vector_size(32), aligned(4)));
 typedef unsigned long long u64;
 typedef float Row[8];
 typedef int Call(void);
+const int TOGETHER = 2;   // lanes in one cell that are moved at once
 constexpr float PER_UNIT = 1.0f / UNIT;
 
 struct Simd : mpm::Lanes<f8> {
@@ -31,9 +32,8 @@ struct Simd : mpm::Lanes<f8> {
       r[i + 4] = __builtin_shufflevector(b[i], b[i + 4], 4, 5, 6, 7, 12, 13, 14, 15);
     }
   }
-  // Nodes of a block's arena that its particles reach, first and last along each axis; and the
-  // lowest and highest places of its particles, six.
-  static inline void range(const Field &field, const int *block, int *low, int *high, int *box) {
+  // Lowest and highest places of a block's particles, six.
+  static inline void box(const Field &field, const int *block, int *box) {
     for (int d = 0; d < 3; d++) {
       const i8 zero = i8{0, 0, 0, 0, 0, 0, 0, 0};
       i8 least = zero + 0x7fffffff, most = ~least;
@@ -45,12 +45,24 @@ struct Simd : mpm::Lanes<f8> {
       }
       box[d] = __builtin_reduce_min(least);
       box[3 + d] = __builtin_reduce_max(most);
+    }
+  }
+  // Nodes of a block's arena that particles in a box reach, first and last along each axis.
+  static inline void range(const int *block, const int *box, int *low, int *high) {
+    for (int d = 0; d < 3; d++) {
       const int first = 4 * block[2 + d] - 1;
       low[d] = ((box[d] - HALF) >> PLACE) - first;
       high[d] = ((box[3 + d] - HALF) >> PLACE) - first;
       low[d] = low[d] < 0 ? 0 : low[d] > 5 ? 5 : low[d];
       high[d] = (high[d] < 0 ? 0 : high[d] > 5 ? 5 : high[d]) + 2;
     }
+  }
+  // Whether so many lanes from l on stand in one cell.
+  static inline bool together(const int *base, int l, int live) {
+    if (l + TOGETHER > live) return false;
+    bool same = true;
+    for (int n = 1; n < TOGETHER; n++) same &= base[l] == base[l + n];
+    return same;
   }
   // Of a batch in a block: distances from the first node, weights of 27 nodes, and the first node's
   // place in the block's arena of 8 x 8 x 8. Who strayed is kept inside: its step counts no more.

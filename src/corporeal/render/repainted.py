@@ -1,0 +1,59 @@
+"""One scene in several sets of plain colours, in the same light.
+
+Which light arrives at a surface does not depend on its colour, nor on that of others where all are
+matt: it is asked for once, and shaded in each set of colours.
+"""
+
+from collections.abc import Sequence
+from concurrent.futures import ThreadPoolExecutor
+
+import numpy as np
+from jaxtyping import UInt8
+
+from corporeal.machine import cores
+from corporeal.render.camera import Aim
+from corporeal.render.embree import BAND, SAMPLING, Block, Job, Quality, Sampling, Stage
+from corporeal.render.kernels import Samples
+
+
+def render_each(
+    stages: Sequence[Stage], camera: Aim, quality: Quality
+) -> list[UInt8[np.ndarray, "H W 3"]]:
+    """Take a picture of each stage: the bytes of ``render``, with one search for light.
+
+    Args:
+        stages: One scene, ``painted`` in different colours.
+        camera: Where from.
+        quality: How finely.
+
+    """
+    size = camera.height, camera.width
+    pictures = [np.empty((*size, 3), np.uint8) for _ in stages]
+    threads = cores()
+    band = max(BAND, -(-camera.height // (2 * threads)))
+    rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
+
+    def take(some: tuple[int, int]) -> None:
+        job = _Repainted(stages[0], camera, SAMPLING[quality])
+        for stage, picture in zip(stages, pictures, strict=True):
+            job.stage = stage
+            job.band(some, picture)
+
+    with ThreadPoolExecutor(threads) as pool:
+        for _ in pool.map(take, rows):
+            pass
+    return pictures
+
+
+class _Repainted(Job):
+    """Some rows of pictures, the first of which asks for light."""
+
+    def __init__(self, stage: Stage, camera: Aim, sampling: Sampling) -> None:
+        super().__init__(stage, camera, sampling)
+        self._arrived: np.ndarray | None = None
+
+    def gather(self, s: Samples, d: np.ndarray, on: np.ndarray, block: Block) -> np.ndarray:
+        """Light that arrives at the samples ``on``, which are the same in each picture."""
+        if self._arrived is None:
+            self._arrived = super().gather(s, d, on, block)
+        return self._arrived

@@ -1,0 +1,29 @@
+"""Colours change what is reflected, not what arrives."""
+
+import numpy as np
+import trimesh
+
+from corporeal.render.camera import place
+from corporeal.render.embree import Light, Stage, render
+from corporeal.render.repainted import render_each
+from corporeal.types import Finish, Scene, SceneObject, Surface
+
+
+def two_blocks():
+    made = [trimesh.creation.box(bounds=[[0, k, 0], [0.7, k + 0.7, 0.7]]) for k in (0, 1)]
+    surfaces = tuple(
+        Surface(f"block_{k}", 0, 0, np.asarray(m.vertices), np.asarray(m.faces))
+        for k, m in enumerate(made)
+    )
+    return Scene("row", "", (SceneObject("row_0", "row", 1.0),), surfaces, (Finish("plain"),))
+
+
+def test_pictures_in_several_sets_of_colours_are_those_that_are_rendered_alone():
+    stage, rng = Stage(two_blocks()), np.random.default_rng(0)
+    count = len(stage.look.triangles)
+    stages = [stage.painted(rng.uniform(0.05, 0.9, (count, 3)), Light()) for _ in range(3)]
+    camera = place(stage.boxes()[None] + stage.origin, (96, 72))
+    together = render_each(stages, camera, "draft")
+    for one, picture in zip(stages, together, strict=True):
+        np.testing.assert_array_equal(picture, render(one, camera, "draft"))
+    assert np.abs(together[0].astype(int) - together[1]).max() > 50
