@@ -205,9 +205,9 @@ def facet_holds(
 ) -> bool: ...
 
 
-@wp.func_native("return mpm::Facet::replaces(&apart.c[0], cosine, radius, dx);")
+@wp.func_native("return mpm::Facet::replaces(&apart.c[0], cosine, radius, dx, alike);")
 def facet_replaces(
-    apart: wp.vec3d, cosine: wp.float64, radius: wp.float64, dx: wp.float64
+    apart: wp.vec3d, cosine: wp.float64, radius: wp.float64, dx: wp.float64, alike: wp.float64
 ) -> bool: ...
 
 
