@@ -145,7 +145,7 @@ struct Curved {
     return true;
   }
   // Height of a place, seen from the point, over the surface; its normal there, and how far aside that is,
-  // squared. Exact for balls, cylinders and tori, from inside and from outside.
+  // squared. Exact for balls and cylinders, from inside and outside; else of third order.
   CUDA_CALLABLE static inline bool height(const double *row, const double *x, double &h, double *m, double &aside) {
     const double *n = row, *e = row + 3;
     const double f[3] = {n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0]};
@@ -166,6 +166,63 @@ struct Curved {
     if (moved <= 0 || sqrt(outward * outward + ahead * ahead) <= SIDEWAYS) return;
     const double a = Round::bounded(atan2(ahead, outward), row[8], radius + moved, beyond);
     for (int i = 0; i < 3; i++) out[i] += moved * (sin(a) * e[i] + (cos(a) - 1.0) * n[i]);
+  }
+  // Out of a body's frame into the world, or back; R: three rows.
+  CUDA_CALLABLE static inline void turn(const double *R, const double *x, double *out) {
+    for (int i = 0; i < 3; i++) out[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
+  }
+  CUDA_CALLABLE static inline void turn_back(const double *R, const double *x, double *out) {
+    for (int i = 0; i < 3; i++) out[i] = R[i] * x[0] + R[3 + i] * x[1] + R[6 + i] * x[2];
+  }
+  // A place in the frame of a body turned by S, in that of one turned by R; apart: of the first's middle
+  // from the other's, in the world.
+  CUDA_CALLABLE static inline void carry(const double *S, const double *R, const double *apart, const double *x, double *out) {
+    double y[3];
+    turn(S, x, y);
+    for (int i = 0; i < 3; i++) y[i] += apart[i];
+    turn_back(R, y, out);
+  }
+  // Whether a curved point may meet a round body at all; first: whether that body comes first.
+  CUDA_CALLABLE static inline bool may(const double *row, const double *q, const double *centre, double far, bool first) {
+    double square = 0;
+    for (int i = 0; i < 3; i++) square += (q[i] - centre[i]) * (q[i] - centre[i]);
+    const double most = far + row[8];
+    return bends(row) && (first || hollow(row)) && square <= most * most;
+  }
+  // Where round point p touches the face around curved point q, each in its body's frame: the place in p's,
+  // the face's normal in the world and the gap; whether it does, nearer than reach.
+  CUDA_CALLABLE static inline bool meet(const double *round, const double *p, const double *S, const double *face,
+                                        const double *q, const double *R, const double *apart, double reach,
+                                        double *x, double *m, double &gap) {
+    const double radius = ball(round), spread = FACET_SPREAD * face[8];
+    double n[3], c[3], d[3], h = 0, aside = 0;
+    turn(R, face, m);
+    turn(S, round, n);
+    if (m[0] * n[0] + m[1] * n[1] + m[2] * n[2] > -FACING) return false;
+    for (int k = 0; k < CURVED_TURNS; k++) {
+      turn_back(S, m, d);
+      for (int i = 0; i < 3; i++) d[i] = -d[i];
+      middle(round, d, x);
+      for (int i = 0; i < 3; i++) x[i] += p[i];
+      carry(S, R, apart, x, c);
+      for (int i = 0; i < 3; i++) c[i] -= q[i];
+      if (!height(face, c, h, d, aside)) return false;
+      turn(R, d, m);
+      if (arc(round) <= 0) break;
+    }
+    gap = h - radius;
+    if (gap >= reach || gap <= -reach || gap <= -radius || aside > spread * spread) return false;
+    const double lean = -(m[0] * n[0] + m[1] * n[1] + m[2] * n[2]);
+    if (radius * acos(lean < 1 ? lean : 1.0) > round[8]) return false;
+    turn_back(S, m, d);
+    for (int i = 0; i < 3; i++) x[i] -= radius * d[i];
+    return true;
+  }
+  // Whether a place that lies `own` from its point, squared, is another round point's, o.
+  CUDA_CALLABLE static inline bool taken(const double *round, double own, const double *x, const double *other, const double *o) {
+    double square = 0, alike = 0;
+    for (int i = 0; i < 3; i++) square += (x[i] - o[i]) * (x[i] - o[i]), alike += round[i] * other[i];
+    return OWN_PLACE * OWN_PLACE * square < own && alike > 0 && ball(other) > 0;
   }
   // How far from there nodes misjudge the gap by more than it is: they take both surfaces for planes.
   CUDA_CALLABLE static inline double misjudged(const double *round, const double *row, double dx) {

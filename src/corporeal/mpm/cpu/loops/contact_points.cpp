@@ -146,19 +146,13 @@ struct Points {
       nears = 0;
       for (int i = 0; i < 3; i++) low[i] = mpm::VAST, high[i] = -mpm::VAST;
       for (int q = 0; q < G.surfaces && nears < MOST; q++) {
-        if (!mpm::Curved::bends(row(q)) || !(f < g || mpm::Curved::hollow(row(q)))) continue;
-        double square = 0, most = s[RADIUS] + reach + row(q)[8];
-        for (int i = 0; i < 3; i++) {
-          const double d = G.surface[3 * q + i] - centre[i];
-          square += d * d;
-        }
-        if (square > most * most) continue;
+        if (!mpm::Curved::may(row(q), G.surface + 3 * q, centre, s[RADIUS] + reach, f < g)) continue;
         near[nears++] = q;
         turn(t, G.surface + 3 * q, x);
         for (int i = 0; i < 3; i++) {
           x[i] -= apart[i];
-          if (x[i] < low[i]) low[i] = x[i];
-          if (x[i] > high[i]) high[i] = x[i];
+          if (x[i] - row(q)[8] < low[i]) low[i] = x[i] - row(q)[8];
+          if (x[i] + row(q)[8] > high[i]) high[i] = x[i] + row(q)[8];
         }
       }
       return nears > 0;
@@ -176,62 +170,31 @@ struct Points {
     }
     // Whether a place in f's frame belongs to point p and not to its neighbours.
     bool owns(int p, const double *x) const {
-      const double *n = F.rounding + mpm::ROUNDING * p, own = away(p, x);
-      for (int o = 0; o < F.surfaces; o++) {
-        const double *other = F.rounding + mpm::ROUNDING * o;
-        if (mpm::OWN_PLACE * mpm::OWN_PLACE * away(o, x) < own && mpm::Curved::ball(other) > 0 && Vec::dot(n, other) > 0)
-          return false;
-      }
+      const double *round = F.rounding + mpm::ROUNDING * p, *at = F.surface + 3 * p;
+      const double d[3] = {x[0] - at[0], x[1] - at[1], x[2] - at[2]}, own = Vec::dot(d, d);
+      for (int o = 0; o < F.surfaces; o++)
+        if (mpm::Curved::taken(round, own, x, F.rounding + mpm::ROUNDING * o, F.surface + 3 * o)) return false;
       return true;
-    }
-    double away(int p, const double *x) const {
-      double square = 0;
-      for (int i = 0; i < 3; i++) square += (x[i] - F.surface[3 * p + i]) * (x[i] - F.surface[3 * p + i]);
-      return square;
-    }
-    void to_g(const double *x, double *out) const {   // from f's frame, as a place
-      double y[3];
-      turn(s, x, y);
-      for (int i = 0; i < 3; i++) y[i] += apart[i];
-      turn_back(t, y, out);
     }
     bool meet(int p, Touch &T) const {
       const double *round = F.rounding + mpm::ROUNDING * p, radius = mpm::Curved::ball(round);
-      double x[3], y[3], c[3], d[3], m[3], n[3], h, aside;
+      double x[3], y[3], m[3], gap;
       turn(s, F.surface + 3 * p, y);
       for (int i = 0; i < 3; i++)
         if (y[i] < low[i] - reach - round[8] || y[i] > high[i] + reach + round[8]) return false;
       for (int i = 0; i < 3; i++) x[i] = F.surface[3 * p + i] - radius * round[i];
-      to_g(x, c);
-      const int q = nearest(c);
-      if (q < 0) return false;
-      const double *face = row(q);
-      turn(t, face, m);
-      turn(s, round, n);
-      if (Vec::dot(m, n) > -mpm::FACING) return false;
-      for (int k = 0; k < mpm::CURVED_TURNS; k++) {
-        turn_back(s, m, d);
-        for (int i = 0; i < 3; i++) d[i] = -d[i];
-        mpm::Curved::middle(round, d, x);
-        for (int i = 0; i < 3; i++) x[i] += F.surface[3 * p + i];
-        to_g(x, c);
-        for (int i = 0; i < 3; i++) c[i] -= G.surface[3 * q + i];
-        if (!mpm::Curved::height(face, c, h, d, aside)) return false;
-        turn(t, d, m);
-        if (mpm::Curved::arc(round) <= 0) break;
-      }
-      const double gap = h - radius, lean = -Vec::dot(m, n), spread = mpm::FACET_SPREAD * face[8];
-      if (gap >= reach || gap <= -reach || gap <= -radius || aside > spread * spread) return false;
-      if (radius * acos(lean < 1 ? lean : 1.0) > round[8]) return false;
-      turn(s, x, y);
-      for (int i = 0; i < 3; i++) y[i] -= radius * m[i];
-      turn_back(s, y, x);
+      mpm::Curved::carry(s + TURN, t + TURN, apart, x, y);
+      const int q = nearest(y);
+      if (q < 0 || !mpm::Curved::meet(round, F.surface + 3 * p, s + TURN, row(q), G.surface + 3 * q, t + TURN, apart,
+                                      reach, x, m, gap))
+        return false;
       if (!owns(p, x)) return false;
       enter(w, T, G.facets * F.surfaces + p, f < g ? f : g, f < g ? g : f, f > g, gap);
-      T.instead = mpm::Curved::misjudged(round, face, w->dx);
+      turn(s, x, y);
+      T.instead = mpm::Curved::misjudged(round, row(q), w->dx);
       for (int i = 0; i < 3; i++) T.x[i] = y[i] + s[CENTRE + i], T.normal[i] = f < g ? -m[i] : m[i];
       for (int i = 0; i < 3; i++) y[i] = T.x[i] + radius * m[i];   // the middle of what is round
-      T.target -= mpm::Curved::inward(round, face, along(y, m), w->dt);
+      T.target -= mpm::Curved::inward(round, row(q), along(y, m), w->dt);
       return true;
     }
     // How fast a place of f moves over g, across a normal, squared.
