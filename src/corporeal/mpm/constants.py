@@ -115,6 +115,9 @@ FACET_ALIKE = 0.95
 NEAREST_MIDDLE = 0.05
 """Nothing that meets a hollow lies nearer to the middle of its curvature than this, over the radius of
 curvature [-]: from the middle all of it is as near."""
+CURVED_SPREAD = 0.8
+"""A curved face goes on from its points by this share of what they stand for [-]: about their distance
+from the sixth point around. Nowhere in it is farther from all of them."""
 CURVED_TURNS = 4
 """How often the place of contact of something round is corrected for where its surface looks."""
 OWN_PLACE = 1.1

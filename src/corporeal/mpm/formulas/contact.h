@@ -194,7 +194,7 @@ struct Curved {
   CUDA_CALLABLE static inline bool meet(const double *round, const double *p, const double *S, const double *face,
                                         const double *q, const double *R, const double *apart, double reach,
                                         double *x, double *m, double &gap) {
-    const double radius = ball(round), spread = FACET_SPREAD * face[8];
+    const double radius = ball(round), spread = CURVED_SPREAD * face[8];
     double n[3], c[3], d[3], h = 0, aside = 0;
     turn(R, face, m);
     turn(S, round, n);

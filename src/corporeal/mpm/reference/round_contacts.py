@@ -7,8 +7,8 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import (
+    CURVED_SPREAD,
     CURVED_TURNS,
-    FACET_SPREAD,
     FACING,
     OWN_PLACE,
     POINT_REACH,
@@ -86,7 +86,7 @@ class Meeting:
         reach = POINT_REACH * self.scene.problem.cell
         lean = np.arccos(np.clip(-np.sum(out * rows[:, :3], axis=1), -1.0, 1.0))
         there &= (gap < reach) & (gap > -np.minimum(reach, radius))
-        there &= over.aside <= (FACET_SPREAD * faces[:, 8]) ** 2
+        there &= over.aside <= (CURVED_SPREAD * faces[:, 8]) ** 2
         there &= radius * lean <= rows[:, 8]
         chosen = np.flatnonzero(there)
         chosen = chosen[self._owned(p[chosen], place[chosen])]
