@@ -812,7 +812,7 @@ class Particles:
     object_of_surface: Int[np.ndarray, " S"]
     mass_real: tuple[float, ...]
     """Estimated mass of every part [kg]: what the particles' masses must add up to."""
-    rounding: Float[np.ndarray, "S2 R"] = field(default_factory=lambda: np.zeros((0, ROUNDING)))
+    rounding: Float[np.ndarray, "S2 Columns"] = field(default_factory=lambda: np.zeros((0, ROUNDING)))
     """How each of those points curves, see ``ROUNDING``; none: as corners."""
     face: Float[np.ndarray, "A 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Outward area vectors of the surface that objects in the wind show to the air [m²]."""
