@@ -404,6 +404,8 @@ class PartWords:
     inflation: float | None = None
     """Gauge pressure of the air sealed behind the wall [Pa]; 0: no more than around it; None: it is
     not sealed."""
+    rebound: float | None = None
+    """Restitution on a hard floor that rules ask of a ball of its name [-]; None: no rule is known."""
     volume_share: float = 1.0
     """Of a piece: its outer shape's share of the volume inside the part's surface, in [0, 1]."""
     surface_share: float = 1.0
@@ -635,6 +637,8 @@ class Structure:
     gauge: float | None = None
     """Pressure of air sealed behind an elastic wall that bears more than the air does, above that
     around it [Pa]; None: there is none, or the air bears more."""
+    rebound: float | None = None
+    """Restitution that rules ask of an inflated ball of its name [-]; None: none is known."""
     solidity: float = 1.0
     """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
     holds: str = ""
