@@ -405,7 +405,7 @@ class PartWords:
     """Gauge pressure of the air sealed behind the wall [Pa]; 0: no more than around it; None: it is
     not sealed."""
     rebound: float | None = None
-    """Restitution on a hard floor that rules ask of a ball of its name [-]; None: no rule is known."""
+    """Restitution on a hard floor that rules ask of balls of its name [-]; None: none is known."""
     volume_share: float = 1.0
     """Of a piece: its outer shape's share of the volume inside the part's surface, in [0, 1]."""
     surface_share: float = 1.0
@@ -816,7 +816,9 @@ class Particles:
     object_of_surface: Int[np.ndarray, " S"]
     mass_real: tuple[float, ...]
     """Estimated mass of every part [kg]: what the particles' masses must add up to."""
-    rounding: Float[np.ndarray, "S2 Columns"] = field(default_factory=lambda: np.zeros((0, ROUNDING)))
+    rounding: Float[np.ndarray, "S2 Columns"] = field(
+        default_factory=lambda: np.zeros((0, ROUNDING))
+    )
     """How each of those points curves, see ``ROUNDING``; none: as corners."""
     face: Float[np.ndarray, "A 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Outward area vectors of the surface that objects in the wind show to the air [m²]."""

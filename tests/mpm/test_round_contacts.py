@@ -1,4 +1,4 @@
-"""What is round rolls on what is curved, outwards and inwards: the engines agree, nothing is lost."""
+"""What is round rolls on what is curved, outwards and inwards: the engines agree."""
 
 import numpy as np
 import pytest

@@ -239,7 +239,7 @@ def is_curved(rounding: Float[np.ndarray, "N 12"]) -> Bool[np.ndarray, " N"]:
 def _rounding(
     normal: np.ndarray, along: np.ndarray, large: np.ndarray, small: np.ndarray, reach: np.ndarray
 ) -> Float[np.ndarray, "N 12"]:
-    """Put a point's rounding together from its two curvatures [1/m]; what is hollow has no radii."""
+    """Put a point's rounding together from its two curvatures [1/m]; hollows have no radii."""
     bent = large * reach > STRAIGHT
     dome = bent & (small * reach > STRAIGHT)
     tight = np.where(bent, 1.0 / np.where(bent, large, 1.0), 0.0)

@@ -113,11 +113,11 @@ FACET_NODES = 2.0
 FACET_ALIKE = 0.95
 """… and on which they meet along nearly the same normal: the least cosine [-]."""
 NEAREST_MIDDLE = 0.05
-"""Nothing that meets a hollow lies nearer to the middle of its curvature than this, over the radius of
-curvature [-]: from the middle all of it is as near."""
+"""Nothing that meets a hollow lies nearer to the middle of its curvature than this, over the radius
+of curvature [-]: from the middle all of it is as near."""
 CURVED_SPREAD = 0.8
-"""A curved face goes on from its points by this share of what they stand for [-]: about their distance
-from the sixth point around. Nowhere in it is farther from all of them."""
+"""A curved face goes on from its points by this share of what they stand for [-]: about their
+distance from the sixth point around. Nowhere in it is farther from all of them."""
 CURVED_TURNS = 4
 """How often the place of contact of something round is corrected for where its surface looks."""
 OWN_PLACE = 1.1
@@ -125,10 +125,10 @@ OWN_PLACE = 1.1
 FACING = 0.2
 """Surface points of two bodies face each other if their normals have a cosine below minus this."""
 BENT_NODES = 9.0
-"""Twice by how much nodes misjudge a gap, over the sum of curvatures that they take for none [cells²]:
-(3 cells)²/2, what a node sees from one side to the other."""
+"""Twice by how much nodes misjudge a gap, over the sum of curvatures that they take for none
+[cells²]: (3 cells)²/2, what a node sees from one side to the other."""
 ROUND_ALIKE = 0.5
-"""Least cosine of normals on nodes around a contact of something round with something curved [-]."""
+"""Least cosine of normals on nodes around a contact of what is round with what is curved [-]."""
 LATTICE_GAP = 0.05
 """What two particles per cell and axis add to the continuous touching distance [cells] …"""
 LATTICE_SLOPE = 0.25

@@ -307,7 +307,10 @@ TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - 
     ("int", "choice"),  # where its candidate is kept; -1: nowhere
     ("double[3]", "x normal"),
     ("double", "gap target inverse mu span"),  # span: over which a wall drags on a liquid [m² s]
-    ("double", "instead"),  # of round on curved: nodes nearer than this transmit nothing [m]; else 0
+    (
+        "double",
+        "instead",
+    ),  # of round on curved: nodes nearer than this transmit nothing [m]; else 0
     ("double[3]", "J before"),
 )
 ENTRY = Record(  # what some contacts of one pair add to the books

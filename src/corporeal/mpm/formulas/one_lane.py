@@ -255,7 +255,8 @@ def curved_meet(
   double own = 0;
   for (int i = 0; i < 3; i++) own += (x.c[i] - at[3 * p + i]) * (x.c[i] - at[3 * p + i]);
   for (int o = first; o < first + count; o++)
-    if (mpm::Curved::taken(row + mpm::ROUNDING * p, own, &x.c[0], row + mpm::ROUNDING * o, at + 3 * o))
+    if (mpm::Curved::taken(row + mpm::ROUNDING * p, own, &x.c[0], row + mpm::ROUNDING * o,
+                           at + 3 * o))
       return false;
   return true;
 """)

@@ -74,9 +74,9 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     rolls = np.repeat([t.rolls for t in touches], [len(t.gap) for t in touches]).astype(np.int64)
     rebound = _rebound(scene, pair, contacts, rolls)
     struck = contact_impulses.solve_impacts(contacts, movers, rebound, problem.cell, dt)
-    target = np.maximum(contacts.gap, 0.0) / dt - _joined([t.inwards for t in touches], (0,)).astype(
-        np.float64
-    )
+    target = np.maximum(contacts.gap, 0.0) / dt - _joined(
+        [t.inwards for t in touches], (0,)
+    ).astype(np.float64)
     sweeps = _sweeps(scene, contacts, bool(struck.any()))
     impulse = struck + contact_impulses.solve(contacts, movers, target, sweeps)
     before, after = contacts.approach(scene.movers_before_forces()), contacts.approach(movers)

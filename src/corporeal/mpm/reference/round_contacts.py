@@ -120,7 +120,12 @@ class Meeting:
         return ~np.any(others & (OWN_PLACE**2 * away < own[:, None]), axis=1)
 
     def _listed(
-        self, rows: np.ndarray, faces: np.ndarray, place: np.ndarray, out: np.ndarray, gap: np.ndarray
+        self,
+        rows: np.ndarray,
+        faces: np.ndarray,
+        place: np.ndarray,
+        out: np.ndarray,
+        gap: np.ndarray,
     ) -> Touch:
         scene, pair = self.scene, (min(self.body, self.other), max(self.body, self.other))
         middle = place + curved.ball_radius(rows)[:, None] * out

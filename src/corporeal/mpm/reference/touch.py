@@ -26,7 +26,7 @@ class Touch:
     kept: KeptChoices = field(default_factory=KeptChoices.none)
     """Candidate normals that were taken, where they are kept."""
     instead: Float[np.ndarray, " E"] | None = None
-    """Of what is round on what is curved: contacts on nodes nearer than this transmit nothing [m]."""
+    """Of what is round on what is curved: nodes nearer than this transmit nothing [m] …"""
     inward: Float[np.ndarray, " E"] | None = None
     """… and the speed at which a way straight ahead leads into a hollow within a step [m/s]."""
     rolls: int = -1
