@@ -187,7 +187,7 @@ def blind(found: Sequence[Result]) -> str:
         f"{len(rows)} of the things were written down before they were tried ({names}): {AT_FIRST} "
         f"were in their range ± {LEEWAY} at draft at the first try, before anything was changed; "
         f"{inside} are now (decisions [54](decisions/0054-heights-fall-through-air.md) and "
-        "[65](decisions/0065-what-rules-say-of-balls.md)). The lexicon tells what the rules of some "
+        "[65](decisions/0065-what-rules-say-of-balls.md)). Names tell what the rules of some "
         "sports ask of their balls: rows of tennis, padel, futsal and basketballs test that it "
         "comes out."
     )
