@@ -76,11 +76,11 @@ class Meeting:
         """Make a contact of each round point that has one; None: none has."""
         p, q = self._nearest()
         rows, faces = self.rows[p], self.faces[q]
-        radius, out = curved.ball_radius(rows), faces[:, :3]
-        there = np.ones(len(p), dtype=bool)
-        for _ in range(CURVED_TURNS):
-            middle = self.points[p] + curved.middle(rows, -out)
-            over = curved.height_over(faces, middle - self.places[q])
+        radius = curved.ball_radius(rows)
+        middle, over = self._over(p, q, faces[:, :3])
+        out, there = over.normal, over.there
+        for _ in range(1, CURVED_TURNS):
+            middle, over = self._over(p, q, out)
             out, there = over.normal, there & over.there
         gap, place = over.height - radius, middle - radius[:, None] * out
         reach = POINT_REACH * self.scene.problem.cell
@@ -93,6 +93,13 @@ class Meeting:
         if len(chosen) == 0:
             return None
         return self._listed(rows[chosen], faces[chosen], place[chosen], out[chosen], gap[chosen])
+
+    def _over(
+        self, p: Int[np.ndarray, " E"], q: Int[np.ndarray, " E"], out: Float[np.ndarray, "E 3"]
+    ) -> tuple[Float[np.ndarray, "E 3"], curved.Over]:
+        """Middles of balls under round points that look against a direction, over their faces."""
+        middle = self.points[p] + curved.middle(self.rows[p], -out)
+        return middle, curved.height_over(self.faces[q], middle - self.places[q])
 
     def _nearest(self) -> tuple[Int[np.ndarray, " E"], Int[np.ndarray, " E"]]:
         """Round points and for each the curved point that it faces, nearest to its middle."""

@@ -128,11 +128,11 @@ struct Points {
   }
   // Round points of body f on curved ones of body g. Where both are round, those of the first body count.
   struct Meets {
-    enum { MOST = 8192 };
+    enum { MOST_BENT = 8192 };   // more than a body has surface points
     const World *w;
     const Field &F, &G;
     const double *s, *t, reach;
-    int f, g, nears, near[MOST];
+    int f, g, nears, near[MOST_BENT];
     double apart[3], low[3], high[3];
     Meets(const World *w, int f, int g)
         : w(w), F(w->field[f]), G(w->field[g]), s(F.rigid), t(G.rigid), reach(mpm::POINT_REACH * w->dx), f(f), g(g) {
@@ -145,7 +145,7 @@ struct Points {
       turn_back(t, apart, centre);
       nears = 0;
       for (int i = 0; i < 3; i++) low[i] = mpm::VAST, high[i] = -mpm::VAST;
-      for (int q = 0; q < G.surfaces && nears < MOST; q++) {
+      for (int q = 0; q < G.surfaces && nears < MOST_BENT; q++) {
         if (!mpm::Curved::may(row(q), G.surface + 3 * q, centre, s[RADIUS] + reach, f < g)) continue;
         near[nears++] = q;
         turn(t, G.surface + 3 * q, x);
