@@ -35,9 +35,9 @@ FARTHEST, APART = 0.1, 0.05
 """No thing may be farther from its range, and draft from normal [-]."""
 INSIDE = 0.85
 """Least share of rows inside."""
-AT_FIRST = 6
+AT_FIRST = 11
 """So many of the blind rows were in their range ± ``LEEWAY`` when they were tried first, at draft
-(decision 54)."""
+(decisions 54 and 65)."""
 UNBOOKED = 0.08
 """Most that may be lost unbooked at draft, over the energy of the blow [-]."""
 
@@ -186,7 +186,10 @@ def blind(found: Sequence[Result]) -> str:
     return (
         f"{len(rows)} of the things were written down before they were tried ({names}): {AT_FIRST} "
         f"were in their range ± {LEEWAY} at draft at the first try, before anything was changed; "
-        f"{inside} are now ([decision 54](decisions/0054-heights-fall-through-air.md))."
+        f"{inside} are now (decisions [54](decisions/0054-heights-fall-through-air.md) and "
+        "[65](decisions/0065-what-rules-say-of-balls.md)). Names tell what the rules of some "
+        "sports ask of their balls: rows of tennis, padel, futsal and basketballs test that it "
+        "comes out."
     )
 
 

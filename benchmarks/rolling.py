@@ -1,16 +1,20 @@
-"""How far what is drawn round rolls, with and without knowing that it is: the table of decision 58.
+"""How far what is drawn round rolls, with and without knowing it: tables of decisions 58 and 64.
 
 A ball of 50 mm on the floor, by how finely it is drawn, a marble of 12 mm and a cylinder of 20 mm
-on a steel board, at detail draft; 5°, or .3 m/s on the level. About half a minute.
+on a steel board, at detail draft; 5°, or .3 m/s on the level. Then a marble that swings in bowls,
+and the period of a ball that rolls in a hollow ball, ω² = g/((R - r)(1 + I/(m r²))), longer by its
+swing. About a minute.
 """
 
 from dataclasses import replace
 
 import numpy as np
 import trimesh
+from scipy.special import ellipk
 
 import corporeal as co
 from corporeal.mpm.problem import Problem
+from corporeal.mpm.state import Matter
 from corporeal.types import ROUNDING
 
 G, SLOPE = 9.81, np.radians(5)
@@ -62,8 +66,70 @@ def unknown(problem: Problem) -> Problem:
     return replace(problem, bodies=tuple(bodies))
 
 
+# ---------------------------------------------------------------- in bowls
+
+BOWL = 0.1
+"""Radius of the hollow ball [m]."""
+SWINGS = ((BOWL, 0.012, 20.0), (BOWL, 0.012, 5.0), (0.06, 0.02, 20.0), (0.15, 0.02, 20.0))
+"""Radii of bowl and marble [m], and how far aside the marble begins [deg]."""
+LOOKS = 100
+"""How often it is looked at in a period."""
+
+
+def hollow(radius: float, wall: float) -> co.Solid:
+    """Return a round block of steel out of which a part of a ball is taken."""
+    angle = np.linspace(np.radians(60), 0, 24)
+    inside = np.stack([radius * np.sin(angle), radius + wall - radius * np.cos(angle)], axis=1)
+    wide = inside[0, 0] + wall
+    line = np.concatenate([[[0, 0], [wide, 0], [wide, inside[0, 1]]], inside])
+    shape = trimesh.creation.revolve(line, sections=64)
+    return co.solid("steel", np.array(shape.vertices), shape.faces)
+
+
+def in_bowl(radius: float, marble: float, lean: float) -> tuple[Problem, float]:
+    """Pose a marble that begins aside in a bowl, and give its period [s]."""
+    wall, theta = 0.008, np.radians(lean)
+    way = np.array([np.sin(theta), 0.0, -np.cos(theta)])
+    at = np.array([0.0, 0.0, radius + wall]) + (radius - marble) * way
+    problem = posed(co.ball("glass", marble, tuple(at)), hollow(radius, wall), gravity=LEVEL)
+    matter = Matter.of(problem)
+    share = matter.inertia[0][1, 1] / (matter.total[0] * marble**2)
+    swing = 4.0 * float(ellipk(np.sin(theta / 2) ** 2))
+    return problem, swing * np.sqrt((radius - marble) * (1.0 + share) / G)
+
+
+def swung(problem: Problem, period: float) -> tuple[float, float, float]:
+    """Period [s] and how far it comes back after two; what normal contact took [J].
+
+    The period is that from one way through the middle to the same again; nan: there is none.
+    """
+    engine, place, time = co.build_engine(problem), [], []
+    for k in range(1, 2 * LOOKS + 1):
+        engine.advance(k * period / LOOKS)
+        found = engine.measure()
+        place.append(found.centre[0, 0] - found.centre[1, 0])
+        time.append(found.time)
+    x, t = np.array(place), np.array(time)
+    k = np.flatnonzero((x[:-1] > 0.0) & (x[1:] <= 0.0))
+    through = t[k] - x[k] * (t[k + 1] - t[k]) / (x[k + 1] - x[k])
+    first = float(through[1] - through[0]) if len(through) > 1 else float("nan")
+    return first, float(x[-1] / x[0]), found.impact_loss
+
+
+def swings() -> None:
+    """Print the table of bowls."""
+    print("\n| bowl, marble, begins at | period over ideal, as points | as round | comes back to |")
+    print("|---|---:|---:|---:|")
+    for radius, marble, lean in SWINGS:
+        problem, period = in_bowl(radius, marble, lean)
+        before, _, _ = swung(unknown(problem), period)
+        now, back, _ = swung(problem, period)
+        name = f"{1e3 * radius:.0f} mm, {1e3 * marble:.0f} mm, {lean:.0f}°"
+        print(f"| {name} | {before / period:.3f} | {now / period:.4f} | {back:.3f} |", flush=True)
+
+
 def main() -> None:
-    """Print the table."""
+    """Print the tables."""
     slope = 0.5 * G * np.sin(SLOPE)
     rows = [
         (
@@ -89,6 +155,7 @@ def main() -> None:
             f"| {speed:.4f} |",
             flush=True,
         )
+    swings()
 
 
 if __name__ == "__main__":

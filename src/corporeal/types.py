@@ -404,6 +404,8 @@ class PartWords:
     inflation: float | None = None
     """Gauge pressure of the air sealed behind the wall [Pa]; 0: no more than around it; None: it is
     not sealed."""
+    rebound: float | None = None
+    """Restitution on a hard floor that rules ask of balls of its name [-]; None: none is known."""
     volume_share: float = 1.0
     """Of a piece: its outer shape's share of the volume inside the part's surface, in [0, 1]."""
     surface_share: float = 1.0
@@ -635,6 +637,8 @@ class Structure:
     gauge: float | None = None
     """Pressure of air sealed behind an elastic wall that bears more than the air does, above that
     around it [Pa]; None: there is none, or the air bears more."""
+    rebound: float | None = None
+    """Restitution that rules ask of an inflated ball of its name [-]; None: none is known."""
     solidity: float = 1.0
     """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
     holds: str = ""
@@ -778,12 +782,13 @@ class Contents:
     """On each part of the vessels' scene, those before it among the contents, and the floor [-]."""
 
 
-ROUNDING = 10
+ROUNDING = 12
 """Numbers that say how a surface curves at a point: its outward unit normal (3); the direction of
 an arc, tangential and of unit length (3); the radius of the ball that moves along that arc [m], and
 the arc's own radius less the ball's [m], both 0 where it is flat; how far from the point the
-surface is so [m]; and 1 where its neighbours take over there on all sides, 0 where something round
-ends. A ball has no arc, a cylinder no ball. All zeros: nothing is known."""
+surface is so [m]; 1 where its neighbours take over there on all sides, 0 where something round
+ends; and the curvatures along the arc's direction and across it [1/m], less than 0 where the
+surface is hollow. A ball has no arc, a cylinder no ball. All zeros: nothing is known."""
 
 
 @dataclass(frozen=True)
@@ -811,7 +816,9 @@ class Particles:
     object_of_surface: Int[np.ndarray, " S"]
     mass_real: tuple[float, ...]
     """Estimated mass of every part [kg]: what the particles' masses must add up to."""
-    rounding: Float[np.ndarray, "S2 10"] = field(default_factory=lambda: np.zeros((0, ROUNDING)))
+    rounding: Float[np.ndarray, "S2 Columns"] = field(
+        default_factory=lambda: np.zeros((0, ROUNDING))
+    )
     """How each of those points curves, see ``ROUNDING``; none: as corners."""
     face: Float[np.ndarray, "A 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Outward area vectors of the surface that objects in the wind show to the air [m²]."""

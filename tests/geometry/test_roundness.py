@@ -68,3 +68,17 @@ def test_a_rounded_edge_leaves_the_faces_beside_it_flat():
     assert rows[inner, 7] == pytest.approx(0.05, rel=0.02)
     assert rows[curved, 7].max() < 0.101  # the first and last of them bend at one side alone
     assert not curved[points[:, :2].min(axis=1) < 0.449].any()
+
+
+def test_the_inside_of_a_bowl_is_hollow_with_its_radius_and_has_no_ball():
+    angle = np.linspace(0, 1.2, 24)
+    profile = 0.3 * np.stack([np.sin(angle), 1 - np.cos(angle)], axis=1)
+    shape = trimesh.creation.revolve(profile, sections=60)
+    if np.mean(shape.face_normals[:, 2]) < 0:
+        shape.invert()
+    points, rows = covered(shape, 900)
+    inner = (points[:, 2] > 0.005) & (points[:, 2] < 0.17)
+    assert rows[inner][:, 10:] == pytest.approx(-1 / 0.3, rel=0.03)
+    assert not is_round(rows[inner]).any()
+    middle = points[inner] + 0.3 * rows[inner, :3]
+    assert np.abs(middle - [0.0, 0.0, 0.3]).max() < 2e-3 * 0.3

@@ -2,6 +2,7 @@
 
 import subprocess
 import sys
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -246,3 +247,25 @@ def test_bodies_that_travel_together_are_sorted_together(monkeypatch):
     monkeypatch.setattr(engine, "connect", lambda go=engine.connect: (sorts.append(1), go()))
     engine.advance(6 * CELL / 2.0)
     assert 3 <= len(sorts) <= 8
+
+
+def test_nodes_are_empty_where_nothing_lies_whichever_field_is_sorted():
+    """Where one field was sorted, those of the others took each other's place and kept old nodes.
+
+    What came to a block of nodes again that it had just left met what lay there before.
+    """
+    centre = np.array([0.4, 0.0, 14.5 * CELL - 0.0451])  # its top is where it reaches a block more
+    still = body(ball(centre))
+    breathing = replace(still, velocity=40.0 * (still.position - centre))
+    other = body(ball((0.0, 0.0, 0.2)))
+    engine = CpuEngine(problem(other, breathing, planes=(), gravity=(0.0, 0.0, 0.0)), threads=1)
+    reached = set()
+    for _ in range(150):
+        engine.step(engine.stable_step())
+        reached.add(int((engine.window[1].used > 0).sum()))
+        engine._sort({0})
+        window, record = engine.window[1], engine.field[1]
+        for side, nodes in ((record["side"], window.node), (1 - record["side"], window.next)):
+            clean = (window.used >> int(side)) & 1 == 0
+            assert not nodes[: len(clean)][clean].any()
+    assert len(reached) > 1

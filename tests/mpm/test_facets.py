@@ -27,7 +27,7 @@ def flat_faces(size, distance=0.012):
         grid = np.stack(np.meshgrid(one, two, indexing="ij"), -1).reshape(-1, 2)
         for side in (-1.0, 1.0):
             points.append(np.insert(grid, axis, side * size[axis] / 2, axis=1))
-            row = np.zeros((len(grid), 10))
+            row = np.zeros((len(grid), 12))
             row[:, axis], row[:, 8] = side, 2.4 * distance
             rows.append(row)
     return np.concatenate(points), np.concatenate(rows)
@@ -85,7 +85,7 @@ def test_a_thin_board_that_is_moved_has_its_own_surface(engine, known):
     moved = replace(board(middle, size), path=up, pivot=(0.0, 0.0, TOP - size[2]))
     falling = round_body((0.12, 0.03, TOP + 0.06), velocity=(0.3, 0.1, -0.5))
     if not known:
-        falling = replace(falling, rounding=np.zeros((0, 10)))
+        falling = replace(falling, rounding=np.zeros((0, 12)))
     given = problem(falling, moved, planes=())
     ours, sure = ENGINES[engine](given), ReferenceEngine(given)
     step_together(ours, sure, 20)

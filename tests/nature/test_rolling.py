@@ -1,10 +1,11 @@
-"""What is drawn round rolls over floors and boards; what has corners does not."""
+"""What is drawn round rolls over floors and boards, in bowls and on domes; corners do not."""
 
 from dataclasses import replace
 
 import numpy as np
 import pytest
 import trimesh
+from scipy.special import ellipk
 
 import corporeal as co
 from corporeal.mpm.state import Matter
@@ -12,7 +13,7 @@ from corporeal.types import ROUNDING
 
 SLOPE, G = np.radians(5), 9.81
 DOWN_SLOPE = (G * np.sin(SLOPE), 0.0, -G * np.cos(SLOPE))
-THICK, RADIUS = 0.02, 0.012
+THICK, RADIUS, MARBLE = 0.02, 0.012, 0.02
 BOARD = co.box("steel", (0.5, 0.1, THICK))
 
 
@@ -92,3 +93,59 @@ def test_a_die_and_a_ball_of_eighty_faces_stay_where_they_lie(shape, on_board):
     way, speed = moved(posed(one, *[BOARD] * on_board, gravity=DOWN_SLOPE), 0.5)
     assert np.abs(way).max() < 0.05 * RADIUS
     assert np.abs(speed).max() < 5e-3
+
+
+def hollow(radius, depth, wall):
+    """Give a round block of steel on the floor with a part of a ball taken out of it."""
+    angle = np.linspace(np.arccos(1 - depth / radius), 0, 20)
+    inside = np.stack([radius * np.sin(angle), radius + wall - radius * np.cos(angle)], axis=1)
+    wide = inside[0, 0] + wall
+    line = np.concatenate([[[0, 0], [wide, 0], [wide, inside[0, 1]]], inside])
+    shape = trimesh.creation.revolve(line, sections=64)
+    return co.solid("steel", np.array(shape.vertices), shape.faces)
+
+
+@pytest.mark.slow
+def test_a_marble_swings_in_a_bowl_as_a_pendulum_does():
+    """ω² = g/((R - r)(1 + I/(m r²))), 5 g/(7 (R - r)) for a ball; at 20° it is .8 % slower."""
+    R, wall, lean = 0.06, 0.008, np.radians(20)
+    way = np.array([np.sin(lean), 0.0, -np.cos(lean)])
+    at = np.array([0.0, 0.0, R + wall]) + (R - MARBLE) * way
+    problem = posed(co.ball("glass", MARBLE, tuple(at)), hollow(R, 0.025, wall))
+    matter = Matter.of(problem)
+    share = matter.inertia[0][1, 1] / (matter.total[0] * MARBLE**2)
+    period = 4 * ellipk(np.sin(lean / 2) ** 2) * np.sqrt((R - MARBLE) * (1 + share) / G)
+    engine = co.build_engine(problem)
+    engine.advance(0.48 * period)
+    found = engine.measure()
+    x, speed = found.centre[1, 0] - found.centre[0, 0], -found.momentum[0, 0] / found.mass[0]
+    # Just before it turns on the other side: from there it goes on as cos ωt does.
+    furthest = (R - MARBLE) * np.sin(lean)
+    left = np.arctan2(speed * period / (2 * np.pi), x) / (2 * np.pi)
+    assert left == pytest.approx(0.02, abs=0.005)
+    assert x > 0.97 * furthest
+    assert found.impact_loss < 1e-3 * found.mass[0] * G * (R - MARBLE) * (1 - np.cos(lean))
+
+
+def test_a_marble_rolls_off_a_dome():
+    """θ'' = g sin θ/((R + r)(1 + I/(m r²))) until the dome no longer bears it."""
+    R, start = 0.08, np.radians(10)
+    angle = np.linspace(np.pi / 2, 0, 30)
+    line = np.concatenate([[[0, 0]], R * np.stack([np.sin(angle), np.cos(angle)], axis=1)])
+    dome = trimesh.creation.revolve(line, sections=80)
+    at = (R + MARBLE) * np.array([np.sin(start), 0.0, np.cos(start)])
+    solid = co.solid("steel", np.array(dome.vertices), dome.faces)
+    problem = posed(co.ball("glass", MARBLE, tuple(at)), solid)
+    matter = Matter.of(problem)
+    share = matter.inertia[0][1, 1] / (matter.total[0] * MARBLE**2)
+    square = G / ((R + MARBLE) * (1 + share))
+    time, theta, speed = 0.22, start, 0.0
+    for _ in range(2000):
+        speed += square * np.sin(theta) * time / 2000
+        theta += speed * time / 2000
+    engine = co.build_engine(problem)
+    engine.advance(time)
+    found = engine.measure()
+    ball = found.centre[0] - [found.centre[1, 0], 0.0, 0.0]
+    assert np.arctan2(ball[0], ball[2]) == pytest.approx(theta, rel=0.02)
+    assert np.hypot(ball[0], ball[2]) == pytest.approx(R + MARBLE, rel=2e-3)

@@ -9,6 +9,8 @@ import corporeal as co
 from corporeal.errors import UserError
 from corporeal.evaluation.drop_test import drop
 from corporeal.evaluation.life import rebounds
+from corporeal.materials.inflated import RESTITUTION
+from corporeal.materials.rebound import loss_of
 from corporeal.pipeline import Settings
 
 RADIUS = 0.11
@@ -31,6 +33,19 @@ def test_a_football_is_inflated_by_its_name_and_weighs_what_skin_and_air_do():
     assert particles.mass.sum() == pytest.approx(skin + 2.15 * volume, rel=0.05)
     np.testing.assert_allclose(particles.density, particles.mass.sum() / volume, rtol=0.02)
     assert particles.treatments[0].young == structure.contents.young
+
+
+@pytest.mark.parametrize(
+    "name, rebound", [("futsal ball", 0.55), ("red tennis ball", 0.64), ("volleyball", None)]
+)
+def test_a_ball_rebounds_as_its_rules_ask_where_they_are_known(name, rebound):
+    """Struck hard, too: a red ball's wall bears more than its air."""
+    ready = co.prepare(named(name))
+    contents = ready.field.structures[0].contents
+    assert contents is not None
+    assert contents.restitution == pytest.approx(rebound or RESTITUTION)
+    assert contents.loss == pytest.approx(loss_of(rebound or RESTITUTION))
+    assert ready.particles.treatments[0].loss == pytest.approx(contents.loss, abs=0.06)
 
 
 def test_a_file_states_its_pressure_and_what_is_not_sealed_stays_a_wall():

@@ -202,7 +202,10 @@ class Asking:
             for name, own in known
         ]
         # How hard it is inflated no picture shows: its name says it.
-        return [sealed(w, own.inflation, None) for w, (_, own) in zip(found, known, strict=True)]
+        return [
+            replace(sealed(w, own.inflation, None), rebound=own.rebound)
+            for w, (_, own) in zip(found, known, strict=True)
+        ]
 
     def _placed(self, interview: Interview, words: list[PartWords]) -> list[PartWords]:
         """Ask where in its measured range each open value of each part lies, in all its ways."""

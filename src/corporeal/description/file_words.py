@@ -29,6 +29,7 @@ from corporeal.vlm.metadata import (
     stated_thickness,
     stated_values,
     usual_inflation,
+    usual_rebound,
     walled,
 )
 
@@ -56,6 +57,7 @@ def words_of_file(
         found = walled(found, stated_thickness(seen.surfaces))
         found = replace(as_stated(found, seen.surfaces), stated=_stated_values(seen.surfaces))
         found = sealed(found, stated_inflation(seen.surfaces), usual_inflation(seen))
+        found = replace(found, rebound=usual_rebound(seen))
         built_by = "metadata" if found.structure else "unknown"
         words[entry.object].append(replace(found, built_by=built_by))
     return words

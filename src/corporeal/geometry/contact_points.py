@@ -18,7 +18,7 @@ stands on small faces, and it would roll on if some of their corners were missin
 
 def contact_points(
     anatomy: Anatomy, spacing: float, rng: np.random.Generator
-) -> tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S 10"]]:
+) -> tuple[Float[np.ndarray, "S 3"], Float[np.ndarray, "S 12"]]:
     """Cover the outside evenly, at most ``MOST`` points, the farthest corners first [m].
 
     The corners in ``EXTREMES`` directions and the lowest make the object rest exactly.

@@ -36,10 +36,10 @@ SAME = 1e-6
 
 def rounded(
     mesh: Mesh, points: Float[np.ndarray, "S 3"]
-) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 10"]]:
+) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 12"]]:
     """Move points of a mesh onto the round surface that it stands for, and say how it curves there.
 
-    A corner of the mesh at which several smooth faces meet is given once for each that is round.
+    A corner of the mesh at which several smooth faces meet is given once for each that curves.
 
     Args:
         mesh: Triangles, normals outward.
@@ -75,7 +75,7 @@ def reach_of(points: Float[np.ndarray, "S 3"]) -> Float[np.ndarray, " S"]:
 
 
 def surrounded(
-    rounding: Float[np.ndarray, "S 10"], points: Float[np.ndarray, "S 3"]
+    rounding: Float[np.ndarray, "S 12"], points: Float[np.ndarray, "S 3"]
 ) -> Bool[np.ndarray, " S"]:
     """Whether what is round around a point goes on on all sides, by where its neighbours look.
 
@@ -204,13 +204,13 @@ def _on_faces(
     normal = _unit(np.einsum("nk,nkj->nj", share, n))
     large, small, along = curved.principal(triangle)
     rounding = _rounding(normal, along, large, small, reach)
-    return np.where(is_round(rounding)[:, None], lifted, points), rounding
+    return np.where(is_curved(rounding)[:, None], lifted, points), rounding
 
 
 def _at_corner(
     curved: Curvature, point: np.ndarray, reach: float, corner: Int[np.ndarray, " C"]
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Give a corner once for each round face that it belongs to; else as a point alone."""
+    """Give a corner once for each curved face that it belongs to; else as a point alone."""
     group = curved.group.reshape(-1)[corner]
     found = []
     for number in np.unique(group):
@@ -220,21 +220,26 @@ def _at_corner(
         high, low = (np.array([weight @ k / weight.sum()]) for k in (large, small))
         normal = curved.normal.reshape(-1, 3)[mine[:1]]
         row = _rounding(normal, along[[np.argmax(large)]], high, low, np.array([reach]))
-        if is_round(row)[0]:
+        if is_curved(row)[0]:
             found.append(row)
     rows = np.concatenate(found) if found else np.zeros((1, ROUNDING))
     return np.tile(point, (len(rows), 1)), rows
 
 
-def is_round(rounding: Float[np.ndarray, "N 10"]) -> Bool[np.ndarray, " N"]:
+def is_round(rounding: Float[np.ndarray, "N 12"]) -> Bool[np.ndarray, " N"]:
     """Whether the surface curves at each point."""
     return rounding[:, 6] + rounding[:, 7] > 0.0
 
 
+def is_curved(rounding: Float[np.ndarray, "N 12"]) -> Bool[np.ndarray, " N"]:
+    """Whether the surface curves at each point, outwards or, where it is hollow, inwards."""
+    return np.any(rounding[:, 10:] != 0.0, axis=1)
+
+
 def _rounding(
     normal: np.ndarray, along: np.ndarray, large: np.ndarray, small: np.ndarray, reach: np.ndarray
-) -> Float[np.ndarray, "N 10"]:
-    """Put a point's rounding together from its two curvatures [1/m]; what is hollow has none."""
+) -> Float[np.ndarray, "N 12"]:
+    """Put a point's rounding together from its two curvatures [1/m]; hollows have no radii."""
     bent = large * reach > STRAIGHT
     dome = bent & (small * reach > STRAIGHT)
     tight = np.where(bent, 1.0 / np.where(bent, large, 1.0), 0.0)
@@ -245,7 +250,9 @@ def _rounding(
     across = _unit(np.cross(normal, along))
     flat = along - np.sum(along * normal, axis=1, keepdims=True) * normal
     direction = np.where(dome[:, None], across, _unit(flat))
-    return np.column_stack([normal, direction, ball, arc, reach, np.zeros(len(reach))])
+    both = np.where(dome, small, large), np.where(dome, large, small)
+    curved = [np.where(np.abs(k) * reach > STRAIGHT, k, 0.0) for k in both]
+    return np.column_stack([normal, direction, ball, arc, reach, np.zeros(len(reach)), *curved])
 
 
 def _barycentric(points: np.ndarray, corners: np.ndarray) -> Float[np.ndarray, "N 3"]:

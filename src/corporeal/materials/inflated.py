@@ -12,7 +12,7 @@ the more of a blow the harder it is: ``struck``. What flows when it is dented, a
 and what leaks, a rubber duck, stays a wall.
 """
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from math import pi, sqrt
 
 from scipy.optimize import brentq
@@ -37,6 +37,8 @@ HEAT_RATIO = 1.4
 RESTITUTION = 0.8
 """Of inflated balls on a hard floor [-]: the middle of what rules ask, with the drag of air taken
 off: footballs .86–.92, basketballs .75–.83, korfballs .72–.80, tennis balls .75–.79."""
+RULED = 0.04
+"""How far from the middle of their range rules let a ball rebound [-]."""
 SOURCE = "engineering-estimate"
 
 
@@ -195,6 +197,31 @@ def sealed_air(gauge: float) -> Material:
         "loss": _ground(loss_of(0.88), loss_of(RESTITUTION), loss_of(0.73), "from the restitution"),
     }
     return _material(f"air at {gauge / 1e3:.3g} kPa", values)
+
+
+def as_ruled(inner: Material, rebound: float | None) -> Material:
+    """Let a ball rebound as its rules ask, where there are any.
+
+    How it is made is not known then: a futsal ball has something in its bladder that takes energy.
+
+    Args:
+        inner: What wall and air are simulated as.
+        rebound: Restitution on a hard floor [-]; None: no rule is known.
+
+    """
+    if rebound is None:
+        return inner
+    lossy = loss_of(rebound)
+    grounds = {
+        "restitution": _ground(
+            rebound - RULED, rebound, rebound + RULED, "what the rules of its sport ask for"
+        ),
+        "loss": _ground(
+            loss_of(rebound + RULED), lossy, loss_of(rebound - RULED), "from the restitution"
+        ),
+    }
+    grounds = inner.grounds | grounds
+    return replace(inner, restitution=rebound, loss=lossy, grounds=grounds)
 
 
 def _ground(low: float, usual: float, high: float, reason: str) -> Ground:

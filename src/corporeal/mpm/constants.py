@@ -112,6 +112,23 @@ FACET_NODES = 2.0
 [cells] and √(r dx/2): beyond, the gap of a ball of radius r is larger than what nodes misjudge …"""
 FACET_ALIKE = 0.95
 """… and on which they meet along nearly the same normal: the least cosine [-]."""
+NEAREST_MIDDLE = 0.05
+"""Nothing that meets a hollow lies nearer to the middle of its curvature than this, over the radius
+of curvature [-]: from the middle all of it is as near."""
+CURVED_SPREAD = 0.8
+"""A curved face goes on from its points by this share of what they stand for [-]: about their
+distance from the sixth point around. Nowhere in it is farther from all of them."""
+CURVED_TURNS = 4
+"""How often the place of contact of something round is corrected for where its surface looks."""
+OWN_PLACE = 1.1
+"""A place of contact belongs to a surface point if no other is nearer by this factor [-]."""
+FACING = 0.2
+"""Surface points of two bodies face each other if their normals have a cosine below minus this."""
+BENT_NODES = 9.0
+"""Twice by how much nodes misjudge a gap, over the sum of curvatures that they take for none
+[cells²]: (3 cells)²/2, what a node sees from one side to the other."""
+ROUND_ALIKE = 0.5
+"""Least cosine of normals on nodes around a contact of what is round with what is curved [-]."""
 LATTICE_GAP = 0.05
 """What two particles per cell and axis add to the continuous touching distance [cells] …"""
 LATTICE_SLOPE = 0.25

@@ -102,7 +102,9 @@ class Body:
     """Six degrees of freedom; the elastic fields are then unused."""
     surface: Float[np.ndarray, "S 3"] = field(default_factory=lambda: np.zeros((0, 3)))
     """Points on the surface [m]: a rigid body touches planes through them."""
-    rounding: Float[np.ndarray, "S2 10"] = field(default_factory=lambda: np.zeros((0, ROUNDING)))
+    rounding: Float[np.ndarray, "S2 Columns"] = field(
+        default_factory=lambda: np.zeros((0, ROUNDING))
+    )
     """How the surface curves at those points, see ``types.ROUNDING``; none: they are corners."""
     wetted: WettedSurface | None = None
     """Of a rigid body: liquids touch it here; None: as everything else does."""

@@ -18,10 +18,12 @@ from corporeal.mpm.substance import Substances
 from corporeal.types import ROUNDING
 
 
-def rounding_of(body: Body) -> Float[np.ndarray, "S 10"]:
+def rounding_of(body: Body) -> Float[np.ndarray, "S 12"]:
     """How a body's surface curves at its points; zeros where it was not told."""
-    known = len(body.rounding) == len(body.surface)
-    return body.rounding if known else np.zeros((len(body.surface), ROUNDING))
+    rows = np.zeros((len(body.surface), ROUNDING))
+    if len(body.rounding) == len(body.surface):
+        rows[:, : body.rounding.shape[1]] = body.rounding
+    return rows
 
 
 @dataclass(frozen=True)
@@ -45,7 +47,7 @@ class Matter:
     """Position at the start, from the body's centre [m]."""
     surface: tuple[Float[np.ndarray, "S 3"], ...]
     """Surface points of each body at the start, from its centre [m]."""
-    rounding: tuple[Float[np.ndarray, "S 10"], ...]
+    rounding: tuple[Float[np.ndarray, "S 12"], ...]
     """How the surface curves there at the start: see ``types.ROUNDING``; zero where it does not."""
 
     @classmethod

@@ -211,7 +211,7 @@ def gather(parts: Parts, bodies: Bodies, chosen: Plan, packings: list[Packing]) 
 
 def contact_surface(
     anatomy: Anatomy, chosen: Plan, number: int
-) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 10"]]:
+) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, "N 12"]]:
     """Points on the surface of what is rigid in object ``number`` [m], and how it curves there."""
     stiff = [m.part for m in anatomy.members if chosen.treatments[m.part].kind == "rigid"]
     if not stiff:

@@ -12,7 +12,7 @@ from corporeal.fields.impose import impose
 from corporeal.fields.specification import asked
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
-from corporeal.materials.inflated import SealedBall, air_bears, sealed_air, sealed_ball
+from corporeal.materials.inflated import SealedBall, air_bears, as_ruled, sealed_air, sealed_ball
 from corporeal.materials.placement import CONTENTS, entry_of, held
 from corporeal.materials.scale import place
 from corporeal.mpm.laws import MENU
@@ -295,11 +295,14 @@ def with_air(
             reason = f"{sealed}, which dents it less than its wall resists."
             return replace(structure, reason=reason)
         reason = f"{sealed}: wall and air bounce side by side, as one soft solid."
-        inner = sealed_ball(SealedBall(gauge, material, structure.thickness, radius))
+        inner = as_ruled(
+            sealed_ball(SealedBall(gauge, material, structure.thickness, radius)), words.rebound
+        )
         built = Structure("filled", structure.thickness, reason, inner, 1.0, inflated=True)
-        return replace(built, gauge=gauge)
+        return replace(built, gauge=gauge, rebound=words.rebound)
     reason = f"{sealed}: it bounces as a soft solid, nine times as stiff as the pressure."
-    return Structure("filled", structure.thickness, reason, sealed_air(gauge), 1.0, inflated=True)
+    inner = as_ruled(sealed_air(gauge), words.rebound)
+    return Structure("filled", structure.thickness, reason, inner, 1.0, inflated=True)
 
 
 def _inner_grounds(inside: Entry, words: PartWords) -> dict[str, Ground]:

@@ -42,7 +42,8 @@ def as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
     spread = replace(inner, density=density)
     if part.structure.gauge is not None:
         blow = struck(sealed(part), 0.5 * density * part.volume * speed**2)
-        spread = replace(spread, young=blow.young, loss=blow.loss)
+        loss = inner.loss if part.structure.rebound is not None else blow.loss
+        spread = replace(spread, young=blow.young, loss=loss)
     return replace(part, material=spread, structure=Structure("solid"), diameter=0.0)
 
 

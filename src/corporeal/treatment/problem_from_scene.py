@@ -241,7 +241,7 @@ def body_of(scene: Scene, particles: Particles, field: MaterialField, piece: Pie
     )
 
 
-def rounding_of(particles: Particles, piece: Piece) -> Float[np.ndarray, "S2 10"]:
+def rounding_of(particles: Particles, piece: Piece) -> Float[np.ndarray, "S2 Columns"]:
     """Give how its surface curves at a piece's surface points; none: it is not known."""
     known = len(particles.rounding) == len(particles.surface)
     return particles.rounding[piece.surface if known else []].astype(float)

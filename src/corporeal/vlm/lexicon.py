@@ -47,6 +47,8 @@ class Term:
     fill: float | None = None
     inflation: float | None = None
     """Gauge pressure of the air sealed in it [Pa]."""
+    rebound: float | None = None
+    """Restitution on a hard floor that its rules ask for [-]."""
     before: int = 0
     """Words of the object that a substance stands right before."""
 
@@ -321,4 +323,5 @@ def _term(kind: str, phrase: str, row: dict) -> Term:
         contents=row.get("contents"),
         fill=row.get("fill"),
         inflation=None if pressure is None else pressure * 1e3,
+        rebound=row.get("rebound"),
     )

@@ -168,6 +168,14 @@ def usual_inflation(evidence: Evidence) -> float | None:
     return usual.pop() if evidence.alone and len(usual) == 1 else None
 
 
+def usual_rebound(evidence: Evidence) -> float | None:
+    """Restitution that rules ask of an object of such a name and one part; None: none is known."""
+    terms = [t for name in evidence.general for t in heads(name.words) if t.kind == "thing"]
+    longest = max((len(t.phrase) for t in terms), default=0)
+    usual = {t.rebound for t in terms if len(t.phrase) == longest}
+    return usual.pop() if evidence.alone and len(usual) == 1 else None
+
+
 SEALABLE = ("shell", "hollow")
 """Structures that air can be sealed in."""
 HIGHEST_INFLATION = 1e6
@@ -404,6 +412,7 @@ def _answer(terms: list[Term], name: str, factor: float) -> PartWords:
         contents=first.contents,
         fill=first.fill,
         inflation=first.inflation,
+        rebound=first.rebound,
     )
 
 
@@ -484,6 +493,7 @@ def _made_as(substance: Term, thing: Term) -> Term:
         contents=thing.contents,
         fill=thing.fill,
         inflation=thing.inflation,
+        rebound=thing.rebound,
         thickness=thing.thickness if same else None,
         every=same and thing.every,
     )

@@ -34,7 +34,8 @@ def some(seed=0):
     reach = rng.uniform(0.01, 0.2, COUNT)
     lean = rng.choice([0.0, 0.1, 0.5, 5.0], (COUNT, 1)) * rng.normal(size=(COUNT, 3))
     inside = rng.integers(0, 2, COUNT)
-    return np.column_stack([normal, along, ball, arc, reach, inside]), unit(normal + lean)
+    curved = np.zeros((COUNT, 2))
+    return np.column_stack([normal, along, ball, arc, reach, inside, curved]), unit(normal + lean)
 
 
 def test_the_fast_engines_shift_as_numpy_does():

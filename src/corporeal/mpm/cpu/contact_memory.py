@@ -101,6 +101,7 @@ def rigid_grid(
     record["clumps"], record["patches"], record["shows"] = len(clumps), len(patches), len(shows)
     record["wets"], record["facets"] = places.shape[1], len(facets.row)
     record["rolls"] = bool((rounding[:, 6:8] > 0.0).any())
+    record["bends"] = bool(np.any(rounding[:, 10:] != 0.0))
     record["spacing"] = spacing
     record["thin"] = thin
     return arrays

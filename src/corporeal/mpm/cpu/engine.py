@@ -251,6 +251,7 @@ class CpuEngine(Interaction):
 
     def _connect_field(self, f: int, window: Window) -> None:
         record = self.field[f : f + 1]
+        window.used[:] = 3  # which set of nodes is which is forgotten: both may hold anything
         for name in POINTED:
             record[name] = getattr(window, name).ctypes.data
         record["material"] = self.material[f].table.ctypes.data

@@ -192,7 +192,7 @@ FIELD = Record(
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
     ("int", "patches wets shows facets"),
     ("int", "rolls"),  # rigid: whether any of its surface points is round
-    ("int", "spare"),
+    ("int", "bends"),  # rigid: whether it curves outwards or inwards anywhere
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )
 BLOW = Record(  # a body in the wind: see wind_records.py
@@ -306,6 +306,10 @@ TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - 
     ("int", "choice"),  # where its candidate is kept; -1: nowhere
     ("double[3]", "x normal"),
     ("double", "gap target inverse mu span"),  # span: over which a wall drags on a liquid [m² s]
+    (
+        "double",
+        "instead",
+    ),  # of round on curved: nodes nearer than this transmit nothing [m]; else 0
     ("double[3]", "J before"),
 )
 ENTRY = Record(  # what some contacts of one pair add to the books

@@ -173,7 +173,7 @@ def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, stride: int):
         c.before[t] = side_before(c, r, g, s, t, c.a[t], fa) - side_before(
             c, r, g, s, t, c.c[t], fc
         )
-        c.target[t] = closing_speed(gap, dt)
+        c.target[t] = closing_speed(gap, dt) - c.inward[t]
         c.struck[t] = wp.vec3d(D(0.0))
         if r.stiff[fa] == 1 and fc < s.bodies:
             if r.stiff[fc] == 1:
@@ -270,7 +270,7 @@ def aim(c: Contacts, r: Rigid, s: Sheet, stride: int):
             fa = c.fa[t]
             fc = c.fc[t]
             gap = D(c.gap[t])
-            c.target[t] = closing_speed(gap, dt)
+            c.target[t] = closing_speed(gap, dt) - c.inward[t]
             c.active[t] = SWEPT_NOW
             if s.flag[LAST_ROUND] == 0:
                 if c.hit[fa, fc] == 0:

@@ -14,6 +14,7 @@ from corporeal.mpm.constants import (
 )
 from corporeal.mpm.cuda.layout import (
     BLOCKS,
+    DT,
     FULL,
     MEETS,
     NODES,
@@ -26,8 +27,16 @@ from corporeal.mpm.cuda.layout import (
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.rigid import speed_at
 from corporeal.mpm.formulas.one_lane import (
+    ball_radius,
+    curved_inward,
+    curved_may,
+    curved_meet,
+    curved_misjudged,
+    curved_owns,
     facet_holds,
+    facet_misjudged,
     facet_near,
     facet_replaces,
     shift_to_contact,
@@ -38,6 +47,10 @@ wp.set_module_options(formulas.options(max_unroll=0))
 POINT_REACH = wp.constant(D(constants.POINT_REACH))
 ROUNDING = wp.constant(constants.ROUNDING)
 FACET_ROW = wp.constant(constants.FACET_ROW)
+FACET_ALIKE, ROUND_ALIKE = (
+    wp.constant(D(constants.FACET_ALIKE)),
+    wp.constant(D(constants.ROUND_ALIKE)),
+)
 
 
 @wp.func
@@ -136,6 +149,8 @@ def add_touch(c: Contacts, t: int, k: int, a: int, other: int):
     c.facet[t] = 0
     c.slips[t] = 0
     c.span[t] = D(0.0)
+    c.instead[t] = D(0.0)
+    c.inward[t] = D(0.0)
     c.impulse[t] = wp.vec3d(D(0.0))
     c.last_impulse[t] = wp.vec3d(D(0.0))
     for q in range(3):
@@ -275,7 +290,7 @@ def enter_point(
         c.point[t] = x
         c.normal[t] = wp.vec3(n)
         c.gap[t] = wp.float32(gap)
-    return 0
+    return t
 
 
 @wp.kernel
@@ -336,6 +351,76 @@ def list_facets(r: Rigid, c: Contacts, s: Sheet, stride: int):
                 enter_point(c, s, other, b, 1, x, n, gap)
 
 
+@wp.func
+def nearest_curved(r: Rigid, p: int, b: int, other: int, far: D):
+    """Find the curved point of another body that a round point faces, nearest to its middle."""
+    row = ROUNDING * p
+    n = wp.vec3d(r.rounding[row], r.rounding[row + 1], r.rounding[row + 2])
+    back = wp.transpose(r.turn[other])
+    apart = r.centre[b] - r.centre[other]
+    x = back * (apart + r.turn[b] * (r.surface[p] - ball_radius(r.rounding, p) * n))
+    centre = back * apart
+    first = int(b < other)
+    best = int(-1)
+    least = D(VAST)
+    for q in range(r.first[other], r.first[other] + r.points[other]):
+        d = x - r.surface[q]
+        square = wp.length_sq(d)
+        if square < least and curved_may(r.rounding, r.surface, q, centre, far, first):
+            out = wp.vec3d(
+                r.rounding[ROUNDING * q], r.rounding[ROUNDING * q + 1], r.rounding[ROUNDING * q + 2]
+            )
+            if wp.dot(d, out) > D(0.0):
+                least = square
+                best = q
+    return best
+
+
+@wp.func
+def square_along(r: Rigid, b: int, other: int, x: wp.vec3d, n: wp.vec3d):
+    """How fast a place of one body moves over another, across a normal, squared [m²/s²]."""
+    v = speed_at(r, b, x) - speed_at(r, other, x)
+    along = wp.dot(v, n)
+    return wp.max(wp.length_sq(v) - along * along, D(0.0))
+
+
+@wp.kernel
+def list_curves(r: Rigid, c: Contacts, s: Sheet, stride: int):
+    """Contacts of round surface points with curved faces of other rigid bodies."""
+    if s.flag[FULL] == 2:
+        return
+    reach = POINT_REACH * s.dx
+    for i in range(wp.tid(), r.surfaces * s.bodies, stride):
+        p = i // s.bodies
+        other = i % s.bodies
+        b = r.surface_body[p]
+        if r.path_count[b] > 0 or b == other or c.apart[b, other] == 1 or r.bends[other] == 0:
+            continue
+        apart = r.centre[b] - r.centre[other]
+        radius = ball_radius(r.rounding, p)
+        if radius <= D(0.0) or wp.length(apart) >= r.radius[b] + r.radius[other] + reach:
+            continue
+        q = nearest_curved(r, p, b, other, r.radius[b] + reach)
+        if q < 0:
+            continue
+        met = curved_meet(r.rounding, r.surface, p, r.turn[b], q, r.turn[other], apart, reach)
+        at = wp.vec3d(met[0], met[1], met[2])
+        n = wp.vec3d(met[3], met[4], met[5])
+        if met[6] >= reach or not curved_owns(
+            r.rounding, r.surface, p, r.first[b], r.points[b], at
+        ):
+            continue
+        x = r.centre[b] + r.turn[b] * at
+        if b < other:
+            t = enter_point(c, s, b, other, 0, x, -n, met[6])
+        else:
+            t = enter_point(c, s, other, b, 1, x, n, met[6])
+        if t < 2 * c.room:
+            c.instead[t] = curved_misjudged(r.rounding, p, q, s.dx)
+            square = square_along(r, b, other, x + radius * n, n)
+            c.inward[t] = curved_inward(r.rounding, p, q, square, s.clock[DT])
+
+
 @wp.kernel
 def instead_of_nodes(r: Rigid, c: Contacts, s: Sheet, stride: int):
     """Contacts on nodes that are those on flat faces, less well known, transmit nothing."""
@@ -353,7 +438,12 @@ def instead_of_nodes(r: Rigid, c: Contacts, s: Sheet, stride: int):
                     rolls = c.fc[q]
                 cosine = D(wp.dot(c.normal[t], c.normal[q]))
                 apart = c.point[t] - c.point[q]
-                if facet_replaces(apart, cosine, r.radius[rolls], s.dx):
+                reach = c.instead[q]
+                alike = ROUND_ALIKE
+                if reach == D(0.0):
+                    reach = facet_misjudged(r.radius[rolls], s.dx)
+                    alike = FACET_ALIKE
+                if facet_replaces(apart, cosine, reach, alike):
                     c.gap[t] = VAST
 
 

@@ -286,6 +286,8 @@ class Rigid:
     surface: wp.array(dtype=wp.vec3d)
     rounding: wp.array(dtype=wp.float64)
     """How the surface curves at each, one row after the other: see ``types.ROUNDING``."""
+    bends: wp.array(dtype=wp.int32)
+    """Of each body: whether it curves outwards or inwards anywhere."""
     facets: int
     facet: wp.array(dtype=wp.float64)
     """Flat faces of all bodies, one row after the other: see ``physics.facets`` …"""
@@ -462,6 +464,10 @@ class Contacts:
     """Fields; B + plane for a plane."""
     facet: wp.array(dtype=wp.int32)
     """Which face of a rigid body a liquid meets."""
+    instead: wp.array(dtype=wp.float64)
+    """Of what is round on what is curved: nodes nearer than this transmit nothing [m]; else 0 …"""
+    inward: wp.array(dtype=wp.float64)
+    """… and the speed at which a way straight ahead leads into a hollow within a step [m/s]."""
     slips: wp.array(dtype=wp.int32)
     """1: there is no friction in it."""
     span: wp.array(dtype=wp.float64)

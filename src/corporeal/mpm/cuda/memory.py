@@ -160,6 +160,7 @@ class Memory:
         r.surface = self.put(np.concatenate([np.zeros((0, 3)), *points]), wp.vec3d)
         rows = [matter.rounding[b].reshape(-1) for b in stiff]
         r.rounding = self.put(np.concatenate([np.zeros(0), *rows]), wp.float64)
+        r.bends = self.put(np.array([np.any(m[:, 10:] != 0.0) for m in matter.rounding]), wp.int32)
         count, thin = np.zeros((2, len(matter.surface)), int)
         count[stiff] = [len(p) for p in points]
         thin[stiff] = [thinness(p, cell) for p in points]
@@ -216,6 +217,7 @@ class Memory:
         c.velocity, c.light = self.zeros(entries, wp.vec3d), self.zeros(entries, wp.float64)
         for name in ("meet", "a", "c", "fa", "fc", "active", "facet", "slips", "pick"):
             setattr(c, name, self.zeros(touches, wp.int32))
+        c.instead, c.inward = self.zeros(touches, wp.float64), self.zeros(touches, wp.float64)
         c.kept_at = self.zeros(touches, wp.vec3i)
         for name in ("kept_fa", "kept_fc", "kept_pick"):
             setattr(c, name, self.zeros(touches, wp.int32))

@@ -43,6 +43,7 @@ class Program:
         self.graph = None
         self.held = False
         self.touching = self.planes > 0 or (self.bodies > 1 and problem.contact == "multi")
+        self.rolls = bool(arrays.rigid.bends.numpy().any()) if arrays.rigid.surfaces else False
         table = arrays.particles.table.numpy()
         self.swelling = bool(table[:, int(layout.SWELLS)].any())
         self.stride = self._threads()
@@ -202,6 +203,9 @@ class Program:
             self._run(meets.count_nodes, 1, a.sheet, stride=False)
             if a.rigid.facets:
                 self._each(meets.list_facets, a.rigid, a.contacts, a.sheet)
+            if self.rolls:
+                self._each(meets.list_curves, a.rigid, a.contacts, a.sheet)
+            if a.rigid.facets or self.rolls:
                 self._each(meets.instead_of_nodes, a.rigid, a.contacts, a.sheet)
             self._each(meets.list_points, a.rigid, a.contacts, a.sheet)
 

@@ -126,6 +126,116 @@ struct Round {
     return !beyond || row[9] == 0;
   }
 };
+// A surface around a point that curves along an arc and across it, outwards or inwards, and what is round
+// that meets it: twin of physics/curved.py. row: types.ROUNDING.
+struct Curved {
+  // Radius of the ball that lies under a round point, and that of the arc along which it moves.
+  CUDA_CALLABLE static inline double ball(const double *row) { return row[6] > 0 ? row[6] : row[7] > 0 ? row[7] : 0.0; }
+  CUDA_CALLABLE static inline double arc(const double *row) { return row[6] > 0 ? row[7] : 0.0; }
+  CUDA_CALLABLE static inline bool bends(const double *row) { return row[10] != 0 || row[11] != 0; }
+  CUDA_CALLABLE static inline bool hollow(const double *row) { return row[10] < 0 || row[11] < 0; }
+  // Height over a curve of curvature k through the origin of what lies s along and h over its tangent there,
+  // how far along the curve it lies, and how far the curve has turned; whether it is on the curve's side.
+  CUDA_CALLABLE static inline bool over(double k, double s, double &h, double &way, double &sine, double &cosine) {
+    const double d = 1.0 + k * h, t = k * s, w = sqrt(t * t + d * d);
+    if (d <= NEAREST_MIDDLE) return false;
+    h = (2.0 * h + k * (s * s + h * h)) / (w + 1.0);
+    way = t * t > TINY ? atan2(t, d) / k : s / d;
+    sine = t / w, cosine = d / w;
+    return true;
+  }
+  // Height of a place, seen from the point, over the surface; its normal there, and how far aside that is,
+  // squared. Exact for balls and cylinders, from inside and outside; else of third order.
+  CUDA_CALLABLE static inline bool height(const double *row, const double *x, double &h, double *m, double &aside) {
+    const double *n = row, *e = row + 3;
+    const double f[3] = {n[1] * e[2] - n[2] * e[1], n[2] * e[0] - n[0] * e[2], n[0] * e[1] - n[1] * e[0]};
+    double s = 0, t = 0, way, across, sine, cosine, leans, stands;
+    h = 0;
+    for (int i = 0; i < 3; i++) h += x[i] * n[i], s += x[i] * e[i], t += x[i] * f[i];
+    if (!over(row[10], s, h, way, sine, cosine) || !over(row[11], t, h, across, leans, stands)) return false;
+    for (int i = 0; i < 3; i++) m[i] = leans * f[i] + stands * (sine * e[i] + cosine * n[i]);
+    aside = way * way + across * across;
+    return true;
+  }
+  // Middle of the ball under a round point that looks in direction d, from the point.
+  CUDA_CALLABLE static inline void middle(const double *row, const double *d, double *out) {
+    const double *n = row, *e = row + 3, radius = ball(row), moved = arc(row);
+    double outward = 0, ahead = 0;
+    bool beyond = false;
+    for (int i = 0; i < 3; i++) outward += d[i] * n[i], ahead += d[i] * e[i], out[i] = -radius * n[i];
+    if (moved <= 0 || sqrt(outward * outward + ahead * ahead) <= SIDEWAYS) return;
+    const double a = Round::bounded(atan2(ahead, outward), row[8], radius + moved, beyond);
+    for (int i = 0; i < 3; i++) out[i] += moved * (sin(a) * e[i] + (cos(a) - 1.0) * n[i]);
+  }
+  // Out of a body's frame into the world, or back; R: three rows.
+  CUDA_CALLABLE static inline void turn(const double *R, const double *x, double *out) {
+    for (int i = 0; i < 3; i++) out[i] = R[3 * i] * x[0] + R[3 * i + 1] * x[1] + R[3 * i + 2] * x[2];
+  }
+  CUDA_CALLABLE static inline void turn_back(const double *R, const double *x, double *out) {
+    for (int i = 0; i < 3; i++) out[i] = R[i] * x[0] + R[3 + i] * x[1] + R[6 + i] * x[2];
+  }
+  // A place in the frame of a body turned by S, in that of one turned by R; apart: of the first's middle
+  // from the other's, in the world.
+  CUDA_CALLABLE static inline void carry(const double *S, const double *R, const double *apart, const double *x, double *out) {
+    double y[3];
+    turn(S, x, y);
+    for (int i = 0; i < 3; i++) y[i] += apart[i];
+    turn_back(R, y, out);
+  }
+  // Whether a curved point may meet a round body at all; first: whether that body comes first.
+  CUDA_CALLABLE static inline bool may(const double *row, const double *q, const double *centre, double far, bool first) {
+    double square = 0;
+    for (int i = 0; i < 3; i++) square += (q[i] - centre[i]) * (q[i] - centre[i]);
+    const double most = far + row[8];
+    return bends(row) && (first || hollow(row)) && square <= most * most;
+  }
+  // Where round point p touches the face around curved point q, each in its body's frame: the place in p's,
+  // the face's normal in the world and the gap; whether it does, nearer than reach.
+  CUDA_CALLABLE static inline bool meet(const double *round, const double *p, const double *S, const double *face,
+                                        const double *q, const double *R, const double *apart, double reach,
+                                        double *x, double *m, double &gap) {
+    const double radius = ball(round), spread = CURVED_SPREAD * face[8];
+    double n[3], c[3], d[3], h = 0, aside = 0;
+    turn(R, face, m);
+    turn(S, round, n);
+    if (m[0] * n[0] + m[1] * n[1] + m[2] * n[2] > -FACING) return false;
+    for (int k = 0; k < CURVED_TURNS; k++) {
+      turn_back(S, m, d);
+      for (int i = 0; i < 3; i++) d[i] = -d[i];
+      middle(round, d, x);
+      for (int i = 0; i < 3; i++) x[i] += p[i];
+      carry(S, R, apart, x, c);
+      for (int i = 0; i < 3; i++) c[i] -= q[i];
+      if (!height(face, c, h, d, aside)) return false;
+      turn(R, d, m);
+      if (arc(round) <= 0) break;
+    }
+    gap = h - radius;
+    if (gap >= reach || gap <= -reach || gap <= -radius || aside > spread * spread) return false;
+    const double lean = -(m[0] * n[0] + m[1] * n[1] + m[2] * n[2]);
+    if (radius * acos(lean < 1 ? lean : 1.0) > round[8]) return false;
+    turn_back(S, m, d);
+    for (int i = 0; i < 3; i++) x[i] -= radius * d[i];
+    return true;
+  }
+  // Whether a place that lies `own` from its point, squared, is another round point's, o.
+  CUDA_CALLABLE static inline bool taken(const double *round, double own, const double *x, const double *other, const double *o) {
+    double square = 0, alike = 0;
+    for (int i = 0; i < 3; i++) square += (x[i] - o[i]) * (x[i] - o[i]), alike += round[i] * other[i];
+    return OWN_PLACE * OWN_PLACE * square < own && alike > 0 && ball(other) > 0;
+  }
+  // How far from there nodes misjudge the gap by more than it is: they take both surfaces for planes.
+  CUDA_CALLABLE static inline double misjudged(const double *round, const double *row, double dx) {
+    const double least = row[10] < row[11] ? row[10] : row[11], most = row[10] < row[11] ? row[11] : row[10];
+    const double own = 1.0 / ball(round), bent = own + (-least > most ? -least : most);
+    return FACET_NODES * dx + sqrt((0.5 * dx + BENT_NODES * bent * dx * dx) / (own + least));
+  }
+  // Speed at which a way straight ahead leads into a hollow within a step, from the square of the speed along it.
+  CUDA_CALLABLE static inline double inward(const double *round, const double *row, double square, double dt) {
+    const double least = row[10] < row[11] ? row[10] : row[11];
+    return least < 0 ? -0.5 * least / (1.0 + least * ball(round)) * square * dt : 0.0;
+  }
+};
 // A flat face of a rigid body, on which what is round rolls: twin of physics/facets.py. row: normal, offset;
 // middle and radius of its points; how far the face goes on from one; the first and last of them.
 struct Facet {
@@ -153,11 +263,11 @@ struct Facet {
     }
     return false;
   }
-  // Whether a contact on a node, apart from that on the face by d with normals that have this cosine, is
-  // the same as it; radius: of what is round.
-  CUDA_CALLABLE static inline bool replaces(const double *d, double cosine, double radius, double dx) {
-    const double reach = FACET_NODES * dx + sqrt(0.5 * radius * dx);
-    return cosine > FACET_ALIKE && d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < reach * reach;
+  // How far from there nodes misjudge the gap of a ball of this radius by more than it is.
+  CUDA_CALLABLE static inline double misjudged(double radius, double dx) { return FACET_NODES * dx + sqrt(0.5 * radius * dx); }
+  // Whether a contact on a node, apart from that on the face by d with normals that have this cosine, is the same as it.
+  CUDA_CALLABLE static inline bool replaces(const double *d, double cosine, double reach, double alike) {
+    return cosine > alike && d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < reach * reach;
   }
 };
 // Where the surface of a rigid body lies for a liquid: twin of physics/contact.py wetted_faces. Rows of

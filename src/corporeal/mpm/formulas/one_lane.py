@@ -205,9 +205,96 @@ def facet_holds(
 ) -> bool: ...
 
 
-@wp.func_native("return mpm::Facet::replaces(&apart.c[0], cosine, radius, dx);")
+MET = wp.types.vector(length=7, dtype=wp.float64)
+"""Place of a contact in the frame of what is round, normal of the face in the world, and gap."""
+
+
+@wp.func_native("""
+  const double *row = (const double *)rows.data + mpm::ROUNDING * q;
+  return mpm::Curved::may(row, (const double *)&points[q], &centre.c[0], far, first != 0);
+""")
+def curved_may(
+    rows: wp.array(dtype=wp.float64),
+    points: wp.array(dtype=wp.vec3d),
+    q: int,
+    centre: wp.vec3d,
+    far: wp.float64,
+    first: int,
+) -> bool: ...
+
+
+@wp.func_native("""
+  return mpm::Curved::ball((const double *)rows.data + mpm::ROUNDING * p);
+""")
+def ball_radius(rows: wp.array(dtype=wp.float64), p: int) -> wp.float64: ...
+
+
+@wp.func_native("""
+  wp::vec_t<7, wp::float64> out;
+  const double *row = (const double *)rows.data, *x = (const double *)points.data;
+  const bool met = mpm::Curved::meet(row + mpm::ROUNDING * p, x + 3 * p, &S.data[0][0],
+                                     row + mpm::ROUNDING * q, x + 3 * q, &R.data[0][0], &apart.c[0],
+                                     reach, &out.c[0], &out.c[3], out.c[6]);
+  if (!met) out.c[6] = mpm::VAST;
+  return out;
+""")
+def curved_meet(
+    rows: wp.array(dtype=wp.float64),
+    points: wp.array(dtype=wp.vec3d),
+    p: int,
+    S: wp.mat33d,
+    q: int,
+    R: wp.mat33d,
+    apart: wp.vec3d,
+    reach: wp.float64,
+) -> MET: ...
+
+
+@wp.func_native("""
+  const double *row = (const double *)rows.data, *at = (const double *)points.data;
+  double own = 0;
+  for (int i = 0; i < 3; i++) own += (x.c[i] - at[3 * p + i]) * (x.c[i] - at[3 * p + i]);
+  for (int o = first; o < first + count; o++)
+    if (mpm::Curved::taken(row + mpm::ROUNDING * p, own, &x.c[0], row + mpm::ROUNDING * o,
+                           at + 3 * o))
+      return false;
+  return true;
+""")
+def curved_owns(
+    rows: wp.array(dtype=wp.float64),
+    points: wp.array(dtype=wp.vec3d),
+    p: int,
+    first: int,
+    count: int,
+    x: wp.vec3d,
+) -> bool: ...
+
+
+@wp.func_native("""
+  const double *row = (const double *)rows.data;
+  return mpm::Curved::misjudged(row + mpm::ROUNDING * p, row + mpm::ROUNDING * q, dx);
+""")
+def curved_misjudged(
+    rows: wp.array(dtype=wp.float64), p: int, q: int, dx: wp.float64
+) -> wp.float64: ...
+
+
+@wp.func_native("""
+  const double *row = (const double *)rows.data;
+  return mpm::Curved::inward(row + mpm::ROUNDING * p, row + mpm::ROUNDING * q, square, dt);
+""")
+def curved_inward(
+    rows: wp.array(dtype=wp.float64), p: int, q: int, square: wp.float64, dt: wp.float64
+) -> wp.float64: ...
+
+
+@wp.func_native("return mpm::Facet::misjudged(radius, dx);")
+def facet_misjudged(radius: wp.float64, dx: wp.float64) -> wp.float64: ...
+
+
+@wp.func_native("return mpm::Facet::replaces(&apart.c[0], cosine, reach, alike);")
 def facet_replaces(
-    apart: wp.vec3d, cosine: wp.float64, radius: wp.float64, dx: wp.float64
+    apart: wp.vec3d, cosine: wp.float64, reach: wp.float64, alike: wp.float64
 ) -> bool: ...
 
 

@@ -21,7 +21,7 @@ class Facets(NamedTuple):
 NONE = Facets(np.zeros((0, FACET_ROW)), np.zeros((0, 3)))
 
 
-def facets_of(surface: Float[np.ndarray, "S 3"], rounding: Float[np.ndarray, "S 10"]) -> Facets:
+def facets_of(surface: Float[np.ndarray, "S 3"], rounding: Float[np.ndarray, "S 12"]) -> Facets:
     """Find the flat faces among a body's surface points: those that look alike and lie in a plane.
 
     Args:
@@ -29,7 +29,8 @@ def facets_of(surface: Float[np.ndarray, "S 3"], rounding: Float[np.ndarray, "S 
         rounding: See ``types.ROUNDING``.
 
     """
-    known = np.any(rounding[:, :3] != 0.0, axis=1) & (rounding[:, 6] + rounding[:, 7] == 0.0)
+    curved = np.any(rounding[:, [6, 7, 10, 11]] != 0.0, axis=1)
+    known = np.any(rounding[:, :3] != 0.0, axis=1) & ~curved
     left = np.flatnonzero(known)
     rows, points, count = [], [np.zeros((0, 3))], 0
     while len(left):

@@ -7,7 +7,7 @@ from corporeal.mpm.constants import MOST_LEAN, SIDEWAYS, TINY_DOUBLE
 
 
 def shift_to_contact(
-    rounding: Float[np.ndarray, "N 10"], towards: Float[np.ndarray, "N 3"]
+    rounding: Float[np.ndarray, "N 12"], towards: Float[np.ndarray, "N 3"]
 ) -> tuple[Float[np.ndarray, "N 3"], Bool[np.ndarray, " N"]]:
     """How far from its point each rounded surface goes on in a direction [m].
 

@@ -23,6 +23,7 @@ from corporeal.mpm.physics import contact, contact_impulses
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.reference.contact_scene import Scene, friction_table
 from corporeal.mpm.reference.kept_choices import KeptChoices
+from corporeal.mpm.reference.round_contacts import on_curves
 from corporeal.mpm.reference.surface_points import (
     in_order,
     instead_of_nodes,
@@ -73,7 +74,9 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     rolls = np.repeat([t.rolls for t in touches], [len(t.gap) for t in touches]).astype(np.int64)
     rebound = _rebound(scene, pair, contacts, rolls)
     struck = contact_impulses.solve_impacts(contacts, movers, rebound, problem.cell, dt)
-    target = np.maximum(contacts.gap, 0.0) / dt
+    target = np.maximum(contacts.gap, 0.0) / dt - _joined(
+        [t.inwards for t in touches], (0,)
+    ).astype(np.float64)
     sweeps = _sweeps(scene, contacts, bool(struck.any()))
     impulse = struck + contact_impulses.solve(contacts, movers, target, sweeps)
     before, after = contacts.approach(scene.movers_before_forces()), contacts.approach(movers)
@@ -168,7 +171,7 @@ def find(scene: Scene) -> list[Touch]:
     look = Look.at(scene, np.concatenate(shown))
     touches = [_between(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])]
     touches += [_on_wall(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
-    faces = on_facets(scene)
+    faces = on_facets(scene) + on_curves(scene)
     return instead_of_nodes(scene, touches, faces) + in_order(faces + on_planes(scene))
 
 

@@ -7,7 +7,7 @@ from itertools import permutations
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.mpm.constants import FACET_ALIKE, FACET_NODES, POINT_REACH
+from corporeal.mpm.constants import FACET_ALIKE, FACET_NODES, POINT_REACH, ROUND_ALIKE
 from corporeal.mpm.physics.facets import on_facet
 from corporeal.mpm.reference.contact_scene import Scene
 from corporeal.mpm.reference.touch import Touch
@@ -74,14 +74,17 @@ def _with_facets(
 
 
 def instead_of_nodes(scene: Scene, nodes: list[Touch], faces: list[Touch]) -> list[Touch]:
-    """Leave out contacts on nodes that are those on flat faces, less well known."""
+    """Leave out contacts on nodes that are those on faces, less well known."""
     cell, kept = scene.problem.cell, []
     for touch in nodes:
         left = np.ones(len(touch.gap), dtype=bool)
         for face in (f for f in faces if f.pair == touch.pair):
-            reach = FACET_NODES * cell + np.sqrt(0.5 * scene.matter.radius[face.rolls] * cell)
+            reach, alike = face.instead, ROUND_ALIKE
+            if reach is None:
+                wide = scene.matter.radius[face.rolls]
+                reach, alike = FACET_NODES * cell + np.sqrt(0.5 * wide * cell), FACET_ALIKE
             apart = np.linalg.norm(touch.point[:, None] - face.point, axis=2)
-            same = (touch.normal @ face.normal.T > FACET_ALIKE) & (apart < reach)
+            same = (touch.normal @ face.normal.T > alike) & (apart < reach)
             left &= ~same.any(axis=1)
         kept.append(touch if left.all() else _some(touch, left))
     return kept

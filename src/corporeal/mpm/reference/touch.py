@@ -25,6 +25,10 @@ class Touch:
     """Where a wall drags on a liquid that sticks: see ``contact_impulses.Contacts``."""
     kept: KeptChoices = field(default_factory=KeptChoices.none)
     """Candidate normals that were taken, where they are kept."""
+    instead: Float[np.ndarray, " E"] | None = None
+    """Of what is round on what is curved: nodes nearer than this transmit nothing [m] …"""
+    inward: Float[np.ndarray, " E"] | None = None
+    """… and the speed at which a way straight ahead leads into a hollow within a step [m/s]."""
     rolls: int = -1
     """The body whose surface points they are; -1: they are on nodes."""
 
@@ -32,6 +36,11 @@ class Touch:
     def grips(self) -> Float[np.ndarray, " E"]:
         """Share of the pair's friction that each transmits [-]."""
         return np.ones(len(self.gap)) if self.slips is None else 1.0 - self.slips
+
+    @property
+    def inwards(self) -> Float[np.ndarray, " E"]:
+        """Speed at which each would close within the step by going straight ahead [m/s]."""
+        return np.zeros(len(self.gap)) if self.inward is None else self.inward
 
     @property
     def layers(self) -> Float[np.ndarray, "E 4"]:

@@ -32,7 +32,7 @@ struct Points {
     T.fc = c;
     T.gap = gap;
     T.active = 1;
-    T.span = 0;
+    T.span = T.instead = 0;
     T.mu = w->friction[a * (w->fields + w->planes) + c];
     T.target = Impact::closing(gap, w->dt);
     for (int i = 0; i < 3; i++) T.J[i] = 0;
@@ -70,10 +70,10 @@ struct Points {
     }
     return count;
   }
-  // Whether rounded points of body f may meet flat faces of body g.
+  // Whether rounded points of body f may meet flat or curved faces of body g.
   static inline bool may(const World *w, int f, int g) {
     const Field &F = w->field[f], &G = w->field[g];
-    if (f == g || !has(F) || !F.rolls || !G.rigids || !G.facets) return false;
+    if (f == g || !has(F) || !F.rolls || !G.rigids || !(G.facets || G.bends)) return false;
     if (w->friction[f * (w->fields + w->planes) + g] < 0) return false;   // never in contact
     double square = 0, most = F.rigid[RADIUS] + G.rigid[RADIUS] + mpm::POINT_REACH * w->dx;
     for (int i = 0; i < 3; i++) {
@@ -86,7 +86,7 @@ struct Points {
     int count = 0;
     for (int f = 0; f < w->fields; f++)
       for (int g = 0; g < w->fields; g++)
-        if (may(w, f, g)) count += with_facets(w, f, g, list + count, room - count);
+        if (w->field[g].facets && may(w, f, g)) count += with_facets(w, f, g, list + count, room - count);
     return count;
   }
   MPM_RARE static int with_facets(const World *w, int f, int g, Touch *list, int room) {
@@ -119,6 +119,101 @@ struct Points {
     }
     return count;
   }
+  MPM_RARE static int on_curves(const World *w, Touch *list, int room) {
+    int count = 0;
+    for (int f = 0; f < w->fields; f++)
+      for (int g = 0; g < w->fields; g++)
+        if (w->field[g].bends && may(w, f, g)) count += Meets(w, f, g).all(list + count, room - count);
+    return count;
+  }
+  // Round points of body f on curved ones of body g. Where both are round, those of the first body count.
+  struct Meets {
+    enum { MOST_BENT = 8192 };   // more than a body has surface points
+    const World *w;
+    const Field &F, &G;
+    const double *s, *t, reach;
+    int f, g, nears, near[MOST_BENT];
+    double apart[3], low[3], high[3];
+    Meets(const World *w, int f, int g)
+        : w(w), F(w->field[f]), G(w->field[g]), s(F.rigid), t(G.rigid), reach(mpm::POINT_REACH * w->dx), f(f), g(g) {
+      for (int i = 0; i < 3; i++) apart[i] = s[CENTRE + i] - t[CENTRE + i];
+    }
+    const double *row(int q) const { return G.rounding + mpm::ROUNDING * q; }
+    // List curved points of g near f, and the box around them, in the world from f's centre.
+    bool find() {
+      double centre[3], x[3];
+      turn_back(t, apart, centre);
+      nears = 0;
+      for (int i = 0; i < 3; i++) low[i] = mpm::VAST, high[i] = -mpm::VAST;
+      for (int q = 0; q < G.surfaces && nears < MOST_BENT; q++) {
+        if (!mpm::Curved::may(row(q), G.surface + 3 * q, centre, s[RADIUS] + reach, f < g)) continue;
+        near[nears++] = q;
+        turn(t, G.surface + 3 * q, x);
+        for (int i = 0; i < 3; i++) {
+          x[i] -= apart[i];
+          if (x[i] - row(q)[8] < low[i]) low[i] = x[i] - row(q)[8];
+          if (x[i] + row(q)[8] > high[i]) high[i] = x[i] + row(q)[8];
+        }
+      }
+      return nears > 0;
+    }
+    // The curved point nearest to a place in g's frame, on its side; -1: none.
+    int nearest(const double *x) const {
+      int best = -1;
+      double least = mpm::VAST;
+      for (int k = 0; k < nears; k++) {
+        const double *q = G.surface + 3 * near[k], *n = row(near[k]);
+        const double d[3] = {x[0] - q[0], x[1] - q[1], x[2] - q[2]}, square = Vec::dot(d, d);
+        if (square < least && Vec::dot(d, n) > 0) least = square, best = near[k];
+      }
+      return best;
+    }
+    // Whether a place in f's frame belongs to point p and not to its neighbours.
+    bool owns(int p, const double *x) const {
+      const double *round = F.rounding + mpm::ROUNDING * p, *at = F.surface + 3 * p;
+      const double d[3] = {x[0] - at[0], x[1] - at[1], x[2] - at[2]}, own = Vec::dot(d, d);
+      for (int o = 0; o < F.surfaces; o++)
+        if (mpm::Curved::taken(round, own, x, F.rounding + mpm::ROUNDING * o, F.surface + 3 * o)) return false;
+      return true;
+    }
+    bool meet(int p, Touch &T) const {
+      const double *round = F.rounding + mpm::ROUNDING * p, radius = mpm::Curved::ball(round);
+      double x[3], y[3], m[3], gap;
+      turn(s, F.surface + 3 * p, y);
+      for (int i = 0; i < 3; i++)
+        if (y[i] < low[i] - reach - round[8] || y[i] > high[i] + reach + round[8]) return false;
+      for (int i = 0; i < 3; i++) x[i] = F.surface[3 * p + i] - radius * round[i];
+      mpm::Curved::carry(s + TURN, t + TURN, apart, x, y);
+      const int q = nearest(y);
+      if (q < 0 || !mpm::Curved::meet(round, F.surface + 3 * p, s + TURN, row(q), G.surface + 3 * q, t + TURN, apart,
+                                      reach, x, m, gap))
+        return false;
+      if (!owns(p, x)) return false;
+      enter(w, T, G.facets * F.surfaces + p, f < g ? f : g, f < g ? g : f, f > g, gap);
+      turn(s, x, y);
+      T.instead = mpm::Curved::misjudged(round, row(q), w->dx);
+      for (int i = 0; i < 3; i++) T.x[i] = y[i] + s[CENTRE + i], T.normal[i] = f < g ? -m[i] : m[i];
+      for (int i = 0; i < 3; i++) y[i] = T.x[i] + radius * m[i];   // the middle of what is round
+      T.target -= mpm::Curved::inward(round, row(q), along(y, m), w->dt);
+      return true;
+    }
+    // How fast a place of f moves over g, across a normal, squared.
+    double along(const double *x, const double *m) const {
+      double v[3], u[3];
+      Body6::velocity(s, x, v);
+      Body6::velocity(t, x, u);
+      for (int i = 0; i < 3; i++) v[i] -= u[i];
+      const double n = Vec::dot(v, m), square = Vec::dot(v, v) - n * n;
+      return square > 0 ? square : 0.0;
+    }
+    int all(Touch *list, int room) {
+      int count = 0;
+      if (!find()) return 0;
+      for (int p = 0; p < F.surfaces && count < room; p++)
+        if (mpm::Curved::ball(F.rounding + mpm::ROUNDING * p) > 0) count += meet(p, list[count]);
+      return count;
+    }
+  };
   // How many contacts on points there may be.
   MPM_RARE static int most(const World *w) {
     int count = 0;
@@ -130,18 +225,19 @@ struct Points {
     }
     return count;
   }
-  // Contacts on nodes that are those on flat faces, less well known, transmit nothing.
+  // Contacts on nodes that are those on flat and curved faces, less well known, transmit nothing.
   MPM_RARE static void instead_of_nodes(const World *w, Touch *touches, int nodes, int all) {
     for (int q = nodes; q < all; q++) {
       const Touch &P = touches[q];
       if (P.fc >= w->fields) continue;
-      const double radius = rolls(w, P)->rigid[RADIUS];
+      const double reach = P.instead > 0 ? P.instead : mpm::Facet::misjudged(rolls(w, P)->rigid[RADIUS], w->dx);
+      const double alike = P.instead > 0 ? mpm::ROUND_ALIKE : mpm::FACET_ALIKE;
       for (int t = 0; t < nodes; t++) {
         Touch &T = touches[t];
         if (!T.active || T.fa != P.fa || T.fc != P.fc) continue;
         double d[3];
         for (int i = 0; i < 3; i++) d[i] = T.x[i] - P.x[i];
-        if (mpm::Facet::replaces(d, Vec::dot(T.normal, P.normal), radius, w->dx)) T.active = 0;
+        if (mpm::Facet::replaces(d, Vec::dot(T.normal, P.normal), reach, alike)) T.active = 0;
       }
     }
   }

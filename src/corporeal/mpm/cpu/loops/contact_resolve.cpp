@@ -157,6 +157,7 @@ int nt = stage->touches, n = 0, stacked = 0;
 double *pair = stage->pair;   // [all][all][PAIR]
 nt += Points::on_planes(world, touches + nt);
 nt += Points::on_facets(world, touches + nt, stage->most_touches - nt);
+nt += Points::on_curves(world, touches + nt, stage->most_touches - nt);
 stage->points = nt - stage->touches;
 Points::instead_of_nodes(world, touches, stage->touches, nt);
 Bonds::join(world);
