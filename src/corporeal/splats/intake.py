@@ -141,7 +141,7 @@ def take_in(
         read = (f"{given.count:,} Gaussians were read from {source.name}.",)
         return Intake(given, usual=usual, statements=read, warnings=given.warnings)
     longest = PRESETS[training.preset].longest
-    shown = _consistent(read_photographs(source, longest, masked_by))
+    shown = _consistent(read_photographs(source, longest, masked_by, close=True))
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
