@@ -194,7 +194,7 @@ def turned_upright(taken: Intake, up: AskedUp = "auto", floor: float | None = No
         taken,
         gaussians=moved_gaussians(taken.gaussians, frame.world_from_file),
         cameras=moved_cameras(taken.cameras, frame.world_from_file),
-        floor=frame.floor_by == "plane" or (floor is not None and taken.masks is None),
+        floor=taken.masks is None and (frame.floor_by == "plane" or floor is not None),
         world_from_file=frame.world_from_file,
         statements=(*taken.statements, frame.reason),
         warnings=(*taken.warnings, *frame.warnings),
