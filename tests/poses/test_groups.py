@@ -13,8 +13,8 @@ from corporeal.poses.groups import (
     Groups,
     groups_of,
     hopeless,
+    look,
     not_found,
-    shared_points,
 )
 from corporeal.poses.pose import pose
 from patterned_scene import patterned, photographs, ring
@@ -121,10 +121,10 @@ def test_two_places_in_one_folder_are_refused_in_one_sentence(two_places, tmp_pa
 def test_points_are_shared_within_a_place_alone(two_places, tmp_path):
     pytest.importorskip("pycolmap")
     gathered = gather(two_places, tmp_path, silent)
-    shared = shared_points(tmp_path, gathered, silent)
+    shared = look(tmp_path, gathered, silent).shared
     assert (shared == shared.T).all() and (shared[:14, 14:] < SHARED).all()
     assert (np.diagonal(shared[:14, :14], 1) >= SHARED).all()
-    again = shared_points(tmp_path, gathered, silent)
+    again = look(tmp_path, gathered, silent).shared
     assert (again == shared).all(), "seeded"
 
 

@@ -273,10 +273,10 @@ def test_folders_that_show_nothing_are_refused_in_one_sentence(taken, tmp_path, 
             data = b"\0\0\0\x18ftypheic" if kind == "heic" else b"\xff\xd8\xff"
             (folder / f"{k}.{kind if kind == 'heic' else 'jpg'}").write_bytes(data + bytes(50))
     said = {
-        "black": "only 0 of 30 photographs can be used.*shows nothing but one colour",
+        "black": "none of 30 photographs can be used.*shows nothing but one colour",
         "same": "only 1 of 30 photographs can be used.*shows the same as 0.jpg",
-        "broken": "only 0 of 30 photographs can be used.*is no PNG, JPEG or WebP",
-        "heic": "only 0 of 30 photographs can be used.*is a HEIC picture: convert it to JPEG",
+        "broken": "none of 30 photographs can be used.*is no PNG, JPEG or WebP",
+        "heic": "none of 30 photographs can be used.*is a HEIC picture: convert it to JPEG",
     }
     assert kind_of([folder]) == "photographs" and unposed(folder)
     with pytest.raises(BadFileError, match=said[kind]) as error:

@@ -9,7 +9,7 @@ from splat_scenes import around, blobs, pictured
 from corporeal.errors import UserError
 from corporeal.features.descriptor import LET_THROUGH, seen_from
 from corporeal.geometry.local_shape import neighbours, normals
-from corporeal.splats.foreground import foreground, shown, with_company
+from corporeal.splats.foreground import foreground, shown, sunk, with_company
 from corporeal.types import Gaussians
 
 CAMERAS = around(24, (64, 64), focal=80.0, centre=(0, 0, 0.4))[:14]
@@ -120,3 +120,9 @@ def test_what_is_faint_goes_with_the_thing_that_it_reaches_and_the_floor_stays()
     made = with_company(whole, np.where(kind == 0, 7, -1), floor=True)
     assert (made == np.where(kind < 2, 7, -1)).all()
     assert (with_company(whole, np.where(kind == 0, 7, -1), floor=False) == 7).all()
+
+
+def test_what_is_below_the_floor_is_not_drawn_with_a_thing_but_for_the_floors_error():
+    heights = np.array([0.3, -0.001, -0.05, -0.05])
+    gaussians = like(np.stack([0 * heights, 0 * heights, heights], axis=1), 0.02)
+    assert sunk(gaussians, np.array([0, 0, 0, -1]), 0.4).tolist() == [False, False, True, False]

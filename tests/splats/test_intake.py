@@ -37,7 +37,7 @@ def taken(monkeypatch, tmp_path):
     views = Views(np.zeros((3, 4, 4, 3), np.uint8), (camera,) * 3)
     whole, sparse = np.full((3, 4, 4), 255, np.uint8), np.zeros((5, 3))
     shown = Photographs(views, ("a", "b", "c"), True, whole, sparse, sparse.astype(np.uint8))
-    monkeypatch.setattr(intake, "read_photographs", lambda *_: shown)
+    monkeypatch.setattr(intake, "read_photographs", lambda *_, **__: shown)
     monkeypatch.setattr(intake, "kind_of", lambda _: "photographs")
 
     def take(said: Agreement, learned: Trained | UserError, instances: bool = False):
@@ -108,7 +108,7 @@ def test_a_photograph_that_contradicts_the_masks_of_all_others_is_left_out(monke
     rgb = np.arange(12, dtype=np.uint8)[:, None, None, None] * np.ones((1, 120, 160, 3), np.uint8)
     names = tuple(f"{k:02d}.jpg" for k in range(12))
     shown = Photographs(Views(rgb, cameras), names, True, masks, warnings=("before",))
-    monkeypatch.setattr(intake, "read_photographs", lambda *_: shown)
+    monkeypatch.setattr(intake, "read_photographs", lambda *_, **__: shown)
     monkeypatch.setattr(intake, "kind_of", lambda _: "photographs")
     monkeypatch.setattr(intake, "agreement", lambda *_: FINE)
     monkeypatch.setattr(intake, "train", lambda *_: learned(GOOD))
@@ -118,3 +118,26 @@ def test_a_photograph_that_contradicts_the_masks_of_all_others_is_left_out(monke
     assert len(taken.masks) == 11
     before, said = taken.warnings
     assert before == "before" and "1 of 12 photographs were left out" in said and "07.jpg" in said
+
+
+def test_with_masks_no_floor_is_among_what_is_learned_though_sparse_points_show_one():
+    """Faint Gaussians on it would stay behind in the film when the object leaves."""
+    rng, aims = np.random.default_rng(0), ring(np.arange(12) * 30, (64, 48))
+    cameras = tuple(camera_of(aim) for aim in aims)
+    plane = np.concatenate([rng.uniform(-1, 1, (400, 2)), rng.normal(0, 1e-4, (400, 1))], axis=1)
+    thing = np.concatenate(
+        [rng.uniform(-0.2, 0.2, (100, 2)), rng.uniform(0, 0.4, (100, 1))], axis=1
+    )
+    gaussians = Gaussians(
+        thing.astype(np.float32),
+        np.tile(np.float32([1, 0, 0, 0]), (100, 1)),
+        np.full((100, 3), 0.02, np.float32),
+        np.ones(100, np.float32),
+        np.zeros((100, 1, 3), np.float32),
+    )
+    views = Views(np.zeros((12, 48, 64, 3), np.uint8), cameras)
+    masks = np.ones((12, 48, 64), bool)
+    taken = intake.Intake(gaussians, cameras, views, masks, seen=np.concatenate([plane, thing]))
+    made = intake.turned_upright(taken)
+    assert "plane" in made.statements[-1], "the floor is found"
+    assert not made.floor, "and yet is not among the Gaussians"

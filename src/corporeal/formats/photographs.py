@@ -92,7 +92,11 @@ class Listed:
 
 
 def read_photographs(
-    path: Path, longest: int = LONGEST, masks: Path | None = None, bare: bool = False
+    path: Path,
+    longest: int = LONGEST,
+    masks: Path | None = None,
+    bare: bool = False,
+    close: bool = False,
 ) -> Photographs:
     """Read a folder of posed photographs, or the ``transforms.json`` of one.
 
@@ -105,6 +109,7 @@ def read_photographs(
         masks: A folder of masks instead of the photographs' own, or one that holds ``masks``,
             ``instances`` or both.
         bare: Whether masks and instances beside the photographs are ignored.
+        close: Whether larger pictures are cut out about what masks show, before they are reduced.
 
     Raises:
         BadFileError: There are no poses, a pose or camera is bad, or too few pictures can be used;
@@ -117,7 +122,7 @@ def read_photographs(
         shots = [replace(shot, mask=None, instances=None) for shot in shots]
     if masks is not None:
         shots = _masked_by(masks, shots)
-    done = develop(found.source, shots, longest)
+    done = develop(found.source, shots, longest, close)
     seen = found.model if found.model is not None and len(found.model.points) else None
     return Photographs(
         views=Views(done.rgb, done.cameras, object_of_pixel=done.object_of_pixel),

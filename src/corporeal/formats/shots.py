@@ -11,10 +11,11 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Int32, UInt8
+from jaxtyping import Float, Int32, UInt8
 from PIL import Image
 
 from corporeal.errors import BadFileError
+from corporeal.formats.close_up import CloseUp, close_up, sides_of
 from corporeal.formats.images import FORMATS, MAX_PIXELS, decode_image, decode_instances
 from corporeal.geometry.lens import Lens, straightened
 from corporeal.types import Camera
@@ -98,13 +99,14 @@ class _Print:
     """Whether it says that it is to be turned, and was not."""
 
 
-def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
+def develop(source: Path, shots: list[Shot], longest: int, close: bool = False) -> Developed:
     """Read all photographs.
 
     Args:
         source: The file or folder to name in errors.
         shots: What to read.
         longest: Larger pictures are reduced until their longer side has that many pixels.
+        close: Whether what is larger is cut out about what masks show, before it is reduced.
 
     Raises:
         BadFileError: Fewer than three can be used, or most cannot, or all are too large together.
@@ -118,16 +120,20 @@ def develop(source: Path, shots: list[Shot], longest: int) -> Developed:
     if len(known) * size[0] * size[1] > LARGEST:
         what = f"{len(known)} pictures of {size[0]} × {size[1]} pixels do not fit into memory."
         raise BadFileError(source, what, "Take fewer, or reduce them.")
+    frame = CloseUp(size, size)
+    if close and known and size not in known:
+        alike = Counter(own for own in known if _reduced(*own, longest) == size)
+        frame = close_up(_boxes(shots), size, alike.most_common(1)[0][0])
     prints = []
     for shot, found in zip(shots, sizes, strict=True):
         if found is not None:
             try:
-                prints.append(_printed(shot, size))
+                prints.append(_printed(shot, frame))
             except _UnusableError as problem:
                 bad.append((shot.name, str(problem)))
     prints = _masked_alike(prints, bad)
     _refuse_most(source, len(shots), bad)
-    warnings = [*left_out(len(shots), bad), *_changes(prints, Counter(known), size)]
+    warnings = [*left_out(len(shots), bad), *_changes(prints, Counter(known), frame)]
     return _developed(prints, tuple(warnings))
 
 
@@ -182,7 +188,26 @@ def unreadable(path: Path) -> str:
     return "is no PNG, JPEG or WebP picture"
 
 
-def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
+def _boxes(shots: list[Shot]) -> Float[np.ndarray, "V 2"]:
+    """Return the sides of the boxes about masks, in those of the pictures; what is bad has none."""
+    found = []
+    for shot in shots:
+        with suppress(_UnusableError):
+            found.append(sides_of(_shown(shot) >= SHOWN))
+    return np.array([box for box in found if box is not None]).reshape(-1, 2)
+
+
+def _shown(shot: Shot) -> UInt8[np.ndarray, "H W"]:
+    """Return what belongs to objects, as ``_alpha`` has it, without more than it takes."""
+    if shot.mask is not None:
+        return _decoded(shot.mask)[..., 0]
+    picture = _decoded(shot.picture)
+    if _turned(shot, picture.shape[1], picture.shape[0], asked := asked_of(shot.picture)):
+        picture = np.rot90(picture, asked)
+    return _alpha(shot, picture, _numbers(shot.instances, picture.shape[1::-1]))
+
+
+def _printed(shot: Shot, frame: CloseUp) -> _Print:
     picture = _decoded(shot.picture)
     height, width = picture.shape[:2]
     asked = asked_of(shot.picture)
@@ -199,18 +224,34 @@ def _printed(shot: Shot, size: tuple[int, int]) -> _Print:
     alpha = _alpha(shot, picture, numbers)
     if masked and alpha.max() < SHOWN:
         raise _UnusableError("has a mask that shows nothing" + (NUMBERS if shot.mask else ""))
-    small = np.dstack([_resized(_on_white(picture[..., :3], alpha), size), _resized(alpha, size)])
+    rgba = np.dstack([_on_white(picture[..., :3], alpha), alpha])
+    rgba, numbers, camera = _framed(rgba, numbers, lens, shot.world_from_camera, frame)
+    ignored = asked > 0 and not turned
+    return _Print(shot.name, rgba, numbers, masked, camera, not lens.straight, ignored)
+
+
+def _framed(
+    rgba: UInt8[np.ndarray, "H W 4"],
+    numbers: Int32[np.ndarray, "H W"] | None,
+    lens: Lens,
+    pose: np.ndarray,
+    frame: CloseUp,
+) -> tuple[UInt8[np.ndarray, "h w 4"], Int32[np.ndarray, "h w"] | None, Camera]:
+    """Reduce a picture and its instances, straighten them, and cut out what is used."""
+    size, (wide, high) = frame.whole, frame.window
+    small = np.dstack([_resized(rgba[..., :3], size), _resized(rgba[..., 3], size)])
     lens = lens.resized(*size)
     try:
         straight, K = straightened(small, lens)
     except ValueError as problem:
         raise _UnusableError(f"cannot be straightened: {problem}") from None
-    camera = Camera(K, shot.world_from_camera, *size)
+    left, top = frame.corner(straight[..., 3] >= SHOWN)
+    cut = slice(top, top + high), slice(left, left + wide)
     if numbers is not None:
-        small = np.asarray(Image.fromarray(numbers).resize(size, Image.Resampling.NEAREST))
-        numbers = straightened(small[..., None], lens)[0][..., 0]
-    ignored = asked > 0 and not turned
-    return _Print(shot.name, straight, numbers, masked, camera, not lens.straight, ignored)
+        few = np.asarray(Image.fromarray(numbers).resize(size, Image.Resampling.NEAREST))
+        numbers = straightened(few[..., None], lens)[0][..., 0][cut]
+    K = K - np.array([[0, 0, left], [0, 0, top], [0, 0, 0]])
+    return straight[cut], numbers, Camera(K, pose, wide, high)
 
 
 def _fits(width: int, height: int, lens: Lens) -> bool:
@@ -335,16 +376,17 @@ def _listed(bad: list[Bad]) -> str:
     return "; ".join(names) + (f"; and {more} more" if more else "")
 
 
-def _changes(
-    prints: list[_Print], sizes: Counter[tuple[int, int]], size: tuple[int, int]
-) -> list[str]:
+def _changes(prints: list[_Print], sizes: Counter[tuple[int, int]], frame: CloseUp) -> list[str]:
     """Return what was done to the pictures, in sentences."""
-    changes = []
+    changes, size = [], frame.whole
     if len(sizes) > 1:
         kinds = ", ".join(f"{n} of {w} × {h}" for (w, h), n in sizes.most_common(NAMED))
         changes.append(f"Pictures of several sizes ({kinds}) were brought to {_sized(size)}.")
     elif size not in sizes:
         changes.append(f"Pictures were reduced to {_sized(size)}.")
+    if frame.window != size:
+        wide, high = frame.window
+        changes.append(f"Of each, {wide} × {high} pixels about what its mask shows were used.")
     bent = sum(p.straightened for p in prints)
     if bent:
         changes.append(f"{bent} pictures were straightened: their lenses bend straight lines.")

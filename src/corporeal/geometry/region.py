@@ -22,7 +22,7 @@ class Region:
 
 
 def region(cameras: tuple[Camera, ...], points: Float[np.ndarray, "N 3"] | None = None) -> Region:
-    """Return the ball about the point nearest to all optical axes.
+    """Return the ball about the point nearest to the rays through the middles of all pictures.
 
     Its radius is the largest that fits into the pictures of half of the cameras.
 
@@ -33,7 +33,7 @@ def region(cameras: tuple[Camera, ...], points: Float[np.ndarray, "N 3"] | None 
 
     """
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
-    axes = np.stack([c.world_from_camera[:3, 2] for c in cameras])
+    axes, sines = (np.stack(each) for each in zip(*map(_middle, cameras), strict=True))
     across = np.eye(3) - axes[:, :, None] * axes[:, None, :]
     # Where axes hardly cross, a weak pull keeps the point near the cameras.
     weak = 1e-3 * len(cameras) * np.eye(3)
@@ -44,9 +44,21 @@ def region(cameras: tuple[Camera, ...], points: Float[np.ndarray, "N 3"] | None 
         votes = np.sum([_sees(c, points) for c in cameras], axis=0)
         if votes.any():
             centre = np.median(points[votes >= 0.75 * votes.max()], axis=0)
-    sines = [np.sin(np.arctan(min(c.width / c.K[0, 0], c.height / c.K[1, 1]) / 2)) for c in cameras]
     radius = float(np.median(np.linalg.norm(eyes - centre, axis=1) * sines))
     return Region((float(centre[0]), float(centre[1]), float(centre[2])), radius)
+
+
+def _middle(camera: Camera) -> tuple[Float[np.ndarray, "3"], float]:
+    """Return the ray through the middle of a picture, and the sine of half the angle that it shows.
+
+    A picture that was cut out of a larger one has its middle beside the optical axis.
+    """
+    f, c = np.diag(camera.K)[:2], camera.K[:2, 2]
+    size = np.array([camera.width, camera.height])
+    ray = np.append((size / 2 - c) / f, 1.0)
+    away = float(np.linalg.norm(ray))
+    half = (size / f).min() / 2 / away**2
+    return camera.world_from_camera[:3, :3] @ ray / away, float(np.sin(np.arctan(half)))
 
 
 def _sees(camera: Camera, points: np.ndarray) -> Bool[np.ndarray, " N"]:

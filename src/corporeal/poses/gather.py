@@ -95,7 +95,8 @@ def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad]) -> None:
     if good >= max(FEWEST, asked / 2):
         return
     why = f" The first of the others, {bad[0][0]}, {bad[0][1]}." if bad else ""
-    what = f"only {good} of {asked} photographs can be used.{why}"
+    count = f"only {good}" if good else "none"
+    what = f"{count} of {asked} photographs can be used.{why}"
     raise BadFileError(source, what, TAKE)
 
 

@@ -13,7 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import numpy as np
-from jaxtyping import Int
+from jaxtyping import Bool, Int
 from scipy.sparse import csr_array
 from scipy.sparse.csgraph import connected_components
 
@@ -21,6 +21,7 @@ from corporeal.machine import cores
 from corporeal.poses.attempt import require
 from corporeal.poses.gather import IMAGES, Gathered
 from corporeal.poses.judge import names_of
+from corporeal.poses.one_viewpoint import same_viewpoint, stood_still
 
 LONGEST, MOST_POINTS = 480, 1024
 """Longer side of the copies [px]; points of each."""
@@ -40,6 +41,10 @@ SORT_THEM = (
 MOST_ALONE = 0.3
 """Share of pictures that share points with no other, above which the rest is searched without
 them: COLMAP leaves out fewer itself, and of more it would seem that nothing fits together."""
+WALK = (
+    "Walk around the thing; a thing that is turned before a camera that stands needs a background "
+    "without any pattern, or masks."
+)
 OUTWEIGHS = 3.0
 """So many times as large as the next, a group is what was meant."""
 
@@ -132,10 +137,23 @@ def without(gathered: Gathered, beside: tuple[int, ...]) -> Gathered:
     )
 
 
-def shared_points(
-    folder: Path, gathered: Gathered, told: Callable[[float], None]
-) -> Int[np.ndarray, "N N"]:
-    """Return how many points each two of the pictures share, in small copies.
+@dataclass(frozen=True)
+class Looked:
+    """What small copies of N pictures say."""
+
+    shared: Int[np.ndarray, "N N"]
+    """Points that each two share."""
+    same: Bool[np.ndarray, "N N"]
+    """Whether both were taken from one viewpoint."""
+
+    @property
+    def stood_still(self) -> str | None:
+        """Say in a clause that all were, if they were."""
+        return stood_still(self.shared >= SHARED, self.same)
+
+
+def look(folder: Path, gathered: Gathered, told: Callable[[float], None]) -> Looked:
+    """Look for points that each two of the pictures share, in small copies.
 
     Args:
         folder: Holds ``images``.
@@ -173,19 +191,25 @@ def shared_points(
         verification_options=checking,
         device=pycolmap.Device.cpu,
     )
-    shared = _read(pycolmap, database, gathered.names)
+    found = _read(pycolmap, database, gathered.names)
     database.unlink()
     told(1.0)
-    return shared
+    return found
 
 
-def _read(pycolmap: Any, database: Path, names: Sequence[str]) -> Int[np.ndarray, "N N"]:
+def _read(pycolmap: Any, database: Path, names: Sequence[str]) -> Looked:
     opened = pycolmap.Database.open(str(database))
     number = {name: k for k, name in enumerate(names)}
     place = {image.image_id: number[image.name] for image in opened.read_all_images()}
+    points = {i: np.asarray(opened.read_keypoints(i))[:, :2].astype(float) for i in place}
     shared = np.zeros((len(names), len(names)), np.int64)
+    same = np.zeros(shared.shape, np.bool_)
     for pair, geometry in zip(*opened.read_two_view_geometries(), strict=True):
-        a, b = (place[k] for k in pycolmap.pair_id_to_image_pair(pair))
+        own = pycolmap.pair_id_to_image_pair(pair)
+        a, b = (place[k] for k in own)
         shared[a, b] = shared[b, a] = len(geometry.inlier_matches)
+        if shared[a, b] >= SHARED:
+            both = (points[k][n] for k, n in zip(own, geometry.inlier_matches.T, strict=True))
+            same[a, b] = same[b, a] = same_viewpoint(*both, longest=LONGEST)
     opened.close()
-    return shared
+    return Looked(shared, same)

@@ -13,14 +13,15 @@ from corporeal.poses.attempt import Attempt, Way, attempt, require
 from corporeal.poses.by_masks import checked_by_masks, filled_share
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
-from corporeal.poses.gather import IMAGES, Gathered, as_gathered, gather
+from corporeal.poses.gather import IMAGES, TAKE, Gathered, as_gathered, gather
 from corporeal.poses.groups import (
     SORT_THEM,
+    WALK,
     Groups,
     groups_of,
     hopeless,
+    look,
     not_found,
-    shared_points,
     told_apart,
     without,
 )
@@ -45,6 +46,8 @@ SAID: dict[Way, str] = {
     "masked": ", from points on objects alone",
     "thorough": ", at the thorough attempt",
 }
+LEAST = 6
+"""Photographs: fewer that were taken all around are more than 60° apart, and share nothing."""
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
 METHOD = 3
 """Raised when other poses would be found: those of an older method are looked for again."""
@@ -165,6 +168,9 @@ def pose_object(posed: Posed, masks: Path, folder: Path, progress: Progress) -> 
 
 def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     said, gathered = _gathered(source, folder, _within(progress, 0.0, GATHERED))
+    if (count := len(gathered.names)) < LEAST:
+        few = f"{count} photographs are too few to find where they were taken from."
+        return _Kept((), (), few, (), TAKE)
     groups = _places(folder, gathered, _within(progress, GATHERED, LOOKED))
     if isinstance(groups, _Kept):
         return groups
@@ -192,10 +198,12 @@ def _places(folder: Path, gathered: Gathered, progress: Progress) -> Groups | _K
     """Look at small copies: which photographs show one place, or why the long search is in vain."""
     if (folder / MASKS[0]).is_dir():  # what was turned over shares nothing, and masks help
         return Groups(())
-    shared = shared_points(folder, gathered, lambda f: progress(f, LOOKING))
-    if (why := hopeless(shared)) is not None:
+    looked = look(folder, gathered, lambda f: progress(f, LOOKING))
+    if (why := hopeless(looked.shared)) is not None:
         return _Kept((), (), not_found([why], 0), ())
-    groups = groups_of(shared)
+    if (why := looked.stood_still) is not None:
+        return _Kept((), (), not_found([why], 0), (), WALK)
+    groups = groups_of(looked.shared)
     if groups.mixed:
         return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
     return groups

@@ -31,6 +31,8 @@ WIDE = 0.5
 """Standard deviation of haze, in those radii."""
 HALF = 0.5
 """Share of a pixel from which on it is an object's."""
+SUNK = 0.01
+"""Below the floor, in the longest side of the objects: less may be error of the floor."""
 TINY = 1e-12
 """Contribution that can be divided by [px]."""
 REACH = 2.0
@@ -153,6 +155,23 @@ def with_company(
     made = owner.copy()
     made[rest[goes]] = owner[own[nearest[goes]]]
     return made
+
+
+def sunk(
+    gaussians: Gaussians, owner: Int[np.ndarray, " N"], longest: float
+) -> Bool[np.ndarray, " N"]:
+    """Tell which Gaussians of objects are below the floor.
+
+    Where nobody looks from below, the visual hull goes on under it, as a cone that nothing denies.
+    The floor ends the surface there; in a film of a thing that is lifted the cone would show.
+
+    Args:
+        gaussians: In the world's frame: +z up, the floor at z = 0.
+        owner: Whose each is; -1: no object's.
+        longest: Side of the objects' boxes [in the unit of the Gaussians].
+
+    """
+    return (owner >= 0) & (gaussians.mean[:, 2] < -SUNK * longest)
 
 
 def _shrunk(mask: Bool[np.ndarray, "H W"]) -> Float[np.ndarray, "h w"]:

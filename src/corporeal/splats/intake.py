@@ -141,7 +141,7 @@ def take_in(
         read = (f"{given.count:,} Gaussians were read from {source.name}.",)
         return Intake(given, usual=usual, statements=read, warnings=given.warnings)
     longest = PRESETS[training.preset].longest
-    shown = _consistent(read_photographs(source, longest, masked_by))
+    shown = _consistent(read_photographs(source, longest, masked_by, close=True))
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
@@ -194,7 +194,7 @@ def turned_upright(taken: Intake, up: AskedUp = "auto", floor: float | None = No
         taken,
         gaussians=moved_gaussians(taken.gaussians, frame.world_from_file),
         cameras=moved_cameras(taken.cameras, frame.world_from_file),
-        floor=frame.floor_by == "plane" or (floor is not None and taken.masks is None),
+        floor=taken.masks is None and (frame.floor_by == "plane" or floor is not None),
         world_from_file=frame.world_from_file,
         statements=(*taken.statements, frame.reason),
         warnings=(*taken.warnings, *frame.warnings),

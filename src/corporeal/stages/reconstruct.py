@@ -14,6 +14,7 @@ from corporeal.errors import UserError
 from corporeal.features.clouds import with_features
 from corporeal.formats.sources import called
 from corporeal.formats.words import safe
+from corporeal.geometry.gaussians import only
 from corporeal.geometry.local_shape import neighbours, normals
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.metric import MetricScale
@@ -32,6 +33,7 @@ from corporeal.reconstruction.reconstruct_config import (
 from corporeal.regions.instance_assignment import assign_instances
 from corporeal.render.camera import cameras_around
 from corporeal.splats.closed import closed
+from corporeal.splats.foreground import sunk
 from corporeal.splats.intake import Intake, turned_upright
 from corporeal.splats.worth import goes_beyond, not_worth, unlike_masks
 from corporeal.types import Camera, Finish, Reconstruction, Scene, SceneObject, Surface
@@ -159,9 +161,10 @@ def _in_metres(
 ) -> Reconstruction:
     made = similarity(scale=scale.metres_per_unit)
     boxes = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in found.solids]
+    kept = ~sunk(found.taken.gaussians, found.closed.owner, float(max(found.extents)))
     return Reconstruction(
-        gaussians=moved_gaussians(found.taken.gaussians, made),
-        object_of_gaussian=found.closed.owner,
+        gaussians=moved_gaussians(only(found.taken.gaussians, kept), made),
+        object_of_gaussian=found.closed.owner[kept],
         cloud=replace(found.cloud, position=moved_points(found.cloud.position, made)),
         object_of_point=found.closed.object_of_point,
         names=tuple(names),

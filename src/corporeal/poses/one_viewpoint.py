@@ -1,0 +1,67 @@
+"""Whether pictures were taken from one place: a tripod, or one picture cut in many ways.
+
+There nothing is nearer than anything else. What two such pictures share differs by a shift, a turn
+and a scale alone, and COLMAP looks for depth in vain, or finds what is not there. Whoever takes but
+five degrees around a thing, or above it, shortens what lies on its floor: that is no similarity.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
+
+EXACT = 0.0025
+"""Median distance of points after a similarity, in the longer side of pictures, up to which two
+were taken from one place: compression and noise move points by less."""
+MOST = 0.8
+"""Share of the pairs of pictures with points in common that one place explains, from which on all
+were taken there. Of bursts on a way around a thing few pairs are of one burst."""
+FEWEST = 10
+"""Pairs without which nothing is said."""
+HALF = 0.5
+"""Of all pictures that must be of that place."""
+ROUNDS = 3
+"""Of fitting again to the half that agrees best."""
+
+
+def same_viewpoint(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], longest: int) -> bool:
+    """Tell whether a shift, a turn and a scale take points of one picture to those of another.
+
+    Args:
+        a: Of the one [px].
+        b: The same points, of the other [px].
+        longest: Longer side of the pictures [px].
+
+    """
+    x, y = a[:, 0] + 1j * a[:, 1], b[:, 0] + 1j * b[:, 1]
+    kept, off = np.ones(len(x), bool), np.zeros(len(x))
+    for _ in range(ROUNDS):
+        middle = x[kept].mean(), y[kept].mean()
+        spread = float(np.square(np.abs(x[kept] - middle[0])).sum())
+        if spread == 0:
+            return False
+        turn = (np.conj(x[kept] - middle[0]) * (y[kept] - middle[1])).sum() / spread
+        off = np.abs(turn * (x - middle[0]) + middle[1] - y)
+        kept = off <= np.median(off)
+    return float(np.median(off)) < EXACT * longest
+
+
+def stood_still(joined: Bool[np.ndarray, "N N"], same: Bool[np.ndarray, "N N"]) -> str | None:
+    """Return in a clause that most of N pictures are from one place, if they are.
+
+    Args:
+        joined: Which two share points.
+        same: Which two were taken from one viewpoint.
+
+    """
+    pairs, alike = (int(np.triu(which, 1).sum()) for which in (joined, joined & same))
+    if pairs < FEWEST or alike < MOST * pairs:
+        return None
+    _, label = connected_components(csr_array(joined & same), directed=False)
+    together = int(np.bincount(label).max())
+    if together < HALF * len(joined):
+        return None
+    return (
+        f"{together} of {len(joined)} were taken from one place: what they share differs by a "
+        "shift, a turn and a scale alone"
+    )
