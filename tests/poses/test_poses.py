@@ -443,7 +443,7 @@ def test_films_that_will_not_do_are_refused_in_one_sentence(tmp_path, kind, monk
         said = "holds 10 frames; at least 20"
         film(path, 10)
     elif kind == "still":
-        said = "only 0 of 40 frames are sharp and differ"
+        said = "none of 40 frames are sharp and differ"
         with reel(path, 30, (320, 240)) as made:
             for _ in range(40):
                 made.add(np.full((240, 320, 3), 90, np.uint8))

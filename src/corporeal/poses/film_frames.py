@@ -85,7 +85,8 @@ def write_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
         raise BadFileError(path, f"holds {len(sharp)} frames; at least {FEWEST} are needed.", TAKE)
     chosen = choose(np.array(change), np.array(sharp), COUNT)
     if len(chosen) < FEWEST:
-        what = f"only {len(chosen)} of {len(sharp)} frames are sharp and differ from one another"
+        count = f"only {len(chosen)}" if len(chosen) else "none"
+        what = f"{count} of {len(sharp)} frames are sharp and differ from one another"
         raise BadFileError(path, f"{what}; at least {FEWEST} are needed.", TAKE)
     if standstill.share > UNMOVED:
         what = f"{standstill.share:.0%} of what has contrast in it never moves: it is a recording"
