@@ -26,6 +26,7 @@ from corporeal.evaluation.drop_test import Drop, drop
 from corporeal.evaluation.life import Rebound, rebounds, sources
 from corporeal.machine import cores
 from corporeal.pipeline import Settings
+from corporeal.vlm.lexicon import heads
 
 DOCS = Path(__file__).parents[1] / "docs"
 DETAILS, SEEDS = ("draft", "normal"), (0, 1, 2)
@@ -187,9 +188,25 @@ def blind(found: Sequence[Result]) -> str:
         f"{len(rows)} of the things were written down before they were tried ({names}): {AT_FIRST} "
         f"were in their range ± {LEEWAY} at draft at the first try, before anything was changed; "
         f"{inside} are now (decisions [54](decisions/0054-heights-fall-through-air.md) and "
-        "[65](decisions/0065-what-rules-say-of-balls.md)). Names tell what the rules of some "
-        "sports ask of their balls: rows of tennis, padel, futsal and basketballs test that it "
-        "comes out."
+        "[65](decisions/0065-what-rules-say-of-balls.md))."
+    )
+
+
+def told(name: str) -> bool:
+    """Tell whether a name gives the restitution that the rules of a sport ask for."""
+    terms = [term for term in heads(tuple(name.split())) if term.kind == "thing"]
+    return max(terms, key=lambda term: len(term.phrase)).rebound is not None if terms else False
+
+
+def foretold(found: Sequence[Result]) -> str:
+    """Say how many rows are in their range that are not there because a rule was read for both."""
+    rows = [r for r in found if not told(r.row.name)]
+    inside = sum(r.off <= LEEWAY for r in rows)
+    names = ", ".join(dict.fromkeys(r.row.name for r in found if told(r.row.name)))
+    return (
+        f"The names of some balls ({names}) tell what the rules of their sport ask for, and their "
+        f"rows test that it comes out. Of the {len(rows)} other rows {inside} are in their range "
+        f"± {LEEWAY}."
     )
 
 
@@ -204,6 +221,8 @@ def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
         INTRODUCTION,
         "",
         *(f"- {'met' if good else '**missed**'}: {sentence}" for sentence, good in met),
+        "",
+        foretold(found),
         "",
         *((blind(found), "") if any(r.row.blind for r in found) else ()),
         "| " + " | ".join((*HEADS, "source")) + " |",
