@@ -24,7 +24,9 @@ from recognition.shapes import shape
 from trimesh.visual import TextureVisuals
 from trimesh.visual.material import PBRMaterial
 
+from corporeal.geometry.make import Make
 from corporeal.geometry.scene_survey import examine
+from corporeal.geometry.survey import Anatomy
 from corporeal.in_memory import load_scene
 from corporeal.materials import find
 from corporeal.stages.describe import describe
@@ -32,6 +34,7 @@ from corporeal.stages.fill import composed
 from corporeal.stages.ground import ground
 from corporeal.stages.segment import segment
 from corporeal.treatment.object_masses import implausible_masses, walls_drawn_too_thick
+from corporeal.types import MaterialField, Scene
 
 LIST = Path(__file__).parent / "recognition" / "names.toml"
 WITHIN = 2.5
@@ -70,6 +73,52 @@ class Found:
         return self.implausible and not self.warned and self.verdict != "unknown"
 
 
+@dataclass(frozen=True)
+class Weighed:
+    """What the pipeline makes of one file."""
+
+    scene: Scene
+    anatomies: list[Anatomy]
+    makes: dict[int, Make]
+    field: MaterialField
+
+    @property
+    def masses(self) -> list[float]:
+        """Of its parts [kg]."""
+        return [self.makes[k].mass for k in sorted(self.makes)]
+
+    @property
+    def size(self) -> list[str]:
+        """What is said of how large it is."""
+        return [w for w in self.scene.warnings if "--extent" in w]
+
+    @property
+    def weight(self) -> list[str]:
+        """What is said of how heavy it is."""
+        return implausible_masses(self.scene, self.anatomies, self.masses)
+
+
+def weigh(mesh: trimesh.Trimesh, path: Path, metres_per_unit: float = 1.0) -> Weighed:
+    """Write a mesh [m], upright along z, to a file and take it through the pipeline's functions.
+
+    Args:
+        mesh: Is left as it is.
+        path: Of a GLB, whose name tells what it is.
+        metres_per_unit: In which unit its file is, which does not say so.
+
+    """
+    written = mesh.copy().apply_transform(UP).apply_scale(1 / metres_per_unit)
+    written.visual = TextureVisuals(material=PBRMaterial(name="material", metallicFactor=0.0))
+    trimesh.Scene({"mesh": written}).export(path)
+    scene = load_scene(path)
+    inventory = describe(scene)
+    parts = segment(scene, inventory)
+    anatomies = examine(scene, parts, 0)
+    field, leaf = ground(scene, parts, inventory), find("leaf_tissue")
+    makes = composed(scene, anatomies, field, leaf.pick(leaf.typical()), 0)
+    return Weighed(scene, anatomies, makes, field)
+
+
 def look_at(row: dict, folder: Path, metres_per_unit: float = 1.0) -> Found:
     """Take one thing through the pipeline's functions by its name and shape alone.
 
@@ -79,21 +128,10 @@ def look_at(row: dict, folder: Path, metres_per_unit: float = 1.0) -> Found:
         metres_per_unit: In which unit its file is, which does not say so.
 
     """
-    path = folder / f"{row['name']}.glb"
-    mesh = shape(row["shape"]).apply_transform(UP).apply_scale(1 / metres_per_unit)
-    mesh.visual = TextureVisuals(material=PBRMaterial(name="material", metallicFactor=0.0))
-    trimesh.Scene({"mesh": mesh}).export(path)
-    scene = load_scene(path)
-    inventory = describe(scene)
-    parts = segment(scene, inventory)
-    anatomies = examine(scene, parts, 0)
-    field, leaf = ground(scene, parts, inventory), find("leaf_tissue")
-    makes = composed(scene, anatomies, field, leaf.pick(leaf.typical()), 0)
-    masses = [makes[k].mass for k in range(len(parts.catalogue))]
-    words, mass = field.words[0], sum(masses)
-    weight = implausible_masses(scene, anatomies, masses)
-    size = [w for w in scene.warnings if "--extent" in w]
-    wall = walls_drawn_too_thick(scene, anatomies, makes, field)
+    seen = weigh(shape(row["shape"]), folder / f"{row['name']}.glb", metres_per_unit)
+    words, mass = seen.field.words[0], sum(seen.masses)
+    weight, size = seen.weight, seen.size
+    wall = walls_drawn_too_thick(seen.scene, seen.anatomies, seen.makes, seen.field)
     off = _off(mass, row["kg"])
     return Found(
         row["name"],
