@@ -149,11 +149,16 @@ def _normalised(extent: float, known: TypicalExtent | None) -> bool:
 def _table() -> tuple[TypicalExtent, ...]:
     rows = tomllib.loads(Path(__file__).with_suffix(".toml").read_text(encoding="utf-8"))
     alike = [
-        TypicalExtent(words, *map(float, row["size"]), part=row.get("part", False))
+        _typical(words, row["size"], row.get("part", False))
         for row in rows.pop("alike")
         for words in row["words"]
     ]
-    return (*(TypicalExtent(words, *map(float, sizes)) for words, sizes in rows.items()), *alike)
+    return (*(_typical(words, sizes) for words, sizes in rows.items()), *alike)
+
+
+def _typical(words: str, sizes: list[float], part: bool = False) -> TypicalExtent:
+    low, usual, high = sizes
+    return TypicalExtent(words, float(low), float(usual), float(high), part)
 
 
 @cache
