@@ -156,7 +156,7 @@ def _table() -> tuple[TypicalExtent, ...]:
     return (*(_typical(words, sizes) for words, sizes in rows.items()), *alike)
 
 
-def _typical(words: str, sizes: list[float], part: bool = False) -> TypicalExtent:
+def _typical(words: str, sizes: list[int | float], part: bool = False) -> TypicalExtent:
     low, usual, high = sizes
     return TypicalExtent(words, float(low), float(usual), float(high), part)
 
