@@ -222,7 +222,7 @@ def test_what_cannot_be_asked_is_not_remembered(typed, tmp_path, monkeypatch):
         ("describe", "box", "--critic", "anthropic:x", "--views", 99),
         ("describe", "box", "--annotations", "nowhere.yaml"),
         ("ground", "box", "--library", "nowhere.toml"),
-        ("ground", "box", "--floor", "cheese"),
+        ("ground", "box", "--floor", "moonlight"),
         ("run", "box.glb", "--out", ".", "--semantic", "bert"),
     ]
     for words in wrong:
