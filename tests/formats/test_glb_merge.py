@@ -410,7 +410,7 @@ def test_what_is_nested_too_deeply_is_left_out_or_refused(tmp_path):
 
 def deep():
     x: dict = {}
-    for _ in range(3000):
+    for _ in range(100_000):
         x = {"x": x}
     return x
 
