@@ -35,7 +35,7 @@ from corporeal.vlm import Album, Vlm
 from corporeal.vlm.answers import FractionAnswer, ValueAnswer, Vocabulary
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Subject
-from corporeal.vlm.metadata import (
+from corporeal.vlm.stated import (
     sealed,
     stated_thickness,
 )

@@ -19,17 +19,19 @@ from corporeal.types import (
     Surface,
 )
 from corporeal.vlm.metadata import (
-    as_stated,
     evidence,
     hollowed,
     recognise,
+    usual_inflation,
+    usual_rebound,
+)
+from corporeal.vlm.stated import (
+    as_stated,
     sealed,
     stated_inflation,
     stated_substance,
     stated_thickness,
     stated_values,
-    usual_inflation,
-    usual_rebound,
     walled,
 )
 

@@ -83,7 +83,7 @@ def _matter(prim: Usd.Prim, path: Path, bodies: tuple[StatedBody, ...]) -> State
 
 
 def _with_matter(surface: Surface, matter: StatedMaterial | None) -> Surface:
-    """Write down at a surface what it is made of, as ``vlm.metadata`` reads it."""
+    """Write down at a surface what it is made of, as ``vlm.stated`` reads it."""
     if matter is None:
         return surface
     values = {name: asdict(value) for name, value in matter.values.items()}

@@ -10,7 +10,7 @@ import yaml
 
 from corporeal.errors import BadFileError
 from corporeal.types import PartWords
-from corporeal.vlm.metadata import HIGHEST_INFLATION, SEALABLE
+from corporeal.vlm.stated import HIGHEST_INFLATION, SEALABLE
 
 KEYS = (
     "material",
