@@ -113,20 +113,21 @@ FACET_NODES = 2.0
 FACET_ALIKE = 0.95
 """… and on which they meet along nearly the same normal: the least cosine [-]."""
 NEAREST_MIDDLE = 0.05
-"""Nothing that meets a hollow lies nearer to the middle of its curvature than this, over the radius
-of curvature [-]: from the middle all of it is as near."""
+"""Least distance of what meets a hollow from its centre of curvature, over the radius [-]: at the
+centre all of the hollow is equally near."""
 CURVED_SPREAD = 0.8
-"""A curved face goes on from its points by this share of what they stand for [-]: about their
-distance from the sixth point around. Nowhere in it is farther from all of them."""
+"""How far from a surface point its curvature describes the face, over the point's reach [-]: far
+enough that these patches leave no part of a face uncovered."""
 CURVED_TURNS = 4
-"""How often the place of contact of something round is corrected for where its surface looks."""
+"""Iterations for the place where something round touches a curved face, which depends on the
+face's normal there."""
 OWN_PLACE = 1.1
-"""A place of contact belongs to a surface point if no other is nearer by this factor [-]."""
+"""A contact belongs to its surface point if no other is nearer to it by this factor [-]."""
 FACING = 0.2
 """Surface points of two bodies face each other if their normals have a cosine below minus this."""
 BENT_NODES = 9.0
-"""Twice by how much nodes misjudge a gap, over the sum of curvatures that they take for none
-[cells²]: (3 cells)²/2, what a node sees from one side to the other."""
+"""Twice the error of a gap on grid nodes over the curvature that they neglect [cells²]: within the
+3 cells that a node sees, a curve of curvature k leaves its tangent by k (3 cells)²/2."""
 ROUND_ALIKE = 0.5
 """Least cosine of normals on nodes around a contact of what is round with what is curved [-]."""
 LATTICE_GAP = 0.05
