@@ -713,6 +713,8 @@ class MaterialField:
     """Per object that a model described, what it may weigh; empty: no model was asked."""
     notes: tuple[str, ...] = ()
     """What a reader of the report should know of numbers from elsewhere, in sentences."""
+    floor: Material | None = None
+    """What the floor and the walls are made of; None: it was not kept, by older runs."""
 
 
 # ---------------------------------------------------------------- what is simulated

@@ -100,6 +100,7 @@ def ground(
         friction=touching.friction,
         restitution=touching.restitution,
         pieces=tuple(tuple(_piece(p, config) for p in w.pieces) for w in words),
+        floor=_floor(config),
     )
     return impose(found, scene, parts, config.field)
 
@@ -375,15 +376,19 @@ def pairs(
         config: Which library, and what the floor is made of.
 
     """
-    floor = entry_of(config.floor, config.library)
-    surfaces, bodies = [_entry(w, config) for w in words], [*made, floor.pick(floor.typical())]
-    surfaces.append(floor)
+    surfaces, bodies = [_entry(w, config) for w in words], [*made, _floor(config)]
+    surfaces.append(entry_of(config.floor, config.library))
     solid = [*(s.kind == "solid" for s in structures), True]
     strikers = [materials.Striker(*s) for s in zip(surfaces, bodies, solid, strict=True)]
     return Pairs(
         _matrix(len(bodies), lambda a, b: _friction(surfaces, bodies, a, b)),
         _matrix(len(bodies), lambda a, b: materials.restitution(strikers[a], strikers[b]).value),
     )
+
+
+def _floor(config: GroundConfig) -> Material:
+    entry = entry_of(config.floor, config.library)
+    return entry.pick(entry.typical())
 
 
 def _friction(surfaces: list[Entry], bodies: list[Material], a: int, b: int) -> float:
