@@ -7,7 +7,7 @@ import pytest
 
 import corporeal as co
 from corporeal.materials.placement import entry_of
-from corporeal.treatment.rolling import Roller, rolling_length, rolling_lengths
+from corporeal.treatment.rolling_length import Roller, rolling_length, rolling_lengths
 
 BALL = Roller(radius=0.01, weight=0.32)
 

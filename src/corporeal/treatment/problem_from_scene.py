@@ -25,7 +25,7 @@ from corporeal.mpm.problem import (
     WettedSurface,
 )
 from corporeal.treatment.filled import acting
-from corporeal.treatment.rolling import rolling_lengths
+from corporeal.treatment.rolling_length import rolling_lengths
 from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment, Wall
 
 STILL = (0.0, 0.0, 0.0)

@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 from typing import Any
 
-from corporeal.mpm.cuda import contact, dilatation, layout, loads, rigid, rolling
+from corporeal.mpm.cuda import contact, dilatation, layout, loads, rigid
 from corporeal.mpm.cuda import contact_impulses as impulses
 from corporeal.mpm.cuda import contact_nodes as meets
+from corporeal.mpm.cuda import contact_rolling as rolling
 from corporeal.mpm.cuda import grid as grids
 from corporeal.mpm.cuda import inclusions as bonds
 from corporeal.mpm.cuda import step as kernels

@@ -23,7 +23,7 @@ from corporeal.mpm.physics import contact, contact_impulses
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.reference.contact_scene import Scene, friction_table
 from corporeal.mpm.reference.kept_choices import KeptChoices
-from corporeal.mpm.reference.rolling import brake_rolling
+from corporeal.mpm.reference.rolling_contacts import brake_rolling
 from corporeal.mpm.reference.round_contacts import on_curves
 from corporeal.mpm.reference.surface_points import (
     in_order,
