@@ -643,6 +643,8 @@ class Structure:
     """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
     holds: str = ""
     """What moves by itself behind the wall of a shell, as an object of its own; "": nothing."""
+    sealed: bool = False
+    """Whether air is sealed behind a wall that resists a dent more than the air does."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,14 @@ from corporeal.fields.impose import impose
 from corporeal.fields.specification import asked
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
-from corporeal.materials.inflated import SealedBall, air_bears, as_ruled, sealed_air, sealed_ball
+from corporeal.materials.inflated import (
+    SealedBall,
+    air_bears,
+    as_ruled,
+    as_sealed_wall,
+    sealed_air,
+    sealed_ball,
+)
 from corporeal.materials.placement import CONTENTS, entry_of, held
 from corporeal.materials.scale import place
 from corporeal.mpm.laws import MENU
@@ -91,6 +98,9 @@ def ground(
     structures = tuple(
         _built(m, w, config, scene, part.object)
         for m, w, part in zip(made, words, parts.catalogue, strict=True)
+    )
+    made = tuple(
+        as_sealed_wall(m) if s.sealed else m for m, s in zip(made, structures, strict=True)
     )
     touching = pairs(words, made, structures, config)
     found = MaterialField(
@@ -294,7 +304,7 @@ def with_air(
     if not air_bears(gauge, material, structure.thickness, radius):
         if MENU[material.law].flows:
             reason = f"{sealed}, which dents it less than its wall resists."
-            return replace(structure, reason=reason)
+            return replace(structure, reason=reason, sealed=True)
         reason = f"{sealed}: wall and air bounce side by side, as one soft solid."
         inner = as_ruled(
             sealed_ball(SealedBall(gauge, material, structure.thickness, radius)), words.rebound
