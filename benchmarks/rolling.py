@@ -1,11 +1,14 @@
-"""How far what is drawn round rolls, with and without knowing it: tables of decisions 58 and 64.
+"""How far what is drawn round rolls, and where it stops: tables of decisions 58, 64 and 72.
+
+    python benchmarks/rolling.py [--only slopes | bowls | floors]
 
 A ball of 50 mm on the floor, by how finely it is drawn, a marble of 12 mm and a cylinder of 20 mm
 on a steel board, at detail draft; 5°, or .3 m/s on the level. Then a marble that swings in bowls,
 and the period of a ball that rolls in a hollow ball, ω² = g/((R - r)(1 + I/(m r²))), longer by its
-swing. About a minute.
+swing. Last, balls that roll over floors until what these lose has stopped them. About a minute.
 """
 
+import argparse
 from dataclasses import replace
 
 import numpy as np
@@ -104,6 +107,7 @@ def swung(problem: Problem, period: float) -> tuple[float, float, float]:
     The period is that from one way through the middle to the same again; nan: there is none.
     """
     engine, place, time = co.build_engine(problem), [], []
+    found = engine.measure()
     for k in range(1, 2 * LOOKS + 1):
         engine.advance(k * period / LOOKS)
         found = engine.measure()
@@ -128,8 +132,56 @@ def swings() -> None:
         print(f"| {name} | {before / period:.3f} | {now / period:.4f} | {back:.3f} |", flush=True)
 
 
-def main() -> None:
-    """Print the tables."""
+# ---------------------------------------------------------------- on floors
+
+FLOORS = ("hardened_steel", "concrete", "wood", "rubber", "felt", "carpet")
+ROLLERS = (("glass", 0.008), ("hardened_steel", 0.01), ("phenolic", 0.0286))
+"""What rolls, and its radius [m]."""
+
+
+def stopped(material: str, radius: float, floor: str) -> tuple[float, float, float]:
+    """c/r [-], and where a ball stops [m]: as simulated, and by the energy that it has.
+
+    It starts at .3 m/s without spin, and rolls with what friction leaves it. nan: not after 4 s.
+    """
+    ball = co.ball(material, radius, (0.0, 0.0, radius), velocity=(0.3, 0.0, 0.0))
+    settings = co.Settings()
+    settings = replace(settings, ground=replace(settings.ground, floor=floor))
+    prepared = co.prepare(co.build_scene(ball), settings)
+    problem = replace(co.pose_problem(prepared, settings), gravity_ramp=0.0)
+    matter, rolling = Matter.of(problem), problem.rolling
+    if rolling is None or not problem.bodies[0].rigid:
+        return float("nan"), float("nan"), float("nan")
+    c, share = rolling[0, 1] / radius, matter.inertia[0][1, 1] / (matter.total[0] * radius**2)
+    rolls = 0.3 / (1.0 + share)
+    ideal = 0.5 * (1.0 + share) * rolls**2 / (c * G)
+    if 2.0 * ideal / rolls > 4.0:
+        return c, float("nan"), ideal
+    engine = co.build_engine(problem)
+    engine.advance(0.1)  # it slides first
+    start = engine.measure()
+    x, v = float(start.centre[0, 0]), float(start.momentum[0, 0] / start.mass[0])
+    engine.advance(4.0)
+    return c, float(engine.measure().centre[0, 0]) - x, ideal * (v / rolls) ** 2
+
+
+def floors() -> None:
+    """Print the table of floors."""
+    print("\n| ball | floor | c/r | stops after [m] | by its energy [m] |")
+    print("|---|---|---:|---:|---:|")
+    for material, radius in ROLLERS:
+        for floor in FLOORS:
+            c, way, ideal = stopped(material, radius, floor)
+            far = "not in 4 s" if np.isnan(way) else f"{way:.4f}"
+            name = f"{material}, {2e3 * radius:.0f} mm"
+            print(f"| {name} | {floor} | {c:.1e} | {far} | {ideal:.4g} |", flush=True)
+
+
+# ---------------------------------------------------------------- on slopes
+
+
+def slopes() -> None:
+    """Print the table of what rolls down a slope or along the level."""
     slope = 0.5 * G * np.sin(SLOPE)
     rows = [
         (
@@ -155,7 +207,21 @@ def main() -> None:
             f"| {speed:.4f} |",
             flush=True,
         )
-    swings()
+
+
+TABLES = {"slopes": slopes, "bowls": swings, "floors": floors}
+
+
+def main() -> None:
+    """Print the tables."""
+    parser = argparse.ArgumentParser(
+        description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
+    )
+    parser.add_argument("--only", choices=TABLES, help="one table alone")
+    asked = parser.parse_args()
+    for name, table in TABLES.items():
+        if asked.only in (None, name):
+            table()
 
 
 if __name__ == "__main__":

@@ -9,7 +9,7 @@ from scipy.spatial import cKDTree
 
 from corporeal.geometry.roundness import reach_of, surrounded
 from corporeal.mpm.problem import Body, Plane, Problem
-from corporeal.types import Law
+from corporeal.types import ROUNDING, Law
 
 Points = Float[np.ndarray, "N 3"]
 Distance = Callable[[np.ndarray], np.ndarray]
@@ -260,15 +260,22 @@ def ball_surface(centre: tuple, radius: float, count: int) -> Points:
 
 def round_rows(
     normal: Points, along: Points, ball: float, arc: float, surface: Points
-) -> Float[np.ndarray, "N 10"]:
+) -> Float[np.ndarray, "N 12"]:
     """Say how a surface curves at points on it: see ``types.ROUNDING``."""
-    radii = np.tile([ball, arc], (len(surface), 1))
-    rows = np.column_stack([normal, along, radii, reach_of(surface), np.zeros(len(surface))])
+    rows = np.zeros((len(surface), ROUNDING))
+    rows[:, :3], rows[:, 3:6], rows[:, 6:8], rows[:, 8] = (
+        normal,
+        along,
+        (ball, arc),
+        reach_of(surface),
+    )
     rows[:, 9] = surrounded(rows, surface)
+    rows[:, 10] = 1.0 / (ball + arc)
+    rows[:, 11] = 1.0 / ball if ball > 0.0 else 0.0
     return rows
 
 
-def ball_rounding(centre: tuple, radius: float, surface: Points) -> Float[np.ndarray, "N 10"]:
+def ball_rounding(centre: tuple, radius: float, surface: Points) -> Float[np.ndarray, "N 12"]:
     """Say that points on a ball's surface stand for a ball."""
     normal = (surface - np.array(centre)) / radius
     along = np.cross(normal, [0.0, 0.0, 1.0])

@@ -643,6 +643,8 @@ class Structure:
     """Share of a solid's shape that is matter, the rest being air between its pieces; 1: all."""
     holds: str = ""
     """What moves by itself behind the wall of a shell, as an object of its own; "": nothing."""
+    sealed: bool = False
+    """Whether air is sealed behind a wall that resists a dent more than the air does."""
 
 
 @dataclass(frozen=True)
@@ -713,6 +715,8 @@ class MaterialField:
     """Per object that a model described, what it may weigh; empty: no model was asked."""
     notes: tuple[str, ...] = ()
     """What a reader of the report should know of numbers from elsewhere, in sentences."""
+    floor: Material | None = None
+    """What the floor and the walls are made of; None: it was not kept, by older runs."""
 
 
 # ---------------------------------------------------------------- what is simulated

@@ -7,6 +7,8 @@ from corporeal.types import Law
 
 CELL = 0.02
 """Grid spacing [m]."""
+SIZE = np.array([0.4, 0.12, 0.06])
+"""Of a board [m]."""
 NUMBERS = {
     "density": 1000.0,
     "young": 1e5,
@@ -52,6 +54,31 @@ def round_body(centre, radius=0.05, count=200, **given):
     rows = np.concatenate([normal, along, radii], axis=1)
     surface = centre + radius * normal
     return body(ball(centre, radius), rigid=True, surface=surface, rounding=rows, **given)
+
+
+def flat_faces(size, distance=0.012):
+    """Points inside the faces of a box around the origin, and rows that say which way they look."""
+    points, rows = [], []
+    for axis in range(3):
+        one, two = (
+            np.arange(-s / 2 + distance / 2, s / 2, distance) for s in np.delete(size, axis)
+        )
+        grid = np.stack(np.meshgrid(one, two, indexing="ij"), -1).reshape(-1, 2)
+        for side in (-1.0, 1.0):
+            points.append(np.insert(grid, axis, side * size[axis] / 2, axis=1))
+            row = np.zeros((len(grid), 12))
+            row[:, axis], row[:, 8] = side, 2.4 * distance
+            rows.append(row)
+    return np.concatenate(points), np.concatenate(rows)
+
+
+def board(middle, size=SIZE, **given):
+    """A rigid box that touches on its flat faces."""
+    axes = [np.arange(-s / 2 + CELL / 4, s / 2, CELL / 2) for s in size]
+    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
+    surface, rows = flat_faces(size)
+    usual = {"surface": surface + middle, "rounding": rows, "density": 8000.0}
+    return body(points + middle, rigid=True, name="board", **usual | given)
 
 
 def problem(*bodies, planes=(FLOOR,), friction=0.4, restitution=0.5, **given):

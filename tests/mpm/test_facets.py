@@ -4,7 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from point_bodies import CELL, body, problem, round_body, step_together
+from point_bodies import CELL, SIZE, board, body, flat_faces, problem, round_body, step_together
 
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.cuda.engine import CudaEngine
@@ -12,33 +12,8 @@ from corporeal.mpm.physics.facets import facets_of, on_facet
 from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.types import Keyframes
 
-SIZE = np.array([0.4, 0.12, 0.06])
 TOP = 0.2
 ENGINES = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": lambda p: CudaEngine(p, "cpu")}
-
-
-def flat_faces(size, distance=0.012):
-    """Points inside the faces of a box around the origin, and rows that say which way they look."""
-    points, rows = [], []
-    for axis in range(3):
-        one, two = (
-            np.arange(-s / 2 + distance / 2, s / 2, distance) for s in np.delete(size, axis)
-        )
-        grid = np.stack(np.meshgrid(one, two, indexing="ij"), -1).reshape(-1, 2)
-        for side in (-1.0, 1.0):
-            points.append(np.insert(grid, axis, side * size[axis] / 2, axis=1))
-            row = np.zeros((len(grid), 12))
-            row[:, axis], row[:, 8] = side, 2.4 * distance
-            rows.append(row)
-    return np.concatenate(points), np.concatenate(rows)
-
-
-def board(middle, size=SIZE, **given):
-    axes = [np.arange(-s / 2 + CELL / 4, s / 2, CELL / 2) for s in size]
-    points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)
-    surface, rows = flat_faces(size)
-    moved = {"surface": surface + middle, "rounding": rows}
-    return body(points + middle, rigid=True, name="board", density=8000.0, **moved | given)
 
 
 def over(centre, **given):

@@ -5,6 +5,8 @@ import pytest
 from laws import touching
 from laws.bodies import Stuff, ball, ball_rounding, ball_surface, box, box_surface, floor, problem
 
+from corporeal.types import ROUNDING
+
 G = 9.81
 DOWN = (0.0, 0.0, -G)
 RADIUS, CELL = 0.05, 0.0125
@@ -181,7 +183,7 @@ def rolled_share(engine, rounded, points=300, time=0.8):
     angle = np.radians(5)
     start = (0.003, 0.002, RADIUS)
     surface = ball_surface(start, RADIUS, points)
-    rows = ball_rounding(start, RADIUS, surface) if rounded else np.zeros((0, 10))
+    rows = ball_rounding(start, RADIUS, surface) if rounded else np.zeros((0, ROUNDING))
     given = problem(
         steel_ball(start, surface=surface, rounding=rows),
         cell=CELL,

@@ -12,6 +12,7 @@ from corporeal.evaluation.life import rebounds
 from corporeal.materials.inflated import RESTITUTION
 from corporeal.materials.rebound import loss_of
 from corporeal.pipeline import Settings
+from corporeal.treatment.step_budget import dent_of_wall
 
 RADIUS = 0.11
 
@@ -121,6 +122,33 @@ def test_what_flows_when_it_is_dented_stays_a_wall():
     asked = {"substance": "ABS", "shell_thickness_m": 0.0004}
     structure = co.prepare(named("thing", **asked, inflation_kPa=0)).field.structures[0]
     assert (structure.kind, structure.contents, structure.gauge) == ("shell", None, None)
+
+
+def test_a_sealed_wall_that_the_budget_would_let_be_crushed_is_rigid():
+    """A table tennis ball is dented by .03 of its radius in life, and as slowed by .3."""
+    settings = Settings()
+    draft = replace(settings, fill=replace(settings.fill, detail="draft"))
+    for name in ("table tennis ball", "table tennis ball on a table"):
+        row = next(r for r in rebounds() if r.name == name)
+        found = drop(row, draft)
+        assert found.treatment == "rigid"
+        assert row.off(found.restitution) < 0.03
+
+
+def test_reissners_dent_of_a_table_tennis_ball():
+    assert dent_of_wall(2.2e9, 0.38, 1050, 4e-4, 0.02, 2.44) == pytest.approx(0.027, abs=0.001)
+    assert dent_of_wall(1e5, 0.38, 1050, 4e-4, 0.02, 2.44) == 1.0
+
+
+@pytest.mark.parametrize("speed", [0.4, 0.8])
+def test_a_sealed_wall_that_is_struck_too_lightly_to_flex_bounces_no_less(speed):
+    """It is rigid then: a table tennis ball had .65 from below 5 cm, and .9 from above."""
+    row = next(r for r in rebounds() if r.name == "table tennis ball")
+    settings = Settings()
+    draft = replace(settings, fill=replace(settings.fill, detail="draft"))
+    found = drop(replace(row, speed=speed), draft)
+    assert found.treatment == "rigid"
+    assert row.low - 0.03 < found.restitution < row.high + 0.03
 
 
 @pytest.mark.parametrize(

@@ -259,6 +259,20 @@ def test_of_compound_nouns_the_last_one_is_the_thing(name, material):
     assert seen("mesh", name).material == material
 
 
+@pytest.mark.parametrize(
+    "name, counts",
+    [
+        ("basketball on a concrete court", "basketball"),
+        ("Vase_on_wooden_table", "vase"),
+        ("tennis ball on carpet", "tennis ball"),
+        ("clip-on lamp", "clip on lamp"),
+        ("Lamp_On", "lamp on"),
+    ],
+)
+def test_what_a_thing_lies_on_is_not_what_it_is_made_of(name, counts):
+    assert " ".join(tokens_of(name)) == counts
+
+
 def test_what_all_parts_are_called_says_nothing_of_one():
     said = told("sofa", ("velvet_sofa_legs", "a"), ("velvet_sofa_fabric", "b"))
     assert {k: v.material for k, v in said.items()} == {

@@ -199,6 +199,7 @@ def sample(
             [Striker(*s) for s in zip(entries, bodies, solid, strict=True)], grades
         ),
         pieces=pieces if field.pieces else (),
+        floor=bodies[-1],
     )
 
 

@@ -199,6 +199,24 @@ def sealed_air(gauge: float) -> Material:
     return _material(f"air at {gauge / 1e3:.3g} kPa", values)
 
 
+def as_sealed_wall(skin: Material) -> Material:
+    """Let a sealed wall that is struck too lightly to be seen to flex rebound as its bulk does.
+
+    A material's restitution is that of solid bodies whose point of contact yields. A closed wall is
+    dented over a wide place instead, and gives back what its loss factor leaves. One that a person
+    stated stays.
+    """
+    told = skin.grounds.get("restitution")
+    if told is not None and told.chosen_by == "annotation":
+        return skin
+    loss = skin.grounds["loss"].range if "loss" in skin.grounds else None
+    most, least = (loss.low, loss.high) if loss is not None else (skin.loss, skin.loss)
+    bounces = rebound(skin.loss)
+    why = "a closed wall loses what its loss factor says; no point of contact yields"
+    ground = _ground(rebound(least), bounces, rebound(most), why)
+    return replace(skin, restitution=bounces, grounds=skin.grounds | {"restitution": ground})
+
+
 def as_ruled(inner: Material, rebound: float | None) -> Material:
     """Let a ball rebound as its rules ask, where there are any.
 

@@ -164,12 +164,20 @@ class Problem:
     """Between rigid bodies."""
     apart: tuple[tuple[int, int], ...] = ()
     """Bodies of one object that are never in contact with each other."""
+    rolling: Float[np.ndarray, "BW BW"] | None = None
+    """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
+    on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
 
     @property
     def never_touch(self) -> tuple[tuple[int, int], ...]:
         """Pairs without contact: what is bonded or apart, and two prescribed motions."""
         prescribed = [b for b, body in enumerate(self.bodies) if body.path is not None]
         return (*self.bonds, *self.apart, *combinations(prescribed, 2))
+
+    @property
+    def brakes(self) -> bool:
+        """Whether anything brakes what rolls."""
+        return self.contact == "multi" and self.rolling is not None and bool(self.rolling.any())
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,14 @@ from corporeal.fields.impose import impose
 from corporeal.fields.specification import asked
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
-from corporeal.materials.inflated import SealedBall, air_bears, as_ruled, sealed_air, sealed_ball
+from corporeal.materials.inflated import (
+    SealedBall,
+    air_bears,
+    as_ruled,
+    as_sealed_wall,
+    sealed_air,
+    sealed_ball,
+)
 from corporeal.materials.placement import CONTENTS, entry_of, held
 from corporeal.materials.scale import place
 from corporeal.mpm.laws import MENU
@@ -92,6 +99,9 @@ def ground(
         _built(m, w, config, scene, part.object)
         for m, w, part in zip(made, words, parts.catalogue, strict=True)
     )
+    made = tuple(
+        as_sealed_wall(m) if s.sealed else m for m, s in zip(made, structures, strict=True)
+    )
     touching = pairs(words, made, structures, config)
     found = MaterialField(
         materials=made,
@@ -100,6 +110,7 @@ def ground(
         friction=touching.friction,
         restitution=touching.restitution,
         pieces=tuple(tuple(_piece(p, config) for p in w.pieces) for w in words),
+        floor=_floor(config),
     )
     return impose(found, scene, parts, config.field)
 
@@ -293,7 +304,7 @@ def with_air(
     if not air_bears(gauge, material, structure.thickness, radius):
         if MENU[material.law].flows:
             reason = f"{sealed}, which dents it less than its wall resists."
-            return replace(structure, reason=reason)
+            return replace(structure, reason=reason, sealed=True)
         reason = f"{sealed}: wall and air bounce side by side, as one soft solid."
         inner = as_ruled(
             sealed_ball(SealedBall(gauge, material, structure.thickness, radius)), words.rebound
@@ -375,15 +386,19 @@ def pairs(
         config: Which library, and what the floor is made of.
 
     """
-    floor = entry_of(config.floor, config.library)
-    surfaces, bodies = [_entry(w, config) for w in words], [*made, floor.pick(floor.typical())]
-    surfaces.append(floor)
+    surfaces, bodies = [_entry(w, config) for w in words], [*made, _floor(config)]
+    surfaces.append(entry_of(config.floor, config.library))
     solid = [*(s.kind == "solid" for s in structures), True]
     strikers = [materials.Striker(*s) for s in zip(surfaces, bodies, solid, strict=True)]
     return Pairs(
         _matrix(len(bodies), lambda a, b: _friction(surfaces, bodies, a, b)),
         _matrix(len(bodies), lambda a, b: materials.restitution(strikers[a], strikers[b]).value),
     )
+
+
+def _floor(config: GroundConfig) -> Material:
+    entry = entry_of(config.floor, config.library)
+    return entry.pick(entry.typical())
 
 
 def _friction(surfaces: list[Entry], bodies: list[Material], a: int, b: int) -> float:

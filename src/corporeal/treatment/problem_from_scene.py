@@ -25,6 +25,7 @@ from corporeal.mpm.problem import (
     WettedSurface,
 )
 from corporeal.treatment.filled import acting
+from corporeal.treatment.rolling_length import rolling_lengths
 from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment, Wall
 
 STILL = (0.0, 0.0, 0.0)
@@ -72,6 +73,12 @@ def pose(
         bonds=tuple((k, p.soft) for k, p in enumerate(pieces) if p.soft >= 0),
         joints=joints_of(particles, pieces),
         apart=parted(pieces),
+        rolling=rolling_lengths(
+            bodies,
+            [field.materials[int(share.argmax())] for share in weights],
+            field.floor,
+            1 + len(scene.walls),
+        ),
     )
     return Posed(
         problem,

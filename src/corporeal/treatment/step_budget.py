@@ -188,18 +188,43 @@ def nearer_rigid(
                     f"it is expected to strain by about {verdict.strain:.2g}, and as soft as the "
                     "grid and the step budget would make it, it would sag by more than that"
                 )
-        elif is_compact(part) and soft.kind == "deformable":
-            life, simulated = (
+        elif is_compact(part):
+            dents = _dents(part, true, soft)
+            if dents is not None and dents.simulated > 2.0 * dents.life:
+                found[k] = (
+                    f"a blow at {true.impact_speed:.2g} m/s would dent it by {dents.life:.2g} of "
+                    "its radius, and as soft as the grid and the step budget would make it, by "
+                    f"{dents.simulated:.2g}; it rebounds by its coefficient of restitution"
+                )
+    return found
+
+
+@dataclass(frozen=True)
+class _Dents:
+    """Greatest dents of a ball in a blow, over its radius [-]."""
+
+    life: float
+    simulated: float
+
+
+def _dents(part: PartGeometry, true: Treatment, soft: Treatment) -> _Dents | None:
+    """Give how deep a blow dents a solid or a sealed wall; None: it bends in another way.
+
+    Other walls are open, or their restitution is that of solids: they stay soft.
+    """
+    if soft.kind == "deformable":
+        return _Dents(
+            *(
                 dent_of_blow(young, true.poisson, true.density, true.impact_speed)
                 for young in (true.young, soft.young)
             )
-            if simulated - life > life:
-                found[k] = (
-                    f"a blow at {true.impact_speed:.2g} m/s would dent it by {life:.2g} of its "
-                    f"radius, and as soft as the step budget would make it, by {simulated:.2g}; "
-                    "it rebounds by its coefficient of restitution"
-                )
-    return found
+        )
+    if soft.kind != "shell" or not part.structure.sealed or not soft.thickness:
+        return None
+    speed, radius, made = true.impact_speed, 0.5 * part.size[0], part.material
+    real = (made.young, made.poisson, made.density, part.structure.thickness or soft.thickness)
+    slow = (soft.young, soft.poisson, soft.density, soft.thickness)
+    return _Dents(*(dent_of_wall(*wall, radius, speed) for wall in (real, slow)))
 
 
 def _sags_too_far(
@@ -235,6 +260,18 @@ def dent_of_blow(young: float, poisson: float, density: float, speed: float) -> 
     """
     plane = young / (1.0 - poisson**2)
     return min(1.0, (1.25 * pi * density * speed**2 / plane) ** 0.4)
+
+
+def dent_of_wall(
+    young: float, poisson: float, density: float, thickness: float, radius: float, speed: float
+) -> float:
+    """Greatest dent of a hollow ball that strikes a rigid plane, over its radius [-], at most 1.
+
+    ½ m v² = ½ k δ² with m = 4π R² ρ t and Reissner's k = 4 E t²/(R √(3(1 - ν²))) (1946):
+    δ/R = v √(π ρ R √(3(1 - ν²))/(E t)).
+    """
+    bend = sqrt(3.0 * (1.0 - poisson**2))
+    return min(1.0, speed * sqrt(pi * density * radius * bend / (young * thickness)))
 
 
 LEAST_HOLD = 0.25

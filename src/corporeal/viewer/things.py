@@ -131,4 +131,5 @@ def _field(field: MaterialField, kept: np.ndarray) -> MaterialField:
         friction=field.friction[np.ix_(rows, rows)],
         restitution=field.restitution[np.ix_(rows, rows)],
         pieces=tuple(field.pieces[p] for p in chosen) if field.pieces else (),
+        floor=field.floor,
     )

@@ -142,13 +142,31 @@ def tokens_of(name: str) -> tuple[str, ...]:
     """Return a name's words in English and the singular, without what exporters write."""
     known = _vocabulary()
     said = [singular(mended(w, known)) for w in in_english(words(name))]
-    return tuple(spelt(said, known))
+    return without_place(tuple(spelt(said, known)))
+
+
+def without_place(tokens: tuple[str, ...]) -> tuple[str, ...]:
+    """Leave out what a thing is said to lie on: a ball on a wooden floor is not of wood.
+
+    Only behind what is known as a thing: a clip-on lamp is a lamp.
+    """
+    if "on" not in tokens[1:-1]:
+        return tokens
+    before = tokens[: tokens.index("on", 1)]
+    things = any(term.kind == "thing" for _, term in _standing_in(before))
+    return before if things or not set(before).isdisjoint(_sizes()) else tokens
+
+
+@cache
+def _sizes() -> frozenset[str]:
+    """Return every single noun of the tables of sizes."""
+    return frozenset(singular(name) for name in classes() if " " not in name)
 
 
 @cache
 def _vocabulary() -> Vocabulary:
     """Return the words of the lexicon and of the tables of sizes, for compounds and slips."""
-    sizes = {singular(name) for name in classes() if " " not in name}
+    sizes = _sizes()
     known, joined = _known() | sizes, _joined()
     return Vocabulary(
         words=known,
@@ -280,7 +298,7 @@ def _holders() -> frozenset[str]:
     Beside those of the table every thing that has a usual size and no usual material: a bowl is a
     bowl, whatever is in it.
     """
-    single = {singular(name) for name in classes() if " " not in name}
+    single = _sizes()
     material = {w for term in lexicon() for w in term.phrase if len(term.phrase) == 1}
     return frozenset(map(singular, _table()["holders"])) | (single - material - _colours())
 

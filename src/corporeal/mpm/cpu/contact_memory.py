@@ -164,6 +164,9 @@ class ContactMemory:
             contact_memory=self.stage,
             face=self.face,
         )
+        if problem.brakes:
+            self.rolling = np.array(problem.rolling, float)
+            point(world, rolling=self.rolling)
         point(world, **{name: getattr(ledger, name) for name in BOOKS.split()})
         world["planes"], world["names"] = len(walls), len(problem.bodies) + len(walls)
         moves = problem.contact == "multi" and any(body.rigid for body in problem.bodies)

@@ -229,6 +229,7 @@ WORLD = Record(
     ("Field *", "field"),
     ("int *", "task list contact_memory"),
     ("double *", "report plane friction restitution"),
+    ("double *", "rolling"),  # c of every pair [m]; null: nothing brakes what rolls
     ("double *", "plane_impulse pair_impulse friction_loss first_contact last_contact"),
     ("double *", "contact_point face impact_loss"),
     ("Blow *", "blow"),

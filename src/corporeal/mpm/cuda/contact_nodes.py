@@ -287,10 +287,25 @@ def enter_point(
         c.fa[t] = a
         c.fc[t] = other
         c.facet[t] = side
+        c.rolls[t] = 0
         c.point[t] = x
         c.normal[t] = wp.vec3(n)
         c.gap[t] = wp.float32(gap)
     return t
+
+
+@wp.func
+def radius_at(r: Rigid, p: int):
+    """Larger radius of curvature at a surface point [m]; 0 where it is not round."""
+    return r.rounding[ROUNDING * p + 6] + r.rounding[ROUNDING * p + 7]
+
+
+@wp.func
+def roll(c: Contacts, t: int, radius: wp.float64):
+    """Note that something round may roll on a contact."""
+    if t < 2 * c.room and radius > D(0.0):
+        c.rolls[t] = 1
+    return 0
 
 
 @wp.kernel
@@ -310,13 +325,8 @@ def list_points(r: Rigid, c: Contacts, s: Sheet, stride: int):
         x = r.centre[b] + r.turn[b] * on
         gap = wp.dot(s.plane[w], x) - s.offset[w]
         if gap < POINT_REACH * s.dx and shift[3] > D(0.0):
-            enter_point(c, s, b, s.bodies + w, 0, x, -s.plane[w], gap)
-
-
-@wp.func
-def radius_at(r: Rigid, p: int):
-    """Larger radius of curvature at a surface point [m]; 0 where it is not round."""
-    return r.rounding[ROUNDING * p + 6] + r.rounding[ROUNDING * p + 7]
+            t = enter_point(c, s, b, s.bodies + w, 0, x, -s.plane[w], gap)
+            roll(c, t, radius_at(r, p))
 
 
 @wp.kernel
@@ -346,9 +356,10 @@ def list_facets(r: Rigid, c: Contacts, s: Sheet, stride: int):
             continue
         if facet_holds(r.facet, k, r.facet_point, back * (x - r.centre[other])):
             if b < other:
-                enter_point(c, s, b, other, 0, x, -n, gap)
+                t = enter_point(c, s, b, other, 0, x, -n, gap)
             else:
-                enter_point(c, s, other, b, 1, x, n, gap)
+                t = enter_point(c, s, other, b, 1, x, n, gap)
+            roll(c, t, radius_at(r, p))
 
 
 @wp.func
@@ -416,6 +427,7 @@ def list_curves(r: Rigid, c: Contacts, s: Sheet, stride: int):
         else:
             t = enter_point(c, s, other, b, 1, x, n, met[6])
         if t < 2 * c.room:
+            c.rolls[t] = 1
             c.instead[t] = curved_misjudged(r.rounding, p, q, s.dx)
             square = square_along(r, b, other, x + radius * n, n)
             c.inward[t] = curved_inward(r.rounding, p, q, square, s.clock[DT])

@@ -464,6 +464,8 @@ class Contacts:
     """Fields; B + plane for a plane."""
     facet: wp.array(dtype=wp.int32)
     """Which face of a rigid body a liquid meets."""
+    rolls: wp.array(dtype=wp.int32)
+    """1: something round may roll on it; of surface points only."""
     instead: wp.array(dtype=wp.float64)
     """Of what is round on what is curved: nodes nearer than this transmit nothing [m]; else 0 …"""
     inward: wp.array(dtype=wp.float64)
@@ -487,5 +489,7 @@ class Contacts:
     hit: wp.array2d(dtype=wp.int32)
     friction: wp.array2d(dtype=wp.float64)
     restitution: wp.array2d(dtype=wp.float64)
+    rolling: wp.array2d(dtype=wp.float64)
+    """c [m]; where nothing brakes what rolls nobody looks."""
     face: wp.array(dtype=wp.float32)
     """Where the face of a half space lies whose mean offset is i/4096 · 1½ - 1½ [dx]."""

@@ -215,7 +215,7 @@ class Memory:
         c.field, c.slot = self.zeros(entries, wp.int32), self.zeros(entries, wp.int32)
         c.mean, c.outward = self.zeros(entries, wp.vec3), self.zeros(entries, wp.vec3)
         c.velocity, c.light = self.zeros(entries, wp.vec3d), self.zeros(entries, wp.float64)
-        for name in ("meet", "a", "c", "fa", "fc", "active", "facet", "slips", "pick"):
+        for name in ("meet", "a", "c", "fa", "fc", "active", "facet", "slips", "pick", "rolls"):
             setattr(c, name, self.zeros(touches, wp.int32))
         c.instead, c.inward = self.zeros(touches, wp.float64), self.zeros(touches, wp.float64)
         c.kept_at = self.zeros(touches, wp.vec3i)
@@ -234,6 +234,7 @@ class Memory:
             self.put(friction, wp.float64),
             self.put(restitution, wp.float64),
         )
+        c.rolling = self.put(problem.rolling if problem.brakes else 0.0 * friction, wp.float64)
         c.hit = self.zeros(friction.shape, wp.int32)
         apart = np.zeros((len(problem.bodies), len(problem.bodies)), int)
         for a, b in problem.never_touch:

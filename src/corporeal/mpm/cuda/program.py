@@ -6,13 +6,14 @@ from typing import Any
 from corporeal.mpm.cuda import contact, dilatation, layout, loads, rigid
 from corporeal.mpm.cuda import contact_impulses as impulses
 from corporeal.mpm.cuda import contact_nodes as meets
+from corporeal.mpm.cuda import contact_rolling as rolling
 from corporeal.mpm.cuda import grid as grids
 from corporeal.mpm.cuda import inclusions as bonds
 from corporeal.mpm.cuda import step as kernels
 from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.problem import Problem
 
-MODULES = (grids, kernels, dilatation, meets, contact, impulses, rigid, loads, bonds)
+MODULES = (grids, kernels, dilatation, meets, contact, impulses, rolling, rigid, loads, bonds)
 """Modules whose kernels a step launches."""
 THREADS_PER_PROCESSOR = 1024
 PARTICLE_STATE = (
@@ -46,6 +47,7 @@ class Program:
         self.rolls = bool(arrays.rigid.bends.numpy().any()) if arrays.rigid.surfaces else False
         table = arrays.particles.table.numpy()
         self.swelling = bool(table[:, int(layout.SWELLS)].any())
+        self.brakes = problem.brakes and bool(arrays.rigid.surfaces)
         self.stride = self._threads()
 
     def _threads(self) -> int:
@@ -216,6 +218,10 @@ class Program:
         self._each(impulses.solve_nodes, a.contacts, a.rigid, a.sheet)
         if a.rigid.count:
             wp.capture_while(self._flag(layout.IMPACTING), self._impact)
+        if self.brakes:
+            self._each(rolling.count_rolling, a.contacts, a.rigid, a.sheet)
+            self._each(rolling.brake_rolling, a.contacts, a.rigid, a.sheet)
+            self._per_body(rolling.slow_down, a.rigid, a.sheet)
         self._each(impulses.hand_back, a.grid, a.contacts, a.rigid, a.sheet)
         self._each(impulses.note, a.contacts, a.rigid, a.sheet)
         everything = self.bodies + self.planes

@@ -400,6 +400,42 @@ def inverse_inertia(R: wp.mat33d, rest: wp.mat33d) -> wp.mat33d: ...
 def turn_of(R: wp.mat33d) -> wp.vec3d: ...
 
 
+Brake = wp.types.vector(length=7, dtype=wp.float64)
+"""Angular impulse (3) [N m s], impulse (3) [N s] and the energy that they take [J]."""
+
+
+@wp.func_native("""
+  mpm::RollingSide a, c;
+  a.light = light_a;
+  c.light = light_c;
+  for (int i = 0; i < 9; i++) {
+    a.inertia[i] = inertia_a.data[i / 3][i % 3];
+    c.inertia[i] = inertia_c.data[i / 3][i % 3];
+  }
+  for (int i = 0; i < 3; i++) {
+    a.arm[i] = arm_a.c[i];
+    c.arm[i] = arm_c.c[i];
+  }
+  wp::vec_t<7, wp::float64> r;
+  double *to = &r.c[0];
+  r.c[6] = mpm::Rolling::brake(a, c, &spin.c[0], &n.c[0], &J.c[0], friction, most, to, to + 3);
+  return r;
+""")
+def brake(
+    light_a: wp.float64,
+    inertia_a: wp.mat33d,
+    arm_a: wp.vec3d,
+    light_c: wp.float64,
+    inertia_c: wp.mat33d,
+    arm_c: wp.vec3d,
+    spin: wp.vec3d,
+    n: wp.vec3d,
+    J: wp.vec3d,
+    friction: wp.float64,
+    most: wp.float64,
+) -> Brake: ...
+
+
 Guided = wp.types.vector(length=15, dtype=wp.float64)
 """Velocity (3), spin (3) and rotation (9)."""
 

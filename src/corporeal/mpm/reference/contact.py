@@ -23,6 +23,7 @@ from corporeal.mpm.physics import contact, contact_impulses
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.reference.contact_scene import Scene, friction_table
 from corporeal.mpm.reference.kept_choices import KeptChoices
+from corporeal.mpm.reference.rolling_contacts import brake_rolling
 from corporeal.mpm.reference.round_contacts import on_curves
 from corporeal.mpm.reference.surface_points import (
     in_order,
@@ -53,6 +54,8 @@ class Meeting:
     """[J]"""
     kept: KeptChoices
     """For the next step."""
+    moment: Float[np.ndarray, "B 3"]
+    """Angular impulse of rolling friction on each body [N m s]."""
 
 
 def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meeting:
@@ -79,6 +82,9 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     ).astype(np.float64)
     sweeps = _sweeps(scene, contacts, bool(struck.any()))
     impulse = struck + contact_impulses.solve(contacts, movers, target, sweeps)
+    rounds = np.concatenate([t.rounds for t in touches]) if touches else np.zeros(0, dtype=bool)
+    braked = brake_rolling(problem, movers, contacts, pair, impulse, rounds)
+    impulse = impulse + braked.impulse
     before, after = contacts.approach(scene.movers_before_forces()), contacts.approach(movers)
     bodies = len(problem.bodies)
     return Meeting(
@@ -88,9 +94,11 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         pair=pair,
         contacts=contacts,
         impulse=impulse,
-        friction_loss=contact_impulses.friction_loss(impulse, contacts.normal, before, after),
+        friction_loss=contact_impulses.friction_loss(impulse, contacts.normal, before, after)
+        + braked.energy,
         impact_loss=contact_impulses.impact_loss(impulse, contacts.normal, before, after),
         kept=KeptChoices.of_all(touch.kept for touch in possible),
+        moment=braked.moment,
     )
 
 
@@ -122,7 +130,8 @@ def _possible(touch: Touch) -> Touch:
     columns = {name: getattr(touch, name)[real] for name, _ in _COLUMNS}
     columns["gap"] = np.minimum(columns["gap"], VAST)
     slips = None if touch.slips is None else touch.slips[real]
-    return replace(touch, **columns, slips=slips, layer=touch.layers[real])
+    corner = None if touch.corner is None else touch.corner[real]
+    return replace(touch, **columns, slips=slips, layer=touch.layers[real], corner=corner)
 
 
 _COLUMNS = (("a", (0,)), ("c", (0,)), ("point", (0, 3)), ("normal", (0, 3)), ("gap", (0,)))

@@ -55,7 +55,8 @@ class Guides:
             gained -= mass * float(self.gravity @ moved)
             thrust = mass * (after.speed[b] - before.speed[b])
             book.external_impulse[b] += thrust - given.sum(axis=0)
-            book.push_work += gained - float(np.sum(given * velocity))
+            turned = float(meeting.moment[b] @ meeting.spin[b])
+            book.push_work += gained - float(np.sum(given * velocity)) - turned
 
 
 def _kinetic(state: State, matter: Matter, b: int) -> float:

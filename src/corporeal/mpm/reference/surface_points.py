@@ -29,7 +29,8 @@ def on_planes(scene: Scene) -> list[Touch]:
             normal = np.tile(-np.array(plane.normal), (len(near), 1))
             mover, wall = np.full(len(near), b), np.full(len(near), scene.wall_mover + w)
             at = point[near], normal, height[near]
-            touches.append(Touch((b, bodies + w), mover, wall, *at, rolls=b))
+            corner = scene.matter.rounding[b][near, 6:8].sum(axis=1) <= 0.0
+            touches.append(Touch((b, bodies + w), mover, wall, *at, rolls=b, corner=corner))
     return touches
 
 

@@ -31,11 +31,19 @@ class Touch:
     """… and the speed at which a way straight ahead leads into a hollow within a step [m/s]."""
     rolls: int = -1
     """The body whose surface points they are; -1: they are on nodes."""
+    corner: Bool[np.ndarray, " E"] | None = None
+    """Which of these points are not round; None: all are."""
 
     @property
     def grips(self) -> Float[np.ndarray, " E"]:
         """Share of the pair's friction that each transmits [-]."""
         return np.ones(len(self.gap)) if self.slips is None else 1.0 - self.slips
+
+    @property
+    def rounds(self) -> Bool[np.ndarray, " E"]:
+        """At which of them something round may roll."""
+        on_points = np.full(len(self.gap), self.rolls >= 0)
+        return on_points if self.corner is None else on_points & ~self.corner
 
     @property
     def inwards(self) -> Float[np.ndarray, " E"]:

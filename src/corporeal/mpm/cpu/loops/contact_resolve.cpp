@@ -286,6 +286,43 @@ if (n) {
     }
   }
 }
+// Rolling friction, after all that touches is solved; in single contacts, one after the other.
+struct Rolls {
+  static inline void side(const double *s, const double *r, mpm::RollingSide &out) {
+    out.light = s ? s[LIGHT] : 0.0;
+    for (int i = 0; i < 9; i++) out.inertia[i] = out.light > 0 ? s[INERTIA + i] : 0.0;
+    for (int i = 0; i < 3; i++) out.arm[i] = s ? r[i] : 0.0;
+  }
+  static inline void give(World *w, double *s, const double *r, const double *M, const double *f, double sign) {
+    if (!s) return;
+    if (s[LIGHT] == 0) *w->clock->push_work -= sign * Vec::dot(M, s + SPIN);
+    if (s[LIGHT] == 0) return;
+    double u[3];
+    List::hit(s, -1, r, f, sign);
+    Vec::apply(s + INERTIA, M, u);
+    for (int i = 0; i < 3; i++) {
+      s[MOMENT + i] += sign * M[i];
+      s[SPIN + i] += sign * u[i];
+    }
+  }
+  static inline void brake(World *w, const Line &R, Touch &T, int all) {
+    const Field *F = Points::rolls(w, T);
+    const double most = w->rolling[T.fa * all + T.fc] * Vec::dot(T.J, T.normal);
+    if (!F || most <= 0 || !F->rolls) return;
+    const double *round = F->rounding + mpm::ROUNDING * (T.a % F->surfaces);
+    if (round[6] + round[7] <= 0) return;
+    mpm::RollingSide a, c;
+    side(R.a, R.ra, a);
+    side(R.c, R.rc, c);
+    double spin[3], M[3], f[3];
+    for (int i = 0; i < 3; i++) spin[i] = R.a[SPIN + i] - (R.c ? R.c[SPIN + i] : 0.0);
+    *w->friction_loss += mpm::Rolling::brake(a, c, spin, R.n, T.J, R.mu, most, M, f);
+    give(w, R.a, R.ra, M, f, -1.0);
+    give(w, R.c, R.rc, M, f, 1.0);
+    for (int i = 0; i < 3; i++) T.J[i] += f[i];
+  }
+};
+for (int i = 0; i < n && world->rolling; i++) Rolls::brake(world, lines[i], touches[lines[i].touch], all);
 struct Books {
   // What a contact's impulse J on a body that moves as told takes of its mover.
   static inline void react(World *w, const double *s, int body, const double *x, const double *J,
