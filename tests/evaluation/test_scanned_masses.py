@@ -37,7 +37,7 @@ class Measured:
 
 
 SETS = [
-    # Both miss the targets (.22 without evidence, .18 with, 85 %), and all ways together do not beat
+    # Both miss the targets (.22 without evidence, .18 with, 85 %); all ways together do not beat
     # the likeliest one: the page says so, and why.
     Measured(
         "scanned_c",
