@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from corporeal import materials
+from corporeal.geometry.make import Leeway, width_of
 from corporeal.materials.scale import place
 from corporeal.mixture import (
     PACKAGING,
@@ -33,6 +34,7 @@ from corporeal.types import (
     Scene,
     SceneObject,
     Surface,
+    Swelling,
     in_way,
 )
 
@@ -227,6 +229,46 @@ def test_a_thin_scan_leaves_its_volume_open_and_a_model_does_not():
     assert m.high / m.low > 1.5
 
 
+def a_blade(**said):
+    """A scanned blade of steel, solid: (scale, inventory)."""
+    blade = trimesh.creation.icosphere(4, 0.05).apply_scale((1, 1, 0.1))
+    scene = one_thing(blade, "blade", 0.1)
+    inventory = describe(scene)
+    part = inventory.objects[0].parts[0]
+    words = replace(part, **({"material": "steel", "structure": "solid"} | said))
+    inventory = replace(inventory, objects=(ObjectWords("blade_0", "blade", (words,)),))
+    return Scale(scene, segment(scene, inventory), GroundConfig(), 0), inventory
+
+
+HALF = Swelling(0.4, 0.5, 0.625, "1 mm, drawn as 2.")
+
+
+def test_what_a_scan_draws_too_thick_weighs_what_is_real_of_it():
+    scale, drawn = a_blade()
+    _, halved = a_blade(swelling=HALF)
+    assert scale.mass(halved) == pytest.approx(0.5 * scale.mass(drawn), rel=1e-12)
+    (m,) = weighed(scale, halved, 200).mixtures
+    assert m.mass == pytest.approx(scale.mass(halved), rel=0.05), "nothing is taken off twice"
+
+
+def test_doubt_about_a_share_adds_to_the_meshs_own_in_quadrature():
+    scale, halved = a_blade(swelling=HALF)
+    (own,) = scale.doubts
+    spread = np.std(np.log([scale.draw(halved, k).masses[0] for k in range(300)]))
+    steel = materials.find("steel").ranges["density"]
+    assert width_of(HALF) == 0.2, "no eye is surer than that"
+    assert steel.high / steel.low < 1.06
+    assert spread == pytest.approx(np.hypot(own, 0.2), rel=0.1)
+
+
+def test_a_share_moves_no_wall_whose_thickness_somebody_stated():
+    scale, sheet = a_blade(structure="sheet", thickness=0.001)
+    _, said = a_blade(structure="sheet", thickness=0.001, swelling=HALF)
+    assert scale.mass(said) == scale.mass(sheet)
+    one, other = (scale.draw(words, 3).masses for words in (sheet, said))
+    assert one == other
+
+
 def scanned_bowl():
     """A deep bowl as a scanner draws it, both faces of its wall: (scale, inventory)."""
     wall, outside = 0.01, [(0, 0), (0.06, 0), (0.06, 0.15)]
@@ -246,12 +288,12 @@ def test_a_wall_as_thick_as_a_scan_draws_it_is_as_open_as_the_scan():
     """Noise moves both faces outwards: a drawn wall swells, one of a known thickness does not."""
     scale, inventory = scanned_bowl()
     field = ground(scale.scene, scale.parts, inventory, scale.grounding)
-    assert scale.of(field, [1.2])[0] == pytest.approx(1.2 * scale.of(field)[0], rel=1e-6)
+    assert scale.of(field, [Leeway(1.2)])[0] == pytest.approx(1.2 * scale.of(field)[0], rel=1e-6)
     (words,) = inventory.objects[0].parts
     stated = replace(words, thickness=0.004)
     inventory = replace(inventory, objects=(ObjectWords("bowl_0", "bowl", (stated,)),))
     field = ground(scale.scene, scale.parts, inventory, scale.grounding)
-    assert scale.of(field, [1.2])[0] == pytest.approx(scale.of(field)[0], rel=1e-6)
+    assert scale.of(field, [Leeway(1.2)])[0] == pytest.approx(scale.of(field)[0], rel=1e-6)
 
 
 def test_an_ensemble_draws_ways_as_often_as_the_evidence_leaves_them_likely():

@@ -7,13 +7,14 @@ inside measured ranges, and its parts fit each other.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import log, sqrt
+from math import exp, log
 
 import numpy as np
 from jaxtyping import Float
 
 from corporeal.geometry.arrangement import life_sized
-from corporeal.geometry.make import weight
+from corporeal.geometry.drawn import coarseness, edge_of_scan
+from corporeal.geometry.make import AS_DRAWN, NINE_IN_TEN, Leeway, weight
 from corporeal.geometry.room import is_vessel, room_of
 from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.survey import Anatomy, Member
@@ -40,8 +41,6 @@ DRAWS = 400
 """Of the whole scene, where nobody says how many."""
 LOW, HIGH = 0.05, 0.95
 """Quantiles of the draws that bound an interval."""
-NINE_IN_TEN = 3.29
-"""Width of the interval that holds 90 % of a normal distribution, in standard deviations."""
 JUDGED = 0.25
 """Standard deviation of the logarithm of a judged mass, at least [-]: direct answers on things that
 no data set publishes are off by a fifth (ALDE .20)."""
@@ -53,8 +52,6 @@ WRONG = 0.02
 """How likely outside evidence is about something else altogether [-]."""
 FAR = 3.0
 """Evidence that is further from every draw than this many of its widths contradicts them."""
-SCANNED, EVEN = 3000, 0.6
-"""A mesh of more triangles than this, whose edges' logarithms spread less than that, is a scan."""
 MOST_DOUBT = log(2.0)
 TRIES = 200
 """Draws of an object, until one is as likely as outside evidence leaves it."""
@@ -107,19 +104,19 @@ class Scale:
         return float(self.of(ground(self.scene, self.parts, inventory, self.grounding)).sum())
 
     def of(
-        self, field: MaterialField, factors: Sequence[float] | None = None
+        self, field: MaterialField, leeways: Sequence[Leeway] | None = None
     ) -> Float[np.ndarray, " B"]:
         """Return the mass of each object [kg].
 
         Args:
             field: What it is made of.
-            factors: Of the volume that each member's surface encloses; None: as its mesh says.
+            leeways: Of what each member's surface encloses; None: as its mesh says.
 
         """
         found = np.zeros(len(self.scene.objects))
         for k, (member, room) in enumerate(zip(self.members, self.rooms, strict=True)):
-            larger = 1.0 if factors is None else factors[k]
-            found[self.owner[member.part]] += weight(member, field, room, larger)
+            leeway = AS_DRAWN if leeways is None else leeways[k]
+            found[self.owner[member.part]] += weight(member, field, room, leeway)
         return found
 
     def draw(self, inventory: Inventory, number: int) -> Draw:
@@ -129,28 +126,27 @@ class Scale:
         words = otherwise(inventory, rng, library)
         field = ground(self.scene, self.parts, words, self.grounding)
         field = sample(field, self.owner, rng, library, floor)
-        factors = [float(np.exp(rng.normal(-d / 2, d))) if d else 1.0 for d in self.doubts]
-        return Draw(words, field, self.of(field, factors))
+        away = [float(rng.normal(-d / 2, d)) if d else 0.0 for d in self.doubts]
+        judged = rng.normal(size=len(away))  # whoever takes one part for too thin takes all so
+        leeways = [
+            Leeway(exp(a), exp(a + d / 2), float(j))
+            for a, d, j in zip(away, self.doubts, judged, strict=True)
+        ]
+        return Draw(words, field, self.of(field, leeways))
 
 
 def doubt(member: Member) -> float:
     """Return how far the mesh leaves the enclosed volume open: deviation of its logarithm [-].
 
-    The surface of a scan lies anywhere within half an edge of the real one, so the logarithm of its
-    volume lies anywhere within A (h/2) / V = h / τ, with the median edge h and the mean thickness
-    τ = 2 V / A: a deviation of h / (√3 τ). It is more often too large than too small, by half of
+    Of a scan h / (√3 τ) (``coarseness``). It is more often too large than too small, by half of
     that, .29 h / τ: fusing views thickens what is thin (boards of 16 mm that were reconstructed on
-    cells of 12 and 7 mm weighed a quarter and a seventh too much, .30 h / τ both).
+    cells of 12 and 7 mm weighed a quarter and a seventh too much, .30 h / τ both). Where somebody
+    who looked says how much too thick it is, that stands instead of this mean.
     """
-    mesh = member.body
     found = 0.0 if member.closed else OPEN
-    if len(mesh.triangles) > SCANNED and member.volume > 0:
-        corners = mesh.corners
-        edges = np.linalg.norm(corners - np.roll(corners, 1, axis=1), axis=2)
-        edges = edges[edges > 0]
-        if np.std(np.log(edges)) < EVEN:
-            thickness = 2 * member.volume / member.body_area
-            found = float(np.hypot(found, np.median(edges) / (sqrt(3.0) * thickness)))
+    edge = edge_of_scan(member.body)
+    if edge > 0 and member.volume > 0:
+        found = float(np.hypot(found, coarseness(edge, member.volume, member.body_area)))
     return min(found, MOST_DOUBT)
 
 

@@ -372,6 +372,21 @@ Speaker = Literal["annotation", "recording", "model", "metadata", "unknown"]
 
 
 @dataclass(frozen=True)
+class Swelling:
+    """How much of what a scan draws of a part the real part takes up: scans thicken what is thin.
+
+    Shares of volume [-]: 1 where the model is as thick as the real thing.
+    """
+
+    low: float
+    """90 % of what it may be lies between ``low`` and ``high``."""
+    likely: float
+    high: float
+    reason: str
+    answered_by: Literal["model", "recording"] = "model"
+
+
+@dataclass(frozen=True)
 class PartWords:
     """The description of one part: what it is made of and how, and by what source."""
 
@@ -421,6 +436,8 @@ class PartWords:
     of a scanned screwdriver. The words above are then those of the piece that matters most."""
     built_by: Speaker = "unknown"
     """The source of how it is built; ``answered_by``: of what it is made of."""
+    swelling: Swelling | None = None
+    """How much of what the mesh draws of it is real; None: nobody said, the mesh counts."""
     wall_unseen: bool = False
     """Whether its surface need not show the inner face of its wall, as pictures do not where that
     is plain: how thick the surface draws it tells nothing."""

@@ -14,6 +14,7 @@ from corporeal.evaluation.truth import read_truth
 from corporeal.stages.ground import GroundConfig
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"
+LIKELIEST = ("hull_fit", "solid_usual", "built_usual", "placed", "mass")
 
 
 @dataclass(frozen=True)
@@ -29,32 +30,34 @@ class Measured:
     covered: float
     """Share of the measured masses inside the 90 % interval."""
     covered_without: float
-    within_2: float = 1.0
+    within_2: float
     """Share of the masses that are right within a factor of two."""
-    ladder: tuple[str, ...] = (
-        "hull_fit",
-        "solid_usual",
-        "built_usual",
-        "placed",
-        "mixture",
-        "mass",
-    )
+    ladder: tuple[str, ...]
     """Steps of which each has less error than the one before."""
 
 
 SETS = [
-    Measured("scanned_a", mixture=0.22, mass=0.18, ape=0.18, covered=0.85, covered_without=0.85),
-    # Misses the targets that the first set meets (.22, .18, 85 %), and all ways together do not
-    # beat the likeliest one: the page says so.
+    # Both miss the targets (.22 without evidence, .18 with, 85 %); all ways together do not beat
+    # the likeliest one: the page says so, and why.
     Measured(
-        "scanned_b",
-        mixture=0.33,
+        "scanned_c",
+        mixture=0.28,
         mass=0.22,
-        ape=0.21,
+        ape=0.20,
+        covered=0.6,
+        covered_without=0.85,
+        within_2=0.89,
+        ladder=LIKELIEST,
+    ),
+    Measured(
+        "scanned_d",
+        mixture=0.26,
+        mass=0.20,
+        ape=0.18,
         covered=0.7,
-        covered_without=0.8,
-        within_2=0.94,
-        ladder=("hull_fit", "solid_usual", "built_usual", "placed", "mass"),
+        covered_without=0.85,
+        within_2=0.89,
+        ladder=LIKELIEST,
     ),
 ]
 

@@ -48,10 +48,10 @@ def test_no_recording_of_a_real_object_is_left_over(described):
 def test_one_mesh_of_several_materials_keeps_its_pieces_and_their_shares(described):
     (drill,) = described["drill_gazebo"][2].pieces
     assert {p.words.name: p.material.name for p in drill} == {
-        "body": "nylon",
-        "battery": "ABS",
+        "body": "glass_filled_nylon",
+        "battery": "battery_cell",
         "chuck": "steel",
-        "side handle": "nylon",
+        "side handle": "glass_filled_nylon",
     }
     (bottle,) = described["water_bottle_khronos"][2].pieces
     assert [(p.words.name, p.words.volume_share) for p in bottle] == [

@@ -12,6 +12,7 @@ from corporeal.description.annotated import with_annotations
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.description.file_words import has_wall, stated_material
 from corporeal.description.offers import Placed, in_all_ways, offer, places_of
+from corporeal.geometry.drawn import drawn
 from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.identity import Identity
 from corporeal.geometry.identity import words as telling
@@ -42,6 +43,7 @@ from corporeal.vlm.stated import (
 from corporeal.vlm.together import together
 from corporeal.vlm.words import (
     against,
+    drawn_by_scan,
     evidence_of,
     gathered,
     leaves,
@@ -49,11 +51,12 @@ from corporeal.vlm.words import (
     placed,
     resolved,
     sides,
+    swollen,
     usage,
     with_extents,
 )
 
-TASKS = ("parts", "ranking", "materials", "placement", "mass", "extents")
+TASKS = ("parts", "ranking", "materials", "thickness", "placement", "mass", "extents")
 Progress = Callable[[float, str], None]
 
 
@@ -139,8 +142,9 @@ class Asking:
                 self.identity.part_of_surface, self.scene.surfaces, strict=True
             )
         ]
-        corners = [s.vertices for s in self.scene.surfaces if s.object == number]
-        lengths = [side / obj.scale for side in oriented_size(np.concatenate(corners))]
+        surfaces = [s for s in self.scene.surfaces if s.object == number]
+        corners = np.concatenate([s.vertices for s in surfaces])
+        lengths = [side / obj.scale for side in oriented_size(corners)]
         return self._about(
             Subject(
                 scene=f"{self.scene.name}/{obj.name}",
@@ -148,6 +152,7 @@ class Asking:
                 class_name=obj.class_name,
                 sides=sides(lengths),
                 box=float(np.prod(lengths)),
+                drawn=drawn(surfaces, obj.scale),
                 views=portrait.words,
                 count=self.config.views + (len(parts) > 1),
                 pictures=Album(partial(portraits, self.scene, own, portrait))
@@ -165,6 +170,7 @@ class Asking:
         words = file
         if not (all(stated.get(name) for name in names) or stated.keys() - set(names)):
             words = self._materials(interview, names, self._pieces(interview, names), file)
+            words = self._swollen(interview, words)
         words = with_annotations(words, annotations, obj.name, self.config)
         words = self._placed(interview, words)
         weighs = interview.mass() if self.config.direct else None
@@ -206,6 +212,14 @@ class Asking:
             replace(sealed(w, own.inflation, None), rebound=own.rebound)
             for w, (_, own) in zip(found, known, strict=True)
         ]
+
+    def _swollen(self, interview: Interview, words: list[PartWords]) -> list[PartWords]:
+        """Ask how much of a thin scan is real, of what fills it; a scan is one mesh."""
+        thin, filling = interview.subject.drawn.thin, drawn_by_scan(words)
+        if thin is None or len(words) > 1 or not filling:
+            return words
+        asked = interview.thickness([leaf.name for leaf in filling], thin)
+        return [swollen(w, *asked) for w in words] if asked else words
 
     def _placed(self, interview: Interview, words: list[PartWords]) -> list[PartWords]:
         """Ask where in its measured range each open value of each part lies, in all its ways."""

@@ -227,8 +227,9 @@ def _usual(words: PartWords) -> PartWords:
 def _solid(words: PartWords) -> PartWords:
     """Keep the materials only."""
     words = replace(
-        _usual(words), structure="solid", thickness=None, contents=None, fill=None, solidity=None
-    )
+        _usual(words), structure="solid", thickness=None, contents=None, fill=None, solidity=None,
+        swelling=None,
+    )  # fmt: skip
     return replace(words, pieces=tuple(_solid(p) for p in words.pieces))
 
 

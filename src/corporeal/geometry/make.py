@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from math import exp, log
 
 import numpy as np
 from jaxtyping import Float
@@ -10,7 +11,7 @@ from corporeal.geometry.anatomy import THIN, Build, wall_behind
 from corporeal.geometry.packing import Recipe
 from corporeal.geometry.room import is_vessel, room_of
 from corporeal.geometry.survey import Anatomy, Member
-from corporeal.types import Material, MaterialField, PartWords, Structure, Treatment
+from corporeal.types import Material, MaterialField, PartWords, Structure, Swelling, Treatment
 
 SHEET_SHARE = 0.01
 """Thickness of an open sheet, of its middle extent, where nobody states it."""
@@ -28,8 +29,42 @@ ALIKE = 0.05
 BOTH_FACES = 4.0
 """A sheet drawn less than this many times as thick as it is shows both its faces: a plate, a blade.
 What is drawn thicker shows its outside only: a cup that a scan has filled."""
+NINE_IN_TEN = 3.29
+"""Width of the interval that holds 90 % of a normal distribution, in standard deviations."""
+BY_EYE = 0.2
+"""Standard deviation of the logarithm of a share that was judged by eye, at least [-]."""
 POROUS_CELLS = 6
 """A shell narrower than this many cells is filled through, with the shell's mass."""
+
+
+@dataclass(frozen=True)
+class Leeway:
+    """One draw of the volume that a mesh leaves open.
+
+    That is of solids, of what is behind a closed wall, and of a wall that is as thick as the mesh
+    draws it, between two faces that a scan has moved apart.
+    """
+
+    larger: float = 1.0
+    """Factor of the volume that the surface encloses, where nobody said how swollen it is [-]."""
+    about: float = 1.0
+    """The same about what somebody said: without its mean [-]."""
+    deviate: float = 0.0
+    """By how many of its widths what somebody said is off."""
+
+    def of(self, words: PartWords) -> float:
+        """Return the factor of what is described [-], whose likely share counts already."""
+        if words.swelling is None:
+            return self.larger
+        return self.about * exp(self.deviate * width_of(words.swelling))
+
+
+AS_DRAWN = Leeway()
+
+
+def width_of(said: Swelling) -> float:
+    """Return the standard deviation of the logarithm of a share that somebody judged [-]."""
+    return max(log(said.high / said.low) / NINE_IN_TEN, BY_EYE)
 
 
 @dataclass(frozen=True)
@@ -138,16 +173,14 @@ def compose(
     return with_contents(made, member, [h for h in holds if h])
 
 
-def weight(member: Member, field: MaterialField, room: float, larger: float = 1.0) -> float:
+def weight(member: Member, field: MaterialField, room: float, leeway: Leeway = AS_DRAWN) -> float:
     """Mass of a part with what is in it [kg], as ``compose`` finds it.
 
     Args:
         member: The part.
         field: What it is made of.
         room: What goes into it, if it is a vessel [m³].
-        larger: Factor of the volume that its surface encloses [-], where the mesh leaves that open:
-            of solids, of what is behind a closed wall, and of a wall that is as thick as the mesh
-            draws it, between two faces that a scan has moved apart. Other walls go with the area.
+        leeway: What its mesh leaves open. Walls that are not as it draws them go with the area.
 
     """
     total = 0.0
@@ -155,9 +188,10 @@ def weight(member: Member, field: MaterialField, room: float, larger: float = 1.
         made = decide(member, piece)
         structure = piece.structure
         swells = structure.kind == "solid" or made.whose == DRAWN
-        total += made.mass * (larger if swells else 1.0)
+        total += made.mass * (leeway.of(piece.words) if swells else 1.0)
         if structure.contents is not None:
-            inner = behind(member, made, piece, room) * (1.0 if is_vessel(member) else larger)
+            larger = 1.0 if is_vessel(member) else leeway.larger
+            inner = behind(member, made, piece, room) * larger
             total += structure.contents.density * structure.fill * inner
     return total
 
@@ -233,11 +267,12 @@ def decide(member: Member, piece: Specified) -> Make:
     scans as in models; of open ware from pictures, whose inside may be plain, only where nobody
     knows how thick such walls usually are. Open sheets weigh ρ A t. Of a piece, its shares of V and
     A count, less the volume of what lies inside it; a piece that the mesh lacks is not bounded by
-    the mesh. Of what is packed of parts and air, the share that is matter counts.
+    the mesh. Of what is packed of parts and air, the share that is matter counts; of what a scan
+    draws too thick, the share that is real.
     """
     structure, material, words = piece.structure, piece.material, piece.words
     wall = member.build is Build.WALL
-    shown = 2 * member.volume / member.body_area if wall else 0.0
+    shown = 2 * _real(words) * member.volume / member.body_area if wall else 0.0
     stated = structure.thickness or material.shell_thickness
     guess = SHEET_SHARE * (member.size[1] or member.size[2])
     only_sheet = member.volume == 0
@@ -255,10 +290,10 @@ def decide(member: Member, piece: Specified) -> Make:
         face, narrowing = 0.5 * face, 1.0
     sheets = member.sheet_area * words.surface_share
     if walled and not only_sheet:
-        most = np.inf if words.missing else volume
-        matter = min(face * thickness * narrowing, most)
+        matter = min(face * thickness * narrowing, np.inf if words.missing else volume)
     else:
-        matter = structure.solidity * max(volume - member.volume * words.inner_share, 0.0)
+        own = max(volume - member.volume * words.inner_share, 0.0)
+        matter = _real(words) * structure.solidity * own
     if thickness > 0 or only_sheet:
         kind = "filled" if structure.kind == "filled" else "shell"
         simulated = replace(structure, kind=kind, thickness=thickness or sheet)
@@ -273,10 +308,15 @@ def decide(member: Member, piece: Specified) -> Make:
         sheet_mass=material.density * sheets * sheet,
         area=face + sheets,
         volume=volume + sheets * sheet,
-        density=material.density * (1.0 if walled else structure.solidity),
+        density=material.density * (1.0 if walled else _real(words) * structure.solidity),
         shown=shown,
         whose=whose,
     )
+
+
+def _real(words: PartWords) -> float:
+    """Return the share of what the mesh draws of a part that the real part takes up [-]."""
+    return words.swelling.likely if words.swelling else 1.0
 
 
 PLATE_BEHIND = 1.5

@@ -21,6 +21,7 @@ from corporeal.types import (
     PartWords,
     Piece,
     Structure,
+    Swelling,
 )
 
 SCALES = {"Pa": ((1e9, "GPa"), (1e6, "MPa"), (1e3, "kPa"), (0.0, "Pa"))}
@@ -159,8 +160,14 @@ def _made_json(material: Material, made: Structure, words: PartWords) -> dict:
         "ways": [_way_json(way) for way in words.hypotheses],
         "law": material.law.name.lower(),
         "structure": _structure_json(made),
+        **_swelling_json(words.swelling),
         "values": {name: _ground_json(name, g) for name, g in material.grounds.items()},
     }
+
+
+def _swelling_json(said: Swelling | None) -> dict:
+    """How much of what a scan draws is real, where somebody said."""
+    return {"real_share": asdict(said)} if said else {}
 
 
 def _way_json(way: Hypothesis) -> dict:

@@ -233,13 +233,21 @@ def _piece(words: PartWords, config: GroundConfig) -> Piece:
     return Piece(words, material, _structure(material, words, config))
 
 
+def _real(words: PartWords) -> str:
+    """Say how much of what its scan draws is real, where somebody said."""
+    said = words.swelling
+    return f" It takes up {said.likely:.0%} of what its scan draws: {said.reason}" if said else ""
+
+
 def _structure(material: Material, words: PartWords, config: GroundConfig) -> Structure:
     if words.structure == "solid":
-        return Structure("solid", None, f"{BUILT_BY[words.built_by]} that it is solid.")
+        reason = f"{BUILT_BY[words.built_by]} that it is solid.{_real(words)}"
+        return Structure("solid", None, reason)
     if words.structure == "packed":
         share = words.solidity or 1.0
         reason = (
             f"{BUILT_BY[words.built_by]} that it is packed: {share:.0%} of its shape is matter."
+            f"{_real(words)}"
         )
         return Structure("solid", None, reason, solidity=share)
     if words.structure is None:

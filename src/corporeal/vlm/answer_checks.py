@@ -16,6 +16,7 @@ from corporeal.vlm.answers import (
     RankingAnswer,
     RegionsAnswer,
     SizeAnswer,
+    ThicknessAnswer,
     ThingsAnswer,
     Value,
     ValueAnswer,
@@ -28,6 +29,8 @@ MOST_THINGS = 12
 MOST_WAYS = 6
 SOLIDITY = (0.1, 0.95)
 """Between these is packed what is packed of parts and air."""
+REAL_SHARE = (0.1, 1.25)
+"""Volume of a real part over the volume that a scan draws of it [-]: scans thicken."""
 DENSITIES = (0.3, 25_000.0)
 """Mass of an object over the volume of its smallest box [kg/m³]: from a paper lampshade to gold."""
 SLACK = 0.05
@@ -189,6 +192,22 @@ def shaky(answer: MaterialsAnswer) -> list[str]:
             "one way only was given for every part, as certain: the interval of its mass covers "
             "measured ranges and no other build"
         )
+    return found
+
+
+def thickness_complaints(answer: ThicknessAnswer, parts: Sequence[str]) -> list[str]:
+    """Check the names, the order and the bounds of how much of a scan is real."""
+    found = name_complaints([p.part for p in answer.parts], parts)
+    low, high = REAL_SHARE
+    for part in answer.parts:
+        if not part.low <= part.likely <= part.high:
+            found.append(f"{part.part}: low, likely and high must be in this order.")
+        if part.low < low or part.high > high:
+            found.append(
+                f"{part.part}: {part.low:g} to {part.high:g} is not between {low:g} and {high:g}. "
+                "Give the volume of the real part over the volume that the model draws, not a "
+                "thickness and not a percentage."
+            )
     return found
 
 

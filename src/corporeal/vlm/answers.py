@@ -99,6 +99,22 @@ class MaterialsAnswer(BaseModel):
     parts: list[PartAnswer]
 
 
+class RealShare(BaseModel):
+    """How much of what a scan draws of one part is real."""
+
+    part: str
+    low: float = Field(gt=0, allow_inf_nan=False)
+    likely: float = Field(gt=0, allow_inf_nan=False)
+    high: float = Field(gt=0, allow_inf_nan=False)
+    reason: str
+
+
+class ThicknessAnswer(BaseModel):
+    """How far a scan of something thin is thicker than the real thing."""
+
+    parts: list[RealShare]
+
+
 class FractionPlace(BaseModel):
     """A place in one quantity's range."""
 

@@ -7,10 +7,12 @@ from string import Template
 
 import numpy as np
 
+from corporeal.geometry.drawn import NOTHING, Drawn, Thin
 from corporeal.vlm import Answer, Check, Question, Reply, UnansweredError, Vlm
 from corporeal.vlm.answer_checks import (
     MOST_PARTS,
     MOST_THINGS,
+    REAL_SHARE,
     extents_complaints,
     mass_complaints,
     materials_complaints,
@@ -20,6 +22,7 @@ from corporeal.vlm.answer_checks import (
     regions_complaints,
     shaky,
     size_complaints,
+    thickness_complaints,
     things_complaints,
 )
 from corporeal.vlm.answers import (
@@ -33,11 +36,12 @@ from corporeal.vlm.answers import (
     RegionsAnswer,
     SeenPart,
     SizeAnswer,
+    ThicknessAnswer,
     ThingsAnswer,
     ValueAnswer,
     Vocabulary,
 )
-from corporeal.vlm.words import Asked
+from corporeal.vlm.words import Asked, millimetres, strange_shares
 
 SHARES = (
     "The parts share one model, so say for each what it takes up of the object as the pictures "
@@ -52,6 +56,11 @@ SHARES = (
     "- surface_share: the area of the part's own outer face over that of the whole object's outer "
     "surface, never 0, also for what lies inside. Over the parts with inside null (what is missing "
     "apart) they add up to 1."
+)
+UNSEEN = " that the model does not show"
+MODELLED = (
+    "; holes, gaps and hollows that the pictures show are modelled: they are already taken off, "
+    "and solidity is of what is left"
 )
 NO_SHARES = "- inside, volume_share and surface_share: null; missing: false."
 FRACTION = (
@@ -77,6 +86,8 @@ class Subject:
     """The three sides of its smallest box, in words."""
     box: float = 0.0
     """Their product [m³]; 0: not known."""
+    drawn: Drawn = NOTHING
+    """What its mesh shows."""
     views: str = "none"
     count: int = 0
     """Pictures that are shown, or were when the answers were recorded."""
@@ -160,8 +171,15 @@ class Interview:
             The answer, and who gave it: "model" or "recording".
 
         """
-        named = "; ".join(f"{name} ({look})" if look else name for name, look in parts.items())
-        asked = self._question("materials", parts=named, shares=SHARES if shared else NO_SHARES)
+        named = _named(parts)
+        hollowed = self.subject.drawn.hollowed
+        asked = self._question(
+            "materials",
+            parts=named,
+            unseen=UNSEEN if hollowed else "",
+            holes=MODELLED if hollowed else "",
+            shares=SHARES if shared else NO_SHARES,
+        )
         asked = replace(asked, lists=lists)
         reply = self._ask(
             self.model,
@@ -172,6 +190,35 @@ class Interview:
         if reply is None:
             return None
         self.warnings += [f"{self.subject.name}: {clause}." for clause in shaky(reply.answer)]
+        return reply.answer, reply.by
+
+    def thickness(self, parts: Sequence[str], thin: Thin) -> tuple[ThicknessAnswer, Asked] | None:
+        """Ask how much of what a scan draws of something thin is real; None: no answer.
+
+        Args:
+            parts: Those whose matter fills what is drawn.
+            thin: How coarse the scan is, and how thick it draws the object.
+
+        """
+        tenth, quarter, half = map(millimetres, thin.behind)
+        least, greatest = (f"{share:g}" for share in REAL_SHARE)
+        asked = self._question(
+            "thickness",
+            parts=_named({name: self.looks.get(name, "") for name in parts}),
+            edge=millimetres(thin.edge),
+            tenth=tenth,
+            quarter=quarter,
+            half=half,
+            least=least,
+            greatest=greatest,
+        )
+        reply = self._ask(
+            self.model, asked, ThicknessAnswer, lambda a: thickness_complaints(a, parts)
+        )
+        if reply is None:
+            return None
+        about = f"{self.subject.name}: "
+        self.warnings += [about + sentence for sentence in strange_shares(reply.answer, thin.doubt)]
         return reply.answer, reply.by
 
     def mass(self) -> tuple[MassAnswer, Asked] | None:
@@ -290,6 +337,11 @@ class Interview:
             return None
         self.transcript.append(_row(question) | _answered(reply))
         return reply
+
+
+def _named(parts: Mapping[str, str]) -> str:
+    """List parts, each with how to tell it in the pictures."""
+    return "; ".join(f"{name} ({look})" if look else name for name, look in parts.items())
 
 
 def _look(part: SeenPart) -> str:

@@ -2,8 +2,10 @@
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import replace
+from math import exp, hypot, log
 from typing import Literal
 
+from corporeal.geometry.make import width_of
 from corporeal.types import (
     NOTHING_ASKED,
     Evidence,
@@ -13,6 +15,7 @@ from corporeal.types import (
     Placement,
     PrintedFact,
     SceneObject,
+    Swelling,
     Usage,
     in_way,
 )
@@ -23,6 +26,7 @@ from corporeal.vlm.answers import (
     MassAnswer,
     MaterialsAnswer,
     PartAnswer,
+    ThicknessAnswer,
     Vocabulary,
 )
 from corporeal.vlm.prices import date, dollars
@@ -32,6 +36,8 @@ LOOKED = {"model": "the model", "recording": "a recorded answer"}
 """Who looks at pictures."""
 ALIKE = 1.25
 """By what factor a wall's thickness may differ from the stated one before it is reported."""
+STRANGE = 3.0
+"""So many standard deviations are too many."""
 FAR = 2.5
 """By what factor a size may differ from the usual one before it is reported."""
 
@@ -229,6 +235,33 @@ def placed(words: PartWords, placements: Mapping[str, Mapping[str, Placement]]) 
     return replace(words, placements=own, pieces=pieces)
 
 
+def drawn_by_scan(words: Sequence[PartWords]) -> list[PartWords]:
+    """Parts whose matter fills what a scan draws, at its surface, in some way they may be."""
+    return [
+        leaf
+        for leaf in leaves(words)
+        if not (leaf.inside or leaf.missing)
+        and any(w in ("solid", "packed", None) for w in _builds(leaf))
+    ]
+
+
+def _builds(words: PartWords) -> list[str | None]:
+    return [way.structure for way in words.hypotheses] or [words.structure]
+
+
+def swollen(words: PartWords, answer: ThicknessAnswer, by: Asked) -> PartWords:
+    """Give a part, or its pieces, what was said of how much of them is real."""
+    said = {p.part: Swelling(p.low, p.likely, p.high, p.reason, by) for p in answer.parts}
+    pieces = tuple(replace(p, swelling=said.get(p.name)) for p in words.pieces)
+    main = max(
+        (p for p in pieces if p.material == words.material),
+        key=lambda p: (p.volume_share - p.inner_share, p.surface_share),
+        default=None,
+    )
+    own = main.swelling if main else said.get(words.name)
+    return replace(words, swelling=own, pieces=pieces)
+
+
 def leaves(words: Sequence[PartWords]) -> list[PartWords]:
     """Parts, or their pieces where they have some."""
     return [leaf for part in words for leaf in (part.pieces or (part,))]
@@ -239,6 +272,32 @@ def sides(lengths: Sequence[float]) -> str:
     ordered = sorted(lengths, reverse=True)
     unit, factor = ("m", 1.0) if ordered[0] >= 1 else ("cm", 100.0)
     return " × ".join(f"{factor * side:.3g}" for side in ordered) + f" {unit}"
+
+
+def strange_shares(answer: ThicknessAnswer, doubt: float) -> list[str]:
+    """Say which parts are said to be far from what a scan draws, for how fine it is.
+
+    Args:
+        answer: Of how much of what it draws is real.
+        doubt: How far its edges leave its volume open: deviation of the logarithm [-].
+
+    """
+    found = []
+    for part in answer.parts:
+        said = Swelling(part.low, part.likely, part.high, part.reason)
+        away = abs(log(part.likely) + doubt / 2) / hypot(doubt, width_of(said))
+        if away > STRANGE:
+            found.append(
+                f"{part.part} is said to take up {part.likely:.0%} of what its scan draws, which "
+                f"is fine enough for {exp(-doubt / 2):.0%} ± {doubt:.0%}. The former was believed; "
+                "--annotations decides."
+            )
+    return found
+
+
+def millimetres(metres: float) -> str:
+    """Write a small length to two digits."""
+    return f"{float(f'{1e3 * metres:.2g}'):g} mm"
 
 
 def length(metres: float) -> str:
