@@ -63,7 +63,7 @@ def verb_run() -> None:
     Results go to runs/<name>/: film.mp4, report.html, materials.json, audit.json and pictures.
     Results that are up to date are reused.
     """
-    from corporeal.pipeline import Settings
+    from corporeal.settings.all_verbs import Settings
 
     @dataclass(frozen=True)
     class Run:
@@ -82,7 +82,7 @@ def verb_demo() -> None:
     The first scene drops a rubber duck on mud. The scene is written to runs/<scene>/input/ as a
     GLB, and then run like any other.
     """
-    from corporeal.pipeline import Settings, write_showcase
+    from corporeal.settings.all_verbs import Settings
     from corporeal.showcase.scenes import SCENES, view
 
     first = next(iter(SCENES))
@@ -96,6 +96,8 @@ def verb_demo() -> None:
     first_options = ("detail", "duration", "quality", "view", "name", "out")
     words = f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}."
     asked = parse(Demo, "demo", words, first=first_options)
+    from corporeal.pipeline import write_showcase
+
     where = replace(asked.where, name=asked.where.name or asked.scene)
     folder = where.out / where.name
     with console.status("building the scene"):
