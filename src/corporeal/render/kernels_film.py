@@ -6,6 +6,7 @@ Loops compiled by numba, over the P pixels of a band.
 import numba
 import numpy as np
 
+from corporeal.geometry.srgb import encoded
 from corporeal.render.kernels import INNER, JIT, LOOP, dot, hash01
 
 FARTHEST = 0.02
@@ -21,6 +22,10 @@ FINER = 3
 """How much finer in each direction pixels are looked at where there is an edge."""
 ABOUT = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) / FINER
 """Samples about the middle of such a pixel, which is known: rows and columns."""
+CURVED = 1 << 14
+"""Parts of the display's curve."""
+CURVE = (255 * encoded(np.arange(CURVED + 1) / CURVED)).astype(np.float32)
+"""Grey level of every so manieth part of the brightest light, and of none."""
 PATCH = 0.1
 """Steps of albedo from which on two triangles are painted apart."""
 
@@ -230,11 +235,11 @@ def printed(picture, index, row, size, first, out):
         grain = hash01(i, j) - np.float32(0.5)
         for c in range(3):
             v = picture[g, c] * np.float32(1 - 0.10 * rim)
-            if v <= 0.0031308:
-                v = 12.92 * v
-            else:
-                v = 1.055 * v ** np.float32(1 / 2.4) - 0.055
-            out[i, j, c] = np.uint8(min(max(v * 255 + 0.5 + 0.9 * grain, 0.0), 255.0))
+            # The display's curve from a table: off by less than .001 grey levels.
+            place = min(max(v, np.float32(0)), np.float32(1)) * np.float32(CURVED)
+            n = min(int(place), CURVED - 1)
+            grey = CURVE[n] + (place - np.float32(n)) * (CURVE[n + 1] - CURVE[n])
+            out[i, j, c] = np.uint8(min(max(grey + 0.5 + 0.9 * grain, 0.0), 255.0))
 
 
 @numba.njit(**INNER)
