@@ -1,6 +1,8 @@
 """What a verb's help shows: six options that most people need, then all others."""
 
 import re
+import subprocess
+import sys
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Annotated, Literal, get_args, get_origin
@@ -124,3 +126,18 @@ def test_an_option_of_another_sub_command_is_refused(command):
     code, said = command("evaluate", "objects", "scenes/", "--anonymous")
     assert code == 2
     assert "--anonymous" in said.err
+
+
+HEAVY = ("warp", "numba", "scipy", "igl", "embreex", "trimesh", "pydantic", "corporeal.pipeline")
+
+
+@pytest.mark.parametrize("words", [["--version"], ["run", "--help"]])
+def test_who_asks_for_help_waits_for_nothing_that_simulates(words):
+    asked = (
+        "import sys\nfrom corporeal import cli\n"
+        f"sys.argv = ['corporeal', *{words}]\n"
+        "try:\n    cli.main()\nexcept SystemExit:\n    pass\n"
+        f"print('loaded:', *(name for name in {HEAVY} if name in sys.modules))"
+    )
+    told = subprocess.run([sys.executable, "-c", asked], capture_output=True, text=True, check=True)
+    assert told.stdout.rstrip().endswith("loaded:")

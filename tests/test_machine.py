@@ -1,5 +1,6 @@
 """What this process may use of the machine."""
 
+import gc
 import os
 import platform
 import subprocess
@@ -7,7 +8,7 @@ import sys
 
 import pytest
 
-from corporeal.machine import cores, keep_freed_memory
+from corporeal.machine import OBJECTS_MADE, collect_seldom, cores, keep_freed_memory
 
 
 @pytest.mark.skipif(not hasattr(os, "sched_setaffinity"), reason="Linux only")
@@ -38,6 +39,40 @@ def test_a_wish_in_the_environment_counts(tmp_path, monkeypatch, text, most):
     free = cores(tmp_path / "none")
     monkeypatch.setenv("OMP_NUM_THREADS", text)
     assert cores(tmp_path / "none") == min(most or free, free)
+
+
+def test_cycles_are_looked_for_seldom_and_still_found():
+    before, found = gc.get_threshold(), []
+    watch = lambda phase, info: found.append(info) if phase == "stop" else None  # noqa: E731
+    try:
+        collect_seldom()
+        gc.collect()
+        gc.callbacks.append(watch)
+        for _ in range(2 * OBJECTS_MADE + 100):
+            cycle: list = []
+            cycle.append(cycle)
+        assert 1 <= len(found) <= 3
+        assert sum(info["collected"] for info in found) >= OBJECTS_MADE
+    finally:
+        gc.callbacks.remove(watch)
+        gc.set_threshold(*before)
+
+
+THREADS = """
+import os, sys
+{before}
+from corporeal import cli
+print(os.environ["OPENBLAS_NUM_THREADS"])
+"""
+
+
+@pytest.mark.parametrize(("before", "then"), [("", "1"), ("2", "2")])
+def test_the_command_line_gives_blas_one_thread_unless_the_environment_says_so(before, then):
+    quiet = {k: v for k, v in os.environ.items() if k != "OPENBLAS_NUM_THREADS"}
+    given = quiet | ({"OPENBLAS_NUM_THREADS": before} if before else {})
+    command = [sys.executable, "-c", THREADS.format(before="assert 'numpy' not in sys.modules")]
+    told = subprocess.run(command, env=given, capture_output=True, text=True, check=True)
+    assert told.stdout.strip() == then
 
 
 FAULTS = """

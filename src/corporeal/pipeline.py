@@ -9,12 +9,11 @@ import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import asdict, dataclass, field, fields, replace
+from dataclasses import asdict, dataclass, fields, replace
 from pathlib import Path
 from typing import Any, Literal
 
 from corporeal import store
-from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UserError
 from corporeal.features import MENU as ENCODERS
 from corporeal.features.maskers import MENU as MASKERS
@@ -28,17 +27,17 @@ from corporeal.formats.words import safe
 from corporeal.geometry.gaussians import axis
 from corporeal.mixture import ground_weighed
 from corporeal.poses.pose import FIGURE, POSES
-from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.results import Results
 from corporeal.run_files import FILES, Spent, write_results
+from corporeal.settings.all_verbs import Settings
+from corporeal.settings.simulate_config import SimulateConfig
 from corporeal.showcase.scenes import build
-from corporeal.stages.assemble import AssembleConfig, assemble
+from corporeal.stages.assemble import assemble
 from corporeal.stages.describe import describe
-from corporeal.stages.fill import FillConfig, fill
-from corporeal.stages.film import FilmConfig, film
-from corporeal.stages.ground import GroundConfig
-from corporeal.stages.segment import SegmentConfig, segment
-from corporeal.stages.simulate import SimulateConfig, as_kept, simulate
+from corporeal.stages.fill import fill
+from corporeal.stages.film import film
+from corporeal.stages.segment import segment
+from corporeal.stages.simulate import as_kept, simulate
 from corporeal.trajectory.audit_file import read_audit
 from corporeal.trajectory.frames import read_trajectory
 from corporeal.typed import typed
@@ -77,20 +76,6 @@ WRITTEN = ("record",)
 BEFORE_PATHS = ("replay", *READERS, *ENCODERS, *MASKERS)
 """What stands before a colon and a path."""
 GAUSSIANS = "gaussians.ply"
-
-
-@dataclass(frozen=True)
-class Settings:
-    """One configuration per verb."""
-
-    reconstruct: ReconstructConfig = field(default_factory=ReconstructConfig)
-    assemble: AssembleConfig = field(default_factory=AssembleConfig)
-    describe: DescribeConfig = field(default_factory=DescribeConfig)
-    segment: SegmentConfig = field(default_factory=SegmentConfig)
-    ground: GroundConfig = field(default_factory=GroundConfig)
-    fill: FillConfig = field(default_factory=FillConfig)
-    simulate: SimulateConfig = field(default_factory=SimulateConfig)
-    film: FilmConfig = field(default_factory=FilmConfig)
 
 
 DEFAULT = Settings()

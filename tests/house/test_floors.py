@@ -19,6 +19,7 @@ FLOORS = [
     {"materials", "vlm", "render", "showcase", "pool", "settle"}
     | {"splats", "features", "regions", "poses", "masking"},
     {"treatment", "fields", "reconstruction", "description"},
+    {"settings"},  # of all verbs, read without what does them
     {"trajectory"},
     {"stages"},
     {"mixture"},

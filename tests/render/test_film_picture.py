@@ -2,10 +2,12 @@ import numpy as np
 import pytest
 from test_embree import RED, ball, front, scene, sheet
 
+from corporeal.geometry.srgb import encoded
 from corporeal.render.camera import Aim
 from corporeal.render.embree import Stage, render
 from corporeal.render.film_picture import FilmCaster
 from corporeal.render.kernels_ask import WAYS, number_of
+from corporeal.render.kernels_film import CURVE, CURVED
 from corporeal.render.kernels_floor import NEAR
 from corporeal.render.liquid_surface import LiquidSurface
 from corporeal.types import Finish
@@ -106,3 +108,11 @@ def test_floor_that_only_some_sky_is_hidden_from_is_darkened_evenly(monkeypatch)
     cast = FilmCaster().picture(tall, aim, "draft", 1).astype(int)
     assert np.abs(soft - cast).max() <= 2
     assert 0 < np.abs(soft - cast).mean() < 0.1 < np.abs(bare - cast).mean()
+
+
+def test_the_displays_curve_is_that_of_srgb():
+    light = np.linspace(0, 1, 100_001, dtype=np.float32)
+    place = light * CURVED
+    number = np.minimum(place.astype(int), CURVED - 1)
+    grey = CURVE[number] + (place - number) * (CURVE[number + 1] - CURVE[number])
+    assert np.abs(grey - 255 * encoded(light)).max() < 1e-3

@@ -96,7 +96,7 @@ def _run() -> None:
     checkpoint. Say the same again to go on.
     """
     from corporeal.corpus.run import RunConfig, run_corpus
-    from corporeal.pipeline import Settings
+    from corporeal.settings.all_verbs import Settings
 
     @dataclass(frozen=True)
     class Run:

@@ -201,7 +201,7 @@ def evaluate_dynamics() -> None:
     from corporeal.evaluation.dynamics.run_evaluation import evaluate_dynamics as evaluate
     from corporeal.evaluation.judge.judge_scenes import JudgeConfig
     from corporeal.evaluation.judge.put_to_judge import connected
-    from corporeal.pipeline import Settings
+    from corporeal.settings.all_verbs import Settings
     from corporeal.vlm import NOBODY
 
     @dataclass(frozen=True)

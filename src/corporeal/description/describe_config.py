@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Literal
 
 from corporeal.errors import check_range
-from corporeal.render.portrait import DIRECTIONS
 
 
 @dataclass(frozen=True)
@@ -43,6 +42,8 @@ DEFAULT = DescribeConfig()
 
 def validate(config: DescribeConfig) -> None:
     """Raise UserError where a setting cannot be right, whatever the scene."""
+    from corporeal.render.portrait import DIRECTIONS  # with all that draws, which help needs not
+
     for name, value, low, high in (
         ("--views", config.views, 1, DIRECTIONS),
         ("--view-size", config.view_size, 16, 2048),

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 from corporeal.errors import BadFileError
 from corporeal.formats import glb
@@ -11,13 +10,11 @@ from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
 from corporeal.formats.meshes import read_mesh
 from corporeal.formats.own_objects import own_objects
 from corporeal.formats.sources import GLTF
+from corporeal.formats.unit import METRES, Unit
 from corporeal.geometry.arrangement import in_unit
 from corporeal.geometry.gaussians import Up
 from corporeal.types import Objects
 
-Unit = Literal["auto", "m", "cm", "mm", "in", "ft"]
-METRES = {"m": 1.0, "cm": 1e-2, "mm": 1e-3, "in": 0.0254, "ft": 0.3048}
-"""Of each unit [m]."""
 READ = ".glb, .gltf, .obj, .ply, .stl, .off, .3mf, .dae, .usd"
 BLENDER = {
     ".fbx": "import bpy; bpy.ops.wm.read_factory_settings(use_empty=True); "

@@ -11,13 +11,7 @@ from corporeal.features.maskers import MENU as MASKERS
 from corporeal.features.maskers import connect_masker, split
 from corporeal.geometry.gaussians import LARGEST, AskedUp
 from corporeal.geometry.metric import MetricScale, TwoPoints, measured
-from corporeal.regions.instance_assignment import Rule
-from corporeal.splats import training_schedule
-from corporeal.vlm.seen_objects import (
-    PERSON,
-    check_extents,
-    usual,
-)
+from corporeal.regions.rule import Rule
 
 Progress = Callable[[float, str], None]
 AUTO, NONE = "auto", "none"
@@ -73,6 +67,10 @@ def validate(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool
 
     asked: whether somebody will be asked what there is.
     """
+    # A person who asks for help needs neither what trains nor what answers.
+    from corporeal.splats import training_schedule
+    from corporeal.vlm.seen_objects import check_extents, usual
+
     check_range("--count", config.count, 1, 1000)
     check_range("--training-seed", config.training_seed, 0, 2**63)
     check_range("--floor-at", config.floor_at, -LARGEST, LARGEST)
@@ -105,4 +103,6 @@ def _check_masks(config: ReconstructConfig) -> None:
 
 def metric_scale(config: ReconstructConfig) -> MetricScale | None:
     """Return the scale that the settings state; None: they state none."""
+    from corporeal.vlm.seen_objects import PERSON
+
     return measured(config.metres_per_unit, config.known_distance, PERSON)

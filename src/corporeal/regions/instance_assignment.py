@@ -1,7 +1,5 @@
 """Instance assignment: by masks, by appearance and concavity, or by the published rule."""
 
-from typing import Literal
-
 import numpy as np
 from jaxtyping import Float, Int
 from scipy.spatial import KDTree
@@ -10,9 +8,8 @@ from corporeal.errors import UserError
 from corporeal.formats.photographs import NO_INSTANCES
 from corporeal.regions.masks import renumbered
 from corporeal.regions.objects import MOST, Split, components, objects
+from corporeal.regions.rule import Rule
 from corporeal.types import Cloud
-
-Rule = Literal["auto", "masks", "look", "components"]
 
 SAME = 0.9
 """Share of what views say of points that must be one number each, for numbers to mean the same in

@@ -4,16 +4,15 @@ Boxes are those of objects over time, nan where an object is absent or went far 
 """
 
 from dataclasses import dataclass, replace
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
 from scipy.ndimage import gaussian_filter1d
 
 from corporeal.render.camera import Aim, place
+from corporeal.render.choices import Shot
 from corporeal.types import Ledger, Vector
 
-Shot = Literal["wide", "close", "follow"]
 SMOOTH = 0.12
 """A camera that moves with something follows a mean over this time [s, standard deviation]."""
 MOVES = 0.1

@@ -4,7 +4,6 @@ import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 from jaxtyping import Float
@@ -14,6 +13,7 @@ from corporeal.errors import UserError
 from corporeal.geometry.srgb import linear
 from corporeal.render import colours, video
 from corporeal.render.camera import place
+from corporeal.render.choices import Quantity
 from corporeal.render.embree import Light, Stage, identify
 from corporeal.render.figure_keys import INK, LARGE, Entry, Key, Line, Mark, legend, scale
 from corporeal.render.glyphs import drawable
@@ -41,8 +41,6 @@ SHEET, SHOWN = (1485, 1045), (472, 354)
 FIRST, STEP = (18, 41), (489, 522)
 """Left and top of the first picture, and from one to the next [px]."""
 
-Quantity = Literal["material", "law", "object", "part", "young", "poisson", "density"]
-"""What parts can be coloured by."""
 ORDER: tuple[Quantity, ...] = ("material", "law", "young", "poisson", "density", "object")
 """Panels of the figure, row by row."""
 

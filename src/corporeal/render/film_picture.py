@@ -176,7 +176,7 @@ class _Picture(Job):
             return
         here = slice(wide[0] * width, wide[1] * width)
         light, toned = (np.empty((len(rays.origin), 3), np.float32) for _ in range(2))
-        self.soften(tiles, block, here, toned)
+        self.soften(_of_rows(tiles, rows, wide[0]), block, here, toned)
         near = kind == NEAR
         near[: max(rows[0] - wide[0] - 1, 0)] = near[rows[1] - wide[0] + 1 :] = False
         active = np.flatnonzero(near)
@@ -396,6 +396,21 @@ class _Picture(Job):
 
 def _unknown(s: Samples) -> Bool[np.ndarray, " S"]:
     return np.ones(len(s.kind), np.bool_)
+
+
+def _of_rows(tiles: np.ndarray, rows: tuple[int, int], first: int) -> np.ndarray:
+    """Kinds of the tiles in some rows of pixels; of those above and below none is to be changed.
+
+    Args:
+        tiles: Kinds (rows, columns).
+        rows: The first row of the picture and the one after the last.
+        first: The picture's row that tiles begin with.
+
+    """
+    kept = np.full_like(tiles, UNTOUCHED)
+    mine = slice((rows[0] - first) // TILE, -(-(rows[1] - first) // TILE))
+    kept[mine] = tiles[mine]
+    return kept
 
 
 @dataclass(frozen=True)

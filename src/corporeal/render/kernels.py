@@ -23,6 +23,12 @@ from corporeal.render.look import (
 )
 
 JIT = {"nogil": True, "cache": True, "fastmath": {"contract", "reassoc", "nsz", "arcp"}}
+LOOP = {**JIT, "_nrt": False}
+"""As ``JIT``, of what makes no array. Else every view of an array is counted when it begins and
+ends, by atomic operations on a place that all threads share."""
+INNER = {**LOOP, "forceinline": True}
+"""As ``LOOP``, of what is called in loops: handing over a structure of arrays takes longer than
+what most of them do."""
 LINEAR = linear(np.arange(256) / 255).astype(np.float32)
 CREASE = float(np.cos(np.radians(SHARP)))
 """Cosine of the largest angle over which made normals are smoothed."""
@@ -81,7 +87,7 @@ def rays(eye, frame, tangent, size, rows, grid):
     return o, d
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _bilinear(texels, offset, h, w, x, y, out):
     """Linear RGBA at texel coordinates, repeated beyond the edges."""
     x = x * w - 0.5
@@ -100,7 +106,7 @@ def _bilinear(texels, offset, h, w, x, y, out):
             out[3] += weight * t[3] * np.float32(1 / 255)
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def texture(look, k, u, v, level, out):
     """Linear RGBA of texture ``k``; level 0 is the finest (pyramid: Williams 1983).
 
@@ -122,7 +128,7 @@ def texture(look, k, u, v, level, out):
             out[c] += share * (more[c] - out[c])
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def colour(look, tri, u, v, footprint, out):
     """Linear RGBA of triangle ``tri`` at barycentric (u, v); ``footprint`` [m] is a sample's.
 
@@ -145,7 +151,7 @@ def colour(look, tri, u, v, footprint, out):
         out[q] *= tint * f[q]
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def opacity(f, alpha):
     """Share of the light that a finish keeps for itself; cut-outs are all or nothing."""
     if f[MODE] == 1:
@@ -157,7 +163,7 @@ def opacity(f, alpha):
     return alpha * (1 - 0.88 * f[TRANSMIT])
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _unit(x):
     length = np.sqrt(x[0] * x[0] + x[1] * x[1] + x[2] * x[2])
     if length > 1e-20:
@@ -166,13 +172,13 @@ def _unit(x):
     return length
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def dot(x, y):
     """Scalar product of two 3-vectors."""
     return x[0] * y[0] + x[1] * y[1] + x[2] * y[2]
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _facet(vertices, tri, d, out):
     """Write a triangle's unit normal, towards the eye; the view itself where it is degenerate."""
     p, q, r = vertices[tri[0]], vertices[tri[1]], vertices[tri[2]]
@@ -191,7 +197,7 @@ def _facet(vertices, tri, d, out):
         out[a] *= side / length
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _shading_normal(normals, tri, bary, flat, d, keep, out):
     """Interpolated normal on the facet's side, bent so that the eye sees its front."""
     for a in range(3):
@@ -213,7 +219,7 @@ def _shading_normal(normals, tri, bary, flat, d, keep, out):
     _unit(out)
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _lift(vertices, normals, tri, bary, flat, p):
     """Move a hit from its facet to the smooth surface that the facet stands for.
 
@@ -236,8 +242,13 @@ def _lift(vertices, normals, tri, bary, flat, p):
 @numba.njit(**JIT)
 def meet(look, vertices, normals, floor, pixel, o, d, prim, u, v, t, index, out):
     """Fill ``out`` at ``index`` from Embree's answers; ``pixel`` is a sample's angle [rad]."""
-    rgba = np.empty(8, np.float32)
-    bary = np.empty(3, np.float32)
+    room = np.empty(8, np.float32), np.empty(3, np.float32)
+    _meet(look, vertices, normals, floor, pixel, o, d, prim, u, v, t, index, room, out)
+
+
+@numba.njit(**LOOP)
+def _meet(look, vertices, normals, floor, pixel, o, d, prim, u, v, t, index, room, out):
+    rgba, bary = room
     for k in range(len(index)):
         g = index[k]
         tri = prim[k]
@@ -268,7 +279,7 @@ def meet(look, vertices, normals, floor, pixel, o, d, prim, u, v, t, index, out)
         out.traits[g, 5] = f[TRANSMIT]
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _meet_floor(floor, o, d, g, out):
     """Meet the endless floor z = floor[3] in the colour floor[:3], or nothing."""
     gap = o[2] - floor[3]
@@ -307,7 +318,7 @@ def worth(prim, shape, every):
     return out
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def fill(light, looked, shape, every):
     """Copy each block's one sample to those that had no look of their own."""
     for i in range(shape[0]):
@@ -318,7 +329,7 @@ def fill(light, looked, shape, every):
                     light[i * shape[1] + j, c] = light[k, c]
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def hash01(a, b):
     """Draw a fixed number in [0, 1) for two integers (after Jarzynski & Olano 2020, pcg3d)."""
     x = np.uint32(a) * np.uint32(1664525) + np.uint32(1013904223)
@@ -337,7 +348,12 @@ def passes(look, prim, u, v, ray, depth):
     Glass still holds back a third of the light, so that it has a shadow.
     """
     out = np.zeros(len(prim), np.bool_)
-    rgba = np.empty(8, np.float32)
+    _passes(look, prim, u, v, ray, depth, np.empty(8, np.float32), out)
+    return out
+
+
+@numba.njit(**LOOP)
+def _passes(look, prim, u, v, ray, depth, rgba, out):
     for k in range(len(prim)):
         if prim[k] < 0:
             continue
@@ -349,4 +365,3 @@ def passes(look, prim, u, v, ray, depth):
         if solid > 0 and f[TRANSMIT] > 0:
             solid = max(solid, np.float32(0.2))
         out[k] = hash01(ray[k], depth + 11) >= solid
-    return out

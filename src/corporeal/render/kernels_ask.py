@@ -8,13 +8,14 @@ over: wherever these begin, each direction is in them once. Loops compiled by nu
 import numba
 import numpy as np
 
-from corporeal.render.kernels import JIT, NOTHING, THING, dot
-from corporeal.render.kernels_film import ALIKE, FARTHEST, meets_box
+from corporeal.render.kernels import INNER, JIT, LOOP, NOTHING, THING, dot
+from corporeal.render.kernels_film import ALIKE, FARTHEST, hull_of, meets_box
 from corporeal.render.kernels_light import (
     GLOSSY,
     SHARP,
     across,
     mirror_way,
+    on_sphere,
     open_way,
     sky_way,
     studio,
@@ -34,7 +35,7 @@ ENOUGH = 2
 """Neighbours of the same surface whose light is a pixel's, too."""
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def chosen(s, on, known, first, out):
     """Mark the pixels that ask for light: every second one, and what has few alike beside it.
 
@@ -63,7 +64,7 @@ def chosen(s, on, known, first, out):
         out[g] = alike < ENOUGH
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def number_of(row, column):
     """Which of ``WAYS`` directions a pixel looks along: 8 in each tile of 4 × 4, in 3 × 3 tiles."""
     tile = (row // 4 % 3) * 3 + column // 4 % 3
@@ -71,21 +72,31 @@ def number_of(row, column):
 
 
 @numba.njit(**JIT)
-def _look_up(s, g, q, w):
-    """Write a direction to the sky: the R2 sequence (Roberts 2018) spreads them."""
-    u, v = (q * 0.7548776662 + 0.37) % 1, (q * 0.5698402910 + 0.71) % 1
-    sky_way(s, g, u * (1 - GRAZING), v, w)
+def _sky_points(count):
+    """Points of the sphere (WAYS × count, 3) that make directions to the sky.
+
+    The R2 sequence (Roberts 2018) spreads them.
+    """
+    out = np.empty((WAYS * count, 3))
+    for q in range(len(out)):
+        u, v = (q * 0.7548776662 + 0.37) % 1, (q * 0.5698402910 + 0.71) % 1
+        on_sphere(u * (1 - GRAZING), v, out[q])
+    return out
 
 
 @numba.njit(**JIT)
-def _sun_way(q, lamps, e, h, w):
-    """Write the direction of one of WAYS × SUNS places on the sun's disc."""
-    r = np.sqrt((q * 0.7548776662 + 0.29) % 1) * lamps.softness
-    phi = 2 * np.pi * ((q * 0.5698402910 + 0.83) % 1)
-    x, y = r * np.cos(phi), r * np.sin(phi)
-    length = np.sqrt(1 + r * r)
-    for a in range(3):
-        w[a] = (lamps.sun[a] + x * e[a] + y * h[a]) / length
+def _sun_ways(lamps):
+    """Directions to WAYS × SUNS places on the sun's disc."""
+    e, out = np.empty(3, np.float32), np.empty((WAYS * SUNS, 3), np.float32)
+    h = across(lamps.sun, e)
+    for q in range(len(out)):
+        r = np.sqrt((q * 0.7548776662 + 0.29) % 1) * lamps.softness
+        phi = 2 * np.pi * ((q * 0.5698402910 + 0.83) % 1)
+        x, y = r * np.cos(phi), r * np.sin(phi)
+        length = np.sqrt(1 + r * r)
+        for a in range(3):
+            out[q, a] = (lamps.sun[a] + x * e[a] + y * h[a]) / length
+    return out
 
 
 @numba.njit(**JIT)
@@ -110,18 +121,26 @@ def ask(s, index, row, column, lamps, count, boxes, o, w, ray, asker, light):
         How many rays are to be cast.
 
     """
+    points, suns, hull = _sky_points(count), _sun_ways(lamps), hull_of(boxes)
+    ways = points, suns
+    return _ask(s, index, row, column, lamps, count, ways, (hull, boxes), o, w, ray, asker, light)
+
+
+@numba.njit(**LOOP)
+def _ask(s, index, row, column, lamps, count, ways, boxes, o, w, ray, asker, light):
+    """As ``ask``; ``ways``: ``_sky_points``, ``_sun_ways``; ``boxes``: the one about all first."""
     gap, share = np.float32(2e-4 * lamps.size), np.float32(1 / count)
-    e = np.empty(3, np.float32)
-    h = across(lamps.sun, e)
+    points, suns = ways
+    hull, parts = boxes
     many, n = len(index), 0
     for k in range(many):
         g, q = index[k], number_of(row[k], column[k])
         pixel = row[k] * 65536 + column[k]
         for number in range(count):
-            _look_up(s, g, q * count + number, w[n])
+            sky_way(s, g, points[q * count + number], w[n])
             for a in range(3):
                 o[n, a] = s.point[g, a] + gap * s.flat[g, a]
-            if meets_box(o[n], w[n], boxes):
+            if meets_box(o[n], w[n], hull) and meets_box(o[n], w[n], parts):
                 ray[n], asker[n] = pixel + number, k
                 n += 1
             else:
@@ -130,8 +149,9 @@ def ask(s, index, row, column, lamps, count, boxes, o, w, ray, asker, light):
             if not sunlit(s, g, lamps, o[n]):
                 break
             # Tiles beside one another see parts of the sun that are far apart.
-            _sun_way((q % 8 * 9 + q // 8) * SUNS + number, lamps, e, h, w[n])
-            if meets_box(o[n], w[n], boxes):
+            for a in range(3):
+                w[n, a] = suns[(q % 8 * 9 + q // 8) * SUNS + number, a]
+            if meets_box(o[n], w[n], hull) and meets_box(o[n], w[n], parts):
                 ray[n], asker[n] = pixel + number, many + k
                 n += 1
             else:
@@ -142,11 +162,12 @@ def ask(s, index, row, column, lamps, count, boxes, o, w, ray, asker, light):
 @numba.njit(**JIT)
 def look_up(s, count, w):
     """Write all directions that pixels of one surface look along (WAYS × count, 3)."""
-    for q in range(WAYS * count):
-        _look_up(s, 0, q, w[q])
+    points = _sky_points(count)
+    for q in range(len(points)):
+        sky_way(s, 0, points[q], w[q])
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def answered(s, index, w, asker, free, lamps, count, light):
     """Add the light of rays that were cast and got away; see ``ask``."""
     share, many = np.float32(1 / count), len(index)
@@ -160,7 +181,7 @@ def answered(s, index, w, asker, free, lamps, count, light):
             light[k - many, 3] += np.float32(1 / SUNS)
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def mirror(s, index, row, column, d, lamps, o, w, asker, light):
     """Write what samples mirror of the studio; return how many may mirror objects, too.
 
@@ -183,11 +204,10 @@ def mirror(s, index, row, column, d, lamps, o, w, asker, light):
     return n
 
 
-@numba.njit(**JIT)
-def _pass(data, normal, depth, on, has, steps, stride, out, had):
+@numba.njit(**LOOP)
+def _pass(data, normal, depth, on, has, steps, stride, total, out, had):
     """Mean over like pixels that have light; ``stride`` (rows, columns) says which way."""
     h, w = on.shape
-    total = np.empty(WIDE, np.float32)
     for i in range(h):
         for j in range(w):
             if not on[i, j]:
@@ -227,8 +247,9 @@ def smooth(data, normal, depth, on, has):
 
     """
     spare, had = np.empty_like(data), np.zeros_like(has)
+    total = np.empty(WIDE, np.float32)
     near, far = (-2, -1, 0, 1), (-4, 0, 4)
-    _pass(data, normal, depth, on, has, near, (1, 0), spare, had)
-    _pass(spare, normal, depth, on, had, near, (0, 1), data, has)
-    _pass(data, normal, depth, on, has, far, (1, 0), spare, had)
-    _pass(spare, normal, depth, on, had, far, (0, 1), data, has)
+    _pass(data, normal, depth, on, has, near, (1, 0), total, spare, had)
+    _pass(spare, normal, depth, on, had, near, (0, 1), total, data, has)
+    _pass(data, normal, depth, on, has, far, (1, 0), total, spare, had)
+    _pass(spare, normal, depth, on, had, far, (0, 1), total, data, has)

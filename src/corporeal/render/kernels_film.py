@@ -6,7 +6,8 @@ Loops compiled by numba, over the P pixels of a band.
 import numba
 import numpy as np
 
-from corporeal.render.kernels import JIT, dot, hash01
+from corporeal.geometry.srgb import encoded
+from corporeal.render.kernels import INNER, JIT, LOOP, dot, hash01
 
 FARTHEST = 0.02
 """Of the depth: what differs by more is another surface."""
@@ -21,11 +22,15 @@ FINER = 3
 """How much finer in each direction pixels are looked at where there is an edge."""
 ABOUT = np.array([[i, j] for i in (-1, 0, 1) for j in (-1, 0, 1) if i or j]) / FINER
 """Samples about the middle of such a pixel, which is known: rows and columns."""
+CURVED = 1 << 14
+"""Parts of the display's curve."""
+CURVE = (255 * encoded(np.arange(CURVED + 1) / CURVED)).astype(np.float32)
+"""Grey level of every so manieth part of the brightest light, and of none."""
 PATCH = 0.1
 """Steps of albedo from which on two triangles are painted apart."""
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def meets_box(o, w, boxes):
     """Whether a ray from ``o`` along ``w`` meets any of the boxes (B, 2, 3): slabs, Kay 1986."""
     for b in range(len(boxes)):
@@ -42,6 +47,17 @@ def meets_box(o, w, boxes):
 
 
 @numba.njit(**JIT)
+def hull_of(boxes):
+    """Find the one box (1, 2, 3) about boxes (B, 2, 3), to be asked first: most rays miss it."""
+    out = boxes[: min(len(boxes), 1)].copy()
+    for b in range(1, len(boxes)):
+        for a in range(3):
+            out[0, 0, a] = min(out[0, 0, a], boxes[b, 0, a])
+            out[0, 1, a] = max(out[0, 1, a], boxes[b, 1, a])
+    return out
+
+
+@numba.njit(**LOOP)
 def could_meet(o, w, boxes, out):
     """For each ray, whether it could meet what is in the boxes."""
     for k in range(len(o)):
@@ -90,6 +106,12 @@ def share(s, row, column, light, normal, depth, known, out):
 
     """
     missing = np.zeros(len(s.kind), np.bool_)
+    _share(s, row, column, light, normal, depth, known, out, missing)
+    return missing
+
+
+@numba.njit(**LOOP)
+def _share(s, row, column, light, normal, depth, known, out, missing):
     h, w, channels = light.shape
     for g in range(len(s.kind)):
         i, j = int(np.floor(row[g])), int(np.floor(column[g]))
@@ -112,10 +134,9 @@ def share(s, row, column, light, normal, depth, known, out):
         if total > 0:
             for c in range(channels):
                 out[g, c] /= total
-    return missing
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def filmic(v):
     """Filmic curve (Narkowicz 2016) of one linear value, 0 to 1."""
     v = max(v, np.float32(0)) * np.float32(0.74)
@@ -123,7 +144,7 @@ def filmic(v):
     return min(max(v, 0.0), 1.0)
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def edges(s, picture, active, shape, inner, out):
     """Mark pixels beside which another surface is seen in another colour.
 
@@ -160,7 +181,7 @@ def edges(s, picture, active, shape, inner, out):
                     out[q] = True
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _one_surface(s, g, q):
     """Whether two pixels see one smooth surface of one colour."""
     if s.kind[g] != s.kind[q] or abs(s.depth[g] - s.depth[q]) >= FARTHEST * s.depth[g]:
@@ -171,7 +192,7 @@ def _one_surface(s, g, q):
     return dot(s.normal[g], s.normal[q]) > ALIKE and far < PATCH
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def tone(light, index, out):
     """Filmic light of some pixels."""
     for g in index:
@@ -179,7 +200,7 @@ def tone(light, index, out):
             out[g, c] = filmic(light[g, c])
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def tone_means(light, index, out):
     """Replace the filmic light of some pixels by its mean with the samples about them."""
     count = len(ABOUT)
@@ -191,7 +212,7 @@ def tone_means(light, index, out):
             out[index[k], c] = total / (count + 1)
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def printed(picture, index, row, size, first, out):
     """Write pixels in sRGB, 0 to 255, with a faint vignette and a fixed grain.
 
@@ -214,14 +235,14 @@ def printed(picture, index, row, size, first, out):
         grain = hash01(i, j) - np.float32(0.5)
         for c in range(3):
             v = picture[g, c] * np.float32(1 - 0.10 * rim)
-            if v <= 0.0031308:
-                v = 12.92 * v
-            else:
-                v = 1.055 * v ** np.float32(1 / 2.4) - 0.055
-            out[i, j, c] = np.uint8(min(max(v * 255 + 0.5 + 0.9 * grain, 0.0), 255.0))
+            # The display's curve from a table: off by less than .001 grey levels.
+            place = min(max(v, np.float32(0)), np.float32(1)) * np.float32(CURVED)
+            n = min(int(place), CURVED - 1)
+            grey = CURVE[n] + (place - np.float32(n)) * (CURVE[n + 1] - CURVE[n])
+            out[i, j, c] = np.uint8(min(max(grey + 0.5 + 0.9 * grain, 0.0), 255.0))
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def way_of(eye, frame, tangent, size, row, column, e):
     """Write the unit direction of a place in the picture."""
     width, height = size
@@ -232,7 +253,7 @@ def way_of(eye, frame, tangent, size, row, column, e):
         e[a] = (right * frame[0, a] + up * frame[1, a] - frame[2, a]) / length
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def finer_rays(eye, frame, tangent, size, first, pixels, o, d, row, column):
     """Origins, directions and places of the samples about the middle of some pixels of a band."""
     width = size[0]

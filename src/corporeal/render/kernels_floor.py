@@ -8,8 +8,8 @@ tiles and changes evenly between. Loops compiled by numba, over a band of pixels
 import numba
 import numpy as np
 
-from corporeal.render.kernels import FLOOR_ROUGHNESS, JIT
-from corporeal.render.kernels_film import HORIZON, filmic, meets_box, way_of
+from corporeal.render.kernels import FLOOR_ROUGHNESS, INNER, JIT, LOOP
+from corporeal.render.kernels_film import HORIZON, filmic, hull_of, meets_box, way_of
 from corporeal.render.kernels_light import fading, shade_one
 
 TILE = 8
@@ -20,7 +20,7 @@ AROUND = 2
 """Tiles about one that shows an object that are near it."""
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def things(prim, shape, out):
     """Mark the tiles in which objects are seen."""
     h, w = shape
@@ -58,9 +58,16 @@ def stains(d, eye, lamps, ways, boxes, blur, shape, near, far):
         far: The sky.
 
     """
+    room = np.empty(3, np.float32), boxes.copy(), boxes.copy()
+    hulls = boxes[:1].copy(), hull_of(boxes)
+    _stains(d, eye, lamps, ways, boxes, blur, shape, near, far, room, hulls)
+
+
+@numba.njit(**LOOP)
+def _stains(d, eye, lamps, ways, boxes, blur, shape, near, far, room, hulls):
     h, w = shape
-    p = np.empty(3, np.float32)
-    wide, dark = boxes.copy(), boxes.copy()
+    p, wide, dark = room
+    around, hull = hulls
     p[2] = lamps.floor[3]
     for top in range(0, h, TILE):
         for left in range(0, w, TILE):
@@ -74,10 +81,14 @@ def stains(d, eye, lamps, ways, boxes, blur, shape, near, far):
                     wide[b, 0, a], wide[b, 1, a] = boxes[b, 0, a] - radius, boxes[b, 1, a] + radius
                     dark[b, 0, a] = wide[b, 0, a] - blur
                     dark[b, 1, a] = wide[b, 1, a] + blur
+            for b in range(len(hull)):
+                for a in range(3):
+                    reach = radius if a < 2 else np.float32(0)
+                    around[b, 0, a], around[b, 1, a] = hull[b, 0, a] - reach, hull[b, 1, a] + reach
             i, j = top // TILE, left // TILE
             near[i, j] = near[i, j] or meets_box(p, ways[len(ways) - 1], dark)
             for k in range(len(ways) - 1):
-                if near[i, j] or meets_box(p, ways[k], wide):
+                if near[i, j] or (meets_box(p, ways[k], around) and meets_box(p, ways[k], wide)):
                     far[i, j] = True
                     break
             # Corners above the horizon have no floor to ask.
@@ -91,21 +102,21 @@ def _patch(d, eye, floor, w, tile, centre):
     top, bottom, left, right = tile
     if d[bottom * w + left, 2] > -HORIZON and d[bottom * w + right, 2] > -HORIZON:
         return np.float32(0), False
-    low = np.full(2, np.float32(np.inf))
-    high = np.full(2, np.float32(-np.inf))
-    for i in (top, bottom):
-        for j in (left, right):
-            e = d[i * w + j]
-            t = (floor - eye[2]) / min(e[2], -HORIZON)
-            for a in range(2):
-                low[a] = min(low[a], eye[a] + t * e[a])
-                high[a] = max(high[a], eye[a] + t * e[a])
+    widest = np.float32(0)
     for a in range(2):
-        centre[a] = (low[a] + high[a]) / 2
-    return max(high[0] - low[0], high[1] - low[1]) / 2, True
+        low, high = np.float32(np.inf), np.float32(-np.inf)
+        for i in (top, bottom):
+            for j in (left, right):
+                e = d[i * w + j]
+                t = (floor - eye[2]) / min(e[2], -HORIZON)
+                low = min(low, np.float32(eye[a] + t * e[a]))
+                high = max(high, np.float32(eye[a] + t * e[a]))
+        centre[a] = (low + high) / 2
+        widest = max(widest, high - low)
+    return widest / 2, True
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _corner(tiles, i, j):
     """Whether a corner is one of a far tile."""
     wanted = False
@@ -115,7 +126,7 @@ def _corner(tiles, i, j):
     return wanted
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def corners(tiles):
     """Count the corners of far tiles."""
     count = 0
@@ -147,9 +158,17 @@ def at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, o, w
         How many rays are to be cast.
 
     """
+    room = np.empty(3), np.empty(3, np.float32), hull_of(boxes)
+    return _at_corners(
+        tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker
+    )
+
+
+@numba.njit(**LOOP)
+def _at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, room, o, w, asker):
     h, width = tiles.shape
     n, many = 0, len(ways) - 1
-    e, p = np.empty(3), np.empty(3, np.float32)
+    e, p, hull = room
     for i in range(h + 1):
         for j in range(width + 1):
             if not _corner(tiles, i, j):
@@ -159,13 +178,15 @@ def at_corners(tiles, eye, frame, tangent, size, first, lamps, ways, boxes, o, w
             p[0], p[1] = eye[0] + t * e[0], eye[1] + t * e[1]
             p[2] = lamps.floor[3] + 2e-4 * lamps.size
             for k in range(many):
-                if meets_box(p, ways[k], boxes):
-                    o[n], w[n], asker[n] = p, ways[k], (i * (width + 1) + j) * many + k
+                if meets_box(p, ways[k], hull) and meets_box(p, ways[k], boxes):
+                    for a in range(3):
+                        o[n, a], w[n, a] = p[a], ways[k, a]
+                    asker[n] = (i * (width + 1) + j) * many + k
                     n += 1
     return n
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def hidden(asker, free, ways, columns, light):
     """Take the sky of rays that were cast from corners and met something.
 
@@ -205,12 +226,21 @@ def softly(tiles, eye, frame, tangent, size, first, shape, lamps, sky, mirrored,
         out: Of the band (P, 3).
 
     """
-    h, w = shape
-    e, up = np.empty(3, np.float32), np.array([0, 0, 1], np.float32)
-    light, near = np.zeros(7, np.float32), np.empty(3, np.float32)
-    room = np.empty((2, 3), np.float32)
-    traits = np.array([0, FLOOR_ROUGHNESS, 0, 0, 1, 0], np.float32)
+    up, traits = np.zeros(3, np.float32), np.zeros(6, np.float32)
+    up[2], traits[1], traits[4] = 1, FLOOR_ROUGHNESS, 1
+    light = np.zeros(7, np.float32)
     light[3] = 1
+    row = np.empty(3, np.float32), np.empty(3, np.float32), np.empty((2, 3), np.float32)
+    view = eye, frame, tangent, size, first
+    _softly(tiles, view, shape, lamps, sky, mirrored, wall, (up, traits, light), row, out)
+
+
+@numba.njit(**LOOP)
+def _softly(tiles, view, shape, lamps, sky, mirrored, wall, floor, row, out):
+    h, w = shape
+    eye, frame, tangent, size, first = view
+    up, traits, light = floor
+    e, near, room = row
     for i in range(h):
         a, fy = i // TILE, np.float32(i % TILE / TILE)
         for j in range(w):

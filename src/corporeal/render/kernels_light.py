@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numba
 import numpy as np
 
-from corporeal.render.kernels import FLOOR, JIT, THING, colour, dot, hash01
+from corporeal.render.kernels import FLOOR, INNER, JIT, LOOP, THING, colour, dot, hash01
 
 SHARP = 0.2
 """Roughness up to which each sample follows its own mirrored ray."""
@@ -43,23 +43,26 @@ class Lamps(NamedTuple):
     """(3,) of the scene [m]"""
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _normalised(x, y, z, out):
     s = 1 / np.sqrt(max(x * x + y * y + z * z, 1e-20))
     out[0], out[1], out[2] = x * s, y * s, z * s
 
 
-@numba.njit(**JIT)
-def sky_way(s, g, u, v, w):
-    """Write the cosine-weighted direction of a place (u, v) in the unit square.
-
-    It is a point of the unit sphere plus the normal.
-    """
+@numba.njit(**INNER)
+def on_sphere(u, v, out):
+    """Write the point of (nearly) the unit sphere for a place (u, v) in the unit square."""
     z = 1 - 2 * u
     phi = 2 * np.pi * v
     r = 0.999 * np.sqrt(1 - z * z)
+    out[0], out[1], out[2] = r * np.cos(phi), r * np.sin(phi), 0.999 * z
+
+
+@numba.njit(**INNER)
+def sky_way(s, g, point, w):
+    """Write the cosine-weighted direction of a point of the unit sphere: it plus the normal."""
     n = s.normal[g]
-    _normalised(n[0] + r * np.cos(phi), n[1] + r * np.sin(phi), n[2] + 0.999 * z, w)
+    _normalised(n[0] + point[0], n[1] + point[1], n[2] + point[2], w)
     side = dot(w, s.flat[g])
     if side < 0.01:
         # Below the facet, though not below the smooth surface: lift it out.
@@ -71,17 +74,23 @@ def sky_way(s, g, u, v, w):
 @numba.njit(**JIT)
 def sky_rays(s, index, cells, lamps, number, count, o, w):
     """One ray to the sky each: the R2 sequence (Roberts 2018) spreads 16 × count over a tile."""
+    _sky_rays(s, index, cells, lamps, number, count, np.empty(3), o, w)
+
+
+@numba.njit(**LOOP)
+def _sky_rays(s, index, cells, lamps, number, count, point, o, w):
     gap = np.float32(2e-4 * lamps.size)
     for k in range(len(index)):
         g = index[k]
         q = cells[k] * count + number
         u, v = (q * 0.7548776662 + 0.37) % 1, (q * 0.5698402910 + 0.71) % 1
-        sky_way(s, g, u, v, w[k])
+        on_sphere(u, v, point)
+        sky_way(s, g, point, w[k])
         for a in range(3):
             o[k, a] = s.point[g, a] + gap * s.flat[g, a]
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def open_way(s, g, w, lamps, share, light):
     """Add what a ray sees that gets away: open sky, or the sunlit floor below the horizon."""
     if w[2] > 0:
@@ -93,7 +102,7 @@ def open_way(s, g, w, lamps, share, light):
         light[2] += share * (0.35 + 0.75 * gap)
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def gather_sky(s, index, w, free, lamps, share, light):
     """Add what one ray per sample saw."""
     for k in range(len(index)):
@@ -117,7 +126,7 @@ def across(sun, e):
     )
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def sun_way(i, pixel, lamps, e, h, w):
     """Write the direction of one of 16 × 16 places on the sun's disc."""
     sun = lamps.sun
@@ -134,7 +143,7 @@ def sun_way(i, pixel, lamps, e, h, w):
     )
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def sunlit(s, g, lamps, o):
     """Say whether the sun may reach a sample, and write where its ray begins.
 
@@ -151,13 +160,17 @@ def sunlit(s, g, lamps, o):
 def sun_rays(s, index, cells, pixels, lamps, o, w, ask):
     """One ray each to the sun."""
     e = np.empty(3, np.float32)
-    h = across(lamps.sun, e)
+    _sun_rays(s, index, cells, pixels, lamps, e, across(lamps.sun, e), o, w, ask)
+
+
+@numba.njit(**LOOP)
+def _sun_rays(s, index, cells, pixels, lamps, e, h, o, w, ask):
     for k in range(len(index)):
         sun_way(cells[k], pixels[k], lamps, e, h, w[k])
         ask[k] = sunlit(s, index[k], lamps, o[k])
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def mirror_way(s, g, e, q, w):
     """Write the direction in which a sample mirrors view ``e``, spread by roughness."""
     n, f = s.normal[g], s.flat[g]
@@ -173,7 +186,7 @@ def mirror_way(s, g, e, q, w):
     _normalised(x - down * f[0], y - down * f[1], z - down * f[2], w)
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def mirror_rays(s, index, d, cells, lamps, o, w):
     """Mirrored directions, spread within a tile."""
     gap = np.float32(2e-4 * lamps.size)
@@ -184,13 +197,13 @@ def mirror_rays(s, index, d, cells, lamps, o, w):
             o[k, a] = s.point[g, a] + gap * s.flat[g, a]
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _ramp(x):
     x = min(max(x, 0.0), 1.0)
     return x * x * (3 - 2 * x)
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def studio(w, blur, lamps, out):
     """Floor, sky, a softbox at the sun and a strip light; blurred for rough surfaces."""
     up = w[2]
@@ -210,6 +223,11 @@ def studio(w, blur, lamps, out):
 def mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first):
     """Write what was mirrored into light[:, first:first+3]: objects roughly lit, or the studio."""
     rgba = np.empty(8, np.float32)
+    _mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first, rgba)
+
+
+@numba.njit(**LOOP)
+def _mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first, rgba):
     for k in range(len(index)):
         rough = s.traits[index[k], 1]
         studio(w[k], max(rough - 0.15, 0.0) ** 2, lamps, light[k, first : first + 3])
@@ -223,13 +241,13 @@ def mirrored(look, normals, lamps, s, index, w, prim, u, v, t, light, first):
             light[k, first + c] = rgba[c] * (0.45 + 0.7 * facing)
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def _like(n, m, a, b):
     """Whether two samples see the same surface: normals and logarithm of depth."""
     return dot(n, m) > 0.92 and abs(a - b) < 0.02
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def _pass(data, normal, depth, on, steps, stride, out):
     """Mean over like samples at the given steps; ``stride`` (rows, columns) says which way."""
     h, w, channels = data.shape
@@ -270,6 +288,12 @@ def spread(s, index, shape, lattice, normal, depth, on, every, out):
     Returns where there is none: True asks for rays of its own.
     """
     missing = np.zeros(len(s.kind), np.bool_)
+    _spread(s, index, shape, lattice, normal, depth, on, every, out, missing)
+    return missing
+
+
+@numba.njit(**LOOP)
+def _spread(s, index, shape, lattice, normal, depth, on, every, out, missing):
     h, w = lattice.shape[:2]
     for g in index:
         i, j = (g // shape[1]) // every, (g % shape[1]) // every
@@ -285,10 +309,9 @@ def spread(s, index, shape, lattice, normal, depth, on, every, out):
                         for c in range(lattice.shape[2]):
                             out[g, c] = lattice[y, x, c]
         missing[g] = not found
-    return missing
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def shade_one(n, e, tint, traits, light, lamps, room, out):
     """Linear light towards the eye of one sample; multiplied by opacity.
 
@@ -339,13 +362,17 @@ def shade_one(n, e, tint, traits, light, lamps, room, out):
 @numba.njit(**JIT)
 def shade(s, index, d, light, lamps, out):
     """Linear light towards the eye [N, 3] of the samples in ``index``; see ``shade_one``."""
-    room = np.empty((2, 3), np.float32)
+    _shade(s, index, d, light, lamps, np.empty((2, 3), np.float32), out)
+
+
+@numba.njit(**LOOP)
+def _shade(s, index, d, light, lamps, room, out):
     for k in range(len(index)):
         g = index[k]
         shade_one(s.normal[g], d[g], s.albedo[g], s.traits[g], light[g], lamps, room, out[g])
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def backdrop(lamps, rows, height, width, grid, out):
     """Paint the wall behind the floor: a gradient down the picture."""
     for i in range((rows[1] - rows[0]) * grid):
@@ -356,13 +383,13 @@ def backdrop(lamps, rows, height, width, grid, out):
                 out[i * width * grid + j, c] = value
 
 
-@numba.njit(**JIT)
+@numba.njit(**INNER)
 def fading(away, lamps):
     """Share of the floor so far away [m] from the scene that is seen before the backdrop."""
     return min(max(1.35 - away / (3 * lamps.size), 0.0), 1.0) ** 1.5
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def blend(s, index, near, lamps, behind):
     """Lay nearer light over what is behind it; the floor fades into the backdrop far away."""
     for k in range(len(index)):
@@ -380,7 +407,7 @@ def blend(s, index, near, lamps, behind):
                 behind[g, c] = near[g, c] + rest * tint * behind[g, c]
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def develop(light, rows, size, grid, out):
     """Filmic curve per sample (Narkowicz 2016), mean over each pixel, faint vignette, sRGB.
 

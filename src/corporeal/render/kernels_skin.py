@@ -3,10 +3,10 @@
 import numba
 import numpy as np
 
-from corporeal.render.kernels import JIT
+from corporeal.render.kernels import JIT, LOOP
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def weights(distance, out):
     """Shepard's weights with local support: (1 - d/R)² / (d/R)² (Franke & Nielson 1980).
 
@@ -34,7 +34,7 @@ def weights(distance, out):
             out[v, k] /= total
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def stretch(rest, near, weight, start, now, F, place, gradient):
     """X' = Σ w (x_p + F_p (X - X_p)) and Σ w F_p; what has no particles stays as it is."""
     for v in range(len(rest)):
@@ -81,7 +81,7 @@ def carry(rest, normals, near, weight, start, now, F, place, turned):
             turned[v, a] = turned[v, a] / length if length > 1e-12 else normals[v, a]
 
 
-@numba.njit(**JIT)
+@numba.njit(**LOOP)
 def strained(F, limit, out):
     """Mark gradients with ‖FᵀF - 1‖² > ``limit``, and those that mirror."""
     for p in range(len(F)):

@@ -22,6 +22,12 @@ Field = Callable[[Points], Distances]
 """From points [m] to signed distances [m]."""
 
 
+def _length(v: Points) -> Distances:
+    """Length of each vector [m], as ``np.linalg.norm``, which takes twice as long."""
+    x, y, z = v.T
+    return np.sqrt(x * x + y * y + z * z)
+
+
 def ellipsoid(centre: ArrayLike, radii: ArrayLike, turn: ArrayLike = STILL) -> Field:
     """Ellipsoid about a centre, turned by xyz Euler angles [degrees]; exact on its surface."""
     c, r = np.asarray(centre, float), np.asarray(radii, float)
@@ -29,7 +35,7 @@ def ellipsoid(centre: ArrayLike, radii: ArrayLike, turn: ArrayLike = STILL) -> F
 
     def field(p: Points) -> Distances:
         q = (p - c) @ axes
-        k0, k1 = np.linalg.norm(q / r, axis=1), np.linalg.norm(q / r**2, axis=1)
+        k0, k1 = _length(q / r), _length(q / r**2)
         return k0 * (k0 - 1) / (k1 + 1e-9)
 
     return field
@@ -37,7 +43,7 @@ def ellipsoid(centre: ArrayLike, radii: ArrayLike, turn: ArrayLike = STILL) -> F
 
 def sphere(centre: ArrayLike, radius: float) -> Field:
     """Sphere."""
-    return lambda p: np.linalg.norm(p - np.asarray(centre, float), axis=1) - radius
+    return lambda p: _length(p - np.asarray(centre, float)) - radius
 
 
 def capsule(start: ArrayLike, end: ArrayLike, first: float, last: float) -> Field:
@@ -46,7 +52,7 @@ def capsule(start: ArrayLike, end: ArrayLike, first: float, last: float) -> Fiel
 
     def field(p: Points) -> Distances:
         t = np.clip((p - a) @ axis / (axis @ axis), 0, 1)
-        return np.linalg.norm(p - a - t[:, None] * axis, axis=1) - (first + (last - first) * t)
+        return _length(p - a - t[:, None] * axis) - (first + (last - first) * t)
 
     return field
 

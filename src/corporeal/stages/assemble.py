@@ -2,15 +2,13 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Literal
 
 import numpy as np
 
-from corporeal import store
 from corporeal.errors import BadFileError, UserError, check_range
-from corporeal.formats.any_model import READ, Frame, Unit, read_model
+from corporeal.formats.any_model import READ, Frame, read_model
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
 from corporeal.formats.sources import models_in, pictures_in
 from corporeal.formats.typical_extents import doubt, likely_unit
@@ -28,40 +26,13 @@ from corporeal.geometry.arrangement import (
 from corporeal.geometry.beginnings import begun, said_lift, said_velocity
 from corporeal.geometry.gaussians import Up
 from corporeal.geometry.sizes import said_extent
+from corporeal.settings.assemble_config import AssembleConfig
 from corporeal.types import Objects, Scene, SceneObject
 
 SHORTEST, LONGEST = 1.0, 3.0
 """Bounds of the time that is watched when nobody says how long [s]."""
 FPS = 30
 """Frames per second of the film when nobody says."""
-
-
-@dataclass(frozen=True)
-class AssembleConfig:
-    """How files become a scene."""
-
-    objects: Literal["auto", "one", "nodes"] = "auto"
-    """What counts as one object within a file: the nodes that state a class, else the pieces that
-    touch no other or are named as things of their own (auto); the whole file (one); every branch
-    below the root (nodes)."""
-    stack: bool = False
-    """Put the files above each other, the first at the bottom, instead of side by side."""
-    drop: float = 0.0
-    """Raise each object above what it stands on by this many times its own size."""
-    lift: tuple[str, ...] = field(default=(), metadata=store.LATER)
-    """Raise an object above where it stands, such as "duck=0.5" [m]."""
-    velocity: tuple[str, ...] = field(default=(), metadata=store.LATER)
-    """An object's initial velocity, such as "duck=1,0,-2" [m/s]."""
-    extent: tuple[str, ...] = ()
-    """Largest real extent of an object, such as "duck=0.1" [m]."""
-    unit: Unit = "auto"
-    """Length of one unit of a mesh file; auto: as stated, else what its size makes likely."""
-    working_extent: float | None = None
-    """Scale the whole scene so that its largest extent is this [m]."""
-    duration: float | None = None
-    """Simulated time [s]; by default from the scene file, else long enough for the falls."""
-    fps: int | None = None
-    """Frames per second of the film; by default from the scene file, else 30."""
 
 
 DEFAULT = AssembleConfig()

@@ -2,8 +2,7 @@
 
 import re
 from collections.abc import Iterable
-from dataclasses import dataclass, replace
-from typing import Literal
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Float, Int
@@ -24,6 +23,7 @@ from corporeal.geometry.sizes import in_scene, is_scaled, scale_of_part
 from corporeal.geometry.survey import Anatomy
 from corporeal.materials import find
 from corporeal.mpm.physics.prescribed import start_velocity
+from corporeal.settings.fill_config import FillConfig
 from corporeal.treatment.loose_contents import in_vessels, pour_out, wetted
 from corporeal.treatment.object_masses import (
     as_heavy_as_stated,
@@ -33,19 +33,6 @@ from corporeal.treatment.object_masses import (
 from corporeal.treatment.plan import Plan, Quality
 from corporeal.treatment.resolution import Accuracy, Bodies, resolve
 from corporeal.types import ROUNDING, Material, MaterialField, Particles, Parts, Scene, Treatment
-
-
-@dataclass(frozen=True)
-class FillConfig:
-    """How objects are filled with material points."""
-
-    detail: Literal["draft", "normal", "fine"] = "draft"
-    """Spatial resolution and step budget; the only setting of accuracy."""
-    stiffness: Literal["true", "capped"] = "true"
-    """Young's moduli as measured, or capped by the published rule, which is a control only."""
-    seed: int = 0
-    """Seed of all random numbers."""
-
 
 DEFAULT = FillConfig()
 COUNTED = re.compile(r"Object (\d+) of the scene")

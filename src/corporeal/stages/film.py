@@ -25,7 +25,7 @@ from corporeal.geometry.srgb import linear
 from corporeal.mpm.laws import MENU
 from corporeal.render import colours, key, video
 from corporeal.render.camera import Aim, camera_of
-from corporeal.render.camera_track import Reel, Shot, first_contact, track
+from corporeal.render.camera_track import Reel, first_contact, track
 from corporeal.render.embree import Stage
 from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, row_of, shades, si
 from corporeal.render.film_picture import FilmCaster
@@ -33,6 +33,7 @@ from corporeal.render.liquid_surface import LiquidSurface, surface_of
 from corporeal.render.pace import between, instants, is_slow
 from corporeal.render.sightlines import clear_view
 from corporeal.render.skin import Skin, bind
+from corporeal.settings.film_config import FilmConfig
 from corporeal.splats import raster
 from corporeal.store import writing
 from corporeal.trajectory.moving_gaussians import MovingGaussians, fluid, granular, moving_gaussians
@@ -69,35 +70,6 @@ FAR = 2.5
 """Sizes of the scene beyond which the camera lets objects go."""
 
 Progress = Callable[[float, str], None]
-
-
-@dataclass(frozen=True)
-class FilmConfig:
-    """Camera, size and quality of the film."""
-
-    width: int = 1280
-    """[px]"""
-    height: int = 720
-    """[px]"""
-    quality: Literal["draft", "normal", "fine"] = "draft"
-    """Rays per pixel; draft casts none where nothing moves, and more at edges."""
-    speed: float = 1.0
-    """Playback speed; 1: real time, 0.25: four times slower."""
-    view: Vector | None = None
-    """Direction from the scene to the camera; None: where objects occlude each other least."""
-    stills: bool = False
-    """Also keep every frame as PNG."""
-    look: Literal["surfaces", "gaussians"] | None = None
-    """What is rendered; None: Gaussians where the scene was reconstructed, else surfaces."""
-    colour_by: Literal["itself", "speed"] | Quantity = "itself"
-    """Quantity shown by colour, with a colour bar; itself: the objects' own colours."""
-    shot: Shot = "wide"
-    """wide: everything, all the time; close: what is struck first, or moves most; follow: the
-    camera goes along with what moves."""
-    slow: float = 1.0
-    """How many times slower the film is about the first contact."""
-    caption: bool = True
-    """Write the time into the picture."""
 
 
 DEFAULT = FilmConfig()

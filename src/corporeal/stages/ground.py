@@ -23,6 +23,7 @@ from corporeal.materials.inflated import (
 from corporeal.materials.placement import CONTENTS, entry_of, held
 from corporeal.materials.scale import place
 from corporeal.mpm.laws import MENU
+from corporeal.settings.ground_config import GroundConfig
 from corporeal.types import (
     Ground,
     Inventory,
@@ -35,22 +36,6 @@ from corporeal.types import (
     Scene,
     Structure,
 )
-
-
-@dataclass(frozen=True)
-class GroundConfig:
-    """Where the numbers come from."""
-
-    library: str = "default"
-    """"default", "reference" (the 22 materials as first published), or the path of a TOML file."""
-    floor: str = "concrete"
-    """What the floor and the walls are made of, for friction and rebound."""
-    neutral: str = "plastics-PP"
-    """What stands in for a part of unknown material."""
-    field: str = ""
-    """Numbers of another method instead of ours: vomp:PATH, pixie:PATH or table:PATH.csv (a file of
-    the scene, or a folder with one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs."""
-
 
 DEFAULT = GroundConfig()
 BUILT_BY = {

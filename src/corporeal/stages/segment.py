@@ -1,7 +1,7 @@
 """Segment: say of every point which object and which part it belongs to."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -12,19 +12,12 @@ from corporeal.features import Reader, connect
 from corporeal.geometry.identity import identify
 from corporeal.regions.naming import Named, name_parts, phrases
 from corporeal.regions.parts import PartsConfig
+from corporeal.settings.segment_config import SegmentConfig
 from corporeal.types import Cloud, Inventory, ObjectWords, Part, Parts, Reconstruction, Scene
 from corporeal.vlm.metadata import matter_hint
 
 VOTERS = 5
 """Points nearest to a triangle that say what part it is of."""
-
-
-@dataclass(frozen=True)
-class SegmentConfig:
-    """Part segmentation of objects from pictures; a model's parts are its nodes and materials."""
-
-    position_weight: float = 0.3
-    """Weight of position relative to appearance features; 0: position is not used."""
 
 
 DEFAULT = SegmentConfig()

@@ -5,12 +5,11 @@ whatever stops a simulation, the same call goes on from there exactly as if noth
 A scene declared as settled is brought to equilibrium first (``trajectory.static_equilibrium``).
 """
 
-import logging
 from collections.abc import Callable
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any
 
 import numpy as np
 
@@ -19,6 +18,7 @@ from corporeal.errors import SimulationError, UserError
 from corporeal.findings import Settled, SettledObject
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import MENU, Engine, Problem
+from corporeal.settings.simulate_config import SimulateConfig
 from corporeal.trajectory.audit import audit
 from corporeal.trajectory.audit_file import write_audit
 from corporeal.trajectory.breaking import break_up, next_blow
@@ -49,27 +49,6 @@ SETTLING = "settling.json"
 Progress = Callable[[float, str], None]
 Build = Callable[[Problem], Engine]
 Relax = Callable[[], dict[str, np.ndarray]]
-
-
-@dataclass(frozen=True)
-class SimulateConfig:
-    """Solver settings; none of them changes material numbers."""
-
-    engine: Literal["cpu", "cuda", "reference", "warp"] = "cpu"
-    """cpu: the fast engine; cuda: the same on a CUDA card; reference: NumPy in double precision,
-    slow, which the others are tested against; warp: the former name of cpu."""
-    contact: Literal["multi", "single"] = "multi"
-    """multi: one velocity field per object, with friction between them; single: one field for all,
-    a control in which touching objects stick together."""
-    breaking: bool = field(default=False, metadata=store.LATER)
-    """Brittle things that are struck with ten times the energy that they bear break into pieces;
-    else they stay whole, and it is said what would break."""
-
-    def __post_init__(self) -> None:
-        """Take the former name of an engine for its present one, and say so."""
-        if self.engine == "warp":
-            logging.getLogger(__name__).warning("The engine 'warp' is called 'cpu' now.")
-            object.__setattr__(self, "engine", "cpu")
 
 
 DEFAULT = SimulateConfig()

@@ -1,0 +1,1 @@
+"""What a person may ask of every verb: read without what does it."""

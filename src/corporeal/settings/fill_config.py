@@ -1,0 +1,16 @@
+"""How objects are filled with material points: what a person may ask."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+
+@dataclass(frozen=True)
+class FillConfig:
+    """How objects are filled with material points."""
+
+    detail: Literal["draft", "normal", "fine"] = "draft"
+    """Spatial resolution and step budget; the only setting of accuracy."""
+    stiffness: Literal["true", "capped"] = "true"
+    """Young's moduli as measured, or capped by the published rule, which is a control only."""
+    seed: int = 0
+    """Seed of all random numbers."""

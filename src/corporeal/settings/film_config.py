@@ -1,0 +1,36 @@
+"""Camera, size and quality of a film: what a person may ask."""
+
+from dataclasses import dataclass
+from typing import Literal
+
+from corporeal.render.choices import Quantity, Shot
+from corporeal.types import Vector
+
+
+@dataclass(frozen=True)
+class FilmConfig:
+    """Camera, size and quality of the film."""
+
+    width: int = 1280
+    """[px]"""
+    height: int = 720
+    """[px]"""
+    quality: Literal["draft", "normal", "fine"] = "draft"
+    """Rays per pixel; draft casts none where nothing moves, and more at edges."""
+    speed: float = 1.0
+    """Playback speed; 1: real time, 0.25: four times slower."""
+    view: Vector | None = None
+    """Direction from the scene to the camera; None: where objects occlude each other least."""
+    stills: bool = False
+    """Also keep every frame as PNG."""
+    look: Literal["surfaces", "gaussians"] | None = None
+    """What is rendered; None: Gaussians where the scene was reconstructed, else surfaces."""
+    colour_by: Literal["itself", "speed"] | Quantity = "itself"
+    """Quantity shown by colour, with a colour bar; itself: the objects' own colours."""
+    shot: Shot = "wide"
+    """wide: everything, all the time; close: what is struck first, or moves most; follow: the
+    camera goes along with what moves."""
+    slow: float = 1.0
+    """How many times slower the film is about the first contact."""
+    caption: bool = True
+    """Write the time into the picture."""

@@ -1,0 +1,28 @@
+"""Which engine steps a scene: what a person may ask."""
+
+import logging
+from dataclasses import dataclass, field
+from typing import Literal
+
+from corporeal import store
+
+
+@dataclass(frozen=True)
+class SimulateConfig:
+    """Solver settings; none of them changes material numbers."""
+
+    engine: Literal["cpu", "cuda", "reference", "warp"] = "cpu"
+    """cpu: the fast engine; cuda: the same on a CUDA card; reference: NumPy in double precision,
+    slow, which the others are tested against; warp: the former name of cpu."""
+    contact: Literal["multi", "single"] = "multi"
+    """multi: one velocity field per object, with friction between them; single: one field for all,
+    a control in which touching objects stick together."""
+    breaking: bool = field(default=False, metadata=store.LATER)
+    """Brittle things that are struck with ten times the energy that they bear break into pieces;
+    else they stay whole, and it is said what would break."""
+
+    def __post_init__(self) -> None:
+        """Take the former name of an engine for its present one, and say so."""
+        if self.engine == "warp":
+            logging.getLogger(__name__).warning("The engine 'warp' is called 'cpu' now.")
+            object.__setattr__(self, "engine", "cpu")
