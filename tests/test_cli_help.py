@@ -82,14 +82,28 @@ def value(annotation):
     return {int: ["7"], float: ["7.5"], str: ["x"], Path: ["x"]}[annotation]
 
 
-@pytest.mark.parametrize("option", options_of(Everything), ids=lambda option: option.name)
-def test_every_option_means_the_same_wherever_it_stands_in_the_help(option):
+def words_of(option):
+    """Return words for the command line that type an option."""
     if option.positional:
-        words = ["a.glb", "b.glb"]
-    elif option.annotation is bool:
-        words = ["a.glb", f"--{'no-' if option.default else ''}{option.name}"]
-    else:
-        words = ["a.glb", f"--{option.name}", *value(option.annotation)]
+        return ["b.glb"]
+    if option.annotation is bool:
+        return [f"--{'no-' if option.default else ''}{option.name}"]
+    return [f"--{option.name}", *value(option.annotation)]
+
+
+NUMBERED = list(enumerate(options_of(Everything), start=1))
+LINES = range(len(NUMBERED).bit_length())
+
+
+@pytest.mark.parametrize("line", LINES)
+def test_every_option_means_the_same_wherever_it_stands_in_the_help(line):
+    """A line has the options with one bit in their numbers: each in some, no two in the same ones.
+
+    So one that is taken for another shows in a line that has only one of them.
+    """
+    words = ["a.glb"]
+    for number, option in sorted(NUMBERED, key=lambda one: not one[1].positional):
+        words += words_of(option) if number >> line & 1 else []
     layout = lay_out(Everything, NEEDED)
     plain = tyro.cli(tyro.conf.OmitArgPrefixes[Everything], args=words)
     ordered = layout.settings(tyro.cli(tyro.conf.OmitArgPrefixes[layout.shape], args=words))

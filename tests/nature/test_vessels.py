@@ -24,17 +24,18 @@ def test_a_wall_that_does_not_fall_on_nodes_holds_it_too(fast_engine):
 @pytest.mark.slow
 def test_through_a_thin_wall_water_leaks_but_for_its_true_surface(fast_engine):
     """A wall of .08 cells, half a second; control: it is met where the grid sees its points."""
-    errors, leaks = [], []
-    for wetted in (True, False):
-        glass = Tumbler(0.006, wall=0.0005, wetted=wetted)
-        run = fast_engine(glass.posed())
-        run.advance(0.5)
-        errors.append(level_error(run, glass))
-        leaks.append(outside(run, glass))
-    assert abs(errors[0]) < 0.01
-    assert leaks[0] == 0
-    assert errors[1] < -0.1
-    assert leaks[1] > 0.05
+    glass = Tumbler(0.006, wall=0.0005)
+    run = fast_engine(glass.posed())
+    run.advance(0.5)
+    assert abs(level_error(run, glass)) < 0.01
+    assert outside(run, glass) == 0
+    control = Tumbler(0.006, wall=0.0005, wetted=False)
+    run = fast_engine(control.posed())
+    leaked = False
+    while run.time < 0.5 and not leaked:  # what has leaked does not come back
+        run.advance(run.time + 0.05)
+        leaked = outside(run, control) > 0.05 and level_error(run, control) < -0.1
+    assert leaked
 
 
 @pytest.mark.parametrize("name", ["reference", "cpu", "cuda"])

@@ -25,17 +25,29 @@ def creased(surface: Surface) -> Surface:
     a, b, c = (surface.vertices[surface.triangles[:, k]] for k in range(3))
     area = np.cross(b - a, c - a)
     flat = _unit(area)
-    _, place = np.unique(surface.vertices, axis=0, return_inverse=True)
     total = area.repeat(3, axis=0)
-    for corner, other in _around(place.reshape(-1)[surface.triangles].reshape(-1)):
-        mine, its = corner // 3, other // 3
-        smooth = np.einsum("pi,pi->p", flat[mine], flat[its]) > np.cos(np.radians(SHARP))
-        np.add.at(total, corner[smooth], area[its[smooth]])
+    for first, second in _around(_place(surface.vertices)[surface.triangles].reshape(-1)):
+        one, other = first // 3, second // 3
+        alike = np.einsum("pi,pi->p", flat.take(one, axis=0), flat.take(other, axis=0))
+        smooth = alike > np.cos(np.radians(SHARP))
+        # Each corner stands at most once on either side.
+        total[first[smooth]] += area.take(other[smooth], axis=0)
+        total[second[smooth]] += area.take(one[smooth], axis=0)
     return _split(surface, _unit(total))
 
 
+def _place(vertices: Float[np.ndarray, "V 3"]) -> Int[np.ndarray, " V"]:
+    """Give each vertex the number of its place: those at one place have the same."""
+    order = np.lexsort(vertices.T)  # a third of the time of sorting rows
+    there = vertices[order]
+    place = np.empty(len(order), np.int64)
+    place[order[:1]] = 0
+    place[order[1:]] = np.cumsum((there[1:] != there[:-1]).any(axis=1))
+    return place
+
+
 def _around(place: Int[np.ndarray, " C"]) -> Iterator[tuple[np.ndarray, np.ndarray]]:
-    """Yield all pairs of different corners at one place, those of every distance in turn."""
+    """Yield all pairs of different corners at one place, each once, of every distance in turn."""
     order = np.argsort(place, kind="stable")
     sorted_place = place[order]
     crowded = np.bincount(place)[sorted_place] > FAN
@@ -43,8 +55,7 @@ def _around(place: Int[np.ndarray, " C"]) -> Iterator[tuple[np.ndarray, np.ndarr
         same = (sorted_place[step:] == sorted_place[:-step]) & ~crowded[step:]
         if not same.any():
             return
-        first, second = order[:-step][same], order[step:][same]
-        yield np.concatenate([first, second]), np.concatenate([second, first])
+        yield order[:-step][same], order[step:][same]
 
 
 def _split(surface: Surface, normals: Float[np.ndarray, "C 3"]) -> Surface:

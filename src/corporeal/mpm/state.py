@@ -158,6 +158,17 @@ class Matter:
         return self.substances.flows[self.kind]
 
     @cached_property
+    def pours(self) -> Bool[np.ndarray, " B"]:
+        """Whether each body holds a liquid."""
+        poured = self.body[np.isin(self.law, laws.LIQUID)]
+        return np.bincount(poured, minlength=len(self.total)) > 0
+
+    @cached_property
+    def inverse_inertia(self) -> Float[np.ndarray, "B 3 3"]:
+        """I⁻¹ of each body at the start [1/(kg m²)]; used where rigid."""
+        return np.linalg.inv(self.inertia)
+
+    @cached_property
     def half_spacing(self) -> Float[np.ndarray, " P"]:
         """r0: half the distance between particles at rest [m]."""
         return 0.5 * np.cbrt(self.volume)
@@ -272,12 +283,7 @@ class State:
 
     def inverse_inertia(self, matter: Matter) -> Float[np.ndarray, "B 3 3"]:
         """I⁻¹ of every body in the world frame [1/(kg m²)]; meaningful where rigid."""
-        return np.stack(
-            [
-                rigid.world_inverse_inertia(R, inertia)
-                for R, inertia in zip(self.rotation, matter.inertia, strict=True)
-            ]
-        )
+        return self.rotation @ matter.inverse_inertia @ np.swapaxes(self.rotation, 1, 2)
 
     def follow_rigid(self, matter: Matter) -> "State":
         """Put the particles of rigid bodies where the bodies are: x = X + R r₀, v = V + ω × r."""

@@ -147,30 +147,38 @@ def finer(mesh: Mesh, edge: float) -> Mesh:
     Edges that are the longest of all their triangles are cut in the middle, again and again
     (Rivara 1984, longest-edge bisection).
     """
+    while (halved := _halved(mesh, edge)) is not None:
+        mesh = halved
+    return mesh
+
+
+def _halved(mesh: Mesh, edge: float) -> Mesh | None:
+    """Cut edges that are the longest of all their triangles, once; None: none is too long."""
     vertices, triangles = mesh.vertices, mesh.triangles
-    while True:
-        ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
-        # One number per edge: rows are sorted twenty times slower.
-        key, of_side = np.unique(ends[..., 0] * len(vertices) + ends[..., 1], return_inverse=True)
-        unique = np.stack(np.divmod(key, len(vertices)), axis=1)
-        of_side = of_side.reshape(-1, 3)
-        length = np.linalg.norm(vertices[unique[:, 0]] - vertices[unique[:, 1]], axis=1)
-        if not (length > edge).any():
-            return Mesh(vertices, triangles)
-        rank = np.empty(len(length), dtype=np.int64)
-        rank[np.argsort(length, kind="stable")] = np.arange(len(length))
-        side = np.argmax(rank[of_side], axis=1)
-        longest = np.take_along_axis(of_side, side[:, None], axis=1)[:, 0]
-        shared = np.bincount(of_side.ravel(), minlength=len(length))
-        cut = (np.bincount(longest, minlength=len(length)) == shared) & (length > edge)
-        middle = np.full(len(length), -1)
-        middle[cut] = len(vertices) + np.arange(np.count_nonzero(cut))
-        halved = np.flatnonzero(cut[longest])
-        a, b, c = (triangles[halved, (side[halved] + k) % 3] for k in range(3))
-        m = middle[longest[halved]]
-        vertices = np.concatenate([vertices, vertices[unique[cut]].mean(axis=1)])
-        halves = [np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)]
-        triangles = np.concatenate([np.delete(triangles, halved, axis=0), *halves])
+    ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
+    # One number per edge: rows are sorted twenty times slower.
+    key, of_side = np.unique(ends[..., 0] * len(vertices) + ends[..., 1], return_inverse=True)
+    unique = np.stack(np.divmod(key, len(vertices)), axis=1)
+    of_side = of_side.reshape(-1, 3)
+    length = np.linalg.norm(vertices[unique[:, 0]] - vertices[unique[:, 1]], axis=1)
+    if not (length > edge).any():
+        return None
+    rank = np.empty(len(length), dtype=np.int64)
+    rank[np.argsort(length, kind="stable")] = np.arange(len(length))
+    side = np.argmax(rank[of_side], axis=1)
+    longest = np.take_along_axis(of_side, side[:, None], axis=1)[:, 0]
+    shared = np.bincount(of_side.ravel(), minlength=len(length))
+    cut = (np.bincount(longest, minlength=len(length)) == shared) & (length > edge)
+    middle = np.full(len(length), -1)
+    middle[cut] = len(vertices) + np.arange(np.count_nonzero(cut))
+    halved = np.flatnonzero(cut[longest])
+    a, b, c = (triangles[halved, (side[halved] + k) % 3] for k in range(3))
+    m = middle[longest[halved]]
+    halves = [np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)]
+    return Mesh(
+        np.concatenate([vertices, vertices[unique[cut]].mean(axis=1)]),
+        np.concatenate([np.delete(triangles, halved, axis=0), *halves]),
+    )
 
 
 def _barycentric(points: np.ndarray, corners: np.ndarray) -> Float[np.ndarray, "N 3"]:

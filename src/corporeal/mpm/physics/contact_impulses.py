@@ -42,8 +42,9 @@ class Movers:
         self, mover: Int[np.ndarray, " E"], point: Float[np.ndarray, "E 3"]
     ) -> Float[np.ndarray, "E 3"]:
         """V + ω × r of each mover at a point [m/s]."""
-        arm = point - self.centre[mover]
-        return self.velocity[mover] + np.cross(self.spin[mover], arm)
+        (p, q, r), (x, y, z) = self.spin[mover].T, (point - self.centre[mover]).T
+        turning = np.stack([q * z - r * y, r * x - p * z, p * y - q * x], axis=1)
+        return self.velocity[mover] + turning
 
 
 class Contacts(NamedTuple):

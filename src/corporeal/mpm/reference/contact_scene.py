@@ -6,7 +6,6 @@ from typing import Protocol
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
-from corporeal.mpm import laws
 from corporeal.mpm.constants import STICKS, TINY_DOUBLE
 from corporeal.mpm.physics import contact, contact_impulses, rigid, wall_stress
 from corporeal.mpm.physics.rounding import shift_to_contact
@@ -87,8 +86,9 @@ class Scene:
 
     def pours(self, field: int) -> bool:
         """Whether a field holds a liquid."""
-        mine = self.matter.law[self.single | (self.matter.body == field)]
-        return not self.is_rigid(field) and bool(np.isin(mine, laws.LIQUID).any())
+        if self.is_rigid(field):
+            return False
+        return bool(self.matter.pours.any() if self.single else self.matter.pours[field])
 
     def full(self, field: int, slot: Int[np.ndarray, " E"]) -> Float[np.ndarray, " E"]:
         """Masses of a field's nodes over that of a cell full of its body [-]."""

@@ -71,6 +71,8 @@ def carry(
     """
     mass, velocity = slots
     bodies = len(state.centre)
+    if not len(load.particle):
+        return Loaded(velocity, state, np.zeros((bodies, 3)), 0.0)
     single = len(np.unique(grid.field)) < bodies
     free = matter.rigid & (not single)
     impulse = np.zeros((bodies, 3))
