@@ -370,14 +370,22 @@ def _adjectives(name: Name) -> list[Term]:
             beside = next((t for t in things if name.says(t.phrase + term.phrase)), None)
         if beside and beside.material not in term.gives_way:
             standing[k] = _made_as(term, beside)
-    return [s for s in standing if not _is_purpose(s, name, things)]
+    solid = any(s.kind == "substance" and s.material not in LOOSE for s in standing)
+    return [
+        s
+        for s in standing
+        if not (solid and _lies_loose(s) and len(s.phrase) == 1)
+        and not _is_purpose(s, name, things)
+    ]
+
+
+def _lies_loose(term: Term) -> bool:
+    return term.kind == "substance" and term.material in LOOSE
 
 
 def _is_purpose(term: Term, name: Name, things: Sequence[Term]) -> bool:
     """Tell whether what lies loose stands beside a thing that is for it, and not made of it."""
-    if term.kind != "substance" or term.material not in LOOSE:
-        return False
-    return any(
+    return _lies_loose(term) and any(
         t.phrase[-1] not in SHAPED | OF_IT
         or not (name.says(term.phrase + t.phrase) or name.says(t.phrase + term.phrase))
         for t in things
