@@ -402,6 +402,9 @@ def test_what_has_no_usual_wall_is_no_shell_by_its_name():
         ("SurfBoard", "rigid_foam"),
         ("wineglas", "glass"),
         ("treestump", "wood"),
+        ("yoga_mat.001", "EVA_foam"),
+        ("chess piece", "wood"),
+        ("Mat_12", None),
         ("canon", None),
     ],
 )

@@ -151,7 +151,8 @@ def _by_first_word() -> dict[str, list[Term]]:
 def tokens_of(name: str) -> tuple[str, ...]:
     """Return a name's words in English and the singular, without what exporters write."""
     known = _vocabulary()
-    said = [singular(mended(unaccented(w, known.words), known)) for w in in_english(words(name))]
+    english = in_english(words(name, phrases()))
+    said = [singular(mended(unaccented(w, known.words), known)) for w in english]
     return tuple(thing_last(spelt(said, known), known, phrases()))
 
 
