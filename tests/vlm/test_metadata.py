@@ -214,6 +214,7 @@ def test_a_thing_of_several_parts_does_not_say_what_each_is():
 def test_goods_are_full_until_a_word_says_otherwise():
     full = seen("mesh", "tomato soup can")
     assert (full.structure, full.contents, full.thickness) == ("filled", "sauce", 0.0002)
+    assert full.fill is not None
     assert 0.8 < full.fill <= 1
     for name in ("empty soup can", "soup can opened", "crushed tuna can"):
         said = seen("mesh", name)
