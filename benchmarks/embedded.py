@@ -39,9 +39,9 @@ def main() -> None:
         s = measured.score(mine)
         print(
             f"{group:8} {s.parts:3} parts: right {s.right:.0%}, wrong {s.wrong:.0%}, unknown "
-            f"{s.unknown:.0%}; margin orders {s.ordering:.2f}"
+            f"{s.unknown:.0%}; margin orders {_number(s.ordering)}"
         )
-    print(f"all: margin orders {measured.ordering(rows):.2f}")
+    print(f"all: margin orders {_number(measured.ordering(rows))}")
     for row in rows:
         if row.verdict == "wrong":
             print(f"  wrong: {row.file} / {row.part}: {row.answer} ({row.margin:.2f}) {row.reason}")
@@ -49,6 +49,11 @@ def main() -> None:
         store.write_json(given.json, measured.record(rows))
     if given.docs:
         DOCS.write_text(page.markdown(), encoding="utf-8")
+
+
+def _number(ordering: float | None) -> str:
+    """Write what needs a wrong answer and a right one, and may have none."""
+    return "-" if ordering is None else f"{ordering:.2f}"
 
 
 if __name__ == "__main__":

@@ -30,6 +30,8 @@ TABLES = tomllib.loads(Path(other_languages.__file__).with_suffix(".toml").read_
         ("balde rojo", "bucket red"),
         ("Стул", "chair"),
         ("ведро_02", "bucket"),
+        ("木の椅子", "wood chair"),
+        ("红木箱", "wood box"),
     ],
 )
 def test_a_thing_is_known_by_its_name_in_another_language(said, english):

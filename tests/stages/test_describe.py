@@ -70,7 +70,7 @@ def test_a_foreign_substance_is_no_obstacle():
 )
 def test_nonsense_in_a_foreign_file_is_no_obstacle(said):
     made = words(describe(scene(("vase_0", [("mesh", plain(), said)]))))[("vase_0", "vase")]
-    assert (made.material, made.structure, made.thickness) == ("ceramic", None, None)
+    assert (made.material, made.structure, made.thickness) == ("ceramic", "shell", None)
 
 
 def test_a_scene_of_a_thousand_surfaces_is_described_in_a_moment():

@@ -214,6 +214,7 @@ def test_a_thing_of_several_parts_does_not_say_what_each_is():
 def test_goods_are_full_until_a_word_says_otherwise():
     full = seen("mesh", "tomato soup can")
     assert (full.structure, full.contents, full.thickness) == ("filled", "sauce", 0.0002)
+    assert full.fill is not None
     assert 0.8 < full.fill <= 1
     for name in ("empty soup can", "soup can opened", "crushed tuna can"):
         said = seen("mesh", name)
@@ -352,6 +353,9 @@ def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
         ("box spring", None),
         ("bucket hat", None),
         ("wooden chair", None),
+        ("garden chair plastic white", "shell"),
+        ("chair_metal_01", "shell"),
+        ("cast iron bench", None),
         ("thing", None),
     ],
 )
@@ -385,7 +389,13 @@ def test_what_is_said_of_how_it_is_built_outranks_what_it_is():
 
 
 @pytest.mark.parametrize(
-    ("thing", "material"), [("snow globe", "hard_plastic"), ("sand barrel", "wood")]
+    ("thing", "material"),
+    [
+        ("snow globe", "hard_plastic"),
+        ("sand barrel", "wood"),
+        ("hourglass sand timer", "glass"),
+        ("stone base sand", "granite"),
+    ],
 )
 def test_no_wall_is_made_of_what_lies_loose(thing, material):
     """A snow globe ended the run: a shell of snow has no usual wall."""
@@ -407,6 +417,9 @@ def test_what_has_no_usual_wall_is_no_shell_by_its_name():
         ("SurfBoard", "rigid_foam"),
         ("wineglas", "glass"),
         ("treestump", "wood"),
+        ("yoga_mat.001", "EVA_foam"),
+        ("chess piece", "wood"),
+        ("Mat_12", None),
         ("canon", None),
     ],
 )
@@ -418,3 +431,11 @@ def test_a_substance_behind_the_thing_is_what_it_is_made_of():
     found = seen("mesh", "watering can zinc")
     assert (found.material, found.structure) == ("zinc", "shell")
     assert seen("mesh", "bucket sand").structure is None
+
+
+@pytest.mark.parametrize(
+    ("thing", "material"),
+    [("Stone and Beam stoneware vase", "ceramic"), ("stone stoneware", None)],
+)
+def test_of_two_substances_the_one_beside_the_thing_is_meant(thing, material):
+    assert seen("mesh", thing).material == material

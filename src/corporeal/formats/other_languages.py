@@ -1,6 +1,7 @@
 """Names in other languages, as far as they name everyday things and what these are made of."""
 
 import tomllib
+import unicodedata
 from collections.abc import Iterator, Sequence
 from functools import cache
 from pathlib import Path
@@ -10,6 +11,8 @@ from corporeal.geometry.identity import plain
 OF = frozenset("de del di du des da do della dello en".split())
 """What stands between a thing and what belongs to it: "caja de carton" is a box of cardboard."""
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
+GAPLESS = ("CJK ", "HIRAGANA ", "KATAKANA ")
+"""Letters of languages that are written without gaps."""
 SHORTEST = 3
 """Letters before the last word of a compound."""
 
@@ -50,18 +53,21 @@ def _translated(word: str) -> tuple[str, ...]:
 
 
 def _pieced(word: str) -> tuple[str, ...]:
-    """Return the English of known words that stand together without a gap; (): some are unknown.
+    """Return the English of known words that stand together without a gap; (): the last is unknown.
 
-    Chinese and Japanese are written so: 木箱 is a box of wood.
+    Chinese and Japanese are written so, the thing last: 木箱 is a box of wood, 木の箱 too. What is
+    not known before it is left out there, and nowhere else.
     """
+    gapless = all(unicodedata.name(c, "").startswith(GAPLESS) for c in word)
     found: list[str] = []
+    known = 0
     while word:
         known = next((k for k in range(len(word), 0, -1) if word[:k] in _words()), 0)
-        if not known:
+        if not known and not gapless:
             return ()
-        found += _words()[word[:known]]
-        word = word[known:]
-    return tuple(found)
+        found += _words()[word[:known]] if known else ()
+        word = word[known or 1 :]
+    return tuple(found) if known else ()
 
 
 @cache

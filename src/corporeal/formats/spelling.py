@@ -4,6 +4,8 @@ import re
 from collections.abc import Container, Mapping, Sequence
 from dataclasses import dataclass
 
+from corporeal.geometry.identity import plain
+
 SHORTEST = 3
 """Letters of the shortest word that a compound is taken apart into."""
 LONGER = 4
@@ -58,6 +60,12 @@ def spelt(words: Sequence[str], known: Vocabulary) -> list[str]:
     """
     right = [mended(word, known) for word in words]
     return [part for word in _together(right, known) for part in _apart(word, known)]
+
+
+def unaccented(word: str, known: Container[str]) -> str:
+    """Return a word without its accents where only this is known: "métal"."""
+    bare = plain(word)
+    return bare if bare in known else word
 
 
 def mended(word: str, known: Vocabulary) -> str:

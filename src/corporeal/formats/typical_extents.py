@@ -8,7 +8,8 @@ from functools import cache
 from pathlib import Path
 
 from corporeal.formats.other_languages import in_english, substances
-from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt
+from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt, unaccented
+from corporeal.formats.word_order import is_several, of_part, thing_last
 
 MARGIN = 1.5
 """How far beyond the table an object may be before it is reported."""
@@ -40,6 +41,8 @@ def typical_extent(class_name: str) -> TypicalExtent | None:
     "soda can" for "soda can crushed", "cup" for "tea set cup": English puts the noun last.
     """
     words = words_in(class_name)
+    if is_several(plain_words(class_name)):
+        return None
     found = [e for e in _table() if set(singular_words(e.words)) <= set(words)]
     return max(found, key=lambda e: _fit(e, words), default=None)
 
@@ -62,10 +65,17 @@ def nouns(class_name: str, compounds: Mapping[str, tuple[str, ...]]) -> list[str
         compounds: A known compound → the words that it is made of.
 
     """
-    said = in_english(re.findall(r"[^\W\d_]+", class_name.lower()))
     known = _vocabulary()
+    said = [unaccented(w, known.words) for w in in_english(plain_words(class_name))]
     tokens = spelt([_singular(mended(w, known)) for w in said], known)
-    return [part for word in tokens for part in compounds.get(word, (word,))]
+    phrases = frozenset((*known.joined.values(), *compounds.values()))
+    ordered = of_part(thing_last(tokens, known, phrases), phrases)
+    return [part for word in ordered for part in compounds.get(word, (word,))]
+
+
+def plain_words(class_name: str) -> list[str]:
+    """Return a name's runs of letters in lower case."""
+    return re.findall(r"[^\W\d_]+", class_name.lower())
 
 
 PLURALS = frozenset(

@@ -13,7 +13,7 @@ VENDORS = frozenset(
 FILLERS = frozenset(
     "notex visual textured texture model mesh meshes scene root node object obj geometry geom lib "
     "lowpoly lp low poly high hp lod final copy export untitled default material mat group fbx dae "
-    "gltf glb draft version defaultmaterial rootnode nonetype the a an of by".split()
+    "gltf glb draft version defaultmaterial rootnode nonetype the a an".split()
 )
 
 

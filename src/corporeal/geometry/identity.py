@@ -3,7 +3,7 @@
 import re
 import unicodedata
 import zlib
-from collections.abc import Callable, Hashable
+from collections.abc import Callable, Collection, Hashable
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -41,13 +41,24 @@ class Identity:
         return np.flatnonzero(self.part_of_surface == part).tolist()
 
 
-def words(name: str) -> list[str]:
+def words(name: str, phrases: Collection[tuple[str, ...]] = ()) -> list[str]:
     """Split a name into lower-case words, without what exporters write.
 
     ``"M_LeatherParts.001"`` gives ``["leather", "parts"]``.
+
+    Args:
+        name: Of a node, a mesh, a finish or a file.
+        phrases: Of two words in which such a word means something: "yoga mat", "ice cube".
+
     """
     found = [w.lower() for run in letter_runs(name) for w in _cut(run)]
-    return [w for w in found if says_something(w) and w not in NOISE]
+    pairs = [pair in phrases for pair in pairwise(found)]
+    meant = [a or b for a, b in zip([False, *pairs], [*pairs, False], strict=True)]
+    return [w for w, m in zip(found, meant, strict=False) if m or _means(w)]
+
+
+def _means(word: str) -> bool:
+    return says_something(word) and word not in NOISE
 
 
 def _cut(run: str) -> list[str]:

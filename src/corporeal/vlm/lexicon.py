@@ -2,14 +2,15 @@
 
 import colorsys
 import tomllib
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.resources import files
 
 from corporeal.formats.other_languages import in_english
-from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt
+from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt, unaccented
 from corporeal.formats.typical_extents import classes
+from corporeal.formats.word_order import part_words, thing_last
 from corporeal.geometry.identity import words
 from corporeal.types import Finish
 
@@ -88,11 +89,20 @@ def heads(tokens: tuple[str, ...]) -> list[Term]:
     standing = [
         (k, term) for k, term in _standing_in(tokens) if _is_of_it(term, _after(tokens, k, term))
     ]
+    head = _head(tokens)
+    if head is not None and tokens[head] in _holders():
+        standing = [(k, s) for k, s in standing if s.kind != "thing" or k + len(s.phrase) > head]
     last: dict[int, int] = {}
     for k, term in standing:
         if term.kind == "thing":
             last[len(term.phrase)] = k
     return [s for k, s in standing if s.kind != "thing" or k == last[len(s.phrase)]]
+
+
+def _head(tokens: tuple[str, ...]) -> int | None:
+    """Return where the last noun of a name stands, which is the thing; None: no noun is known."""
+    nouns = _nouns() - _describing()
+    return next((k for k in range(len(tokens) - 1, -1, -1) if tokens[k] in nouns), None)
 
 
 def _is_of_it(term: Term, following: str) -> bool:
@@ -141,20 +151,18 @@ def _by_first_word() -> dict[str, list[Term]]:
 def tokens_of(name: str) -> tuple[str, ...]:
     """Return a name's words in English and the singular, without what exporters write."""
     known = _vocabulary()
-    said = [singular(mended(w, known)) for w in in_english(words(name))]
-    return without_place(tuple(spelt(said, known)))
+    english = in_english(words(name, phrases()))
+    said = [singular(mended(unaccented(w, known.words), known)) for w in english]
+    return tuple(thing_last(spelt(said, known), known, phrases()))
 
 
-def without_place(tokens: tuple[str, ...]) -> tuple[str, ...]:
-    """Leave out what a thing is said to lie on: a ball on a wooden floor is not of wood.
-
-    Only behind what is known as a thing: a clip-on lamp is a lamp.
-    """
-    if "on" not in tokens[1:-1]:
-        return tokens
-    before = tokens[: tokens.index("on", 1)]
-    things = any(term.kind == "thing" for _, term in _standing_in(before))
-    return before if things or not set(before).isdisjoint(_sizes()) else tokens
+@cache
+def phrases() -> frozenset[tuple[str, ...]]:
+    """Return every name of a thing that is more than one word."""
+    listed = (phrase for table in ("hollow", "open", "cast") for phrase in _listed(table))
+    sizes = (tuple(singular(w) for w in name.split()) for name in classes())
+    named = (*(term.phrase for term in lexicon()), *listed, *sizes)
+    return frozenset(phrase for phrase in named if len(phrase) > 1)
 
 
 @cache
@@ -199,6 +207,18 @@ def hollow(tokens: tuple[str, ...]) -> bool:
     return _is_one(tokens, "hollow")
 
 
+def wall_of(tokens: tuple[str, ...], material: str) -> float | None:
+    """Return the wall [m] of what is hollow where it is of such a material; None: it is not.
+
+    A chair of plastic is moulded, one of steel is of tubes.
+    """
+    for row in _table()["walls"]:
+        if material in row["of"] and _ends_in(tokens, _singulars(row["words"])):
+            solid = _ends_in(tokens, _singulars(row["but"]))
+            return None if solid else row["thickness_mm"] * 1e-3
+    return None
+
+
 def open_ware(tokens: tuple[str, ...]) -> bool:
     """Tell whether a name is that of an open vessel: its last noun is what it names."""
     return _is_one(tokens, "open")
@@ -211,11 +231,22 @@ def cast(tokens: tuple[str, ...]) -> bool:
 
 def _is_one(tokens: tuple[str, ...], table: str) -> bool:
     """Tell whether a name's last noun stands in a table: "bin" in "bin old green"."""
-    while tokens and tokens[-1] in _describing():
-        if any(tokens[-len(phrase) :] == phrase for phrase in _listed(table)):
-            return True
-        tokens = tokens[:-1]
-    return any(tokens[-len(phrase) :] == phrase for phrase in _listed(table))
+    return _ends_in(tokens, _listed(table))
+
+
+def _ends_in(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]]) -> bool:
+    """Tell whether a name's last noun is one of these, whatever describes it behind."""
+    first = _head(tokens) or 0
+    ends = range(len(tokens), first, -1)
+    return any(tokens[:end][-len(phrase) :] == phrase for end in ends for phrase in named)
+
+
+@cache
+def _nouns() -> frozenset[str]:
+    """Return words that name a thing: what stands behind the last of them only describes it."""
+    tables = {phrase[-1] for table in ("hollow", "open", "cast") for phrase in _listed(table)}
+    things = {term.phrase[-1] for term in lexicon() if term.kind != "substance"}
+    return frozenset(tables | things | {name[-1] for name in phrases()}) | _holders() | part_words()
 
 
 @cache
@@ -226,7 +257,11 @@ def _describing() -> frozenset[str]:
 
 @cache
 def _listed(table: str) -> frozenset[tuple[str, ...]]:
-    return frozenset(tuple(singular(w) for w in phrase.split()) for phrase in _table()[table])
+    return _singulars(_table()[table])
+
+
+def _singulars(named: Sequence[str]) -> frozenset[tuple[str, ...]]:
+    return frozenset(tuple(singular(w) for w in phrase.split()) for phrase in named)
 
 
 def singular(word: str) -> str:

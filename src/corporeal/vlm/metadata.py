@@ -4,6 +4,7 @@ from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
+from corporeal.formats.word_order import of_part
 from corporeal.geometry.identity import Identity
 from corporeal.types import (
     Finish,
@@ -27,9 +28,11 @@ from corporeal.vlm.lexicon import (
     lookbook,
     metals,
     open_ware,
+    phrases,
     seen_as,
     singular,
     tokens_of,
+    wall_of,
 )
 
 WEAKER = 0.6
@@ -72,7 +75,8 @@ class Evidence:
         """Names of the whole object."""
         stem = self.thing.source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
         named = dict.fromkeys([self.thing.class_name, self.thing.name, stem])
-        return [*map(_name, named), *(Name(" ".join(w), w) for w in self.shared if w)]
+        whole = (Name(text, of_part(tokens_of(text), phrases())) for text in named)
+        return [*whole, *(Name(" ".join(w), w) for w in self.shared if w)]
 
 
 def evidence(scene: Scene, identity: Identity) -> list[Evidence]:
@@ -174,6 +178,9 @@ def hollowed(
         return replace(words, structure=None, contents=None, fill=None)
     if words.structure is not None:
         return words
+    wall = _moulded(words, evidence)
+    if wall is not None and not from_pictures:
+        return replace(words, structure="shell", thickness=words.thickness or wall)
     if from_pictures and any(open_ware(name.words) for name in evidence.general):
         return replace(words, structure="sheet", wall_unseen=True)
     is_hollow = any(hollow(name.words) for name in evidence.general)
@@ -181,6 +188,14 @@ def hollowed(
     if is_cast and any(cast(name.words) for name in evidence.general):
         is_hollow = True
     return replace(words, structure="shell") if is_hollow else words
+
+
+def _moulded(words: PartWords, evidence: Evidence) -> float | None:
+    """Return the wall [m] of a part that is hollow because of what it is and is made of."""
+    if words.material is None or not evidence.alone:
+        return None
+    walls = (wall_of(name.words, words.material) for name in evidence.general)
+    return next((wall for wall in walls if wall is not None), None)
 
 
 def matter_hint(surface: Surface, finish: Finish) -> str:
@@ -303,11 +318,12 @@ def _strongest(
 ) -> tuple[list[Term], str]:
     """Find the strongest terms in any of the names, and the name they stand in.
 
-    Longest phrase first, then substance before piece before object. The phrase of a piece never
-    ranks above a substance ("oak table top"), nor that of an object above the substance right
-    before it ("steel trash can"). Several are returned when equally strong ones stand in the names.
+    Longest phrase first, then substance before piece before object, then what stands beside an
+    object. The phrase of a piece never ranks above a substance ("oak table top"), nor that of an
+    object above the substance right before it ("steel trash can"). Several are returned when
+    equally strong ones stand in the names.
     """
-    found: list[tuple[tuple[int, int, int], Term, str]] = []
+    found: list[tuple[tuple[int, int, int, bool], Term, str]] = []
     around = {w for name in thing for w in name.words}
     nameless = thing and not any(_names_a_thing(name) for name in (*names, *thing))
     shiny = any(f.metallic > METALLIC for f in finishes)
@@ -321,7 +337,8 @@ def _strongest(
             if term.kind in kinds and _fits(term, finishes, around | set(name.words)):
                 length = len(term.phrase)
                 weight = 1 if term.kind == "piece" else max(length, term.before)
-                found.append(((weight, -KINDS.index(term.kind), length), term, name.text))
+                rank = (weight, -KINDS.index(term.kind), length, term.before > 0)
+                found.append((rank, term, name.text))
     if not found:
         return [], ""
     best = max(rank for rank, _, _ in found)
@@ -353,15 +370,25 @@ def _adjectives(name: Name) -> list[Term]:
             beside = next((t for t in things if name.says(t.phrase + term.phrase)), None)
         if beside and beside.material not in term.gives_way:
             standing[k] = _made_as(term, beside)
-    return [s for s in standing if not _is_purpose(s, name, things)]
+    solid = any(s.kind == "substance" and s.material not in LOOSE for s in standing)
+    return [
+        s
+        for s in standing
+        if not (solid and _lies_loose(s) and len(s.phrase) == 1)
+        and not _is_purpose(s, name, things)
+    ]
+
+
+def _lies_loose(term: Term) -> bool:
+    return term.kind == "substance" and term.material in LOOSE
 
 
 def _is_purpose(term: Term, name: Name, things: Sequence[Term]) -> bool:
-    """Tell whether what lies loose stands before a thing that is for it, and not made of it."""
-    if term.kind != "substance" or term.material not in LOOSE:
-        return False
-    return any(
-        name.says(term.phrase + t.phrase) and t.phrase[-1] not in SHAPED | OF_IT for t in things
+    """Tell whether what lies loose stands beside a thing that is for it, and not made of it."""
+    return _lies_loose(term) and any(
+        t.phrase[-1] not in SHAPED | OF_IT
+        or not (name.says(term.phrase + t.phrase) or name.says(t.phrase + term.phrase))
+        for t in things
     )
 
 
