@@ -18,11 +18,11 @@ from corporeal.formats.sources import kind_of, photographs_in, sources, unposed
 from corporeal.masking.grown_masks import GrownMasks
 from corporeal.poses import film_frames
 from corporeal.poses import pose as posing
-from corporeal.poses.attempt import Attempt
+from corporeal.poses.attempt import Attempt, beside_first, by_camera
 from corporeal.poses.by_masks import checked_by_masks
 from corporeal.poses.film_frames import choose, write_frames
 from corporeal.poses.gather import gather
-from corporeal.poses.judge import FILLED, doubts, names_of, unseen_side
+from corporeal.poses.judge import FILLED, doubts, in_vain, names_of, unseen_side
 from corporeal.poses.pose import FIGURE, moved_within, pose, pose_object
 from corporeal.poses.standstill import Standstill
 from corporeal.reconstruction import picture_intake as reconstructing
@@ -42,6 +42,7 @@ from patterned_scene import (
 )
 
 COUNT = 14
+TURN_ABOUT_Z = np.array([[0, -1.0, 0, 0.3], [1, 0, 0, 0], [0, 0, 1, 0], [0, 0, 0, 1]])
 AWAY = np.array([[1, 0, 0, 0.06], [0, 1, 0, 0.04], [0, 0, 1, 0], [0, 0, 0, 1.0]])
 TURN_RIGHT = 6
 """EXIF: the picture is to be turned by a quarter to the right."""
@@ -362,6 +363,54 @@ def test_models_that_were_wrong_are_not(name):
     assert any(said in clause for clause in doubts(told))
     cured = replace(told, pictures=40, registered=40, points=4000, others=(), focal=1.0, bent=0.0)
     assert doubts(cured) == [], "each has one thing wrong, or several, and nothing else"
+
+
+def test_a_group_that_says_the_same_again_is_no_rival():
+    """COLMAP begins anew at pictures that it has placed: 20 far apart gave 17 that were right, and
+    12 of these once more."""
+    pycolmap = pytest.importorskip("pycolmap")
+    eyes = [camera_of(aim).world_from_camera for aim in ring(np.arange(12) * 30)]
+    first = model_of(pycolmap, eyes)
+    turned = [TURN_ABOUT_Z @ eye for eye in eyes[4:]]
+    assert beside_first(first, model_of(pycolmap, turned, 4)) == 0
+    assert beside_first(first, model_of(pycolmap, [*turned, np.eye(4), np.eye(4)], 4)) == 2
+    mirrored = [eyes[k] for k in (8, 4, 9, 5, 10, 6, 11, 7)]
+    assert beside_first(first, model_of(pycolmap, mirrored, 4)) == 8, "it contradicts"
+
+
+def model_of(pycolmap, eyes, begin=0):
+    model = pycolmap.Reconstruction()
+    model.add_camera_with_trivial_rig(
+        pycolmap.Camera(model=0, width=4, height=4, params=[4, 2, 2], camera_id=1)
+    )
+    for k, eye in enumerate(eyes):
+        image = pycolmap.Image(f"{begin + k}.jpg", image_id=k + 1, camera_id=1)
+        pose = np.linalg.inv(eye)[:3]
+        model.add_image_with_trivial_frame(image, pycolmap.Rigid3d(pose))
+    return model
+
+
+def test_pictures_of_two_lenses_have_two_cameras(tmp_path):
+    """A telephone has several, and their pictures one size; EXIF tells them apart."""
+    (tmp_path / "photos").mkdir()
+    for k in range(6):
+        exif = Image.Exif()
+        exif.get_ifd(0x8769)[0xA405] = 52 if k % 2 else 26
+        noise = np.random.default_rng(k).integers(0, 255, (30, 40, 3)).astype(np.uint8)
+        Image.fromarray(noise).save(tmp_path / "photos" / f"{k}.jpg", exif=exif)
+    gathered = gather(tmp_path / "photos", tmp_path / "poses", silent)
+    assert by_camera(tmp_path / "poses" / "images", gathered) == [
+        ["0.jpg", "2.jpg", "4.jpg"],
+        ["1.jpg", "3.jpg", "5.jpg"],
+    ]
+
+
+def test_only_pictures_that_points_join_can_be_placed():
+    told = Attempt("plain", 20, joined=7)
+    assert doubts(told) == ["only 7 of 20 pictures share points with one another"]
+    assert in_vain(told, 0) and not in_vain(replace(told, joined=20), 0)
+    assert in_vain(replace(told, joined=20), 12), "most are blurred"
+    assert doubts(replace(told, joined=20)) == ["no two pictures share enough points"]
 
 
 def test_a_side_that_nobody_photographed_is_named_by_its_neighbours():

@@ -27,6 +27,8 @@ SAME = 0.5
 """Mean difference of thumbnails, of 255, below which two show the same from the same place."""
 BLANK = 2.0
 """Standard deviation of a thumbnail, of 255, below which there is nothing on it."""
+EXIF, FILM_FOCAL = 0x8769, 0xA405
+"""Tags of EXIF: where its own tags lie; the focal length as on 35 mm film."""
 QUALITY = 95
 """Of JPEG copies."""
 IMAGES = "images"
@@ -42,6 +44,8 @@ class Gathered:
     """Width and height of each [px]."""
     said: tuple[str, ...]
     """What was left out, and why, in sentences."""
+    doubled: bool = True
+    """Whether points are looked for in pictures of twice their size, too, where small ones are."""
 
 
 def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
@@ -89,6 +93,16 @@ def as_gathered(folder: Path) -> Gathered:
         with Image.open(file, formats=FORMATS) as picture:
             sizes[file.name] = picture.size
     return Gathered(tuple(sizes), tuple(sizes.values()), ())
+
+
+def lens_stated(picture: Path) -> float:
+    """Return the focal length that a picture's EXIF states, as on 35 mm film [mm]; 0: none."""
+    with Image.open(picture, formats=FORMATS) as opened:
+        stated = opened.getexif().get_ifd(EXIF).get(FILM_FOCAL, 0)
+    try:
+        return float(stated)
+    except (TypeError, ValueError, ZeroDivisionError):
+        return 0.0
 
 
 def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad]) -> None:
