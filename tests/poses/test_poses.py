@@ -475,7 +475,7 @@ def test_a_film_gives_sharp_frames(tmp_path):
     assert np.abs(shown - paper[y : y + 240, x : x + 320]).mean() < 12, "and not another frame"
 
 
-def test_a_film_that_was_held_upright_is_turned(tmp_path):
+def test_a_film_that_was_held_upright_is_turned(tmp_path, caplog):
     film(tmp_path / "a.mp4", 60)
     program = imageio_ffmpeg.get_ffmpeg_exe()
     command = [program, "-v", "error", "-display_rotation", "90", "-i", str(tmp_path / "a.mp4")]
@@ -483,6 +483,7 @@ def test_a_film_that_was_held_upright_is_turned(tmp_path):
     write_frames(tmp_path / "b.mp4", tmp_path / "frames", silent)
     with Image.open(next((tmp_path / "frames").iterdir())) as picture:
         assert picture.size == (240, 320)
+    assert caplog.records == [], "nothing is said of it in the terminal"
 
 
 @pytest.mark.parametrize("kind", ["ten frames", "still", "noise", "empty", "text", "long"])

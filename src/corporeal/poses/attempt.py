@@ -361,7 +361,13 @@ def _adjust(model: Any) -> None:
     options.ceres.solver_options.num_threads = cores()
     options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     options.ceres.loss_function_scale = EXACT
-    pycolmap.bundle_adjustment(model, options)
+    chosen = pycolmap.BundleAdjustmentConfig()
+    for number in model.reg_image_ids():
+        chosen.add_image(number)
+    chosen.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    # Not pycolmap.bundle_adjustment, which writes to the terminal whatever the level.
+    pycolmap.create_default_bundle_adjuster(options, chosen, model).solve()
+    model.update_point_3d_errors()
 
 
 def _joined(pycolmap: Any, database: Path, least: int) -> int:
