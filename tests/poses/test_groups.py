@@ -84,7 +84,9 @@ def test_what_joins_but_a_few_others_is_left_out_with_what_joins_none():
 
 
 def test_pictures_that_share_much_when_small_need_no_finer_points():
-    assert well_joined(circle(40, 6)) and not well_joined(circle(40, 3))
+    large, small = [(1280, 960)] * 40, [(640, 480)] * 40
+    assert well_joined(circle(40, 6), large) and not well_joined(circle(40, 3), large)
+    assert not well_joined(circle(40, 6), small), "they would have no more points than copies"
 
 
 def test_a_search_is_in_vain_where_few_pictures_share_anything():

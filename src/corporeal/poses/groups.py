@@ -32,6 +32,8 @@ SHARED = 15
 WELL_JOINED = 8
 """Pictures that each is joined with, in the median, from which on the finest points are spared,
 which are two thirds of the cost of looking for points."""
+LARGE = 2
+"""Times as long as the copies, at least, the pictures are of which that is true."""
 JOINED = 4
 """Pictures that each of a group is joined with, in the median: then it is one place for certain."""
 SMALLEST, SMALLEST_SHARE = 5, 0.1
@@ -100,13 +102,16 @@ def groups_of(shared: Int[np.ndarray, "N N"]) -> Groups:
     return Groups(tuple(tuple(m.tolist()) for m in large), alone)
 
 
-def well_joined(shared: Int[np.ndarray, "N N"]) -> bool:
+def well_joined(shared: Int[np.ndarray, "N N"], sizes: Sequence[tuple[int, int]]) -> bool:
     """Tell whether small copies share so much that large ones need no finer points than their own.
 
     Args:
         shared: Points that each two pictures share.
+        sizes: Of the large ones [px]; those that are hardly larger have no more points than copies.
 
     """
+    if min(max(size) for size in sizes) < LARGE * LONGEST:
+        return False
     return float(np.median((shared >= SHARED).sum(axis=1))) >= WELL_JOINED
 
 

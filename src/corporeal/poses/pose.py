@@ -244,7 +244,7 @@ def _places(folder: Path, gathered: Gathered, progress: Progress) -> tuple[Gathe
     kept = np.setdiff1d(np.arange(len(gathered.names)), groups.beside)
     if groups.beside:
         gathered = without(gathered, groups.beside)
-    fine = not well_joined(looked.shared[np.ix_(kept, kept)])
+    fine = not well_joined(looked.shared[np.ix_(kept, kept)], gathered.sizes)
     return replace(gathered, doubled=fine), len(groups.beside)
 
 
