@@ -307,7 +307,8 @@ def _judged(models: Any, out: Path, gathered: Gathered, way: Way) -> Attempt:
     best = max(models.values(), key=lambda m: m.num_reg_images(), default=None)
     if best is None:
         return Attempt(way, total, left_out=gathered.names)
-    _adjust(best)
+    if best.num_reg_images() >= SHARE * total:  # of two pictures nothing can be adjusted
+        _adjust(best)
     place = out / "sparse" / "0"
     place.mkdir(parents=True, exist_ok=True)
     best.write_text(str(place))
