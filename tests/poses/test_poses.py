@@ -89,7 +89,11 @@ def test_cameras_are_found_where_they_were(taken, spoilt, tmp_path):
     assert angle.max() < 0.5 and place.max() < 0.01
     assert f"{COUNT} of {COUNT} photographs" in found.statements[0]
     (told,) = found.warnings
-    for name in ("broken.jpg", "phone.heic is a HEIC picture", "lens cap.jpg shows nothing"):
+    for name in (
+        "broken.jpg is damaged",
+        "phone.heic is a HEIC picture",
+        "lens cap.jpg shows nothing",
+    ):
         assert name in told
     assert "photo_001.jpg shows the same as photo_001_(copy).jpg" in told
     assert (found.folder / FIGURE).stat().st_size > 10_000

@@ -120,8 +120,10 @@ class _UnusableError(Exception):
 
 def _upright(file: Path) -> Image.Image:
     """Return a photograph turned as it says, reduced, with what it says of its lens."""
+    why = unreadable(file)
     try:
         with Image.open(file, formats=FORMATS) as opened:
+            why = "is damaged: its pixels cannot be read to the end"
             if opened.width * opened.height > MAX_PIXELS:
                 raise _UnusableError(f"claims {opened.width} × {opened.height} pixels")
             opened.draft("RGB", (LONGEST, LONGEST))
@@ -131,7 +133,7 @@ def _upright(file: Path) -> Image.Image:
     except _UnusableError:
         raise
     except Exception as problem:  # Pillow's decoders raise almost anything on broken input
-        raise _UnusableError(unreadable(file)) from problem
+        raise _UnusableError(why) from problem
     picture.thumbnail((LONGEST, LONGEST), Image.Resampling.LANCZOS)
     picture.info["exif"] = exif.tobytes() if exif else b""
     return picture
