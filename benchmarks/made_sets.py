@@ -1,7 +1,7 @@
 """Sets of photographs of models, as a stranger takes them: walking around, in a furnished room.
 
     python benchmarks/made_sets.py MODEL OUT [--pictures 30] [--rounds 20 45] [--size 640 480]
-        [--seed 0] [--plain] [--wall] [--clutter] [--flash] [--rolled] [--film]
+        [--seed 0] [--plain] [--wall] [--clutter] [--flash] [--rolled] [--film] [--zoomed 1.6]
 
 MODEL is what ``corporeal run`` takes. Somebody walks around it once for each of the rounds, at such
 an angle above the floor [deg], with unsteady hands and at no constant pace. The room and how badly
@@ -9,7 +9,8 @@ the pictures are taken are those of ``as_photographed.py``; with ``--plain`` flo
 one colour each. With ``--wall`` half of each round is walked, before it.
 OUT is a set for ``real_photographs.py``: ``images``, true ``masks``, true poses in ``sparse/0``,
 and ``known.toml`` with up and the sides of what is seen. With ``--film`` the way is walked
-once, in frames of a film, ``film.mp4``, whose numbers are those of the images.
+once, in frames of a film, ``film.mp4``, whose numbers are those of the images. With ``--zoomed``
+every second picture is taken through a lens so many times as long; pictures state theirs in EXIF.
 """
 
 import argparse
@@ -27,7 +28,7 @@ from corporeal.geometry.arrangement import boxes_of
 from corporeal.render.camera import Aim
 from corporeal.stages.assemble import assemble
 from corporeal.stages.capture import pictures
-from corporeal.types import Views
+from corporeal.types import Camera, Views
 
 FIELD = 48.0
 """Vertical field of view [deg]: a telephone's, held level."""
@@ -62,9 +63,15 @@ def way_around(
     eyes = middle + far[:, None] * where
     at = middle + AIM * away * np.stack(shaken[2:], axis=1)
     return [
-        Aim(tuple(eye.tolist()), tuple(target.tolist()), FIELD, *asked.size)
-        for eye, target in zip(eyes, at, strict=True)
+        Aim(tuple(eye.tolist()), tuple(target.tolist()), _field(asked, k), *asked.size)
+        for k, (eye, target) in enumerate(zip(eyes, at, strict=True))
     ]
+
+
+def _field(asked: argparse.Namespace, k: int) -> float:
+    """Return the vertical field of view of a picture [deg]."""
+    half = np.tan(np.radians(FIELD / 2)) / (asked.zoomed if k % 2 else 1)
+    return float(2 * np.degrees(np.arctan(half)))
 
 
 def _unsteady(count: int, smooth: bool, rng: np.random.Generator) -> np.ndarray:
@@ -89,14 +96,30 @@ def sides_of(views: Views) -> np.ndarray:
     return high - low
 
 
-def write_set(out: Path, views: Views, sides: np.ndarray, note: str, film: bool) -> None:
-    """Write what ``real_photographs.py`` reads; note: how it was made."""
+def write_set(
+    out: Path, views: Views, sides: np.ndarray, note: str, film: bool, zoomed: bool
+) -> None:
+    """Write what ``real_photographs.py`` reads.
+
+    Args:
+        out: The set.
+        views: Photographs.
+        sides: Of what is seen (3,) [m].
+        note: How it was made.
+        film: Whether photographs are frames of a film, which is written, too.
+        zoomed: Whether photographs state their lenses.
+
+    """
     assert views.object_of_pixel is not None
     names = tuple(f"{'frame' if film else 'img'}_{k:05d}" for k in range(len(views.cameras)))
     for name in ("images", "masks"):
         (out / name).mkdir(parents=True, exist_ok=True)
-    for name, rgb, owner in zip(names, views.rgb, views.object_of_pixel, strict=True):
-        Image.fromarray(rgb).save(out / "images" / f"{name}.jpg", quality=QUALITY, subsampling=0)
+    for name, rgb, owner, camera in zip(
+        names, views.rgb, views.object_of_pixel, views.cameras, strict=True
+    ):
+        exif = _lens(camera) if zoomed else Image.Exif()
+        photograph = Image.fromarray(rgb)
+        photograph.save(out / "images" / f"{name}.jpg", quality=QUALITY, subsampling=0, exif=exif)
         Image.fromarray(np.uint8(255) * (owner >= 0)).save(out / "masks" / f"{name}.png")
     write_colmap(out / "sparse" / "0", views.cameras, tuple(f"{name}.jpg" for name in names))
     shown = ", ".join(f"{side:.4f}" for side in sides)
@@ -104,6 +127,13 @@ def write_set(out: Path, views: Views, sides: np.ndarray, note: str, film: bool)
     (out / "known.toml").write_text(facts, encoding="utf-8")
     if film:
         _write_film(out / "film.mp4", views.rgb)
+
+
+def _lens(camera: Camera) -> Image.Exif:
+    """Return what a telephone writes of its lens: the focal length over that of 35 mm film."""
+    exif = Image.Exif()
+    exif.get_ifd(0x8769)[0xA405] = round(36 * camera.K[0, 0] / max(camera.width, camera.height))
+    return exif
 
 
 def _write_film(path: Path, frames: np.ndarray) -> None:
@@ -126,6 +156,7 @@ def main() -> None:
     parser.add_argument("--rounds", type=float, nargs="+", default=[20.0, 45.0])
     parser.add_argument("--size", type=int, nargs=2, default=[640, 480])
     parser.add_argument("--seed", type=int, default=0)
+    parser.add_argument("--zoomed", type=float, default=1.0)
     for name in ("plain", "wall", "clutter", "flash", "rolled", "film"):
         parser.add_argument(f"--{name}", action="store_true")
     asked = parser.parse_args()
@@ -144,7 +175,9 @@ def main() -> None:
     )
     options = [word for word in sys.argv[1:] if word not in map(str, (*asked.model, asked.out))]
     note = f"{', '.join(p.name for p in asked.model)}, {' '.join(options)}"
-    write_set(asked.out, degraded(views, look), sides_of(views), note, asked.film)
+    write_set(
+        asked.out, degraded(views, look), sides_of(views), note, asked.film, asked.zoomed != 1
+    )
 
 
 if __name__ == "__main__":

@@ -8,7 +8,7 @@ no vocabulary tree (loop detection).
 import shutil
 from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
@@ -16,11 +16,13 @@ from typing import Any, Literal
 
 import numpy as np
 from PIL import Image
+from scipy.sparse import coo_array
+from scipy.sparse.csgraph import connected_components
 
 from corporeal.errors import UserError
 from corporeal.formats.photographs import MASKS
 from corporeal.machine import cores
-from corporeal.poses.gather import IMAGES, LONGEST, Gathered
+from corporeal.poses.gather import IMAGES, LONGEST, Gathered, lens_stated
 
 Progress = Callable[[float, str], None]
 
@@ -42,6 +44,12 @@ OVERLAP = (*range(1, 11), 16, 32, 64)
 """Distances by name at which they are then matched."""
 BATCH, BLOCK = 4, 100
 """Pictures and pairs that are worked on before progress is told."""
+SHARE = 0.7
+"""Of the pictures that must be registered."""
+CONTRADICTS = 5.0
+"""Median angle by which two groups turn pictures apart, from which on one is wrong [deg]."""
+EXACT = 0.5
+"""Reprojection error [px] from which on a point counts for less (Cauchy's loss)."""
 HALF = 127
 """Of 255: more than that in a mask is on the object."""
 DATABASE = "database.db"
@@ -62,7 +70,7 @@ class Attempt:
     reprojection: float = 0.0
     """Mean reprojection error [px]."""
     others: tuple[int, ...] = ()
-    """Pictures in the other groups, which share nothing with the first."""
+    """Pictures in the other groups, beside those that are in the first, too."""
     focal: float = 0.0
     """Focal length over the longer side, of the camera that is furthest from one [-]."""
     bent: float = 0.0
@@ -77,6 +85,9 @@ class Attempt:
     """Registered pictures in which masks say that the object is elsewhere."""
     filled: float = 1.0
     """Share of a mask that the visual hull of all fills, the median; 1 without masks [-]."""
+    joined: int | None = None
+    """Pictures that points join with one another, directly or through others: the most that can be
+    placed. None: it was not counted."""
 
 
 def require() -> Any:
@@ -125,7 +136,7 @@ def attempt(folder: Path, out: Path, gathered: Gathered, way: Way, progress: Pro
             progress(begin + (end - begin) * share, WORDS[way] + what)
 
         _watched(pycolmap, partial(step, told))
-    return _judged(work.models, out, gathered, way)
+    return replace(_judged(work.models, out, gathered, way), joined=work.joined)
 
 
 def _watched(pycolmap: Any, work: Callable[[Any], None]) -> None:
@@ -170,11 +181,13 @@ class _Work:
         self.pycolmap, self.images, self.out = pycolmap, folder / IMAGES, out
         self.gathered, self.thorough = gathered, way == "thorough"
         self.masks = folder / MASKS[0] if way == "masked" else None
+        self.least = 10 if self.thorough else 15
         self.database = out / DATABASE
         self.models: Any = {}
+        self.joined = 0
 
     def extract(self, told: Callable[[float], None], token: Any) -> None:
-        """Find points; pictures of one size share a camera."""
+        """Find points; pictures of one size share a camera, if their lenses are stated alike."""
         reading = self.pycolmap.ImageReaderOptions()
         reading.camera_model = "SIMPLE_RADIAL"
         if self.masks is not None:
@@ -183,10 +196,10 @@ class _Work:
         sift.num_threads, sift.use_gpu, sift.max_image_size = cores(), False, LONGEST
         sift.sift.max_num_features = MOST_POINTS
         sift.sift.estimate_affine_shape = sift.sift.domain_size_pooling = self.thorough
+        if not self.thorough and not self.gathered.doubled:
+            sift.sift.first_octave = 0
         done = 0
-        for camera, size in enumerate(dict.fromkeys(self.gathered.sizes)):
-            both = zip(self.gathered.names, self.gathered.sizes, strict=True)
-            names = [name for name, own in both if own == size]
+        for camera, names in enumerate(by_camera(self.images, self.gathered)):
             for first in range(0, len(names), BATCH):
                 if token.is_cancelled:
                     return
@@ -229,20 +242,23 @@ class _Work:
                 cancellation_token=token,
             )
             told(min((first + BLOCK) / len(pairs), 1.0))
+        self.joined = _joined(self.pycolmap, self.database, self.least)
 
     def place(self, told: Callable[[float], None], token: Any) -> None:
         """Place cameras one after the other, in groups that share points."""
         options = self.pycolmap.IncrementalPipelineOptions()
         options.num_threads, options.random_seed, options.min_model_size = cores(), 0, 3
         options.mapper.random_seed = options.triangulation.random_seed = 0
+        options.min_num_matches = self.least
         if self.thorough:  # believe less: pictures are far apart; the whole is judged afterwards
-            options.min_num_matches = 10
             options.mapper.init_min_num_inliers = 40
             options.mapper.abs_pose_min_num_inliers = 12
             options.mapper.abs_pose_min_inlier_ratio = 0.15
             options.triangulation.ignore_two_view_tracks = False
         placed = count(1)
         total = len(self.gathered.names)
+        if self.joined < SHARE * total:  # whatever is placed, it would not be believed
+            return
         shutil.rmtree(self.out / "models", ignore_errors=True)
         (self.out / "models").mkdir()
         self.models = self.pycolmap.incremental_mapping(
@@ -253,6 +269,20 @@ class _Work:
             next_image_callback=lambda: told(min(next(placed) / total, 1.0)),
             cancellation_token=token,
         )
+
+
+def by_camera(images: Path, gathered: Gathered) -> list[list[str]]:
+    """Return the names of pictures that one camera took: of one size, and one focal length in EXIF.
+
+    Args:
+        images: Where they lie.
+        gathered: What lies there.
+
+    """
+    made: dict[tuple[tuple[int, int], float], list[str]] = {}
+    for name, size in zip(gathered.names, gathered.sizes, strict=True):
+        made.setdefault((size, lens_stated(images / name)), []).append(name)
+    return list(made.values())
 
 
 def _points_allowed(masks: Path, out: Path, gathered: Gathered) -> Path:
@@ -277,10 +307,13 @@ def _judged(models: Any, out: Path, gathered: Gathered, way: Way) -> Attempt:
     best = max(models.values(), key=lambda m: m.num_reg_images(), default=None)
     if best is None:
         return Attempt(way, total, left_out=gathered.names)
+    if best.num_reg_images() >= SHARE * total:  # of two pictures nothing can be adjusted
+        _adjust(best)
     place = out / "sparse" / "0"
     place.mkdir(parents=True, exist_ok=True)
     best.write_text(str(place))
-    placed = {image.name for image in best.images.values() if image.has_pose}
+    placed = _placed(best)
+    beside = (beside_first(best, m) for m in models.values() if m is not best)
     focal, bent = _lens([c for c in best.cameras.values()])
     return Attempt(
         way,
@@ -288,11 +321,72 @@ def _judged(models: Any, out: Path, gathered: Gathered, way: Way) -> Attempt:
         registered=best.num_reg_images(),
         points=best.num_points3D(),
         reprojection=round(best.compute_mean_reprojection_error(), 3),
-        others=tuple(sorted((m.num_reg_images() for m in models.values()), reverse=True)[1:]),
+        others=tuple(sorted(filter(None, beside), reverse=True)),
         focal=focal,
         bent=bent,
         left_out=tuple(n for n in gathered.names if n not in placed),
     )
+
+
+def _placed(model: Any) -> set[str]:
+    return {image.name for image in model.images.values() if image.has_pose}
+
+
+def beside_first(first: Any, other: Any) -> int:
+    """Return how many pictures another group holds that the first does not; all: they contradict.
+
+    COLMAP begins anew at pictures that it has placed before: such a group may say the same.
+    """
+    both = [
+        {i.name: i.cam_from_world().rotation.matrix() for i in m.images.values() if i.has_pose}
+        for m in (first, other)
+    ]
+    common = sorted(both[0].keys() & both[1].keys())
+    turns = np.array([both[0][name].T @ both[1][name] for name in common]).reshape(-1, 3, 3)
+    between = np.einsum("aij,bij->ab", turns, turns)  # traces: 3 where two turns are one
+    cosine = np.clip((between[np.triu_indices(len(common), 1)] - 1) / 2, -1, 1)
+    if len(cosine) and np.degrees(np.arccos(np.median(cosine))) > CONTRADICTS:
+        return len(both[1])
+    return len(both[1]) - len(common)
+
+
+def _adjust(model: Any) -> None:
+    """Adjust cameras and points once more, so that wrong matches count for little.
+
+    COLMAP's last adjustment is one of least squares, which points that are 4 px off pull with 64
+    times the weight of those that are half a pixel off.
+    """
+    pycolmap = require()
+    options = pycolmap.BundleAdjustmentOptions()
+    options.print_summary = False
+    options.ceres.solver_options.num_threads = cores()
+    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
+    options.ceres.loss_function_scale = EXACT
+    chosen = pycolmap.BundleAdjustmentConfig()
+    for number in model.reg_image_ids():
+        chosen.add_image(number)
+    chosen.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
+    # Not pycolmap.bundle_adjustment, which writes to the terminal whatever the level.
+    pycolmap.create_default_bundle_adjuster(options, chosen, model).solve()
+    model.update_point_3d_errors()
+
+
+def _joined(pycolmap: Any, database: Path, least: int) -> int:
+    """Return how many pictures are joined by pairs that share at least so many points."""
+    opened = pycolmap.Database.open(str(database))
+    number = {image.image_id: k for k, image in enumerate(opened.read_all_images())}
+    ends = [
+        [number[k] for k in pycolmap.pair_id_to_image_pair(pair)]
+        for pair, geometry in zip(*opened.read_two_view_geometries(), strict=True)
+        if len(geometry.inlier_matches) >= least
+    ]
+    opened.close()
+    if not ends:
+        return 0
+    a, b = np.array(ends).T
+    between = coo_array((np.ones(len(a)), (a, b)), shape=(len(number), len(number)))
+    _, label = connected_components(between, directed=False)
+    return int(np.bincount(label).max())
 
 
 def _lens(cameras: Sequence[Any]) -> tuple[float, float]:

@@ -5,6 +5,7 @@ turns pictures as the film's own matrix says.
 """
 
 import contextlib
+import logging
 import subprocess
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -126,6 +127,8 @@ def choose(
 
 
 def _opened(path: Path) -> Film:
+    # It warns that a turned film is not as wide as its frames are stored: so it should be.
+    logging.getLogger("imageio_ffmpeg").setLevel(logging.ERROR)
     reading = imageio_ffmpeg.read_frames(str(path))
     try:
         said = next(reading)

@@ -27,6 +27,8 @@ SAME = 0.5
 """Mean difference of thumbnails, of 255, below which two show the same from the same place."""
 BLANK = 2.0
 """Standard deviation of a thumbnail, of 255, below which there is nothing on it."""
+EXIF, FILM_FOCAL = 0x8769, 0xA405
+"""Tags of EXIF: where its own tags lie; the focal length as on 35 mm film."""
 QUALITY = 95
 """Of JPEG copies."""
 IMAGES = "images"
@@ -42,6 +44,8 @@ class Gathered:
     """Width and height of each [px]."""
     said: tuple[str, ...]
     """What was left out, and why, in sentences."""
+    doubled: bool = True
+    """Whether points are looked for in pictures of twice their size, too, where small ones are."""
 
 
 def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
@@ -91,6 +95,16 @@ def as_gathered(folder: Path) -> Gathered:
     return Gathered(tuple(sizes), tuple(sizes.values()), ())
 
 
+def lens_stated(picture: Path) -> float:
+    """Return the focal length that a picture's EXIF states, as on 35 mm film [mm]; 0: none."""
+    with Image.open(picture, formats=FORMATS) as opened:
+        stated = opened.getexif().get_ifd(EXIF).get(FILM_FOCAL, 0)
+    try:
+        return float(stated)
+    except (TypeError, ValueError, ZeroDivisionError):
+        return 0.0
+
+
 def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad]) -> None:
     if good >= max(FEWEST, asked / 2):
         return
@@ -106,8 +120,10 @@ class _UnusableError(Exception):
 
 def _upright(file: Path) -> Image.Image:
     """Return a photograph turned as it says, reduced, with what it says of its lens."""
+    why = unreadable(file)
     try:
         with Image.open(file, formats=FORMATS) as opened:
+            why = "is damaged: its pixels cannot be read to the end"
             if opened.width * opened.height > MAX_PIXELS:
                 raise _UnusableError(f"claims {opened.width} × {opened.height} pixels")
             opened.draft("RGB", (LONGEST, LONGEST))
@@ -117,7 +133,7 @@ def _upright(file: Path) -> Image.Image:
     except _UnusableError:
         raise
     except Exception as problem:  # Pillow's decoders raise almost anything on broken input
-        raise _UnusableError(unreadable(file)) from problem
+        raise _UnusableError(why) from problem
     picture.thumbnail((LONGEST, LONGEST), Image.Resampling.LANCZOS)
     picture.info["exif"] = exif.tobytes() if exif else b""
     return picture

@@ -8,7 +8,7 @@ far apart, fall into groups of 7, 4 and 3 whose median is 2.
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +29,11 @@ TRIALS = 1000
 """Samples of a pair: most of the time would go to pairs that share nothing."""
 SHARED = 15
 """Points that two pictures share by epipolar geometry, as COLMAP asks of a pair."""
+WELL_JOINED = 8
+"""Pictures that each is joined with, in the median, from which on the finest points are spared,
+which are two thirds of the cost of looking for points."""
+LARGE = 2
+"""Times as long as the copies, at least, the pictures are of which that is true."""
 JOINED = 4
 """Pictures that each of a group is joined with, in the median: then it is one place for certain."""
 SMALLEST, SMALLEST_SHARE = 5, 0.1
@@ -38,9 +43,9 @@ SORT_THEM = (
     "Put the photographs of each into a folder of their own. If all show one thing that was moved "
     "or turned over, give masks of it."
 )
-MOST_ALONE = 0.3
-"""Share of pictures that share points with no other, above which the rest is searched without
-them: COLMAP leaves out fewer itself, and of more it would seem that nothing fits together."""
+MOST_ALONE = 0.2
+"""Share of pictures of no place, above which the one that is meant is searched without them: COLMAP
+leaves out fewer itself, and of more it would seem that nothing fits together."""
 WALK = (
     "Walk around the thing; a thing that is turned before a camera that stands needs a background "
     "without any pattern, or masks."
@@ -61,7 +66,7 @@ class Groups:
     certain: tuple[tuple[int, ...], ...]
     """Places of their own, the largest first."""
     alone: tuple[int, ...] = ()
-    """Many pictures that share points with no other, beside a place that most of all show."""
+    """Many pictures that share points with few others or none, beside a place that most show."""
 
     @property
     def mixed(self) -> bool:
@@ -89,11 +94,25 @@ def groups_of(shared: Int[np.ndarray, "N N"]) -> Groups:
     members = [np.flatnonzero(label == k) for k in np.unique(label)]
     large = [m for m in members if len(m) >= least and np.median(joined[m].sum(axis=1)) >= JOINED]
     large.sort(key=len, reverse=True)
-    alone = np.concatenate([m for m in members if len(m) == 1] or [np.zeros(0, np.int64)])
+    placed = {int(k) for m in large for k in m}
+    alone = tuple(k for k in range(len(shared)) if k not in placed)
     most = bool(large) and len(large[0]) > len(shared) / 2
-    if not most or len(alone) <= MOST_ALONE * len(shared):
-        alone = alone[:0]
-    return Groups(tuple(tuple(m.tolist()) for m in large), tuple(np.sort(alone).tolist()))
+    if not most or len(alone) <= MOST_ALONE * (len(large[0]) + len(alone)):
+        alone = ()
+    return Groups(tuple(tuple(m.tolist()) for m in large), alone)
+
+
+def well_joined(shared: Int[np.ndarray, "N N"], sizes: Sequence[tuple[int, int]]) -> bool:
+    """Tell whether small copies share so much that large ones need no finer points than their own.
+
+    Args:
+        shared: Points that each two pictures share.
+        sizes: Of the large ones [px]; those that are hardly larger have no more points than copies.
+
+    """
+    if min(max(size) for size in sizes) < LARGE * LONGEST:
+        return False
+    return float(np.median((shared >= SHARED).sum(axis=1))) >= WELL_JOINED
 
 
 def hopeless(shared: Int[np.ndarray, "N N"]) -> str | None:
@@ -130,10 +149,11 @@ def without(gathered: Gathered, beside: tuple[int, ...]) -> Gathered:
     kept = [k for k in range(len(gathered.names)) if k not in beside]
     left_out = tuple(gathered.names[k] for k in beside)
     said = f"{len(beside)} photographs show another place and were left out: {names_of(left_out)}."
-    return Gathered(
-        tuple(gathered.names[k] for k in kept),
-        tuple(gathered.sizes[k] for k in kept),
-        (*gathered.said, said),
+    return replace(
+        gathered,
+        names=tuple(gathered.names[k] for k in kept),
+        sizes=tuple(gathered.sizes[k] for k in kept),
+        said=(*gathered.said, said),
     )
 
 

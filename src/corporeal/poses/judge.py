@@ -9,11 +9,9 @@ from jaxtyping import Float
 
 from corporeal.geometry.level import level
 from corporeal.geometry.region import region
-from corporeal.poses.attempt import Attempt
+from corporeal.poses.attempt import SHARE, Attempt
 from corporeal.types import Camera
 
-SHARE = 0.7
-"""Of the pictures that must be registered."""
 POINTS = 30
 """Points per registered picture, at least."""
 FOCAL = 0.45, 3.0
@@ -25,6 +23,15 @@ RIVAL = 1 / 3
 FILLED = 0.9
 """Share of a mask that the visual hull fills: 1.00 under right poses of two real sets, 0.85 under
 those of the card that an axe head lay on before and after it was turned over."""
+HOPELESS = 0.4
+"""Share of the pictures that the plain attempt must join by points, or the thorough one is in vain:
+of sets that it posed alone all 15, 20 and 24 were joined."""
+MOST_BLURRED = 0.5
+"""Share of heavily blurred pictures from which on there is no use in looking longer."""
+HOLD_STILL = (
+    "Hold the camera still, in more light, let it focus on the thing, and look at the pictures at "
+    "full size before you leave."
+)
 NAMED = 8
 GAP = 60.0
 """Angle between neighbouring cameras, about what they look at, that leaves a side unseen [deg]."""
@@ -36,6 +43,8 @@ WHAT_TO_DO = (
 
 def doubts(told: Attempt) -> list[str]:
     """Return what speaks against a model, in clauses; nothing: it can be believed."""
+    if not told.registered and 0 < (told.joined or 0) < SHARE * told.pictures:
+        return [f"only {told.joined} of {told.pictures} pictures share points with one another"]
     if not told.registered:
         return ["no two pictures share enough points"]
     found = []
@@ -56,6 +65,19 @@ def doubts(told: Attempt) -> list[str]:
         groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])
         found.append(f"the pictures fall into groups of {groups} that share nothing")
     return found
+
+
+def in_vain(told: Attempt, blurred: int) -> bool:
+    """Tell whether a thorough attempt cannot mend what was doubted.
+
+    Args:
+        told: What came of the plain attempt.
+        blurred: Pictures that are heavily blurred.
+
+    """
+    if blurred >= MOST_BLURRED * told.pictures:
+        return True
+    return told.joined is not None and told.joined < HOPELESS * told.pictures
 
 
 def doubt_of_neighbours(told: Attempt) -> str:

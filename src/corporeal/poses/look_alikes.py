@@ -16,8 +16,8 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.formats.colmap import ColmapModel, read_colmap
-from corporeal.poses.attempt import Attempt, pairs_of, without_pictures
-from corporeal.poses.judge import SHARE, doubts
+from corporeal.poses.attempt import SHARE, Attempt, pairs_of, without_pictures
+from corporeal.poses.judge import doubts
 
 NEAR = 18.0
 """Largest angle between the lines of sight of two pictures that are compared, the median [deg]. At

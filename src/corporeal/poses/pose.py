@@ -2,14 +2,17 @@
 
 import shutil
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+
+import numpy as np
 
 from corporeal import store
 from corporeal.errors import BadFileError
 from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
 from corporeal.poses.attempt import Attempt, Way, attempt, require
+from corporeal.poses.blur import blurred
 from corporeal.poses.by_masks import checked_by_masks, filled_share
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
@@ -17,20 +20,23 @@ from corporeal.poses.gather import IMAGES, TAKE, Gathered, as_gathered, gather
 from corporeal.poses.groups import (
     SORT_THEM,
     WALK,
-    Groups,
     groups_of,
     hopeless,
     look,
     not_found,
     told_apart,
+    well_joined,
     without,
 )
 from corporeal.poses.judge import (
     FILLED,
+    HOLD_STILL,
+    MOST_BLURRED,
     WHAT_TO_DO,
     doubt_of_masks,
     doubt_of_neighbours,
     doubts,
+    in_vain,
     names_of,
     unseen_side,
 )
@@ -49,7 +55,7 @@ SAID: dict[Way, str] = {
 LEAST = 6
 """Photographs: fewer that were taken all around are more than 60° apart, and share nothing."""
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
-METHOD = 3
+METHOD = 4
 """Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
@@ -171,42 +177,75 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     if (count := len(gathered.names)) < LEAST:
         few = f"{count} photographs are too few to find where they were taken from."
         return _Kept((), (), few, (), TAKE)
-    groups = _places(folder, gathered, _within(progress, GATHERED, LOOKED))
-    if isinstance(groups, _Kept):
-        return groups
-    if groups.beside:
-        gathered = without(gathered, groups.beside)
-    tried: list[Attempt] = []
-    before = LOOKED
-    for way, until in UNTIL.items():
-        share, before = (before, until), until
-        if not _worth_trying(way, folder, tried):
-            continue
-        told = attempt(folder, folder / way, gathered, way, _within(progress, *share))
-        tried.append(_checked(told, folder, gathered))
-        if not doubts(tried[-1]) and doubt_of_masks(tried[-1]) is None:
-            break
+    looked = _places(folder, gathered, _within(progress, GATHERED, LOOKED))
+    if isinstance(looked, _Kept):
+        return looked
+    gathered, others = looked
+    tried, smeared = _tried(folder, gathered, progress)
     believed = [told for told in tried if not doubts(told)]
     if believed:  # the first of those that masks agree with best: masks may be poor
         best = max(believed, key=lambda told: told.filled)
         return _told(folder, gathered, tuple(said), tuple(tried), best)
     best = max(tried, key=lambda told: told.registered)
-    return _Kept((), (), not_found(doubts(best), len(groups.beside)), tuple(tried))
+    return _refused(doubts(best), gathered, smeared, others, tuple(tried))
 
 
-def _places(folder: Path, gathered: Gathered, progress: Progress) -> Groups | _Kept:
-    """Look at small copies: which photographs show one place, or why the long search is in vain."""
+def _refused(
+    why: list[str],
+    gathered: Gathered,
+    smeared: tuple[str, ...],
+    others: int = 0,
+    tried: tuple[Attempt, ...] = (),
+) -> _Kept:
+    """Refuse, and say which pictures are blurred, if that may be why."""
+    total = len(gathered.names)
+    if smeared:
+        why = [*why, f"{len(smeared)} of {total} pictures are blurred ({names_of(smeared)})"]
+    what_to_do = HOLD_STILL if len(smeared) >= MOST_BLURRED * total else WHAT_TO_DO
+    return _Kept((), (), not_found(why, others), tried, what_to_do)
+
+
+def _tried(
+    folder: Path, gathered: Gathered, progress: Progress
+) -> tuple[list[Attempt], tuple[str, ...]]:
+    """Attempt until one is believed; return all, and which pictures are blurred if one was not."""
+    tried: list[Attempt] = []
+    smeared: tuple[str, ...] = ()
+    before = LOOKED
+    for way, until in UNTIL.items():
+        share, before = (before, until), until
+        if not _worth_trying(way, folder, tried, len(smeared)):
+            continue
+        told = attempt(folder, folder / way, gathered, way, _within(progress, *share))
+        tried.append(_checked(told, folder, gathered))
+        if not doubts(tried[-1]) and doubt_of_masks(tried[-1]) is None:
+            break
+        smeared = smeared or blurred(folder / IMAGES, gathered.names)
+    return tried, smeared
+
+
+def _places(folder: Path, gathered: Gathered, progress: Progress) -> tuple[Gathered, int] | _Kept:
+    """Look at small copies: which photographs show one place, or why the long search is in vain.
+
+    Returns:
+        What is searched, and how many photographs show another place.
+
+    """
     if (folder / MASKS[0]).is_dir():  # what was turned over shares nothing, and masks help
-        return Groups(())
+        return gathered, 0
     looked = look(folder, gathered, lambda f: progress(f, LOOKING))
     if (why := hopeless(looked.shared)) is not None:
-        return _Kept((), (), not_found([why], 0), ())
+        return _refused([why], gathered, blurred(folder / IMAGES, gathered.names))
     if (why := looked.stood_still) is not None:
         return _Kept((), (), not_found([why], 0), (), WALK)
     groups = groups_of(looked.shared)
     if groups.mixed:
         return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
-    return groups
+    kept = np.setdiff1d(np.arange(len(gathered.names)), groups.beside)
+    if groups.beside:
+        gathered = without(gathered, groups.beside)
+    fine = not well_joined(looked.shared[np.ix_(kept, kept)], gathered.sizes)
+    return replace(gathered, doubled=fine), len(groups.beside)
 
 
 def _checked(told: Attempt, folder: Path, gathered: Gathered) -> Attempt:
@@ -215,11 +254,13 @@ def _checked(told: Attempt, folder: Path, gathered: Gathered) -> Attempt:
     return checked_by_masks(checked_by_neighbours(told, place, gathered.names), folder, place)
 
 
-def _worth_trying(way: Way, folder: Path, tried: list[Attempt]) -> bool:
+def _worth_trying(way: Way, folder: Path, tried: list[Attempt], smeared: int) -> bool:
     """Tell whether an attempt can better those before: thorough where none is believed."""
     if way == "masked":
         return (folder / MASKS[0]).is_dir()
-    return way == "plain" or all(doubts(told) for told in tried)
+    if way == "plain":
+        return True
+    return all(doubts(told) for told in tried) and not in_vain(tried[0], smeared)
 
 
 def _gathered(source: Path, folder: Path, progress: Progress) -> tuple[list[str], Gathered]:
