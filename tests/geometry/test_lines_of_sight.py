@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.geometry.lines_of_sight import LinesOfSight
-from corporeal.splats import hull
+from corporeal.splats import allowed_space, hull
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Views
 
@@ -102,8 +102,8 @@ def test_the_hull_of_an_open_box_seen_from_above_has_no_lid(lines, cameras, monk
         mask[v, u] = True
     views = Views(np.zeros((*masks.shape, 3), np.uint8), cameras)
     with ThreadPool(1) as pool:
-        with_lines = hull.outlines_of(views, masks, lines, pool)
-        without = hull.outlines_of(views, masks, None, pool)
+        with_lines = allowed_space.outlines_of(views, masks, lines, pool)
+        without = allowed_space.outlines_of(views, masks, None, pool)
     tops = [o.hull.cells[o.hull.inside][:, 2].max() for o in (without, with_lines)]
     assert tops[0] > HEIGHT + 0.3, "nothing but masks leaves a roof over the mouth"
     assert tops[1] < HEIGHT + 0.15

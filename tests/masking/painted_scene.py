@@ -7,11 +7,16 @@ from corporeal.types import Views
 
 WIDE, HIGH = 96, 72
 RADIUS, FLOOR = 0.5, -0.5
+BELT, ASIDE = 0.25, 36
+"""Half the width of a belt; how far from the middle a picture shows another thing [px]."""
 RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
 
 
-def scene(ball=RED, ground=GREY, seed=0, count=14):
-    """Photographs of a ball on a mottled floor, its true masks, and points on both."""
+def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None):
+    """Photographs of a ball on a mottled floor, its true masks, and points on both.
+
+    belt: colour of a belt about the ball, and of what both sides of all pictures show.
+    """
     random = np.random.default_rng(seed)
     mottled = random.uniform(-1, 1, (64, 64, 64))
     turns = 2.4 * np.arange(count)
@@ -33,7 +38,11 @@ def scene(ball=RED, ground=GREY, seed=0, count=14):
         place = eye + far[..., None] * rays
         at = (np.floor(place * 16).astype(int) % 64).reshape(-1, 3).T
         tone = mottled[tuple(at)].reshape(HIGH, WIDE)
-        colour = np.where(on[..., None], ball, ground) * (1 + 0.15 * tone[..., None])
+        colour = np.where(on[..., None], ball, ground)
+        if belt is not None:
+            aside = np.abs(u - WIDE / 2) > ASIDE
+            colour[aside | (on & (np.abs(place[..., 2]) < BELT))] = belt
+        colour = colour * (1 + 0.15 * tone[..., None])
         light = np.where(on, 0.75 + 0.25 * place[..., 2] / RADIUS, 1.0)
         noisy = colour * light[..., None] + random.normal(scale=0.01, size=colour.shape)
         pictures.append(np.round(255 * np.clip(noisy, 0, 1)).astype(np.uint8))

@@ -28,6 +28,14 @@ def test_what_looks_like_all_around_it_is_doubted():
     assert doubt(grow(views, looked_at(views, None))) is not None
 
 
+def test_what_is_far_away_takes_no_part_of_its_colour_from_an_object():
+    """A white ring of a red drill was lost to a white wall that never bordered on it."""
+    views, masks, points = scene(belt=(0.2, 0.3, 0.8))
+    grown = grow(views, looked_at(views, points))
+    assert grown is not None and doubt(grown) is None
+    assert agreement(grown.inside, masks).mean() > 0.9
+
+
 def test_nothing_is_doubted():
     assert doubt(None) is not None
 

@@ -1,5 +1,7 @@
 """Whose each point is, where somebody drew masks, and by the published rule."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -105,3 +107,28 @@ def test_masks_that_are_forgotten_or_missing(pair):
     assert "instance masks" not in split.found_by
     with pytest.raises(UserError, match="There are no instance masks"):
         assign_instances(cloud, "masks", 2, normal)
+
+
+@pytest.mark.parametrize(
+    ("rule", "count", "gap", "found"),
+    [
+        ("auto", None, -0.3, 1),
+        ("look", None, -0.3, 2),
+        ("auto", 2, -0.3, 2),
+        ("auto", None, 1.0, 2),
+    ],
+    ids=["touching", "asked to look", "told", "space between"],
+)
+def test_where_one_thing_was_photographed_what_touches_is_one(pair, rule, count, gap, found):
+    cloud, normal, owner = pair
+    looks, shifted = (
+        np.eye(2, dtype=np.float32)[owner],
+        cloud.position + np.outer(owner, [gap, 0, 0]),
+    )
+    unlike = replace(cloud, position=shifted, semantic=looks)
+    split = assign_instances(unlike, rule, count, normal, None, touching_is_one=True)
+    assert split.object_of_point.max() + 1 == found
+    if found > 1:
+        assert same(split.object_of_point, owner) > 0.95
+    else:
+        assert any("what touches was taken for one" in said for said in split.warnings)

@@ -12,6 +12,7 @@ from corporeal.errors import UserError
 from corporeal.geometry.region import region
 from corporeal.geometry.rotation import matrix
 from corporeal.splats import hull, limits, start, sweep
+from corporeal.splats.allowed_space import outlines_of
 from corporeal.splats.densification import CROWD, jitter, moved, shared, turn
 from corporeal.splats.kernels_learn import WINDOW, adam
 from corporeal.splats.loss import Goal, goal, loss
@@ -181,9 +182,9 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
     u, v = np.meshgrid(np.arange(64) + 0.5, np.arange(64) + 0.5)
     disc = np.hypot(u - 32, v - 32) < 80 * 0.5 / np.sqrt(9 - 0.25)
     masks = np.stack([disc] * 40)
-    views, _ = pictured(blobs(), cameras)
+    views = Views(np.zeros((*masks.shape, 3), np.uint8), cameras)  # plain: stereo sees nothing
     with ThreadPool(1) as pool:
-        points = on_hull(hull.outlines_of(views, masks, None, pool), 3000, RNG(0), pool, 0.2)
+        points = on_hull(outlines_of(views, masks, None, pool), 3000, RNG(0), pool, 0.2)
         distance, faint = np.linalg.norm(points.position, axis=1), points.opacity < start.OPAQUE
         assert len(distance) == 3000 and faint.sum() == 600
         on, within = distance[~faint], distance[faint]
@@ -191,7 +192,7 @@ def test_the_hull_of_a_ball_is_a_ball(monkeypatch):
         # Evenly: the share within a radius grows as its cube.
         np.testing.assert_allclose(np.median(within), 0.5 * 0.5 ** (1 / 3), atol=0.02)
         with pytest.raises(UserError, match="inside all masks"):
-            hull.outlines_of(views, np.zeros_like(masks), None, pool)
+            outlines_of(views, np.zeros_like(masks), None, pool)
 
 
 @pytest.fixture(scope="module")

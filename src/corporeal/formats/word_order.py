@@ -60,9 +60,17 @@ def _turned(words: list[str], known: Vocabulary, phrases: Phrases) -> list[str]:
             continue
         if (words[k],) in _phrases("of") or _is_of_matter(words[k], behind, known):
             return _turned([*behind, *(before[:-1] if several else before)], known, phrases)
-        if (words[k],) in (*_phrases("beside"), *_phrases("made")):
+        if (words[k],) in (*_phrases("beside"), *_phrases("made")) and _is_thing(
+            before, known, phrases
+        ):
             return before
     return words
+
+
+def _is_thing(words: Sequence[str], known: Vocabulary, phrases: Phrases) -> bool:
+    """Tell whether words name a thing: a clip-on lamp is no clip."""
+    named = any(word in known.last for word in words)
+    return named or any(_within(words, k, phrases) for k in range(len(words)))
 
 
 def _is_of_matter(word: str, behind: Sequence[str], known: Vocabulary) -> bool:

@@ -38,6 +38,9 @@ IN_HULL, BESIDE_HULL = -0.5, 2.0
 MARGIN = 0.03
 """Width of the band around silhouettes in which only colours and edges count, in widths of the
 picture."""
+NEARBY = 0.2
+"""How far around silhouettes colours are learned that objects are told from, in the same widths:
+what pictures show farther away, such as a wall of their colour, does not border on them."""
 HALF = 0.5
 """Of a pixel: from here on it is inside."""
 CRUMB = 0.02
@@ -153,7 +156,8 @@ def _round(side: _Side, room: Volume, evidence: Evidence) -> _Round | None:
     band = _widened(seen)
     masks &= band
     inside = histogram(side.bins, masks & seen)
-    outside = histogram(side.bins, ~band | ~(seen | masks))
+    about = _widened(seen, NEARBY)
+    outside = histogram(side.bins, about & (~band | ~(seen | masks)))
     prior = np.where(seen, IN_HULL, np.where(band, 0, BESIDE_HULL)).astype(np.float32)
     outer = float(room.outer[hull].mean())
     hiding = room.silhouettes(hull & room.tall)
@@ -197,8 +201,9 @@ def _shrunk(
     return np.stack([np.asarray(p) for p in made])
 
 
-def _widened(seen: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, "V H W"]:
-    steps = max(1, round(MARGIN * seen.shape[2]))
+def _widened(seen: Bool[np.ndarray, "V H W"], by: float = MARGIN) -> Bool[np.ndarray, "V H W"]:
+    """Add what is within so many widths of the picture to silhouettes."""
+    steps = max(1, round(by * seen.shape[2]))
     return np.stack([binary_dilation(one, iterations=steps) for one in seen])
 
 

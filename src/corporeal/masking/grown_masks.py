@@ -24,7 +24,7 @@ from corporeal.masking.seeds import looked_at
 
 Progress = Callable[[float, str], None]
 
-METHOD = 5
+METHOD = 6
 """Raised when other masks would be grown: those of an older method are grown again."""
 GROWN = 0.8
 """Share of the work that is done when masks are grown."""

@@ -7,7 +7,7 @@ from scipy.spatial import KDTree
 from corporeal.errors import UserError
 from corporeal.formats.photographs import NO_INSTANCES
 from corporeal.regions.masks import renumbered
-from corporeal.regions.objects import MOST, Split, components, objects
+from corporeal.regions.objects import DEFAULT, MOST, TOUCHING_IS_ONE, Split, components, objects
 from corporeal.regions.rule import Rule
 from corporeal.types import Cloud
 
@@ -27,6 +27,7 @@ def assign_instances(
     count: int | None = None,
     normals: Float[np.ndarray, "N 3"] | None = None,
     masks: Int[np.ndarray, "V N"] | None = None,
+    touching_is_one: bool = False,
 ) -> Split:
     """Segment objects.
 
@@ -36,6 +37,8 @@ def assign_instances(
         count: How many objects there are, if known.
         normals: Unit, outward; None: found from the points.
         masks: What each view takes each point for; -1: unknown. None: nobody drew any.
+        touching_is_one: Whether appearance and concavity segment nothing that touches, unless the
+            rule asks for it or ``count`` is given.
 
     Raises:
         UserError: Masks are asked for and there are none, there are no points, or more objects than
@@ -47,7 +50,8 @@ def assign_instances(
     if rule == "masks" and masks is None:
         raise UserError(NO_INSTANCES)
     if masks is None or rule == "look":
-        return objects(cloud, count, normals)
+        whole = touching_is_one and rule == "auto"
+        return objects(cloud, count, normals, config=TOUCHING_IS_ONE if whole else DEFAULT)
     named = by_numbers(cloud, masks, count, NUMBERED)
     named = named or by_numbers(cloud, renumbered(masks), count, MATCHED)
     return named or _by_masks(cloud, masks, count, normals)

@@ -51,10 +51,12 @@ class ObjectsConfig:
     narrowest: float = 0.003
     """Share of all borders that a cut counts for at least, so that crumbs are not cut off."""
     apart: float = 0.018
-    """Score up to which a cut is made where their number is unknown."""
+    """Score below which a cut is made where their number is unknown."""
 
 
 DEFAULT = ObjectsConfig()
+TOUCHING_IS_ONE = ObjectsConfig(apart=0.0)
+"""Only space, or a number that is told, makes several objects."""
 
 
 @dataclass(frozen=True)
@@ -124,7 +126,7 @@ def objects(
     return Split(
         instance[found.of_point],
         _confidence(graph, instance)[found.of_point],
-        (*_counted(count, int(instance.max()) + 1), *_doubts(found, instance, cuts)),
+        (*_counted(count, instance, config), *_doubts(found, instance, cuts)),
         _found_by(spaces, int(instance.max()) + 1, masks is not None),
     )
 
@@ -196,7 +198,7 @@ def _cut(
         if not scores or len(possible) == MOST:
             break
         k = min(scores, key=scores.__getitem__)
-        if count is None and scores[k] > config.apart:
+        if count is None and scores[k] >= config.apart:
             break
         found, own, new = possible[k], np.flatnonzero(instance == k), len(possible)
         assert found is not None
@@ -217,11 +219,15 @@ def _confidence(graph: Graph, instance: np.ndarray) -> np.ndarray:
     return np.where(own + other > 0, own / np.maximum(own + other, 1e-300), 1.0)
 
 
-def _counted(count: int | None, found: int) -> list[str]:
+def _counted(count: int | None, instance: np.ndarray, config: ObjectsConfig) -> list[str]:
+    found = int(instance.max()) + 1
     if count is None:
+        by = "where the scene is narrow, appearance and notches"
+        if not config.apart:
+            by = "the space between them; what touches was taken for one"
         return [
-            f"The number of objects was not given: {found} were counted, by where the scene is "
-            "narrow, appearance and notches. Say the number where it is known."
+            f"The number of objects was not given: {found} were counted, by {by}. Say the number "
+            "where it is known."
         ]
     if found < count:
         return [f"{count} objects are to be found; there are points for {found} only."]

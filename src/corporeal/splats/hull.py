@@ -7,7 +7,6 @@ from jaxtyping import Bool, Float
 from scipy.ndimage import label, maximum
 
 from corporeal.errors import UserError
-from corporeal.geometry.lines_of_sight import LinesOfSight
 from corporeal.geometry.region import region
 from corporeal.geometry.silhouettes import (
     BESIDE_SHARE,
@@ -56,9 +55,9 @@ class Outlines:
     views: Views
     masks: Bool[np.ndarray, "V H W"]
     hull: Carved
-    """Without what lines of sight pass through."""
+    """Without what lines of sight pass through, and what stereo sees past."""
     empty: Bool[np.ndarray, "X Y Z"]
-    """Which of its cells these pass through."""
+    """Which of its cells lines of sight pass through."""
 
     def emptied(self, places: Float[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
         """Tell which places are where lines of sight say that nothing is."""
@@ -68,30 +67,6 @@ class Outlines:
         near = ((cell >= 0) & (cell < self.empty.shape)).all(axis=1)
         cell = np.where(near[:, None], cell, 0).astype(np.int64)
         return near & self.empty[*cell.T]
-
-
-def outlines_of(
-    views: Views,
-    masks: Bool[np.ndarray, "V H W"],
-    lines: LinesOfSight | None,
-    pool: ThreadPool,
-) -> Outlines:
-    """Carve the visual hull, and empty it where cameras saw points through it.
-
-    lines: from the views' cameras; None: nothing is known to be seen through it.
-
-    Raises:
-        UserError: Nothing is inside all masks.
-
-    """
-    hull = tight(views, masks, pool)
-    empty, low = np.zeros(hull.inside.shape, np.bool_), hull.cells[0, 0, 0]
-    if lines is not None:
-        empty = lines.emptied(views.cameras, low, hull.side, empty.shape)
-    left = hull.inside & ~empty
-    if not left.any():  # lines of poses that masks contradict
-        return Outlines(views, masks, hull, np.zeros_like(empty))
-    return Outlines(views, masks, replace(hull, inside=left), empty)
 
 
 def tight(views: Views, masks: Bool[np.ndarray, "V H W"], pool: ThreadPool) -> Carved:

@@ -16,7 +16,7 @@ from jaxtyping import Bool, Float32
 
 from corporeal.geometry.lines_of_sight import LinesOfSight
 from corporeal.splats import densification, exposure, limits, saved
-from corporeal.splats.hull import outlines_of
+from corporeal.splats.allowed_space import outlines_of
 from corporeal.splats.kernels_learn import adam
 from corporeal.splats.limits import Limits
 from corporeal.splats.loss import goal, loss

@@ -91,6 +91,7 @@ def reconstruct(
     validate(config, extents, asked=viewer.model is not None)
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
     taken, masked = take_pictures(source, config, folder, within(progress, 0.0, TRAINED))
+    grown = taken.masks is not None and not masked  # of what all cameras look at: one thing
     taken = _upright(source, taken, config)
     photographers = taken.cameras
     if not taken.cameras:
@@ -108,7 +109,7 @@ def reconstruct(
     wanted = named_objects(config, viewer, taken)
     normal = normals(cloud.position, neighbours(cloud.position, AROUND), placed.outside)
     count, drawn = config.count or len(wanted) or None, drawn_masks(taken, cloud, front.on_objects)
-    split = assign_instances(cloud, config.apart, count, normal, drawn)
+    split = assign_instances(cloud, config.apart, count, normal, drawn, grown)
     # One closed surface for each object.
     progress(FOUND, "closing surfaces")
     found = FoundObjects(

@@ -1,0 +1,108 @@
+"""What pictures agree on inside the visual hull empties the way to it, and nothing else."""
+
+import numpy as np
+import trimesh
+
+from corporeal.splats import hull
+from corporeal.splats.hull_stereo import seen_past
+from corporeal.splats.thread_pool import ThreadPool
+from corporeal.types import Camera, Views
+
+HALF, WALL, HEIGHT, SIZE = 1.0, 0.25, 1.2, 96
+"""A box without a lid: half its width, its walls and bottom, its height [m]; pictures [px]."""
+INNER, WAVES = HALF - WALL, 6
+"""Of the grain, in each colour."""
+
+
+def block(low, high):
+    return trimesh.creation.box(bounds=[low, high])
+
+
+def without_lid():
+    sides = [
+        block([-HALF, -HALF, 0], [-INNER, HALF, HEIGHT]),
+        block([INNER, -HALF, 0], [HALF, HALF, HEIGHT]),
+        block([-INNER, -HALF, 0], [INNER, -INNER, HEIGHT]),
+        block([-INNER, INNER, 0], [INNER, HALF, HEIGHT]),
+    ]
+    return trimesh.util.concatenate([*sides, block([-INNER, -INNER, 0], [INNER, INNER, WALL])])
+
+
+def cameras():
+    """From all around, and from above: the roof over the mouth is no silhouette's."""
+    found = []
+    for turn in np.linspace(0, 2 * np.pi, 16, endpoint=False):
+        eye = np.array([3 * np.cos(turn), 3 * np.sin(turn), 4.0])
+        ahead = np.array([0, 0, HEIGHT / 2]) - eye
+        ahead /= np.linalg.norm(ahead)
+        right = np.cross(ahead, [0, 0, 1]) / np.linalg.norm(np.cross(ahead, [0, 0, 1]))
+        pose = np.eye(4)
+        pose[:3] = np.stack([right, np.cross(ahead, right), ahead, eye], axis=1)
+        K = np.array([[SIZE, 0, SIZE / 2], [0, SIZE, SIZE / 2], [0, 0, 1.0]])
+        found.append(Camera(K, pose, SIZE, SIZE))
+    return tuple(found)
+
+
+def photographed(solid, contrast):
+    """Return pictures of a solid whose grain goes all through it, each otherwise exposed."""
+    rng, eyes = np.random.default_rng(0), cameras()
+    waves, phases = 8 * rng.normal(size=(3 * WAVES, 3)), 6 * rng.random(3 * WAVES)
+    rgb = np.full((len(eyes), SIZE, SIZE, 3), 40, np.uint8)
+    masks = np.zeros(rgb.shape[:3], bool)
+    v, u = (i.ravel() + 0.5 for i in np.indices((SIZE, SIZE)))
+    local = np.stack([u - SIZE / 2, v - SIZE / 2, np.full(u.shape, SIZE)], axis=1)
+    for k, eye in enumerate(eyes):
+        rays = local @ eye.world_from_camera[:3, :3].T
+        origins = np.broadcast_to(eye.world_from_camera[:3, 3], rays.shape)
+        places, ray, _ = solid.ray.intersects_location(origins, rays, multiple_hits=False)
+        grain = np.sin(places @ waves.T + phases).reshape(-1, WAVES, 3).mean(axis=1)
+        shade = (0.4 + contrast * grain) * rng.uniform(0.7, 1.3)
+        rgb[k].reshape(-1, 3)[ray] = np.clip(255 * shade, 0, 255)
+        masks[k].ravel()[ray] = True
+    return Views(rgb, eyes), masks
+
+
+def emptied(solid, contrast, monkeypatch):
+    monkeypatch.setattr(hull, "CELLS", 60_000)
+    views, masks = photographed(solid, contrast)
+    with ThreadPool(1) as pool:
+        found = hull.tight(views, masks, pool)
+        return found, seen_past(views, masks, found, pool)
+
+
+def test_stereo_opens_a_box_that_all_look_into_and_leaves_its_walls(monkeypatch):
+    found, empty = emptied(without_lid(), 0.25, monkeypatch)
+    x, y, z = np.moveaxis(found.cells, -1, 0)
+    wide, cell = np.maximum(abs(x), abs(y)), found.side
+    roof = found.inside & (z > HEIGHT + 2 * cell)
+    assert roof.sum() > 0.05 * (found.inside & (z > 0)).sum(), "nothing but masks leaves a roof"
+    assert empty[roof].mean() > 0.9
+    hollow = (wide < INNER - 3 * cell) & (z > WALL + 4 * cell) & (z < HEIGHT)
+    assert empty[hollow].mean() > 0.8
+    walls = found.inside & (wide > INNER + cell) & (wide < HALF - cell) & (z < HEIGHT - 2 * cell)
+    assert empty[walls].mean() < 0.02
+    assert not empty[~found.inside].any()
+
+
+def test_what_is_full_stays_full(monkeypatch):
+    full = block([-HALF, -HALF, 0], [HALF, HALF, HEIGHT])
+    found, empty = emptied(full, 0.25, monkeypatch)
+    x, y, z = np.moveaxis(found.cells, -1, 0)
+    inside = (np.maximum(abs(x), abs(y)) < HALF) & (z < HEIGHT - found.side) & found.inside
+    assert inside.sum() > 5000
+    assert empty[inside].mean() < 0.01
+
+
+def test_plain_pictures_empty_nothing(monkeypatch):
+    _, empty = emptied(without_lid(), 0.0, monkeypatch)
+    assert not empty.any()
+
+
+def test_the_number_of_threads_changes_nothing(monkeypatch):
+    monkeypatch.setattr(hull, "CELLS", 20_000)
+    views, masks = photographed(without_lid(), 0.25)
+    results = []
+    for count in (1, 3):
+        with ThreadPool(count) as pool:
+            results.append(seen_past(views, masks, hull.tight(views, masks, pool), pool))
+    np.testing.assert_array_equal(*results)
