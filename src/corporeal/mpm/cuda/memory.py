@@ -234,7 +234,8 @@ class Memory:
             self.put(friction, wp.float64),
             self.put(restitution, wp.float64),
         )
-        c.rolling = self.put(problem.rolling if problem.brakes else 0.0 * friction, wp.float64)
+        lengths = 0.0 * friction if problem.rolling is None else problem.rolling
+        c.rolling = self.put(lengths, wp.float64)
         c.hit = self.zeros(friction.shape, wp.int32)
         apart = np.zeros((len(problem.bodies), len(problem.bodies)), int)
         for a, b in problem.never_touch:
