@@ -126,7 +126,7 @@ def grow(
         inside=closed(_drawn(views, state, floor), rough.cameras, room),
         coherence=_agreement(state.masks, state.silhouettes),
         settled=_agreement(state.masks, before),
-        alike=overlap(evidence.inside, evidence.outside) * (1 - _told(state.masks, on_floor)),
+        alike=state.alike * (1 - _told(state.masks, on_floor)),
         outer=state.outer,
         cropped=float(cropped(state.masks).mean()),
         share=float(state.masks.mean()),
@@ -142,6 +142,10 @@ class _Round:
     """Of what of the hull is high above the floor, which is not seen there."""
     outer: float
     """As in ``Grown``."""
+    alike: float
+    """Overlap of the colours of objects with what is near them, or with all that is around them,
+    whichever is less: either tells them apart. Outlines that contradict one another, of what was
+    moved, leave some of the object in what is near."""
     evidence: Evidence
     """For the next round."""
 
@@ -156,12 +160,13 @@ def _round(side: _Side, room: Volume, evidence: Evidence) -> _Round | None:
     band = _widened(seen)
     masks &= band
     inside = histogram(side.bins, masks & seen)
-    about = _widened(seen, NEARBY)
-    outside = histogram(side.bins, about & (~band | ~(seen | masks)))
+    beside = ~band | ~(seen | masks)
+    outside = histogram(side.bins, _widened(seen, NEARBY) & beside)
+    alike = min(overlap(inside, outside), overlap(inside, histogram(side.bins, beside)))
     prior = np.where(seen, IN_HULL, np.where(band, 0, BESIDE_HULL)).astype(np.float32)
     outer = float(room.outer[hull].mean())
     hiding = room.silhouettes(hull & room.tall)
-    return _Round(masks, seen, hiding, outer, Evidence(inside, outside, prior))
+    return _Round(masks, seen, hiding, outer, alike, Evidence(inside, outside, prior))
 
 
 def _drawn(
