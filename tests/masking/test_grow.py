@@ -1,5 +1,7 @@
 """Masks grown of a painted ball on a floor of another colour."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from painted_scene import GREY, agreement, scene
@@ -34,6 +36,14 @@ def test_what_is_far_away_takes_no_part_of_its_colour_from_an_object():
     grown = grow(views, looked_at(views, points))
     assert grown is not None and doubt(grown) is None
     assert agreement(grown.inside, masks).mean() > 0.9
+
+
+def test_what_was_moved_between_two_rounds_is_told_from_all_around_it():
+    """Its outlines contradict one another, so that some of it is left in what is near."""
+    views, _, points = scene()
+    shown = views.rgb.copy()
+    shown[1::2] = np.roll(shown[1::2], 8, axis=2)
+    assert doubt(grow(replace(views, rgb=shown), looked_at(views, points))) is None
 
 
 def test_nothing_is_doubted():
