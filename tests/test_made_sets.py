@@ -19,7 +19,8 @@ SIDES = np.array([0.6, 0.6, 0.14])
 
 @pytest.fixture(scope="module")
 def walked():
-    asked = Namespace(pictures=8, rounds=[20.0, 45.0], size=[160, 120], wall=False, film=False)
+    plain = {"wall": False, "film": False, "zoomed": 1.0}
+    asked = Namespace(pictures=8, rounds=[20.0, 45.0], size=[160, 120], **plain)
     low, high = np.array([-0.3, -0.3, -0.02]), np.array([0.3, 0.3, 0.12])
     return pictures(patterned(), way_around(low, high, asked, np.random.default_rng(0)))
 
@@ -42,7 +43,9 @@ def test_somebody_walks_around_at_two_heights(walked):
 
 @pytest.mark.parametrize("look", [Look(grid=1), Look(grid=1, plain=True, flash=True, clutter=True)])
 def test_a_set_is_read_as_it_was_written(walked, look, tmp_path):
-    write_set(tmp_path / "block", degraded(walked, look), SIDES, "a block", film=False)
+    write_set(
+        tmp_path / "block", degraded(walked, look), SIDES, "a block", film=False, zoomed=False
+    )
     facts = measure.known(tmp_path / "block")
     assert facts.note == "a block" and facts.unit == 1 and facts.up == (0, 0, 1)
     np.testing.assert_allclose(facts.sides, SIDES, atol=1e-4)
