@@ -4,7 +4,7 @@ import numba
 import numpy as np
 
 from corporeal.splats.kernels_basis import JIT
-from corporeal.splats.kernels_camera import from_camera, pixel
+from corporeal.splats.kernels_sweep import depth_there
 
 f4 = np.float32
 REACH = 2
@@ -171,19 +171,12 @@ def past(points, first, last, cameras, depths, pace, margin, votes):
     cameras (V, 16): ``hull.camera_rows``; depths (V, h, w) [m], inf: unknown; pace: pixels from one
     depth to the next; margin: error of depths [m]; votes (N, 2).
     """
-    views, rows, columns = depths.shape
+    views = len(depths)
     for n in range(first, last):
         votes[n] = 0
         for k in range(views):
-            c = cameras[k]
-            right, down, ahead = from_camera(c, points[n, 0], points[n, 1], points[n, 2])
-            if not ahead > 0:
-                continue
-            u, v = pixel(c, right, down, ahead)
-            if not (0 <= u / pace < columns and 0 <= v / pace < rows):
-                continue
-            z = depths[k, int(v / pace), int(u / pace)]
-            if not z < np.inf:
+            shown, ahead, z = depth_there(cameras[k], points[n], depths[k], pace)
+            if not (shown and z < np.inf):
                 continue
             votes[n, 0] += abs(ahead - z) <= margin
             votes[n, 1] += ahead < z - margin

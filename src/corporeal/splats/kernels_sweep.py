@@ -144,26 +144,37 @@ def prefer(k, first, last, pace, pictures, lenses, mates, turns, shifts, wanted,
 
 
 @numba.njit(**JIT)
+def depth_there(c, point, depth, pace):
+    """Return whether a view shows where a point is, how far ahead that is, and its depth there [m].
+
+    c (16,): camera from world (3 × 4), fx, fy, cx, cy; depth (h, w) [m], one of pace pixels.
+    """
+    rows, columns = depth.shape
+    right, down, ahead = from_camera(c, point[0], point[1], point[2])
+    if not ahead > 0:
+        return False, ahead, np.inf
+    u, v = pixel(c, right, down, ahead)
+    if not (0 <= u / pace < columns and 0 <= v / pace < rows):
+        return False, ahead, np.inf
+    return True, ahead, depth[int(v / pace), int(u / pace)]
+
+
+@numba.njit(**JIT)
 def support(points, owners, first, last, cameras, depths, pace, near, votes):
     """Count for points first to last the views that see them where they are, and that see past.
 
     cameras (V, 16): camera from world (3 × 4), fx, fy, cx, cy; owners: the view that each comes
     from, which is not asked; near: relative difference of depths that agree; votes (N, 2).
     """
-    views, rows, columns = depths.shape
+    views = len(depths)
     for i in range(first, last):
         votes[i] = 0
         for k in range(views):
             if k == owners[i]:
                 continue
-            c = cameras[k]
-            right, down, ahead = from_camera(c, points[i, 0], points[i, 1], points[i, 2])
-            if not ahead > 0:
+            shown, ahead, z = depth_there(cameras[k], points[i], depths[k], pace)
+            if not shown:
                 continue
-            u, v = pixel(c, right, down, ahead)
-            if not (0 <= u / pace < columns and 0 <= v / pace < rows):
-                continue
-            z = depths[k, int(v / pace), int(u / pace)]
             if abs(ahead - z) <= near * z:
                 votes[i, 0] += 1
             elif ahead < z and z < np.inf:
