@@ -9,11 +9,11 @@ from fake_server import FakeServer
 from pydantic import BaseModel
 
 from corporeal.errors import UserError
-from corporeal.vlm import Question, Spent, Turn, connect
+from corporeal.vlm import Question, Spent, Turn
 from corporeal.vlm.cache import Cached
 from corporeal.vlm.patience import Patience
 from corporeal.vlm.provider import Anthropic, OpenAI
-from corporeal.vlm.recordings import Recorder, record
+from corporeal.vlm.recordings import Recorder, Recordings, record
 
 QUICK = Patience(tries=4, corrections=2, timeout=30.0, first_wait=0.02, longest_wait=5.0)
 ASKED = Question("materials", "How heavy?", "s/chair", "1", (np.full((8, 8, 3), 100, np.uint8),))
@@ -148,7 +148,7 @@ def test_recordings_keep_each_answer_and_the_first_under_the_name_of_one(tmp_pat
     with FakeServer(several) as server:
         model = OpenAI(f"fake-model@{server.url}", QUICK)
         told(Recorder(model, tmp_path / "three"))
-    replayed = connect(f"replay:{tmp_path / 'three'}")
+    replayed = Recordings(str(tmp_path / "three"))
     assert numbers(told(replayed)) == [1, 2, 3]
     assert replayed.ask(ASKED, Heavy).answer.kilograms == 1
     one = record(tmp_path / "one", ASKED, Heavy(kilograms=1), model.address.spec)
