@@ -50,8 +50,8 @@ from corporeal.vlm import (
     UnansweredError,
     nothing,
 )
-from corporeal.vlm.choices import HEARD, TEMPERATURE, Spares, hear
 from corporeal.vlm.patience import Gate, Patience, seconds_asked_for
+from corporeal.vlm.spares import HEARD, TEMPERATURE, Spares, hear
 
 OTHER_KEY = "CORPOREAL_API_KEY"
 VENDORS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")

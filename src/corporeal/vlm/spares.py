@@ -8,7 +8,6 @@ import hashlib
 import json
 from contextvars import ContextVar
 from threading import Lock
-from typing import Any
 
 from httpx2 import Response
 from pydantic import BaseModel, ValidationError
@@ -22,32 +21,54 @@ HEARD: ContextVar[list[list[str]] | None] = ContextVar("heard", default=None)
 """What was said beside the first choice, by response, of the question that this task asks."""
 
 
+class Arguments(BaseModel):
+    """With what a model calls a tool: the answer, where that is how it is held to a shape."""
+
+    arguments: str = ""
+
+
+class Call(BaseModel):
+    """A call of a tool."""
+
+    function: Arguments
+
+
+class Message(BaseModel):
+    """What a model says."""
+
+    content: str | None = None
+    tool_calls: list[Call] | None = None
+
+
+class Choice(BaseModel):
+    """One of the answers in a response."""
+
+    message: Message
+
+
+class Choices(BaseModel):
+    """A response in OpenAI's chat format, as far as it is read here."""
+
+    choices: list[Choice]
+
+
 async def hear(response: Response) -> None:
     """Keep what a response says beside its first choice, where several were asked for."""
     heard = HEARD.get()
     if heard is None or not response.is_success:
         return
-    await response.aread()
-    heard.append([text for choice in _choices(response)[1:] if (text := _said(choice))])
-
-
-def _choices(response: Response) -> list[Any]:
     try:
-        body = response.json()
-    except ValueError:
-        return []  # the client says what is wrong with it
-    choices = body.get("choices") if isinstance(body, dict) else None
-    return choices if isinstance(choices, list) else []
+        body = Choices.model_validate_json(await response.aread())
+    except ValidationError:
+        heard.append([])  # the client says what is wrong with it
+        return
+    heard.append([text for choice in body.choices[1:] if (text := _said(choice.message))])
 
 
-def _said(choice: Any) -> str:
-    """Return the answer in a choice: its text, or the arguments of the call that it is."""
-    try:
-        message = choice["message"]
-        calls = message.get("tool_calls")
-        return str(calls[0]["function"]["arguments"] if calls else message["content"] or "")
-    except (AttributeError, IndexError, KeyError, TypeError):
-        return ""
+def _said(message: Message) -> str:
+    """Return the answer in a message: its text, or the arguments of the call that it is."""
+    calls = message.tool_calls
+    return (calls[0].function.arguments if calls else message.content) or ""
 
 
 class Spares:
