@@ -9,15 +9,20 @@ from PIL import Image
 
 from corporeal.cli import main
 from corporeal.errors import UserError
+from corporeal.formats.colmap import write_colmap
 from corporeal.formats.mask_files import corrected
 from corporeal.formats.photographs import read_photographs
 from corporeal.formats.transforms import write_views
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.masking.pointed import Pointed
 from corporeal.pipeline import Settings, _Run, quiet
-from corporeal.reconstruction.picture_intake import masks_for
+from corporeal.reconstruction.picture_intake import masks_for, take_pictures
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate
 from corporeal.types import Views
+
+
+def unheard(fraction, words):
+    """Progress that nobody is told of."""
 
 
 @pytest.fixture
@@ -61,6 +66,23 @@ def test_what_was_corrected_is_kept_and_makes_results_stale(photos, tmp_path):
     again = grown_masks(folder, tmp_path / "0-reconstruct")
     assert again.said[-1] == "1 of the masks were corrected by hand."
     assert np.asarray(Image.open(mask)).min() == 255
+
+
+def test_what_masks_hold_a_part_of_is_refused_until_somebody_corrects_them(tmp_path):
+    views, _, points = scene(flat=0.33)
+    photos, run = tmp_path / "tea set", tmp_path / "run"
+    names = tuple(f"{k:04d}.png" for k in range(len(views.cameras)))
+    (photos / "images").mkdir(parents=True)
+    for name, picture in zip(names, views.rgb, strict=True):
+        Image.fromarray(picture).save(photos / "images" / name)
+    write_colmap(photos / "sparse" / "0", views.cameras, names, points)
+    for _ in range(2):  # the second time what was noted is read
+        with pytest.raises(UserError, match=r"tea set: not all of .* --force goes on"):
+            take_pictures(photos, ReconstructConfig(), run, unheard)
+    forced = masks_for(ReconstructConfig(force=True), photos, run, unheard)
+    assert forced.folder is not None and "Check them: not all of it" in forced.warnings[0]
+    Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(run / "masks" / names[3])
+    assert not masks_for(ReconstructConfig(), photos, run, unheard).incomplete
 
 
 def test_what_cannot_be_told_is_not_written(tmp_path):

@@ -16,7 +16,7 @@ from corporeal.formats.mask_files import (
     write_record,
 )
 from corporeal.formats.photographs import MASKS, Photographs, listed, read_photographs
-from corporeal.masking.doubt import doubt
+from corporeal.masking.doubt import doubt, incomplete
 from corporeal.masking.grow import FINE, ROUGH, Grown, grow
 from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
@@ -38,6 +38,8 @@ class GrownMasks:
     """Holds the masks; None: they are not to be believed, and were not written."""
     said: tuple[str, ...]
     """How they came about, or why there are none, in sentences."""
+    incomplete: str = ""
+    """Why nobody can tell all of what the photographs are of, in a clause; empty: masks do."""
 
 
 def grown_masks(
@@ -62,7 +64,9 @@ def grown_masks(
     made_by = store.key(f"grown masks {METHOD}", pointed, [store.digest(source)])
     record = read_record(folder)
     if record is not None and record.made_by == made_by:
-        return GrownMasks(folder if record.digest_of else None, (*record.said, *_changes(folder)))
+        changes = _changes(folder)
+        lacking = "" if changes else record.incomplete
+        return GrownMasks(folder if record.digest_of else None, (*record.said, *changes), lacking)
     progress(0.0, "reading photographs")
     shown = read_photographs(source, FINE, bare=True)
     rough = reduced(shown.views, ROUGH)
@@ -71,17 +75,17 @@ def grown_masks(
     else:
         seeds = pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
     grown = grow(shown.views, seeds, lambda f, words: progress(GROWN * f, words))
-    why = doubt(grown)
+    why, lacking = doubt(grown), incomplete(grown) or ""
     for name in (MASKS[0], RECORD):
         _forget(folder / name)
     if grown is None or (why is not None and pointed is None):
         said = (f"No masks were grown from what all photographs show: {why}.",)
-        write_record(folder, made_by, said)
-        return GrownMasks(None, said)
+        write_record(folder, made_by, said, lacking)
+        return GrownMasks(None, said, lacking)
     _written(source, shown, grown, folder, progress)
-    said = (_told(grown, pointed), *([] if why is None else [f"Check them: {why}."]))
-    write_record(folder, made_by, said)
-    return GrownMasks(folder, said)
+    said = (_told(grown, pointed), *(f"Check them: {w}." for w in (why, lacking) if w))
+    write_record(folder, made_by, said, lacking)
+    return GrownMasks(folder, said, lacking)
 
 
 def _written(

@@ -27,6 +27,11 @@ STAND_STILL = (
     "Photograph it while neither it nor what is around it moves, give masks (a folder 'masks' with "
     "the names of the pictures), or go on all the same with --force."
 )
+ALL_OF_IT = (
+    "Give masks (a folder 'masks' with the names of the pictures), or grow them with 'corporeal "
+    "masks' and correct them; or photograph it on a ground of another colour, from more sides. "
+    "--force goes on with what was found."
+)
 CORRECT = (
     "They lie in 0-reconstruct/masks of the run: what is corrected there is taken by the next run."
 )
@@ -40,6 +45,9 @@ def take_pictures(
     Returns:
         What there is, and whether somebody said which pixels are objects.
 
+    Raises:
+        BadFileError: Where pictures were taken from, or what they are of, cannot be told.
+
     """
     training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
     kept = None if folder is None else folder / "training.npz"
@@ -50,6 +58,8 @@ def take_pictures(
     begun = 0.0 if posed is None else POSED
     posed = posed or Posed(source, (), ())
     found = masks_for(config, posed.folder, folder, within(progress, begun, begun + MASKED))
+    if found.incomplete and not config.force:
+        raise BadFileError(source, f"{found.incomplete}.", ALL_OF_IT)
     later = within(progress, begun + MASKED, 1.0)
     taken = take_in(posed.folder, training, kept, later, instances, found.folder)
     made = replace(
@@ -69,6 +79,8 @@ class _Masks:
     warnings: tuple[str, ...] = ()
     grown: bool = False
     """Whether nobody, and no model, said what an object is."""
+    incomplete: str = ""
+    """Why they are not of all that the photographs are of, in a clause; empty: they are."""
 
 
 def masks_for(
@@ -87,10 +99,9 @@ def masks_for(
         return _Masks(learned.folder, (*learned.said, CORRECT))
     grown = grown_masks(source, place, progress=progress)
     if grown.folder is None:
-        return _Masks(warnings=grown.said)
-    return _Masks(
-        grown.folder, (), (" ".join(("There were no masks.", *grown.said, CORRECT)),), True
-    )
+        return _Masks(warnings=grown.said, incomplete=grown.incomplete)
+    said = " ".join(("There were no masks.", *grown.said, CORRECT))
+    return _Masks(grown.folder, (), (said,), True, grown.incomplete)
 
 
 def _posed(
