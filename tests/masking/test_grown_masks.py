@@ -16,9 +16,11 @@ from corporeal.formats.transforms import write_views
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.masking.pointed import Pointed
 from corporeal.pipeline import Settings, _Run, quiet
+from corporeal.reconstruction import picture_intake
 from corporeal.reconstruction.picture_intake import masks_for, take_pictures
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate
-from corporeal.types import Views
+from corporeal.splats.intake import Intake
+from corporeal.types import Gaussians, Views
 
 
 def unheard(fraction, words):
@@ -90,8 +92,20 @@ def test_what_cannot_be_told_is_not_written(tmp_path):
     made = grown_masks(tmp_path / "photos", tmp_path / "made")
     assert made.folder is None and "No masks were grown" in made.said[0]
     assert not (tmp_path / "made" / "masks").exists()
+    assert made.doubted is not None, "they are kept, to be compared with"
+    assert read_photographs(tmp_path / "photos", WIDE, made.doubted).masks is not None
     again = grown_masks(tmp_path / "photos", tmp_path / "made")
     assert again == made
+
+
+def test_what_colours_tell_goes_with_pictures_though_it_is_doubted(tmp_path, monkeypatch):
+    views, _, _ = scene(ball=GREY)
+    write_views(tmp_path / "photos", views)
+    none = Gaussians(*(np.zeros((0, n)) for n in (3, 4, 3)), np.zeros(0), np.zeros((0, 1, 3)))
+    monkeypatch.setattr(picture_intake, "take_in", lambda *_: Intake(none, views.cameras, views))
+    taken, masked = take_pictures(tmp_path / "photos", ReconstructConfig(), tmp_path, unheard)
+    assert not masked and taken.coloured is not None
+    assert taken.coloured.shape == views.rgb.shape[:3]
 
 
 @pytest.mark.parametrize(

@@ -4,15 +4,18 @@ import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Bool
+
 from corporeal.errors import BadFileError
 from corporeal.features.learned_masks import learned_masks
 from corporeal.features.maskers import connect_masker, split
-from corporeal.formats.photographs import MASKS, has_masks, listed
+from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
-from corporeal.splats.intake import Intake, take_in
+from corporeal.splats.intake import ON, Intake, take_in
 from corporeal.splats.training_schedule import TrainConfig
 
 POSED = 0.5
@@ -64,6 +67,7 @@ def take_pictures(
     taken = take_in(posed.folder, training, kept, later, instances, found.folder)
     made = replace(
         taken,
+        coloured=None if found.doubted is None else _sized(taken, posed.folder, found.doubted),
         statements=(*posed.statements, *found.statements, *taken.statements),
         warnings=(*posed.warnings, *found.warnings, *taken.warnings),
     )
@@ -79,6 +83,8 @@ class _Masks:
     warnings: tuple[str, ...] = ()
     grown: bool = False
     """Whether nobody, and no model, said what an object is."""
+    doubted: Path | None = None
+    """Where masks are that are not to be believed."""
     incomplete: str = ""
     """Why they are not of all that the photographs are of, in a clause; empty: they are."""
 
@@ -99,9 +105,18 @@ def masks_for(
         return _Masks(learned.folder, (*learned.said, CORRECT))
     grown = grown_masks(source, place, progress=progress)
     if grown.folder is None:
-        return _Masks(warnings=grown.said, incomplete=grown.incomplete)
+        return _Masks(None, (), grown.said, False, grown.doubted, grown.incomplete)
     said = " ".join(("There were no masks.", *grown.said, CORRECT))
-    return _Masks(grown.folder, (), (said,), True, grown.incomplete)
+    return _Masks(grown.folder, (), (said,), True, incomplete=grown.incomplete)
+
+
+def _sized(taken: Intake, source: Path, folder: Path) -> Bool[np.ndarray, "V H W"] | None:
+    """Read masks from a folder, as large as pictures are; None: not of all of them."""
+    if taken.views is None:
+        return None
+    shape = taken.views.rgb.shape[:3]
+    masks = read_photographs(source, max(shape[1:]), folder).masks
+    return masks >= ON if masks is not None and masks.shape == shape else None
 
 
 def _posed(
