@@ -9,13 +9,16 @@ WIDE, HIGH = 96, 72
 RADIUS, FLOOR = 0.5, -0.5
 BELT, ASIDE = 0.25, 36
 """Half the width of a belt; how far from the middle a picture shows another thing [px]."""
+DISCS = 0.95
+"""From the ball to the middles of discs."""
 RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
 
 
-def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None):
+def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0):
     """Photographs of a ball on a mottled floor, its true masks, and points on both.
 
-    belt: colour of a belt about the ball, and of what both sides of all pictures show.
+    belt: colour of a belt about the ball, and of what both sides of all pictures show; flat: radius
+    of three discs of the ball's colour that lie on the floor around it.
     """
     random = np.random.default_rng(seed)
     mottled = random.uniform(-1, 1, (64, 64, 64))
@@ -38,7 +41,7 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None):
         place = eye + far[..., None] * rays
         at = (np.floor(place * 16).astype(int) % 64).reshape(-1, 3).T
         tone = mottled[tuple(at)].reshape(HIGH, WIDE)
-        colour = np.where(on[..., None], ball, ground)
+        colour = np.where((on | _on_discs(place, flat))[..., None], ball, ground)
         if belt is not None:
             aside = np.abs(u - WIDE / 2) > ASIDE
             colour[aside | (on & (np.abs(place[..., 2]) < BELT))] = belt
@@ -50,6 +53,13 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None):
         near = np.abs(place).max(axis=-1) < 2
         seen.append(place[near][random.permutation(near.sum())[:60]])
     return Views(np.stack(pictures), cameras), np.stack(masks), np.concatenate(seen)
+
+
+def _on_discs(place, radius):
+    turns = 2 * np.pi * np.arange(3) / 3
+    middles = DISCS * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    near = [np.linalg.norm(place[..., :2] - middle, axis=-1) < radius for middle in middles]
+    return np.any(near, axis=0)
 
 
 def agreement(inside, masks):

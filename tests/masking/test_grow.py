@@ -7,7 +7,7 @@ import pytest
 from painted_scene import GREY, agreement, scene
 
 from corporeal.errors import UserError
-from corporeal.masking.doubt import doubt
+from corporeal.masking.doubt import doubt, incomplete
 from corporeal.masking.grow import grow
 from corporeal.masking.pointed import Spot, cut_around, pointed_at
 from corporeal.masking.seeds import looked_at
@@ -19,7 +19,7 @@ from corporeal.types import Views
 def test_what_all_cameras_look_at_is_found(known):
     views, masks, points = scene()
     grown = grow(views, looked_at(views, points if known else None))
-    assert grown is not None and doubt(grown) is None
+    assert grown is not None and doubt(grown) is None and incomplete(grown) is None
     assert agreement(grown.inside, masks).mean() > 0.93
     assert agreement(grown.inside, masks).min() > 0.85
 
@@ -46,8 +46,15 @@ def test_what_was_moved_between_two_rounds_is_told_from_all_around_it():
     assert doubt(grow(replace(views, rgb=shown), looked_at(views, points))) is None
 
 
+def test_flat_things_of_its_colour_beside_it_are_told():
+    """Plates beside a tea pot are a pattern on the floor, as print on paper is: nobody can tell."""
+    views, _, points = scene(flat=0.33)
+    why = incomplete(grow(views, looked_at(views, points)))
+    assert why is not None and "times as much with its colours" in why
+
+
 def test_nothing_is_doubted():
-    assert doubt(None) is not None
+    assert doubt(None) is not None and incomplete(None) is None
 
 
 @pytest.mark.parametrize("how", ["point", "box"])

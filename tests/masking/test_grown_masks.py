@@ -9,15 +9,22 @@ from PIL import Image
 
 from corporeal.cli import main
 from corporeal.errors import UserError
+from corporeal.formats.colmap import write_colmap
 from corporeal.formats.mask_files import corrected
 from corporeal.formats.photographs import read_photographs
 from corporeal.formats.transforms import write_views
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.masking.pointed import Pointed
 from corporeal.pipeline import Settings, _Run, quiet
-from corporeal.reconstruction.picture_intake import masks_for
+from corporeal.reconstruction import picture_intake
+from corporeal.reconstruction.picture_intake import masks_for, take_pictures
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig, validate
-from corporeal.types import Views
+from corporeal.splats.intake import Intake
+from corporeal.types import Gaussians, Views
+
+
+def unheard(fraction, words):
+    """Progress that nobody is told of."""
 
 
 @pytest.fixture
@@ -63,13 +70,42 @@ def test_what_was_corrected_is_kept_and_makes_results_stale(photos, tmp_path):
     assert np.asarray(Image.open(mask)).min() == 255
 
 
+def test_what_masks_hold_a_part_of_is_refused_until_somebody_corrects_them(tmp_path):
+    views, _, points = scene(flat=0.33)
+    photos, run = tmp_path / "tea set", tmp_path / "run"
+    names = tuple(f"{k:04d}.png" for k in range(len(views.cameras)))
+    (photos / "images").mkdir(parents=True)
+    for name, picture in zip(names, views.rgb, strict=True):
+        Image.fromarray(picture).save(photos / "images" / name)
+    write_colmap(photos / "sparse" / "0", views.cameras, names, points)
+    for _ in range(2):  # the second time what was noted is read
+        with pytest.raises(UserError, match=r"tea set: not all of .* --force goes on"):
+            take_pictures(photos, ReconstructConfig(), run, unheard)
+    forced = masks_for(ReconstructConfig(force=True), photos, run, unheard)
+    assert forced.folder is not None and "Check them: not all of it" in forced.warnings[0]
+    Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(run / "masks" / names[3])
+    assert not masks_for(ReconstructConfig(), photos, run, unheard).incomplete
+
+
 def test_what_cannot_be_told_is_not_written(tmp_path):
     write_views(tmp_path / "photos", scene(ball=GREY)[0])
     made = grown_masks(tmp_path / "photos", tmp_path / "made")
     assert made.folder is None and "No masks were grown" in made.said[0]
     assert not (tmp_path / "made" / "masks").exists()
+    assert made.doubted is not None, "they are kept, to be compared with"
+    assert read_photographs(tmp_path / "photos", WIDE, made.doubted).masks is not None
     again = grown_masks(tmp_path / "photos", tmp_path / "made")
     assert again == made
+
+
+def test_what_colours_tell_goes_with_pictures_though_it_is_doubted(tmp_path, monkeypatch):
+    views, _, _ = scene(ball=GREY)
+    write_views(tmp_path / "photos", views)
+    none = Gaussians(*(np.zeros((0, n)) for n in (3, 4, 3)), np.zeros(0), np.zeros((0, 1, 3)))
+    monkeypatch.setattr(picture_intake, "take_in", lambda *_: Intake(none, views.cameras, views))
+    taken, masked = take_pictures(tmp_path / "photos", ReconstructConfig(), tmp_path, unheard)
+    assert not masked and taken.coloured is not None
+    assert taken.coloured.shape == views.rgb.shape[:3]
 
 
 @pytest.mark.parametrize(

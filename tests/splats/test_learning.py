@@ -14,7 +14,9 @@ from corporeal.geometry.rotation import matrix
 from corporeal.splats import hull, limits, start, sweep
 from corporeal.splats.allowed_space import outlines_of
 from corporeal.splats.densification import CROWD, jitter, moved, shared, turn
+from corporeal.splats.hull import camera_rows
 from corporeal.splats.kernels_learn import WINDOW, adam
+from corporeal.splats.kernels_sweep import support
 from corporeal.splats.loss import Goal, goal, loss
 from corporeal.splats.parameters import gaussians_of, opacity, parameters
 from corporeal.splats.quality import psnr, quality, ssim
@@ -223,6 +225,19 @@ def test_a_sweep_finds_the_surface(ball, monkeypatch):
     assert np.mean(np.abs(distance[near] - 0.62) < 0.06) > 0.8
     assert np.mean((distance > 0.8) & (distance < 2)) < 0.1, "something floats before the cameras"
     assert points.colour[near].std() > 0.1
+
+
+def test_a_view_that_knows_no_depth_neither_confirms_nor_denies():
+    cameras = around(6, (8, 8), focal=8.0)
+    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
+    middle = np.linalg.norm(eyes, axis=1)  # all look at the origin
+    depths = np.full((6, 8, 8), np.inf)
+    depths[1], depths[2], depths[3] = middle[1], 2 * middle[2], 0.5 * middle[3]
+    votes = np.empty((1, 2))
+    owner = np.zeros(1, int)
+    support(np.zeros((1, 3)), owner, 0, 1, camera_rows(cameras), depths, 1.0, 0.04, votes)
+    # One sees the point where it is, one sees past it, before one something else stands.
+    np.testing.assert_array_equal(votes, [[1, 1]])
 
 
 def test_the_number_of_threads_changes_no_sweep(ball, monkeypatch):

@@ -7,7 +7,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import Stage, identify
 from corporeal.splats.quality import Quality
-from corporeal.splats.worth import GREY, goes_beyond, not_worth, unlike_masks
+from corporeal.splats.worth import GREY, goes_beyond, not_worth, told_otherwise, unlike_masks
 from patterned_scene import OF_SLAB, patterned, ring
 from patterned_scene import box as made_box
 
@@ -52,6 +52,18 @@ def test_what_pictures_cut_off_is_the_room():
     masks[10, 20:40] = True
     why = goes_beyond(masks)
     assert why is not None and "11 of 20 photographs show but a part" in why and "--force" in why
+
+
+def test_what_colours_tell_otherwise_is_refused():
+    cut, coloured = np.zeros((2, 20, 60, 80), bool)
+    cut[:, 20:40, 30:50] = True
+    coloured[:, 22:40, 32:50] = True
+    assert told_otherwise(cut, coloured) is None, "outlines by colours are off"
+    coloured[9:, 20:40, 30:80] = True
+    why = told_otherwise(cut, coloured)
+    assert why is not None and "overlaps by 40% only" in why and "--force" in why
+    assert told_otherwise(cut, None) is None
+    assert told_otherwise(cut, np.zeros_like(cut)) is None, "colours tell nothing"
 
 
 def test_pictures_no_better_than_grey_are_no_shape():

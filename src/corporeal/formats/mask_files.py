@@ -38,6 +38,8 @@ class MaskRecord:
     """How they came about, in sentences."""
     digest_of: dict[str, str]
     """Of every file, as it was written."""
+    incomplete: str = ""
+    """Why they are not of all that the photographs are of, in a clause; empty: they are."""
 
 
 def file_names(shots: Sequence[Shot]) -> list[str]:
@@ -77,10 +79,10 @@ def write_instances(folder: Path, name: str, number: Int[np.ndarray, "H W"]) -> 
     Image.fromarray(np.minimum(number, MOST).astype(np.uint8)).save(path)
 
 
-def write_record(folder: Path, made_by: str, said: Sequence[str]) -> None:
+def write_record(folder: Path, made_by: str, said: Sequence[str], incomplete: str = "") -> None:
     """Note what lies in the folder now; until then nothing in it counts as made."""
     digests = {str(p.relative_to(folder)): store.digest(p) for p in _files(folder)}
-    store.write_json(folder / RECORD, MaskRecord(made_by, tuple(said), digests))
+    store.write_json(folder / RECORD, MaskRecord(made_by, tuple(said), digests, incomplete))
 
 
 def read_record(folder: Path) -> MaskRecord | None:

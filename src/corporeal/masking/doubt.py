@@ -16,6 +16,9 @@ CROPPED = 0.5
 """Share of the photographs in which objects may be cropped."""
 SMALLEST, LARGEST = 0.005, 0.7
 """Shares of the photographs that objects may fill."""
+LEFT_OVER = 0.25
+"""As much again as masks hold, with their colours and on the floor in the middle, above which masks
+are not of all of the thing: they would overlap with right ones by less than .8."""
 
 
 def doubt(grown: Grown | None) -> str | None:
@@ -32,3 +35,13 @@ def doubt(grown: Grown | None) -> str | None:
     if grown.coherence < COHERENT or grown.settled < SETTLED:
         return f"its outlines contradict each other ({grown.coherence:.0%} agree)"
     return None
+
+
+def incomplete(grown: Grown | None) -> str | None:
+    """Return in a clause why nobody can tell all of what the photographs are of; None: masks do."""
+    if grown is None or grown.left_over <= LEFT_OVER:
+        return None
+    return (
+        "not all of it can be told from its ground: beside what was taken for the thing, "
+        f"{grown.left_over:.1f} times as much with its colours is seen on the floor in the middle"
+    )

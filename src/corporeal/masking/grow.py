@@ -19,6 +19,7 @@ from corporeal.masking.colour_likelihood import against, bins_of, histogram, ove
 from corporeal.masking.floor_colour import shaded_floor
 from corporeal.masking.floor_pattern import shows_floor
 from corporeal.masking.holes import closed
+from corporeal.masking.left_over import before_the_floor, left_over
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds
 from corporeal.masking.total_variation import Cutter
@@ -66,6 +67,8 @@ class Grown:
     """Share of the pictures in which masks reach the border."""
     share: float
     """Share of the pictures' pixels that is inside."""
+    left_over: float
+    """What has their colours on the floor in the middle, but is none of them, over what is."""
 
 
 @dataclass(frozen=True)
@@ -105,8 +108,8 @@ def grow(
     """
     rough = reduced(views, ROUGH)
     side, room = _Side(rough), volume(rough.cameras, seeds.around, seeds.floor, seeds.cone)
-    floor = shows_floor(views, seeds.floor, seeds.around)
-    floor |= shaded_floor(views, seeds.floor, seeds.around)
+    shaded = shaded_floor(views, seeds.floor, seeds.around)
+    floor = shaded | shows_floor(views, seeds.floor, seeds.around)
     on_floor = np.float32(FLOOR) * _shrunk(floor, rough.rgb.shape[1:3])
     inside, outside = (histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
     never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0)) + on_floor
@@ -122,6 +125,9 @@ def grow(
         evidence = replace(state.evidence, prior=state.evidence.prior + on_floor)
     assert state is not None
     progress(ROUNDS / (ROUNDS + 1), "drawing their outlines")
+    middle = ~seeds.never & before_the_floor(rough.cameras, seeds.floor, seeds.around)
+    middle &= ~_widened(state.silhouettes) & (_shrunk(shaded, rough.rgb.shape[1:3]) < HALF)
+    by_colour = side.cut(replace(state.evidence, prior=np.zeros_like(on_floor))) > HALF
     return Grown(
         inside=closed(_drawn(views, state, floor), rough.cameras, room),
         coherence=_agreement(state.masks, state.silhouettes),
@@ -130,6 +136,7 @@ def grow(
         outer=state.outer,
         cropped=float(cropped(state.masks).mean()),
         share=float(state.masks.mean()),
+        left_over=left_over(by_colour, state.masks, middle),
     )
 
 

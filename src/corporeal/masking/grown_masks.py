@@ -16,7 +16,7 @@ from corporeal.formats.mask_files import (
     write_record,
 )
 from corporeal.formats.photographs import MASKS, Photographs, listed, read_photographs
-from corporeal.masking.doubt import doubt
+from corporeal.masking.doubt import doubt, incomplete
 from corporeal.masking.grow import FINE, ROUGH, Grown, grow
 from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
@@ -24,6 +24,8 @@ from corporeal.masking.seeds import looked_at
 
 Progress = Callable[[float, str], None]
 
+DOUBTED = "doubted"
+"""Folder of masks that are not to be believed: what colours alone would take for objects."""
 METHOD = 6
 """Raised when other masks would be grown: those of an older method are grown again."""
 GROWN = 0.8
@@ -38,6 +40,10 @@ class GrownMasks:
     """Holds the masks; None: they are not to be believed, and were not written."""
     said: tuple[str, ...]
     """How they came about, or why there are none, in sentences."""
+    doubted: Path | None = None
+    """Holds masks that are not to be believed, if there are any."""
+    incomplete: str = ""
+    """Why nobody can tell all of what the photographs are of, in a clause; empty: masks do."""
 
 
 def grown_masks(
@@ -50,8 +56,8 @@ def grown_masks(
 
     Args:
         source: A folder of photographs with poses. Masks that it has are not looked at.
-        folder: Gets ``masks`` and ``masks.json``. Masks of the same that lie there are kept, and
-            what somebody corrected in them.
+        folder: Gets ``masks`` and ``masks.json``, or ``doubted/masks``. Masks of the same that lie
+            there are kept, and what somebody corrected in them.
         pointed: At what, in which photograph; None: at what all cameras look at.
         progress: Told the fraction done and what is being done.
 
@@ -62,7 +68,10 @@ def grown_masks(
     made_by = store.key(f"grown masks {METHOD}", pointed, [store.digest(source)])
     record = read_record(folder)
     if record is not None and record.made_by == made_by:
-        return GrownMasks(folder if record.digest_of else None, (*record.said, *_changes(folder)))
+        changes = _changes(folder)
+        lacking = "" if changes else record.incomplete
+        believed = folder if record.digest_of else None
+        return GrownMasks(believed, (*record.said, *changes), _doubted(folder), lacking)
     progress(0.0, "reading photographs")
     shown = read_photographs(source, FINE, bare=True)
     rough = reduced(shown.views, ROUGH)
@@ -71,17 +80,19 @@ def grown_masks(
     else:
         seeds = pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
     grown = grow(shown.views, seeds, lambda f, words: progress(GROWN * f, words))
-    why = doubt(grown)
-    for name in (MASKS[0], RECORD):
+    why, lacking = doubt(grown), incomplete(grown) or ""
+    for name in (MASKS[0], DOUBTED, RECORD):
         _forget(folder / name)
     if grown is None or (why is not None and pointed is None):
         said = (f"No masks were grown from what all photographs show: {why}.",)
-        write_record(folder, made_by, said)
-        return GrownMasks(None, said)
+        if grown is not None:
+            _written(source, shown, grown, folder / DOUBTED, progress)
+        write_record(folder, made_by, said, lacking)
+        return GrownMasks(None, said, _doubted(folder), lacking)
     _written(source, shown, grown, folder, progress)
-    said = (_told(grown, pointed), *([] if why is None else [f"Check them: {why}."]))
-    write_record(folder, made_by, said)
-    return GrownMasks(folder, said)
+    said = (_told(grown, pointed), *(f"Check them: {w}." for w in (why, lacking) if w))
+    write_record(folder, made_by, said, lacking)
+    return GrownMasks(folder, said, incomplete=lacking)
 
 
 def _written(
@@ -109,6 +120,10 @@ def _told(grown: Grown, pointed: Pointed | None) -> str:
 def _changes(folder: Path) -> list[str]:
     count = len(corrected(folder))
     return [f"{count} of the masks were corrected by hand."] * bool(count)
+
+
+def _doubted(folder: Path) -> Path | None:
+    return folder / DOUBTED if (folder / DOUBTED / MASKS[0]).is_dir() else None
 
 
 def _forget(path: Path) -> None:

@@ -4,15 +4,18 @@ import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
 
+import numpy as np
+from jaxtyping import Bool
+
 from corporeal.errors import BadFileError
 from corporeal.features.learned_masks import learned_masks
 from corporeal.features.maskers import connect_masker, split
-from corporeal.formats.photographs import MASKS, has_masks, listed
+from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
-from corporeal.splats.intake import Intake, take_in
+from corporeal.splats.intake import ON, Intake, take_in
 from corporeal.splats.training_schedule import TrainConfig
 
 POSED = 0.5
@@ -27,6 +30,11 @@ STAND_STILL = (
     "Photograph it while neither it nor what is around it moves, give masks (a folder 'masks' with "
     "the names of the pictures), or go on all the same with --force."
 )
+ALL_OF_IT = (
+    "Give masks (a folder 'masks' with the names of the pictures), or grow them with 'corporeal "
+    "masks' and correct them; or photograph it on a ground of another colour, from more sides. "
+    "--force goes on with what was found."
+)
 CORRECT = (
     "They lie in 0-reconstruct/masks of the run: what is corrected there is taken by the next run."
 )
@@ -40,6 +48,9 @@ def take_pictures(
     Returns:
         What there is, and whether somebody said which pixels are objects.
 
+    Raises:
+        BadFileError: Where pictures were taken from, or what they are of, cannot be told.
+
     """
     training = TrainConfig(config.training, seed=config.training_seed, rasteriser=config.rasteriser)
     kept = None if folder is None else folder / "training.npz"
@@ -50,10 +61,13 @@ def take_pictures(
     begun = 0.0 if posed is None else POSED
     posed = posed or Posed(source, (), ())
     found = masks_for(config, posed.folder, folder, within(progress, begun, begun + MASKED))
+    if found.incomplete and not config.force:
+        raise BadFileError(source, f"{found.incomplete}.", ALL_OF_IT)
     later = within(progress, begun + MASKED, 1.0)
     taken = take_in(posed.folder, training, kept, later, instances, found.folder)
     made = replace(
         taken,
+        coloured=None if found.doubted is None else _sized(taken, posed.folder, found.doubted),
         statements=(*posed.statements, *found.statements, *taken.statements),
         warnings=(*posed.warnings, *found.warnings, *taken.warnings),
     )
@@ -69,6 +83,10 @@ class _Masks:
     warnings: tuple[str, ...] = ()
     grown: bool = False
     """Whether nobody, and no model, said what an object is."""
+    doubted: Path | None = None
+    """Where masks are that are not to be believed."""
+    incomplete: str = ""
+    """Why they are not of all that the photographs are of, in a clause; empty: they are."""
 
 
 def masks_for(
@@ -87,10 +105,18 @@ def masks_for(
         return _Masks(learned.folder, (*learned.said, CORRECT))
     grown = grown_masks(source, place, progress=progress)
     if grown.folder is None:
-        return _Masks(warnings=grown.said)
-    return _Masks(
-        grown.folder, (), (" ".join(("There were no masks.", *grown.said, CORRECT)),), True
-    )
+        return _Masks(None, (), grown.said, False, grown.doubted, grown.incomplete)
+    said = " ".join(("There were no masks.", *grown.said, CORRECT))
+    return _Masks(grown.folder, (), (said,), True, incomplete=grown.incomplete)
+
+
+def _sized(taken: Intake, source: Path, folder: Path) -> Bool[np.ndarray, "V H W"] | None:
+    """Read masks from a folder, as large as pictures are; None: not of all of them."""
+    if taken.views is None:
+        return None
+    shape = taken.views.rgb.shape[:3]
+    masks = read_photographs(source, max(shape[1:]), folder).masks
+    return masks >= ON if masks is not None and masks.shape == shape else None
 
 
 def _posed(

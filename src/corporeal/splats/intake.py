@@ -60,6 +60,8 @@ class Intake:
     """The photographs; their cameras stay as the file has them."""
     masks: Bool[np.ndarray, "V H W"] | None = None
     """Which pixels are on objects; None: unknown."""
+    coloured: Bool[np.ndarray, "V H W"] | None = None
+    """Which pixels have the colours of objects, where that is not to be believed alone."""
     z_up: bool = False
     """The file's kind says so, and that its unit is the metre."""
     usual: Vector | None = None
@@ -158,7 +160,7 @@ def take_in(
         shown.views.cameras,
         shown.views,
         masks,
-        shown.z_up,
+        z_up=shown.z_up,
         seen=None if points is None else points.position,
         quality=trained.quality,
         statements=_learned_how(trained, len(shown.views.cameras)),

@@ -164,7 +164,8 @@ def support(points, owners, first, last, cameras, depths, pace, near, votes):
     """Count for points first to last the views that see them where they are, and that see past.
 
     cameras (V, 16): camera from world (3 × 4), fx, fy, cx, cy; owners: the view that each comes
-    from, which is not asked; near: relative difference of depths that agree; votes (N, 2).
+    from, which is not asked; depths (V, h, w) [m], inf: unknown, which is neither; near: relative
+    difference of depths that agree; votes (N, 2).
     """
     views = len(depths)
     for i in range(first, last):
@@ -173,11 +174,11 @@ def support(points, owners, first, last, cameras, depths, pace, near, votes):
             if k == owners[i]:
                 continue
             shown, ahead, z = depth_there(cameras[k], points[i], depths[k], pace)
-            if not shown:
+            if not (shown and z < np.inf):
                 continue
             if abs(ahead - z) <= near * z:
                 votes[i, 0] += 1
-            elif ahead < z and z < np.inf:
+            elif ahead < z:
                 votes[i, 1] += 1
 
 

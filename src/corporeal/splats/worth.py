@@ -22,6 +22,9 @@ CROPPED = 0.5
 right masks show reach it in a fifth, a pot from near above in .43, a bed and a wall in .60."""
 GREY = 14.0
 """Held-out photographs agree with a plain grey picture as well as this [dB]."""
+DIFFERS = 0.5
+"""Median overlap of what was cut out by height above the floor and what colours tell, below which
+more is in dispute than agreed on: wrong cuts have .05 to .5, right ones .64 to .9."""
 UNLIKE = 0.35
 """Median overlap of surfaces with masks below which they are no shape of what masks show: 0.9 for
 most objects; foliage and wires, whose gaps close, have less."""
@@ -83,6 +86,28 @@ def goes_beyond(masks: Bool[np.ndarray, "V H W"]) -> str | None:
         return None
     what = f"{count} of {len(masks)} photographs show but a part of it"
     return f"The thing would go on beyond the pictures: {what}. {SAY_WHAT}"
+
+
+def told_otherwise(
+    masks: Bool[np.ndarray, "V H W"], coloured: Bool[np.ndarray, "V H W"] | None
+) -> str | None:
+    """Return in a sentence or two why what was cut out is not to be believed; None: it may be.
+
+    Colours say something else of what the thing is. Either may be wrong, and neither is sure.
+
+    Args:
+        masks: Which pixels show what was taken for objects, by where it is.
+        coloured: The same, by its colours, which are not to be believed alone; None: nobody knows.
+
+    """
+    if coloured is None or not coloured.any():
+        return None
+    either = np.maximum((masks | coloured).sum(axis=(1, 2)), 1)
+    overlap = float(np.median((masks & coloured).sum(axis=(1, 2)) / either))
+    if overlap >= DIFFERS:
+        return None
+    what = f"what either sets apart overlaps by {overlap:.0%} only"
+    return f"Colours and heights above the floor contradict each other: {what}. {SAY_WHAT}"
 
 
 def unlike_masks(

@@ -35,7 +35,7 @@ from corporeal.render.camera import cameras_around
 from corporeal.splats.closed import closed
 from corporeal.splats.foreground import sunk
 from corporeal.splats.intake import Intake, turned_upright
-from corporeal.splats.worth import goes_beyond, not_worth, unlike_masks
+from corporeal.splats.worth import goes_beyond, not_worth, told_otherwise, unlike_masks
 from corporeal.types import Camera, Finish, Reconstruction, Scene, SceneObject, Surface
 from corporeal.vlm.seen_objects import (
     SeenObject,
@@ -138,8 +138,10 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig) -> Intake:
     """
     made = turned_upright(taken, config.up, config.floor_at)
     cut_out = None if taken.masks is not None else made.masks
-    if cut_out is not None and not config.force and (why := goes_beyond(cut_out)):
-        raise UserError(f"{source}: {why}")
+    if cut_out is not None and not config.force:
+        why = goes_beyond(cut_out) or told_otherwise(cut_out, made.coloured)
+        if why is not None:
+            raise UserError(f"{source}: {why}")
     return made
 
 
