@@ -7,6 +7,7 @@ import pytest
 from painted_scene import GREY, agreement, scene
 
 from corporeal.errors import UserError
+from corporeal.masking import grow as growing
 from corporeal.masking.doubt import doubt
 from corporeal.masking.grow import grow
 from corporeal.masking.pointed import Spot, cut_around, pointed_at
@@ -44,6 +45,23 @@ def test_what_was_moved_between_two_rounds_is_told_from_all_around_it():
     shown = views.rgb.copy()
     shown[1::2] = np.roll(shown[1::2], 8, axis=2)
     assert doubt(grow(replace(views, rgb=shown), looked_at(views, points))) is None
+
+
+def test_rounds_go_on_until_masks_settle(monkeypatch):
+    """A printed sheet under a pot is lost bit by bit: after four rounds half of it was left."""
+    views, masks, points = scene()
+    once, rounds = growing._round, []
+
+    def changing(*given):
+        made = once(*given)
+        rounds.append(made)
+        early = len(rounds) in (1, 3, 5)
+        return replace(made, masks=made.masks ^ masks) if early else made
+
+    monkeypatch.setattr(growing, "_round", changing)
+    grown = grow(views, looked_at(views, points))
+    assert doubt(grown) is None
+    assert len(rounds) == 7  # the first after which two are the same
 
 
 def test_nothing_is_doubted():

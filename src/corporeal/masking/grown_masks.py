@@ -24,7 +24,7 @@ from corporeal.masking.seeds import looked_at
 
 Progress = Callable[[float, str], None]
 
-METHOD = 6
+METHOD = 7
 """Raised when other masks would be grown: those of an older method are grown again."""
 GROWN = 0.8
 """Share of the work that is done when masks are grown."""
