@@ -12,7 +12,7 @@ from corporeal.evaluation.life import rebounds
 from corporeal.materials.inflated import RESTITUTION
 from corporeal.materials.rebound import loss_of
 from corporeal.pipeline import Settings
-from corporeal.treatment.step_budget import dent_of_wall
+from corporeal.treatment.dents import dent_of_wall
 
 RADIUS = 0.11
 
