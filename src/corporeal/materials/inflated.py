@@ -36,7 +36,7 @@ HEAT_RATIO = 1.4
 """γ of air [-]."""
 RESTITUTION = 0.8
 """Of inflated balls on a hard floor [-]: the middle of what rules ask, with the drag of air taken
-off: footballs .86–.92, basketballs .75–.83, korfballs .72–.80, tennis balls .75–.79."""
+off: footballs .82–.92, basketballs .75–.83, korfballs .72–.80, tennis balls .75–.79."""
 RULED = 0.04
 """How far from the middle of their range rules let a ball rebound [-]."""
 SOURCE = "engineering-estimate"
