@@ -9,6 +9,7 @@ import corporeal as co
 from corporeal.errors import UserError
 from corporeal.evaluation.drop_test import drop
 from corporeal.evaluation.life import rebounds
+from corporeal.materials import find
 from corporeal.materials.inflated import RESTITUTION
 from corporeal.materials.rebound import loss_of
 from corporeal.pipeline import Settings
@@ -54,6 +55,15 @@ def test_a_ball_rebounds_as_its_rules_ask_where_they_are_known(name, rebound):
     assert contents.restitution == pytest.approx(rebound or RESTITUTION)
     assert contents.loss == pytest.approx(loss_of(rebound or RESTITUTION))
     assert ready.particles.treatments[0].loss == pytest.approx(contents.loss, abs=0.06)
+
+
+def test_a_solid_ball_rebounds_as_its_rules_ask_and_loses_in_its_bulk_what_it_did():
+    """From 60 inches a croquet ball comes back to 30 to 45, whatever plastic it is of."""
+    field = co.prepare(named("croquet ball")).field
+    nylon = find("nylon").ranges["loss"].typical
+    assert field.materials[0].restitution == pytest.approx(0.79)
+    assert field.materials[0].loss == nylon
+    assert field.structures[0].kind == "solid"
 
 
 def test_a_file_states_its_pressure_and_what_is_not_sealed_stays_a_wall():
