@@ -43,7 +43,7 @@ def test_what_a_person_stated_or_nobody_rated_stays():
 def test_every_rating_is_of_a_material_of_the_library():
     for name, rating in ratings().items():
         assert materials.find(name).name == name
-        assert rating.speed > 0.0 < rating.slope
+        assert rating.speed_m_s > 0.0 < rating.slope_s_m
 
 
 def test_a_metal_that_yields_follows_johnson():

@@ -12,6 +12,7 @@ from importlib.resources import files
 from math import pi, sqrt
 
 from corporeal.materials.rebound import loss_of, rebound
+from corporeal.typed import typed
 from corporeal.types import Law, Material
 
 NOMINAL = 1.0
@@ -24,22 +25,25 @@ LEAST, MOST = 0.12, 0.99
 class Rating:
     """At which speed the restitution of a material was rated, and how it changes with it."""
 
-    speed: float
-    """[m/s]"""
-    slope: float
-    """How much less it is for every m/s more [s/m]."""
+    of: str
+    """Name of the material."""
+    speed_m_s: float
+    slope_s_m: float
+    """How much less it is for every m/s more."""
     source: str
     """Key of ``materials.sources``."""
+
+
+@dataclass(frozen=True)
+class _Table:
+    rated: tuple[Rating, ...]
 
 
 @cache
 def ratings() -> dict[str, Rating]:
     """Every material whose restitution is known to fall with speed, by its name."""
     text = files("corporeal.materials").joinpath("pairs.toml").read_text(encoding="utf-8")
-    return {
-        row["of"]: Rating(row["speed_m_s"], row["slope_s_m"], row["source"])
-        for row in tomllib.loads(text)["rated"]
-    }
+    return {rating.of: rating for rating in typed(_Table, tomllib.loads(text)).rated}
 
 
 def at_speed(material: Material, speed: float) -> Material:
@@ -55,7 +59,7 @@ def at_speed(material: Material, speed: float) -> Material:
     rating = ratings().get(material.name)
     if rating is None:
         return material
-    gained = rating.slope * (rating.speed - speed)
+    gained = rating.slope_s_m * (rating.speed_m_s - speed)
     changed = {}
     if not stated(material, "restitution"):
         changed["restitution"] = _bounded(material.restitution + gained)

@@ -224,6 +224,6 @@ def _rebounds() -> list[str]:
 
 def _ratings() -> list[str]:
     lines = ["| material | rated at | less for every m/s more | source |", "|---|---:|---:|---|"]
-    for name, rating in ratings().items():
-        lines.append(f"| {name} | {rating.speed:g} m/s | {rating.slope:g} | {rating.source} |")
+    for name, row in ratings().items():
+        lines.append(f"| {name} | {row.speed_m_s:g} m/s | {row.slope_s_m:g} | {row.source} |")
     return lines
