@@ -4,7 +4,8 @@ from pathlib import Path
 
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline import RUN, Settings, reopen
-from corporeal.stages import assemble, describe, fill, film, ground, reconstruct, segment, simulate
+from corporeal.reconstruction import reconstruct_config
+from corporeal.stages import assemble, describe, fill, film, ground, segment, simulate
 from corporeal.vlm import connect, critic_of
 from corporeal.vlm.annotation import mapping_of
 
@@ -27,7 +28,7 @@ def validate(folder: Path, settings: Settings) -> None:
     if known is None or known.ground != settings.ground:
         ground.validate(settings.ground)
     if known is None or known.reconstruct != settings.reconstruct:
-        reconstruct.validate(settings.reconstruct)
+        reconstruct_config.validate(settings.reconstruct)
 
 
 def _validate_answers(config: DescribeConfig) -> None:
