@@ -18,11 +18,12 @@ from corporeal.geometry.make import AS_DRAWN, NINE_IN_TEN, Leeway, weight
 from corporeal.geometry.room import is_vessel, room_of
 from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.survey import Anatomy, Member
-from corporeal.materials.ensemble import otherwise, sample
+from corporeal.materials.ensemble import as_answered, otherwise, sample
 from corporeal.materials.placement import CONTENTS, WEIGHING
 from corporeal.materials.scale import fraction_of
 from corporeal.stages.ground import GroundConfig, ground
 from corporeal.types import (
+    AnsweredMass,
     Evidence,
     Inventory,
     MassMixture,
@@ -57,6 +58,8 @@ TRIES = 200
 """Draws of an object, until one is as likely as outside evidence leaves it."""
 OPEN = 0.3
 """Standard deviation of the logarithm of the volume of what is not closed [-]."""
+NESTED = ("volume_share", "surface_share", "inside", "inner_share", "missing")
+"""What pieces of one mesh take up of it: it fits only what the same answer says of the others."""
 FITTED = "This draw from the range fits the estimate of the object's mass best."
 
 
@@ -120,10 +123,13 @@ class Scale:
         return found
 
     def draw(self, inventory: Inventory, number: int) -> Draw:
-        """Draw a way for each part, values from their ranges, and what the meshes leave open."""
+        """Draw a way for each part, values from their ranges, and what the meshes leave open.
+
+        Where several answers were given, draws are of each in turn.
+        """
         rng = np.random.default_rng([self.seed, number])
         library, floor = self.grounding.library, self.grounding.floor
-        words = otherwise(inventory, rng, library)
+        words = otherwise(as_answered(inventory, number), rng, library)
         field = ground(self.scene, self.parts, words, self.grounding)
         field = sample(field, self.owner, rng, library, floor)
         away = [float(rng.normal(-d / 2, d)) if d else 0.0 for d in self.doubts]
@@ -173,7 +179,8 @@ def weighed(scale: Scale, inventory: Inventory, samples: int) -> Believed:
     placed = scale.of(ground(scale.scene, scale.parts, inventory, scale.grounding))
     objects, mixtures = [], []
     for k, words in enumerate(inventory.objects):
-        doubted = any(len(p.hypotheses) > 1 or p.material is None for p in _leaves(words))
+        doubted = bool(words.answers)
+        doubted |= any(len(p.hypotheses) > 1 or p.material is None for p in _leaves(words))
         doubted |= any(
             d for m, d in zip(scale.members, scale.doubts, strict=True) if scale.owner[m.part] == k
         )
@@ -281,6 +288,18 @@ class _Own:
             hypotheses=self._hypotheses(),
             evidence=self.words.evidence,
             warning=contradiction(self.words, self.masses),
+            answers=self._answers(),
+        )
+
+    def _answers(self) -> tuple[AnsweredMass, ...]:
+        """Say what each of several answers comes to by itself; its draws are every N-th."""
+        answers = self.words.answers
+        return tuple(
+            AnsweredMass(
+                mass=float(np.median(self.masses[k :: len(answers)])),
+                judged=answer.evidence.likely if answer.evidence else None,
+            )
+            for k, answer in enumerate(answers)
         )
 
     def _hypotheses(self) -> tuple[WeighedHypothesis, ...]:
@@ -336,7 +355,7 @@ class _Own:
 def _taken(words: PartWords, drawn: PartWords, made: Material, built: Structure) -> PartWords:
     """Let a part be as it was drawn; what its mass hangs on stands where it was drawn."""
     if not words.hypotheses or drawn.material is None or words.material is None:
-        return words
+        return replace(words, **{name: getattr(drawn, name) for name in NESTED})
     places = dict(drawn.placements)
     for name in WEIGHING:
         if name in made.grounds and (name == "density" or built.kind != "solid"):

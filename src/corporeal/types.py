@@ -467,6 +467,14 @@ def in_way(words: PartWords, way: Hypothesis) -> PartWords:
 
 
 @dataclass(frozen=True)
+class Account:
+    """What one of several answers to the same questions says of one object."""
+
+    parts: tuple[PartWords, ...]
+    evidence: Evidence | None = None
+
+
+@dataclass(frozen=True)
 class ObjectWords:
     """One object's parts, in words."""
 
@@ -477,6 +485,8 @@ class ObjectWords:
     """How large such an object usually is, as a model says [m]."""
     evidence: Evidence | None = None
     """An estimate of its mass made without the library; None: nobody was asked."""
+    answers: tuple[Account, ...] = ()
+    """Each of several answers, as a whole; what stands above pools them. Empty: one was given."""
 
 
 @dataclass(frozen=True)
@@ -688,6 +698,16 @@ class WeighedHypothesis:
 
 
 @dataclass(frozen=True)
+class AnsweredMass:
+    """What one of several answers says that an object weighs."""
+
+    mass: float
+    """Median over its own ways and ranges, without outside evidence [kg]."""
+    judged: float | None
+    """What it was judged to weigh outright [kg]; None: nobody was asked, or no usable answer."""
+
+
+@dataclass(frozen=True)
 class MassMixture:
     """What one object may weigh, over all ways it may be, and over all ranges."""
 
@@ -709,6 +729,8 @@ class MassMixture:
     evidence: Evidence | None = None
     warning: str = ""
     """Where outside evidence contradicts all that was drawn: what would reconcile them."""
+    answers: tuple[AnsweredMass, ...] = ()
+    """Of each of several answers; empty: one was given."""
 
 
 @dataclass(frozen=True)

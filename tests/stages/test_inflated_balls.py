@@ -9,10 +9,11 @@ import corporeal as co
 from corporeal.errors import UserError
 from corporeal.evaluation.drop_test import drop
 from corporeal.evaluation.life import rebounds
+from corporeal.materials import find
 from corporeal.materials.inflated import RESTITUTION
 from corporeal.materials.rebound import loss_of
 from corporeal.pipeline import Settings
-from corporeal.treatment.step_budget import dent_of_wall
+from corporeal.treatment.dents import dent_of_wall
 
 RADIUS = 0.11
 
@@ -37,7 +38,14 @@ def test_a_football_is_inflated_by_its_name_and_weighs_what_skin_and_air_do():
 
 
 @pytest.mark.parametrize(
-    "name, rebound", [("futsal ball", 0.55), ("red tennis ball", 0.64), ("volleyball", None)]
+    "name, rebound",
+    [
+        ("futsal ball", 0.55),
+        ("red tennis ball", 0.64),
+        ("football", 0.87),
+        ("dead tennis ball", 0.635),
+        ("volleyball", None),
+    ],
 )
 def test_a_ball_rebounds_as_its_rules_ask_where_they_are_known(name, rebound):
     """Struck hard, too: a red ball's wall bears more than its air."""
@@ -47,6 +55,15 @@ def test_a_ball_rebounds_as_its_rules_ask_where_they_are_known(name, rebound):
     assert contents.restitution == pytest.approx(rebound or RESTITUTION)
     assert contents.loss == pytest.approx(loss_of(rebound or RESTITUTION))
     assert ready.particles.treatments[0].loss == pytest.approx(contents.loss, abs=0.06)
+
+
+def test_a_solid_ball_rebounds_as_its_rules_ask_and_loses_in_its_bulk_what_it_did():
+    """From 60 inches a croquet ball comes back to 30 to 45, whatever plastic it is of."""
+    field = co.prepare(named("croquet ball")).field
+    nylon = find("nylon").ranges["loss"].typical
+    assert field.materials[0].restitution == pytest.approx(0.79)
+    assert field.materials[0].loss == nylon
+    assert field.structures[0].kind == "solid"
 
 
 def test_a_file_states_its_pressure_and_what_is_not_sealed_stays_a_wall():
@@ -101,7 +118,7 @@ def test_it_bounces_as_its_rules_ask_and_touches_as_long_as_measured():
     m = engine.measure()
     touched = np.nanmax(m.last_contact[0]) - np.nanmin(m.first_contact[0])
     fall = np.sqrt(6.0**2 + 2 * 9.81 * (0.2 - RADIUS))
-    assert m.momentum[0, 2] / m.mass[0] / fall == pytest.approx(0.8, abs=0.03)
+    assert m.momentum[0, 2] / m.mass[0] / fall == pytest.approx(0.87, abs=0.03)
     assert 0.0075 < touched < 0.011
 
 
@@ -159,6 +176,8 @@ def test_a_sealed_wall_that_is_struck_too_lightly_to_flex_bounces_no_less(speed)
         ("hockey puck", "damping_rubber", False),
         ("cricket ball", "baseball_core", False),
         ("bouncy ball", "rubber", False),
+        ("unhappy ball", "polynorbornene", False),
+        ("hollow ball of hard plastic", "plastics-LDPE", False),
     ],
 )
 def test_names_tell_what_balls_of_sports_are_made_of(name, material, sealed):

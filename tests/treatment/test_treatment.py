@@ -13,8 +13,9 @@ from corporeal.mpm.constants import GRID_LOSS, POISSON_FLOOR
 from corporeal.mpm.physics.branches import stiffening
 from corporeal.mpm.physics.stability import compress_young, compression, p_wave_speed
 from corporeal.treatment import part
+from corporeal.treatment.dents import dent_of_blow, mark_of_blow
+from corporeal.treatment.part import folds, wall_factors
 from corporeal.treatment.plan import QUALITIES, Motion, PartGeometry, judge, plan
-from corporeal.treatment.step_budget import dent_of_blow
 from corporeal.types import Law, Material, Structure
 
 SOLID = Structure("solid")
@@ -200,6 +201,8 @@ def test_a_step_budget_keeps_the_order_of_stiffness_and_the_yield_speed():
     copper = Material("copper", Law.VON_MISES, 110e9, 0.35, 8940.0, yield_stress=20e6)
     plaster = replace(copper, name="plaster", young=5e9, yield_stress=2e6)
     parts = [sphere(m, 0.1, number=k) for k, m in enumerate((FOAM, RUBBER, plaster, copper))]
+    # Long enough to bend: a ball of metal would be marked too deeply, and be rigid.
+    parts[2:] = [replace(p, size=(0.1, 0.1, 0.21)) for p in parts[2:]]
     foam, rubber, soft_metal, hard_metal = plan(parts, [FALL] * 4, "draft").treatments
     assert foam.young < rubber.young < soft_metal.young < hard_metal.young
     assert foam.young == 50e3
@@ -413,6 +416,40 @@ def test_what_would_be_dented_twice_as_much_as_in_life_rebounds_rigidly():
     # Sheets and rods bend, and hollow things give way as a whole.
     for thing in (block(hard, 0.004, 0.06, 0.06), sphere(hard, 0.06, shell(0.003))):
         assert plan([thing], [fast], "draft").treatments[0].kind != "rigid"
+
+
+LEAD = Material("lead", Law.VON_MISES, 14e9, 0.44, 11340.0, yield_stress=10e6)
+
+
+def test_what_would_be_marked_twice_as_deeply_as_in_life_is_rigid():
+    """A lead ball from 1 m is flattened by .07 of its radius (Tabor), on a draft grid by .4."""
+    assert mark_of_blow(10e6, 11340.0, 4.43) == pytest.approx(0.073, abs=0.001)
+    assert mark_of_blow(10e6 / 4, 11340.0, 4.43) == pytest.approx(2 * 0.073, abs=0.002)
+    fast = Motion(impact_speed=4.43, acceleration=9.81)
+    (ball,) = plan([sphere(LEAD, 0.02)], [fast], "draft").treatments
+    assert ball.kind == "rigid"
+    assert "0.073 of its radius" in ball.why
+    putty = replace(LEAD, young=3.2e6, density=1750.0, yield_stress=1e5)
+    (soft,) = plan([sphere(putty, 0.04)], [fast], "draft").treatments
+    assert soft.kind == "deformable"
+    # A bar bends, whatever its end is marked by.
+    (bar,) = plan([block(LEAD, 0.02, 0.02, 0.1)], [fast], "draft").treatments
+    assert bar.kind == "deformable"
+
+
+def test_a_closed_wall_that_yields_is_round_where_it_is_dented_little_and_folds_where_deeply():
+    """A ball of polyethylene, 1.7 mm, is dented by 2.5 walls at 6 m/s; a can by 10."""
+    soft = Material("polyethylene", Law.VON_MISES, 0.2e9, 0.47, 920.0, yield_stress=9e6)
+    tin = Material("aluminium", Law.VON_MISES, 70e9, 0.33, 2700.0, yield_stress=2e8)
+    ball = replace(sphere(soft, 0.074, shell(1.7e-3)), closed=True)
+    can = replace(sphere(tin, 0.066, shell(1e-4)), closed=True)
+    assert not folds(ball, 6.0)
+    assert folds(can, 4.0)
+    assert folds(ball, 0.0)
+    assert folds(ball, 20.0)
+    assert wall_factors(ball, 0.1, 6.0)[0] == pytest.approx(0.1**2)
+    assert wall_factors(can, 0.1, 4.0)[0] == pytest.approx(0.1**3)
+    assert not folds(replace(ball, material=RUBBER), 20.0)
 
 
 def test_a_dent_doubles_where_stiffness_is_five_and_a_half_times_too_small():

@@ -1,7 +1,8 @@
 """A server on this machine that speaks the formats of OpenAI, Anthropic and Google, and can fail.
 
 A script is a list of steps; each request takes the next, and the last one is repeated. A step is a
-dict (content, status, headers, error, sleep), or a function that makes one from the request.
+dict (content, more, status, headers, error, sleep), or a function that makes one from the request.
+In OpenAI's format ``more`` are the choices beside the first.
 """
 
 import json
@@ -105,10 +106,11 @@ def _answer(path, body, step):
         "model": body["model"],
         "choices": [
             {
-                "index": 0,
+                "index": k,
                 "finish_reason": "stop",
-                "message": {"role": "assistant", "content": text},
+                "message": {"role": "assistant", "content": said},
             }
+            for k, said in enumerate([text, *step.get("more", [])])
         ],
         "usage": {"prompt_tokens": 1200, "completion_tokens": 80, "total_tokens": 1280},
     }

@@ -12,6 +12,8 @@ from corporeal.description.annotated import with_annotations
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.description.file_words import has_wall, stated_material
 from corporeal.description.offers import Placed, in_all_ways, offer, places_of
+from corporeal.description.pooled import pooled
+from corporeal.description.several import told_several_times
 from corporeal.geometry.drawn import drawn
 from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.identity import Identity
@@ -44,7 +46,6 @@ from corporeal.vlm.together import together
 from corporeal.vlm.words import (
     against,
     drawn_by_scan,
-    evidence_of,
     gathered,
     leaves,
     part_words,
@@ -93,6 +94,8 @@ class Asking:
         sizes = self._about(Subject(self.scene.name, self.scene.name, "", "not known"))
         named = dict.fromkeys(o.class_name or o.name for o in self.scene.objects)
         classes = [name for name in named if telling(name)]  # "object" has no usual size
+        times = self.config.answers
+        doing = "asking" if times == 1 else f"asking, {times} answers each"
         jobs: list[Callable] = [
             partial(self._object, number, interviews[number], file[number], annotations)
             for number in range(count)
@@ -100,7 +103,7 @@ class Asking:
         results = together(
             [*jobs, lambda: sizes.extents(classes) if classes else {}],
             self.config.parallel,
-            lambda done: progress(done / (count + 1), "asking"),
+            lambda done: progress(done / (count + 1), doing),
             is_more,
         )
         *objects, extents = all_answered(results, self.config.vlm)
@@ -167,15 +170,21 @@ class Asking:
         """Ask everything about one object."""
         obj, names = self.scene.objects[number], self._names(number)
         stated = {part: a.material for (name, part), a in annotations.items() if name == obj.name}
-        words = file
-        if not (all(stated.get(name) for name in names) or stated.keys() - set(names)):
-            words = self._materials(interview, names, self._pieces(interview, names), file)
-            words = self._swollen(interview, words)
-        words = with_annotations(words, annotations, obj.name, self.config)
-        words = self._placed(interview, words)
-        weighs = interview.mass() if self.config.direct else None
-        evidence = evidence_of(*weighs) if weighs else None
-        return ObjectWords(obj.name, obj.class_name, tuple(words), evidence=evidence)
+        asks = not (all(stated.get(name) for name in names) or stated.keys() - set(names))
+        pieces = self._pieces(interview, names) if asks else []
+
+        def described() -> list[PartWords]:
+            words = file
+            if asks:
+                words = self._materials(interview, names, pieces, file)
+                words = self._swollen(interview, words)
+            words = with_annotations(words, annotations, obj.name, self.config)
+            return self._placed(interview, words)
+
+        answers = told_several_times(interview, self.config.answers, described, self.config.direct)
+        first, *others = answers
+        thing = ObjectWords(obj.name, obj.class_name, first.parts, evidence=first.evidence)
+        return pooled(thing, answers) if others else thing
 
     def _pieces(self, interview: Interview, names: list[str]) -> list[str]:
         """Name the parts to ask about: the file's, or what a single mesh is taken apart into."""

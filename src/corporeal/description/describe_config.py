@@ -1,10 +1,14 @@
 """Who is asked what is in a scene, and how."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal
 
+from corporeal import store
 from corporeal.errors import check_range
+
+MOST_ANSWERS = 40
+"""To one question: Wang et al. (2022) sampled so many."""
 
 
 @dataclass(frozen=True)
@@ -33,6 +37,9 @@ class DescribeConfig:
     direct: bool = True
     """Also ask a model, without the library, what is printed on each object and what it weighs.
     This reweights the ways it may be, and sets no value."""
+    answers: int = field(default=1, metadata=store.LATER)
+    """Number of answers to each question about materials, values and mass (self-consistency). What
+    an object may weigh is pooled over them, each with the same weight; parts are asked for once."""
     parallel: int = 4
     """Number of objects that a model is asked about at the same time."""
 
@@ -47,6 +54,7 @@ def validate(config: DescribeConfig) -> None:
     for name, value, low, high in (
         ("--views", config.views, 1, DIRECTIONS),
         ("--view-size", config.view_size, 16, 2048),
+        ("--answers", config.answers, 1, MOST_ANSWERS),
         ("--parallel", config.parallel, 1, 64),
     ):
         check_range(name, value, low, high)

@@ -1,15 +1,14 @@
 """Whether masks that nobody drew are of what the photographs are of."""
 
-from corporeal.masking.grow import Grown
+from corporeal.masking.grow import SETTLED, Grown
 
 ALIKE = 0.2
 """Overlap of the colours of objects and of what is around them, above which the outline is chance:
 a brown axe on white has .05 and a clay pot on a print .13, whose masks are right; a helmet before
 clutter .33, a doll on a bed .56, whose masks are wrong."""
 COHERENT = 0.7
-"""Masks and the silhouettes of their hull must agree by so much."""
-SETTLED = 0.95
-"""Masks of the last two rounds must."""
+"""Masks and the silhouettes of their hull must agree by so much; those of the last two rounds by
+SETTLED."""
 OUTER = 0.25
 """Share of the hull at the edge of what all cameras look at, above which it goes on beyond."""
 CROPPED = 0.5

@@ -30,7 +30,10 @@ Progress = Callable[[float, str], None]
 
 ROUGH, FINE = 192, 384
 """Longer side of the pictures that rounds look at, and of the masks that come out [px]."""
-ROUNDS = 4
+ROUNDS, MOST = 4, 12
+"""At least, and where masks still change from one to the next, at most."""
+SETTLED = 0.95
+"""Masks of two rounds that agree so well do not change any more."""
 FLOOR = 6.0
 """Evidence against a pixel that shows the floor's pattern, or a shade of its colour: more than any
 colour's for it."""
@@ -120,23 +123,25 @@ def grow(
     never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0)) + on_floor
     state: _Round | None = None
     evidence, before = Evidence(inside, outside, never), seeds.never
-    for turn in range(ROUNDS):
-        progress(turn / (ROUNDS + 1), f"growing masks, round {turn + 1} of {ROUNDS}")
+    settled, turn = 0.0, 0
+    while turn < ROUNDS or (turn < MOST and settled < SETTLED):
+        progress(turn / (MOST + 1), f"growing masks, round {turn + 1}")
         before = before if state is None else state.masks
         state = _round(side, room, evidence)
         if state is None:
             return None
+        settled, turn = _agreement(state.masks, before), turn + 1
         on_floor = np.where(state.hiding, np.float32(0), on_floor)
         evidence = replace(state.evidence, prior=state.evidence.prior + on_floor)
     assert state is not None
-    progress(ROUNDS / (ROUNDS + 1), "drawing their outlines")
+    progress(MOST / (MOST + 1), "drawing their outlines")
     middle = ~seeds.never & before_the_floor(rough.cameras, seeds.floor, seeds.around)
     middle &= ~_widened(state.silhouettes) & (_shrunk(shaded, rough.rgb.shape[1:3]) < HALF)
     by_colour = side.cut(replace(state.evidence, prior=np.zeros_like(on_floor))) > HALF
     return Grown(
         inside=closed(_drawn(views, state, floor), rough.cameras, room),
         coherence=_agreement(state.masks, state.silhouettes),
-        settled=_agreement(state.masks, before),
+        settled=settled,
         alike=state.alike * (1 - _told(state.masks, on_floor)),
         outer=state.outer,
         cropped=float(cropped(state.masks).mean()),

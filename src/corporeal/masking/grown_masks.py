@@ -28,7 +28,7 @@ Progress = Callable[[float, str], None]
 FLAT = "What has their colours and lies flat on the floor was taken for objects, too."
 DOUBTED = "doubted"
 """Folder of masks that are not to be believed: what colours alone would take for objects."""
-METHOD = 6
+METHOD = 8
 """Raised when other masks would be grown: those of an older method are grown again."""
 GROWN = 0.8
 """Share of the work that is done when masks are grown."""

@@ -2,12 +2,14 @@
 
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import cache
 from importlib.resources import files
 from math import sqrt
 
+from corporeal.materials.blow import NOMINAL, at_speed, stated, yielding
 from corporeal.materials.entry import Entry
+from corporeal.materials.rebound import rebound
 from corporeal.types import Material, Range
 
 
@@ -61,22 +63,58 @@ class Restitution:
     """Of the pair; None: nobody measured it, and ``value`` is the rule's."""
 
 
-def restitution(a: Striker, b: Striker) -> Restitution:
-    """Restitution of two bodies: the most particular measured pair, else ``restitution_between``.
+VITREOUS = frozenset(("glass", "ceramic", "porcelain"))
+"""What is as smooth and as free of pores as metals are, and does not yield."""
+
+
+def restitution(a: Striker, b: Striker, speed: float = NOMINAL) -> Restitution:
+    """Restitution of two bodies: the most particular measured pair, else a rule.
 
     What was measured are solid balls on solid bodies, so it holds for what is solid. A value that
-    a person stated for one of the materials outranks it.
+    a person stated for one of the materials outranks it. Of solid metals, glass and ceramics no
+    value "on a hard floor" is needed: their bulk loses what its loss factor says, and metals yield.
+
+    Args:
+        a: One body.
+        b: The other.
+        speed: Of the blow [m/s].
+
     """
-    particular = not all(s.solid for s in (a, b)) or any(_stated(s.material) for s in (a, b))
-    row = None if particular else _closest(a.entry.kin, b.entry.kin, rebounds)
-    if row is None:
-        return Restitution(restitution_between(a.material, b.material), None)
-    low, typical, high = row["restitution"]
-    return Restitution(typical, Range(low, typical, high, row["source"]))
+    solid = a.solid and b.solid
+    told = any(stated(s.material, "restitution") for s in (a, b))
+    row = _closest(a.entry.kin, b.entry.kin, rebounds) if solid and not told else None
+    if row is not None:
+        low, typical, high = row["restitution"]
+        return Restitution(typical, Range(low, typical, high, row["source"]))
+    one, other = (at_speed(s.material, speed) for s in (a, b))
+    if told or not solid:
+        return Restitution(restitution_between(one, other), None)
+    smooth = _smooth(a) and _smooth(b)
+    value = _of_bulk(one, other) if smooth else restitution_between(one, other)
+    return Restitution(min(value, yielding(*_metals(a, b), speed)), None)
+
+
+def _metals(a: Striker, b: Striker) -> tuple[Material, Material]:
+    """Both materials; what is no metal is crushed or creeps, and does not yield as one."""
+    one, other = (
+        s.material if s.entry.group == "metal" else replace(s.material, yield_stress=None)
+        for s in (a, b)
+    )
+    return one, other
+
+
+def _smooth(body: Striker) -> bool:
+    return body.entry.group == "metal" or bool(VITREOUS & set(body.entry.kin))
+
+
+def _of_bulk(a: Material, b: Material) -> float:
+    """Restitution of two bodies that lose in their bulk alone [-], of each what it stores."""
+    stiff_a, stiff_b = (m.young / (1.0 - m.poisson**2) for m in (a, b))
+    return rebound((stiff_b * a.loss + stiff_a * b.loss) / (stiff_a + stiff_b))
 
 
 def restitution_between(a: Material, b: Material) -> float:
-    """Restitution of an unmeasured pair.
+    """Restitution of an unmeasured pair of which one is rough, fibrous or a polymer, or a wall.
 
     Each body stores energy in proportion to its compliance and returns the share e² of it:
     e² = (E_b e_a² + E_a e_b²)/(E_a + E_b), with the plane-strain modulus E/(1 - ν²), so the softer
@@ -115,11 +153,6 @@ def _closest(
     known = table()
     rows = (known.get(frozenset(names)) for names in _by_closeness(a, b))
     return next((row for row in rows if row), None)
-
-
-def _stated(material: Material) -> bool:
-    ground = material.grounds.get("restitution")
-    return ground is not None and ground.chosen_by == "annotation"
 
 
 def _by_closeness(a: tuple[str, ...], b: tuple[str, ...]) -> list[tuple[str, str]]:

@@ -67,7 +67,8 @@ def otherwise(inventory: Inventory, rng: np.random.Generator, library: str) -> I
     """Draw for every part one of the ways it may be, as a whole, by their probabilities.
 
     Ways that share a reading of the object ("imitation") are drawn together. What nobody recognised
-    may be of any of the library's materials.
+    may be of any of the library's materials. Where several answers were given, one of them is drawn
+    first, since its ways and its values fit each other.
     """
     return replace(
         inventory,
@@ -75,7 +76,21 @@ def otherwise(inventory: Inventory, rng: np.random.Generator, library: str) -> I
     )
 
 
+def as_answered(inventory: Inventory, number: int) -> Inventory:
+    """Let every object be as one of the answers about it says; they are taken in turn."""
+    return replace(inventory, objects=tuple(_told(thing, number) for thing in inventory.objects))
+
+
+def _told(thing: ObjectWords, number: int) -> ObjectWords:
+    if not thing.answers:
+        return thing
+    account = thing.answers[number % len(thing.answers)]
+    return replace(thing, parts=account.parts, answers=())
+
+
 def _object(thing: ObjectWords, rng: np.random.Generator, library: str) -> ObjectWords:
+    if thing.answers:
+        thing = _told(thing, int(rng.integers(len(thing.answers))))
     read = ""  # the reading that the first part of the object to have any was drawn with
 
     def drawn(words: PartWords) -> PartWords:

@@ -17,6 +17,7 @@ from math import pi, sqrt
 
 from scipy.optimize import brentq
 
+from corporeal.materials.blow import stated
 from corporeal.materials.rebound import loss_of, rebound
 from corporeal.mpm.constants import AIR_DENSITY
 from corporeal.types import Ground, Law, Material, Range
@@ -36,7 +37,7 @@ HEAT_RATIO = 1.4
 """γ of air [-]."""
 RESTITUTION = 0.8
 """Of inflated balls on a hard floor [-]: the middle of what rules ask, with the drag of air taken
-off: footballs .86–.92, basketballs .75–.83, korfballs .72–.80, tennis balls .75–.79."""
+off: footballs .82–.92, basketballs .75–.83, korfballs .72–.80, tennis balls .75–.79."""
 RULED = 0.04
 """How far from the middle of their range rules let a ball rebound [-]."""
 SOURCE = "engineering-estimate"
@@ -206,8 +207,7 @@ def as_sealed_wall(skin: Material) -> Material:
     dented over a wide place instead, and gives back what its loss factor leaves. One that a person
     stated stays.
     """
-    told = skin.grounds.get("restitution")
-    if told is not None and told.chosen_by == "annotation":
+    if stated(skin, "restitution"):
         return skin
     loss = skin.grounds["loss"].range if "loss" in skin.grounds else None
     most, least = (loss.low, loss.high) if loss is not None else (skin.loss, skin.loss)
@@ -215,6 +215,26 @@ def as_sealed_wall(skin: Material) -> Material:
     why = "a closed wall loses what its loss factor says; no point of contact yields"
     ground = _ground(rebound(least), bounces, rebound(most), why)
     return replace(skin, restitution=bounces, grounds=skin.grounds | {"restitution": ground})
+
+
+def solid_as_ruled(material: Material, rebound: float | None) -> Material:
+    """Let a solid ball that is struck as a rigid body rebound as its rules ask, if there are any.
+
+    Its loss factor stays: what is hard does not lose its rebound in its bulk. A restitution that a
+    person stated stays, too.
+
+    Args:
+        material: What it is made of.
+        rebound: Restitution on a hard floor [-]; None: no rule is known.
+
+    """
+    if rebound is None or stated(material, "restitution"):
+        return material
+    ground = _ground(
+        rebound - RULED, rebound, rebound + RULED, "what the rules of its sport ask for"
+    )
+    grounds = material.grounds | {"restitution": ground}
+    return replace(material, restitution=rebound, grounds=grounds)
 
 
 def as_ruled(inner: Material, rebound: float | None) -> Material:

@@ -14,6 +14,7 @@ from corporeal.materials.treatments import inside, treatments
 from corporeal.types import (
     Ground,
     Hypothesis,
+    MassMixture,
     Material,
     MaterialField,
     Part,
@@ -122,7 +123,7 @@ def materials_json(
     weighed = zip(masses, scales, strict=True)
     heavy = [{"scale": s, "mass_kg": m, "real_mass_kg": m / s**3} for m, s in weighed]
     rows_of_parts = [_part_json(*row) for row in rows]
-    mixtures = {"masses": [asdict(m) for m in field.mixtures]} if field.mixtures else {}
+    mixtures = {"masses": [_mass_json(m) for m in field.mixtures]} if field.mixtures else {}
     return mixtures | {
         "units": {q.field: q.unit for q in QUANTITIES.values()},
         "parts": [
@@ -133,6 +134,12 @@ def materials_json(
         "restitution": field.restitution.round(4).tolist(),
         "order": "rows and columns are the parts in order, then the floor and the walls",
     }
+
+
+def _mass_json(mixture: MassMixture) -> dict:
+    """Say what an object may weigh, by each of several answers too where several were given."""
+    row = asdict(mixture)
+    return row if mixture.answers else {n: value for n, value in row.items() if n != "answers"}
 
 
 def _part_json(

@@ -17,7 +17,15 @@ import numpy as np
 from jaxtyping import Bool, Float32, UInt8
 
 from corporeal.machine import cores
-from corporeal.render import cull, kernels, kernels_ask, kernels_film, kernels_floor, kernels_light
+from corporeal.render import (
+    crop,
+    cull,
+    kernels,
+    kernels_ask,
+    kernels_film,
+    kernels_floor,
+    kernels_light,
+)
 from corporeal.render.camera import Aim
 from corporeal.render.embree import (
     BAND,
@@ -63,6 +71,12 @@ class _Empty:
     """The studio with nothing in it, before one camera."""
 
     aim: Aim
+    place: tuple[float, ...]
+    """Where scene and floor are: pictures of another scene need another studio."""
+    rays: Rays
+    """Of all pixels."""
+    glances: Float32[np.ndarray, "P 3"]
+    """How pixels see the floor: see ``kernels_floor.glances``."""
     wall: Float32[np.ndarray, "P 3"]
     """Light of the backdrop, without the floor."""
     mirrored: Float32[np.ndarray, "P 3"]
@@ -95,14 +109,18 @@ class FilmCaster:
         band = -(-lines // TILE) * TILE
         rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
         with ThreadPoolExecutor(threads) as pool:
-            if self._empty is None or self._empty.aim != camera:
-                self._empty = _emptied(stage, camera, PLANS[quality], rows, pool)
-            empty = self._empty
-            out = empty.printed.copy()
-            job = _Picture(stage, camera, PLANS[quality], empty)
+            known = self._empty
+            if known is None or (known.aim, known.place) != (camera, _place(stage)):
+                known = self._empty = _emptied(stage, camera, PLANS[quality], rows, pool)
+            out = known.printed.copy()
+            job = _Picture(stage, camera, PLANS[quality], known)
             for _ in pool.map(lambda r: job.band(r, out), rows):
                 pass
         return out
+
+
+def _place(stage: Stage) -> tuple[float, ...]:
+    return (*stage.origin.tolist(), *stage.centre.tolist(), stage.size)
 
 
 def _emptied(
@@ -113,11 +131,14 @@ def _emptied(
     pool: ThreadPoolExecutor,
 ) -> _Empty:
     """Cast the studio without objects."""
-    pixels = camera.width * camera.height
+    pixels, cleared = camera.width * camera.height, stage.cleared()
+    rays = Job(cleared, camera, Sampling(1, 1, 1)).rays((0, camera.height))
+    # Above the horizon no floor is seen.
+    glances = np.zeros((pixels, 3), np.float32)
     wall, mirrored = (np.empty((pixels, 3), np.float32) for _ in range(2))
     printed = np.empty((camera.height, camera.width, 3), np.uint8)
-    made = _Empty(camera, wall, mirrored, printed)
-    job = _Picture(stage.cleared(), camera, plan, made)
+    made = _Empty(camera, _place(stage), rays, glances, wall, mirrored, printed)
+    job = _Picture(cleared, camera, plan, made)
     for _ in pool.map(job.empty_band, rows):
         pass
     return made
@@ -139,11 +160,15 @@ class _Picture(Job):
         halo = HALO * TILE
         return max(rows[0] - halo, 0), min(rows[1] + halo, self.camera.height)
 
+    def rays_of(self, here: slice) -> Rays:
+        """Return those of some pixels of the picture."""
+        return Rays(self.empty.rays.origin[here], self.empty.rays.direction[here])
+
     def empty_band(self, rows: tuple[int, int]) -> None:
         """Cast rows of the empty studio."""
         width, height = self.camera.width, self.camera.height
         wide = self.wide(rows)
-        rays = self.rays(wide)
+        rays = self.rays_of(slice(wide[0] * width, wide[1] * width))
         light = np.empty((len(rays.origin), 3), np.float32)
         kernels_light.backdrop(self.lamps, wide, height, width, 1, light)
         wall = light.copy()
@@ -151,12 +176,15 @@ class _Picture(Job):
         index = np.arange(len(light))
         everywhere = np.ones((block.rows, width), np.bool_)
         missed = self.stage.missed(rays.origin)
-        _, arrived = self.cast(rays, index, everywhere, block, light, missed)
+        s, arrived = self.cast(rays, index, everywhere, block, light, missed)
         toned = np.empty_like(light)
         kernels_film.tone(light, index, toned)
         mine = slice((rows[0] - wide[0]) * width, (rows[1] - wide[0]) * width)
         here = slice(rows[0] * width, rows[1] * width)
         self.empty.wall[here] = wall[mine]
+        floor = np.flatnonzero(s.kind[mine] == kernels.FLOOR)
+        eye, glances = self.eye.astype(np.float32), self.empty.glances[here]
+        kernels_floor.glances(rays.direction[mine], floor, eye, self.lamps, glances)
         self.empty.mirrored[here] = arrived.light.reshape(-1, WIDE)[mine, 4:CHANNELS]
         size = width, height
         kernels_film.printed(toned, index, wide[0], size, rows, self.empty.printed)
@@ -165,7 +193,8 @@ class _Picture(Job):
         """Cast some rows of a picture where it differs from the empty studio."""
         width = self.camera.width
         wide = self.wide(rows)
-        rays = self.rays(wide)
+        here = slice(wide[0] * width, wide[1] * width)
+        rays = self.rays_of(here)
         block = Block(wide[0], wide[1] - wide[0], width)
         shape = block.rows, width
         # What is seen, and where light differs: on things, and where they may be in its way.
@@ -174,26 +203,56 @@ class _Picture(Job):
         kind = np.repeat(np.repeat(tiles, TILE, axis=0), TILE, axis=1)[: shape[0], :width]
         if not kind.any():
             return
-        here = slice(wide[0] * width, wide[1] * width)
-        light, toned = (np.empty((len(rays.origin), 3), np.float32) for _ in range(2))
+        toned = np.empty((len(rays.origin), 3), np.float32)
         self.soften(_of_rows(tiles, rows, wide[0]), block, here, toned)
         near = kind == NEAR
         near[: max(rows[0] - wide[0] - 1, 0)] = near[rows[1] - wide[0] + 1 :] = False
-        active = np.flatnonzero(near)
-        light[active] = self.empty.wall[here][active]
-        known = kernels_film.widened(near, REACH)
-        s, arrived = self.cast(rays, active, known, block, light, hit)
-        kernels_film.tone(light, active, toned)
-        # Once more, finer, beside other surfaces of another colour.
-        edge = np.zeros(len(light), np.bool_)
-        inner = max(rows[0] - wide[0] - 1, 0), min(rows[1] - wide[0] + 1, shape[0])
-        kernels_film.edges(s, toned, near.ravel(), shape, inner, edge)
-        pixels = np.flatnonzero(edge)
-        if len(pixels):
-            self.refine(pixels, block, arrived, toned)
+        part = crop.about(near, block, REACH)
+        if part is not None:
+            near = crop.cut(near, block, part)
+            bright = self.closely(rays, hit, near, (block, part), rows)
+            there = toned.reshape(*shape, 3)[crop.window(block, part)]
+            there[near] = bright.reshape(*near.shape, 3)[near]
         size = width, self.camera.height
         changed = np.flatnonzero(kind != UNTOUCHED)
         kernels_film.printed(toned, changed, wide[0], size, rows, out)
+
+    def closely(
+        self,
+        rays: Rays,
+        hit: tuple[np.ndarray, ...],
+        near: Bool[np.ndarray, "h w"],
+        blocks: tuple[Block, Block],
+        rows: tuple[int, int],
+    ) -> Float32[np.ndarray, "P 3"]:
+        """Cast some pixels one by one; return the filmic light of the part that they lie in.
+
+        Args:
+            rays: Of the band.
+            hit: What they met.
+            near: Which pixels of the part.
+            blocks: The band, and the part of it.
+            rows: The first row of the picture to answer for and the one after the last.
+
+        """
+        block, part = blocks
+        rays = Rays(crop.cut(rays.origin, *blocks), crop.cut(rays.direction, *blocks))
+        hit = tuple(crop.cut(x, *blocks) for x in hit)
+        wall = self.empty.wall[block.first * block.columns :][: block.rows * block.columns]
+        light = crop.cut(wall, *blocks)
+        toned = np.empty_like(light)
+        active = np.flatnonzero(near)
+        known = kernels_film.widened(near, REACH)
+        s, arrived = self.cast(rays, active, known, part, light, hit)
+        kernels_film.tone(light, active, toned)
+        # Once more, finer, beside other surfaces of another colour.
+        edge = np.zeros(len(light), np.bool_)
+        inner = max(rows[0] - part.first - 1, 0), min(rows[1] - part.first + 1, part.rows)
+        kernels_film.edges(s, toned, near.ravel(), near.shape, inner, edge)
+        pixels = np.flatnonzero(edge)
+        if len(pixels):
+            self.refine(pixels, part, arrived, toned)
+        return toned
 
     def seen(self, rays: Rays, block: Block) -> tuple[np.ndarray, ...]:
         """Nearest triangle and where, of each pixel; rays that could hit nothing are not cast."""
@@ -241,9 +300,8 @@ class _Picture(Job):
         sky = np.full((height + 1, width + 1, 2), self.open, np.float32)
         kernels_floor.hidden(asker, free, self.ways, width + 1, sky)
         empty, shape = self.empty, (block.rows, block.columns)
-        kernels_floor.softly(
-            tiles, *view, shape, self.lamps, sky, empty.mirrored[here], empty.wall[here], toned
-        )
+        known = empty.glances[here], empty.mirrored[here], empty.wall[here]
+        kernels_floor.softly(tiles, shape, self.lamps, sky, *known, toned)
 
     def cast(
         self,
@@ -264,7 +322,7 @@ class _Picture(Job):
         on = index[s.kind[index] != NOTHING]
         shape = block.rows, block.columns
         asks = np.zeros(len(light), np.bool_)
-        kernels_ask.chosen(s, on, known, block.first, asks)
+        kernels_ask.chosen(s, on, known, block.first + block.left, asks)
         asking = np.flatnonzero(asks)
         arriving = np.zeros((len(light), WIDE), np.float32)
         arriving[asking] = self.arriving(s, d, asking, block.places(asking))
@@ -325,12 +383,14 @@ class _Picture(Job):
         o, d = (np.empty((total, 3), np.float32) for _ in range(2))
         row, column = (np.empty(total, np.float32) for _ in range(2))
         size, view = (self.camera.width, self.camera.height), (self.eye, self.frame, self.tangent)
-        kernels_film.finer_rays(*view, size, block.first, pixels, o, d, row, column)
-        light = np.repeat(self.empty.wall[block.first * block.columns + pixels], count, axis=0)
+        within = block.first, block.left, block.columns
+        kernels_film.finer_rays(*view, size, within, pixels, o, d, row, column)
+        middle = block.places(pixels)
+        light = np.repeat(self.empty.wall[middle.row * size[0] + middle.column], count, axis=0)
         # Dice hang on the sample's place in a picture of so many samples.
         places = Places(
             ((row + block.first + 0.5) * FINER).astype(np.int64),
-            ((column + 0.5) * FINER).astype(np.int64),
+            ((column + block.left + 0.5) * FINER).astype(np.int64),
         )
         lit = np.zeros((total, WIDE), np.float32)
 

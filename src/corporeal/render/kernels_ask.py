@@ -43,7 +43,7 @@ def chosen(s, on, known, first, out):
         s: What pixels met.
         on: Pixels that met something.
         known: Which pixels were looked at (rows, columns).
-        first: The picture's row of the first one.
+        first: The picture's row and column of the first one, added.
         out: Marks (P,).
 
     """

@@ -254,15 +254,30 @@ def way_of(eye, frame, tangent, size, row, column, e):
 
 
 @numba.njit(**LOOP)
-def finer_rays(eye, frame, tangent, size, first, pixels, o, d, row, column):
-    """Origins, directions and places of the samples about the middle of some pixels of a band."""
-    width = size[0]
+def finer_rays(eye, frame, tangent, size, block, pixels, o, d, row, column):
+    """Origins, directions and places of the samples about the middle of some pixels.
+
+    Args:
+        eye: Where the camera is [m].
+        frame: Its axes.
+        tangent: Of half its field of view.
+        size: Of the picture: width, height.
+        block: What part of it pixels are numbered in: first row, first column, columns.
+        pixels: Their numbers (N,).
+        o: Origins (N × ``len(ABOUT)``, 3).
+        d: Unit directions.
+        row: Of each sample, from the first row on.
+        column: From the first column on.
+
+    """
+    first, left, columns = block
     count = len(ABOUT)
     for k in range(len(pixels)):
-        i, j = pixels[k] // width, pixels[k] % width
+        i, j = pixels[k] // columns, pixels[k] % columns
         for n in range(count):
             m = k * count + n
             row[m], column[m] = i + ABOUT[n, 0], j + ABOUT[n, 1]
-            way_of(eye, frame, tangent, size, first + i + ABOUT[n, 0], j + ABOUT[n, 1], d[m])
+            y, x = first + i + ABOUT[n, 0], left + j + ABOUT[n, 1]
+            way_of(eye, frame, tangent, size, y, x, d[m])
             for a in range(3):
                 o[m, a] = eye[a]

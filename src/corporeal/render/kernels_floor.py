@@ -10,7 +10,7 @@ import numpy as np
 
 from corporeal.render.kernels import FLOOR_ROUGHNESS, INNER, JIT, LOOP
 from corporeal.render.kernels_film import HORIZON, filmic, hull_of, meets_box, way_of
-from corporeal.render.kernels_light import fading, shade_one
+from corporeal.render.kernels_light import fading, glance, shade_seen
 
 TILE = 8
 """Sides of a tile [px]."""
@@ -208,39 +208,60 @@ def hidden(asker, free, ways, columns, light):
 
 
 @numba.njit(**JIT)
-def softly(tiles, eye, frame, tangent, size, first, shape, lamps, sky, mirrored, wall, out):
+def glances(d, index, eye, lamps, out):
+    """Write how pixels see the floor: what no object changes, worked out once for each camera.
+
+    Args:
+        d: Directions of the pixels (P, 3).
+        index: Those that see floor (N,).
+        eye: Where they come from [m].
+        lamps: The studio.
+        out: Highlight, grazing share, and how much of the floor is seen before the backdrop (P, 3).
+
+    """
+    up, scratch = np.zeros(3, np.float32), np.empty(3, np.float32)
+    up[2] = 1
+    _glances(d, index, eye, lamps, up, scratch, out)
+
+
+@numba.njit(**LOOP)
+def _glances(d, index, eye, lamps, up, scratch, out):
+    for g in index:
+        e = d[g]
+        t = (lamps.floor[3] - eye[2]) / min(e[2], -HORIZON)
+        x, y = eye[0] + t * e[0] - lamps.centre[0], eye[1] + t * e[1] - lamps.centre[1]
+        out[g, 0], out[g, 1] = glance(up, e, FLOOR_ROUGHNESS, lamps.sun, scratch)
+        out[g, 2] = fading(np.hypot(x, y), lamps)
+
+
+@numba.njit(**JIT)
+def softly(tiles, shape, lamps, sky, glances, mirrored, wall, out):
     """Write the filmic light of the pixels of far tiles.
 
     Args:
         tiles: Kinds (rows, columns).
-        eye: Where the camera is [m].
-        frame: Its axes.
-        tangent: Of half its field of view.
-        size: Of the picture: width, height.
-        first: The picture's row that the band begins with.
         shape: Rows and columns of pixels.
         lamps: The studio.
         sky: At the corners of tiles, from ``at_corners``.
+        glances: How the band's pixels see the floor (P, 3).
         mirrored: What each pixel of the band mirrors in the empty studio (P, 3).
         wall: Light of the backdrop (P, 3).
         out: Of the band (P, 3).
 
     """
-    up, traits = np.zeros(3, np.float32), np.zeros(6, np.float32)
-    up[2], traits[1], traits[4] = 1, FLOOR_ROUGHNESS, 1
+    traits = np.zeros(6, np.float32)
+    traits[1], traits[4] = FLOOR_ROUGHNESS, 1
     light = np.zeros(7, np.float32)
     light[3] = 1
-    row = np.empty(3, np.float32), np.empty(3, np.float32), np.empty((2, 3), np.float32)
-    view = eye, frame, tangent, size, first
-    _softly(tiles, view, shape, lamps, sky, mirrored, wall, (up, traits, light), row, out)
+    room = np.empty(3, np.float32), np.empty(3, np.float32)
+    _softly(tiles, shape, lamps, sky, glances, mirrored, wall, (traits, light), room, out)
 
 
 @numba.njit(**LOOP)
-def _softly(tiles, view, shape, lamps, sky, mirrored, wall, floor, row, out):
+def _softly(tiles, shape, lamps, sky, glances, mirrored, wall, floor, room, out):
     h, w = shape
-    eye, frame, tangent, size, first = view
-    up, traits, light = floor
-    e, near, room = row
+    traits, light = floor
+    near, above = room
     for i in range(h):
         a, fy = i // TILE, np.float32(i % TILE / TILE)
         for j in range(w):
@@ -248,18 +269,13 @@ def _softly(tiles, view, shape, lamps, sky, mirrored, wall, floor, row, out):
             if tiles[a, b] != FAR:
                 continue
             g, fx = i * w + j, np.float32(j % TILE / TILE)
-            way_of(eye, frame, tangent, size, first + i, j, e)
-            t = (lamps.floor[3] - eye[2]) / min(e[2], -HORIZON)
-            away = np.hypot(
-                eye[0] + t * e[0] - lamps.centre[0], eye[1] + t * e[1] - lamps.centre[1]
-            )
             for c in range(2):
-                above = (1 - fx) * sky[a, b, c] + fx * sky[a, b + 1, c]
-                below = (1 - fx) * sky[a + 1, b, c] + fx * sky[a + 1, b + 1, c]
-                light[c] = (1 - fy) * above + fy * below
+                upper = (1 - fx) * sky[a, b, c] + fx * sky[a, b + 1, c]
+                lower = (1 - fx) * sky[a + 1, b, c] + fx * sky[a + 1, b + 1, c]
+                light[c] = (1 - fy) * upper + fy * lower
             for c in range(3):
                 light[4 + c] = mirrored[g, c]
-            shade_one(up, e, lamps.floor, traits, light, lamps, room, near)
-            fade = fading(away, lamps)
+            spot, graze, fade = glances[g, 0], glances[g, 1], glances[g, 2]
+            shade_seen(lamps.sun[2], spot, graze, lamps.floor, traits, light, lamps, above, near)
             for c in range(3):
                 out[g, c] = filmic(near[c] * fade + wall[g, c] * (1 - fade))

@@ -328,7 +328,45 @@ def shade_one(n, e, tint, traits, light, lamps, room, out):
         out: The light (3,).
 
     """
-    h, sky, sun = room[0], room[1], lamps.sun
+    spot, graze = glance(n, e, traits[1], lamps.sun, room[0])
+    shade_seen(dot(n, lamps.sun), spot, graze, tint, traits, light, lamps, room[1], out)
+
+
+@numba.njit(**INNER)
+def glance(n, e, rough, sun, h):
+    """Highlight of a unit sun, and how grazing a sample is seen: what no light changes.
+
+    Args:
+        n: Normal.
+        e: Unit direction from the eye.
+        rough: Roughness.
+        sun: Unit direction towards it.
+        h: Scratch (3,).
+
+    """
+    _normalised(sun[0] - e[0], sun[1] - e[1], sun[2] - e[2], h)
+    alpha = max(rough * rough, 0.02)
+    nh = min(max(dot(n, h), 0.0), 1.0)
+    ggx = alpha**2 / (np.pi * (nh * nh * (alpha**2 - 1) + 1) ** 2)
+    return min(ggx * 0.25, 12.0), (1 - min(max(-dot(n, e), 0.0), 1.0)) ** 5
+
+
+@numba.njit(**INNER)
+def shade_seen(cos, spot, graze, tint, traits, light, lamps, sky, out):
+    """Do as ``shade_one`` where ``glance`` is known.
+
+    Args:
+        cos: Of the angle between normal and sun.
+        spot: Highlight of a unit sun.
+        graze: Schlick's fifth power.
+        tint: Albedo, linear.
+        traits: As of ``Samples``.
+        light: That arrives (CHANNELS).
+        lamps: The studio.
+        sky: Scratch (3,).
+        out: The light (3,).
+
+    """
     metal, rough, through, glow, solid = traits[0], traits[1], traits[2], traits[3], traits[4]
     for c in range(3):
         sky[c] = (
@@ -337,14 +375,8 @@ def shade_one(n, e, tint, traits, light, lamps, room, out):
             + light[2] * lamps.floor[c]
         )
     free = min(max((sky[0] + sky[1] + sky[2]) / 3, 0.0), 1.0)
-    cos = dot(n, sun)
     lit = max(cos, 0.0) + through * max(-cos, 0.0)
-    _normalised(sun[0] - e[0], sun[1] - e[1], sun[2] - e[2], h)
-    alpha = max(rough * rough, 0.02)
-    nh = min(max(dot(n, h), 0.0), 1.0)
-    ggx = alpha**2 / (np.pi * (nh * nh * (alpha**2 - 1) + 1) ** 2)
-    shine = min(ggx * 0.25, 12.0) * light[3] * max(cos, 0.0)
-    graze = (1 - min(max(-dot(n, e), 0.0), 1.0)) ** 5
+    shine = spot * light[3] * max(cos, 0.0)
     hidden = min(max(free * 1.3, 0.1), 1.0)
     for c in range(3):
         albedo = tint[c]

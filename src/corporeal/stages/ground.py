@@ -19,6 +19,7 @@ from corporeal.materials.inflated import (
     as_sealed_wall,
     sealed_air,
     sealed_ball,
+    solid_as_ruled,
 )
 from corporeal.materials.placement import CONTENTS, entry_of, held
 from corporeal.materials.scale import place
@@ -85,7 +86,7 @@ def ground(
         for m, w, part in zip(made, words, parts.catalogue, strict=True)
     )
     made = tuple(
-        as_sealed_wall(m) if s.sealed else m for m, s in zip(made, structures, strict=True)
+        _as_built(m, s, w.rebound) for m, s, w in zip(made, structures, words, strict=True)
     )
     touching = pairs(words, made, structures, config)
     found = MaterialField(
@@ -268,6 +269,13 @@ def _built(
     if words.inflation is None:
         return bare
     return with_air(bare, material, words, radius(scene, number))
+
+
+def _as_built(material: Material, structure: Structure, rebound: float | None) -> Material:
+    """Let a sealed wall rebound as its bulk does, and a solid ball as the rules of its sport."""
+    if structure.sealed:
+        return as_sealed_wall(material)
+    return solid_as_ruled(material, rebound) if structure.kind == "solid" else material
 
 
 def radius(scene: Scene, number: int) -> float:

@@ -259,7 +259,7 @@ def _mixture_row(m: MassMixture) -> str:
         else f"{evidence.likely:.3g} ({evidence.low:.3g} to {evidence.high:.3g})"
     )
     printed = "; ".join(dict.fromkeys(f.words for f in evidence.printed)) if evidence else ""
-    warning = f"<br><b>{safe(m.warning)}</b>" if m.warning else ""
+    warning = f"{_answers(m)}<br><b>{safe(m.warning)}</b>" if m.warning else _answers(m)
     cells = (
         _cells(safe(m.object), f"{m.mass:.3g} ({m.low:.3g} to {m.high:.3g})"),
         _cells(f"{m.mass_without:.3g} ({m.low_without:.3g} to {m.high_without:.3g})"),
@@ -268,6 +268,20 @@ def _mixture_row(m: MassMixture) -> str:
         _cells(safe(printed) or "–", wrap=True),
     )
     return f"<tr>{''.join(cells)}</tr>"
+
+
+def _answers(m: MassMixture) -> str:
+    """Say how many answers were given and how far they lie apart; "" where one was."""
+    if not m.answers:
+        return ""
+    alone = [a.mass for a in m.answers]
+    judged = [a.judged for a in m.answers if a.judged]
+    told = f"{len(alone)} answers, alone {', '.join(f'{mass:.3g}' for mass in alone)} kg"
+    told += f" (apart by a factor of {max(alone) / max(min(alone), 1e-300):.2f})"
+    if judged:
+        told += f"; judged {', '.join(f'{mass:.3g}' for mass in judged)} kg"
+        told += f" ({max(judged) / min(judged):.2f})"
+    return f"<br>{told}"
 
 
 def _part_row(story: Story, k: int) -> str:

@@ -10,6 +10,7 @@ from collections.abc import Callable
 from dataclasses import replace
 from math import pi
 
+from corporeal.materials.blow import at_speed
 from corporeal.materials.inflated import SealedBall, struck
 from corporeal.treatment.part import Motion, PartGeometry, Verdict
 from corporeal.types import Material, Structure, Treatment
@@ -41,17 +42,24 @@ def as_contents(part: PartGeometry, speed: float = 0.0) -> PartGeometry:
     density = mean_density(part) if inflated else inner.density * part.structure.fill
     spread = replace(inner, density=density)
     if part.structure.gauge is not None:
-        blow = struck(sealed(part), 0.5 * density * part.volume * speed**2)
+        blow = struck(sealed(part, speed), 0.5 * density * part.volume * speed**2)
         loss = inner.loss if part.structure.rebound is not None else blow.loss
         spread = replace(spread, young=blow.young, loss=loss)
     return replace(part, material=spread, structure=Structure("solid"), diameter=0.0)
 
 
-def sealed(part: PartGeometry) -> SealedBall:
-    """Return the ball of its volume that a part with air sealed behind an elastic wall is."""
+def sealed(part: PartGeometry, speed: float) -> SealedBall:
+    """Return the ball of its volume that a part with air sealed behind an elastic wall is.
+
+    Args:
+        part: Which.
+        speed: At which it is struck [m/s]: of some walls the loss depends on it.
+
+    """
     structure = part.structure
     radius = (0.75 * part.volume / pi) ** (1.0 / 3.0)
-    return SealedBall(structure.gauge or 0.0, part.material, structure.thickness or 0.0, radius)
+    skin = at_speed(part.material, speed)
+    return SealedBall(structure.gauge or 0.0, skin, structure.thickness or 0.0, radius)
 
 
 def masses(part: PartGeometry) -> tuple[float, float]:

@@ -8,6 +8,7 @@ from math import inf, pi
 
 from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.stability import closed_wall, limp_wall, thin_wall
+from corporeal.treatment.dents import dent_of_wall
 from corporeal.types import Material, Structure
 
 TRINKET_CELLS, TRINKET_LENGTH = 8.0, 5.0
@@ -142,17 +143,39 @@ def tube(part: PartGeometry) -> float:
     return diameter if hollow and TUBE * diameter < long and rolled < 3 * long else 0.0
 
 
-def wall_factors(part: PartGeometry, ratio: float) -> tuple[float, float, float]:
+FOLDED = 5.0
+"""Depth over thickness from which the dent of a closed wall is facets and folds [-]: to about that
+depth it is round (Fitch 1968; Vaziri and Mahadevan, PNAS 105 (2008) 7913; recalled)."""
+
+
+def wall_factors(part: PartGeometry, ratio: float, speed: float) -> tuple[float, float, float]:
     """Factors on (E, σ_y, ρ) of a part's wall, by how it gives way.
 
-    A closed wall that does not flow answers by its indentation stiffness; an open one bends, but
-    what is limp only resists in its plane; and what flows (a can) folds along plastic hinges.
+    A closed wall answers by its indentation stiffness; an open one bends, but what is limp only
+    resists in its plane; and what flows (a can) folds along plastic hinges.
+
+    Args:
+        part: Which.
+        ratio: Its thickness over the simulated one [-].
+        speed: At which it is struck [m/s].
+
     """
+    if part.closed and not folds(part, speed):
+        return closed_wall(ratio)
     if MENU[part.material.law].flows:
         return thin_wall(ratio)
-    if part.closed:
-        return closed_wall(ratio)
     return limp_wall(ratio) if is_limp(part, ratio) else thin_wall(ratio)
+
+
+def folds(part: PartGeometry, speed: float) -> bool:
+    """Tell whether a closed wall that yields crumples: dented deeply, or pressed at rest."""
+    material, thickness = part.material, part.structure.thickness
+    if not MENU[material.law].flows or not thickness or part.size[0] <= 0.0:
+        return MENU[material.law].flows
+    radius = 0.5 * part.size[0]
+    made = (material.young, min(material.poisson, 0.49), material.density)
+    depth = dent_of_wall(*made, thickness, radius, speed) * radius / thickness
+    return not 0.0 < depth < FOLDED
 
 
 def is_limp(part: PartGeometry, ratio: float) -> bool:

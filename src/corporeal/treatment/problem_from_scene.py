@@ -24,6 +24,7 @@ from corporeal.mpm.problem import (
     Tether,
     WettedSurface,
 )
+from corporeal.treatment.blow_restitution import in_blows
 from corporeal.treatment.filled import acting
 from corporeal.treatment.rolling_length import rolling_lengths
 from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment, Wall
@@ -61,11 +62,12 @@ def pose(
     bodies = tuple(body_of(scene, particles, field, piece) for piece in pieces)
     weights = part_weights(particles, pieces)
     footing = footing_weights(particles, pieces, weights)
+    bounces = in_blows(field, particles.treatments)
     problem = Problem(
         bodies=bodies,
         cell=particles.cell,
         friction=with_walls(pair_values(field.friction, weights, footing), len(scene.walls)),
-        restitution=with_walls(pair_values(field.restitution, weights, footing), len(scene.walls)),
+        restitution=with_walls(pair_values(bounces, weights, footing), len(scene.walls)),
         planes=(FLOOR, *(plane_of(w) for w in scene.walls)),
         gravity=scene.gravity,
         gravity_ramp=RAMP if starts_settled(scene, particles) else 0.0,

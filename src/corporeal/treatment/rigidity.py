@@ -41,7 +41,7 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
     young, poisson = bounded_poisson(material.young, material.poisson)
     density = material.density
     ratio = 1.0 if tube(part) else wall_ratio(part, width(part) / 10)
-    stiffer, _, denser = wall_factors(part, ratio)
+    stiffer, _, denser = wall_factors(part, ratio, speed)
     real = p_wave_speed(young, poisson, density)
     mapped = stiffer / denser
     weight = max(

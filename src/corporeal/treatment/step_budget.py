@@ -8,7 +8,7 @@ Also the published rule, a cap that does not keep the order: a control only.
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from math import pi, sqrt
+from math import sqrt
 
 from scipy.optimize import brentq
 
@@ -22,6 +22,7 @@ from corporeal.mpm.physics.stability import (
     p_wave_speed,
     stable_step,
 )
+from corporeal.treatment.dents import dent_of_blow, dent_of_wall, mark_of_blow
 from corporeal.treatment.part import Motion, PartGeometry, Verdict, is_trinket
 from corporeal.treatment.rigidity import INVISIBLE_STRAIN
 from corporeal.types import Treatment
@@ -168,8 +169,9 @@ def nearer_rigid(
     """Say which parts would be simulated so much too soft that rigid is nearer to the truth.
 
     Rigid is nearer where the strain is off by more than all that there is of it in life. No strain
-    counts as more than 1, at which all shape is lost. What yields or flows has to do so at any
-    stiffness; sheets, rods and hollow things keep bending when struck.
+    counts as more than 1, at which all shape is lost. Of a solid that yields the lasting dent
+    counts. What flows has to do so at any stiffness; sheets, rods and hollow things keep bending
+    when struck.
 
     Returns:
         Number of the part → why, in a clause.
@@ -179,24 +181,42 @@ def nearer_rigid(
     for k, (true, soft) in enumerate(zip(unslowed, slowed, strict=True)):
         part, verdict = parts[k], verdicts[k]
         flows = MENU[part.material.law].loose
-        yields = flows or true.impact_speed >= verdict.yield_speed
-        if verdict.rigid or yields or true.wave_speed == 0:
+        if verdict.rigid or flows or true.wave_speed == 0:
             continue
-        if verdict.impact < INVISIBLE_STRAIN:
-            if _sags_too_far(part, motions[part.object], verdict, true, soft):
-                found[k] = (
-                    f"it is expected to strain by about {verdict.strain:.2g}, and as soft as the "
-                    "grid and the step budget would make it, it would sag by more than that"
-                )
-        elif is_compact(part):
-            dents = _dents(part, true, soft)
-            if dents is not None and dents.simulated > 2.0 * dents.life:
-                found[k] = (
-                    f"a blow at {true.impact_speed:.2g} m/s would dent it by {dents.life:.2g} of "
-                    "its radius, and as soft as the grid and the step budget would make it, by "
-                    f"{dents.simulated:.2g}; it rebounds by its coefficient of restitution"
-                )
+        why = _too_soft(part, motions[part.object], verdict, true, soft)
+        if why:
+            found[k] = why
     return found
+
+
+def _too_soft(
+    part: PartGeometry, motion: Motion, verdict: Verdict, true: Treatment, soft: Treatment
+) -> str:
+    """Say why rigid is nearer to the truth than as soft as a part would be simulated; "": no."""
+    if true.impact_speed >= verdict.yield_speed:
+        dents = _marks(part, true, soft)
+    elif verdict.impact < INVISIBLE_STRAIN:
+        sags = _sags_too_far(part, motion, verdict, true, soft)
+        return (
+            f"it is expected to strain by about {verdict.strain:.2g}, and as soft as the grid and "
+            "the step budget would make it, it would sag by more than that"
+            if sags
+            else ""
+        )
+    else:
+        dents = _dents(part, true, soft) if is_compact(part) else None
+    if dents is None or dents.simulated <= 2.0 * dents.life:
+        return ""
+    return _dented(true.impact_speed, dents)
+
+
+def _dented(speed: float, dents: "_Dents") -> str:
+    """Say why a part that would be dented too deeply is rigid."""
+    return (
+        f"a blow at {speed:.2g} m/s would dent it by {dents.life:.2g} of its radius, and as soft "
+        f"as the grid and the step budget would make it, by {dents.simulated:.2g}; it rebounds "
+        "by its coefficient of restitution"
+    )
 
 
 @dataclass(frozen=True)
@@ -227,6 +247,15 @@ def _dents(part: PartGeometry, true: Treatment, soft: Treatment) -> _Dents | Non
     return _Dents(*(dent_of_wall(*wall, radius, speed) for wall in (real, slow)))
 
 
+def _marks(part: PartGeometry, true: Treatment, soft: Treatment) -> _Dents | None:
+    """Give how deep a blow marks a compact solid that yields; None: it bends in another way."""
+    solid = soft.kind == "deformable" and part.structure.kind == "solid"
+    if not (solid and is_compact(part) and true.yield_stress and soft.yield_stress):
+        return None
+    strengths = (true.yield_stress, soft.yield_stress)
+    return _Dents(*(mark_of_blow(s, true.density, true.impact_speed) for s in strengths))
+
+
 def _sags_too_far(
     part: PartGeometry, motion: Motion, verdict: Verdict, true: Treatment, soft: Treatment
 ) -> bool:
@@ -250,28 +279,6 @@ def is_compact(part: PartGeometry) -> bool:
     """Tell whether a blow dents a part rather than bends it: no rod, no sheet, no plant."""
     lumpy = part.size[0] >= COMPACT * part.size[2]
     return lumpy and part.leaves == 0 and part.diameter == 0
-
-
-def dent_of_blow(young: float, poisson: float, density: float, speed: float) -> float:
-    """Greatest dent of a ball that strikes a rigid plane, over its radius [-], at most 1.
-
-    δ/R = (5π ρ v²/4 E*)^(2/5), E* = E/(1 - ν²): all of ½ m v² is stored by Hertz's force
-    (Johnson, Contact Mechanics, 1985, §11.4). So E/5.7 doubles it.
-    """
-    plane = young / (1.0 - poisson**2)
-    return min(1.0, (1.25 * pi * density * speed**2 / plane) ** 0.4)
-
-
-def dent_of_wall(
-    young: float, poisson: float, density: float, thickness: float, radius: float, speed: float
-) -> float:
-    """Greatest dent of a hollow ball that strikes a rigid plane, over its radius [-], at most 1.
-
-    ½ m v² = ½ k δ² with m = 4π R² ρ t and Reissner's k = 4 E t²/(R √(3(1 - ν²))) (1946):
-    δ/R = v √(π ρ R √(3(1 - ν²))/(E t)).
-    """
-    bend = sqrt(3.0 * (1.0 - poisson**2))
-    return min(1.0, speed * sqrt(pi * density * radius * bend / (young * thickness)))
 
 
 LEAST_HOLD = 0.25

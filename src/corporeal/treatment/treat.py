@@ -4,6 +4,7 @@ from dataclasses import dataclass
 from math import hypot, inf, sqrt
 from typing import Literal
 
+from corporeal.materials.blow import at_speed
 from corporeal.mpm.constants import FEWEST_CELLS, GRID_LOSS
 from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.liquid_stiffness import bulk_modulus, elastic_numbers, fall_speed
@@ -21,6 +22,7 @@ from corporeal.treatment.part import (
     Motion,
     PartGeometry,
     Verdict,
+    folds,
     life_sized,
     rod_ratio,
     tube,
@@ -65,7 +67,8 @@ def left_of_loss(material: Material, motion: Motion, across: float) -> float:
         return 0.0
     if motion.impact_speed == 0.0:
         return material.loss
-    return max(0.0, material.loss - GRID_LOSS / max(across, FEWEST_CELLS) ** 2)
+    struck = at_speed(material, motion.impact_speed)
+    return max(0.0, struck.loss - GRID_LOSS / max(across, FEWEST_CELLS) ** 2)
 
 
 def treat(
@@ -78,7 +81,7 @@ def treat(
     soft = role in ("soft", "trinket")
     part = as_contents(part, motion.impact_speed) if soft else part
     material, structure = part.material, part.structure
-    thicker = thickened(part, role, 2 * cell)
+    thicker = thickened(part, role, 2 * cell, motion.impact_speed)
     density = mean_density(part) * thicker.density
     # True elastic numbers; those of a liquid follow from its speed.
     young, poisson = bounded_poisson(material.young, material.poisson)
@@ -106,7 +109,7 @@ def treat(
         why="".join(
             (
                 reason(verdict, role),
-                wall_reason(part, thicker.wall) if soft else "",
+                wall_reason(part, thicker.wall, motion.impact_speed) if soft else "",
                 rod_reason(thicker.rod),
                 bar_reason(part, 2 * cell if soft else 0.0),
                 scale_reason(part, motion),
@@ -131,12 +134,13 @@ class Thickened:
     """Factor on the density [-]."""
 
 
-def thickened(part: PartGeometry, role: Role, thick: float) -> Thickened:
+def thickened(part: PartGeometry, role: Role, thick: float, speed: float) -> Thickened:
     """Choose the factors that keep bending and mass where a part is simulated ``thick`` [m]."""
     wall = wall_ratio(part, thick)
-    young, strength, density = wall_factors(part, wall)
+    young, strength, density = wall_factors(part, wall, speed)
     thickness = part.structure.thickness
-    if MENU[part.material.law].ductile and thickness and wall < 1:
+    round_dent = part.closed and not folds(part, speed)
+    if MENU[part.material.law].ductile and thickness and wall < 1 and not round_dent:
         young *= fold_factor(thickness, thick, part.size[1] / 2)
     rod = rod_ratio(part, thick) if role == "soft" else 1.0
     if rod < 1:
@@ -227,11 +231,11 @@ def bar_reason(part: PartGeometry, simulated: float) -> str:
     )
 
 
-def wall_reason(part: PartGeometry, ratio: float) -> str:
+def wall_reason(part: PartGeometry, ratio: float, speed: float) -> str:
     """Say what a thickened wall keeps."""
     if ratio >= 1:
         return ""
-    factors = wall_factors(part, ratio)
+    factors = wall_factors(part, ratio, speed)
     if factors == limp_wall(ratio):
         kept, lost = "its stiffness in its plane", "limp as it is, it bends less easily"
     else:

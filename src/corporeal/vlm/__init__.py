@@ -59,6 +59,20 @@ class Album(Sequence[np.ndarray]):
 
 
 @dataclass(frozen=True)
+class Turn:
+    """Which of several answers to a question is wanted (self-consistency: Wang et al. 2022)."""
+
+    number: int = 1
+    of: int = 1
+    """So many are wanted in all; more than one are sampled at a temperature above 0."""
+    alike: bool = False
+    """Whether the later ones are answers to the same text, so that one request can give them."""
+
+
+ONCE = Turn()
+
+
+@dataclass(frozen=True)
 class Question:
     """What is asked, about what, and what it was asked with."""
 
@@ -74,6 +88,7 @@ class Question:
     """Each H x W x 3, uint8, sRGB."""
     lists: Mapping[str, str] = field(default_factory=dict)
     """What the library in use offers, by name. A longer list does not make an answer stale."""
+    turn: Turn = ONCE
 
     @property
     def text(self) -> str:

@@ -4,7 +4,6 @@ For who has a chat window and no key, or wants to look for themselves. Answered 
 as recordings in the same folder, so ``--vlm replay:FOLDER`` needs nobody any more.
 """
 
-import hashlib
 import re
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -17,7 +16,7 @@ from pydantic import BaseModel, ValidationError
 from corporeal import store
 from corporeal.errors import UserError
 from corporeal.vlm import Answer, Check, Question, Reply, nothing
-from corporeal.vlm.recordings import FIELDS, Recordings, asked, first_problem, record
+from corporeal.vlm.recordings import Recordings, asked, digest, first_problem, record
 
 PAGES = "questions"
 BY_HAND = "by hand"
@@ -77,10 +76,10 @@ class ByHand:
         raise WaitingError(f"{page.with_suffix('.md')} waits for an answer.")
 
     def _name(self, question: Question, answer: type[BaseModel]) -> str:
-        row = asked(question, answer)
-        key = hashlib.sha256("\0".join(row[f] for f in FIELDS).encode()).hexdigest()[:6]
+        key = digest(asked(question, answer))[:6]
         plain = re.sub(r"[^\w.-]+", "-", f"{question.scene}-{question.task}")
-        return f"{plain}-{key}.md"
+        number = question.turn.number
+        return f"{plain}{f'-answer-{number}' if number > 1 else ''}-{key}.md"
 
 
 def all_answered(results: list, spec: str) -> list:

@@ -86,6 +86,8 @@ class Cached:
             "schema": schema_digest(answer),
             "settings": self.settings,
         }
+        if question.turn.number > 1:
+            asked["answer_number"] = question.turn.number
         return hashlib.sha256(json.dumps(asked, sort_keys=True).encode()).hexdigest()
 
 

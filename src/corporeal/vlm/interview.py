@@ -8,7 +8,16 @@ from string import Template
 import numpy as np
 
 from corporeal.geometry.drawn import NOTHING, Drawn, Thin
-from corporeal.vlm import Answer, Check, Question, Reply, UnansweredError, Vlm
+from corporeal.vlm import (
+    ONCE,
+    Answer,
+    Check,
+    Question,
+    Reply,
+    Turn,
+    UnansweredError,
+    Vlm,
+)
 from corporeal.vlm.answer_checks import (
     MOST_PARTS,
     MOST_THINGS,
@@ -73,6 +82,9 @@ AGAIN = (
     "$problems\n\nAnswer again, for all parts. Keep a value only if it is meant so, and say why."
 )
 
+ALIKE = ("materials", "mass")
+"""Questions whose text hangs on question 1 only, so that each of several answers is to the same."""
+
 
 @dataclass(frozen=True)
 class Subject:
@@ -121,6 +133,8 @@ class Interview:
     """Part → how question 1 found it to look."""
     transcript: list[dict] = field(default_factory=list)
     warnings: list[str] = field(default_factory=list)
+    turn: Turn = ONCE
+    """Which of several answers the questions are asked for."""
 
     def parts(self) -> tuple[Decomposition, PartsAnswer] | None:
         """Ask question 1, and the critic where there is a choice; None where nobody answers.
@@ -321,7 +335,8 @@ class Interview:
             "seen": f"It was found to be: {self.seen}." if self.seen else "",
         }
         prompt = Template(self.prompts[task]).substitute(common | facts).strip()
-        return Question(task, prompt, about.scene, about.views, about.pictures)
+        turn = replace(self.turn, alike=True) if task in ALIKE and self.turn.of > 1 else self.turn
+        return Question(task, prompt, about.scene, about.views, about.pictures, turn=turn)
 
     def _ask(
         self, whom: Vlm, question: Question, shape: type[Answer], check: Check[Answer]
@@ -331,7 +346,7 @@ class Interview:
         except UnansweredError as error:
             self.warnings.append(
                 f"{self.subject.name}: the question about {question.task} got no usable answer "
-                f"({error})"
+                f"{_which(question.turn)}({error})"
             )
             self.transcript.append(_row(question) | {"answer": None, "error": str(error)})
             return None
@@ -358,12 +373,19 @@ def _ranges(offers: Mapping[str, Offer]) -> str:
     return "\n\n".join(blocks)
 
 
+def _which(turn: Turn) -> str:
+    """Say which of several answers is meant; "" where one only is wanted."""
+    return f"{turn.number} of {turn.of} " if turn.of > 1 else ""
+
+
 def _row(question: Question) -> dict:
+    turn = question.turn
     return {
         "task": question.task,
         "scene": question.scene,
         "views": question.views,
         "prompt": question.text,
+        **({"answer_number": turn.number} if turn.of > 1 else {}),
     }
 
 

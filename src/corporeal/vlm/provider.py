@@ -40,8 +40,18 @@ from pydantic_ai.settings import ModelSettings
 from pydantic_ai.usage import RunUsage
 
 from corporeal.errors import UserError
-from corporeal.vlm import Answer, Check, Question, Reply, Spent, UnansweredError, nothing
+from corporeal.vlm import (
+    Answer,
+    Check,
+    Question,
+    Reply,
+    Spent,
+    Turn,
+    UnansweredError,
+    nothing,
+)
 from corporeal.vlm.patience import Gate, Patience, seconds_asked_for
+from corporeal.vlm.spares import HEARD, TEMPERATURE, Spares, hear
 
 OTHER_KEY = "CORPOREAL_API_KEY"
 VENDORS = ("OPENAI_API_KEY", "ANTHROPIC_API_KEY", "GOOGLE_API_KEY")
@@ -77,6 +87,18 @@ class Address:
     url: str | None
 
 
+@dataclass(frozen=True)
+class Form:
+    """How a question is put to a server."""
+
+    mode: str
+    """How the model is held to the shape of an answer: one of ``OUTPUTS``."""
+    sampled: bool
+    """With a temperature of our own."""
+    count: int
+    """Answers that one request asks for."""
+
+
 class Live(ABC):
     """A model behind an API. Each question is its own conversation."""
 
@@ -85,6 +107,8 @@ class Live(ABC):
     key: ClassVar[str]
     """Environment variable of the provider's own key."""
     limits: ClassVar[ModelSettings] = {}
+    several: ClassVar[bool] = False
+    """Whether its format lets one request ask for several answers."""
 
     def __init__(self, rest: str, patience: Patience | None = None) -> None:
         model, _, url = rest.partition("@http")
@@ -97,6 +121,8 @@ class Live(ABC):
         native = self.model.profile.get("supports_json_schema_output")
         self.mode = "native" if native else "tool"
         self._dice = np.random.default_rng()
+        self._sampled, self._several = True, self.several
+        self._spares = Spares()
         self._over: UserError | None = None
         """What ended the asking for good."""
 
@@ -136,7 +162,7 @@ class Live(ABC):
         hooks = client.event_hooks
         client.event_hooks = {
             "request": [*hooks["request"], out],
-            "response": [*hooks["response"], back],
+            "response": [*hooks["response"], back, hear],
         }
         return client
 
@@ -166,13 +192,16 @@ class Live(ABC):
         self, question: Question, answer: type[Answer], check: Check[Answer]
     ) -> Reply[Answer]:
         usage, start = RunUsage(), time.monotonic()
+        spare = self._spares.take(question, answer, check)
+        if spare is not None:
+            return Reply(spare, "model", self.address.spec)
         for failures in range(1, self.patience.tries + 1):
-            mode = self.mode
+            sent = self._form(question.turn)
             try:
                 async with self._gate.places:
-                    made = await self._once(question, answer, check, usage)
+                    made = await self._once(question, answer, check, usage, sent)
             except ModelAPIError as error:
-                wait = self._what_now(error, mode, failures)
+                wait = self._what_now(error, sent, failures)
             except AgentRunError as error:
                 raise UnansweredError(self._plain(error)) from error
             else:
@@ -184,7 +213,12 @@ class Live(ABC):
         raise AssertionError("the last failure raises")
 
     async def _once(
-        self, question: Question, answer: type[Answer], check: Check[Answer], usage: RunUsage
+        self,
+        question: Question,
+        answer: type[Answer],
+        check: Check[Answer],
+        usage: RunUsage,
+        form: Form,
     ) -> Answer:
         agent = Agent(
             self.model,
@@ -200,21 +234,43 @@ class Live(ABC):
                 raise ModelRetry("\n".join(complaints))
             return answered
 
+        heard: list[list[str]] = []
+        HEARD.set(heard if form.count > 1 else None)
+        pictures = [BinaryContent(jpeg(p), media_type="image/jpeg") for p in question.pictures]
+        try:
+            asked = await agent.run(
+                [question.text, *pictures],
+                model_settings=lambda context: self._settings(form, context.run_step <= 1),
+                usage=usage,
+                infer_name=False,
+            )
+        finally:
+            if heard:
+                self._several = bool(heard[0])
+                self._spares.keep(question, answer, heard[0])
+        return asked.output
+
+    def _form(self, turn: Turn) -> Form:
+        """Say how a question is put, as far as the server is known to take it."""
+        sampled = self._sampled and turn.of > 1
+        count = turn.of - turn.number + 1 if sampled and turn.alike and self._several else 1
+        return Form(self.mode, sampled, count)
+
+    def _settings(self, form: Form, first: bool) -> ModelSettings:
+        """Return what goes with a request; a correction asks for one answer."""
         longest = self.patience.timeout
         settings = ModelSettings(timeout=longest, request_timeout=longest, max_retries=0)
         settings.update(self.limits)
-        pictures = [BinaryContent(jpeg(p), media_type="image/jpeg") for p in question.pictures]
-        asked = await agent.run(
-            [question.text, *pictures], model_settings=settings, usage=usage, infer_name=False
-        )
-        return asked.output
+        if form.sampled:
+            settings["temperature"] = TEMPERATURE
+        if form.count > 1 and first:
+            settings["extra_body"] = {"n": form.count}
+        return settings
 
-    def _what_now(self, error: ModelAPIError, mode: str, failures: int) -> float:
+    def _what_now(self, error: ModelAPIError, sent: Form, failures: int) -> float:
         """Return how long to wait before asking again [s], or raise that it is no use."""
         self._give_up_all(error, failures)
-        if isinstance(error, ModelRequestRejectedError) and mode != "prompted":
-            self.mode = "prompted"  # the server may only refuse the schema
-            self.model = self._model(self._secret(), IN_WORDS)
+        if isinstance(error, ModelRequestRejectedError) and self._simpler(sent):
             return 0.0
         garbled = not isinstance(error, ModelHTTPError | ModelRequestRejectedError)
         if not (garbled or isinstance(error, PASSING)) or failures >= self.patience.tries:
@@ -229,6 +285,18 @@ class Live(ABC):
         if isinstance(error, ModelRateLimitError):
             self._gate.close(wait)
         return wait
+
+    def _simpler(self, sent: Form) -> bool:
+        """Ask for less after a refusal: the server may only refuse settings, or the schema."""
+        if sent.sampled:
+            self._sampled = False
+            return True
+        if sent.mode == "prompted":
+            return False
+        if self.mode != "prompted":
+            self.mode, self._sampled = "prompted", True
+            self.model = self._model(self._secret(), IN_WORDS)
+        return True
 
     def _give_up_all(self, error: ModelAPIError, failures: int) -> None:
         """Raise what holds for every question."""
@@ -265,6 +333,7 @@ class OpenAI(Live):
     """OpenAI, and every server that speaks its chat format."""
 
     provider, key = "openai", "OPENAI_API_KEY"
+    several = True
 
     def _model(self, secret: str, profile: ModelProfile) -> Model:
         from pydantic_ai.models.openai import OpenAIChatModel

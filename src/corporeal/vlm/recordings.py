@@ -18,6 +18,8 @@ from corporeal.vlm import Answer, Check, Question, Reply, Vlm, nothing
 
 FIELDS = ("task", "scene", "prompt", "schema", "views")
 """What must be equal for a recording to answer a question, most telling last to differ."""
+NUMBER = "answer_number"
+"""Which of several answers to a question it is; absent: the first, as in recordings of one."""
 
 
 class Recordings:
@@ -54,12 +56,21 @@ class Recordings:
         return self._row(asked(question, answer)) is not None
 
     def _row(self, wanted: dict[str, str]) -> dict | None:
-        return next((r for r in self.rows if all(r[f] == wanted[f] for f in FIELDS)), None)
+        return next((r for r in self._alike(wanted) if r.get(NUMBER) == wanted.get(NUMBER)), None)
+
+    def _alike(self, wanted: dict[str, str]) -> list[dict]:
+        """Return the recorded answers to a question, whichever of several they are."""
+        return [r for r in self.rows if all(r[f] == wanted[f] for f in FIELDS)]
 
     def _why_not(self, wanted: dict[str, str]) -> str:
         about = f"{wanted['task']!r} about {wanted['scene']!r}"
         if not self.rows:
             return f"No recording in {self.folder}: nothing answers {about}."
+        if alike := self._alike(wanted):
+            return (
+                f"No recording in {self.folder} is answer {wanted.get(NUMBER, '1')} to {about}; it "
+                f"holds {len(alike)}. Record more of them, or ask for fewer (--answers)."
+            )
         nearest = max(self.rows, key=lambda row: [row[f] == wanted[f] for f in FIELDS])
         differs = next(f for f in FIELDS if nearest[f] != wanted[f])
         if differs in ("prompt", "schema"):
@@ -97,7 +108,7 @@ class Recorder:
 def record(folder: Path, question: Question, answer: BaseModel, model: str) -> Path:
     """Keep an answer where ``Recordings`` finds it; the file appears whole or not at all."""
     row = asked(question, type(answer))
-    key = hashlib.sha256("\0".join(row[f] for f in FIELDS).encode()).hexdigest()[:16]
+    key = digest(row)[:16]
     row = row | {"model": model, "lists": dict(question.lists), "answer": answer.model_dump()}
     path = folder / f"{question.task}-{key}.json"
     store.write_json(path, row)
@@ -106,13 +117,21 @@ def record(folder: Path, question: Question, answer: BaseModel, model: str) -> P
 
 def asked(question: Question, answer: type[BaseModel]) -> dict[str, str]:
     """Name a question by all that its answer depends on."""
+    number = question.turn.number
     return {
         "task": question.task,
         "scene": question.scene,
         "prompt": question.prompt,
         "schema": schema_digest(answer),
         "views": question.views,
+        **({NUMBER: str(number)} if number > 1 else {}),
     }
+
+
+def digest(row: dict[str, str]) -> str:
+    """Return the name of what was asked, in hexadecimal digits."""
+    words = [row[f] for f in FIELDS] + ([row[NUMBER]] if NUMBER in row else [])
+    return hashlib.sha256("\0".join(words).encode()).hexdigest()
 
 
 def schema_digest(answer: type[BaseModel]) -> str:

@@ -305,13 +305,12 @@ TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - 
     ("int", "meet a c fa fc active"),
     ("int", "face"),  # which face of a rigid body a liquid meets
     ("int", "choice"),  # where its candidate is kept; -1: nowhere
-    ("double[3]", "x normal"),
+    ("double[3]", "normal"),
     ("double", "gap target inverse mu span"),  # span: over which a wall drags on a liquid [m² s]
-    (
-        "double",
-        "instead",
-    ),  # of round on curved: nodes nearer than this transmit nothing [m]; else 0
-    ("double[3]", "J before"),
+    ("double[3]", "J"),
+    # Of nodes with planes or rigid bodies alone, in memory that the others need not touch:
+    ("double[3]", "x before"),
+    ("double", "instead"),  # of round on curved: nodes nearer transmit nothing [m]; else 0
 )
 ENTRY = Record(  # what some contacts of one pair add to the books
     "Entry",

@@ -6,23 +6,31 @@ namespace mpm {
 namespace {
 // Half spaces as a node sees them through its quadratic spline; R: double or float.
 template <class R> struct Face {
+  // Of a half space u < n that holds the smaller part of a node's spline, -1.5 <= n <= 0: its share …
+  CUDA_CALLABLE static inline R least(R n) {
+    const R w = n + R(1.5), far = w * w * w / R(6.0), near = R(0.5) + R(0.75) * n - n * n * n / R(3.0);
+    return n < R(-0.5) ? far : near;
+  }
+  // … and its share times its mean offset, which the rest of the spline has, too.
+  CUDA_CALLABLE static inline R moment(R n) {
+    const R w = n + R(1.5), far = w * w * w * w / R(8.0) - w * w * w / R(4.0);
+    const R near = R(-13.0 / 64.0) + R(0.375) * n * n - R(0.25) * n * n * n * n;
+    return n < R(-0.5) ? far : near;
+  }
+  CUDA_CALLABLE static inline R enough(R share) {
+    return share > R(SMALLEST_WEIGHT) ? share : R(SMALLEST_WEIGHT);
+  }
   // Share of a node's spline that the half space u < s fills.
   CUDA_CALLABLE static inline R filled(R s) {
     s = s < R(-1.5) ? R(-1.5) : s > R(1.5) ? R(1.5) : s;
-    const R n = s > 0 ? -s : s, w = n + R(1.5);
-    const R weight = n < R(-0.5) ? w * w * w / R(6.0) : R(0.5) + R(0.75) * n - n * n * n / R(3.0);
-    const R all = s > 0 ? R(1.0) - weight : weight;
-    return all > R(SMALLEST_WEIGHT) ? all : R(SMALLEST_WEIGHT);
+    const R weight = least(s > 0 ? -s : s);
+    return enough(s > 0 ? R(1.0) - weight : weight);
   }
   // Mean offset e(s) of the half space u < s.
   CUDA_CALLABLE static inline R mean(R s) {
     s = s < R(-1.5) ? R(-1.5) : s > R(1.5) ? R(1.5) : s;
-    R n = s > 0 ? -s : s, w = n + R(1.5), weight = filled(s), moment;
-    if (n < R(-0.5))
-      moment = w * w * w * w / R(8.0) - w * w * w / R(4.0);
-    else
-      moment = R(-13.0 / 64.0) + R(0.375) * n * n - R(0.25) * n * n * n * n;
-    return weight > R(SMALLEST_WEIGHT) ? moment / weight : n;
+    const R n = s > 0 ? -s : s, weight = filled(s);
+    return weight > R(SMALLEST_WEIGHT) ? moment(n) / weight : n;
   }
   // The same of a lattice of two points per cell and axis, the first a quarter of a cell behind the face.
   CUDA_CALLABLE static inline R lattice(R s) {
@@ -46,12 +54,17 @@ template <class R> struct Face {
   CUDA_CALLABLE static inline R touching(R s) {
     s = s < 0 ? -s : s;
     if (s > R(DEEPEST)) s = R(DEEPEST);
-    R over = s - R(LATTICE_START);
-    return -mean(s) - mean(-s) + R(LATTICE_GAP) + R(LATTICE_SLOPE) * (over > 0 ? over : R(0.0));
+    const R n = -s, over = s - R(LATTICE_START), less = least(n), m = moment(n), fills = enough(less);
+    const R ahead = m / enough(R(1.0) - less), behind = fills > R(SMALLEST_WEIGHT) ? m / fills : n;
+    return -ahead - behind + R(LATTICE_GAP) + R(LATTICE_SLOPE) * (over > 0 ? over : R(0.0));
   }
   // Open distance along n, from a to c, of two fields whose mean offsets along it are a and c.
   CUDA_CALLABLE static inline R gap(const R *table, R a, R c) {
-    return c - a - touching(R(0.5) * (place(table, a) - place(table, -c)));
+    return c - a - touching(overlap(table, a, c));
+  }
+  // How deep each of them lies in the other where both are a half space.
+  CUDA_CALLABLE static inline R overlap(const R *table, R a, R c) {
+    return R(0.5) * (place(table, a) - place(table, -c));
   }
   // The same to a plane, h below the node.
   CUDA_CALLABLE static inline R gap_to_plane(R a, R h) { return -mean(-h) - a - touching(h); }

@@ -5,7 +5,7 @@ for (int j = begun; j < ended; j++) {
   const Junction &J = junctions[j];
   for (int t = J.touch; t < J.last && J.chosen; t++) {
     const Aim &A = aims[t];
-    if (A.fa < 0 || leans[t].known) continue;
+    if (leans[t].known || A.fa < 0) continue;
     float best = -(float)mpm::VAST;
     int pick = 0;
     for (int q = 0; q < 3; q++) {

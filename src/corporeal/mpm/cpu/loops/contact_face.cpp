@@ -9,26 +9,24 @@ struct Candidate {
     for (int d = 0; d < 3; d++) n[d] = (float)v[d];
   }
 };
-int from = (int)((long long)stage->sides * index / PARTS),
-    to = (int)((long long)stage->sides * (index + 1) / PARTS);
-for (int s = from; s < to; s++)
-  for (int d = 0; d < 3; d++) sides[s].mean[d] /= sides[s].m;
-from = (int)((long long)stage->touches * index / PARTS);
-to = (int)((long long)stage->touches * (index + 1) / PARTS);
+const int from = (int)((long long)stage->touches * index / PARTS),
+          to = (int)((long long)stage->touches * (index + 1) / PARTS);
 for (int t = from; t < to; t++) {
   const Touch &T = touches[t];
   Aim &aim = aims[t];
+  float n[3];
+  if (leans[t].known) {
+    const Side &A = sides[T.a], &C = sides[T.c];
+    const float weight = A.m < C.m ? A.m : C.m;
+    Candidate::unit(A, C, leans[t].known - 1, n);
+    for (int d = 0; d < 3; d++) leans[t].u[d] = weight * n[d];
+    continue;
+  }
   aim.fa = T.c < 0 ? -1 : T.fa;
   aim.fc = T.c < 0 ? -1 : T.fc;
   if (T.c < 0) continue;
   const Side &A = sides[T.a], &C = sides[T.c];
   aim.weight = A.m < C.m ? A.m : C.m;
-  float n[3];
-  if (leans[t].known) {
-    Candidate::unit(A, C, leans[t].known - 1, n);
-    for (int d = 0; d < 3; d++) leans[t].u[d] = aim.weight * n[d];
-    continue;
-  }
   // What is small against the cell has no face of its own.
   const bool point = world->field[T.fa].thin == 2, other = world->field[T.fc].thin == 2;
   for (int q = 0; q < 4; q++) {

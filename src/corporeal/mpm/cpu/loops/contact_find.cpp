@@ -49,6 +49,16 @@ struct Around {
       if (home >= 0) add(F, home);
     }
   }
+  // Whether the particles in a block of nodes alone are not so far apart: nor are those around it then.
+  static inline bool side_by_side(const Field &F, int f, const Field &G, int g, double far) {
+    if (F.home[f] < 0 || G.home[g] < 0) return false;
+    Around mine, other;
+    mine.begin();
+    mine.add(F, F.home[f]);
+    other.begin();
+    other.add(G, G.home[g]);
+    return !apart(F, mine, G, other, far);
+  }
   // Whether the particles of two fields are so far apart along an axis that no gap closes in a step.
   static inline bool apart(const Field &F, const Around &A, const Field &G, const Around &B, double far) {
     far += F.flows || G.flows ? mpm::LOOSE_REACH : mpm::DENSE_REACH;
@@ -115,7 +125,7 @@ for (int f = 0; f < fields; f++) {
         u64 both = J.have[a] & J.have[c];
         if (!both) continue;
         const Field &A = world->field[J.field[a]], &C = world->field[J.field[c]];
-        if (!A.rigids && !C.rigids) {
+        if (!A.rigids && !C.rigids && !Around::side_by_side(A, J.block[a], C, J.block[c], meanwhile)) {
           if (!(known >> a & 1)) box[a].up(A, J.at);
           if (!(known >> c & 1)) box[c].up(C, J.at);
           known |= 1 << a | 1 << c;

@@ -28,9 +28,8 @@ struct Asked {              // nodes of a block's arena that are listed
     const int corner = (4 * (n / 9 - 1) + 1) * 64 + (4 * (n / 3 % 3 - 1) + 1) * 8 + 4 * (n % 3 - 1) + 1;
     for (; mine; mine &= mine - 1) {
       const int i = __builtin_ctzll(mine), node = corner + (i >> 4) * 64 + (i >> 2 & 3) * 8 + (i & 3);
-      int s = J.side;
-      for (int k = 0; k < J.fields; k++)
-        s += Grid::count(J.have[k] & J.mask & Grid::below(i)) + (k < q && J.have[k] >> i & 1);
+      int s = stage->meet[Grid::meet(J, i)].side;
+      for (int k = 0; k < q; k++) s += (int)(J.have[k] >> i & 1);
       __builtin_prefetch(stage->side[s].mean, 1);
       layers[node >> 6] |= 1ull << (node & 63);
       at[count] = node;

@@ -161,7 +161,7 @@ nt += Points::on_curves(world, touches + nt, stage->most_touches - nt);
 stage->points = nt - stage->touches;
 Points::instead_of_nodes(world, touches, stage->touches, nt);
 Bonds::join(world);
-for (int t = 0; t < nt; t++) {
+for (int t = world->turns ? 0 : stage->touches; t < nt; t++) {   // where none is rigid no node moves one
   Touch &T = touches[t];
   if (!T.active || (T.meet >= 0 && !meets[T.meet].stiff)) continue;
   int kind = T.meet < 0 ? 2 : T.fc >= fields ? 1 : 0;

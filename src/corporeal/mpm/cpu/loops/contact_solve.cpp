@@ -15,7 +15,6 @@ struct Solver {
     }
     const Side &C = sides[T.c];
     double pc = C.mean[0] * n[0] + C.mean[1] * n[1] + C.mean[2] * n[2];
-    if (T.choice >= 0) return Face::gap(w->face, pa, pc);   // neither is rigid
     const Field &F = w->field[A.field], &G = w->field[C.field];
     if (liquid(F, G)) {
       const double mean = F.rigids ? -pc : pa, h = T.gap * inv, full = filled(w, F.rigids ? C : A);
@@ -35,6 +34,7 @@ struct Solver {
   }
   // Which side of a contact is a liquid that sticks to a wall, whose normal and height are known: 0: none.
   static inline int sticks(const World *w, const Touch &T) {
+    if (T.choice >= 0) return 0;
     if (T.c < 0) return Grid::sticks(w, T.fa, T.fc) ? 1 : 0;
     if (!liquid(w->field[T.fa], w->field[T.fc])) return 0;
     return Grid::sticks(w, T.fa, T.fc) ? 1 : Grid::sticks(w, T.fc, T.fa) ? 2 : 0;
@@ -161,6 +161,7 @@ struct Solver {
     double u[3], d[3], t[3], next[3];
     slip(sides, T, u);
     double un = Vec::dot(u, T.normal), old = Vec::dot(T.J, T.normal);
+    if (un <= T.target && old == 0 && T.span == 0) return false;   // as below, but without a division to wait for
     double jn = Coulomb::push(old, un, T.target, T.inverse);
     if (jn == 0 && old == 0 && T.span == 0) return false;
     for (int i = 0; i < 3; i++) {
@@ -221,6 +222,12 @@ struct Smooth {
       while (k < J.fields && J.field[k] < O.field[q]) k++;
       mine[q] = k < J.fields && J.field[k] == O.field[q] ? (unsigned char)k : NONE;
     }
+    unsigned char number[FIELDS_IN_BLOCK][FIELDS_IN_BLOCK];   // of O's pairs among ours
+    for (int a = 0; a < O.fields; a++)
+      for (int c = a + 1; c < O.fields; c++) {
+        const unsigned p = mine[a] == NONE || mine[c] == NONE ? ~0u : (unsigned)pair[mine[a]][mine[c]] - (unsigned)low;
+        number[a][c] = p < (unsigned)many ? (unsigned char)p : NONE;
+      }
     const int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
     for (u64 left = O.several & Grid::margin(n); left; left &= left - 1) {
       const int i = __builtin_ctzll(left);
@@ -228,10 +235,8 @@ struct Smooth {
       const int place = ((x + (i >> 4)) * 6 + y + (i >> 2 & 3)) * 6 + z + (i & 3);
       for (const Lean *L = leans + M.touch, *end = L + M.touches; L < end; L++) {
         if (L->c == NONE) continue;
-        const unsigned char a = mine[L->a], c = mine[L->c];
-        if (a == NONE || c == NONE) continue;
-        const unsigned p = (unsigned)pair[a][c] - (unsigned)low;
-        if (p < (unsigned)many) grid[p][place] = f4{L->u[0], L->u[1], L->u[2], 0};
+        const unsigned char p = number[L->a][L->c];
+        if (p != NONE) grid[p][place] = f4{L->u[0], L->u[1], L->u[2], 0};
       }
     }
   }
@@ -253,26 +258,93 @@ struct Smooth {
     return x[0] + x[1] + x[2];
   }
 };
+// Contacts of two fields of which neither is rigid, several at once: number by number, so that loops over
+// them become vectors.
+struct Together {
+  enum { MOST = 64, WIDE = 8 };
+  int touch[MOST], count = 0;
+  double normal[3][MOST], mean[6][MOST], slip[3][MOST];
+  double size[MOST], speed[MOST], gap[MOST];
+  inline void add(int t, const Touch &T, const Side *sides, f4 along) {
+    const Side &A = sides[T.a], &C = sides[T.c];
+    touch[count] = t;
+    for (int d = 0; d < 3; d++) {
+      normal[d][count] = along[d];
+      mean[d][count] = A.mean[d];
+      mean[3 + d][count] = C.mean[d];
+      slip[d][count] = A.v[d] - C.v[d];
+    }
+    count++;
+  }
+  // Call what will be read soon.
+  static inline void ahead(const void *from, const void *to) {
+    for (const char *line = (const char *)from; line < (const char *)to; line += 64) __builtin_prefetch(line, 1);
+  }
+  // Unit normals, and along them how fast sides come nearer and how far apart they are [cells].
+  inline void find(const double *table) {
+    for (int first = 0; first < count; first += WIDE) {
+      double n[3][WIDE], near[2][WIDE], off[WIDE], far[WIDE], fast[WIDE], l[WIDE];
+      for (int i = 0; i < WIDE; i++) {
+        const int k = first + i;
+        const double x = normal[0][k], y = normal[1][k], z = normal[2][k], length = sqrt(x * x + y * y + z * z);
+        l[i] = length;
+        n[0][i] = length > mpm::TINY ? x / length : 0.0;
+        n[1][i] = length > mpm::TINY ? y / length : 0.0;
+        n[2][i] = length > mpm::TINY ? z / length : 0.0;
+        fast[i] = slip[0][k] * n[0][i] + slip[1][k] * n[1][i] + slip[2][k] * n[2][i];
+        near[0][i] = mean[0][k] * n[0][i] + mean[1][k] * n[1][i] + mean[2][k] * n[2][i];
+        near[1][i] = mean[3][k] * n[0][i] + mean[4][k] * n[1][i] + mean[5][k] * n[2][i];
+      }
+      for (int i = 0; i < WIDE; i++) off[i] = Face::overlap(table, near[0][i], near[1][i]);
+      for (int i = 0; i < WIDE; i++) far[i] = near[1][i] - near[0][i] - Face::touching(off[i]);
+      for (int i = 0; i < WIDE; i++) {
+        const int k = first + i;
+        size[k] = l[i], speed[k] = fast[i], gap[k] = far[i];
+        for (int d = 0; d < 3; d++) normal[d][k] = n[d][i];
+      }
+    }
+  }
+  // Write it down; target: the speed, until the contact is known to be active.
+  inline void give(Touch *touches, const double *table, double dx) {
+    find(table);
+    for (int i = 0; i < count; i++) {
+      Touch &T = touches[touch[i]];
+      for (int d = 0; d < 3; d++) T.normal[d] = normal[d][i];
+      T.active = size[i] > mpm::TINY;
+      T.target = speed[i];
+      T.gap = gap[i] * dx;
+    }
+    count = 0;
+  }
+};
 const int from = (int)((long long)stage->junctions * index / PARTS),
           to = (int)((long long)stage->junctions * (index + 1) / PARTS);
 int entries = 0;
 Smooth smooth;
+Together together = {};
 if (from < to) {
   Entry *book = stage->entry + junctions[from].touch;
   for (int j = from; j < to; j++) {
     const Junction &J = junctions[j];
     const int end = J.meet + Grid::count(J.mask);
+    const Junction *around[27];
+    const int last_side = meets[end - 1].side + meets[end - 1].sides;
+    Together::ahead(sides + J.side, sides + last_side);
     if (J.several) {
+      Together::ahead(touches + J.touch, touches + J.last);
       smooth.begin(J, leans);
-      const Junction *around[27];
       for (int n = 0; n < 27; n++) {
         int at[3] = {J.at[0] + n / 9 - 1, J.at[1] + n / 3 % 3 - 1, J.at[2] + n % 3 - 1}, other = 0;
-        for (int q = 0; q < J.fields && !other; q++) {
+        for (int q = 0; q < J.fields - 1 && !other; q++) {   // of two that meet there, one is before the last
           int b = Grid::block(world->field[J.field[q]], at);
           if (b >= 0) other = world->field[J.field[q]].where[4 * b + 3];
         }
         around[n] = other && junctions[other - 1].several ? &junctions[other - 1] : 0;
       }
+    }
+    for (Side *S = sides + J.side; S < sides + last_side; S++)   // from the moments that particles gave
+      for (int d = 0; d < 3; d++) S->mean[d] /= S->m;
+    if (J.several) {
       for (int low = 0; low < smooth.pairs; low += Smooth::MOST) {
         const int many = smooth.pairs - low < Smooth::MOST ? smooth.pairs - low : Smooth::MOST;
         smooth.empty(many);
@@ -284,8 +356,14 @@ if (from < to) {
           const unsigned p = L.c == Smooth::NONE ? ~0u : (unsigned)smooth.pair[L.a][L.c] - (unsigned)low;
           if (p >= (unsigned)many) continue;
           const f4 sum = smooth.around(p, smooth.count[low + p] < Smooth::FEW, L.node);
-          for (int d = 0; d < 3; d++) touches[t].normal[d] = sum[d];
+          if (touches[t].choice < 0) {
+            for (int d = 0; d < 3; d++) touches[t].normal[d] = sum[d];
+            continue;
+          }
+          together.add(t, touches[t], sides, sum);
+          if (together.count == Together::MOST) together.give(touches, world->face, dx);
         }
+        together.give(touches, world->face, dx);
       }
     }
     for (int k = J.meet; k < end; k++) {
@@ -294,14 +372,16 @@ if (from < to) {
       mpm::Wetted face[mpm::WETTED_FACES];
       for (int t = M.touch; t < M.touch + M.touches; t++) {
         Touch &T = touches[t];
-        for (int d = 0; d < 3; d++) {
-          T.x[d] = M.at[d] * dx;
-          T.J[d] = 0;
+        for (int d = 0; d < 3; d++) T.J[d] = 0;
+        for (int d = 0; d < 3 && (T.choice < 0 || M.stiff); d++) T.x[d] = M.at[d] * dx;
+        if (T.choice >= 0) {
+          nears |= T.active & (int)(T.target > 0);   // without a branch to guess
+          continue;
         }
         T.active = 0;
         if (T.c < 0) {
           for (int d = 0; d < 3; d++) T.normal[d] = -world->plane[4 * (-1 - T.c) + d];
-        } else if (T.choice < 0 && Solver::liquid(world->field[T.fa], world->field[T.fc])) {
+        } else if (Solver::liquid(world->field[T.fa], world->field[T.fc])) {
           if (T.face == 0) faces = Solver::wet(world, sides, T.x, T, face);
           if (T.face >= faces) continue;
           for (int d = 0; d < 3; d++) T.normal[d] = face[T.face].normal[d];
@@ -319,12 +399,15 @@ if (from < to) {
         Touch &T = touches[t];
         if (!nears) T.active = 0;
         if (!T.active) continue;
-        double u[3];
-        Solver::slip(sides, T, u);
+        double speed = T.target, u[3];
+        if (T.choice < 0) {
+          Solver::slip(sides, T, u);
+          speed = Vec::dot(u, T.normal);
+        }
         const double high = Solver::height(world, T);
         const int sticks = Solver::sticks(world, T);
         T.mu = world->friction[T.fa * all + T.fc];
-        T.gap = Solver::gap(world, sides, T, inv) * dx;
+        if (T.choice < 0) T.gap = Solver::gap(world, sides, T, inv) * dx;
         T.span = sticks ? Solver::span(world, sides, T, sticks, high * inv) : 0.0;
         T.active = T.gap < mpm::VAST * dx || T.span > 0;   // else no contact at all
         if (!T.active) continue;
@@ -332,7 +415,7 @@ if (from < to) {
         if (sticks || high > mpm::WALL_REACH * dx) T.mu = 0.0;
         if (M.stiff) continue;
         T.inverse = sides[T.a].inverse + (T.c < 0 ? 0.0 : sides[T.c].inverse);
-        if (M.touches == 1) T.active = T.span > 0 || Vec::dot(u, T.normal) > T.target;
+        if (M.touches == 1) T.active = (int)(T.span > 0) | (int)(speed > T.target);
         active += T.active;
       }
       if (!active) continue;
@@ -361,7 +444,7 @@ if (from < to) {
         Solver::before(world, sides, T, was);
         book[e].normal += jn;
         for (int i = 0; i < 3; i++) {
-          book[e].place[i] += jn * T.x[i];
+          book[e].place[i] += jn * (M.at[i] * dx);
           book[e].J[i] += T.J[i];
           book[e].loss += (T.J[i] - jn * T.normal[i]) * 0.5 * (was[i] + u[i]);
           book[e].impact += jn * T.normal[i] * 0.5 * (was[i] + u[i]);

@@ -13,12 +13,11 @@ if (F.floor >= 0) {
     const int *w = F.where + 4 * b;
     const int at[3] = {w[0] + F.origin[0], w[1] + F.origin[1], w[2] + F.origin[2]};
     if (Grid::over(P, at, dx, reach)) continue;
-    u64 left = Grid::wall(P, at, dx, reach);
+    u64 left = Grid::wall(P, at, dx, reach) & F.have[b];
     if (w[3]) left &= ~junctions[w[3] - 1].mask;
     for (; left; left &= left - 1) {
       const int i = __builtin_ctzll(left);
       float *node = F.node + ((size_t)b * 64 + i) * 8;
-      if (!(node[0] > 0)) continue;
       const double m = node[0], v[3] = {node[1], node[2], node[3]}, fall = -Vec::dot(P, v);
       if (fall <= 0 && !sticks) continue;
       const double x[3] = {(4 * at[0] + (i >> 4)) * dx, (4 * at[1] + (i >> 2 & 3)) * dx,

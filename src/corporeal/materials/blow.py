@@ -1,0 +1,95 @@
+"""How restitution falls with the speed of a blow.
+
+Two laws, by what takes the energy. A wound, foamed or rubber ball loses more of a harder blow, in
+proportion to its speed: e(v) = e_r - s (v - v_r), with the speed v_r at which its restitution was
+rated. A metal yields where it is struck: e ∝ v^(-1/4) (Johnson, Contact Mechanics, 1985, §11.5).
+"""
+
+import tomllib
+from dataclasses import dataclass, replace
+from functools import cache
+from importlib.resources import files
+from math import pi, sqrt
+
+from corporeal.materials.rebound import loss_of, rebound
+from corporeal.types import Law, Material
+
+NOMINAL = 1.0
+"""Speed at which restitution of pairs is stated where no other is said [m/s]."""
+LEAST, MOST = 0.12, 0.99
+"""What a restitution that was carried to another speed may be [-]."""
+
+
+@dataclass(frozen=True)
+class Rating:
+    """At which speed the restitution of a material was rated, and how it changes with it."""
+
+    speed: float
+    """[m/s]"""
+    slope: float
+    """How much less it is for every m/s more [s/m]."""
+    source: str
+    """Key of ``materials.sources``."""
+
+
+@cache
+def ratings() -> dict[str, Rating]:
+    """Every material whose restitution is known to fall with speed, by its name."""
+    text = files("corporeal.materials").joinpath("pairs.toml").read_text(encoding="utf-8")
+    return {
+        row["of"]: Rating(row["speed_m_s"], row["slope_s_m"], row["source"])
+        for row in tomllib.loads(text)["rated"]
+    }
+
+
+def at_speed(material: Material, speed: float) -> Material:
+    """Return a material as it rebounds from a blow at this speed; what a person stated stays.
+
+    Its loss factor changes so that its rebound does by as much.
+
+    Args:
+        material: With its values at the speed at which it was rated.
+        speed: Of the blow [m/s].
+
+    """
+    rating = ratings().get(material.name)
+    if rating is None:
+        return material
+    gained = rating.slope * (rating.speed - speed)
+    changed = {}
+    if not stated(material, "restitution"):
+        changed["restitution"] = _bounded(material.restitution + gained)
+    if not stated(material, "loss"):
+        changed["loss"] = loss_of(_bounded(rebound(material.loss) + gained))
+    return replace(material, **changed)
+
+
+def yielding(a: Material, b: Material, speed: float) -> float:
+    """Restitution of two bodies of which at least one yields where it is struck [-], at most 1.
+
+    e = 3.8 (Y/E*)^(1/2) (½ m v²/Y R³)^(-1/8) of a ball (Johnson, Contact Mechanics, 1985, eq.
+    11.43; recalled), with the yield stress Y of the weaker and ½ m v²/Y R³ = 2/3 π ρ v²/Y.
+
+    Args:
+        a: One material.
+        b: The other; the denser is taken for the ball's.
+        speed: Of the blow [m/s].
+
+    """
+    weak = [m.yield_stress for m in (a, b) if m.law is Law.VON_MISES and m.yield_stress]
+    if not weak or speed <= 0.0:
+        return 1.0
+    strength = min(weak)
+    plane = 1.0 / sum((1.0 - m.poisson**2) / m.young for m in (a, b))
+    blow = 2.0 / 3.0 * pi * max(a.density, b.density) * speed**2 / strength
+    return min(1.0, 3.8 * sqrt(strength / plane) * blow**-0.125)
+
+
+def stated(material: Material, field: str) -> bool:
+    """Tell whether a person stated this number of a material."""
+    ground = material.grounds.get(field)
+    return ground is not None and ground.chosen_by == "annotation"
+
+
+def _bounded(restitution: float) -> float:
+    return min(max(restitution, LEAST), MOST)

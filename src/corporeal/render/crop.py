@@ -1,0 +1,31 @@
+"""The part of a picture that is worth a closer look, so that the rest takes no memory."""
+
+import numpy as np
+from jaxtyping import Bool
+
+from corporeal.render.embree import Block
+
+
+def about(near: Bool[np.ndarray, "h w"], block: Block, reach: int) -> Block | None:
+    """Return the part of a block that holds marked pixels and those within ``reach``."""
+    rows, columns = (np.flatnonzero(near.any(axis=axis)) for axis in (1, 0))
+    if not len(rows):
+        return None
+    top, left = max(rows[0] - reach, 0), max(columns[0] - reach, 0)
+    bottom = min(rows[-1] + reach + 1, block.rows)
+    right = min(columns[-1] + reach + 1, block.columns)
+    return Block(int(block.first + top), int(bottom - top), int(right - left), int(left))
+
+
+def window(block: Block, part: Block) -> tuple[slice, slice]:
+    """Rows and columns of a block that a part of it takes."""
+    top = part.first - block.first
+    return slice(top, top + part.rows), slice(part.left, part.left + part.columns)
+
+
+def cut(values: np.ndarray, block: Block, part: Block) -> np.ndarray:
+    """Copy what belongs to a part from the values of a block's pixels, (P, ...) or (h, w)."""
+    flat = values.ndim < 2 or values.shape != (block.rows, block.columns)
+    trailing = values.shape[1:] if flat else ()
+    there = values.reshape(block.rows, block.columns, *trailing)[window(block, part)].copy()
+    return there.reshape(-1, *trailing) if flat else there

@@ -1,0 +1,73 @@
+"""Restitution at the speed of a blow: rated balls, and metals that yield."""
+
+from dataclasses import replace
+from math import inf
+
+import pytest
+
+from corporeal import materials
+from corporeal.materials.blow import at_speed, ratings, yielding
+from corporeal.materials.rebound import rebound
+from corporeal.types import Ground
+
+
+def made(name):
+    entry = materials.find(name)
+    return entry.pick(entry.typical())
+
+
+def striker(name, solid=True):
+    return materials.Striker(materials.find(name), made(name), solid)
+
+
+def test_a_baseball_bounces_better_from_a_hand_than_from_a_bat():
+    """Rated at 25.9 m/s; .001 more for every mile per hour less."""
+    ball = made("baseball_core")
+    dropped = at_speed(ball, 25.9 - 10 * 0.44704)
+    assert dropped.restitution == pytest.approx(ball.restitution + 0.01, abs=1e-4)
+    assert rebound(dropped.loss) == pytest.approx(rebound(ball.loss) + 0.01, abs=1e-4)
+    assert at_speed(ball, 25.9).loss == pytest.approx(ball.loss)
+    assert at_speed(ball, 1e3).restitution == pytest.approx(0.12)
+
+
+def test_what_a_person_stated_or_nobody_rated_stays():
+    ball, steel = made("softball_core"), made("steel")
+    said = {"loss": replace(ball.grounds["loss"], chosen_by="annotation")}
+    stated = replace(ball, grounds=ball.grounds | said)
+    assert at_speed(stated, 4.0).loss == ball.loss
+    assert at_speed(stated, 4.0).restitution > ball.restitution
+    assert at_speed(steel, 4.0) is steel
+    assert isinstance(said["loss"], Ground)
+
+
+def test_every_rating_is_of_a_material_of_the_library():
+    for name, rating in ratings().items():
+        assert materials.find(name).name == name
+        assert rating.speed > 0.0 < rating.slope
+
+
+def test_a_metal_that_yields_follows_johnson():
+    """Lead at 4.43 m/s on concrete: .17; e falls with the fourth root of the speed."""
+    lead, concrete = made("lead"), made("concrete")
+    assert yielding(lead, concrete, 4.43) == pytest.approx(0.167, abs=0.002)
+    slow, fast = (yielding(lead, concrete, v) for v in (1.0, 16.0))
+    assert slow / fast == pytest.approx(2.0)
+    assert yielding(lead, concrete, 0.0) == yielding(concrete, concrete, 4.0) == 1.0
+    assert yielding(lead, concrete, 1e-6) == 1.0 < inf
+
+
+def test_solid_metals_glass_and_ceramics_need_no_value_on_a_hard_floor():
+    """Published: steel on glass .97, aluminium oxide on glass .98, on aluminium .65."""
+    bearing, oxide, window = (striker(n) for n in ("hardened_steel", "alumina", "glass"))
+    for one in (bearing, oxide):
+        assert materials.restitution(one, window, 1.4).value > 0.94
+    soft = striker("aluminium")
+    assert materials.restitution(oxide, soft, 2.4).value == pytest.approx(0.65, abs=0.08)
+    brass = striker("brass")
+    slow, fast = (materials.restitution(brass, brass, v).value for v in (1.0, 4.0))
+    assert slow / fast == pytest.approx(4.0**0.25)
+    # What rings, and what is rough, keeps the rule.
+    bowl, plank = striker("glass", solid=False), striker("wood")
+    for pair in ((bowl, bearing), (plank, window)):
+        rule = materials.restitution_between(pair[0].material, pair[1].material)
+        assert materials.restitution(*pair, 3.0).value == pytest.approx(rule)

@@ -1,0 +1,38 @@
+"""Restitution is carried to the speed of each pair's first blow when a problem is posed."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import corporeal as co
+from corporeal.treatment.blow_restitution import in_blows
+
+
+def fallen(material, speed):
+    made = co.build_scene(co.ball(material, 0.02, (0, 0, 0.03), (0, 0, -speed), "thing"))
+    (surface,) = made.surfaces
+    return co.prepare(replace(made, surfaces=(replace(surface, extras={"substance": material}),)))
+
+
+def test_a_lead_ball_rebounds_less_the_harder_it_strikes():
+    ready = fallen("lead", 4.0)
+    assert ready.particles.treatments[0].kind == "rigid"
+    problem = co.pose_problem(ready)
+    nominal = ready.field.restitution[0, -1]
+    # Of its estimated speed at impact, which its start above the floor adds to.
+    struck = ready.particles.treatments[0].impact_speed
+    assert problem.restitution[0, -1] == pytest.approx(nominal * struck**-0.25, rel=1e-3)
+    assert np.allclose(problem.restitution, problem.restitution.T)
+
+
+def test_what_was_drawn_stays_drawn_and_what_is_unknown_stays():
+    ready = fallen("softball_core", 4.0)
+    field, treatments = ready.field, ready.particles.treatments
+    (usual,) = in_blows(field, treatments)[:1, -1]
+    drawn = replace(field, restitution=0.9 * field.restitution)
+    assert in_blows(drawn, treatments)[0, -1] == pytest.approx(0.9 * usual)
+    strange = replace(field.materials[0], name="of a library of one's own")
+    own = replace(field, materials=(strange,))
+    assert in_blows(own, treatments)[0, -1] == field.restitution[0, -1]
+    assert in_blows(replace(field, floor=None), treatments) is field.restitution
