@@ -41,7 +41,7 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0):
         place = eye + far[..., None] * rays
         at = (np.floor(place * 16).astype(int) % 64).reshape(-1, 3).T
         tone = mottled[tuple(at)].reshape(HIGH, WIDE)
-        colour = np.where((on | _on_discs(place, flat))[..., None], ball, ground)
+        colour = np.where((on | on_discs(place, flat))[..., None], ball, ground)
         if belt is not None:
             aside = np.abs(u - WIDE / 2) > ASIDE
             colour[aside | (on & (np.abs(place[..., 2]) < BELT))] = belt
@@ -55,7 +55,7 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0):
     return Views(np.stack(pictures), cameras), np.stack(masks), np.concatenate(seen)
 
 
-def _on_discs(place, radius):
+def on_discs(place, radius):
     turns = 2 * np.pi * np.arange(3) / 3
     middles = DISCS * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
     near = [np.linalg.norm(place[..., :2] - middle, axis=-1) < radius for middle in middles]

@@ -4,11 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from painted_scene import GREY, agreement, scene
+from painted_scene import FLOOR, GREY, agreement, on_discs, scene
 
 from corporeal.errors import UserError
+from corporeal.geometry.ground_plane import Plane
 from corporeal.masking import grow as growing
+from corporeal.masking import volume
 from corporeal.masking.doubt import doubt, incomplete
+from corporeal.masking.floor_square import met
 from corporeal.masking.grow import grow
 from corporeal.masking.pointed import Spot, cut_around, pointed_at
 from corporeal.masking.seeds import looked_at
@@ -52,6 +55,21 @@ def test_flat_things_of_its_colour_beside_it_are_told():
     views, _, points = scene(flat=0.33)
     why = incomplete(grow(views, looked_at(views, points)))
     assert why is not None and "times as much with its colours" in why
+
+
+def test_what_lies_flat_is_a_pattern_of_the_floor_unless_it_may_be_a_thing(monkeypatch):
+    monkeypatch.setattr(volume, "PIECE", 0.005)  # of a ball a disc is a crumb
+    views, masks, points = scene(flat=0.2)
+    plane = Plane(np.array([0.0, 0.0, 1.0]), FLOOR, 1.0, 0.01)
+    places = np.stack([met(camera, plane).reshape(*masks.shape[1:], 3) for camera in views.cameras])
+    discs = on_discs(places, 0.2) & ~masks
+    for flat, least, most in ((False, 0.0, 0.1), (True, 0.95, 1.0)):
+        grown = grow(views, looked_at(views, points), flat=flat)
+        assert grown is not None
+        inside = grown.inside > 0.5
+        assert least <= inside[discs].mean() <= most
+        assert inside[masks].mean() > 0.98
+        assert (inside & ~discs & ~masks).sum() < 0.01 * discs.sum()
 
 
 def test_rounds_go_on_until_masks_settle(monkeypatch):

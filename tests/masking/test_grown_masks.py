@@ -1,6 +1,7 @@
 """Masks of a folder of photographs: written, corrected, pointed at, refused."""
 
 import json
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,8 +14,11 @@ from corporeal.formats.colmap import write_colmap
 from corporeal.formats.mask_files import corrected
 from corporeal.formats.photographs import read_photographs
 from corporeal.formats.transforms import write_views
+from corporeal.masking import grown_masks as module
+from corporeal.masking.grow import grow
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.masking.pointed import Pointed
+from corporeal.masking.seeds import looked_at
 from corporeal.pipeline import Settings, _Run, quiet
 from corporeal.reconstruction import picture_intake
 from corporeal.reconstruction.picture_intake import masks_for, take_pictures
@@ -85,6 +89,19 @@ def test_what_masks_hold_a_part_of_is_refused_until_somebody_corrects_them(tmp_p
     assert forced.folder is not None and "Check them: not all of it" in forced.warnings[0]
     Image.fromarray(np.full((HIGH, WIDE), 255, np.uint8)).save(run / "masks" / names[3])
     assert not masks_for(ReconstructConfig(), photos, run, unheard).incomplete
+
+
+@pytest.mark.parametrize("left_over", [0.0, 0.5])
+def test_what_lies_flat_is_taken_if_masks_are_whole_then(photos, tmp_path, monkeypatch, left_over):
+    folder, _ = photos
+    views, _, points = scene()
+    whole = grow(views, looked_at(views, points))
+    assert whole is not None
+    made = {False: replace(whole, left_over=1.0), True: replace(whole, left_over=left_over)}
+    monkeypatch.setattr(module, "grow", lambda *_, flat=False: made[flat])
+    found = grown_masks(folder, tmp_path / "made")
+    assert (module.FLAT in found.said) == (left_over == 0)
+    assert ("1.0 times as much" in found.incomplete) == (left_over > 0)
 
 
 def test_what_cannot_be_told_is_not_written(tmp_path):

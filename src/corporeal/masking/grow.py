@@ -23,7 +23,7 @@ from corporeal.masking.left_over import before_the_floor, left_over
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds
 from corporeal.masking.total_variation import Cutter
-from corporeal.masking.volume import Volume, volume
+from corporeal.masking.volume import Volume, lowered, volume
 from corporeal.types import Views
 
 Progress = Callable[[float, str], None]
@@ -99,7 +99,10 @@ class _Side:
 
 
 def grow(
-    views: Views, seeds: Seeds, progress: Progress = lambda fraction, words: None
+    views: Views,
+    seeds: Seeds,
+    progress: Progress = lambda fraction, words: None,
+    flat: bool = False,
 ) -> Grown | None:
     """Grow masks; None: nothing is left.
 
@@ -107,12 +110,14 @@ def grow(
         views: Pictures of at most FINE pixels.
         seeds: For the same pictures at ROUGH pixels, as ``reduced`` returns them.
         progress: Told the fraction done and what is being done.
+        flat: Whether what lies flat on the floor may be objects, too: only colours tell then.
 
     """
     rough = reduced(views, ROUGH)
-    side, room = _Side(rough), volume(rough.cameras, seeds.around, seeds.floor, seeds.cone)
+    bottom = lowered(seeds.floor, seeds.around) if flat else seeds.floor
+    side, room = _Side(rough), volume(rough.cameras, seeds.around, bottom, seeds.cone)
     shaded = shaded_floor(views, seeds.floor, seeds.around)
-    floor = shaded | shows_floor(views, seeds.floor, seeds.around)
+    floor = shaded if flat else shaded | shows_floor(views, seeds.floor, seeds.around)
     on_floor = np.float32(FLOOR) * _shrunk(floor, rough.rgb.shape[1:3])
     inside, outside = (histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
     never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0)) + on_floor

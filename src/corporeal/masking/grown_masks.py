@@ -20,10 +20,12 @@ from corporeal.masking.doubt import doubt, incomplete
 from corporeal.masking.grow import FINE, ROUGH, Grown, grow
 from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
-from corporeal.masking.seeds import looked_at
+from corporeal.masking.seeds import Seeds, looked_at
+from corporeal.types import Views
 
 Progress = Callable[[float, str], None]
 
+FLAT = "What has their colours and lies flat on the floor was taken for objects, too."
 DOUBTED = "doubted"
 """Folder of masks that are not to be believed: what colours alone would take for objects."""
 METHOD = 8
@@ -79,7 +81,7 @@ def grown_masks(
         seeds = looked_at(rough, shown.points)
     else:
         seeds = pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
-    grown = grow(shown.views, seeds, lambda f, words: progress(GROWN * f, words))
+    grown, flat = _grown(shown.views, seeds, lambda f, words: progress(GROWN * f, words))
     why, lacking = doubt(grown), incomplete(grown) or ""
     for name in (MASKS[0], DOUBTED, RECORD):
         _forget(folder / name)
@@ -90,9 +92,27 @@ def grown_masks(
         write_record(folder, made_by, said, lacking)
         return GrownMasks(None, said, _doubted(folder), lacking)
     _written(source, shown, grown, folder, progress)
-    said = (_told(grown, pointed), *(f"Check them: {w}." for w in (why, lacking) if w))
+    said = (
+        _told(grown, pointed),
+        *([FLAT] if flat else []),
+        *(f"Check them: {w}." for w in (why, lacking) if w),
+    )
     write_record(folder, made_by, said, lacking)
     return GrownMasks(folder, said, incomplete=lacking)
+
+
+def _grown(views: Views, seeds: Seeds, progress: Progress) -> tuple[Grown | None, bool]:
+    """Grow masks, and say whether what lies flat on the floor is in them.
+
+    Plates are as flat as print on paper, which is no object. Where so much of the colours of
+    objects lies beside them, colours decide, if masks are complete and not doubted then.
+    """
+    grown = grow(views, seeds, progress)
+    if grown is None or incomplete(grown) is None:
+        return grown, False
+    wider = grow(views, seeds, progress, flat=True)
+    flat = doubt(wider) is None and incomplete(wider) is None
+    return (wider if flat else grown), flat
 
 
 def _written(

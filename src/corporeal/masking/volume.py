@@ -1,6 +1,6 @@
 """Cells of space that objects may fill, carved by masks, and the silhouettes of what is left."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, Int32
@@ -117,6 +117,12 @@ def volume(
     outer = far[index] > 1 - 4 / ACROSS
     tall = height[index] > TALL
     return Volume(index, pixel.astype(np.int32), shape, footprint, outer, tall)
+
+
+def lowered(floor: Plane | None, around: Region) -> Plane | None:
+    """Return a floor so far below that cells hold what lies flat on the true one."""
+    down = (ON_FLOOR + 2 / ACROSS) * around.radius
+    return None if floor is None else replace(floor, offset=floor.offset - down)
 
 
 def pixels_of(points: Float[np.ndarray, "N 3"], camera: Camera) -> Int[np.ndarray, " N"]:
