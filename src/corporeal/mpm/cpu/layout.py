@@ -275,6 +275,7 @@ SIDE = Record(  # one field there
     ("int", "field slot"),
     ("float", "m"),
     ("float[3]", "mean out"),
+    ("float", "spare"),
     ("double[3]", "v"),
     ("double", "inverse"),
 )
@@ -286,13 +287,10 @@ AIM = Record(  # candidate normals of a possible contact of two fields
     ("float[3]", "chosen"),
     ("float", "weight"),
 )
-LEAN = (
-    Record(  # of a possible contact, what its neighbours read: weighted normal, node in its block,
-        "Lean",  # and which of the fields there; c: 255 for a plane
-        ("float[3]", "u"),
-        ("unsigned char", "a c node"),
-        ("unsigned char", "known"),  # 1 + the candidate that is kept; 0: chosen anew
-    )
+LEAN = Record(  # what neighbours read of a possible contact: pair by pair of a block's fields
+    "Lean",
+    ("float[3]", "u"),  # weighted normal
+    ("int", "touch"),  # the contact, or the first of them
 )
 CHOICE = Record(  # which candidates won where two fields meet in a block: see physics/contact.py
     "Choice",
@@ -305,6 +303,8 @@ TOUCH = Record(  # a possible contact of side a with side c, or with plane -1 - 
     ("int", "meet a c fa fc active"),
     ("int", "face"),  # which face of a rigid body a liquid meets
     ("int", "choice"),  # where its candidate is kept; -1: nowhere
+    ("int", "lean"),  # -1: a plane
+    ("int", "known"),  # 1 + the candidate that is kept; 0: chosen anew
     ("double[3]", "normal"),
     ("double", "gap target inverse mu span"),  # span: over which a wall drags on a liquid [m² s]
     ("double[3]", "J"),

@@ -4,8 +4,9 @@ const int begun = (int)((long long)stage->junctions * index / PARTS),
 for (int j = begun; j < ended; j++) {
   const Junction &J = junctions[j];
   for (int t = J.touch; t < J.last && J.chosen; t++) {
+    const Touch &T = touches[t];
     const Aim &A = aims[t];
-    if (leans[t].known || A.fa < 0) continue;
+    if (T.known || T.c < 0) continue;
     float best = -(float)mpm::VAST;
     int pick = 0;
     for (int q = 0; q < 3; q++) {
@@ -13,9 +14,9 @@ for (int j = begun; j < ended; j++) {
       float wide = (float)(q == 0 ? mpm::FIRST_BIAS : mpm::OTHER_BIAS) - A.far[0][q] - A.far[1][q];
       if (wide > best) best = wide, pick = q;
     }
-    for (int d = 0; d < 3; d++) leans[t].u[d] = A.weight * A.n[d][pick];
-    if (touches[t].choice < 0) continue;
-    u64 *bits = choices[touches[t].choice].bits;
-    for (int k = 0; k < 2; k++) bits[k] |= (u64)((pick + 1) >> k & 1) << leans[t].node;
+    for (int d = 0; d < 3; d++) leans[T.lean].u[d] = A.weight * A.n[d][pick];
+    if (T.choice < 0) continue;
+    u64 *bits = choices[T.choice].bits;
+    for (int k = 0; k < 2; k++) bits[k] |= (u64)((pick + 1) >> k & 1) << Grid::node(meets[T.meet].at);
   }
 }

@@ -15,11 +15,11 @@ for (int t = from; t < to; t++) {
   const Touch &T = touches[t];
   Aim &aim = aims[t];
   float n[3];
-  if (leans[t].known) {
+  if (T.known) {
     const Side &A = sides[T.a], &C = sides[T.c];
     const float weight = A.m < C.m ? A.m : C.m;
-    Candidate::unit(A, C, leans[t].known - 1, n);
-    for (int d = 0; d < 3; d++) leans[t].u[d] = weight * n[d];
+    Candidate::unit(A, C, T.known - 1, n);
+    for (int d = 0; d < 3; d++) leans[T.lean].u[d] = weight * n[d];
     continue;
   }
   aim.fa = T.c < 0 ? -1 : T.fa;

@@ -5,19 +5,26 @@ bool asked = false;
 for (int j = from; j < to; j++) {
   Junction &J = junctions[j];
   int k = J.meet, s = J.side, t = J.touch;
-  int choice_of[FIELDS_IN_BLOCK][FIELDS_IN_BLOCK];
-  u64 bits[FIELDS_IN_BLOCK * (FIELDS_IN_BLOCK - 1) / 2][2];   // what is known of each pair
-  for (int a = 0, p = 0; a < J.fields; a++)
-    for (int c = a + 1; c < J.fields; c++) {
-      choice_of[a][c] = -1;
-      if (!(J.met[a] >> c & 1) || world->field[J.field[a]].rigids || world->field[J.field[c]].rigids) continue;
-      Choice &mine = choices[J.choice + p];
-      mine = Choice{{J.at[0], J.at[1], J.at[2]}, J.field[a], J.field[c], 0, {0, 0}};
-      const Choice *before = Kept::find(stage, mine);
-      for (int k = 0; k < 2; k++) bits[p][k] = before ? before->bits[k] : 0;
-      choice_of[a][c] = p++;
-    }
+  Pairs pairs(J);
+  unsigned char number[FIELDS_IN_BLOCK][FIELDS_IN_BLOCK];   // of a pair of fields; NONE: they never meet here
+  int choice_of[Pairs::MOST];
+  for (int a = 0; a < J.fields; a++)
+    for (int c = 0; c < J.fields; c++) number[a][c] = Pairs::NONE;
+  u64 bits[Pairs::MOST][2];   // what is known of each pair
   J.chosen = 0;
+  for (int p = 0, made = J.choice; p < pairs.count; p++) {
+    const int a = J.field[pairs.a[p]], c = J.field[pairs.c[p]];
+    number[pairs.a[p]][pairs.c[p]] = (unsigned char)p;
+    choice_of[p] = -1;
+    bits[p][0] = bits[p][1] = 0;
+    if (!world->field[a].rigids && !world->field[c].rigids) {
+      Choice &mine = choices[choice_of[p] = made++];
+      mine = Choice{{J.at[0], J.at[1], J.at[2]}, a, c, 0, {0, 0}};
+      const Choice *before = Kept::find(stage, mine);
+      for (int k = 0; k < 2 && before; k++) mine.bits[k] = bits[p][k] = before->bits[k] & pairs.nodes[p];
+    }
+    J.chosen |= pairs.nodes[p] & ~(bits[p][0] | bits[p][1]);
+  }
   const Walls wall(world, J.at);
   for (u64 left = J.mask; left; left &= left - 1) {
     int i = __builtin_ctzll(left);
@@ -61,17 +68,15 @@ for (int j = from; j < to; j++) {
         } else {
           T.c = M.side + c;
           T.fc = sides[T.c].field;
-          if (!(J.met[here[a]] >> here[c] & 1)) continue;
+          if (number[here[a]][here[c]] == Pairs::NONE) continue;
           const Field &G = world->field[T.fc];
           if ((F.patches && G.pours) || (G.patches && F.pours)) faces = mpm::WETTED_FACES;
         }
-        const int pair = w >= 0 ? -1 : choice_of[here[a]][here[c]];
-        const int pick = pair < 0 ? 0 : (int)(bits[pair][0] >> i & 1) | (int)(bits[pair][1] >> i & 1) << 1;
-        if (w < 0 && !pick) J.chosen |= 1ull << i;
-        leans[t] = Lean{{0, 0, 0}, (unsigned char)here[a], (unsigned char)(w >= 0 ? 255 : here[c]), (unsigned char)i,
-                        (unsigned char)pick};
-        T.choice = pair < 0 ? -1 : J.choice + pair;
-        for (int b = 0; b < 2 && pick; b++) choices[T.choice].bits[b] |= (u64)(pick >> b & 1) << i;
+        const int pair = w >= 0 ? -1 : number[here[a]][here[c]];
+        T.choice = pair < 0 ? -1 : choice_of[pair];
+        T.known = pair < 0 ? 0 : (int)(bits[pair][0] >> i & 1) | (int)(bits[pair][1] >> i & 1) << 1;
+        T.lean = pair < 0 ? -1 : pairs.lean[pair]++;
+        if (pair >= 0) leans[T.lean].touch = t;
         T.meet = k;
         T.a = M.side + a;
         T.fa = A.field;
@@ -79,7 +84,6 @@ for (int j = from; j < to; j++) {
         for (int f = 1; f < faces; f++, t++) {
           touches[t] = T;
           touches[t].face = f;
-          leans[t] = leans[t - 1];
         }
       }
     }

@@ -128,12 +128,9 @@ for (int b = task[1]; b < task[2]; b++) {
     }
   }
   for (int e = 0; e < asked.count; e++) {
-    const f8 &h = arena[asked.at[e]];
+    f8 h = arena[asked.at[e]];
     if (!(h[0] > 0)) continue;
-    Side &S = sides[asked.side[e]];
-    for (int d = 0; d < 3; d++) {
-      S.mean[d] += h[1 + d];
-      S.out[d] += h[4 + d];
-    }
+    h[0] = h[7] = 0.0f;   // the mass is known
+    *(f8u *)&sides[asked.side[e]].m += h;
   }
 }

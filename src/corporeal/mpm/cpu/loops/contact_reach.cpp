@@ -109,7 +109,7 @@ for (int b = task[1]; b < task[2]; b++) {
       const Meet &M = meets[Grid::meet(J, i)];
       for (int t = M.touch; t < M.touch + M.touches; t++) {
         const Aim &A = aims[t];
-        if (leans[t].known || (A.fa != task[0] && A.fc != task[0])) continue;
+        if (touches[t].known || (A.fa != task[0] && A.fc != task[0])) continue;
         Own &O = own[owns++];
         const float sign = A.fa == task[0] ? 1.0f : -1.0f;
         for (int d = 0; d < 3; d++)

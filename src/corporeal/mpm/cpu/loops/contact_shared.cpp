@@ -33,6 +33,7 @@ struct Grid {
     if (x < 0 || y < 0 || z < 0 || x >= f.dim[0] || y >= f.dim[1] || z >= f.dim[2]) return -1;
     return f.table[(x * f.dim[1] + y) * f.dim[2] + z];
   }
+  static inline int node(const int *at) { return (at[0] & 3) << 4 | (at[1] & 3) << 2 | (at[2] & 3); }   // in its block
   static inline u64 below(int i) { return (1ull << i) - 1; }
   static inline int count(u64 m) { return __builtin_popcountll(m); }
   static inline int meet(const Junction &J, int i) { return J.meet + count(J.mask & below(i)); }
@@ -85,6 +86,26 @@ struct Grid {
         mask |= row << (16 * i + 4 * j);
       }
     return mask;
+  }
+};
+
+// The pairs of a block's fields that meet somewhere in it, where, and their first lean.
+struct Pairs {
+  enum { MOST = FIELDS_IN_BLOCK * (FIELDS_IN_BLOCK - 1) / 2, NONE = 255 };
+  unsigned char a[MOST], c[MOST];
+  u64 nodes[MOST];
+  int lean[MOST], count;
+  Pairs(const Junction &J) : count(0) {
+    int next = J.touch;
+    for (int first = 0; first < J.fields; first++)
+      for (int met = J.met[first]; met; met &= met - 1) {
+        const int second = __builtin_ctz(met);
+        a[count] = (unsigned char)first;
+        c[count] = (unsigned char)second;
+        nodes[count] = J.have[first] & J.have[second];
+        lean[count] = next;
+        next += Grid::count(nodes[count++]);
+      }
   }
 };
 

@@ -186,10 +186,8 @@ struct Solver {
 // Normals of some pairs of fields, weighted by their masses, added up over the 27 nodes around each
 // node of a block: one axis after the other; node by node for a pair that meets at few.
 struct Smooth {
-  enum { MOST = 24, FEW = 10, NONE = 255 };
+  enum { MOST = 24, FEW = 10 };
   f4 grid[MOST][216];        // of the block and one layer around; then sums, of the block
-  unsigned char pair[FIELDS_IN_BLOCK][FIELDS_IN_BLOCK];   // number of a pair of the block's fields
-  int count[FIELDS_IN_BLOCK * (FIELDS_IN_BLOCK - 1) / 2], pairs;
   static inline void sum(const f4 *from, f4 *to, int rows, int step, int inner) {
     for (int r = 0; r < rows; r++)
       for (int k = 0; k < 4; k++)
@@ -198,58 +196,39 @@ struct Smooth {
           to[(r * 4 + k) * inner + i] = g[0] + g[inner] + g[2 * inner];
         }
   }
-  inline void begin(const Junction &J, const Lean *leans) {
-    for (int a = 0; a < J.fields; a++)
-      for (int c = 0; c < J.fields; c++) pair[a][c] = NONE;
-    pairs = 0;
-    for (int t = J.touch; t < J.last; t++) {
-      const Lean &L = leans[t];
-      if (L.c == NONE) continue;
-      unsigned char &p = pair[L.a][L.c];
-      if (p == NONE) count[p = (unsigned char)pairs++] = 0;
-      count[p]++;
-    }
-  }
   inline void empty(int many) {
     for (int p = 0; p < many; p++)
       for (int i = 0; i < 216; i++) grid[p][i] = f4{0, 0, 0, 0};
   }
-  // What another block's contacts add to some pairs, from low on.
-  inline void add(const Junction &J, const Junction &O, int n, int low, int many, const Meet *meets,
+  // What another block's contacts add to some pairs of this one, from low on.
+  inline void add(const Junction &J, const Pairs &mine, const Junction &O, int n, int low, int many,
                   const Lean *leans) {
-    unsigned char mine[FIELDS_IN_BLOCK];   // which field of J is each of O's: both are in order
-    for (int q = 0, k = 0; q < O.fields; q++) {
-      while (k < J.fields && J.field[k] < O.field[q]) k++;
-      mine[q] = k < J.fields && J.field[k] == O.field[q] ? (unsigned char)k : NONE;
-    }
-    unsigned char number[FIELDS_IN_BLOCK][FIELDS_IN_BLOCK];   // of O's pairs among ours
-    for (int a = 0; a < O.fields; a++)
-      for (int c = a + 1; c < O.fields; c++) {
-        const unsigned p = mine[a] == NONE || mine[c] == NONE ? ~0u : (unsigned)pair[mine[a]][mine[c]] - (unsigned)low;
-        number[a][c] = p < (unsigned)many ? (unsigned char)p : NONE;
-      }
+    const Pairs others(O);
+    const u64 margin = Grid::margin(n);
     const int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
-    for (u64 left = O.several & Grid::margin(n); left; left &= left - 1) {
-      const int i = __builtin_ctzll(left);
-      const Meet &M = meets[Grid::meet(O, i)];
-      const int place = ((x + (i >> 4)) * 6 + y + (i >> 2 & 3)) * 6 + z + (i & 3);
-      for (const Lean *L = leans + M.touch, *end = L + M.touches; L < end; L++) {
-        if (L->c == NONE) continue;
-        const unsigned char p = number[L->a][L->c];
-        if (p != NONE) grid[p][place] = f4{L->u[0], L->u[1], L->u[2], 0};
+    for (int p = low, o = 0; p < low + many; p++) {   // both are in order
+      const int a = J.field[mine.a[p]], c = J.field[mine.c[p]];
+      while (o < others.count && (O.field[others.a[o]] < a || (O.field[others.a[o]] == a && O.field[others.c[o]] < c))) o++;
+      if (o == others.count) break;
+      if (O.field[others.a[o]] != a || O.field[others.c[o]] != c) continue;
+      for (u64 left = others.nodes[o] & margin; left; left &= left - 1) {
+        const int i = __builtin_ctzll(left);
+        const Lean &L = leans[others.lean[o] + Grid::count(others.nodes[o] & Grid::below(i))];
+        grid[p - low][((x + (i >> 4)) * 6 + y + (i >> 2 & 3)) * 6 + z + (i & 3)] = f4{L.u[0], L.u[1], L.u[2], 0};
       }
     }
   }
-  inline void up(int low, int many) {
+  static inline bool few(const Pairs &mine, int p) { return Grid::count(mine.nodes[p]) < FEW; }
+  inline void up(const Pairs &mine, int low, int many) {
     f4 z[144], y[96];
     for (int p = 0; p < many; p++) {
-      if (count[low + p] < FEW) continue;
+      if (few(mine, low + p)) continue;
       sum(grid[p], z, 36, 6, 1);
       sum(z, y, 6, 6, 4);
       sum(y, grid[p], 1, 6, 16);
     }
   }
-  inline f4 around(int p, int few, int i) const {
+  inline f4 around(int p, bool few, int i) const {
     if (!few) return grid[p][i];
     const f4 *g = grid[p] + ((i >> 4) * 6 + (i >> 2 & 3)) * 6 + (i & 3);
     f4 x[3];
@@ -328,11 +307,11 @@ if (from < to) {
     const Junction &J = junctions[j];
     const int end = J.meet + Grid::count(J.mask);
     const Junction *around[27];
+    const Pairs pairs(J);
     const int last_side = meets[end - 1].side + meets[end - 1].sides;
     Together::ahead(sides + J.side, sides + last_side);
     if (J.several) {
       Together::ahead(touches + J.touch, touches + J.last);
-      smooth.begin(J, leans);
       for (int n = 0; n < 27; n++) {
         int at[3] = {J.at[0] + n / 9 - 1, J.at[1] + n / 3 % 3 - 1, J.at[2] + n % 3 - 1}, other = 0;
         for (int q = 0; q < J.fields - 1 && !other; q++) {   // of two that meet there, one is before the last
@@ -345,23 +324,25 @@ if (from < to) {
     for (Side *S = sides + J.side; S < sides + last_side; S++)   // from the moments that particles gave
       for (int d = 0; d < 3; d++) S->mean[d] /= S->m;
     if (J.several) {
-      for (int low = 0; low < smooth.pairs; low += Smooth::MOST) {
-        const int many = smooth.pairs - low < Smooth::MOST ? smooth.pairs - low : Smooth::MOST;
+      for (int low = 0; low < pairs.count; low += Smooth::MOST) {
+        const int many = pairs.count - low < Smooth::MOST ? pairs.count - low : Smooth::MOST;
         smooth.empty(many);
         for (int n = 0; n < 27; n++)
-          if (around[n]) smooth.add(J, *around[n], n, low, many, meets, leans);
-        smooth.up(low, many);
-        for (int t = J.touch; t < J.last; t++) {
-          const Lean &L = leans[t];
-          const unsigned p = L.c == Smooth::NONE ? ~0u : (unsigned)smooth.pair[L.a][L.c] - (unsigned)low;
-          if (p >= (unsigned)many) continue;
-          const f4 sum = smooth.around(p, smooth.count[low + p] < Smooth::FEW, L.node);
-          if (touches[t].choice < 0) {
-            for (int d = 0; d < 3; d++) touches[t].normal[d] = sum[d];
-            continue;
+          if (around[n]) smooth.add(J, pairs, *around[n], n, low, many, leans);
+        smooth.up(pairs, low, many);
+        for (int p = 0; p < many; p++) {
+          const bool few = Smooth::few(pairs, low + p);
+          const Lean *L = leans + pairs.lean[low + p];
+          for (u64 left = pairs.nodes[low + p]; left; left &= left - 1, L++) {
+            const f4 sum = smooth.around(p, few, __builtin_ctzll(left));
+            Touch &T = touches[L->touch];
+            if (T.choice < 0) {
+              for (int d = 0; d < 3; d++) T.normal[d] = sum[d];
+              continue;
+            }
+            together.add(L->touch, T, sides, sum);
+            if (together.count == Together::MOST) together.give(touches, world->face, dx);
           }
-          together.add(t, touches[t], sides, sum);
-          if (together.count == Together::MOST) together.give(touches, world->face, dx);
         }
         together.give(touches, world->face, dx);
       }
