@@ -240,10 +240,10 @@ struct Smooth {
 // Contacts of two fields of which neither is rigid, several at once: number by number, so that loops over
 // them become vectors.
 struct Together {
-  enum { MOST = 64, WIDE = 8 };
-  int touch[MOST], count = 0;
-  double normal[3][MOST], mean[6][MOST], slip[3][MOST];
-  double size[MOST], speed[MOST], gap[MOST];
+  enum { BATCH = 64, WIDE = 8 };
+  int touch[BATCH], count = 0;
+  double normal[3][BATCH], mean[6][BATCH], slip[3][BATCH];
+  double size[BATCH], speed[BATCH], gap[BATCH];
   inline void add(int t, const Touch &T, const Side *sides, f4 along) {
     const Side &A = sides[T.a], &C = sides[T.c];
     touch[count] = t;
@@ -341,7 +341,7 @@ if (from < to) {
               continue;
             }
             together.add(L->touch, T, sides, sum);
-            if (together.count == Together::MOST) together.give(touches, world->face, dx);
+            if (together.count == Together::BATCH) together.give(touches, world->face, dx);
           }
         }
         together.give(touches, world->face, dx);
