@@ -79,6 +79,7 @@ def test_rounds_go_on_until_masks_settle(monkeypatch):
 
     def changing(*given):
         made = once(*given)
+        assert made is not None
         rounds.append(made)
         early = len(rounds) in (1, 3, 5)
         return replace(made, masks=made.masks ^ masks) if early else made

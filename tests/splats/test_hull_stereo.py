@@ -4,6 +4,8 @@ import numpy as np
 import trimesh
 
 from corporeal.splats import hull
+from corporeal.splats.deepened import deepened, laid
+from corporeal.splats.depth_rendering import DepthRendering
 from corporeal.splats.hull_stereo import seen_past
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Views
@@ -106,3 +108,47 @@ def test_the_number_of_threads_changes_nothing(monkeypatch):
         with ThreadPool(count) as pool:
             results.append(seen_past(views, masks, hull.tight(views, masks, pool), pool))
     np.testing.assert_array_equal(*results)
+
+
+def depths(solid):
+    """Along z, of every pixel of all cameras; inf: beside the solid."""
+    found = np.full((len(cameras()), SIZE, SIZE), np.inf, np.float32)
+    v, u = (i.ravel() + 0.5 for i in np.indices((SIZE, SIZE)))
+    local = np.stack([u / SIZE - 0.5, v / SIZE - 0.5, np.ones(u.shape)], axis=1)
+    for k, eye in enumerate(cameras()):
+        rays, origin = local @ eye.world_from_camera[:3, :3].T, eye.world_from_camera[:3, 3]
+        origins = np.broadcast_to(origin, rays.shape)
+        places, ray, _ = solid.ray.intersects_location(origins, rays, multiple_hits=False)
+        found[k].ravel()[ray] = (places - origin) @ eye.world_from_camera[:3, 2]
+    return found
+
+
+def test_photographs_see_below_a_lid_of_gaussians(monkeypatch):
+    """Of a box without a lid Gaussians show one; photographs know better, and leave its sides."""
+    monkeypatch.setattr(hull, "CELLS", 60_000)
+    views, masks = photographed(without_lid(), 0.25)
+    shown, true = depths(block([-HALF, -HALF, 0], [HALF, HALF, HEIGHT])), depths(without_lid())
+    met, rows = np.zeros(shown.shape, np.int32), np.zeros((len(shown), 18))
+    with ThreadPool(1) as pool:
+        found = deepened(DepthRendering(views.rgb, shown, met, rows), views, masks, pool).depth
+    on = np.isfinite(true)
+    lid, sides = on & (true > shown + 0.3), on & (true < shown + 0.01)
+    assert lid.mean() > 0.05
+    assert np.median(true[lid] - shown[lid]) > 1
+    assert (np.abs(found[lid] - true[lid]) < 0.25).mean() > 0.7
+    assert (found[sides] < true[sides] + 0.05).mean() > 0.98
+    np.testing.assert_array_equal(np.isfinite(found), np.isfinite(shown))
+
+
+def test_a_plain_face_goes_on_between_known_depths():
+    """A slanted plane: what is plain lies on it, what is not stays unknown."""
+    rows, columns = np.mgrid[:24, :30]
+    true = 1 / (0.2 + 0.004 * rows + 0.003 * columns)
+    known = (rows < 4) | (rows > 19) | (columns < 4) | (columns > 25)
+    plain = columns < 20
+    found = laid(np.where(known, true, np.inf), np.ones(true.shape, bool), plain)
+    there = known | plain
+    np.testing.assert_allclose(found[there], true[there], rtol=1e-3)
+    assert np.isinf(found[~there]).all()
+    nothing = np.full(true.shape, np.inf)
+    assert np.isinf(laid(nothing, np.ones(true.shape, bool), plain)).all()

@@ -79,13 +79,13 @@ def carved(
 ) -> Float32[np.ndarray, "X Y Z"]:
     """Return the signed distance to what is seen, cut off at a few cells [m]; positive outside.
 
-    Nothing is below the floor: what is seen there is a plate that lies on it.
+    Nothing is below the floor: what is seen there, or closely above it, is a plate that lies on it.
     """
     field = np.empty(grid.shape, np.float32)
     place = np.array([*grid.low, grid.cell])
     reach = TRUST * grid.cell
     rule = np.array([reach, EMPTIER, max(1, round(WITNESSES * len(rendering.depth)))])
-    rest = place, rendering.rows, _on(rendering, floor + PLATE * grid.cell, floor), rule, field
+    rest = place, rendering.rows, _on(rendering, floor + PLATE * grid.cell), rule, field
     pool.each(carve, [(*span, *rest) for span in pool.spans(grid.shape[0])])
     above = grid.axes[2] > floor
     room = field[:, :, above]  # the floor is no witness: below it everything is unknown
@@ -98,8 +98,8 @@ def carved(
     return field
 
 
-def _on(rendering: DepthRendering, top: float, floor: float) -> Float32[np.ndarray, "V H W"]:
-    """Return depths with what objects show below the floor lifted to a plate's upper side [m].
+def _on(rendering: DepthRendering, top: float) -> Float32[np.ndarray, "V H W"]:
+    """Return depths with what objects show lower than a plate's upper side lifted to it [m].
 
     Where nothing is seen: minus the distance to what is [px], as far as that is near.
     """
@@ -112,7 +112,7 @@ def _on(rendering: DepthRendering, top: float, floor: float) -> Float32[np.ndarr
         up = turn[0, 2] * (u - cx) / fx + turn[1, 2] * (v - cy) / fy + turn[2, 2]
         eye = -float(turn[:, 2] @ shift)
         with np.errstate(invalid="ignore"):
-            below = (met >= 0) & (up < 0) & (eye + depth * up < floor)
+            below = (met >= 0) & (up < 0) & (eye + depth * up < top)
         depth[below] = ((top - eye) / up[below]).astype(np.float32)
         nothing = np.isinf(depth)
         edge = nothing & binary_dilation(~nothing)

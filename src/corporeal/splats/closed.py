@@ -47,7 +47,8 @@ def closed(
     owner = with_company(taken.gaussians, owner, taken.floor)
     # Masks say what is an object's: what is no object's then takes no space from objects.
     kept = np.ones(len(owner), bool) if taken.masks is None else owner >= 0
-    found = solids(only(taken.gaussians, kept), owner[kept], taken.cameras, taken.masks)
+    shown = only(taken.gaussians, kept)
+    found = solids(shown, owner[kept], taken.cameras, taken.masks, taken.views)
     order = np.argsort([-np.prod(np.ptp(s.vertices, axis=0)) for s in found], kind="stable")
     place = np.append(np.argsort(order), -1)  # the last for what is no object's
     return Closed(tuple(found[k] for k in order), place[owner], place[object_of_point])

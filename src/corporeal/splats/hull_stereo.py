@@ -8,7 +8,7 @@ those kept that other views confirm. What lies on the way there is empty.
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
-from scipy.ndimage import minimum_filter
+from scipy.ndimage import minimum_filter, uniform_filter
 
 from corporeal.splats.hull import Carved, camera_rows
 from corporeal.splats.kernels_hull_stereo import REACH, chords, past, search
@@ -45,11 +45,8 @@ def seen_past(
         pool: Threads.
 
     """
-    looks = _Looks(views, masks)
-    depths = np.full((len(views.cameras), *looks.grid), np.inf)
-    for k, depth in enumerate(depths):
-        looks.fill(k, depth, hull, pool)
-    depths[~looks.confirmed(depths, pool)] = np.inf
+    looks = Looks(views, masks)
+    depths = looks.depths(hull, pool)
     points = hull.cells[hull.inside]
     votes = np.empty((len(points), 2))
     rest = looks.rows, depths, float(looks.pace), SURE * hull.side, votes
@@ -59,7 +56,7 @@ def seen_past(
     return empty
 
 
-class _Looks:
+class Looks:
     """Pictures, and the pixels of each that are looked at."""
 
     def __init__(self, views: Views, masks: Bool[np.ndarray, "V H W"]) -> None:
@@ -71,12 +68,20 @@ class _Looks:
         self.lenses = self.rows[:, 12:].copy()
         self.pace = max(1, round(np.sqrt(masks.sum() / factor**2 / PIXELS)))
         height, width = (n // self.pace for n in self.pictures.shape[1:3])
-        every = factor * self.pace
+        self.every = factor * self.pace
         self.grid = height, width
         # A patch that is partly beside the object moves with the outline, which is no place.
         patch = (2 * REACH + 1) * factor
         masks = minimum_filter(masks, (1, patch, patch))
-        self.on = masks[:, every // 2 :: every, every // 2 :: every][:, :height, :width]
+        self.on = self._at_looks(masks, self.every)
+
+    def depths(self, hull: Carved, pool: ThreadPool) -> Float[np.ndarray, "V h w"]:
+        """Return how deep views see within a hull [m]; inf: nobody knows, or none confirms it."""
+        found = np.full((len(self.cameras), *self.grid), np.inf)
+        for k, depth in enumerate(found):
+            self.fill(k, depth, hull, pool)
+        found[~self.confirmed(found, pool)] = np.inf
+        return found
 
     def fill(self, k: int, depth: Float[np.ndarray, "h w"], hull: Carved, pool: ThreadPool) -> None:
         """Fill in how deep a view sees where its mask is."""
@@ -104,6 +109,22 @@ class _Looks:
         pool.each(support, [(points, view, *span, *rest) for span in pool.spans(len(points))])
         known[known] = (votes[:, 0] >= CONFIRMED) & (votes[:, 0] > votes[:, 1])
         return known
+
+    def plain(self, k: int) -> Bool[np.ndarray, "h w"]:
+        """Tell where a view's patches are too plain for their depth to be looked for."""
+        side, channels = 2 * REACH + 1, np.moveaxis(self.pictures[k], -1, 0)
+        variance = np.zeros(channels.shape[1:])
+        for one in channels:
+            mean = uniform_filter(one, side)
+            variance += (uniform_filter(one * one, side) - mean * mean) / len(channels)
+        return self._at_looks(np.sqrt(np.maximum(variance, 0)) < PLAIN, self.pace)
+
+    def _at_looks(
+        self, pixels: Bool[np.ndarray, "*V H W"], every: int
+    ) -> Bool[np.ndarray, "*V h w"]:
+        """Return what is so at the pixels that are looked at."""
+        height, width = self.grid
+        return pixels[..., every // 2 :: every, every // 2 :: every][..., :height, :width]
 
     def places(self, k: int) -> Int[np.ndarray, "N 2"]:
         """Return column and row of the looks of a view."""

@@ -20,14 +20,17 @@ from corporeal.geometry.harmonics import DC
 from corporeal.geometry.mesh import Mesh, signed_volume, volumes_under
 from corporeal.geometry.shape import Shape
 from corporeal.splats.carve import Grid, carved, gridded
+from corporeal.splats.deepened import deepened
 from corporeal.splats.depth_rendering import DepthRendering, render_depth
 from corporeal.splats.disjoint import disjoint
 from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
 from corporeal.splats.outline import fitted, outlined
 from corporeal.splats.thread_pool import ThreadPool
-from corporeal.types import Camera, Gaussians
+from corporeal.types import Camera, Gaussians, Views
 
+FLOOR = 0.0
+"""Height that nothing is below [m]."""
 CELLS = 1_000_000
 """Of the grid about each object, about."""
 MOST_CELLS = 4_000_000
@@ -83,7 +86,7 @@ def solids(
     object_of_gaussian: Int[np.ndarray, " N"],
     cameras: tuple[Camera, ...],
     masks: Bool[np.ndarray, "V H W"] | None = None,
-    floor: float = 0.0,
+    views: Views | None = None,
     threads: int | None = None,
 ) -> tuple[Solid, ...]:
     """Make a solid of each object, 0 to the largest label.
@@ -95,7 +98,8 @@ def solids(
             known.
         masks: Pixels of the cameras' pictures that show objects, where given: outlines
             are made to fit them. What Gaussians cover is too coarse for that.
-        floor: Height that nothing is below [m].
+        views: Photographs by these cameras, in any frame of the same unit, where there are some and
+            masks: they may see deeper than Gaussians do.
         threads: None: one per core that this process may use.
 
     Raises:
@@ -110,14 +114,16 @@ def solids(
         raise UserError(f"No Gaussian belongs to object {lacking[0]}.")
     with ThreadPool(threads) as pool:
         rendering = render_depth(gaussians, cameras, pool)
+        if views is not None and masks is not None:
+            rendering = deepened(rendering, views, masks, pool)
         own = np.where(object_of_gaussian[rendering.met] < 0, -1, rendering.met)
         rendering, shown = _shown(replace(rendering, met=own), object_of_gaussian, masks)
-        scene = _Scene(gaussians, object_of_gaussian, rendering, shown, floor)
+        scene = _Scene(gaussians, object_of_gaussian, rendering, shown, FLOOR)
         survey, made = _surveyed(scene, count, pool), []
         for k in range(count):
             made.append(_solid(scene, k, survey, pool))
     meshes = [Mesh(one.vertices, one.triangles) for one in made]
-    meshes = disjoint(meshes, [one.cell for one in made], floor)
+    meshes = disjoint(meshes, [one.cell for one in made], FLOOR)
     return tuple(replace(s, vertices=m.vertices) for s, m in zip(made, meshes, strict=True))
 
 
