@@ -4,10 +4,16 @@ import numpy as np
 import pytest
 from scipy.spatial.transform import Rotation
 
-from corporeal.mpm.physics.distance import pair_gap, pair_gaps, plane_depth
+from corporeal.mpm.physics.distance import pair_gaps, plane_depth
 from corporeal.mpm.problem import FLOOR
 
 CELL = 0.01
+
+
+def pair_gap(a, c, squeezed=None):
+    """Gap and depth of two bodies [m]."""
+    gap, depth = pair_gaps([a, c], CELL, squeezed)
+    return gap[0, 1], depth[0, 1]
 
 
 def block(size, at=(0.0, 0.0, 0.0), seed=0):
@@ -24,7 +30,7 @@ def test_two_blocks_are_as_far_apart_or_as_deep_as_they_were_put(overlap, turn):
     low = block((0.1, 0.1, 0.06))
     high = block((0.1, 0.1, 0.06), at=(0.003, 0.001, 0.06 - overlap * CELL), seed=1)
     R = Rotation.from_euler("xyz", [turn, turn / 2, 10], degrees=True).as_matrix()
-    gap, depth = pair_gap(low @ R.T, high @ R.T, CELL)
+    gap, depth = pair_gap(low @ R.T, high @ R.T)
     assert depth == pytest.approx(max(0.0, overlap) * CELL, abs=0.3 * CELL)
     if overlap < 0:
         assert gap == pytest.approx(-overlap * CELL, abs=0.3 * CELL)
@@ -32,10 +38,19 @@ def test_two_blocks_are_as_far_apart_or_as_deep_as_they_were_put(overlap, turn):
         assert gap < 0.2 * CELL
 
 
+def test_squeezed_foam_is_no_deeper_than_it_is():
+    """A block that is pressed to half its height has twice as many particles about a point."""
+    foam = block((0.1, 0.1, 0.12)) * [1, 1, 0.5]
+    steel = block((0.1, 0.1, 0.06), at=(0.003, 0.001, 0.06 - 0.6 * CELL), seed=1)
+    shares = [np.full(len(foam), 0.5), np.ones(len(steel))]
+    assert pair_gap(foam, steel, shares)[1] == pytest.approx(0.6 * CELL, abs=0.3 * CELL)
+    assert pair_gap(foam, steel)[1] > 1.2 * CELL, "counted, it would be twice as deep"
+
+
 def test_bodies_that_touch_do_not_penetrate():
     ball = block((0.1, 0.1, 0.1)) - 0.05
     ball = ball[np.linalg.norm(ball, axis=1) < 0.05 - 0.002]
-    _, depth = pair_gap(ball, block((0.1, 0.1, 0.05), at=(-0.05, -0.05, -0.1)), CELL)
+    _, depth = pair_gap(ball, block((0.1, 0.1, 0.05), at=(-0.05, -0.05, -0.1)))
     assert depth < 0.2 * CELL
 
 

@@ -32,12 +32,14 @@ def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) 
     found["plane_depth"][:, prescribed] = 0.0
     # The bodies of one object become one.
     group = object_of_body(problem)
+    squeezed = np.split(volume_shares(now), ends)
     if problem.bonds or problem.apart:
         found |= merged(found, group)
         one = [np.flatnonzero(group == k) for k in range(group.max() + 1)]
         position = [np.concatenate([position[b] for b in bodies]) for bodies in one]
+        squeezed = [np.concatenate([squeezed[b] for b in bodies]) for bodies in one]
     # Distances between objects, and how time was cut.
-    gap, overlap = pair_gaps(position, problem.cell)
+    gap, overlap = pair_gaps(position, problem.cell, squeezed)
     if prescribed.any():
         moved = np.isin(np.arange(len(gap)), group[prescribed])
         overlap = np.where(moved[:, None] & moved, 0.0, overlap)
@@ -51,6 +53,12 @@ def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) 
         dt_max=np.array(steps.largest),
         nan=np.array(np.count_nonzero(~finite)),
     )
+
+
+def volume_shares(now: Snapshot) -> np.ndarray:
+    """Volume of every particle over its volume at rest (P,), at most 1; lost ones have 1."""
+    share = np.linalg.det(now.motion)
+    return np.where(np.isfinite(share), np.clip(share, 0.0, 1.0), 1.0)
 
 
 def plane_depths(problem: Problem, now: Snapshot) -> np.ndarray:

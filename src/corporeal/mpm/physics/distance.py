@@ -5,6 +5,7 @@ that far outside its centre.
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -15,70 +16,96 @@ from corporeal.mpm.problem import Plane
 
 _U = np.linspace(-1.0, 1.0, 401)
 _FILLED = 0.5 + 0.75 * _U - 0.25 * _U**3
+SQUEEZED = 0.99
+"""Matter with no particle below this share of its volume at rest is counted, which is quicker."""
 
 
 def pair_gaps(
-    bodies: Sequence[Float[np.ndarray, "_ 3"]], cell: float
+    bodies: Sequence[Float[np.ndarray, "_ 3"]],
+    cell: float,
+    squeezed: Sequence[Float[np.ndarray, " _"]] | None = None,
 ) -> tuple[Float[np.ndarray, "B B"], Float[np.ndarray, "B B"]]:
     """Distance of surfaces and depth of overlap of every two bodies, both [m].
 
     Args:
         bodies: Particle positions of each body [m].
         cell: Grid spacing dx [m].
+        squeezed: Volume of each of these particles over its volume at rest, at most 1 [-]; None:
+            all at rest.
 
     Returns:
         Gap, negative when particles interleave, inf on the diagonal; depth, 0 when apart.
 
     """
     count = len(bodies)
+    if squeezed is None:
+        squeezed = [np.ones(len(b)) for b in bodies]
+    lumps = [Lump(b, v) for b, v in zip(bodies, squeezed, strict=True)]
     gap, depth = np.full((count, count), np.inf), np.zeros((count, count))
     for a in range(count):
         for c in range(a + 1, count):
-            gap[a, c], depth[a, c] = pair_gap(bodies[a], bodies[c], cell)
+            gap[a, c], depth[a, c] = pair_gap(lumps[a], lumps[c], cell)
             gap[c, a], depth[c, a] = gap[a, c], depth[a, c]
     return gap, depth
 
 
-def pair_gap(a: np.ndarray, c: np.ndarray, cell: float) -> tuple[float, float]:
+@dataclass(frozen=True)
+class Lump:
+    """Particles of one body."""
+
+    points: Float[np.ndarray, "N 3"]
+    """[m]"""
+    squeezed: Float[np.ndarray, " N"]
+    """Volume over volume at rest, at most 1 [-]."""
+
+    def near(self, other: "Lump", reach: float) -> "Lump":
+        """Particles not farther than ``reach`` outside the other's bounding box [m]."""
+        low, high = other.points.min(0) - reach, other.points.max(0) + reach
+        inside = ((self.points > low) & (self.points < high)).all(axis=1)
+        return Lump(self.points[inside], self.squeezed[inside])
+
+
+def pair_gap(a: Lump, c: Lump, cell: float) -> tuple[float, float]:
     """Gap and depth of two bodies [m]."""
-    apart = np.maximum(0.0, np.maximum(a.min(0) - c.max(0), c.min(0) - a.max(0)))
+    low, high = (np.array([f(x.points, 0) for x in (a, c)]) for f in (np.min, np.max))
+    apart = np.maximum(0.0, np.maximum(low[0] - high[1], low[1] - high[0]))
     distance = float(np.linalg.norm(apart))
     if distance > BOXES_APART * cell:
         return distance - 2 * PARTICLE_RADIUS * cell, 0.0
     reach = distance + 2 * BOXES_APART * cell
-    near_a, near_c = within(a, c, reach), within(c, a, reach)
-    if len(near_a) == 0 or len(near_c) == 0:
+    near_a, near_c = a.near(c, reach), c.near(a, reach)
+    if len(near_a.points) == 0 or len(near_c.points) == 0:
         return reach, 0.0
-    tree_a, tree_c = KDTree(near_a), KDTree(near_c)
+    tree_a, tree_c = KDTree(near_a.points), KDTree(near_c.points)
     close = OVERLAP_REACH * cell
-    to_c = tree_c.query(near_a, distance_upper_bound=close)[0]  # bounded: far ones cost most
-    to_a = tree_a.query(near_c, distance_upper_bound=close)[0]
+    to_c = tree_c.query(near_a.points, distance_upper_bound=close)[0]  # bounded: far ones cost most
+    to_a = tree_a.query(near_c.points, distance_upper_bound=close)[0]
     if np.isinf(to_c).all():
-        to_c = tree_c.query(near_a)[0]
+        to_c = tree_c.query(near_a.points)[0]
     depth = max(
-        overlap(near_a[to_c < close], tree_c, cell), overlap(near_c[to_a < close], tree_a, cell)
+        overlap(near_a.points[to_c < close], tree_c, near_c.squeezed, cell),
+        overlap(near_c.points[to_a < close], tree_a, near_a.squeezed, cell),
     )
     return float(to_c.min()) - 2 * PARTICLE_RADIUS * cell, depth
 
 
-def within(points: np.ndarray, other: np.ndarray, reach: float) -> np.ndarray:
-    """Points not farther than ``reach`` outside the other's bounding box [m]."""
-    inside = (points > other.min(0) - reach) & (points < other.max(0) + reach)
-    return points[inside.all(axis=1)]
-
-
-def overlap(points: np.ndarray, tree: KDTree, cell: float) -> float:
+def overlap(points: np.ndarray, tree: KDTree, squeezed: np.ndarray, cell: float) -> float:
     """How deep the deepest of some points, as balls, lie below the surface of a body [m].
 
     The share φ of a ball of radius r that lies in a half space whose face is s away is
-    φ = ½ + ¾ s/r - ¼ (s/r)³ (spherical cap): the number of neighbours gives s.
+    φ = ½ + ¾ s/r - ¼ (s/r)³ (spherical cap): the volume of the body's particles in it gives s. Foam
+    squeezed to half its volume has twice as many particles there, and no more depth.
     """
     if len(points) == 0:
         return 0.0
     reach = OVERLAP_REACH * cell
     full = 8.0 * 4.0 / 3.0 * np.pi * OVERLAP_REACH**3
-    neighbours = np.asarray(tree.query_ball_point(points, reach, return_length=True))
-    signed = reach * np.interp(neighbours / full, _FILLED, _U)
+    if squeezed.min() > SQUEEZED:
+        filled = np.asarray(tree.query_ball_point(points, reach, return_length=True))
+    else:
+        near = tree.query_ball_point(points, reach)
+        filled = np.array([squeezed[k].sum() for k in near])
+    signed = reach * np.interp(filled / full, _FILLED, _U)
     deepest = np.sort(signed)[-DEEPEST_PARTICLES:].mean()
     return max(0.0, float(deepest) + PARTICLE_RADIUS * cell)
 
