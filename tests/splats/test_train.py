@@ -196,12 +196,16 @@ def test_a_checkpoint_of_something_else_is_not_gone_on_from(scene, tmp_path, mon
 
 
 @pytest.mark.parametrize("shade", [0, 255])
-def test_pictures_of_nothing_give_no_nan(shade, monkeypatch):
+def test_pictures_of_nothing_are_refused_and_with_masks_give_no_nan(shade, monkeypatch):
     monkeypatch.setattr(sweep, "PIXELS", 500)
     cameras = around(4)
     views = Views(np.full((4, 40, 48, 3), shade, np.uint8), cameras)
     config = TrainConfig(preset="draft", gaussians=100, steps=30, threads=1)
-    out = train(views, config=config)
+    with pytest.raises(UserError, match="agree on no place"):
+        train(views, config=config)
+    masks = np.zeros((4, 40, 48), bool)
+    masks[:, 10:30, 14:34] = True
+    out = train(views, masks, config=config)
     for name in ("mean", "rotation", "scale", "opacity", "sh"):
         assert np.isfinite(getattr(out.gaussians, name)).all()
 

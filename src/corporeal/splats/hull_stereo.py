@@ -3,7 +3,8 @@
 No silhouette shows the mouth of a vessel that everybody looked into from above: the hull closes it.
 For pixels of every view, the depth is looked for between the front and the back of the hull at
 which patches of neighbouring views correlate best, as Goesele, Curless and Seitz (2006) do, and
-those kept that other views confirm. What lies on the way there is empty.
+those kept that other views do not contradict. What lies on the way there is empty where two views
+see past it, and more of them than see something there.
 """
 
 import numpy as np
@@ -30,7 +31,7 @@ NEAR = 0.015
 SURE = 2.0
 """Error of depths [cells]."""
 CONFIRMED = 2
-"""Views that must see the same, or past a cell."""
+"""Views that must see past a cell."""
 
 
 def seen_past(
@@ -76,11 +77,11 @@ class Looks:
         self.on = self._at_looks(masks, self.every)
 
     def depths(self, hull: Carved, pool: ThreadPool) -> Float[np.ndarray, "V h w"]:
-        """Return how deep views see within a hull [m]; inf: nobody knows, or none confirms it."""
+        """Return how deep views see within a hull [m]; inf: unknown or contradicted."""
         found = np.full((len(self.cameras), *self.grid), np.inf)
         for k, depth in enumerate(found):
             self.fill(k, depth, hull, pool)
-        found[~self.confirmed(found, pool)] = np.inf
+        found[~self.stands(found, pool)] = np.inf
         return found
 
     def fill(self, k: int, depth: Float[np.ndarray, "h w"], hull: Carved, pool: ThreadPool) -> None:
@@ -96,10 +97,14 @@ class Looks:
         pool.each(search, [(k, *span, *rest) for span in pool.spans(len(places))])
         depth[rows, columns] = found
 
-    def confirmed(
+    def stands(
         self, depths: Float[np.ndarray, "V h w"], pool: ThreadPool
     ) -> Bool[np.ndarray, "V h w"]:
-        """Return which depths more of the other views confirm than deny, and enough of them."""
+        """Return which depths at least as many of the other views confirm as deny.
+
+        Of plain faces few views know a depth. One that nobody speaks for stays, since what it
+        empties is voted on once more, cell by cell.
+        """
         known = np.isfinite(depths)
         points, view = self.points(depths), np.nonzero(self.on)[0]
         good = known[self.on]
@@ -107,7 +112,7 @@ class Looks:
         votes = np.empty((len(points), 2))
         rest = self.rows, depths, float(self.pace), NEAR, votes
         pool.each(support, [(points, view, *span, *rest) for span in pool.spans(len(points))])
-        known[known] = (votes[:, 0] >= CONFIRMED) & (votes[:, 0] > votes[:, 1])
+        known[known] = votes[:, 0] >= votes[:, 1]
         return known
 
     def plain(self, k: int) -> Bool[np.ndarray, "h w"]:
