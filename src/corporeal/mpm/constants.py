@@ -278,6 +278,9 @@ PARTICLE_RADIUS = 0.25
 """Of the ball that a particle stands for where distances are measured [cells]."""
 OVERLAP_REACH = 1.5
 """Radius in which neighbours are counted [cells]; deeper overlap reads as this plus a radius."""
+SQUEEZED = 0.99
+"""Where no particle is below this share of its volume at rest, neighbours are counted instead of
+their volumes added up, which is quicker [-]."""
 BOXES_APART = 4.0
 """Bodies farther apart than this [cells] are measured by their bounding boxes."""
 DEEPEST_PARTICLES = 8

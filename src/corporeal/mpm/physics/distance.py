@@ -11,13 +11,17 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from corporeal.mpm.constants import BOXES_APART, DEEPEST_PARTICLES, OVERLAP_REACH, PARTICLE_RADIUS
+from corporeal.mpm.constants import (
+    BOXES_APART,
+    DEEPEST_PARTICLES,
+    OVERLAP_REACH,
+    PARTICLE_RADIUS,
+    SQUEEZED,
+)
 from corporeal.mpm.problem import Plane
 
 _U = np.linspace(-1.0, 1.0, 401)
 _FILLED = 0.5 + 0.75 * _U - 0.25 * _U**3
-SQUEEZED = 0.99
-"""Matter with no particle below this share of its volume at rest is counted, which is quicker."""
 
 
 def pair_gaps(
