@@ -15,7 +15,7 @@ from scipy.ndimage import distance_transform_edt
 from corporeal.errors import UserError
 from corporeal.splats.depth_rendering import DepthRendering
 from corporeal.splats.hull import tight
-from corporeal.splats.hull_stereo import SURE, Looks
+from corporeal.splats.hull_stereo import CONFIRMED, SURE, Looks
 from corporeal.splats.kernels_carve import relax
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Views
@@ -41,7 +41,7 @@ def deepened(
     except UserError:  # masks agree nowhere: Gaussians are all there is
         return rendering
     looks = Looks(views, masks)
-    depths = looks.depths(hull, pool)
+    depths = looks.depths(hull, CONFIRMED, pool)
     for k, depth in enumerate(depths):
         depth[:] = laid(depth, looks.on[k], looks.plain(k))
     sizes = zip(rendering.depth.shape[1:], looks.grid, strict=True)

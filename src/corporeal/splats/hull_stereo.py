@@ -31,7 +31,7 @@ NEAR = 0.015
 SURE = 2.0
 """Error of depths [cells]."""
 CONFIRMED = 2
-"""Views that must see past a cell."""
+"""Views that must see past a cell, or the same depth where nothing else asks."""
 
 
 def seen_past(
@@ -47,7 +47,9 @@ def seen_past(
 
     """
     looks = Looks(views, masks)
-    depths = looks.depths(hull, pool)
+    # Of plain faces few views know a depth. One that nobody speaks for stays, since what it empties
+    # is voted on once more, cell by cell.
+    depths = looks.depths(hull, 0, pool)
     points = hull.cells[hull.inside]
     votes = np.empty((len(points), 2))
     rest = looks.rows, depths, float(looks.pace), SURE * hull.side, votes
@@ -76,12 +78,19 @@ class Looks:
         masks = minimum_filter(masks, (1, patch, patch))
         self.on = self._at_looks(masks, self.every)
 
-    def depths(self, hull: Carved, pool: ThreadPool) -> Float[np.ndarray, "V h w"]:
-        """Return how deep views see within a hull [m]; inf: unknown or contradicted."""
+    def depths(self, hull: Carved, confirmed: int, pool: ThreadPool) -> Float[np.ndarray, "V h w"]:
+        """Return how deep views see within a hull [m]; inf: unknown or contradicted.
+
+        Args:
+            hull: What masks allow.
+            confirmed: Other views that must see the same.
+            pool: Threads.
+
+        """
         found = np.full((len(self.cameras), *self.grid), np.inf)
         for k, depth in enumerate(found):
             self.fill(k, depth, hull, pool)
-        found[~self.stands(found, pool)] = np.inf
+        found[~self.stands(found, confirmed, pool)] = np.inf
         return found
 
     def fill(self, k: int, depth: Float[np.ndarray, "h w"], hull: Carved, pool: ThreadPool) -> None:
@@ -98,13 +107,9 @@ class Looks:
         depth[rows, columns] = found
 
     def stands(
-        self, depths: Float[np.ndarray, "V h w"], pool: ThreadPool
+        self, depths: Float[np.ndarray, "V h w"], confirmed: int, pool: ThreadPool
     ) -> Bool[np.ndarray, "V h w"]:
-        """Return which depths at least as many of the other views confirm as deny.
-
-        Of plain faces few views know a depth. One that nobody speaks for stays, since what it
-        empties is voted on once more, cell by cell.
-        """
+        """Return which depths so many of the other views confirm, and no more of them deny."""
         known = np.isfinite(depths)
         points, view = self.points(depths), np.nonzero(self.on)[0]
         good = known[self.on]
@@ -112,7 +117,7 @@ class Looks:
         votes = np.empty((len(points), 2))
         rest = self.rows, depths, float(self.pace), NEAR, votes
         pool.each(support, [(points, view, *span, *rest) for span in pool.spans(len(points))])
-        known[known] = votes[:, 0] >= votes[:, 1]
+        known[known] = (votes[:, 0] >= confirmed) & (votes[:, 0] >= votes[:, 1])
         return known
 
     def plain(self, k: int) -> Bool[np.ndarray, "h w"]:
