@@ -31,7 +31,8 @@ NEAR = 0.015
 SURE = 2.0
 """Error of depths [cells]."""
 CONFIRMED = 2
-"""Views that must see past a cell, or the same depth where nothing else asks."""
+"""Views that must see past a cell before it is emptied. As many must confirm a depth that is used
+without such a vote."""
 
 
 def seen_past(

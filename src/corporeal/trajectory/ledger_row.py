@@ -56,9 +56,12 @@ def ledger_row(problem: Problem, now: Snapshot, measure: Measure, steps: Steps) 
 
 
 def volume_shares(now: Snapshot) -> np.ndarray:
-    """Volume of every particle over its volume at rest (P,), at most 1; lost ones have 1."""
+    """Volume of every particle over its volume at rest (P,), at most 1.
+
+    What is lost or turned inside out has 1, so that a failure hides no overlap.
+    """
     share = np.linalg.det(now.motion)
-    return np.where(np.isfinite(share), np.clip(share, 0.0, 1.0), 1.0)
+    return np.where(share > 0.0, np.minimum(share, 1.0), 1.0)
 
 
 def plane_depths(problem: Problem, now: Snapshot) -> np.ndarray:
