@@ -27,3 +27,13 @@ def test_readme_and_api_page_begin_with_the_same_lines():
 def test_the_library_is_as_large_as_it_says():
     said = {int(n) for n in re.findall(r"(\d+) materials", (ROOT / "README.md").read_text())}
     assert said == {len(library("default"))}
+
+
+def test_rebounds_are_counted_as_their_page_counts_them():
+    said = re.search(
+        r"of (\d+) rebounds of real objects (\d+) lie within", (ROOT / "README.md").read_text()
+    )
+    page = re.search(r"Of the (\d+) other rows (\d+) are", (ROOT / "docs/life.md").read_text())
+    assert said is not None
+    assert page is not None
+    assert said.groups() == page.groups()
