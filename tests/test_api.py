@@ -36,8 +36,13 @@ except SystemExit:
     ("done", "unwanted"),
     [
         (HELP, "scipy numba warp trimesh matplotlib pydantic mujoco torch corporeal.pipeline"),
-        ("import corporeal.pipeline", "trimesh networkx matplotlib mujoco torch pydantic_ai"),
-        ("import corporeal.pipeline", "corporeal.splats.train corporeal.stages.reconstruct"),
+        # What a run of a model has imported when its first verb begins.
+        (
+            "import corporeal.cli.validate, corporeal.pipeline",
+            "numba warp trimesh networkx matplotlib mujoco torch pydantic_ai embreex scipy.ndimage "
+            "corporeal.splats.train corporeal.stages.reconstruct corporeal.stages.simulate "
+            "corporeal.stages.film corporeal.run_files corporeal.formats.photographs",
+        ),
     ],
 )
 def test_what_is_not_needed_to_begin_is_not_imported(done, unwanted):

@@ -28,6 +28,8 @@ from corporeal.pipeline import Settings, run
 checkpoint.EVERY, checkpoint.LARGEST_SHARE = 0.05, 1.0
 silent = lambda fraction, words: None
 run([Path(sys.argv[1])], Path(sys.argv[2]), Settings(), lambda verb: silent, until="simulate")
+slow_to_import = {"trimesh", "networkx", "matplotlib", "scipy.cluster", "torch", "pydantic_ai"}
+assert not slow_to_import & set(sys.modules), slow_to_import & set(sys.modules)
 """
 PATIENCE = 600.0
 """Longest that a run may take on a busy machine [s]."""

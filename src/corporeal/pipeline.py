@@ -3,6 +3,8 @@
 A run is a folder. Each verb leaves its result in a numbered folder inside, named by a key that
 covers everything it depends on: what is fresh is read back, what is stale is done again, what was
 interrupted goes on. ``run.json`` says how far the run came.
+
+What does a verb is imported when it is done: a run that is read back, or not begun, waits for none.
 """
 
 import shutil
@@ -19,27 +21,13 @@ from corporeal.features import MENU as ENCODERS
 from corporeal.features.maskers import MENU as MASKERS
 from corporeal.fields.specification import READERS
 from corporeal.formats.glb_writer import write_glb
-from corporeal.formats.mask_files import corrected
 from corporeal.formats.scene_file import read_scene_file, write_scene_file
 from corporeal.formats.sources import called, kind_of, pictured, sources
-from corporeal.formats.splat_ply import write_splat
 from corporeal.formats.words import safe
 from corporeal.geometry.gaussians import axis
-from corporeal.mixture import ground_weighed
-from corporeal.poses.pose import FIGURE, POSES
-from corporeal.results import Results
-from corporeal.run_files import FILES, Spent, write_results
+from corporeal.results import FILES, Results
 from corporeal.settings.all_verbs import Settings
-from corporeal.settings.simulate_config import SimulateConfig
-from corporeal.showcase.scenes import build
-from corporeal.stages.assemble import assemble
-from corporeal.stages.describe import describe
-from corporeal.stages.fill import fill
-from corporeal.stages.film import film
-from corporeal.stages.segment import segment
-from corporeal.stages.simulate import as_kept, simulate
-from corporeal.trajectory.audit_file import read_audit
-from corporeal.trajectory.frames import read_trajectory
+from corporeal.settings.simulate_config import SimulateConfig, as_kept
 from corporeal.typed import typed
 from corporeal.types import (
     Film,
@@ -51,7 +39,6 @@ from corporeal.types import (
     Scene,
     Trajectory,
 )
-from corporeal.vlm.seen_objects import Viewer
 
 Progress = Callable[[float, str], None]
 """Told the fraction done and what is being done."""
@@ -176,6 +163,8 @@ def read_back(folder: Path) -> Results:
 
 def _result(verb: str, folder: Path) -> Any:
     if verb == "simulate":
+        from corporeal.trajectory.frames import read_trajectory
+
         return read_trajectory(folder)
     return None if verb == "report" else store.load(folder / store.DATA)
 
@@ -251,6 +240,8 @@ def write_showcase(name: str, folder: Path) -> Path:
         UnknownChoiceError: There is no such scene.
 
     """
+    from corporeal.showcase.scenes import build
+
     path = folder / f"{name}.glb"
     with store.writing(path):
         folder.mkdir(parents=True, exist_ok=True)
@@ -312,6 +303,8 @@ class _Run:
     def _borrowed(self, verb: str) -> list[str]:
         """Name what a verb takes from another verb's settings."""
         if verb == "reconstruct":
+            from corporeal.formats.mask_files import corrected
+
             asked = [] if self.settings.reconstruct.things else [self.settings.describe.vlm]
             by_hand = sorted(corrected(self.folder / FOLDERS[verb]).items())
             return [*self.settings.assemble.extent, *asked, *(" ".join(mask) for mask in by_hand)]
@@ -352,7 +345,9 @@ class _Run:
     # ------------------------------------------------------------ the verbs
 
     def _reconstruct(self, folder: Path, progress: Progress) -> Reconstruction:
-        from corporeal.stages.reconstruct import reconstruct  # with all that models need not import
+        from corporeal.formats.splat_ply import write_splat
+        from corporeal.stages.reconstruct import reconstruct
+        from corporeal.vlm.seen_objects import Viewer
 
         source, asked = pictured(self.inputs), self.settings.describe
         assert source is not None, "models need no reconstruction"
@@ -369,6 +364,8 @@ class _Run:
         return self._keep(folder, made)
 
     def _assemble(self, folder: Path, progress: Progress) -> Scene:
+        from corporeal.stages.assemble import assemble
+
         progress(0.0, "reading the scene")
         inputs, config = self.inputs, self.settings.assemble
         if self.made.reconstruct is not None:
@@ -378,6 +375,8 @@ class _Run:
         return self._keep(folder, assemble(inputs, config, axis(self.settings.reconstruct.up)))
 
     def _describe(self, folder: Path, progress: Progress) -> Inventory:
+        from corporeal.stages.describe import describe
+
         progress(0.0, "recognising")
         config, library = self.settings.describe, self.settings.ground.library
         pictures = self.made.reconstruct is not None
@@ -387,6 +386,8 @@ class _Run:
         return self._keep(folder, made)
 
     def _segment(self, folder: Path, progress: Progress) -> Parts:
+        from corporeal.stages.segment import segment
+
         progress(0.0, "finding parts")
         made, config = self.made, self.settings.segment
         semantic = self.settings.reconstruct.semantic
@@ -394,31 +395,49 @@ class _Run:
         return self._keep(folder, parts)
 
     def _ground(self, folder: Path, progress: Progress) -> MaterialField:
+        from corporeal.mixture import ground_weighed
+
         progress(0.0, "looking numbers up")
         made = self.made
         found = ground_weighed(made.scene, made.parts, made.inventory, self.settings.ground)
         return self._keep(folder, found)
 
     def _fill(self, folder: Path, progress: Progress) -> Particles:
+        from corporeal.stages.fill import fill
+
         progress(0.0, "filling with particles")
         made = self.made
         return self._keep(folder, fill(made.scene, made.parts, made.field, self.settings.fill))
 
     def _simulate(self, folder: Path, progress: Progress) -> Trajectory:
+        from corporeal.stages.simulate import simulate
+
         made, config = self.made, self.settings.simulate
         return simulate(made.scene, made.particles, made.field, config, folder, progress)
 
     def _film(self, folder: Path, progress: Progress) -> Film:
+        from corporeal.stages.film import film
+
         return self._keep(folder, film(self.made.played, self.settings.film, folder, progress))
 
     def _report(self, folder: Path, progress: Progress) -> None:
+        from corporeal.run_files import Spent, write_results
+        from corporeal.trajectory.audit_file import read_audit
+
         progress(0.0, "writing the report")
         audit = read_audit(self.folder / FOLDERS["simulate"])
         divided = self.settings.assemble.objects != "auto"
         spent = Spent(_spoken(self.settings), self.seconds, divided)
+        write_results(self.folder, self.made, audit, spent, progress, self._figures())
+
+    def _figures(self) -> dict[str, Path]:
+        """Name the figures that the reconstruction left, by what they show."""
+        if self.made.reconstruct is None:
+            return {}
+        from corporeal.poses.pose import FIGURE, POSES
+
         seen = self.folder / FOLDERS["reconstruct"] / POSES / FIGURE
-        more = {"Where the photographs were taken from": seen} if seen.exists() else {}
-        write_results(self.folder, self.made, audit, spent, progress, more)
+        return {"Where the photographs were taken from": seen} if seen.exists() else {}
 
 
 def _modelled(asked: Path, folder: Path) -> Path:

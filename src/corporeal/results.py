@@ -6,6 +6,7 @@ from typing import Any, TypeVar
 from corporeal.geometry.broken import Filled, with_breaks
 from corporeal.geometry.contents import Whole, with_contents
 from corporeal.geometry.followed import followed
+from corporeal.trajectory.audit_file import AUDIT
 from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
     Film,
@@ -19,6 +20,13 @@ from corporeal.types import (
 )
 
 T = TypeVar("T")
+
+FILES = (
+    *("film.mp4", "report.html", "materials.json", AUDIT, "fields.png", "strip.png"),
+    "close-up.png",
+    *("ensemble.json", "ensemble.png"),
+)
+"""All that may lie in a run's folder beside the folders of its verbs."""
 
 
 @dataclass(frozen=True)

@@ -20,19 +20,11 @@ from corporeal.stages.film import CLOSE_UP
 from corporeal.stages.ground import doubts
 from corporeal.stages.report import Story, report
 from corporeal.trajectory.audit import believed
-from corporeal.trajectory.audit_file import AUDIT, write_audit
+from corporeal.trajectory.audit_file import write_audit
 from corporeal.trajectory.hints import hints
 from corporeal.types import Film, Inventory, Scene
 
 Progress = Callable[[float, str], None]
-
-FILES = (
-    *("film.mp4", "report.html", "materials.json", AUDIT, "fields.png", "strip.png"),
-    "close-up.png",
-    *("ensemble.json", "ensemble.png"),
-)
-"""All that may lie in a run's folder beside the folders of its verbs."""
-
 
 LARGEST = 4_000_000
 """Of the 3D view in the report [bytes]."""

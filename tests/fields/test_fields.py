@@ -14,7 +14,8 @@ from corporeal.fields.registration import axis_turns, register
 from corporeal.fields.samples import checked
 from corporeal.fields.specification import asked
 from corporeal.fields.vomp import read_vomp
-from corporeal.stages.ground import GroundConfig, doubts, ground, validate
+from corporeal.settings.ground_config import GroundConfig, validate
+from corporeal.stages.ground import doubts, ground
 from corporeal.types import Law
 from fields import made_up
 

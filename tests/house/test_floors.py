@@ -2,6 +2,7 @@
 
 import ast
 from collections import defaultdict
+from functools import cache
 from graphlib import CycleError, TopologicalSorter
 from pathlib import Path
 
@@ -87,8 +88,13 @@ def name_of(path):
 MODULES = {name_of(path): path for path in SOURCES}
 
 
+@cache
 def imported(path):
     """Modules of the house that a file imports: anywhere in it, and for type checkers alone."""
+    return tuple(_imported(path))
+
+
+def _imported(path):
     for node in ast.walk(ast.parse(path.read_text())):
         if isinstance(node, ast.Import):
             yield from (alias.name for alias in node.names if alias.name in MODULES)

@@ -14,6 +14,7 @@ from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.types import Law, Push
 
 ARCHITECTURES = [86, 90, 120]
+OLDEST = ARCHITECTURES[:1]
 
 
 def on_processor(given):
@@ -229,21 +230,22 @@ def test_what_a_later_contract_asks_for_is_refused_and_not_left_out():
 # ---------------------------------------------------------------- cards
 
 
-def compiled(module, folder):
-    made = program.wp.compile_aot_module(module, arch=ARCHITECTURES, module_dir=folder)
-    return [path.suffixes[-2:] for path in made if path.stat().st_size > 10_000]
+def assert_compiles(module, folder, architectures):
+    made = program.wp.compile_aot_module(module, arch=architectures, module_dir=folder)
+    written = [path.suffixes[-2:] for path in made if path.stat().st_size > 10_000]
+    assert written == [[f".sm{arch}", ".cubin"] for arch in architectures]
 
 
 def test_rigid_inclusions_compile_for_cards_without_one(tmp_path):
-    expected = [[f".sm{arch}", ".cubin"] for arch in ARCHITECTURES]
-    assert compiled(program.bonds, tmp_path) == expected
+    assert_compiles(program.bonds, tmp_path, ARCHITECTURES)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("module", program.MODULES, ids=lambda m: m.__name__.split(".")[-1])
 def test_every_kernel_compiles_for_cards_without_one(module, tmp_path):
-    expected = [[f".sm{arch}", ".cubin"] for arch in ARCHITECTURES]
-    assert compiled(module, tmp_path) == expected
+    """For the oldest card, which has the fewest instructions; the step itself for all of them."""
+    everywhere = module is program.kernels
+    assert_compiles(module, tmp_path, ARCHITECTURES if everywhere else OLDEST)
 
 
 @pytest.mark.gpu

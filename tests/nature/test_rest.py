@@ -22,13 +22,13 @@ def test_a_block_at_rest_on_the_floor_stays(patient_engine, rigid):
     run = patient_engine(
         problem(block, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.05)
     )
-    run.advance(0.3)
+    run.advance(0.15)
     m = run.measure()
     moved = (m.centre[0] - CENTRE) / CELL
-    assert np.abs(moved[:2]).max() < 0.005
+    assert np.abs(moved[:2]).max() < 0.0025
     assert abs(moved[2]) < 0.03
     assert m.kinetic[0] < 1e-5 * m.mass[0]
-    weight = m.mass[0] * G * (0.3 - 0.025)
+    weight = m.mass[0] * G * (0.15 - 0.025)
     assert m.plane_impulse[0, 0, 2] == pytest.approx(weight, rel=0.015)
     assert m.external_impulse[0, 2] == pytest.approx(-weight, rel=1e-4)
 
@@ -38,16 +38,16 @@ def test_a_stack_of_two_stands(patient_engine):
     high = box(np.add(CENTRE, (0, 0, 0.1)), SIZE, CELL / 2, stuff=Stuff(young=2e5, loss=1.0))
     run = patient_engine(
         problem(
-            low, high, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.1
+            low, high, cell=CELL, friction=0.5, planes=[floor()], gravity=DOWN, gravity_ramp=0.05
         )
     )
-    run.advance(0.25)
+    run.advance(0.15)
     m = run.measure()
     moved = (m.centre - np.array([CENTRE, np.add(CENTRE, (0, 0, 0.1))])) / CELL
-    assert np.abs(moved[:, :2]).max() < 0.02
+    assert np.abs(moved[:, :2]).max() < 0.012
     assert np.abs(moved[:, 2]).max() < 0.1
     carried = m.plane_impulse[0, 0, 2]
-    assert carried == pytest.approx(m.mass.sum() * G * 0.2, rel=0.03)
+    assert carried == pytest.approx(m.mass.sum() * G * 0.125, rel=0.03)
     assert m.plane_impulse[0, 1, 2] == 0.0
 
 
@@ -65,7 +65,7 @@ def test_a_rigid_stack_stands(patient_engine):
 def test_every_elastic_law_is_hookes_where_strains_are_small(patient_engine, law):
     """The top sinks by ρ g L² / 2 (λ + 2μ); smooth walls keep the sides."""
     length, width, cell = 0.2, 0.04, 0.02
-    stuff = Stuff(law=law, young=2e5, poisson=0.3, loss=1.0)
+    stuff = Stuff(law=law, young=2e5, poisson=0.3, loss=0.5)
     column = box((width / 2, width / 2, length / 2), (width, width, length), cell / 2, stuff=stuff)
     walls = [
         floor(),
@@ -74,12 +74,12 @@ def test_every_elastic_law_is_hookes_where_strains_are_small(patient_engine, law
         Plane((0.0, 1.0, 0.0), 0.0),
         Plane((0.0, -1.0, 0.0), -width),
     ]
-    run = patient_engine(problem(column, cell=cell, planes=walls, gravity=DOWN, gravity_ramp=0.05))
+    run = patient_engine(problem(column, cell=cell, planes=walls, gravity=DOWN, gravity_ramp=0.03))
     top = run.snapshot().position[:, 2] > length - cell / 2
     rest = run.snapshot().position[top, 2].mean()
     foot = run.snapshot().position[:, 2] < cell / 2
     start = run.snapshot().position[foot, 2].mean()
-    run.advance(0.25)
+    run.advance(0.15)
     now = run.snapshot().position
     shortened = (rest - start) - (now[top, 2].mean() - now[foot, 2].mean())
     modulus = 2e5 * 0.7 / (1.3 * 0.4)
@@ -97,9 +97,9 @@ def test_a_wall_holds_whichever_way_it_faces(patient_engine):
             block, cell=CELL, friction=0.5, planes=[wall], gravity=(-G, 0.0, 0.0), gravity_ramp=0.05
         )
     )
-    run.advance(0.2)
+    run.advance(0.12)
     m = run.measure()
-    assert m.plane_impulse[0, 0, 0] == pytest.approx(m.mass[0] * G * 0.175, rel=0.03)
+    assert m.plane_impulse[0, 0, 0] == pytest.approx(m.mass[0] * G * 0.095, rel=0.03)
     assert np.abs((m.centre[0] - centre) / CELL).max() < 0.05
 
 

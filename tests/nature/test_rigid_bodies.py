@@ -76,7 +76,16 @@ def last_of_a_row(engine, gap, restitution):
     return after.momentum[:, 0] / after.mass
 
 
-@pytest.mark.parametrize("gap", [0.0, 0.02, 0.1, 0.5])
+GAPS = (0.0, 0.02, 0.1, 0.5)
+SURE = [pytest.param("reference", gap, marks=pytest.mark.slow) for gap in (0.0, 0.5)]
+CARDS = [pytest.param("cuda", gap, marks=pytest.mark.slow) for gap in GAPS]
+
+
+@pytest.mark.parametrize(
+    ("patient_engine", "gap"),
+    [*(("cpu", gap) for gap in GAPS), *SURE, *CARDS],
+    indirect=["patient_engine"],
+)
 def test_newtons_cradle_passes_a_blow_on_to_the_last_ball(patient_engine, gap):
     u = last_of_a_row(patient_engine, gap, restitution=1.0)
     assert u[-1] == pytest.approx(1.0, abs=0.05)
@@ -107,7 +116,15 @@ def test_a_marble_sinks_into_foam_by_no_more_than_a_part_of_its_radius(fast_engi
     assert abs(gap) < 0.3 * touching.MARBLE
 
 
-@pytest.mark.parametrize("speed", [10.0, 100.0])
+@pytest.mark.parametrize(
+    ("patient_engine", "speed"),
+    [
+        ("cpu", 10.0),
+        ("cpu", 100.0),
+        *(pytest.param(name, 100.0, marks=pytest.mark.slow) for name in ("reference", "cuda")),
+    ],
+    indirect=["patient_engine"],
+)
 def test_a_ball_rebounds_at_the_face_of_a_plate_thinner_than_a_cell(patient_engine, speed):
     cell, radius, thick = 0.00625, 0.02, 0.001
     at = np.array([0.13, 0.31, 0.3]) * cell

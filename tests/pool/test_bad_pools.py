@@ -277,9 +277,9 @@ def test_too_many_triangles_to_decimate_are_refused_at_once(tmp_path, monkeypatc
 
 
 @pytest.mark.slow
-def test_three_million_triangles_become_two_hundred_thousand(tmp_path):
-    vertices, triangles, uv = ball(867, 0.1, bumps=0.05)
-    assert len(triangles) > 3_000_000
+def test_a_million_triangles_become_two_hundred_thousand(tmp_path):
+    vertices, triangles, uv = ball(502, 0.1, bumps=0.05)
+    assert len(triangles) > 1_000_000
     put(tmp_path / "in", big=glb(vertices, triangles, uv, checks(1024, 512)))
     (asset,) = index([tmp_path / "in"], tmp_path / "pool").assets
     assert 150_000 < asset.triangles <= 200_000

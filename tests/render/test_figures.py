@@ -4,6 +4,8 @@ import matplotlib
 import numpy as np
 import pytest
 import trimesh
+from matplotlib import font_manager
+from matplotlib.ft2font import FT2Font
 from PIL import Image
 
 from corporeal.errors import UserError
@@ -172,3 +174,11 @@ def test_a_short_film_gives_a_short_strip_and_a_broken_one_a_clear_sentence(tmp_
 def test_a_name_that_the_font_cannot_write_is_a_number():
     assert drawable("мяч 0", "object 1") == "мяч 0"
     assert drawable("椅子 0", "object 2") == "object 2"
+
+
+def test_letters_that_are_drawn_are_those_of_the_font():
+    here = FT2Font(font_manager.findfont(font_manager.FontProperties())).get_charmap()
+    letters = [chr(code) for code in (*range(0xA1, 0x5F5, 3), *range(0x4E00, 0x4E40))]
+    told = [drawable(letter, "") == letter for letter in letters]
+    assert told == [ord(letter) in here for letter in letters]
+    assert any(told) and not all(told)

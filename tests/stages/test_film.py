@@ -11,7 +11,8 @@ from PIL import Image
 
 from corporeal.errors import UserError
 from corporeal.render import video
-from corporeal.stages.film import FilmConfig, _box, _fullness, film, validate
+from corporeal.settings.film_config import FilmConfig, validate
+from corporeal.stages.film import _box, _fullness, film
 from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
     Finish,

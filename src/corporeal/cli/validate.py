@@ -2,10 +2,18 @@
 
 from pathlib import Path
 
+from corporeal.description import describe_config
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.pipeline import RUN, Settings, reopen
 from corporeal.reconstruction import reconstruct_config
-from corporeal.stages import assemble, describe, fill, film, ground, segment, simulate
+from corporeal.settings import (
+    assemble_config,
+    fill_config,
+    film_config,
+    ground_config,
+    segment_config,
+    simulate_config,
+)
 from corporeal.vlm import connect, critic_of
 from corporeal.vlm.annotation import mapping_of
 
@@ -21,18 +29,21 @@ def validate(folder: Path, settings: Settings) -> None:
 
     """
     known = reopen(folder).settings if (folder / RUN).exists() else None
-    for stage in (assemble, segment, fill, simulate, film):
-        stage.validate(getattr(settings, stage.__name__.rpartition(".")[2]))
+    assemble_config.validate(settings.assemble)
+    segment_config.validate(settings.segment)
+    fill_config.validate(settings.fill)
+    simulate_config.validate(settings.simulate)
+    film_config.validate(settings.film)
     if known is None or known.describe != settings.describe:
         _validate_answers(settings.describe)
     if known is None or known.ground != settings.ground:
-        ground.validate(settings.ground)
+        ground_config.validate(settings.ground)
     if known is None or known.reconstruct != settings.reconstruct:
         reconstruct_config.validate(settings.reconstruct)
 
 
 def _validate_answers(config: DescribeConfig) -> None:
-    describe.validate(config)
+    describe_config.validate(config)
     if config.annotations is not None:
         mapping_of(config.annotations)
     for spec in (config.vlm, critic_of(config.vlm, config.critic)):

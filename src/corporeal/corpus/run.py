@@ -15,8 +15,8 @@ from corporeal.corpus.manifest import Row
 from corporeal.corpus.plan import Plan, PlannedScene, read_plan
 from corporeal.errors import UserError
 from corporeal.pipeline import Settings
+from corporeal.settings.simulate_config import as_kept
 from corporeal.showcase.scenes import view
-from corporeal.stages.simulate import as_kept
 
 SCENES, RUNS = "scenes", "runs"
 SCENE, VIEWS = "scene.toml", "views"

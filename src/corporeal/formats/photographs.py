@@ -12,6 +12,7 @@ from PIL import Image
 from corporeal.errors import BadFileError
 from corporeal.formats.colmap import ColmapModel, is_colmap, read_colmap
 from corporeal.formats.images import FORMATS
+from corporeal.formats.picture_names import IMAGES
 from corporeal.formats.projections import check_focal, parted, projections_in, read_projection
 from corporeal.formats.resources import beside
 from corporeal.formats.shots import Shot, develop
@@ -30,7 +31,6 @@ MODELS = (
     "dense/sparse",
     "undistorted/sparse",
 )
-IMAGES = ("images", "", "input", "rgb", "images_2", "images_4", "images_8")
 SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".webp", ".PNG", ".JPG", ".JPEG")
 MASKS = ("masks", "mask")
 INSTANCES = ("instances", "objects")

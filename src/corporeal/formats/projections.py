@@ -13,11 +13,11 @@ from jaxtyping import Float
 from scipy.linalg import rq
 
 from corporeal.errors import BadFileError
+from corporeal.formats.picture_names import SHOWN
 
 FOLDERS = ("", "projections", "cameras", "calib", "txt")
 PICTURES = ("", "images", "rgb", "image", "visualize")
 SUFFIXES = (".txt", ".npy")
-SHOWN = (".png", ".jpg", ".jpeg", ".webp")
 LARGEST_FILE = 2**16
 """[bytes]"""
 NARROWEST, WIDEST = 50.0, 0.1

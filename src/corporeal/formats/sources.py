@@ -8,8 +8,7 @@ from corporeal.errors import UserError
 from corporeal.formats.gltf_document import Document
 from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
 from corporeal.formats.meshes import companions
-from corporeal.formats.photographs import IMAGES, holds_photographs
-from corporeal.formats.projections import SHOWN
+from corporeal.formats.picture_names import IMAGES, SHOWN
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
 
@@ -76,9 +75,16 @@ def _kind_of_folder(folder: Path) -> Kind:
         return "model"
     if _is_sog(folder):
         return "splat"
-    if holds_photographs(folder):
+    if _has_poses(folder):
         return "photographs"
     return "photographs" if photographs_in(folder) and not models_in(folder) else "model"
+
+
+def _has_poses(folder: Path) -> bool:
+    # Lenses and lines of sight take a third of a second to import; models have neither.
+    from corporeal.formats.photographs import holds_photographs
+
+    return holds_photographs(folder)
 
 
 def _is_sog(folder: Path) -> bool:
@@ -126,7 +132,7 @@ def photographs_in(folder: Path) -> list[Path]:
 
 def unposed(path: Path) -> bool:
     """Whether pictures come without the places that they were taken from."""
-    return path.suffix.lower() in FILMS or (path.is_dir() and not holds_photographs(path))
+    return path.suffix.lower() in FILMS or (path.is_dir() and not _has_poses(path))
 
 
 def _named_by(path: Path) -> list[Path]:

@@ -9,7 +9,6 @@ cannot: the mouth of a vessel that nobody photographed from the side.
 from collections.abc import Sequence
 from dataclasses import dataclass
 
-import numba
 import numpy as np
 from jaxtyping import Bool, Float, Int
 from scipy.ndimage import binary_dilation
@@ -17,17 +16,11 @@ from scipy.spatial import Delaunay, QhullError
 
 from corporeal.types import Camera
 
-SHORT = 3.0
-"""Cells before a point where its line ends: the place of a point is not exact."""
 WITNESSES = 2
 """Views whose lines must pass through a cell for it to be empty."""
-STEP = 0.5
-"""Between places on a line that are looked at [cells]."""
 APART = 8.0
 """Points that are nearer together [cells], and neighbours in a picture, are taken to be on one
 face: what is before it is empty, too. Things that stand on a face show points of their own."""
-NEAREST = 0.05
-"""Share of a line, from the camera on, that is not looked at: nothing is so near."""
 
 
 @dataclass(frozen=True)
@@ -66,6 +59,9 @@ class LinesOfSight:
             shape: How many cells there are along x, y and z.
 
         """
+        # numba takes a quarter of a second to import, and models have no lines of sight.
+        from corporeal.geometry.kernels_sight import march
+
         votes = np.zeros(shape, np.int32)
         for k, camera in enumerate(cameras):
             ends = self.seen_by(k)
@@ -73,7 +69,7 @@ class LinesOfSight:
                 ends = np.concatenate([ends, _between(ends, camera, APART * side)])
                 passed = np.zeros(shape, np.bool_)
                 eye = camera.world_from_camera[:3, 3]
-                _march((ends - low) / side, (eye - low) / side, passed)
+                march((ends - low) / side, (eye - low) / side, passed)
                 votes += binary_dilation(passed)
         return votes >= WITNESSES
 
@@ -93,18 +89,3 @@ def _between(
     corner = corner[(along < apart).all(axis=1)]
     middles = (corner + np.roll(corner, 1, axis=1)) / 2
     return np.concatenate([corner.mean(axis=1), middles.reshape(-1, 3)])
-
-
-@numba.njit(nogil=True, cache=True)
-def _march(ends, eye, passed):
-    """Mark the cells between an eye and points; all in cells from the middle of the first."""
-    for n in range(len(ends)):
-        way = ends[n] - eye
-        length = np.sqrt((way * way).sum())
-        for step in range(int(NEAREST * length / STEP), int((length - SHORT) / STEP)):
-            share = STEP * step / length
-            x = int(np.floor(eye[0] + share * way[0] + 0.5))
-            y = int(np.floor(eye[1] + share * way[1] + 0.5))
-            z = int(np.floor(eye[2] + share * way[2] + 0.5))
-            if 0 <= x < passed.shape[0] and 0 <= y < passed.shape[1] and 0 <= z < passed.shape[2]:
-                passed[x, y, z] = True

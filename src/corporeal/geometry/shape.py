@@ -2,17 +2,14 @@
 
 from dataclasses import dataclass
 from functools import cached_property
-from typing import TYPE_CHECKING
 
 import igl
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.geometry.mesh import Mesh, boundary
+from corporeal.geometry.rays import RayCaster
 from corporeal.geometry.winding import OpenEdges, PlumbLines, plumb_lines, unbalanced
-
-if TYPE_CHECKING:
-    from trimesh.ray.ray_pyembree import RayMeshIntersector
 
 FEW_OPEN = 1000
 """Open edges up to which their solid angles are added up one by one: 20 ns each, where a tree of
@@ -58,12 +55,8 @@ class Shape:
         return tree
 
     @cached_property
-    def _rays(self) -> "RayMeshIntersector":
-        import trimesh  # takes half a second, and not every shape is looked at along rays
-        from trimesh.ray.ray_pyembree import RayMeshIntersector
-
-        mesh = trimesh.Trimesh(self.mesh.vertices, self.mesh.triangles, process=False)
-        return RayMeshIntersector(mesh)
+    def _rays(self) -> RayCaster:
+        return RayCaster(self.mesh)
 
     def winding(self, points: Float[np.ndarray, "N 3"]) -> Float[np.ndarray, " N"]:
         """Generalised winding number: about ±1 inside, about 0 outside.
@@ -114,7 +107,7 @@ class Shape:
         """How many of 26 evenly spread directions hit the surface."""
         hits = np.zeros(len(points), dtype=np.int64)
         for direction in sphere_directions(26):
-            hits += self._rays.intersects_any(points, np.tile(direction, (len(points), 1)))
+            hits += self.hit(points, np.tile(direction, (len(points), 1))) >= 0
         return hits
 
     def reach(
@@ -123,16 +116,16 @@ class Shape:
         """Distance to the first hit along each ray [m]; inf: none."""
         length = np.full(len(origins), np.inf)
         if len(origins):
-            where, ray, _ = self._rays.intersects_location(origins, directions, multiple_hits=False)
-            length[ray] = np.einsum("ij,ij->i", where - origins[ray], directions[ray])
+            place, ray, _ = self._rays.hits(origins, directions, only_first=True)
+            length[ray] = np.einsum("ij,ij->i", place - origins[ray], directions[ray])
         return length
 
     def crossings(
         self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]
     ) -> tuple[Int[np.ndarray, " H"], Float[np.ndarray, " H"], Int[np.ndarray, " H"]]:
         """Every hit along each ray: its ray, its distance [m], and 1 into the shape, -1 out."""
-        where, ray, triangle = self._rays.intersects_location(origins, directions)
-        length = np.einsum("ij,ij->i", where - origins[ray], directions[ray])
+        place, ray, triangle = self._rays.hits(origins, directions)
+        length = np.einsum("ij,ij->i", place - origins[ray], directions[ray])
         facing = np.einsum("ij,ij->i", self.mesh.area_vectors[triangle], directions[ray])
         return ray, length, -np.sign(facing).astype(np.int64)
 
@@ -140,7 +133,7 @@ class Shape:
         self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]
     ) -> Int[np.ndarray, " N"]:
         """First triangle along each ray; -1: none."""
-        return np.asarray(self._rays.intersects_first(origins, directions))
+        return self._rays.first(origins, directions)
 
 
 def _by_place(points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:

@@ -9,7 +9,6 @@ from typing import Literal
 
 import numpy as np
 from jaxtyping import Float, Int
-from scipy.cluster.hierarchy import linkage
 from scipy.spatial.distance import pdist, squareform
 
 NOISE = -1
@@ -69,6 +68,8 @@ def hdbscan(
 
 def _merges(points: np.ndarray, samples: int) -> np.ndarray:
     """Return the single-linkage merges of mutual reachability: two nodes, distance, size."""
+    from scipy.cluster.hierarchy import linkage  # models are never divided by clusters
+
     apart = squareform(pdist(points.astype(np.float64)))
     nth = min(samples, len(points)) - 1
     core = np.partition(apart, nth, axis=1)[:, nth]

@@ -2,6 +2,15 @@
 
 from functools import cache
 
+from PIL import Image, ImageDraw, ImageFont
+
+from corporeal.render.figure_keys import font
+
+SIZE = 24
+"""Of letters that are compared [px]."""
+NO_LETTER = "\uffff"
+"""Never a character (Unicode 23.7): a font draws the sign of what it has not."""
+
 
 def drawable(name: str, instead: str) -> str:
     """Return a name as figures can write it.
@@ -11,14 +20,17 @@ def drawable(name: str, instead: str) -> str:
     """
     if name.isascii():
         return name
-    known = _known()
-    return name if all(ord(letter) in known for letter in name) else instead
+    return name if all(map(_known, name)) else instead
 
 
 @cache
-def _known() -> frozenset[int]:
-    from matplotlib import font_manager  # takes long, and most names are plain
-    from matplotlib.ft2font import FT2Font
+def _known(letter: str) -> bool:
+    """Tell whether the font draws a letter otherwise than what is no letter at all."""
+    return _drawn(letter) != _drawn(NO_LETTER)
 
-    font = FT2Font(font_manager.findfont(font_manager.FontProperties()))
-    return frozenset(font.get_charmap())
+
+def _drawn(letter: str) -> bytes:
+    sheet = Image.new("L", (2 * SIZE, 2 * SIZE))
+    one_by_one = font(SIZE).font_variant(layout_engine=ImageFont.Layout.BASIC)
+    ImageDraw.Draw(sheet).text((SIZE / 2, SIZE / 2), letter, 255, one_by_one)
+    return sheet.tobytes()

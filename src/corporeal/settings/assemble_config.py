@@ -4,6 +4,7 @@ from dataclasses import dataclass, field
 from typing import Literal
 
 from corporeal import store
+from corporeal.errors import check_range
 from corporeal.formats.unit import Unit
 
 
@@ -33,3 +34,20 @@ class AssembleConfig:
     """Simulated time [s]; by default from the scene file, else long enough for the falls."""
     fps: int | None = None
     """Frames per second of the film; by default from the scene file, else 30."""
+
+
+def validate(config: AssembleConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    from corporeal.geometry.beginnings import said_lift, said_velocity  # NumPy: help needs none
+    from corporeal.geometry.sizes import said_extent
+
+    check_range("The drop", config.drop, 0.0, 100.0)
+    check_range("The working extent", config.working_extent, 1e-3, 1e3)
+    check_range("The duration", config.duration, 0.01, 60.0)
+    check_range("The fps", config.fps, 1, 1000)
+    for text in config.extent:
+        said_extent(text, "it")
+    for text in config.lift:
+        said_lift(text)
+    for text in config.velocity:
+        said_velocity(text)

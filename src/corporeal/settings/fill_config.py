@@ -3,6 +3,8 @@
 from dataclasses import dataclass
 from typing import Literal
 
+from corporeal.errors import check_range
+
 
 @dataclass(frozen=True)
 class FillConfig:
@@ -14,3 +16,8 @@ class FillConfig:
     """Young's moduli as measured, or capped by the published rule, which is a control only."""
     seed: int = 0
     """Seed of all random numbers."""
+
+
+def validate(config: FillConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    check_range("--seed", config.seed, 0, 2**63)

@@ -1,10 +1,15 @@
 """Camera, size and quality of a film: what a person may ask."""
 
+import math
 from dataclasses import dataclass
 from typing import Literal
 
+from corporeal.errors import UserError, check_range
 from corporeal.render.choices import Quantity, Shot
 from corporeal.types import Vector
+
+SLOWEST, FASTEST = 0.01, 100.0
+MOST_SLOWED = 100.0
 
 
 @dataclass(frozen=True)
@@ -34,3 +39,15 @@ class FilmConfig:
     """How many times slower the film is about the first contact."""
     caption: bool = True
     """Write the time into the picture."""
+
+
+def validate(config: FilmConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    from corporeal.render.video import check_size  # and with it the encoder, which help needs not
+
+    check_size(config.width, config.height)
+    check_range("--speed", config.speed, SLOWEST, FASTEST)
+    check_range("--slow", config.slow, 1.0, MOST_SLOWED)
+    if config.view is not None and not 0 < math.hypot(*config.view) < math.inf:
+        given = " ".join(f"{x:g}" for x in config.view)
+        raise UserError(f"--view is {given}, which is no direction. Give one: --view 1 -1 0.5.")

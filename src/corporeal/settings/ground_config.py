@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from corporeal.errors import UserError
+
 
 @dataclass(frozen=True)
 class GroundConfig:
@@ -16,3 +18,14 @@ class GroundConfig:
     field: str = ""
     """Numbers of another method instead of ours: vomp:PATH, pixie:PATH or table:PATH.csv (a file of
     the scene, or a folder with one per object), one[:E=2e6,nu=.4,rho=200], or omniphysgs."""
+
+
+def validate(config: GroundConfig) -> None:
+    """Raise UserError where a material or a file is unknown, or cannot be what it is to be."""
+    from corporeal.fields.specification import asked  # help reads no library
+    from corporeal.materials.placement import entry_of
+
+    entry_of(config.floor, config.library)
+    if entry_of(config.neutral, config.library).group == "liquid":
+        raise UserError(f"--neutral {config.neutral} is a liquid, of which no part can be made.")
+    asked(config.field)

@@ -2,6 +2,8 @@
 
 from dataclasses import dataclass
 
+from corporeal.errors import check_range
+
 
 @dataclass(frozen=True)
 class SegmentConfig:
@@ -9,3 +11,8 @@ class SegmentConfig:
 
     position_weight: float = 0.3
     """Weight of position relative to appearance features; 0: position is not used."""
+
+
+def validate(config: SegmentConfig) -> None:
+    """Raise UserError where a setting cannot be right, whatever the scene."""
+    check_range("--position-weight", config.position_weight, 0.0, 100.0)

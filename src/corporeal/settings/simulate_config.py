@@ -2,9 +2,10 @@
 
 import logging
 from dataclasses import dataclass, field
-from typing import Literal
+from typing import Any, Literal
 
-from corporeal import store
+from corporeal import backends, store
+from corporeal.errors import UserError
 
 
 @dataclass(frozen=True)
@@ -26,3 +27,23 @@ class SimulateConfig:
         if self.engine == "warp":
             logging.getLogger(__name__).warning("The engine 'warp' is called 'cpu' now.")
             object.__setattr__(self, "engine", "cpu")
+
+
+def as_kept(config: SimulateConfig) -> dict[str, Any]:
+    """Return the settings as results on disk are named by them (``store.kept``).
+
+    The first were kept when the engine `cpu` was called `warp`; they stay what they are.
+    """
+    engine = "warp" if config.engine == "cpu" else config.engine
+    return store.kept(config) | {"engine": engine}
+
+
+def validate(config: SimulateConfig) -> None:
+    """Raise UserError where there is no engine as asked for, whatever the scene."""
+    if config.breaking and (config.engine, config.contact) != ("cpu", "multi"):
+        raise UserError(
+            "--breaking works with the engine cpu and with contact multi alone. Leave out "
+            "--engine and --contact."
+        )
+    if config.engine == "cuda":
+        backends.load("engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:present"})("cuda")

@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import BadFileError, UserError, check_range
+from corporeal.errors import BadFileError, UserError
 from corporeal.formats.any_model import READ, Frame, read_model
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
 from corporeal.formats.sources import models_in, pictures_in
@@ -23,10 +23,10 @@ from corporeal.geometry.arrangement import (
     resized,
     scaled,
 )
-from corporeal.geometry.beginnings import begun, said_lift, said_velocity
+from corporeal.geometry.beginnings import begun
 from corporeal.geometry.gaussians import Up
 from corporeal.geometry.sizes import said_extent
-from corporeal.settings.assemble_config import AssembleConfig
+from corporeal.settings.assemble_config import AssembleConfig, validate
 from corporeal.types import Objects, Scene, SceneObject
 
 SHORTEST, LONGEST = 1.0, 3.0
@@ -72,20 +72,6 @@ def assemble(
     scene = _at_working_extent(scene, config.working_extent)
     scene = begun(_dropped(scene, config.drop), config.lift, config.velocity)
     return _timed(_with_overlaps_named(scene), blocks, plan, config)
-
-
-def validate(config: AssembleConfig) -> None:
-    """Raise UserError where a setting cannot be right, whatever the scene."""
-    check_range("The drop", config.drop, 0.0, 100.0)
-    check_range("The working extent", config.working_extent, 1e-3, 1e3)
-    check_range("The duration", config.duration, 0.01, 60.0)
-    check_range("The fps", config.fps, 1, 1000)
-    for text in config.extent:
-        said_extent(text, "it")
-    for text in config.lift:
-        said_lift(text)
-    for text in config.velocity:
-        said_velocity(text)
 
 
 # ---------------------------------------------------------------- what the files hold

@@ -7,7 +7,6 @@ from dataclasses import replace
 import numpy as np
 from jaxtyping import Float, Int
 
-from corporeal.errors import check_range
 from corporeal.geometry.arrangement import underside
 from corporeal.geometry.contact_points import contact_points
 from corporeal.geometry.contents import with_contents
@@ -37,11 +36,6 @@ from corporeal.types import ROUNDING, Material, MaterialField, Particles, Parts,
 DEFAULT = FillConfig()
 COUNTED = re.compile(r"Object (\d+) of the scene")
 """As the treatment, which knows no names, calls an object."""
-
-
-def validate(config: FillConfig) -> None:
-    """Raise UserError where a setting cannot be right, whatever the scene."""
-    check_range("--seed", config.seed, 0, 2**63)
 
 
 def fill(

@@ -20,7 +20,7 @@ from jaxtyping import Bool, Float, Int
 from PIL import Image
 from scipy.spatial import KDTree
 
-from corporeal.errors import UserError, check_range
+from corporeal.errors import UserError
 from corporeal.geometry.srgb import linear
 from corporeal.mpm.laws import MENU
 from corporeal.render import colours, key, video
@@ -73,18 +73,6 @@ Progress = Callable[[float, str], None]
 
 
 DEFAULT = FilmConfig()
-SLOWEST, FASTEST = 0.01, 100.0
-MOST_SLOWED = 100.0
-
-
-def validate(config: FilmConfig) -> None:
-    """Raise UserError where a setting cannot be right, whatever the scene."""
-    video.check_size(config.width, config.height)
-    check_range("--speed", config.speed, SLOWEST, FASTEST)
-    check_range("--slow", config.slow, 1.0, MOST_SLOWED)
-    if config.view is not None and not 0 < float(np.linalg.norm(config.view)) < np.inf:
-        given = " ".join(f"{x:g}" for x in config.view)
-        raise UserError(f"--view is {given}, which is no direction. Give one: --view 1 -1 0.5.")
 
 
 def film(

@@ -9,7 +9,6 @@ from jaxtyping import Float
 from corporeal import materials
 from corporeal.errors import UserError
 from corporeal.fields.impose import impose
-from corporeal.fields.specification import asked
 from corporeal.materials import Entry
 from corporeal.materials.consistency import contradictions
 from corporeal.materials.inflated import (
@@ -134,14 +133,6 @@ def _words(inventory: Inventory, number: int, name: str) -> PartWords:
         if piece.name == name:  # it has a surface of its own, and shares it with nobody
             return replace(piece, volume_share=1.0, surface_share=1.0)
     raise UserError(f"The description has no part {name!r}. Describe the scene again.")
-
-
-def validate(config: GroundConfig) -> None:
-    """Raise UserError where a material or a file is unknown, or cannot be what it is to be."""
-    entry_of(config.floor, config.library)
-    if entry_of(config.neutral, config.library).group == "liquid":
-        raise UserError(f"--neutral {config.neutral} is a liquid, of which no part can be made.")
-    asked(config.field)
 
 
 def _entry(words: PartWords, config: GroundConfig) -> Entry:

@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import KDTree
 
-from corporeal.errors import UserError, check_range
+from corporeal.errors import UserError
 from corporeal.features import Reader, connect
 from corporeal.geometry.identity import identify
 from corporeal.regions.naming import Named, name_parts, phrases
@@ -23,11 +23,6 @@ VOTERS = 5
 DEFAULT = SegmentConfig()
 UNSEEN = ("metadata", "unknown")
 """Who says of parts what words say, and has seen none."""
-
-
-def validate(config: SegmentConfig) -> None:
-    """Raise UserError where a setting cannot be right, whatever the scene."""
-    check_range("--position-weight", config.position_weight, 0.0, 100.0)
 
 
 def segment(

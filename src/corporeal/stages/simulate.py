@@ -9,16 +9,15 @@ from collections.abc import Callable
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from corporeal import backends, store
-from corporeal.errors import SimulationError, UserError
+from corporeal.errors import SimulationError
 from corporeal.findings import Settled, SettledObject
 from corporeal.mpm.cpu.engine import CpuEngine
 from corporeal.mpm.problem import MENU, Engine, Problem
-from corporeal.settings.simulate_config import SimulateConfig
+from corporeal.settings.simulate_config import SimulateConfig, as_kept, validate
 from corporeal.trajectory.audit import audit
 from corporeal.trajectory.audit_file import write_audit
 from corporeal.trajectory.breaking import break_up, next_blow
@@ -52,26 +51,6 @@ Relax = Callable[[], dict[str, np.ndarray]]
 
 
 DEFAULT = SimulateConfig()
-
-
-def as_kept(config: SimulateConfig) -> dict[str, Any]:
-    """Return the settings as results on disk are named by them (``store.kept``).
-
-    The first were kept when the engine `cpu` was called `warp`; they stay what they are.
-    """
-    engine = "warp" if config.engine == "cpu" else config.engine
-    return store.kept(config) | {"engine": engine}
-
-
-def validate(config: SimulateConfig) -> None:
-    """Raise UserError where there is no engine as asked for, whatever the scene."""
-    if config.breaking and (config.engine, config.contact) != ("cpu", "multi"):
-        raise UserError(
-            "--breaking works with the engine cpu and with contact multi alone. Leave out "
-            "--engine and --contact."
-        )
-    if config.engine == "cuda":
-        backends.load("engine", "cuda", {"cuda": "corporeal.mpm.cuda.engine:present"})("cuda")
 
 
 def simulate(

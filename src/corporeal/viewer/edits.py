@@ -17,8 +17,8 @@ from corporeal.materials.library import find
 from corporeal.materials.quantities import QUANTITIES
 from corporeal.pipeline import Settings, reopen
 from corporeal.results import Results
+from corporeal.settings.assemble_config import validate as validate_assemble
 from corporeal.stages.assemble import AssembleConfig
-from corporeal.stages.assemble import validate as validate_assemble
 from corporeal.viewer.queue import Asked
 
 ANNOTATIONS = "annotations.yaml"

@@ -13,7 +13,7 @@ from starlette.routing import BaseRoute, Route
 from corporeal.errors import UserError
 from corporeal.materials.library import library
 from corporeal.pipeline import Settings, reopen
-from corporeal.stages.assemble import validate as validate_assemble
+from corporeal.settings.assemble_config import validate as validate_assemble
 from corporeal.viewer.edits import DETAILS, changed, new_name, number
 from corporeal.viewer.queue import Asked, Queue
 from corporeal.viewer.shelf import Shelf

@@ -10,7 +10,7 @@ from corporeal.evaluation.dynamics.methods import Method, ours, settings_of
 from corporeal.evaluation.dynamics.places import Finer, reference_folder, run_folder
 from corporeal.evaluation.dynamics.run_numbers import measure, write_numbers
 from corporeal.pipeline import Settings
-from corporeal.stages.simulate import as_kept
+from corporeal.settings.simulate_config import as_kept
 
 ORPHAN = 60.0
 """Longest wait for the process of an earlier call that was killed to be gone [s]."""

@@ -6,11 +6,11 @@ and by what its mover does, J = Δp - Σ J_contact and W = ΔE - Σ J_contact ·
 """
 
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import TYPE_CHECKING, NamedTuple
 
 import numpy as np
 from jaxtyping import Float
-from scipy.interpolate import CubicHermiteSpline, PchipInterpolator
+from numpy.typing import ArrayLike
 
 from corporeal.errors import UserError
 from corporeal.mpm.constants import (
@@ -26,6 +26,9 @@ from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.springs import turn_of
 from corporeal.mpm.problem import Body, Problem
 from corporeal.types import Keyframes, Vector
+
+if TYPE_CHECKING:
+    from scipy.interpolate import CubicHermiteSpline
 
 SAMPLES = 9
 """Times in each interval at which speeds are compared: they are quadratic in time there."""
@@ -79,8 +82,14 @@ def _cubics(
     time: Float[np.ndarray, " N"], value: Float[np.ndarray, "N 3"]
 ) -> Float[np.ndarray, "N1 12"]:
     """Coefficients from the constant on of every interval's cubics, component after component."""
-    curve: CubicHermiteSpline = PchipInterpolator(time, value)
+    curve = _curve(time, value)
     return curve.c[::-1].transpose(1, 2, 0).reshape(len(time) - 1, 12)
+
+
+def _curve(time: ArrayLike, value: Float[np.ndarray, "N 3"]) -> "CubicHermiteSpline":
+    from scipy.interpolate import PchipInterpolator  # few scenes have anything that moves as told
+
+    return PchipInterpolator(time, value)
 
 
 def pose(rows: Float[np.ndarray, "N K"], time: float) -> Pose:
@@ -214,8 +223,8 @@ def fastest_velocity(path: Keyframes, reach: float) -> Float[np.ndarray, "3"]:
     t = np.linspace(path.time[0], path.time[-1], SAMPLES * len(path.time))
     if len(path.time) == 1:
         return np.zeros(3)
-    moved = PchipInterpolator(path.time, np.array(path.shift)).derivative()(t)
-    turned = PchipInterpolator(path.time, np.cumsum(path.turn, axis=0)).derivative()(t)
+    moved = _curve(path.time, np.array(path.shift)).derivative()(t)
+    turned = _curve(path.time, np.cumsum(path.turn, axis=0)).derivative()(t)
     speed, rim = np.linalg.norm(moved, axis=1), reach * np.linalg.norm(turned, axis=1)
     k = int(np.argmax(speed + rim))
     along = moved[k] / speed[k] if speed[k] > 0.0 else np.array([1.0, 0.0, 0.0])
