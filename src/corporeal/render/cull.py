@@ -36,6 +36,11 @@ def outlined(
     return seen
 
 
+def of_pixels(tiles: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Give each pixel (rows, columns) what its tile has."""
+    return np.repeat(np.repeat(tiles, TILE, axis=0), TILE, axis=1)[: shape[0], : shape[1]]
+
+
 def ways(lamps: Lamps, sky: int) -> Float32[np.ndarray, "ways 3"]:
     """Where pixels of the floor look: to the sky, and last to the sun."""
     s = kernels.samples(1)

@@ -85,10 +85,14 @@ class _Empty:
 
 
 class FilmCaster:
-    """Takes a film's pictures one after the other; keeps the empty studio of the last camera."""
+    """Takes a film's pictures one after the other; keeps the empty studio of the last camera.
+
+    A stage that is given twice, to the same camera, is cast once.
+    """
 
     def __init__(self) -> None:
         self._empty: _Empty | None = None
+        self._last: tuple[Stage, Aim, Quality, np.ndarray] | None = None
 
     def picture(
         self, stage: Stage, camera: Aim, quality: Quality, threads: int | None = None
@@ -102,9 +106,17 @@ class FilmCaster:
             threads: At once; None: as many as there are cores.
 
         """
+        last = self._last
+        if last is None or last[0] is not stage or last[1:3] != (camera, quality):
+            picture = self._cast(stage, camera, quality, threads or cores())
+            self._last = last = stage, camera, quality, picture
+        return last[3].copy()
+
+    def _cast(
+        self, stage: Stage, camera: Aim, quality: Quality, threads: int
+    ) -> UInt8[np.ndarray, "H W 3"]:
         if quality not in PLANS:
             return render(stage, camera, quality, threads)
-        threads = threads or cores()
         # One thread alone takes the picture as a whole, since bands overlap.
         parts = 2 * threads if threads > 1 else 1
         lines = max(BAND, -(-camera.height // parts))
@@ -204,7 +216,7 @@ class _Picture(Job):
         # What is seen, and where light differs: on things, and where they may be in its way.
         hit = self.seen(rays, block)
         tiles = self.tiles(rays, hit[0], block)
-        kind = _of_pixels(tiles, shape)
+        kind = cull.of_pixels(tiles, shape)
         if not kind.any():
             return
         toned = np.empty((len(rays.origin), 3), np.float32)
@@ -263,7 +275,7 @@ class _Picture(Job):
         hit = self.stage.missed(rays.origin)
         if not self.stage.shown:
             return hit
-        asked = _of_pixels(self.outlined[block.first // TILE :], (block.rows, block.columns))
+        asked = cull.of_pixels(self.outlined[block.first // TILE :], (block.rows, block.columns))
         index = np.flatnonzero(asked)
         found = self.stage.hit(rays.origin[index], rays.direction[index])
         full = tuple(whole.copy() for whole in hit)
@@ -456,11 +468,6 @@ class _Picture(Job):
 
 def _unknown(s: Samples) -> Bool[np.ndarray, " S"]:
     return np.ones(len(s.kind), np.bool_)
-
-
-def _of_pixels(tiles: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
-    """Give each pixel (rows, columns) what its tile has."""
-    return np.repeat(np.repeat(tiles, TILE, axis=0), TILE, axis=1)[: shape[0], : shape[1]]
 
 
 def _of_rows(tiles: np.ndarray, rows: tuple[int, int], first: int) -> np.ndarray:
