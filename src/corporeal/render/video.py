@@ -15,8 +15,8 @@ from corporeal.formats.words import writable
 from corporeal.store import DiskError, writing
 
 EFFORT, COMPRESSION = "veryfast", 14
-"""x264's preset and constant rate factor: 0 is lossless, 23 its default. At 17, "medium" makes files
-as large and errors as large in twice the time."""
+"""x264's preset and constant rate factor: 0 is lossless, 23 its default. "medium" at 17
+makes files as large, and errors as large, in twice the time."""
 
 SMALLEST, LARGEST = 16, 4096
 """Sides of a film [px]."""
