@@ -99,6 +99,28 @@ def test_an_array_takes_the_pages_that_the_last_one_freed():
     assert kept < 0.1 * usual
 
 
+HEAP = """
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+import numpy as np
+from corporeal.machine import keep_freed_memory
+keep_freed_memory()
+def kept_by_the_program():
+    place = np.ones(2_000_000).ctypes.data
+    lines = Path("/proc/self/maps").read_text().splitlines()
+    low, high = (int(x, 16) for x in next(k for k in lines if "[heap]" in k).split()[0].split("-"))
+    return low <= place < high
+print(kept_by_the_program(), ThreadPoolExecutor(1).submit(kept_by_the_program).result())
+"""
+
+
+@pytest.mark.skipif(platform.libc_ver()[0] != "glibc", reason="a setting of glibc's malloc")
+def test_arrays_of_threads_have_no_memory_apart():
+    quiet = {k: v for k, v in os.environ.items() if not k.startswith("MALLOC_")}
+    told = subprocess.check_output([sys.executable, "-c", HEAP], env=quiet, text=True)
+    assert told.split() == ["True", "True"]
+
+
 def test_a_setting_of_ones_own_for_memory_stays(monkeypatch):
     monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "131072")
     assert not keep_freed_memory()

@@ -13,7 +13,7 @@ KEPT = 1 << 26
 """Memory that was freed and stays with the process [bytes]: some pictures of a film."""
 OBJECTS_MADE = 50_000
 """Objects made, less those that ended, after which unused cycles of them are looked for."""
-TRIM_THRESHOLD, MMAP_THRESHOLD = -1, -3
+TRIM_THRESHOLD, MMAP_THRESHOLD, ARENA_MAX = -1, -3, -8
 """Numbers of these settings in glibc's ``malloc.h``."""
 
 
@@ -32,8 +32,9 @@ def keep_freed_memory() -> bool:
     """Let arrays reuse what others freed instead of asking the system for each; whether it does.
 
     Usual is that every large array is fresh memory of the system, which has to empty each page of
-    it at the first touch. Where the C library is not glibc, or the environment has a
-    ``MALLOC_`` setting of its own, nothing is changed.
+    it at the first touch, and that threads have memory apart (arenas), most of which goes back to
+    the system when it is freed, whatever is to be kept; here they share one. Where the C library is
+    not glibc, or the environment has a ``MALLOC_`` setting of its own, nothing is changed.
     """
     if any(name.startswith("MALLOC_") for name in os.environ):
         return False
@@ -41,7 +42,8 @@ def keep_freed_memory() -> bool:
         mallopt = ctypes.CDLL(None).mallopt
     except (AttributeError, OSError, TypeError):
         return False
-    return all(mallopt(what, KEPT) == 1 for what in (MMAP_THRESHOLD, TRIM_THRESHOLD))
+    wanted = {MMAP_THRESHOLD: KEPT, TRIM_THRESHOLD: KEPT, ARENA_MAX: 1}
+    return all(mallopt(what, value) == 1 for what, value in wanted.items())
 
 
 def collect_seldom() -> None:

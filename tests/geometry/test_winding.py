@@ -7,7 +7,7 @@ import trimesh
 
 from corporeal.geometry.mesh import Mesh, joined, weld
 from corporeal.geometry.shape import FEW_OPEN, Shape
-from corporeal.geometry.winding import plumb_lines, unbalanced
+from corporeal.geometry.winding import plumb_lines, unbalanced, winding_of_few
 
 BODIES = {
     "ball": trimesh.creation.icosphere(3),
@@ -34,7 +34,9 @@ def test_it_is_the_sum_of_all_solid_angles(name, missing, rng):
     kept = rng.uniform(size=len(body.triangles)) >= missing
     mesh = body.only(kept) if kept.any() else body
     points = rng.uniform(-1.2, 1.2, (3000, 3))
-    assert np.abs(plumb_lines(mesh).winding(points) - exact(mesh, points)).max() < 1e-9
+    found = plumb_lines(mesh).winding(points)
+    assert np.abs(found - exact(mesh, points)).max() < 1e-9
+    assert np.array_equal(winding_of_few(mesh, unbalanced(mesh), points), found)
 
 
 def test_faces_that_are_turned_or_doubled_count_as_often_as_they_are_there(rng):
@@ -88,3 +90,11 @@ def test_a_shape_that_moved_answers_as_one_made_there(rng):
     moved, made = Shape(holed).moved(there), Shape(Mesh(there, holed.triangles))
     assert np.array_equal(moved.winding(points), made.winding(points))
     assert not np.array_equal(moved.winding(points), Shape(holed).winding(points))
+
+
+def test_few_points_get_the_answer_of_many(rng):
+    ball = shown(trimesh.creation.icosphere(4))
+    points = np.concatenate([rng.uniform(-1.1, 1.1, (300, 3)), ball.vertices[:20]])
+    few = [Shape(ball).winding(points[k : k + 40]) for k in range(0, len(points), 40)]
+    many = Shape(ball).winding(np.tile(points, (5, 1)))
+    assert np.array_equal(np.concatenate(few), many[: len(points)])

@@ -3,12 +3,13 @@ import pytest
 from test_embree import RED, ball, front, scene, sheet
 
 from corporeal.geometry.srgb import encoded
+from corporeal.render import cull
 from corporeal.render.camera import Aim
-from corporeal.render.embree import Stage, render
+from corporeal.render.embree import Job, Sampling, Stage, render
 from corporeal.render.film_picture import FilmCaster
-from corporeal.render.kernels_ask import WAYS, number_of
+from corporeal.render.kernels_ask import WAYS, asks, number_of
 from corporeal.render.kernels_film import CURVE, CURVED
-from corporeal.render.kernels_floor import NEAR
+from corporeal.render.kernels_floor import NEAR, TILE
 from corporeal.render.liquid_surface import LiquidSurface
 from corporeal.types import Finish
 
@@ -94,12 +95,12 @@ def test_liquids_that_replace_surfaces_are_seen_where_they_went(monkeypatch):
 def test_pixels_that_are_smoothed_over_look_along_every_direction_once(corner):
     top, left = corner
     places = [(i, j) for i in range(top, top + 12) for j in range(left, left + 12)]
-    asked = sorted(number_of(i, j) for i, j in places if (i + j) % 2 == 0)
+    asked = sorted(number_of(i, j) for i, j in places if asks(i, j))
     assert asked == list(range(WAYS))
 
 
 def test_floor_that_only_some_sky_is_hidden_from_is_darkened_evenly(monkeypatch):
-    """Asked at the corners of tiles or by every second pixel: the same to two grey levels."""
+    """Asked at the corners of tiles or by every fourth pixel: the same to two grey levels."""
     aim = Aim((0.0, -6.0, 3.0), (0.0, 0.0, 0.2), 40.0, 320, 240)
     tall = stage("a red ball")
     soft = FilmCaster().picture(tall, aim, "draft", 1).astype(int)
@@ -108,6 +109,23 @@ def test_floor_that_only_some_sky_is_hidden_from_is_darkened_evenly(monkeypatch)
     cast = FilmCaster().picture(tall, aim, "draft", 1).astype(int)
     assert np.abs(soft - cast).max() <= 2
     assert 0 < np.abs(soft - cast).mean() < 0.1 < np.abs(bare - cast).mean()
+
+
+@pytest.mark.parametrize("eye", [(0.0, -6.0, 1.5), (0.3, -0.9, 0.4), (0.0, -0.1, 0.2)])
+@pytest.mark.parametrize("name", ["a mirror beside a ball", "a pane before a ball"])
+def test_no_triangle_is_seen_beside_the_tiles_that_it_could_be_seen_in(name, eye):
+    """From afar, from so near that most of it is beyond the picture, and from within."""
+    there, aim = stage(name), Aim(eye, (0.1, 0.0, 0.3), 40.0, 90, 70)
+    job = Job(there, aim, Sampling(1, 1, 1))
+    rays = job.rays((0, aim.height))
+    seen = there.hit(rays.origin, rays.direction)[0].reshape(aim.height, aim.width) >= 0
+    size = aim.width, aim.height
+    marked = cull.outlined(there, job.eye, job.frame, job.tangent, size)
+    pixels = np.repeat(np.repeat(marked, TILE, axis=0), TILE, axis=1)[: aim.height, : aim.width]
+    assert seen.any()
+    assert not (seen & ~pixels).any()
+    if eye[1] < -5:
+        assert pixels.sum() < 5 * seen.sum()
 
 
 def test_the_displays_curve_is_that_of_srgb():

@@ -11,6 +11,7 @@ from PIL import Image
 
 from corporeal.errors import UserError
 from corporeal.render import video
+from corporeal.render.film_picture import FilmCaster
 from corporeal.settings.film_config import FilmConfig, validate
 from corporeal.stages.film import _box, _fullness, film
 from corporeal.trajectory.played import Played, Prepared
@@ -149,6 +150,16 @@ def test_what_does_not_move_does_not_flicker(tmp_path):
     stills = [np.asarray(Image.open(p)) for p in sorted((tmp_path / "stills").iterdir())]
     assert len(stills) == 6
     assert all(np.array_equal(s, stills[0]) for s in stills)
+
+
+@pytest.mark.parametrize(
+    ("speed", "casts"), [(0.0, 1), (1e-3, 1), (4.0, 6)], ids=["still", "unseen", "seen"]
+)
+def test_what_stands_still_is_cast_once(tmp_path, monkeypatch, speed, casts):
+    made, cast = [], FilmCaster._cast
+    monkeypatch.setattr(FilmCaster, "_cast", lambda *given: made.append(1) or cast(*given))
+    film(play(cube(), lambda t: (np.eye(3), np.array([0, speed * t, 0.0]))), SMALL, tmp_path)
+    assert len(made) == casts
 
 
 def test_the_whole_motion_stays_in_the_picture(tmp_path):

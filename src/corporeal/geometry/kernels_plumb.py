@@ -120,6 +120,26 @@ def drop(points, vertices, triangles, table, found):
 
 
 @numba.njit(cache=True)
+def drop_each(points, vertices, triangles, found):
+    """Do as ``drop`` without a table: points are in order of x, faces are asked one by one."""
+    for t in range(len(triangles)):
+        a, b, c = triangles[t]
+        x = vertices[a, 0], vertices[b, 0], vertices[c, 0]
+        n = np.searchsorted(points[:, 0], min(x))
+        if n == len(points) or points[n, 0] > max(x):
+            continue
+        y = vertices[a, 1], vertices[b, 1], vertices[c, 1]
+        lowest = min(vertices[a, 2], vertices[b, 2], vertices[c, 2])
+        while n < len(points) and points[n, 0] <= max(x):
+            px, py, pz = points[n]
+            if min(y) <= py <= max(y) and lowest < pz:
+                around = covers(vertices, triangles[t], px, py)
+                if around != 0 and height(vertices, triangles[t], px, py) < pz:
+                    found[n] -= around
+            n += 1
+
+
+@numba.njit(cache=True)
 def hang(points, vertices, rim, excess, found):
     """Add the solid angle of the curtain below each open edge (van Oosterom and Strackee 1983)."""
     for n in range(len(points)):

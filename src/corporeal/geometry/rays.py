@@ -16,20 +16,16 @@ from corporeal.geometry.mesh import Mesh
 
 DIAGONAL = 100.0
 """Of the mesh as Embree sees it."""
-STEP, LEAST_STEP = 1e-6, 1e-8
-"""From one hit to behind it: of the diagonal, and at least [m]."""
 NONE = 100.0 * np.finfo(np.float64).eps
 """Lengths up to it are none."""
 GRAZING = 1e-5
 """Up to this cosine to its normal a ray does not meet a plane."""
-MOST_HITS = 100
-"""Along one ray."""
 
 Points = Float[np.ndarray, "N 3"]
 
 
 class Hits(NamedTuple):
-    """H places where rays meet triangles: all first ones, then all second ones, and so on."""
+    """H places where rays meet triangles."""
 
     place: Float[np.ndarray, "H 3"]
     """[m]"""
@@ -43,7 +39,6 @@ class RayCaster:
     def __init__(self, mesh: Mesh) -> None:
         a, b, c = np.swapaxes(mesh.corners, 0, 1)
         self._corner, self._normal = a, _unit(np.cross(b - a, c - b))
-        self._step = max(LEAST_STEP, mesh.extent * STEP)
         self._low = mesh.vertices.min(axis=0, initial=np.inf)
         self._scale = DIAGONAL / (mesh.extent or 1.0)
         self._scene = EmbreeScene() if len(mesh.triangles) else None
@@ -57,33 +52,12 @@ class RayCaster:
         begin, way = origins.astype(np.float32), directions.astype(np.float32)
         return self._cast(begin.astype(np.float64), _unit(way))
 
-    def hits(self, origins: Points, directions: Points, only_first: bool = False) -> Hits:
-        """Give the places where rays meet the mesh, or the first of each ray.
-
-        A ray goes on from a little behind each hit; one that meets the same triangle again is taken
-        twice as far as the last time.
-        """
+    def hits(self, origins: Points, directions: Points) -> Hits:
+        """Give the places where rays meet the mesh first."""
         origin, way = np.array(origins, dtype=np.float64), _unit(directions)
-        found, step = [], np.full(len(origin), self._step)
-        last, live = np.full(len(origin), -1), np.arange(len(origin))
-        for _ in range(1 if only_first else MOST_HITS):
-            triangle = self._cast(origin[live], way[live])
-            met = triangle >= 0
-            if not met.any():
-                break
-            ray, triangle = live[met], triangle[met]
-            stuck = last[ray] == triangle
-            last[ray] = triangle
-            hits = self._met(origin, way, ray[~stuck], triangle[~stuck])
-            found.append(hits)
-            step[hits.ray] = self._step
-            origin[hits.ray] = hits.place + way[hits.ray] * self._step
-            again = ray[stuck]
-            step[again] *= 2.0
-            origin[again] += way[again] * step[again, None]
-            live = np.concatenate([hits.ray, again])
-        nothing = Hits(np.zeros((0, 3)), np.zeros(0, np.int64), np.zeros(0, np.int64))
-        return Hits(*(np.concatenate(rows) for rows in zip(nothing, *found, strict=True)))
+        triangle = self._cast(origin, way)
+        ray = np.flatnonzero(triangle >= 0)
+        return self._met(origin, way, ray, triangle[ray])
 
     def _met(self, origin: Points, way: Points, ray: np.ndarray, triangle: np.ndarray) -> Hits:
         """Meet the planes of triangles, one a ray; rays that graze their triangle are left out."""

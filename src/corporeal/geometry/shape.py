@@ -2,18 +2,39 @@
 
 from dataclasses import dataclass
 from functools import cached_property
+from typing import NamedTuple
 
 import igl
 import numpy as np
 from jaxtyping import Bool, Float, Int
 
+from corporeal.geometry.kernels_segments import through
 from corporeal.geometry.mesh import Mesh, boundary
 from corporeal.geometry.rays import RayCaster
-from corporeal.geometry.winding import OpenEdges, PlumbLines, plumb_lines, unbalanced
+from corporeal.geometry.winding import (
+    OpenEdges,
+    PlumbLines,
+    plumb_lines,
+    unbalanced,
+    winding_of_few,
+)
 
+FEW_POINTS = 0.05
+"""Points over triangles up to which faces above and below them are looked for one by one."""
 FEW_OPEN = 1000
 """Open edges up to which their solid angles are added up one by one: 20 ns each, where a tree of
 faces takes 2 to 100 µs, the most where faces lie upon each other."""
+
+
+class Crossings(NamedTuple):
+    """H times that a way goes through a triangle."""
+
+    way: Int[np.ndarray, " H"]
+    share: Float[np.ndarray, " H"]
+    """Of the way that is gone until there [-]."""
+    triangle: Int[np.ndarray, " H"]
+    side: Int[np.ndarray, " H"]
+    """1 into the shape, -1 out of it."""
 
 
 @dataclass(frozen=True)
@@ -66,8 +87,10 @@ class Shape:
         """
         if not len(points) or not len(self.mesh.triangles):
             return np.zeros(len(points))
-        if len(self._plumb_lines.rim) <= FEW_OPEN:
-            return self._plumb_lines.winding(points)
+        if len(self.open_edges.rim) <= FEW_OPEN:
+            if len(points) > FEW_POINTS * len(self.mesh.triangles):
+                return self._plumb_lines.winding(points)
+            return winding_of_few(self.mesh, self.open_edges, points)
         return np.asarray(self._winding.winding_number(np.ascontiguousarray(points))).reshape(-1)
 
     def inside(self, points: Float[np.ndarray, "N 3"]) -> Bool[np.ndarray, " N"]:
@@ -116,18 +139,22 @@ class Shape:
         """Distance to the first hit along each ray [m]; inf: none."""
         length = np.full(len(origins), np.inf)
         if len(origins):
-            place, ray, _ = self._rays.hits(origins, directions, only_first=True)
+            place, ray, _ = self._rays.hits(origins, directions)
             length[ray] = np.einsum("ij,ij->i", place - origins[ray], directions[ray])
         return length
 
     def crossings(
-        self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]
-    ) -> tuple[Int[np.ndarray, " H"], Float[np.ndarray, " H"], Int[np.ndarray, " H"]]:
-        """Every hit along each ray: its ray, its distance [m], and 1 into the shape, -1 out."""
-        place, ray, triangle = self._rays.hits(origins, directions)
-        length = np.einsum("ij,ij->i", place - origins[ray], directions[ray])
-        facing = np.einsum("ij,ij->i", self.mesh.area_vectors[triangle], directions[ray])
-        return ray, length, -np.sign(facing).astype(np.int64)
+        self, starts: Float[np.ndarray, "N 3"], ends: Float[np.ndarray, "N 3"]
+    ) -> Crossings:
+        """Every triangle that short ways from ``starts`` to ``ends`` [m] go through."""
+        first, last = (np.ascontiguousarray(x, dtype=np.float64) for x in (starts, ends))
+        vertices, triangles, found = self.mesh.vertices, self.mesh.triangles, np.zeros((0, 4))
+        count = through(first, last, vertices, triangles, found)
+        if count:
+            found = np.zeros((count, 4))
+            through(first, last, vertices, triangles, found)
+        whole = found.astype(np.int64)
+        return Crossings(whole[:, 0], found[:, 1], whole[:, 2], whole[:, 3])
 
     def hit(
         self, origins: Float[np.ndarray, "N 3"], directions: Float[np.ndarray, "N 3"]

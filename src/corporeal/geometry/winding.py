@@ -88,6 +88,20 @@ def plumb_lines(mesh: Mesh, open_edges: OpenEdges | None = None) -> PlumbLines:
     return PlumbLines(mesh, start, width, counts, first, face, box, *known)
 
 
+def winding_of_few(
+    mesh: Mesh, open_edges: OpenEdges, points: Float[np.ndarray, "N 3"]
+) -> Float[np.ndarray, " N"]:
+    """Winding number about points, as ``PlumbLines`` has it, of so few that no table is made."""
+    order = np.argsort(points[:, 0], kind="stable")
+    points = np.ascontiguousarray(points[order], dtype=np.float64)
+    around, found = np.zeros(len(points)), np.empty(len(points))
+    kernels.drop_each(points, mesh.vertices, mesh.triangles, around)
+    if len(open_edges.rim):
+        kernels.hang(points, mesh.vertices, *open_edges, around)
+    found[order] = around
+    return found
+
+
 def unbalanced(mesh: Mesh) -> OpenEdges:
     """Edges that are walked more often one way than the other, and how many times more."""
     f = mesh.triangles

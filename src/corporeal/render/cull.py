@@ -1,49 +1,44 @@
 """What no object can change, so that no ray need be cast for it."""
 
 import numpy as np
-from jaxtyping import Float, Float32
+from jaxtyping import Bool, Float, Float32
 
-from corporeal.render import kernels, kernels_ask
+from corporeal.render import kernels, kernels_ask, kernels_cull
+from corporeal.render.embree import Stage
 from corporeal.render.kernels_ask import WAYS
+from corporeal.render.kernels_floor import TILE
 from corporeal.render.kernels_light import Lamps
 
 LOWEST = 1e-3
 """Sine of the lowest sun whose shadows are followed."""
-NEAREST = 1e-3
-"""Of the way to a box: a corner that is nearer to the eye, or behind it, may be seen anywhere."""
 
 
-def outlines(
-    boxes: Float[np.ndarray, "B 2 3"],
+def outlined(
+    stage: Stage,
     eye: Float[np.ndarray, "3"],
     frame: Float[np.ndarray, "3 3"],
     tangent: float,
     size: tuple[int, int],
-) -> list[tuple[int, int, int, int]]:
-    """Rows and columns of a picture that each box could be seen at: first, last, first, last.
+) -> Bool[np.ndarray, "rows columns"]:
+    """Tiles of a picture in which surfaces could be seen.
 
     Args:
-        boxes: Corners [m].
+        stage: The surfaces.
         eye: Where from [m].
         frame: Right, up and back of the camera, as rows.
         tangent: Of half the vertical field of view.
         size: Width and height [px].
 
     """
-    width, height = size
-    found = []
-    for low, high in boxes.astype(np.float64):
-        corners = np.stack(np.meshgrid(*zip(low, high, strict=True)), axis=-1).reshape(-1, 3)
-        right, up, back = frame @ (corners - eye).T
-        if (-back).min() <= NEAREST * np.abs(back).max():
-            found.append((0, height, 0, width))
-            continue
-        row = (1 - up / -back / tangent) * height / 2
-        column = (1 + right / -back / tangent * height / width) * width / 2
-        rows, columns = np.clip(row, -1, height + 1), np.clip(column, -1, width + 1)
-        top, left = max(int(rows.min()) - 1, 0), max(int(columns.min()) - 1, 0)
-        found.append((top, int(rows.max()) + 2, left, int(columns.max()) + 2))
-    return found
+    seen = np.zeros([-(-n // TILE) for n in size[::-1]], np.bool_)
+    if stage.shown:
+        kernels_cull.outlined(stage.vertices, stage.look.triangles, eye, frame, tangent, size, seen)
+    return seen
+
+
+def of_pixels(tiles: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Give each pixel (rows, columns) what its tile has."""
+    return np.repeat(np.repeat(tiles, TILE, axis=0), TILE, axis=1)[: shape[0], : shape[1]]
 
 
 def ways(lamps: Lamps, sky: int) -> Float32[np.ndarray, "ways 3"]:

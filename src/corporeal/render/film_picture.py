@@ -3,7 +3,7 @@
 Most of a film is floor and backdrop: where no ray to sky or sun could meet a box about an object, a
 pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
 still. Where objects are far and hide only some sky, the sky is asked at the corners of tiles. What
-is left is seen by one ray a pixel; every second pixel asks for light, and neighbours on one surface
+is left is seen by one ray a pixel; every fourth pixel asks for light, and neighbours on one surface
 share what they found. Pixels beside which another surface is seen in another colour are cast again,
 finer. Nothing hangs on the picture before: equal input gives equal bytes, and what does not move
 does not flicker.
@@ -85,10 +85,14 @@ class _Empty:
 
 
 class FilmCaster:
-    """Takes a film's pictures one after the other; keeps the empty studio of the last camera."""
+    """Takes a film's pictures one after the other; keeps the empty studio of the last camera.
+
+    A stage that is given twice, to the same camera, is cast once.
+    """
 
     def __init__(self) -> None:
         self._empty: _Empty | None = None
+        self._last: tuple[Stage, Aim, Quality, np.ndarray] | None = None
 
     def picture(
         self, stage: Stage, camera: Aim, quality: Quality, threads: int | None = None
@@ -102,10 +106,20 @@ class FilmCaster:
             threads: At once; None: as many as there are cores.
 
         """
+        last = self._last
+        if last is None or last[0] is not stage or last[1:3] != (camera, quality):
+            picture = self._cast(stage, camera, quality, threads or cores())
+            self._last = last = stage, camera, quality, picture
+        return last[3].copy()
+
+    def _cast(
+        self, stage: Stage, camera: Aim, quality: Quality, threads: int
+    ) -> UInt8[np.ndarray, "H W 3"]:
         if quality not in PLANS:
             return render(stage, camera, quality, threads)
-        threads = threads or cores()
-        lines = max(BAND, -(-camera.height // (2 * threads)))
+        # One thread alone takes the picture as a whole, since bands overlap.
+        parts = 2 * threads if threads > 1 else 1
+        lines = max(BAND, -(-camera.height // parts))
         band = -(-lines // TILE) * TILE
         rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
         with ThreadPoolExecutor(threads) as pool:
@@ -154,6 +168,8 @@ class _Picture(Job):
         self.ways = cull.ways(self.lamps, 1)
         self.open = 1.0, float(cull.ways(self.lamps, plan.sky)[:-1, 2].mean())
         self.blur = np.float32(cull.blur(self.lamps, self.boxes))
+        size = camera.width, camera.height
+        self.outlined = cull.outlined(stage, self.eye, self.frame, self.tangent, size)
 
     def wide(self, rows: tuple[int, int]) -> tuple[int, int]:
         """Rows with those above and below that the light filter looks at."""
@@ -200,7 +216,7 @@ class _Picture(Job):
         # What is seen, and where light differs: on things, and where they may be in its way.
         hit = self.seen(rays, block)
         tiles = self.tiles(rays, hit[0], block)
-        kind = np.repeat(np.repeat(tiles, TILE, axis=0), TILE, axis=1)[: shape[0], :width]
+        kind = cull.of_pixels(tiles, shape)
         if not kind.any():
             return
         toned = np.empty((len(rays.origin), 3), np.float32)
@@ -259,11 +275,7 @@ class _Picture(Job):
         hit = self.stage.missed(rays.origin)
         if not self.stage.shown:
             return hit
-        asked = np.zeros((block.rows, block.columns), np.bool_)
-        size = self.camera.width, self.camera.height
-        seen = cull.outlines(self.boxes, self.eye, self.frame, self.tangent, size)
-        for top, bottom, left, right in seen:
-            asked[max(top - block.first, 0) : max(bottom - block.first, 0), left:right] = True
+        asked = cull.of_pixels(self.outlined[block.first // TILE :], (block.rows, block.columns))
         index = np.flatnonzero(asked)
         found = self.stage.hit(rays.origin[index], rays.direction[index])
         full = tuple(whole.copy() for whole in hit)
@@ -318,11 +330,11 @@ class _Picture(Job):
         thin = active[s.traits[active, 4] < 1]
         if len(thin):
             self.behind(rays, s, thin, block, light, 0)
-        # Every second pixel asks for light, which is smoothed over each surface.
+        # Every fourth pixel asks for light, which is smoothed over each surface.
         on = index[s.kind[index] != NOTHING]
         shape = block.rows, block.columns
         asks = np.zeros(len(light), np.bool_)
-        kernels_ask.chosen(s, on, known, block.first + block.left, asks)
+        kernels_ask.chosen(s, on, known, (block.first, block.left), asks)
         asking = np.flatnonzero(asks)
         arriving = np.zeros((len(light), WIDE), np.float32)
         arriving[asking] = self.arriving(s, d, asking, block.places(asking))

@@ -1,8 +1,8 @@
 """Light at the hits of a film's pixels: where to ask for it, with which rays, and how it is shared.
 
-Pixels of a checkerboard ask; the others take their neighbours' light. The 72 that ask in 12 × 12
-pixels look along as many different directions, and it is 12 × 12 pixels that light is smoothed
-over: wherever these begin, each direction is in them once. Loops compiled by numba.
+One pixel asks in each row and column of 4 × 4; the others take their neighbours' light. The 36 that
+ask in 12 × 12 pixels look along as many different directions, and it is 12 × 12 pixels that light
+is smoothed over: wherever these begin, each direction is in them once. Loops compiled by numba.
 """
 
 import numba
@@ -24,51 +24,58 @@ from corporeal.render.kernels_light import (
 
 WIDE = 8
 """Channels of light, one more than there are: loops over them fill whole registers."""
-WAYS = 72
+WAYS = 36
 """Directions of pixels that ask."""
 SUNS = 2
 """Rays to the sun of each: its shadows are the sharpest of all light that is smoothed."""
 GRAZING = 0.04
 """Of the light of the sky that comes from right above the horizon, and is taken from higher up:
 shadows of so little would reach far over the floor."""
-ENOUGH = 2
+ENOUGH = 4
 """Neighbours of the same surface whose light is a pixel's, too."""
+
+
+@numba.njit(**INNER)
+def asks(row, column):
+    """Whether a pixel asks for light: one in each row and column of 4 × 4."""
+    return column % 4 == (2 * row + row % 4 // 2) % 4
 
 
 @numba.njit(**LOOP)
 def chosen(s, on, known, first, out):
-    """Mark the pixels that ask for light: every second one, and what has few alike beside it.
+    """Mark the pixels that ask for light: every fourth one, and what has few alike about it.
 
     Args:
         s: What pixels met.
         on: Pixels that met something.
         known: Which pixels were looked at (rows, columns).
-        first: The picture's row and column of the first one, added.
+        first: The picture's row and column of the first one.
         out: Marks (P,).
 
     """
     h, w = known.shape
+    row, column = first
     for g in on:
         i, j = g // w, g % w
-        if (i + first + j) % 2 == 0:
+        if asks(row + i, column + j):
             out[g] = True
             continue
         alike = 0
-        for n in range(4):
-            y, x = i + (1 - n if n % 2 == 0 else 0), j + (2 - n if n % 2 == 1 else 0)
-            if 0 <= y < h and 0 <= x < w and known[y, x]:
-                q = y * w + x
-                near = abs(s.depth[g] - s.depth[q]) < FARTHEST * s.depth[g]
-                if s.kind[q] != NOTHING and near and dot(s.normal[g], s.normal[q]) > ALIKE:
-                    alike += 1
+        for y in range(max(i - 2, 0), min(i + 2, h)):
+            for x in range(max(j - 2, 0), min(j + 2, w)):
+                if asks(row + y, column + x) and known[y, x]:
+                    q = y * w + x
+                    near = abs(s.depth[g] - s.depth[q]) < FARTHEST * s.depth[g]
+                    if s.kind[q] != NOTHING and near and dot(s.normal[g], s.normal[q]) > ALIKE:
+                        alike += 1
         out[g] = alike < ENOUGH
 
 
 @numba.njit(**INNER)
 def number_of(row, column):
-    """Which of ``WAYS`` directions a pixel looks along: 8 in each tile of 4 × 4, in 3 × 3 tiles."""
+    """Which of ``WAYS`` directions a pixel looks along: 4 in each tile of 4 × 4, in 3 × 3 tiles."""
     tile = (row // 4 % 3) * 3 + column // 4 % 3
-    return tile * 8 + (row % 4) * 2 + column % 4 // 2
+    return tile * 4 + row % 4
 
 
 @numba.njit(**JIT)
@@ -136,8 +143,10 @@ def _ask(s, index, row, column, lamps, count, ways, boxes, o, w, ray, asker, lig
     for k in range(many):
         g, q = index[k], number_of(row[k], column[k])
         pixel = row[k] * 65536 + column[k]
+        # Tiles beside one another look at parts of sky and sun that are far apart.
+        first = q % 4 * 9 + q // 4
         for number in range(count):
-            sky_way(s, g, points[q * count + number], w[n])
+            sky_way(s, g, points[first * count + number], w[n])
             for a in range(3):
                 o[n, a] = s.point[g, a] + gap * s.flat[g, a]
             if meets_box(o[n], w[n], hull) and meets_box(o[n], w[n], parts):
@@ -148,9 +157,8 @@ def _ask(s, index, row, column, lamps, count, ways, boxes, o, w, ray, asker, lig
         for number in range(SUNS):
             if not sunlit(s, g, lamps, o[n]):
                 break
-            # Tiles beside one another see parts of the sun that are far apart.
             for a in range(3):
-                w[n, a] = suns[(q % 8 * 9 + q // 8) * SUNS + number, a]
+                w[n, a] = suns[first * SUNS + number, a]
             if meets_box(o[n], w[n], hull) and meets_box(o[n], w[n], parts):
                 ray[n], asker[n] = pixel + number, many + k
                 n += 1

@@ -20,6 +20,9 @@ Points = Float[np.ndarray, "N 3"]
 Distances = Float[np.ndarray, " N"]
 Field = Callable[[Points], Distances]
 """From points [m] to signed distances [m]."""
+SLOPE = 3.0
+"""Values of a field over distances from its surface, at most [-]: 1 where they are distances, more
+about ellipsoids and stretched rings."""
 
 
 def _length(v: Points) -> Distances:
@@ -166,8 +169,7 @@ def _march(f: Field, sampling: Sampling) -> tuple[np.ndarray, np.ndarray]:
         np.arange(a - 2.318 * step, b + 3 * step, step)
         for a, b in zip(sampling.low, sampling.high, strict=True)
     ]
-    grid = np.stack(np.meshgrid(*axes, indexing="ij"), -1).reshape(-1, 3)
-    values = f(grid).reshape([len(a) for a in axes])
+    values = near_surface(f, axes, step)
     if min(np.take(values, end, axis).min() for axis in range(3) for end in (0, -1)) < 0:
         raise ValueError(
             f"The surface leaves the box {sampling.low} to {sampling.high} m and would stay open. "
@@ -177,3 +179,32 @@ def _march(f: Field, sampling: Sampling) -> tuple[np.ndarray, np.ndarray]:
         values, 0.0, spacing=(step, step, step), gradient_direction="descent"
     )
     return weld(v + np.array([a[0] for a in axes]), faces)
+
+
+def near_surface(f: Field, axes: Sequence[np.ndarray], step: float) -> Float[np.ndarray, "X Y Z"]:
+    """Values of a field on a grid, exact in every cell that its surface could go through.
+
+    Every second point along each axis is asked first. Where the values at all eight about a place
+    are so large that no surface can be between them (see ``SLOPE``), one of them does for the
+    points between.
+    """
+    # One more than the grid has, so that every point lies between two.
+    coarse = [a[0] + 2 * step * np.arange(len(a) // 2 + 1) for a in axes]
+    far = _asked(f, *np.meshgrid(*coarse, indexing="ij"))
+    reach, least = SLOPE * np.sqrt(3) * step, np.abs(far)
+    shape = [len(a) for a in axes]
+    values, near = np.empty(shape), np.zeros(shape, bool)
+    # Of the eight points about a cell of 2 x 2 x 2, the one that is nearest to the surface.
+    for axis in range(3):
+        least = np.minimum(least, np.roll(least, -1, axis))
+    cells = tuple(np.arange(n) // 2 for n in shape)
+    near[:] = least[np.ix_(*cells)] <= reach
+    values[:] = far[np.ix_(*cells)]
+    places = np.nonzero(near)
+    values[near] = _asked(f, *(a[k] for a, k in zip(axes, places, strict=True)))
+    return values
+
+
+def _asked(f: Field, *place: np.ndarray) -> np.ndarray:
+    """Values of a field at places [m] given axis by axis."""
+    return f(np.stack(place, -1).reshape(-1, 3)).reshape(place[0].shape)

@@ -29,6 +29,7 @@ from corporeal.render.camera_track import Reel, first_contact, track
 from corporeal.render.embree import Stage
 from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, row_of, shades, si
 from corporeal.render.film_picture import FilmCaster
+from corporeal.render.held import Held
 from corporeal.render.liquid_surface import LiquidSurface, surface_of
 from corporeal.render.pace import between, instants, is_slow
 from corporeal.render.sightlines import clear_view
@@ -116,7 +117,7 @@ def film(
     places = instants(trajectory.time, config.slow, about)
     times, caster = [], FilmCaster()
     with video.reel(folder / FILM, fps, size, credit) as made:
-        for number, scenery in enumerate(_sceneries(troupe, trajectory, places)):
+        for number, scenery in enumerate(_sceneries(troupe, trajectory, places, camera.at)):
             picture = scenery.picture(caster, camera.at(scenery.time), config.quality)
             picture = picture if paint is None else paint.keyed(picture)
             _keep(picture, number, len(places), config, folder)
@@ -153,7 +154,7 @@ def _close_up(
     caster = FilmCaster()
     pictures = [
         scenery.picture(caster, camera.at(scenery.time), config.quality)
-        for scenery in _sceneries(troupe, trajectory, places)
+        for scenery in _sceneries(troupe, trajectory, places, camera.at)
     ]
     row_of(pictures, [f"{t:.3f} s" for t in times.tolist()], folder / CLOSE_UP)
 
@@ -386,8 +387,14 @@ class _Troupe:
     paint: _Paint | None
     liquids: Liquids
 
-    def at(self, number: int, frame: Frame) -> _Scenery:
-        stage = self.stage.posed(*self.skin.pose(frame))
+    @property
+    def holds(self) -> bool:
+        """Whether its surfaces in their pose are all that there is to see."""
+        painted = self.paint is not None and self.paint.of_particle is None
+        return self.puppet is None and not self.liquids.bodies and not painted
+
+    def at(self, number: int, frame: Frame, pose: tuple[np.ndarray, np.ndarray]) -> _Scenery:
+        stage = self.stage.posed(*pose)
         colour = None if self.paint is None else self.paint.at(number)
         if self.puppet is not None:
             return _Scenery(stage.shadows(), self.puppet.at(frame, colour), frame.time)
@@ -404,23 +411,37 @@ class _Troupe:
 
 
 def _sceneries(
-    troupe: _Troupe, trajectory: Trajectory, places: Float[np.ndarray, " N"]
+    troupe: _Troupe,
+    trajectory: Trajectory,
+    places: Float[np.ndarray, " N"],
+    aim_at: Callable[[float], Aim],
 ) -> Iterator[_Scenery]:
     """Every picture's scenery in order; the next one is made ready while one is drawn.
+
+    Where nothing moves by what could be seen, the stage is the one before.
 
     Args:
         troupe: All that moves.
         trajectory: How.
         places: Of the pictures among the frames: see ``render.pace``.
+        aim_at: Where the camera is at a time [s].
 
     """
+    held, made = Held(aim_at), None
 
     def ready(place: float) -> _Scenery:
+        nonlocal made
         first = int(place)
         frame = trajectory.frames[first]
         if place > first:
             frame = between(frame, trajectory.frames[first + 1], place - first)
-        return troupe.at(round(place), frame)
+        pose = troupe.skin.pose(frame)
+        moved = held.moved(*pose, frame.time)
+        if made is None or moved or not troupe.holds:
+            made = troupe.at(round(place), frame, pose)
+        else:
+            made = replace(made, time=frame.time)
+        return made
 
     with ThreadPoolExecutor(1) as ahead:
         coming = ahead.submit(ready, float(places[0]))

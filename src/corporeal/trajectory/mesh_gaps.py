@@ -14,7 +14,7 @@ from jaxtyping import Bool, Float, Int
 from corporeal.findings import PairSurfaces
 from corporeal.geometry.mesh import Mesh, joined
 from corporeal.geometry.rigid_fit import RigidFit, angle, rigid_fit
-from corporeal.geometry.shape import Shape
+from corporeal.geometry.shape import Crossings, Shape
 from corporeal.geometry.spread import sample_surface
 from corporeal.render.skin import Skin, bind_points
 from corporeal.types import Frame, Particles, Scene, Trajectory
@@ -154,15 +154,20 @@ def finer(mesh: Mesh, edge: float) -> Mesh:
 
 def _halved(mesh: Mesh, edge: float) -> Mesh | None:
     """Cut edges that are the longest of all their triangles, once; None: none is too long."""
-    vertices, triangles = mesh.vertices, mesh.triangles
+    vertices = mesh.vertices
+    corners = mesh.corners
+    sides = corners - np.roll(corners, -1, axis=1)
+    long = np.flatnonzero((np.linalg.norm(sides, axis=2) > edge).any(axis=1))
+    if not len(long):
+        return None
+    # What has no long edge has none that is cut.
+    triangles = mesh.triangles[long]
     ends = np.sort(np.stack([triangles, np.roll(triangles, -1, axis=1)], axis=2), axis=2)
     # One number per edge: rows are sorted twenty times slower.
     key, of_side = np.unique(ends[..., 0] * len(vertices) + ends[..., 1], return_inverse=True)
     unique = np.stack(np.divmod(key, len(vertices)), axis=1)
     of_side = of_side.reshape(-1, 3)
     length = np.linalg.norm(vertices[unique[:, 0]] - vertices[unique[:, 1]], axis=1)
-    if not (length > edge).any():
-        return None
     rank = np.empty(len(length), dtype=np.int64)
     rank[np.argsort(length, kind="stable")] = np.arange(len(length))
     side = np.argmax(rank[of_side], axis=1)
@@ -177,7 +182,7 @@ def _halved(mesh: Mesh, edge: float) -> Mesh | None:
     halves = [np.stack([a, m, c], axis=1), np.stack([m, b, c], axis=1)]
     return Mesh(
         np.concatenate([vertices, vertices[unique[cut]].mean(axis=1)]),
-        np.concatenate([np.delete(triangles, halved, axis=0), *halves]),
+        np.concatenate([np.delete(mesh.triangles, long[halved], axis=0), *halves]),
     )
 
 
@@ -328,29 +333,24 @@ class Walk:
         if not near.any():
             return found
         body = Shape(Mesh(box, mesh.triangles))
-        way = there[near] - last[near]
-        length = np.linalg.norm(way, axis=1)
-        ray, along, side = body.crossings(last[near], way / length[:, None])
-        met = along < length[ray]
-        into = np.bincount(ray[met & (side > 0)], minlength=len(way))
-        out = np.bincount(ray[met & (side < 0)], minlength=len(way))
+        met, count = body.crossings(last[near], there[near]), int(np.count_nonzero(near))
+        into = np.bincount(met.way[met.side > 0], minlength=count)
+        out = np.bincount(met.way[met.side < 0], minlength=count)
         if not self.other.closed:
             found[near] = (into + out) % 2 == 1
             return found
-        found[near] = (into > 0) & (out > 0) & self._opposite(body, last[near], way, ray[met])
+        found[near] = (into > 0) & (out > 0) & self._opposite(body, met, count)
         return found
 
     @staticmethod
-    def _opposite(
-        body: Shape, last: np.ndarray, way: np.ndarray, ray: np.ndarray
-    ) -> Bool[np.ndarray, " N"]:
+    def _opposite(body: Shape, met: Crossings, count: int) -> Bool[np.ndarray, " N"]:
         """Whether the first face that each way meets looks against the last one."""
-        answer = np.zeros(len(way), dtype=bool)
-        for k in np.unique(ray).tolist():
-            ends = np.stack([last[k], last[k] + way[k]])
-            ahead = np.stack([way[k], -way[k]]) / np.linalg.norm(way[k])
-            first, final = body.hit(ends, ahead).tolist()
-            if min(first, final) >= 0:
-                normals = body.mesh.normals
-                answer[k] = float(normals[first] @ normals[final]) < 0.0
+        answer = np.zeros(count, dtype=bool)
+        if not len(met.way):
+            return answer
+        normals = body.mesh.normals
+        for k in np.unique(met.way).tolist():
+            share, faces = met.share[met.way == k], met.triangle[met.way == k]
+            first, final = faces[np.argmin(share)], faces[np.argmax(share)]
+            answer[k] = float(normals[first] @ normals[final]) < 0.0
         return answer
