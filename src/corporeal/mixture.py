@@ -5,6 +5,7 @@ Draws of the whole scene are weighed; an estimate of an object's mass made witho
 inside measured ranges, and its parts fit each other.
 """
 
+from collections import Counter
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
@@ -293,14 +294,14 @@ class _Own:
 
     def _answers(self) -> tuple[AnsweredMass, ...]:
         """Say what each of several answers comes to by itself; its draws are every N-th."""
-        answers = self.words.answers
-        return tuple(
-            AnsweredMass(
-                mass=float(np.median(self.masses[k :: len(answers)])),
-                judged=answer.evidence.likely if answer.evidence else None,
-            )
-            for k, answer in enumerate(answers)
-        )
+        found, count = [], len(self.words.answers)
+        for k, answer in enumerate(self.words.answers):
+            masses = self.masses[k::count]
+            low, mass, high = quantiles(masses, np.full(len(masses), 1 / len(masses)))
+            ((words, often),) = Counter(self.labels[k::count]).most_common(1)
+            judged = answer.evidence.likely if answer.evidence else None
+            found.append(AnsweredMass(mass, judged, low, high, words, often / len(masses)))
+        return tuple(found)
 
     def _hypotheses(self) -> tuple[WeighedHypothesis, ...]:
         labels = np.array(self.labels)

@@ -705,6 +705,14 @@ class AnsweredMass:
     """Median over its own ways and ranges, without outside evidence [kg]."""
     judged: float | None
     """What it was judged to weigh outright [kg]; None: nobody was asked, or no usable answer."""
+    low: float = 0.0
+    """5 % [kg]; 0, as ``high``: older runs did not keep it."""
+    high: float = 0.0
+    """95 % [kg]."""
+    words: str = ""
+    """Its likeliest way, as in ``WeighedHypothesis``; "": older runs did not keep it."""
+    probability: float = 0.0
+    """How likely it takes that way to be, in [0, 1]."""
 
 
 @dataclass(frozen=True)

@@ -12,7 +12,6 @@ from corporeal.materials.listing import materials_json
 from corporeal.mixture import Scale, drawn_given, quantiles, weighed
 from corporeal.stages.describe import describe
 from corporeal.stages.ground import GroundConfig, ground
-from corporeal.stages.report import weighed as in_the_report
 from corporeal.stages.segment import segment
 from corporeal.types import (
     Account,
@@ -200,15 +199,14 @@ def test_how_much_of_a_scan_is_real_pools_as_masses_do():
     assert words.swelling.low < 0.5 < 0.8 < words.swelling.high
 
 
-def test_the_report_and_the_list_of_materials_say_how_far_answers_lie_apart():
+def test_the_list_of_materials_says_what_each_answer_comes_to():
     answers = (account(SOLID, evidence=judged(4.0)), account(HOLLOW, evidence=judged(2.0)))
     mixture, scale, inventory = weigh(*answers)
-    page = in_the_report([mixture])
-    assert "2 answers, alone 4." in page
-    assert "judged 4, 2 kg (2.00)" in page
-    assert "answers, alone" not in in_the_report([replace(mixture, answers=())])
     field = ground(scale.scene, scale.parts, inventory, GroundConfig())
     (row,) = materials_json(replace(field, mixtures=(mixture,)), scale.parts)["masses"]
     assert [a["judged"] for a in row["answers"]] == [4.0, 2.0]
+    assert [a["words"] for a in row["answers"]] == ["ball: steel, solid", "ball: steel, hollow"]
+    assert [a["probability"] for a in row["answers"]] == [1.0, 1.0]
+    assert all(a["low"] < a["mass"] < a["high"] for a in row["answers"])
     alone = replace(field, mixtures=(replace(mixture, answers=()),))
     assert "answers" not in materials_json(alone, scale.parts)["masses"][0]

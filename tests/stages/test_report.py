@@ -7,24 +7,20 @@ from corporeal import materials
 from corporeal.stages.describe import describe
 from corporeal.stages.fill import fill
 from corporeal.stages.ground import ground
-from corporeal.stages.report import Story, asked, built, others, report, si, simulated, weighed
+from corporeal.stages.report import Story, asked, built, others, report, si, simulated
 from corporeal.stages.segment import segment
 from corporeal.types import (
     NOTHING_ASKED,
-    Evidence,
     Film,
     Hypothesis,
     Law,
-    MassMixture,
     Material,
     ObjectWords,
     PartWords,
     Placement,
-    PrintedFact,
     Structure,
     Treatment,
     Usage,
-    WeighedHypothesis,
 )
 from handmade import plain, scene
 from made_findings import run_audit
@@ -74,20 +70,6 @@ def test_what_a_part_may_be_instead_and_what_was_told_apart_in_it_is_told():
         " Alternatives: ABS (30%). Components: head: steel (25% of the volume)."
     )
     assert others(PartWords("hammer", "hardwood")) == ""
-
-
-def test_the_leading_two_ways_and_what_was_said_of_a_mass_stand_beside_it():
-    ways = [WeighedHypothesis(f"way {k}", 0.5 - 0.1 * k, 0.2, 1.0 + k) for k in range(3)]
-    printed = (PrintedFact("net weight", 0.453, "Net Wt 1 lb"),)
-    said = Evidence(0.4, 0.49, 0.6, "It says so.", printed)
-    told = weighed([MassMixture("box_0", 0.5, 0.4, 0.6, 0.7, 0.3, 1.2, tuple(ways), said, "Far.")])
-    for words in (
-        "0.5 (0.4 to 0.6)", "0.7 (0.3 to 1.2)", "0.49 (0.4 to 0.6)", "Net Wt 1 lb", "<b>Far.</b>",
-        "way 0: 1 kg (50%; before 20%)", "way 1: 2 kg (40%; before 20%)",
-    ):  # fmt: skip
-        assert words in told
-    assert "way 2" not in told
-    assert weighed([]) == ""
 
 
 TOOK = Usage(("openai:x",), 9, 11, 20500, 1200, 43.2, 0.0693, "2026-11-21")

@@ -1,7 +1,7 @@
 """Words that a name writes together, apart, or with a letter too few."""
 
 import re
-from collections.abc import Container, Mapping, Sequence
+from collections.abc import Callable, Container, Mapping, Sequence
 from dataclasses import dataclass
 
 from corporeal.geometry.identity import plain
@@ -14,6 +14,13 @@ DOUBTFUL = 5
 """Letters of the shortest word whose spelling is mended."""
 REAL = frozenset(("canon",))
 """Right words that a doubled letter would make another of."""
+PLURALS = (
+    ("ie", "y"), ("ve", "f"), ("ve", "fe"), ("se", "s"), ("xe", "x"), ("ze", "z"), ("che", "ch"),
+    ("she", "sh"), ("oe", "o"),
+)  # fmt: skip
+"""How plurals without their s end, and what stands for it in the singular: "cherrie", "knive"."""
+OTHERWISE = frozenset(("glasses", "ashes"))
+"""Plurals that mean something else, but in a phrase: glasses are no glass, wine glasses are."""
 
 
 @dataclass(frozen=True)
@@ -60,6 +67,37 @@ def spelt(words: Sequence[str], known: Vocabulary) -> list[str]:
     """
     right = [mended(word, known) for word in words]
     return [part for word in _together(right, known) for part in _apart(word, known)]
+
+
+def singulars(
+    words: Sequence[str], known: Vocabulary, without_s: Callable[[str], str]
+) -> list[str]:
+    """Return words in the singular: ``["wine", "glasses"]`` gives ``["wine", "glass"]``.
+
+    What a plural in -ies, -ves or -es is of has to be known; of any other the s is cut.
+
+    Args:
+        words: Of a name.
+        known: The words that there are.
+        without_s: Cuts the s of a plural.
+
+    """
+    found: list[str] = []
+    for word in words:
+        found.append(_singular(word, found[-1] if found else "", known, without_s))
+    return found
+
+
+def _singular(word: str, before: str, known: Vocabulary, without_s: Callable[[str], str]) -> str:
+    shorter = without_s(word)
+    ways = [shorter.removesuffix(a) + b for a, b in PLURALS if shorter.endswith(a)]
+    if word in OTHERWISE:
+        return next((way for way in ways if before + way in known.joined), shorter)
+    if shorter == word:  # it may end as a singular does: taxis as tennis
+        ways = [] if word in known.words else [word.removesuffix("s")]
+    elif shorter in known.words or shorter in known.joined:
+        return shorter
+    return next((way for way in ways if way in known.words or way in known.joined), shorter)
 
 
 def unaccented(word: str, known: Container[str]) -> str:

@@ -42,3 +42,8 @@ def figure(caption: str, address: str) -> str:
     """Show a picture with its caption."""
     image = f'<img src="{address}" alt="{safe(caption)}">'
     return f"<figure>{image}<figcaption>{safe(caption)}</figcaption></figure>"
+
+
+def cells(*texts: str, wrap: bool = False) -> str:
+    """Put ready HTML into cells of a table's row, in one line each unless it may wrap."""
+    return "".join(f"<td>{t}</td>" if wrap else f'<td class="n">{t}</td>' for t in texts)

@@ -14,13 +14,13 @@ from corporeal.findings import Breakage, Expectation, RunAudit
 from corporeal.geometry.sizes import how_heavy, how_scaled
 from corporeal.materials.scale import fraction_of, logarithmic
 from corporeal.mpm.laws import MENU
-from corporeal.render.page import figure, inlined, page, safe
+from corporeal.render.mass_tables import weighed
+from corporeal.render.page import cells, figure, inlined, page, safe
 from corporeal.render.subject import parts_named
 from corporeal.trajectory.audit_words import breakage_words, equilibrium_words
 from corporeal.types import (
     Film,
     Ground,
-    MassMixture,
     Material,
     MaterialField,
     Particles,
@@ -74,8 +74,6 @@ CHOSEN = {
 }
 LONG_REASON = 60
 """Letters of a reason that is not printed at every value."""
-WAYS_SHOWN = 2
-"""Ways an object may be, of those that were drawn."""
 
 
 @dataclass(frozen=True)
@@ -136,7 +134,7 @@ def _summary(story: Story) -> str:
         f"{len(scene.objects)} object{'s' * (len(scene.objects) != 1)} ({objects}), "
         f"{len(field.materials)} part{'s' * (len(field.materials) != 1)}, "
         f"{scene.duration:g} s simulated with {story.particles.count:,} particles.",
-        _looked(story.audit.questions)
+        _looked(story.audit.questions, max((len(m.answers) for m in field.mixtures), default=0))
         if seen
         else "No vision-language model was asked: materials come from annotations and from "
         "metadata of the file.",
@@ -154,9 +152,10 @@ def _summary(story: Story) -> str:
     return " ".join(sentences)
 
 
-def _looked(questions: Usage) -> str:
-    """Say who chose the materials from pictures."""
-    return f"Materials were recognised in pictures by {safe(_answerers(questions))}."
+def _looked(questions: Usage, answers: int) -> str:
+    """Say who chose the materials from pictures, and how often, where more often than once."""
+    times = f", asked for {answers} answers each" if answers else ""
+    return f"Materials were recognised in pictures by {safe(_answerers(questions))}{times}."
 
 
 def _answerers(questions: Usage) -> str:
@@ -231,59 +230,6 @@ def _expectations(expectations: Sequence[Expectation]) -> str:
 # ---------------------------------------------------------------- tables
 
 
-def weighed(mixtures: Sequence[MassMixture]) -> str:
-    """Lay out what each object may weigh, the two likeliest ways it may be, and the evidence."""
-    if not mixtures:
-        return ""
-    rows = "".join(_mixture_row(m) for m in mixtures)
-    return (
-        "<h2>Masses over all ways the objects may be</h2>"
-        '<p class="lead">Median and 90 % interval over the ways the objects may be, the measured '
-        "ranges and what the meshes leave open, at real size. Estimates of masses made without the "
-        "library reweight the ways; they set no value.</p>"
-        '<div class="wide"><table><tr><th>object</th><th>mass [kg]</th>'
-        "<th>without outside evidence [kg]</th><th>likeliest ways</th><th>estimate of its mass [kg]"
-        f"</th><th>printed on it</th></tr>{rows}</table></div>"
-    )
-
-
-def _mixture_row(m: MassMixture) -> str:
-    ways = "<br>".join(
-        f"{safe(h.words)}: {h.mass:.3g} kg ({h.probability:.0%}; before {h.prior:.0%})"
-        for h in m.hypotheses[:WAYS_SHOWN]
-    )
-    evidence = m.evidence
-    judged = (
-        "–"
-        if evidence is None
-        else f"{evidence.likely:.3g} ({evidence.low:.3g} to {evidence.high:.3g})"
-    )
-    printed = "; ".join(dict.fromkeys(f.words for f in evidence.printed)) if evidence else ""
-    warning = f"{_answers(m)}<br><b>{safe(m.warning)}</b>" if m.warning else _answers(m)
-    cells = (
-        _cells(safe(m.object), f"{m.mass:.3g} ({m.low:.3g} to {m.high:.3g})"),
-        _cells(f"{m.mass_without:.3g} ({m.low_without:.3g} to {m.high_without:.3g})"),
-        _cells(ways + warning, wrap=True),
-        _cells(judged),
-        _cells(safe(printed) or "–", wrap=True),
-    )
-    return f"<tr>{''.join(cells)}</tr>"
-
-
-def _answers(m: MassMixture) -> str:
-    """Say how many answers were given and how far they lie apart; "" where one was."""
-    if not m.answers:
-        return ""
-    alone = [a.mass for a in m.answers]
-    judged = [a.judged for a in m.answers if a.judged]
-    told = f"{len(alone)} answers, alone {', '.join(f'{mass:.3g}' for mass in alone)} kg"
-    told += f" (apart by a factor of {max(alone) / max(min(alone), 1e-300):.2f})"
-    if judged:
-        told += f"; judged {', '.join(f'{mass:.3g}' for mass in judged)} kg"
-        told += f" ({max(judged) / min(judged):.2f})"
-    return f"<br>{told}"
-
-
 def _part_row(story: Story, k: int) -> str:
     part, material = story.parts.catalogue[k], story.field.materials[k]
     treatment, words = story.particles.treatments[k], story.field.words[k]
@@ -296,19 +242,15 @@ def _part_row(story: Story, k: int) -> str:
         yields,
         how_heavy(story.particles.mass_real[k], story.scene.objects[part.object].scale),
     )
-    cells = (
-        _cells(*map(safe, names), wrap=True),
-        _cells(f"<b>{safe(material.name)}</b>"),
-        _cells(WHO[words.answered_by], MENU[material.law].full_name, wrap=True),
-        _cells(*numbers),
-        _cells(safe(built(story.field.structures[k])), safe(treatment.kind), wrap=True),
-        _cells(simulated(treatment), wrap=True),
+    row = (
+        cells(*map(safe, names), wrap=True),
+        cells(f"<b>{safe(material.name)}</b>"),
+        cells(WHO[words.answered_by], MENU[material.law].full_name, wrap=True),
+        cells(*numbers),
+        cells(safe(built(story.field.structures[k])), safe(treatment.kind), wrap=True),
+        cells(simulated(treatment), wrap=True),
     )
-    return f"<tr>{''.join(cells)}</tr>"
-
-
-def _cells(*texts: str, wrap: bool = False) -> str:
-    return "".join(f"<td>{t}</td>" if wrap else f'<td class="n">{t}</td>' for t in texts)
+    return f"<tr>{''.join(row)}</tr>"
 
 
 def built(structure: Structure) -> str:

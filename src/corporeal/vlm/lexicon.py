@@ -8,7 +8,14 @@ from functools import cache, lru_cache
 from importlib.resources import files
 
 from corporeal.formats.other_languages import in_english
-from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt, unaccented
+from corporeal.formats.spelling import (
+    Vocabulary,
+    by_squeezing,
+    mended,
+    singulars,
+    spelt,
+    unaccented,
+)
 from corporeal.formats.typical_extents import classes
 from corporeal.formats.word_order import part_words, thing_last
 from corporeal.geometry.identity import words
@@ -152,8 +159,8 @@ def tokens_of(name: str) -> tuple[str, ...]:
     """Return a name's words in English and the singular, without what exporters write."""
     known = _vocabulary()
     english = in_english(words(name, phrases()))
-    said = [singular(mended(unaccented(w, known.words), known)) for w in english]
-    return tuple(thing_last(spelt(said, known), known, phrases()))
+    said = [mended(unaccented(w, known.words), known) for w in english]
+    return tuple(thing_last(spelt(singulars(said, known, singular), known), known, phrases()))
 
 
 @cache

@@ -39,6 +39,8 @@ WEAKER = 0.6
 """Factor on the margin of what describes the whole object when the part is only one of several."""
 METALLIC = 0.5
 """Metallic value from which most of a surface is metal: a picture's value is its mean."""
+BARE = frozenset("stainless_steel clad_steel cast-iron brass bronze pewter silver".split())
+"""Metals that are seldom painted: beside what is usually of them, a metal's name is no colour."""
 WORKS = "machinery"
 """What a machine's case holds: no goods that somebody takes out."""
 LARGEST_SOLID_CASTING = 0.2
@@ -325,13 +327,16 @@ def _strongest(
     """
     found: list[tuple[tuple[int, int, int, bool], Term, str]] = []
     around = {w for name in thing for w in name.words}
-    nameless = thing and not any(_names_a_thing(name) for name in (*names, *thing))
+    things = [t for n in (*names, *thing) for t in heads(n.words) if t.kind != "substance"]
+    every = around.union(*(name.words for name in names))
+    nameless = thing and not any(_fits(t, finishes, every) for t in things)
     shiny = any(f.metallic > METALLIC for f in finishes)
     of_metal = {t.metallic for name in thing for t in heads(name.words) if t.metallic}
+    bare = any(t.kind == "thing" and t.material in BARE for t in things)
     for name in names:
         for term in _adjectives(name):
             if term.colour and not shiny:
-                if not (term.seldom and (nameless or term.material in of_metal)):
+                if not (term.seldom and (nameless or bare or term.material in of_metal)):
                     continue
                 term = replace(term, margin=term.margin * WEAKER)
             if term.kind in kinds and _fits(term, finishes, around | set(name.words)):
@@ -347,11 +352,6 @@ def _strongest(
     kept = [(s, n) for s, n in strongest if not materials & set(s.gives_way)]
     kept.sort(key=lambda pair: -pair[0].margin)
     return _particular([s for s, _ in kept]), kept[0][1]
-
-
-def _names_a_thing(name: Name) -> bool:
-    """Whether a name has a word for an object, or a piece of one."""
-    return any(s.kind != "substance" for s in heads(name.words))
 
 
 def _adjectives(name: Name) -> list[Term]:

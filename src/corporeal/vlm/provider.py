@@ -10,7 +10,7 @@ import io
 import os
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from functools import cache
 from threading import Lock, Thread
@@ -33,6 +33,7 @@ from pydantic_ai.exceptions import (
     ModelRequestTimeout,
     ModelServerError,
     ModelUnavailableError,
+    ToolRetryError,
 )
 from pydantic_ai.models import Model, create_async_httpx2_client
 from pydantic_ai.profiles import ModelProfile
@@ -324,9 +325,26 @@ class Live(ABC):
     def _plain(self, error: Exception) -> str:
         """Say in one short line what went wrong, without the key."""
         secret = self._secret()
-        words = " ".join(str(error).split())
+        words = " ".join((_unfit(error) or str(error)).split())
         words = words if secret == NO_KEY else words.replace(secret, "[key]")
         return f"{self.address.spec}: {words if len(words) <= 200 else f'{words[:197]}...'}"
+
+
+def _unfit(error: Exception) -> str:
+    """Say what did not fit in the last of several tries to answer; "": it failed otherwise."""
+    last = error.__cause__
+    if not isinstance(last, ToolRetryError):
+        return ""
+    said = last.tool_retry.content
+    if isinstance(said, list):
+        rows = [row for row in said if isinstance(row, dict)]
+        said = "; ".join(f"{_place(row.get('loc', ()))}: {row.get('msg', '')}" for row in rows)
+    return f"no answer fits, also when asked again; of the last: {said}"
+
+
+def _place(path: Sequence[str | int]) -> str:
+    """Name a place within an answer: "answer.parts.0.material"."""
+    return ".".join(map(str, ("answer", *path)))
 
 
 class OpenAI(Live):

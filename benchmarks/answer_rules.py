@@ -1,0 +1,118 @@
+"""Compare rules for several answers about masses: who weighs the draws, and how wide they make it.
+
+    python benchmarks/answer_rules.py FOLDER --truth masses.csv --recordings SET ...
+
+The two rules of decision 86 beside the product's, over the same draws of ``--answers 3``. Objects
+are models of one object each, pictured without names, as in ``evaluate mass``.
+"""
+
+import argparse
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from jaxtyping import Float
+from scipy.stats import norm, t
+
+from corporeal.description.describe_config import DescribeConfig
+from corporeal.evaluation.mass import anonymous
+from corporeal.evaluation.truth import Weighed, read_truth
+from corporeal.geometry.arrangement import life_sized
+from corporeal.mixture import DRAWS, HIGH, Scale, likelihood, quantiles
+from corporeal.stages.assemble import assemble
+from corporeal.stages.describe import describe
+from corporeal.stages.ground import GroundConfig
+from corporeal.stages.segment import segment
+from corporeal.types import Evidence
+
+ANSWERS = 3
+MISS = 2 / (2 * (1 - HIGH))
+"""What lying outside a 90 % interval costs in its score, per unit of the logarithm."""
+
+
+@dataclass(frozen=True)
+class Drawn:
+    """One object's draws, taken from its answers in turn, and what was said of its mass."""
+
+    truth: float
+    """On the scales [kg]."""
+    masses: Float[np.ndarray, " N"]
+    """Of the draws [kg]."""
+    pooled: Evidence | None
+    own: tuple[Evidence | None, ...]
+    """Of each answer."""
+
+    def weights(self, evidence: bool, by_its_own: bool) -> Float[np.ndarray, " N"]:
+        """Return what each draw counts; they add up to 1."""
+        found = np.full(len(self.masses), 1 / len(self.masses))
+        if evidence and by_its_own:
+            for k, said in enumerate(self.own):
+                found[k :: len(self.own)] *= likelihood(self.masses[k :: len(self.own)], said)
+        elif evidence:
+            found *= likelihood(self.masses, self.pooled)
+        return found / found.sum()
+
+    def interval(self, weights: Float[np.ndarray, " N"], few: bool) -> tuple[float, float, float]:
+        """Return the 5 %, 50 % and 95 % points [kg]; ``few``: as wide as so few answers say.
+
+        Each half h of the interval of ln m becomes √(h² + s² (t² (1 + 1/N) - z² (N-1)/N)), s the
+        deviation of the answers' medians: what the draws hold of the variance between answers is
+        taken out, and what a further answer would say is put in.
+        """
+        low, middle, high = quantiles(self.masses, weights)
+        if not few:
+            return low, middle, high
+        n = len(self.own)
+        each = [(self.masses[k::n], weights[k::n] / weights[k::n].sum()) for k in range(n)]
+        between = float(np.var([np.log(quantiles(*one)[1]) for one in each], ddof=1))
+        wider = t.ppf(HIGH, n - 1) ** 2 * (1 + 1 / n) - norm.ppf(HIGH) ** 2 * (n - 1) / n
+        reach = np.sqrt(between * wider)
+        down, up = np.hypot(np.log(middle / low), reach), np.hypot(np.log(high / middle), reach)
+        return middle * float(np.exp(-down)), middle, middle * float(np.exp(up))
+
+
+def drawn(thing: Weighed, recordings: Path) -> Drawn:
+    """Draw what an object may weigh by recorded answers, as ``evaluate mass`` does."""
+    scene = anonymous(life_sized(assemble([thing.file])), thing.file)
+    said = describe(scene, DescribeConfig(vlm=f"replay:{recordings}", answers=ANSWERS))
+    scale = Scale(scene, segment(scene, said), GroundConfig(), 0)
+    masses = np.array([scale.draw(said, number).masses.sum() for number in range(DRAWS)])
+    (words,) = said.objects
+    assert thing.mass is not None, "only measured things are drawn"
+    return Drawn(thing.mass, masses, words.evidence, tuple(a.evidence for a in words.answers))
+
+
+def row(things: Sequence[Drawn], evidence: bool, by_its_own: bool, few: bool) -> str:
+    """Return ALDE, how many lie inside, the median width and the mean interval score."""
+    found = [one.interval(one.weights(evidence, by_its_own), few) for one in things]
+    low, middle, high = np.log(found).T
+    truth = np.log([one.truth for one in things])
+    inside = int(((low <= truth) & (truth <= high)).sum())
+    outside = np.maximum(low - truth, 0) + np.maximum(truth - high, 0)
+    score = float(np.mean(high - low + MISS * outside))
+    error, width = float(np.abs(middle - truth).mean()), float(np.exp(np.median(high - low)))
+    return f"ALDE {error:.3f}, inside {inside} of {len(things)}, × {width:.2f}, score {score:.2f}"
+
+
+def main() -> None:
+    """Print one line per set, rule, and with or without outside evidence."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("folder", type=Path)
+    parser.add_argument("--truth", type=Path, required=True)
+    parser.add_argument("--recordings", type=Path, nargs="+", required=True)
+    asked = parser.parse_args()
+    for recordings in asked.recordings:
+        rows = [one for one in read_truth(asked.folder, asked.truth) if one.mass is not None]
+        things = [drawn(one, recordings) for one in rows]
+        for evidence in (True, False):
+            said = "with evidence" if evidence else "without"
+            for own, few in ((False, False), (True, False), (False, True), (True, True)):
+                if own and not evidence:
+                    continue
+                rule = " and ".join(["A"] * own + ["B"] * few) or "the product's"
+                print(f"{recordings.name} {said}, {rule}: {row(things, evidence, own, few)}")
+
+
+if __name__ == "__main__":
+    main()
