@@ -796,6 +796,8 @@ class Treatment:
     why: str
     loss: float = 0.0
     """Simulated loss factor [-]: its material's, less what the grid takes of a blow by itself."""
+    vibration: float = 0.0
+    """About which angular frequency it loses so much [rad/s]; 0: its object's slowest vibration."""
 
 
 @dataclass(frozen=True)

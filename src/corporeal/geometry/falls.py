@@ -1,7 +1,9 @@
 """How far objects are from what they may hit."""
 
+from dataclasses import dataclass
+
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Float, Int
 
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.shape import Shape
@@ -10,19 +12,34 @@ LOWEST = 400
 """Points of an object that look down."""
 
 
-def drop_heights(meshes: list[Mesh], rng: np.random.Generator) -> Float[np.ndarray, " B"]:
-    """Free height below each object, down to the nearest other object or the floor z = 0 [m]."""
-    heights = []
+FLOOR = -1
+"""Stands for the floor among the numbers of objects."""
+
+
+@dataclass(frozen=True)
+class Falls:
+    """How far each of B objects can fall straight down, and onto what."""
+
+    height: Float[np.ndarray, " B"]
+    """Free height below it [m]."""
+    onto: Int[np.ndarray, " B"]
+    """Number of the object that ends it, or ``FLOOR``."""
+
+
+def falls(meshes: list[Mesh], rng: np.random.Generator) -> Falls:
+    """Measure free heights, down to the nearest other object or the floor z = 0."""
+    heights, ends = [], []
     for number, mesh in enumerate(meshes):
         used = mesh.vertices[np.unique(mesh.triangles)]
-        others = [m for k, m in enumerate(meshes) if k != number]
         looking = used[np.argsort(used[:, 2])[:LOWEST]]
         spread = used[rng.integers(0, len(used), LOWEST)]
         points = np.concatenate([looking, spread])
-        free = points[:, 2].copy()
-        for other in others:
+        free, onto = float(points[:, 2].min()), FLOOR
+        for other in (k for k in range(len(meshes)) if k != number):
             down = np.tile([0.0, 0.0, -1.0], (len(points), 1))
             lift = np.array([0.0, 0.0, 1e-6 * mesh.extent])
-            free = np.minimum(free, Shape(other).reach(points + lift, down))
-        heights.append(max(0.0, float(free.min())))
-    return np.array(heights)
+            reach = float(Shape(meshes[other]).reach(points + lift, down).min())
+            free, onto = (reach, other) if reach < free else (free, onto)
+        heights.append(max(0.0, free))
+        ends.append(onto)
+    return Falls(np.array(heights), np.array(ends, dtype=np.int64))

@@ -108,21 +108,35 @@ def _smooth(body: Striker) -> bool:
 
 
 def _of_bulk(a: Material, b: Material) -> float:
-    """Restitution of two bodies that lose in their bulk alone [-], of each what it stores."""
+    """Restitution of two bodies that lose in their bulk alone [-]."""
+    return rebound(loss_of_pair(a, b))
+
+
+def share(a: Material, b: Material) -> float:
+    """Share of the compliance of a contact, and so of the energy in it, that is ``a``'s [-].
+
+    One force presses both and their dents add up, so that 1/E* = (1 - ν_a²)/E_a + (1 - ν_b²)/E_b
+    (Hertz; Johnson, Contact Mechanics, 1985, §4.2), and each stores its part of the sum.
+    """
     stiff_a, stiff_b = (m.young / (1.0 - m.poisson**2) for m in (a, b))
-    return rebound((stiff_b * a.loss + stiff_a * b.loss) / (stiff_a + stiff_b))
+    return stiff_b / (stiff_a + stiff_b)
+
+
+def loss_of_pair(a: Material, b: Material) -> float:
+    """Loss factor of a contact of two bodies that lose in their bulk [-]: of each its share."""
+    of_a = share(a, b)
+    return of_a * a.loss + (1.0 - of_a) * b.loss
 
 
 def restitution_between(a: Material, b: Material) -> float:
     """Restitution of an unmeasured pair of which one is rough, fibrous or a polymer, or a wall.
 
-    Each body stores energy in proportion to its compliance and returns the share e² of it:
+    Each body stores energy in proportion to its compliance (``share``) and returns e² of it:
     e² = (E_b e_a² + E_a e_b²)/(E_a + E_b), with the plane-strain modulus E/(1 - ν²), so the softer
     body decides (Cross, Am. J. Phys. 68 (2000) 1025, eq. for two bodies in series).
     """
-    stiff_a, stiff_b = (m.young / (1.0 - m.poisson**2) for m in (a, b))
-    squared = stiff_b * a.restitution**2 + stiff_a * b.restitution**2
-    return sqrt(squared / (stiff_a + stiff_b))
+    of_a = share(a, b)
+    return sqrt(of_a * a.restitution**2 + (1.0 - of_a) * b.restitution**2)
 
 
 @cache

@@ -5,12 +5,12 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.geometry.falls import drop_heights
+from corporeal.geometry.falls import falls
 from corporeal.geometry.outer_skin import cross_section
 from corporeal.geometry.survey import Anatomy
 from corporeal.mpm.physics.prescribed import fastest_velocity
 from corporeal.mpm.physics.wind import greatest_acceleration
-from corporeal.treatment.part import Motion
+from corporeal.treatment.part import Landing, Motion
 from corporeal.types import Scene, SceneObject
 
 
@@ -39,10 +39,10 @@ def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: i
 
     """
     gravity = float(np.linalg.norm(scene.gravity))
-    heights = drop_heights([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
+    drops = falls([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
     # Each object by itself.
     horizontal, fall, forced = [], [], []
-    for k, (obj, height) in enumerate(zip(scene.objects, heights, strict=True)):
+    for k, (obj, height) in enumerate(zip(scene.objects, drops.height, strict=True)):
         drive = driven(obj, anatomies[k], masses[k], scene.duration)
         velocity = np.array(obj.velocity) + drive.velocity
         horizontal.append(velocity[:2])
@@ -57,7 +57,8 @@ def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: i
             if j != i:
                 closing = np.linalg.norm(horizontal[i] - horizontal[j])
                 speeds.append(float(np.hypot(max(fall[i], fall[j]), closing)))
-        result.append(Motion(max(speeds), gravity + forced[i], forced[i]))
+        lands = Landing(int(drops.onto[i]), float(fall[i]), masses[i])
+        result.append(Motion(max(speeds), gravity + forced[i], forced[i], lands))
     return result
 
 

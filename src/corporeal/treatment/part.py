@@ -50,6 +50,32 @@ class PartGeometry:
 
 
 @dataclass(frozen=True)
+class Landing:
+    """What an object falls onto."""
+
+    onto: int
+    """Number of the object, or ``geometry.falls.FLOOR``."""
+    speed: float
+    """Of its fall, as it lands [m/s]; 0: it lies there."""
+    mass: float
+    """Of the object [kg]."""
+
+    @property
+    def energy(self) -> float:
+        """Of its fall [J]."""
+        return 0.5 * self.mass * self.speed**2
+
+
+@dataclass(frozen=True)
+class Partner:
+    """What is rigid, or a plane, and meets something soft in a blow."""
+
+    material: Material
+    energy: float
+    """Of the blow [J]."""
+
+
+@dataclass(frozen=True)
 class Motion:
     """What is about to happen to one object."""
 
@@ -59,6 +85,10 @@ class Motion:
     """Largest acceleration: gravity, push and wind [m/s²]."""
     driven: float = 0.0
     """Without gravity [m/s²]."""
+    landing: Landing | None = None
+    """None: it is not known."""
+    partners: tuple[Partner, ...] = ()
+    """What cannot be dented in its blows, and loses its share of them in life."""
 
 
 @dataclass(frozen=True)
@@ -141,6 +171,12 @@ def tube(part: PartGeometry) -> float:
     long, rolled = part.size[2], part.area / (pi * diameter) if diameter > 0 else inf
     hollow = diameter > 4 * thickness
     return diameter if hollow and TUBE * diameter < long and rolled < 3 * long else 0.0
+
+
+def is_flat_wall(part: PartGeometry) -> bool:
+    """Tell whether a wall is one flat sheet, as of a carpet: struck, it is dented across itself."""
+    thickness = part.structure.thickness or 0.0
+    return part.structure.kind == "shell" and part.size[0] < 2 * thickness
 
 
 FOLDED = 5.0

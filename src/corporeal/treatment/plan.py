@@ -12,8 +12,10 @@ from dataclasses import dataclass, replace
 from math import inf
 from typing import Literal
 
+from corporeal.treatment.blow_frequency import tuned_to_blows
 from corporeal.treatment.crown_of_leaves import Judgements, with_plants
 from corporeal.treatment.filled import as_contents
+from corporeal.treatment.lossy_partners import with_partners
 from corporeal.treatment.part import (
     Motion,
     PartGeometry,
@@ -29,7 +31,7 @@ from corporeal.treatment.step_budget import (
     torn_walls,
 )
 from corporeal.treatment.treat import Resolved, Role, treat
-from corporeal.types import Treatment
+from corporeal.types import Material, Treatment
 
 Detail = Literal["draft", "normal", "fine"]
 Stiffness = Literal["true", "capped"]
@@ -86,6 +88,7 @@ def plan(
     motions: Sequence[Motion],
     detail: Detail | Quality,
     stiffness: Stiffness = "true",
+    floor: Material | None = None,
 ) -> Plan:
     """Choose the grid spacing and every part's treatment.
 
@@ -94,6 +97,7 @@ def plan(
         motions: One per object.
         detail: The one knob of quality, or what it buys.
         stiffness: "capped" is the published rule, a control only.
+        floor: What the floor is made of; None: it is not known.
 
     """
     verdicts = [judge(part, motions[part.object]) for part in parts]
@@ -101,12 +105,13 @@ def plan(
     if stiffness == "true":
         judged = with_plants(parts, verdicts)
     while True:
-        draft = _plan(parts, motions, judged, detail, stiffness)
+        met = with_partners(parts, motions, [v.rigid for v in judged.verdicts], floor)
+        draft = _plan(parts, met, judged, detail, stiffness)
         treatments = draft.plan.treatments
-        why = nearer_rigid(parts, motions, judged.verdicts, draft.unslowed, treatments)
+        why = nearer_rigid(parts, met, judged.verdicts, draft.unslowed, treatments)
         why |= torn_walls(parts, judged.verdicts, treatments)
         if stiffness == "capped" or not why:
-            return draft.plan
+            return replace(draft.plan, treatments=tuned_to_blows(parts, motions, treatments))
         verdicts = [
             replace(v, rigid=True, reason=why[k]) if k in why else v
             for k, v in enumerate(judged.verdicts)

@@ -299,7 +299,7 @@ def numbers(material: Material, treatment: Treatment, extent: float) -> dict[str
         "consistency": material.thickness_of_flow,
         "flow_index": material.flow_index,
         "loss": treatment.loss,
-        "vibration": slowest_vibration(treatment, extent),
+        "vibration": treatment.vibration or slowest_vibration(treatment, extent),
     }
 
 

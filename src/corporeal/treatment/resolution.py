@@ -67,7 +67,7 @@ def _plan(bodies: Bodies, accuracy: Accuracy) -> Plan:
     ordered = [geometries[k] for k in sorted(geometries)]
     masses = [sum(bodies.makes[m.part].mass for m in a.members) for a in bodies.anatomies]
     moved = motions(bodies.scene, bodies.anatomies, masses, accuracy.seed)
-    return plan(ordered, moved, accuracy.detail, accuracy.stiffness)
+    return plan(ordered, moved, accuracy.detail, accuracy.stiffness, bodies.field.floor)
 
 
 def _geometry(member: Member, bodies: Bodies, number: int) -> PartGeometry:

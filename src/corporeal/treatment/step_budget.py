@@ -23,7 +23,7 @@ from corporeal.mpm.physics.stability import (
     stable_step,
 )
 from corporeal.treatment.dents import dent_of_blow, dent_of_wall, mark_of_blow
-from corporeal.treatment.part import Motion, PartGeometry, Verdict, is_trinket
+from corporeal.treatment.part import Motion, PartGeometry, Verdict, is_flat_wall, is_trinket
 from corporeal.treatment.rigidity import INVISIBLE_STRAIN
 from corporeal.types import Treatment
 
@@ -298,7 +298,7 @@ def torn_walls(
     found = {}
     for k, (part, verdict, treatment) in enumerate(zip(parts, verdicts, treatments, strict=True)):
         thickness, strong = part.structure.thickness or 0.0, part.material.yield_stress
-        flat = treatment.kind == "shell" and part.size[0] < 2 * thickness
+        flat = treatment.kind == "shell" and is_flat_wall(part)
         if verdict.rigid or not flat or not strong or not treatment.thickness:
             continue
         hold = (treatment.yield_stress or 0.0) * treatment.thickness / (strong * thickness)

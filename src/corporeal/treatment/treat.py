@@ -17,12 +17,14 @@ from corporeal.mpm.physics.stability import (
 )
 from corporeal.treatment.crown_of_leaves import SWAYS
 from corporeal.treatment.filled import as_contents, mean_density
+from corporeal.treatment.lossy_partners import loss_for_both, takes_part
 from corporeal.treatment.part import (
     TUBE,
     Motion,
     PartGeometry,
     Verdict,
     folds,
+    is_flat_wall,
     life_sized,
     rod_ratio,
     tube,
@@ -34,7 +36,7 @@ from corporeal.treatment.rigidity import judge
 from corporeal.treatment.step_budget import (
     wave_speed,
 )
-from corporeal.types import Material, Treatment
+from corporeal.types import Treatment
 
 Role = Literal["soft", "rigid", "frame", "trinket", "crown"]
 """A frame is a rigid inclusion: it holds the softer parts of its object. A trinket is too small to
@@ -51,24 +53,31 @@ class Resolved:
     """Cells across what deforms of it [-]."""
 
 
-def left_of_loss(material: Material, motion: Motion, across: float) -> float:
+def left_of_loss(part: PartGeometry, motion: Motion, across: float) -> float:
     """Loss factor that is left to the matter of what is struck, beside the grid's own share [-].
 
     Contact at nodes and transfers take a share of a blow themselves. It counts on what the material
-    has to take, so that both together are what was measured.
+    has to take, so that both together are what was measured. A solid loses for what is rigid and
+    meets it, too; a wall is dented so much more easily that it does not matter.
 
     Args:
-        material: What is struck.
+        part: What is struck, as its contents where those are simulated.
         motion: Of its object.
         across: Cells across it [-].
 
     """
-    if MENU[material.law].loose:
+    if MENU[part.material.law].loose:
         return 0.0
     if motion.impact_speed == 0.0:
-        return material.loss
-    struck = at_speed(material, motion.impact_speed)
-    return max(0.0, struck.loss - GRID_LOSS / max(across, FEWEST_CELLS) ** 2)
+        return part.material.loss
+    struck = at_speed(part.material, motion.impact_speed)
+    loss = loss_for_both(struck, motion) if dented_across(part) else struck.loss
+    return max(0.0, loss - GRID_LOSS / max(across, FEWEST_CELLS) ** 2)
+
+
+def dented_across(part: PartGeometry) -> bool:
+    """Tell whether a blow dents a part as Hertz has it: no wall but a flat one."""
+    return part.structure.kind == "solid" or is_flat_wall(part)
 
 
 def treat(
@@ -91,7 +100,7 @@ def treat(
         real, strong = young, sqrt(3.0) * material.yield_shear
     # What the grid does not dissipate by itself, and the waves that limit the step.
     shell = structure.kind == "shell" and structure.thickness is not None
-    loss = left_of_loss(material, motion, resolved.across) if soft else 0.0
+    loss = left_of_loss(part, motion, resolved.across) if soft else 0.0
     wave = wave_speed(young * thicker.young, poisson, density, loss) if soft else 0.0
     return Treatment(
         kind=("shell" if shell else "deformable") if soft else "rigid",
@@ -112,6 +121,7 @@ def treat(
                 wall_reason(part, thicker.wall, motion.impact_speed) if soft else "",
                 rod_reason(thicker.rod),
                 bar_reason(part, 2 * cell if soft else 0.0),
+                partner_reason(part, motion) if soft else "",
                 scale_reason(part, motion),
             )
         ),
@@ -228,6 +238,17 @@ def bar_reason(part: PartGeometry, simulated: float) -> str:
     return (
         " It is long and thin, but not one round rod or tube: whether it flexes was judged as for "
         f"a solid bar {1e3 * across:.2g} mm across{grid}."
+    )
+
+
+def partner_reason(part: PartGeometry, motion: Motion) -> str:
+    """Say what else a part loses for; "" where it is nothing."""
+    names = sorted({p.material.name for p in motion.partners if takes_part(part.material, p)})
+    if not names or not dented_across(part) or MENU[part.material.law].loose:
+        return ""
+    return (
+        f" What meets it is rigid here ({', '.join(names)}) and would give way beside it in life: "
+        "its loss factor is that of both, of each by its share of the compliance."
     )
 
 
