@@ -233,10 +233,18 @@ class Program:
 
 def aligned(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
     """Zeros that begin on a cache line."""
-    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
-    raw = np.zeros(size + 64, np.uint8)
-    start = -raw.ctypes.data % 64
-    return raw[start : start + size].view(dtype).reshape(shape)
+    return within(np.zeros(on_lines(shape, dtype), np.uint8), shape, dtype)
+
+
+def on_lines(shape: tuple[int, ...], dtype: np.dtype | type) -> int:
+    """Bytes in which an array that begins on a cache line finds room."""
+    return int(np.prod(shape)) * np.dtype(dtype).itemsize + 64
+
+
+def within(memory: np.ndarray, shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
+    """Lay an array that begins on a cache line into bytes; its ``base`` are these bytes."""
+    start, size = -memory.ctypes.data % 64, on_lines(shape, dtype) - 64
+    return memory[start : start + size].view(dtype).reshape(shape)
 
 
 def _yield_address() -> int:
