@@ -17,6 +17,7 @@ sees them. After it they hold mass, velocity and the velocity as it was.
 """
 
 import ctypes
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -204,14 +205,18 @@ class Program:
         ]
         self.smallest_share = SMALLEST_SHARE
 
-    def divide(self, first: list[int], tasks: int, particles: int) -> None:
-        """Say where each colour's tasks begin, and how many tasks and particles there are."""
+    def employ(self, particles: Iterable[int]) -> int:
+        """Choose how many threads share the particles of some fields."""
+        self.hands = max(1, min(self.threads, sum(particles) // self.smallest_share))
+        return self.hands
+
+    def divide(self, first: list[int], chores: int) -> None:
+        """Say where each colour's chores begin, and how many there are."""
         for row, phase in zip(self.phase, SCHEDULE, strict=True):
             if phase.count in ("bare", "colour", "looks", "reaches"):
                 row[1] = first[phase.which]
             elif phase.count == "turns":
-                row[1] = tasks
-        self.hands = max(1, min(self.threads, particles // self.smallest_share))
+                row[1] = chores
 
     def run(self, resume: bool = False) -> None:
         """Step until a piece says stop, or that a list is full."""
