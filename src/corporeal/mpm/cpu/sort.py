@@ -40,8 +40,9 @@ def sort(memory: Memory, stage: int, low: int, high: int):
     sort_native(memory, stage, low, high)
 
 
-ROOM, MOST_ROOM = 1.0625, 1.25
-"""Of what a sort fills: how much memory it is given, since blocks come and go, and the most."""
+GROWTH_PART, IDLE_PART = 16, 4
+"""Of what a sort fills: by which part more memory it is given, since blocks come and go, and how
+much more it may be given at most."""
 
 
 class Sortable(Protocol):
@@ -74,12 +75,12 @@ class Spare:
         """Give memory for so many batches, which may hold anything, (batches, channels, 8)."""
         shape = (batches, self.channels, 8)
         size, kept = on_lines(shape, np.float32), self.memory
-        if kept.nbytes <= size * MOST_ROOM:
+        if kept.nbytes <= size + size // IDLE_PART:
             self.memory = np.empty(0, np.uint8)
             if size <= kept.nbytes:
                 return within(kept, shape, np.float32)
             del kept  # before new memory is asked for
-        return aligned((int(batches * ROOM), *shape[1:]), np.float32)[:batches]
+        return aligned((batches + batches // GROWTH_PART, *shape[1:]), np.float32)[:batches]
 
     def keep(self, rows: np.ndarray) -> None:
         """Take back memory of ``rows`` or ``aligned`` that nobody needs, if it is the largest."""
