@@ -51,10 +51,16 @@ FULL = Size(
     (1, 2, 4),
 )
 QUICK = Size(20_000, (10_000, 100_000), (16,), (64, 256), 24, (1,))
-PHASED = ((100_000, 1), (100_000, 16), (16_000, 16))
-"""Particles and objects of what is timed phase by phase …"""
-PHASED_QUICK = ((20_000, 1), (16_000, 16))
-"""… and of a quick look."""
+PHASED = (
+    drop_of(100_000),
+    drop_of(100_000, objects=16, heap=True),
+    drop_of(16_000, objects=16, heap=True),
+    drop_of(100_000, objects=16),
+    drop_of(1_000_000),
+)
+"""What is timed phase by phase …"""
+PHASED_QUICK = (drop_of(20_000), drop_of(16_000, objects=16, heap=True))
+"""… and in a quick look."""
 DOCS = Path(__file__).parent.parent / "docs"
 WIDTHS = (16, 6, 2, 16, 10, 3, 24, 8, 8, 5)
 """Of the columns on the screen."""

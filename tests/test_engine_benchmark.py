@@ -103,15 +103,17 @@ def test_a_checkout_costs_what_it_costs(engine):
 
 def test_phases_of_a_heap_add_up_and_contact_costs_nothing_where_there_is_none(engine):
     from cost import phases
+    from cost.blocks import drop_of
 
-    lines = phases.table(((1000, 1), (4000, 8)), 4).splitlines()
+    drops = drop_of(1000), drop_of(4000, objects=8, heap=True)
+    lines = phases.table(drops, 4).splitlines()
     rows = {line.split("|")[1].strip(): line.split("|")[2:-1] for line in lines[2:]}
     values = {name: [float(cell) for cell in cells] for name, cells in rows.items()}
     whole, ratio = values.pop("all"), values.pop("against the first")
     for column in range(2):
         parts = sum(value[column] for value in values.values())
         assert parts == pytest.approx(whole[column], abs=0.05 * len(values))
-    assert values["move"][0] > 0.5 * whole[0]
+    assert values["move"][0] > 0.5 * (whole[0] - values[phases.BETWEEN][0])
     assert values["reach"][0] == 0.0 < values["reach"][1]
     assert ratio[0] == 1.0 < ratio[1]
 

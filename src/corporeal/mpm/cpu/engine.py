@@ -21,7 +21,7 @@ from corporeal.mpm.constants import (
     TINY,
 )
 from corporeal.mpm.cpu import clock as pacing
-from corporeal.mpm.cpu import tables
+from corporeal.mpm.cpu import tables, tasks
 from corporeal.mpm.cpu.contact_memory import ContactMemory, point, rigid_grid
 from corporeal.mpm.cpu.layout import (
     ASTRAY,
@@ -50,7 +50,7 @@ from corporeal.mpm.cpu.shared_field import Carried
 from corporeal.mpm.cpu.sort import Sorter
 from corporeal.mpm.cpu.spring_records import Springs
 from corporeal.mpm.cpu.wind_records import Blows
-from corporeal.mpm.cpu.window import POINTED, Window, node_tasks, particle_tasks, too_wide
+from corporeal.mpm.cpu.window import POINTED, Window, too_wide
 from corporeal.mpm.interaction import Interaction
 from corporeal.mpm.joining import Joined, as_it_runs
 from corporeal.mpm.ledger import Ledger
@@ -84,8 +84,7 @@ class CpuEngine(Interaction):
         self.threads = threads or min(DEFAULT_THREADS, cores())
         self.steps = Steps()
         self.ledger = Ledger.blank(len(problem.bodies), len(problem.planes))
-        counts = [len(b.position) for b in problem.bodies]
-        self.first = [0, *np.cumsum(counts).tolist()]
+        self.first = [0, *np.cumsum([len(b.position) for b in problem.bodies]).tolist()]
         self.lost = np.zeros(self.first[-1], bool)
         everything = list(range(len(problem.bodies)))
         single = problem.contact == "single"
@@ -209,9 +208,10 @@ class CpuEngine(Interaction):
 
     def connect(self) -> None:
         """List the tasks and point the native structs to where everything is."""
-        self.task, counts = particle_tasks(self.window)
-        self.node_task = node_tasks(self.window)
-        self.report = np.zeros((len(self.task), REPORT))
+        hands = self.program.employ(window.count for window in self.window.values())
+        self.task = tasks.on_particles(self.window, hands)
+        self.node_task = tasks.on_nodes(self.window)
+        self.report = np.zeros((len(self.task.row), REPORT))
         for f, window in self.window.items():
             self._connect_field(f, window)
         for body in self.carried:
@@ -220,7 +220,8 @@ class CpuEngine(Interaction):
         point(
             world,
             field=self.field,
-            task=self.task,
+            task=self.task.row,
+            chore=self.task.chore,
             list=self.node_task,
             report=self.report,
             blow=self.blows.record,
@@ -231,13 +232,12 @@ class CpuEngine(Interaction):
         world["blows"] = len(self.blows.record)
         world["blown"] = len(self.field) if len(self.blows.record) else 0
         world["fields"], world["dx"] = len(self.field), self.problem.cell
-        world["tasks"], world["nodes"] = len(self.task), len(self.node_task)
-        world["colour"] = counts
+        world["tasks"], world["nodes"] = len(self.task.row), len(self.node_task)
+        world["colour"], world["chores"] = self.task.colours, len(self.task.chore)
         world["stands"] = self.contact.stand(self.field["floor"], len(self.node_task))
         world["rigids"] = len(self.field) if self.field["rigids"].any() else 0
         self.clock["laid"] = 0
-        particles = sum(window.count for window in self.window.values())
-        self.program.divide((np.cumsum(counts) - counts).tolist(), len(self.task), particles)
+        self.program.divide(self.task.first, len(self.task.chore))
 
     def _connect_bonds(self) -> None:
         """Make room for every node that a frame could hold."""
@@ -312,7 +312,7 @@ class CpuEngine(Interaction):
             self._find_lost()
         if world["stop"][0] == STRAYED or any(strayed):
             astray = (self.report[:, ASTRAY] > 0) | any(strayed)
-            self._sort({int(f) for f in self.task[astray, 0]})
+            self._sort({int(f) for f in self.task.field[astray]})
 
     def _note_steps(self) -> None:
         clock = self.clock[0]

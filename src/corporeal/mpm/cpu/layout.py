@@ -228,6 +228,7 @@ WORLD = Record(
     ("Clock *", "clock"),
     ("Field *", "field"),
     ("int *", "task list contact_memory"),
+    ("int *", "chore"),  # [chores][2]: first and last of the tasks that are done one by one
     ("double *", "report plane friction restitution"),
     ("double *", "rolling"),  # c of every pair [m]; null: nothing brakes what rolls
     ("double *", "plane_impulse pair_impulse friction_loss first_contact last_contact"),
@@ -245,13 +246,14 @@ WORLD = Record(
     ("int", "tethers joints grips sprung"),  # sprung: whether there is any of them
     ("int", "stop"),  # why the steps end after this phase; 0: they go on
     ("int", "nodes"),  # tasks on nodes …
-    (f"int[{COLOURS}]", "colour"),  # … and on particles of each colour
+    (f"int[{COLOURS}]", "colour"),  # … and chores on particles of each colour
     ("int", "bare_nodes"),  # the same where this step's nodes are still to be laid
     (f"int[{COLOURS}]", "bare"),
     ("int", "stands parts"),  # tasks on nodes that may stand on a plane; on contacts
-    (f"int[{COLOURS}]", "looks"),  # tasks on particles for contact; 0 without any
+    (f"int[{COLOURS}]", "looks"),  # chores on particles for contact; 0 without any
     (f"int[{COLOURS}]", "reaches"),  # the same where a normal is chosen anew
     ("int", "rigids turns"),  # fields, where some are rigid; tasks to look at those
+    ("int", "chores spare"),
 )
 STEP = (POST, THREAD_POOL, BOND, BODY_LOAD, CLOCK, FIELD, BLOW, TETHER, JOINT, GRIP, WORLD)
 

@@ -17,6 +17,7 @@ sees them. After it they hold mass, velocity and the velocity as it was.
 """
 
 import ctypes
+from collections.abc import Iterable
 from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 from typing import NamedTuple
@@ -204,14 +205,18 @@ class Program:
         ]
         self.smallest_share = SMALLEST_SHARE
 
-    def divide(self, first: list[int], tasks: int, particles: int) -> None:
-        """Say where each colour's tasks begin, and how many tasks and particles there are."""
+    def employ(self, particles: Iterable[int]) -> int:
+        """Choose how many threads share the particles of some fields."""
+        self.hands = max(1, min(self.threads, sum(particles) // self.smallest_share))
+        return self.hands
+
+    def divide(self, first: list[int], chores: int) -> None:
+        """Say where each colour's chores begin, and how many there are."""
         for row, phase in zip(self.phase, SCHEDULE, strict=True):
             if phase.count in ("bare", "colour", "looks", "reaches"):
                 row[1] = first[phase.which]
             elif phase.count == "turns":
-                row[1] = tasks
-        self.hands = max(1, min(self.threads, particles // self.smallest_share))
+                row[1] = chores
 
     def run(self, resume: bool = False) -> None:
         """Step until a piece says stop, or that a list is full."""
@@ -233,10 +238,18 @@ class Program:
 
 def aligned(shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
     """Zeros that begin on a cache line."""
-    size = int(np.prod(shape)) * np.dtype(dtype).itemsize
-    raw = np.zeros(size + 64, np.uint8)
-    start = -raw.ctypes.data % 64
-    return raw[start : start + size].view(dtype).reshape(shape)
+    return within(np.zeros(on_lines(shape, dtype), np.uint8), shape, dtype)
+
+
+def on_lines(shape: tuple[int, ...], dtype: np.dtype | type) -> int:
+    """Bytes in which an array that begins on a cache line finds room."""
+    return int(np.prod(shape)) * np.dtype(dtype).itemsize + 64
+
+
+def within(memory: np.ndarray, shape: tuple[int, ...], dtype: np.dtype | type) -> np.ndarray:
+    """Lay an array that begins on a cache line into bytes; its ``base`` are these bytes."""
+    start, size = -memory.ctypes.data % 64, on_lines(shape, dtype) - 64
+    return memory[start : start + size].view(dtype).reshape(shape)
 
 
 def _yield_address() -> int:

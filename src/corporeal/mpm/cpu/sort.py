@@ -16,7 +16,16 @@ from corporeal.mpm.cpu.layout import (
     SORTING,
     SURVEY,
 )
-from corporeal.mpm.cpu.program import OPTIONS, SMALLEST_PASS, Memory, Program, aligned, native
+from corporeal.mpm.cpu.program import (
+    OPTIONS,
+    SMALLEST_PASS,
+    Memory,
+    Program,
+    aligned,
+    native,
+    on_lines,
+    within,
+)
 from corporeal.mpm.warp_start import wp
 
 wp.set_module_options(OPTIONS)
@@ -29,6 +38,11 @@ def sort_native(memory: Memory, stage: int, low: int, high: int): ...
 @wp.kernel
 def sort(memory: Memory, stage: int, low: int, high: int):
     sort_native(memory, stage, low, high)
+
+
+GROWTH_PART, IDLE_PART = 16, 4
+"""Of what a sort fills: by which part more memory it is given, since blocks come and go, and how
+much more it may be given at most."""
 
 
 class Sortable(Protocol):
@@ -45,6 +59,34 @@ class Sortable(Protocol):
     count: int
     kinds: int
     """Rows of the table of materials."""
+
+
+class Spare:
+    """Memory that one sort leaves and the next one fills.
+
+    Memory that is new to a process costs more than the copy: the system empties every page of it.
+    """
+
+    def __init__(self, channels: int) -> None:
+        self.channels = channels
+        self.memory = np.empty(0, np.uint8)
+
+    def rows(self, batches: int) -> np.ndarray:
+        """Give memory for so many batches, which may hold anything, (batches, channels, 8)."""
+        shape = (batches, self.channels, 8)
+        size, kept = on_lines(shape, np.float32), self.memory
+        if kept.nbytes <= size + size // IDLE_PART:
+            self.memory = np.empty(0, np.uint8)
+            if size <= kept.nbytes:
+                return within(kept, shape, np.float32)
+            del kept  # before new memory is asked for
+        return aligned((batches + batches // GROWTH_PART, *shape[1:]), np.float32)[:batches]
+
+    def keep(self, rows: np.ndarray) -> None:
+        """Take back memory of ``rows`` or ``aligned`` that nobody needs, if it is the largest."""
+        memory = rows.base
+        if memory is not None and memory.nbytes > self.memory.nbytes:
+            self.memory = memory
 
 
 class Sorter:
@@ -76,6 +118,7 @@ class Sorter:
             for k in range(COPY + program.threads)
         ]
         self.share = program.share
+        self.spare = {channels: Spare(channels) for channels in (CHANNELS, HISTORY, MEMORY)}
 
     def survey(self, window: Sortable) -> tuple[bool, float]:
         """See where a window's particles are.
@@ -125,9 +168,9 @@ class Sorter:
 
     def _copy(self, window: Sortable) -> None:
         batches = int(self.record["slots"][0]) // 8
-        part = aligned((batches, CHANNELS, 8), np.float32)
-        history = aligned((batches if len(window.history) else 0, HISTORY, 8), np.float32)
-        branch = aligned((batches if len(window.branch) else 0, MEMORY, 8), np.float32)
+        part = self.spare[CHANNELS].rows(batches)
+        history = self.spare[HISTORY].rows(batches if len(window.history) else 0)
+        branch = self.spare[MEMORY].rows(batches if len(window.branch) else 0)
         self._point(to=part, past_to=history, branch_to=branch)
         copies = self.launches[COPY:][: max(1, 8 * batches // SMALLEST_PASS)]
         end = window.block[:, 1]
@@ -136,6 +179,8 @@ class Sorter:
             launch.set_param_at_index(2, int(low))
             launch.set_param_at_index(3, int(high))
         self.share(copies)
+        for rows in (window.part, window.history, window.branch):
+            self.spare[rows.shape[1]].keep(rows)
         window.part, window.history, window.branch = part, history, branch
 
     def _point(self, **arrays: np.ndarray) -> None:

@@ -12,7 +12,6 @@ from corporeal.errors import SimulationError
 from corporeal.mpm.cpu.layout import (
     BLOCK,
     CHANNELS,
-    COLOURS,
     DE,
     HISTORY,
     ID,
@@ -33,10 +32,6 @@ LONGEST = (1 << (31 - PLACE)) // 4 - 4
 """Blocks that a window may span before places overflow."""
 POINTED = tuple("part history branch node next table block where used home box have".split())
 """Arrays that the native pieces work in."""
-CHUNK = 32
-"""Node blocks of one task."""
-HEIGHT = 2
-"""Particle blocks, one above the other, of one task."""
 KEPT = ("part", "history", "branch", "origin", "dim", "table", "where", "block")
 """What the next step depends on."""
 
@@ -258,29 +253,3 @@ def too_wide(problem: Problem, bodies: list[int], time: float) -> str:
         f"At t = {time:.4g} s {names} no longer fits into one grid: it spans more than 500 cells. "
         "Use less detail, a shorter time, or contact='multi'."
     )
-
-
-def particle_tasks(windows: dict[int, Window]) -> tuple[np.ndarray, np.ndarray]:
-    """List tasks on particles by colour, (T, 4) field, first and last block; how many of each.
-
-    The largest come first, so that those which end a phase are small, and no thread waits long.
-    """
-    pieces = [np.zeros((0, 7), np.int64)]
-    for f, window in windows.items():
-        columns = window.columns(HEIGHT)
-        pieces.append(np.column_stack([np.full(len(columns), f), columns]))
-    column = np.concatenate(pieces)
-    colour = column[:, 1:4] % 2 @ (2, 1, 4)
-    task = np.zeros((len(column), 4), np.int32)
-    task[:, :3] = column[np.lexsort([-column[:, 6], colour])][:, [0, 4, 5]]
-    return task, np.bincount(colour, minlength=COLOURS)
-
-
-def node_tasks(windows: dict[int, Window]) -> np.ndarray:
-    """List tasks on nodes, (T, 4) field, first and last node block."""
-    rows = [
-        (f, low, min(low + CHUNK, len(window.where)), 0)
-        for f, window in windows.items()
-        for low in range(0, len(window.where), CHUNK)
-    ]
-    return np.array(rows, np.int32).reshape(-1, 4)

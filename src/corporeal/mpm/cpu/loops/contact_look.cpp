@@ -1,5 +1,5 @@
 // Second look at the particles around listed nodes, and only them: where a field's mass lies there,
-// and its outward gradient of volume. One task: a run of blocks in one plane of one field.
+// and its outward gradient of volume. One chore: tasks of one field, each a run of blocks.
 struct Asked {              // nodes of a block's arena that are listed
   u64 layers[8];            // layer by layer, a bit for each
   u64 cells[6];             // cells whose particles reach one of them
@@ -96,41 +96,44 @@ struct Shares {
     }
   }
 };
-int *task = world->task + 4 * index;
-Field &field = world->field[task[0]];
 alignas(64) f8 arena[512];
 Shares shares;
-for (int b = task[1]; b < task[2]; b++) {
-  const int *record = field.block + BLOCK * b;
-  for (int s = record[0]; s < record[1] && s < record[0] + 16; s += 8) Shares::ahead(field.part + (size_t)s * CHANNELS);
-  const Asked asked(stage, field, task[0], record);
-  if (!asked.count) continue;
-  asked.empty(arena);
-  for (int s = record[0]; s < record[1]; s += 8) {
-    const float *q = field.part + (size_t)s * CHANNELS;
-    Shares::ahead(q + 8 * 2 * CHANNELS);
-    i8 cell[3], place = i8{0, 0, 0, 0, 0, 0, 0, 0};   // in the arena
-    for (int d = 0; d < 3; d++) {
-      cell[d] = (*(const i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE;
-      place = place * 8 + (cell[d] - (4 * record[2 + d] - 1));
+const int *chore = world->chore + 2 * index;
+for (int number = chore[0]; number < chore[1]; number++) {
+  const int *task = world->task + 4 * number;
+  const Field &field = world->field[task[0]];
+  for (int b = task[1]; b < task[2]; b++) {
+    const int *record = field.block + BLOCK * b;
+    for (int s = record[0]; s < record[1] && s < record[0] + 16; s += 8) Shares::ahead(field.part + (size_t)s * CHANNELS);
+    const Asked asked(stage, field, task[0], record);
+    if (!asked.count) continue;
+    asked.empty(arena);
+    for (int s = record[0]; s < record[1]; s += 8) {
+      const float *q = field.part + (size_t)s * CHANNELS;
+      Shares::ahead(q + 8 * 2 * CHANNELS);
+      i8 cell[3], place = i8{0, 0, 0, 0, 0, 0, 0, 0};   // in the arena
+      for (int d = 0; d < 3; d++) {
+        cell[d] = (*(const i8u *)(q + 8 * (XI + d)) - HALF) >> PLACE;
+        place = place * 8 + (cell[d] - (4 * record[2 + d] - 1));
+      }
+      const int live = record[1] - s < 8 ? record[1] - s : 8;
+      // Runs of neighbours in one cell.
+      int ends = Simd::which(place != __builtin_shufflevector(place, place, 1, 2, 3, 4, 5, 6, 7, 7)) | 1 << (live - 1);
+      ends &= (2 << (live - 1)) - 1;
+      bool known = false;
+      for (int first = 0, end; ends; first = end, ends &= ends - 1) {
+        end = __builtin_ctz(ends) + 1;
+        if (!asked.by(place[first])) continue;
+        if (!known) shares.find(q, cell, asked.several);
+        known = true;
+        shares.add(arena, asked.layers, place[first], first, end);
+      }
     }
-    const int live = record[1] - s < 8 ? record[1] - s : 8;
-    // Runs of neighbours in one cell.
-    int ends = Simd::which(place != __builtin_shufflevector(place, place, 1, 2, 3, 4, 5, 6, 7, 7)) | 1 << (live - 1);
-    ends &= (2 << (live - 1)) - 1;
-    bool known = false;
-    for (int first = 0, end; ends; first = end, ends &= ends - 1) {
-      end = __builtin_ctz(ends) + 1;
-      if (!asked.by(place[first])) continue;
-      if (!known) shares.find(q, cell, asked.several);
-      known = true;
-      shares.add(arena, asked.layers, place[first], first, end);
+    for (int e = 0; e < asked.count; e++) {
+      f8 h = arena[asked.at[e]];
+      if (!(h[0] > 0)) continue;
+      h[0] = h[7] = 0.0f;   // the mass is known
+      *(f8u *)&sides[asked.side[e]].m += h;
     }
-  }
-  for (int e = 0; e < asked.count; e++) {
-    f8 h = arena[asked.at[e]];
-    if (!(h[0] > 0)) continue;
-    h[0] = h[7] = 0.0f;   // the mass is known
-    *(f8u *)&sides[asked.side[e]].m += h;
   }
 }

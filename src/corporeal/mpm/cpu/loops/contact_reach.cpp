@@ -45,8 +45,8 @@ struct Support {
     most = reach * Simd::root(rows * columns) * (float)mpm::REACH_MARGIN;
   }
 };
-if (index >= world->tasks) {
-  const int f = index - world->tasks;
+if (index >= world->chores) {
+  const int f = index - world->chores;
   const Field &F = world->field[f];
   if (!F.rigids) return;
   for (int e = 0; e < F.blocks; e++) {
@@ -80,77 +80,80 @@ if (index >= world->tasks) {
   }
   return;
 }
-int *task = world->task + 4 * index;
-Field &field = world->field[task[0]];
 alignas(64) int map[512];   // node of the arena to its field's first contact + 1, and how many << 24
 const int ROOM = 1024;    // at least what one block of nodes can hold
 alignas(64) Own own[ROOM];
 f8 volume = Simd::all(0.0f);
 Support support;
-for (int b = task[1]; b < task[2]; b++) {
-  const int *record = field.block + BLOCK * b;
-  int any = 0;
-  for (int i = 0; i < 27; i++) any |= field.where[4 * record[NEIGHBOURS + i] + 3];
-  if (!any) continue;
-  const Reached reached(field, record);
-  for (int n = 0; n < 27;) {
-  int owns = 0;
-  u64 layers[8] = {0, 0, 0, 0, 0, 0, 0, 0};
-  for (; n < 27 && owns + 64 * (FIELDS_IN_BLOCK - 1) <= ROOM; n++) {
-    const u64 mine = reached.nodes(n) & Grid::arena(n);
-    int j = mine ? field.where[4 * record[NEIGHBOURS + n] + 3] : 0;
-    if (!j) continue;
-    const Junction &J = junctions[j - 1];
-    u64 have = 0;
-    for (int q = 0; q < J.fields; q++) have |= J.field[q] == task[0] ? J.have[q] : 0;
-    int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
-    for (u64 left = J.chosen & have & mine; left; left &= left - 1) {
-      int i = __builtin_ctzll(left), begin = owns;
-      const Meet &M = meets[Grid::meet(J, i)];
-      for (int t = M.touch; t < M.touch + M.touches; t++) {
-        const Aim &A = aims[t];
-        if (touches[t].known || (A.fa != task[0] && A.fc != task[0])) continue;
-        Own &O = own[owns++];
-        const float sign = A.fa == task[0] ? 1.0f : -1.0f;
-        for (int d = 0; d < 3; d++)
-          for (int k = 0; k < 3; k++) O.n[d][k] = sign * A.n[d][k];
-        *(f4 *)O.far = *(f4 *)A.far[A.fa == task[0] ? 0 : 1];
-        O.touch = t;
-      }
-      if (owns == begin) continue;
-      const int X = x + (i >> 4), row = (y + (i >> 2 & 3)) * 8 + z + (i & 3);
-      map[X * 64 + row] = (begin + 1) | (owns - begin) << 24;
-      layers[X] |= 1ull << row;
-    }
-  }
-  for (int s = record[0]; s < record[1] && owns; s += 8) {
-    const float *q = field.part + (size_t)s * CHANNELS;
-    Nearby P;
-    if (!P.find(record, q, s, layers)) continue;
-    f8 V = *(f8u *)(q + 8 * VO);
-    for (int k = 0; k < 9; k++) support.F[k] = *(f8u *)(q + 8 * (DE + k));
-    for (int k = 0; k < 9; k += 4) support.F[k] += 1.0f;
-    if (Simd::any(V != volume)) {
-      volume = V;
-      for (int l = 0; l < 8; l++) support.reach[l] = (float)(0.5 * cbrt((double)V[l]) * inv);
-    }
-    support.stretch();
-    for (int i = P.low[0]; i <= P.high[0] + 2; i++) {
-      const f8 x = P.at[0] - (float)i;
-      for (u64 left = layers[i] & P.box; left; left &= left - 1) {
-        const int row = __builtin_ctzll(left), j = row >> 3, k = row & 7;
-        const i8 in = P.in[0][i] & P.in[1][j] & P.in[2][k];
-        if (!Simd::any(in)) continue;
-        const f8 y = P.at[1] - (float)j, z = P.at[2] - (float)k;
-        const int id = map[i * 64 + row];
-        for (int t = (id & 0xffffff) - 1, end = t + (id >> 24); t < end; t++)
-          support.see(own[t], x, y, z, in);
+const int *chore = world->chore + 2 * index;
+for (int number = chore[0]; number < chore[1]; number++) {
+  const int *task = world->task + 4 * number;
+  const Field &field = world->field[task[0]];
+  for (int b = task[1]; b < task[2]; b++) {
+    const int *record = field.block + BLOCK * b;
+    int any = 0;
+    for (int i = 0; i < 27; i++) any |= field.where[4 * record[NEIGHBOURS + i] + 3];
+    if (!any) continue;
+    const Reached reached(field, record);
+    for (int n = 0; n < 27;) {
+    int owns = 0;
+    u64 layers[8] = {0, 0, 0, 0, 0, 0, 0, 0};
+    for (; n < 27 && owns + 64 * (FIELDS_IN_BLOCK - 1) <= ROOM; n++) {
+      const u64 mine = reached.nodes(n) & Grid::arena(n);
+      int j = mine ? field.where[4 * record[NEIGHBOURS + n] + 3] : 0;
+      if (!j) continue;
+      const Junction &J = junctions[j - 1];
+      u64 have = 0;
+      for (int q = 0; q < J.fields; q++) have |= J.field[q] == task[0] ? J.have[q] : 0;
+      int x = 4 * (n / 9 - 1) + 1, y = 4 * (n / 3 % 3 - 1) + 1, z = 4 * (n % 3 - 1) + 1;
+      for (u64 left = J.chosen & have & mine; left; left &= left - 1) {
+        int i = __builtin_ctzll(left), begin = owns;
+        const Meet &M = meets[Grid::meet(J, i)];
+        for (int t = M.touch; t < M.touch + M.touches; t++) {
+          const Aim &A = aims[t];
+          if (touches[t].known || (A.fa != task[0] && A.fc != task[0])) continue;
+          Own &O = own[owns++];
+          const float sign = A.fa == task[0] ? 1.0f : -1.0f;
+          for (int d = 0; d < 3; d++)
+            for (int k = 0; k < 3; k++) O.n[d][k] = sign * A.n[d][k];
+          *(f4 *)O.far = *(f4 *)A.far[A.fa == task[0] ? 0 : 1];
+          O.touch = t;
+        }
+        if (owns == begin) continue;
+        const int X = x + (i >> 4), row = (y + (i >> 2 & 3)) * 8 + z + (i & 3);
+        map[X * 64 + row] = (begin + 1) | (owns - begin) << 24;
+        layers[X] |= 1ull << row;
       }
     }
-  }
-  for (int o = 0; o < owns; o++) {
-    Aim &A = aims[own[o].touch];
-    *(f4 *)A.far[A.fa == task[0] ? 0 : 1] = *(f4 *)own[o].far;
-  }
+    for (int s = record[0]; s < record[1] && owns; s += 8) {
+      const float *q = field.part + (size_t)s * CHANNELS;
+      Nearby P;
+      if (!P.find(record, q, s, layers)) continue;
+      f8 V = *(f8u *)(q + 8 * VO);
+      for (int k = 0; k < 9; k++) support.F[k] = *(f8u *)(q + 8 * (DE + k));
+      for (int k = 0; k < 9; k += 4) support.F[k] += 1.0f;
+      if (Simd::any(V != volume)) {
+        volume = V;
+        for (int l = 0; l < 8; l++) support.reach[l] = (float)(0.5 * cbrt((double)V[l]) * inv);
+      }
+      support.stretch();
+      for (int i = P.low[0]; i <= P.high[0] + 2; i++) {
+        const f8 x = P.at[0] - (float)i;
+        for (u64 left = layers[i] & P.box; left; left &= left - 1) {
+          const int row = __builtin_ctzll(left), j = row >> 3, k = row & 7;
+          const i8 in = P.in[0][i] & P.in[1][j] & P.in[2][k];
+          if (!Simd::any(in)) continue;
+          const f8 y = P.at[1] - (float)j, z = P.at[2] - (float)k;
+          const int id = map[i * 64 + row];
+          for (int t = (id & 0xffffff) - 1, end = t + (id >> 24); t < end; t++)
+            support.see(own[t], x, y, z, in);
+        }
+      }
+    }
+    for (int o = 0; o < owns; o++) {
+      Aim &A = aims[own[o].touch];
+      *(f4 *)A.far[A.fa == task[0] ? 0 : 1] = *(f4 *)own[o].far;
+    }
+    }
   }
 }

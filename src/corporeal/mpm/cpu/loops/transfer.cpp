@@ -1,16 +1,19 @@
-// One task on particles: some blocks of one column of one field. Nodes give particles their motion, or
-// particles lay the nodes of a step, or both, the second for the step after. Tasks of one colour never
-// overlap.
-int *task = world->task + 4 * (index >> 1);
-const Field &field = world->field[task[0]];
+// One chore on particles: tasks of one field one after the other, each some blocks of one column. Nodes
+// give particles their motion, or particles lay the nodes of a step, or both, the second for the step
+// after. Chores of one colour never overlap.
+const int *chore = world->chore + 2 * (index >> 1);
 const bool fused = world->clock->fused, bare = index & 1;
-Gather gather;
-double work = 0;
-for (int b = task[1]; b < task[2]; b++) {
-  const int *block = field.block + BLOCK * b;
-  if (!bare) gather.block(world, field, block);
-  if (bare || fused) work += Scatter::block(world, field, block, bare ? field.node : field.next);
+for (int number = chore[0]; number < chore[1]; number++) {
+  const int *task = world->task + 4 * number;
+  const Field &field = world->field[task[0]];
+  Gather gather;
+  double work = 0;
+  for (int b = task[1]; b < task[2]; b++) {
+    const int *block = field.block + BLOCK * b;
+    if (!bare) gather.block(world, field, block);
+    if (bare || fused) work += Scatter::block(world, field, block, bare ? field.node : field.next);
+  }
+  double *report = world->report + REPORT * task[3];
+  if (!bare) gather.report(report);
+  report[WORK] += work;
 }
-double *report = world->report + REPORT * (index >> 1);
-if (!bare) gather.report(report);
-report[WORK] += work;
