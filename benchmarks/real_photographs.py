@@ -176,8 +176,8 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     """Return a row of the table."""
 
     def shown(form: str, *keys: str) -> str:
-        values = [row.get(key) for key in keys]
-        return "–" if values[0] is None else ", ".join(form.format(v) for v in values if v is not None)
+        values = [row[key] for key in keys if row.get(key) is not None]
+        return ", ".join(form.format(value) for value in values) or "–"
 
     registered = f"{row['registered']}/{pictures}" if "registered" in row else "–"
     good = "–"
