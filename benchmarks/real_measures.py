@@ -43,6 +43,8 @@ class Known:
     unit: float | None = None
     floor: bool = False
     sides: tuple[float, ...] = ()
+    all_sides: tuple[float, ...] = ()
+    """The same, by a second yardstick that leaves nothing of the object out."""
     height: float | None = None
     volume: tuple[float, ...] = ()
     up: tuple[float, ...] = ()
@@ -179,8 +181,9 @@ def sizes(result: Came, facts: Known) -> dict[str, Any]:
     height = unit * float(np.ptp(mesh.vertices[:, 2]))
     volume = unit**3 * float(trimesh.Trimesh(mesh.vertices, mesh.triangles).volume)
     row: dict[str, Any] = {"sides_m": sides, "height_m": height, "volume_m3": volume}
-    if facts.sides:
-        row["size_off"] = max((s / k - 1 for s, k in zip(sides, facts.sides, strict=True)), key=abs)
+    for key, stated in (("size_off", facts.sides), ("size_off_all", facts.all_sides)):
+        if stated:
+            row[key] = max((s / k - 1 for s, k in zip(sides, stated, strict=True)), key=abs)
     if facts.height is not None:
         row["size_off"] = height / facts.height - 1
     return row

@@ -10,7 +10,7 @@ the numbers of its images, from the film. Measured are: photographs registered, 
 share within 1.5° and 3 % of the given poses, and the medians; quality on photographs held out,
 whole and on objects; the angle between up and the normal of the plane with the most sparse points,
 where the object is known to stand on one; size against what the set's ``known.toml`` or
-``real_sets.toml`` states; intersection
+``real_sets.toml`` states, and against a second yardstick where these have one; intersection
 over union of the closed surfaces' silhouettes with the masks of the set, mean and worst; minutes of
 the processor, all threads together. A set that is refused or fails is a row that says why. Rows
 that are there already are kept, and a training or a search for poses that was interrupted is
@@ -176,8 +176,8 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     """Return a row of the table."""
 
     def shown(form: str, *keys: str) -> str:
-        values = [row.get(key) for key in keys]
-        return "–" if values[0] is None else ", ".join(form.format(v) for v in values if v)
+        values = [row[key] for key in keys if row.get(key) is not None]
+        return ", ".join(form.format(value) for value in values) or "–"
 
     registered = f"{row['registered']}/{pictures}" if "registered" in row else "–"
     good = "–"
@@ -194,7 +194,7 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
         shown("{:.2%}", "place"),
         shown("{:.1f}", "psnr", "psnr_thing"),
         shown("{:.1f}°", "up_off_deg"),
-        shown("{:+.1%}", "size_off"),
+        shown("{:+.1%}", "size_off", "size_off_all"),
         shown("{:.2f}", "iou", "iou_worst"),
         good,
         f"{row['seconds'] / 60:.1f}",

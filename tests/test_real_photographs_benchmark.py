@@ -6,9 +6,11 @@ import numpy as np
 import pytest
 import real_measures as measure
 import real_photographs as benchmark
+import trimesh
 from PIL import Image
 
 from corporeal.formats.colmap import read_colmap, write_colmap
+from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.similarity import moved_cameras, similarity
 from corporeal.render.embree import Stage, identify
 from corporeal.splats import training_schedule
@@ -81,6 +83,19 @@ def test_errors_of_poses_do_not_see_a_similarity_but_a_wrong_camera(sets, tmp_pa
     assert found.registered == COUNT and found.right == COUNT - 1
     assert found.angle < 1e-3 and found.place < 1e-4
     np.testing.assert_allclose(found.given_from_found @ way, np.eye(4), atol=1e-3)
+
+
+def test_a_size_is_compared_with_both_yardsticks():
+    vertices = np.array([[x, y, z] for x in (0, 1) for y in (0, 2) for z in (0, 3)], float)
+    mesh = Mesh(vertices, trimesh.convex.convex_hull(vertices).faces)
+    came = measure.Came((mesh,), np.array([0, 0, 1.0]), (mesh,))
+    facts = measure.Known(unit=0.1, sides=(0.1, 0.19, 0.3), all_sides=(0.101, 0.2, 0.3))
+    row = measure.sizes(came, facts)
+    assert row["size_off"] == pytest.approx(0.2 / 0.19 - 1)
+    assert row["size_off_all"] == pytest.approx(0.1 / 0.101 - 1)
+    assert row["volume_m3"] == pytest.approx(0.006)
+    row |= {"set": "box", "case": "all", "training": "draft", "seconds": 0.0}
+    assert "+5.3%, -1.0%" in benchmark.cells(row, 0)
 
 
 def test_the_floor_is_the_plane_with_most_points(sets):

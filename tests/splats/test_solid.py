@@ -97,6 +97,22 @@ def test_a_ball_on_the_floor_becomes_a_closed_ball():
     assert near.max() < 0.12
 
 
+def test_a_thing_is_as_large_as_its_outlines_though_gaussians_are_wide():
+    """Learned ones have their means inside by a deviation; what is met first is too far out."""
+    sides, wide = np.array([0.8, 0.5, 0.6]), 1.5 * PIXEL
+    ball, inner = (
+        trimesh.creation.icosphere(4, 0.5).apply_scale(s).apply_translation([0, 0, 0.3])
+        for s in (sides, sides - 2 * wide)
+    )
+    gaussians, owner = together(clad(inner, 2000))
+    blobs = replace(gaussians, scale=np.full_like(gaussians.scale, wide))
+    (solid,) = solids(blobs, owner, eyes(), masks(eyes(), ball), threads=1)
+    upper = solid.vertices[solid.vertices[:, 2] > 0.3] - [0, 0, 0.3]
+    size = np.linalg.norm(upper / (sides / 2), axis=1)
+    assert np.median(size) == pytest.approx(1, abs=0.01)
+    assert solid.vertices[:, 2].max() == pytest.approx(0.6, abs=0.009)
+
+
 def test_what_stands_on_the_floor_is_closed_by_it():
     cube = box([-0.4, -0.4, 0], [0.4, 0.4, 0.8])
     gaussians, owner = together(clad(cube))
