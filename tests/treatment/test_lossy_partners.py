@@ -73,7 +73,7 @@ def test_all_else_keeps_the_very_loss_of_its_material(parts, motions, floor):
     assert soft_loss(parts, motions, floor) == SOFT.loss
 
 
-def mat(young=4e6, kind: Kind = "deformable", thickness=None):
+def mat(young=4e6, kind: Kind = "deformable", thickness=None, loss=0.1):
     return Treatment(
         kind=kind,
         young_real=young,
@@ -87,6 +87,7 @@ def mat(young=4e6, kind: Kind = "deformable", thickness=None):
         wave_speed=1.0,
         step=1.0,
         why="",
+        loss=loss,
     )
 
 
@@ -106,13 +107,15 @@ def test_a_mat_loses_at_the_frequency_of_the_blow():
     assert slower.vibration == pytest.approx(found.vibration / 2**0.4)
 
 
-def test_only_what_is_flat_and_struck_is_tuned():
+def test_only_what_is_flat_and_struck_and_loses_is_tuned():
     cube = replace(SLAB, size=(0.1, 0.1, 0.1))
     hollow = replace(SLAB, structure=Structure("shell", 0.002))
     sheet = replace(SLAB, structure=Structure("shell", 0.008))
     striker, moving = ball(LOSSY, 1), [LYING, fallen(0)]
     for part, treated in ((cube, mat()), (hollow, mat(kind="shell", thickness=0.004))):
         assert tuned_to_blows([part, striker], moving, [treated, RIGID])[0] is treated
+    clay = mat(loss=0.0)
+    assert tuned_to_blows([SLAB, striker], moving, [clay, RIGID])[0] is clay
     lying = mat()
     assert tuned_to_blows([SLAB, striker], [LYING, LYING], [lying, RIGID])[0] is lying
     assert tuned_to_blows([SLAB, striker], [fallen(FLOOR), fallen(0)], [lying, RIGID])[0] is lying

@@ -81,9 +81,9 @@ def tuned_to_blows(
 
 
 def is_mat(part: PartGeometry, treatment: Treatment) -> bool:
-    """Tell whether a part is soft, and a slab or a flat sheet."""
+    """Tell whether a part is soft and has a loss factor, and is a slab or a flat sheet."""
     slab = treatment.kind == "deformable" and not is_compact(part)
-    return slab or (treatment.kind == "shell" and is_flat_wall(part))
+    return treatment.loss > 0.0 and (slab or (treatment.kind == "shell" and is_flat_wall(part)))
 
 
 def blows_on(
