@@ -12,8 +12,8 @@ from math import exp, log, pi, sqrt
 
 from corporeal.mpm.constants import FASTEST_LOSS, SLOWEST_LOSS
 from corporeal.treatment.dents import contact_time
-from corporeal.treatment.filled import mean_density
-from corporeal.treatment.part import Motion, PartGeometry, is_flat_wall
+from corporeal.treatment.filled import bulk
+from corporeal.treatment.part import Landing, Motion, PartGeometry, is_flat_wall
 from corporeal.treatment.step_budget import is_compact
 from corporeal.types import Treatment
 
@@ -25,19 +25,11 @@ MIDDLE = sqrt(SLOWEST_LOSS * FASTEST_LOSS)
 class _Blow:
     """What one object does to the one that it falls onto."""
 
-    mass: float
-    """[kg]"""
+    landing: Landing
     radius: float
     """Half of the middle side of the largest part [m]."""
-    speed: float
-    """[m/s]"""
     compliance: float
     """(1 - ν²)/E as simulated [1/Pa]; 0: it is rigid."""
-
-    @property
-    def energy(self) -> float:
-        """Of the blow [J]."""
-        return 0.5 * self.mass * self.speed**2
 
     def frequency(self, part: PartGeometry, treatment: Treatment) -> float:
         """Angular frequency of the half period that it lasts [rad/s].
@@ -49,7 +41,7 @@ class _Blow:
         """
         plane = 1.0 / (self.compliance + compliance(treatment))
         thick = treatment.thickness or part.size[0]
-        return pi / contact_time(self.mass, self.radius, self.speed, plane, thick)
+        return pi / contact_time(self.landing.mass, self.radius, self.landing.speed, plane, thick)
 
 
 def tuned_to_blows(
@@ -70,12 +62,12 @@ def tuned_to_blows(
     found = []
     for part, treatment in zip(parts, treatments, strict=True):
         taken = blows.get(part.object, [])
-        energy = sum(b.energy for b in taken)
+        energy = sum(b.landing.energy for b in taken)
         own = motions[part.object].landing
         falls = own is not None and own.energy >= energy
         if taken and not falls and is_mat(part, treatment):
-            pitch = sum(b.energy * log(b.frequency(part, treatment)) for b in taken) / energy
-            treatment = replace(treatment, vibration=exp(pitch) / MIDDLE)
+            logs = (b.landing.energy * log(b.frequency(part, treatment)) for b in taken)
+            treatment = replace(treatment, vibration=exp(sum(logs) / energy) / MIDDLE)
         found.append(treatment)
     return tuple(found)
 
@@ -95,9 +87,8 @@ def blows_on(
         lands, own = motion.landing, [n for n, p in enumerate(parts) if p.object == k]
         if lands is None or lands.energy <= 0.0 or not own:
             continue
-        largest = max(own, key=lambda n: mean_density(parts[n]) * parts[n].volume)
-        radius = 0.5 * parts[largest].size[1]
-        blow = _Blow(lands.mass, radius, lands.speed, compliance(treatments[largest]))
+        largest = max(own, key=lambda n: bulk(parts[n]))
+        blow = _Blow(lands, 0.5 * parts[largest].size[1], compliance(treatments[largest]))
         found.setdefault(lands.onto, []).append(blow)
     return found
 

@@ -76,6 +76,11 @@ def mean_density(part: PartGeometry) -> float:
     return sum(masses(part)) / part.volume if filled else part.material.density
 
 
+def bulk(part: PartGeometry) -> float:
+    """Mean density times volume [kg], by which parts are ranked; of an empty shell as if solid."""
+    return mean_density(part) * part.volume
+
+
 def judge_filled(
     part: PartGeometry, motion: Motion, judge: Callable[[PartGeometry, Motion], Verdict]
 ) -> Verdict:

@@ -16,7 +16,7 @@ from dataclasses import replace
 from corporeal.geometry.falls import FLOOR
 from corporeal.materials.blow import at_speed
 from corporeal.materials.contact import loss_of_pair, share
-from corporeal.treatment.filled import mean_density
+from corporeal.treatment.filled import bulk
 from corporeal.treatment.part import Motion, PartGeometry, Partner
 from corporeal.types import Material
 
@@ -56,7 +56,7 @@ def with_partners(
 def matter_of(parts: Sequence[PartGeometry], number: int) -> Material:
     """Material of the largest part of an object, by its mass."""
     own = [p for p in parts if p.object == number]
-    return max(own, key=lambda p: mean_density(p) * p.volume).material
+    return max(own, key=bulk).material
 
 
 def takes_part(material: Material, partner: Partner) -> bool:
