@@ -1,7 +1,8 @@
-"""Write ten everyday things whose masses nobody published: they follow from how they are built.
+"""Write everyday things whose masses nobody published: they follow from how they are built.
 
-    python benchmarks/own_props.py OUT
+    python benchmarks/own_props.py OUT [--batch 2]
 
+Ten in the first batch; twelve in the second, whose walls and fillings show less from outside.
 ``OUT/models`` gets one GLB a thing, with neutral names and without a word on what it is made of;
 ``OUT/truth/masses.csv`` what each weighs, and ``OUT/truth/recipes.md`` why. Whoever answers
 questions about the models opens neither.
@@ -11,7 +12,7 @@ import argparse
 import csv
 from pathlib import Path
 
-from weighed import goods, vessels
+from weighed import built_things, goods, household, vessels
 from weighed.piece import Prop
 
 from corporeal.formats.glb_writer import write_glb
@@ -28,20 +29,36 @@ PROPS = (
     goods.cushion,
     vessels.flower_pot,
 )
-"""In an order that says nothing."""
+SECOND = (
+    built_things.cool_box,
+    household.wine_bottle,
+    built_things.loaf,
+    household.pear,
+    built_things.toolbox,
+    household.candle,
+    built_things.side_table,
+    household.tissue_roll,
+    built_things.helmet,
+    household.vacuum_flask,
+    built_things.hammer,
+    household.sand_bucket,
+)
+BATCHES = {1: PROPS, 2: SECOND}
+"""Both in an order that says nothing."""
 
 
-def names() -> list[str]:
-    """Return the neutral names, in the order of ``PROPS``."""
-    return [f"thing_{k:02d}" for k in range(1, len(PROPS) + 1)]
+def names(batch: int = 1) -> list[str]:
+    """Return the neutral names of a batch, in its order; they go on from the batch before."""
+    before = sum(len(BATCHES[k]) for k in range(1, batch))
+    return [f"thing_{before + k:02d}" for k in range(1, len(BATCHES[batch]) + 1)]
 
 
-def write(folder: Path) -> None:
+def write(folder: Path, batch: int = 1) -> None:
     """Write models, masses and recipes."""
     models, truth = folder / "models", folder / "truth"
     for below in (models, truth):
         below.mkdir(parents=True, exist_ok=True)
-    made = {name: build() for name, build in zip(names(), PROPS, strict=True)}
+    made = {name: build() for name, build in zip(names(batch), BATCHES[batch], strict=True)}
     for name, prop in made.items():
         write_glb(models / f"{name}.glb", prop.scene(name))
     with (truth / "masses.csv").open("w", encoding="utf-8", newline="") as file:
@@ -72,9 +89,11 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("out", type=Path)
-    folder = parser.parse_args().out
-    write(folder)
-    print(f"{len(PROPS)} models in {folder / 'models'}; their masses are in {folder / 'truth'}.")
+    parser.add_argument("--batch", type=int, choices=sorted(BATCHES), default=1)
+    asked = parser.parse_args()
+    folder, count = asked.out, len(BATCHES[asked.batch])
+    write(folder, asked.batch)
+    print(f"{count} models in {folder / 'models'}; their masses are in {folder / 'truth'}.")
 
 
 if __name__ == "__main__":
