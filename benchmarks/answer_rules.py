@@ -2,8 +2,9 @@
 
     python benchmarks/answer_rules.py FOLDER --truth masses.csv --recordings SET ...
 
-The two rules of decision 86 beside the product's, over the same draws of ``--answers 3``. Objects
-are models of one object each, pictured without names, as in ``evaluate mass``.
+The two rules of decision 86 beside the product's, over the same draws of ``--answers 3``, and what
+decision 92 asks of rule B. Objects are models of one object each, pictured without names, as in
+``evaluate mass``.
 """
 
 import argparse
@@ -12,7 +13,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.stats import norm, t
 
 from corporeal.description.describe_config import DescribeConfig
@@ -29,6 +30,8 @@ from corporeal.types import Evidence
 ANSWERS = 3
 MISS = 2 / (2 * (1 - HIGH))
 """What lying outside a 90 % interval costs in its score, per unit of the logarithm."""
+AIM, WIDEST = HIGH - (1 - HIGH), 2.2
+"""Share of masses that should lie inside, and the widest median interval (high over low)."""
 
 
 @dataclass(frozen=True)
@@ -83,16 +86,47 @@ def drawn(thing: Weighed, recordings: Path) -> Drawn:
     return Drawn(thing.mass, masses, words.evidence, tuple(a.evidence for a in words.answers))
 
 
-def row(things: Sequence[Drawn], evidence: bool, by_its_own: bool, few: bool) -> str:
-    """Return ALDE, how many lie inside, the median width and the mean interval score."""
+@dataclass(frozen=True)
+class Scored:
+    """What intervals of one rule come to; one number a thing."""
+
+    error: Float[np.ndarray, " N"]
+    """|ln m̂ - ln m|"""
+    width: Float[np.ndarray, " N"]
+    """ln high - ln low"""
+    inside: Bool[np.ndarray, " N"]
+    score: Float[np.ndarray, " N"]
+    """Interval score of ln m (Gneiting and Raftery 2007)."""
+
+    def words(self) -> str:
+        """Return ALDE, how many lie inside, the median width and the mean interval score."""
+        return (
+            f"ALDE {self.error.mean():.3f}, inside {self.inside.sum()} of {len(self.inside)}, "
+            f"× {np.exp(np.median(self.width)):.2f}, score {self.score.mean():.3f}"
+        )
+
+
+def scored(things: Sequence[Drawn], evidence: bool, by_its_own: bool, few: bool) -> Scored:
+    """Score one rule's intervals."""
     found = [one.interval(one.weights(evidence, by_its_own), few) for one in things]
     low, middle, high = np.log(found).T
     truth = np.log([one.truth for one in things])
-    inside = int(((low <= truth) & (truth <= high)).sum())
     outside = np.maximum(low - truth, 0) + np.maximum(truth - high, 0)
-    score = float(np.mean(high - low + MISS * outside))
-    error, width = float(np.abs(middle - truth).mean()), float(np.exp(np.median(high - low)))
-    return f"ALDE {error:.3f}, inside {inside} of {len(things)}, × {width:.2f}, score {score:.2f}"
+    inside = (low <= truth) & (truth <= high)
+    return Scored(np.abs(middle - truth), high - low, inside, high - low + MISS * outside)
+
+
+def verdict(plain: Scored, few: Scored) -> dict[str, bool]:
+    """Tell which conditions of decision 92 rule B meets; all four must hold."""
+    gain = plain.score - few.score
+    most = int(np.argmax(gain))
+    away = [abs(float(s.inside.mean()) - AIM) for s in (plain, few)]
+    return {
+        "share inside no farther from 90 %": away[1] <= away[0] + 1e-12,
+        "score lower": float(gain.mean()) > 0,
+        "lower without the thing that gains most": float(np.delete(gain, most).mean()) > 0,
+        "median width at most 2.2": float(np.exp(np.median(few.width))) <= WIDEST,
+    }
 
 
 def main() -> None:
@@ -104,14 +138,21 @@ def main() -> None:
     asked = parser.parse_args()
     for recordings in asked.recordings:
         rows = [one for one in read_truth(asked.folder, asked.truth) if one.mass is not None]
-        things = [drawn(one, recordings) for one in rows]
-        for evidence in (True, False):
-            said = "with evidence" if evidence else "without"
-            for own, few in ((False, False), (True, False), (False, True), (True, True)):
-                if own and not evidence:
-                    continue
-                rule = " and ".join(["A"] * own + ["B"] * few) or "the product's"
-                print(f"{recordings.name} {said}, {rule}: {row(things, evidence, own, few)}")
+        report(recordings.name, [drawn(one, recordings) for one in rows])
+
+
+def report(name: str, things: Sequence[Drawn]) -> None:
+    """Print one line per rule, with and without evidence, and what decides about rule B."""
+    for evidence in (True, False):
+        said = f"{name} {'with evidence' if evidence else 'without'}"
+        for own, few in ((False, False), (True, False), (False, True), (True, True)):
+            if own and not evidence:
+                continue
+            rule = " and ".join(["A"] * own + ["B"] * few) or "the product's"
+            print(f"{said}, {rule}: {scored(things, evidence, own, few).words()}")
+        plain, few = (scored(things, evidence, False, b) for b in (False, True))
+        for condition, met in verdict(plain, few).items():
+            print(f"{said}, B: {condition}: {'yes' if met else 'no'}")
 
 
 if __name__ == "__main__":

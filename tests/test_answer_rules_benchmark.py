@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from answer_rules import Drawn
+from answer_rules import Drawn, Scored, scored, verdict
 from scipy.stats import norm, t
 
 from corporeal.types import Evidence
@@ -40,3 +40,30 @@ def test_an_answer_that_contradicts_its_own_judgement_counts_less():
     each = [weights[k::3].sum() for k in range(3)]
     assert each[0] == pytest.approx(each[1])
     assert each[2] < 0.05
+
+
+def intervals(*things):
+    """Scores of things: (width, how far outside)."""
+    width, outside = np.array(things, float).T
+    return Scored(0 * width, width, outside == 0, width + 20 * outside)
+
+
+def test_an_interval_scores_its_width_and_twenty_times_what_it_misses_by():
+    one = drawn(0.5, 0.5, 0.5)
+    found = scored([one], False, False, False)
+    middle = np.log(2) - found.width[0] / 2
+    assert found.score[0] == pytest.approx(found.width[0] + 20 * middle, rel=1e-3)
+    assert not found.inside[0]
+    assert found.error[0] == pytest.approx(np.log(2), rel=1e-3)
+
+
+def test_what_decides_about_rule_b_holds_one_by_one():
+    plain = intervals((0.3, 0.1), (0.3, 0.1), (0.3, 0))
+    better = intervals((0.5, 0), (0.5, 0), (0.4, 0))
+    assert list(verdict(plain, better).values()) == [True] * 4
+    one_thing = intervals((0.5, 0), (0.5, 0.1), (0.4, 0))
+    assert list(verdict(plain, one_thing).values()) == [True, True, False, True]
+    for_nothing = intervals((0.9, 0.1), (0.9, 0.1), (0.9, 0))
+    assert list(verdict(plain, for_nothing).values()) == [True, False, False, False]
+    fewer = intervals((0.3, 0.1), (0.3, 0.1), (0.3, 0.1))
+    assert not verdict(plain, fewer)["share inside no farther from 90 %"]
