@@ -137,11 +137,10 @@ class Stage:
         there.scene = there._built()
         return there
 
-    def painted(self, colours: np.ndarray, light: Light) -> "Stage":
-        """Return the stage in matt plain colours, (T, 3) linear, one per triangle."""
+    def painted(self, shades: np.ndarray, shade_of_triangle: np.ndarray, light: Light) -> "Stage":
+        """Return the stage in matt plain colours: each triangle has one of (S, 3) linear ones."""
         there = copy(self)
-        shades, number = np.unique(colours, axis=0, return_inverse=True)
-        there.look = painted(self.look, shades, number.reshape(-1))
+        there.look = painted(self.look, shades, shade_of_triangle)
         there.light, there.see_through = light, False
         return there
 
