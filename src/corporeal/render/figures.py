@@ -115,7 +115,7 @@ def strip(film: Film, path: Path, count: int = 6, width: int = 340) -> None:
         UserError: The film cannot be read, or the file cannot be written.
 
     """
-    last = max(video.length(film.path) - 1, 0)
+    last = max((len(film.times) or video.length(film.path)) - 1, 0)
     numbers = [int(k) for k in np.unique(np.linspace(0, last, count).round())]
     pictures = video.pictures(film.path, numbers)
     if not pictures:
