@@ -124,3 +124,23 @@ def test_arrays_of_threads_have_no_memory_apart():
 def test_a_setting_of_ones_own_for_memory_stays(monkeypatch):
     monkeypatch.setenv("MALLOC_TRIM_THRESHOLD_", "131072")
     assert not keep_freed_memory()
+
+
+LOOPED = """
+from corporeal.machine import collect_seldom
+collect_seldom()
+class Loop:
+    def __init__(self):
+        self.itself = self
+    def __del__(self):
+        print("searched for")
+Loop()
+"""
+
+
+def test_a_process_that_ends_searches_for_no_cycles():
+    command = [sys.executable, "-c", LOOPED]
+    assert subprocess.run(command, capture_output=True, text=True, check=True).stdout == ""
+    plain = [sys.executable, "-c", LOOPED.replace("collect_seldom()\n", "")]
+    told = subprocess.run(plain, capture_output=True, text=True, check=True)
+    assert told.stdout == "searched for\n"

@@ -1,5 +1,6 @@
 """What this process may use of the machine that it runs on."""
 
+import atexit
 import ctypes
 import gc
 import os
@@ -50,9 +51,11 @@ def collect_seldom() -> None:
     """Let Python look for unused cycles of objects after every 50,000, not 700.
 
     Modules and materials are hundreds of thousands of objects that stay, and each search goes
-    through many of them: 2 % of the demo. Large arrays are in no cycles.
+    through many of them: 2 % of the demo. Large arrays are in no cycles. When the process ends,
+    Python would search all of them several times more; the system takes their memory back anyway.
     """
     gc.set_threshold(OBJECTS_MADE, *gc.get_threshold()[1:])
+    atexit.register(gc.freeze)
 
 
 def _granted(quota: Path) -> int:

@@ -21,7 +21,8 @@ def two_blocks():
 def test_pictures_in_several_sets_of_colours_are_those_that_are_rendered_alone():
     stage, rng = Stage(two_blocks()), np.random.default_rng(0)
     count = len(stage.look.triangles)
-    stages = [stage.painted(rng.uniform(0.05, 0.9, (count, 3)), Light()) for _ in range(3)]
+    each = np.arange(count)
+    stages = [stage.painted(rng.uniform(0.05, 0.9, (count, 3)), each, Light()) for _ in range(3)]
     camera = place(stage.boxes()[None] + stage.origin, (96, 72))
     together = render_each(stages, camera, "draft")
     for one, picture in zip(stages, together, strict=True):

@@ -137,11 +137,10 @@ class Stage:
         there.scene = there._built()
         return there
 
-    def painted(self, colours: np.ndarray, light: Light) -> "Stage":
-        """Return the stage in matt plain colours, (T, 3) linear, one per triangle."""
+    def painted(self, shades: np.ndarray, shade_of_triangle: np.ndarray, light: Light) -> "Stage":
+        """Return the stage in matt plain colours: each triangle has one of (S, 3) linear ones."""
         there = copy(self)
-        shades, number = np.unique(colours, axis=0, return_inverse=True)
-        there.look = painted(self.look, shades, number.reshape(-1))
+        there.look = painted(self.look, shades, shade_of_triangle)
         there.light, there.see_through = light, False
         return there
 
@@ -341,11 +340,10 @@ class Job:
         wide = max(rows[0] - halo, 0), min(rows[1] + halo, height)
         # The studio behind everything, where rays miss.
         rays = self.rays(wide)
-        o, d = rays.origin, rays.direction
-        light = np.empty((len(o), 3), np.float32)
+        light = np.empty((len(rays.origin), 3), np.float32)
         kernels_light.backdrop(self.lamps, wide, height, width, grid, light)
         shape = (wide[1] - wide[0]) * grid, width * grid
-        hit = self.stage.hit(o, d) if self.stage.shown else self.stage.missed(o)
+        hit = self.first_hit(rays)
         # Shade what is worth a sample of its own; the rest takes its neighbours' light.
         looked = kernels.worth(hit[0], shape, every)
         index = np.flatnonzero(looked)
@@ -356,6 +354,11 @@ class Job:
         line = width * grid * grid
         mine = light[(rows[0] - wide[0]) * line : (rows[1] - wide[0]) * line]
         kernels_light.develop(mine, rows, (width, height), grid, out)
+
+    def first_hit(self, rays: Rays) -> tuple[np.ndarray, ...]:
+        """Nearest triangle and where, of each ray from the camera."""
+        o, d = rays.origin, rays.direction
+        return self.stage.hit(o, d) if self.stage.shown else self.stage.missed(o)
 
     def layer(
         self,

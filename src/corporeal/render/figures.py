@@ -1,6 +1,5 @@
 """Figures as papers show them: the scene coloured by what it is made of, and a film as a strip."""
 
-import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,8 +16,8 @@ from corporeal.render.choices import Quantity
 from corporeal.render.embree import Light, Stage, identify
 from corporeal.render.figure_keys import INK, LARGE, Entry, Key, Line, Mark, legend, scale
 from corporeal.render.glyphs import drawable
+from corporeal.render.png import write_png
 from corporeal.render.repainted import render_each
-from corporeal.store import writing
 from corporeal.types import Film, MaterialField, Parts, Scene
 
 PAPER = Light(
@@ -87,7 +86,7 @@ def fields_figure(scene: Scene, parts: Parts, field: MaterialField, path: Path) 
         small = Image.fromarray(picture).resize(SHOWN, Image.Resampling.LANCZOS)
         sheet.paste(small, (left, top))
         key_of(panel, share, (left, top)).draw(sheet)
-    _save(sheet, path)
+    write_png(sheet, path)
 
 
 def key_of(panel: Names | Numbers, share: np.ndarray, corner: tuple[int, int]) -> Key:
@@ -116,7 +115,7 @@ def strip(film: Film, path: Path, count: int = 6, width: int = 340) -> None:
         UserError: The film cannot be read, or the file cannot be written.
 
     """
-    last = max(video.length(film.path) - 1, 0)
+    last = max((len(film.times) or video.length(film.path)) - 1, 0)
     numbers = [int(k) for k in np.unique(np.linspace(0, last, count).round())]
     pictures = video.pictures(film.path, numbers)
     if not pictures:
@@ -145,19 +144,7 @@ def row_of(pictures: Sequence[np.ndarray], words: Sequence[str], path: Path) -> 
         row.paste(Image.fromarray(picture), (k * (width + gap), 0))
         middle = (k * (width + gap) + width / 2, height + foot / 2 + 1)
         draw.text(middle, label, fill=INK, font=font, anchor="mm")
-    _save(row, path)
-
-
-def _save(page: Image.Image, path: Path) -> None:
-    """Write a PNG whole or not at all."""
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f".{path.stem}.{os.getpid()}.part.png")
-        try:
-            page.save(partial)
-            partial.replace(path)
-        finally:
-            partial.unlink(missing_ok=True)
+    write_png(row, path)
 
 
 def si(value: float, unit: str) -> str:
@@ -209,8 +196,9 @@ def shades(panel: Names | Numbers) -> Float[np.ndarray, "K 3"]:
 
 
 def _painted(stage: Stage, parts: Parts, colour_of_part: np.ndarray) -> Stage:
+    """Paint each part; what is of none, number -1, is grey."""
     table = np.vstack([colour_of_part, [[0.75] * 3]])
-    return stage.painted(linear(table)[parts.part_of_point], PAPER)
+    return stage.painted(linear(table), np.mod(parts.part_of_point, len(table)), PAPER)
 
 
 def _share(seen: np.ndarray, parts: Parts) -> np.ndarray:

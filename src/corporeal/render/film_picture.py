@@ -203,7 +203,8 @@ class _Picture(Job):
         kernels_floor.glances(rays.direction[mine], floor, eye, self.lamps, glances)
         self.empty.mirrored[here] = arrived.light.reshape(-1, WIDE)[mine, 4:CHANNELS]
         size = width, height
-        kernels_film.printed(toned, index, wide[0], size, rows, self.empty.printed)
+        every = np.ones(len(light), np.uint8)
+        kernels_film.printed(toned, every, wide[0], size, rows, self.empty.printed)
 
     def band(self, rows: tuple[int, int], out: np.ndarray) -> None:
         """Cast some rows of a picture where it differs from the empty studio."""
@@ -230,8 +231,7 @@ class _Picture(Job):
             there = toned.reshape(*shape, 3)[crop.window(block, part)]
             there[near] = bright.reshape(*near.shape, 3)[near]
         size = width, self.camera.height
-        changed = np.flatnonzero(kind != UNTOUCHED)
-        kernels_film.printed(toned, changed, wide[0], size, rows, out)
+        kernels_film.printed(toned, kind.reshape(-1), wide[0], size, rows, out)
 
     def closely(
         self,

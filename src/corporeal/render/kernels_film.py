@@ -213,23 +213,23 @@ def tone_means(light, index, out):
 
 
 @numba.njit(**LOOP)
-def printed(picture, index, row, size, first, out):
+def printed(picture, wanted, row, size, first, out):
     """Write pixels in sRGB, 0 to 255, with a faint vignette and a fixed grain.
 
     Args:
         picture: Filmic light of a band (P, 3).
-        index: Its pixels to be written.
+        wanted: Not 0 where a pixel is to be written (P,).
         row: The picture's row that the band begins with.
         size: Of the picture: width, height.
-        first: Pixels of the band before this row are left out.
+        first: The picture's first row to be written and the one after the last.
         out: The picture (height, width, 3).
 
     """
     width, height = size
-    for g in index:
-        i, j = g // width + row, g % width
-        if i < first[0] or i >= first[1]:
+    for g in range((first[0] - row) * width, (first[1] - row) * width):
+        if not wanted[g]:
             continue
+        i, j = g // width + row, g % width
         y, x = 2 * i / (height - 1) - 1, 2 * j / (width - 1) - 1
         rim = min(max(x * x + y * y - 0.5, 0.0), 2.0) / 1.5
         grain = hash01(i, j) - np.float32(0.5)

@@ -83,7 +83,7 @@ def carry(rest, normals, near, weight, start, now, F, place, turned):
 
 @numba.njit(**LOOP)
 def strained(F, limit, out):
-    """Mark gradients with ‖FᵀF - 1‖² > ``limit``, and those that mirror."""
+    """Mark gradients with ‖FᵀF - 1‖² > their ``limit`` (P,), and those that mirror."""
     for p in range(len(F)):
         norm = 0.0
         for a in range(3):
@@ -95,4 +95,4 @@ def strained(F, limit, out):
         for a in range(3):
             b, c = (a + 1) % 3, (a + 2) % 3
             volume += F[p, 2, a] * (F[p, 0, b] * F[p, 1, c] - F[p, 0, c] * F[p, 1, b])
-        out[p] = norm > limit or volume <= 0
+        out[p] = norm > limit[p] or volume <= 0

@@ -80,7 +80,7 @@ def portraits(
         pictures = list(pool.map(lambda camera: render(stage, camera, "draft", 1), cameras))
     if parts.max(initial=0) > 0:
         colours = np.array([COLOURS[c] for c in colour_of_part(1 + int(parts.max()))])
-        painted = stage.painted(colours[parts].astype(np.float32), Light())
+        painted = stage.painted(colours.astype(np.float32), parts, Light())
         pictures.append(
             render(painted, max(cameras, key=lambda c: _shown(stage, c, parts)), "draft", 1)
         )

@@ -1,7 +1,8 @@
 """One scene in several sets of plain colours, in the same light.
 
-Which light arrives at a surface does not depend on its colour, nor on that of others where all are
-matt: it is asked for once, and shaded in each set of colours.
+What is seen does not depend on colours. Which light arrives at a surface does not depend on its
+colour, nor on that of others where all are matt. Both are asked for once, and shaded in each set of
+colours.
 """
 
 from collections.abc import Sequence
@@ -12,7 +13,7 @@ from jaxtyping import UInt8
 
 from corporeal.machine import cores
 from corporeal.render.camera import Aim
-from corporeal.render.embree import BAND, SAMPLING, Block, Job, Quality, Sampling, Stage
+from corporeal.render.embree import BAND, SAMPLING, Block, Job, Quality, Rays, Sampling, Stage
 from corporeal.render.kernels import Samples
 
 
@@ -46,11 +47,18 @@ def render_each(
 
 
 class _Repainted(Job):
-    """Some rows of pictures, the first of which asks for light."""
+    """Some rows of pictures, the first of which asks for what is seen, and for light."""
 
     def __init__(self, stage: Stage, camera: Aim, sampling: Sampling) -> None:
         super().__init__(stage, camera, sampling)
+        self._hit: tuple[np.ndarray, ...] | None = None
         self._arrived: np.ndarray | None = None
+
+    def first_hit(self, rays: Rays) -> tuple[np.ndarray, ...]:
+        """Return what rays from the camera meet, the same in each picture."""
+        if self._hit is None:
+            self._hit = super().first_hit(rays)
+        return self._hit
 
     def gather(self, s: Samples, d: np.ndarray, on: np.ndarray, block: Block) -> np.ndarray:
         """Light that arrives at the samples ``on``, which are the same in each picture."""

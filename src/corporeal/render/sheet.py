@@ -8,7 +8,7 @@ import numpy as np
 from jaxtyping import UInt8
 from PIL import Image, ImageDraw, ImageFont
 
-from corporeal.store import writing
+from corporeal.render.png import write_png
 
 PAPER, INK, FAINT = (255, 255, 255), (28, 30, 34), (120, 124, 132)
 GAP = 14
@@ -39,11 +39,7 @@ def sheet(tiles: Sequence[Tile], path: Path, columns: int = 0) -> None:
         x, y = GAP + k % columns * right, GAP + k // columns * down
         page.paste(Image.fromarray(tile.picture), (x, y))
         _caption(pen, tile, (x, y + height + 4), width)
-    with writing(path):
-        path.parent.mkdir(parents=True, exist_ok=True)
-        partial = path.with_name(f".{path.stem}.part.png")
-        page.save(partial)
-        partial.replace(path)
+    write_png(page, path)
 
 
 def _caption(pen: ImageDraw.ImageDraw, tile: Tile, place: tuple[int, int], width: int) -> None:

@@ -84,7 +84,7 @@ class Skin:
     def _moved(self, frame: Frame) -> tuple[np.ndarray, np.ndarray]:
         """Particles' positions [m] and gradients, made fit to be seen."""
         F = np.ascontiguousarray(frame.deformation, dtype=np.float64)
-        F = bounded(bounded(F, STRETCH), LOOSE, self.loose)
+        F = bounded(F, np.where(self.loose[:, None], LOOSE, STRETCH))
         now = np.ascontiguousarray(frame.position, dtype=np.float64)
         lost = ~np.all(np.isfinite(now), axis=1)
         if lost.any():
@@ -172,26 +172,23 @@ def _bound(
 
 
 def bounded(
-    F: Float[np.ndarray, "P 3 3"],
-    limits: tuple[float, float],
-    of: Bool[np.ndarray, " P"] | None = None,
+    F: Float[np.ndarray, "P 3 3"], limits: tuple[float, float] | Float[np.ndarray, "P 2"]
 ) -> Float[np.ndarray, "P 3 3"]:
     """F with its principal stretches within limits; a mirrored or broken F becomes a rotation."""
-    low, high = limits
+    low, high = np.broadcast_to(limits, (len(F), 2)).T
     finite = np.isfinite(F)
     if not finite.all():
         F = np.where(np.all(finite, axis=(1, 2))[:, None, None], F, np.eye(3))
     # |σ² - 1| ≤ ‖FᵀF - 1‖, so that small strains need no decomposition.
     outside = np.empty(len(F), np.bool_)
-    kernels_skin.strained(F, min(1 - low**2, high**2 - 1) ** 2, outside)
-    if of is not None:
-        outside &= of
+    kernels_skin.strained(F, np.minimum(1 - low**2, high**2 - 1) ** 2, outside)
     if outside.any():
         U, s, Vt = np.linalg.svd(F[outside])
         flip = np.linalg.det(U) * np.linalg.det(Vt) < 0
         U[flip, :, 2] *= -1
         F = F.copy()
-        F[outside] = U * np.clip(s, low, high)[:, None, :] @ Vt
+        s = np.clip(s, low[outside, None], high[outside, None])
+        F[outside] = U * s[:, None, :] @ Vt
     return F
 
 

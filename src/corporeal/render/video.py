@@ -164,19 +164,20 @@ def pictures(path: Path, wanted: list[int]) -> list[np.ndarray]:
         UserError: The film cannot be read.
 
     """
+    numbers = sorted(set(wanted))
+    chosen = "+".join(rf"eq(n\,{k})" for k in numbers)
+    # New times, one after the other: else the gaps between the chosen ones would be filled.
+    only = ["-vf", f"select={chosen},setpts=N/FRAME_RATE/TB"]
     try:
-        reader = imageio_ffmpeg.read_frames(str(path))
+        reader = imageio_ffmpeg.read_frames(str(path), output_params=only)
         meta: dict[str, Any] = next(reader)  # type: ignore[assignment]
     except (OSError, RuntimeError, StopIteration) as error:
         raise UserError(f"{path}: cannot be read as a film ({error}). Make it again.") from error
     width, height = meta["source_size"]
     found: dict[int, np.ndarray] = {}
     try:
-        for number, data in enumerate(reader):
-            if number in wanted:
-                found[number] = np.frombuffer(data, np.uint8).reshape(height, width, 3)
-            if number >= max(wanted):
-                break
+        for number, data in zip(numbers, reader, strict=False):
+            found[number] = np.frombuffer(data, np.uint8).reshape(height, width, 3)
     finally:
         reader.close()
     return [found[min(k, max(found))] for k in wanted] if found else []

@@ -8,7 +8,6 @@ The camera stands where it sees the whole motion; light and camera do not move; 
 ray caster are fixed per pixel, so that nothing flickers.
 """
 
-import os
 from collections.abc import Callable, Iterator
 from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass, replace
@@ -32,11 +31,11 @@ from corporeal.render.film_picture import FilmCaster
 from corporeal.render.held import Held
 from corporeal.render.liquid_surface import LiquidSurface, surface_of
 from corporeal.render.pace import between, instants, is_slow
+from corporeal.render.png import write_png
 from corporeal.render.sightlines import clear_view
 from corporeal.render.skin import Skin, bind
 from corporeal.settings.film_config import FilmConfig
 from corporeal.splats import raster
-from corporeal.store import writing
 from corporeal.trajectory.moving_gaussians import MovingGaussians, fluid, granular, moving_gaussians
 from corporeal.trajectory.played import Played, Prepared
 from corporeal.types import (
@@ -406,7 +405,7 @@ class _Troupe:
                 [nearest[~self.liquids.of_triangle], self.liquids.nearest(frame.position, surfaces)]
             )
         if colour is not None:
-            stage = stage.painted(linear(colour[nearest]), PAPER)
+            stage = stage.painted(linear(colour), nearest, PAPER)
         return _Scenery(stage, None, frame.time)
 
 
@@ -457,12 +456,4 @@ def _keep(picture: np.ndarray, number: int, count: int, config: FilmConfig, fold
     names = [f"stills/{number:05d}.png"] if config.stills else []
     names += [THUMBNAIL] if number == (2 * (count - 1)) // 3 else []
     for name in names:
-        path = folder / name
-        with writing(path):
-            path.parent.mkdir(parents=True, exist_ok=True)
-            partial = path.with_name(f".{path.stem}.{os.getpid()}.part.png")
-            try:
-                Image.fromarray(picture).save(partial)
-                partial.replace(path)
-            finally:
-                partial.unlink(missing_ok=True)
+        write_png(Image.fromarray(picture), folder / name)

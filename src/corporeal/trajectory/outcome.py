@@ -62,6 +62,7 @@ class Bodies:
         self.members = [np.flatnonzero(particles.object == b) for b in range(count)]
         first = trajectory.frames[0].position.astype(float)
         self.start = [first[m] for m in self.members]
+        self.size = [diagonal(start) for start in self.start]
         self.error = np.zeros((len(self.time), count))
         self.squeeze = np.zeros(count)
         self.last: list[list[np.ndarray]] = [[] for _ in range(count)]
@@ -75,7 +76,7 @@ class Bodies:
             now, start = position[mine], self.start[b]
             fit = rigid_fit(start, now, np.ones(len(start)))
             shift = np.linalg.norm(fit.undo(now) - start, axis=1)
-            self.error[k, b] = np.sqrt(np.mean(shift**2)) / diagonal(start)
+            self.error[k, b] = np.sqrt(np.mean(shift**2)) / self.size[b]
             self.squeeze[b] = max(self.squeeze[b], reached_by_share(shift))
             if keep:
                 self.last[b].append(now)

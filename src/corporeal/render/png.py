@@ -1,0 +1,28 @@
+"""Pictures as PNG files."""
+
+import os
+from pathlib import Path
+
+from PIL import Image
+
+from corporeal.store import writing
+
+EFFORT = 4
+"""Of zlib, 1 to 9: a sixth larger than by its usual 6, and in less than half the time."""
+
+
+def write_png(picture: Image.Image, path: Path) -> None:
+    """Write a picture whole or not at all.
+
+    Raises:
+        DiskError: The disk refuses it.
+
+    """
+    with writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        partial = path.with_name(f".{path.stem}.{os.getpid()}.part.png")
+        try:
+            picture.save(partial, compress_level=EFFORT)
+            partial.replace(path)
+        finally:
+            partial.unlink(missing_ok=True)
