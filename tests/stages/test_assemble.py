@@ -305,6 +305,38 @@ def test_a_mesh_without_a_unit_is_as_large_as_such_things_are(tmp_path, name, si
     assert len(told) == 1 and said in told[0] and "--unit or --extent" in told[0]
 
 
+def placed(folder, *things):
+    """A scene file that places cubes by hand: name of the file and extent, in its unit."""
+    rows = []
+    for k, (name, extent) in enumerate(things):
+        stl(folder / name, extent)
+        rows.append(f'[[object]]\nfile = "{name}"\nposition = [{k}, 0, 0]\n')
+    return toml(folder, "".join(rows))
+
+
+def test_a_mesh_that_fits_no_unit_is_in_that_of_the_scene_file_s_other_meshes(tmp_path):
+    """A brick of 5 cm, placed by hand beside others in metres, was made 22 cm large."""
+    scene = assemble([placed(tmp_path, ("plank.ply", 0.6), ("pipe.ply", 0.2), ("brick.ply", 0.05))])
+    assert [o.real_extent for o in scene.objects] == pytest.approx([0.6, 0.2, 0.05])
+    both = "plank.ply and pipe.ply state no unit: they were taken to be in metres"
+    assert any(s.startswith(both) and "20 cm to 60 cm large" in s for s in scene.warnings)
+    assert any("brick.ply" in s and "as the other meshes are" in s for s in scene.warnings)
+    assert any("but a brick is usually about 22 cm" in s for s in scene.warnings)
+
+
+@pytest.mark.parametrize("others", [[], [("plank.ply", 0.6), ("pipe.ply", 200.0)]])
+def test_it_gets_its_usual_size_where_the_others_say_nothing_or_disagree(tmp_path, others):
+    scene = assemble([placed(tmp_path, *others, ("brick.ply", 0.05))])
+    assert scene.objects[-1].real_extent == pytest.approx(0.22)
+
+
+def test_many_files_without_a_unit_are_one_sentence(tmp_path):
+    names = [(f"thing{letter}.ply", 0.1) for letter in "abcdef"]
+    told = [s for s in assemble([placed(tmp_path, *names)]).warnings if "no unit" in s]
+    assert len(told) == 1
+    assert told[0].startswith("thinga.ply, thingb.ply, thingc.ply and 3 more state no unit")
+
+
 def test_a_person_knows_the_unit_better(tmp_path):
     path = stl(tmp_path / "bracket.stl", 45.0)
     inches = assemble([path], AssembleConfig(unit="in"))

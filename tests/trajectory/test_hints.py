@@ -63,3 +63,10 @@ def test_a_push_or_wind_that_moves_nothing_is_named():
     (said,) = hints(shelf("boards", wind=wind), seen(), divided=False)
     assert said.startswith("shelf_0: the wind is too weak")
     assert hints(shelf("boards", push=push), seen(**FALLS), divided=False) == ()
+
+
+@pytest.mark.parametrize(("lost", "told"), [(None, False), (0.02, False), (0.31, True)])
+def test_energy_that_the_grid_took_is_told_where_it_is_much(lost, told):
+    """A rubber ring of 2.4 cells fell flat and stayed: nothing said that it should have bounced."""
+    said = hints(shelf("boards"), seen(**FALLS), divided=False, lost=lost)
+    assert any("31% of the energy was lost" in s for s in said) == told

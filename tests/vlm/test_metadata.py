@@ -6,7 +6,7 @@ import pytest
 from corporeal import materials
 from corporeal.geometry.identity import identify
 from corporeal.types import Finish, PartWords, SceneObject
-from corporeal.vlm.lexicon import lexicon, metals, tokens_of
+from corporeal.vlm.lexicon import lexicon, metals, mouldable, tokens_of
 from corporeal.vlm.metadata import Evidence, evidence, hollowed, matter_hint, recognise
 from handmade import plain, scene
 
@@ -35,6 +35,8 @@ def test_every_material_of_the_lexicon_is_in_the_library():
     assert metals() <= set(materials.library())
     assert {s.metallic for s in lexicon() if s.metallic} <= metals()
     assert all(0 < s.margin <= 1 for s in lexicon())
+    assert mouldable() <= set(materials.library())
+    assert {s.material for s in lexicon() if s.moulded} <= mouldable()
 
 
 def test_every_solid_of_the_library_is_known_by_its_name():
@@ -416,6 +418,32 @@ def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
 def test_what_is_hollow_by_what_it_is_has_a_wall(thing, structure):
     known = about("mesh", thing)
     assert hollowed(recognise(known), known, lambda _: True).structure == structure
+
+
+@pytest.mark.parametrize(
+    ("thing", "material", "structure"),
+    [
+        ("steel_ball", "steel", None),
+        ("ball_brass", "brass", None),
+        ("wooden ball", "wood", None),
+        ("stone ball", "granite", None),
+        ("glass ball", "glass", None),
+        ("foam ball", "seat_foam", None),
+        ("wooden duck", "wood", None),
+        ("rubber ball", "rubber", "shell"),
+        ("leather ball", "leather", "shell"),
+        ("plastic duck", "soft_PVC", "shell"),
+        ("ball", "rubber", "shell"),
+        ("wooden barrel", "wood", "shell"),
+        ("steel barrel", "steel", "shell"),
+    ],
+)
+def test_what_is_hollow_because_it_is_moulded_is_solid_of_what_is_not(thing, material, structure):
+    """A steel ball of 24 mm was a shell of .7 mm and weighed a sixth of itself."""
+    found = seen("mesh", thing)
+    assert (found.material, found.structure) == (material, structure)
+    if structure is None:
+        assert (found.thickness, found.inflation) == (None, None)
 
 
 def test_a_large_statue_of_metal_is_cast_around_a_core():

@@ -3,14 +3,17 @@
 from collections.abc import Sequence
 from pathlib import Path
 
-from corporeal.findings import PartAudit
+from corporeal.findings import Breakage, PartAudit
 from corporeal.terminal import console, print_table
 from corporeal.trajectory.audit_file import read_run_audit
+from corporeal.trajectory.audit_words import breakage_words
 
 MOST_PARTS = 12
 """Rows of the table; a scene of more parts is in the report."""
 MOST_WARNINGS = 5
 """Warnings that are printed whole."""
+MOST_BLOWS = 3
+"""Blows that may break something and are printed."""
 HEADS = ("object", "part", "material", "mass", "simulated as")
 
 
@@ -24,6 +27,18 @@ def show_summary(folder: Path) -> None:
     _listed("warning", audit.warnings)
     for hint in audit.hints:
         _say(f"hint: {hint}")
+    _breaking(audit.breakage)
+
+
+def _breaking(found: Sequence[Breakage]) -> None:
+    """Say what the film shows whole although it would break, and how to see it break."""
+    doubted = [b for b in found if b.word != "holds" and not b.pieces]
+    for blow in doubted[:MOST_BLOWS]:
+        _say(f"hint: {breakage_words(blow)}")
+    if len(doubted) > MOST_BLOWS:
+        _say(f"and {len(doubted) - MOST_BLOWS} more that may break: see the report.")
+    if any(b.word == "would break" for b in doubted):
+        _say("hint: with --breaking what would break falls into pieces.")
 
 
 def _row(part: PartAudit) -> tuple[str, ...]:

@@ -15,12 +15,8 @@ MARGIN = 1.5
 """How far beyond the table an object may be before it is reported."""
 SMALLEST, LARGEST = 0.005, 20.0
 """Extents that would be remarkable for anything in a scene [m]."""
-UNITS = {"metres": 1.0, "centimetres": 1e-2, "millimetres": 1e-3, "inches": 0.0254}
-"""What programs usually model in [m]."""
 AS_MATTER = ("marble", "brick", "stone", "rock", "sand", "snow", "mud", "foam", "paper", "glass")
 """Classes that may be meant as matter where another is named, the least likely last."""
-PRINTED = ("millimetres", "metres", "centimetres", "inches")
-"""In which order they are likely in files that are made for printing."""
 
 
 @dataclass(frozen=True)
@@ -110,43 +106,11 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
     low, high = (known.low / MARGIN, known.high * MARGIN) if known else (SMALLEST, LARGEST)
     if low <= extent <= high and not _normalised(extent, known):
         return None
-    size = f"{name} is {_length(extent)} large"
+    size = f"{name} is {length(extent)} large"
     if known is None:
         return f"{size}: is the file in metres? Give its real size with --extent {name}=METRES."
-    usual = f"{one_of(known.words, 'is', 'are')} usually about {_length(known.usual)}"
+    usual = f"{one_of(known.words, 'is', 'are')} usually about {length(known.usual)}"
     return f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}."
-
-
-@dataclass(frozen=True)
-class LikelyUnit:
-    """What one unit of a file that states none was taken to be."""
-
-    metres: float
-    reason: str
-    """In a clause about "it", the file."""
-
-
-def likely_unit(class_name: str, extent: float, printed: bool = False) -> LikelyUnit | None:
-    """Return the first usual unit in which a thing is as large as such things are.
-
-    Where there is none, a thing of the table gets its usual size; else None.
-
-    Args:
-        class_name: What it is.
-        extent: Its largest extent, in the file's unit.
-        printed: Whether the file is of a kind that is made for printing.
-
-    """
-    for name in PRINTED if printed else UNITS:
-        size = extent * UNITS[name]
-        if doubt("it", class_name, size) is None:
-            reason = f"it was taken to be in {name}, so that it is {_length(size)} large"
-            return LikelyUnit(UNITS[name], reason)
-    known = typical_extent(class_name)
-    if known is None:
-        return None
-    reason = f"it was made as large as a {known.words} usually is, {_length(known.usual)}"
-    return LikelyUnit(known.usual / extent, reason)
 
 
 def _normalised(extent: float, known: TypicalExtent | None) -> bool:
@@ -206,5 +170,6 @@ def _singular(word: str) -> str:
     return word[:-1] if word.endswith("s") and not keep and len(word) > 3 else word
 
 
-def _length(metres: float) -> str:
+def length(metres: float) -> str:
+    """Return a length in words [m]."""
     return f"{metres:.3g} m" if metres >= 1 else f"{100 * metres:.3g} cm"

@@ -9,9 +9,10 @@ import numpy as np
 
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.any_model import READ, Frame, read_model
+from corporeal.formats.likely_unit import LikelyUnit, in_shared_unit, likely_unit, sentences
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
 from corporeal.formats.sources import models_in, pictures_in
-from corporeal.formats.typical_extents import doubt, likely_unit
+from corporeal.formats.typical_extents import doubt
 from corporeal.formats.words import safe, unique
 from corporeal.geometry import placing
 from corporeal.geometry.arrangement import (
@@ -171,9 +172,8 @@ def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
     alone = len(blocks) == len(blocks[0].scene.objects) == 1
     only = blocks[0].scene.objects[0].name if alone else ""
     wanted = [said_extent(text, only) for text in extents]
-    used = set()
+    used, blocks = set(), _in_metres(blocks, dict(wanted))
     for i, block in enumerate(blocks):
-        block = _in_metres(block, dict(wanted))
         scene, messages = block.scene, []
         for k, obj in enumerate(scene.objects):
             hits = [w for w in wanted if _means(w[0], obj)]
@@ -191,25 +191,45 @@ def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
     return blocks
 
 
-def _in_metres(block: _Block, wanted: Mapping[str, float]) -> _Block:
-    """Find the unit of a file that states none, by an extent that was asked for or by its size."""
-    if block.metric:
-        return block
-    scene = block.scene
-    for thing in scene.objects:
+def _in_metres(blocks: list[_Block], wanted: Mapping[str, float]) -> list[_Block]:
+    """Find the units of files that state none, by an extent asked for or by their sizes."""
+    blocks = [b if b.metric else _as_asked(b, wanted) for b in blocks]
+    alone = {i: _likely(b) for i, b in enumerate(blocks) if not b.metric}
+    found = []
+    for i, guess in alone.items():
+        block, largest = blocks[i], _largest_object(blocks[i])
+        file = Path(block.scene.source)
+        if block.entry is not None and block.entry.position is not None:
+            others = (other for k, other in alone.items() if k != i)
+            guess = in_shared_unit(guess, file, largest.real_extent, others)
+        if guess is None:
+            what = f"states no unit, and {largest.name} is {largest.real_extent:.4g} units large."
+            step = "Give --unit, or --extent NAME=METRES."
+            raise BadFileError(file, what, step)
+        found.append(guess)
+        blocks[i] = replace(block, scene=in_unit(block.scene, guess.metres), metric=True)
+    first = blocks[0].scene
+    told = (*first.warnings, *sentences(found))
+    return [replace(blocks[0], scene=replace(first, warnings=told)), *blocks[1:]]
+
+
+def _as_asked(block: _Block, wanted: Mapping[str, float]) -> _Block:
+    """Return a block in metres where somebody says how large one of its objects is."""
+    for thing in block.scene.objects:
         asked = [extent for name, extent in wanted.items() if _means(name, thing)]
         if asked:
-            return replace(block, scene=in_unit(scene, asked[-1] / thing.real_extent), metric=True)
-    file = Path(scene.source)
-    largest = max(scene.objects, key=lambda o: o.real_extent)
-    printed = file.suffix.lower() == ".stl"
-    found = likely_unit(largest.class_name, largest.real_extent, printed)
-    if found is None:
-        what = f"states no unit, and {largest.name} is {largest.real_extent:.4g} units large."
-        raise BadFileError(file, what, "Give --unit, or --extent NAME=METRES.")
-    message = f"{file.name} states no unit: {found.reason}. --unit or --extent says otherwise."
-    scene = in_unit(scene, found.metres)
-    return replace(block, scene=replace(scene, warnings=(*scene.warnings, message)), metric=True)
+            scene = in_unit(block.scene, asked[-1] / thing.real_extent)
+            return replace(block, scene=scene, metric=True)
+    return block
+
+
+def _likely(block: _Block) -> LikelyUnit | None:
+    thing = _largest_object(block)
+    return likely_unit(Path(block.scene.source), thing.class_name, thing.real_extent)
+
+
+def _largest_object(block: _Block) -> SceneObject:
+    return max(block.scene.objects, key=lambda o: o.real_extent)
 
 
 def _means(words: str, obj: SceneObject) -> bool:

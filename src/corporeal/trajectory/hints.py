@@ -15,20 +15,35 @@ STILL = 0.01
 """Of an object's length: what moves or bends less cannot be seen [-]."""
 STILL_TURN = 1.0
 """The same of its turning [degrees]."""
+LOST = 0.1
+"""Energy that no booked loss accounts for, as a share of what there was: more is told [-]."""
 START = "Let it fall (--drop 0.5), throw it (--velocity NAME=1,0,0) or push it (scene.toml)."
 
 
-def hints(scene: Scene, happened: Outcome, divided: bool) -> tuple[str, ...]:
+def hints(
+    scene: Scene, happened: Outcome, divided: bool, lost: float | None = None
+) -> tuple[str, ...]:
     """Return what a person may want to know before the next run, in sentences.
 
     Args:
         scene: What was simulated.
         happened: What was seen.
         divided: Whether it was asked for which nodes of a file are objects of their own.
+        lost: Share of the energy that no booked loss accounts for [-]; None: it is not known.
 
     """
     joined = () if divided else _joined(scene)
-    return (*scene.hints, *joined, *_motionless(scene, happened))
+    return (*scene.hints, *joined, *_motionless(scene, happened), *_lost(lost))
+
+
+def _lost(share: float | None) -> Iterator[str]:
+    """Say that coarse cells took energy that nature would have kept."""
+    if share is not None and share > LOST:
+        yield (
+            f"{share:.0%} of the energy was lost between material points and grid, and to nothing "
+            "in nature: what is soft and few cells across rebounds and swings too little. A finer "
+            "--detail loses less."
+        )
 
 
 def _joined(scene: Scene) -> Iterator[str]:

@@ -57,8 +57,12 @@ class Term:
     """Gauge pressure of the air sealed in it [Pa]."""
     rebound: float | None = None
     """Restitution on a hard floor that its rules ask for [-]."""
+    moulded: bool = False
+    """It is hollow only where it is of one of the ``mouldable`` materials."""
     before: int = 0
     """Words of the object that a substance stands right before."""
+    narrowed: bool = False
+    """A general substance, of which the object beside it tells the kind."""
 
 
 @dataclass(frozen=True)
@@ -298,6 +302,12 @@ def kin(one: str, other: str) -> bool:
 
 
 @cache
+def mouldable() -> frozenset[str]:
+    """Materials of which a moulded thing is hollow: blown, moulded, slip-cast or sewn."""
+    return frozenset(_table()["mouldable"])
+
+
+@cache
 def metals() -> frozenset[str]:
     """Materials whose surface is metallic."""
     general = next(s for s in lexicon() if s.phrase == ("metal",))
@@ -384,4 +394,5 @@ def _term(kind: str, phrase: str, row: dict) -> Term:
         fill=row.get("fill"),
         inflation=None if pressure is None else pressure * 1e3,
         rebound=row.get("rebound"),
+        moulded=row.get("moulded", False),
     )

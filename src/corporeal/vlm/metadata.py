@@ -27,6 +27,7 @@ from corporeal.vlm.lexicon import (
     kin,
     lookbook,
     metals,
+    mouldable,
     open_ware,
     phrases,
     seen_as,
@@ -299,7 +300,8 @@ def _answer(terms: list[Term], name: str, factor: float) -> PartWords:
         return PartWords("", None, reason=reason)
     first = terms[0]
     kinds = {"substance": "names the material", "piece": "is usually", "thing": "is usually"}
-    reason = f"{' '.join(first.phrase)!r} in {name!r} {kinds[first.kind]} {first.material}."
+    says = kinds["thing" if first.narrowed else first.kind]
+    reason = f"{' '.join(first.phrase)!r} in {name!r} {says} {first.material}."
     shell = "shell" if first.structure == "shell" else None
     return PartWords(
         "",
@@ -358,7 +360,7 @@ def _adjectives(name: Name) -> list[Term]:
     """Find what stands in a name; a substance right beside an object is that of such an object.
 
     "Wooden chair", and as files are named "chair_wooden"; what lies loose is no thing's matter: a
-    snow shoe, a snow globe.
+    snow shoe, a snow globe. A general word means what such things are of: a plastic duck is of PVC.
     """
     standing = heads(name.words)
     things = sorted((s for s in standing if s.kind == "thing"), key=lambda t: -len(t.phrase))
@@ -368,7 +370,9 @@ def _adjectives(name: Name) -> list[Term]:
         beside = next((t for t in things if name.says(term.phrase + t.phrase)), None)
         if beside is None and term.material not in LOOSE and not term.colour:
             beside = next((t for t in things if name.says(t.phrase + term.phrase)), None)
-        if beside and beside.material not in term.gives_way:
+        if beside and beside.material in term.gives_way:
+            standing[k] = replace(beside, kind=term.kind, before=len(beside.phrase), narrowed=True)
+        elif beside:
             standing[k] = _made_as(term, beside)
     solid = any(s.kind == "substance" and s.material not in LOOSE for s in standing)
     return [
@@ -393,8 +397,13 @@ def _is_purpose(term: Term, name: Name, things: Sequence[Term]) -> bool:
 
 
 def _made_as(substance: Term, thing: Term) -> Term:
-    """Return a substance built as an object is; how thick depends on what it is usually made of."""
+    """Return a substance built as an object is; how thick depends on what it is usually made of.
+
+    A ball of rubber is blown up, and one of steel is solid.
+    """
     same = kin(substance.material, thing.material)
+    if thing.moulded and substance.material not in mouldable():
+        return replace(substance, before=len(thing.phrase))
     return replace(
         substance,
         before=len(thing.phrase),

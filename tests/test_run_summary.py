@@ -1,0 +1,32 @@
+"""What a finished run says in the terminal."""
+
+import pytest
+
+from corporeal import store
+from corporeal.cli.run_summary import show_summary
+from corporeal.findings import Breakage
+from corporeal.trajectory.audit_file import AUDIT
+from made_findings import run_audit
+
+
+def blow(word, ratio, pieces=0):
+    return Breakage("glass_0", "glass", "tile_0", 0.3, 3.1, 0.75, ratio, word, pieces)
+
+
+@pytest.mark.parametrize(
+    ("found", "told"),
+    [
+        (blow("would break", 11.0), ("glass would break", "with --breaking")),
+        (blow("may break", 3.0), ("glass may break",)),
+        (blow("holds", 0.4), ()),
+        (blow("would break", 11.0, pieces=7), ()),
+    ],
+)
+def test_what_would_break_is_said_where_the_film_shows_it_whole(tmp_path, capsys, found, told):
+    """A glass that fell on a tile bounced, and only the report said that it would break."""
+    store.write_json(tmp_path / AUDIT, store.plain(run_audit(breakage=(found,))))
+    show_summary(tmp_path)
+    said = capsys.readouterr()
+    text = said.out + said.err
+    assert all(words in text for words in told)
+    assert ("break" in text) == bool(told)
