@@ -18,7 +18,7 @@ from corporeal.trajectory.audit import believed
 from corporeal.trajectory.audit_file import read_audit
 from corporeal.trajectory.frames import read_trajectory
 from corporeal.trajectory.outcome import outcome
-from corporeal.types import Particles, Scene, Trajectory
+from corporeal.types import MaterialField, Particles, Scene, Trajectory
 
 
 @dataclass(frozen=True)
@@ -28,6 +28,7 @@ class Told:
     name: str
     scene: Scene
     particles: Particles
+    field: MaterialField
     film: Trajectory
     audit: Audit
     seconds: float
@@ -36,7 +37,7 @@ class Told:
     @cached_property
     def outcome(self) -> Outcome:
         """Who met whom, who was dented where, who bounced how high."""
-        return outcome(self.scene, self.particles, self.film)
+        return outcome(self.scene, self.particles, self.field, self.film)
 
     def expectations(self) -> list[Expectation]:
         """Compare what happened with what must be seen."""
@@ -71,6 +72,7 @@ def told(name: str, folder: Path) -> Told:
         name,
         prepared.scene,
         prepared.particles,
+        prepared.field,
         read_trajectory(simulated),
         read_audit(simulated),
         read_meta(simulated).seconds,

@@ -32,13 +32,18 @@ class ObjectOutcome:
     shape_error_max: float
     """The same, its largest over time [-]."""
     dent_depth_m: float
-    """Of the largest dent that is left at the end, from averages over the last 0.3 s [m]."""
+    """Of the largest dent that is left at the end, from averages over the last 0.3 s [m].
+
+    Of what holds together: how far a patch of its matter went from where it was (``trajectory.
+    residual_shape``). Of grains and pastes: how deep the free surface fell (``surface_mark``).
+    """
     dent_depth_dx: float
     """[cells]"""
     dent_place: Vector | None
     """Centroid of the dent on the object as it started [m]."""
     dent_share: float
-    """Share of its particles in the dent [-]."""
+    """Share of its particles in the dent; of grains and pastes, of the columns of a cell's width
+    in which the surface fell by more than a cell [-]."""
     dent_from_contact_m: Mapping[str, float | None]
     """Other body → distance of the dent's centroid from where the two first touched [m]."""
     deepest_squeeze_m: float
@@ -67,6 +72,9 @@ class ObjectOutcome:
     """Of its top over its bottom at the end, a particle's own size included [m]."""
     left_vessel: float | None = None
     """Share of it that is outside of the vessel that held it [-]; None: none did."""
+    rim_height_m: float | None = None
+    """By how much the surface of grains or paste rose where it rose most [m]; None: it holds
+    together, or the run is from before this was measured."""
 
 
 @dataclass(frozen=True)

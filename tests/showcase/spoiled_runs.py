@@ -9,7 +9,6 @@ import numpy as np
 from corporeal import pipeline
 from corporeal.evaluation.judge.simulated_controls import SIMULATED, simulate_control
 from corporeal.pipeline import Settings
-from corporeal.trajectory.outcome import outcome
 from corporeal.trajectory.played import Played
 
 HEIGHT_LEFT = 0.7
@@ -111,4 +110,4 @@ PLANTED = {"frozen": frozen, "squashed": squashed, "toppled": toppled, "shifted"
 
 def happened(played: Played):
     """Measure what happened."""
-    return outcome(played.prepared.scene, played.prepared.particles, played.trajectory)
+    return played.outcome

@@ -102,8 +102,8 @@ def bounce(tmp_path_factory):
 
 
 def test_a_jelly_ball_bounces_and_is_round_again(bounce):
-    (scene, particles, _), trajectory, _ = bounce
-    row = outcome(scene, particles, trajectory).objects["ball_0"]
+    (scene, particles, field), trajectory, _ = bounce
+    row = outcome(scene, particles, field, trajectory).objects["ball_0"]
     assert row.fall_m == pytest.approx(FALL, abs=0.3 * particles.cell)
     assert 0.6 < row.rebound_ratio < 1.0
     assert row.shape_error_max > 0.008
@@ -125,7 +125,7 @@ def test_its_audit_has_nothing_to_complain_about(bounce):
 def test_a_steel_ball_rebounds_by_its_coefficient_of_restitution(tmp_path):
     scene, particles, field = balls([STEEL], [FALL], duration=0.4)
     moved = simulate(scene, particles, field, SimulateConfig(), tmp_path)
-    row = outcome(scene, particles, moved).objects["ball_0"]
+    row = outcome(scene, particles, field, moved).objects["ball_0"]
     assert particles.treatments[0].kind == "rigid"
     assert row.rebound_ratio == pytest.approx(0.36, abs=0.04)
     assert row.shape_error_max < 1e-6
@@ -167,7 +167,7 @@ def test_two_balls_that_meet_part_again_and_one_field_glues_them(tmp_path):
     pairs = {}
     for contact in ("multi", "single"):
         trajectory = simulate(*asked, SimulateConfig(contact=contact), tmp_path / contact)
-        pairs[contact] = outcome(asked[0], asked[1], trajectory).pair("ball_0", "ball_1")
+        pairs[contact] = outcome(*asked, trajectory).pair("ball_0", "ball_1")
     assert pairs["multi"].separated
     assert not pairs["single"].separated
 

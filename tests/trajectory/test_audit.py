@@ -152,7 +152,7 @@ def story(tmp_path_factory):
 
 @pytest.fixture(scope="module")
 def seen(story):
-    return outcome(story[0], story[1], story[3])
+    return outcome(*story)
 
 
 def test_the_imprint_is_where_the_stone_struck(seen):
@@ -162,6 +162,18 @@ def test_the_imprint_is_where_the_stone_struck(seen):
     assert clay.dent_from_contact_m["stone_0"] < 0.02
     assert clay.dent_from_contact_m["floor"] > 0.06
     assert clay.at_rest
+
+
+def test_the_same_imprint_in_sand_is_measured_at_its_surface(story, seen):
+    scene, particles, field, trajectory = story
+    sand = replace(CLAY, law=Law.DRUCKER_PRAGER, yield_stress=None, friction_angle=0.6)
+    lump = outcome(scene, particles, replace(field, materials=(sand, CLAY)), trajectory).objects[
+        "clay_0"
+    ]
+    assert lump.dent_depth_m == pytest.approx(0.02, rel=0.05)
+    np.testing.assert_allclose(lump.dent_place[:2], [0.02, 0.02], atol=0.003)
+    assert lump.rim_height_m == pytest.approx(0.0, abs=1e-3)
+    assert seen.objects["clay_0"].rim_height_m is None, "what holds together has none"
 
 
 def test_the_stone_bounced_and_kept_its_shape(seen):
@@ -180,12 +192,12 @@ def test_the_stone_bounced_and_kept_its_shape(seen):
 @pytest.mark.parametrize(("gap", "order"), [(1.0, (("clay_0", "stone_0"),)), (0.45, ())])
 def test_what_meets_before_the_second_frame_was_apart_if_there_was_a_gap(story, gap, order):
     """Ways between things in a row are crossed sooner than a film can show."""
-    scene, particles, _, trajectory = story
+    scene, particles, field, trajectory = story
     ledger = deepcopy(trajectory.ledger)
     ledger.first_contact[-1, 0, 1] = 0.4 / FPS
     ledger.contact_point[-1, 0, 1] = 0.0
     ledger.gap[0, 0, 1] = gap * CELL
-    seen = outcome(scene, particles, replace(trajectory, ledger=ledger))
+    seen = outcome(scene, particles, field, replace(trajectory, ledger=ledger))
     assert seen.order == order
     assert seen.pair("clay_0", "stone_0").gap_start_dx == pytest.approx(gap)
 

@@ -79,7 +79,7 @@ def test_a_run_from_before_opens_and_its_keys_are_still_those(tmp_path):
     assert again.pop("questions")["models"] == []
     for kept_since in ("energy_gain", "unbooked_loss", "impact_loss"):
         assert again.pop(kept_since) is None
-    for kept_since in ("left_vessel", "reach_m", "height_m"):
+    for kept_since in ("left_vessel", "reach_m", "height_m", "rim_height_m"):
         assert again["outcome"]["objects"]["can_0"].pop(kept_since) is None
     assert again.pop("breakage") == []
     assert again.pop("surfaces") == []

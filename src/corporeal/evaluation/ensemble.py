@@ -24,7 +24,6 @@ from corporeal.stages.simulate import SimulateConfig, simulate
 from corporeal.trajectory.frames import FOLDER
 from corporeal.trajectory.outcome import outcome
 from corporeal.typed import typed
-from corporeal.types import Particles, Scene, Trajectory
 
 MEMBERS, DATA, SPREAD = "ensemble", "outcome.json", "ensemble.json"
 QUANTITIES = {
@@ -139,7 +138,7 @@ def ensemble(
     with opened(asked.inputs, folder, settings, tell, "simulate") as work:
         made = work.made
         progress = tell("ensemble")
-        chosen = outcome_row(made.scene, made.particles, made.trajectory)
+        chosen = outcome_row(made)
         rows = []
         for number in range(samples):
             name = store.key("member", {"seed": seed, "number": number}, [work.key])
@@ -179,7 +178,8 @@ def _member(member: Member, made: Results, settings: Settings, progress: Progres
 def _simulated(
     member: Member, made: Results, settings: Settings, progress: Progress
 ) -> MemberOutcome:
-    scene, parts, random = made.scene, made.parts, member.random
+    random = member.random
+    scene, parts, _ = made.assembled.all
     library, floor = settings.ground.library, settings.ground.floor
     words = drawn_given(made.inventory, made.field.mixtures, random, library)
     field = ground(scene, parts, words, settings.ground)
@@ -194,12 +194,14 @@ def _simulated(
         trajectory = simulate(scene, particles, field, settings.simulate, member.folder, progress)
     except SimulationError as error:
         return MemberOutcome(member.number, drawn, {}, str(error))
-    return MemberOutcome(member.number, drawn, outcome_row(scene, particles, trajectory))
+    again = made.having("ground", field).having("fill", particles).having("simulate", trajectory)
+    return MemberOutcome(member.number, drawn, outcome_row(again))
 
 
-def outcome_row(scene: Scene, particles: Particles, trajectory: Trajectory) -> Numbers:
-    """Return what happened to every object."""
-    happened = outcome(scene, particles, trajectory).objects
+def outcome_row(made: Results) -> Numbers:
+    """Return what happened to every object, what moved in vessels and broke off included."""
+    scene, particles = made.scene, made.particles
+    happened = outcome(scene, particles, made.field, made.trajectory).objects
     mass = np.bincount(particles.object, particles.mass, len(scene.objects))
     return {
         obj.name: {
@@ -213,7 +215,9 @@ def outcome_row(scene: Scene, particles: Particles, trajectory: Trajectory) -> N
 def spread(chosen: Numbers, rows: Sequence[MemberOutcome]) -> Mapping[str, Mapping[str, Spread]]:
     """Say how far each outcome number is spread over the members that came through."""
     return {
-        name: {q: _spread(own[q], [r.objects[name][q] for r in rows if r.objects]) for q in own}
+        name: {
+            q: _spread(own[q], [r.objects[name][q] for r in rows if name in r.objects]) for q in own
+        }
         for name, own in chosen.items()
     }
 

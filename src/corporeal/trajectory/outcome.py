@@ -12,7 +12,8 @@ from scipy.spatial import Delaunay
 from corporeal.findings import FLOOR, ObjectOutcome, Outcome, PairOutcome, pair_name
 from corporeal.geometry.rigid_fit import rigid_fit
 from corporeal.trajectory.residual_shape import Dent, dent, diagonal, reached_by_share, where_it_was
-from corporeal.types import Particles, Scene, Trajectory, Vector
+from corporeal.trajectory.surface_mark import marked_at_its_surface, surface_mark
+from corporeal.types import MaterialField, Particles, Scene, Trajectory, Vector
 
 REST = 0.3
 """A dent is what is left after so long at rest [s]."""
@@ -27,17 +28,20 @@ TOUCHING = 0.5
 known no better. What rests on something is within 0.45, what stands beside it from 1 on."""
 
 
-def outcome(scene: Scene, particles: Particles, trajectory: Trajectory) -> Outcome:
+def outcome(
+    scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
+) -> Outcome:
     """Say what was seen.
 
     Args:
         scene: What was simulated.
         particles: Its material points.
+        field: What every part is made of: grains are marked, what holds together is dented.
         trajectory: How they moved, with the ledger.
 
     """
     names = [o.name for o in scene.objects]
-    bodies = Bodies(scene, particles, trajectory)
+    bodies = Bodies(scene, particles, field, trajectory)
     pairs = pair_rows(names, particles.cell, trajectory)
     return Outcome(
         objects={name: object_row(b, names, bodies) for b, name in enumerate(names)},
@@ -51,7 +55,9 @@ def outcome(scene: Scene, particles: Particles, trajectory: Trajectory) -> Outco
 class Bodies:
     """Particle positions of every object over time; one pass over the frames on disk."""
 
-    def __init__(self, scene: Scene, particles: Particles, trajectory: Trajectory) -> None:
+    def __init__(
+        self, scene: Scene, particles: Particles, field: MaterialField, trajectory: Trajectory
+    ) -> None:
         self.gravity = -scene.gravity[2]
         self.cell, self.time, self.ledger = particles.cell, trajectory.time, trajectory.ledger
         self.trajectory = trajectory
@@ -63,6 +69,9 @@ class Bodies:
         first = trajectory.frames[0].position.astype(float)
         self.start = [first[m] for m in self.members]
         self.size = [diagonal(start) for start in self.start]
+        parting = np.array([marked_at_its_surface(m) for m in field.materials], dtype=bool)
+        self.parting = [parting[particles.part[m]] for m in self.members]
+        """Of each object's particles, which keep a mark at their surface."""
         self.error = np.zeros((len(self.time), count))
         self.squeeze = np.zeros(count)
         self.last: list[list[np.ndarray]] = [[] for _ in range(count)]
@@ -105,7 +114,7 @@ class Bodies:
 def object_row(body: int, names: list[str], bodies: Bodies) -> ObjectOutcome:
     """Say what happened to one object."""
     ledger, cell, start = bodies.ledger, bodies.cell, bodies.start[body]
-    mark = dent(start, bodies.last[body], cell)
+    mark, rim = residual_mark(body, bodies)
     centre = ledger.centre[:, body]
     late = bodies.resting_frames()
     drift = float(np.linalg.norm(np.ptp(centre[late], axis=0)))
@@ -123,6 +132,7 @@ def object_row(body: int, names: list[str], bodies: Bodies) -> ObjectOutcome:
         dent_place=None if mark.share == 0 else vector(mark.place),
         dent_share=mark.share,
         dent_from_contact_m=dent_distances(body, mark, names, bodies),
+        rim_height_m=rim,
         deepest_squeeze_m=float(bodies.squeeze[body]),
         moved_m=vector(moved),
         moved_level_m=float(np.hypot(moved[0], moved[1])),
@@ -136,6 +146,18 @@ def object_row(body: int, names: list[str], bodies: Bodies) -> ObjectOutcome:
         height_m=height(bodies.last[body][-1], start, cell),
         left_vessel=left_vessel(body, bodies),
     )
+
+
+def residual_mark(body: int, bodies: Bodies) -> tuple[Dent, float | None]:
+    """Find what mark is left, and how high a rim rose about it [m]; None: it holds together.
+
+    An object of whose particles most are grains or paste is measured at their surface.
+    """
+    start, last, parting = bodies.start[body], bodies.last[body], bodies.parting[body]
+    if 2 * np.count_nonzero(parting) <= len(start):
+        return dent(start, last, bodies.cell), None
+    mark = surface_mark(start[parting], [x[parting] for x in last], bodies.cell, bodies.cell)
+    return Dent(mark.depth, mark.place, mark.share), mark.rim
 
 
 def reach(points: Float[np.ndarray, "N 3"], cell: float) -> float:

@@ -52,4 +52,5 @@ class Played:
     @cached_property
     def outcome(self) -> Outcome:
         """What happened to every object and pair: falls, rebounds, dents, distances."""
-        return outcome(self.prepared.scene, self.prepared.particles, self.trajectory)
+        made = self.prepared
+        return outcome(made.scene, made.particles, made.field, self.trajectory)
