@@ -172,6 +172,17 @@ SWEEPS, SWEEPS_OF_A_HIT = 10, 100
 SCATTER = 0.6180339887498949
 """Contacts are swept in strides of this share of their number [-], the golden section: in the order
 in which they lie next to one another the first would carry more, and what rests would tilt."""
+BACKED = 3.0
+"""A body between what strikes it and what it rests on is squeezed at once where the square of its
+own frequency between the two is more than this times that of the blow [-] (decision 89) …"""
+BEHIND = 0.5
+"""… and what it rests on lies behind it: least cosine of the normal with the blow's [-] …"""
+AS_HEAVY = 0.9
+"""… and is no lighter than this share of it [-]."""
+SWEEPS_OF_A_HOLD = 1000
+"""Gauss–Seidel sweeps of such a round: what is heavy presses on what is light."""
+RESTING = 1e-3
+"""Contacts that open faster than this [m/s] rest on nothing."""
 IMPACTS = 50
 """Most impacts that follow one another within a step, as along a row of touching balls."""
 SWEEPS_REMEMBERED = 2
@@ -179,7 +190,7 @@ SWEEPS_REMEMBERED = 2
 STILL, STILL_OF_A_HIT = 2e-3, 2e-5
 """Sweeps end when no contact changes its velocity by more than this [cells/s]: stacks that creep
 slower stand. An impact is one event, whose error stays in the motion."""
-JACOBI_SWEEPS, JACOBI_SWEEPS_OF_A_HIT = 100, 400
+JACOBI_SWEEPS, JACOBI_SWEEPS_OF_A_HIT, JACOBI_SWEEPS_OF_A_HOLD = 100, 400, 2000
 """The same of Jacobi sweeps on cards, which converge more slowly …"""
 JACOBI_STILL = 1e-4
 """… and end where they change less [cells/s]."""

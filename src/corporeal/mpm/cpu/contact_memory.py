@@ -155,7 +155,8 @@ class ContactMemory:
         self.face = face_table()
         self.stage = np.zeros(1, layout.STAGE.dtype)
         self.pair = np.zeros(self.friction.size * PAIR)
-        point(self.stage, pair=self.pair)
+        self.light = np.zeros(len(self.friction))
+        point(self.stage, pair=self.pair, light=self.light)
         point(
             world,
             plane=self.plane,

@@ -102,8 +102,9 @@ PARTS = 16
 """Parts that a list is cut into, whoever works on them."""
 FIELDS_IN_BLOCK = 12
 """Fields that may meet in one block of nodes."""
-PAIR = 8
-"""Columns of a pair of fields in a step: hit, normal sum, weighted place (3), spare."""
+PAIR = 16
+"""Columns of a pair of fields in a step: its part in a round of impacts, normal sum, weighted place
+(3), spare; in such a round those of ``Backing`` in backing.h."""
 
 
 def numbers() -> str:
@@ -348,6 +349,7 @@ STAGE = Record(
     ("Past *", "past"),
     ("int *", "slot"),  # where each past contact stands, by its key; slots: a power of two
     ("double *", "pair"),  # [fields and planes][fields and planes][PAIR]
+    ("double *", "light"),  # inverse masses of fields and planes, as in ``Backing``
     ("int *", "order"),
     ("Lean *", "lean"),
     ("Choice *", "choice kept"),  # of this step, and of the last one

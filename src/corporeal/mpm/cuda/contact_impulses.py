@@ -5,40 +5,37 @@ projected Gauss–Seidel. Rigid bodies couple many nodes. There every sweep is a
 a body with n busy contacts lends each of them an n-th of its mass (mass splitting, Tonge et al.
 2012, "Mass splitting for jitter-free parallel rigid body simulation"): it converges whatever the
 order of threads, and each impulse moves the whole body, so momentum is exact. Impacts of rigid
-bodies come first, in rounds of such sweeps: see ``physics.contact_impulses.solve_impacts``.
+bodies come first, in rounds of such sweeps: see ``contact_rounds``.
 """
 
 from corporeal.mpm import constants, formulas
 from corporeal.mpm.constants import (
     FIELDS_AT_NODE,
-    IMPACTS,
     JACOBI_STILL,
     JACOBI_SWEEPS,
     JACOBI_SWEEPS_OF_A_HIT,
+    JACOBI_SWEEPS_OF_A_HOLD,
     SWEEPS,
     VAST,
 )
-from corporeal.mpm.cuda.contact_nodes import curve_of, is_stiff
+from corporeal.mpm.cuda.contact_nodes import curve_of
 from corporeal.mpm.cuda.layout import (
     DT,
     FULL,
     HITS,
+    HOLDS,
     IMPACTING,
     LANES,
-    LAST_ROUND,
     MEETS,
     PUSHING,
-    ROUND,
     RUBBING,
     STIFF,
     STRIKING,
-    STRUCK,
     SWEEPING,
     SWEPT,
     SWEPT_NOW,
     TIME,
     TOUCHES,
-    WAITING,
     Contacts,
     D,
     Grid,
@@ -48,11 +45,8 @@ from corporeal.mpm.cuda.layout import (
 )
 from corporeal.mpm.cuda.rigid import softness_at, speed_at
 from corporeal.mpm.formulas.one_lane import (
-    approach_of,
     closing_speed,
     dragged,
-    impact_begins,
-    impact_target,
     push_of,
     within_cone,
 )
@@ -184,127 +178,6 @@ def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, stride: int):
             s.flag[IMPACTING] = 1
 
 
-# ---------------------------------------------------------------- impacts, one after the other
-
-
-@wp.func
-def of_rigid(c: Contacts, t: int):
-    """Whether a contact is solved with those of rigid bodies."""
-    alone = c.meet[t] < 0
-    if not alone:
-        alone = c.stiff[c.meet[t]] == 1
-    return alone
-
-
-@wp.func
-def rebounds(c: Contacts, r: Rigid, s: Sheet, t: int):
-    """Whether a contact has a restitution: of rigid bodies with one another and with planes."""
-    stiff = False
-    if c.active[t] > 0:
-        if r.stiff[c.fa[t]] == 1 and is_stiff(r, s, c.fc[t]):
-            stiff = c.restitution[c.fa[t], c.fc[t]] > D(0.0)
-    return stiff
-
-
-@wp.func
-def kick_of(c: Contacts, s: Sheet, t: int):
-    """Approach speed of two rigid sides that forces added in this step [m/s]."""
-    kick = s.kick[c.fa[t]]
-    if c.fc[t] < s.bodies:
-        kick = kick - s.kick[c.fc[t]]
-    return wp.dot(kick, wp.vec3d(c.normal[t]))
-
-
-@wp.func
-def feigned(c: Contacts, r: Rigid, t: int):
-    """Speed at which a body that rolls on its surface points meets the next one [m/s]."""
-    speed = D(0.0)
-    if c.meet[t] < 0:
-        b = c.fa[t]
-        if c.facet[t] == 1:
-            b = c.fc[t]
-        speed = wp.length(r.spin[b]) * r.spacing[b]
-    return speed
-
-
-@wp.kernel
-def strike(c: Contacts, r: Rigid, s: Sheet, stride: int):
-    """Find the rigid pairs that are hit as things move now."""
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        if rebounds(c, r, s, t):
-            un = wp.dot(slip_of(c, r, s, t), wp.vec3d(c.normal[t]))
-            approach = approach_of(un, kick_of(c, s, t), feigned(c, r, t))
-            if impact_begins(approach, un, D(c.gap[t]), s.clock[DT]):
-                c.hit[c.fa[t], c.fc[t]] = 1
-                s.flag[STRUCK] = 1
-
-
-@wp.kernel
-def begin_round(r: Rigid, s: Sheet):
-    """Begin the sweeps of a round; the last one is of all contacts together."""
-    s.flag[LAST_ROUND] = 1
-    if s.flag[STRUCK] == 1 and s.flag[ROUND] < IMPACTS:
-        s.flag[LAST_ROUND] = 0
-        s.flag[HITS] = 1
-    s.flag[SWEEPING] = 1
-    s.flag[SWEPT] = 0
-    s.change[0] = 0.0
-    s.pace[0] = D(1.0)
-    s.pace[1] = D(0.0)
-    s.pace[2] = D(0.0)
-    for b in range(s.bodies):
-        r.last_speed[b] = r.speed[b]
-        r.last_moment[b] = r.moment[b]
-
-
-@wp.kernel
-def aim(c: Contacts, r: Rigid, s: Sheet, stride: int):
-    """Say which contacts take part in a round, and what speed each may keep."""
-    dt = s.clock[DT]
-    for k in range(wp.tid(), s.flag[MEETS], stride):
-        if c.stiff[k] == 1:
-            for q in range(c.number[k]):
-                c.last_velocity[k * FIELDS_AT_NODE + q] = c.velocity[k * FIELDS_AT_NODE + q]
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        if c.active[t] > 0 and of_rigid(c, t):
-            fa = c.fa[t]
-            fc = c.fc[t]
-            gap = D(c.gap[t])
-            c.target[t] = closing_speed(gap, dt) - c.inward[t]
-            c.active[t] = SWEPT_NOW
-            if s.flag[LAST_ROUND] == 0:
-                if c.hit[fa, fc] == 0:
-                    c.active[t] = WAITING
-                elif rebounds(c, r, s, t):
-                    un = wp.dot(slip_of(c, r, s, t), wp.vec3d(c.normal[t]))
-                    approach = approach_of(un, kick_of(c, s, t), feigned(c, r, t))
-                    e = c.restitution[fa, fc]
-                    c.target[t] = impact_target(e, approach, un, gap, dt, s.dx)
-
-
-@wp.kernel
-def bank(c: Contacts, s: Sheet, stride: int):
-    """Keep a round's impulses, and go on to the next."""
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        if c.active[t] > 0 and of_rigid(c, t):
-            c.struck[t] = c.struck[t] + c.impulse[t]
-            c.impulse[t] = wp.vec3d(D(0.0))
-            c.last_impulse[t] = wp.vec3d(D(0.0))
-
-
-@wp.kernel
-def end_round(c: Contacts, s: Sheet):
-    """Forget who was hit; end where all contacts took part."""
-    everything = c.hit.shape[0]
-    for a in range(everything):
-        for b in range(everything):
-            c.hit[a, b] = 0
-    s.flag[ROUND] = s.flag[ROUND] + 1
-    s.flag[STRUCK] = 0
-    if s.flag[LAST_ROUND] == 1:
-        s.flag[IMPACTING] = 0
-
-
 # ---------------------------------------------------------------- the sweeps
 
 
@@ -406,6 +279,8 @@ def apply(r: Rigid, s: Sheet):
     limit = JACOBI_SWEEPS
     if s.flag[HITS] > 0:
         limit = JACOBI_SWEEPS_OF_A_HIT
+    if s.flag[HOLDS] > 0:
+        limit = JACOBI_SWEEPS_OF_A_HOLD
     moved = s.change[0]
     s.change[0] = 0.0
     more = quicken(s)

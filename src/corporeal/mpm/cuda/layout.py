@@ -45,7 +45,9 @@ ASKED = wp.constant(16)
 """1: some are made anew in this step."""
 NODES = wp.constant(17)
 """Contacts on nodes: those on surface points come after them."""
-FLAGS = 18
+HOLDS = wp.constant(18)
+"""1: in this round of impacts something is held from behind."""
+FLAGS = 19
 # What ``Contacts.active`` says, where it is not 0: not in this step.
 WAITING = wp.constant(1)
 """Not in this round of impacts."""
@@ -486,7 +488,10 @@ class Contacts:
     turn: wp.array(dtype=wp.float64)
     apart: wp.array2d(dtype=wp.int32)
     """1: two bodies that are never in contact."""
-    hit: wp.array2d(dtype=wp.int32)
+    rounds: wp.array2d(dtype=wp.float64)
+    """Of every pair of bodies and planes in a round of impacts: ``Backing``, backing.h …"""
+    lightness: wp.array(dtype=wp.float64)
+    """… and inverse masses as it takes them."""
     friction: wp.array2d(dtype=wp.float64)
     restitution: wp.array2d(dtype=wp.float64)
     rolling: wp.array2d(dtype=wp.float64)

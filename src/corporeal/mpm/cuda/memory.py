@@ -5,9 +5,10 @@ from typing import Any
 import numpy as np
 
 from corporeal.mpm import laws
-from corporeal.mpm.constants import FACET_ROW, FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP
+from corporeal.mpm.constants import FACET_ROW, FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP, VAST_DOUBLE
 from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.layout import Contacts, Grid, Particles, Rigid, Sheet, wp
+from corporeal.mpm.formulas.one_lane import BACKING_ROW, LEAST
 from corporeal.mpm.physics import prescribed
 from corporeal.mpm.physics.contact import face_table, full_cell
 from corporeal.mpm.physics.rigid import thinness
@@ -229,6 +230,12 @@ class Memory:
         c.last_velocity, c.turn = self.zeros(entries, wp.vec3d), self.zeros(touches, wp.float64)
         for name in ("point", "before", "impulse", "last_impulse", "struck"):
             setattr(c, name, self.zeros(touches, wp.vec3d))
+        self._pairs(c, problem)
+        c.face = self.put(face_table(), wp.float32)
+        return c
+
+    def _pairs(self, c: Struct, problem: Problem) -> None:
+        """Tables of all pairs of bodies and planes."""
         friction, restitution = _pair_tables(problem)
         c.friction, c.restitution = (
             self.put(friction, wp.float64),
@@ -236,13 +243,14 @@ class Memory:
         )
         lengths = 0.0 * friction if problem.rolling is None else problem.rolling
         c.rolling = self.put(lengths, wp.float64)
-        c.hit = self.zeros(friction.shape, wp.int32)
+        rows = np.zeros((friction.size, BACKING_ROW))
+        rows[:, LEAST] = VAST_DOUBLE
+        c.rounds = self.put(rows, wp.float64)
+        c.lightness = self.zeros(len(friction), wp.float64)
         apart = np.zeros((len(problem.bodies), len(problem.bodies)), int)
         for a, b in problem.never_touch:
             apart[a, b] = apart[b, a] = 1
         c.apart = self.put(apart, wp.int32)
-        c.face = self.put(face_table(), wp.float32)
-        return c
 
     def choices(self, contacts: Struct, count: int) -> np.ndarray:
         """Copy the first choices of candidate normals, (N, 6): node, two fields, candidate."""

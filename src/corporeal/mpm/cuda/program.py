@@ -7,13 +7,17 @@ from corporeal.mpm.cuda import contact, dilatation, layout, loads, rigid
 from corporeal.mpm.cuda import contact_impulses as impulses
 from corporeal.mpm.cuda import contact_nodes as meets
 from corporeal.mpm.cuda import contact_rolling as rolling
+from corporeal.mpm.cuda import contact_rounds as rounds
 from corporeal.mpm.cuda import grid as grids
 from corporeal.mpm.cuda import inclusions as bonds
 from corporeal.mpm.cuda import step as kernels
 from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.problem import Problem
 
-MODULES = (grids, kernels, dilatation, meets, contact, impulses, rolling, rigid, loads, bonds)
+MODULES = (
+    *(grids, kernels, dilatation, meets, contact),
+    *(impulses, rounds, rolling, rigid, loads, bonds),
+)
 """Modules whose kernels a step launches."""
 THREADS_PER_PROCESSOR = 1024
 PARTICLE_STATE = (
@@ -235,12 +239,14 @@ class Program:
     def _impact(self) -> None:
         """Solve one round of impacts, or all contacts together."""
         a = self.arrays
-        self._each(impulses.strike, a.contacts, a.rigid, a.sheet)
-        self._run(impulses.begin_round, 1, a.rigid, a.sheet, stride=False)
-        self._each(impulses.aim, a.contacts, a.rigid, a.sheet)
+        self._each(rounds.strike, a.contacts, a.rigid, a.sheet)
+        self._each(rounds.find_least, a.contacts, a.rigid, a.sheet)
+        self._each(rounds.look_behind, a.contacts, a.rigid, a.sheet)
+        self._run(rounds.begin_round, 1, a.contacts, a.rigid, a.sheet, stride=False)
+        self._each(rounds.aim, a.contacts, a.rigid, a.sheet)
         wp.capture_while(self._flag(layout.SWEEPING), self._sweep)
-        self._each(impulses.bank, a.contacts, a.sheet)
-        self._run(impulses.end_round, 1, a.contacts, a.sheet, stride=False)
+        self._each(rounds.bank, a.contacts, a.sheet)
+        self._run(rounds.end_round, 1, a.contacts, a.sheet, stride=False)
 
     def _flag(self, which: Any) -> Any:
         """One flag, as something that repeats while it is 1."""

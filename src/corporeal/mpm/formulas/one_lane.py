@@ -327,6 +327,43 @@ def impact_target(
 ) -> wp.float64: ...
 
 
+BACKING_ROW, ROLE, BOUNCE, LEAST, BACKING_SUMS = 16, 0, 1, 2, 3
+"""Columns of ``Backing`` in backing.h: how many, and some of them; from BACKING_SUMS on sums."""
+STRUCK_PAIR, HELD_PAIR = 1, 2
+"""What its role may be, where it is not 0: waiting."""
+BackingSums = wp.types.vector(length=BACKING_ROW - BACKING_SUMS, dtype=wp.float64)
+
+
+@wp.func_native("return mpm::Backing::near(gap, least, speed, dx);")
+def backing_near(gap: wp.float64, least: wp.float64, speed: wp.float64, dx: wp.float64) -> bool: ...
+
+
+@wp.func_native(f"""
+  static_assert(mpm::Backing::ROW == {BACKING_ROW} && mpm::Backing::COUNT == {BACKING_SUMS} &&
+                mpm::Backing::STRUCK == {STRUCK_PAIR} && mpm::Backing::HELD == {HELD_PAIR}, "");
+  wp::vec_t<{BACKING_ROW - BACKING_SUMS}, wp::float64> sums;
+  mpm::Backing::adds(&x.c[0], &n.c[0], &sums.c[0]);
+  return sums;
+""")
+def backing_adds(x: wp.vec3d, n: wp.vec3d) -> BackingSums: ...
+
+
+@wp.func_native("""
+  mpm::Backing::hold((double *)rows.data, (const double *)restitution.data,
+                     (const double *)light.data, light.shape[0], dx);
+""")
+def backing_hold(
+    rows: wp.array2d(dtype=wp.float64),
+    restitution: wp.array2d(dtype=wp.float64),
+    light: wp.array(dtype=wp.float64),
+    dx: wp.float64,
+): ...
+
+
+@wp.func_native("return mpm::Backing::held(gap, dt, dx);")
+def held_speed(gap: wp.float64, dt: wp.float64, dx: wp.float64) -> wp.float64: ...
+
+
 @wp.func_native("return mpm::Keep::steps(travel);")
 def steps_kept(travel: wp.float64) -> int: ...
 

@@ -18,7 +18,9 @@ from corporeal.mpm.constants import (
     SLOWEST_BOUNCE,
     SMALLEST_SLIP,
     SWEEPS_OF_A_HIT,
+    SWEEPS_OF_A_HOLD,
 )
+from corporeal.mpm.physics import backing
 from corporeal.mpm.physics.contact import Indices, Scalars, Vectors
 from corporeal.mpm.physics.wall_stress import drag
 
@@ -83,7 +85,8 @@ class Rebound(NamedTuple):
     """What decides whether rigid contacts bounce in this step."""
 
     pair: Indices
-    """Which pair of bodies the contact belongs to."""
+    """Which pair the contact belongs to: number of its first body times how many bodies and planes
+    there are, and the second's."""
     restitution: Scalars
     """Newton's e; 0 unless both partners are rigid or a wall."""
     kick: Scalars
@@ -91,6 +94,8 @@ class Rebound(NamedTuple):
     feigned: Scalars
     """Speed at which a body that rolls on its surface points meets the next one [m/s]: its spin
     times their distance. What closes no faster than that and .05 m/s does not rebound."""
+    bodies: backing.Bodies | None = None
+    """What may hold them from behind; None: nothing does."""
 
 
 def target_speeds(
@@ -127,7 +132,8 @@ def solve_impacts(
     What is hit passes the blow on to what it touches: in every round the pairs that approach now
     rebound together and all others wait (generalized reflections: Smith, Kaufman, Vouga, Tamstorf
     and Grinspun 2012, "Reflections on simultaneous impact"). Solved at once, all pairs of a row of
-    touching balls would share the blow; in rounds it runs through to the last.
+    touching balls would share the blow; in rounds it runs through to the last. What is light
+    between what strikes it and what it rests on is held in the same round (``backing``).
 
     Returns:
         Impulses J [N s], as of ``solve``.
@@ -139,7 +145,16 @@ def solve_impacts(
         target, hit = target_speeds(contacts, speed, rebound, cell, dt)
         if not hit.any():
             break
-        total += solve(contacts, movers, target, SWEEPS_OF_A_HIT, hit)
+        sweeps = SWEEPS_OF_A_HIT
+        if rebound.bodies is not None:
+            c = contacts
+            seen = backing.Seen(rebound.pair, c.point, c.normal, c.gap, speed, hit)
+            now = backing.Round.of(rebound.bodies, seen, cell)
+            bounces = rebound._replace(restitution=now.bounce(rebound.restitution))
+            target, _ = target_speeds(contacts, speed, bounces, cell, dt)
+            target = np.where(now.held & (contacts.gap < PATCH * cell), 0.0, target)
+            hit, sweeps = hit | now.held, SWEEPS_OF_A_HOLD if now.held.any() else sweeps
+        total += solve(contacts, movers, target, sweeps, hit)
     return total
 
 

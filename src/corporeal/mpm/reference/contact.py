@@ -19,7 +19,7 @@ from corporeal.mpm.constants import (
     WALL_REACH,
 )
 from corporeal.mpm.laws.kinematics import determinant
-from corporeal.mpm.physics import contact, contact_impulses
+from corporeal.mpm.physics import backing, contact, contact_impulses
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.reference.contact_scene import Scene, friction_table
 from corporeal.mpm.reference.kept_choices import KeptChoices
@@ -75,7 +75,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
     movers = scene.movers(velocity)
     # Impacts of rigid bodies first, one after the other; then all that touches, together.
     rolls = np.repeat([t.rolls for t in touches], [len(t.gap) for t in touches]).astype(np.int64)
-    rebound = _rebound(scene, pair, contacts, rolls)
+    rebound = _rebound(scene, movers, pair, contacts, rolls)
     struck = contact_impulses.solve_impacts(contacts, movers, rebound, problem.cell, dt)
     target = np.maximum(contacts.gap, 0.0) / dt - _joined(
         [t.inwards for t in touches], (0,)
@@ -145,6 +145,7 @@ def _joined(columns: list[np.ndarray], empty: tuple[int, ...]) -> np.ndarray:
 
 def _rebound(
     scene: Scene,
+    movers: contact_impulses.Movers,
     pair: Int[np.ndarray, "E 2"],
     contacts: contact_impulses.Contacts,
     rolls: Int[np.ndarray, " E"],
@@ -153,6 +154,7 @@ def _rebound(
     bodies, planes = len(problem.bodies), len(problem.planes)
     stiff = np.array([scene.is_rigid(b) for b in range(bodies)] + [True] * planes)
     kick = np.concatenate([scene.kick, np.zeros((planes, 3))])
+    light = movers.inverse_mass[:bodies]
     first, second = pair.T
     both = stiff[first] & stiff[second]
     return contact_impulses.Rebound(
@@ -160,6 +162,10 @@ def _rebound(
         restitution=np.where(both, np.asarray(problem.restitution)[first, second], 0.0),
         kick=np.sum((kick[first] - kick[second]) * contacts.normal, axis=1),
         feigned=np.where(rolls >= 0, scene.feigned[rolls], 0.0),
+        bodies=backing.Bodies(
+            np.concatenate([np.where(stiff[:bodies], light, -1.0), np.zeros(planes)]),
+            np.asarray(problem.restitution, dtype=float),
+        ),
     )
 
 

@@ -152,6 +152,47 @@ struct List {
     }
   }
 };
+// Rounds of impacts: who takes part in the next one.
+struct Rounds {
+  static_assert(PAIR == Backing::ROW, "one row of a pair");
+  static inline bool both_rigid(const Line &R) { return R.ma < 0 && (R.mc < 0 || !R.c); }
+  // Note the pairs that approach as things move now, and what holds them from behind; whether there are any.
+  static inline bool find(const World *w, Stage *stage, int n, int all, double dt, double dx) {
+    double *pair = stage->pair, approach;
+    bool any = false;
+    for (int i = 0; i < n; i++) {
+      const Touch &T = stage->touch[stage->line[i].touch];
+      const Line &R = stage->line[i];
+      if (R.e <= 0) continue;
+      const double speed = List::closing(R, Points::rolls(w, T), approach);
+      if (!Impact::begins(approach, speed, T.gap, dt)) continue;
+      for (int k = 0; k < PAIR * all * all && !any; k++) pair[k] = 0;
+      pair[PAIR * (T.fa * all + T.fc) + Backing::ROLE] = Backing::STRUCK;
+      pair[PAIR * (T.fa * all + T.fc) + Backing::LEAST] = mpm::VAST_DOUBLE;
+      any = true;
+    }
+    if (!any) return false;
+    for (int i = 0; i < n; i++) {
+      const Touch &T = stage->touch[stage->line[i].touch];
+      double *row = pair + PAIR * (T.fa * all + T.fc);
+      if (row[Backing::ROLE] == Backing::STRUCK && T.gap < row[Backing::LEAST]) row[Backing::LEAST] = T.gap;
+    }
+    for (int i = 0; i < n; i++) {
+      const Line &R = stage->line[i];
+      const Touch &T = stage->touch[R.touch];
+      double *row = pair + PAIR * (T.fa * all + T.fc), sums[Backing::ROW - Backing::COUNT];
+      if (!both_rigid(R)) continue;
+      const double speed = List::closing(R, 0, approach);
+      if (!Backing::near(T.gap, row[Backing::LEAST], speed, dx)) continue;
+      Backing::adds(T.x, R.n, sums);
+      for (int k = Backing::COUNT; k < Backing::ROW; k++) row[k] += sums[k - Backing::COUNT];
+    }
+    for (int f = 0; f < all; f++)
+      stage->light[f] = f >= w->fields ? 0.0 : w->field[f].rigids ? w->field[f].rigid[LIGHT] : -1.0;
+    Backing::hold(pair, w->restitution, stage->light, all, dx);
+    return true;
+  }
+};
 Line *lines = stage->line;
 int nt = stage->touches, n = 0, stacked = 0;
 double *pair = stage->pair;   // [all][all][PAIR]
@@ -187,7 +228,7 @@ for (int t = world->turns ? 0 : stage->touches; t < nt; t++) {   // where none i
   double u[3];
   List::slip(R, u);
   R.target = T.target;
-  R.e = R.ma < 0 && (R.mc < 0 || !R.c) ? world->restitution[T.fa * all + T.fc] : 0.0;
+  R.e = Rounds::both_rigid(R) ? world->restitution[T.fa * all + T.fc] : 0.0;
   R.waits = 0;
   stacked |= R.ma < 0 && R.mc < 0;
   for (int i = 0; i < 3; i++) T.before[i] = u[i];
@@ -215,30 +256,27 @@ if (n) {
   for (int i = 0; i < n; i++) order[place[lines[i].group]++] = i;
   List::sort(lines, order, n);
   // Impacts of rigid bodies, one after the other: what is hit passes the blow on to what it touches.
-  // In every round the pairs that approach now rebound together, and all others wait.
+  // In every round the pairs that approach now rebound together, those behind hold what is light, and
+  // all others wait.
   int impacts = 0;
-  for (; impacts < mpm::IMPACTS; impacts++) {
-    bool hit = false;
+  for (; impacts < mpm::IMPACTS && Rounds::find(world, stage, n, all, dt, dx); impacts++) {
     double approach;
-    for (int i = 0; i < all * all; i++) pair[PAIR * i] = 0;
-    for (int i = 0; i < n; i++) {
-      const Touch &T = touches[lines[i].touch];
-      if (lines[i].e <= 0) continue;
-      const double speed = List::closing(lines[i], Points::rolls(world, T), approach);
-      if (!Impact::begins(approach, speed, T.gap, dt)) continue;
-      pair[PAIR * (T.fa * all + T.fc)] = hit = true;
-    }
-    if (!hit) break;
+    bool holds = false;
     for (int i = 0; i < n; i++) {
       Line &R = lines[i];
       const Touch &T = touches[R.touch];
-      R.waits = pair[PAIR * (T.fa * all + T.fc)] == 0;
+      const double *row = pair + PAIR * (T.fa * all + T.fc);
+      R.waits = row[Backing::ROLE] == Backing::WAITS;
       if (R.waits) continue;
-      const double speed = List::closing(R, Points::rolls(world, T), approach);
-      R.target = Impact::target(R.e, approach, speed, T.gap, dt, dx);
       for (int d = 0; d < 3; d++) R.J[d] = 0;
+      R.target = Backing::held(T.gap, dt, dx);
+      holds |= row[Backing::ROLE] == Backing::HELD;
+      if (row[Backing::ROLE] == Backing::HELD) continue;
+      const double speed = List::closing(R, Points::rolls(world, T), approach);
+      R.target = Impact::target(row[Backing::BOUNCE], approach, speed, T.gap, dt, dx);
     }
-    List::sweep(lines, order, n, mpm::SWEEPS_OF_A_HIT, mpm::SWEEPS, mpm::STILL_OF_A_HIT * dx, stacked);
+    const int most = holds ? mpm::SWEEPS_OF_A_HOLD : mpm::SWEEPS_OF_A_HIT;
+    List::sweep(lines, order, n, most, mpm::SWEEPS, mpm::STILL_OF_A_HIT * dx, stacked);
     for (int i = 0; i < n; i++)
       for (int d = 0; d < 3 && !lines[i].waits; d++) touches[lines[i].touch].J[d] += lines[i].J[d];
   }

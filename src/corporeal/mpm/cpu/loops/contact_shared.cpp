@@ -7,6 +7,7 @@ const int ENTRIES = 8;    // entries looked back at
 typedef float f4 __attribute__((vector_size(16), aligned(4)));
 
 typedef mpm::Face<double> Face;
+using mpm::Backing;
 using mpm::Coulomb;
 using mpm::Impact;
 using mpm::Scatter;

@@ -1,0 +1,177 @@
+"""What holds a rigid body from behind while it is struck: twin of formulas/backing.h.
+
+A body between what strikes it and what it rests on is squeezed at once where it is light, or where
+the contact behind is the wider one: its own vibration between the two contacts is then much quicker
+than the blow, so that both contacts are springs in series (decision 89).
+"""
+
+from dataclasses import dataclass
+from math import sqrt
+from typing import NamedTuple
+
+import numpy as np
+from jaxtyping import Bool, Float
+
+from corporeal.mpm.constants import AS_HEAVY, BACKED, BEHIND, PATCH, RESTING, TINY_DOUBLE
+from corporeal.mpm.physics.contact import Indices, Scalars, Vectors
+
+WAITS, REBOUNDS, HELD = 0, 1, 2
+"""The part of a pair in a round of impacts."""
+
+
+@dataclass(frozen=True)
+class Bodies:
+    """What a round of impacts knows of the N bodies and planes."""
+
+    light: Float[np.ndarray, " N"]
+    """Inverse masses [1/kg]; 0 of planes and prescribed motion, -1 of what is not rigid."""
+    restitution: Float[np.ndarray, "N N"]
+    """Newton's e of every pair."""
+
+
+class Seen(NamedTuple):
+    """E contacts at the begin of a round."""
+
+    number: Indices
+    """Of each contact's pair, as in ``Rebound``."""
+    point: Vectors
+    """[m]"""
+    normal: Vectors
+    """Unit, from the first body of the pair to the second."""
+    gap: Scalars
+    """[m]"""
+    speed: Scalars
+    """At which it closes [m/s]."""
+    struck: Bool[np.ndarray, " E"]
+    """Whether its pair is."""
+
+
+@dataclass
+class Pair:
+    """One pair's near contacts in a round."""
+
+    role: int
+    bounce: float
+    """Restitution in this round [-]."""
+    radius: float
+    """Of the disc over which they spread [m]."""
+    normal: Float[np.ndarray, "3"]
+    """Their mean, unit, from the first to the second."""
+
+
+def radius(points: Vectors, normal: Float[np.ndarray, "3"], cell: float) -> float:
+    """Radius of the disc over which contacts spread across their normal [m], of a cell at least.
+
+    A contact of radius a is as stiff as 2 E* a (Johnson, Contact Mechanics, 1985, §3.4, §4.2).
+    """
+    arms = points - points.mean(axis=0)
+    spread = np.mean(np.sum(arms**2, axis=1) - (arms @ normal) ** 2)
+    return sqrt(2.0 * max(float(spread), 0.0) + cell**2)
+
+
+def is_quick(stiffness: float, mass: float, strikes: float, behind: float) -> bool:
+    """Whether what lies between swings much quicker than the blow lasts.
+
+    ω² = k (1/m + 1/m_behind) + 1/m between both springs, against 1/m_strikes + 1/(m + m_behind) of
+    the blow, over the stiffness of the contact that is struck.
+
+    Args:
+        stiffness: k: of the contact behind over that of the one that is struck [-].
+        mass: m [kg].
+        strikes: Inverse mass of what strikes [1/kg].
+        behind: Inverse mass of what is behind [1/kg].
+
+    """
+    between = stiffness * (1.0 / mass + behind) + 1.0 / mass
+    return between > BACKED * (strikes + behind / (1.0 + mass * behind))
+
+
+@dataclass
+class Round:
+    """Who takes part in one round of impacts; E contacts."""
+
+    bodies: Bodies
+    number: Indices
+    """Of each contact's pair, as in ``Rebound``."""
+    pairs: dict[int, Pair]
+
+    @classmethod
+    def of(cls, bodies: Bodies, seen: Seen, cell: float) -> "Round":
+        """Look at near contacts, and hold what is struck; cell: dx [m]."""
+        number, found = seen.number, {}
+        rigid = (bodies.light[np.stack(np.divmod(number, len(bodies.light)))] >= 0.0).all(axis=0)
+        for pair in np.unique(number[rigid]):
+            mine = number == pair
+            struck = bool(seen.struck[mine].any())
+            least = max(float(seen.gap[mine].min()), 0.0) if struck else 0.0
+            near = mine & (seen.speed > -RESTING) & (seen.gap < least + PATCH * cell)
+            if not near.any():
+                continue
+            normal = seen.normal[near].sum(axis=0)
+            normal = normal / max(float(np.linalg.norm(normal)), TINY_DOUBLE)
+            e = float(bodies.restitution[np.divmod(pair, len(bodies.light))])
+            width = radius(seen.point[near], normal, cell)
+            found[int(pair)] = Pair(REBOUNDS if struck else WAITS, e, width, normal)
+        now = cls(bodies, number, found)
+        for pair, blow in found.items():
+            if blow.role == REBOUNDS:
+                now._hold(pair, blow)
+        return now
+
+    def _hold(self, pair: int, blow: Pair) -> None:
+        a, c = divmod(pair, len(self.bodies.light))
+        soft, kept = 1.0, blow.bounce**2
+        for strikes, first, along in ((a, c, blow.normal), (c, a, -blow.normal)):
+            for stiffness, e in self._behind(strikes, first, along, blow.radius):
+                soft, kept = soft + 1.0 / stiffness, kept + e**2 / stiffness
+        blow.bounce = sqrt(kept / soft) if soft > 1.0 else blow.bounce
+
+    def _behind(
+        self, strikes: int, first: int, along: Float[np.ndarray, "3"], width: float
+    ) -> list[tuple[float, float]]:
+        """Hold what a struck body rests on, and what that rests on; stiffness and e of each."""
+        found: list[tuple[float, float]] = []
+        light, before, body, mass = self.bodies.light, strikes, first, 0.0
+        while light[body] > 0.0 and len(found) < len(light):
+            mass += 1.0 / light[body]
+            stiffest, following = 0.0, -1
+            for other in range(len(light)):
+                pair = self._between(body, other)
+                if other == before or pair is None or not self._backs(pair, body, other, along):
+                    continue
+                stiffness = pair.radius / width
+                if not is_quick(stiffness, mass, light[strikes], light[other]):
+                    continue
+                pair.role = HELD
+                if stiffness > stiffest:
+                    stiffest, following = stiffness, other
+            if following < 0:
+                break
+            found.append((stiffest, float(self.bodies.restitution[body, following])))
+            before, body = body, following
+        return found
+
+    def _between(self, one: int, other: int) -> Pair | None:
+        return self.pairs.get(min(one, other) * len(self.bodies.light) + max(one, other))
+
+    def _backs(self, pair: Pair, body: int, other: int, along: Float[np.ndarray, "3"]) -> bool:
+        """Whether another body lies behind a struck one, and is not much lighter."""
+        light = self.bodies.light
+        if pair.role == REBOUNDS or light[other] < 0.0 or AS_HEAVY * light[other] > light[body]:
+            return False
+        cosine = float(pair.normal @ along)
+        return (cosine if body < other else -cosine) >= BEHIND
+
+    @property
+    def held(self) -> Bool[np.ndarray, " E"]:
+        """Which contacts hold what is struck."""
+        held = [pair for pair, found in self.pairs.items() if found.role == HELD]
+        return np.isin(self.number, np.array(held, dtype=np.int64))
+
+    def bounce(self, restitution: Scalars) -> Scalars:
+        """Restitution in this round [-]; of pairs that are not struck as it was."""
+        out = np.array(restitution)
+        for pair, found in self.pairs.items():
+            if found.role == REBOUNDS:
+                out[(self.number == pair) & (restitution > 0.0)] = found.bounce
+        return out
