@@ -3,8 +3,8 @@
     python benchmarks/answer_rules.py FOLDER --truth masses.csv --recordings SET ...
 
 The two rules of decision 86 beside the product's, over the same draws of ``--answers 3``, and what
-decision 92 asks of rule B. Objects are models of one object each, pictured without names, as in
-``evaluate mass``.
+decision 92 asks of rule B. ``--each`` prints the interval of each thing first. Objects are models
+of one object each, pictured without names, as in ``evaluate mass``.
 """
 
 import argparse
@@ -135,10 +135,26 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--truth", type=Path, required=True)
     parser.add_argument("--recordings", type=Path, nargs="+", required=True)
+    parser.add_argument("--each", action="store_true")
     asked = parser.parse_args()
+    rows = [one for one in read_truth(asked.folder, asked.truth) if one.mass is not None]
     for recordings in asked.recordings:
-        rows = [one for one in read_truth(asked.folder, asked.truth) if one.mass is not None]
-        report(recordings.name, [drawn(one, recordings) for one in rows])
+        things = [drawn(one, recordings) for one in rows]
+        for row, thing in zip(rows, things, strict=True) if asked.each else ():
+            print(f"{row.name}: {each(thing)}")
+        report(recordings.name, things)
+
+
+def each(thing: Drawn) -> str:
+    """Return a thing's intervals as low < middle < high, over what the scales say."""
+    said = []
+    for evidence in (True, False):
+        weights = thing.weights(evidence, False)
+        for few in (False, True):
+            found = np.array(thing.interval(weights, few)) / thing.truth
+            rule = ("with evidence" if evidence else "without") + ", B" * few
+            said.append(f"{rule} " + " < ".join(f"{x:.2f}" for x in found))
+    return "; ".join(said)
 
 
 def report(name: str, things: Sequence[Drawn]) -> None:

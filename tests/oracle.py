@@ -8,7 +8,7 @@ from corporeal.vlm import Reply, Spent, UnansweredError
 SIMPLE = {"reason": "So it looks."}
 
 
-def part(name, material, built="solid", alternatives=(), **said):
+def part(name, material, built: str | None = "solid", alternatives=(), **said):
     """One part of a materials answer, certain to 0.7 unless other materials are named."""
     names = ("probability", "contents", "fill", "solidity", "reading", "reason")
     own = {k: said.pop(k) for k in names if k in said}

@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from answer_rules import Drawn, Scored, scored, verdict
+from answer_rules import Drawn, Scored, each, scored, verdict
 from scipy.stats import norm, t
 
 from corporeal.types import Evidence
@@ -67,3 +67,9 @@ def test_what_decides_about_rule_b_holds_one_by_one():
     assert list(verdict(plain, for_nothing).values()) == [True, False, False, False]
     fewer = intervals((0.3, 0.1), (0.3, 0.1), (0.3, 0.1))
     assert not verdict(plain, fewer)["share inside no farther from 90 %"]
+
+
+def test_each_interval_is_told_over_the_scales():
+    said = each(drawn(0.5, 0.5, 0.5))
+    assert said.split("; ")[3] == "without, B 0.50 < 0.50 < 0.50"
+    assert said.startswith("with evidence 0.50 < 0.50 < 0.50; with evidence, B ")

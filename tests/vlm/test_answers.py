@@ -238,16 +238,36 @@ def test_a_density_in_grams_a_cubic_centimetre_is_asked_for_again():
     assert "density is 7.85, outside the measured range 7800 to 7900" in said
 
 
+def bottle(*printed):
+    judged = {"low_kg": 1.1, "likely_kg": 1.2, "high_kg": 1.4, "reason": "So."}
+    return MassAnswer.model_validate(judged | {"printed": list(printed)})
+
+
 def test_what_is_printed_comes_in_si():
-    said = MassAnswer(
-        printed=[
-            {"kind": "net weight", "number": 10.75, "unit": "oz", "words": "10 3/4 OZ"},
-            {"kind": "volume", "number": 330, "unit": "ml", "words": "330 ml"},
-            {"kind": "other", "number": 14.4, "unit": "", "words": "14.4 V"},
-        ],
-        low_kg=0.1, likely_kg=0.2, high_kg=0.3, reason="So.",
-    )  # fmt: skip
+    said = bottle(
+        {"kind": "net weight", "number": 10.75, "unit": "oz", "words": "10 3/4 OZ"},
+        {"kind": "volume", "number": 330, "unit": "ml", "words": "330 ml"},
+        {"kind": "other", "number": 14.4, "unit": "", "words": "14.4 V"},
+    )
     weight, volume, other = evidence_of(said, "model").printed
     assert weight.value == pytest.approx(0.30476, rel=1e-4)
     assert volume.value == pytest.approx(3.3e-4)
     assert other.value is None
+
+
+@pytest.mark.parametrize(
+    ("number", "unit", "litres"),
+    [(75, "cl", 0.75), (2.5, "dl", 0.25), (1, "L", 1.0), (330, "mL", 0.33), (750, " CL. ", 7.5)],
+)
+def test_print_in_a_unit_that_the_question_does_not_list_is_converted(number, unit, litres):
+    row = {"kind": "volume", "number": number, "unit": unit, "words": f"{number} {unit}"}
+    (volume,) = evidence_of(bottle(row), "model").printed
+    assert volume.value == pytest.approx(litres * 1e-3)
+    assert volume.words == row["words"]
+
+
+@pytest.mark.parametrize(("number", "unit"), [("75", "cl"), (75, "bushels")])
+def test_print_that_cannot_be_converted_is_refused(number, unit):
+    row = {"kind": "volume", "number": number, "unit": unit, "words": ""}
+    with pytest.raises(ValueError, match="unit"):
+        bottle(row)

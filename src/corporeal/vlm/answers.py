@@ -6,9 +6,9 @@ and bounds are checked against what was asked (``answer_checks``).
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
-from pydantic import BaseModel, Field
+from pydantic import BaseModel, Field, model_validator
 
 Share = Annotated[float, Field(ge=0, le=1, allow_inf_nan=False)]
 Lookup = Callable[[str], str | None]
@@ -30,6 +30,9 @@ KILOGRAMS = {"g": 1e-3, "kg": 1.0, "oz": 0.028349523, "lb": 0.45359237}
 CUBIC_METRES = {"ml": 1e-6, "l": 1e-3, "fl oz": 2.9573530e-5}
 METRES = {"mm": 1e-3, "cm": 1e-2, "m": 1.0, "in": 0.0254}
 """Units of what is printed (NIST Handbook 44, Appendix C; fluid ounces are those of the US)."""
+UNLISTED = {"cl": ("ml", 10.0), "dl": ("ml", 100.0), "mg": ("g", 1e-3), "lbs": ("lb", 1.0)}
+"""Units that answers give, too: a listed one, and how many of it. To list them would change the
+schema, and so end every recorded answer about a mass."""
 
 
 class SeenPart(BaseModel):
@@ -174,6 +177,17 @@ class Printed(BaseModel):
     number: float | None = Field(default=None, ge=0, allow_inf_nan=False)
     unit: Literal["g", "kg", "oz", "lb", "ml", "l", "fl oz", "mm", "cm", "m", "in", ""] = ""
     words: str
+
+    @model_validator(mode="before")
+    @classmethod
+    def _in_a_listed_unit(cls, said: Any) -> Any:
+        if not isinstance(said, dict) or not isinstance(said.get("unit"), str):
+            return said
+        unit, number = said["unit"].strip(" .").casefold(), said.get("number")
+        listed, factor = UNLISTED.get(unit, (unit, 1.0))
+        if isinstance(number, int | float):
+            return said | {"unit": listed, "number": number * factor}
+        return said | {"unit": listed} if factor == 1.0 else said
 
 
 class MassAnswer(BaseModel):
