@@ -108,6 +108,14 @@ def test_what_slides_as_a_whole_is_not_marked():
     assert moved.depth < 1e-6 and moved.share == 0.0 and np.isnan(moved.place).all()
 
 
+def test_grains_in_rows_are_on_no_edge_of_a_column():
+    """A lattice that rounding moved by a hair is where it was."""
+    axis = np.arange(CELL / 4, 0.1, CELL / 2)
+    rows = np.stack(np.meshgrid(axis, axis, axis, indexing="ij"), -1).reshape(-1, 3)
+    moved = rows - np.outer(rows[:, 0] > 0.05, [1e-9, 0.0, 0.0])
+    assert surface_mark(rows, [moved], CELL, CELL).depth < 1e-6
+
+
 def test_half_the_bed_in_half_the_cells_has_half_the_mark():
     fine = 0.5 * BED
     half = fine.copy()

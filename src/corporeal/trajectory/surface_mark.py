@@ -92,9 +92,13 @@ class Columns:
 
     @classmethod
     def over(cls, points: Float[np.ndarray, "N 3"], width: float) -> "Columns":
-        """Lay columns over the points that a body starts with."""
-        corner = points[:, :2].min(axis=0)
-        count = np.floor(np.ptp(points[:, :2], axis=0) / width).astype(int) + 1
+        """Lay columns over the points that a body starts with.
+
+        Their edges lie half a spacing beside its outermost points, so that where points are a
+        lattice no row of them is on an edge.
+        """
+        corner = points[:, :2].min(axis=0) - width / 4
+        count = np.floor((points[:, :2].max(axis=0) - corner) / width).astype(int) + 1
         columns = cls(corner, width, count, np.full(count.prod(), np.inf))
         np.minimum.at(columns.bottom, columns.of(points)[0], points[:, 2])
         return columns
