@@ -2,12 +2,15 @@
 
     git worktree add ../before COMMIT
     python benchmarks/film.py RUN [RUN ...] --against ../before [--frames N] [--rounds N]
+    python benchmarks/film.py RUN [RUN ...] [--frames N]
 
-RUN is the folder of a finished run. Each checkout poses and casts the same surfaces before the same
-camera in a process of its own, on one thread; the two take turns, so both meet the same machine.
-Given is processor time per picture, this checkout at 1280 × 720 and at 640 × 480, the other one at
-640 × 480, and the ratio is the median over rounds. The error is the root mean square difference, in
-steps of 255, from a picture of 3 × 3 samples a pixel that each send 16 rays to the sky.
+RUN is the folder of a finished run. Without another checkout, what its film shows in some frames,
+liquids too, is cast as the film casts it, and the error is given. With one, each checkout poses and
+casts the same surfaces before the same camera in a process of its own, on one thread; the two take
+turns, so both meet the same machine. Given is processor time per picture, this checkout at
+1280 × 720 and at 640 × 480, the other one at 640 × 480, and the ratio is the median over rounds.
+The error is the root mean square difference, in steps of 255, from a picture of 3 × 3 samples a
+pixel that each send 16 rays to the sky.
 """
 
 import argparse
@@ -53,14 +56,18 @@ def taken(run: Path, frames: int) -> Set:
     scene = prepared.scene
     skin = bind(scene, prepared.parts, prepared.particles, granular(prepared.field))
     camera = track("wide", reel_of(skin, scene, prepared.particles, trajectory), SMALL, None)
-    chosen = np.linspace(0, len(trajectory.frames) - 1, frames + 2)[1:-1].round().astype(int)
-    moments = [trajectory.frames[int(k)] for k in chosen]
+    moments = [trajectory.frames[int(k)] for k in _even(frames, len(trajectory.frames))]
     return Set(
         [_plain(f) for f in scene.finishes],
         [_plain(s) for s in scene.surfaces],
         [skin.pose(frame) for frame in moments],
         [asdict(camera.at(frame.time)) for frame in moments],
     )
+
+
+def _even(count: int, total: int) -> np.ndarray:
+    """Numbers of so many of all frames, neither the first nor the last."""
+    return np.linspace(0, total - 1, count + 2)[1:-1].round().astype(int)
 
 
 def _plain(record: Any) -> dict[str, Any]:
@@ -122,8 +129,33 @@ def _fit(kind: type, values: dict[str, Any]) -> Any:
 
 def error(pictures: Path, exact: Path) -> float:
     """Root mean square difference [steps of 255]."""
-    a, b = (np.load(p).astype(np.float64) for p in (pictures, exact))
-    return float(np.sqrt(((a - b) ** 2).mean()))
+    return _rms(np.load(pictures), np.load(exact))
+
+
+def _rms(a: np.ndarray, b: np.ndarray) -> float:
+    return float(np.sqrt(((a.astype(np.float64) - b) ** 2).mean()))
+
+
+def film_errors(run: Path, frames: int) -> list[float]:
+    """Return the error of what a run's film shows in some frames, evenly over its time.
+
+    Of a film of Gaussians, these are the surfaces behind them.
+    """
+    from corporeal.pipeline import read_back, reopen
+    from corporeal.render import embree
+    from corporeal.render.film_picture import FilmCaster
+    from corporeal.stages.film import moments
+
+    embree.SAMPLING["exact"] = embree.Sampling(3, 1, 16)
+    results, config, caster = read_back(run), reopen(run).settings.film, FilmCaster()
+    exactly: Callable[..., np.ndarray] = embree.render
+    found = []
+    for stage, aim in moments(
+        results.played, config, _even(frames, len(results.trajectory.frames))
+    ):
+        picture = caster.picture(stage, aim, config.quality, 1)
+        found.append(_rms(picture, exactly(stage, aim, "exact", 1)))
+    return found
 
 
 def measure(run: Path, other: Path, frames: int, rounds: int) -> None:
@@ -168,10 +200,16 @@ def main() -> None:
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
     parser.add_argument("runs", nargs="+", type=Path, metavar="RUN")
-    parser.add_argument("--against", type=Path, required=True, help="the other checkout")
+    parser.add_argument("--against", type=Path, help="the other checkout")
     parser.add_argument("--frames", type=int, default=2, help="pictures of each run")
     parser.add_argument("--rounds", type=int, default=3)
     asked = parser.parse_args()
+    if asked.against is None:
+        print("| run | error of its film's pictures [of 255] |\n|---|---|")
+        for run in asked.runs:
+            errors = film_errors(run, asked.frames)
+            print(f"| {run.name} | {', '.join(f'{e:.2f}' for e in errors)} |", flush=True)
+        return
     print("| run | picture | time [s] | ratio | error [of 255] |\n|---|---|---|---|---|")
     for run in asked.runs:
         measure(run, asked.against.resolve(), asked.frames, asked.rounds)

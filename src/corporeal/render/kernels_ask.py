@@ -33,12 +33,6 @@ GRAZING = 0.04
 shadows of so little would reach far over the floor."""
 ENOUGH = 4
 """Neighbours of the same surface whose light is a pixel's, too."""
-SHADE = np.float32(0.6)
-"""Of all sky or sun: means over 4 × 4 pixels that differ by more are in and out of a shadow. Each
-is of eight rays, so where half is hidden two of them differ by .25 in the root mean square."""
-WHATEVER = np.float32(np.inf)
-SKY, SUN = 0, 3
-"""Channels of light: shares that arrive."""
 
 
 @numba.njit(**INNER)
@@ -219,11 +213,8 @@ def mirror(s, index, row, column, d, lamps, o, w, asker, light):
 
 
 @numba.njit(**LOOP)
-def _pass(data, normal, depth, on, has, steps, stride, shade, total, out, had):
-    """Mean over like pixels that have light; ``stride`` (rows, columns) says which way.
-
-    Those are left out whose share of the sky or the sun differs by ``shade``.
-    """
+def _pass(data, normal, depth, on, has, steps, stride, total, out, had):
+    """Mean over like pixels that have light; ``stride`` (rows, columns) says which way."""
     h, w = on.shape
     for i in range(h):
         for j in range(w):
@@ -239,8 +230,6 @@ def _pass(data, normal, depth, on, has, steps, stride, shade, total, out, had):
                 alike = step == 0 or (
                     abs(depth[i, j] - depth[y, x]) < 0.02
                     and dot(normal[i, j], normal[y, x]) > ALIKE
-                    and abs(data[i, j, SUN] - data[y, x, SUN]) < shade
-                    and abs(data[i, j, SKY] - data[y, x, SKY]) < shade
                 )
                 if alike:
                     weight += 1
@@ -257,9 +246,6 @@ def _pass(data, normal, depth, on, has, steps, stride, shade, total, out, had):
 def smooth(data, normal, depth, on, has):
     """Mean over 4 pixels down, 4 across, then once more over thrice that, of like surfaces.
 
-    The second goes not beyond the edges of shadows, which would be drawn too wide and too light
-    where things stand.
-
     Args:
         data: Light of the pixels that have any; then that of all (rows, columns, ``WIDE``).
         normal: Of what pixels met.
@@ -271,7 +257,7 @@ def smooth(data, normal, depth, on, has):
     spare, had = np.empty_like(data), np.zeros_like(has)
     total = np.empty(WIDE, np.float32)
     near, far = (-2, -1, 0, 1), (-4, 0, 4)
-    _pass(data, normal, depth, on, has, near, (1, 0), WHATEVER, total, spare, had)
-    _pass(spare, normal, depth, on, had, near, (0, 1), WHATEVER, total, data, has)
-    _pass(data, normal, depth, on, has, far, (1, 0), SHADE, total, spare, had)
-    _pass(spare, normal, depth, on, had, far, (0, 1), SHADE, total, data, has)
+    _pass(data, normal, depth, on, has, near, (1, 0), total, spare, had)
+    _pass(spare, normal, depth, on, had, near, (0, 1), total, data, has)
+    _pass(data, normal, depth, on, has, far, (1, 0), total, spare, had)
+    _pass(spare, normal, depth, on, had, far, (0, 1), total, data, has)

@@ -24,7 +24,7 @@ from corporeal.geometry.srgb import linear
 from corporeal.mpm.laws import MENU
 from corporeal.render import colours, key, video
 from corporeal.render.camera import Aim, camera_of
-from corporeal.render.camera_track import Reel, first_contact, track
+from corporeal.render.camera_track import Reel, Track, first_contact, track
 from corporeal.render.embree import Stage
 from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, row_of, shades, si
 from corporeal.render.film_picture import FilmCaster
@@ -95,23 +95,15 @@ def film(
             is full, or the encoder fails.
 
     """
-    prepared, trajectory = played.prepared, played.trajectory
-    scene, count = prepared.scene, len(trajectory.frames)
-    if count == 0:
+    scene, trajectory = played.prepared.scene, played.trajectory
+    if len(trajectory.frames) == 0:
         raise UserError(f"{trajectory.folder} holds no frames. Run corporeal simulate again.")
     progress(0.0, "placing the camera")
-    field = prepared.field
-    skin = bind(scene, prepared.parts, prepared.particles, granular(field), fluid(field))
-    reel = reel_of(skin, scene, prepared.particles, trajectory)
-    size = config.width, config.height
-    if config.view is None:
-        config = replace(config, view=_clear_view(scene, skin, reel, trajectory, size))
-    camera = track(config.shot, reel, size, config.view)
+    staged = _staged(played, config)
+    troupe, reel, camera, config = staged.troupe, staged.reel, staged.camera, staged.config
+    size, paint = (config.width, config.height), troupe.paint
     fps = max(round(scene.fps * config.speed), 1)
     credit = "; ".join(dict.fromkeys(o.credit for o in scene.objects if o.credit))
-    paint = _paint(config.colour_by, played)
-    liquids = liquids_of(played.prepared)
-    troupe = _Troupe(Stage(scene), skin, _puppet(config, played), paint, liquids)
     about = None if reel.contact is None else reel.contact.time
     places = instants(trajectory.time, config.slow, about)
     times, caster = [], FilmCaster()
@@ -125,6 +117,46 @@ def film(
             progress((number + 1) / len(places), f"frame {number + 1} of {len(places)}")
     _close_up(troupe, reel, trajectory, config, folder)
     return Film(folder / FILM, fps, *size, times=tuple(times))
+
+
+@dataclass(frozen=True)
+class _Staged:
+    """A film ready to be taken."""
+
+    troupe: "_Troupe"
+    reel: Reel
+    camera: Track
+    config: FilmConfig
+    """With the view that was found, where none was asked for."""
+
+
+def _staged(played: Played, config: FilmConfig) -> _Staged:
+    """Bind what moves to its particles, and place the camera."""
+    prepared, trajectory = played.prepared, played.trajectory
+    scene, field = prepared.scene, prepared.field
+    skin = bind(scene, prepared.parts, prepared.particles, granular(field), fluid(field))
+    reel = reel_of(skin, scene, prepared.particles, trajectory)
+    size = config.width, config.height
+    if config.view is None:
+        config = replace(config, view=_clear_view(scene, skin, reel, trajectory, size))
+    troupe = _Troupe(
+        Stage(scene),
+        skin,
+        _puppet(config, played),
+        _paint(config.colour_by, played),
+        liquids_of(prepared),
+    )
+    return _Staged(troupe, reel, track(config.shot, reel, size, config.view), config)
+
+
+def moments(
+    played: Played, config: FilmConfig, frames: Int[np.ndarray, " N"]
+) -> Iterator[tuple[Stage, Aim]]:
+    """Return the surfaces that a film shows in some frames, each with its camera."""
+    staged = _staged(played, config)
+    at = staged.camera.at
+    for scenery in _sceneries(staged.troupe, played.trajectory, frames.astype(float), at):
+        yield scenery.stage, at(scenery.time)
 
 
 def _clear_view(
