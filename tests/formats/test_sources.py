@@ -28,7 +28,10 @@ def test_a_broken_file_still_counts_as_itself(tmp_path):
     for name in ("a.gltf", "a.toml"):
         (tmp_path / name).write_text("{ broken")
         assert sources([tmp_path / name]) == [tmp_path / name]
-    assert sources([tmp_path / "none.glb"]) == []
+    for name in ("none.glb", "none.ply", "none.spz", "none.mp4", "none.json"):
+        assert sources([tmp_path / name]) == []
+        (tmp_path / "scene.toml").write_text(f'[[object]]\nfile = "{name}"')
+        assert sources([tmp_path / "scene.toml"]) == [tmp_path / "scene.toml"], "it cannot be read"
 
 
 def test_a_folder_is_called_by_its_whole_name(tmp_path):

@@ -536,3 +536,9 @@ def test_what_stands_still_before_a_plain_wall_is_no_screen():
         plain[60:140, 100:200] = paper[60:140, 3 * k : 3 * k + 100]
         turns.look(plain)
     assert moves.share < 0.01 and turns.share < 0.05
+
+
+def test_a_film_that_is_not_there_is_named(tmp_path):
+    """A scene file that named one ended as a mistake of ours."""
+    with pytest.raises(BadFileError, match=r"none\.mp4: there is no such file"):
+        pose(tmp_path / "none.mp4", tmp_path / "poses", lambda share, what: None)

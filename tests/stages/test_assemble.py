@@ -208,6 +208,36 @@ def test_objects_that_stand_in_each_other_are_told(models):
     assert scene.warnings == ("duck_0 and ball_0 overlap at the start.",)
 
 
+@pytest.mark.parametrize(
+    ("first", "second", "at", "told"),
+    [
+        ((1, 0.1, 0.1), (0.1, 1, 0.1), "[0, 0, 0]", True),
+        ((0.1, 0.1, 0.1), (0.1, 0.1, 0.1), "[0.03, 0, 0.02]", True),
+        ((0.1, 0.1, 0.1), (0.1, 0.1, 0.1), "[0.1, 0, 0]", False),
+        ((0.3, 0.3, 0.1), (0.1, 0.1, 0.1), "[0, 0, 0.1]", False),
+    ],
+)
+@pytest.mark.parametrize("everted", [False, True])
+def test_bars_that_cross_overlap_though_neither_holds_a_vertex(
+    tmp_path, first, second, at, told, everted
+):
+    for name, size in (("one", first), ("other", second)):
+        bar = trimesh.creation.box(size)
+        if everted:
+            bar.invert()
+        bar.export(tmp_path / f"{name}.obj")
+    text = f"""
+    [[object]]
+    file = "one.obj"
+    position = [0, 0, 0]
+    [[object]]
+    file = "other.obj"
+    position = {at}
+    """
+    scene = assemble([toml(tmp_path, text)], AssembleConfig(unit="m"), up="+z")
+    assert any("overlap at the start" in s for s in scene.warnings) == told
+
+
 def test_inputs_that_are_no_models_are_refused(tmp_path, models):
     (tmp_path / "empty").mkdir()
     (tmp_path / "photos" / "images").mkdir(parents=True)

@@ -136,13 +136,13 @@ def unposed(path: Path) -> bool:
 
 
 def _named_by(path: Path) -> list[Path]:
+    if not path.exists():
+        return []  # whoever reads it says so
     if path.suffix.lower() != ".toml" and _kind(path) != "model":
         alone = path.is_dir() or path.suffix.lower() in (*SPLATS, *FILMS)
         return [path if alone else path.parent]
     if path.is_dir():
         return [f for model in models_in(path) for f in _named_by(model)]
-    if not path.is_file():
-        return []
     try:
         if path.suffix.lower() == ".toml":
             scene = read_scene_file(path)

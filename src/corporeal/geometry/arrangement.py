@@ -8,10 +8,11 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.geometry import placing
+from corporeal.geometry.mesh import joined
 from corporeal.types import Scene, SceneObject, Surface, Vector
 
 SAMPLES = 2000
-"""Vertices of an object that are looked up in another."""
+"""Vertices of an object, and places on its triangles, that are looked up in another."""
 TOUCH = 0.01
 """Share of them that may lie inside before the two are taken to overlap."""
 DEPTH = 2e-3
@@ -96,19 +97,31 @@ def _scaled(point: Vector, factor: float) -> Vector:
 
 
 def intersecting(scene: Scene) -> list[tuple[int, int]]:
-    """Return the pairs of objects of which one holds vertices of the other."""
+    """Return the pairs of objects of which one holds parts of the other's surface.
+
+    Vertices alone do not tell: of two bars that cross, none lies in the other.
+    """
     pairs = placing.overlapping(boxes_of(scene))
-    return [(a, b) for a, b in pairs if inside(scene, a, b) or inside(scene, b, a)]
+    return [(a, b) for a, b in pairs if _reaches(scene, a, b) or _reaches(scene, b, a)]
 
 
 def inside(scene: Scene, a: int, b: int) -> bool:
     """Tell whether vertices of ``a`` lie within ``b``, deeper than what merely touches."""
     points = np.concatenate([s.vertices for s in _surfaces(scene, a)])
-    points = points[:: max(1, len(points) // SAMPLES)]
+    return _within(points[:: max(1, len(points) // SAMPLES)], scene, a, b)
+
+
+def _reaches(scene: Scene, a: int, b: int) -> bool:
+    """Tell whether vertices of ``a``, or places on its triangles, lie within ``b``."""
+    return inside(scene, a, b) or _within(_on_triangles(_surfaces(scene, a)), scene, a, b)
+
+
+def _within(points: Float[np.ndarray, "N 3"], scene: Scene, a: int, b: int) -> bool:
+    """Tell whether some of the points of ``a`` lie within ``b``, whichever way its faces look."""
     winding, depth = np.zeros(len(points)), np.full(len(points), np.inf)
     for s in _surfaces(scene, b):
         winding += np.asarray(igl.fast_winding_number(s.vertices, s.triangles, points), float)
-    held = winding > 0.5
+    held = np.abs(winding) > 0.5
     if held.mean() <= TOUCH:
         return False
     for s in _surfaces(scene, b):
@@ -116,6 +129,14 @@ def inside(scene: Scene, a: int, b: int) -> bool:
         depth[held] = np.minimum(depth[held], np.sqrt(squared))
     sizes = [float(np.ptp(box_of(_surfaces(scene, k)), axis=0).max()) for k in (a, b)]
     return bool(np.mean(held & (depth > DEPTH * min(sizes))) > TOUCH)
+
+
+def _on_triangles(surfaces: Sequence[Surface]) -> Float[np.ndarray, "N 3"]:
+    """Return places all over some triangles, as many on each as its area asks for."""
+    # It brings Numba, which assembling needs only where boxes of objects overlap.
+    from corporeal.geometry.spread import sample_surface
+
+    return sample_surface(joined(surfaces), SAMPLES, np.random.default_rng(0))[0]
 
 
 def _surfaces(scene: Scene, k: int) -> list[Surface]:

@@ -103,6 +103,8 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
         UserError: pycolmap is not installed, or the poses cannot be found or not be believed.
 
     """
+    if not source.exists():
+        raise BadFileError(source, "there is no such file or folder.", "Check the path.")
     require()
     begun = {"source": store.digest(source), "method": METHOD}
     if not (folder / BEGUN).exists() or store.read_json(folder / BEGUN) != begun:
