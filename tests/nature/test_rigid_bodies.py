@@ -1,10 +1,13 @@
 """Bodies too stiff to bend."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from laws import touching
 from laws.bodies import Stuff, ball, ball_rounding, ball_surface, box, box_surface, floor, problem
 
+from corporeal.mpm.physics import backing
 from corporeal.types import ROUNDING
 
 G = 9.81
@@ -39,6 +42,30 @@ def test_a_rigid_ball_bounces_to_the_height_its_restitution_says(patient_engine,
         total = m.kinetic.sum() + m.potential.sum()
         assert total <= before.potential.sum() + 1e-3 * 7850 * 5.2e-4 * G * drop
     assert peak == pytest.approx(restitution**2 * drop, rel=0.03, abs=0.03 * CELL)
+
+
+@pytest.mark.parametrize("law", [(1.2, 0.0, 0.25, 0.0, 0.9), (1.2, 0.2, 0.0, 0.1, 0.9)])
+def test_each_rise_has_the_restitution_of_its_own_blow(patient_engine, law):
+    """A power of the speed where a metal yields, a line where a ball is rated."""
+    speed, e = 1.2, 0.5
+    stone = steel_ball((0.003, 0.002, RADIUS + 0.001), velocity=(0, 0, -speed))
+    given = problem(stone, cell=CELL, restitution=e, planes=[floor()], gravity=DOWN)
+    run = patient_engine(replace(given, blows=np.tile(law, (2, 2, 1))))
+    before = run.measure()
+    struck = np.sqrt(speed**2 + 2 * G * 0.001)
+    for _ in range(3):
+        expected = backing.bounce_at(e, np.array(law), struck) * struck
+        while run.measure().momentum[0, 2] <= 0.0:
+            run.advance(run.time + 2e-3)
+        while (now := run.measure()).momentum[0, 2] > 0.0:
+            run.advance(run.time + 2e-3)
+        # At its highest; what gravity does in a step or two is not known better.
+        struck = np.sqrt(2 * G * (now.centre[0, 2] - RADIUS))
+        assert struck == pytest.approx(expected, abs=0.008)
+    measure = run.measure()
+    given = measure.plane_impulse[0, 0, 2] - measure.mass[0] * G * measure.time
+    gained = measure.momentum[0, 2] - before.momentum[0, 2]
+    assert given == pytest.approx(gained, rel=1e-4)
 
 
 def test_two_rigid_balls_rebound_as_newton_says(patient_engine):

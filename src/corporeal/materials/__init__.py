@@ -1,11 +1,13 @@
 """The measured library: what a material is like, in which range, and who measured it."""
 
 from corporeal.materials.contact import (
+    BlowLaw,
     Friction,
     Restitution,
     Striker,
     combine,
     friction_between,
+    law_of_blows,
     restitution,
     restitution_between,
 )
@@ -28,6 +30,7 @@ from corporeal.materials.shipped import citation, estimated, sources
 
 __all__ = [
     "QUANTITIES",
+    "BlowLaw",
     "Entry",
     "Friction",
     "Problem",
@@ -42,6 +45,7 @@ __all__ = [
     "estimated",
     "find",
     "friction_between",
+    "law_of_blows",
     "library",
     "markdown",
     "materials_json",

@@ -7,7 +7,7 @@ from functools import cache
 from importlib.resources import files
 from math import sqrt
 
-from corporeal.materials.blow import NOMINAL, at_speed, stated, yielding
+from corporeal.materials.blow import LEAST, NOMINAL, at_speed, stated, yielding
 from corporeal.materials.entry import Entry
 from corporeal.materials.rebound import rebound
 from corporeal.types import Material, Range
@@ -92,6 +92,54 @@ def restitution(a: Striker, b: Striker, speed: float = NOMINAL) -> Restitution:
     smooth = _smooth(a) and _smooth(b)
     value = _of_bulk(one, other) if smooth else restitution_between(one, other)
     return Restitution(min(value, yielding(*_metals(a, b), speed)), None)
+
+
+@dataclass(frozen=True)
+class BlowLaw:
+    """How the restitution of two bodies changes with the speed v of a blow.
+
+    e = value (v/speed)^(-exponent) - slope (v - speed), between ``least`` and ``most``.
+    """
+
+    value: float
+    """[-]"""
+    speed: float
+    """[m/s]"""
+    slope: float = 0.0
+    """[s/m]"""
+    exponent: float = 0.0
+    """[-]"""
+    least: float = 0.0
+    """[-]"""
+    most: float = 1.0
+    """[-]"""
+
+
+YIELDS = 0.25
+"""Exponent of a metal that yields: e ∝ v^(-1/4) (``blow.yielding``)."""
+FAST = 1e4
+"""At which every metal yields [m/s]."""
+
+
+def law_of_blows(a: Striker, b: Striker, speed: float = NOMINAL) -> BlowLaw:
+    """Say how restitution changes about the speed of a blow, as ``restitution`` gives it.
+
+    Metals are as elastic as their bulk up to the speed at which they yield. The line of a rated
+    ball, which is exact for it alone, is the chord from this speed to a quarter of it.
+
+    Args:
+        a: One body.
+        b: The other.
+        speed: Of the blow [m/s].
+
+    """
+    now, slow, fast = (restitution(a, b, v).value for v in (speed, 0.0, FAST))
+    limit = yielding(*_metals(a, b), FAST)
+    if fast == limit < min(slow, 1.0):
+        yields_at = FAST * (limit / slow) ** (1.0 / YIELDS)
+        return BlowLaw(now, max(speed, yields_at), 0.0, YIELDS, 0.0, slow)
+    slope = (restitution(a, b, 0.25 * speed).value - now) / (0.75 * speed)
+    return BlowLaw(now, speed, slope, 0.0, min(now, LEAST), max(now, slow))
 
 
 def _metals(a: Striker, b: Striker) -> tuple[Material, Material]:

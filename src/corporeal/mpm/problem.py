@@ -167,12 +167,23 @@ class Problem:
     rolling: Float[np.ndarray, "BW BW"] | None = None
     """c of every pair [m]: what is round and rigid is met by a moment of up to c N against rolling
     on planes and rigid bodies. Symmetric; None: nothing brakes what rolls."""
+    blows: Float[np.ndarray, "BW BW 5"] | None = None
+    """How e of every pair changes with the speed of a blow: at which it is ``restitution``
+    [m/s], slope [s/m], exponent [-], least and most: see ``physics.backing.bounce_at``. None: it is
+    the same at all speeds."""
 
     @property
     def never_touch(self) -> tuple[tuple[int, int], ...]:
         """Pairs without contact: what is bonded or apart, and two prescribed motions."""
         prescribed = [b for b, body in enumerate(self.bodies) if body.path is not None]
         return (*self.bonds, *self.apart, *combinations(prescribed, 2))
+
+    @property
+    def blow_laws(self) -> Float[np.ndarray, "BW BW 5"]:
+        """``blows``, or that no restitution changes."""
+        if self.blows is not None:
+            return np.asarray(self.blows, float)
+        return np.tile([1.0, 0.0, 0.0, 0.0, 1.0], (*np.shape(self.restitution), 1))
 
     @property
     def brakes(self) -> bool:

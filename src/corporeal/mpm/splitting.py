@@ -88,6 +88,7 @@ def split_problem(problem: Problem, split: Split) -> Problem:
         bodies=(*bodies, *pieces[1:]),
         friction=problem.friction[np.ix_(rows, rows)],
         restitution=problem.restitution[np.ix_(rows, rows)],
+        blows=None if problem.blows is None else problem.blows[np.ix_(rows, rows)],
         rolling=None if problem.rolling is None else problem.rolling[np.ix_(rows, rows)],
     )
 

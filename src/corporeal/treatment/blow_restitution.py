@@ -1,6 +1,7 @@
-"""Restitution of rigid parts at the speeds of their first blows."""
+"""Restitution of rigid parts at the speeds of their blows."""
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 from jaxtyping import Float
@@ -10,20 +11,35 @@ from corporeal.materials import Striker
 from corporeal.materials.blow import NOMINAL
 from corporeal.types import MaterialField, Treatment
 
+CONSTANT = (NOMINAL, 0.0, 0.0, 0.0, 1.0)
+"""The law of what does not change: see ``Problem.blows``."""
 
-def in_blows(field: MaterialField, treatments: Sequence[Treatment]) -> Float[np.ndarray, "K1 K1"]:
+
+@dataclass(frozen=True)
+class Blows:
+    """Restitution of all pairs of K parts and the floor."""
+
+    restitution: Float[np.ndarray, "K1 K1"]
+    """At the speeds of their first blows [-]."""
+    laws: Float[np.ndarray, "K1 K1 5"]
+    """How it changes with speed: see ``Problem.blows``."""
+
+
+def in_blows(field: MaterialField, treatments: Sequence[Treatment]) -> Blows:
     """Carry the restitution of all pairs of parts and the floor to the speeds of their blows.
 
     The ratio to what the same pair has at ``NOMINAL`` is applied, so that what was drawn from a
-    measured range stays drawn. Later, slower blows have the first one's.
+    measured range stays drawn, and so do the laws by which later, slower blows lose less.
 
     Args:
         field: With the restitution at ``NOMINAL``.
         treatments: One per part: they know how fast it will be struck.
 
     """
+    table = np.array(field.restitution)
+    laws = np.tile(CONSTANT, (*table.shape, 1))
     if field.floor is None:
-        return field.restitution
+        return Blows(table, laws)
     known = materials.library()
     bodies = [*field.materials, field.floor]
     solid = [*(s.kind == "solid" for s in field.structures), True]
@@ -32,13 +48,16 @@ def in_blows(field: MaterialField, treatments: Sequence[Treatment]) -> Float[np.
         Striker(known[m.name], m, whole) if m.name in known else None
         for m, whole in zip(bodies, solid, strict=True)
     ]
-    table = np.array(field.restitution)
     for i, one in enumerate(strikers):
         for j, other in enumerate(strikers[: i + 1]):
-            speed = max(speeds[i], speeds[j]) or NOMINAL
-            if one is None or other is None or speed == NOMINAL:
+            if one is None or other is None:
                 continue
-            nominal, struck = (materials.restitution(one, other, v).value for v in (NOMINAL, speed))
-            ratio = struck / nominal if nominal > 0.0 else 1.0
-            table[i, j] = table[j, i] = min(1.0, table[i, j] * ratio)
-    return table
+            speed = max(speeds[i], speeds[j]) or NOMINAL
+            nominal = materials.restitution(one, other, NOMINAL).value
+            law = materials.law_of_blows(one, other, speed)
+            ratio = table[i, j] / nominal if nominal > 0.0 else 1.0
+            if speed != NOMINAL and nominal > 0.0:
+                table[i, j] = table[j, i] = min(1.0, ratio * law.value)
+            least, most = min(law.least, table[i, j]), min(1.0, ratio * law.most)
+            laws[i, j] = laws[j, i] = law.speed, ratio * law.slope, law.exponent, least, most
+    return Blows(table, laws)

@@ -63,11 +63,16 @@ def pose(
     weights = part_weights(particles, pieces)
     footing = footing_weights(particles, pieces, weights)
     bounces = in_blows(field, particles.treatments)
+
+    def averaged(table: np.ndarray) -> np.ndarray:
+        return with_walls(pair_values(table, weights, footing), len(scene.walls))
+
     problem = Problem(
         bodies=bodies,
         cell=particles.cell,
-        friction=with_walls(pair_values(field.friction, weights, footing), len(scene.walls)),
-        restitution=with_walls(pair_values(bounces, weights, footing), len(scene.walls)),
+        friction=averaged(field.friction),
+        restitution=averaged(bounces.restitution),
+        blows=np.stack([averaged(column) for column in np.moveaxis(bounces.laws, -1, 0)], axis=-1),
         planes=(FLOOR, *(plane_of(w) for w in scene.walls)),
         gravity=scene.gravity,
         gravity_ramp=RAMP if starts_settled(scene, particles) else 0.0,

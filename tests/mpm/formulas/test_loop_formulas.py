@@ -8,6 +8,7 @@ import pytest
 from corporeal.mpm import constants, formulas
 from corporeal.mpm.formulas import one_lane
 from corporeal.mpm.physics import (
+    backing,
     contact,
     contact_impulses,
     grips,
@@ -312,6 +313,24 @@ def test_what_rebounds_and_how_fast_is_as_in_numpy(rng):
     assert 0.1 < hit.mean() < 0.9 and (exact[hit] < 0.0).all() and (exact[~hit] >= 0.0).all()
     given = [sent(value, wp.float64) for value in (e, u, kick, feigned, gap)]
     found = run(targets, *given, dt, dx, out=(COUNT, wp.float64))
+    assert np.abs(found - exact).max() < DOUBLE
+
+
+@wp.kernel
+def bounces(e: Doubles, laws: wp.array2d(dtype=D), v: Doubles, out: Doubles):
+    i = wp.tid()
+    out[i] = one_lane.bounce_at(e[i], laws, i, v[i])
+
+
+def test_restitution_at_the_speed_of_a_blow_is_as_in_numpy(rng):
+    e, v = rng.uniform(0.1, 1.0, COUNT), rng.uniform(0.0, 9.0, COUNT)
+    power = np.where(rng.uniform(size=COUNT) < 0.5, 0.25, 0.0)
+    law = np.column_stack([rng.uniform(0.1, 9.0, COUNT), rng.uniform(0, 0.05, COUNT), power])
+    law = np.column_stack([law, rng.uniform(0.0, 0.3, COUNT), rng.uniform(0.5, 1.0, COUNT)])
+    exact = np.array([backing.bounce_at(*row) for row in zip(e, law, v, strict=True)])
+    assert 0.05 < (exact == law[:, 4]).mean() < 0.6
+    table = wp.array(law, dtype=D, device="cpu")
+    found = run(bounces, sent(e, wp.float64), table, sent(v, wp.float64), out=(COUNT, wp.float64))
     assert np.abs(found - exact).max() < DOUBLE
 
 

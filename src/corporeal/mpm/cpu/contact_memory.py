@@ -152,6 +152,7 @@ class ContactMemory:
         walls = [[*plane.normal, plane.offset] for plane in problem.planes]
         self.plane = np.array(walls, float).reshape(-1, 4)
         self.friction, self.restitution = _pair_tables(problem)
+        self.blows = np.ascontiguousarray(problem.blow_laws)
         self.face = face_table()
         self.stage = np.zeros(1, layout.STAGE.dtype)
         self.pair = np.zeros(self.friction.size * PAIR)
@@ -162,6 +163,7 @@ class ContactMemory:
             plane=self.plane,
             friction=self.friction,
             restitution=self.restitution,
+            bounces=self.blows,
             contact_memory=self.stage,
             face=self.face,
         )

@@ -102,7 +102,7 @@ PARTS = 16
 """Parts that a list is cut into, whoever works on them."""
 FIELDS_IN_BLOCK = 12
 """Fields that may meet in one block of nodes."""
-PAIR = 16
+PAIR = 17
 """Columns of a pair of fields in a step: its part in a round of impacts, normal sum, weighted place
 (3), spare; in such a round those of ``Backing`` in backing.h."""
 
@@ -231,6 +231,7 @@ WORLD = Record(
     ("int *", "task list contact_memory"),
     ("int *", "chore"),  # [chores][2]: first and last of the tasks that are done one by one
     ("double *", "report plane friction restitution"),
+    ("double *", "bounces"),  # how restitution changes with speed: 5 numbers a pair
     ("double *", "rolling"),  # c of every pair [m]; null: nothing brakes what rolls
     ("double *", "plane_impulse pair_impulse friction_loss first_contact last_contact"),
     ("double *", "contact_point face impact_loss"),

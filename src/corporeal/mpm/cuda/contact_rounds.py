@@ -32,6 +32,7 @@ from corporeal.mpm.formulas.one_lane import (
     BACKING_ROW,
     BACKING_SUMS,
     BOUNCE,
+    FASTEST_BLOW,
     HELD_PAIR,
     LEAST,
     ROLE,
@@ -117,7 +118,9 @@ def strike(c: Contacts, r: Rigid, s: Sheet, stride: int):
             un = closing_of(c, r, s, t)
             approach = approach_of(un, kick_of(c, s, t), feigned(c, r, t))
             if impact_begins(approach, un, D(c.gap[t]), s.clock[DT]):
-                c.rounds[pair_of(c, t), ROLE] = D(STRUCK_PAIR)
+                pair = pair_of(c, t)
+                c.rounds[pair, ROLE] = D(STRUCK_PAIR)
+                wp.atomic_max(c.rounds, pair, FASTEST_BLOW, approach)
                 s.flag[STRUCK] = 1
 
 
@@ -160,7 +163,7 @@ def hold(c: Contacts, r: Rigid, s: Sheet):
             c.lightness[b] = D(-1.0)
             if r.stiff[b] == 1:
                 c.lightness[b] = r.light[b]
-    backing_hold(c.rounds, c.restitution, c.lightness, s.dx)
+    backing_hold(c.rounds, c.restitution, c.blows, c.lightness, s.dx)
     held = int(0)
     for pair in range(everything * everything):
         if c.rounds[pair, ROLE] == D(HELD_PAIR):

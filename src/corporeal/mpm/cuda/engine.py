@@ -31,7 +31,7 @@ KNOWN = {
     "friction_angle cohesion loss vibration consistency flow_index "
     "rigid surface rounding wetted push wind faces tether path pivot",
     Problem: "bodies cell friction restitution planes gravity gravity_ramp contact transfer "
-    "courant bonds joints apart rolling",
+    "courant bonds joints apart rolling blows",
 }
 """What this engine knows of a problem; anything else must be at its default."""
 CONTACT_ROOM = 4096

@@ -241,6 +241,7 @@ class Memory:
             self.put(friction, wp.float64),
             self.put(restitution, wp.float64),
         )
+        c.blows = self.put(problem.blow_laws.reshape(-1, 5), wp.float64)
         lengths = 0.0 * friction if problem.rolling is None else problem.rolling
         c.rolling = self.put(lengths, wp.float64)
         rows = np.zeros((friction.size, BACKING_ROW))

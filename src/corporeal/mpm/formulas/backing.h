@@ -1,13 +1,14 @@
 // What holds a rigid body from behind while it is struck: twin of physics/backing.py. A light body between
 // what strikes it and what it lies on is squeezed at once, both contacts being springs in series.
 #pragma once
-#include "lanes.h"
+#include "contact.h"
 namespace mpm {
 namespace {
 // Of every pair of bodies, or body and plane, one row: its part in this round of impacts, its restitution in
-// it, the least gap of its contacts, and of those that are near how many there are, the sums of place, squared place and normal.
+// it, the least gap of its contacts, the speed of the blow, and of those that are near how many there are, the sums of place, squared place and normal.
 struct Backing {
-  enum { ROLE, BOUNCE, LEAST, COUNT, PLACE, SQUARE = 7, NORMAL = 13, ROW = 16 };
+  enum { ROLE, BOUNCE, LEAST, SPEED, COUNT, PLACE, SQUARE = 8, NORMAL = 14, ROW = 17 };
+  enum { LAW = 5 };   // numbers of Impact::bounce
   enum { WAITS, STRUCK, HELD };
   // Whether a contact is near and does not open; least: gap of the nearest one of its pair, if that is struck.
   CUDA_CALLABLE static inline bool near(double gap, double least, double speed, double dx) {
@@ -76,13 +77,15 @@ struct Backing {
     }
   }
   // Say of all pairs that are struck what they rebound with, and which others hold them. light: inverse masses,
-  // of planes and what moves as told 0, of what is no rigid body -1; e: restitution of all pairs.
-  CUDA_CALLABLE static inline void hold(double *rows, const double *e, const double *light, int all, double dx) {
+  // of planes and what moves as told 0, of what is no rigid body -1; e: restitution of all pairs; law: how it changes with speed.
+  CUDA_CALLABLE static inline void hold(double *rows, const double *e, const double *law, const double *light,
+                                        int all, double dx) {
     for (int a = 0; a < all; a++)
       for (int c = a + 1; c < all; c++) {
         double *row = rows + ROW * (a * all + c), u[3], back[3];
         if (row[ROLE] != STRUCK) continue;
-        const double *n = row + NORMAL, blow = radius(row, dx), own = e[a * all + c];
+        const double *n = row + NORMAL, blow = radius(row, dx);
+        const double own = Impact::bounce(e[a * all + c], law + LAW * (a * all + c), row[SPEED]);
         const double size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         double soft = 1, kept = own * own;
         for (int i = 0; i < 3; i++) u[i] = n[i] / (size > TINY_DOUBLE ? size : TINY_DOUBLE), back[i] = -u[i];

@@ -409,6 +409,13 @@ struct Impact {
     const bool rebounds = approach > SLOWEST_BOUNCE && (speed * dt > gap || gap < PATCH * dx);
     return rebounds ? -e * approach : closing(gap, dt);
   }
+  // Restitution at the speed of a blow. law: the speed at which it is e, slope, exponent, least and most.
+  CUDA_CALLABLE static inline double bounce(double e, const double *law, double speed) {
+    double now = e;
+    if (law[2] != 0) now *= pow((speed > TINY_DOUBLE ? speed : TINY_DOUBLE) / law[0], -law[2]);
+    now -= law[1] * (speed - law[0]);
+    return now < law[3] ? law[3] : now > law[4] ? law[4] : now;
+  }
   // Speed at which a gap may close within a step.
   CUDA_CALLABLE static inline double closing(double gap, double dt) {
     return (gap > 0 ? gap : 0.0) / dt;

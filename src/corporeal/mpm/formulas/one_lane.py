@@ -327,7 +327,7 @@ def impact_target(
 ) -> wp.float64: ...
 
 
-BACKING_ROW, ROLE, BOUNCE, LEAST, BACKING_SUMS = 16, 0, 1, 2, 3
+BACKING_ROW, ROLE, BOUNCE, LEAST, FASTEST_BLOW, BACKING_SUMS = 17, 0, 1, 2, 3, 4
 """Columns of ``Backing`` in backing.h: how many, and some of them; from BACKING_SUMS on sums."""
 STRUCK_PAIR, HELD_PAIR = 1, 2
 """What its role may be, where it is not 0: waiting."""
@@ -350,11 +350,12 @@ def backing_adds(x: wp.vec3d, n: wp.vec3d) -> BackingSums: ...
 
 @wp.func_native("""
   mpm::Backing::hold((double *)rows.data, (const double *)restitution.data,
-                     (const double *)light.data, light.shape[0], dx);
+                     (const double *)laws.data, (const double *)light.data, light.shape[0], dx);
 """)
 def backing_hold(
     rows: wp.array2d(dtype=wp.float64),
     restitution: wp.array2d(dtype=wp.float64),
+    laws: wp.array2d(dtype=wp.float64),
     light: wp.array(dtype=wp.float64),
     dx: wp.float64,
 ): ...
@@ -362,6 +363,14 @@ def backing_hold(
 
 @wp.func_native("return mpm::Backing::held(gap, dt, dx);")
 def held_speed(gap: wp.float64, dt: wp.float64, dx: wp.float64) -> wp.float64: ...
+
+
+@wp.func_native("""
+  return mpm::Impact::bounce(e, (const double *)laws.data + mpm::Backing::LAW * pair, speed);
+""")
+def bounce_at(
+    e: wp.float64, laws: wp.array2d(dtype=wp.float64), pair: int, speed: wp.float64
+) -> wp.float64: ...
 
 
 @wp.func_native("return mpm::Keep::steps(travel);")

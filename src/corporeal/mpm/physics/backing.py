@@ -26,7 +26,9 @@ class Bodies:
     light: Float[np.ndarray, " N"]
     """Inverse masses [1/kg]; 0 of planes and prescribed motion, -1 of what is not rigid."""
     restitution: Float[np.ndarray, "N N"]
-    """Newton's e of every pair."""
+    """Newton's e of every pair …"""
+    blows: Float[np.ndarray, "N N 5"]
+    """… and how it changes with the speed of a blow: see ``bounce_at``."""
 
 
 class Seen(NamedTuple):
@@ -44,6 +46,8 @@ class Seen(NamedTuple):
     """At which it closes [m/s]."""
     struck: Bool[np.ndarray, " E"]
     """Whether its pair is."""
+    blow: Scalars
+    """Speed of approach of those that begin an impact, without this step's forces [m/s]; else 0."""
 
 
 @dataclass
@@ -57,6 +61,23 @@ class Pair:
     """Of the disc over which they spread [m]."""
     normal: Float[np.ndarray, "3"]
     """Their mean, unit, from the first to the second."""
+
+
+def bounce_at(restitution: float, law: Float[np.ndarray, "5"], speed: float) -> float:
+    """Restitution at the speed of a blow [-]: twin of ``Impact::bounce`` in contact.h.
+
+    e = e_r (v/v_r)^(-q) - s (v - v_r), within bounds: q = 1/4 where a metal yields, a slope s where
+    a rubber ball was rated at two speeds (decision 77).
+
+    Args:
+        restitution: e_r: at the law's speed [-].
+        law: v_r [m/s], s [s/m], q [-], least and most e.
+        speed: v [m/s].
+
+    """
+    rated, slope, power, least, most = law
+    now = restitution * (max(speed, TINY_DOUBLE) / rated) ** -power - slope * (speed - rated)
+    return float(min(max(now, least), most))
 
 
 def radius(points: Vectors, normal: Float[np.ndarray, "3"], cell: float) -> float:
@@ -109,7 +130,9 @@ class Round:
                 continue
             normal = seen.normal[near].sum(axis=0)
             normal = normal / max(float(np.linalg.norm(normal)), TINY_DOUBLE)
-            e = float(bodies.restitution[np.divmod(pair, len(bodies.light))])
+            both = np.divmod(pair, len(bodies.light))
+            blow = float(seen.blow[mine].max())
+            e = bounce_at(float(bodies.restitution[both]), bodies.blows[both], blow)
             width = radius(seen.point[near], normal, cell)
             found[int(pair)] = Pair(REBOUNDS if struck else WAITS, e, width, normal)
         now = cls(bodies, number, found)

@@ -115,13 +115,26 @@ def target_speeds(
         dt: [s]
 
     """
-    approach = speed - np.maximum(rebound.kick, 0.0)
+    approach = approach_of(speed, rebound)
     closing = speed * dt > contacts.gap
     fast = (approach > SLOWEST_BOUNCE + rebound.feigned) & (rebound.restitution > 0.0)
-    hit = np.isin(rebound.pair, rebound.pair[closing & fast])
+    hit = np.isin(rebound.pair, rebound.pair[closing_fast(contacts, speed, rebound, dt)])
     bounces = hit & fast & (closing | (contacts.gap < PATCH * cell))
     target = np.maximum(contacts.gap, 0.0) / dt
     return np.where(bounces, -rebound.restitution * approach, target), hit
+
+
+def approach_of(speed: Scalars, rebound: Rebound) -> Scalars:
+    """Approach speed without this step's forces [m/s], so that nothing gains from them."""
+    return speed - np.maximum(rebound.kick, 0.0)
+
+
+def closing_fast(
+    contacts: Contacts, speed: Scalars, rebound: Rebound, dt: float
+) -> Bool[np.ndarray, " E"]:
+    """Which contacts close within the step fast enough to begin an impact."""
+    fast = approach_of(speed, rebound) > SLOWEST_BOUNCE + rebound.feigned
+    return (speed * dt > contacts.gap) & fast & (rebound.restitution > 0.0)
 
 
 def solve_impacts(
@@ -148,7 +161,8 @@ def solve_impacts(
         sweeps = SWEEPS_OF_A_HIT
         if rebound.bodies is not None:
             c = contacts
-            seen = backing.Seen(rebound.pair, c.point, c.normal, c.gap, speed, hit)
+            blow = np.where(closing_fast(c, speed, rebound, dt), approach_of(speed, rebound), 0.0)
+            seen = backing.Seen(rebound.pair, c.point, c.normal, c.gap, speed, hit, blow)
             now = backing.Round.of(rebound.bodies, seen, cell)
             bounces = rebound._replace(restitution=now.bounce(rebound.restitution))
             target, _ = target_speeds(contacts, speed, bounces, cell, dt)

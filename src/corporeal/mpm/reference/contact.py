@@ -165,6 +165,7 @@ def _rebound(
         bodies=backing.Bodies(
             np.concatenate([np.where(stiff[:bodies], light, -1.0), np.zeros(planes)]),
             np.asarray(problem.restitution, dtype=float),
+            problem.blow_laws,
         ),
     )
 

@@ -167,8 +167,10 @@ struct Rounds {
       const double speed = List::closing(R, Points::rolls(w, T), approach);
       if (!Impact::begins(approach, speed, T.gap, dt)) continue;
       for (int k = 0; k < PAIR * all * all && !any; k++) pair[k] = 0;
-      pair[PAIR * (T.fa * all + T.fc) + Backing::ROLE] = Backing::STRUCK;
-      pair[PAIR * (T.fa * all + T.fc) + Backing::LEAST] = mpm::VAST_DOUBLE;
+      double *row = pair + PAIR * (T.fa * all + T.fc);
+      row[Backing::ROLE] = Backing::STRUCK;
+      row[Backing::LEAST] = mpm::VAST_DOUBLE;
+      if (approach > row[Backing::SPEED]) row[Backing::SPEED] = approach;
       any = true;
     }
     if (!any) return false;
@@ -189,7 +191,7 @@ struct Rounds {
     }
     for (int f = 0; f < all; f++)
       stage->light[f] = f >= w->fields ? 0.0 : w->field[f].rigids ? w->field[f].rigid[LIGHT] : -1.0;
-    Backing::hold(pair, w->restitution, stage->light, all, dx);
+    Backing::hold(pair, w->restitution, w->bounces, stage->light, all, dx);
     return true;
   }
 };
