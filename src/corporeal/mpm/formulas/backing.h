@@ -8,7 +8,7 @@ namespace {
 // it, the least gap of its contacts, the speed of the blow, and of those that are near how many there are, the sums of place, squared place and normal.
 struct Backing {
   enum { ROLE, BOUNCE, LEAST, SPEED, COUNT, PLACE, SQUARE = 8, NORMAL = 14, ROW = 17 };
-  enum { LAW = 5 };   // numbers of Impact::bounce
+  enum { PER_BLOW = 5 };   // numbers of Impact::bounce
   enum { WAITS, STRUCK, HELD };
   // Whether a contact is near and does not open; least: gap of the nearest one of its pair, if that is struck.
   CUDA_CALLABLE static inline bool near(double gap, double least, double speed, double dx) {
@@ -85,7 +85,7 @@ struct Backing {
         double *row = rows + ROW * (a * all + c), u[3], back[3];
         if (row[ROLE] != STRUCK) continue;
         const double *n = row + NORMAL, blow = radius(row, dx);
-        const double own = Impact::bounce(e[a * all + c], law + LAW * (a * all + c), row[SPEED]);
+        const double own = Impact::bounce(e[a * all + c], law + PER_BLOW * (a * all + c), row[SPEED]);
         const double size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         double soft = 1, kept = own * own;
         for (int i = 0; i < 3; i++) u[i] = n[i] / (size > TINY_DOUBLE ? size : TINY_DOUBLE), back[i] = -u[i];

@@ -366,7 +366,7 @@ def held_speed(gap: wp.float64, dt: wp.float64, dx: wp.float64) -> wp.float64: .
 
 
 @wp.func_native("""
-  return mpm::Impact::bounce(e, (const double *)laws.data + mpm::Backing::LAW * pair, speed);
+  return mpm::Impact::bounce(e, (const double *)laws.data + mpm::Backing::PER_BLOW * pair, speed);
 """)
 def bounce_at(
     e: wp.float64, laws: wp.array2d(dtype=wp.float64), pair: int, speed: wp.float64
