@@ -446,6 +446,23 @@ def test_what_is_hollow_because_it_is_moulded_is_solid_of_what_is_not(thing, mat
         assert (found.thickness, found.inflation) == (None, None)
 
 
+@pytest.mark.parametrize(
+    ("surface", "thing", "material"),
+    [
+        ("spring mattress", "spring mattress", "seat_foam"),
+        ("mesh", "lead brick", "lead"),
+        ("mesh", "glass brick", "glass"),
+        ("mesh", "clay brick", "brick"),
+        ("mesh", "red brick", "brick"),
+        ("mesh", "jelly", "gelatin"),
+        ("mesh", "jelly jar", "glass"),
+    ],
+)
+def test_a_word_that_only_says_of_what_kind_leaves_no_doubt(surface, thing, material):
+    """A mattress named so in its only mesh was of steel springs as much, and so of plastic."""
+    assert seen(surface, thing).material == material
+
+
 def test_a_large_statue_of_metal_is_cast_around_a_core():
     def built(name, size):
         known = replace(about("mesh", name), thing=SceneObject("it_0", name, size))
