@@ -25,6 +25,7 @@ from corporeal.vlm.metadata import (
     usual_inflation,
     usual_rebound,
 )
+from corporeal.vlm.said_contents import as_said
 from corporeal.vlm.stated import (
     as_stated,
     sealed,
@@ -54,6 +55,8 @@ def words_of_file(
         found = stated_material(list(seen.surfaces), library) or hollowed(
             recognise(seen), seen, walls, from_pictures
         )
+        if not from_pictures:
+            found = as_said(found, seen, found.material is None or walls(found.material))
         by = "metadata" if found.material else "unknown"
         found = replace(found, name=entry.name, answered_by=by)
         found = walled(found, stated_thickness(seen.surfaces))
