@@ -254,6 +254,11 @@ def _is_one(tokens: tuple[str, ...], table: str) -> bool:
     return _ends_in(tokens, _listed(table))
 
 
+def ends_in(tokens: tuple[str, ...], named: Sequence[str]) -> bool:
+    """Tell whether a name's last noun is one of these names of things."""
+    return _ends_in(tokens, _singulars(named))
+
+
 def _ends_in(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]]) -> bool:
     """Tell whether a name's last noun is one of these, whatever describes it behind."""
     first = _head(tokens) or 0

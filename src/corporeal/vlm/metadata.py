@@ -81,8 +81,7 @@ class Evidence:
     @property
     def general(self) -> list[Name]:
         """Names of the whole object."""
-        stem = self.thing.source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
-        named = dict.fromkeys([self.thing.class_name, self.thing.name, stem])
+        named = dict.fromkeys([self.thing.class_name, self.thing.name, self.thing.stem])
         whole = (Name(text, of_part(tokens_of(text), phrases())) for text in named)
         return [*whole, *(Name(" ".join(w), w) for w in self.shared if w)]
 

@@ -42,8 +42,7 @@ class Filling:
 
 def said_contents(thing: SceneObject) -> Filling | None:
     """Return what an object's names say of its contents; None: nothing."""
-    stem = thing.source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
-    every = (_of_name(name) for name in dict.fromkeys([thing.name, thing.class_name, stem]))
+    every = (_of_name(name) for name in dict.fromkeys([thing.name, thing.class_name, thing.stem]))
     return next((found for found in every if found), None)
 
 
@@ -60,7 +59,7 @@ def _of_name(name: str) -> Filling | None:
 
 def _vessel(said: Sequence[str]) -> tuple[Phrase, int]:
     """Return the vessel, the last before what it is of, and where its name ends."""
-    stop = next((k for k, w in enumerate(said) if k and w in _table()["words"]["of"]), len(said))
+    stop = next((k for k, w in enumerate(said) if k and w in _told("of")), len(said))
     known = {p for table in ("drink", "any") for p in _phrases("vessels", table)}
     found = [(k + n, n, p) for k, n, p in _standing(said[:stop], known)]
     if not found:
@@ -83,7 +82,7 @@ def _share(name: str, said: Sequence[str]) -> float | None:
 
 
 def _is_level(said: Sequence[str], k: int, n: int) -> bool:
-    return n > 1 or k + 1 >= len(said) or said[k + 1] not in _table()["words"]["no_level"]
+    return n > 1 or k + 1 >= len(said) or said[k + 1] not in _told("no_level")
 
 
 def _contents(said: Sequence[str], vessel: Phrase, end: int, levelled: bool) -> str | None:
@@ -92,11 +91,10 @@ def _contents(said: Sequence[str], vessel: Phrase, end: int, levelled: bool) -> 
         return None
     table = {p: name for name in _table()["contents"] for p in _phrases("contents", name)}
     found = list(_standing(said, table))
-    told = _table()["words"]
     for k, n, phrase in sorted(found, key=lambda row: -row[1]):
         before = said[max(end, k - SKIPPED - 1) : k]
-        free = k + n == len(said) or said[k + n] in told["behind"]
-        if k >= end and free and any(w in told["of"] for w in before):
+        free = k + n == len(said) or said[k + n] in _told("behind")
+        if k >= end and free and any(w in _told("of") for w in before):
             return table[phrase]
         if levelled and k + n == end - len(vessel):
             return table[phrase]
@@ -144,14 +142,14 @@ def not_filled(scene: Scene, objects: Sequence[ObjectWords]) -> tuple[str, ...]:
     """Say of which objects it was not used how full their names say they are."""
     said = [(o, said_contents(thing)) for o, thing in zip(objects, scene.objects, strict=True)]
     return tuple(
-        f"{o.name}: its name says how full it is ({_told(filling)}), and that was not used: "
+        f"{o.name}: its name says how full it is ({_in_words(filling)}), and that was not used: "
         f"{_why(o, filling)}. Say it with --annotations: structure filled, contents and fill."
         for o, filling in said
         if filling and filling.share != 0 and not _holds(o, filling)
     )
 
 
-def _told(said: Filling) -> str:
+def _in_words(said: Filling) -> str:
     level = "full" if said.share is None else f"{said.share:.0%}"
     return f"{level} of {said.contents}" if said.contents else level
 
@@ -183,7 +181,14 @@ def _holds(thing: ObjectWords, said: Filling) -> bool:
 
 @cache
 def _phrases(table: str, row: str) -> frozenset[Phrase]:
-    return frozenset(tuple(singular(w) for w in p.split()) for p in _table()[table][row])
+    rows = _table()[table]
+    return frozenset(tuple(singular(w) for w in p.split()) for p in rows[row])
+
+
+@cache
+def _told(row: str) -> frozenset[str]:
+    rows = _table()["words"]
+    return frozenset(rows[row])
 
 
 @cache
