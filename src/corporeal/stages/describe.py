@@ -49,8 +49,8 @@ def describe(
     validate(config)
     identity = identify(scene, matter_hint)
     annotations = annotations_of(scene, identity, config, library, from_pictures)
-    file = words_of_file(scene, identity, library, from_pictures)
     model = connect(config.vlm, config.record)
+    file = words_of_file(scene, identity, library, from_pictures, unasked=model is None)
     if model is None:
         objects = [
             ObjectWords(
