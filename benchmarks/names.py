@@ -29,11 +29,16 @@ from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.survey import Anatomy
 from corporeal.in_memory import load_scene
 from corporeal.materials import find
+from corporeal.mixture import ground_weighed
+from corporeal.settings.ground_config import GroundConfig
 from corporeal.stages.describe import describe
 from corporeal.stages.fill import composed
-from corporeal.stages.ground import ground
 from corporeal.stages.segment import segment
-from corporeal.treatment.object_masses import implausible_masses, walls_drawn_too_thick
+from corporeal.treatment.object_masses import (
+    implausible_masses,
+    masses_not_as_named,
+    walls_drawn_too_thick,
+)
 from corporeal.types import MaterialField, Scene
 
 LIST = Path(__file__).parent / "recognition" / "names.toml"
@@ -95,7 +100,8 @@ class Weighed:
     @property
     def weight(self) -> list[str]:
         """What is said of how heavy it is."""
-        return implausible_masses(self.scene, self.anatomies, self.masses)
+        told = (implausible_masses, masses_not_as_named)
+        return [w for tell in told for w in tell(self.scene, self.anatomies, self.masses)]
 
 
 def weigh(mesh: trimesh.Trimesh, path: Path, metres_per_unit: float = 1.0) -> Weighed:
@@ -114,7 +120,7 @@ def weigh(mesh: trimesh.Trimesh, path: Path, metres_per_unit: float = 1.0) -> We
     inventory = describe(scene)
     parts = segment(scene, inventory)
     anatomies = examine(scene, parts, 0)
-    field, leaf = ground(scene, parts, inventory), find("leaf_tissue")
+    field, leaf = ground_weighed(scene, parts, inventory, GroundConfig()), find("leaf_tissue")
     makes = composed(scene, anatomies, field, leaf.pick(leaf.typical()), 0)
     return Weighed(scene, anatomies, makes, field)
 

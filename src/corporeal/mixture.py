@@ -38,6 +38,7 @@ from corporeal.types import (
     Structure,
     WeighedHypothesis,
 )
+from corporeal.vlm.named_weights import fitting, ways_of
 
 DRAWS = 400
 """Of the whole scene, where nobody says how many."""
@@ -162,16 +163,44 @@ def ground_weighed(
 ) -> MaterialField:
     """Choose every value, as ``ground`` does; where a model was asked, weigh its answers first.
 
+    Where none was, a mass that the name of a weight states chooses how it is made.
+
     Raises:
         UserError: As ``ground``.
 
     """
     if not inventory.transcript:  # nothing but ranges is open
-        return ground(scene, parts, inventory, grounding)
+        return ground(scene, parts, _as_named(scene, parts, inventory, grounding), grounding)
     ours = replace(grounding, field="")  # draws are of our ranges, whoever decides in the end
     believed = weighed(Scale(life_sized(scene), parts, ours, 0), inventory, DRAWS)
     found = ground(scene, parts, believed.inventory, grounding)
     return replace(found, mixtures=believed.mixtures)
+
+
+def _as_named(
+    scene: Scene, parts: Parts, inventory: Inventory, grounding: GroundConfig
+) -> Inventory:
+    """Let weights be made in the way that fits the mass which their name states best."""
+    found = [ways_of(scene, k, words) for k, words in enumerate(inventory.objects)]
+    if not any(found):
+        return inventory
+    scale = Scale(life_sized(scene), parts, replace(grounding, field=""), 0)
+    for number, ways in enumerate(found):
+        if ways is None:
+            continue
+        made = [_with_words(inventory, number, words) for words in ways.words]
+        masses = [
+            float(scale.of(ground(scale.scene, parts, one, scale.grounding))[number])
+            for one in made
+        ]
+        inventory = made[fitting(masses, ways.mass)]
+    return inventory
+
+
+def _with_words(inventory: Inventory, number: int, words: PartWords) -> Inventory:
+    objects = list(inventory.objects)
+    objects[number] = replace(objects[number], parts=(words,))
+    return replace(inventory, objects=tuple(objects))
 
 
 def weighed(scale: Scale, inventory: Inventory, samples: int) -> Believed:

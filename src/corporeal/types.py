@@ -150,6 +150,11 @@ class SceneObject:
     mass: float | None = None
     """As the file states it, of the object in the scene [kg]; None: its materials say."""
 
+    @property
+    def stem(self) -> str:
+        """Name of the file that it came from, without folders and suffix."""
+        return self.source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
+
 
 @dataclass(frozen=True)
 class Scene:

@@ -101,7 +101,7 @@ def test_what_is_before_a_noun_of_any_material_is_its_purpose(name):
 def test_no_phrase_means_two_things():
     told = {}
     for s in lexicon():
-        key = (s.phrase, s.kind, s.alpha)
+        key = (s.phrase, s.kind, s.alpha, s.extents)
         assert told.setdefault(key, s.material) == s.material, key
 
 

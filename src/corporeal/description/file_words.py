@@ -15,6 +15,7 @@ from corporeal.types import (
     Ground,
     ObjectWords,
     PartWords,
+    Range,
     Scene,
     Surface,
 )
@@ -25,6 +26,7 @@ from corporeal.vlm.metadata import (
     usual_inflation,
     usual_rebound,
 )
+from corporeal.vlm.said_contents import as_said
 from corporeal.vlm.stated import (
     as_stated,
     sealed,
@@ -34,15 +36,23 @@ from corporeal.vlm.stated import (
     stated_values,
     walled,
 )
+from corporeal.vlm.wet import density_when_wet
 
 OPEN = ("sheet", "metadata")
 """What an open vessel is by its name, and who says so."""
 
 
 def words_of_file(
-    scene: Scene, identity: Identity, library: str, from_pictures: bool
+    scene: Scene, identity: Identity, library: str, from_pictures: bool, unasked: bool
 ) -> list[list[PartWords]]:
     """Return what the file says of each part of each object: stated, or recognised by its names.
+
+    Args:
+        scene: What was assembled.
+        identity: Its parts.
+        library: Where materials are looked up.
+        from_pictures: Surfaces need not show how deep a vessel is.
+        unasked: No model looks: that a name says wet counts.
 
     Raises:
         UserError: A number in the file can be no material's.
@@ -54,10 +64,16 @@ def words_of_file(
         found = stated_material(list(seen.surfaces), library) or hollowed(
             recognise(seen), seen, walls, from_pictures
         )
+        if not from_pictures:
+            found = as_said(found, seen, found.material is None or walls(found.material))
         by = "metadata" if found.material else "unknown"
         found = replace(found, name=entry.name, answered_by=by)
         found = walled(found, stated_thickness(seen.surfaces))
-        found = replace(as_stated(found, seen.surfaces), stated=_stated_values(seen.surfaces))
+        stated = _stated_values(seen.surfaces)
+        if unasked:
+            dry = _density(found.material, library)
+            stated = density_when_wet(seen.general, found.material, dry) | stated
+        found = replace(as_stated(found, seen.surfaces), stated=stated)
         found = sealed(found, stated_inflation(seen.surfaces), usual_inflation(seen))
         found = replace(found, rebound=usual_rebound(seen))
         built_by = "metadata" if found.structure else "unknown"
@@ -82,6 +98,10 @@ def has_wall(library: str, name: str) -> bool:
         return "shell_thickness" in entry_of(name, library).ranges
     except UserError:
         return True
+
+
+def _density(material: str | None, library: str) -> Range | None:
+    return entry_of(material, library).ranges.get("density") if material else None
 
 
 def _stated_values(surfaces: Sequence[Surface]) -> dict[str, Ground]:

@@ -16,6 +16,7 @@ from corporeal.vlm import connect, critic_of
 from corporeal.vlm.metadata import (
     matter_hint,
 )
+from corporeal.vlm.said_contents import not_filled
 
 Progress = Callable[[float, str], None]
 
@@ -48,8 +49,8 @@ def describe(
     validate(config)
     identity = identify(scene, matter_hint)
     annotations = annotations_of(scene, identity, config, library, from_pictures)
-    file = words_of_file(scene, identity, library, from_pictures)
     model = connect(config.vlm, config.record)
+    file = words_of_file(scene, identity, library, from_pictures, unasked=model is None)
     if model is None:
         objects = [
             ObjectWords(
@@ -59,7 +60,8 @@ def describe(
             )
             for obj, words in zip(scene.objects, file, strict=True)
         ]
-        return Inventory(tuple(objects), warnings=open_ware(objects) if from_pictures else ())
+        open_made = open_ware(objects) if from_pictures else ()
+        return Inventory(tuple(objects), warnings=(*open_made, *not_filled(scene, objects)))
     critic = connect(critic_of(config.vlm, config.critic), config.record) or model
     asking = Asking(scene, identity, config, library, model, critic)
     return asking.inventory(file, annotations, progress)

@@ -27,6 +27,7 @@ from corporeal.treatment.loose_contents import in_vessels, pour_out, wetted
 from corporeal.treatment.object_masses import (
     as_heavy_as_stated,
     implausible_masses,
+    masses_not_as_named,
     walls_drawn_too_thick,
 )
 from corporeal.treatment.plan import Plan, Quality
@@ -79,8 +80,9 @@ def fill(
     packings = keep_apart(packed(bodies, chosen, config.seed), chosen.cell, together)
     particles = wetted(gather(parts, bodies, chosen, packings), bodies, config.seed)
     doubted = implausible_masses(scene, anatomies, particles.mass_real)
+    unlike = masses_not_as_named(scene, anatomies, particles.mass_real)
     thick = walls_drawn_too_thick(scene, anatomies, makes, field)
-    told = (*by_name(particles.warnings, scene), *drawn, *heavy, *thick, *doubted)
+    told = (*by_name(particles.warnings, scene), *drawn, *heavy, *thick, *doubted, *unlike)
     particles = replace(particles, warnings=told, contents=contents)
     return planted(scene, particles, anatomies, field, tissue)
 

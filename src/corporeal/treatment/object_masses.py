@@ -3,6 +3,7 @@
 from collections.abc import Mapping, Sequence
 
 from corporeal.errors import UserError
+from corporeal.formats.said_mass import doubt_said_mass
 from corporeal.formats.typical_bulk import doubt_mass
 from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.make import DRAWN, Make, heavier
@@ -80,6 +81,29 @@ def implausible_masses(
             obj.class_name or obj.name,
             sum(masses[m.part] for m in anatomy.members) / obj.scale**3,
             _real(oriented_size(anatomy.vertices), obj.scale),
+        )
+        for obj, anatomy in zip(scene.objects, anatomies, strict=True)
+    )
+    return [sentence for sentence in doubts if sentence]
+
+
+def masses_not_as_named(
+    scene: Scene, anatomies: Sequence[Anatomy], masses: Sequence[float]
+) -> list[str]:
+    """Say which objects do not weigh what their names say ("dumbbell_5kg").
+
+    Args:
+        scene: The objects, with what they are called.
+        anatomies: One per object.
+        masses: Of every part, as large as it is in the scene [kg].
+
+    """
+    doubts = (
+        doubt_said_mass(
+            obj.name,
+            sum(masses[m.part] for m in anatomy.members) / obj.scale**3,
+            obj.name,
+            obj.stem,
         )
         for obj, anatomy in zip(scene.objects, anatomies, strict=True)
     )

@@ -6,6 +6,7 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache, lru_cache
 from importlib.resources import files
+from math import inf
 
 from corporeal.formats.other_languages import in_english
 from corporeal.formats.spelling import (
@@ -58,7 +59,13 @@ class Term:
     rebound: float | None = None
     """Restitution on a hard floor that its rules ask for [-]."""
     moulded: bool = False
+    """It is hollow only where it is of one of the ``mouldable`` materials, or ``fired``."""
+    blown: bool = False
     """It is hollow only where it is of one of the ``mouldable`` materials."""
+    extents: tuple[float, float] = (0.0, inf)
+    """It tells of things only whose longest side is at least and below that [m]."""
+    lone: bool = False
+    """It counts only where it is all that a thing is called."""
     before: int = 0
     """Words of the object that a substance stands right before."""
     narrowed: bool = False
@@ -98,7 +105,9 @@ def heads(tokens: tuple[str, ...]) -> list[Term]:
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
     standing = [
-        (k, term) for k, term in _standing_in(tokens) if _is_of_it(term, _after(tokens, k, term))
+        (k, term)
+        for k, term in _standing_in(tokens)
+        if _is_of_it(term, _after(tokens, k, term)) and not (term.lone and tokens != term.phrase)
     ]
     head = _head(tokens)
     if head is not None and tokens[head] in _holders():
@@ -245,6 +254,11 @@ def _is_one(tokens: tuple[str, ...], table: str) -> bool:
     return _ends_in(tokens, _listed(table))
 
 
+def ends_in(tokens: tuple[str, ...], named: Sequence[str]) -> bool:
+    """Tell whether a name's last noun is one of these names of things."""
+    return _ends_in(tokens, _singulars(named))
+
+
 def _ends_in(tokens: tuple[str, ...], named: frozenset[tuple[str, ...]]) -> bool:
     """Tell whether a name's last noun is one of these, whatever describes it behind."""
     first = _head(tokens) or 0
@@ -303,8 +317,21 @@ def kin(one: str, other: str) -> bool:
 
 @cache
 def mouldable() -> frozenset[str]:
-    """Materials of which a moulded thing is hollow: blown, moulded, slip-cast or sewn."""
+    """Materials of which blown and moulded things are hollow: blown, moulded or sewn."""
     return frozenset(_table()["mouldable"])
+
+
+@cache
+def fired() -> frozenset[str]:
+    """Materials of which moulded things are hollow, and balls are not: slip-cast."""
+    return frozenset(_table()["fired"])
+
+
+def made_hollow(thing: Term, material: str) -> bool:
+    """Tell whether a thing has its wall where it is of a material that somebody names."""
+    if not (thing.moulded or thing.blown) or material in mouldable():
+        return True
+    return thing.moulded and material in fired()
 
 
 @cache
@@ -395,4 +422,7 @@ def _term(kind: str, phrase: str, row: dict) -> Term:
         inflation=None if pressure is None else pressure * 1e3,
         rebound=row.get("rebound"),
         moulded=row.get("moulded", False),
+        blown=row.get("blown", False),
+        extents=(row.get("longer_m", 0.0), row.get("shorter_m", inf)),
+        lone=row.get("lone", False),
     )

@@ -26,8 +26,8 @@ from corporeal.vlm.lexicon import (
     hollow,
     kin,
     lookbook,
+    made_hollow,
     metals,
-    mouldable,
     open_ware,
     phrases,
     seen_as,
@@ -68,6 +68,11 @@ class Evidence:
     """Materials that the object's other parts name as their own."""
 
     @property
+    def extent(self) -> float:
+        """Longest side of the object [m]."""
+        return self.thing.real_extent
+
+    @property
     def own(self) -> list[Name]:
         """Names that are the part's own, without what its sibling parts are called too."""
         finishes = [_name(f.name, self.shared[1]) for f in self.finishes]
@@ -76,8 +81,7 @@ class Evidence:
     @property
     def general(self) -> list[Name]:
         """Names of the whole object."""
-        stem = self.thing.source.replace("\\", "/").rsplit("/", 1)[-1].rsplit(".", 1)[0]
-        named = dict.fromkeys([self.thing.class_name, self.thing.name, stem])
+        named = dict.fromkeys([self.thing.class_name, self.thing.name, self.thing.stem])
         whole = (Name(text, of_part(tokens_of(text), phrases())) for text in named)
         return [*whole, *(Name(" ".join(w), w) for w in self.shared if w)]
 
@@ -186,9 +190,11 @@ def hollowed(
         return replace(words, structure="shell", thickness=words.thickness or wall)
     if from_pictures and any(open_ware(name.words) for name in evidence.general):
         return replace(words, structure="sheet", wall_unseen=True)
-    is_hollow = any(hollow(name.words) for name in evidence.general)
+    named = evidence.general
+    called = evidence.alone and any("hollow" in name.words for name in named)
+    is_hollow = called or any(hollow(name.words) for name in named)
     is_cast = words.material in metals() and evidence.thing.real_extent > LARGEST_SOLID_CASTING
-    if is_cast and any(cast(name.words) for name in evidence.general):
+    if is_cast and any(cast(name.words) for name in named):
         is_hollow = True
     return replace(words, structure="shell") if is_hollow else words
 
@@ -213,21 +219,23 @@ def recognise(evidence: Evidence) -> PartWords:
     for ask in (_own_names, _general_names, _looks, _surface_values):
         answer = ask(evidence)
         if answer is not None:
-            return _emptied(_weighed(answer, evidence), evidence)
+            return _called_solid(_emptied(_weighed(answer, evidence), evidence), evidence)
     return UNKNOWN
 
 
 def _own_names(evidence: Evidence) -> PartWords | None:
-    terms, name = _strongest(evidence.own, evidence.finishes, KINDS, evidence.general)
+    terms, name = _strongest(
+        evidence.own, evidence.finishes, KINDS, evidence.general, evidence.extent
+    )
     if not terms or (terms[0].plant and not evidence.alone):
         return None  # "plant" names the pot's node as often as the leaves
-    whole = terms[0].kind != "thing" or evidence.alone or terms[0].every
-    return _answer(_of_metal(terms, evidence), name, 1.0 if whole else WEAKER)
+    sure = terms[0].kind != "thing" or evidence.alone or terms[0].every
+    return _answer(_of_metal(terms, evidence), name, 1.0 if sure else WEAKER)
 
 
 def _general_names(evidence: Evidence) -> PartWords | None:
     kinds, names = ("substance", "thing"), evidence.general
-    terms, name = _strongest(names, evidence.finishes, kinds, names)
+    terms, name = _strongest(names, evidence.finishes, kinds, names, evidence.extent)
     if not terms:
         return None
     if evidence.alone or terms[0].every:
@@ -286,6 +294,14 @@ def _emptied(answer: PartWords, evidence: Evidence) -> PartWords:
     return replace(answer, structure="shell", contents=None, fill=None)
 
 
+def _called_solid(answer: PartWords, evidence: Evidence) -> PartWords:
+    """Let a ball be solid that is called so; a chest of solid oak is hollow."""
+    named = [name for name in evidence.general if "solid" in name.words]
+    if answer.structure != "shell" or not any(t.blown for n in named for t in heads(n.words)):
+        return answer
+    return replace(answer, structure="solid", thickness=None, inflation=None, rebound=None)
+
+
 def _of_metal(terms: list[Term], evidence: Evidence) -> list[Term]:
     """Let an object that looks metallic be of the metal that such objects are made of."""
     if not _metallic(evidence):
@@ -318,7 +334,11 @@ def _answer(terms: list[Term], name: str, factor: float) -> PartWords:
 
 
 def _strongest(
-    names: Sequence[Name], finishes: Sequence[Finish], kinds: Sequence[str], thing: Sequence[Name]
+    names: Sequence[Name],
+    finishes: Sequence[Finish],
+    kinds: Sequence[str],
+    thing: Sequence[Name],
+    extent: float = 0.0,
 ) -> tuple[list[Term], str]:
     """Find the strongest terms in any of the names, and the name they stand in.
 
@@ -341,6 +361,8 @@ def _strongest(
                 if not (term.seldom and (nameless or bare or term.material in of_metal)):
                     continue
                 term = replace(term, margin=term.margin * WEAKER)
+            if not term.extents[0] <= extent < term.extents[1] or (term.lone and name not in thing):
+                continue
             if term.kind in kinds and _fits(term, finishes, around | set(name.words)):
                 length = len(term.phrase)
                 weight = 1 if term.kind == "piece" else max(length, term.before)
@@ -402,7 +424,7 @@ def _made_as(substance: Term, thing: Term) -> Term:
     A ball of rubber is blown up, and one of steel is solid.
     """
     same = kin(substance.material, thing.material)
-    if thing.moulded and substance.material not in mouldable():
+    if not made_hollow(thing, substance.material):
         return replace(substance, before=len(thing.phrase))
     return replace(
         substance,

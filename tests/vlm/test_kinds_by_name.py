@@ -1,0 +1,91 @@
+"""Things that are of one kind or another by a word beside them, or by how large they are."""
+
+import pytest
+
+from corporeal.types import SceneObject
+from corporeal.vlm.metadata import Evidence, hollowed, recognise
+from handmade import plain
+
+
+class Named:
+    def __init__(self, name):
+        self.name, self.extras = name, {}
+
+
+def built(name, extent=1.0, surface="mesh"):
+    """Return what a thing of one part and such a name becomes."""
+    known = Evidence(
+        surfaces=[Named(surface)],  # type: ignore[list-item]
+        finishes=[plain()],
+        thing=SceneObject(f"{name}_0", name, extent),
+        alone=True,
+        metallic_means_something=False,
+    )
+    return hollowed(recognise(known), known, lambda _: True)
+
+
+@pytest.mark.parametrize("name", ["bean bag", "juggling bean bag", "beanbag_red"])
+def test_a_bean_bag_for_juggling_is_full_of_grains(name):
+    """It was a tuft of fibre fill and weighed 5 g."""
+    found = built(name, 0.07)
+    assert (found.material, found.structure, found.contents) == ("cotton", "filled", "grain")
+
+
+@pytest.mark.parametrize("name", ["bean bag", "bean bag chair", "beanbag"])
+def test_a_bean_bag_to_sit_on_is_full_of_beads_of_foam(name):
+    found = built(name, 0.8)
+    assert (found.material, found.structure) == ("packaging_foam", None)
+
+
+def test_how_large_a_thing_is_tells_nothing_of_what_is_always_the_same():
+    assert built("sponge", 0.05) == built("sponge", 0.9)
+
+
+@pytest.mark.parametrize(
+    ("name", "material", "structure"),
+    [
+        ("bocce ball", "phenolic", None),
+        ("wooden bocce ball", "wood", None),
+        ("clay ball", "terracotta", None),
+        ("ceramic ball", "ceramic", None),
+        ("porcelain duck", "porcelain", "shell"),
+        ("hollow plastic golf ball", "hard_plastic", "shell"),
+        ("plastic golf ball", "hard_plastic", None),
+        ("golf ball", "golf_ball_core", None),
+        ("hollow steel ball", "steel", "shell"),
+        ("hollow_brick", "brick", "shell"),
+        ("solid rubber ball", "rubber", "solid"),
+        ("solid wood table", "wood", None),
+    ],
+)
+def test_balls_of_what_is_fired_are_solid_and_what_is_called_hollow_is(name, material, structure):
+    found = built(name)
+    assert (found.material, found.structure) == (material, structure)
+    if structure != "shell":
+        assert (found.thickness, found.inflation) == (None, None)
+
+
+@pytest.mark.parametrize(
+    ("name", "extent", "material"),
+    [
+        ("orange", 0.08, "soft_fruit"),
+        ("Orange_01", 0.07, "soft_fruit"),
+        ("orange fruit", 0.07, "soft_fruit"),
+        ("orange", 0.6, None),
+        ("orange chair", 0.08, "wood"),
+        ("chair orange", 0.9, "wood"),
+        ("orange thingummy", 0.08, None),
+    ],
+)
+def test_an_orange_is_a_fruit_where_nothing_else_is_named(name, extent, material):
+    assert built(name, extent).material == material
+
+
+def test_a_finish_called_orange_is_a_colour():
+    assert built("thing", 0.08, surface="orange").material is None
+
+
+def test_the_wall_of_a_balloon_is_that_of_one_blown_up():
+    """A party balloon of 28 cm weighs 3 g without its air; it weighed 74 g."""
+    rubber, area = 930.0, 3.1416 * 0.28**2
+    assert 2e-3 < rubber * area * (built("balloon").thickness or 1.0) < 5e-3

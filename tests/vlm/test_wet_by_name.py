@@ -1,0 +1,27 @@
+"""What is wet by its name weighs more: a wet sponge weighed as a dry one."""
+
+import pytest
+
+from corporeal.stages.describe import describe
+from handmade import plain, scene
+
+
+def density(name):
+    """Return what the name says of the density [kg/m3]; None: the library's is meant."""
+    (part,) = describe(scene((name, [("mesh", plain(), {})]))).objects[0].parts
+    found = part.stated.get("density")
+    return found and found.value
+
+
+def test_a_wet_sponge_holds_water_and_a_soaked_one_more():
+    wet, soaked = density("wet sponge"), density("soaked_sponge")
+    assert wet == pytest.approx(3 * 30)
+    assert soaked == pytest.approx(5.7 * 30)
+    assert density("damp towel") == pytest.approx(2 * 400)
+
+
+@pytest.mark.parametrize(
+    "name", ["dry sponge", "sponge", "wet stone", "wet steel ball", "wet thingamajig"]
+)
+def test_what_is_dry_or_holds_no_water_weighs_what_it_did(name):
+    assert density(name) is None
