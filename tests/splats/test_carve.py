@@ -21,7 +21,7 @@ def test_what_lies_flat_on_the_floor_is_a_plate(height):
     grid = gridded(np.array([-0.5, -0.5, -0.1]), np.array([0.5, 0.5, 0.4]), 20_000, 0.0)
     assert grid.cell > 0.02
     with ThreadPool(1) as pool:
-        field = carved(grid, DepthRendering(rgb, depth, met, rows), 0.0, pool)
+        field = carved(grid, DepthRendering(rgb, depth, depth, met, rows), 0.0, pool)
     first = int(np.argmax(grid.axes[2] > 0))
     assert (field[..., first] < 0).all()
     assert (field[..., first + 2 :] > 0).all()

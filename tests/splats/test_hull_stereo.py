@@ -1,6 +1,7 @@
 """What pictures agree on inside the visual hull empties the way to it, and nothing else."""
 
 import numpy as np
+import pytest
 import trimesh
 
 from corporeal.splats import hull
@@ -123,21 +124,38 @@ def depths(solid):
     return found
 
 
-def test_photographs_see_below_a_lid_of_gaussians(monkeypatch):
-    """Of a box without a lid Gaussians show one; photographs know better, and leave its sides."""
+@pytest.fixture
+def lidless(monkeypatch):
+    """A box without a lid, of which Gaussians show one: its photographs, masks and both depths."""
     monkeypatch.setattr(hull, "CELLS", 60_000)
-    views, masks = photographed(without_lid(), 0.25)
     shown, true = depths(block([-HALF, -HALF, 0], [HALF, HALF, HEIGHT])), depths(without_lid())
+    return *photographed(without_lid(), 0.25), shown, true
+
+
+def deeper(views, masks, shown, far):
     met, rows = np.zeros(shown.shape, np.int32), np.zeros((len(shown), 18))
     with ThreadPool(1) as pool:
-        found = deepened(DepthRendering(views.rgb, shown, met, rows), views, masks, pool).depth
-    on = np.isfinite(true)
+        return deepened(DepthRendering(views.rgb, shown, far, met, rows), views, masks, pool).depth
+
+
+def test_photographs_see_below_a_thin_lid_of_gaussians(lidless):
+    """Through a lid that hides less than half they know better, and leave its sides."""
+    views, masks, shown, true = lidless
+    found, on = deeper(views, masks, shown, np.full_like(true, np.inf)), np.isfinite(true)
     lid, sides = on & (true > shown + 0.3), on & (true < shown + 0.01)
     assert lid.mean() > 0.05
     assert np.median(true[lid] - shown[lid]) > 1
     assert (np.abs(found[lid] - true[lid]) < 0.25).mean() > 0.7
     assert (found[sides] < true[sides] + 0.05).mean() > 0.98
     np.testing.assert_array_equal(np.isfinite(found), np.isfinite(shown))
+
+
+def test_what_hides_most_light_is_no_lid(lidless):
+    """As in a mirror: photographs agree on what lies behind its face, and Gaussians hide it."""
+    views, masks, shown, _ = lidless
+    found = deeper(views, masks, shown, shown + 0.1)
+    assert (found > shown).any()
+    assert (found <= shown + np.float32(0.1001)).all()
 
 
 def test_a_plain_face_goes_on_between_known_depths():

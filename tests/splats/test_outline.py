@@ -42,7 +42,7 @@ def rendering(shown):
         K = c.K
         rows.append([*pose.ravel(), K[0, 0], K[1, 1], K[0, 2], K[1, 2], SIDE, SIDE])
     rgb = np.zeros((*shown.shape, 3), np.float32)
-    return DepthRendering(rgb, depth, np.where(shown, 0, -1), np.array(rows))
+    return DepthRendering(rgb, depth, depth, np.where(shown, 0, -1), np.array(rows))
 
 
 def fit(body, shown):

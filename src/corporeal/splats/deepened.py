@@ -4,6 +4,10 @@ Gaussians are learned as balls some pixels wide, and of what is plain, such as t
 pan, no picture says where they are: their depth is that of a hump. Neighbouring photographs say how
 deep they see (``hull_stereo.py``), and between such depths a plain face has none of the edges that
 a step would have: there it is taken to go on as flat as it can.
+
+In a mirror photographs see far behind its face, and agree on where: a highlight on a ball lies half
+its radius deep. Gaussians stay on the face, since their colours change with the view. So nothing is
+taken to lie deeper than the far side of the Gaussian at which half of the light is lost.
 """
 
 from dataclasses import replace
@@ -27,7 +31,7 @@ ROUNDS = 200
 def deepened(
     rendering: DepthRendering, views: Views, masks: Bool[np.ndarray, "V H W"], pool: ThreadPool
 ) -> DepthRendering:
-    """Return the same, as deep as photographs see where that is deeper, but for their error.
+    """Return the same, as deep as photographs see and Gaussians let most light through.
 
     Args:
         rendering: Of Gaussians.
@@ -48,6 +52,7 @@ def deepened(
     rows, columns = (np.minimum(np.arange(n) // looks.every, most - 1) for n, most in sizes)
     seen = depths[:, rows[:, None], columns] - SURE * hull.side
     known = np.isfinite(seen) & np.isfinite(rendering.depth)
+    seen = np.minimum(seen, rendering.far)
     deeper = np.where(known, np.maximum(rendering.depth, seen), rendering.depth)
     return replace(rendering, depth=deeper.astype(np.float32))
 

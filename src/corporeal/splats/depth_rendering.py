@@ -23,6 +23,8 @@ class DepthRendering:
     """sRGB."""
     depth: Float32[np.ndarray, "V H W"]
     """Along the camera's z, to where the first surface begins [m]; inf where there is nothing."""
+    far: Float32[np.ndarray, "V H W"]
+    """The same, to the far side of the Gaussian at which half of the light is lost [m]."""
     met: Int[np.ndarray, "V H W"]
     """Which Gaussian takes the middle of the light; -1: none."""
     rows: Float[np.ndarray, "V 18"]
@@ -37,7 +39,7 @@ def render_depth(
     eyes = [pinhole(c, near=near) for c, near in zip(cameras, clear, strict=True)]
     shape = len(eyes), max(e.height for e in eyes), max(e.width for e in eyes)
     rgb = np.zeros((*shape, 3), np.float32)
-    depth = np.full(shape, np.inf, np.float32)
+    depth, far = (np.full(shape, np.inf, np.float32) for _ in range(2))
     met = np.full(shape, -1, np.int32)
     spread = covariances(gaussians)
     for k, eye in enumerate(eyes):
@@ -50,9 +52,10 @@ def render_depth(
         slope = np.empty((gaussians.count, 4), np.float32)
         seen = gaussians.mean, spread, drawing.ellipses, eye, slope
         pool.each(slopes, [(*span, *seen) for span in pool.spans(gaussians.count)])
-        rest = drawing.first, drawing.ids, drawing.ellipses, slope, depth[own], met[own]
+        found = depth[own], far[own], met[own]
+        rest = drawing.first, drawing.ids, drawing.ellipses, slope, *found
         pool.each(meet, [(t, *rest) for t in dealt(drawing.first, pool)])
-    return DepthRendering(rgb, depth, met, np.stack([_row(eye) for eye in eyes]))
+    return DepthRendering(rgb, depth, far, met, np.stack([_row(eye) for eye in eyes]))
 
 
 def covariances(gaussians: Gaussians) -> Float[np.ndarray, "N 3 3"]:

@@ -64,10 +64,10 @@ def slopes(first, last, mean, spread, ellipses, camera, out):
 
 
 @numba.njit(**JIT)
-def meet(tiles, first, ids, ellipses, slopes, depth, met):
-    """Find where the ray of each pixel has lost some of its light, and to whom half of it goes.
+def meet(tiles, first, ids, ellipses, slopes, depth, far, met):
+    """Find where the ray of each pixel has lost some of its light, half of it, and to whom.
 
-    depth (H, W) stays inf and met (H, W) stays -1 where half of the light gets through.
+    depth and far (H, W) stay inf and met (H, W) stays -1 where half of the light gets through.
 
     slopes (N, 4): how the depth of a Gaussian's densest point along a ray changes with the pixel,
     along u and v [m/px], by how much at most, and how far before it the Gaussian begins [m].
@@ -99,12 +99,14 @@ def meet(tiles, first, ids, ellipses, slopes, depth, met):
                         continue
                     T[y, x] = before * (f4(1) - alpha)
                     left -= T[y, x] <= HALF
-                    if before > MET and T[y, x] <= MET:
+                    if (before > MET and T[y, x] <= MET) or T[y, x] <= HALF:
                         off = s_[0] * dx + s_[1] * dy
                         off = min(max(off, -s_[2]), s_[2])
-                        depth[y0 + y, x0 + x] = e[Z] + off - s_[3]
-                    if T[y, x] <= HALF:
-                        met[y0 + y, x0 + x] = i
+                        if before > MET:
+                            depth[y0 + y, x0 + x] = e[Z] + off - s_[3]
+                        if T[y, x] <= HALF:
+                            far[y0 + y, x0 + x] = e[Z] + off + s_[3]
+                            met[y0 + y, x0 + x] = i
         for y in range(min(TILE, height - y0)):
             for x in range(min(TILE, width - x0)):
                 if T[y, x] > HALF:
