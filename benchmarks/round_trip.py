@@ -68,8 +68,8 @@ ASIDE = 0.01
 Detail = Literal["draft", "normal", "fine"]
 Training = Literal["draft", "normal"]
 FOUND = (
-    "- Compact objects keep their mass within a percent, and a duck on mud lands, sinks in and "
-    "stays as its model does. Plants stand and sway.",
+    "- Compact objects that do not mirror keep their mass within a percent, and a "
+    "duck on mud lands, sinks in and stays as its model does. Plants stand and sway.",
     "- Where objects fly, bounce or topple, small differences grow. End positions of the model's "
     "balls, lamp and vase depend on the particle sampling only within the own spread. The "
     "reconstructed rubber ball leaves its bounces at an angle: an offset of a tenth of a "
