@@ -48,7 +48,8 @@ def test_a_run_keeps_what_is_compared(tmp_path):
     numbers = read_numbers(folder)
     assert [b.name for b in numbers.bodies] == ["ball", "block"]
     ball, block = numbers.bodies
-    assert ball.places[:, 2].min() < ball.places[0, 2] - 0.005
+    # It turns between two frames, 10 mm down: of that frames see 4 mm.
+    assert ball.places[:, 2].min() < ball.places[0, 2] - 0.003
     assert ball.young > 1e11 > 1e8 > block.young
     assert ball.groups == ("metal",) and ball.laws == ("rigid body",)
     assert numbers.outcome.pair("ball", "block").first_contact_s is not None

@@ -101,7 +101,11 @@ def has_wall(library: str, name: str) -> bool:
 
 
 def _density(material: str | None, library: str) -> Range | None:
-    return entry_of(material, library).ranges.get("density") if material else None
+    """Return what a library knows of a material's density; None: nothing."""
+    try:
+        return entry_of(material, library).ranges.get("density") if material else None
+    except UserError:
+        return None
 
 
 def _stated_values(surfaces: Sequence[Surface]) -> dict[str, Ground]:
