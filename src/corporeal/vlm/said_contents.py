@@ -70,12 +70,10 @@ def _vessel(said: Sequence[str]) -> tuple[Phrase, int]:
 
 def _share(name: str, said: Sequence[str]) -> float | None:
     """Return how full it is said to be [-]."""
-    level, fraction = LEVEL.search(name), FRACTION.search(name)
-    if level or fraction:
-        part, whole = (
-            (level[1], 100) if level else (fraction[1], fraction[2]) if fraction else (1, 1)
-        )
-        return min(int(part) / int(whole), FULLEST)
+    if level := LEVEL.search(name):
+        return min(int(level[1]) / 100, FULLEST)
+    if fraction := FRACTION.search(name):
+        return min(int(fraction[1]) / int(fraction[2]), FULLEST)
     shares = {p: float(share) for share in _table()["share"] for p in _phrases("share", share)}
     found = [(n, k, p) for k, n, p in _standing(said, shares) if _is_level(said, k, n)]
     return shares[max(found)[2]] if found else None
@@ -122,10 +120,9 @@ def as_said(found: PartWords, evidence: Evidence, holds: bool) -> PartWords:
     if said is None or not evidence.alone or not (said.vessel and holds):
         return found
     inner = said.contents or found.contents or ("water" if said.drinks else None)
-    if not said.share and said.share is not None:
-        return (
-            replace(found, structure="shell", contents=None, fill=None) if found.contents else found
-        )
+    if said.share == 0:
+        empty = replace(found, structure="shell", contents=None, fill=None)
+        return empty if found.contents else found
     if inner is None or inner == found.material:
         return found
     if found.contents is not None and said.share is None:
