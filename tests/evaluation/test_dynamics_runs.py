@@ -34,8 +34,8 @@ PATIENCE = 600.0
 
 
 def scene_of_a_fall(folder: Path, duration: float = 0.1) -> Path:
-    """A steel ball that falls on a block of rubber."""
-    ball = co.ball("steel", 0.03, (0.0, 0.0, 0.14), (0.0, 0.0, -1.0), "ball")
+    """A steel ball that falls on a block of rubber, slowly enough for a frame to see it low."""
+    ball = co.ball("steel", 0.03, (0.0, 0.0, 0.14), (0.0, 0.0, -0.5), "ball")
     block = co.box("rubber", (0.1, 0.1, 0.1), name="block")
     path = folder / "fall.glb"
     co.write_glb(path, co.build_scene(ball, block, name="fall", duration=duration))
@@ -48,8 +48,7 @@ def test_a_run_keeps_what_is_compared(tmp_path):
     numbers = read_numbers(folder)
     assert [b.name for b in numbers.bodies] == ["ball", "block"]
     ball, block = numbers.bodies
-    # It turns between two frames, 10 mm down: of that frames see 4 mm.
-    assert ball.places[:, 2].min() < ball.places[0, 2] - 0.003
+    assert ball.places[:, 2].min() < ball.places[0, 2] - 0.005
     assert ball.young > 1e11 > 1e8 > block.young
     assert ball.groups == ("metal",) and ball.laws == ("rigid body",)
     assert numbers.outcome.pair("ball", "block").first_contact_s is not None
