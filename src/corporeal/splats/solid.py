@@ -9,7 +9,7 @@ both are drawn back to a common face.
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Int
+from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import KDTree
 from skimage import measure
@@ -26,6 +26,8 @@ from corporeal.splats.disjoint import disjoint
 from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
 from corporeal.splats.outline import fitted, outlined
+from corporeal.splats.photometric import Agreed, agreed, pictured
+from corporeal.splats.sheets import without_sheets
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Gaussians, Views
 
@@ -118,7 +120,8 @@ def solids(
             rendering = deepened(rendering, views, masks, pool)
         own = np.where(object_of_gaussian[rendering.met] < 0, -1, rendering.met)
         rendering, shown = _shown(replace(rendering, met=own), object_of_gaussian, masks)
-        scene = _Scene(gaussians, object_of_gaussian, rendering, shown, FLOOR)
+        rgb = None if views is None else views.rgb
+        scene = _Scene(gaussians, object_of_gaussian, rendering, shown, rgb, FLOOR)
         survey, made = _surveyed(scene, count, pool), []
         for k in range(count):
             made.append(_solid(scene, k, survey, pool))
@@ -134,6 +137,8 @@ class _Scene:
     rendering: DepthRendering
     shown: Int[np.ndarray, "V H W"] | None
     """Whose each pixel is; -1: no object's; None: no masks say it."""
+    rgb: UInt8[np.ndarray, "V H W 3"] | None
+    """Photographs; None: there are none."""
     floor: float
 
     def owner(self, places: Float[np.ndarray, "M 3"]) -> Int[np.ndarray, " M"]:
@@ -345,9 +350,31 @@ def _fitted(
     if scene.shown is not None:
         lines = outlined(scene.shown == k, rendering, cell, pool)
         mesh = fitted(mesh, lines, seen, contact, scene.floor, pool)
+        if scene.rgb is not None:
+            mesh = without_sheets(mesh, _pixel(scene, k), scene.floor)
+            close = _agreed(mesh, scene, k, seen & ~contact, cell, pool)
+            again = fitted(close.mesh, lines, seen, contact, scene.floor, pool)
+            # Where photographs agree outlines, of which faces have none, have nothing to add.
+            way = (1 - close.belief)[:, None] * (again.vertices - close.mesh.vertices)
+            mesh = replace(again, vertices=close.mesh.vertices + way)
     lies = mesh.vertices[:, 2] < scene.floor + ON
     still = lies | contact
     return continued(mesh, ~(seen | still), still, cell, scene.floor, mean)
+
+
+def _agreed(
+    mesh: Mesh,
+    scene: _Scene,
+    k: int,
+    movable: Bool[np.ndarray, " V"],
+    cell: float,
+    pool: ThreadPool,
+) -> Agreed:
+    """Move a surface to where photographs agree."""
+    assert scene.shown is not None and scene.rgb is not None
+    mine, rows = scene.shown == k, scene.rendering.rows
+    pictures = pictured(scene.rgb, mine, rows, _pixel(scene, k))
+    return agreed(mesh, pictures, movable, cell, scene.floor, pool)
 
 
 def _painted(
