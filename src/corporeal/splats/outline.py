@@ -51,6 +51,8 @@ class Outlines:
     """To the outline [px], negative inside; nan: not near, or something hides it there."""
     cameras: Float[np.ndarray, "V 18"]
     """As ``DepthRendering.rows``."""
+    rounds: int = ROUNDS
+    """How often a surface is moved to them."""
 
 
 def outlined(
@@ -95,7 +97,7 @@ def fitted(
     rule = np.array([STEEP, REACH, EDGE])
     lies = mesh.vertices[:, 2] < floor + ON
     begun, leeway = mesh, np.minimum(_leeway(mesh), REACH * _pixel(mesh, outlines))
-    for _ in range(ROUNDS):
+    for _ in range(outlines.rounds):
         normals = mesh.vertex_normals
         rest = mesh.vertices, mesh.triangles, normals, outlines.cameras, outlines.distance
         pool.each(stray, [(*span, *rest, rule, out) for span in pool.spans(views)])

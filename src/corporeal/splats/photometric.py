@@ -39,7 +39,7 @@ SCATTER = 0.5
 HALF, SHARPLY = 0.3, 4
 """Share of vertices about one that must know where the face is for it to go half of the way there,
 and the power by which more makes that more."""
-EVERY = 1.7
+EVERY = 1.2
 """Of vertices in a square pixel, one in so many is asked."""
 MOST = 4.0
 """Nothing is moved farther in a round [px]."""

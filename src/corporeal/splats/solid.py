@@ -51,6 +51,8 @@ AWAY = 0.02
 """Vertices stay so many cells away from the middles of cells, so that no triangle is degenerate."""
 PASSES = 8
 """How often the surface is smoothed."""
+AGAIN = 2
+"""How often it is moved to outlines after it was moved to where photographs agree."""
 SEEN = 1e-3
 """Weight of views from which on a vertex is seen."""
 CHECKED = 4000
@@ -353,6 +355,7 @@ def _fitted(
         if scene.rgb is not None:
             mesh = without_sheets(mesh, _pixel(scene, k), scene.floor)
             close = _agreed(mesh, scene, k, seen & ~contact, cell, pool)
+            lines = replace(lines, rounds=AGAIN)
             again = fitted(close.mesh, lines, seen, contact, scene.floor, pool)
             # Where photographs agree outlines, of which faces have none, have nothing to add.
             way = (1 - close.belief)[:, None] * (again.vertices - close.mesh.vertices)
