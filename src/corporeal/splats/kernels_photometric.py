@@ -11,7 +11,7 @@ REACH = 2
 """Patches are that many pixels wide to each side of their middle."""
 SIDE = 2 * REACH + 1
 SAMPLES = SIDE * SIDE
-MOST, LEAST = 10, 3
+MOST, LEAST = 8, 3
 """Views that a vertex is looked at from: those that see it most from ahead, and how few will do."""
 UNKNOWN = f4(-2)
 """Below any correlation."""
@@ -86,13 +86,18 @@ def _witnesses(x, y, z, normal, cameras, depths, inside, rule, view, cosine):
 def _sampled(x, y, z, across, along, step, c, picture, patch):
     """Fill in what a view shows of a square patch (SAMPLES, 3); whether all of it is in view."""
     height, width, _ = picture.shape
+    r, d, h = from_camera(c, x, y, z)
+    # How right, down and ahead grow from one sample to the next.
+    rj = step * (c[0] * across[0] + c[1] * across[1] + c[2] * across[2])
+    dj = step * (c[4] * across[0] + c[5] * across[1] + c[6] * across[2])
+    hj = step * (c[8] * across[0] + c[9] * across[1] + c[10] * across[2])
+    ri = step * (c[0] * along[0] + c[1] * along[1] + c[2] * along[2])
+    di = step * (c[4] * along[0] + c[5] * along[1] + c[6] * along[2])
+    hi = step * (c[8] * along[0] + c[9] * along[1] + c[10] * along[2])
     s = 0
     for j in range(-REACH, REACH + 1):
         for i in range(-REACH, REACH + 1):
-            px = x + step * (j * across[0] + i * along[0])
-            py = y + step * (j * across[1] + i * along[1])
-            pz = z + step * (j * across[2] + i * along[2])
-            right, down, ahead = from_camera(c, px, py, pz)
+            right, down, ahead = r + j * rj + i * ri, d + j * dj + i * di, h + j * hj + i * hi
             if not ahead > 0:
                 return False
             u, v = pixel(c, right, down, ahead)
