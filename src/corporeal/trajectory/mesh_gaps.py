@@ -237,9 +237,12 @@ def distance_within(
     Only triangles that can be within ``reach`` are looked at: a tree of all of them takes longer
     than asking it for some hundred points. What is farther is looked up again where it counts.
     """
-    corners = shape.mesh.corners
     low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
-    near = ((corners.max(axis=1) >= low) & (corners.min(axis=1) <= high)).all(axis=1)
+    # One bit of a corner for each side of the box that it does not lie beyond.
+    inner = np.hstack([shape.mesh.vertices >= low, shape.mesh.vertices <= high])
+    sides = np.packbits(inner, axis=1)[:, 0]
+    near = np.bitwise_or.reduce([sides[corner] for corner in shape.mesh.triangles.T])
+    near = near == np.packbits(np.ones(6, np.bool_))[0]
     distance = np.full(len(points), np.inf)
     if near.any():
         distance = Shape(shape.mesh.only(near)).closest(points)[0]
