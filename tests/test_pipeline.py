@@ -78,3 +78,42 @@ def test_a_size_that_a_model_has_judged_is_doubted_once():
         "vase_0 and hut_0 overlap at the start.",
         *table[1:],
     )
+
+
+@pytest.fixture
+def building(monkeypatch, tmp_path):
+    """Keep scenes in a fresh folder; give it with the names of the scenes that were built."""
+    built = []
+
+    def write(name, folder):
+        built.append(name)
+        store.write_bytes(folder / f"{name}.glb", f"{name} as built".encode())
+        return folder / f"{name}.glb"
+
+    monkeypatch.setenv(store.CACHE, str(tmp_path / "cache"))
+    monkeypatch.setattr(pipeline, "write_showcase", write)
+    return tmp_path / "cache" / "scenes", built
+
+
+def test_a_scene_of_our_own_is_built_once_for_each_state_of_the_code(
+    building, tmp_path, monkeypatch
+):
+    kept, built = building
+    for run_name in ("a", "b"):
+        path = pipeline.kept_showcase("duck-on-mud", tmp_path / run_name)
+        assert path.read_bytes() == b"duck-on-mud as built"
+    assert built == ["duck-on-mud"]
+    pipeline.kept_showcase("duck-on-can", tmp_path / "a")
+    monkeypatch.setattr(store, "source", lambda: "edited")
+    pipeline.kept_showcase("duck-on-mud", tmp_path / "a")
+    assert built == ["duck-on-mud", "duck-on-can", "duck-on-mud"]
+    # Of each scene only the newest is kept.
+    assert len(list(kept.iterdir())) == 2
+
+
+def test_a_scene_that_cannot_be_kept_is_built_each_time(building, tmp_path):
+    kept, built = building
+    kept.parent.write_text("in the way")
+    for run_name in ("a", "b"):
+        assert pipeline.kept_showcase("duck-on-mud", tmp_path / run_name).exists()
+    assert len(built) == 2

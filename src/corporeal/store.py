@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import shutil
+import sys
 import time
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -32,6 +33,8 @@ META = "meta.json"
 DATA = "data.npz"
 TREE = "tree"
 LOCK = ".lock"
+CACHE = "CORPOREAL_CACHE"
+"""Environment variable that names the folder of what is kept outside of runs."""
 KNOWN: dict[str, Any] = {
     name: kind
     for name, kind in vars(types).items()
@@ -355,6 +358,20 @@ def digest(path: Path) -> str:
             while block := stream.read(1 << 20):
                 total.update(block)
     return total.hexdigest()[:20]
+
+
+def cache_folder(kind: str) -> Path:
+    """Return where things of a kind are kept for all runs: as ``CACHE`` says, or the system's."""
+    chosen = os.environ.get(CACHE)
+    if chosen:
+        return Path(chosen).expanduser() / kind
+    if sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    elif sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "corporeal" / kind
 
 
 @dataclass(frozen=True)

@@ -96,12 +96,12 @@ def verb_demo() -> None:
     first_options = ("detail", "duration", "quality", "view", "name", "out")
     words = f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}."
     asked = parse(Demo, "demo", words, first=first_options)
-    from corporeal.pipeline import write_showcase
+    from corporeal.pipeline import kept_showcase
 
     where = replace(asked.where, name=asked.where.name or asked.scene)
     folder = where.out / where.name
     with console.status("building the scene"):
-        path = write_showcase(asked.scene, folder / "input")
+        path = kept_showcase(asked.scene, folder / "input")
     settings = asked.settings
     if settings.film.view is None:
         settings = replace(settings, film=replace(settings.film, view=view(asked.scene)))
