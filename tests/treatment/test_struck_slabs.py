@@ -34,6 +34,13 @@ def test_foam_that_is_as_soft_as_in_life_stays_soft():
     assert ready.particles.treatments[1].kind == "deformable"
 
 
+def test_a_large_mat_is_a_sheet_and_paper_is_too_thin_to_be_rigid():
+    mat = prepared("potato", "rubber", (0.6, 0.6, 0.01), 2.0)
+    assert mat.particles.treatments[1].kind == "rigid"
+    paper = prepared("potato", "paper", (0.28, 0.21, 1e-4), 2.0)
+    assert [t.kind for t in paper.particles.treatments] == ["rigid", "shell"]
+
+
 @pytest.mark.parametrize("width", [0.06, 0.3])
 def test_how_wide_a_mat_is_does_not_matter(width):
     """A floor holds it, though it is many times heavier than what strikes it."""

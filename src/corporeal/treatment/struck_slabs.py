@@ -19,6 +19,9 @@ from corporeal.types import Material, Treatment
 
 TOO_DEEP = 2.0
 """Dent as simulated over that of life, from which rigid is nearer to the truth [-]."""
+THICKEST = 4.0
+"""Thickness of a sheet as simulated, two cells at least, over that of life, up to which it may be
+rigid [-]: what is thinner than half a cell has no face of its own, and throws things sideways."""
 
 
 def pressed_slabs(
@@ -81,7 +84,13 @@ def _lies_flat(part: PartGeometry, motion: Motion, treatment: Treatment) -> bool
     lies = lands is not None and lands.onto == FLOOR and lands.speed == 0.0
     slab = treatment.kind == "deformable" and part.size[0] < COMPACT * part.size[1]
     sheet = treatment.kind == "shell" and is_flat_wall(part) and motion.driven == 0.0
-    return lies and (slab or sheet) and part.leaves == 0 and not MENU[part.material.law].loose
+    resolved = (treatment.thickness or 0.0) <= THICKEST * _thickness(part)
+    return (
+        lies
+        and (slab or (sheet and resolved))
+        and part.leaves == 0
+        and not MENU[part.material.law].loose
+    )
 
 
 def _dent(ball: PartGeometry, lands: Landing, plane: float, thick: float) -> float:
