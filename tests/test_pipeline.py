@@ -9,7 +9,7 @@ from corporeal.errors import UserError
 from corporeal.pipeline import Settings, reopen, run
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.stages.fill import FillConfig
-from corporeal.types import Inventory, ObjectWords
+from corporeal.types import Film, Inventory, ObjectWords
 from handmade import plain, scene
 
 
@@ -34,6 +34,15 @@ def test_a_failed_run_says_why(tmp_path):
     said = store.read_json(tmp_path / "run" / "run.json")
     assert said["state"] == "failed"
     assert "nowhere.glb" in said["error"]
+
+
+def test_a_run_that_was_moved_finds_its_film(tmp_path):
+    made = Path("runs/a/9-film")
+    there = tmp_path / "moved"
+    store.write_json(there / "run.json", {"state": "finished", "inputs": [], "settings": {}})
+    store.save(there / "9-film" / store.DATA, Film(made / "film.mp4", 30, 64, 64))
+    store.finish(there / "9-film", "key", None, 1.0)
+    assert pipeline.read_back(there).movie.path == there / "9-film" / "film.mp4"
 
 
 def test_an_edited_annotation_makes_its_answers_stale(tmp_path):

@@ -167,7 +167,11 @@ def _result(verb: str, folder: Path) -> Any:
         from corporeal.trajectory.frames import read_trajectory
 
         return read_trajectory(folder)
-    return None if verb == "report" else store.load(folder / store.DATA)
+    if verb == "report":
+        return None
+    found = store.load(folder / store.DATA)
+    # A run may have been moved, or is named from elsewhere: its film lies beside what says so.
+    return replace(found, path=folder / found.path.name) if verb == "film" else found
 
 
 def files_read(config: Any) -> list[str]:
