@@ -90,9 +90,14 @@ def require_room(folder: Path, needed: int) -> None:
     free = shutil.disk_usage(folder).free
     if needed > free:
         raise DiskError(
-            f"Cannot write {folder}: {needed / 1e9:.1f} GB are needed, and {free / 1e9:.1f} GB are "
-            "free. Free some space, choose another folder with --out, or ask for less detail."
+            f"Cannot write {folder}: {_megabytes(needed)} MB are needed, and {_megabytes(free)} MB "
+            "are free. Free some space, choose another folder with --out, or ask for less detail."
         )
+
+
+def _megabytes(size: int) -> str:
+    """Size in megabytes: two figures below ten, which may be all that is missing."""
+    return f"{size / 1e6:,.0f}" if size >= 10e6 else f"{size / 1e6:.2g}"
 
 
 @contextmanager
