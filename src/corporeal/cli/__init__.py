@@ -6,6 +6,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Any
 
 # NumPy reads this when it is imported: threads of BLAS that wait for a core spin. A product of
@@ -312,7 +313,7 @@ def _go(
         print(folder / "report.html")
         print(folder / "film.mp4")
     else:
-        print(f"{until} done. Go on with: corporeal report {folder}")
+        print(f"{until} done. Go on with: corporeal report {quote(str(folder))}")
 
 
 def _usage() -> str:
