@@ -41,6 +41,17 @@ def test_a_large_mat_is_a_sheet_and_paper_is_too_thin_to_be_rigid():
     assert [t.kind for t in paper.particles.treatments] == ["rigid", "shell"]
 
 
+def test_a_steel_ball_comes_back_from_felt_as_felt_returns_it():
+    """Pressed through to the floor, a softened mat threw it higher than it fell."""
+    mat = co.box("felt", (0.2, 0.2, 0.006), name="mat")
+    ball = co.ball("steel", 0.015, (0, 0, 0.216), name="ball")
+    played = co.play(co.build_scene(mat, ball, duration=0.3))
+    ratio = played.outcome.objects["ball"].rebound_ratio
+    returned = co.material("felt").ranges["restitution"]
+    assert ratio is not None
+    assert returned.low**2 <= ratio <= returned.high**2
+
+
 @pytest.mark.parametrize("width", [0.06, 0.3])
 def test_how_wide_a_mat_is_does_not_matter(width):
     """A floor holds it, though it is many times heavier than what strikes it."""
