@@ -9,7 +9,7 @@ from corporeal.errors import UserError
 from corporeal.pipeline import Settings, reopen, run
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.stages.fill import FillConfig
-from corporeal.types import Inventory, ObjectWords
+from corporeal.types import Film, Inventory, ObjectWords
 from handmade import plain, scene
 
 
@@ -34,6 +34,15 @@ def test_a_failed_run_says_why(tmp_path):
     said = store.read_json(tmp_path / "run" / "run.json")
     assert said["state"] == "failed"
     assert "nowhere.glb" in said["error"]
+
+
+def test_a_run_that_was_moved_finds_its_film(tmp_path):
+    made = Path("runs/a/9-film")
+    there = tmp_path / "moved"
+    store.write_json(there / "run.json", {"state": "finished", "inputs": [], "settings": {}})
+    store.save(there / "9-film" / store.DATA, Film(made / "film.mp4", 30, 64, 64))
+    store.finish(there / "9-film", "key", None, 1.0)
+    assert pipeline.read_back(there).movie.path == there / "9-film" / "film.mp4"
 
 
 def test_an_edited_annotation_makes_its_answers_stale(tmp_path):
@@ -78,3 +87,42 @@ def test_a_size_that_a_model_has_judged_is_doubted_once():
         "vase_0 and hut_0 overlap at the start.",
         *table[1:],
     )
+
+
+@pytest.fixture
+def building(monkeypatch, tmp_path):
+    """Keep scenes in a fresh folder; give it with the names of the scenes that were built."""
+    built = []
+
+    def write(name, folder):
+        built.append(name)
+        store.write_bytes(folder / f"{name}.glb", f"{name} as built".encode())
+        return folder / f"{name}.glb"
+
+    monkeypatch.setenv(store.CACHE, str(tmp_path / "cache"))
+    monkeypatch.setattr(pipeline, "write_showcase", write)
+    return tmp_path / "cache" / "scenes", built
+
+
+def test_a_scene_of_our_own_is_built_once_for_each_state_of_the_code(
+    building, tmp_path, monkeypatch
+):
+    kept, built = building
+    for run_name in ("a", "b"):
+        path = pipeline.kept_showcase("duck-on-mud", tmp_path / run_name)
+        assert path.read_bytes() == b"duck-on-mud as built"
+    assert built == ["duck-on-mud"]
+    pipeline.kept_showcase("duck-on-can", tmp_path / "a")
+    monkeypatch.setattr(store, "source", lambda: "edited")
+    pipeline.kept_showcase("duck-on-mud", tmp_path / "a")
+    assert built == ["duck-on-mud", "duck-on-can", "duck-on-mud"]
+    # Of each scene only the newest is kept.
+    assert len(list(kept.iterdir())) == 2
+
+
+def test_a_scene_that_cannot_be_kept_is_built_each_time(building, tmp_path):
+    kept, built = building
+    kept.parent.write_text("in the way")
+    for run_name in ("a", "b"):
+        assert pipeline.kept_showcase("duck-on-mud", tmp_path / run_name).exists()
+    assert len(built) == 2

@@ -10,8 +10,9 @@ What does a verb is imported when it is done: a run that is read back, or not be
 import shutil
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from dataclasses import asdict, dataclass, fields, replace
+from importlib.metadata import version
 from pathlib import Path
 from typing import Any, Literal
 
@@ -166,7 +167,11 @@ def _result(verb: str, folder: Path) -> Any:
         from corporeal.trajectory.frames import read_trajectory
 
         return read_trajectory(folder)
-    return None if verb == "report" else store.load(folder / store.DATA)
+    if verb == "report":
+        return None
+    found = store.load(folder / store.DATA)
+    # A run may have been moved, or is named from elsewhere: its film lies beside what says so.
+    return replace(found, path=folder / found.path.name) if verb == "film" else found
 
 
 def files_read(config: Any) -> list[str]:
@@ -246,6 +251,36 @@ def write_showcase(name: str, folder: Path) -> Path:
     with store.writing(path):
         folder.mkdir(parents=True, exist_ok=True)
         write_glb(path, build(name))
+    return path
+
+
+BUILT_WITH = ("numpy", "scipy", "manifold3d", "scikit-image", "fast-simplification", "pillow")
+"""Packages whose versions decide what one of our own scenes is, beside this one's code."""
+
+
+def kept_showcase(name: str, folder: Path) -> Path:
+    """Write one of our own scenes as ``write_showcase`` does, from what an earlier call built.
+
+    It is kept with the caches of the system (``store.cache_folder``), named by all it depends on;
+    what cannot be kept there is built each time.
+
+    Raises:
+        UnknownChoiceError: There is no such scene.
+
+    """
+    recipe = store.key("showcase", {p: version(p) for p in BUILT_WITH}, [name, store.source()])
+    kept = store.cache_folder("scenes") / f"{name}-{recipe}.glb"
+    try:
+        data = kept.read_bytes()
+    except OSError:
+        path = write_showcase(name, folder)
+        with suppress(OSError, store.DiskError):
+            for old in kept.parent.glob(f"{name}-*.glb"):
+                old.unlink()
+            store.write_bytes(kept, path.read_bytes())
+        return path
+    path = folder / f"{name}.glb"
+    store.write_bytes(path, data)
     return path
 
 

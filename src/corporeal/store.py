@@ -11,6 +11,7 @@ import hashlib
 import json
 import os
 import shutil
+import sys
 import time
 import zipfile
 from collections.abc import Iterator, Mapping
@@ -32,6 +33,8 @@ META = "meta.json"
 DATA = "data.npz"
 TREE = "tree"
 LOCK = ".lock"
+CACHE = "CORPOREAL_CACHE"
+"""Environment variable that names the folder of what is kept outside of runs."""
 KNOWN: dict[str, Any] = {
     name: kind
     for name, kind in vars(types).items()
@@ -87,9 +90,14 @@ def require_room(folder: Path, needed: int) -> None:
     free = shutil.disk_usage(folder).free
     if needed > free:
         raise DiskError(
-            f"Cannot write {folder}: {needed / 1e9:.1f} GB are needed, and {free / 1e9:.1f} GB are "
-            "free. Free some space, choose another folder with --out, or ask for less detail."
+            f"Cannot write {folder}: {_megabytes(needed)} MB are needed, and {_megabytes(free)} MB "
+            "are free. Free some space, choose another folder with --out, or ask for less detail."
         )
+
+
+def _megabytes(size: int) -> str:
+    """Size in megabytes: two figures below ten, which may be all that is missing."""
+    return f"{size / 1e6:,.0f}" if size >= 10e6 else f"{size / 1e6:.2g}"
 
 
 @contextmanager
@@ -355,6 +363,20 @@ def digest(path: Path) -> str:
             while block := stream.read(1 << 20):
                 total.update(block)
     return total.hexdigest()[:20]
+
+
+def cache_folder(kind: str) -> Path:
+    """Return where things of a kind are kept for all runs: as ``CACHE`` says, or the system's."""
+    chosen = os.environ.get(CACHE)
+    if chosen:
+        return Path(chosen).expanduser() / kind
+    if sys.platform == "darwin":
+        base = Path.home() / "Library" / "Caches"
+    elif sys.platform == "win32":
+        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
+    else:
+        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
+    return base / "corporeal" / kind
 
 
 @dataclass(frozen=True)

@@ -105,12 +105,13 @@ def test_what_is_no_scene_is_told(command, tmp_path):
 
 
 def test_a_run_without_matter_is_told_how_to_go_on(command, run_folder, tmp_path):
-    run = tmp_path / "run"
+    run = tmp_path / "a run"
     shutil.copytree(run_folder, run)
     (run / "7-fill" / "meta.json").unlink()
     code, said = command("export", run, "--to", "glb")
     assert code == 2
-    assert said.err.strip().endswith(f"has no matter yet. Go on with: corporeal fill {run}")
+    # As a shell takes it, blanks and all.
+    assert said.err.strip().endswith(f"has no matter yet. Go on with: corporeal fill '{run}'")
 
 
 def test_a_scene_can_leave_before_it_was_simulated(tmp_path, monkeypatch):

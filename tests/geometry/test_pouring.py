@@ -1,10 +1,13 @@
 """What lies loose in a vessel has the shape of its hollow, up to its level."""
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 
 from corporeal.geometry.mesh import signed_volume
 from corporeal.geometry.pouring import pool
+from corporeal.geometry.room import room_of
 from corporeal.geometry.survey import survey
 
 R, WALL, BASE, HEIGHT = 0.035, 0.003, 0.005, 0.1
@@ -63,3 +66,39 @@ def test_what_has_no_room_is_not_poured():
     assert (
         pool(*measured([(1e-5, 0.0), (0.1, 0.0), (0.1, 0.01), (1e-5, 0.01)]), 0.006, 1e-6) is None
     )
+
+
+BOWL = [
+    *((1e-5, 0.0), (0.03, 0.0), (0.05, 0.02), (0.07, 0.06)),
+    *((0.067, 0.06), (0.047, 0.023), (0.028, 0.004), (1e-5, 0.004)),
+]
+MORTAR = [(1e-5, 0.0), (0.05, 0.0), (0.06, 0.08), (0.045, 0.08), (0.035, 0.02), (1e-5, 0.02)]
+CAN = [(1e-5, 0.0), (R, 0.0), (R, HEIGHT), (R - WALL, HEIGHT), (R - WALL, 0.095), (1e-5, 0.095)]
+
+
+def cones(*rings):
+    """Volume of truncated cones between rings (r, z)."""
+    return sum(np.pi * (z - y) * (a * a + a * b + b * b) / 3 for (a, y), (b, z) in pairwise(rings))
+
+
+@pytest.mark.parametrize(
+    ("profile", "volume"),
+    [
+        (BOWL, cones((0.028, 0.004), (0.047, 0.023), (0.067, 0.06))),
+        (MORTAR, cones((0.035, 0.02), (0.045, 0.08))),
+    ],
+)
+def test_a_wide_bowl_and_a_thick_one_are_filled_in_their_hollow(profile, volume):
+    anatomy, member = measured(profile)
+    room = room_of(anatomy, member, 0.0015, np.random.default_rng(0))
+    assert room.volume == pytest.approx(volume, rel=0.03)
+    lies = pool(anatomy, member, 0.0015, 0.5 * volume)
+    assert lies is not None
+    assert np.hypot(*lies.mesh.vertices[:, :2].T).max() < profile[3][0]
+
+
+def test_what_is_drawn_full_is_not_filled_over_its_lid():
+    anatomy, member = measured(CAN)
+    room = room_of(anatomy, member, 0.001, np.random.default_rng(0))
+    inside = np.hypot(*room.points[:, :2].T) < R - WALL
+    assert room.points[inside, 2].max() < 0.095

@@ -8,6 +8,7 @@ from corporeal import materials
 from corporeal.errors import OutOfRangeError, UnknownChoiceError, UserError
 from corporeal.materials.blow import ratings
 from corporeal.materials.contact import pairs, rebounds
+from corporeal.materials.crush import layers
 from corporeal.materials.shipped import source_table
 from corporeal.types import Ground, Law, MaterialField, Part, Parts, PartWords, Structure
 
@@ -17,6 +18,7 @@ LIBRARIES = ["default", "reference"]
 def test_every_source_can_be_looked_up_and_none_is_idle():
     cited = {row["source"] for table in (pairs(), rebounds()) for row in table.values()}
     cited |= {rating.source for rating in ratings().values()}
+    cited |= {one.source for one in layers().values()}
     for name in LIBRARIES:
         for entry in materials.library(name).values():
             cited |= {key for r in entry.ranges.values() for key in r.source.split("+")}

@@ -9,6 +9,7 @@ from scipy.spatial import KDTree
 
 from corporeal.errors import UserError
 from corporeal.geometry.scene_survey import examine
+from corporeal.materials import find
 from corporeal.mpm.problem import Plane
 from corporeal.stages.fill import FillConfig, by_name, fill
 from corporeal.stages.simulate import SimulateConfig, simulate
@@ -489,6 +490,15 @@ def test_what_flows_lies_at_the_bottom_of_a_half_full_can(contents):
         assert particles.mass[own] @ away**2 == pytest.approx(turn[1], rel=0.02)
     else:
         assert second[0, 0] + second[1, 1] == pytest.approx(turn.sum(), rel=0.04)
+
+
+def test_an_egg_that_falls_is_no_soft_ball():
+    shell, inside = (e.pick(e.typical()) for e in map(find, ("eggshell", "packed_food")))
+    made = filled(inside, 0.97, 3.6e-4, loose=False)
+    egg = put(trimesh.creation.icosphere(3, 0.025), 0.3)
+    particles = fill(*inputs(thing((egg, shell, made))))
+    assert particles.treatments[0].kind == "rigid"
+    assert "breaks before it visibly flexes" in particles.treatments[0].why
 
 
 def test_a_pillow_is_as_soft_as_its_stuffing_and_as_heavy_as_all_of_it():

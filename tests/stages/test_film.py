@@ -243,3 +243,14 @@ def test_a_camera_goes_by_where_most_of_a_thing_is_and_sees_all_of_what_keeps_it
     scattered[:400] *= 40.0
     low, high = _box(scattered, mass, full)
     assert (high - low).max() < 0.13
+
+
+def test_what_is_no_film_is_said_in_one_line(tmp_path):
+    path = tmp_path / "film.mp4"
+    with pytest.raises(UserError, match=r"film\.mp4: there is no such film\. Make it again\.$"):
+        video.pictures(path, [0])
+    path.write_bytes(b"no film at all" * 100)
+    for read in (video.length, lambda p: video.pictures(p, [0])):
+        with pytest.raises(UserError, match=r"cannot be read as a film \(.+\)\. Make it") as said:
+            read(path)
+        assert "\n" not in str(said.value)

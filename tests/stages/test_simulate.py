@@ -277,7 +277,7 @@ def test_a_full_disk_is_one_clear_sentence(tmp_path, monkeypatch):
 def test_what_the_disk_cannot_hold_is_not_begun(tmp_path, monkeypatch):
     usage = SimpleNamespace(free=50_000)
     monkeypatch.setattr(store.shutil, "disk_usage", lambda folder: usage)
-    with pytest.raises(DiskError, match=r"GB are needed, and 0\.0 GB are free"):
+    with pytest.raises(DiskError, match=r": \d\.\d+ MB are needed, and 0\.05 MB are free"):
         simulate(*scene_of(), SimulateConfig(), tmp_path)
     assert len(final(tmp_path)) == 1
     usage.free = 50_000_000

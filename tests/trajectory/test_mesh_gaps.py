@@ -9,9 +9,10 @@ from scipy.spatial.transform import Rotation
 from test_audit import CELL, TREATMENT, row
 
 from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.shape import Shape
 from corporeal.trajectory.audit_words import surface_warnings
 from corporeal.trajectory.frames import Layout, gather, write_frame, write_layout
-from corporeal.trajectory.mesh_gaps import finer, surface_pairs
+from corporeal.trajectory.mesh_gaps import distance_within, finer, surface_pairs
 from corporeal.types import Finish, Frame, Particles, Scene, SceneObject, Surface
 
 THICK = 0.002
@@ -155,3 +156,16 @@ def test_long_triangles_are_halved_and_stay_one_surface():
     again = trimesh.Trimesh(fine.vertices, fine.triangles, process=False)
     assert again.is_watertight and again.volume == pytest.approx(0.06)
     assert again.edges_unique_length.max() <= 0.07
+
+
+@pytest.mark.parametrize(("shift", "reach"), [(1.02, 0.05), (0.95, 0.05), (0.3, 0.05), (2.0, 0.1)])
+def test_triangles_in_reach_alone_give_the_same_least_distance(shift, reach):
+    made = trimesh.creation.icosphere(4, 1.0)
+    shape = Shape(Mesh(np.array(made.vertices, float), np.array(made.faces, np.int64)))
+    points = np.random.default_rng(3).normal(0.0, 0.02, (40, 3)) + np.array([shift, 0, 0])
+    within = shape.inside(points)
+    found = distance_within(points, shape, within, reach)
+    true = shape.closest(points)[0]
+    near = (true <= reach) | within | (true == true.min())
+    assert found[near].tobytes() == true[near].tobytes()
+    assert (found >= true).all()

@@ -70,6 +70,14 @@ def test_a_push_acts_on_all_that_it_was_to_move():
     assert whole.scene.objects[1].push is None
 
 
+def test_a_pushed_vessel_and_what_is_in_it_are_expected_to_move_as_they_were_told_to():
+    scene = scenes.alone("tumbler")
+    pushed = replace(scene.objects[0], push=Push((2.0, 0.0, 0.0), 0.0, 0.5), mass=0.5)
+    whole = in_memory.prepare(replace(scene, objects=(pushed,)))
+    for treatment in whole.particles.treatments:
+        assert treatment.impact_speed == pytest.approx(1.0, abs=0.05)
+
+
 @pytest.mark.parametrize(
     ("change", "does"),
     [({}, True), ({"fill": 0.95}, False), ({"loose": False}, False), ({"inflated": True}, False)],

@@ -6,6 +6,7 @@ import traceback
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Any
 
 # NumPy reads this when it is imported: threads of BLAS that wait for a core spin. A product of
@@ -96,12 +97,12 @@ def verb_demo() -> None:
     first_options = ("detail", "duration", "quality", "view", "name", "out")
     words = f"{verb_demo.__doc__}\nScenes: {', '.join(SCENES)}."
     asked = parse(Demo, "demo", words, first=first_options)
-    from corporeal.pipeline import write_showcase
+    from corporeal.pipeline import kept_showcase
 
     where = replace(asked.where, name=asked.where.name or asked.scene)
     folder = where.out / where.name
     with console.status("building the scene"):
-        path = write_showcase(asked.scene, folder / "input")
+        path = kept_showcase(asked.scene, folder / "input")
     settings = asked.settings
     if settings.film.view is None:
         settings = replace(settings, film=replace(settings.film, view=view(asked.scene)))
@@ -312,7 +313,7 @@ def _go(
         print(folder / "report.html")
         print(folder / "film.mp4")
     else:
-        print(f"{until} done. Go on with: corporeal report {folder}")
+        print(f"{until} done. Go on with: corporeal report {quote(str(folder))}")
 
 
 def _usage() -> str:

@@ -4,6 +4,7 @@ import re
 from collections.abc import Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import tyro
@@ -192,4 +193,4 @@ def _props() -> None:
             path.parent.mkdir(parents=True, exist_ok=True)
             write_glb(path, prop(name))
     print(f"{len(PROPS)} models in {asked.folder}. Go on with: corporeal assets index "
-          f"{asked.folder}")  # fmt: skip
+          f"{quote(str(asked.folder))}")  # fmt: skip

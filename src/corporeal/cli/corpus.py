@@ -3,6 +3,7 @@
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from pathlib import Path
+from shlex import quote
 from typing import Annotated, Any, Literal
 
 import tyro
@@ -82,7 +83,7 @@ def _assemble() -> None:
         asked,
         "assemble",
         lambda hands: assemble_corpus(asked.corpus, asked.plan, sources, hands),
-        f"Go on with: corporeal corpus run {asked.corpus}",
+        f"Go on with: corporeal corpus run {quote(str(asked.corpus))}",
     )
 
 
@@ -111,7 +112,7 @@ def _run() -> None:
         asked,
         "run",
         lambda hands: run_corpus(asked.corpus, asked.scenes, asked.settings, hands),
-        f"Look at it: corporeal corpus report {asked.corpus}",
+        f"Look at it: corporeal corpus report {quote(str(asked.corpus))}",
     )
 
 

@@ -2,6 +2,7 @@
 
 from dataclasses import dataclass
 from pathlib import Path
+from shlex import quote
 from typing import Annotated
 
 import tyro
@@ -53,4 +54,5 @@ def verb_masks() -> None:
     if made.folder is None:
         raise UserError(f"{' '.join(made.said)} Point at the object with --at or --box.")
     print(*made.said, sep="\n")
-    print(f"Look at {out}. Go on with: corporeal run {asked.photographs} --masks {out}")
+    photographs, masks = quote(str(asked.photographs)), quote(str(out))
+    print(f"Look at {out}. Go on with: corporeal run {photographs} --masks {masks}")

@@ -6,6 +6,7 @@ Every target has a folder of its own that appears whole or not at all; the run i
 from collections.abc import Callable, Sequence
 from dataclasses import replace
 from pathlib import Path
+from shlex import quote
 
 from corporeal import backends, store
 from corporeal.errors import UnknownChoiceError, UserError
@@ -116,7 +117,7 @@ def _asked(source: str | Path | Played | Prepared, config: ExportConfig) -> tupl
         return _of_scene(prepare(load_scene(path)), config), str(path)
     made = read_back(path)
     if made.fill is None:
-        raise UserError(f"{path} has no matter yet. Go on with: corporeal fill {path}")
+        raise UserError(f"{path} has no matter yet. Go on with: corporeal fill {quote(str(path))}")
     if made.simulate is None:
         return _of_scene(made.prepared, config), str(path)
     return _of_run(made.played, config), str(path)

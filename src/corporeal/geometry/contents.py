@@ -44,6 +44,12 @@ def with_contents(
     return whole
 
 
+def holders(scene: Scene, contents: Sequence[Contents]) -> dict[int, int]:
+    """Return the vessel of each object that lies loose in one, of a scene that has both."""
+    first = len(scene.objects) - len(contents)
+    return {first + k: one.vessel for k, one in enumerate(contents)}
+
+
 def _with_object(scene: Scene, one: Contents) -> Scene:
     things = list(scene.objects)
     things[one.vessel] = one.holder

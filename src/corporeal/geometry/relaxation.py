@@ -11,6 +11,13 @@ from corporeal.geometry.spread import repel
 ROUNDS, STEPS = 7, 5
 REACH = 1.2
 """Of the repulsion, in spacings."""
+STRIDE = 0.3
+"""Longest way of a point in one step, in spacings."""
+DRAWN = 0.85
+"""The surface draws what lies shallower than this, in spacings."""
+UNFELT = 2.5
+"""What is deeper than this feels no surface in the steps of a round, in spacings: that is more than
+``DRAWN`` and ``STEPS`` strides."""
 
 
 @dataclass(frozen=True)
@@ -27,6 +34,24 @@ class Skin:
     def depth(self, points: np.ndarray) -> Float[np.ndarray, " M"]:
         """Distance below the plane [m]."""
         return np.einsum("md,md->m", points[self.which] - self.foot, self.inward)
+
+
+@dataclass
+class Deep:
+    """How far points may go from where they were last asked, before they can feel the surface."""
+
+    start: Float[np.ndarray, "N 3"]
+    """Where each was [m]."""
+    free: Float[np.ndarray, " N"]
+    """Way that each may go [m]; 0 or less: it must be asked."""
+
+    def note(self, points: np.ndarray, which: np.ndarray, free: np.ndarray) -> None:
+        """Keep what some points were told where they are."""
+        self.start[which], self.free[which] = points[which], free
+
+    def still(self, points: np.ndarray, which: np.ndarray) -> Bool[np.ndarray, " M"]:
+        """Whether each of some points is so deep yet that asking again would change nothing."""
+        return np.linalg.norm(points - self.start[which], axis=1) < self.free[which]
 
 
 def relax(
@@ -64,15 +89,18 @@ def relax(
     candidates = np.flatnonzero(
         free & (np.isfinite(limit) | outer.may_be_within(4 * spacing, points))
     )
-    near = candidates
+    near, deep = candidates, Deep(points.copy(), np.zeros(len(points)))
     # Repulsion in rounds; the surface is looked up once a round, and draws from the third on.
     for turn in range(ROUNDS):
-        asked = candidates if turn % 3 == 0 else near
+        asked = candidates[~deep.still(points[candidates], candidates)] if turn % 3 == 0 else near
         distance, skin = _feel(points, asked, outer, spacing)
+        far = np.where(limit[asked] == np.inf, skin.depth(points) - UNFELT * spacing, 0.0)
+        deep.note(points, asked, far)
         near = asked[(distance < 2 * spacing) | (distance > limit[asked] - spacing)]
         for _ in range(STEPS):
             move = repel(points, REACH * spacing)
-            move *= np.minimum(1, 0.3 * spacing / (np.linalg.norm(move, axis=1) + 1e-300))[:, None]
+            length = np.linalg.norm(move, axis=1) + 1e-300
+            move *= np.minimum(1, STRIDE * spacing / length)[:, None]
             points[free] += move[free]
             _press(points, skin, spacing, limit, draw=turn >= 2)
     # Last, only the surface: nothing may be left shallower than half a spacing.
@@ -102,7 +130,7 @@ def _press(
     half = 0.5 * spacing
     wanted = depth
     if draw:
-        wanted = np.where(depth < 0.85 * spacing, depth + 0.3 * (half - depth), depth)
+        wanted = np.where(depth < DRAWN * spacing, depth + 0.3 * (half - depth), depth)
     wanted = np.clip(wanted, half, limit[skin.which])
     points[skin.which] += (wanted - depth)[:, None] * skin.inward
 

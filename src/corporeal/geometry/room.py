@@ -6,13 +6,14 @@ import numpy as np
 from jaxtyping import Bool, Float
 
 from corporeal.geometry.anatomy import Build
-from corporeal.geometry.shape import Shape
+from corporeal.geometry.hollow import below_rim
 from corporeal.geometry.survey import Anatomy, Member
 
 COUNT = 20_000
 """Points thrown into a vessel's box to measure how much goes in."""
-ROUND = 12
-"""Level directions that are looked into."""
+OPEN = 0.5
+"""A hollow that is open up to the rim is what a vessel fills if it is more than this share of the
+matter [-]: less, as over a can's lid or a candle's wax, is the empty end of what is full."""
 
 
 @dataclass(frozen=True)
@@ -32,8 +33,13 @@ class Room:
 
 
 def is_vessel(member: Member) -> bool:
-    """Whether the room lies between the faces of the mesh instead of behind all of them."""
-    return member.build is not Build.BODY or member.volume == 0
+    """Whether the room lies between the faces of the mesh instead of behind all of them.
+
+    A bowl too wide to be told from a body by what is blocked around its hollow is told by how much
+    goes into that.
+    """
+    apart = member.build is not Build.BODY or member.volume == 0
+    return apart or member.hollow > OPEN * member.volume
 
 
 def room_of(anatomy: Anatomy, member: Member, thickness: float, rng: np.random.Generator) -> Room:
@@ -96,25 +102,4 @@ def reachable(
     anatomy: Anatomy, member: Member, points: Float[np.ndarray, "N 3"]
 ) -> Bool[np.ndarray, " N"]:
     """Whether a level liquid in a vessel could reach each point without running over the rim."""
-    found = np.ones(len(points), dtype=bool)
-    if anatomy.shape is not None:
-        found = ~anatomy.shape.inside(points)
-    faces = [m for m in (member.body, member.sheet) if len(m.triangles)]
-    shapes = [Shape(m) for m in faces]
-    found[found] = blocked(shapes, points[found], np.array([0.0, 0.0, -1.0]))
-    turns = 2 * np.pi * np.arange(ROUND) / ROUND
-    around = np.zeros(int(found.sum()), dtype=np.int64)
-    for turn in turns:
-        around += blocked(shapes, points[found], np.array([np.cos(turn), np.sin(turn), 0.0]))
-    found[found] = around >= ROUND - 1
-    return found
-
-
-def blocked(
-    shapes: list[Shape], points: Float[np.ndarray, "N 3"], direction: Float[np.ndarray, "3"]
-) -> Bool[np.ndarray, " N"]:
-    """Whether something lies that way."""
-    found = np.zeros(len(points), dtype=bool)
-    for shape in shapes:
-        found |= shape.hit(points, np.tile(direction, (len(points), 1))) >= 0
-    return found
+    return below_rim(anatomy.shape, (member.body, member.sheet), points)

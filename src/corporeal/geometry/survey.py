@@ -19,6 +19,7 @@ from corporeal.geometry.anatomy import (
     sheets,
 )
 from corporeal.geometry.extent import oriented_size
+from corporeal.geometry.hollow import volume_below_rim
 from corporeal.geometry.mesh import Mesh, convergence, openness, orient, signed_volume, weld
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import scatter
@@ -100,6 +101,14 @@ class Member:
         """Whether its wall closes about something, alone or with the object's other parts."""
         closed = self.closed or (self.whole is not None and closes(self.whole.mesh))
         return closed and self.face_area > ONE_FACE * self.body_area
+
+    @cached_property
+    def hollow(self) -> float:
+        """Volume that a level liquid could fill of it, up to its rim [m³]."""
+        if not len(self.body.triangles):
+            return 0.0
+        rng = np.random.default_rng(self.part)
+        return volume_below_rim(self.whole or self.shape, self.body, rng)
 
     @cached_property
     def sheet_area(self) -> float:

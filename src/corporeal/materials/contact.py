@@ -9,7 +9,7 @@ from math import sqrt
 
 from corporeal.materials.blow import LEAST, NOMINAL, at_speed, stated, yielding
 from corporeal.materials.entry import Entry
-from corporeal.materials.rebound import rebound
+from corporeal.materials.rebound import loss_of, rebound
 from corporeal.types import Material, Range
 
 
@@ -65,6 +65,8 @@ class Restitution:
 
 VITREOUS = frozenset(("glass", "ceramic", "porcelain"))
 """What is as smooth and as free of pores as metals are, and does not yield."""
+LOSSY = frozenset(("soft", "elastomer", "foam", "food"))
+"""Groups of what loses in its bulk alone: loss factor and restitution tell of the same."""
 
 
 def restitution(a: Striker, b: Striker, speed: float = NOMINAL) -> Restitution:
@@ -89,8 +91,7 @@ def restitution(a: Striker, b: Striker, speed: float = NOMINAL) -> Restitution:
     one, other = (at_speed(s.material, speed) for s in (a, b))
     if told or not solid:
         return Restitution(restitution_between(one, other), None)
-    smooth = _smooth(a) and _smooth(b)
-    value = _of_bulk(one, other) if smooth else restitution_between(one, other)
+    value = _unmeasured(a, b)(one, other)
     return Restitution(min(value, yielding(*_metals(a, b), speed)), None)
 
 
@@ -151,6 +152,13 @@ def _metals(a: Striker, b: Striker) -> tuple[Material, Material]:
     return one, other
 
 
+def _unmeasured(a: Striker, b: Striker) -> Callable[[Material, Material], float]:
+    """Choose the rule for two solids by where they lose."""
+    if _smooth(a) and _smooth(b):
+        return _of_bulk
+    return _in_series if {a.entry.group, b.entry.group} <= LOSSY else restitution_between
+
+
 def _smooth(body: Striker) -> bool:
     return body.entry.group == "metal" or bool(VITREOUS & set(body.entry.kin))
 
@@ -158,6 +166,17 @@ def _smooth(body: Striker) -> bool:
 def _of_bulk(a: Material, b: Material) -> float:
     """Restitution of two bodies that lose in their bulk alone [-]."""
     return rebound(loss_of_pair(a, b))
+
+
+def _in_series(a: Material, b: Material) -> float:
+    """Restitution of two bodies that are soft and lossy in their bulk, both [-].
+
+    Their loss factors add up, each by its share of the compliance (``loss_of_pair``). Of each the
+    loss factor is that of its rebound from something rigid, whatever is drawn for either.
+    """
+    of_a = share(a, b)
+    losses = [loss_of(max(m.restitution, LEAST)) for m in (a, b)]
+    return rebound(of_a * losses[0] + (1.0 - of_a) * losses[1])
 
 
 def share(a: Material, b: Material) -> float:

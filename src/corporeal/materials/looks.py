@@ -68,6 +68,7 @@ SOLIDS: dict[str, str] = {
     "elastomer": "#a8433a",
     "food": "#c49a62",
     "apple": "#b23a2e",
+    "potato": "#b99a6b",
     "meat": "#a4574f",
     "bulk": "#a9834f",
 }

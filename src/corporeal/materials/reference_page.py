@@ -4,6 +4,7 @@ from collections.abc import Sequence
 
 from corporeal.materials.blow import ratings
 from corporeal.materials.contact import pairs, rebounds
+from corporeal.materials.crush import layers
 from corporeal.materials.entry import Entry
 from corporeal.materials.library import library
 from corporeal.materials.listing import COLUMNS, HEADS, span
@@ -93,7 +94,11 @@ Solid metals, glass and ceramics return what their loss factors leave; a metal t
 3.8 (Y/E*)^½ (⅔ π ρ v²/Y)^(-⅛) at most (Johnson, Contact Mechanics, eq. 11.43), here at 1 m/s, in a
 simulation at the speed of the first blow.
 For all other pairs e² = (E_b e_a² + E_a e_b²)/(E_a + E_b) of the materials' own values with the
-plane-strain moduli, so the softer body decides (Cross, Am. J. Phys. 68 (2000) 1025).
+plane-strain moduli, so the softer body decides (Cross, Am. J. Phys. 68 (2000) 1025); where both are
+soft and lossy (elastomer, foam, food, soft) their loss factors add up by the same shares instead.
+"""
+LAYERED = """These are weak across their layers: what strikes a sheet of them on its face crushes it
+at this pressure (`materials/crush.py`).
 """
 RATED = """These were rated at a speed, and return less of a faster blow; their loss factor follows.
 """
@@ -133,6 +138,8 @@ def markdown() -> str:
             *(*_rebounds(), ""),
             RATED,
             *(*_ratings(), ""),
+            LAYERED,
+            *(*_layered(), ""),
             SOURCES,
             *(f"- **{k}** ({row['check']}): {row['cite']}" for k, row in source_table().items()),
             "",
@@ -226,4 +233,12 @@ def _ratings() -> list[str]:
     lines = ["| material | rated at | less for every m/s more | source |", "|---|---:|---:|---|"]
     for name, row in ratings().items():
         lines.append(f"| {name} | {row.speed_m_s:g} m/s | {row.slope_s_m:g} | {row.source} |")
+    return lines
+
+
+def _layered() -> list[str]:
+    lines = ["| material | E across | crushed at | source |", "|---|---:|---:|---|"]
+    for name, row in layers().items():
+        young, crush = f"{1e-6 * row.young_across_pa:g} MPa", f"{1e-3 * row.crush_pa:g} kPa"
+        lines.append(f"| {name} | {young} | {crush} | {row.source} |")
     return lines

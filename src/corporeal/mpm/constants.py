@@ -179,6 +179,9 @@ BEHIND = 0.5
 """… and what it rests on lies behind it: least cosine of the normal with the blow's [-] …"""
 AS_HEAVY = 0.9
 """… and is no lighter than this share of it [-]."""
+AS_LAYER = 1.5707963267948966
+"""Stiffness E π a²/h of a layer under a disc over that of a half-space, 2 E* a, by a/h: π/2 [-]
+(decision 96)."""
 SWEEPS_OF_A_HOLD = 1000
 """Gauss–Seidel sweeps of such a round: what is heavy presses on what is light."""
 RESTING = 1e-3

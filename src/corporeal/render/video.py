@@ -143,6 +143,14 @@ def _credit_options(credit: str) -> list[str]:
     return ["-metadata", f"copyright={words}", "-metadata", f"comment={words}"] if words else []
 
 
+def _unreadable(path: Path, error: Exception) -> UserError:
+    """Say that a film cannot be read, by the last line of all that the program says."""
+    if not path.exists():
+        return UserError(f"{path}: there is no such film. Make it again.")
+    last = (str(error).strip().splitlines() or ["it is empty"])[-1].strip(" .)")
+    return UserError(f"{path}: cannot be read as a film ({last}). Make it again.")
+
+
 def length(path: Path) -> int:
     """Count the frames of a film.
 
@@ -153,7 +161,7 @@ def length(path: Path) -> int:
     try:
         count, _ = imageio_ffmpeg.count_frames_and_secs(str(path))
     except (OSError, RuntimeError) as error:
-        raise UserError(f"{path}: cannot be read as a film ({error}). Make it again.") from error
+        raise _unreadable(path, error) from error
     return int(count or 0)
 
 
@@ -172,7 +180,7 @@ def pictures(path: Path, wanted: list[int]) -> list[np.ndarray]:
         reader = imageio_ffmpeg.read_frames(str(path), output_params=only)
         meta: dict[str, Any] = next(reader)  # type: ignore[assignment]
     except (OSError, RuntimeError, StopIteration) as error:
-        raise UserError(f"{path}: cannot be read as a film ({error}). Make it again.") from error
+        raise _unreadable(path, error) from error
     width, height = meta["source_size"]
     found: dict[int, np.ndarray] = {}
     try:

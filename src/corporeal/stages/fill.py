@@ -9,7 +9,7 @@ from jaxtyping import Float, Int
 
 from corporeal.geometry.arrangement import underside
 from corporeal.geometry.contact_points import contact_points
-from corporeal.geometry.contents import with_contents
+from corporeal.geometry.contents import holders, with_contents
 from corporeal.geometry.foliage import in_leaves, planted
 from corporeal.geometry.make import Make, compose, how_filled, recipe
 from corporeal.geometry.mass_shares import keep_apart, weigh
@@ -70,7 +70,8 @@ def fill(
     makes = composed(scene, anatomies, field, tissue, config.seed)
     makes, heavy = as_heavy_as_stated(scene, anatomies, makes)
     refuse_flat(scene, anatomies)
-    bodies = Bodies(scene, field, anatomies, makes, solid_rods(anatomies, makes, config.seed))
+    rods = solid_rods(anatomies, makes, config.seed)
+    bodies = Bodies(scene, field, anatomies, makes, rods, holders(scene, contents))
     # Grid spacing and treatments follow from all of it.
     asked = Accuracy(quality or config.detail, config.stiffness, config.seed)
     bodies, chosen = resolve(bodies, asked)

@@ -289,9 +289,11 @@ class Run:
         """Write the present as frame ``number``, particles in their own order."""
         now, measure = self.engine.snapshot(), self.engine.measure()
         rigid = self.posed.rigid[self.layout.object]
-        # A rigid piece has turned before it was one.
-        turned = now.deformation[self.place] @ self.stage.turned[self.layout.object]
-        motion = np.where(rigid[:, None, None], turned, now.motion[self.place])
+        motion = now.motion[self.place]
+        if rigid.any():
+            # A rigid piece has turned before it was one.
+            turned = now.deformation[self.place] @ self.stage.turned[self.layout.object]
+            motion = np.where(rigid[:, None, None], turned, motion)
         stress = self.stress.at(now)[self.place]
         frame = Frame(now.time, now.position[self.place], motion, stress)
         row = ledger_row(self.posed.problem, now, measure, self.engine.steps)

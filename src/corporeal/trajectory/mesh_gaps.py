@@ -220,11 +220,36 @@ def _gap(
         points = points[((points > box[0]) & (points < box[1])).all(axis=1)]
         if not len(points):
             continue
-        distance = shape.closest(points)[0]
-        if coats[other].closed:
-            distance = np.where(shape.inside(points), -distance, distance)
-        found.append(float(distance.min()))
+        within = shape.inside(points) if coats[other].closed else np.zeros(len(points), np.bool_)
+        distance = distance_within(points, shape, within, reach)
+        found.append(float(np.where(within, -distance, distance).min()))
     return min(found)
+
+
+def distance_within(
+    points: Float[np.ndarray, "N 3"],
+    shape: Shape,
+    within: Bool[np.ndarray, " N"],
+    reach: float,
+) -> Float[np.ndarray, " N"]:
+    """Distance of points to a surface [m]; of those outside maybe too much, but for the nearest.
+
+    Only triangles that can be within ``reach`` are looked at: a tree of all of them takes longer
+    than asking it for some hundred points. What is farther is looked up again where it counts.
+    """
+    low, high = points.min(axis=0) - reach, points.max(axis=0) + reach
+    # One bit of a corner for each side of the box that it does not lie beyond.
+    inner = np.hstack([shape.mesh.vertices >= low, shape.mesh.vertices <= high])
+    sides = np.packbits(inner, axis=1)[:, 0]
+    near = np.bitwise_or.reduce([sides[corner] for corner in shape.mesh.triangles.T])
+    near = near == np.packbits(np.ones(6, np.bool_))[0]
+    distance = np.full(len(points), np.inf)
+    if near.any():
+        distance = Shape(shape.mesh.only(near)).closest(points)[0]
+    far = distance > reach
+    if far.all() or within[far].any():
+        distance[far] = shape.closest(points[far])[0]
+    return distance
 
 
 # ------------------------------------------------------------------ who passed through whom
@@ -281,10 +306,12 @@ class Walk:
         """Where each grain was last outside, in the other's frame at the start [m]."""
         self.turned: Float[np.ndarray, "3 3"] | None = None
         """How the other was turned in the frame before."""
+        self.now: tuple[RigidFit, np.ndarray] | None = None
+        """The other's rigid motion and the grains in its frame, as last looked at."""
 
     def goes_on(self, frame: Frame) -> bool:
         """Whether some grain has come so far near the other that it must be looked at."""
-        fit, there = self._there(frame)
+        self.now = fit, there = self._there(frame)
         turned, self.turned = self.turned, fit.rotation
         if self.last is None or turned is None or angle(fit.rotation @ turned.T) > MOST_TURN:
             self.last = there
@@ -305,8 +332,9 @@ class Walk:
         return fit, fit.undo(frame.position[self.walker.grains].astype(float))
 
     def go(self, frame: Frame, shape: Shape) -> float:
-        """Take a step; give the share of the grains that have passed through."""
-        fit, there = self._there(frame)
+        """Take the step just asked for; give the share of the grains that have passed through."""
+        assert self.now is not None
+        fit, there = self.now
         last = there if self.last is None else self.last
         now = frame.position[self.walker.grains].astype(float)
         outside = ~shape.inside(now) if self.other.closed else np.ones(len(now), dtype=bool)

@@ -1,14 +1,15 @@
 """Restitution of rigid parts at the speeds of their blows."""
 
-from collections.abc import Sequence
-from dataclasses import dataclass
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Float
 
 from corporeal import materials
-from corporeal.materials import Striker
+from corporeal.materials import BlowLaw, Striker
 from corporeal.materials.blow import NOMINAL
+from corporeal.treatment.crushed_layers import Shape, law_of_pair
 from corporeal.types import MaterialField, Treatment
 
 CONSTANT = (NOMINAL, 0.0, 0.0, 0.0, 1.0)
@@ -25,7 +26,9 @@ class Blows:
     """How it changes with speed: see ``Problem.blows``."""
 
 
-def in_blows(field: MaterialField, treatments: Sequence[Treatment]) -> Blows:
+def in_blows(
+    field: MaterialField, treatments: Sequence[Treatment], shapes: Mapping[int, Shape] | None = None
+) -> Blows:
     """Carry the restitution of all pairs of parts and the floor to the speeds of their blows.
 
     The ratio to what the same pair has at ``NOMINAL`` is applied, so that what was drawn from a
@@ -34,6 +37,7 @@ def in_blows(field: MaterialField, treatments: Sequence[Treatment]) -> Blows:
     Args:
         field: With the restitution at ``NOMINAL``.
         treatments: One per part: they know how fast it will be struck.
+        shapes: Of parts by their numbers, where sheets are weak across their layers.
 
     """
     table = np.array(field.restitution)
@@ -53,11 +57,25 @@ def in_blows(field: MaterialField, treatments: Sequence[Treatment]) -> Blows:
             if one is None or other is None:
                 continue
             speed = max(speeds[i], speeds[j]) or NOMINAL
-            nominal = materials.restitution(one, other, NOMINAL).value
-            law = materials.law_of_blows(one, other, speed)
-            ratio = table[i, j] / nominal if nominal > 0.0 else 1.0
-            if speed != NOMINAL and nominal > 0.0:
-                table[i, j] = table[j, i] = min(1.0, ratio * law.value)
-            least, most = min(law.least, table[i, j]), min(1.0, ratio * law.most)
-            laws[i, j] = laws[j, i] = law.speed, ratio * law.slope, law.exponent, least, most
+            law = _carried(one, other, speed, table[i, j])
+            law = law_of_pair(field, shapes or {}, (i, j), speed, law.value) or law
+            table[i, j] = table[j, i] = law.value
+            laws[i, j] = laws[j, i] = law.speed, law.slope, law.exponent, law.least, law.most
     return Blows(table, laws)
+
+
+def _carried(one: Striker, other: Striker, speed: float, drawn: float) -> BlowLaw:
+    """Carry the restitution that two bodies have at ``NOMINAL`` to the speed of their blow."""
+    nominal = materials.restitution(one, other, NOMINAL).value
+    law = materials.law_of_blows(one, other, speed)
+    ratio, value = 1.0, drawn
+    if nominal > 0.0:
+        ratio = drawn / nominal
+        value = min(1.0, ratio * law.value) if speed != NOMINAL else drawn
+    return replace(
+        law,
+        value=value,
+        slope=ratio * law.slope,
+        least=min(law.least, value),
+        most=min(1.0, ratio * law.most),
+    )

@@ -18,7 +18,12 @@ CONTACT = 2.94
 
 
 def contact_time(mass: float, radius: float, speed: float, plane: float, most: float) -> float:
-    """How long a ball touches a layer that it dents [s]: 2.94 δ/v.
+    """How long a ball touches a layer that it dents [s]: 2.94 δ/v; arguments: ``dent_of_layer``."""
+    return CONTACT * dent_of_layer(mass, radius, speed, plane, most) / speed
+
+
+def dent_of_layer(mass: float, radius: float, speed: float, plane: float, most: float) -> float:
+    """How much nearer a ball draws to a layer that it strikes [m].
 
     δ = (15 m v²/(16 E* √R))^(2/5) of a half-space (Johnson, Contact Mechanics, 1985, §11.4), and no
     more than the layer is thick.
@@ -31,8 +36,7 @@ def contact_time(mass: float, radius: float, speed: float, plane: float, most: f
         most: Thickness of the layer [m].
 
     """
-    dent = (15.0 * mass * speed**2 / (16.0 * plane * sqrt(radius))) ** 0.4
-    return CONTACT * min(dent, most) / speed
+    return min((15.0 * mass * speed**2 / (16.0 * plane * sqrt(radius))) ** 0.4, most)
 
 
 HARDNESS = 2.8

@@ -93,9 +93,12 @@ def judge_filled(
             return replace(inside, reason=f"{inside.reason}; its wall and the air in it bounce")
         return replace(inside, reason=f"{inside.reason}; its wall is as limp as its {inner.name}")
     wall = judge(as_wall(part), motion)
+    carried = f"its {inner.name} moves with the wall as one rigid mass"
     if wall.rigid:
-        carried = f"its {inner.name} moves with the wall as one rigid mass"
         return replace(wall, reason=f"{wall.reason}; {carried}")
+    if part.material.strength_local is not None:
+        brittle = f"its wall of {part.material.name} breaks before it visibly flexes"
+        return replace(wall, rigid=True, reason=f"{brittle}; {carried}")
     if not structure.loose:
         inside = judge(as_contents(part), motion)
         reason = f"{inside.reason}; it is simulated as its {inner.name}, the wall's mass around it"

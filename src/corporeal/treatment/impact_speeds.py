@@ -1,6 +1,8 @@
 """Expected impact speed and acceleration of every object, before anything is simulated."""
 
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from types import MappingProxyType
 
 import numpy as np
 from jaxtyping import Float
@@ -24,7 +26,13 @@ class Drive:
     """Largest [m/s²]."""
 
 
-def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: int) -> list[Motion]:
+def motions(
+    scene: Scene,
+    anatomies: list[Anatomy],
+    masses: list[float],
+    seed: int,
+    vessels: Mapping[int, int] = MappingProxyType({}),
+) -> list[Motion]:
     """Estimate every object's speed at impact.
 
     Falling gives √(v_z² + 2 g h) with the free height h below; pushes, wind and own velocity add
@@ -36,14 +44,18 @@ def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: i
         anatomies: One per object.
         masses: Of every object [kg].
         seed: Of the points by which free heights are measured.
+        vessels: Of each object that lies loose in another, that other.
 
     """
     gravity = float(np.linalg.norm(scene.gravity))
     drops = falls([a.everything for a in anatomies], np.random.default_rng([seed, 2]))
     # Each object by itself.
     horizontal, fall, forced = [], [], []
-    for k, (obj, height) in enumerate(zip(scene.objects, drops.height, strict=True)):
-        drive = driven(obj, anatomies[k], masses[k], scene.duration)
+    single = [
+        driven(obj, anatomies[k], masses[k], scene.duration) for k, obj in enumerate(scene.objects)
+    ]
+    drives = carried(single, masses, vessels)
+    for obj, height, drive in zip(scene.objects, drops.height, drives, strict=True):
         velocity = np.array(obj.velocity) + drive.velocity
         horizontal.append(velocity[:2])
         dropped = 0.0 if obj.path is not None else height
@@ -60,6 +72,27 @@ def motions(scene: Scene, anatomies: list[Anatomy], masses: list[float], seed: i
         lands = Landing(int(drops.onto[i]), float(fall[i]), masses[i])
         result.append(Motion(max(speeds), gravity + forced[i], forced[i], lands))
     return result
+
+
+def carried(
+    drives: Sequence[Drive], masses: Sequence[float], vessels: Mapping[int, int]
+) -> list[Drive]:
+    """Share what drives a vessel with what lies loose in it, which it carries along.
+
+    Args:
+        drives: Of every object by itself.
+        masses: Of every object [kg].
+        vessels: Of each object that lies loose in another, that other.
+
+    """
+    found = list(drives)
+    for vessel in set(vessels.values()):
+        load = [k for k, v in vessels.items() if v == vessel]
+        share = masses[vessel] / (masses[vessel] + sum(masses[k] for k in load))
+        drive = drives[vessel]
+        for k in (vessel, *load):
+            found[k] = Drive(share * drive.velocity, share * drive.acceleration)
+    return found
 
 
 def driven(obj: SceneObject, anatomy: Anatomy, mass: float, duration: float) -> Drive:

@@ -16,6 +16,7 @@ from dataclasses import replace
 from corporeal.geometry.falls import FLOOR
 from corporeal.materials.blow import at_speed
 from corporeal.materials.contact import loss_of_pair, share
+from corporeal.treatment.crushed_layers import loss_on_layers
 from corporeal.treatment.filled import bulk
 from corporeal.treatment.part import Motion, PartGeometry, Partner
 from corporeal.types import Material
@@ -40,28 +41,30 @@ def with_partners(
 
     """
     soft = {p.object for p, stiff in zip(parts, rigid, strict=True) if not stiff}
-    made: dict[int, Material] = {} if floor is None else {FLOOR: floor}
-    made |= {k: matter_of(parts, k) for k in {p.object for p in parts} - soft}
+    made = {k: largest_of(parts, k) for k in {p.object for p in parts} - soft}
     found: dict[int, list[Partner]] = {k: [] for k in range(len(motions))}
     for k, motion in enumerate(motions):
         lands = motion.landing
         if lands is None or lands.energy <= 0.0:
             continue
         for one, other in ((k, lands.onto), (lands.onto, k)):
-            if one != FLOOR and other in made:
-                found[one].append(Partner(made[other], lands.energy))
+            if other == FLOOR and floor is not None:
+                found[one].append(Partner(floor, lands.energy))
+            elif one != FLOOR and other in made:
+                ball = largest_of(parts, one)
+                loss = loss_on_layers(ball, lands, made[other]) if one == k else None
+                found[one].append(Partner(made[other].material, lands.energy, loss))
     return [replace(m, partners=tuple(found[k])) for k, m in enumerate(motions)]
 
 
-def matter_of(parts: Sequence[PartGeometry], number: int) -> Material:
-    """Material of the largest part of an object, by its mass."""
-    own = [p for p in parts if p.object == number]
-    return max(own, key=bulk).material
+def largest_of(parts: Sequence[PartGeometry], number: int) -> PartGeometry:
+    """Return the largest part of an object, by its mass."""
+    return max((p for p in parts if p.object == number), key=bulk)
 
 
 def takes_part(material: Material, partner: Partner) -> bool:
     """Tell whether a partner would, in life, take more than a negligible share of a blow."""
-    return share(partner.material, material) >= LEAST_SHARE
+    return partner.loss is not None or share(partner.material, material) >= LEAST_SHARE
 
 
 def loss_for_both(struck: Material, motion: Motion) -> float:
@@ -76,5 +79,6 @@ def loss_for_both(struck: Material, motion: Motion) -> float:
     losses = struck.loss * energy
     for partner in (p for p in motion.partners if takes_part(struck, p)):
         other = at_speed(partner.material, motion.impact_speed)
-        losses += partner.energy * (loss_of_pair(struck, other) - struck.loss)
+        both = loss_of_pair(struck, other) if partner.loss is None else partner.loss
+        losses += partner.energy * (both - struck.loss)
     return losses / energy if energy > 0.0 else struck.loss

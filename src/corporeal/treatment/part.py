@@ -17,6 +17,9 @@ its own stiffness cannot be seen."""
 
 GRAVITY = 9.81
 """[m/s²]"""
+COMPACT = 0.5
+"""Least shortest over longest side of what bounces as a ball does [-]; what is thinner than so much
+of its width is a sheet."""
 TUBE = 8.0
 """Least length over diameter of a tube."""
 
@@ -73,6 +76,8 @@ class Partner:
     material: Material
     energy: float
     """Of the blow [J]."""
+    loss: float | None = None
+    """Loss factor of the whole contact, where layers are crushed in it [-]; None: none are."""
 
 
 @dataclass(frozen=True)

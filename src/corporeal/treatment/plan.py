@@ -30,6 +30,7 @@ from corporeal.treatment.step_budget import (
     nearer_rigid,
     torn_walls,
 )
+from corporeal.treatment.struck_slabs import pressed_slabs
 from corporeal.treatment.treat import Resolved, Role, treat
 from corporeal.types import Material, Treatment
 
@@ -110,6 +111,8 @@ def plan(
         treatments = draft.plan.treatments
         why = nearer_rigid(parts, met, judged.verdicts, draft.unslowed, treatments)
         why |= torn_walls(parts, judged.verdicts, treatments)
+        if not why:  # first what strikes, then what is struck
+            why = pressed_slabs(parts, motions, treatments)
         if stiffness == "capped" or not why:
             return replace(draft.plan, treatments=tuned_to_blows(parts, motions, treatments))
         verdicts = [

@@ -25,6 +25,7 @@ from corporeal.mpm.problem import (
     WettedSurface,
 )
 from corporeal.treatment.blow_restitution import in_blows
+from corporeal.treatment.crushed_layers import shapes_of
 from corporeal.treatment.filled import acting
 from corporeal.treatment.rolling_length import rolling_lengths
 from corporeal.types import Law, Material, MaterialField, Particles, Scene, Treatment, Wall
@@ -62,7 +63,7 @@ def pose(
     bodies = tuple(body_of(scene, particles, field, piece) for piece in pieces)
     weights = part_weights(particles, pieces)
     footing = footing_weights(particles, pieces, weights)
-    bounces = in_blows(field, particles.treatments)
+    bounces = in_blows(field, particles.treatments, shapes_of(particles, field))
 
     def averaged(table: np.ndarray) -> np.ndarray:
         return with_walls(pair_values(table, weights, footing), len(scene.walls))

@@ -37,6 +37,8 @@ class Bodies:
     """Of each part."""
     rods: Mapping[int, Rod]
     """Of each part that is a solid rod."""
+    vessels: Mapping[int, int]
+    """Of each object that lies loose in another, that other."""
 
 
 def resolve(bodies: Bodies, accuracy: Accuracy) -> tuple[Bodies, Plan]:
@@ -66,7 +68,7 @@ def _plan(bodies: Bodies, accuracy: Accuracy) -> Plan:
     geometries = {m.part: _geometry(m, bodies, n) for n, a in anatomies for m in a.members}
     ordered = [geometries[k] for k in sorted(geometries)]
     masses = [sum(bodies.makes[m.part].mass for m in a.members) for a in bodies.anatomies]
-    moved = motions(bodies.scene, bodies.anatomies, masses, accuracy.seed)
+    moved = motions(bodies.scene, bodies.anatomies, masses, accuracy.seed, bodies.vessels)
     return plan(ordered, moved, accuracy.detail, accuracy.stiffness, bodies.field.floor)
 
 

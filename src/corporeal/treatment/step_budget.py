@@ -23,7 +23,14 @@ from corporeal.mpm.physics.stability import (
     stable_step,
 )
 from corporeal.treatment.dents import dent_of_blow, dent_of_wall, mark_of_blow
-from corporeal.treatment.part import Motion, PartGeometry, Verdict, is_flat_wall, is_trinket
+from corporeal.treatment.part import (
+    COMPACT,
+    Motion,
+    PartGeometry,
+    Verdict,
+    is_flat_wall,
+    is_trinket,
+)
 from corporeal.treatment.rigidity import INVISIBLE_STRAIN
 from corporeal.types import Treatment
 
@@ -269,10 +276,6 @@ def _sags_too_far(
     squashed = soft.density * pull * part.size[2] / soft.young
     sags = min(1.0, max(squashed, verdict.weight * true.young / soft.young))
     return sags - min(1.0, verdict.weight) > max(verdict.weight, INVISIBLE_STRAIN)
-
-
-COMPACT = 0.5
-"""Least shortest over longest side of what bounces as a ball does [-]."""
 
 
 def is_compact(part: PartGeometry) -> bool:

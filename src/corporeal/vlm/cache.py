@@ -6,8 +6,6 @@ several processes may share the folder, and one that is killed leaves no half an
 
 import hashlib
 import json
-import os
-import sys
 from collections.abc import Mapping
 from pathlib import Path
 from threading import Lock
@@ -19,23 +17,12 @@ from corporeal import store
 from corporeal.vlm import Answer, Check, Question, Reply, Vlm, nothing
 from corporeal.vlm.recordings import schema_digest
 
-VARIABLE = "CORPOREAL_CACHE"
-"""Environment variable that names another folder."""
 VERSION = 1
 
 
 def folder() -> Path:
     """Return where answers are kept: as the environment says, else where the system has such."""
-    kept = os.environ.get(VARIABLE)
-    if kept:
-        return Path(kept).expanduser() / "answers"
-    if sys.platform == "darwin":
-        base = Path.home() / "Library" / "Caches"
-    elif sys.platform == "win32":
-        base = Path(os.environ.get("LOCALAPPDATA", Path.home() / "AppData" / "Local"))
-    else:
-        base = Path(os.environ.get("XDG_CACHE_HOME") or Path.home() / ".cache")
-    return base / "corporeal" / "answers"
+    return store.cache_folder("answers")
 
 
 class Cached:

@@ -37,6 +37,16 @@ struct Backing {
     }
     return sqrt(2 * (all > along ? all - along : 0.0) + dx * dx);
   }
+  // How stiff a contact behind is, as the radius of a punch that is as stiff: what is thin and lies on its face
+  // is pressed as a layer, E pi a^2/h, h being its thickness from the contact before it along u.
+  CUDA_CALLABLE static inline double reach(const double *row, const double *front, const double *u, double dx) {
+    const double a = radius(row, dx);
+    double thick = 0;
+    for (int i = 0; i < 3; i++) thick += u[i] * (row[PLACE + i] / row[COUNT] - front[PLACE + i] / front[COUNT]);
+    thick = thick < 0 ? -thick : thick;
+    const double layer = AS_LAYER * (a * a - dx * dx) / (thick > TINY_DOUBLE ? thick : TINY_DOUBLE);
+    return layer > a ? layer : a;
+  }
   // Whether what lies between, of this mass, swings much faster than the blow lasts: k is the stiffness of the
   // contact behind over that of the blow; from, to: inverse masses of what strikes and of what is behind.
   CUDA_CALLABLE static inline bool quick(double k, double mass, double from, double to) {
@@ -53,8 +63,9 @@ struct Backing {
   // Hold what body b, struck along u, rests on, and what that rests on in turn. soft, kept: compliance of what
   // is pressed, over that of the blow, and the part of the energy in it that comes back.
   CUDA_CALLABLE static inline void follow(double *rows, const double *e, const double *light, int all, int from,
-                                          int b, const double *u, double blow, double dx, double &soft, double &kept) {
+                                          int b, const double *u, const double *struck, double dx, double &soft, double &kept) {
     double mass = 0;
+    const double blow = radius(struck, dx), *front = struck;
     for (int before = from, turn = 0; turn < all && light[b] > 0; turn++) {
       int next = -1;
       double stiffest = 0;
@@ -63,7 +74,7 @@ struct Backing {
         double *row = rows + ROW * at(b, d, all);
         if (d == b || d == before || light[d] < 0 || row[COUNT] == 0 || row[ROLE] == STRUCK) continue;
         if (AS_HEAVY * light[d] > light[b] || along(row, b < d, u) < BEHIND) continue;
-        const double k = radius(row, dx) / blow;
+        const double k = reach(row, front, u, dx) / blow;
         if (!quick(k, mass, light[from], light[d])) continue;
         row[ROLE] = HELD;
         if (k > stiffest) stiffest = k, next = d;
@@ -72,6 +83,7 @@ struct Backing {
       const double back = e[at(b, next, all)];
       soft += 1 / stiffest;
       kept += back * back / stiffest;
+      front = rows + ROW * at(b, next, all);
       before = b;
       b = next;
     }
@@ -84,13 +96,13 @@ struct Backing {
       for (int c = a + 1; c < all; c++) {
         double *row = rows + ROW * (a * all + c), u[3], back[3];
         if (row[ROLE] != STRUCK) continue;
-        const double *n = row + NORMAL, blow = radius(row, dx);
+        const double *n = row + NORMAL;
         const double own = Impact::bounce(e[a * all + c], law + PER_BLOW * (a * all + c), row[SPEED]);
         const double size = sqrt(n[0] * n[0] + n[1] * n[1] + n[2] * n[2]);
         double soft = 1, kept = own * own;
         for (int i = 0; i < 3; i++) u[i] = n[i] / (size > TINY_DOUBLE ? size : TINY_DOUBLE), back[i] = -u[i];
-        follow(rows, e, light, all, a, c, u, blow, dx, soft, kept);
-        follow(rows, e, light, all, c, a, back, blow, dx, soft, kept);
+        follow(rows, e, light, all, a, c, u, row, dx, soft, kept);
+        follow(rows, e, light, all, c, a, back, row, dx, soft, kept);
         row[BOUNCE] = soft > 1 ? sqrt(kept / soft) : own;
       }
   }

@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from jaxtyping import Bool, Float
 
-from corporeal.mpm.constants import AS_HEAVY, BACKED, BEHIND, PATCH, RESTING, TINY_DOUBLE
+from corporeal.mpm.constants import AS_HEAVY, AS_LAYER, BACKED, BEHIND, PATCH, RESTING, TINY_DOUBLE
 from corporeal.mpm.physics.contact import Indices, Scalars, Vectors
 
 WAITS, REBOUNDS, HELD = 0, 1, 2
@@ -61,6 +61,8 @@ class Pair:
     """Of the disc over which they spread [m]."""
     normal: Float[np.ndarray, "3"]
     """Their mean, unit, from the first to the second."""
+    place: Float[np.ndarray, "3"]
+    """Their mean [m]."""
 
 
 def bounce_at(restitution: float, law: Float[np.ndarray, "5"], speed: float) -> float:
@@ -90,6 +92,22 @@ def radius(points: Vectors, normal: Float[np.ndarray, "3"], cell: float) -> floa
     return sqrt(2.0 * max(float(spread), 0.0) + cell**2)
 
 
+def reach(radius: float, thickness: float, cell: float) -> float:
+    """How stiff a contact behind is, as the radius of a punch on a half-space that is as stiff [m].
+
+    What is thin and lies on its face is pressed as a layer: E π a²/h, which is more than 2 E* a
+    from a = 2h/π on.
+
+    Args:
+        radius: Of the disc over which it spreads, with its cell [m].
+        thickness: h: of what is pressed, from the contact before it [m].
+        cell: dx [m].
+
+    """
+    spread = max(radius**2 - cell**2, 0.0)
+    return max(radius, AS_LAYER * spread / max(thickness, TINY_DOUBLE))
+
+
 def is_quick(stiffness: float, mass: float, strikes: float, behind: float) -> bool:
     """Whether what lies between swings much quicker than the blow lasts.
 
@@ -115,6 +133,8 @@ class Round:
     number: Indices
     """Of each contact's pair, as in ``Rebound``."""
     pairs: dict[int, Pair]
+    cell: float
+    """dx [m]"""
 
     @classmethod
     def of(cls, bodies: Bodies, seen: Seen, cell: float) -> "Round":
@@ -134,8 +154,9 @@ class Round:
             blow = float(seen.blow[mine].max())
             e = bounce_at(float(bodies.restitution[both]), bodies.blows[both], blow)
             width = radius(seen.point[near], normal, cell)
-            found[int(pair)] = Pair(REBOUNDS if struck else WAITS, e, width, normal)
-        now = cls(bodies, number, found)
+            place = seen.point[near].mean(axis=0)
+            found[int(pair)] = Pair(REBOUNDS if struck else WAITS, e, width, normal, place)
+        now = cls(bodies, number, found, cell)
         for pair, blow in found.items():
             if blow.role == REBOUNDS:
                 now._hold(pair, blow)
@@ -145,33 +166,35 @@ class Round:
         a, c = divmod(pair, len(self.bodies.light))
         soft, kept = 1.0, blow.bounce**2
         for strikes, first, along in ((a, c, blow.normal), (c, a, -blow.normal)):
-            for stiffness, e in self._behind(strikes, first, along, blow.radius):
+            for stiffness, e in self._behind(strikes, first, along, blow):
                 soft, kept = soft + 1.0 / stiffness, kept + e**2 / stiffness
         blow.bounce = sqrt(kept / soft) if soft > 1.0 else blow.bounce
 
     def _behind(
-        self, strikes: int, first: int, along: Float[np.ndarray, "3"], width: float
+        self, strikes: int, first: int, along: Float[np.ndarray, "3"], blow: Pair
     ) -> list[tuple[float, float]]:
         """Hold what a struck body rests on, and what that rests on; stiffness and e of each."""
         found: list[tuple[float, float]] = []
         light, before, body, mass = self.bodies.light, strikes, first, 0.0
+        front = blow
         while light[body] > 0.0 and len(found) < len(light):
             mass += 1.0 / light[body]
-            stiffest, following = 0.0, -1
+            stiffest, following, rests = 0.0, -1, front
             for other in range(len(light)):
                 pair = self._between(body, other)
                 if other == before or pair is None or not self._backs(pair, body, other, along):
                     continue
-                stiffness = pair.radius / width
+                thickness = abs(float((pair.place - front.place) @ along))
+                stiffness = reach(pair.radius, thickness, self.cell) / blow.radius
                 if not is_quick(stiffness, mass, light[strikes], light[other]):
                     continue
                 pair.role = HELD
                 if stiffness > stiffest:
-                    stiffest, following = stiffness, other
+                    stiffest, following, rests = stiffness, other, pair
             if following < 0:
                 break
             found.append((stiffest, float(self.bodies.restitution[body, following])))
-            before, body = body, following
+            before, body, front = body, following, rests
         return found
 
     def _between(self, one: int, other: int) -> Pair | None:

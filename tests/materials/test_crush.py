@@ -1,0 +1,85 @@
+"""A blow across layers is work against the pressure at which they fold."""
+
+from dataclasses import replace
+from math import pi, sqrt
+
+import pytest
+
+from corporeal import materials
+from corporeal.materials import Striker
+from corporeal.materials.contact import loss_of_pair, restitution
+from corporeal.materials.crush import Ball, Sheet, across, crushed, law_of_crushing
+from corporeal.materials.rebound import rebound
+
+RADIUS, THICK = 0.016, 0.008
+
+
+def made(name):
+    entry = materials.find(name)
+    return entry.pick(entry.typical())
+
+
+BOARD = Sheet(made("corrugated_cardboard"), THICK)
+
+
+def ball(name, radius=RADIUS):
+    material = made(name)
+    return Ball(material, 4 / 3 * pi * radius**3 * material.density, radius)
+
+
+def test_a_rigid_ball_loses_the_pressure_times_what_it_crushes():
+    """Hard and slow: e² is what both store, 8 p² a³/3E*, over p π a⁴/4R, for a thick sheet."""
+    thick = replace(BOARD, thickness=1.0)
+    steel, speed = ball("steel"), 0.5
+    p, young = thick.layers.crush_pa, thick.layers.young_across_pa
+    blow = 0.5 * steel.mass * speed**2
+    a = (4 * RADIUS * blow / (pi * p)) ** 0.25
+    e = crushed(steel, thick, speed, 0.3)
+    plain = sqrt(8 / 3 * p**2 * a**3 / young / blow) * rebound(thick.material.loss)
+    assert e == pytest.approx(plain, rel=0.08)
+
+
+def test_what_presses_less_than_the_layers_bear_loses_nothing_to_them():
+    rubber = ball("rubber")
+    elastic = crushed(rubber, BOARD, 0.0, 0.79)
+    assert crushed(rubber, BOARD, 0.02, 0.79) == pytest.approx(elastic)
+    # Both return their own parts of what they store.
+    low, high = sorted((rubber.material.restitution, across(BOARD.material).restitution))
+    assert low < elastic < high
+    speeds = (0.3, 1.0, 3.0)
+    found = [crushed(rubber, BOARD, v, 0.79) for v in speeds]
+    assert elastic > found[0] > found[1] > found[2] > 0.3
+
+
+def test_a_sheet_takes_no_more_than_its_thickness():
+    """A heavy ball packs it, and rebounds from what is packed."""
+    heavy = ball("steel", 0.05)
+    takes = pi * heavy.radius * BOARD.depth**2 * BOARD.layers.crush_pa
+    blow = 0.5 * heavy.mass * 6.0**2
+    assert takes < 0.1 * blow
+    assert crushed(heavy, BOARD, 6.0, 0.6) == pytest.approx(0.6, abs=0.03)
+    assert crushed(heavy, replace(BOARD, thickness=1.0), 6.0, 0.6) < 0.25
+    assert BOARD.depth == pytest.approx(THICK * (1 - 1.4 * 150 / 690))
+
+
+@pytest.mark.parametrize("speed", [1.0, 3.0])
+def test_slower_blows_follow_a_power(speed):
+    rubber = ball("rubber")
+    law = law_of_crushing(rubber, BOARD, speed, 0.79)
+    assert law.value == crushed(rubber, BOARD, speed, 0.79)
+    for v in (speed, 0.7 * speed, 0.25 * speed):
+        exact = crushed(rubber, BOARD, v, 0.79)
+        power = min(law.most, law.value * (v / law.speed) ** -law.exponent)
+        assert power == pytest.approx(exact, abs=0.01)
+
+
+def test_two_lossy_bodies_lose_in_series():
+    """Their loss factors add up by compliance; of what is far stiffer nothing is seen."""
+    one, other = (Striker(materials.find(n), made(n)) for n in ("potato", "rubber"))
+    e = restitution(one, other).value
+    assert e == restitution(other, one).value
+    assert e == pytest.approx(rebound(loss_of_pair(one.material, other.material)), abs=0.01)
+    own = restitution(one, one).value
+    assert own == pytest.approx(one.material.restitution)
+    stiff = replace(other, material=replace(other.material, young=1e13))
+    assert restitution(one, stiff).value == pytest.approx(own)
