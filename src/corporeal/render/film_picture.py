@@ -4,9 +4,9 @@ Most of a film is floor and backdrop: where no ray to sky or sun could meet a bo
 pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
 still. Where objects are far and hide only some sky, the sky is asked at the corners of tiles. What
 is left is seen by one ray a pixel; every fourth pixel asks for light, and neighbours on one surface
-share what they found. Pixels beside which another surface is seen in another colour are cast again,
-finer. Nothing hangs on the picture before: equal input gives equal bytes, and what does not move
-does not flicker.
+share what they found. Where that is not theirs, each pixel asks for itself. Pixels beside which
+another surface is seen in another colour are cast again, finer. Nothing hangs on the picture
+before: equal input gives equal bytes, and what does not move does not flicker.
 """
 
 from collections.abc import Callable
@@ -49,7 +49,7 @@ from corporeal.render.kernels_light import CHANNELS, SHARP
 
 REACH = 7
 """Pixels over which the light filter spreads what one of them met."""
-HALO = AROUND + -(-HANGS_ON // TILE)
+HALO = AROUND + 1 + -(-HANGS_ON // TILE)
 """Tiles above and below a band that what is seen in it hangs on."""
 FILTER = 0.65
 """Pixels that textures are filtered over: their pyramid's levels are blurred as they are."""
@@ -299,6 +299,8 @@ class _Picture(Job):
         kernels_floor.stains(
             rays.direction, eye, self.lamps, self.ways, self.boxes, self.blur, shape, near, far
         )
+        # Smoothing carries light into the tile beside.
+        near = kernels_floor.grown(near, 1)
         return np.where(near, NEAR, np.where(far, FAR, UNTOUCHED)).astype(np.uint8)
 
     def soften(self, tiles: np.ndarray, block: Block, here: slice, toned: np.ndarray) -> None:

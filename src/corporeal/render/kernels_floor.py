@@ -16,7 +16,7 @@ TILE = 8
 """Sides of a tile [px]."""
 UNTOUCHED, FAR, NEAR = 0, 1, 2
 """As in the empty studio; darkened softly; to be cast pixel by pixel."""
-AROUND = 1
+AROUND = 2
 """Tiles about one that shows an object that are near it."""
 
 
