@@ -5,7 +5,7 @@ from test_embree import RED, ball, front, scene, sheet
 
 from corporeal.geometry.srgb import encoded
 from corporeal.render import cull, embree
-from corporeal.render.asking import Asker
+from corporeal.render.arriving import Asker
 from corporeal.render.camera import Aim
 from corporeal.render.embree import Job, Sampling, Stage, identify, render
 from corporeal.render.film_picture import FilmCaster

@@ -26,7 +26,7 @@ from corporeal.render import (
     kernels_floor,
     kernels_light,
 )
-from corporeal.render.asking import HANGS_ON, Arrived, Asker
+from corporeal.render.arriving import HANGS_ON, Arrived, Asker
 from corporeal.render.camera import Aim
 from corporeal.render.embree import (
     BAND,
