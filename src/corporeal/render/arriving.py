@@ -9,13 +9,15 @@ from corporeal.render import kernels_ask, kernels_doubt, kernels_film, kernels_l
 from corporeal.render.embree import Block, Places, Stage
 from corporeal.render.kernels import Samples
 from corporeal.render.kernels_ask import SUNS, WAYS, WIDE
-from corporeal.render.kernels_doubt import APART, SETS
+from corporeal.render.kernels_doubt import APART, SETS, SIDE
 from corporeal.render.kernels_light import CHANNELS, Lamps
 
 AGAIN = 3, 4
 """Rays to the sky and to the sun of a pixel whose neighbours' light is not its own."""
 AROUND = APART
 """Pixels about a doubtful one that ask, too."""
+RIM = SIDE // 2
+"""Of those, how many at the rim only help others."""
 HANGS_ON = 37
 """Pixels as far away may change a pixel's light: 10 by means over those that asked again, 6 by
 ``AROUND``, 6 by ``APART``, 8 by light that is shared, and 7 by which pixels share it."""
@@ -129,11 +131,13 @@ class Asker:
         asks = kernels_film.widened(doubt, AROUND) & arrived.known
         index = np.flatnonzero(asks)
         times = np.empty(len(index), np.int64)
-        kernels_doubt.lonely(index, asks, *surface, times)
+        kernels_doubt.lonely(index, arrived.known, *surface, times)
         who = np.repeat(index, times)
         places, number = block.places(who), np.empty(len(who), np.int64)
         kernels_doubt.sets(who, places.row, places.column, number)
         found = self.along(s, d, Directions(who, number, places, (SETS, *AGAIN), False))
         light = np.zeros_like(arrived.light)
         kernels_doubt.together(index, times, found, light.reshape(-1, WIDE))
-        kernels_doubt.settle(s, index, light, *surface, asks, AGAIN, arrived.light)
+        # Those at the rim only help others: not all that they would be smoothed over asked.
+        inner = np.flatnonzero(kernels_film.widened(doubt, AROUND - RIM) & arrived.known)
+        kernels_doubt.settle(s, inner, light, *surface, asks, AGAIN, arrived.light)

@@ -138,25 +138,25 @@ def _bend(shown, count):
 
 
 @numba.njit(**LOOP)
-def lonely(index, asks, normal, depth, out):
+def lonely(index, lit, normal, depth, out):
     """Write how many times as many rays pixels need that have few alike about them.
 
     Args:
         index: Pixels that ask (N,).
-        asks: The same, as marks (rows, columns).
+        lit: Which pixels have light (rows, columns).
         normal: Of what pixels met (rows, columns, 3).
         depth: Its logarithm (rows, columns).
         out: Sets of directions of each (N,), 1 to ``MOST``.
 
     """
-    h, w = asks.shape
+    h, w = lit.shape
     half = SIDE // 2
     for k in range(len(index)):
         i, j = index[k] // w, index[k] % w
         count = 0
         for y in range(max(i - half, 0), min(i + half, h)):
             for x in range(max(j - half, 0), min(j + half, w)):
-                if asks[y, x] and _like(normal, depth, i, j, y, x):
+                if lit[y, x] and _like(normal, depth, i, j, y, x):
                     count += 1
         out[k] = min((SETS + count // 2) // max(count, 1), MOST)
 
@@ -208,7 +208,7 @@ def settle(s, index, light, normal, depth, asks, counts, known):
 
     Args:
         s: What pixels met.
-        index: Pixels that asked (N,).
+        index: Pixels that are to have new light (N,).
         light: What each of them found (rows, columns, channels).
         normal: Of what they met (rows, columns, 3).
         depth: Its logarithm (rows, columns).
