@@ -18,6 +18,8 @@ AROUND = APART
 """Pixels about a doubtful one that ask, too."""
 RIM = SIDE // 2
 """Of those, how many at the rim only help others."""
+SAME = 1e-3
+"""Share of the sun that is as good as none of it."""
 HANGS_ON = 37
 """Pixels as far away may change a pixel's light: 10 by means over those that asked again, 6 by
 ``AROUND``, 6 by ``APART``, 8 by light that is shared, and 7 by which pixels share it."""
@@ -135,7 +137,14 @@ class Asker:
         who = np.repeat(index, times)
         places, number = block.places(who), np.empty(len(who), np.int64)
         kernels_doubt.sets(who, places.row, places.column, number)
-        found = self.along(s, d, Directions(who, number, places, (SETS, *AGAIN), False))
+        found = np.empty((len(who), WIDE), np.float32)
+        # Where all rays to the sun that were smoothed over agree, no edge of a shadow is near.
+        bright = arrived.light.reshape(-1, WIDE)[who, 3]
+        calm = (bright < SAME) | (bright > 1 - SAME)
+        for some, suns in ((calm, 0), (~calm, AGAIN[1])):
+            ways = who[some], number[some], block.places(who[some]), (SETS, AGAIN[0], suns)
+            found[some] = self.along(s, d, Directions(*ways, False))
+        found[calm, 3] = bright[calm]
         light = np.zeros_like(arrived.light)
         kernels_doubt.together(index, times, found, light.reshape(-1, WIDE))
         # Those at the rim only help others: not all that they would be smoothed over asked.

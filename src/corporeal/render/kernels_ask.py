@@ -188,7 +188,8 @@ def look_up(s, count, w):
 @numba.njit(**LOOP)
 def answered(s, index, w, asker, free, lamps, counts, light):
     """Add the light of rays that were cast and got away; see ``ask``."""
-    share, sun, many = np.float32(1 / counts[0]), np.float32(1 / counts[1]), len(index)
+    share, sun = np.float32(1 / counts[0]), np.float32(1 / max(counts[1], 1))
+    many = len(index)
     for n in range(len(free)):
         if not free[n]:
             continue
