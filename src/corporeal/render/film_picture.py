@@ -94,6 +94,7 @@ class FilmCaster:
     def __init__(self) -> None:
         self._empty: _Empty | None = None
         self._last: tuple[Stage, Aim, Quality, np.ndarray] | None = None
+        self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
     def picture(
         self, stage: Stage, camera: Aim, quality: Quality, threads: int | None = None
@@ -113,6 +114,12 @@ class FilmCaster:
             self._last = last = stage, camera, quality, picture
         return last[3].copy()
 
+    def _workers(self, threads: int) -> ThreadPoolExecutor:
+        """Return threads that stay, and their memory with them."""
+        if self._pool is None or self._pool[0] != threads:
+            self._pool = threads, ThreadPoolExecutor(threads)
+        return self._pool[1]
+
     def _cast(
         self, stage: Stage, camera: Aim, quality: Quality, threads: int
     ) -> UInt8[np.ndarray, "H W 3"]:
@@ -122,14 +129,14 @@ class FilmCaster:
         lines = max(BAND, -(-camera.height // threads))
         band = -(-lines // TILE) * TILE
         rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
-        with ThreadPoolExecutor(threads) as pool:
-            known = self._empty
-            if known is None or (known.aim, known.place) != (camera, _place(stage)):
-                known = self._empty = _emptied(stage, camera, PLANS[quality], rows, pool)
-            out = known.printed.copy()
-            job = _Picture(stage, camera, PLANS[quality], known)
-            for _ in pool.map(lambda r: job.band(r, out), rows):
-                pass
+        pool = self._workers(threads)
+        known = self._empty
+        if known is None or (known.aim, known.place) != (camera, _place(stage)):
+            known = self._empty = _emptied(stage, camera, PLANS[quality], rows, pool)
+        out = known.printed.copy()
+        job = _Picture(stage, camera, PLANS[quality], known)
+        for _ in pool.map(lambda r: job.band(r, out), rows):
+            pass
         return out
 
 
@@ -276,16 +283,18 @@ class _Picture(Job):
 
     def seen(self, rays: Rays, block: Block) -> tuple[np.ndarray, ...]:
         """Nearest triangle and where, of each pixel; rays that could hit nothing are not cast."""
-        hit = self.stage.missed(rays.origin)
         if not self.stage.shown:
-            return hit
+            return self.stage.missed(rays.origin)
         asked = cull.of_pixels(self.outlined[block.first // TILE :], (block.rows, block.columns))
-        index = np.flatnonzero(asked)
-        found = self.stage.hit(rays.origin[index], rays.direction[index])
-        full = tuple(whole.copy() for whole in hit)
-        for whole, part in zip(full, found, strict=True):
+        index, many = np.flatnonzero(asked), len(rays.origin)
+        # All rays begin at the eye.
+        eye = np.broadcast_to(rays.origin[0], (len(index), 3)).copy()
+        found = self.stage.hit(eye, rays.direction[index])
+        # Memory that comes zeroed costs nothing where no ray hits.
+        hit = np.full(many, -1, np.int32), *(np.zeros(many, np.float32) for _ in range(3))
+        for whole, part in zip(hit, found, strict=True):
             whole[index] = part
-        return full
+        return hit
 
     def tiles(
         self, rays: Rays, prim: np.ndarray, block: Block
