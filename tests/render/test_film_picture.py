@@ -1,17 +1,19 @@
 import numpy as np
 import pytest
+import trimesh
 from test_embree import RED, ball, front, scene, sheet
 
 from corporeal.geometry.srgb import encoded
-from corporeal.render import cull
+from corporeal.render import cull, embree
+from corporeal.render.arriving import Asker
 from corporeal.render.camera import Aim
-from corporeal.render.embree import Job, Sampling, Stage, render
+from corporeal.render.embree import Job, Sampling, Stage, identify, render
 from corporeal.render.film_picture import FilmCaster
 from corporeal.render.kernels_ask import WAYS, asks, number_of
 from corporeal.render.kernels_film import CURVE, CURVED
 from corporeal.render.kernels_floor import NEAR, TILE
 from corporeal.render.liquid_surface import LiquidSurface
-from corporeal.types import Finish
+from corporeal.types import Finish, Surface
 
 LEAF = Finish(
     "leaf",
@@ -134,3 +136,26 @@ def test_the_displays_curve_is_that_of_srgb():
     number = np.minimum(place.astype(int), CURVED - 1)
     grey = CURVE[number] + (place - number) * (CURVE[number + 1] - CURVE[number])
     assert np.abs(grey - 255 * encoded(light)).max() < 1e-3
+
+
+def test_floor_beside_a_contact_is_as_dark_as_many_rays_find_it(monkeypatch):
+    """Without rays of their own, pixels there show the light of twelve pixels about them."""
+    box = trimesh.creation.box((0.6, 0.6, 0.4))
+    corners = np.asarray(box.vertices) + np.array([0, 0, 0.2])
+    there = Stage(scene([Surface("box", 0, 0, corners, np.asarray(box.faces))]))
+    aim = Aim((-1.8, -2.2, 1.2), (0.0, 0.0, 0.2), 30.0, 400, 300)
+    monkeypatch.setitem(embree.SAMPLING, "exact", Sampling(3, 1, 16))
+    exact = render(there, aim, "exact", 1).astype(float)
+    floor = identify(there, aim)[0] < 0
+
+    def off():
+        made = FilmCaster().picture(there, aim, "draft", 1)
+        return np.sqrt(((made - exact) ** 2).mean(axis=2)) * floor
+
+    asked = off()
+    monkeypatch.setattr(Asker, "again", lambda *_: None)
+    shared = off()
+    beside = shared > 8
+    assert beside.sum() > 300
+    assert np.sqrt((asked[beside] ** 2).mean()) < 0.5 * np.sqrt((shared[beside] ** 2).mean())
+    assert np.sqrt((asked**2).mean()) < 0.6 * np.sqrt((shared**2).mean())

@@ -4,9 +4,9 @@ Most of a film is floor and backdrop: where no ray to sky or sun could meet a bo
 pixel keeps the light of the empty studio, which is cast once for as long as the camera stands
 still. Where objects are far and hide only some sky, the sky is asked at the corners of tiles. What
 is left is seen by one ray a pixel; every fourth pixel asks for light, and neighbours on one surface
-share what they found. Pixels beside which another surface is seen in another colour are cast again,
-finer. Nothing hangs on the picture before: equal input gives equal bytes, and what does not move
-does not flicker.
+share what they found. Where that is not theirs, each pixel asks for itself. Pixels beside which
+another surface is seen in another colour are cast again, finer. Nothing hangs on the picture
+before: equal input gives equal bytes, and what does not move does not flicker.
 """
 
 from collections.abc import Callable
@@ -26,6 +26,7 @@ from corporeal.render import (
     kernels_floor,
     kernels_light,
 )
+from corporeal.render.arriving import HANGS_ON, Arrived, Asker
 from corporeal.render.camera import Aim
 from corporeal.render.embree import (
     BAND,
@@ -41,16 +42,16 @@ from corporeal.render.embree import (
     render,
 )
 from corporeal.render.kernels import NOTHING, Samples
-from corporeal.render.kernels_ask import SUNS, WIDE
+from corporeal.render.kernels_ask import WIDE
 from corporeal.render.kernels_film import ABOUT, FINER
 from corporeal.render.kernels_floor import AROUND, FAR, NEAR, TILE, UNTOUCHED
 from corporeal.render.kernels_light import CHANNELS, SHARP
 
 REACH = 7
 """Pixels over which the light filter spreads what one of them met."""
-HALO = AROUND + 2
+HALO = AROUND + 1 + -(-HANGS_ON // TILE)
 """Tiles above and below a band that what is seen in it hangs on."""
-FILTER = 0.6
+FILTER = 0.65
 """Pixels that textures are filtered over: their pyramid's levels are blurred as they are."""
 
 
@@ -93,6 +94,7 @@ class FilmCaster:
     def __init__(self) -> None:
         self._empty: _Empty | None = None
         self._last: tuple[Stage, Aim, Quality, np.ndarray] | None = None
+        self._pool: tuple[int, ThreadPoolExecutor] | None = None
 
     def picture(
         self, stage: Stage, camera: Aim, quality: Quality, threads: int | None = None
@@ -112,24 +114,29 @@ class FilmCaster:
             self._last = last = stage, camera, quality, picture
         return last[3].copy()
 
+    def _workers(self, threads: int) -> ThreadPoolExecutor:
+        """Return threads that stay, and their memory with them."""
+        if self._pool is None or self._pool[0] != threads:
+            self._pool = threads, ThreadPoolExecutor(threads)
+        return self._pool[1]
+
     def _cast(
         self, stage: Stage, camera: Aim, quality: Quality, threads: int
     ) -> UInt8[np.ndarray, "H W 3"]:
         if quality not in PLANS:
             return render(stage, camera, quality, threads)
-        # One thread alone takes the picture as a whole, since bands overlap.
-        parts = 2 * threads if threads > 1 else 1
-        lines = max(BAND, -(-camera.height // parts))
+        # No more bands than threads, since bands overlap.
+        lines = max(BAND, -(-camera.height // threads))
         band = -(-lines // TILE) * TILE
         rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
-        with ThreadPoolExecutor(threads) as pool:
-            known = self._empty
-            if known is None or (known.aim, known.place) != (camera, _place(stage)):
-                known = self._empty = _emptied(stage, camera, PLANS[quality], rows, pool)
-            out = known.printed.copy()
-            job = _Picture(stage, camera, PLANS[quality], known)
-            for _ in pool.map(lambda r: job.band(r, out), rows):
-                pass
+        pool = self._workers(threads)
+        known = self._empty
+        if known is None or (known.aim, known.place) != (camera, _place(stage)):
+            known = self._empty = _emptied(stage, camera, PLANS[quality], rows, pool)
+        out = known.printed.copy()
+        job = _Picture(stage, camera, PLANS[quality], known)
+        for _ in pool.map(lambda r: job.band(r, out), rows):
+            pass
         return out
 
 
@@ -165,6 +172,7 @@ class _Picture(Job):
         super().__init__(stage, camera, Sampling(1, 1, plan.sky))
         self.pixel *= FILTER
         self.plan, self.empty, self.boxes = plan, empty, stage.boxes()
+        self.asker = Asker(stage, self.lamps, self.boxes)
         self.ways = cull.ways(self.lamps, 1)
         self.open = 1.0, float(cull.ways(self.lamps, plan.sky)[:-1, 2].mean())
         self.blur = np.float32(cull.blur(self.lamps, self.boxes))
@@ -223,7 +231,8 @@ class _Picture(Job):
         toned = np.empty((len(rays.origin), 3), np.float32)
         self.soften(_of_rows(tiles, rows, wide[0]), block, here, toned)
         near = kind == NEAR
-        near[: max(rows[0] - wide[0] - 1, 0)] = near[rows[1] - wide[0] + 1 :] = False
+        last = rows[1] - wide[0] + HANGS_ON
+        near[: max(rows[0] - wide[0] - HANGS_ON, 0)] = near[last:] = False
         part = crop.about(near, block, REACH)
         if part is not None:
             near = crop.cut(near, block, part)
@@ -246,7 +255,7 @@ class _Picture(Job):
         Args:
             rays: Of the band.
             hit: What they met.
-            near: Which pixels of the part.
+            near: Which pixels of the part, and those above and below that they hang on.
             blocks: The band, and the part of it.
             rows: The first row of the picture to answer for and the one after the last.
 
@@ -257,13 +266,15 @@ class _Picture(Job):
         wall = self.empty.wall[block.first * block.columns :][: block.rows * block.columns]
         light = crop.cut(wall, *blocks)
         toned = np.empty_like(light)
-        active = np.flatnonzero(near)
         known = kernels_film.widened(near, REACH)
+        inner = max(rows[0] - part.first - 1, 0), min(rows[1] - part.first + 1, part.rows)
+        near = near.copy()
+        near[: inner[0]] = near[inner[1] :] = False
+        active = np.flatnonzero(near)
         s, arrived = self.cast(rays, active, known, part, light, hit)
         kernels_film.tone(light, active, toned)
         # Once more, finer, beside other surfaces of another colour.
         edge = np.zeros(len(light), np.bool_)
-        inner = max(rows[0] - part.first - 1, 0), min(rows[1] - part.first + 1, part.rows)
         kernels_film.edges(s, toned, near.ravel(), near.shape, inner, edge)
         pixels = np.flatnonzero(edge)
         if len(pixels):
@@ -272,16 +283,18 @@ class _Picture(Job):
 
     def seen(self, rays: Rays, block: Block) -> tuple[np.ndarray, ...]:
         """Nearest triangle and where, of each pixel; rays that could hit nothing are not cast."""
-        hit = self.stage.missed(rays.origin)
         if not self.stage.shown:
-            return hit
+            return self.stage.missed(rays.origin)
         asked = cull.of_pixels(self.outlined[block.first // TILE :], (block.rows, block.columns))
-        index = np.flatnonzero(asked)
-        found = self.stage.hit(rays.origin[index], rays.direction[index])
-        full = tuple(whole.copy() for whole in hit)
-        for whole, part in zip(full, found, strict=True):
+        index, many = np.flatnonzero(asked), len(rays.origin)
+        # All rays begin at the eye.
+        eye = np.broadcast_to(rays.origin[0], (len(index), 3)).copy()
+        found = self.stage.hit(eye, rays.direction[index])
+        # Memory that comes zeroed costs nothing where no ray hits.
+        hit = np.full(many, -1, np.int32), *(np.zeros(many, np.float32) for _ in range(3))
+        for whole, part in zip(hit, found, strict=True):
             whole[index] = part
-        return full
+        return hit
 
     def tiles(
         self, rays: Rays, prim: np.ndarray, block: Block
@@ -323,7 +336,7 @@ class _Picture(Job):
         block: Block,
         light: np.ndarray,
         hit: tuple[np.ndarray, ...],
-    ) -> tuple[Samples, "_Arrived"]:
+    ) -> tuple[Samples, Arrived]:
         """Shade what pixels ``active`` see into light; return that, and the light that arrived."""
         d, index = rays.direction, np.flatnonzero(known)
         s = self.meet(rays.origin, d, index, tuple(x[index] for x in hit))
@@ -337,20 +350,22 @@ class _Picture(Job):
         kernels_ask.chosen(s, on, known, (block.first, block.left), asks)
         asking = np.flatnonzero(asks)
         arriving = np.zeros((len(light), WIDE), np.float32)
-        arriving[asking] = self.arriving(s, d, asking, block.places(asking))
+        arriving[asking] = self.asker.sparsely(s, d, asking, block.places(asking), self.plan.sky)
         lit = np.zeros(len(light), np.bool_)
         lit[on] = True
         log = np.zeros(len(light), np.float32)
         log[on] = np.log(s.depth[on])
-        arrived = _Arrived(
+        arrived = Arrived(
             arriving.reshape(*shape, WIDE),
             s.normal.reshape(*shape, 3),
             s.depth.reshape(shape),
+            log.reshape(shape),
             lit.reshape(shape),
         )
         kernels_ask.smooth(
-            arrived.light, arrived.normal, log.reshape(shape), arrived.known, asks.reshape(shape)
+            arrived.light, arrived.normal, arrived.log, arrived.known, asks.reshape(shape)
         )
+        self.asker.again(s, d, on, block, arrived)
         self.reflect_sharply(s, d, on, arriving)
         seen = active[lit[active]]
         near = np.zeros(light.shape, np.float32)
@@ -358,37 +373,13 @@ class _Picture(Job):
         kernels_light.blend(s, seen, near, self.lamps, light)
         return s, arrived
 
-    def arriving(
-        self, s: Samples, d: np.ndarray, index: np.ndarray, places: Places, times: int = 1
-    ) -> Float32[np.ndarray, "N channels"]:
-        """Light that arrives at some samples, from so many times as many rays to the sky."""
-        stage, sky, many = self.stage, times * self.sampling.sky, len(index)
-        where = index, places.row, places.column
-        light = np.zeros((many, WIDE), np.float32)
-        o, w = (np.empty((many * (sky + SUNS) + 1, 3), np.float32) for _ in range(2))
-        ray, asker = (np.empty(len(o), np.int64) for _ in range(2))
-        n = kernels_ask.ask(s, *where, self.lamps, sky, self.boxes, o, w, ray, asker, light)
-        free = stage.free(o[:n], w[:n], ray[:n])
-        kernels_ask.answered(s, index, w, asker, free, self.lamps, sky, light)
-        n = kernels_ask.mirror(s, *where, d, self.lamps, o, w, asker, light)
-        if n:
-            seen, who = np.empty((n, 3), np.float32), asker[:n]
-            prim, u, v, t = stage.hit(o[:n], w[:n])
-            kernels_light.mirrored(
-                stage.look, stage.normals, self.lamps, s, index[who], w, prim, u, v, t, seen, 0
-            )
-            light[who, 4:CHANNELS] = seen
-        return light
-
     def reflect_sharply(self, s: Samples, d: np.ndarray, on: np.ndarray, light: np.ndarray) -> None:
         """Let each smooth surface mirror what it sees itself, instead of its neighbours."""
         sharp = on[(s.traits[on, 1] <= SHARP) & (s.kind[on] == kernels.THING)]
         if len(sharp):
             self.reflect(s, d, sharp, np.zeros(len(sharp), np.int64), light, sharp)
 
-    def refine(
-        self, pixels: np.ndarray, block: Block, arrived: "_Arrived", toned: np.ndarray
-    ) -> None:
+    def refine(self, pixels: np.ndarray, block: Block, arrived: Arrived, toned: np.ndarray) -> None:
         """Replace pixels by the mean of finer samples."""
         count = len(ABOUT)
         total = len(pixels) * count
@@ -448,7 +439,7 @@ class _Picture(Job):
         on = np.flatnonzero(s.kind != NOTHING)
         lone = on[known(s)[on]]
         there = Places(places.row[lone], places.column[lone])
-        lit[lone] = self.arriving(s, d, lone, there, 2)
+        lit[lone] = self.asker.sparsely(s, d, lone, there, 2 * self.plan.sky)
         self.reflect_sharply(s, d, on, lit)
         near = np.zeros(light.shape, np.float32)
         kernels_light.shade(s, on, d, lit, self.lamps, near)
@@ -483,14 +474,3 @@ def _of_rows(tiles: np.ndarray, rows: tuple[int, int], first: int) -> np.ndarray
     mine = slice((rows[0] - first) // TILE, -(-(rows[1] - first) // TILE))
     kept[mine] = tiles[mine]
     return kept
-
-
-@dataclass(frozen=True)
-class _Arrived:
-    """Light that arrived at the pixels of a band."""
-
-    light: Float32[np.ndarray, "h w channels"]
-    normal: Float32[np.ndarray, "h w 3"]
-    depth: Float32[np.ndarray, "h w"]
-    """[m]"""
-    known: Bool[np.ndarray, "h w"]

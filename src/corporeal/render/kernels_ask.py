@@ -79,22 +79,22 @@ def number_of(row, column):
 
 
 @numba.njit(**JIT)
-def _sky_points(count):
-    """Points of the sphere (WAYS × count, 3) that make directions to the sky.
+def sky_points(count):
+    """Points of the sphere (count, 3) that make directions to the sky.
 
     The R2 sequence (Roberts 2018) spreads them.
     """
-    out = np.empty((WAYS * count, 3))
-    for q in range(len(out)):
+    out = np.empty((count, 3))
+    for q in range(count):
         u, v = (q * 0.7548776662 + 0.37) % 1, (q * 0.5698402910 + 0.71) % 1
         on_sphere(u * (1 - GRAZING), v, out[q])
     return out
 
 
 @numba.njit(**JIT)
-def _sun_ways(lamps):
-    """Directions to WAYS × SUNS places on the sun's disc."""
-    e, out = np.empty(3, np.float32), np.empty((WAYS * SUNS, 3), np.float32)
+def sun_ways(lamps, count):
+    """Directions to places on the sun's disc (count, 3)."""
+    e, out = np.empty(3, np.float32), np.empty((count, 3), np.float32)
     h = across(lamps.sun, e)
     for q in range(len(out)):
         r = np.sqrt((q * 0.7548776662 + 0.29) % 1) * lamps.softness
@@ -106,19 +106,30 @@ def _sun_ways(lamps):
     return out
 
 
+@numba.njit(**LOOP)
+def numbers(row, column, out):
+    """Write which of ``WAYS`` sets of directions each pixel looks along."""
+    for k in range(len(row)):
+        q = number_of(row[k], column[k])
+        # Tiles beside one another look at parts of sky and sun that are far apart.
+        out[k] = q % 4 * 9 + q // 4
+
+
 @numba.njit(**JIT)
-def ask(s, index, row, column, lamps, count, boxes, o, w, ray, asker, light):
+def ask(s, index, number, pixel, lamps, ways, counts, boxes, o, w, ray, asker, light):
     """Add the light of all rays that meet no box; write down the others, to be cast.
 
     Args:
         s: What samples met.
         index: Those that ask (N,).
-        row: Where in the picture they are (N,).
-        column: The same.
+        number: Which set of directions each looks along (N,).
+        pixel: What its dice hang on (N,).
         lamps: The studio.
-        count: Rays to the sky of each.
+        ways: Points of the sphere (sets × C, 3) and directions to the sun (sets × D, 3): see
+            ``sky_points`` and ``sun_ways``.
+        counts: C and D.
         boxes: About all that can be met (B, 2, 3) [m].
-        o: Origins of rays (R, 3), room for N × (count + SUNS) and one more.
+        o: Origins of rays (R, 3), room for N × (C + D) and one more.
         w: Their directions.
         ray: Their dice.
         asker: Of each ray, whose it is among N; those to the sun are counted from N on.
@@ -128,57 +139,57 @@ def ask(s, index, row, column, lamps, count, boxes, o, w, ray, asker, light):
         How many rays are to be cast.
 
     """
-    points, suns, hull = _sky_points(count), _sun_ways(lamps), hull_of(boxes)
-    ways = points, suns
-    return _ask(s, index, row, column, lamps, count, ways, (hull, boxes), o, w, ray, asker, light)
+    hull = hull_of(boxes)
+    return _ask(
+        s, index, number, pixel, lamps, ways, counts, (hull, boxes), o, w, ray, asker, light
+    )
 
 
 @numba.njit(**LOOP)
-def _ask(s, index, row, column, lamps, count, ways, boxes, o, w, ray, asker, light):
-    """As ``ask``; ``ways``: ``_sky_points``, ``_sun_ways``; ``boxes``: the one about all first."""
-    gap, share = np.float32(2e-4 * lamps.size), np.float32(1 / count)
+def _ask(s, index, number, pixel, lamps, ways, counts, boxes, o, w, ray, asker, light):
+    """As ``ask``; ``boxes``: the one about all first."""
     points, suns = ways
+    skies, many_suns = counts
+    gap, share = np.float32(2e-4 * lamps.size), np.float32(1 / skies)
     hull, parts = boxes
     many, n = len(index), 0
     for k in range(many):
-        g, q = index[k], number_of(row[k], column[k])
-        pixel = row[k] * 65536 + column[k]
-        # Tiles beside one another look at parts of sky and sun that are far apart.
-        first = q % 4 * 9 + q // 4
-        for number in range(count):
-            sky_way(s, g, points[first * count + number], w[n])
+        g, first = index[k], number[k]
+        for m in range(skies):
+            sky_way(s, g, points[first * skies + m], w[n])
             for a in range(3):
                 o[n, a] = s.point[g, a] + gap * s.flat[g, a]
             if meets_box(o[n], w[n], hull) and meets_box(o[n], w[n], parts):
-                ray[n], asker[n] = pixel + number, k
+                ray[n], asker[n] = pixel[k] + m, k
                 n += 1
             else:
                 open_way(s, g, w[n], lamps, share, light[k])
-        for number in range(SUNS):
+        for m in range(many_suns):
             if not sunlit(s, g, lamps, o[n]):
                 break
             for a in range(3):
-                w[n, a] = suns[first * SUNS + number, a]
+                w[n, a] = suns[first * many_suns + m, a]
             if meets_box(o[n], w[n], hull) and meets_box(o[n], w[n], parts):
-                ray[n], asker[n] = pixel + number, many + k
+                ray[n], asker[n] = pixel[k] + m, many + k
                 n += 1
             else:
-                light[k, 3] += np.float32(1 / SUNS)
+                light[k, 3] += np.float32(1 / many_suns)
     return n
 
 
 @numba.njit(**JIT)
 def look_up(s, count, w):
     """Write all directions that pixels of one surface look along (WAYS × count, 3)."""
-    points = _sky_points(count)
+    points = sky_points(WAYS * count)
     for q in range(len(points)):
         sky_way(s, 0, points[q], w[q])
 
 
 @numba.njit(**LOOP)
-def answered(s, index, w, asker, free, lamps, count, light):
+def answered(s, index, w, asker, free, lamps, counts, light):
     """Add the light of rays that were cast and got away; see ``ask``."""
-    share, many = np.float32(1 / count), len(index)
+    share, sun = np.float32(1 / counts[0]), np.float32(1 / max(counts[1], 1))
+    many = len(index)
     for n in range(len(free)):
         if not free[n]:
             continue
@@ -186,14 +197,15 @@ def answered(s, index, w, asker, free, lamps, count, light):
         if k < many:
             open_way(s, index[k], w[n], lamps, share, light[k])
         else:
-            light[k - many, 3] += np.float32(1 / SUNS)
+            light[k - many, 3] += sun
 
 
 @numba.njit(**LOOP)
-def mirror(s, index, row, column, d, lamps, o, w, asker, light):
+def mirror(s, index, number, d, lamps, soft, o, w, asker, light):
     """Write what samples mirror of the studio; return how many may mirror objects, too.
 
-    Those rays are written down as in ``ask``. Sharp mirrors follow rays of their own.
+    Those rays are written down as in ``ask``. Sharp mirrors follow rays of their own; what mirrors
+    the studio only is left out where it is not asked for (``soft``).
     """
     gap, n = np.float32(2e-4 * lamps.size), 0
     for k in range(len(index)):
@@ -201,19 +213,19 @@ def mirror(s, index, row, column, d, lamps, o, w, asker, light):
         rough, thing = s.traits[g, 1], s.kind[g] == THING
         if thing and rough <= SHARP:
             continue
-        mirror_way(s, g, d[g], number_of(row[k], column[k]), w[n])
+        mirror_way(s, g, d[g], number[k], w[n])
         if thing and rough < GLOSSY:
             for a in range(3):
                 o[n, a] = s.point[g, a] + gap * s.flat[g, a]
             asker[n] = k
             n += 1
-        else:
+        elif soft:
             studio(w[n], max(rough - 0.15, 0.0) ** 2, lamps, light[k, 4:7])
     return n
 
 
 @numba.njit(**LOOP)
-def _pass(data, normal, depth, on, has, steps, stride, total, out, had):
+def means(data, normal, depth, on, has, steps, stride, total, out, had):
     """Mean over like pixels that have light; ``stride`` (rows, columns) says which way."""
     h, w = on.shape
     for i in range(h):
@@ -257,7 +269,7 @@ def smooth(data, normal, depth, on, has):
     spare, had = np.empty_like(data), np.zeros_like(has)
     total = np.empty(WIDE, np.float32)
     near, far = (-2, -1, 0, 1), (-4, 0, 4)
-    _pass(data, normal, depth, on, has, near, (1, 0), total, spare, had)
-    _pass(spare, normal, depth, on, had, near, (0, 1), total, data, has)
-    _pass(data, normal, depth, on, has, far, (1, 0), total, spare, had)
-    _pass(spare, normal, depth, on, had, far, (0, 1), total, data, has)
+    means(data, normal, depth, on, has, near, (1, 0), total, spare, had)
+    means(spare, normal, depth, on, had, near, (0, 1), total, data, has)
+    means(data, normal, depth, on, has, far, (1, 0), total, spare, had)
+    means(spare, normal, depth, on, had, far, (0, 1), total, data, has)

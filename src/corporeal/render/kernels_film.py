@@ -144,6 +144,14 @@ def filmic(v):
     return min(max(v, 0.0), 1.0)
 
 
+@numba.njit(**INNER)
+def grey(v):
+    """Grey level of filmic light from a table: off by less than .001 levels."""
+    place = min(max(v, np.float32(0)), np.float32(1)) * np.float32(CURVED)
+    n = min(int(place), CURVED - 1)
+    return CURVE[n] + (place - np.float32(n)) * (CURVE[n + 1] - CURVE[n])
+
+
 @numba.njit(**LOOP)
 def edges(s, picture, active, shape, inner, out):
     """Mark pixels beside which another surface is seen in another colour.
@@ -235,11 +243,7 @@ def printed(picture, wanted, row, size, first, out):
         grain = hash01(i, j) - np.float32(0.5)
         for c in range(3):
             v = picture[g, c] * np.float32(1 - 0.10 * rim)
-            # The display's curve from a table: off by less than .001 grey levels.
-            place = min(max(v, np.float32(0)), np.float32(1)) * np.float32(CURVED)
-            n = min(int(place), CURVED - 1)
-            grey = CURVE[n] + (place - np.float32(n)) * (CURVE[n + 1] - CURVE[n])
-            out[i, j, c] = np.uint8(min(max(grey + 0.5 + 0.9 * grain, 0.0), 255.0))
+            out[i, j, c] = np.uint8(min(max(grey(v) + 0.5 + 0.9 * grain, 0.0), 255.0))
 
 
 @numba.njit(**INNER)
