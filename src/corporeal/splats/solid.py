@@ -25,6 +25,7 @@ from corporeal.splats.depth_rendering import DepthRendering, render_depth
 from corporeal.splats.disjoint import disjoint
 from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
+from corporeal.splats.mouths import entered
 from corporeal.splats.outline import fitted, outlined
 from corporeal.splats.photometric import Agreed, agreed, pictured
 from corporeal.splats.sheets import without_sheets
@@ -51,6 +52,8 @@ AWAY = 0.02
 """Vertices stay so many cells away from the middles of cells, so that no triangle is degenerate."""
 PASSES = 8
 """How often the surface is smoothed."""
+MOUTH = 4.0
+"""Radius of the ball that enters what photographs see into [px]."""
 AGAIN = 2
 """How often it is moved to outlines after it was moved to where photographs agree."""
 SEEN = 1e-3
@@ -118,12 +121,12 @@ def solids(
         raise UserError(f"No Gaussian belongs to object {lacking[0]}.")
     with ThreadPool(threads) as pool:
         rendering = render_depth(gaussians, cameras, pool)
-        if views is not None and masks is not None:
-            rendering = deepened(rendering, views, masks, pool)
         own = np.where(object_of_gaussian[rendering.met] < 0, -1, rendering.met)
         rendering, shown = _shown(replace(rendering, met=own), object_of_gaussian, masks)
-        rgb = None if views is None else views.rgb
-        scene = _Scene(gaussians, object_of_gaussian, rendering, shown, rgb, FLOOR)
+        shallow, rgb = None, None if views is None else views.rgb
+        if views is not None and masks is not None:
+            shallow, rendering = rendering, deepened(rendering, views, masks, pool)
+        scene = _Scene(gaussians, object_of_gaussian, rendering, shallow, shown, rgb, FLOOR)
         survey, made = _surveyed(scene, count, pool), []
         for k in range(count):
             made.append(_solid(scene, k, survey, pool))
@@ -137,6 +140,9 @@ class _Scene:
     gaussians: Gaussians
     object_of_gaussian: Int[np.ndarray, " N"]
     rendering: DepthRendering
+    """As deep as photographs see, where there are some."""
+    shallow: DepthRendering | None
+    """As deep as Gaussians are; None: there are no photographs."""
     shown: Int[np.ndarray, "V H W"] | None
     """Whose each pixel is; -1: no object's; None: no masks say it."""
     rgb: UInt8[np.ndarray, "V H W 3"] | None
@@ -241,6 +247,9 @@ def _emptied(
 ) -> tuple[Float[np.ndarray, "X Y Z"], Bool[np.ndarray, "X Y Z"], tuple[str, ...]]:
     """Carve an object; return its distance [m], where it meets others, and warnings."""
     distance = carved(grid, scene.rendering, scene.floor, pool)
+    if scene.shallow is not None:
+        shallow, mouth = carved(grid, scene.shallow, scene.floor, pool), MOUTH * _pixel(scene, k)
+        distance = entered(shallow, distance, mouth / grid.cell)
     cut = _share(distance, grid, scene, k, survey)
     warnings = _cleaned(distance)
     if not (distance < 0).any():
