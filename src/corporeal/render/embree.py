@@ -408,7 +408,7 @@ class Job:
     ) -> Samples:
         """First surface that is not a hole; of samples so many times finer in each direction."""
         stage, s = self.stage, kernels.samples(len(o))
-        o, e = o[index], d[index]
+        o, e = np.take(o, index, axis=0), np.take(d, index, axis=0)
         walked = np.zeros(len(index), np.float32)
         for _ in range(4 * LAYERS):
             prim, u, v, t = hit

@@ -238,7 +238,7 @@ class _Picture(Job):
             near = crop.cut(near, block, part)
             bright = self.closely(rays, hit, near, (block, part), rows)
             there = toned.reshape(*shape, 3)[crop.window(block, part)]
-            there[near] = bright.reshape(*near.shape, 3)[near]
+            np.copyto(there, bright.reshape(there.shape), where=near[..., None])
         size = width, self.camera.height
         kernels_film.printed(toned, kind.reshape(-1), wide[0], size, rows, out)
 
@@ -289,7 +289,7 @@ class _Picture(Job):
         index, many = np.flatnonzero(asked), len(rays.origin)
         # All rays begin at the eye.
         eye = np.broadcast_to(rays.origin[0], (len(index), 3)).copy()
-        found = self.stage.hit(eye, rays.direction[index])
+        found = self.stage.hit(eye, np.take(rays.direction, index, axis=0))
         # Memory that comes zeroed costs nothing where no ray hits.
         hit = np.full(many, -1, np.int32), *(np.zeros(many, np.float32) for _ in range(3))
         for whole, part in zip(hit, found, strict=True):
