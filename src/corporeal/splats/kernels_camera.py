@@ -4,6 +4,7 @@ A camera is a row: camera from world (3 × 4), fx, fy, cx, cy, and whatever come
 """
 
 import numba
+import numpy as np
 
 from corporeal.splats.kernels_basis import JIT
 
@@ -20,3 +21,14 @@ def from_camera(c, x, y, z):
 def pixel(c, right, down, ahead):
     """Return u and v [px] of what is ahead."""
     return c[12] * right / ahead + c[14], c[13] * down / ahead + c[15]
+
+
+@numba.njit(**JIT)
+def between(picture, u, v, out):
+    """Fill out (3,) with the colour at u, v [px from the middle of the first pixel]; in it."""
+    column, row = int(u), int(v)
+    a, b = np.float32(u - column), np.float32(v - row)
+    for q in range(3):
+        above = (1 - a) * picture[row, column, q] + a * picture[row, column + 1, q]
+        below = (1 - a) * picture[row + 1, column, q] + a * picture[row + 1, column + 1, q]
+        out[q] = (1 - b) * above + b * below

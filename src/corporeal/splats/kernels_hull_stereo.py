@@ -4,6 +4,7 @@ import numba
 import numpy as np
 
 from corporeal.splats.kernels_basis import JIT
+from corporeal.splats.kernels_camera import between
 from corporeal.splats.kernels_sweep import depth_there
 
 f4 = np.float32
@@ -84,12 +85,7 @@ def _seen(ray, z, turn, shift, lens, picture, step, patch):
             v = lens[1] * down / ahead + lens[3] - 0.5
             if not (0 <= u < width - 1 and 0 <= v < height - 1):
                 return False
-            c, r = int(u), int(v)
-            a, b = f4(u - c), f4(v - r)
-            for q in range(3):
-                above = (1 - a) * picture[r, c, q] + a * picture[r, c + 1, q]
-                below = (1 - a) * picture[r + 1, c, q] + a * picture[r + 1, c + 1, q]
-                patch[j, i, q] = (1 - b) * above + b * below
+            between(picture, u, v, patch[j, i])
     return True
 
 

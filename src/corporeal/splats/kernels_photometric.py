@@ -4,7 +4,7 @@ import numba
 import numpy as np
 
 from corporeal.splats.kernels_basis import JIT
-from corporeal.splats.kernels_camera import from_camera, pixel
+from corporeal.splats.kernels_camera import between, from_camera, pixel
 
 f4 = np.float32
 REACH = 2
@@ -104,12 +104,7 @@ def _sampled(x, y, z, across, along, step, c, picture, patch):
             u, v = u - 0.5, v - 0.5
             if not (0 <= u < width - 1 and 0 <= v < height - 1):
                 return False
-            col, row = int(u), int(v)
-            a, b = f4(u - col), f4(v - row)
-            for q in range(3):
-                above = (1 - a) * picture[row, col, q] + a * picture[row, col + 1, q]
-                below = (1 - a) * picture[row + 1, col, q] + a * picture[row + 1, col + 1, q]
-                patch[s, q] = (1 - b) * above + b * below
+            between(picture, u, v, patch[s])
             s += 1
     return True
 
