@@ -31,9 +31,9 @@ def entered(
     if not taken.any():
         return after
     away = _away(before >= 0, after >= 0, radius)
-    piece, count = ndimage.label(taken & (away > 0))
-    deepest = ndimage.maximum(away, piece, np.arange(count + 1))
-    cavern = (deepest > CORNER * radius) & (np.arange(count + 1) > 0)
+    piece = np.asarray(measure.label(taken & (away > 0), connectivity=1))
+    number = np.arange(piece.max() + 1)
+    cavern = (np.asarray(ndimage.maximum(away, piece, number)) > CORNER * radius) & (number > 0)
     return np.where(cavern[piece], before, after)
 
 
