@@ -68,6 +68,11 @@ def at_speed(material: Material, speed: float) -> Material:
     return replace(material, **changed)
 
 
+def compliance_of(material: Material) -> float:
+    """(1 - ν²)/E, what a material adds to 1/E* of a contact [1/Pa] (Johnson, 1985, §4.2)."""
+    return (1.0 - material.poisson**2) / material.young
+
+
 def yielding(a: Material, b: Material, speed: float) -> float:
     """Restitution of two bodies of which at least one yields where it is struck [-], at most 1.
 
@@ -84,7 +89,7 @@ def yielding(a: Material, b: Material, speed: float) -> float:
     if not weak or speed <= 0.0:
         return 1.0
     strength = min(weak)
-    plane = 1.0 / sum((1.0 - m.poisson**2) / m.young for m in (a, b))
+    plane = 1.0 / sum(compliance_of(m) for m in (a, b))
     blow = 2.0 / 3.0 * pi * max(a.density, b.density) * speed**2 / strength
     return min(1.0, 3.8 * sqrt(strength / plane) * blow**-0.125)
 

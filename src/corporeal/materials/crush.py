@@ -15,7 +15,7 @@ from math import log, pi, sqrt
 
 from scipy.optimize import brentq
 
-from corporeal.materials.blow import at_speed
+from corporeal.materials.blow import at_speed, compliance_of
 from corporeal.materials.contact import BlowLaw, share
 from corporeal.materials.rebound import rebound
 from corporeal.typed import typed
@@ -146,7 +146,7 @@ def crushed(ball: Ball, sheet: Sheet, speed: float, packed: float) -> float:
     blow = 0.5 * ball.mass * speed**2
     if blow <= 0.0:
         return sqrt(back)
-    of_ball = (1.0 - struck.poisson**2) / struck.young
+    of_ball = compliance_of(struck)
     both = of_ball / (1.0 - of_sheet)
     contact = _Contact(sheet.layers.crush_pa, both, of_ball, ball.radius)
     widest = _root(contact.depth, sheet.depth)

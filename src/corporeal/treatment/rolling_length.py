@@ -16,6 +16,7 @@ from math import pi, sqrt
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.materials.blow import compliance_of
 from corporeal.materials.rebound import rebound
 from corporeal.mpm.problem import GRAVITY, Body
 from corporeal.types import Material
@@ -88,7 +89,7 @@ def rolling_length(roller: Roller, own: Material, other: Material) -> float:
     with e what a ball of it keeps in a blow (``materials.rebound``). Hertz: a³ = 3 N R/(4 E*) of a
     ball, a² = 4 N R/(π L E*) of a cylinder.
     """
-    soft = [(1.0 - m.poisson**2) / m.young if m.young > 0 else 0.0 for m in (own, other)]
+    soft = [compliance_of(m) if m.young > 0 else 0.0 for m in (own, other)]
     taken = [1.0 - rebound(min(m.loss, 2.0)) ** 2 for m in (own, other)]
     both = sum(soft)
     if both == 0.0:

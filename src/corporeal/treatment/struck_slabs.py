@@ -10,12 +10,13 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from corporeal.geometry.falls import FLOOR
+from corporeal.materials.blow import compliance_of
 from corporeal.mpm.laws import MENU
 from corporeal.treatment.blow_frequency import compliance
 from corporeal.treatment.dents import dent_of_layer
 from corporeal.treatment.lossy_partners import largest_of
 from corporeal.treatment.part import COMPACT, Landing, Motion, PartGeometry, is_flat_wall
-from corporeal.types import Material, Treatment
+from corporeal.types import Treatment
 
 TOO_DEEP = 2.0
 """Dent as simulated over that of life, from which rigid is nearer to the truth [-]."""
@@ -52,7 +53,12 @@ def pressed_slabs(
             if treatment.kind == "shell" and beside.kind != "rigid":
                 continue
             dents = _Dents(
-                _dent(ball, lands, _of(part.material) + _of(ball.material), _thickness(part)),
+                _dent(
+                    ball,
+                    lands,
+                    compliance_of(part.material) + compliance_of(ball.material),
+                    _thickness(part),
+                ),
                 _dent(
                     ball,
                     lands,
@@ -95,10 +101,6 @@ def _lies_flat(part: PartGeometry, motion: Motion, treatment: Treatment) -> bool
 
 def _dent(ball: PartGeometry, lands: Landing, plane: float, thick: float) -> float:
     return dent_of_layer(lands.mass, 0.5 * ball.size[1], lands.speed, 1.0 / plane, thick)
-
-
-def _of(material: Material) -> float:
-    return (1.0 - material.poisson**2) / material.young
 
 
 def _why(speed: float, dents: _Dents) -> str:
