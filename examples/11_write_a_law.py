@@ -13,14 +13,14 @@ from corporeal.types import Law
 
 PARTS = Path(__file__).parent / "law"
 NAME = "saint_venant_kirchhoff"
-NEXT = "\n\n@dataclass(frozen=True)\nclass Range"  # what follows the laws' numbers
+NEXT = "\n\n@dataclass(frozen=True)\nclass Material:"  # what follows the laws' numbers
 
 
 def write_law(package: Path) -> None:
     """Write the law's file, its twin in C++, its number and a material that follows it."""
     shutil.copy(PARTS / f"{NAME}.py", package / "mpm/laws")
     insert(package / "mpm/formulas/laws.h", "// Who chooses", (PARTS / "laws.h").read_text())
-    insert(package / "types.py", NEXT, f"    {NAME.upper()} = {len(Law)}\n")
+    insert(package / "types/matter.py", NEXT, f"    {NAME.upper()} = {len(Law)}\n")
     insert(package / "materials/library.toml", "[gold]", (PARTS / "library.toml").read_text())
 
 

@@ -38,7 +38,7 @@ CACHE = "CORPOREAL_CACHE"
 KNOWN: dict[str, Any] = {
     name: kind
     for name, kind in vars(types).items()
-    if isinstance(kind, type) and kind.__module__ == types.__name__
+    if isinstance(kind, type) and kind.__module__.startswith(f"{types.__name__}.")
 }
 
 
@@ -237,7 +237,7 @@ def _plain_leaf(value: Any) -> Any:
 
 
 def save(path: Path, value: Any) -> None:
-    """Save any value made of the types in ``types.py``, containers, arrays and numbers."""
+    """Save any value made of the types in ``types``, containers, arrays and numbers."""
     arrays: dict[str, Any] = {}
     tree = json.dumps(_encode(value, arrays), allow_nan=True)
     with writing(path):
