@@ -39,7 +39,7 @@ from corporeal.treatment.object_masses import (
     masses_not_as_named,
     walls_drawn_too_thick,
 )
-from corporeal.types import MaterialField, Scene
+from corporeal.types import Inventory, MaterialField, Parts, Scene
 
 LIST = Path(__file__).parent / "recognition" / "names.toml"
 WITHIN = 2.5
@@ -86,6 +86,8 @@ class Weighed:
     anatomies: list[Anatomy]
     makes: dict[int, Make]
     field: MaterialField
+    inventory: Inventory
+    parts: Parts
 
     @property
     def masses(self) -> list[float]:
@@ -122,7 +124,7 @@ def weigh(mesh: trimesh.Trimesh, path: Path, metres_per_unit: float = 1.0) -> We
     anatomies = examine(scene, parts, 0)
     field, leaf = ground_weighed(scene, parts, inventory, GroundConfig()), find("leaf_tissue")
     makes = composed(scene, anatomies, field, leaf.pick(leaf.typical()), 0)
-    return Weighed(scene, anatomies, makes, field)
+    return Weighed(scene, anatomies, makes, field, inventory, parts)
 
 
 def look_at(row: dict, folder: Path, metres_per_unit: float = 1.0) -> Found:

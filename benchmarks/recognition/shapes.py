@@ -16,20 +16,23 @@ def shape(text: str) -> trimesh.Trimesh:
     """Make the mesh that a line of the list describes.
 
     Args:
-        text: Bodies, separated by semicolons: a kind, its sizes, and where it stands along x and
-            up; all in metres.
+        text: Bodies, separated by semicolons: a kind, its sizes, and where it stands along x, up
+            and along y; all in metres. "turned" has the outline of a whole body of revolution
+            instead: radius and height of each of its points.
 
     """
     return trimesh.util.concatenate([_body(one.split()) for one in text.split(";")])
 
 
 def _body(words: list[str]) -> trimesh.Trimesh:
-    make, count = KINDS[words[0]]
     numbers = [float(w) for w in words[1:]]
+    if words[0] == "turned":
+        return _turned(*zip(numbers[::2], numbers[1::2], strict=True))
+    make, count = KINDS[words[0]]
     if words[0] == "ball" and len(numbers) == 1:
         numbers *= 3
-    x, up = ([*numbers[count:], 0.0, 0.0])[:2]
-    return make(*numbers[:count]).apply_translation((x, 0, up))
+    x, up, y = ([*numbers[count:], 0.0, 0.0, 0.0])[:3]
+    return make(*numbers[:count]).apply_translation((x, y, up))
 
 
 def block(length: float, width: float, height: float) -> trimesh.Trimesh:
