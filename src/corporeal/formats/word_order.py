@@ -52,14 +52,19 @@ def is_several(words: Sequence[str]) -> bool:
 
 
 def _turned(words: list[str], known: Vocabulary, phrases: Phrases) -> list[str]:
-    """Put what stands behind a preposition before the thing, or leave it out."""
+    """Put what stands behind a preposition before the thing, or leave it out.
+
+    What only describes stays in front: a full bottle of wine is a full wine bottle.
+    """
     for k in range(1, len(words) - 1):
         before, behind = words[:k], words[k + 1 :]
         several = (before[-1],) in _phrases("several")
         if _within(words, k, phrases) or not (several or any(w in known.words for w in before)):
             continue
         if (words[k],) in _phrases("of") or _is_of_matter(words[k], behind, known):
-            return _turned([*behind, *(before[:-1] if several else before)], known, phrases)
+            own = before[:-1] if several else before
+            n = next((n for n, w in enumerate(own) if w in known.words), 0)
+            return _turned([*own[:n], *behind, *own[n:]], known, phrases)
         if (words[k],) in (*_phrases("beside"), *_phrases("made")) and _is_thing(
             before, known, phrases
         ):
