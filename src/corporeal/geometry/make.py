@@ -16,6 +16,7 @@ from corporeal.types import Material, MaterialField, PartWords, Structure, Swell
 SHEET_SHARE = 0.01
 """Thickness of an open sheet, of its middle extent, where nobody states it."""
 DRAWN = "as its mesh shows"
+OF_NAME = "as things of its name usually have"
 JUDGED = {
     "annotation": "as your annotation says",
     "recording": "as a recorded answer says",
@@ -378,7 +379,8 @@ def wall_of(
 
     """
     if words.thickness:
-        return words.thickness, JUDGED.get(words.built_by, "as is stated")
+        whose = JUDGED.get(words.built_by, "as is stated")
+        return words.thickness, OF_NAME if words.wall_usual else whose
     by = judge(words)
     if by and structure.thickness:
         return structure.thickness, JUDGED[by]

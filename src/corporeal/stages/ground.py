@@ -329,7 +329,8 @@ class _Wall:
 
 def _wall(material: Material, words: PartWords) -> _Wall:
     if words.thickness:
-        return _Wall(words.thickness, f"Its thickness, {_mm(words.thickness)} mm, is stated.")
+        whose = "usual of such things" if words.wall_usual else "stated"
+        return _Wall(words.thickness, f"Its thickness, {_mm(words.thickness)} mm, is {whose}.")
     if material.shell_thickness:
         ground = material.grounds["shell_thickness"]
         where = f"{_mm(ground.value)} mm, in the range of {material.name}: " + " to ".join(

@@ -201,7 +201,12 @@ def built(annotation: Annotation, words: PartWords) -> PartWords:
         bare = replace(words, structure=structure, thickness=None, contents=None, fill=None)
         solidity = annotation.solidity if structure == "packed" else None
         return replace(bare, solidity=solidity, inflation=None)
-    words = replace(words, structure=structure, thickness=annotation.thickness or words.thickness)
+    words = replace(
+        words,
+        structure=structure,
+        thickness=annotation.thickness or words.thickness,
+        wall_usual=words.wall_usual and annotation.thickness is None,
+    )
     pressure = words.inflation if annotation.inflation is None else annotation.inflation
     words = replace(words, inflation=pressure if structure in SEALABLE else None)
     if structure != "filled":

@@ -187,7 +187,12 @@ def hollowed(
         return words
     wall = _moulded(words, evidence)
     if wall is not None and not from_pictures:
-        return replace(words, structure="shell", thickness=words.thickness or wall)
+        return replace(
+            words,
+            structure="shell",
+            thickness=words.thickness or wall,
+            wall_usual=words.wall_usual or words.thickness is None,
+        )
     if from_pictures and any(open_ware(name.words) for name in evidence.general):
         return replace(words, structure="sheet", wall_unseen=True)
     named = evidence.general
@@ -299,7 +304,8 @@ def _called_solid(answer: PartWords, evidence: Evidence) -> PartWords:
     named = [name for name in evidence.general if "solid" in name.words]
     if answer.structure != "shell" or not any(t.blown for n in named for t in heads(n.words)):
         return answer
-    return replace(answer, structure="solid", thickness=None, inflation=None, rebound=None)
+    bare = replace(answer, structure="solid", thickness=None, wall_usual=False)
+    return replace(bare, inflation=None, rebound=None)
 
 
 def _of_metal(terms: list[Term], evidence: Evidence) -> list[Term]:
@@ -324,6 +330,7 @@ def _answer(terms: list[Term], name: str, factor: float) -> PartWords:
         first.material,
         structure="filled" if first.contents else shell,
         thickness=first.thickness,
+        wall_usual=first.thickness is not None,
         margin=round(first.margin * factor, 3),
         reason=reason,
         contents=first.contents,

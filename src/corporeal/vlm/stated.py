@@ -87,6 +87,7 @@ def as_stated(words: PartWords, surfaces: Iterable[Surface]) -> PartWords:
         words,
         structure=structure,
         thickness=_length(row.get("thickness")) or None,
+        wall_usual=False,
         contents=contents if isinstance(contents, str) else None,
         fill=float(fill) if isinstance(fill, int | float) and 0 < fill <= 1 else None,
     )
@@ -104,9 +105,11 @@ def walled(words: PartWords, thickness: float | None) -> PartWords:
     if thickness is None:
         return words
     if thickness == 0:
-        return replace(words, structure="solid", thickness=None, contents=None, fill=None)
+        words = replace(words, structure="solid", thickness=None, contents=None, fill=None)
+        return replace(words, wall_usual=False)
     filled = words.structure == "filled"
-    return replace(words, structure="filled" if filled else "shell", thickness=thickness)
+    built = "filled" if filled else "shell"
+    return replace(words, structure=built, thickness=thickness, wall_usual=False)
 
 
 def sealed(words: PartWords, stated: float | None, usual: float | None) -> PartWords:
