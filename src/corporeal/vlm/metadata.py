@@ -42,6 +42,10 @@ METALLIC = 0.5
 """Metallic value from which most of a surface is metal: a picture's value is its mean."""
 BARE = frozenset("stainless_steel clad_steel cast-iron brass bronze pewter silver".split())
 """Metals that are seldom painted: beside what is usually of them, a metal's name is no colour."""
+STUFFING = frozenset(("seat_foam", "memory_foam", "fibre_fill"))
+"""What upholstered things are of, behind their covers."""
+COVERS = frozenset("leather synthetic_leather cotton synthetic_textile felt".split())
+"""What comes in sheets, and covers what is upholstered: a leather sofa is no block of leather."""
 WORKS = "machinery"
 """What a machine's case holds: no goods that somebody takes out."""
 LARGEST_SOLID_CASTING = 0.2
@@ -291,10 +295,13 @@ def _weighed(answer: PartWords, evidence: Evidence) -> PartWords:
 
 
 def _emptied(answer: PartWords, evidence: Evidence) -> PartWords:
-    """Leave contents only in goods that are one part and are not called empty; and in machines."""
+    """Leave contents only in goods that are one part and are not called empty.
+
+    What works in a machine stays, and what stuffs upholstery.
+    """
     named = {w for name in (*evidence.own, *evidence.general) for w in name.words}
     whole = evidence.alone and not named & emptied()
-    if answer.contents in (None, WORKS) or whole:
+    if answer.contents in (None, WORKS, *STUFFING) or whole:
         return answer
     return replace(answer, structure="shell", contents=None, fill=None)
 
@@ -428,8 +435,17 @@ def _is_purpose(term: Term, name: Name, things: Sequence[Term]) -> bool:
 def _made_as(substance: Term, thing: Term) -> Term:
     """Return a substance built as an object is; how thick depends on what it is usually made of.
 
-    A ball of rubber is blown up, and one of steel is solid.
+    A ball of rubber is blown up, and one of steel is solid. A sofa of leather is covered with it,
+    as thick as that usually is.
     """
+    if substance.material in COVERS and thing.material in STUFFING:
+        return replace(
+            substance,
+            before=len(thing.phrase),
+            contents=thing.material,
+            fill=1.0,
+            every=thing.every,
+        )
     same = kin(substance.material, thing.material)
     if not made_hollow(thing, substance.material):
         return replace(substance, before=len(thing.phrase))
