@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from corporeal import materials
-from corporeal.materials.ensemble import _shares, otherwise, sample, triangle
+from corporeal.materials.ensemble import NAMED_WALLS, _shares, otherwise, sample, triangle
 from corporeal.types import (
     Hypothesis,
     Inventory,
@@ -251,3 +251,20 @@ def test_a_small_library_can_be_drawn_from_too():
     odd = PartWords("cup", "steel", hypotheses=(Hypothesis("phlogiston", None, 1.0),))
     kept = otherwise(inventory(odd), np.random.default_rng(0), "reference")
     assert kept.objects[0].parts[0].material == "steel"
+
+
+def test_a_wall_that_is_only_usual_of_a_name_is_drawn_and_a_stated_one_is_not():
+    shell = PartWords("safe", "steel", "shell", thickness=0.005, wall_usual=True)
+    stated = replace(shell, wall_usual=False)
+    ball = replace(shell, inflation=80e3)
+
+    def walls(words):
+        field = field_of("steel", structures=(Structure("shell", 0.005),), words=(words,))
+        drawn = draws(field, [0])
+        assert all(d.words[0].thickness == d.structures[0].thickness for d in drawn)
+        return np.log([d.structures[0].thickness / 0.005 for d in drawn])
+
+    assert walls(shell).std() == pytest.approx(NAMED_WALLS, rel=0.2)
+    assert np.median(walls(shell)) == pytest.approx(0.0, abs=0.1)
+    assert not walls(stated).any()
+    assert not walls(ball).any()

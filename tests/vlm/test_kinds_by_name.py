@@ -89,3 +89,36 @@ def test_the_wall_of_a_balloon_is_that_of_one_blown_up():
     """A party balloon of 28 cm weighs 3 g without its air; it weighed 74 g."""
     rubber, area = 930.0, 3.1416 * 0.28**2
     assert 2e-3 < rubber * area * (built("balloon").thickness or 1.0) < 5e-3
+
+
+@pytest.mark.parametrize(
+    ("name", "cover", "inside"),
+    [
+        ("leather pouf", "leather", "seat_foam"),
+        ("sofa_leather_brown", "leather", "seat_foam"),
+        ("Velvet Cushion", "cotton", "fibre_fill"),
+        ("faux leather armchair", "synthetic_leather", "seat_foam"),
+    ],
+)
+def test_what_is_upholstered_is_covered_with_the_sheet_of_its_name(name, cover, inside):
+    """A pouf of leather was a block of leather and weighed 70 kg."""
+    found = built(name)
+    assert (found.material, found.structure) == (cover, "filled")
+    assert (found.contents, found.fill, found.thickness) == (inside, 1.0, None)
+
+
+def test_what_is_not_upholstered_is_of_the_leather_of_its_name():
+    assert built("leather belt").contents is None
+    assert built("wooden sofa").contents is None
+
+
+def test_the_wall_of_a_name_is_usual_and_not_stated():
+    assert built("mailbox").wall_usual
+    assert built("plastic garden chair").wall_usual
+    assert not built("brick").wall_usual
+
+
+def test_a_tank_is_hollow_and_how_large_a_safe_is_tells_its_wall():
+    assert built("old copper tank").structure == "shell"
+    assert built("scuba tank", 0.6).thickness == 0.012
+    assert (built("mini safe", 0.25).thickness, built("safe", 0.8).thickness) == (0.002, 0.005)
