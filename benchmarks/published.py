@@ -101,8 +101,9 @@ def summary(found: Sequence[Found]) -> str:
     inside = sum(f.low <= f.true <= f.high for f in found)
     width = np.median([f.high / f.low for f in found])
     return (
-        f"{len(found)} things: ALDE {off.mean():.3f}, median factor {exp(float(np.median(off))):.2f}; "
-        f"within a factor of 1.5 {(off <= log(1.5)).mean():.0%}, of 2 {(off <= log(2)).mean():.0%}; "
+        f"{len(found)} things: ALDE {off.mean():.3f}, median factor "
+        f"{exp(float(np.median(off))):.2f}; within a factor of 1.5 "
+        f"{(off <= log(1.5)).mean():.0%}, of 2 {(off <= log(2)).mean():.0%}; "
         f"inside the interval {inside / len(found):.0%}, its median width {width:.2f}; unknown "
         f"{sum(not f.known for f in found)}; off by more than {OFF:g} "
         f"{sum(abs(f.off) > log(OFF) for f in found)}, of these known and without a warning "

@@ -3,7 +3,10 @@
 import pytest
 
 from corporeal.types import SceneObject
+from corporeal.vlm.annotation import Annotation
+from corporeal.vlm.annotation import built as annotated
 from corporeal.vlm.metadata import Evidence, hollowed, recognise
+from corporeal.vlm.stated import walled
 from handmade import plain
 
 
@@ -116,6 +119,10 @@ def test_the_wall_of_a_name_is_usual_and_not_stated():
     assert built("mailbox").wall_usual
     assert built("plastic garden chair").wall_usual
     assert not built("brick").wall_usual
+    assert not walled(built("mailbox"), 0.003).wall_usual
+    thin = Annotation(None, thickness=0.003)
+    assert not annotated(thin, built("mailbox")).wall_usual
+    assert annotated(Annotation("steel"), built("mailbox")).wall_usual
 
 
 def test_a_tank_is_hollow_and_how_large_a_safe_is_tells_its_wall():

@@ -176,7 +176,7 @@ class PartWords:
     """Whether its surface need not show the inner face of its wall, as pictures do not where that
     is plain: how thick the surface draws it tells nothing."""
     wall_usual: bool = False
-    """Whether ``thickness`` is that of most things of its name, and nobody stated it of this one."""
+    """Whether ``thickness`` is that of most things of its name: nobody stated it of this one."""
 
     @property
     def alternatives(self) -> tuple[tuple[str, float], ...]:
