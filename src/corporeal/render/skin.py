@@ -11,6 +11,7 @@ from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.geometry.mesh import joined
+from corporeal.mpm.laws.kinematics import determinant
 from corporeal.render import kernels_skin
 from corporeal.render.look import positions, vertex_normals
 from corporeal.types import Frame, Particles, Parts, Scene
@@ -184,7 +185,7 @@ def bounded(
     kernels_skin.strained(F, np.minimum(1 - low**2, high**2 - 1) ** 2, outside)
     if outside.any():
         U, s, Vt = np.linalg.svd(F[outside])
-        flip = np.linalg.det(U) * np.linalg.det(Vt) < 0
+        flip = determinant(U) * determinant(Vt) < 0
         U[flip, :, 2] *= -1
         F = F.copy()
         s = np.clip(s, low[outside, None], high[outside, None])
