@@ -100,6 +100,8 @@ class Stage:
         counts = [len(s.triangles) for s in scene.surfaces]
         self.starts = np.cumsum([0, *counts[:-1]])
         """First triangle of each surface."""
+        self.corners = self.look.triangles.astype(object)
+        """Of all triangles, as objects of Python: those of every pose are copied one by one."""
         self.scene = self._built()
         self.shown = True
 
@@ -134,6 +136,7 @@ class Stage:
         there.look = grown(look, ~gone, np.concatenate(triangles), np.concatenate(finish), first)
         there.vertices = np.ascontiguousarray(np.concatenate(vertices))
         there.normals = np.ascontiguousarray(np.concatenate(normals))
+        there.corners = there.look.triangles.astype(np.uint32)
         there.scene = there._built()
         return there
 
@@ -160,8 +163,7 @@ class Stage:
         scene = EmbreeScene()
         if len(self.look.triangles):
             # Numbers that Python itself has are copied in half the time.
-            corners = self.look.triangles.astype(np.uint32)
-            TriangleMesh(scene, self.vertices.astype(np.float64), corners)
+            TriangleMesh(scene, self.vertices.astype(np.float64), self.corners)
             # Embree builds at the first ray; several threads must not be the first at once.
             scene.run(np.zeros((1, 3), np.float32), np.ones((1, 3), np.float32))
         return scene

@@ -136,11 +136,11 @@ def _staged(played: Played, config: FilmConfig) -> _Staged:
     scene, field = prepared.scene, prepared.field
     skin = bind(scene, prepared.parts, prepared.particles, granular(field), fluid(field))
     reel = reel_of(skin, scene, prepared.particles, trajectory)
-    size = config.width, config.height
+    size, stage = (config.width, config.height), Stage(scene)
     if config.view is None:
-        config = replace(config, view=_clear_view(scene, skin, reel, trajectory, size))
+        config = replace(config, view=_clear_view(scene, stage, skin, reel, trajectory, size))
     troupe = _Troupe(
-        Stage(scene),
+        stage,
         skin,
         _puppet(config, played),
         _paint(config.colour_by, played),
@@ -160,12 +160,17 @@ def moments(
 
 
 def _clear_view(
-    scene: Scene, skin: Skin, reel: Reel, trajectory: Trajectory, size: tuple[int, int]
+    scene: Scene,
+    stage: Stage,
+    skin: Skin,
+    reel: Reel,
+    trajectory: Trajectory,
+    size: tuple[int, int],
 ) -> Vector | None:
     """Return a direction in which objects do not hide behind or inside of one another."""
     if len(scene.objects) < 2:
         return None
-    last, stage = len(trajectory.frames) - 1, Stage(scene)
+    last = len(trajectory.frames) - 1
     numbers = dict.fromkeys(round(share * last) for share in SOUNDED)
     stages = [stage.posed(*skin.pose(trajectory.frames[k])) for k in numbers]
     owner = np.repeat([s.object for s in scene.surfaces], [len(s.vertices) for s in scene.surfaces])
