@@ -36,9 +36,15 @@ ENOUGH = 4
 
 
 @numba.njit(**INNER)
+def asking(row):
+    """Which of every four pixels in a row asks for light: one in each row and column of 4 × 4."""
+    return (2 * row + row % 4 // 2) % 4
+
+
+@numba.njit(**INNER)
 def asks(row, column):
-    """Whether a pixel asks for light: one in each row and column of 4 × 4."""
-    return column % 4 == (2 * row + row % 4 // 2) % 4
+    """Whether a pixel asks for light."""
+    return column % 4 == asking(row)
 
 
 @numba.njit(**LOOP)
@@ -62,12 +68,14 @@ def chosen(s, on, known, first, out):
             continue
         alike = 0
         for y in range(max(i - 2, 0), min(i + 2, h)):
-            for x in range(max(j - 2, 0), min(j + 2, w)):
-                if asks(row + y, column + x) and known[y, x]:
-                    q = y * w + x
-                    near = abs(s.depth[g] - s.depth[q]) < FARTHEST * s.depth[g]
-                    if s.kind[q] != NOTHING and near and dot(s.normal[g], s.normal[q]) > ALIKE:
-                        alike += 1
+            x = j - 2 + (asking(row + y) - column - j + 2) % 4
+            if x < 0 or x >= w or not known[y, x]:
+                break
+            q = y * w + x
+            near = abs(s.depth[g] - s.depth[q]) < FARTHEST * s.depth[g]
+            if s.kind[q] == NOTHING or not near or dot(s.normal[g], s.normal[q]) <= ALIKE:
+                break
+            alike += 1
         out[g] = alike < ENOUGH
 
 

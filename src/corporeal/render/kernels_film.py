@@ -234,16 +234,18 @@ def printed(picture, wanted, row, size, first, out):
 
     """
     width, height = size
-    for g in range((first[0] - row) * width, (first[1] - row) * width):
-        if not wanted[g]:
-            continue
-        i, j = g // width + row, g % width
-        y, x = 2 * i / (height - 1) - 1, 2 * j / (width - 1) - 1
-        rim = min(max(x * x + y * y - 0.5, 0.0), 2.0) / 1.5
-        grain = hash01(i, j) - np.float32(0.5)
-        for c in range(3):
-            v = picture[g, c] * np.float32(1 - 0.10 * rim)
-            out[i, j, c] = np.uint8(min(max(grey(v) + 0.5 + 0.9 * grain, 0.0), 255.0))
+    for i in range(first[0], first[1]):
+        y = 2 * i / (height - 1) - 1
+        for j in range(width):
+            g = (i - row) * width + j
+            if not wanted[g]:
+                continue
+            x = 2 * j / (width - 1) - 1
+            rim = min(max(x * x + y * y - 0.5, 0.0), 2.0) / 1.5
+            grain = hash01(i, j) - np.float32(0.5)
+            for c in range(3):
+                v = picture[g, c] * np.float32(1 - 0.10 * rim)
+                out[i, j, c] = np.uint8(min(max(grey(v) + 0.5 + 0.9 * grain, 0.0), 255.0))
 
 
 @numba.njit(**INNER)
