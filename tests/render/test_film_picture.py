@@ -4,7 +4,7 @@ import trimesh
 from test_embree import RED, ball, front, scene, sheet
 
 from corporeal.geometry.srgb import encoded
-from corporeal.render import cull, embree
+from corporeal.render import cull, embree, film_picture
 from corporeal.render.arriving import Asker
 from corporeal.render.camera import Aim
 from corporeal.render.embree import Job, Sampling, Stage, identify, render
@@ -60,6 +60,21 @@ def test_a_picture_hangs_neither_on_threads_nor_on_the_one_before():
     caster.picture(stage("a mirror beside a ball"), front(), "draft", 1)
     after = caster.picture(stage("a red ball"), front(), "draft", 3)
     assert np.array_equal(after, FilmCaster().picture(stage("a red ball"), front(), "draft", 1))
+
+
+def test_the_empty_studio_hangs_on_no_band(monkeypatch):
+    near = front()
+    tall = Aim(near.eye, near.target, 30.0, 64, 240)  # so that rows beside one another are alike
+
+    def cast() -> tuple[np.ndarray, ...]:
+        caster = FilmCaster()
+        picture = caster.picture(stage("a red ball"), tall, "draft", 1)
+        assert caster._empty is not None
+        return picture, caster._empty.mirrored, caster._empty.glances, caster._empty.wall
+
+    whole = cast()
+    monkeypatch.setattr(film_picture, "EMPTY_BAND", 2)
+    assert all(np.array_equal(a, b) for a, b in zip(cast(), whole, strict=True))
 
 
 def test_a_camera_that_moves_sees_another_floor():

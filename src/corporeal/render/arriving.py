@@ -20,9 +20,11 @@ RIM = SIDE // 2
 """Of those, how many at the rim only help others."""
 SAME = 1e-3
 """Share of the sun that is as good as none of it."""
-HANGS_ON = 37
+SHARED = 15
+"""Pixels as far away may change the light that is shared: 8 by its means, 7 by who shares it."""
+HANGS_ON = 22 + SHARED
 """Pixels as far away may change a pixel's light: 10 by means over those that asked again, 6 by
-``AROUND``, 6 by ``APART``, 8 by light that is shared, and 7 by which pixels share it."""
+``AROUND``, 6 by ``APART``, and what is shared hangs on more."""
 
 
 @dataclass(frozen=True)
@@ -149,4 +151,5 @@ class Asker:
         kernels_doubt.together(index, times, found, light.reshape(-1, WIDE))
         # Those at the rim only help others: not all that they would be smoothed over asked.
         inner = np.flatnonzero(kernels_film.widened(doubt, AROUND - RIM) & arrived.known)
-        kernels_doubt.settle(s, inner, light, *surface, asks, AGAIN, arrived.light)
+        room = np.zeros_like(light), np.empty_like(light), np.empty_like(light)
+        kernels_doubt.settle(s, inner, light, *surface, asks, AGAIN, arrived.light, room)

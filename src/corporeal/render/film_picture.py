@@ -26,7 +26,7 @@ from corporeal.render import (
     kernels_floor,
     kernels_light,
 )
-from corporeal.render.arriving import HANGS_ON, Arrived, Asker
+from corporeal.render.arriving import HANGS_ON, SHARED, Arrived, Asker
 from corporeal.render.camera import Aim
 from corporeal.render.embree import (
     BAND,
@@ -51,6 +51,10 @@ REACH = 7
 """Pixels over which the light filter spreads what one of them met."""
 HALO = AROUND + 1 + -(-HANGS_ON // TILE)
 """Tiles above and below a band that what is seen in it hangs on."""
+EMPTY_HALO = -(-SHARED // TILE)
+"""The same of the empty studio: what hides nothing lets nobody ask again."""
+EMPTY_BAND = 24
+"""Tiles of the empty studio that are cast at once: its memory is that of a part of the picture."""
 FILTER = 0.65
 """Pixels that textures are filtered over: their pyramid's levels are blurred as they are."""
 
@@ -132,7 +136,7 @@ class FilmCaster:
         pool = self._workers(threads)
         known = self._empty
         if known is None or (known.aim, known.place) != (camera, _place(stage)):
-            known = self._empty = _emptied(stage, camera, PLANS[quality], rows, pool)
+            known = self._empty = _emptied(stage, camera, PLANS[quality], pool)
         out = known.printed.copy()
         job = _Picture(stage, camera, PLANS[quality], known)
         for _ in pool.map(lambda r: job.band(r, out), rows):
@@ -148,10 +152,11 @@ def _emptied(
     stage: Stage,
     camera: Aim,
     plan: _Plan,
-    rows: list[tuple[int, int]],
     pool: ThreadPoolExecutor,
 ) -> _Empty:
     """Cast the studio without objects."""
+    band = EMPTY_BAND * TILE
+    rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
     pixels, cleared = camera.width * camera.height, stage.cleared()
     rays = Job(cleared, camera, Sampling(1, 1, 1)).rays((0, camera.height))
     # Above the horizon no floor is seen.
@@ -179,9 +184,9 @@ class _Picture(Job):
         size = camera.width, camera.height
         self.outlined = cull.outlined(stage, self.eye, self.frame, self.tangent, size)
 
-    def wide(self, rows: tuple[int, int]) -> tuple[int, int]:
-        """Rows with those above and below that the light filter looks at."""
-        halo = HALO * TILE
+    def wide(self, rows: tuple[int, int], tiles: int = HALO) -> tuple[int, int]:
+        """Rows with those above and below, so many tiles, that the light filter looks at."""
+        halo = tiles * TILE
         return max(rows[0] - halo, 0), min(rows[1] + halo, self.camera.height)
 
     def rays_of(self, here: slice) -> Rays:
@@ -191,7 +196,7 @@ class _Picture(Job):
     def empty_band(self, rows: tuple[int, int]) -> None:
         """Cast rows of the empty studio."""
         width, height = self.camera.width, self.camera.height
-        wide = self.wide(rows)
+        wide = self.wide(rows, EMPTY_HALO)
         rays = self.rays_of(slice(wide[0] * width, wide[1] * width))
         light = np.empty((len(rays.origin), 3), np.float32)
         kernels_light.backdrop(self.lamps, wide, height, width, 1, light)
@@ -362,10 +367,10 @@ class _Picture(Job):
             log.reshape(shape),
             lit.reshape(shape),
         )
-        kernels_ask.smooth(
-            arrived.light, arrived.normal, arrived.log, arrived.known, asks.reshape(shape)
-        )
-        self.asker.again(s, d, on, block, arrived)
+        surface, spare = (arrived.normal, arrived.log), np.empty_like(arrived.light)
+        kernels_ask.smooth(arrived.light, *surface, arrived.known, asks.reshape(shape), spare)
+        if len(self.boxes):
+            self.asker.again(s, d, on, block, arrived)
         self.reflect_sharply(s, d, on, arriving)
         seen = active[lit[active]]
         near = np.zeros(light.shape, np.float32)

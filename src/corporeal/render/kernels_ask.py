@@ -263,7 +263,7 @@ def means(data, normal, depth, on, has, steps, stride, total, out, had):
 
 
 @numba.njit(**JIT)
-def smooth(data, normal, depth, on, has):
+def smooth(data, normal, depth, on, has, spare):
     """Mean over 4 pixels down, 4 across, then once more over thrice that, of like surfaces.
 
     Args:
@@ -272,9 +272,10 @@ def smooth(data, normal, depth, on, has):
         depth: Its logarithm.
         on: Which of them met something.
         has: Which of them have light; then all that could be given some.
+        spare: Room like ``data``; of NumPy's making, whose large arrays are on large pages.
 
     """
-    spare, had = np.empty_like(data), np.zeros_like(has)
+    had = np.zeros_like(has)
     total = np.empty(WIDE, np.float32)
     near, far = (-2, -1, 0, 1), (-4, 0, 4)
     means(data, normal, depth, on, has, near, (1, 0), total, spare, had)

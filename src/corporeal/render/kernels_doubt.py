@@ -200,7 +200,7 @@ def together(index, times, light, out):
 
 
 @numba.njit(**JIT)
-def settle(s, index, light, normal, depth, asks, counts, known):
+def settle(s, index, light, normal, depth, asks, counts, known, room):
     """Smooth new light over 4 × 4 pixels, and over more where it only differs by its noise.
 
     Of a mean over few rays and one over many that may be off, the first is taken as far as they
@@ -215,21 +215,23 @@ def settle(s, index, light, normal, depth, asks, counts, known):
         asks: Marks of those that asked (rows, columns).
         counts: Rays of each to the sky and to the sun.
         known: Light that was there before; then what is to be taken (rows, columns, channels).
+        room: Thrice as much, the first third of it zeros; see ``kernels_ask.smooth``.
 
     """
     near, far = (-2, -1, 0, 1), (-4, 0, 4)
-    _smoothed(light, normal, depth, asks, near)
-    wide, off = light.copy(), np.zeros_like(light)
-    _smoothed(wide, normal, depth, asks, far)
+    off, wide, spare = room
+    _smoothed(light, normal, depth, asks, near, spare)
+    wide[:] = light
+    _smoothed(wide, normal, depth, asks, far, spare)
     _compared(index, light, known, wide, off)
-    _smoothed(off, normal, depth, asks, far)
+    _smoothed(off, normal, depth, asks, far, spare)
     _settled(s, index, light, wide, off, counts, known)
 
 
 @numba.njit(**JIT)
-def _smoothed(data, normal, depth, on, steps):
+def _smoothed(data, normal, depth, on, steps, spare):
     """Mean over like pixels that asked, so many steps down and across."""
-    spare, had, has = np.empty_like(data), np.zeros_like(on), on.copy()
+    had, has = np.zeros_like(on), on.copy()
     total = np.empty(WIDE, np.float32)
     means(data, normal, depth, on, has, steps, (1, 0), total, spare, had)
     means(spare, normal, depth, on, had, steps, (0, 1), total, data, has)
