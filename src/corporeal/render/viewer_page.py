@@ -5,6 +5,8 @@ import zlib
 from base64 import b64encode
 from importlib.resources import files
 
+from corporeal.render.png import EFFORT
+
 MODULES = ("three.min.js", "take.js", "splats.js", "stage.js", "cards.js", "page.js")
 """Of the view, each after those that it imports."""
 ALONE = """<div id="view"></div>
@@ -44,4 +46,4 @@ def inline_view(take: bytes) -> str:
 
 
 def _packed(data: bytes) -> str:
-    return b64encode(zlib.compress(data, 6)).decode()
+    return b64encode(zlib.compress(data, EFFORT)).decode()
