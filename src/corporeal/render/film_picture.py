@@ -159,6 +159,8 @@ def _emptied(
     rows = [(k, min(k + band, camera.height)) for k in range(0, camera.height, band)]
     pixels, cleared = camera.width * camera.height, stage.cleared()
     rays = Job(cleared, camera, Sampling(1, 1, 1)).rays((0, camera.height))
+    # All begin at the eye: it is kept once.
+    rays = Rays(np.broadcast_to(rays.origin[0].copy(), rays.direction.shape), rays.direction)
     # Above the horizon no floor is seen.
     glances = np.zeros((pixels, 3), np.float32)
     wall, mirrored = (np.empty((pixels, 3), np.float32) for _ in range(2))
