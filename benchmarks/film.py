@@ -105,7 +105,7 @@ def serve(root: str, file: str) -> None:
 
 
 def _stage(made: Set) -> Any:
-    from corporeal.render.embree import Stage
+    from corporeal.render.stage import Stage
     from corporeal.types import Finish, Scene, SceneObject, Surface
 
     surfaces = tuple(_fit(Surface, s) for s in made.surfaces)

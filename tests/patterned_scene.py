@@ -6,7 +6,8 @@ import numpy as np
 from PIL import Image
 
 from corporeal.render.camera import Aim, camera_of
-from corporeal.render.embree import Light, Stage, render
+from corporeal.render.embree import render
+from corporeal.render.stage import Light, Stage
 from corporeal.types import Camera, Finish, Scene, SceneObject, Surface
 
 OF_SLAB = 12

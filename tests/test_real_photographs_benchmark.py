@@ -12,7 +12,8 @@ from PIL import Image
 from corporeal.formats.colmap import read_colmap, write_colmap
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.similarity import moved_cameras, similarity
-from corporeal.render.embree import Stage, identify
+from corporeal.render.embree import identify
+from corporeal.render.stage import Stage
 from corporeal.splats import training_schedule
 from corporeal.types import Camera
 from patterned_scene import OF_SLAB, patterned, photographs, ring

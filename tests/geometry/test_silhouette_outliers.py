@@ -7,7 +7,8 @@ import pytest
 
 from corporeal.geometry.silhouette_outliers import compare, outliers
 from corporeal.render.camera import camera_of
-from corporeal.render.embree import Stage, identify
+from corporeal.render.embree import identify
+from corporeal.render.stage import Stage
 from patterned_scene import OF_SLAB, patterned, ring
 
 COUNT = 16

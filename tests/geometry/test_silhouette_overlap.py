@@ -6,7 +6,8 @@ import pytest
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.silhouette_overlap import sampled, silhouette_overlaps
 from corporeal.render.camera import camera_of
-from corporeal.render.embree import Stage, identify
+from corporeal.render.embree import identify
+from corporeal.render.stage import Stage
 from patterned_scene import OF_SLAB, box, patterned, ring
 
 

@@ -28,7 +28,8 @@ from corporeal.poses.standstill import Standstill
 from corporeal.reconstruction import picture_intake as reconstructing
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.render.camera import camera_of
-from corporeal.render.embree import Stage, identify
+from corporeal.render.embree import identify
+from corporeal.render.stage import Stage
 from corporeal.render.video import reel
 from patterned_scene import (
     OF_SLAB,

@@ -3,7 +3,8 @@ import pytest
 import trimesh
 
 from corporeal.render.camera import Aim, axes, place
-from corporeal.render.embree import Stage, identify, render
+from corporeal.render.embree import identify, render
+from corporeal.render.stage import Stage
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
 SIZE = (96, 72)

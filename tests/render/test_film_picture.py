@@ -7,12 +7,13 @@ from corporeal.geometry.srgb import encoded
 from corporeal.render import cull, embree, film_picture
 from corporeal.render.arriving import Asker
 from corporeal.render.camera import Aim
-from corporeal.render.embree import Job, Sampling, Stage, identify, render
+from corporeal.render.embree import Job, Sampling, identify, render
 from corporeal.render.film_picture import FilmCaster
 from corporeal.render.kernels_ask import WAYS, asks, number_of
 from corporeal.render.kernels_film import CURVE, CURVED
 from corporeal.render.kernels_floor import NEAR, TILE
 from corporeal.render.liquid_surface import LiquidSurface
+from corporeal.render.stage import Stage
 from corporeal.types import Finish, Surface
 
 LEAF = Finish(

@@ -4,8 +4,9 @@ import numpy as np
 import trimesh
 
 from corporeal.render.camera import place
-from corporeal.render.embree import Light, Stage, render
+from corporeal.render.embree import render
 from corporeal.render.repainted import render_each
+from corporeal.render.stage import Light, Stage
 from corporeal.types import Finish, Scene, SceneObject, Surface
 
 

@@ -5,8 +5,8 @@ import pytest
 import trimesh
 
 import corporeal as co
-from corporeal.render.embree import Stage
 from corporeal.render.sightlines import clear_view
+from corporeal.render.stage import Stage
 
 SIZE = (160, 120)
 BOWL = [(0, 0), (0.04, 0), (0.08, 0.02), (0.12, 0.09), (0.115, 0.09), (0.077, 0.026), (0, 0.006)]

@@ -10,7 +10,8 @@ from corporeal.errors import UserError
 from corporeal.formats.photographs import Photographs
 from corporeal.geometry.agreement import Agreement
 from corporeal.render.camera import camera_of
-from corporeal.render.embree import Stage, identify
+from corporeal.render.embree import identify
+from corporeal.render.stage import Stage
 from corporeal.splats import intake
 from corporeal.splats.intake import take_in
 from corporeal.splats.quality import Quality

@@ -5,7 +5,8 @@ import pytest
 
 from corporeal.geometry.mesh import Mesh
 from corporeal.render.camera import camera_of
-from corporeal.render.embree import Stage, identify
+from corporeal.render.embree import identify
+from corporeal.render.stage import Stage
 from corporeal.splats.quality import Quality
 from corporeal.splats.worth import GREY, goes_beyond, not_worth, told_otherwise, unlike_masks
 from patterned_scene import OF_SLAB, patterned, ring

@@ -9,8 +9,9 @@ from corporeal.formats.glb import read_glb
 from corporeal.geometry.arrangement import box_of, moved
 from corporeal.pool.asset import Asset
 from corporeal.render.camera import place
-from corporeal.render.embree import Stage, render
+from corporeal.render.embree import render
 from corporeal.render.sheet import Tile, sheet
+from corporeal.render.stage import Stage
 from corporeal.types import Vector
 
 VIEW: Vector = (0.6, -1.0, 0.45)

@@ -6,11 +6,12 @@ import numpy as np
 from jaxtyping import Bool, Float32, Int
 
 from corporeal.render import kernels_ask, kernels_doubt, kernels_film, kernels_light
-from corporeal.render.embree import Block, Places, Stage
+from corporeal.render.embree import Block, Places
 from corporeal.render.kernels import Samples
 from corporeal.render.kernels_ask import SUNS, WAYS, WIDE
 from corporeal.render.kernels_doubt import APART, SETS, SIDE
 from corporeal.render.kernels_light import CHANNELS, Lamps
+from corporeal.render.stage import Stage
 
 AGAIN = 3, 4
 """Rays to the sky and to the sun of a pixel whose neighbours' light is not its own."""

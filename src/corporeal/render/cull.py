@@ -4,10 +4,10 @@ import numpy as np
 from jaxtyping import Bool, Float, Float32
 
 from corporeal.render import kernels, kernels_ask, kernels_cull
-from corporeal.render.embree import Stage
 from corporeal.render.kernels_ask import WAYS
 from corporeal.render.kernels_floor import TILE
 from corporeal.render.kernels_light import Lamps
+from corporeal.render.stage import Stage
 
 LOWEST = 1e-3
 """Sine of the lowest sun whose shadows are followed."""

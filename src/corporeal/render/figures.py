@@ -13,11 +13,12 @@ from corporeal.geometry.srgb import linear
 from corporeal.render import colours, video
 from corporeal.render.camera import place
 from corporeal.render.choices import Quantity
-from corporeal.render.embree import Light, Stage, identify
+from corporeal.render.embree import identify
 from corporeal.render.figure_keys import INK, LARGE, Entry, Key, Line, Mark, legend, scale
 from corporeal.render.glyphs import drawable
 from corporeal.render.png import write_png
 from corporeal.render.repainted import render_each
+from corporeal.render.stage import Light, Stage
 from corporeal.types import Film, MaterialField, Parts, Scene
 
 PAPER = Light(

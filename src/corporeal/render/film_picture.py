@@ -30,15 +30,12 @@ from corporeal.render.arriving import HANGS_ON, SHARED, Arrived, Asker
 from corporeal.render.camera import Aim
 from corporeal.render.embree import (
     BAND,
-    LAYERS,
     Block,
     Job,
     Places,
     Quality,
     Rays,
     Sampling,
-    Stage,
-    beyond,
     render,
 )
 from corporeal.render.kernels import NOTHING, Samples
@@ -46,6 +43,7 @@ from corporeal.render.kernels_ask import WIDE
 from corporeal.render.kernels_film import ABOUT, FINER
 from corporeal.render.kernels_floor import AROUND, FAR, NEAR, TILE, UNTOUCHED
 from corporeal.render.kernels_light import CHANNELS, SHARP
+from corporeal.render.stage import LAYERS, Stage, beyond
 
 REACH = 7
 """Pixels over which the light filter spreads what one of them met."""

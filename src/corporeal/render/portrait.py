@@ -8,7 +8,8 @@ import numpy as np
 from corporeal.geometry.arrangement import box_of, moved
 from corporeal.machine import cores
 from corporeal.render.camera import Aim, place
-from corporeal.render.embree import Light, Stage, identify, render
+from corporeal.render.embree import identify, render
+from corporeal.render.stage import Light, Stage
 from corporeal.types import Scene, Vector
 
 DIRECTIONS = 8

@@ -13,8 +13,9 @@ from jaxtyping import UInt8
 
 from corporeal.machine import cores
 from corporeal.render.camera import Aim
-from corporeal.render.embree import BAND, SAMPLING, Block, Job, Quality, Rays, Sampling, Stage
+from corporeal.render.embree import BAND, SAMPLING, Block, Job, Quality, Rays, Sampling
 from corporeal.render.kernels import Samples
+from corporeal.render.stage import Stage
 
 
 def render_each(

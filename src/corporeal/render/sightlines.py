@@ -10,8 +10,8 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.render.camera import Aim, place
-from corporeal.render.embree import Stage
 from corporeal.render.look import TRANSMIT
+from corporeal.render.stage import Stage
 from corporeal.types import Vector
 
 HIDDEN = 0.6

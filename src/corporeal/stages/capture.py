@@ -16,8 +16,9 @@ from corporeal.errors import UserError
 from corporeal.geometry.arrangement import boxes_of
 from corporeal.machine import cores
 from corporeal.render.camera import VIEW, Aim, around, camera_of
-from corporeal.render.embree import Light, Stage, first_seen, render
+from corporeal.render.embree import first_seen, render
 from corporeal.render.kernels import NOTHING
+from corporeal.render.stage import Light, Stage
 from corporeal.types import Camera, Scene, Views
 
 Progress = Callable[[float, str], None]

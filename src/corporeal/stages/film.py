@@ -25,7 +25,6 @@ from corporeal.mpm.laws import MENU
 from corporeal.render import colours, key, video
 from corporeal.render.camera import Aim, camera_of
 from corporeal.render.camera_track import Reel, Track, first_contact, track
-from corporeal.render.embree import Stage
 from corporeal.render.figures import PAPER, Names, Numbers, Quantity, panels, row_of, shades, si
 from corporeal.render.film_picture import FilmCaster
 from corporeal.render.held import Held
@@ -34,6 +33,7 @@ from corporeal.render.pace import between, instants, is_slow
 from corporeal.render.png import write_png
 from corporeal.render.sightlines import clear_view
 from corporeal.render.skin import Skin, bind
+from corporeal.render.stage import Stage
 from corporeal.settings.film_config import FilmConfig
 from corporeal.splats import raster
 from corporeal.trajectory.moving_gaussians import MovingGaussians, fluid, granular, moving_gaussians

@@ -13,7 +13,8 @@ from corporeal.evaluation.judge.staging import CLOSE, DATED, SIZE, TURNS, Stagin
 from corporeal.machine import cores
 from corporeal.render import key
 from corporeal.render.camera import Aim
-from corporeal.render.embree import Light, Stage, render
+from corporeal.render.embree import render
+from corporeal.render.stage import Light, Stage
 
 PICTURES = DATED + CLOSE + 1
 
