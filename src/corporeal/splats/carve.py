@@ -3,9 +3,11 @@
 A place is free where views see past it. One view may err, and all do along outlines; so a cell's
 distance is not the largest that any view allows, but the one that four in ten of those views exceed
 that see the cell at all. Both sides of a thin wall are seen by about as many, and each side's views
-agree among themselves, so that the wall stays. What no view observes, inside objects and below
-them, is filled in smoothly between (∇²f = 0), which closes a seat from below with about the least
-area.
+agree among themselves, so that the wall stays. A view says nothing of what is well behind the
+surface that it sees, so that behind a surface of faint Gaussians the few rays that leak through it
+are alone, and agree on a cavern: what is free must be looked into through free places. What no view
+observes, inside objects and below them, is filled in smoothly between (∇²f = 0), which closes a
+seat from below with about the least area.
 """
 
 from dataclasses import dataclass
@@ -15,7 +17,7 @@ from jaxtyping import Bool, Float, Float32, Int
 from scipy.ndimage import binary_dilation
 
 from corporeal.splats.depth_rendering import DepthRendering
-from corporeal.splats.kernels_carve import carve, relax
+from corporeal.splats.kernels_carve import carve, hidden, relax
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Vector
 
@@ -29,6 +31,8 @@ PLATE = 1.5
 """How thick what lies flat on the floor is at least [cells]."""
 EDGE = 1.0
 """Rays through pixels next to those that show an object miss it by so little [px]."""
+CRUST = 1
+"""A camera sees through so many cells of what is not free: a surface is as rough."""
 ROUNDS = 100
 """Of filling in what no view observes."""
 
@@ -87,6 +91,11 @@ def carved(
     rule = np.array([reach, EMPTIER, max(1, round(WITNESSES * len(rendering.depth)))])
     rest = place, rendering.rows, _on(rendering, floor + PLATE * grid.cell), rule, field
     pool.each(carve, [(*span, *rest) for span in pool.spans(grid.shape[0])])
+    # Where a surface lets some light through, only rays that leak through it see what is behind.
+    blind = np.empty(grid.shape, np.bool_)
+    rest = place, rendering.rows, field, CRUST, int(rule[2]), blind
+    pool.each(hidden, [(*span, *rest) for span in pool.spans(grid.shape[0])])
+    field[blind] = np.nan
     above = grid.axes[2] > floor
     room = field[:, :, above]  # the floor is no witness: below it everything is unknown
     unseen = np.isnan(room)

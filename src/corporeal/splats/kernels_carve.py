@@ -161,6 +161,50 @@ def carve(first, last, grid, cameras, depths, rule, out):
 
 
 @numba.njit(**JIT)
+def hidden(first, last, grid, cameras, field, crust, need, out):
+    """Fill out[first:last] of a grid (X, Y, Z): whether a free place is hidden by what is not free.
+
+    That is: fewer than ``need`` cameras look at it through no more than ``crust`` such cells.
+    field: as ``carve`` fills it, where nan is not free; grid and cameras as there.
+    """
+    for i in range(first, last):
+        for j in range(field.shape[1]):
+            for k in range(field.shape[2]):
+                out[i, j, k] = False
+                if field[i, j, k] > 0:
+                    looks = 0
+                    for v in range(len(cameras)):
+                        looks += _looks_into(cameras[v], grid, field, i, j, k, crust)
+                        if looks >= need:
+                            break
+                    out[i, j, k] = looks < need
+
+
+@numba.njit(**JIT)
+def _looks_into(c, grid, field, i, j, k, crust):
+    """Whether no more than ``crust`` cells that are not free are between a camera and a cell."""
+    nx, ny, nz = field.shape
+    x, y, z = grid[0] + i * grid[3], grid[1] + j * grid[3], grid[2] + k * grid[3]
+    right, down, ahead = from_camera(c, x, y, z)
+    if not ahead > 0:
+        return False
+    u, w = pixel(c, right, down, ahead)
+    if not (0 <= u < c[16] and 0 <= w < c[17]):
+        return False
+    far = np.sqrt(right * right + down * down + ahead * ahead)
+    dx = -(c[0] * right + c[4] * down + c[8] * ahead) / far
+    dy = -(c[1] * right + c[5] * down + c[9] * ahead) / far
+    dz = -(c[2] * right + c[6] * down + c[10] * ahead) / far
+    x, y, z, met = i + 0.5, j + 0.5, k + 0.5, 0
+    while met <= crust:
+        x, y, z = x + dx, y + dy, z + dz
+        if not (0 <= x < nx and 0 <= y < ny and 0 <= z < nz):
+            return True
+        met += not field[int(x), int(y), int(z)] > 0
+    return False
+
+
+@numba.njit(**JIT)
 def _largest(values, count, place):
     """Return the value with so many larger ones, by quickselect; values are put out of order."""
     low, high = 0, count - 1
