@@ -70,8 +70,9 @@ Training = Literal["draft", "normal"]
 FOUND = (
     "- Photographs were taken and learned from once; surfaces, masses and motion are of decisions "
     "[97](decisions/0097-surfaces-where-photographs-agree.md) and "
-    "[99](decisions/0099-caverns-behind-narrow-mouths-are-not-believed.md), 26 November 2026. "
-    "Before these two the same photographs gave -10.2, +6.5, -14.7, -4.6, +15.2, -26.7 and "
+    "[99](decisions/0099-caverns-behind-narrow-mouths-are-not-believed.md), the row of mud "
+    "of [101](decisions/0101-what-no-camera-looks-into-is-not-empty.md), 26 November 2026. "
+    "Before these three the same photographs gave -10.2, +6.5, -14.7, -4.6, +15.2, -26.7 and "
     "-11.5 %; rows of 22 November, of older code, said -.2, +6.4, -15.1, -.4, +7.0, -13.6 and "
     "+2.7 %.",
     "- Balls of rubber and mud keep their mass within a percent or so; the steel ball, a mirror, "
@@ -91,13 +92,16 @@ FOUND = (
     "15](decisions/0015-a-small-training-tells-where-to-begin.md)).",
     "- The lamp lacks 12 %: its foot, reconstructed with a dent, is too light, and its shade, "
     "uneven inside and merged with bulb and wires, too heavy.",
-    "- The heap of sand has a cavern of several litres under its top, where ball and tree shade "
-    "it, and its rim is 2 cm too low. Both are in the Gaussians: without depths of photographs "
-    "they are the same. Why they were not on 22 November was not found.",
-    "- Pot and soil of the plant are poorly segmented in the shade, and a third of its trunk is "
-    "found; the model has become heavier since 22 November, too. A crown is weighed by the area "
-    "of its leaves, within a factor of two; feet in sand or a pot, which no picture shows, are "
-    "guessed.",
+    "- The heap of sand had seven litres of caverns behind faces of faint Gaussians, which "
+    "[101](decisions/0101-what-no-camera-looks-into-is-not-empty.md) closes: its surface encloses "
+    "91.6 of 95.6 litres instead of 84.5. Its rim is 2 cm too low, 3 litres, because Gaussians "
+    "there lie below the face; a pit is left beside the trunk.",
+    "- Of the 2.7 kg that the plant lacks 2.0 are soil. Pot and soil together enclose 10.5 litres "
+    "(9.8 in the model), but each place inside goes with the nearest face: 4.4 litres behind the "
+    "pot's wall are taken for air. As soil, which cannot hang over air, they would weigh 2.6 kg. "
+    "Another .5 kg are the pot's, .2 the trunk's. The model has become heavier since 22 November, "
+    "too. A crown is weighed by the area of its leaves, within a factor of two; feet in sand or a "
+    "pot, which no picture shows, are guessed.",
 )
 HEADS = (
     "scene",
