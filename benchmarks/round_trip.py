@@ -70,7 +70,7 @@ Training = Literal["draft", "normal"]
 FOUND = (
     "- Photographs were taken and learned from once; surfaces, masses and motion are of decisions "
     "[97](decisions/0097-surfaces-where-photographs-agree.md) and "
-    "[99](decisions/0099-caverns-behind-narrow-mouths-are-not-believed.md), the row of mud "
+    "[99](decisions/0099-caverns-behind-narrow-mouths-are-not-believed.md), rows of mud and sand "
     "of [101](decisions/0101-what-no-camera-looks-into-is-not-empty.md), 26 November 2026. "
     "Before these three the same photographs gave -10.2, +6.5, -14.7, -4.6, +15.2, -26.7 and "
     "-11.5 %; rows of 22 November, of older code, said -.2, +6.4, -15.1, -.4, +7.0, -13.6 and "
