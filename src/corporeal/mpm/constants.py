@@ -145,6 +145,12 @@ LATTICE_ROWS = 6
 THIN = 2.0
 """A rigid body thinner than this [cells] fills no half space around a node: its surface points say
 where it begins."""
+MANY_WALLS = 0.5
+"""So they do for a body of which walls thinner than that are more than this share of its surface;
+walls are found by …"""
+WALLS_ASKED, FACING_AWAY = 400, 0.8
+"""… this many points at least, of its surface or all, behind which points have normals with a
+cosine below minus this [-]."""
 SHOWN_AROUND = 1.0
 """They are looked at this far from the normal through the node [cells]."""
 RUN_ACROSS = 6.0
