@@ -145,7 +145,7 @@ LATTICE_ROWS = 6
 THIN = 2.0
 """A rigid body thinner than this [cells] fills no half space around a node: its surface points say
 where it begins."""
-MANY_WALLS = 0.5
+MANY_WALLS = 0.67
 """So they do for a body of which walls thinner than that are more than this share of its surface;
 walls are found by …"""
 WALLS_ASKED, FACING_AWAY = 400, 0.8
