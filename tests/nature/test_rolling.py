@@ -73,6 +73,29 @@ def test_a_marble_that_rolls_slowly_over_a_board_goes_on():
     assert stopped[0] < 0.03  # the control: nodes of the grid are a road with bumps
 
 
+def ramp(slope, low=0.05, length=0.5, wide=0.1):
+    """Give a block of steel whose upper side falls along +x, and its upper edge's height [m]."""
+    high = low + length * np.tan(slope)
+    outline = [(0, 0), (length, 0), (length, low), (0, high)]
+    corners = [(x, y, z) for y in (-wide, wide) for x, z in outline]
+    return trimesh.convex.convex_hull(np.array(corners, dtype=float)), high
+
+
+@pytest.mark.parametrize(("degrees", "radius"), [(15, 0.03), (10, 0.02)], ids=["hole", "far node"])
+def test_a_ball_rolls_down_a_ramp_without_a_hop(degrees, radius):
+    """The first fell into a hole between the ramp's points, the second hit a node 3.4 cells off."""
+    slope, time = np.radians(degrees), 0.55
+    shape, high = ramp(slope)
+    out, down = np.array([np.sin(slope), 0, np.cos(slope)]), [np.cos(slope), 0, -np.sin(slope)]
+    start = np.array([0.05, 0.0, high - 0.05 * np.tan(slope)]) + radius * out
+    steel = co.ball("steel", radius, tuple(start))
+    problem = posed(steel, co.solid("steel", np.array(shape.vertices), shape.faces))
+    way, _ = moved(problem, time)
+    share = ideal(problem, radius, time) / np.sin(SLOPE) * np.sin(slope)
+    assert way @ down == pytest.approx(share, rel=0.015)
+    assert way @ out == pytest.approx(0.0, abs=0.005 * radius)
+
+
 def test_a_marble_rolls_over_the_edge_and_falls():
     marble = co.ball("glass", RADIUS, (0.22, 0.0, THICK + RADIUS), velocity=(0.4, 0.0, 0.0))
     way, _ = moved(posed(marble, BOARD), 0.35)

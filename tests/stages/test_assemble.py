@@ -354,6 +354,19 @@ def test_a_mesh_that_fits_no_unit_is_in_that_of_the_scene_file_s_other_meshes(tm
     assert any("but a brick is usually about 22 cm" in s for s in scene.warnings)
 
 
+def test_a_class_of_many_sizes_is_far_off_by_its_smallest_and_largest(tmp_path):
+    """A steel ball of 1 cm beside dominoes was made as large as a ball usually is, 20 cm."""
+    scene = assemble([placed(tmp_path, ("plank.ply", 0.6), ("steel_ball.ply", 0.01))])
+    assert scene.objects[1].real_extent == pytest.approx(0.01)
+
+
+def test_an_extent_in_the_scene_file_is_believed(tmp_path):
+    """It was answered by "Set its size with --extent", as if nobody had."""
+    stl(tmp_path / "steel_ball.ply", 0.01)
+    row = '[[object]]\nfile = "steel_ball.ply"\nextent = 0.01\n'
+    assert assemble([toml(tmp_path, row)]).warnings == ()
+
+
 @pytest.mark.parametrize("others", [[], [("plank.ply", 0.6), ("pipe.ply", 200.0)]])
 def test_it_gets_its_usual_size_where_the_others_say_nothing_or_disagree(tmp_path, others):
     scene = assemble([placed(tmp_path, *others, ("brick.ply", 0.05))])

@@ -55,6 +55,12 @@ def test_the_real_stiffness_stands_beside_the_simulated_one():
     assert simulated(treated("shell", 1e6)) == "1 MPa (0.001 × measured)"
 
 
+def test_a_liquid_has_no_modulus_to_compare():
+    """Water of 300 Pa was simulated with "67.9 kPa (as measured)"."""
+    said = simulated(replace(treated("deformable", 6e4), wave_speed=47.3), liquid=True)
+    assert said == "liquid, its sound slowed to 47 m/s"
+
+
 def test_what_is_inside_is_told_with_how_it_is_built():
     soup = Material("soup", Law.NEO_HOOKEAN, 300.0, 0.49, 1050.0)
     assert built(Structure("filled", 2e-4, contents=soup, fill=0.9)) == "filled with soup"

@@ -11,7 +11,7 @@ UNITS = {"metres": 1.0, "centimetres": 1e-2, "millimetres": 1e-3, "inches": 0.02
 PRINTED = ("millimetres", "metres", "centimetres", "inches")
 """In which order they are likely in files that are made for printing."""
 FAR = 10.0
-"""No mesh is so many times smaller or larger than such things usually are."""
+"""No mesh is so many times smaller or larger than the smallest or largest of such things."""
 ADVICE = "--unit or --extent says otherwise."
 MOST_NAMES = 3
 """Files that are named in one sentence."""
@@ -61,7 +61,7 @@ def in_shared_unit(
     """Return the unit that a scene file's other meshes are in, where a mesh fits none by its size.
 
     Who places meshes by hand in metres has modelled them in one unit. A thing of the table that
-    would be ten times too small or large in it is as large as such things usually are.
+    would be ten times smaller or larger in it than any such thing is as large as they usually are.
 
     Args:
         found: What the mesh by itself was taken for; None: nothing.
@@ -75,7 +75,8 @@ def in_shared_unit(
         return found
     unit = named.pop()
     size = extent * UNITS[unit]
-    if found is not None and not found.extent / FAR < size < found.extent * FAR:
+    known = None if found is None else typical_extent(found.usual)
+    if known is not None and not known.low / FAR < size < known.high * FAR:
         return found
     return LikelyUnit(file, size, UNITS[unit], unit, shared=True)
 

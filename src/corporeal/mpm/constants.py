@@ -107,9 +107,13 @@ FEWEST_ON_FACET = 6
 FACET_SPREAD = 0.5
 """A face goes on from its points by this share of what they stand for [-]: a point's distance from
 the next."""
+WIDEST_HOLE = 0.8
+"""A hole between a face's points whose middle is no farther from them than this, over what they
+stand for [-], is of their scatter and belongs to the face."""
 FACET_NODES = 2.0
 """What is round meets a flat face exactly, and not on nodes that are nearer to there than this
-[cells] and √(r dx/2): beyond, the gap of a ball of radius r is larger than what nodes misjudge …"""
+[cells] and √(r dx/2 + 9 dx²): beyond, the gap of a ball of radius r is larger than what nodes
+misjudge, as they take it for a plane within the 3 cells that each sees …"""
 FACET_ALIKE = 0.95
 """… and on which they meet along nearly the same normal: the least cosine [-]."""
 NEAREST_MIDDLE = 0.05
@@ -141,6 +145,12 @@ LATTICE_ROWS = 6
 THIN = 2.0
 """A rigid body thinner than this [cells] fills no half space around a node: its surface points say
 where it begins."""
+MANY_WALLS = 0.67
+"""So they do for a body of which walls thinner than that are more than this share of its surface;
+walls are found by …"""
+WALLS_ASKED, FACING_AWAY = 400, 0.8
+"""… this many points at least, of its surface or all, behind which points have normals with a
+cosine below minus this [-]."""
 SHOWN_AROUND = 1.0
 """They are looked at this far from the normal through the node [cells]."""
 RUN_ACROSS = 6.0

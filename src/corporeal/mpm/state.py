@@ -91,6 +91,17 @@ class Matter:
         """Distance of each body's surface points [m]; 0 without any."""
         return np.array([rigid.spacing(points) for points in self.surface])
 
+    def thinness(self, cell: float) -> tuple[int, ...]:
+        """How thin each body is against a cell [m], were it rigid: see ``rigid.thinness``."""
+        if cell not in self._thin:
+            both = zip(self.surface, self.rounding, strict=True)
+            self._thin[cell] = tuple(rigid.thinness(p, rows[:, :3], cell) for p, rows in both)
+        return self._thin[cell]
+
+    @cached_property
+    def _thin(self) -> dict[float, tuple[int, ...]]:
+        return {}
+
     @cached_property
     def law(self) -> Int[np.ndarray, " P"]:
         """``types.Law`` values; 0 where rigid."""

@@ -178,8 +178,11 @@ def _sized(blocks: list[_Block], extents: tuple[str, ...]) -> list[_Block]:
         for k, obj in enumerate(scene.objects):
             hits = [w for w in wanted if _means(w[0], obj)]
             used.update(hits)
+            said = block.entry is not None and block.entry.extent is not None
             if hits:
                 scene = resized(scene, k, hits[-1][1])
+            elif said:  # by the scene file, and there is nothing to ask
+                continue
             elif sentence := doubt(obj.name, obj.class_name, obj.real_extent):
                 messages.append(sentence)
         messages = [s for s in messages if not block.ours]

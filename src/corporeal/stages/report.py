@@ -235,9 +235,10 @@ def _part_row(story: Story, k: int) -> str:
     treatment, words = story.particles.treatments[k], story.field.words[k]
     yields = "–" if material.yield_stress is None else si(material.yield_stress, "Pa")
     names = (story.scene.objects[part.object].name, part.name)
+    liquid = MENU[material.law].liquid
     numbers = (
-        si(material.young, "Pa"),
-        f"{material.poisson:.3g}",
+        "–" if liquid else si(material.young, "Pa"),
+        "–" if liquid else f"{material.poisson:.3g}",
         f"{material.density:.4g}",
         yields,
         how_heavy(story.particles.mass_real[k], story.scene.objects[part.object].scale),
@@ -248,7 +249,7 @@ def _part_row(story: Story, k: int) -> str:
         cells(WHO[words.answered_by], MENU[material.law].full_name, wrap=True),
         cells(*numbers),
         cells(safe(built(story.field.structures[k])), safe(treatment.kind), wrap=True),
-        cells(simulated(treatment), wrap=True),
+        cells(simulated(treatment, liquid=liquid), wrap=True),
     )
     return f"<tr>{''.join(row)}</tr>"
 
@@ -261,10 +262,15 @@ def built(structure: Structure) -> str:
     return f"{structure.kind} with {structure.contents.name}"
 
 
-def simulated(treatment: Treatment) -> str:
-    """Say which Young's modulus was simulated, and how far it is from the real one."""
+def simulated(treatment: Treatment, *, liquid: bool = False) -> str:
+    """Say which Young's modulus was simulated, and how far it is from the real one.
+
+    A liquid has none: its pressure is that of its volume, with a speed of sound of our own.
+    """
     if treatment.kind == "rigid":
         return "rigid"
+    if liquid:
+        return f"liquid, its sound slowed to {treatment.wave_speed:.2g} m/s"
     ratio = treatment.young / treatment.young_real
     factor = "as measured" if abs(ratio - 1) < 1e-3 else f"{ratio:.2g} × measured"
     return f"{si(treatment.young, 'Pa')} ({factor})"

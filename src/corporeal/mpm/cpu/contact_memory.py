@@ -72,7 +72,8 @@ def rigid_grid(
     wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
     places[:, : len(wetted)] = wetted[:, :3].T
-    thin, spacing = rigid.thinness(body.surface, cell), rigid.spacing(body.surface)
+    thin = rigid.thinness(body.surface, rounding_of(body)[:, :3], cell)
+    spacing = rigid.spacing(body.surface)
     # Many nodes ask where a thin body's surface begins: runs of points that are near each other.
     width = max(SHOWN_AROUND * cell, RUN_ACROSS * spacing)
     shown, shows = _clumped(surface if thin else surface[:0], width)

@@ -11,7 +11,6 @@ from corporeal.mpm.cuda.layout import Contacts, Grid, Particles, Rigid, Sheet, w
 from corporeal.mpm.formulas.one_lane import BACKING_ROW, LEAST
 from corporeal.mpm.physics import prescribed
 from corporeal.mpm.physics.contact import face_table, full_cell
-from corporeal.mpm.physics.rigid import thinness
 from corporeal.mpm.physics.springs import longest_step
 from corporeal.mpm.physics.wall_stress import flow_curve
 from corporeal.mpm.problem import Problem
@@ -164,7 +163,7 @@ class Memory:
         r.bends = self.put(np.array([np.any(m[:, 10:] != 0.0) for m in matter.rounding]), wp.int32)
         count, thin = np.zeros((2, len(matter.surface)), int)
         count[stiff] = [len(p) for p in points]
-        thin[stiff] = [thinness(p, cell) for p in points]
+        thin[stiff] = [matter.thinness(cell)[b] for b in stiff]
         r.spacing = self.put(matter.spacing, wp.float64)
         r.first = self.put(np.cumsum(count) - count, wp.int32)
         r.points, r.thin = self.put(count, wp.int32), self.put(thin, wp.int32)

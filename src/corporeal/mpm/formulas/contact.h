@@ -276,8 +276,10 @@ struct Facet {
     }
     return false;
   }
-  // How far from there nodes misjudge the gap of a ball of this radius by more than it is.
-  CUDA_CALLABLE static inline double misjudged(double radius, double dx) { return FACET_NODES * dx + sqrt(0.5 * radius * dx); }
+  // How far from there nodes misjudge the gap of a ball of this radius by more than it is: they take it for a plane, too.
+  CUDA_CALLABLE static inline double misjudged(double radius, double dx) {
+    return FACET_NODES * dx + sqrt((0.5 * radius + BENT_NODES * dx) * dx);
+  }
   // Whether a contact on a node, apart from that on the face by d with normals that have this cosine, is the same as it.
   CUDA_CALLABLE static inline bool replaces(const double *d, double cosine, double reach, double alike) {
     return cosine > alike && d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < reach * reach;

@@ -4,8 +4,16 @@ from typing import NamedTuple
 
 import numpy as np
 from jaxtyping import Bool, Float
+from scipy.spatial import Delaunay, QhullError
 
-from corporeal.mpm.constants import FACET_ROW, FACET_SPREAD, FACET_TURN, FEWEST_ON_FACET, SAME_PLANE
+from corporeal.mpm.constants import (
+    FACET_ROW,
+    FACET_SPREAD,
+    FACET_TURN,
+    FEWEST_ON_FACET,
+    SAME_PLANE,
+    WIDEST_HOLE,
+)
 
 
 class Facets(NamedTuple):
@@ -41,7 +49,8 @@ def facets_of(surface: Float[np.ndarray, "S 3"], rounding: Float[np.ndarray, "S 
         mine = alike & (np.abs(height) <= SAME_PLANE * reach)
         if mine.sum() >= FEWEST_ON_FACET:
             held = surface[left[mine]]
-            reach = FACET_SPREAD * float(np.median(rounding[left[mine], 8]))
+            stands = float(np.median(rounding[left[mine], 8]))
+            reach = max(FACET_SPREAD * stands, _widest_hole(held, normal, WIDEST_HOLE * stands))
             middle = 0.5 * (held.min(axis=0) + held.max(axis=0))
             radius = np.linalg.norm(held - middle, axis=1).max()
             ends = count, count + len(held)
@@ -62,3 +71,28 @@ def on_facet(
     apart = place[:, None] - points
     along = apart @ normal
     return np.any(np.sum(apart**2, axis=2) - along**2 <= reach**2, axis=1)
+
+
+def _widest_hole(
+    points: Float[np.ndarray, "N 3"], normal: Float[np.ndarray, "3"], at_most: float
+) -> float:
+    """How far the middle of the widest hole between points of a face is from them [m].
+
+    Points at random leave some: what rolls must not fall into one. What is wider than ``at_most``
+    is an opening of the face. The places farthest from points are the middles of circles around
+    triangles of Delaunay's.
+    """
+    across = np.linalg.svd(normal[None])[2][1:]
+    flat = points @ across.T
+    try:
+        net = Delaunay(flat - flat.mean(axis=0))
+    except QhullError:  # all in a row
+        return 0.0
+    first, *others = np.moveaxis(net.points[net.simplices], 1, 0)
+    sides = np.stack([other - first for other in others], axis=1)
+    thick = np.abs(np.linalg.det(sides)) > 0.0
+    square = 0.5 * np.sum(sides[thick] ** 2, axis=2)
+    to_middle = np.linalg.solve(sides[thick], square[..., None])[..., 0]
+    away = np.linalg.norm(to_middle, axis=1)
+    inside = net.find_simplex(first[thick] + to_middle) >= 0
+    return float(away[inside & (away <= at_most)].max(initial=0.0))

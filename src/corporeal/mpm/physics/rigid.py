@@ -7,7 +7,14 @@ import numpy as np
 from jaxtyping import Float
 from scipy.spatial import KDTree
 
-from corporeal.mpm.constants import RANK_CUTOFF, SMALL_TURN, THIN
+from corporeal.mpm.constants import (
+    FACING_AWAY,
+    MANY_WALLS,
+    RANK_CUTOFF,
+    SMALL_TURN,
+    THIN,
+    WALLS_ASKED,
+)
 
 Vector3 = Float[np.ndarray, "3"]
 Matrix3 = Float[np.ndarray, "3 3"]
@@ -135,11 +142,14 @@ def effective_inverse_mass(
     return inverse_mass + float(lever @ inverse_inertia @ lever)
 
 
-def thinness(surface: Float[np.ndarray, "S 3"], cell: float) -> int:
-    """How many of its principal extents are below ``THIN`` cells: 0 none, 1 some, 2 all.
+def thinness(
+    surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], cell: float
+) -> int:
+    """How thin a body is against the cell: 2 in all directions, 1 in some, or in its walls, 0 not.
 
     Args:
         surface: Points on the body's surface [m]; without any it is 0.
+        normal: Which way it looks there; 0 where that is not known.
         cell: dx [m].
 
     """
@@ -148,7 +158,33 @@ def thinness(surface: Float[np.ndarray, "S 3"], cell: float) -> int:
     arm = surface - surface.mean(axis=0)
     axes = np.linalg.svd(arm, full_matrices=False)[2]
     below = np.ptp(arm @ axes.T, axis=0) < THIN * cell
-    return int(below.any()) + int(below.all())
+    if below.all():
+        return 2
+    return int(below.any() or thin_walls(surface, normal, THIN * cell) > MANY_WALLS)
+
+
+def thin_walls(
+    surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], thick: float
+) -> float:
+    """Share of a surface behind which, less than ``thick`` [m] deep, another side looks away.
+
+    A few hundred points speak for all of those whose normals are known.
+    """
+    known = np.flatnonzero(np.any(normal != 0.0, axis=1))
+    if len(known) == 0:
+        return 0.0
+    points, out, aside = surface[known], normal[known], spacing(surface)
+    tree = KDTree(points)
+    asked = np.arange(0, len(known), len(known) // WALLS_ASKED + 1)
+    behind = tree.query_ball_point(points[asked] - 0.5 * thick * out[asked], 0.5 * thick + aside)
+    walls = 0
+    for k, near in zip(asked, behind, strict=True):
+        apart = points[k] - points[near]
+        depth = apart @ out[k]
+        beside = np.linalg.norm(apart - depth[:, None] * out[k], axis=1)
+        away = out[near] @ out[k] < -FACING_AWAY
+        walls += bool(np.any(away & (depth > 0.0) & (depth < thick) & (beside <= aside)))
+    return walls / len(asked)
 
 
 def spacing(surface: Float[np.ndarray, "S 3"]) -> float:

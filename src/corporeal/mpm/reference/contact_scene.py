@@ -7,7 +7,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import STICKS, TINY_DOUBLE
-from corporeal.mpm.physics import contact, contact_impulses, rigid, wall_stress
+from corporeal.mpm.physics import contact, contact_impulses, wall_stress
 from corporeal.mpm.physics.rounding import shift_to_contact
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.problem import Problem, WettedSurface
@@ -127,7 +127,7 @@ class Scene:
         """How thin a rigid body is against the cell; 0 for what deforms."""
         if not self.is_rigid(field):
             return 0
-        return rigid.thinness(self.matter.surface[field], self.problem.cell)
+        return self.matter.thinness(self.problem.cell)[field]
 
     @property
     def wall_mover(self) -> int:

@@ -7,7 +7,13 @@ from itertools import permutations
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.mpm.constants import FACET_ALIKE, FACET_NODES, POINT_REACH, ROUND_ALIKE
+from corporeal.mpm.constants import (
+    BENT_NODES,
+    FACET_ALIKE,
+    FACET_NODES,
+    POINT_REACH,
+    ROUND_ALIKE,
+)
 from corporeal.mpm.physics.facets import on_facet
 from corporeal.mpm.reference.contact_scene import Scene
 from corporeal.mpm.reference.touch import Touch
@@ -83,7 +89,8 @@ def instead_of_nodes(scene: Scene, nodes: list[Touch], faces: list[Touch]) -> li
             reach, alike = face.instead, ROUND_ALIKE
             if reach is None:
                 wide = scene.matter.radius[face.rolls]
-                reach, alike = FACET_NODES * cell + np.sqrt(0.5 * wide * cell), FACET_ALIKE
+                alike = FACET_ALIKE
+                reach = FACET_NODES * cell + np.sqrt((0.5 * wide + BENT_NODES * cell) * cell)
             apart = np.linalg.norm(touch.point[:, None] - face.point, axis=2)
             same = (touch.normal @ face.normal.T > alike) & (apart < reach)
             left &= ~same.any(axis=1)
