@@ -15,6 +15,7 @@ from typing import Literal
 from corporeal.treatment.blow_frequency import tuned_to_blows
 from corporeal.treatment.crown_of_leaves import Judgements, with_plants
 from corporeal.treatment.filled import as_contents
+from corporeal.treatment.hard_blows import calmed
 from corporeal.treatment.lossy_partners import with_partners
 from corporeal.treatment.part import (
     Motion,
@@ -169,7 +170,7 @@ def _plan(
         unslowed = calm_trinkets(parts, treatments, cell)
         steps = quality.steps(particles_needed(parts, cell))
         fitted = fit_budget(unslowed, cell, steps, quality.outrun)
-        treatments = fitted.treatments
+        treatments = calmed(parts, motions, unslowed, fitted.treatments, cell)
         warnings.extend(fitted.warnings)
     chosen = Plan(cell=cell, treatments=tuple(treatments), warnings=tuple(warnings))
     return _Draft(chosen, unslowed)
