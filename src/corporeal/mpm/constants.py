@@ -111,7 +111,8 @@ FACET_NODES = 2.0
 """What is round meets a flat face exactly, and not on nodes that are nearer to there than this
 [cells] and √(r dx/2): beyond, the gap of a ball of radius r is larger than what nodes misjudge …"""
 FACET_ALIKE = 0.95
-"""… and on which they meet along nearly the same normal: the least cosine [-]."""
+"""… and on which they meet along nearly the same normal: the least cosine [-]. On what is ``THIN``
+normals of nodes lean, since mass lies around them on both sides: there ``ROUND_ALIKE`` counts."""
 NEAREST_MIDDLE = 0.05
 """Least distance of what meets a hollow from its centre of curvature, over the radius [-]: at the
 centre all of the hollow is equally near."""
