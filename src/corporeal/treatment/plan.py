@@ -31,7 +31,7 @@ from corporeal.treatment.step_budget import (
     nearer_rigid,
     torn_walls,
 )
-from corporeal.treatment.struck_slabs import pressed_slabs
+from corporeal.treatment.struck_slabs import laid_sheets, pressed_slabs
 from corporeal.treatment.treat import Resolved, Role, treat
 from corporeal.types import Material, Treatment
 
@@ -115,7 +115,8 @@ def plan(
         if not why:  # first what strikes, then what is struck
             why = pressed_slabs(parts, motions, treatments)
         if stiffness == "capped" or not why:
-            return replace(draft.plan, treatments=tuned_to_blows(parts, motions, treatments))
+            laid = laid_sheets(parts, motions, treatments)
+            return replace(draft.plan, treatments=tuned_to_blows(parts, motions, laid))
         verdicts = [
             replace(v, rigid=True, reason=why[k]) if k in why else v
             for k, v in enumerate(judged.verdicts)
