@@ -43,7 +43,9 @@ def test_a_ball_that_steps_have_softened_loses_no_more_than_a_stiff_one():
     assert drop(row("bouncy ball"), DRAFT).restitution == pytest.approx(rebound(0.15), abs=0.015)
 
 
-@pytest.mark.parametrize("name", ["ball of plasticine", "tennis ball on carpet", "ball of seat foam"])
+@pytest.mark.parametrize(
+    "name", ["ball of plasticine", "tennis ball on carpet", "ball of seat foam"]
+)
 def test_what_yields_falls_on_something_soft_or_is_as_stiff_as_in_life_keeps_its_loss(name):
     assert "vibrations" not in prepared(name).particles.treatments[0].why
 
