@@ -68,7 +68,7 @@ class Blow:
         thing = ball(tuple(place), self.radius, cell / 2, **given)
         run = load("engine", "cpu", MENU)(problem(thing, cell=cell, planes=(FLOOR,)))
         dent = dent_of_blow(young, self.poisson, self.density, self.speed) * self.radius
-        lasts = TOUCHES * dent / self.speed
+        lasts, now = TOUCHES * dent / self.speed, run.measure()
         while run.time < 20.0 * lasts:
             run.advance(run.time + lasts / 20.0)
             now = run.measure()
