@@ -71,3 +71,21 @@ def test_solid_metals_glass_and_ceramics_need_no_value_on_a_hard_floor():
     for pair in ((bowl, bearing), (plank, window)):
         rule = materials.restitution_between(pair[0].material, pair[1].material)
         assert materials.restitution(*pair, 3.0).value == pytest.approx(rule)
+
+
+def metals():
+    entries = materials.library().values()
+    return [e.name for e in entries if e.group == "metal" and "yield_stress" in e.ranges]
+
+
+@pytest.mark.parametrize("name", metals())
+@pytest.mark.parametrize("below", ["itself", "hardened_steel"])
+def test_every_metal_yields_in_a_fast_blow_whatever_was_measured_in_slow_ones(name, below):
+    """Balls of bearings, .94 below 3 m/s, and lead, .16, kept that at all speeds."""
+    pair = striker(name), striker(name if below == "itself" else below)
+    values = [materials.restitution(*pair, v).value for v in (1.0, 25.0, 50.0)]
+    assert values[2] == pytest.approx(yielding(*(s.material for s in pair), 50.0))
+    assert values[2] / values[1] == pytest.approx(2.0**-0.25, rel=0.02)
+    law = materials.law_of_blows(*pair, 50.0)
+    assert (law.exponent, law.most) == (0.25, materials.restitution(*pair, 0.0).value)
+    assert values[0] >= values[1]

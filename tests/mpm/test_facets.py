@@ -87,3 +87,22 @@ def test_a_tiny_ball_is_not_held_by_the_far_face_of_a_sheet(engine):
     run.advance(2e-3)
     found = run.measure()
     assert found.momentum[0, 2] == pytest.approx(0.2 * found.mass[0], rel=1e-6)
+
+
+@pytest.mark.parametrize("engine", ["cpu", "cuda", "reference"])
+def test_a_ball_leaves_a_sheet_straight_up(engine):
+    """Nodes see matter on both sides of a sheet: their normals lean, and threw it aside."""
+    size = np.array([0.4, 0.4, 0.02 * CELL])
+    surface, faces = flat_faces(size)
+    middle = np.array([0.0, 0.0, size[2] / 2])
+    layer = np.array([0.4, 0.4, 0.4 * CELL])
+    sheet = board(middle, layer, surface=surface + middle, rounding=faces)
+    start, down = (0.0, 0.0, size[2] + 0.065), (0.0, 0.0, -3.0)
+    falling = round_body(start, radius=0.055, count=646, velocity=down)
+    given = problem(falling, sheet, gravity=(0.0, 0.0, 0.0), friction=0.6, restitution=0.8)
+    run = (ENGINES | {"reference": ReferenceEngine})[engine](given)
+    run.advance(0.01)
+    found = run.measure()
+    left = found.momentum[0] / found.mass[0]
+    assert left[2] > 2.0
+    assert np.abs(left[:2]).max() < 0.03

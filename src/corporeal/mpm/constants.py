@@ -115,7 +115,8 @@ FACET_NODES = 2.0
 [cells] and √(r dx/2 + 9 dx²): beyond, the gap of a ball of radius r is larger than what nodes
 misjudge, as they take it for a plane within the 3 cells that each sees …"""
 FACET_ALIKE = 0.95
-"""… and on which they meet along nearly the same normal: the least cosine [-]."""
+"""… and on which they meet along nearly the same normal: the least cosine [-]. On what is ``THIN``
+normals of nodes lean, since mass lies around them on both sides: there ``ROUND_ALIKE`` counts."""
 NEAREST_MIDDLE = 0.05
 """Least distance of what meets a hollow from its centre of curvature, over the radius [-]: at the
 centre all of the hollow is equally near."""

@@ -32,7 +32,8 @@ def in_blows(
     """Carry the restitution of all pairs of parts and the floor to the speeds of their blows.
 
     The ratio to what the same pair has at ``NOMINAL`` is applied, so that what was drawn from a
-    measured range stays drawn, and so do the laws by which later, slower blows lose less.
+    measured range stays drawn, and so do the laws by which later, slower blows lose less. What
+    strikes a sheet that is laid on the floor rebounds as from the floor.
 
     Args:
         field: With the restitution at ``NOMINAL``.
@@ -61,6 +62,9 @@ def in_blows(
             law = law_of_pair(field, shapes or {}, (i, j), speed, law.value) or law
             table[i, j] = table[j, i] = law.value
             laws[i, j] = laws[j, i] = law.speed, law.slope, law.exponent, law.least, law.most
+    for k in (k for k, treatment in enumerate(treatments) if treatment.laid):
+        table[k, :-1] = table[:-1, k] = table[-1, :-1]
+        laws[k, :-1] = laws[:-1, k] = laws[-1, :-1]
     return Blows(table, laws)
 
 

@@ -63,9 +63,10 @@ def sealed(part: PartGeometry, speed: float) -> SealedBall:
 
 
 def masses(part: PartGeometry) -> tuple[float, float]:
-    """Mass of the wall and of what is behind it [kg]: ρ A t and ρ f (V - A t)."""
+    """Mass of the wall and of what is behind it [kg]: ρ V_w and ρ f (V - V_w), V_w = n A t."""
     structure, inner = part.structure, part.structure.contents
-    matter = min(part.area * (structure.thickness or 0.0), part.volume)
+    wall = part.narrowing * part.area * (structure.thickness or 0.0)
+    matter = min(wall, part.volume)
     load = inner.density * structure.fill * (part.volume - matter) if inner else 0.0
     return part.material.density * matter, load
 

@@ -38,6 +38,8 @@ class PartGeometry:
     """Enclosed volume [m³]."""
     area: float
     """Surface area, one side [m²]."""
+    narrowing: float = 1.0
+    """Volume of its wall over area times thickness [-]: its inside is smaller than its outside."""
     closed: bool = False
     """Whether its wall goes all around something, as a duck's does and a vase's does not."""
     leaves: int = 0

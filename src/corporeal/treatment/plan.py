@@ -15,6 +15,7 @@ from typing import Literal
 from corporeal.treatment.blow_frequency import tuned_to_blows
 from corporeal.treatment.crown_of_leaves import Judgements, with_plants
 from corporeal.treatment.filled import as_contents
+from corporeal.treatment.hard_blows import calmed
 from corporeal.treatment.lossy_partners import with_partners
 from corporeal.treatment.part import (
     Motion,
@@ -30,7 +31,7 @@ from corporeal.treatment.step_budget import (
     nearer_rigid,
     torn_walls,
 )
-from corporeal.treatment.struck_slabs import pressed_slabs
+from corporeal.treatment.struck_slabs import laid_sheets, pressed_slabs
 from corporeal.treatment.treat import Resolved, Role, treat
 from corporeal.types import Material, Treatment
 
@@ -114,7 +115,8 @@ def plan(
         if not why:  # first what strikes, then what is struck
             why = pressed_slabs(parts, motions, treatments)
         if stiffness == "capped" or not why:
-            return replace(draft.plan, treatments=tuned_to_blows(parts, motions, treatments))
+            laid = laid_sheets(parts, motions, treatments)
+            return replace(draft.plan, treatments=tuned_to_blows(parts, motions, laid))
         verdicts = [
             replace(v, rigid=True, reason=why[k]) if k in why else v
             for k, v in enumerate(judged.verdicts)
@@ -169,7 +171,7 @@ def _plan(
         unslowed = calm_trinkets(parts, treatments, cell)
         steps = quality.steps(particles_needed(parts, cell))
         fitted = fit_budget(unslowed, cell, steps, quality.outrun)
-        treatments = fitted.treatments
+        treatments = calmed(parts, motions, unslowed, fitted.treatments, cell)
         warnings.extend(fitted.warnings)
     chosen = Plan(cell=cell, treatments=tuple(treatments), warnings=tuple(warnings))
     return _Draft(chosen, unslowed)

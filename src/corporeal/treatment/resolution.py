@@ -83,6 +83,7 @@ def _geometry(member: Member, bodies: Bodies, number: int) -> PartGeometry:
         size=(max(member.size[0], made.sheet), member.size[1], member.size[2]),
         volume=made.volume,
         area=made.area,
+        narrowing=narrowing(made),
         closed=closes_about(member, made),
         leaves=leaves_of(member, material, made, obj.scale),
         diameter=bodies.rods[k].diameter if k in bodies.rods else 0.0,
@@ -111,6 +112,12 @@ def closes_about(member: Member, made: Make) -> bool:
     if made.modelled:
         return False
     return member.encloses if made.thickness else member.closed
+
+
+def narrowing(made: Make) -> float:
+    """Volume of a part's wall over its area times its thickness [-]."""
+    thin = made.density * made.area * made.thickness
+    return (made.body_mass + made.sheet_mass) / thin if thin > 0.0 else 1.0
 
 
 def burden(member: Member, anatomy: Anatomy, bodies: Bodies) -> float:

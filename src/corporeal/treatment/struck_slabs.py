@@ -3,11 +3,13 @@
 A ball that is dented more than twice as deep as in life is rigid instead (``step_budget``). So is a
 slab that lies on the floor and is softened by the step budget, and a flat sheet that the grid makes
 thicker, where what falls on it is rigid: what it loses then depends on the grid, and rounds of
-impacts know that the floor holds it, so that both rebound by their coefficient of restitution.
+impacts know that the floor holds it, so that both rebound by their coefficient of restitution. A
+sheet thinner than half a cell, as of paper, is so whatever falls on it: it would be a mattress of
+two cells between a ball and the floor.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from corporeal.geometry.falls import FLOOR
 from corporeal.materials.blow import compliance_of
@@ -21,8 +23,8 @@ from corporeal.types import Treatment
 TOO_DEEP = 2.0
 """Dent as simulated over that of life, from which rigid is nearer to the truth [-]."""
 THICKEST = 4.0
-"""Thickness of a sheet as simulated, two cells at least, over that of life, up to which it may be
-rigid [-]: what is thinner than half a cell has no face of its own, and throws things sideways."""
+"""Thickness of a sheet as simulated, two cells at least, over that of life, up to which it is a mat
+to what is soft and falls on it [-]; one that is thinner than half a cell is nothing of its own."""
 
 
 def pressed_slabs(
@@ -50,7 +52,7 @@ def pressed_slabs(
                 continue
             ball = largest_of(parts, number)
             beside = treatments[parts.index(ball)]
-            if treatment.kind == "shell" and beside.kind != "rigid":
+            if beside.kind != "rigid" and _is_mat(part, treatment):
                 continue
             dents = _Dents(
                 _dent(
@@ -71,6 +73,31 @@ def pressed_slabs(
     return found
 
 
+def laid_sheets(
+    parts: Sequence[PartGeometry], motions: Sequence[Motion], treatments: Sequence[Treatment]
+) -> tuple[Treatment, ...]:
+    """Mark rigid flat sheets on the floor that are thinner than half a cell.
+
+    A tenth of a millimetre of paper stores nothing of a blow, and the next step may lead through it
+    to the floor: what it is made of says nothing of the rebound.
+
+    Args:
+        parts: All of the scene's.
+        motions: One per object.
+        treatments: As they are simulated.
+
+    """
+    return tuple(
+        replace(treatment, laid=True)
+        if treatment.kind == "rigid"
+        and is_flat_wall(part)
+        and _rests(motions[part.object])
+        and not _is_mat(part, treatment)
+        else treatment
+        for part, treatment in zip(parts, treatments, strict=True)
+    )
+
+
 def _thickness(part: PartGeometry) -> float:
     """Thickness in life [m]."""
     wall = part.structure.thickness if is_flat_wall(part) else None
@@ -86,17 +113,23 @@ class _Dents:
 
 
 def _lies_flat(part: PartGeometry, motion: Motion, treatment: Treatment) -> bool:
+    slab = treatment.kind == "deformable" and part.size[0] < COMPACT * part.size[1]
+    sheet = treatment.kind == "shell" and is_flat_wall(part)
+    flows = MENU[part.material.law].loose
+    return _rests(motion) and (slab or sheet) and part.leaves == 0 and not flows
+
+
+def _rests(motion: Motion) -> bool:
+    """Tell whether an object lies on the floor, and nothing but gravity acts on it."""
     lands = motion.landing
     lies = lands is not None and lands.onto == FLOOR and lands.speed == 0.0
-    slab = treatment.kind == "deformable" and part.size[0] < COMPACT * part.size[1]
-    sheet = treatment.kind == "shell" and is_flat_wall(part) and motion.driven == 0.0
+    return lies and motion.driven == 0.0
+
+
+def _is_mat(part: PartGeometry, treatment: Treatment) -> bool:
+    """Tell whether a part is a sheet that is at least half a cell thick."""
     resolved = (treatment.thickness or 0.0) <= THICKEST * _thickness(part)
-    return (
-        lies
-        and (slab or (sheet and resolved))
-        and part.leaves == 0
-        and not MENU[part.material.law].loose
-    )
+    return is_flat_wall(part) and resolved
 
 
 def _dent(ball: PartGeometry, lands: Landing, plane: float, thick: float) -> float:

@@ -42,6 +42,9 @@ class Treatment:
     """Simulated loss factor [-]: its material's, less what the grid takes of a blow by itself."""
     vibration: float = 0.0
     """About which angular frequency it loses so much [rad/s]; 0: its object's slowest vibration."""
+    laid: bool = False
+    """Whether it is a rigid sheet that lies on the floor, thinner than half a cell: what strikes it
+    strikes the floor."""
 
 
 @dataclass(frozen=True)

@@ -446,15 +446,18 @@ def instead_of_nodes(r: Rigid, c: Contacts, s: Sheet, stride: int):
         for q in range(s.flag[NODES], s.flag[TOUCHES]):
             if c.fa[q] == c.fa[t] and c.fc[q] == c.fc[t]:
                 rolls = c.fa[q]
+                flat = c.fc[q]
                 if c.facet[q] == 1:
                     rolls = c.fc[q]
+                    flat = c.fa[q]
                 cosine = D(wp.dot(c.normal[t], c.normal[q]))
                 apart = c.point[t] - c.point[q]
                 reach = c.instead[q]
                 alike = ROUND_ALIKE
                 if reach == D(0.0):
                     reach = facet_misjudged(r.radius[rolls], s.dx)
-                    alike = FACET_ALIKE
+                    if r.thin[flat] == 0:
+                        alike = FACET_ALIKE
                 if facet_replaces(apart, cosine, reach, alike):
                     c.gap[t] = VAST
 

@@ -89,8 +89,9 @@ def instead_of_nodes(scene: Scene, nodes: list[Touch], faces: list[Touch]) -> li
             reach, alike = face.instead, ROUND_ALIKE
             if reach is None:
                 wide = scene.matter.radius[face.rolls]
-                alike = FACET_ALIKE
                 reach = FACET_NODES * cell + np.sqrt((0.5 * wide + BENT_NODES * cell) * cell)
+                thin = scene.thinness(sum(face.pair) - face.rolls)
+                alike = ROUND_ALIKE if thin else FACET_ALIKE
             apart = np.linalg.norm(touch.point[:, None] - face.point, axis=2)
             same = (touch.normal @ face.normal.T > alike) & (apart < reach)
             left &= ~same.any(axis=1)

@@ -231,7 +231,8 @@ struct Points {
       const Touch &P = touches[q];
       if (P.fc >= w->fields) continue;
       const double reach = P.instead > 0 ? P.instead : mpm::Facet::misjudged(rolls(w, P)->rigid[RADIUS], w->dx);
-      const double alike = P.instead > 0 ? mpm::ROUND_ALIKE : mpm::FACET_ALIKE;
+      const bool bent = P.instead > 0 || w->field[P.face ? P.fa : P.fc].thin;
+      const double alike = bent ? mpm::ROUND_ALIKE : mpm::FACET_ALIKE;
       for (int t = 0; t < nodes; t++) {
         Touch &T = touches[t];
         if (!T.active || T.fa != P.fa || T.fc != P.fc) continue;
