@@ -7,12 +7,14 @@ from splat_scenes import around
 from corporeal.geometry.rotation import matrix
 from corporeal.geometry.similarity import moved_cameras, similarity
 from corporeal.splats import hull
-from corporeal.splats.lowest import lowest
+from corporeal.splats.lowest import LOWEST, _foot, lowest
 from corporeal.types import Views
 
 CAMERAS = around(30, (96, 80), focal=100.0, centre=(0, 0, 0.3))[:16]
 LOW, HIGH = np.array([-0.3, -0.2, 0.0]), np.array([0.3, 0.2, 0.6])
 DIAMETER = 2.2
+PIXEL = float(np.linalg.norm(CAMERAS[0].world_from_camera[:3, 3] - [0, 0, 0.3])) / 100
+"""At the box [m]."""
 
 
 def masks_of_a_box(cameras):
@@ -46,6 +48,23 @@ def test_a_box_stands_where_its_outlines_meet_however_cameras_are_held(turn):
     found = lowest(pictures(held), masks_of_a_box(back), threads=1)
     assert found is not None
     assert abs(found - 1.5) < 0.01 * DIAMETER
+
+
+def test_a_floor_is_where_most_outlines_meet_not_where_the_lowest_do():
+    """Pixels are square, so that heights scatter: the lowest are wrong by twice as much."""
+    every = around(48, (96, 80), focal=100.0, centre=(0, 0, 0.3))
+    cameras = tuple(c for c in every if c.world_from_camera[2, 3] > 0.5)
+    found = lowest(pictures(cameras), masks_of_a_box(cameras), threads=1)
+    assert found is not None
+    assert abs(found) < 0.3 * PIXEL
+
+
+def test_where_outlines_meet_at_many_heights_nothing_is_below_the_lowest():
+    many = np.random.default_rng(0).uniform(0, 1, 400)
+    one = 0.2 + 0.01 * np.random.default_rng(1).normal(size=400)
+    assert _foot(many, 0.01) == pytest.approx(np.percentile(many, LOWEST))
+    assert _foot(one, 0.01) == pytest.approx(0.2, abs=0.004)
+    assert np.percentile(one, LOWEST) < 0.186
 
 
 def test_views_from_straight_above_do_not_tell():

@@ -80,3 +80,31 @@ def test_a_ball_gets_the_size_that_masks_show():
     made = fit(begun, masks(trimesh.creation.icosphere(4, 0.6 - 1.5 * PIXEL)))
     radius = np.linalg.norm(made.vertices, axis=1)
     assert radius.mean() == pytest.approx(0.6 - 1.5 * PIXEL, abs=0.25 * PIXEL)
+
+
+HOLLOW = 0.6 - 2 * PIXEL
+"""Radius of a bowl's inside [m]."""
+
+
+def bowl():
+    """Half a shell two pixels thick, in fine triangles."""
+    angle = np.linspace(-np.pi / 2, 0, 40)
+    arc = np.stack([np.cos(angle), np.sin(angle)], axis=1)
+    outer, inner = 0.6 * arc, HOLLOW * arc[::-1]
+    profile = np.concatenate([outer, np.linspace(outer[-1], inner[0], 4)[1:-1], inner])
+    profile[[0, -1], 0] = 0
+    return trimesh.creation.revolve(profile, sections=96)
+
+
+def test_the_inside_of_a_bowl_stays_though_its_outlines_are_too_small():
+    begun = bowl()
+    made = fit(Mesh(np.asarray(begun.vertices), np.asarray(begun.faces)), masks(larger(begun)))
+    inner = np.linalg.norm(begun.vertices, axis=1) < HOLLOW + 0.01 * PIXEL
+    deep = inner & (begun.vertices[:, 2] < -8 * PIXEL)
+    outer = np.linalg.norm(made.vertices[~inner], axis=1)
+    assert np.median(outer) == pytest.approx(0.6 + 1.5 * PIXEL, abs=0.3 * PIXEL)
+    assert np.linalg.norm(made.vertices[deep], axis=1).min() > HOLLOW - 0.1 * PIXEL
+
+
+def larger(body):
+    return body.copy().apply_scale(1 + 1.5 * PIXEL / 0.6)

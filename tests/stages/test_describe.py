@@ -54,6 +54,35 @@ def test_open_ware_from_pictures_is_no_solid_and_that_is_said():
     assert not describe(scene(THING), from_pictures=True).warnings
 
 
+def test_open_ware_from_pictures_stays_so_whatever_a_person_says_it_is_made_of(tmp_path):
+    """Else a bowl of which only the steel was stated weighed what its surface encloses."""
+    (tmp_path / "said.yaml").write_text("bowl_0: steel\n")
+    config = DescribeConfig(annotations=tmp_path / "said.yaml")
+    bowl = scene(("bowl_0", [("mesh", plain(), {})]))
+    said = words(describe(bowl, config, from_pictures=True))[("bowl_0", "bowl")]
+    assert (said.material, said.answered_by) == ("steel", "annotation")
+    assert (said.structure, said.wall_unseen) == ("sheet", True)
+    (tmp_path / "said.yaml").write_text("bowl_0: { material: steel, structure: solid }\n")
+    said = words(describe(bowl, config, from_pictures=True))[("bowl_0", "bowl")]
+    assert said.structure == "solid"
+    (tmp_path / "said.yaml").write_text("bowl_0: steel\n")
+    assert words(describe(bowl, config))[("bowl_0", "bowl")].structure is None
+
+
+def test_no_wall_from_pictures_is_believed_whoever_says_that_there_is_one(tmp_path):
+    (tmp_path / "said.yaml").write_text("thing_0: { material: steel, structure: sheet }\n")
+    config = DescribeConfig(annotations=tmp_path / "said.yaml")
+    said = words(describe(scene(THING), config, from_pictures=True))[("thing_0", "thing")]
+    assert (said.structure, said.built_by, said.wall_unseen) == ("sheet", "annotation", True)
+    assert not words(describe(scene(THING), config))[("thing_0", "thing")].wall_unseen
+
+
+@pytest.mark.parametrize("name", ["frypan", "iron skillet", "steel frying pan"])
+def test_pans_are_open_ware(name):
+    said = describe(scene((name, [("mesh", plain(), {})])), from_pictures=True)
+    assert [p.structure for o in said.objects for p in o.parts] == ["sheet"]
+
+
 def test_a_foreign_substance_is_no_obstacle():
     odd = ("vase_0", [("mesh", plain(), {"substance": "unobtainium"})])
     assert words(describe(scene(odd)))[("vase_0", "vase")].material == "ceramic"

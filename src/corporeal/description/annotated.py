@@ -6,6 +6,7 @@ from pathlib import Path
 
 from corporeal import materials
 from corporeal.description.describe_config import DescribeConfig
+from corporeal.description.file_words import OPEN
 from corporeal.geometry.identity import Identity
 from corporeal.types import (
     PartWords,
@@ -17,6 +18,8 @@ from corporeal.vlm.words import (
 )
 
 SHARES = ("volume_share", "surface_share")
+BUILT = ("structure", "built_by")
+"""Kept of open ware, which is no solid whatever it is made of."""
 
 
 def annotations_of(
@@ -66,7 +69,8 @@ def _annotated(annotation: Annotation | None, words: PartWords, path: Path | Non
     where = f"Stated in {Path(str(path)).name}."
     if annotation.material is not None:
         found = PartWords(words.name, annotation.material, None, None, "annotation", 1.0, where)
-        words = replace(found, **{s: getattr(words, s) for s in SHARES})
+        kept = SHARES + BUILT * ((words.structure, words.built_by) == OPEN)
+        words = replace(found, **{s: getattr(words, s) for s in kept})
     if (
         annotation.material is not None
         or annotation.structure is not None

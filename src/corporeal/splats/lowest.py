@@ -2,7 +2,10 @@
 
 Gaussians say it badly: nobody sees undersides, and what all masks allow bulges below them. But
 where an object touches the floor its lower outlines all meet: a ray through an outline touches what
-all masks allow in a short stretch there, and that lies on the object.
+all masks allow in a short stretch there, and that lies on the object. Of what stands on a flat
+foot most rays say the same height but for noise, and the floor is there: the lowest of them are
+wrong by twice their noise. What is round below touches no outline where it touches the floor, and
+its rays say many heights.
 """
 
 import numpy as np
@@ -19,7 +22,10 @@ STEEP = 0.3
 SHORT = 0.04
 """Longest stretch in height that still says where an object is, in radii of the region."""
 LOWEST = 5
-"""Percentile of heights that is the floor's: of rays through rims that touch it, all but a few."""
+"""Percentile of heights below which nothing is: of rays through rims, all but a few."""
+ERROR, WIDE = 0.5, 2.0
+"""Error of outlines [px], by which heights are smoothed; and how far below the height at which most
+rays touch something the lowest may lie for these to be one height and its noise [px]."""
 FEWEST = 20
 """Rays that must say it."""
 
@@ -42,7 +48,22 @@ def lowest(
     good = high - low < SHORT * around.radius
     if np.count_nonzero(good) < FEWEST:
         return None
-    return float(np.percentile((low + high)[good] / 2, LOWEST))
+    return _foot((low + high)[good] / 2, _pixel(views, np.array(around.centre)))
+
+
+def _pixel(views: Views, centre: np.ndarray) -> float:
+    """Return how wide a pixel is at what is looked at, in the middle view [m]."""
+    eyes = ((c.world_from_camera[:3, 3], c.K[0, 0]) for c in views.cameras)
+    return float(np.median([np.linalg.norm(eye - centre) / focal for eye, focal in eyes]))
+
+
+def _foot(height: Float[np.ndarray, " N"], pixel: float) -> float:
+    """Return where the floor is, by the heights at which rays touch something [m]."""
+    least = float(np.percentile(height, LOWEST))
+    near = height[height < least + 2 * WIDE * pixel]
+    apart = (height[:, None] - near) / (ERROR * pixel)
+    most = float(height[np.exp(-0.5 * np.square(apart)).sum(axis=1).argmax()])
+    return most if most - least < WIDE * pixel else least
 
 
 def _touched(

@@ -4,6 +4,8 @@ What carves space are depths, which are off by a pixel or two where an object is
 mostly all to the same side. Outlines are known to a tenth of a pixel. Wherever the surface's own
 outline differs from the object's, the surface there is moved along its normal by as much, and what
 lies between goes along (compare Kolev and Cremers 2008, who add outlines to stereo as constraints).
+Where no outline is near, a surface goes inwards as most outlines do, since what is met first is too
+near; that outlines want more elsewhere, as at the rim of a pan, says nothing of its bottom.
 No side of a wall, and none of a gap, is moved as far as its middle: else thin things would be
 turned inside out, and from then on every round would make them larger.
 """
@@ -33,7 +35,7 @@ ROUNDS = 5
 SPREAD = 6
 """How often a move is shared with neighbours."""
 PRIOR = 0.05
-"""Outlines that the median of all counts for, where the surface is seen."""
+"""Outlines that the median of all counts for, where the surface is seen and that is inwards."""
 FARTHEST = 0.4
 """Share of a wall's thickness, and of a gap's width, that either side of it may be moved by."""
 SLOPE, RINGS = 0.5, 12
@@ -105,11 +107,10 @@ def fitted(
         total, count = np.where(known, out, 0).sum(axis=0), known.sum(axis=0).astype(float)
         if not count.any():
             break
-        median = float(np.median(total[count > 0] / count[count > 0]))
+        median = min(0.0, float(np.median(total[count > 0] / count[count > 0])))
         for _ in range(SPREAD):
             total, count = mean @ total, mean @ count
-        prior = PRIOR * seen
-        move = (total + prior * median) / (count + PRIOR)
+        move = (total + PRIOR * seen * median) / (count + PRIOR)
         vertices = mesh.vertices + np.where(still, 0, move)[:, None] * begun.vertex_normals
         vertices[lies, 2] = floor
         mesh = smoothed(Mesh(vertices, mesh.triangles), floor, 2, mean)

@@ -1,6 +1,7 @@
 """Describe: say in words what is in the scene and what each part is made of."""
 
 from collections.abc import Callable
+from dataclasses import replace
 
 from corporeal.description.annotated import annotations_of, with_annotations
 from corporeal.description.asking import Asking
@@ -10,6 +11,7 @@ from corporeal.geometry.identity import identify
 from corporeal.types import (
     Inventory,
     ObjectWords,
+    PartWords,
     Scene,
 )
 from corporeal.vlm import connect, critic_of
@@ -39,13 +41,33 @@ def describe(
         config: Whom to ask.
         library: The library whose names and ranges a model is offered.
         progress: Told the fraction done and what is being done.
-        from_pictures: Objects are one surface each; an annotation may name the pieces of one.
+        from_pictures: Objects are one surface each; an annotation may name the pieces of one, and
+            how thick the surface draws a wall tells nothing, whoever says that there is one.
 
     Raises:
         UserError: An annotation or a recording does not fit the scene, nobody can be asked, or
             questions wait for a person's answers.
 
     """
+    made = _described(scene, config, library, progress, from_pictures)
+    if not from_pictures:
+        return made
+    return replace(made, objects=tuple(_pictured(thing) for thing in made.objects))
+
+
+def _pictured(thing: ObjectWords) -> ObjectWords:
+    """Say of all parts, in each answer, that pictures need not show the inside of their walls."""
+    answers = (replace(one, parts=tuple(map(_unseen, one.parts))) for one in thing.answers)
+    return replace(thing, parts=tuple(map(_unseen, thing.parts)), answers=tuple(answers))
+
+
+def _unseen(words: PartWords) -> PartWords:
+    return replace(words, wall_unseen=True, pieces=tuple(map(_unseen, words.pieces)))
+
+
+def _described(
+    scene: Scene, config: DescribeConfig, library: str, progress: Progress, from_pictures: bool
+) -> Inventory:
     validate(config)
     identity = identify(scene, matter_hint)
     annotations = annotations_of(scene, identity, config, library, from_pictures)

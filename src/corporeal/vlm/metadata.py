@@ -198,7 +198,7 @@ def hollowed(
             wall_usual=words.wall_usual or words.thickness is None,
         )
     if from_pictures and any(open_ware(name.words) for name in evidence.general):
-        return replace(words, structure="sheet", wall_unseen=True)
+        return replace(words, structure="sheet")
     named = evidence.general
     called = evidence.alone and any("hollow" in name.words for name in named)
     is_hollow = called or any(hollow(name.words) for name in named)
