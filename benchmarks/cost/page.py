@@ -234,13 +234,13 @@ def _together(results: list[Result]) -> list[tuple[str, ...]]:
 
 
 def _linear(results: list[Result]) -> list[tuple[str, ...]]:
-    sizes = _series(results)
-    large = [r for r in sizes if r.particles >= 90_000]
-    if len(large) < 2:
-        return []
-    ratio = large[-1].cpu / large[0].cpu
-    words = f"{large[-1].particles:,} particles against {large[0].particles:,}, each"
-    return [_judged(words, ratio, "×", 1.1, at_most=True)]
+    """Compare what a particle costs among many with what it costs among a hundred thousand."""
+    large = [r for r in _series(results) if r.particles >= 90_000]
+    rows = []
+    for one in large[1:]:
+        words = f"{one.particles:,} particles against {large[0].particles:,}, each"
+        rows.append(_judged(words, one.cpu / large[0].cpu, "×", 1.1, at_most=True))
+    return rows
 
 
 def _judged(
