@@ -198,3 +198,16 @@ def camera_rows(cameras: tuple[Camera, ...]) -> Float[np.ndarray, "V 16"]:
         K = camera.K
         row[12:] = K[0, 0], K[1, 1], K[0, 2], K[1, 2]
     return rows
+
+
+def pixel_width(rows: Float[np.ndarray, "V _"], place: Float[np.ndarray, "3"]) -> float:
+    """Return how wide a pixel is at a place, in the middle view [m].
+
+    Args:
+        rows: Cameras as ``camera_rows`` gives them; more may follow in each row.
+        place: [m]
+
+    """
+    pose = rows[:, :12].reshape(-1, 3, 4)
+    ahead = pose[:, 2, :3] @ place + pose[:, 2, 3]
+    return float(np.median(np.abs(ahead) / rows[:, 12]))

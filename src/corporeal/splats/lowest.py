@@ -10,10 +10,10 @@ its rays say many heights.
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import shift
+from scipy.ndimage import gaussian_filter1d, shift
 
 from corporeal.geometry.region import region
-from corporeal.splats.hull import Carved, tight
+from corporeal.splats.hull import Carved, camera_rows, pixel_width, tight
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Views
 
@@ -26,6 +26,8 @@ LOWEST = 5
 ERROR, WIDE = 0.5, 2.0
 """Error of outlines [px], by which heights are smoothed; and how far below the height at which most
 rays touch something the lowest may lie for these to be one height and its noise [px]."""
+FINE = 8
+"""Steps of height in one such error: so finely heights are counted."""
 FEWEST = 20
 """Rays that must say it."""
 
@@ -48,21 +50,17 @@ def lowest(
     good = high - low < SHORT * around.radius
     if np.count_nonzero(good) < FEWEST:
         return None
-    return _foot((low + high)[good] / 2, _pixel(views, np.array(around.centre)))
-
-
-def _pixel(views: Views, centre: np.ndarray) -> float:
-    """Return how wide a pixel is at what is looked at, in the middle view [m]."""
-    eyes = ((c.world_from_camera[:3, 3], c.K[0, 0]) for c in views.cameras)
-    return float(np.median([np.linalg.norm(eye - centre) / focal for eye, focal in eyes]))
+    pixel = pixel_width(camera_rows(views.cameras), np.array(around.centre))
+    return _foot((low + high)[good] / 2, pixel)
 
 
 def _foot(height: Float[np.ndarray, " N"], pixel: float) -> float:
     """Return where the floor is, by the heights at which rays touch something [m]."""
     least = float(np.percentile(height, LOWEST))
     near = height[height < least + 2 * WIDE * pixel]
-    apart = (height[:, None] - near) / (ERROR * pixel)
-    most = float(height[np.exp(-0.5 * np.square(apart)).sum(axis=1).argmax()])
+    step = ERROR * pixel / FINE
+    counts = np.bincount(((near - near.min()) / step).astype(int)).astype(float)
+    most = float(near.min() + (gaussian_filter1d(counts, FINE).argmax() + 0.5) * step)
     return most if most - least < WIDE * pixel else least
 
 

@@ -19,6 +19,7 @@ from jaxtyping import Bool, Float, Float32
 from corporeal.geometry.mesh import Mesh
 from corporeal.splats.depth_rendering import DepthRendering
 from corporeal.splats.fairing import ON, means, smoothed
+from corporeal.splats.hull import pixel_width
 from corporeal.splats.kernels_outline import outline, stray
 from corporeal.splats.thread_pool import ThreadPool
 
@@ -98,7 +99,8 @@ def fitted(
     mean, out = means(mesh), np.empty((views, len(mesh.vertices)), np.float32)
     rule = np.array([STEEP, REACH, EDGE])
     lies = mesh.vertices[:, 2] < floor + ON
-    begun, leeway = mesh, np.minimum(_leeway(mesh), REACH * _pixel(mesh, outlines))
+    pixel = pixel_width(outlines.cameras, mesh.vertices.mean(axis=0))
+    begun, leeway = mesh, np.minimum(_leeway(mesh), REACH * pixel)
     for _ in range(outlines.rounds):
         normals = mesh.vertex_normals
         rest = mesh.vertices, mesh.triangles, normals, outlines.cameras, outlines.distance
@@ -116,13 +118,6 @@ def fitted(
         mesh = smoothed(Mesh(vertices, mesh.triangles), floor, 2, mean)
         mesh = _held(mesh, begun, leeway)
     return mesh
-
-
-def _pixel(mesh: Mesh, outlines: Outlines) -> float:
-    """Return how wide a pixel is at a surface, in the middle view [m]."""
-    pose = outlines.cameras[:, :12].reshape(-1, 3, 4)
-    ahead = pose[:, 2, :3] @ mesh.vertices.mean(axis=0) + pose[:, 2, 3]
-    return float(np.median(np.abs(ahead) / outlines.cameras[:, 12]))
 
 
 def _leeway(mesh: Mesh) -> Float[np.ndarray, "2 N"]:
