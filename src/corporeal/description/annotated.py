@@ -69,7 +69,8 @@ def _annotated(annotation: Annotation | None, words: PartWords, path: Path | Non
     where = f"Stated in {Path(str(path)).name}."
     if annotation.material is not None:
         found = PartWords(words.name, annotation.material, None, None, "annotation", 1.0, where)
-        kept = SHARES + BUILT * ((words.structure, words.built_by) == OPEN)
+        is_open = (words.structure, words.built_by) == OPEN
+        kept = SHARES + BUILT if is_open else SHARES
         words = replace(found, **{s: getattr(words, s) for s in kept})
     if (
         annotation.material is not None

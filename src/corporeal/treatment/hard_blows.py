@@ -15,7 +15,6 @@ It is too much
 from collections.abc import Sequence
 from dataclasses import replace
 
-from corporeal.geometry.falls import FLOOR
 from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.stability import stable_step
 from corporeal.treatment.filled import as_contents
@@ -68,10 +67,9 @@ def calmed(
     found = []
     for part, true, made in zip(parts, unslowed, slowed, strict=True):
         lands = motions[part.object].landing
-        onto = lands.onto if lands is not None and lands.speed > 0.0 else None
-        if onto is not None and (onto == FLOOR or onto not in soft) and _bounces(part, made):
-            speed = lands.speed if lands is not None else 0.0
-            made = _less_lossy(made, _excess(part, true, made, speed), cell)
+        if lands is not None and lands.speed > 0.0 and lands.onto not in soft:
+            if _bounces(part, made):
+                made = _less_lossy(made, _excess(part, true, made, lands.speed), cell)
         found.append(made)
     return found
 
