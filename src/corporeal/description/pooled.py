@@ -29,7 +29,7 @@ from corporeal.types import (
 from corporeal.vlm.words import gathered
 
 LOOKED = ("model", "recording")
-FROM_NAME = ("stated", "values", "inflation", "rebound", "wall_unseen")
+FROM_NAME = ("stated", "values", "inflation", "rebound")
 """What no answer says of a part: its file or a person does."""
 SHARES = ("volume_share", "surface_share", "inner_share")
 
