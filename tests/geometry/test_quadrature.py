@@ -102,3 +102,23 @@ def test_nothing_is_divided_among_nobody():
     ball = shaped(trimesh.creation.icosphere(1))
     points, volumes = centred(np.zeros((0, 3)), ball, 0.1, np.zeros(0, bool))
     assert points.shape == (0, 3) and volumes.shape == (0,)
+
+
+def test_what_belongs_to_another_part_is_not_divided_among_these_points():
+    """Leaves of a tree stand for themselves: its twigs do not weigh as much as they do."""
+    bar = shaped(trimesh.creation.box((0.1, 0.1, 1.0)))
+    rng = np.random.default_rng(0)
+    below = fill_body(bar, bar, SPACING, lambda p: np.where(p[:, 2] < 0, np.inf, 0.0), rng)
+    assert below.points[:, 2].max() < 0
+    assert below.volumes.sum() == pytest.approx(0.1 * 0.1 * 0.5, rel=0.01)
+    assert centre(below)[2] == pytest.approx(-0.25, rel=0.01)
+
+
+def test_a_thin_twig_stands_for_less_than_a_thick_one():
+    """Both are thinner than the spacing, so that each is one row of points."""
+    thick = trimesh.creation.cylinder(0.02, 1.0)
+    thin = trimesh.creation.cylinder(0.005, 1.0).apply_translation((0, 0, 1.1))
+    made = filled(shaped(thick + thin))
+    upper = made.points[:, 2] > 0.55
+    assert 10 < upper.sum() < 40
+    assert made.volumes[upper].sum() / made.volumes.sum() == pytest.approx(1 / 17, abs=0.02)

@@ -157,6 +157,22 @@ def test_matched_moments_are_those_of_the_reference(rng):
     assert masses.min() > 0
 
 
+def test_moments_that_some_points_would_pay_for_with_negative_mass_are_matched_by_the_others(rng):
+    reference = rng.uniform(0, 1, (5000, 3)) * (1, 1, 3) + (0, 0, 1.0)
+    points = rng.uniform(0, 1, (400, 3)) * (1, 1, 4)
+    given = np.full(5000, 0.002)
+    masses = match_moments(points, np.ones(400), reference, given)
+    assert np.allclose(masses @ points, given @ reference)
+    assert np.allclose((masses[:, None] * points).T @ points, reference.T @ reference * 0.002)
+    assert masses.min() >= 0.1 * 10 / 400 - 1e-12
+
+
+def test_points_too_few_for_an_inertia_have_the_right_centre(rng):
+    points, reference = rng.normal(size=(20, 3)), rng.normal((0.2, 0, 0), 1, (5000, 3))
+    masses = match_moments(points, np.ones(20), reference, np.full(5000, 0.002))
+    assert np.allclose(masses @ points, reference.sum(axis=0) * 0.002)
+
+
 def test_a_point_is_inside_whichever_way_the_surface_faces(rng):
     ball = shaped(trimesh.creation.icosphere(3))
     turned = Shape(Mesh(ball.mesh.vertices, np.ascontiguousarray(ball.mesh.triangles[:, ::-1])))

@@ -14,6 +14,12 @@ from corporeal.geometry.spread import sample_surface, scatter, thin_out
 
 SLIVER = 0.02
 """Volumes below this share of spacing³ are left out where there is more."""
+ALIKE = 1.25
+"""Ratio of two thicknesses up to which points stand for about the same volume."""
+ENOUGH = 3
+"""Points per moment that is matched."""
+LEAST, ROUNDS = 0.1, 30
+"""Share of its mass that every point keeps when moments are matched, and attempts at that."""
 PACKING = 0.83
 """Least distance, in spacings, at which dart throwing reaches one point per spacing²."""
 
@@ -51,6 +57,7 @@ def fill_body(
     """
     points = scatter(shape, spacing, rng)
     limit = deepest(points)
+    elsewhere = bool((limit <= 0).any())
     depth, foot = np.full(len(points), np.inf), np.zeros_like(points)
     ask = np.isfinite(limit) | skin.may_be_within(2 * spacing, points)
     depth[ask], _, foot[ask] = skin.closest(points[ask])
@@ -60,14 +67,16 @@ def fill_body(
     narrow = depth < spacing
     inward = (points - foot)[narrow] / np.maximum(depth[narrow], 1e-300)[:, None]
     narrow[narrow] = depth[narrow] + skin.reach(points[narrow] + 1e-9 * inward, inward) < spacing
-    middle = fill_narrow(skin, spacing, rng)
-    middle = middle[deepest(middle) > 0]
+    middle, through = fill_narrow(skin, spacing, rng)
+    there = deepest(middle) > 0
+    elsewhere |= not there.all()
+    middle, through = _pick(there, middle, through)
     lost = float(narrow.sum()) * spacing**3
     points, limit = points[~narrow], limit[~narrow]
-    middle = middle[thin_out(middle, 0.6 * spacing, points)]
+    middle, through = _pick(thin_out(middle, 0.6 * spacing, points), middle, through)
     each = lost / max(len(middle), 1)
     if each < SLIVER * spacing**3 and len(points):  # only sharp edges: nothing to speak of
-        middle = middle[:0]
+        middle, through = middle[:0], through[:0]
     everything = np.concatenate([points, middle])
     held = np.arange(len(everything)) >= len(points)
     limit = np.concatenate([limit, np.full(len(middle), np.inf)])
@@ -75,18 +84,38 @@ def fill_body(
     least = SLIVER * spacing**3
     if np.isfinite(limit).any():
         return Filling(relaxed, np.where(held, max(each, least), spacing**3))
-    relaxed, volumes = centred(relaxed, shape, spacing, held)
-    if held.any():
-        volumes[held] = volumes[held].mean()  # of what is this thin, samples are few
+    empty = (lambda p: deepest(p) <= 0) if elsewhere else None
+    relaxed, volumes = centred(relaxed, shape, spacing, held, empty)
+    volumes[held] = _of_like_thickness(volumes[held], through)
     return Filling(relaxed, np.maximum(volumes, least))
 
 
-def _pick(mask: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
-    return tuple(a[mask] for a in arrays)
+def _pick(which: np.ndarray, *arrays: np.ndarray) -> tuple[np.ndarray, ...]:
+    return tuple(a[which] for a in arrays)
 
 
-def fill_narrow(skin: Shape, spacing: float, rng: np.random.Generator) -> Float[np.ndarray, "N 3"]:
-    """One layer of points midway through whatever is thinner than ``spacing``."""
+def _of_like_thickness(
+    volumes: Float[np.ndarray, " N"], through: Float[np.ndarray, " N"]
+) -> Float[np.ndarray, " N"]:
+    """Give points the mean volume [m³] of those where the body is about as thick [m].
+
+    Of what is this thin, one point has few samples. All of them together would say that a twig
+    weighs as much as the same length of the trunk.
+    """
+    likeness = np.floor(np.log(np.maximum(through, 1e-300)) / np.log(ALIKE))
+    _, group = np.unique(likeness, return_inverse=True)
+    return (np.bincount(group, volumes) / np.maximum(np.bincount(group), 1))[group]
+
+
+def fill_narrow(
+    skin: Shape, spacing: float, rng: np.random.Generator
+) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, " N"]]:
+    """Lay one layer of points midway through whatever is thinner than ``spacing``.
+
+    Returns:
+        Positions, and how thick the body is there [m].
+
+    """
     mesh = skin.mesh
     count = int(np.clip(6 * mesh.areas.sum() / spacing**2, 200, 2_000_000))
     points, triangle = sample_surface(mesh, count, rng)
@@ -95,8 +124,9 @@ def fill_narrow(skin: Shape, spacing: float, rng: np.random.Generator) -> Float[
     through = skin.reach(points + step * inward, inward) + step
     thin = through < spacing
     middle = points[thin] + 0.5 * through[thin, None] * inward[thin]
-    middle = middle[rng.permutation(len(middle))]
-    return middle[thin_out(middle, PACKING * spacing)]
+    middle, through = _pick(rng.permutation(len(middle)), middle, through[thin])
+    apart = thin_out(middle, PACKING * spacing)
+    return middle[apart], through[apart]
 
 
 def fill_wall(face: Mesh, spacing: float, thickness: float, rng: np.random.Generator) -> Filling:
@@ -137,25 +167,48 @@ def match_moments(
     """Adjust masses so that mass, centre and inertia equal those of a reference.
 
     The smallest relative change m_i (1 + Σ_k λ_k φ_k(x_i)) over the ten monomials φ up to second
-    order; returned unchanged in shape when the points cannot carry it (fewer than 30, a change
-    that would make a mass negative, or a reference that is a single point).
+    order that leaves every point a tenth of its mass: points that would keep less keep that, and
+    the others are solved again. Points that cannot carry the inertia so have the right centre at
+    least; those that cannot carry that either, too few or all to one side, are returned with the
+    right mass only, and so is what stands for a single point.
 
     Returns:
         Masses [kg].
 
     """
     masses = masses * wanted_masses.sum() / masses.sum()
-    if len(points) < 30:
-        return masses
     centre = np.average(wanted, axis=0, weights=wanted_masses)
     scale = np.sqrt(np.average(((wanted - centre) ** 2).sum(axis=1), weights=wanted_masses))
     if scale <= 1e-9 * np.ptp(points, axis=0).max():
         return masses
     phi = _monomials((points - centre) / scale)
-    missing = wanted_masses @ _monomials((wanted - centre) / scale) - masses @ phi
-    factors = np.linalg.lstsq((phi * masses[:, None]).T @ phi, missing, rcond=1e-8)[0]
-    change = 1 + phi @ factors
-    return masses * change if change.min() > 0.1 else masses
+    target = wanted_masses @ _monomials((wanted - centre) / scale)
+    for moments in (10, 4):
+        if len(points) < ENOUGH * moments:
+            continue
+        change = _least_change(masses, phi[:, :moments], target[:moments])
+        if change is not None:
+            return masses * change
+    return masses
+
+
+def _least_change(
+    masses: Float[np.ndarray, " N"], phi: Float[np.ndarray, "N K"], target: Float[np.ndarray, " K"]
+) -> Float[np.ndarray, " N"] | None:
+    """Smallest factors of masses that give K moments; None where none of at least LEAST do."""
+    change, free = np.ones(len(masses)), np.ones(len(masses), dtype=bool)
+    for _ in range(ROUNDS):
+        change[free] = 1.0
+        missing = target - (masses * change) @ phi
+        own = phi[free]
+        factors = np.linalg.lstsq((own * masses[free, None]).T @ own, missing, rcond=1e-8)[0]
+        change[free] = 1 + own @ factors
+        low = free & (change < LEAST)
+        if not low.any():
+            break
+        change[low], free[low] = LEAST, False
+    off = np.abs((masses * change) @ phi - target).max()
+    return change if change.min() >= LEAST and off <= 1e-6 * masses.sum() else None
 
 
 def _monomials(x: np.ndarray) -> np.ndarray:

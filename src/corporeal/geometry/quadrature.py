@@ -6,6 +6,8 @@ upright it bounces off to a side. Each point at the centroid of its Voronoi cell
 volume is the midpoint rule: exact for whatever is linear within cells, so for mass and its centre.
 """
 
+from collections.abc import Callable
+
 import numpy as np
 from jaxtyping import Bool, Float
 
@@ -23,6 +25,7 @@ def centred(
     shape: Shape,
     spacing: float,
     held: Bool[np.ndarray, " N"],
+    empty: Callable[[np.ndarray], np.ndarray] | None = None,
 ) -> tuple[Float[np.ndarray, "N 3"], Float[np.ndarray, " N"]]:
     """Move points to the centroids of their Voronoi cells within a shape, and measure these.
 
@@ -31,6 +34,7 @@ def centred(
         shape: What is divided among them.
         spacing: [m]
         held: Points that stay: layers in the middle of what is thin.
+        empty: For each point given, whether it belongs to something else; None: nothing does.
 
     Returns:
         Positions [m] and volumes of the cells [m³].
@@ -41,6 +45,8 @@ def centred(
     table = cells(points, spacing)
     count, total = np.zeros(len(points)), np.zeros_like(points)
     for samples in scattered(shape, spacing / FINER, np.random.default_rng(5)):
+        if empty is not None:
+            samples = samples[~empty(samples)]
         owner = table.nearest(samples)
         count += np.bincount(owner, minlength=len(points))
         for axis in range(3):
