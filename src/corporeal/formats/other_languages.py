@@ -10,6 +10,9 @@ from corporeal.geometry.identity import plain
 
 OF = frozenset("de del di du des da do della dello en".split())
 """What stands between a thing and what belongs to it: "caja de carton" is a box of cardboard."""
+STATES = frozenset("empty full old small large red blue green white black".split())
+"""What stands behind a thing and what belongs to it, and is of the thing: "botella de vino vacía"
+is an empty bottle."""
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 GAPLESS = ("CJK ", "HIRAGANA ", "KATAKANA ")
 """Letters of languages that are written without gaps."""
@@ -33,7 +36,9 @@ def in_english(words: Sequence[str]) -> list[str]:
     if where is None:
         return known
     before = [part for k in range(where) for part in found[k] or (words[k],)]
-    return in_english(words[where + 1 :]) + before
+    behind = in_english(words[where + 1 :])
+    last = next((k for k in range(len(behind), 1, -1) if behind[k - 1] not in STATES), 1)
+    return behind[:last] + before + behind[last:]
 
 
 @cache
