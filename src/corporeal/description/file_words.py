@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 from corporeal import materials
+from corporeal.description.no_block import no_block
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.geometry.identity import Identity
 from corporeal.materials.placement import (
@@ -52,7 +53,7 @@ def words_of_file(
         identity: Its parts.
         library: Where materials are looked up.
         from_pictures: Surfaces need not show how deep a vessel is.
-        unasked: No model looks: that a name says wet counts.
+        unasked: No model looks: that a name says wet counts, and what is too thick for a block.
 
     Raises:
         UserError: A number in the file can be no material's.
@@ -64,6 +65,8 @@ def words_of_file(
         found = stated_material(list(seen.surfaces), library) or hollowed(
             recognise(seen), seen, walls, from_pictures
         )
+        if unasked and not from_pictures:
+            found = no_block(found, seen, library)
         if not from_pictures:
             found = as_said(found, seen, found.material is None or walls(found.material))
         by = "metadata" if found.material else "unknown"

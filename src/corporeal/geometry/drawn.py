@@ -65,6 +65,21 @@ def drawn(surfaces: Sequence[Triangles], scale: float = 1.0) -> Drawn:
     return Drawn(_hollowed(mesh, volume), _thin(mesh, volume, scale))
 
 
+def mean_thickness(surfaces: Sequence[Triangles], scale: float = 1.0) -> float:
+    """Return how thick the shape that surfaces enclose is on average, 2 V / A [m]; 0: it is open.
+
+    Args:
+        surfaces: All of the object's.
+        scale: Lengths in them over the real ones [-].
+
+    """
+    whole = joined(surfaces)
+    mesh = orient(weld(whole.vertices, whole.triangles)[0])
+    if not closes(mesh):
+        return 0.0
+    return 2 * abs(signed_volume(mesh)) / float(mesh.areas.sum()) / scale
+
+
 def edge_of_scan(mesh: Mesh) -> float:
     """Return the median edge of a scan [m]; 0: it is none."""
     if len(mesh.triangles) <= SCANNED:

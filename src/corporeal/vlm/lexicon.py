@@ -8,7 +8,7 @@ from functools import cache, lru_cache
 from importlib.resources import files
 from math import inf
 
-from corporeal.formats.other_languages import in_english
+from corporeal.formats.other_languages import OF, in_english
 from corporeal.formats.spelling import (
     Vocabulary,
     by_squeezing,
@@ -325,6 +325,24 @@ def mouldable() -> frozenset[str]:
 def fired() -> frozenset[str]:
     """Materials of which moulded things are hollow, and balls are not: slip-cast."""
     return frozenset(_table()["fired"])
+
+
+@cache
+def formed() -> frozenset[str]:
+    """Return materials that things of any kind are sheets, castings or mouldings of."""
+    return (metals() | mouldable() | fired() | {"glass"}) - frozenset(_table()["solid"])
+
+
+def nameless(tokens: tuple[str, ...]) -> bool:
+    """Tell whether a name has a word for a thing, of whose matter no table knows anything."""
+    standing = heads(tokens)
+    known = {w for term in standing for w in term.phrase} | _describing() | OF
+    return all(t.kind == "substance" for t in standing) and any(w not in known for w in tokens)
+
+
+def massive(tokens: tuple[str, ...]) -> bool:
+    """Tell whether a word of a name says that the thing is solid all through."""
+    return bool(set(tokens) & frozenset(map(singular, _table()["massive"])))
 
 
 def made_hollow(thing: Term, material: str) -> bool:
