@@ -10,6 +10,7 @@ from corporeal import materials
 from corporeal.geometry.make import Leeway, width_of
 from corporeal.materials.scale import place
 from corporeal.mixture import (
+    FORM,
     PACKAGING,
     Scale,
     contradiction,
@@ -49,6 +50,27 @@ def one_thing(mesh, name, extent):
         "one", "", (SceneObject(f"{name}_0", name, extent),),
         (Surface(name, 0, 0, points, triangles),), (Finish("plain"),),
     )  # fmt: skip
+
+
+def spread(mesh, answered_by):
+    """Return how wide the masses of a ball of gold are: ln of the 95 % over the 5 % point."""
+    scene = one_thing(mesh, "gold ball", 0.1)
+    inventory = describe(scene)
+    (thing,) = inventory.objects
+    words = replace(thing.parts[0], material="gold", structure="solid", answered_by=answered_by)
+    said = replace(inventory, objects=(replace(thing, parts=(words,)),))
+    scale = Scale(scene, segment(scene, said), GroundConfig(), 0)
+    low, high = np.percentile([scale.draw(said, k).masses[0] for k in range(120)], (5, 95))
+    return float(np.log(high / low))
+
+
+def test_a_modelled_shape_is_in_doubt_only_where_a_name_alone_tells_what_it_is():
+    """Gold's density is known to .1 %; what was drawn of it is not."""
+    modelled = trimesh.creation.icosphere(2, RADIUS)
+    assert spread(modelled, "metadata") == pytest.approx(2 * 1.645 * FORM, rel=0.25)
+    assert spread(modelled, "model") < 0.02
+    scanned = trimesh.creation.icosphere(4, RADIUS)  # its edges leave it open, its form does not
+    assert spread(scanned, "metadata") == pytest.approx(spread(scanned, "model"), rel=0.1)
 
 
 def a_ball(*ways, evidence=None, **said):
