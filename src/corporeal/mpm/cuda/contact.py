@@ -25,14 +25,15 @@ from corporeal.mpm.cuda.layout import (
     KEPT,
     MEETS,
     TOUCHES,
-    Contacts,
     D,
     Grid,
     Particles,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
+from corporeal.mpm.cuda.rows import cell_at, matrix_at, vector_at
 from corporeal.mpm.formulas.one_lane import (
     gap_between,
     gap_of_liquid,
@@ -91,8 +92,9 @@ def show_particles(p: Particles, g: Grid, c: Contacts, s: Sheet, stride: int):
         return
     for i in range(wp.tid(), p.count, stride):
         if g.aware[p.home[i]] > 0:
-            J = wp.determinant(wp.identity(n=3, dtype=wp.float32) + p.strain[i])
-            show(g, c, s, p.home[i], p.cell[i], p.place[i], p.mass[i], J * p.volume[i])
+            J = wp.determinant(wp.identity(n=3, dtype=wp.float32) + matrix_at(p.strain, i))
+            f = vector_at(p.place, i)
+            show(g, c, s, p.home[i], cell_at(p.cell, i), f, p.mass[i], J * p.volume[i])
 
 
 @wp.kernel
@@ -222,8 +224,8 @@ def reach_particles(p: Particles, g: Grid, c: Contacts, s: Sheet, stride: int):
         return
     for i in range(wp.tid(), p.count, stride):
         if g.aware[p.home[i]] == 2:
-            F = wp.identity(n=3, dtype=wp.float32) + p.strain[i]
-            reach(g, c, s, p.home[i], p.cell[i], p.place[i], F, p.volume[i])
+            F = wp.identity(n=3, dtype=wp.float32) + matrix_at(p.strain, i)
+            reach(g, c, s, p.home[i], cell_at(p.cell, i), vector_at(p.place, i), F, p.volume[i])
 
 
 @wp.kernel

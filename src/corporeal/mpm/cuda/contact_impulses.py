@@ -36,13 +36,13 @@ from corporeal.mpm.cuda.layout import (
     SWEPT_NOW,
     TIME,
     TOUCHES,
-    Contacts,
     D,
     Grid,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.cuda.rigid import softness_at, speed_at
 from corporeal.mpm.formulas.one_lane import (
     closing_speed,

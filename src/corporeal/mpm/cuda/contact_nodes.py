@@ -20,13 +20,13 @@ from corporeal.mpm.cuda.layout import (
     NODES,
     STIFF,
     TOUCHES,
-    Contacts,
     D,
     Grid,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.cuda.rigid import speed_at
 from corporeal.mpm.formulas.one_lane import (
     ball_radius,

@@ -22,12 +22,12 @@ from corporeal.mpm.cuda.layout import (
     SWEPT_NOW,
     TOUCHES,
     WAITING,
-    Contacts,
     D,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.formulas.one_lane import (
     BACKING_ROW,
     BACKING_SUMS,

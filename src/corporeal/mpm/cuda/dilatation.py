@@ -19,6 +19,7 @@ from corporeal.mpm.cuda.layout import (
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.rows import cell_at, matrix_at
 from corporeal.mpm.formulas.one_lane import mean_bulk, mean_pressure
 
 wp.set_module_options(formulas.options(max_unroll=0))
@@ -36,7 +37,7 @@ def pool(p: Particles, g: Grid, stride: int):
     """Add up volume, and volume times pressure, of every cluster."""
     for i in range(wp.tid(), p.count, stride):
         if p.table[p.kind[i], SWELLS] > 0.0:
-            cell = p.cell[i]
+            cell = cell_at(p.cell, i)
             if p.home[i] < 0:
                 p.home[i] = find(g, p.field[i], block_of(cell))
             pair = wp.vec3i((cell[0] >> 1) & 1, (cell[1] >> 1) & 1, (cell[2] >> 1) & 1)
@@ -57,7 +58,7 @@ def press(p: Particles, g: Grid, s: Sheet, stride: int):
             relief = p.relief[i] + total[2] / total[0] - p.grown[i]
             law = p.table[row, LAW]
             bulk = mean_bulk(law, p.table[row, MU], p.table[row, LAMBDA])
-            found = mean_pressure(law, bulk, p.strain[i], relief)
+            found = mean_pressure(law, bulk, matrix_at(p.strain, i), relief)
             p.relief[i] = relief
             p.pressure[i] = found[0]
             wave = wp.sqrt((p.bound[i] + found[1]) / p.table[row, DENSITY])

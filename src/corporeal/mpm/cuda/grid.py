@@ -12,10 +12,11 @@ from corporeal.mpm.cuda.layout import (
     FULL,
     Grid,
     Particles,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.rows import cell_at
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 0})
 
@@ -120,22 +121,22 @@ def key_particles(
 ):
     """Number particles by block, for sorting."""
     for i in range(wp.tid(), p.count, stride):
-        keys[i] = key_of(p.field[i], block_of(p.cell[i]))
+        keys[i] = key_of(p.field[i], block_of(cell_at(p.cell, i)))
         order[i] = i
 
 
 @wp.kernel
 def reorder(
     count: int,
-    width: int,
     order: wp.array(dtype=wp.int32),
-    values: wp.array(dtype=wp.int32),
-    out: wp.array(dtype=wp.int32),
+    values: wp.array2d(dtype=wp.int32),
+    out: wp.array2d(dtype=wp.int32),
     stride: int,
 ):
-    """Copy rows of 32-bit words in a new order."""
-    for i in range(wp.tid(), count * width, stride):
-        out[i] = values[order[i // width] * width + i % width]
+    """Copy all channels in a new order."""
+    for i in range(wp.tid(), count, stride):
+        for k in range(values.shape[0]):
+            out[k, i] = values[k, order[i]]
 
 
 @wp.kernel
@@ -154,13 +155,13 @@ def claim_blocks(p: Particles, r: Rigid, g: Grid, s: Sheet, stride: int):
     """Claim the blocks of all particles."""
     for i in range(wp.tid(), p.count, stride):
         p.home[i] = -1
-        low = block_of(p.cell[i])
+        low = block_of(cell_at(p.cell, i))
         same = int(0)
         if i > 0 and p.field[i - 1] == p.field[i]:
-            if block_of(p.cell[i - 1]) == low:
+            if block_of(cell_at(p.cell, i - 1)) == low:
                 same = 1  # sorted: the first of a block claims for all
         if same == 0:
-            claim_around(s, g, p.field[i], p.cell[i])
+            claim_around(s, g, p.field[i], cell_at(p.cell, i))
     for i in range(wp.tid(), r.count, stride):
         r.home[i] = -1
         claim_around(s, g, r.body[i], r.cell[i])

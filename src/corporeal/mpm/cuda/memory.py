@@ -7,7 +7,9 @@ import numpy as np
 from corporeal.mpm import laws
 from corporeal.mpm.constants import FACET_ROW, FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP, VAST_DOUBLE
 from corporeal.mpm.cuda import layout
-from corporeal.mpm.cuda.layout import Contacts, Grid, Particles, Rigid, Sheet, wp
+from corporeal.mpm.cuda.layout import Grid, Sheet, wp
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.formulas.one_lane import BACKING_ROW, LEAST
 from corporeal.mpm.physics import prescribed
 from corporeal.mpm.physics.contact import face_table, full_cell
@@ -39,36 +41,6 @@ class Memory:
         """Make an array of zeros; never an empty one."""
         shape = tuple(max(1, n) for n in (count if isinstance(count, tuple) else (count,)))
         return wp.zeros(shape, dtype=kind, device=self.device)
-
-    # ------------------------------------------------------------ particles
-
-    def particles(self, problem: Problem, matter: Matter, chosen: np.ndarray) -> Struct:
-        """Lay out the particles that move with a grid of their own."""
-        count = len(chosen)
-        position = np.concatenate([b.position for b in problem.bodies])[chosen]
-        velocity = np.concatenate([b.velocity for b in problem.bodies])[chosen]
-        cell, place = split(position / problem.cell)
-        single = problem.contact == "single"
-        p = Particles()
-        p.count = count
-        p.cell, p.place = self.put(cell, wp.vec3i), self.put(place, wp.vec3)
-        p.velocity = self.put(velocity, wp.vec3)
-        for name in ("affine", "strain", "motion"):
-            setattr(p, name, self.zeros(count, wp.mat33))
-        p.stress = self.zeros(count, layout.vec6)
-        p.mass = self.put(matter.mass[chosen], wp.float32)
-        p.volume = self.put(matter.volume[chosen], wp.float32)
-        p.plastic, p.opened = self.zeros(count, wp.float32), self.zeros(count, wp.float32)
-        p.branch = self.zeros(count, layout.vec14)
-        for name in ("relief", "pressure", "grown", "bound"):
-            setattr(p, name, self.zeros(count, wp.float32))
-        p.cluster = self.zeros(count, wp.int32)
-        p.kind = self.put(matter.kind[chosen], wp.int32)
-        p.field = self.put(matter.body[chosen] * (not single), wp.int32)
-        p.number = self.put(chosen, wp.int32)
-        p.home, p.lost = self.zeros(count, wp.int32), self.zeros(count, wp.int32)
-        p.table = self.put(_materials(matter), wp.float32)
-        return p
 
     # ------------------------------------------------------------ grid
 
@@ -328,25 +300,6 @@ def split(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest of each particle's 27 nodes, and its offset from it [cells]."""
     low = np.floor(place - 0.5)
     return low.astype(np.int64), place - low
-
-
-def _materials(matter: Matter) -> np.ndarray:
-    """Write the rows that kernels read: see ``layout`` for the columns."""
-    s = matter.substances
-    table = np.zeros((len(s.body), layout.COLUMNS))
-    table[:, layout.LAW], table[:, layout.MU], table[:, layout.LAMBDA] = s.law, s.mu, s.lam
-    table[:, layout.YIELD], table[:, layout.HARD] = s.yield_stress, s.hardening
-    table[:, layout.CONE], table[:, layout.APEX] = s.cone, s.apex
-    table[:, layout.DENSITY], table[:, layout.FORGET] = s.density, s.forgetting
-    table[:, layout.STIFFENING] = s.stiffening
-    table[:, layout.CONSISTENCY], table[:, layout.INDEX] = s.consistency, s.flow_index
-    named = {layout.SHEAR: "shear", layout.BULK: "bulk", layout.RELAXATION: "time"}
-    for first, name in named.items():
-        column = getattr(s.branches, name)
-        table[:, int(first) : int(first) + column.shape[1]] = column
-    table[:, layout.BODY], table[:, layout.RIGID] = s.body, s.rigid
-    table[:, layout.SWELLS] = s.swells
-    return table
 
 
 def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:

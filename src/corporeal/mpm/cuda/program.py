@@ -20,10 +20,6 @@ MODULES = (
 )
 """Modules whose kernels a step launches."""
 THREADS_PER_PROCESSOR = 1024
-PARTICLE_STATE = (
-    "cell place velocity affine strain motion stress mass volume plastic opened relief pressure "
-    "branch kind field number"
-)
 
 
 @dataclass
@@ -105,12 +101,9 @@ class Program:
         order = wp.zeros(2 * count, dtype=wp.int32, device=self.device)
         self._each(grids.key_particles, p, keys, order)
         wp.utils.radix_sort_pairs(keys, order, count)
-        for name in PARTICLE_STATE.split():
-            array = getattr(p, name)
-            words = _words(array)
-            sorted_words = wp.empty_like(words)
-            self._each(grids.reorder, count, words.size // count, order, words, sorted_words)
-            wp.copy(words, sorted_words)
+        in_order = wp.empty_like(p.words)
+        self._each(grids.reorder, count, order, p.words, in_order)
+        wp.copy(p.words, in_order)
 
     def _record(self) -> Any:
         """Capture a whole frame: steps until the clock says stop."""
@@ -257,9 +250,3 @@ class Program:
         self._each(impulses.count_busy, a.contacts, a.rigid, a.sheet)
         self._each(impulses.sweep, a.contacts, a.rigid, a.sheet)
         self._run(impulses.apply, 1, a.rigid, a.sheet, stride=False)
-
-
-def _words(array: Any) -> Any:
-    """Look at the same memory as 32-bit words."""
-    size = array.size * wp.types.type_size_in_bytes(array.dtype) // 4
-    return wp.array(ptr=array.ptr, dtype=wp.int32, shape=(size,), device=array.device)

@@ -11,10 +11,10 @@ from corporeal.mpm.cuda.layout import (
     TIME,
     D,
     Grid,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.formulas.one_lane import follow_path, inverse_inertia, turned
 
 wp.set_module_options(formulas.options())

@@ -53,13 +53,24 @@ from corporeal.mpm.cuda.layout import (
     YIELD,
     D,
     Grid,
-    Loads,
     Particles,
-    Rigid,
     Sheet,
     vec6,
     vec14,
     wp,
+)
+from corporeal.mpm.cuda.layout_bodies import Loads, Rigid
+from corporeal.mpm.cuda.rows import (
+    cell_at,
+    fourteen_at,
+    matrix_at,
+    put_cell,
+    put_fourteen,
+    put_matrix,
+    put_six,
+    put_vector,
+    symmetric_at,
+    vector_at,
 )
 from corporeal.mpm.formulas.one_lane import (
     OPENED,
@@ -175,20 +186,19 @@ def scatter(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
     """Sum mass, momentum, and momentum as it was."""
     dt = wp.float32(s.clock[DT])
     for i in range(wp.tid(), p.count, stride):
-        cell = p.cell[i]
+        cell = cell_at(p.cell, i)
         home = p.home[i]
         if home < 0:
             home = find(g, p.field[i], block_of(cell))
             p.home[i] = home
-        f = p.place[i]
+        f = vector_at(p.place, i)
         m = p.mass[i]
         row = p.kind[i]
-        t = p.stress[i]
-        B = m * p.affine[i]
-        A = B + dt * wp.mat33(t[0], t[1], t[2], t[1], t[3], t[4], t[2], t[4], t[5])
-        old = m * p.velocity[i]
+        B = m * matrix_at(p.affine, i)
+        A = B + dt * symmetric_at(p.stress, i)
+        old = m * vector_at(p.velocity, i)
         new = old + m * wp.vec3(s.kick[int(p.table[row, BODY])])
-        new += l.blown[i] + l.pulled[i]
+        new += vector_at(l.blown, i) + vector_at(l.pulled, i)
         w = splines(f)
         if p.table[row, SWELLS] > 0.0:
             shared = g.pool[p.cluster[i]]
@@ -269,7 +279,7 @@ def relaxed(p: Particles, i: int, row: int, A: wp.mat33, memory: vec14, dt: wp.f
     after = memory
     for b in range(BRANCHES):
         after = follow(A, dt, p.table[row, RELAXATION + b], after, BRANCH * b)
-    p.branch[i] = after
+    put_fourteen(p.branch, i, after)
     return held(p, row, after)
 
 
@@ -281,13 +291,13 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
     dt = wp.float32(s.clock[DT])
     step = dt / s.cell
     for i in range(wp.tid(), p.count, stride):
-        cell = p.cell[i]
-        f = p.place[i]
+        cell = cell_at(p.cell, i)
+        f = vector_at(p.place, i)
         home = p.home[i]
         row = p.kind[i]
         w = splines(f)
         keep = 1.0 - wp.min(1.0, p.table[row, FORGET] * dt)
-        blown = wp.length_sq(l.blown[i]) > 0.0
+        blown = wp.length_sq(vector_at(l.blown, i)) > 0.0
         swells = p.table[row, SWELLS] > 0.0
         lam = p.table[row, LAMBDA]
         v = wp.vec3(0.0)
@@ -309,23 +319,23 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
                         was = n * wp.vec3(o[0], o[1], o[2])
                         u += was
                         K += wp.outer(was, arm)
-        B = p.affine[i]
-        before = p.velocity[i]
+        B = matrix_at(p.affine, i)
+        before = vector_at(p.velocity, i)
         body = int(p.table[row, BODY])
         push = wp.vec3(s.pushed[body])
         if wp.length_sq(push) > 0.0:
             mean = before + 0.5 * wp.vec3(s.kick[body])
             book(s, PUSHING, i, p.mass[i] * wp.dot(push, mean))
         if blown:
-            book(s, PUSHING, i, 0.5 * wp.dot(l.blown[i], u + v))
+            book(s, PUSHING, i, 0.5 * wp.dot(vector_at(l.blown, i), u + v))
         C = L
         if keep > 0.0:
             C = L + keep * (B - K)
-            p.velocity[i] = v + keep * (before - u)
+            put_vector(p.velocity, i, v + keep * (before - u))
         else:
-            p.velocity[i] = v
-        p.affine[i] = C
-        H = p.strain[i]
+            put_vector(p.velocity, i, v)
+        put_matrix(p.affine, i, C)
+        H = matrix_at(p.strain, i)
         # What belongs to a rigid body does not strain.
         A = (1.0 - p.table[row, RIGID]) * step * L
         law = p.table[row, LAW]
@@ -349,13 +359,13 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
             p.opened[i],
         )
         if remembers(law):
-            T = p.motion[i]
+            T = matrix_at(p.motion, i)
             T = T + A + A * T
             if liquid(law):
                 for x in range(3):
                     for y in range(3):
                         T[x, y] = a[STRAIN + 3 * x + y]
-            p.motion[i] = T
+            put_matrix(p.motion, i, T)
             p.plastic[i] = p.plastic[i] + a[PLASTIC_STRAIN]
             p.opened[i] = a[OPENED]
             book(s, PLASTIC, i, p.volume[i] * a[PLASTIC_WORK])
@@ -372,16 +382,17 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
             a[STRAIN + 8],
         )
         if p.table[row, STIFFENING] > 1.0:
-            memory = p.branch[i]
+            memory = fourteen_at(p.branch, i)
             tau += relaxed(p, i, row, A, memory, dt)
             book(s, VISCOUS, i, p.volume[i] * wp.ddot(held(p, row, memory), A))
-        p.strain[i] = strain
+        put_matrix(p.strain, i, strain)
         p.bound[i] = a[WAVE]
         pull = -4.0 / s.cell * p.volume[i] * tau
-        p.stress[i] = vec6(pull[0, 0], pull[0, 1], pull[0, 2], pull[1, 1], pull[1, 2], pull[2, 2])
+        six = vec6(pull[0, 0], pull[0, 1], pull[0, 2], pull[1, 1], pull[1, 2], pull[2, 2])
+        put_six(p.stress, i, six)
         move(p, g, s, i, f + step * v)
         if p.lost[i] == 0:
-            heard(s, 0, wp.length(p.velocity[i]))
+            heard(s, 0, wp.length(vector_at(p.velocity, i)))
             wave = wp.sqrt(a[WAVE] / p.table[row, DENSITY]) * p.table[row, STIFFENING]
             heard(s, 1, wave)
 
@@ -389,16 +400,16 @@ def gather(p: Particles, g: Grid, l: Loads, s: Sheet, stride: int):
 @wp.func
 def move(p: Particles, g: Grid, s: Sheet, i: int, f: wp.vec3):
     """Put a particle at f [cells] from its lowest node."""
-    cell = p.cell[i]
+    cell = cell_at(p.cell, i)
     shift = wp.vec3(wp.floor(f[0] - 0.5), wp.floor(f[1] - 0.5), wp.floor(f[2] - 0.5))
-    good = wp.length(f) < FARTHEST_STEP and wp.length_sq(p.velocity[i]) < VAST
-    good = good and wp.ddot(p.strain[i], p.strain[i]) < VAST
+    good = wp.length(f) < FARTHEST_STEP and wp.length_sq(vector_at(p.velocity, i)) < VAST
+    good = good and wp.ddot(matrix_at(p.strain, i), matrix_at(p.strain, i)) < VAST
     if good:
         moved = cell + wp.vec3i(int(shift[0]), int(shift[1]), int(shift[2]))
         good = inside(s, moved, f - shift)
         if good:
-            p.place[i] = f - shift
-            p.cell[i] = moved
+            put_vector(p.place, i, f - shift)
+            put_cell(p.cell, i, moved)
             if not (block_of(moved) == block_of(cell)):
                 p.home[i] = -1
                 claim_around(s, g, p.field[i], moved)
