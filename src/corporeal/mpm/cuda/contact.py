@@ -3,7 +3,6 @@
 Same formulas as ``physics.contact`` and ``reference.contact``, in float32 and relative to the node.
 """
 
-from corporeal.mpm import formulas
 from corporeal.mpm.constants import (
     FIELDS_AT_NODE,
     FIRST_BIAS,
@@ -16,8 +15,10 @@ from corporeal.mpm.constants import (
     VAST,
     WALL_REACH,
 )
+from corporeal.mpm.cuda import arena
+from corporeal.mpm.cuda.arena import node_of
 from corporeal.mpm.cuda.contact_nodes import height_of, slides, sticks, wets
-from corporeal.mpm.cuda.grid import block_of, find, node_of
+from corporeal.mpm.cuda.grid import block_of, find
 from corporeal.mpm.cuda.layout import (
     ASKED,
     DT,
@@ -48,7 +49,7 @@ from corporeal.mpm.formulas.one_lane import (
     wetted_face,
 )
 
-wp.set_module_options(formulas.options(max_unroll=0))
+wp.set_module_options(arena.options(max_unroll=0))
 
 
 # ---------------------------------------------------------------- surfaces
@@ -71,7 +72,7 @@ def show(
     for x in range(3):
         for y in range(3):
             for z in range(3):
-                e = g.meet[node_of(g, home, cell, x, y, z)] - 1
+                e = g.meet[node_of(g.near, home, cell, x, y, z)] - 1
                 if e >= 0:
                     offset = s.cell * (f - wp.vec3(float(x), float(y), float(z)))
                     n = w[0, x] * w[1, y] * w[2, z]
@@ -210,7 +211,7 @@ def reach(
     for x in range(3):
         for y in range(3):
             for z in range(3):
-                e = g.meet[node_of(g, home, cell, x, y, z)] - 1
+                e = g.meet[node_of(g.near, home, cell, x, y, z)] - 1
                 if e >= 0:
                     r = s.cell * (f - wp.vec3(float(x), float(y), float(z)))
                     reach_from(c, e, c.field[e], r, F, radius)

@@ -16,7 +16,7 @@ from corporeal.mpm.cuda import layout, memory, particle_memory
 from corporeal.mpm.cuda import load_memory as extras
 from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.cuda.memory import Memory, split
-from corporeal.mpm.cuda.program import MODULES, Arrays, Program
+from corporeal.mpm.cuda.program import Arrays, Program
 from corporeal.mpm.interaction import Interaction
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measure import Energy, Sums
@@ -79,8 +79,7 @@ class CudaEngine(Interaction):
         self.spare = {name: wp.empty_like(array) for name, array in self.kept.items()}
         self.lost = np.zeros(len(self.matter.mass), bool)
         self.grips: dict[int, Grip] = {}
-        for module in MODULES:
-            wp.load_module(module, device=self.device)
+        self.program.load()
         self._start()
 
     def _blocks_needed(self) -> int:

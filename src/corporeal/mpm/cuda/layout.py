@@ -47,7 +47,21 @@ NODES = wp.constant(17)
 """Contacts on nodes: those on surface points come after them."""
 HOLDS = wp.constant(18)
 """1: in this round of impacts something is held from behind."""
-FLAGS = 19
+STEPPING = wp.constant(19)
+"""1: another step comes before particles are sorted."""
+HOMES = wp.constant(20)
+"""Blocks that had particles in them when these were sorted: the first ones."""
+TASKS = wp.constant(21)
+"""Tasks: parts of such blocks' particles, each for a group of threads."""
+PLACED = wp.constant(22)
+"""Particles that have a place, while they are sorted."""
+STRAYS = wp.constant(23)
+"""Particles that have left the block they were sorted into."""
+FLAGS = 24
+GROUP = 128
+"""Threads of a group on a card."""
+TASK = wp.constant(512)
+"""Particles of a task at most: a block of eight a cell is one."""
 # What ``Contacts.active`` says, where it is not 0: not in this step.
 WAITING = wp.constant(1)
 """Not in this round of impacts."""
@@ -144,6 +158,8 @@ class Sheet:
     pushed: wp.array(dtype=wp.vec3d)
     """… the push's part of it."""
     mass: wp.array(dtype=wp.float64)
+    particles: int
+    """Those that can deform."""
     bodies: int
     planes: int
     plane: wp.array(dtype=wp.vec3d)
@@ -201,6 +217,10 @@ class Particles:
     number: wp.array(dtype=wp.int32)
     home: wp.array(dtype=wp.int32)
     """Block of ``cell``; -1: not looked up since it changed."""
+    rank: wp.array(dtype=wp.int32)
+    """Number within its block, while particles are sorted, and …"""
+    spare: wp.array2d(dtype=wp.int32)
+    """… room for some of their channels."""
     lost: wp.array(dtype=wp.int32)
     table: wp.array2d(dtype=wp.float32)
 
@@ -225,10 +245,23 @@ class Grid:
     """1: fields meet in this block; 2: more than one does."""
     aware: wp.array(dtype=wp.int32)
     """The same of any block that particles of this one reach."""
+    held_by: wp.array(dtype=wp.int32)
+    """Particles sorted into each block …"""
+    first: wp.array(dtype=wp.int32)
+    """… and the first of them."""
+    task_home: wp.array(dtype=wp.int32)
+    """Of each task: its block …"""
+    task_first: wp.array(dtype=wp.int32)
+    task_last: wp.array(dtype=wp.int32)
+    """… and its particles, from the first to before the last."""
+    arena: wp.array(dtype=wp.float32)
+    """Sums of a group where it has no memory of its own, on the processor."""
+    sum: wp.array(dtype=wp.float32)
+    """Mass [kg], momentum and impulse [kg m/s] of nodes: see ``arena.h``; 0 between steps."""
     node: wp.array(dtype=wp.vec4)
-    """Mass [kg] and momentum [kg m/s], then velocity [m/s]."""
+    """Mass [kg] and velocity [m/s]."""
     old: wp.array(dtype=wp.vec4)
-    """Momentum, then velocity, without forces."""
+    """Velocity without the step's forces [m/s]."""
     pool: wp.array(dtype=wp.vec3)
     """Eight clusters of 2³ cells per block: volume, and volume times pressure and dilatation, of
     nearly incompressible matter."""

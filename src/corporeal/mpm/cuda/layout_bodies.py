@@ -90,6 +90,8 @@ class Rigid:
 class Loads:
     """What acts on single particles, wind and tethers; and joints of rigid bodies."""
 
+    acts: int
+    """1: something acts on particles."""
     blown: wp.array2d(dtype=wp.float32)
     """What wind and grips give each particle in this step [N s], in the order of ``Particles`` …"""
     pulled: wp.array2d(dtype=wp.float32)

@@ -6,7 +6,7 @@ import numpy as np
 
 from corporeal.mpm import laws
 from corporeal.mpm.constants import FACET_ROW, FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP, VAST_DOUBLE
-from corporeal.mpm.cuda import layout
+from corporeal.mpm.cuda import arena, layout
 from corporeal.mpm.cuda.layout import Grid, Sheet, wp
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
@@ -56,6 +56,13 @@ class Memory:
         g.near = self.zeros(8 * room, wp.int32)
         g.partner = self.zeros(FIELDS_AT_NODE * room, wp.int32)
         g.seen, g.aware = self.zeros(room, wp.int32), self.zeros(room, wp.int32)
+        for name in ("held_by", "first"):
+            setattr(g, name, self.zeros(room, wp.int32))
+        particles = sum(len(b.position) for b in problem.bodies)
+        for name in ("task_home", "task_first", "task_last"):
+            setattr(g, name, self.zeros(room + particles // int(layout.TASK), wp.int32))
+        g.arena = self.zeros(arena.SUMS * arena.NODES, wp.float32)
+        g.sum = self.zeros(arena.SUMS * arena.BLOCK * room, wp.float32)
         g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec4)
         g.pool = self.zeros(8 * room, wp.vec3)
         for name in ("meet", "held", "was"):
@@ -253,7 +260,8 @@ class Memory:
         s.longest = min(LONGEST_STEP, longest_step(problem), prescribed.longest_step(problem))
         self._forces(s, problem)
         s.mass = self.put(matter.total, wp.float64)
-        s.bodies, s.planes = bodies, planes
+        soft = ~matter.rigid | (problem.contact == "single")
+        s.particles, s.bodies, s.planes = int(soft.sum()), bodies, planes
         normals = np.array([p.normal for p in problem.planes], float).reshape(-1, 3)
         s.plane = self.put(normals, wp.vec3d)
         s.offset = self.put(np.array([p.offset for p in problem.planes], float), wp.float64)

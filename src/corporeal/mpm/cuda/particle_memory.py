@@ -36,8 +36,10 @@ STATE: dict[str, tuple[tuple[int, ...], Any]] = {
     "field": ((), wp.int32),
     "number": ((), wp.int32),
 }
-"""What is kept of each particle: shape of a row, and type."""
-CHANNELS = sum(int(np.prod(shape)) for shape, _ in STATE.values())
+"""What is kept of each particle: shape of a row, and type; behind it stands their block."""
+SORTED_AT_ONCE = 16
+"""Channels that are moved together when particles are sorted: so many are there twice."""
+CHANNELS = 1 + sum(int(np.prod(shape)) for shape, _ in STATE.values())
 
 
 def particles(memory: Memory, problem: Problem, matter: Matter, chosen: np.ndarray) -> Any:
@@ -52,6 +54,8 @@ def particles(memory: Memory, problem: Problem, matter: Matter, chosen: np.ndarr
         typed = p.words if kind is wp.int32 else p.words.view(kind)
         setattr(p, name, typed[first : first + width] if shape else typed[first])
         first += width
+    p.home = p.words[first]
+    p.spare = memory.zeros((SORTED_AT_ONCE, lanes), wp.int32)
     cell, place = split(_joined(problem, "position")[chosen] / problem.cell)
     given = {
         "cell": cell,
@@ -67,7 +71,7 @@ def particles(memory: Memory, problem: Problem, matter: Matter, chosen: np.ndarr
         put(p, name, rows)
     for name in ("grown", "bound"):
         setattr(p, name, memory.zeros(lanes, wp.float32))
-    for name in ("cluster", "home", "lost"):
+    for name in ("cluster", "rank", "lost"):
         setattr(p, name, memory.zeros(lanes, wp.int32))
     p.table = memory.put(_materials(matter), wp.float32)
     return p

@@ -52,19 +52,21 @@ def law_lists() -> list[str]:
     ]
 
 
-def options(**others: Any) -> dict[str, Any]:
+def options(*headers: Path, **others: Any) -> dict[str, Any]:
     """Options of a Warp module that uses the formulas.
 
     Args:
+        headers: Headers of the module's own, after those of the formulas.
         others: More options of ``wp.set_module_options``.
 
     """
-    folder, text = [str(HERE)], preamble()
+    folders = [str(folder) for folder in (HERE, *(header.parent for header in headers))]
+    text = preamble() + "".join(f'#include "{header.name}"\n' for header in headers)
     build = wp.ModuleBuildOptions(
-        extra_cpu_include_dirs=folder,
-        extra_cuda_include_dirs=folder,
+        extra_cpu_include_dirs=folders,
+        extra_cuda_include_dirs=folders,
         extra_cpu_preamble=text,
         extra_cuda_preamble=text,
-        extra_build_dependencies=[str(HERE / name) for name in HEADERS],
+        extra_build_dependencies=[*(str(HERE / name) for name in HEADERS), *map(str, headers)],
     )
     return {"enable_backward": False, "extra_build_options": build, **others}
