@@ -5,14 +5,12 @@
 #include "spline.h"
 namespace mpm {
 namespace {
+static_assert(ARENA_NODES == ARENA_SIDE * ARENA_SIDE * ARENA_SIDE, "nodes that a block's particles reach");
 struct Arena {
-  enum { SIDE = 6, NODES = SIDE * SIDE * SIDE, BLOCK = 64 };
-  enum { SUMS = 7 };     // mass, momentum, impulse
-  enum { MOTION = 6 };   // velocity, velocity without forces
   // A group's own memory; given: where there is one group at a time, on a processor.
   CUDA_CALLABLE static MPM_INLINE float *memory(float *given) {
 #if defined(__CUDA_ARCH__)
-    __shared__ float own[SUMS * NODES];
+    __shared__ float own[ARENA_SUMS * ARENA_NODES];
     return own;
 #else
     return given;
@@ -26,19 +24,19 @@ struct Arena {
 #endif
   }
   // Place in the arena of a node, counted along each axis from the block's first.
-  CUDA_CALLABLE static MPM_INLINE int at(int x, int y, int z) { return (x * SIDE + y) * SIDE + z; }
+  CUDA_CALLABLE static MPM_INLINE int at(int x, int y, int z) { return (x * ARENA_SIDE + y) * ARENA_SIDE + z; }
   // Index of that node among all: it is in one of the eight blocks near home.
   CUDA_CALLABLE static MPM_INLINE int node(const int *near, int home, int x, int y, int z) {
     const int slot = near[8 * home + 4 * (x >> 2) + 2 * (y >> 2) + (z >> 2)];
-    return BLOCK * slot + 16 * (x & 3) + 4 * (y & 3) + (z & 3);
+    return NODES_OF_BLOCK * slot + 16 * (x & 3) + 4 * (y & 3) + (z & 3);
   }
   // The same of the arena's k-th.
   CUDA_CALLABLE static MPM_INLINE int node(const int *near, int home, int k) {
-    return node(near, home, k / (SIDE * SIDE), k / SIDE % SIDE, k % SIDE);
+    return node(near, home, k / (ARENA_SIDE * ARENA_SIDE), k / ARENA_SIDE % ARENA_SIDE, k % ARENA_SIDE);
   }
   // Where a node's sums stand: those of one kind side by side for a whole block.
   CUDA_CALLABLE static MPM_INLINE int sum(int node, int kind) {
-    return BLOCK * SUMS * (node / BLOCK) + BLOCK * kind + node % BLOCK;
+    return NODES_OF_BLOCK * (ARENA_SUMS * (node / NODES_OF_BLOCK) + kind) + node % NODES_OF_BLOCK;
   }
 };
 
@@ -88,7 +86,7 @@ struct Gift {
 // Places in the arena.
 struct Here {
   CUDA_CALLABLE MPM_INLINE int node(int x, int y, int z) const { return Arena::at(x, y, z); }
-  CUDA_CALLABLE MPM_INLINE int sum(int node, int kind) const { return Arena::NODES * kind + node; }
+  CUDA_CALLABLE MPM_INLINE int sum(int node, int kind) const { return ARENA_NODES * kind + node; }
 };
 
 // Places among all nodes, of what has strayed from its group's block.

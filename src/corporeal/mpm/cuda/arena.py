@@ -8,13 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from corporeal.mpm import formulas
+from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.layout import wp
 
 HEADER = Path(__file__).with_name("arena.h").resolve()
-SUMS, MOTION = 7, 6
-"""Sums of a node: mass [kg], momentum and impulse [kg m/s]; numbers of its motion."""
-NODES, BLOCK = 216, 64
-"""Nodes that a block's particles reach; nodes of a block."""
+NUMBERS = "ARENA_SIDE ARENA_NODES NODES_OF_BLOCK ARENA_SUMS ARENA_MOTION"
+"""What the header knows of ``layout``."""
 SEEN = 24
 """Numbers that a particle receives: v, ∇v, u, ∇u, gradients of dx v in row order times 4."""
 Seen = wp.types.vector(length=SEEN, dtype=wp.float32)
@@ -22,7 +21,8 @@ Seen = wp.types.vector(length=SEEN, dtype=wp.float32)
 
 def options(**others: Any) -> dict[str, Any]:
     """Options of a Warp module that uses the formulas and the arena."""
-    return formulas.options(HEADER, **others)
+    numbers = {name: int(getattr(layout, name)) for name in NUMBERS.split()}
+    return formulas.options(HEADER, numbers=numbers, **others)
 
 
 @wp.func_native("WP_TILE_SYNC();")
@@ -54,7 +54,7 @@ def sum_at(node: int, kind: int) -> int:
 
 @wp.func_native("""
   float *own = mpm::Arena::memory((float *)arena.data);
-  for (int k = lane; k < mpm::Arena::SUMS * mpm::Arena::NODES; k += lanes) own[k] = 0.0f;
+  for (int k = lane; k < mpm::ARENA_SUMS * mpm::ARENA_NODES; k += lanes) own[k] = 0.0f;
 """)
 def empty(arena: wp.array(dtype=wp.float32), lane: int, lanes: int):
     """Begin with sums of zero."""
@@ -126,14 +126,14 @@ def give_mass(
 
 @wp.func_native("""
   float *own = mpm::Arena::memory((float *)arena.data);
-  for (int k = lane; k < mpm::Arena::NODES; k += lanes) {
+  for (int k = lane; k < mpm::ARENA_NODES; k += lanes) {
     if (own[k] > 0.0f) {
       const int node = mpm::Arena::node((const int *)near.data, home, k);
       float *sum = (float *)sums.data + mpm::Arena::sum(node, 0);
-      for (int c = 0; c < mpm::Arena::SUMS; c++)
-        mpm::Arena::add(sum + mpm::Arena::BLOCK * c, own[mpm::Arena::NODES * c + k]);
+      for (int c = 0; c < mpm::ARENA_SUMS; c++)
+        mpm::Arena::add(sum + mpm::NODES_OF_BLOCK * c, own[mpm::ARENA_NODES * c + k]);
     }
-    for (int c = 0; c < mpm::Arena::SUMS; c++) own[mpm::Arena::NODES * c + k] = 0.0f;
+    for (int c = 0; c < mpm::ARENA_SUMS; c++) own[mpm::ARENA_NODES * c + k] = 0.0f;
   }
 """)
 def hand_over(
@@ -154,10 +154,10 @@ def hand_over(
 @wp.func_native("""
   float *own = mpm::Arena::memory((float *)arena.data);
   const float *now = (const float *)node.data, *before = (const float *)old.data;
-  for (int k = lane; k < mpm::Arena::NODES; k += lanes) {
+  for (int k = lane; k < mpm::ARENA_NODES; k += lanes) {
     const mpm::Far far = {{(const int *)near.data, home}, now, before};
     const int at = mpm::Arena::node((const int *)near.data, home, k);
-    for (int c = 0; c < mpm::Arena::MOTION; c++) own[mpm::Arena::NODES * c + k] = far.of(at, c);
+    for (int c = 0; c < mpm::ARENA_MOTION; c++) own[mpm::ARENA_NODES * c + k] = far.of(at, c);
   }
 """)
 def fetch(

@@ -6,7 +6,6 @@ Means are taken over the particles of 2³ cells of a field, as ``reference.mean_
 from corporeal.mpm import formulas
 from corporeal.mpm.cuda.grid import block_of, find
 from corporeal.mpm.cuda.layout import (
-    BLOCKS,
     DENSITY,
     FULL,
     LAMBDA,
@@ -26,13 +25,6 @@ wp.set_module_options(formulas.options(max_unroll=0))
 
 
 @wp.kernel
-def empty(g: Grid, s: Sheet, stride: int):
-    """Empty all clusters."""
-    for i in range(wp.tid(), 8 * s.flag[BLOCKS], stride):
-        g.pool[i] = wp.vec3(0.0)
-
-
-@wp.kernel
 def pool(p: Particles, g: Grid, stride: int):
     """Add up volume, and volume times pressure, of every cluster."""
     for i in range(wp.tid(), p.count, stride):
@@ -43,7 +35,8 @@ def pool(p: Particles, g: Grid, stride: int):
             pair = wp.vec3i((cell[0] >> 1) & 1, (cell[1] >> 1) & 1, (cell[2] >> 1) & 1)
             at = 8 * p.home[i] + 4 * pair[0] + 2 * pair[1] + pair[2]
             p.cluster[i] = at
-            wp.atomic_add(g.pool, at, p.volume[i] * wp.vec3(1.0, p.pressure[i], 0.0))
+            wp.atomic_add(g.pool, 0, at, p.volume[i])
+            wp.atomic_add(g.pool, 1, at, p.volume[i] * p.pressure[i])
 
 
 @wp.kernel
@@ -54,8 +47,8 @@ def press(p: Particles, g: Grid, s: Sheet, stride: int):
     for i in range(wp.tid(), p.count, stride):
         row = p.kind[i]
         if p.table[row, SWELLS] > 0.0:
-            total = g.pool[p.cluster[i]]
-            relief = p.relief[i] + total[2] / total[0] - p.grown[i]
+            at = p.cluster[i]
+            relief = p.relief[i] + g.pool[2, at] / g.pool[0, at] - p.grown[i]
             law = p.table[row, LAW]
             bulk = mean_bulk(law, p.table[row, MU], p.table[row, LAMBDA])
             found = mean_pressure(law, bulk, matrix_at(p.strain, i), relief)

@@ -1,4 +1,4 @@
-"""Node blocks on the device: found by hashing, linked, cleared.
+"""Node blocks on the device: found by hashing, and linked.
 
 A hash instead of a table with bounds: bodies may travel as far as they like, and nothing is laid
 out anew while they do. Particles remember their block: the hash is asked only when they change it.
@@ -7,7 +7,7 @@ out anew while they do. Particles remember their block: the hash is asked only w
 from corporeal.mpm.constants import FIELDS_AT_NODE, SMALLEST_MASS
 from corporeal.mpm.cuda import arena
 from corporeal.mpm.cuda.arena import sum_at
-from corporeal.mpm.cuda.layout import BLOCKS, EMPTY, FRESH, FULL, Grid, Sheet, wp
+from corporeal.mpm.cuda.layout import ARENA_SUMS, BLOCKS, EMPTY, FRESH, FULL, Grid, Sheet, wp
 
 wp.set_module_options(arena.options(max_unroll=0))
 
@@ -15,7 +15,6 @@ HALF_WIDTH = wp.constant(wp.int64(1 << 17))
 FIELD_UNIT = wp.constant(wp.int64(1 << 54))
 X_UNIT = wp.constant(wp.int64(1 << 36))
 Y_UNIT = wp.constant(wp.int64(1 << 18))
-SUMS = wp.constant(arena.SUMS)
 
 
 @wp.func
@@ -97,12 +96,13 @@ def claim_around(s: Sheet, g: Grid, field: int, cell: wp.vec3i):
     return 0
 
 
-@wp.kernel
-def link(g: Grid, s: Sheet, stride: int):
+@wp.func
+def link(g: Grid, s: Sheet, tid: int, stride: int):
     """Point every block to its neighbours and to other fields' blocks, if any are new."""
+    blocks = s.flag[BLOCKS]
     if s.flag[FRESH] == 0:
-        return
-    for b in range(wp.tid(), s.flag[BLOCKS], stride):
+        blocks = 0
+    for b in range(tid, blocks, stride):
         at = g.where[b]
         for o in range(8):
             g.near[8 * b + o] = find(g, g.field[b], at + wp.vec3i(o >> 2, (o >> 1) & 1, o & 1))
@@ -115,26 +115,28 @@ def link(g: Grid, s: Sheet, stride: int):
                     n += 1
         if n < FIELDS_AT_NODE:
             g.partner[FIELDS_AT_NODE * b + n] = -1
+    return 0
 
 
 @wp.kernel
-def clear(g: Grid, s: Sheet, stride: int):
-    """Empty all nodes."""
-    blocks = s.flag[BLOCKS]
-    for i in range(wp.tid(), 64 * blocks, stride):
-        g.meet[i] = 0
-        g.was[i] = 0
-        g.held[i] = 0
-    for b in range(wp.tid(), blocks, stride):
-        g.seen[b] = 0
-    if wp.tid() == 0:
-        s.flag[FRESH] = 0
+def link_all(g: Grid, s: Sheet, stride: int):
+    """Link what was claimed while particles were sorted."""
+    link(g, s, wp.tid(), stride)
 
 
 @wp.kernel
 def divide(g: Grid, s: Sheet, stride: int):
-    """Momentum to velocity, with the step's impulses and without; sums begin again."""
-    for i in range(wp.tid(), 64 * s.flag[BLOCKS], stride):
+    """Momentum to velocity, with the step's impulses and without; all else begins again."""
+    blocks = s.flag[BLOCKS]
+    for b in range(wp.tid(), blocks, stride):
+        g.seen[b] = 0
+    if wp.tid() == 0:
+        s.flag[FRESH] = 0
+    for i in range(wp.tid(), 64 * blocks, stride):
+        if g.fields > 1 or s.planes > 0:
+            g.meet[i] = 0
+            g.was[i] = 0
+            g.held[i] = 0
         m = g.sum[sum_at(i, 0)]
         now = wp.vec4(0.0)
         old = wp.vec4(0.0)
@@ -147,5 +149,5 @@ def divide(g: Grid, s: Sheet, stride: int):
             old = wp.vec4(u[0], u[1], u[2], 0.0)
         g.node[i] = now
         g.old[i] = old
-        for k in range(SUMS):
+        for k in range(ARENA_SUMS):
             g.sum[sum_at(i, k)] = 0.0

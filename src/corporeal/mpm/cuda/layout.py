@@ -57,7 +57,13 @@ PLACED = wp.constant(22)
 """Particles that have a place, while they are sorted."""
 STRAYS = wp.constant(23)
 """Particles that have left the block they were sorted into."""
-FLAGS = 24
+PAIRS = wp.constant(24)
+"""Pairs that met in this step."""
+FLAGS = 25
+ARENA_SIDE, ARENA_NODES, NODES_OF_BLOCK = 6, 216, 64
+"""Nodes along an axis that particles of one block reach, all of them, and nodes of a block."""
+ARENA_SUMS, ARENA_MOTION = wp.constant(7), 6
+"""Sums of a node: mass [kg], momentum and impulse [kg m/s]; numbers of its motion [m/s]."""
 GROUP = 128
 """Threads of a group on a card."""
 TASK = wp.constant(512)
@@ -138,7 +144,7 @@ class Sheet:
     change: wp.array(dtype=wp.float32)
     """Largest change of a contact's velocity in this sweep [m/s]."""
     pace: wp.array(dtype=wp.float64)
-    """Nesterov's t and momentum, and whether the last sweep went back on its way."""
+    """Nesterov's t and momentum, whether the last sweep went back, and momentum of this one."""
     loss: wp.array2d(dtype=wp.float64)
     gravity: wp.vec3d
     ramp: wp.float64
@@ -170,6 +176,10 @@ class Sheet:
     first_contact: wp.array2d(dtype=wp.float64)
     last_contact: wp.array2d(dtype=wp.float64)
     contact_point: wp.array2d(dtype=wp.vec3d)
+    marked: wp.array2d(dtype=wp.int32)
+    """1: the pair met in this step, and …"""
+    met: wp.array(dtype=wp.int32)
+    """… all that did: rows times their number, plus columns."""
     step_impulse: wp.array2d(dtype=wp.float64)
     """Normal impulse of each pair in this step [N s] …"""
     step_place: wp.array2d(dtype=wp.vec3d)
@@ -243,8 +253,6 @@ class Grid:
     """FIELDS_AT_NODE per block: blocks of other fields at the same place, by field; -1: no more."""
     seen: wp.array(dtype=wp.int32)
     """1: fields meet in this block; 2: more than one does."""
-    aware: wp.array(dtype=wp.int32)
-    """The same of any block that particles of this one reach."""
     held_by: wp.array(dtype=wp.int32)
     """Particles sorted into each block …"""
     first: wp.array(dtype=wp.int32)
@@ -262,7 +270,7 @@ class Grid:
     """Mass [kg] and velocity [m/s]."""
     old: wp.array(dtype=wp.vec4)
     """Velocity without the step's forces [m/s]."""
-    pool: wp.array(dtype=wp.vec3)
+    pool: wp.array2d(dtype=wp.float32)
     """Eight clusters of 2³ cells per block: volume, and volume times pressure and dilatation, of
     nearly incompressible matter."""
     meet: wp.array(dtype=wp.int32)

@@ -36,7 +36,6 @@ class Contacts:
     far_c: wp.array(dtype=wp.float32)
     pick: wp.array(dtype=wp.int32)
     """The candidate that is kept from the last step; -1: none is."""
-    chosen: wp.array(dtype=wp.vec3)
     kept_at: wp.array(dtype=wp.vec3i)
     """Choices that the next step finds, those of a node and field next to one another: node …"""
     kept_fa: wp.array(dtype=wp.int32)

@@ -15,7 +15,7 @@ from corporeal.mpm.cuda.layout import (
     wp,
 )
 from corporeal.mpm.cuda.layout_bodies import Loads, Rigid
-from corporeal.mpm.cuda.rigid import speed_at
+from corporeal.mpm.cuda.rigid import force, speed_at
 from corporeal.mpm.cuda.rows import cell_at, matrix_at, put_vector, vector_at
 from corporeal.mpm.formulas.one_lane import pressed, pulled, turn_of, turned_area
 from corporeal.mpm.physics.wind import HALF_RHO_C
@@ -122,11 +122,10 @@ def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
 # ---------------------------------------------------------------- rigid bodies
 
 
-@wp.kernel
-def load_rigid(r: Rigid, l: Loads, s: Sheet):
-    """Give rigid bodies their loads, and book the wind's work at their mean velocity."""
-    b = wp.tid()
-    if r.stiff[b] == 1 and s.flag[FULL] != 2:
+@wp.func
+def load(r: Rigid, l: Loads, s: Sheet, b: int):
+    """Give a rigid body its loads, and book the wind's work at its mean velocity."""
+    if r.stiff[b] == 1:
         speed = r.speed[b] + D(0.5) * l.wind_force[b] * r.light[b]
         spin = r.inertia[b] * (r.moment[b] + D(0.5) * l.wind_moment[b])
         work = wp.dot(l.wind_force[b], speed + s.kick[b]) + wp.dot(l.wind_moment[b], spin)
@@ -134,6 +133,18 @@ def load_rigid(r: Rigid, l: Loads, s: Sheet):
         r.speed[b] = r.speed[b] + (l.wind_force[b] + l.force[b]) * r.light[b]
         r.moment[b] = r.moment[b] + l.wind_moment[b] + l.moment[b]
         r.spin[b] = r.inertia[b] * r.moment[b]
+    return 0
+
+
+@wp.kernel
+def force_rigid(r: Rigid, l: Loads, s: Sheet):
+    """Let loads and forces act on rigid bodies."""
+    b = wp.tid()
+    if s.flag[FULL] == 2:
+        return
+    if l.faces > 0 or l.tethers > 0:
+        load(r, l, s, b)
+    force(r, s, b)
 
 
 @wp.func

@@ -6,7 +6,7 @@ import numpy as np
 
 from corporeal.mpm import laws
 from corporeal.mpm.constants import FACET_ROW, FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP, VAST_DOUBLE
-from corporeal.mpm.cuda import arena, layout
+from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.layout import Grid, Sheet, wp
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
@@ -55,16 +55,16 @@ class Memory:
         g.where, g.field = self.zeros(room, wp.vec3i), self.zeros(room, wp.int32)
         g.near = self.zeros(8 * room, wp.int32)
         g.partner = self.zeros(FIELDS_AT_NODE * room, wp.int32)
-        g.seen, g.aware = self.zeros(room, wp.int32), self.zeros(room, wp.int32)
+        g.seen = self.zeros(room, wp.int32)
         for name in ("held_by", "first"):
             setattr(g, name, self.zeros(room, wp.int32))
         particles = sum(len(b.position) for b in problem.bodies)
         for name in ("task_home", "task_first", "task_last"):
             setattr(g, name, self.zeros(room + particles // int(layout.TASK), wp.int32))
-        g.arena = self.zeros(arena.SUMS * arena.NODES, wp.float32)
-        g.sum = self.zeros(arena.SUMS * arena.BLOCK * room, wp.float32)
+        g.arena = self.zeros(int(layout.ARENA_SUMS) * layout.ARENA_NODES, wp.float32)
+        g.sum = self.zeros(int(layout.ARENA_SUMS) * layout.NODES_OF_BLOCK * room, wp.float32)
         g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec4)
-        g.pool = self.zeros(8 * room, wp.vec3)
+        g.pool = self.zeros((3, 8 * room), wp.float32)
         for name in ("meet", "held", "was"):
             setattr(g, name, self.zeros(64 * room, wp.int32))
         return g
@@ -202,7 +202,7 @@ class Memory:
             setattr(c, name, self.zeros(touches, wp.int32))
         c.candidate = self.zeros(touches, wp.mat33)
         c.far_a, c.far_c = self.zeros(3 * touches, wp.float32), self.zeros(3 * touches, wp.float32)
-        c.chosen, c.normal = self.zeros(touches, wp.vec3), self.zeros(touches, wp.vec3)
+        c.normal = self.zeros(touches, wp.vec3)
         c.gap = self.zeros(touches, wp.float32)
         c.target, c.span = self.zeros(touches, wp.float64), self.zeros(touches, wp.float64)
         c.last_velocity, c.turn = self.zeros(entries, wp.vec3d), self.zeros(touches, wp.float64)
@@ -253,7 +253,7 @@ class Memory:
         s.clock, s.flag = self.zeros(layout.CLOCK, wp.float64), self.zeros(layout.FLAGS, wp.int32)
         s.clock[int(layout.SMALLEST) : int(layout.SMALLEST) + 1].fill_(np.inf)
         s.fast, s.change = self.zeros(4, wp.float32), self.zeros(1, wp.float32)
-        s.pace = self.zeros(3, wp.float64)
+        s.pace = self.zeros(4, wp.float64)
         s.loss = self.zeros((5, int(layout.LANES)), wp.float64)
         s.gravity, s.ramp = wp.vec3d(*problem.gravity), problem.gravity_ramp
         s.courant, s.dx, s.cell = problem.courant, problem.cell, problem.cell
@@ -271,6 +271,8 @@ class Memory:
         never = np.full((everything, everything), np.nan)
         s.first_contact, s.last_contact = self.put(never, wp.float64), self.put(never, wp.float64)
         s.contact_point = self.put(np.stack([never] * 3, axis=2), wp.vec3d)
+        s.marked = self.zeros((everything, everything), wp.int32)
+        s.met = self.zeros(everything * everything, wp.int32)
         s.step_impulse = self.zeros((everything, everything), wp.float64)
         s.step_place = self.zeros((everything, everything), wp.vec3d)
         return s

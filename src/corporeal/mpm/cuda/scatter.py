@@ -30,8 +30,8 @@ def scatter_one(p: Particles, g: Grid, l: Loads, s: Sheet, i: int, home: int):
     if l.acts == 1:
         impulse += vector_at(l.blown, i) + vector_at(l.pulled, i)
     if p.table[row, SWELLS] > 0.0:
-        shared = g.pool[p.cluster[i]]
-        push = -4.0 / s.cell * p.volume[i] * dt * shared[1] / shared[0]
+        at = p.cluster[i]
+        push = -4.0 / s.cell * p.volume[i] * dt * g.pool[1, at] / g.pool[0, at]
         S += wp.diag(wp.vec3(push))
     if p.home[i] == home:
         give(g.arena, cell, f, m, momentum, B, impulse, S)

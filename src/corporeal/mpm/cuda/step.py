@@ -157,15 +157,17 @@ def gather_one(p: Particles, g: Grid, l: Loads, s: Sheet, i: int, home: int):
     old = int(0)
     if keep > 0.0 or blown:
         old = 1
-    a = Seen()
+    seen = Seen()
     if p.home[i] == home:
-        a = receive(g.arena, cell, f, old)
+        seen = receive(g.arena, cell, f, old)
     else:
-        a = receive_afar(g.node, g.old, g.near, p.home[i], cell, f, old)
-    v = wp.vec3(a[0], a[1], a[2])
-    L = wp.mat33(a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11])
-    u = wp.vec3(a[12], a[13], a[14])
-    K = wp.mat33(a[15], a[16], a[17], a[18], a[19], a[20], a[21], a[22], a[23])
+        seen = receive_afar(g.node, g.old, g.near, p.home[i], cell, f, old)
+    v = wp.vec3(seen[0], seen[1], seen[2])
+    L = wp.mat33(seen[3], seen[4], seen[5], seen[6], seen[7], seen[8], seen[9], seen[10], seen[11])
+    u = wp.vec3(seen[12], seen[13], seen[14])
+    K = wp.mat33(
+        seen[15], seen[16], seen[17], seen[18], seen[19], seen[20], seen[21], seen[22], seen[23]
+    )
     B = matrix_at(p.affine, i)
     before = vector_at(p.velocity, i)
     body = int(p.table[row, BODY])
@@ -175,12 +177,12 @@ def gather_one(p: Particles, g: Grid, l: Loads, s: Sheet, i: int, home: int):
         book(s, PUSHING, i, p.mass[i] * wp.dot(push, mean))
     if blown:
         book(s, PUSHING, i, 0.5 * wp.dot(given, u + v))
+    after = v
     C = L
     if keep > 0.0:
+        after = v + keep * (before - u)
         C = L + keep * (B - K)
-        put_vector(p.velocity, i, v + keep * (before - u))
-    else:
-        put_vector(p.velocity, i, v)
+    put_vector(p.velocity, i, after)
     put_matrix(p.affine, i, C)
     H = matrix_at(p.strain, i)
     # What belongs to a rigid body does not strain.
@@ -189,9 +191,10 @@ def gather_one(p: Particles, g: Grid, l: Loads, s: Sheet, i: int, home: int):
     if swells:
         # The rest of λ waits for what the whole cluster does.
         lam -= mean_bulk(law, p.table[row, MU], lam)
-        p.grown[i] = wp.trace(A)
-        wp.atomic_add(g.pool, p.cluster[i], wp.vec3(0.0, 0.0, p.volume[i] * p.grown[i]))
-    b = respond(
+        grown = wp.trace(A)
+        p.grown[i] = grown
+        wp.atomic_add(g.pool, 2, p.cluster[i], p.volume[i] * grown)
+    a = respond(
         law,
         p.table[row, MU],
         lam,
@@ -211,37 +214,43 @@ def gather_one(p: Particles, g: Grid, l: Loads, s: Sheet, i: int, home: int):
         if liquid(law):
             for x in range(3):
                 for y in range(3):
-                    T[x, y] = b[STRAIN + 3 * x + y]
+                    T[x, y] = a[STRAIN + 3 * x + y]
         put_matrix(p.motion, i, T)
-        p.plastic[i] = p.plastic[i] + b[PLASTIC_STRAIN]
-        p.opened[i] = b[OPENED]
-        book(s, PLASTIC, i, p.volume[i] * b[PLASTIC_WORK])
-    tau = wp.mat33(b[0], b[1], b[2], b[1], b[3], b[4], b[2], b[4], b[5])
+        p.plastic[i] = p.plastic[i] + a[PLASTIC_STRAIN]
+        p.opened[i] = a[OPENED]
+        book(s, PLASTIC, i, p.volume[i] * a[PLASTIC_WORK])
+    tau = wp.mat33(a[0], a[1], a[2], a[1], a[3], a[4], a[2], a[4], a[5])
     strain = wp.mat33(
-        b[STRAIN],
-        b[STRAIN + 1],
-        b[STRAIN + 2],
-        b[STRAIN + 3],
-        b[STRAIN + 4],
-        b[STRAIN + 5],
-        b[STRAIN + 6],
-        b[STRAIN + 7],
-        b[STRAIN + 8],
+        a[STRAIN],
+        a[STRAIN + 1],
+        a[STRAIN + 2],
+        a[STRAIN + 3],
+        a[STRAIN + 4],
+        a[STRAIN + 5],
+        a[STRAIN + 6],
+        a[STRAIN + 7],
+        a[STRAIN + 8],
     )
     if p.table[row, STIFFENING] > 1.0:
         memory = fourteen_at(p.branch, i)
         tau += relaxed(p, i, row, A, memory, dt)
         book(s, VISCOUS, i, p.volume[i] * wp.ddot(held(p, row, memory), A))
     put_matrix(p.strain, i, strain)
-    p.bound[i] = b[WAVE]
+    if swells:
+        p.bound[i] = a[WAVE]
     pull = -4.0 / s.cell * p.volume[i] * tau
     six = vec6(pull[0, 0], pull[0, 1], pull[0, 2], pull[1, 1], pull[1, 2], pull[2, 2])
     put_six(p.stress, i, six)
-    move(p, g, s, i, home, f + step * v)
-    if p.lost[i] == 0:
-        heard(s, 0, wp.length(vector_at(p.velocity, i)))
-        wave = wp.sqrt(b[WAVE] / p.table[row, DENSITY]) * p.table[row, STIFFENING]
+    good = wp.length_sq(after) < VAST and wp.ddot(strain, strain) < VAST
+    if good:
+        good = move(p, g, s, i, home, cell, f + step * v)
+    if good:
+        heard(s, 0, wp.length(after))
+        wave = wp.sqrt(a[WAVE] / p.table[row, DENSITY]) * p.table[row, STIFFENING]
         heard(s, 1, wave)
+    else:
+        p.lost[i] = 1
+        s.flag[LOST] = 1
     return 0
 
 
@@ -260,12 +269,10 @@ def stray(p: Particles, g: Grid, s: Sheet, i: int, home: int, to: wp.vec3i):
 
 
 @wp.func
-def move(p: Particles, g: Grid, s: Sheet, i: int, home: int, f: wp.vec3):
-    """Put a particle at f [cells] from its lowest node; home: its group's block."""
-    cell = cell_at(p.cell, i)
+def move(p: Particles, g: Grid, s: Sheet, i: int, home: int, cell: wp.vec3i, f: wp.vec3):
+    """Put a particle at f [cells] from its lowest node, if that is a place for particles."""
     shift = wp.vec3(wp.floor(f[0] - 0.5), wp.floor(f[1] - 0.5), wp.floor(f[2] - 0.5))
-    good = wp.length(f) < FARTHEST_STEP and wp.length_sq(vector_at(p.velocity, i)) < VAST
-    good = good and wp.ddot(matrix_at(p.strain, i), matrix_at(p.strain, i)) < VAST
+    good = wp.length(f) < FARTHEST_STEP
     if good:
         moved = cell + wp.vec3i(int(shift[0]), int(shift[1]), int(shift[2]))
         good = inside(s, moved, f - shift)
@@ -275,7 +282,4 @@ def move(p: Particles, g: Grid, s: Sheet, i: int, home: int, f: wp.vec3):
             if not (block_of(moved) == block_of(cell)):
                 stray(p, g, s, i, home, block_of(moved))
                 claim_around(s, g, p.field[i], moved)
-    if not good:
-        p.lost[i] = 1
-        s.flag[LOST] = 1
-    return 0
+    return good
