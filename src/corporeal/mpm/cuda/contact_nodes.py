@@ -159,11 +159,13 @@ def faces_of(r: Rigid, a: int, b: int):
 def add_touches(c: Contacts, s: Sheet, r: Rigid, k: int, room: int):
     """Enter all pairs of a meeting, and its planes."""
     n = c.number[k]
-    total = n * (n - 1) // 2
+    total = int(0)
     for a in range(n):
         f = c.field[k * FIELDS_AT_NODE + a]
         for b in range(a + 1, n):
-            total += faces_of(r, f, c.field[k * FIELDS_AT_NODE + b]) - 1
+            other = c.field[k * FIELDS_AT_NODE + b]
+            if c.apart[f, other] == 0:
+                total += faces_of(r, f, other)
         total += walls_near(c, s, r, c.field[k * FIELDS_AT_NODE + a], c.at[k], n == 1)
     t = wp.atomic_add(s.flag, TOUCHES, total)
     c.first[k] = t
