@@ -5,6 +5,7 @@ import pytest
 from test_cuda import CELL, ball, body, on_processor, problem, same
 
 from corporeal.mpm.problem import Plane
+from corporeal.mpm.reference.engine import ReferenceEngine
 from corporeal.types import Law
 
 G = 9.81
@@ -138,3 +139,18 @@ def test_two_runs_on_the_processor_are_the_same():
         engine.advance(0.03)
     assert first.measure().pair_impulse[0, 1] > 0
     same(first.measure(), second.measure())
+
+
+def test_what_a_pair_that_never_touches_leaves_room_for_is_not_booked():
+    """Room for contacts of the pair held what others gave in earlier steps: twice the impulse."""
+    one = body(ball((0, 0, 0.055)), velocity=(1.0, 0, -1.0))
+    two = body(ball((0.02, 0.03, 0.055)), velocity=(-1.0, 0.5, -1.0))
+    given = problem(one, two, apart=((0, 1),))
+    ours, sure = on_processor(given), ReferenceEngine(given)
+    for engine in (ours, sure):
+        for _ in range(40):
+            engine.step(5e-4)
+    mine, theirs = ours.measure(), sure.measure()
+    assert theirs.plane_impulse[0, :, 2].min() > 0.1
+    assert mine.plane_impulse == pytest.approx(theirs.plane_impulse, rel=1e-4, abs=1e-6)
+    assert mine.friction_loss == pytest.approx(theirs.friction_loss, rel=1e-4)

@@ -5,6 +5,8 @@ NumPy code imports them, kernels on cards take them as they compile, and C++ tex
 constitutive law stand with the law, coefficients of a formula in the formula. A cell is dx long.
 """
 
+from collections.abc import Mapping
+
 from corporeal import types
 
 # ---------------------------------------------------------------- how long a step may be
@@ -325,8 +327,13 @@ def numbers() -> dict[str, int | float]:
 
 
 def text() -> str:
-    """Define all of them in C++, in ``namespace mpm``: whole ones as int, others as double."""
-    lines = [f"constexpr {type_of(v)} {name} = {v!r};" for name, v in numbers().items()]
+    """Define all of them in C++."""
+    return written(numbers())
+
+
+def written(given: Mapping[str, int | float]) -> str:
+    """Define numbers in C++, in ``namespace mpm``: whole ones as int, others as double."""
+    lines = [f"constexpr {type_of(v)} {name} = {v!r};" for name, v in given.items()]
     return "\n".join(["namespace mpm {", *lines, "}", ""])
 
 

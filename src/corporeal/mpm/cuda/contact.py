@@ -3,7 +3,6 @@
 Same formulas as ``physics.contact`` and ``reference.contact``, in float32 and relative to the node.
 """
 
-from corporeal.mpm import formulas
 from corporeal.mpm.constants import (
     FIELDS_AT_NODE,
     FIRST_BIAS,
@@ -16,23 +15,27 @@ from corporeal.mpm.constants import (
     VAST,
     WALL_REACH,
 )
+from corporeal.mpm.cuda import arena
+from corporeal.mpm.cuda.arena import node_of
 from corporeal.mpm.cuda.contact_nodes import height_of, slides, sticks, wets
-from corporeal.mpm.cuda.grid import block_of, find, node_of
+from corporeal.mpm.cuda.grid import block_of, find
 from corporeal.mpm.cuda.layout import (
     ASKED,
     DT,
     FULL,
     KEPT,
     MEETS,
+    NODES,
     TOUCHES,
-    Contacts,
     D,
     Grid,
     Particles,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
+from corporeal.mpm.cuda.rows import cell_at, matrix_at, vector_at
 from corporeal.mpm.formulas.one_lane import (
     gap_between,
     gap_of_liquid,
@@ -47,7 +50,7 @@ from corporeal.mpm.formulas.one_lane import (
     wetted_face,
 )
 
-wp.set_module_options(formulas.options(max_unroll=0))
+wp.set_module_options(arena.options(max_unroll=0))
 
 
 # ---------------------------------------------------------------- surfaces
@@ -70,7 +73,7 @@ def show(
     for x in range(3):
         for y in range(3):
             for z in range(3):
-                e = g.meet[node_of(g, home, cell, x, y, z)] - 1
+                e = g.meet[node_of(g.near, home, cell, x, y, z)] - 1
                 if e >= 0:
                     offset = s.cell * (f - wp.vec3(float(x), float(y), float(z)))
                     n = w[0, x] * w[1, y] * w[2, z]
@@ -84,24 +87,27 @@ def show(
     return 0
 
 
+@wp.func
+def aware_of(g: Grid, home: int):
+    """Whether fields meet on nodes that particles of a block reach: 1; 2: with one another."""
+    aware = int(0)
+    for o in range(8):
+        aware = wp.max(aware, g.seen[g.near[8 * home + o]])
+    return aware
+
+
 @wp.kernel
-def show_particles(p: Particles, g: Grid, c: Contacts, s: Sheet, stride: int):
+def look(p: Particles, r: Rigid, g: Grid, c: Contacts, s: Sheet, stride: int):
     """Second look at the particles around those nodes, and only them."""
     if s.flag[FULL] == 2 or s.flag[MEETS] == 0:
         return
     for i in range(wp.tid(), p.count, stride):
-        if g.aware[p.home[i]] > 0:
-            J = wp.determinant(wp.identity(n=3, dtype=wp.float32) + p.strain[i])
-            show(g, c, s, p.home[i], p.cell[i], p.place[i], p.mass[i], J * p.volume[i])
-
-
-@wp.kernel
-def show_rigid(r: Rigid, g: Grid, c: Contacts, s: Sheet, stride: int):
-    """Likewise at the particles of rigid bodies."""
-    if s.flag[FULL] == 2 or s.flag[MEETS] == 0:
-        return
+        if aware_of(g, p.home[i]) > 0:
+            J = wp.determinant(wp.identity(n=3, dtype=wp.float32) + matrix_at(p.strain, i))
+            f = vector_at(p.place, i)
+            show(g, c, s, p.home[i], cell_at(p.cell, i), f, p.mass[i], J * p.volume[i])
     for i in range(wp.tid(), r.count, stride):
-        if g.aware[r.home[i]] > 0:
+        if aware_of(g, r.home[i]) > 0:
             show(g, c, s, r.home[i], r.cell[i], r.place[i], r.mass[i], r.volume[i])
 
 
@@ -112,22 +118,6 @@ def unit(v: wp.vec3):
     if size > TINY:
         return v / size
     return wp.vec3(0.0)
-
-
-@wp.kernel
-def recall(g: Grid, c: Contacts, s: Sheet, stride: int):
-    """Tell nodes where the choices of the last step are."""
-    for t in range(wp.tid(), s.flag[KEPT], stride):
-        at = c.kept_at[t]
-        f = c.kept_fa[t]
-        first = int(1)
-        if t > 0:
-            if c.kept_fa[t - 1] == f and c.kept_at[t - 1] == at:
-                first = 0
-        if first == 1 and f >= 0:
-            slot = find(g, f, block_of(at))
-            if slot >= 0:
-                g.was[64 * slot + 16 * (at[0] & 3) + 4 * (at[1] & 3) + (at[2] & 3)] = t + 1
 
 
 @wp.func
@@ -208,7 +198,7 @@ def reach(
     for x in range(3):
         for y in range(3):
             for z in range(3):
-                e = g.meet[node_of(g, home, cell, x, y, z)] - 1
+                e = g.meet[node_of(g.near, home, cell, x, y, z)] - 1
                 if e >= 0:
                     r = s.cell * (f - wp.vec3(float(x), float(y), float(z)))
                     reach_from(c, e, c.field[e], r, F, radius)
@@ -216,56 +206,22 @@ def reach(
 
 
 @wp.kernel
-def reach_particles(p: Particles, g: Grid, c: Contacts, s: Sheet, stride: int):
-    """Supports of what can deform."""
+def reach_all(p: Particles, r: Rigid, g: Grid, c: Contacts, s: Sheet, stride: int):
+    """Supports of all particles where a choice is made anew."""
     if s.flag[FULL] == 2 or s.flag[ASKED] == 0:
         return
+    one = wp.identity(n=3, dtype=wp.float32)
     for i in range(wp.tid(), p.count, stride):
-        if g.aware[p.home[i]] == 2:
-            F = wp.identity(n=3, dtype=wp.float32) + p.strain[i]
-            reach(g, c, s, p.home[i], p.cell[i], p.place[i], F, p.volume[i])
-
-
-@wp.kernel
-def reach_rigid(r: Rigid, g: Grid, c: Contacts, s: Sheet, stride: int):
-    """Supports of rigid bodies."""
-    if s.flag[FULL] == 2 or s.flag[ASKED] == 0:
-        return
+        if aware_of(g, p.home[i]) == 2:
+            F = one + matrix_at(p.strain, i)
+            f = vector_at(p.place, i)
+            reach(g, c, s, p.home[i], cell_at(p.cell, i), f, F, p.volume[i])
     for i in range(wp.tid(), r.count, stride):
-        if g.aware[r.home[i]] == 2:
-            F = wp.identity(n=3, dtype=wp.float32)
-            reach(g, c, s, r.home[i], r.cell[i], r.place[i], F, r.volume[i])
+        if aware_of(g, r.home[i]) == 2:
+            reach(g, c, s, r.home[i], r.cell[i], r.place[i], one, r.volume[i])
 
 
 # ---------------------------------------------------------------- normals and gaps
-
-
-@wp.kernel
-def choose(c: Contacts, r: Rigid, s: Sheet, stride: int):
-    """Take the candidate along which the two fields are farthest apart, or the one that is kept.
-
-    Pairs with a rigid body are looked at in every step.
-    """
-    if s.flag[FULL] == 2:
-        return
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        keep = int(-1)
-        k = c.meet[t]
-        if c.c[t] >= 0:
-            pick = c.pick[t]
-            if pick < 0:
-                pick = widest(c, s, t)
-            c.chosen[t] = candidate_of(c, t, pick)
-            if r.stiff[c.fa[t]] == 0 and r.stiff[c.fc[t]] == 0:
-                keep = pick
-        c.kept_pick[t] = keep
-        c.kept_at[t] = c.at[k]
-        c.kept_fa[t] = c.fa[t]
-        if t < c.first[k] or t >= c.last[k]:
-            c.kept_fa[t] = -1  # room that a bonded pair did not need
-        c.kept_fc[t] = c.fc[t]
-    if wp.tid() == 0:
-        s.flag[KEPT] = s.flag[TOUCHES]
 
 
 @wp.func
@@ -291,7 +247,34 @@ def widest(c: Contacts, s: Sheet, t: int):
 
 
 @wp.func
-def smoothed(g: Grid, c: Contacts, t: int):
+def picked(c: Contacts, s: Sheet, t: int):
+    """Number of the candidate that a touch of two fields takes: the kept one, or the widest."""
+    pick = c.pick[t]
+    if pick < 0:
+        pick = widest(c, s, t)
+    return pick
+
+
+@wp.func
+def keep(c: Contacts, r: Rigid, s: Sheet, t: int):
+    """Note for the next step which candidate a touch takes.
+
+    Pairs with a rigid body are looked at in every step.
+    """
+    k = c.meet[t]
+    kept = int(-1)
+    if c.c[t] >= 0:
+        if r.stiff[c.fa[t]] == 0 and r.stiff[c.fc[t]] == 0:
+            kept = picked(c, s, t)
+    c.kept_pick[t] = kept
+    c.kept_at[t] = c.at[k]
+    c.kept_fa[t] = c.fa[t]
+    c.kept_fc[t] = c.fc[t]
+    return 0
+
+
+@wp.func
+def smoothed(g: Grid, c: Contacts, s: Sheet, t: int):
     """Mean normal of the same pair over 27 nodes, weighted with min(m_a, m_c)."""
     at = c.at[c.meet[t]]
     total = wp.vec3(0.0)
@@ -309,7 +292,7 @@ def smoothed(g: Grid, c: Contacts, t: int):
                             if c.fa[o] == c.fa[t] and c.fc[o] == c.fc[t]:
                                 a = g.node[c.slot[c.a[o]]][0]
                                 b = g.node[c.slot[c.c[o]]][0]
-                                total += wp.min(a, b) * c.chosen[o]
+                                total += wp.min(a, b) * candidate_of(c, o, picked(c, s, o))
     return unit(total)
 
 
@@ -370,10 +353,14 @@ def span_of(s: Sheet, xi: wp.float32, h: wp.float32, mass: wp.float32, full: wp.
 
 @wp.kernel
 def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
-    """Smooth normals, and measure the open distance along them."""
+    """Choose and smooth normals, and measure the open distance along them."""
     if s.flag[FULL] == 2:
         return
+    if wp.tid() == 0:
+        s.flag[KEPT] = s.flag[TOUCHES]
+        s.flag[NODES] = s.flag[TOUCHES]
     for t in range(wp.tid(), s.flag[TOUCHES], stride):
+        keep(c, r, s, t)
         a = c.a[t]
         other = c.c[t]
         if other < 0:
@@ -420,7 +407,7 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
                 if gap < VAST:
                     c.gap[t] = gap * s.cell
         else:
-            n = smoothed(g, c, t)
+            n = smoothed(g, c, s, t)
             c.normal[t] = n
             if wp.length_sq(n) > 0.0:
                 xa = wp.dot(c.mean[a], n) / (g.node[c.slot[a]][0] * s.cell)

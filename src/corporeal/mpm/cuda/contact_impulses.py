@@ -18,7 +18,9 @@ from corporeal.mpm.constants import (
     SWEEPS,
     VAST,
 )
+from corporeal.mpm.cuda.arena import meet
 from corporeal.mpm.cuda.contact_nodes import curve_of
+from corporeal.mpm.cuda.contact_surface import replaced
 from corporeal.mpm.cuda.layout import (
     DT,
     FULL,
@@ -27,6 +29,8 @@ from corporeal.mpm.cuda.layout import (
     IMPACTING,
     LANES,
     MEETS,
+    NODES,
+    PAIRS,
     PUSHING,
     RUBBING,
     STIFF,
@@ -34,15 +38,14 @@ from corporeal.mpm.cuda.layout import (
     SWEEPING,
     SWEPT,
     SWEPT_NOW,
-    TIME,
     TOUCHES,
-    Contacts,
     D,
     Grid,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.cuda.rigid import softness_at, speed_at
 from corporeal.mpm.formulas.one_lane import (
     closing_speed,
@@ -151,50 +154,58 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
 # ---------------------------------------------------------------- before
 
 
-@wp.kernel
-def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, stride: int):
-    """Normal speed that each contact may keep, and which rigid pairs are hit."""
-    if s.flag[FULL] == 2:
-        return
-    dt = s.clock[DT]
-    for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        if c.gap[t] >= VAST and c.span[t] == D(0.0):
-            continue
+@wp.func
+def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
+    """Normal speed that a contact may keep, and whether it is of a rigid pair."""
+    if replaced(r, c, s, t):
+        c.gap[t] = VAST
+    if c.gap[t] < VAST or c.span[t] > D(0.0):
         gap = D(c.gap[t])
         fa = c.fa[t]
         fc = c.fc[t]
         c.active[t] = 1
-        c.before[t] = side_before(c, r, g, s, t, c.a[t], fa) - side_before(
-            c, r, g, s, t, c.c[t], fc
-        )
-        c.target[t] = closing_speed(gap, dt) - c.inward[t]
+        before = side_before(c, r, g, s, t, c.a[t], fa)
+        c.before[t] = before - side_before(c, r, g, s, t, c.c[t], fc)
+        c.target[t] = closing_speed(gap, s.clock[DT]) - c.inward[t]
         c.struck[t] = wp.vec3d(D(0.0))
         if r.stiff[fa] == 1 and fc < s.bodies:
             if r.stiff[fc] == 1:
                 wp.atomic_max(s.flag, HITS, 1)
-    if wp.tid() == 0:
-        s.flag[IMPACTING] = 0
-        if s.flag[STIFF] > 0:
-            s.flag[IMPACTING] = 1
+    return 0
 
 
 # ---------------------------------------------------------------- the sweeps
 
 
 @wp.kernel
-def solve_nodes(c: Contacts, r: Rigid, s: Sheet, stride: int):
-    """Solve every node that no rigid body takes part in."""
+def begin_contact(c: Contacts, r: Rigid, g: Grid, s: Sheet, stride: int):
+    """Prepare all contacts, and solve every node that no rigid body takes part in."""
     if s.flag[FULL] == 2:
         return
     for k in range(wp.tid(), s.flag[MEETS], stride):
+        for t in range(c.first[k], c.last[k]):
+            prepare(c, r, g, s, t)
         if c.stiff[k] == 0:
-            for _ in range(SWEEPS):
-                moved = float(0.0)
-                for t in range(c.first[k], c.last[k]):
-                    if c.active[t] > 0:
-                        moved += relax(c, r, s, t)
-                if moved == 0.0 or c.last[k] - c.first[k] == 1:
-                    break
+            solve_node(c, r, s, k)
+    for t in range(s.flag[NODES] + wp.tid(), s.flag[TOUCHES], stride):
+        prepare(c, r, g, s, t)
+    if wp.tid() == 0:
+        s.flag[IMPACTING] = 0
+        if s.flag[STIFF] > 0:
+            s.flag[IMPACTING] = 1
+
+
+@wp.func
+def solve_node(c: Contacts, r: Rigid, s: Sheet, k: int):
+    """Sweep over a node's contacts until nothing changes."""
+    for _ in range(SWEEPS):
+        moved = float(0.0)
+        for t in range(c.first[k], c.last[k]):
+            if c.active[t] > 0:
+                moved += relax(c, r, s, t)
+        if moved == 0.0 or c.last[k] - c.first[k] == 1:
+            break
+    return 0
 
 
 @wp.func
@@ -272,22 +283,26 @@ def quicken(s: Sheet):
 
 
 @wp.kernel
-def apply(r: Rigid, s: Sheet):
-    """Let rigid bodies have what they were given; go on while it was much."""
-    n = s.flag[SWEPT] + 1
-    s.flag[SWEPT] = n
-    limit = JACOBI_SWEEPS
-    if s.flag[HITS] > 0:
-        limit = JACOBI_SWEEPS_OF_A_HIT
-    if s.flag[HOLDS] > 0:
-        limit = JACOBI_SWEEPS_OF_A_HOLD
-    moved = s.change[0]
-    s.change[0] = 0.0
-    more = quicken(s)
-    if moved == 0.0 or n >= limit or (n >= SWEEPS and moved < JACOBI_STILL * s.cell):
-        s.flag[SWEEPING] = 0
-        more = D(0.0)
-    for b in range(s.bodies):
+def apply(r: Rigid, s: Sheet, lanes: int):
+    """Let rigid bodies have what they were given; go on while it was much. One group."""
+    lane = wp.tid()
+    if lane == 0:
+        n = s.flag[SWEPT] + 1
+        s.flag[SWEPT] = n
+        limit = JACOBI_SWEEPS
+        if s.flag[HITS] > 0:
+            limit = JACOBI_SWEEPS_OF_A_HIT
+        if s.flag[HOLDS] > 0:
+            limit = JACOBI_SWEEPS_OF_A_HOLD
+        moved = s.change[0]
+        s.change[0] = 0.0
+        s.pace[3] = quicken(s)
+        if moved == 0.0 or n >= limit or (n >= SWEEPS and moved < JACOBI_STILL * s.cell):
+            s.flag[SWEEPING] = 0
+            s.pace[3] = D(0.0)
+    meet()
+    more = s.pace[3]
+    for b in range(lane, s.bodies, lanes):
         if r.stiff[b] == 1 and r.path_count[b] == 0:
             speed = r.speed[b] + r.speed_change[b]
             moment = r.moment[b] + r.moment_change[b]
@@ -304,17 +319,15 @@ def apply(r: Rigid, s: Sheet):
 # ---------------------------------------------------------------- after
 
 
-@wp.kernel
-def hand_back(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
-    """Give nodes their velocities after contact."""
-    if s.flag[FULL] == 2:
-        return
-    for k in range(wp.tid(), s.flag[MEETS], stride):
-        for q in range(c.number[k]):
-            e = k * FIELDS_AT_NODE + q
-            if r.stiff[c.field[e]] == 0:
-                v = wp.vec3(c.velocity[e])
-                g.node[c.slot[e]] = wp.vec4(g.node[c.slot[e]][0], v[0], v[1], v[2])
+@wp.func
+def hand_back(g: Grid, c: Contacts, r: Rigid, k: int):
+    """Give a node's fields their velocities after contact."""
+    for q in range(c.number[k]):
+        e = k * FIELDS_AT_NODE + q
+        if r.stiff[c.field[e]] == 0:
+            v = wp.vec3(c.velocity[e])
+            g.node[c.slot[e]] = wp.vec4(g.node[c.slot[e]][0], v[0], v[1], v[2])
+    return 0
 
 
 @wp.func
@@ -327,48 +340,44 @@ def react(c: Contacts, r: Rigid, s: Sheet, t: int, field: int, J: wp.vec3d):
     return 0
 
 
+@wp.func
+def met(s: Sheet, a: int, b: int):
+    """List a pair that met in this step, once."""
+    if s.marked[a, b] == 0:
+        if wp.atomic_max(s.marked, a, b, 1) == 0:
+            s.met[wp.atomic_add(s.flag, PAIRS, 1)] = a * s.marked.shape[0] + b
+    return 0
+
+
+@wp.func
+def note(c: Contacts, r: Rigid, s: Sheet, t: int):
+    """Add up what a contact exchanged."""
+    n = wp.vec3d(c.normal[t])
+    J = c.impulse[t] + c.struck[t]
+    size = wp.dot(J, n)
+    if c.active[t] > 0 and (size > D(0.0) or c.span[t] > D(0.0)):
+        fa = c.fa[t]
+        fc = c.fc[t]
+        mean = D(0.5) * (c.before[t] + slip_of(c, r, s, t))
+        wp.atomic_add(s.loss, RUBBING, t % LANES, wp.dot(J - size * n, mean))
+        wp.atomic_add(s.loss, STRIKING, t % LANES, size * wp.dot(n, mean))
+        met(s, fa, fc)
+        wp.atomic_add(s.step_impulse, fa, fc, size)
+        wp.atomic_add(s.step_place, fa, fc, size * c.point[t])
+        react(c, r, s, t, fa, -J)
+        if fc >= s.bodies:
+            wp.atomic_sub(s.plane_impulse, fc - s.bodies, fa, J)
+        else:
+            react(c, r, s, t, fc, J)
+    return 0
+
+
 @wp.kernel
-def note(c: Contacts, r: Rigid, s: Sheet, stride: int):
-    """Add up what every pair exchanged."""
+def end_contact(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Give nodes their velocities, and add up what every pair exchanged."""
     if s.flag[FULL] == 2:
         return
+    for k in range(wp.tid(), s.flag[MEETS], stride):
+        hand_back(g, c, r, k)
     for t in range(wp.tid(), s.flag[TOUCHES], stride):
-        n = wp.vec3d(c.normal[t])
-        J = c.impulse[t] + c.struck[t]
-        size = wp.dot(J, n)
-        if c.active[t] > 0 and (size > D(0.0) or c.span[t] > D(0.0)):
-            fa = c.fa[t]
-            fc = c.fc[t]
-            mean = D(0.5) * (c.before[t] + slip_of(c, r, s, t))
-            wp.atomic_add(s.loss, RUBBING, t % LANES, wp.dot(J - size * n, mean))
-            wp.atomic_add(s.loss, STRIKING, t % LANES, size * wp.dot(n, mean))
-            wp.atomic_add(s.step_impulse, fa, fc, size)
-            wp.atomic_add(s.step_place, fa, fc, size * c.point[t])
-            react(c, r, s, t, fa, -J)
-            if fc >= s.bodies:
-                wp.atomic_sub(s.plane_impulse, fc - s.bodies, fa, J)
-            else:
-                react(c, r, s, t, fc, J)
-
-
-@wp.kernel
-def enter_books(c: Contacts, s: Sheet):
-    """Enter the step: who touched whom, how much, when and where."""
-    a, b = wp.tid()
-    if s.flag[FULL] == 2:
-        return
-    size = s.step_impulse[a, b]
-    if size > D(0.0):
-        if b < s.bodies:
-            s.pair_impulse[a, b] = s.pair_impulse[a, b] + size
-            s.pair_impulse[b, a] = s.pair_impulse[a, b]
-        if not (s.first_contact[a, b] >= D(0.0)):
-            place = s.step_place[a, b] / size
-            s.first_contact[a, b] = s.clock[TIME]
-            s.first_contact[b, a] = s.clock[TIME]
-            s.contact_point[a, b] = place
-            s.contact_point[b, a] = place
-        s.last_contact[a, b] = s.clock[TIME]
-        s.last_contact[b, a] = s.clock[TIME]
-        s.step_impulse[a, b] = D(0.0)
-        s.step_place[a, b] = wp.vec3d(D(0.0))
+        note(c, r, s, t)

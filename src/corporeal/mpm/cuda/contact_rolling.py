@@ -11,12 +11,12 @@ from corporeal.mpm.cuda.layout import (
     PUSHING,
     RUBBING,
     TOUCHES,
-    Contacts,
     D,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.formulas.one_lane import brake
 
 wp.set_module_options(formulas.options(max_unroll=0))

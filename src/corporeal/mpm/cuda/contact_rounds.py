@@ -6,6 +6,7 @@ on, and all others wait; the last round is of all contacts together.
 
 from corporeal.mpm import formulas
 from corporeal.mpm.constants import FIELDS_AT_NODE, IMPACTS, VAST_DOUBLE
+from corporeal.mpm.cuda.arena import meet
 from corporeal.mpm.cuda.contact_impulses import slip_of
 from corporeal.mpm.cuda.contact_nodes import is_stiff
 from corporeal.mpm.cuda.layout import (
@@ -22,12 +23,12 @@ from corporeal.mpm.cuda.layout import (
     SWEPT_NOW,
     TOUCHES,
     WAITING,
-    Contacts,
     D,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.formulas.one_lane import (
     BACKING_ROW,
     BACKING_SUMS,
@@ -153,42 +154,40 @@ def look_behind(c: Contacts, r: Rigid, s: Sheet, stride: int):
                     wp.atomic_add(c.rounds, pair, BACKING_SUMS + k, sums[k])
 
 
-@wp.func
-def hold(c: Contacts, r: Rigid, s: Sheet):
-    """Say what is held from behind in this round; whether anything is."""
-    everything = c.lightness.shape[0]
-    for b in range(everything):
-        c.lightness[b] = D(0.0)
-        if b < s.bodies:
-            c.lightness[b] = D(-1.0)
-            if r.stiff[b] == 1:
-                c.lightness[b] = r.light[b]
-    backing_hold(c.rounds, c.restitution, c.blows, c.lightness, s.dx)
-    held = int(0)
-    for pair in range(everything * everything):
-        if c.rounds[pair, ROLE] == D(HELD_PAIR):
-            held = 1
-    return held
-
-
 @wp.kernel
-def begin_round(c: Contacts, r: Rigid, s: Sheet):
-    """Begin the sweeps of a round; the last one is of all contacts together."""
-    s.flag[LAST_ROUND] = 1
-    s.flag[HOLDS] = 0
-    if s.flag[STRUCK] == 1 and s.flag[ROUND] < IMPACTS:
-        s.flag[LAST_ROUND] = 0
-        s.flag[HITS] = 1
-        s.flag[HOLDS] = hold(c, r, s)
-    s.flag[SWEEPING] = 1
-    s.flag[SWEPT] = 0
-    s.change[0] = 0.0
-    s.pace[0] = D(1.0)
-    s.pace[1] = D(0.0)
-    s.pace[2] = D(0.0)
-    for b in range(s.bodies):
+def begin_round(c: Contacts, r: Rigid, s: Sheet, lanes: int):
+    """Begin the sweeps of a round; the last one is of all contacts together. One group."""
+    lane = wp.tid()
+    everything = c.lightness.shape[0]
+    last = s.flag[STRUCK] == 0 or s.flag[ROUND] >= IMPACTS
+    for b in range(lane, s.bodies, lanes):
         r.last_speed[b] = r.speed[b]
         r.last_moment[b] = r.moment[b]
+    if not last:
+        for b in range(lane, everything, lanes):
+            c.lightness[b] = D(0.0)
+            if b < s.bodies:
+                c.lightness[b] = D(-1.0)
+                if r.stiff[b] == 1:
+                    c.lightness[b] = r.light[b]
+    meet()
+    if lane == 0:
+        s.flag[LAST_ROUND] = int(last)
+        s.flag[HOLDS] = 0
+        s.flag[SWEEPING] = 1
+        s.flag[SWEPT] = 0
+        s.change[0] = 0.0
+        s.pace[0] = D(1.0)
+        s.pace[1] = D(0.0)
+        s.pace[2] = D(0.0)
+        if not last:
+            s.flag[HITS] = 1
+            backing_hold(c.rounds, c.restitution, c.blows, c.lightness, s.dx)
+    meet()
+    if not last:
+        for pair in range(lane, everything * everything, lanes):
+            if c.rounds[pair, ROLE] == D(HELD_PAIR):
+                s.flag[HOLDS] = 1
 
 
 @wp.kernel
@@ -218,25 +217,28 @@ def aim(c: Contacts, r: Rigid, s: Sheet, stride: int):
                     c.target[t] = impact_target(e, approach, un, gap, dt, s.dx)
 
 
+@wp.func
+def forget_pair(c: Contacts, pair: int):
+    """Forget what a pair had to do with impacts."""
+    for k in range(BACKING_ROW):
+        c.rounds[pair, k] = D(0.0)
+    c.rounds[pair, LEAST] = D(VAST_DOUBLE)
+    return 0
+
+
 @wp.kernel
-def bank(c: Contacts, s: Sheet, stride: int):
-    """Keep a round's impulses, and go on to the next."""
+def end_round(c: Contacts, r: Rigid, s: Sheet, stride: int):
+    """Keep a round's impulses, forget who was hit, and go on; end where all took part."""
+    struck = s.flag[LAST_ROUND] == 0 or s.flag[ROUND] >= IMPACTS
     for t in range(wp.tid(), s.flag[TOUCHES], stride):
         if c.active[t] > 0 and of_rigid(c, t):
             c.struck[t] = c.struck[t] + c.impulse[t]
             c.impulse[t] = wp.vec3d(D(0.0))
             c.last_impulse[t] = wp.vec3d(D(0.0))
-
-
-@wp.kernel
-def end_round(c: Contacts, s: Sheet):
-    """Forget who was hit; end where all contacts took part."""
-    if s.flag[STRUCK] == 1:
-        for pair in range(c.rounds.shape[0]):
-            for k in range(BACKING_ROW):
-                c.rounds[pair, k] = D(0.0)
-            c.rounds[pair, LEAST] = D(VAST_DOUBLE)
-    s.flag[ROUND] = s.flag[ROUND] + 1
-    s.flag[STRUCK] = 0
-    if s.flag[LAST_ROUND] == 1:
-        s.flag[IMPACTING] = 0
+            if struck and both_rigid(c, r, s, t):
+                forget_pair(c, pair_of(c, t))
+    if wp.tid() == 0:
+        s.flag[ROUND] = s.flag[ROUND] + 1
+        s.flag[STRUCK] = 0
+        if s.flag[LAST_ROUND] == 1:
+            s.flag[IMPACTING] = 0

@@ -6,7 +6,6 @@ Means are taken over the particles of 2³ cells of a field, as ``reference.mean_
 from corporeal.mpm import formulas
 from corporeal.mpm.cuda.grid import block_of, find
 from corporeal.mpm.cuda.layout import (
-    BLOCKS,
     DENSITY,
     FULL,
     LAMBDA,
@@ -19,16 +18,10 @@ from corporeal.mpm.cuda.layout import (
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.rows import cell_at, matrix_at
 from corporeal.mpm.formulas.one_lane import mean_bulk, mean_pressure
 
 wp.set_module_options(formulas.options(max_unroll=0))
-
-
-@wp.kernel
-def empty(g: Grid, s: Sheet, stride: int):
-    """Empty all clusters."""
-    for i in range(wp.tid(), 8 * s.flag[BLOCKS], stride):
-        g.pool[i] = wp.vec3(0.0)
 
 
 @wp.kernel
@@ -36,13 +29,14 @@ def pool(p: Particles, g: Grid, stride: int):
     """Add up volume, and volume times pressure, of every cluster."""
     for i in range(wp.tid(), p.count, stride):
         if p.table[p.kind[i], SWELLS] > 0.0:
-            cell = p.cell[i]
+            cell = cell_at(p.cell, i)
             if p.home[i] < 0:
                 p.home[i] = find(g, p.field[i], block_of(cell))
             pair = wp.vec3i((cell[0] >> 1) & 1, (cell[1] >> 1) & 1, (cell[2] >> 1) & 1)
             at = 8 * p.home[i] + 4 * pair[0] + 2 * pair[1] + pair[2]
             p.cluster[i] = at
-            wp.atomic_add(g.pool, at, p.volume[i] * wp.vec3(1.0, p.pressure[i], 0.0))
+            wp.atomic_add(g.pool, 0, at, p.volume[i])
+            wp.atomic_add(g.pool, 1, at, p.volume[i] * p.pressure[i])
 
 
 @wp.kernel
@@ -53,11 +47,11 @@ def press(p: Particles, g: Grid, s: Sheet, stride: int):
     for i in range(wp.tid(), p.count, stride):
         row = p.kind[i]
         if p.table[row, SWELLS] > 0.0:
-            total = g.pool[p.cluster[i]]
-            relief = p.relief[i] + total[2] / total[0] - p.grown[i]
+            at = p.cluster[i]
+            relief = p.relief[i] + g.pool[2, at] / g.pool[0, at] - p.grown[i]
             law = p.table[row, LAW]
             bulk = mean_bulk(law, p.table[row, MU], p.table[row, LAMBDA])
-            found = mean_pressure(law, bulk, p.strain[i], relief)
+            found = mean_pressure(law, bulk, matrix_at(p.strain, i), relief)
             p.relief[i] = relief
             p.pressure[i] = found[0]
             wave = wp.sqrt((p.bound[i] + found[1]) / p.table[row, DENSITY])

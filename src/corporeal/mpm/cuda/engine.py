@@ -12,11 +12,11 @@ from typing import Any
 import numpy as np
 
 from corporeal.errors import SimulationError, UserError
-from corporeal.mpm.cuda import layout, memory
+from corporeal.mpm.cuda import layout, memory, particle_memory
 from corporeal.mpm.cuda import load_memory as extras
 from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.cuda.memory import Memory, split
-from corporeal.mpm.cuda.program import MODULES, PARTICLE_STATE, Arrays, Program
+from corporeal.mpm.cuda.program import Arrays, Program
 from corporeal.mpm.interaction import Interaction
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.measure import Energy, Sums
@@ -64,10 +64,10 @@ class CudaEngine(Interaction):
         self.matter = Matter.of(problem)
         room = self.memory = Memory(self.device)
         apart = self.matter.rigid & (problem.contact == "multi")
-        particles = room.particles(problem, self.matter, np.flatnonzero(~apart))
+        soft = np.flatnonzero(~apart)
         self.arrays = Arrays(
             sheet=room.sheet(problem, self.matter),
-            particles=particles,
+            particles=particle_memory.particles(room, problem, self.matter, soft),
             rigid=room.rigid(problem, self.matter),
             grid=room.grid(problem, self._blocks_needed()),
             contacts=room.contacts(problem, CONTACT_ROOM),
@@ -79,8 +79,7 @@ class CudaEngine(Interaction):
         self.spare = {name: wp.empty_like(array) for name, array in self.kept.items()}
         self.lost = np.zeros(len(self.matter.mass), bool)
         self.grips: dict[int, Grip] = {}
-        for module in MODULES:
-            wp.load_module(module, device=self.device)
+        self.program.load()
         self._start()
 
     def _blocks_needed(self) -> int:
@@ -100,7 +99,7 @@ class CudaEngine(Interaction):
     def _kept(self) -> dict[str, Any]:
         """Everything that the next step depends on, and the books."""
         groups = (
-            ("particle", self.arrays.particles, PARTICLE_STATE),
+            ("particle", self.arrays.particles, " ".join(particle_memory.STATE)),
             ("rigid", self.arrays.rigid, RIGID_STATE),
             ("sheet", self.arrays.sheet, SHEET_STATE),
         )
@@ -113,7 +112,7 @@ class CudaEngine(Interaction):
     def _start(self) -> None:
         """Say how fast things are at the start, and find their blocks."""
         m = self.matter
-        soft = self.arrays.particles.number.numpy()[: self.arrays.particles.count]
+        soft = self._rows("number")
         speed = wave = 0.0
         if len(soft):
             velocity = np.concatenate([b.velocity for b in self.problem.bodies])[soft]
@@ -201,7 +200,7 @@ class CudaEngine(Interaction):
         count, time = self.arrays.particles.count, self.time
         lost = self.arrays.particles.lost.numpy()[:count] > 0
         self.lost[:] = False
-        self.lost[self.arrays.particles.number.numpy()[:count][lost]] = True
+        self.lost[self._rows("number")[lost]] = True
         for b in np.flatnonzero(self.arrays.rigid.lost.numpy()):
             self.lost |= self.matter.body == b
         for name, array in self.kept.items():
@@ -221,13 +220,13 @@ class CudaEngine(Interaction):
 
     def save(self) -> dict[str, np.ndarray]:
         """Everything needed to go on later exactly as if nothing had happened."""
-        saved = {name: array.numpy().copy() for name, array in self.kept.items()}
+        saved = {name: self._read(name) for name in self.kept}
         return saved | {"choices": self._choices()}
 
     def restore(self, saved: dict[str, np.ndarray]) -> None:
         """Go on from what ``save`` returned, on an engine built from the same problem."""
-        for name, array in self.kept.items():
-            array.assign(saved[name])
+        for name in self.kept:
+            self._write(name, saved[name])
         self.lost[:] = False
         self.arrays.sheet.flag.zero_()
         choices, room = saved["choices"], self.arrays.contacts.room
@@ -242,41 +241,57 @@ class CudaEngine(Interaction):
     # ------------------------------------------------------------ accessors of what is common
 
     def _particles(self) -> Snapshot:
-        p, m, cell = self.arrays.particles, self.matter, self.problem.cell
-        F, motion = self._placed(p.strain) + np.eye(3), self._placed(p.motion) + np.eye(3)
-        place = p.cell.numpy() + p.place.numpy().astype(np.float64)
+        m, cell = self.matter, self.problem.cell
+        F, motion = self._placed("strain") + np.eye(3), self._placed("motion") + np.eye(3)
+        place = self._rows("cell") + self._rows("place").astype(np.float64)
         return Snapshot(
             time=self.time,
             position=self._in_order(place) * cell,
-            velocity=self._placed(p.velocity),
+            velocity=self._placed("velocity"),
             deformation=F,
             motion=np.where(m.flows[:, None, None], motion, F),
-            plastic_strain=self._placed(p.plastic),
+            plastic_strain=self._placed("plastic"),
         )
 
     def _sums(self) -> Sums:
         now, cell = self._particles(), self.problem.cell
-        affine = self._placed(self.arrays.particles.affine) / cell
-        relief = self._placed(self.arrays.particles.relief)
+        affine = self._placed("affine") / cell
+        relief = self._placed("relief")
         elastic = strain_energy(self.matter, now.deformation, relief)
         energy = Energy(elastic, branch_energy(self.matter, self._memory()))
         return Sums.of(self.matter, now, affine, energy, cell)
 
     def _memory(self) -> branches.Memory:
         """Read what the Maxwell branches of the particles that have any remember."""
-        rows = self._placed(self.arrays.particles.branch)[self.matter.relaxing]
+        rows = self._placed("branch")[self.matter.relaxing]
         rows = rows.reshape(-1, int(layout.BRANCHES), int(layout.BRANCH))
         return branches.Memory(_full(rows[..., :6]), rows[..., 6])
 
-    def _placed(self, array: wp.array) -> np.ndarray:
-        """Copy an array of particles to the host, in the problem's order; 0 where rigid."""
-        return self._in_order(array.numpy())
+    def _rows(self, name: str) -> np.ndarray:
+        """Copy what is kept of particles to the host, in the engine's order."""
+        return particle_memory.rows(self.arrays.particles, name)
+
+    def _placed(self, name: str) -> np.ndarray:
+        """Copy what is kept of particles to the host, in the problem's order; 0 where rigid."""
+        return self._in_order(self._rows(name))
 
     def _in_order(self, values: np.ndarray) -> np.ndarray:
-        p = self.arrays.particles
         out = np.zeros((len(self.matter.mass), *values.shape[1:]))
-        out[p.number.numpy()[: p.count]] = values[: p.count]
+        out[self._rows("number")] = values
         return out
+
+    def _read(self, name: str) -> np.ndarray:
+        """Copy what is kept by a name of ``kept``; of particles in rows."""
+        group, _, own = name.partition(".")
+        return self._rows(own) if group == "particle" else self.kept[name].numpy().copy()
+
+    def _write(self, name: str, values: np.ndarray) -> None:
+        """Write what ``_read`` gave."""
+        group, _, own = name.partition(".")
+        if group == "particle":
+            particle_memory.put(self.arrays.particles, own, values)
+        else:
+            self.kept[name].assign(values)
 
     def _rigid_bodies(self) -> dict[int, RigidBody]:
         r, m = self.arrays.rigid, self.matter
@@ -322,10 +337,9 @@ class CudaEngine(Interaction):
         p, m = self.arrays.particles, self.matter
         every = np.zeros((len(m.mass), 3))
         every[np.flatnonzero(m.body == body)[particle]] = gained
-        velocity = p.velocity.numpy()
-        velocity[: p.count] += every[p.number.numpy()[: p.count]]
-        p.velocity.assign(velocity)
-        self._note_fast(2, np.linalg.norm(velocity[: p.count], axis=1).max())
+        velocity = self._rows("velocity") + every[self._rows("number")].astype(np.float32)
+        particle_memory.put(p, "velocity", velocity)
+        self._note_fast(2, np.linalg.norm(velocity, axis=1).max())
 
     def _note_fast(self, what: int, speed: float) -> None:
         """Raise the largest speed (2) or wave speed (3) of the last step [m/s]."""
@@ -345,10 +359,10 @@ class CudaEngine(Interaction):
 
     def _set_motion(self, bodies: Collection[int], motion: Motion) -> None:
         p, r = self.arrays.particles, self.arrays.rigid
-        number, which = p.number.numpy(), np.array(list(bodies), int)
+        number, which = self._rows("number"), np.array(list(bodies), int)
         mine = np.flatnonzero(np.isin(self.matter.body[number], which))
-        memory.change(p.velocity, mine, motion.velocity[number[mine]])
-        memory.change(p.affine, mine, 0.0)
+        particle_memory.change(p, "velocity", mine, motion.velocity[number[mine]])
+        particle_memory.change(p, "affine", mine, 0.0)
         moment = motion.spin_momentum[which]
         memory.change(r.speed, which, motion.speed[which])
         memory.change(r.moment, which, moment)
@@ -360,12 +374,13 @@ class CudaEngine(Interaction):
         which = np.array(list(bodies), int)
         there = np.empty(len(owner), int)
         there[saved["particle.number"][: p.count]] = np.arange(p.count)
-        number = p.number.numpy()[: p.count]
+        number = self._rows("number")
         mine = np.flatnonzero(np.isin(owner[number], which))
         for name in PLACED:
-            memory.change(getattr(p, name), mine, saved[f"particle.{name}"][there[number[mine]]])
+            then = saved[f"particle.{name}"][there[number[mine]]]
+            particle_memory.change(p, name, mine, then)
         # Whatever it was strained by there was long ago: branches have forgotten it.
-        memory.change(p.branch, mine, 0.0)
+        particle_memory.change(p, "branch", mine, 0.0)
         for name in ("centre", "turn", "inertia"):
             memory.change(getattr(r, name), which, saved[f"rigid.{name}"][which])
         riding = np.flatnonzero(np.isin(r.body.numpy(), which))

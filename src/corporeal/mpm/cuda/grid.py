@@ -1,23 +1,15 @@
-"""Node blocks on the device: found by hashing, linked, cleared.
+"""Node blocks on the device: found by hashing, and linked.
 
 A hash instead of a table with bounds: bodies may travel as far as they like, and nothing is laid
 out anew while they do. Particles remember their block: the hash is asked only when they change it.
 """
 
 from corporeal.mpm.constants import FIELDS_AT_NODE, SMALLEST_MASS
-from corporeal.mpm.cuda.layout import (
-    BLOCKS,
-    EMPTY,
-    FRESH,
-    FULL,
-    Grid,
-    Particles,
-    Rigid,
-    Sheet,
-    wp,
-)
+from corporeal.mpm.cuda import arena
+from corporeal.mpm.cuda.arena import sum_at
+from corporeal.mpm.cuda.layout import ARENA_SUMS, BLOCKS, EMPTY, FRESH, FULL, Grid, Sheet, wp
 
-wp.set_module_options({"enable_backward": False, "max_unroll": 0})
+wp.set_module_options(arena.options(max_unroll=0))
 
 HALF_WIDTH = wp.constant(wp.int64(1 << 17))
 FIELD_UNIT = wp.constant(wp.int64(1 << 54))
@@ -105,73 +97,12 @@ def claim_around(s: Sheet, g: Grid, field: int, cell: wp.vec3i):
 
 
 @wp.func
-def node_of(g: Grid, home: int, cell: wp.vec3i, i: int, j: int, k: int):
-    """Index of one of the 27 nodes from ``cell`` on, which lies in block ``home``."""
-    x = (cell[0] & 3) + i
-    y = (cell[1] & 3) + j
-    z = (cell[2] & 3) + k
-    slot = g.near[8 * home + 4 * (x >> 2) + 2 * (y >> 2) + (z >> 2)]
-    return 64 * slot + 16 * (x & 3) + 4 * (y & 3) + (z & 3)
-
-
-@wp.kernel
-def key_particles(
-    p: Particles, keys: wp.array(dtype=wp.int64), order: wp.array(dtype=wp.int32), stride: int
-):
-    """Number particles by block, for sorting."""
-    for i in range(wp.tid(), p.count, stride):
-        keys[i] = key_of(p.field[i], block_of(p.cell[i]))
-        order[i] = i
-
-
-@wp.kernel
-def reorder(
-    count: int,
-    width: int,
-    order: wp.array(dtype=wp.int32),
-    values: wp.array(dtype=wp.int32),
-    out: wp.array(dtype=wp.int32),
-    stride: int,
-):
-    """Copy rows of 32-bit words in a new order."""
-    for i in range(wp.tid(), count * width, stride):
-        out[i] = values[order[i // width] * width + i % width]
-
-
-@wp.kernel
-def forget(g: Grid, s: Sheet, stride: int):
-    """Empty the hash."""
-    for i in range(wp.tid(), g.mask + 1, stride):
-        g.keys[i] = EMPTY
-        if i == 0:
-            s.flag[BLOCKS] = 0
-            s.flag[FULL] = 0
-            s.flag[FRESH] = 1
-
-
-@wp.kernel
-def claim_blocks(p: Particles, r: Rigid, g: Grid, s: Sheet, stride: int):
-    """Claim the blocks of all particles."""
-    for i in range(wp.tid(), p.count, stride):
-        p.home[i] = -1
-        low = block_of(p.cell[i])
-        same = int(0)
-        if i > 0 and p.field[i - 1] == p.field[i]:
-            if block_of(p.cell[i - 1]) == low:
-                same = 1  # sorted: the first of a block claims for all
-        if same == 0:
-            claim_around(s, g, p.field[i], p.cell[i])
-    for i in range(wp.tid(), r.count, stride):
-        r.home[i] = -1
-        claim_around(s, g, r.body[i], r.cell[i])
-
-
-@wp.kernel
-def link(g: Grid, s: Sheet, stride: int):
+def link(g: Grid, s: Sheet, tid: int, stride: int):
     """Point every block to its neighbours and to other fields' blocks, if any are new."""
+    blocks = s.flag[BLOCKS]
     if s.flag[FRESH] == 0:
-        return
-    for b in range(wp.tid(), s.flag[BLOCKS], stride):
+        blocks = 0
+    for b in range(tid, blocks, stride):
         at = g.where[b]
         for o in range(8):
             g.near[8 * b + o] = find(g, g.field[b], at + wp.vec3i(o >> 2, (o >> 1) & 1, o & 1))
@@ -184,32 +115,39 @@ def link(g: Grid, s: Sheet, stride: int):
                     n += 1
         if n < FIELDS_AT_NODE:
             g.partner[FIELDS_AT_NODE * b + n] = -1
+    return 0
 
 
 @wp.kernel
-def clear(g: Grid, s: Sheet, stride: int):
-    """Empty all nodes."""
-    blocks = s.flag[BLOCKS]
-    for i in range(wp.tid(), 64 * blocks, stride):
-        g.node[i] = wp.vec4(0.0)
-        g.old[i] = wp.vec4(0.0)
-        g.meet[i] = 0
-        g.was[i] = 0
-        g.held[i] = 0
-    for b in range(wp.tid(), blocks, stride):
-        g.seen[b] = 0
-    if wp.tid() == 0:
-        s.flag[FRESH] = 0
+def link_all(g: Grid, s: Sheet, stride: int):
+    """Link what was claimed while particles were sorted."""
+    link(g, s, wp.tid(), stride)
 
 
 @wp.kernel
 def divide(g: Grid, s: Sheet, stride: int):
-    """Momentum to velocity."""
-    for i in range(wp.tid(), 64 * s.flag[BLOCKS], stride):
-        a = g.node[i]
-        if a[0] > SMALLEST_MASS:
-            g.node[i] = wp.vec4(a[0], a[1] / a[0], a[2] / a[0], a[3] / a[0])
-            g.old[i] = g.old[i] / a[0]
-        else:
-            g.node[i] = wp.vec4(0.0)
-            g.old[i] = wp.vec4(0.0)
+    """Momentum to velocity, with the step's impulses and without; all else begins again."""
+    blocks = s.flag[BLOCKS]
+    for b in range(wp.tid(), blocks, stride):
+        g.seen[b] = 0
+    if wp.tid() == 0:
+        s.flag[FRESH] = 0
+    for i in range(wp.tid(), 64 * blocks, stride):
+        if g.fields > 1 or s.planes > 0:
+            g.meet[i] = 0
+            g.was[i] = 0
+            g.held[i] = 0
+        m = g.sum[sum_at(i, 0)]
+        now = wp.vec4(0.0)
+        old = wp.vec4(0.0)
+        if m > SMALLEST_MASS:
+            p = wp.vec3(g.sum[sum_at(i, 1)], g.sum[sum_at(i, 2)], g.sum[sum_at(i, 3)])
+            j = wp.vec3(g.sum[sum_at(i, 4)], g.sum[sum_at(i, 5)], g.sum[sum_at(i, 6)])
+            v = (p + j) / m
+            u = p / m
+            now = wp.vec4(m, v[0], v[1], v[2])
+            old = wp.vec4(u[0], u[1], u[2], 0.0)
+        g.node[i] = now
+        g.old[i] = old
+        for k in range(ARENA_SUMS):
+            g.sum[sum_at(i, k)] = 0.0

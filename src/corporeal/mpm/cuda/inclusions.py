@@ -9,13 +9,12 @@ from corporeal.mpm.constants import FIELDS_AT_NODE
 from corporeal.mpm.cuda.layout import (
     BLOCKS,
     FULL,
-    Bonds,
     D,
     Grid,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Bonds, Rigid
 
 wp.set_module_options({"enable_backward": False, "max_unroll": 0})
 

@@ -4,7 +4,8 @@ from typing import Any
 
 import numpy as np
 
-from corporeal.mpm.cuda.layout import Bonds, Loads, wp
+from corporeal.mpm.cuda.layout import wp
+from corporeal.mpm.cuda.layout_bodies import Bonds, Loads
 from corporeal.mpm.cuda.memory import Memory
 from corporeal.mpm.physics import inclusions, wind
 from corporeal.mpm.physics.grips import Grip
@@ -17,7 +18,8 @@ NEVER = (0.0, -1.0)
 def loads(memory: Memory, problem: Problem, matter: Matter) -> Any:
     """Lay out wind, tethers and joints."""
     bodies, count, out = len(problem.bodies), len(matter.mass), Loads()
-    out.blown, out.pulled = memory.zeros(count, wp.vec3), memory.zeros(count, wp.vec3)
+    out.blown = memory.zeros((3, count), wp.float32)
+    out.pulled = memory.zeros((3, count), wp.float32)
     out.at = memory.zeros(count, wp.int32)
     for name in ("wind_force", "wind_moment", "force", "moment", "external"):
         setattr(out, name, memory.zeros(bodies, wp.vec3d))

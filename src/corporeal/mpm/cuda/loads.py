@@ -10,13 +10,13 @@ from corporeal.mpm.cuda.layout import (
     PUSHING,
     TIME,
     D,
-    Loads,
     Particles,
-    Rigid,
     Sheet,
     wp,
 )
-from corporeal.mpm.cuda.rigid import speed_at
+from corporeal.mpm.cuda.layout_bodies import Loads, Rigid
+from corporeal.mpm.cuda.rigid import force, speed_at
+from corporeal.mpm.cuda.rows import cell_at, matrix_at, put_vector, vector_at
 from corporeal.mpm.formulas.one_lane import pressed, pulled, turn_of, turned_area
 from corporeal.mpm.physics.wind import HALF_RHO_C
 
@@ -30,8 +30,8 @@ TURN = wp.constant(D(2.0 * math.pi))
 def calm(p: Particles, l: Loads, s: Sheet, stride: int):
     """Take all loads away, and say where particles are."""
     for i in range(wp.tid(), p.count, stride):
-        l.blown[i] = wp.vec3(0.0)
-        l.pulled[i] = wp.vec3(0.0)
+        put_vector(l.blown, i, wp.vec3(0.0))
+        put_vector(l.pulled, i, wp.vec3(0.0))
         l.at[p.number[i]] = i
     for b in range(wp.tid(), s.bodies, stride):
         l.wind_force[b] = wp.vec3d(D(0.0))
@@ -78,12 +78,13 @@ def blow(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
             wp.atomic_add(l.external, b, J)
         else:
             i = l.at[l.face[k]]
-            F = wp.identity(n=3, dtype=wp.float32) + p.strain[i]
+            F = wp.identity(n=3, dtype=wp.float32) + matrix_at(p.strain, i)
             if p.table[p.kind[i], 0] > 2.5:
-                F = wp.identity(n=3, dtype=wp.float32) + p.motion[i]
-            seen_here = wp.vec3(air) - p.velocity[i]
+                F = wp.identity(n=3, dtype=wp.float32) + matrix_at(p.motion, i)
+            seen_here = wp.vec3(air) - vector_at(p.velocity, i)
             given = pressed(HALF_RHO_C, turned_area(F, l.area[k]), seen_here, l.weight[k], dt)
-            wp.atomic_add(l.blown, i, given)
+            for d in range(3):
+                wp.atomic_add(l.blown, d, i, given[d])
             wp.atomic_add(l.external, b, wp.vec3d(given))
 
 
@@ -93,8 +94,8 @@ def blow(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
 @wp.func
 def position_of(p: Particles, s: Sheet, i: int):
     """Where a particle is [m]."""
-    cell = p.cell[i]
-    return (wp.vec3d(D(cell[0]), D(cell[1]), D(cell[2])) + wp.vec3d(p.place[i])) * s.dx
+    cell = cell_at(p.cell, i)
+    return (wp.vec3d(D(cell[0]), D(cell[1]), D(cell[2])) + wp.vec3d(vector_at(p.place, i))) * s.dx
 
 
 @wp.kernel
@@ -106,14 +107,14 @@ def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
         h = l.holder[k]
         place = position_of(p, s, i) - r.centre[h]
         arm = r.turn[h] * l.anchor[k]
-        v = wp.vec3d(p.velocity[i]) - r.speed[h] - wp.cross(r.spin[h], arm)
+        v = wp.vec3d(vector_at(p.velocity, i)) - r.speed[h] - wp.cross(r.spin[h], arm)
         rate = l.rate[k]
         mass = D(p.mass[i])
         pull = (rate * rate * (place - arm) + l.damping[k] * v) * (-dt)
         wp.atomic_add(l.loss, 0, mass * dt * l.damping[k] * wp.dot(v, v + D(0.5) * pull))
         # Springs bear the weight from the start, so that nothing sags.
         J = mass * (pull - (s.kick[h] - s.pushed[h]))
-        l.pulled[i] = wp.vec3(J)
+        put_vector(l.pulled, i, wp.vec3(J))
         wp.atomic_sub(l.force, h, J)
         wp.atomic_sub(l.moment, h, wp.cross(place, J))
 
@@ -121,11 +122,10 @@ def tether(p: Particles, r: Rigid, l: Loads, s: Sheet, stride: int):
 # ---------------------------------------------------------------- rigid bodies
 
 
-@wp.kernel
-def load_rigid(r: Rigid, l: Loads, s: Sheet):
-    """Give rigid bodies their loads, and book the wind's work at their mean velocity."""
-    b = wp.tid()
-    if r.stiff[b] == 1 and s.flag[FULL] != 2:
+@wp.func
+def load(r: Rigid, l: Loads, s: Sheet, b: int):
+    """Give a rigid body its loads, and book the wind's work at its mean velocity."""
+    if r.stiff[b] == 1:
         speed = r.speed[b] + D(0.5) * l.wind_force[b] * r.light[b]
         spin = r.inertia[b] * (r.moment[b] + D(0.5) * l.wind_moment[b])
         work = wp.dot(l.wind_force[b], speed + s.kick[b]) + wp.dot(l.wind_moment[b], spin)
@@ -133,6 +133,18 @@ def load_rigid(r: Rigid, l: Loads, s: Sheet):
         r.speed[b] = r.speed[b] + (l.wind_force[b] + l.force[b]) * r.light[b]
         r.moment[b] = r.moment[b] + l.wind_moment[b] + l.moment[b]
         r.spin[b] = r.inertia[b] * r.moment[b]
+    return 0
+
+
+@wp.kernel
+def force_rigid(r: Rigid, l: Loads, s: Sheet):
+    """Let loads and forces act on rigid bodies."""
+    b = wp.tid()
+    if s.flag[FULL] == 2:
+        return
+    if l.faces > 0 or l.tethers > 0:
+        load(r, l, s, b)
+    force(r, s, b)
 
 
 @wp.func
@@ -195,7 +207,7 @@ def feel(p: Particles, l: Loads, s: Sheet, stride: int):
         if share > D(0.0):
             b = int(p.table[p.kind[i], BODY])
             wp.atomic_add(l.hand, b, share * position_of(p, s, i))
-            wp.atomic_add(l.hand_speed, b, share * wp.vec3d(p.velocity[i]))
+            wp.atomic_add(l.hand_speed, b, share * wp.vec3d(vector_at(p.velocity, i)))
 
 
 @wp.kernel
@@ -206,7 +218,7 @@ def grasp(p: Particles, l: Loads, s: Sheet, stride: int):
         if share > D(0.0):
             b = int(p.table[p.kind[i], BODY])
             J = share * pull_at(l, b, l.hand[b], l.hand_speed[b], s.clock[DT])
-            l.blown[i] = l.blown[i] + wp.vec3(J)
+            put_vector(l.blown, i, vector_at(l.blown, i) + wp.vec3(J))
             wp.atomic_add(l.external, b, J)
 
 

@@ -7,7 +7,9 @@ import numpy as np
 from corporeal.mpm import laws
 from corporeal.mpm.constants import FACET_ROW, FIELDS_AT_NODE, KEY_ROW, LONGEST_STEP, VAST_DOUBLE
 from corporeal.mpm.cuda import layout
-from corporeal.mpm.cuda.layout import Contacts, Grid, Particles, Rigid, Sheet, wp
+from corporeal.mpm.cuda.layout import Grid, Sheet, wp
+from corporeal.mpm.cuda.layout_bodies import Rigid
+from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.formulas.one_lane import BACKING_ROW, LEAST
 from corporeal.mpm.physics import prescribed
 from corporeal.mpm.physics.contact import face_table, full_cell
@@ -40,36 +42,6 @@ class Memory:
         shape = tuple(max(1, n) for n in (count if isinstance(count, tuple) else (count,)))
         return wp.zeros(shape, dtype=kind, device=self.device)
 
-    # ------------------------------------------------------------ particles
-
-    def particles(self, problem: Problem, matter: Matter, chosen: np.ndarray) -> Struct:
-        """Lay out the particles that move with a grid of their own."""
-        count = len(chosen)
-        position = np.concatenate([b.position for b in problem.bodies])[chosen]
-        velocity = np.concatenate([b.velocity for b in problem.bodies])[chosen]
-        cell, place = split(position / problem.cell)
-        single = problem.contact == "single"
-        p = Particles()
-        p.count = count
-        p.cell, p.place = self.put(cell, wp.vec3i), self.put(place, wp.vec3)
-        p.velocity = self.put(velocity, wp.vec3)
-        for name in ("affine", "strain", "motion"):
-            setattr(p, name, self.zeros(count, wp.mat33))
-        p.stress = self.zeros(count, layout.vec6)
-        p.mass = self.put(matter.mass[chosen], wp.float32)
-        p.volume = self.put(matter.volume[chosen], wp.float32)
-        p.plastic, p.opened = self.zeros(count, wp.float32), self.zeros(count, wp.float32)
-        p.branch = self.zeros(count, layout.vec14)
-        for name in ("relief", "pressure", "grown", "bound"):
-            setattr(p, name, self.zeros(count, wp.float32))
-        p.cluster = self.zeros(count, wp.int32)
-        p.kind = self.put(matter.kind[chosen], wp.int32)
-        p.field = self.put(matter.body[chosen] * (not single), wp.int32)
-        p.number = self.put(chosen, wp.int32)
-        p.home, p.lost = self.zeros(count, wp.int32), self.zeros(count, wp.int32)
-        p.table = self.put(_materials(matter), wp.float32)
-        return p
-
     # ------------------------------------------------------------ grid
 
     def grid(self, problem: Problem, room: int) -> Struct:
@@ -83,9 +55,16 @@ class Memory:
         g.where, g.field = self.zeros(room, wp.vec3i), self.zeros(room, wp.int32)
         g.near = self.zeros(8 * room, wp.int32)
         g.partner = self.zeros(FIELDS_AT_NODE * room, wp.int32)
-        g.seen, g.aware = self.zeros(room, wp.int32), self.zeros(room, wp.int32)
+        g.seen = self.zeros(room, wp.int32)
+        for name in ("held_by", "first"):
+            setattr(g, name, self.zeros(room, wp.int32))
+        particles = sum(len(b.position) for b in problem.bodies)
+        for name in ("task_home", "task_first", "task_last"):
+            setattr(g, name, self.zeros(room + particles // int(layout.TASK), wp.int32))
+        g.arena = self.zeros(int(layout.ARENA_SUMS) * layout.ARENA_NODES, wp.float32)
+        g.sum = self.zeros(int(layout.ARENA_SUMS) * layout.NODES_OF_BLOCK * room, wp.float32)
         g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec4)
-        g.pool = self.zeros(8 * room, wp.vec3)
+        g.pool = self.zeros((3, 8 * room), wp.float32)
         for name in ("meet", "held", "was"):
             setattr(g, name, self.zeros(64 * room, wp.int32))
         return g
@@ -223,7 +202,7 @@ class Memory:
             setattr(c, name, self.zeros(touches, wp.int32))
         c.candidate = self.zeros(touches, wp.mat33)
         c.far_a, c.far_c = self.zeros(3 * touches, wp.float32), self.zeros(3 * touches, wp.float32)
-        c.chosen, c.normal = self.zeros(touches, wp.vec3), self.zeros(touches, wp.vec3)
+        c.normal = self.zeros(touches, wp.vec3)
         c.gap = self.zeros(touches, wp.float32)
         c.target, c.span = self.zeros(touches, wp.float64), self.zeros(touches, wp.float64)
         c.last_velocity, c.turn = self.zeros(entries, wp.vec3d), self.zeros(touches, wp.float64)
@@ -274,14 +253,15 @@ class Memory:
         s.clock, s.flag = self.zeros(layout.CLOCK, wp.float64), self.zeros(layout.FLAGS, wp.int32)
         s.clock[int(layout.SMALLEST) : int(layout.SMALLEST) + 1].fill_(np.inf)
         s.fast, s.change = self.zeros(4, wp.float32), self.zeros(1, wp.float32)
-        s.pace = self.zeros(3, wp.float64)
+        s.pace = self.zeros(4, wp.float64)
         s.loss = self.zeros((5, int(layout.LANES)), wp.float64)
         s.gravity, s.ramp = wp.vec3d(*problem.gravity), problem.gravity_ramp
         s.courant, s.dx, s.cell = problem.courant, problem.cell, problem.cell
         s.longest = min(LONGEST_STEP, longest_step(problem), prescribed.longest_step(problem))
         self._forces(s, problem)
         s.mass = self.put(matter.total, wp.float64)
-        s.bodies, s.planes = bodies, planes
+        soft = ~matter.rigid | (problem.contact == "single")
+        s.particles, s.bodies, s.planes = int(soft.sum()), bodies, planes
         normals = np.array([p.normal for p in problem.planes], float).reshape(-1, 3)
         s.plane = self.put(normals, wp.vec3d)
         s.offset = self.put(np.array([p.offset for p in problem.planes], float), wp.float64)
@@ -291,6 +271,8 @@ class Memory:
         never = np.full((everything, everything), np.nan)
         s.first_contact, s.last_contact = self.put(never, wp.float64), self.put(never, wp.float64)
         s.contact_point = self.put(np.stack([never] * 3, axis=2), wp.vec3d)
+        s.marked = self.zeros((everything, everything), wp.int32)
+        s.met = self.zeros(everything * everything, wp.int32)
         s.step_impulse = self.zeros((everything, everything), wp.float64)
         s.step_place = self.zeros((everything, everything), wp.vec3d)
         return s
@@ -328,25 +310,6 @@ def split(place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Lowest of each particle's 27 nodes, and its offset from it [cells]."""
     low = np.floor(place - 0.5)
     return low.astype(np.int64), place - low
-
-
-def _materials(matter: Matter) -> np.ndarray:
-    """Write the rows that kernels read: see ``layout`` for the columns."""
-    s = matter.substances
-    table = np.zeros((len(s.body), layout.COLUMNS))
-    table[:, layout.LAW], table[:, layout.MU], table[:, layout.LAMBDA] = s.law, s.mu, s.lam
-    table[:, layout.YIELD], table[:, layout.HARD] = s.yield_stress, s.hardening
-    table[:, layout.CONE], table[:, layout.APEX] = s.cone, s.apex
-    table[:, layout.DENSITY], table[:, layout.FORGET] = s.density, s.forgetting
-    table[:, layout.STIFFENING] = s.stiffening
-    table[:, layout.CONSISTENCY], table[:, layout.INDEX] = s.consistency, s.flow_index
-    named = {layout.SHEAR: "shear", layout.BULK: "bulk", layout.RELAXATION: "time"}
-    for first, name in named.items():
-        column = getattr(s.branches, name)
-        table[:, int(first) : int(first) + column.shape[1]] = column
-    table[:, layout.BODY], table[:, layout.RIGID] = s.body, s.rigid
-    table[:, layout.SWELLS] = s.swells
-    return table
 
 
 def _pair_tables(problem: Problem) -> tuple[np.ndarray, np.ndarray]:

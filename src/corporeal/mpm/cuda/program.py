@@ -3,11 +3,12 @@
 from dataclasses import dataclass
 from typing import Any
 
-from corporeal.mpm.cuda import contact, dilatation, layout, loads, rigid
+from corporeal.mpm.cuda import contact, dilatation, layout, loads, planning, rigid, scatter, sorting
 from corporeal.mpm.cuda import contact_impulses as impulses
 from corporeal.mpm.cuda import contact_nodes as meets
 from corporeal.mpm.cuda import contact_rolling as rolling
 from corporeal.mpm.cuda import contact_rounds as rounds
+from corporeal.mpm.cuda import contact_surface as surface
 from corporeal.mpm.cuda import grid as grids
 from corporeal.mpm.cuda import inclusions as bonds
 from corporeal.mpm.cuda import step as kernels
@@ -15,15 +16,13 @@ from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.problem import Problem
 
 MODULES = (
-    *(grids, kernels, dilatation, meets, contact),
-    *(impulses, rounds, rolling, rigid, loads, bonds),
+    *(sorting, grids, planning, scatter, kernels, dilatation, meets, contact),
+    *(surface, impulses, rounds, rolling, rigid, loads, bonds),
 )
 """Modules whose kernels a step launches."""
 THREADS_PER_PROCESSOR = 1024
-PARTICLE_STATE = (
-    "cell place velocity affine strain motion stress mass volume plastic opened relief pressure "
-    "branch kind field number"
-)
+SMALL_TASK = 32
+"""Particles of a task where blocks are part-filled: small scenes have a group for so many."""
 
 
 @dataclass
@@ -53,11 +52,21 @@ class Program:
         self.swelling = bool(table[:, int(layout.SWELLS)].any())
         self.brakes = problem.brakes and bool(arrays.rigid.surfaces)
         self.stride = self._threads()
+        self.lanes = layout.GROUP if wp.get_device(self.device).is_cuda else 1
 
     def _threads(self) -> int:
-        """Threads of one launch: as many as keep the device busy."""
+        """Threads of one launch, in whole groups: as many as keep the device busy, or have work."""
         found = wp.get_device(self.device)
-        return THREADS_PER_PROCESSOR * found.sm_count if found.is_cuda else 1
+        if not found.is_cuda:
+            return 1
+        tasks = self.arrays.particles.count // SMALL_TASK + 1
+        groups = max(tasks, self.arrays.rigid.count // layout.GROUP)
+        return min(THREADS_PER_PROCESSOR * found.sm_count, groups * layout.GROUP)
+
+    def load(self) -> None:
+        """Compile what a step launches, or find it compiled."""
+        for module in MODULES:
+            wp.load_module(module, device=self.device, block_dim=self.lanes)
 
     def run(self) -> None:
         """Take all steps of a frame."""
@@ -77,61 +86,59 @@ class Program:
 
     def look_ahead(self) -> None:
         """Work out the largest stable step."""
-        self._run(kernels.begin, 1, self.arrays.sheet, self.arrays.rigid, stride=False)
+        self._one_group(planning.begin, self.arrays.sheet, self.arrays.rigid)
 
-    def _run(self, kernel: Any, threads: int, *inputs: Any, stride: bool = True) -> None:
-        given = [*inputs, threads] if stride else list(inputs)
-        wp.launch(kernel, dim=threads, inputs=given, device=self.device)
+    def _run(self, kernel: Any, threads: int, *inputs: Any) -> None:
+        """Launch a kernel with so many threads."""
+        wp.launch(kernel, threads, inputs, device=self.device, block_dim=self.lanes)
 
     def _each(self, kernel: Any, *inputs: Any) -> None:
         """Launch a kernel that loops over its items."""
-        self._run(kernel, self.stride, *inputs)
+        self._run(kernel, self.stride, *inputs, self.stride)
+
+    def _groups(self, kernel: Any, *inputs: Any) -> None:
+        """Launch a kernel whose threads work in groups."""
+        self._run(kernel, self.stride, *inputs, self.stride, self.lanes)
+
+    def _one_group(self, kernel: Any, *inputs: Any) -> None:
+        """Launch a kernel of one group of threads."""
+        self._run(kernel, self.lanes, *inputs, self.lanes)
 
     def _per_body(self, kernel: Any, *inputs: Any) -> None:
         """Launch a kernel with one thread for each body."""
-        self._run(kernel, self.bodies, *inputs, stride=False)
+        self._run(kernel, self.bodies, *inputs)
 
     def arrange(self) -> None:
         """Sort particles by block, and give every block that they reach a slot: FULL if too few."""
         a = self.arrays
-        if a.particles.count:
-            self._sort()
-        self._each(grids.forget, a.grid, a.sheet)
-        self._each(grids.claim_blocks, a.particles, a.rigid, a.grid, a.sheet)
-
-    def _sort(self) -> None:
-        p, count = self.arrays.particles, self.arrays.particles.count
-        keys = wp.zeros(2 * count, dtype=wp.int64, device=self.device)
-        order = wp.zeros(2 * count, dtype=wp.int32, device=self.device)
-        self._each(grids.key_particles, p, keys, order)
-        wp.utils.radix_sort_pairs(keys, order, count)
-        for name in PARTICLE_STATE.split():
-            array = getattr(p, name)
-            words = _words(array)
-            sorted_words = wp.empty_like(words)
-            self._each(grids.reorder, count, words.size // count, order, words, sorted_words)
-            wp.copy(words, sorted_words)
+        self._each(sorting.forget, a.grid, a.sheet)
+        self._each(sorting.claim_homes, a.particles, a.grid, a.sheet)
+        self._each(sorting.count_homes, a.particles, a.grid, a.sheet)
+        self._each(sorting.claim_rest, a.rigid, a.grid, a.sheet)
+        channels, together = a.particles.words.shape[0], a.particles.spare.shape[0]
+        for first in range(0, channels if a.particles.count else 0, together):
+            self._each(sorting.place, a.particles, a.grid, a.sheet, first)
+            self._each(sorting.put_back, a.particles, a.sheet, first)
+        self._each(grids.link_all, a.grid, a.sheet)
 
     def _record(self) -> Any:
         """Capture a whole frame: steps until the clock says stop."""
         with wp.ScopedCapture(device=self.device) as capture:
-            self._run(kernels.begin, 1, self.arrays.sheet, self.arrays.rigid, stride=False)
-            wp.capture_while(self._flag(layout.GOING), self._step)
+            self._one_group(planning.begin, self.arrays.sheet, self.arrays.rigid)
+            wp.capture_while(self._flag(layout.GOING), self._steps)
         return capture.graph
+
+    def _steps(self) -> None:
+        """Step until too many particles have strayed; then sort them, unless the frame is over."""
+        wp.capture_while(self._flag(layout.STEPPING), self._step)
+        wp.capture_if(self._flag(layout.GOING), self.arrange)
 
     def _step(self) -> None:
         a = self.arrays
-        self._each(grids.link, a.grid, a.sheet)
-        self._each(grids.clear, a.grid, a.sheet)
-        if self.touching:
-            self._each(contact.recall, a.grid, a.contacts, a.sheet)
         self._load()
         if self.swelling:
-            self._each(dilatation.empty, a.grid, a.sheet)
             self._each(dilatation.pool, a.particles, a.grid)
-        self._each(kernels.scatter, a.particles, a.grid, a.loads, a.sheet)
-        if a.rigid.count:
-            self._each(kernels.scatter_rigid, a.rigid, a.grid, a.sheet)
+        self._groups(scatter.scatter, a.particles, a.grid, a.rigid, a.loads, a.sheet)
         self._each(grids.divide, a.grid, a.sheet)
         self._hold()
         if self.touching:
@@ -140,18 +147,19 @@ class Program:
         if self.touching:
             self._touch()
         self._release()
-        self._each(kernels.gather, a.particles, a.grid, a.loads, a.sheet)
+        self._groups(kernels.gather, a.particles, a.grid, a.loads, a.sheet)
         if self.swelling:
             self._each(dilatation.press, a.particles, a.grid, a.sheet)
         if a.rigid.count:
             self._per_body(rigid.advance, a.rigid, a.sheet)
             self._each(rigid.follow, a.rigid, a.grid, a.sheet)
-        self._run(kernels.tick, 1, a.sheet, a.rigid, a.loads, stride=False)
+        self._groups(planning.finish, a.grid, a.rigid, a.loads, a.sheet)
 
     def _load(self) -> None:
         """Let wind and tethers act on particles."""
         a = self.arrays
-        if not (a.loads.faces or a.loads.tethers or a.loads.joints or self.held):
+        a.loads.acts = int(bool(a.loads.faces or a.loads.tethers or self.held))
+        if not (a.loads.acts or a.loads.joints):
             return
         self._each(loads.calm, a.particles, a.loads, a.sheet)
         if a.loads.faces:
@@ -174,11 +182,9 @@ class Program:
         a = self.arrays
         if not a.rigid.count:
             return
-        if a.loads.faces or a.loads.tethers:
-            self._per_body(loads.load_rigid, a.rigid, a.loads, a.sheet)
-        self._per_body(rigid.force, a.rigid, a.sheet)
+        self._per_body(loads.force_rigid, a.rigid, a.loads, a.sheet)
         if a.loads.joints:
-            self._run(loads.join, 1, a.rigid, a.loads, a.sheet, stride=False)
+            self._run(loads.join, 1, a.rigid, a.loads, a.sheet)
         if self.held:
             self._per_body(loads.grasp_rigid, a.rigid, a.loads, a.sheet)
         if a.bonds.count:
@@ -195,46 +201,24 @@ class Program:
         """List nodes where fields meet, choose normals, and measure gaps."""
         a = self.arrays
         self._each(meets.list_meets, a.grid, a.contacts, a.rigid, a.sheet)
-        self._each(meets.look_around, a.grid, a.sheet)
-        self._each(contact.show_particles, a.particles, a.grid, a.contacts, a.sheet)
-        if a.rigid.count:
-            self._each(contact.show_rigid, a.rigid, a.grid, a.contacts, a.sheet)
+        self._each(contact.look, a.particles, a.rigid, a.grid, a.contacts, a.sheet)
         self._each(contact.propose, a.grid, a.contacts, a.rigid, a.sheet)
-        self._each(contact.reach_particles, a.particles, a.grid, a.contacts, a.sheet)
-        if a.rigid.count:
-            self._each(contact.reach_rigid, a.rigid, a.grid, a.contacts, a.sheet)
-        self._each(contact.choose, a.contacts, a.rigid, a.sheet)
+        self._each(contact.reach_all, a.particles, a.rigid, a.grid, a.contacts, a.sheet)
         self._each(contact.measure_gaps, a.grid, a.contacts, a.rigid, a.sheet)
         if a.rigid.surfaces:
-            self._run(meets.count_nodes, 1, a.sheet, stride=False)
-            if a.rigid.facets:
-                self._each(meets.list_facets, a.rigid, a.contacts, a.sheet)
-            if self.rolls:
-                self._each(meets.list_curves, a.rigid, a.contacts, a.sheet)
-            if a.rigid.facets or self.rolls:
-                self._each(meets.instead_of_nodes, a.rigid, a.contacts, a.sheet)
-            self._each(meets.list_points, a.rigid, a.contacts, a.sheet)
+            self._each(surface.list_surface, a.rigid, a.contacts, a.sheet, int(self.rolls))
 
     def _touch(self) -> None:
         """Solve all impulses, and enter them."""
         a = self.arrays
-        self._each(impulses.prepare, a.contacts, a.rigid, a.grid, a.sheet)
-        self._each(impulses.solve_nodes, a.contacts, a.rigid, a.sheet)
+        self._each(impulses.begin_contact, a.contacts, a.rigid, a.grid, a.sheet)
         if a.rigid.count:
             wp.capture_while(self._flag(layout.IMPACTING), self._impact)
         if self.brakes:
             self._each(rolling.count_rolling, a.contacts, a.rigid, a.sheet)
             self._each(rolling.brake_rolling, a.contacts, a.rigid, a.sheet)
             self._per_body(rolling.slow_down, a.rigid, a.sheet)
-        self._each(impulses.hand_back, a.grid, a.contacts, a.rigid, a.sheet)
-        self._each(impulses.note, a.contacts, a.rigid, a.sheet)
-        everything = self.bodies + self.planes
-        wp.launch(
-            impulses.enter_books,
-            (everything, everything),
-            [a.contacts, a.sheet],
-            device=self.device,
-        )
+        self._each(impulses.end_contact, a.grid, a.contacts, a.rigid, a.sheet)
 
     def _impact(self) -> None:
         """Solve one round of impacts, or all contacts together."""
@@ -242,11 +226,10 @@ class Program:
         self._each(rounds.strike, a.contacts, a.rigid, a.sheet)
         self._each(rounds.find_least, a.contacts, a.rigid, a.sheet)
         self._each(rounds.look_behind, a.contacts, a.rigid, a.sheet)
-        self._run(rounds.begin_round, 1, a.contacts, a.rigid, a.sheet, stride=False)
+        self._one_group(rounds.begin_round, a.contacts, a.rigid, a.sheet)
         self._each(rounds.aim, a.contacts, a.rigid, a.sheet)
         wp.capture_while(self._flag(layout.SWEEPING), self._sweep)
-        self._each(rounds.bank, a.contacts, a.sheet)
-        self._run(rounds.end_round, 1, a.contacts, a.sheet, stride=False)
+        self._each(rounds.end_round, a.contacts, a.rigid, a.sheet)
 
     def _flag(self, which: Any) -> Any:
         """One flag, as something that repeats while it is 1."""
@@ -256,10 +239,4 @@ class Program:
         a = self.arrays
         self._each(impulses.count_busy, a.contacts, a.rigid, a.sheet)
         self._each(impulses.sweep, a.contacts, a.rigid, a.sheet)
-        self._run(impulses.apply, 1, a.rigid, a.sheet, stride=False)
-
-
-def _words(array: Any) -> Any:
-    """Look at the same memory as 32-bit words."""
-    size = array.size * wp.types.type_size_in_bytes(array.dtype) // 4
-    return wp.array(ptr=array.ptr, dtype=wp.int32, shape=(size,), device=array.device)
+        self._one_group(impulses.apply, a.rigid, a.sheet)

@@ -11,10 +11,10 @@ from corporeal.mpm.cuda.layout import (
     TIME,
     D,
     Grid,
-    Rigid,
     Sheet,
     wp,
 )
+from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.formulas.one_lane import follow_path, inverse_inertia, turned
 
 wp.set_module_options(formulas.options())
@@ -66,12 +66,9 @@ def guide(r: Rigid, s: Sheet, b: int):
     return 0
 
 
-@wp.kernel
-def force(r: Rigid, s: Sheet):
-    """Give rigid bodies gravity and push; steer those with prescribed motion."""
-    b = wp.tid()
-    if s.flag[FULL] == 2:
-        return
+@wp.func
+def force(r: Rigid, s: Sheet, b: int):
+    """Give a rigid body gravity and push; steer what has prescribed motion."""
     if r.path_count[b] > 0:
         guide(r, s, b)
     elif r.stiff[b] == 1:
@@ -81,6 +78,7 @@ def force(r: Rigid, s: Sheet):
         wp.atomic_add(s.loss, 2, b % 256, work)
         r.speed[b] = r.speed[b] + kick
         r.spin[b] = r.inertia[b] * r.moment[b]
+    return 0
 
 
 @wp.kernel

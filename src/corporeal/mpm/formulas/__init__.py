@@ -5,6 +5,7 @@ every module that was given ``options``, whatever the module is compiled for.
 """
 
 import re
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
@@ -52,19 +53,25 @@ def law_lists() -> list[str]:
     ]
 
 
-def options(**others: Any) -> dict[str, Any]:
+def options(
+    *headers: Path, numbers: Mapping[str, int] | None = None, **others: Any
+) -> dict[str, Any]:
     """Options of a Warp module that uses the formulas.
 
     Args:
+        headers: Headers of the module's own, after those of the formulas.
+        numbers: What they know by name in ``namespace mpm``.
         others: More options of ``wp.set_module_options``.
 
     """
-    folder, text = [str(HERE)], preamble()
+    folders = [str(folder) for folder in (HERE, *(header.parent for header in headers))]
+    text = preamble() + constants.written(numbers or {})
+    text += "".join(f'#include "{header.name}"\n' for header in headers)
     build = wp.ModuleBuildOptions(
-        extra_cpu_include_dirs=folder,
-        extra_cuda_include_dirs=folder,
+        extra_cpu_include_dirs=folders,
+        extra_cuda_include_dirs=folders,
         extra_cpu_preamble=text,
         extra_cuda_preamble=text,
-        extra_build_dependencies=[str(HERE / name) for name in HEADERS],
+        extra_build_dependencies=[*(str(HERE / name) for name in HEADERS), *map(str, headers)],
     )
     return {"enable_backward": False, "extra_build_options": build, **others}

@@ -1,0 +1,216 @@
+"""A block's nodes in a group's own memory, as functions that Warp kernels call: see ``arena.h``.
+
+A group is the threads of one CUDA block, or the processor's one thread. Its threads call all of
+these with the same block, each with its number ``lane`` among ``lanes``.
+"""
+
+from pathlib import Path
+from typing import Any
+
+from corporeal.mpm import formulas
+from corporeal.mpm.cuda import layout
+from corporeal.mpm.cuda.layout import wp
+
+HEADER = Path(__file__).with_name("arena.h").resolve()
+NUMBERS = "ARENA_SIDE ARENA_NODES NODES_OF_BLOCK ARENA_SUMS ARENA_MOTION"
+"""What the header knows of ``layout``."""
+SEEN = 24
+"""Numbers that a particle receives: v, ∇v, u, ∇u, gradients of dx v in row order times 4."""
+Seen = wp.types.vector(length=SEEN, dtype=wp.float32)
+
+
+def options(**others: Any) -> dict[str, Any]:
+    """Options of a Warp module that uses the formulas and the arena."""
+    numbers = {name: int(getattr(layout, name)) for name in NUMBERS.split()}
+    return formulas.options(HEADER, numbers=numbers, **others)
+
+
+@wp.func_native("WP_TILE_SYNC();")
+def meet():
+    """Wait for all threads of the group."""
+    ...
+
+
+@wp.func_native("return mpm::Arena::node((const int *)near.data, home, x, y, z);")
+def node_at(near: wp.array(dtype=wp.int32), home: int, x: int, y: int, z: int) -> int:
+    """Index of a node, counted from the first of a block, in this or a block near it."""
+    ...
+
+
+@wp.func
+def node_of(near: wp.array(dtype=wp.int32), home: int, cell: wp.vec3i, i: int, j: int, k: int):
+    """Index of one of the 27 nodes from ``cell`` on, which lies in block ``home``."""
+    return node_at(near, home, (cell[0] & 3) + i, (cell[1] & 3) + j, (cell[2] & 3) + k)
+
+
+@wp.func_native("return mpm::Arena::sum(node, kind);")
+def sum_at(node: int, kind: int) -> int:
+    """Where a node's sum of one kind stands."""
+    ...
+
+
+# ---------------------------------------------------------------- particles to grid
+
+
+@wp.func_native("""
+  float *own = mpm::Arena::memory((float *)arena.data);
+  for (int k = lane; k < mpm::ARENA_SUMS * mpm::ARENA_NODES; k += lanes) own[k] = 0.0f;
+""")
+def empty(arena: wp.array(dtype=wp.float32), lane: int, lanes: int):
+    """Begin with sums of zero."""
+    ...
+
+
+@wp.func_native("""
+  mpm::Gift gift(m, &momentum.c[0], &B.data[0][0], &impulse.c[0], &S.data[0][0], &f.c[0]);
+  const mpm::Reach to(&cell.c[0], &f.c[0]);
+  gift.scatter(to, mpm::Arena::memory((float *)arena.data), mpm::Here());
+""")
+def give(
+    arena: wp.array(dtype=wp.float32),
+    cell: wp.vec3i,
+    f: wp.vec3,
+    m: wp.float32,
+    momentum: wp.vec3,
+    B: wp.mat33,
+    impulse: wp.vec3,
+    S: wp.mat33,
+):
+    """Add a particle of the group's block to the arena."""
+    ...
+
+
+@wp.func_native("""
+  mpm::Gift gift(m, &momentum.c[0], &B.data[0][0], &impulse.c[0], &S.data[0][0], &f.c[0]);
+  const mpm::There place = {(const int *)near.data, home};
+  gift.scatter(mpm::Reach(&cell.c[0], &f.c[0]), (float *)sums.data, place);
+""")
+def give_afar(
+    sums: wp.array(dtype=wp.float32),
+    near: wp.array(dtype=wp.int32),
+    home: int,
+    cell: wp.vec3i,
+    f: wp.vec3,
+    m: wp.float32,
+    momentum: wp.vec3,
+    B: wp.mat33,
+    impulse: wp.vec3,
+    S: wp.mat33,
+):
+    """Add a particle that has strayed to the nodes themselves."""
+    ...
+
+
+@wp.func_native("""
+  const mpm::Reach to(&cell.c[0], &f.c[0]);
+  const mpm::There place = {(const int *)near.data, home};
+  for (int i = 0; i < 3; i++)
+    for (int j = 0; j < 3; j++)
+      for (int k = 0; k < 3; k++) {
+        const int node = place.node(to.x + i, to.y + j, to.z + k);
+        const float n = to.n[0][i] * to.n[1][j] * to.n[2][k];
+        mpm::Arena::add((float *)sums.data + place.sum(node, 0), n * m);
+      }
+""")
+def give_mass(
+    sums: wp.array(dtype=wp.float32),
+    near: wp.array(dtype=wp.int32),
+    home: int,
+    cell: wp.vec3i,
+    f: wp.vec3,
+    m: wp.float32,
+):
+    """Add the mass of a particle of a rigid body to the nodes themselves."""
+    ...
+
+
+@wp.func_native("""
+  float *own = mpm::Arena::memory((float *)arena.data);
+  for (int k = lane; k < mpm::ARENA_NODES; k += lanes) {
+    if (own[k] > 0.0f) {
+      const int node = mpm::Arena::node((const int *)near.data, home, k);
+      float *sum = (float *)sums.data + mpm::Arena::sum(node, 0);
+      for (int c = 0; c < mpm::ARENA_SUMS; c++)
+        mpm::Arena::add(sum + mpm::NODES_OF_BLOCK * c, own[mpm::ARENA_NODES * c + k]);
+    }
+    for (int c = 0; c < mpm::ARENA_SUMS; c++) own[mpm::ARENA_NODES * c + k] = 0.0f;
+  }
+""")
+def hand_over(
+    arena: wp.array(dtype=wp.float32),
+    sums: wp.array(dtype=wp.float32),
+    near: wp.array(dtype=wp.int32),
+    home: int,
+    lane: int,
+    lanes: int,
+):
+    """Add the arena's sums to the nodes that anything reached, and begin again."""
+    ...
+
+
+# ---------------------------------------------------------------- grid to particles
+
+
+@wp.func_native("""
+  float *own = mpm::Arena::memory((float *)arena.data);
+  const float *now = (const float *)node.data, *before = (const float *)old.data;
+  for (int k = lane; k < mpm::ARENA_NODES; k += lanes) {
+    const mpm::Far far = {{(const int *)near.data, home}, now, before};
+    const int at = mpm::Arena::node((const int *)near.data, home, k);
+    for (int c = 0; c < mpm::ARENA_MOTION; c++) own[mpm::ARENA_NODES * c + k] = far.of(at, c);
+  }
+""")
+def fetch(
+    arena: wp.array(dtype=wp.float32),
+    node: wp.array(dtype=wp.vec4),
+    old: wp.array(dtype=wp.vec4),
+    near: wp.array(dtype=wp.int32),
+    home: int,
+    lane: int,
+    lanes: int,
+):
+    """Read the motion of all nodes that the group's block reaches, once."""
+    ...
+
+
+RETURN_SEEN = f"""
+  wp::vec_t<{SEEN}, wp::float32> r;
+  for (int k = 0; k < 3; k++) r.c[k] = seen.v[k], r.c[12 + k] = seen.u[k];
+  for (int k = 0; k < 9; k++) r.c[3 + k] = seen.L[k], r.c[15 + k] = seen.K[k];
+  return r;
+"""
+
+
+@wp.func_native(
+    """
+  mpm::Seen seen;
+  const mpm::Near motion = {mpm::Here(), mpm::Arena::memory((float *)arena.data)};
+  seen.gather(mpm::Reach(&cell.c[0], &f.c[0]), &f.c[0], motion, before != 0);
+"""
+    + RETURN_SEEN
+)
+def receive(arena: wp.array(dtype=wp.float32), cell: wp.vec3i, f: wp.vec3, before: int) -> Seen:
+    """What a particle of the group's block sees; ``before``: without forces too."""
+    ...
+
+
+@wp.func_native(
+    """
+  mpm::Seen seen;
+  const float *now = (const float *)node.data, *without = (const float *)old.data;
+  const mpm::Far motion = {{(const int *)near.data, home}, now, without};
+  seen.gather(mpm::Reach(&cell.c[0], &f.c[0]), &f.c[0], motion, before != 0);
+"""
+    + RETURN_SEEN
+)
+def receive_afar(
+    node: wp.array(dtype=wp.vec4),
+    old: wp.array(dtype=wp.vec4),
+    near: wp.array(dtype=wp.int32),
+    home: int,
+    cell: wp.vec3i,
+    f: wp.vec3,
+    before: int,
+) -> Seen:
+    """Look at the nodes themselves, for a particle that has strayed."""
+    ...
