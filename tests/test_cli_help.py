@@ -133,6 +133,19 @@ def test_an_unknown_second_word_shows_the_menu(command):
     assert "Choose one of: dynamics, judge, mass, materials, objects, parts." in said.err
 
 
+def test_the_second_words_stand_in_a_column_of_their_own(command):
+    _, said = command("evaluate", "--help")
+    rows = [line for line in said.out.splitlines() if line.startswith("  corporeal evaluate ")]
+    starts = {re.match(r"  corporeal evaluate (\w+ +)", row).end() for row in rows}
+    assert len(rows) == 6 and len(starts) == 1
+
+
+def test_a_judge_asks_for_a_folder_of_runs_and_not_of_models(command):
+    _, said = command("evaluate", "judge", "--help")
+    assert "Runs, as evaluate dynamics leaves them." in " ".join(said.out.split())
+    assert "Models, one object each" not in said.out
+
+
 def test_a_judge_without_runs_is_told_where_they_come_from(command, tmp_path):
     code, said = command("evaluate", "judge", str(tmp_path), "--judge", "ask:answers")
     assert code == 2

@@ -304,6 +304,9 @@ class Audit:
     """With the floor and walls [m]."""
     pair_penetration_m: float
     """Of objects [m]."""
+    start_penetration_m: float | None = field(default=None, kw_only=True)
+    """Of objects at the start: how deep the scene puts them into each other [m]; None: a run from
+    before it was kept."""
     parts: tuple[PartAudit, ...]
     """One per part, in the catalogue's order."""
     settling: Settled | None

@@ -255,6 +255,30 @@ def test_every_breach_is_said_in_plain_words(story, key, value, word):
     assert sentence.endswith(".")
 
 
+@pytest.mark.parametrize(("begun", "word"), [(0.0173, "at the start"), (0.002, "--detail")])
+def test_detail_is_not_proposed_for_what_the_scene_puts_into_each_other(story, begun, word):
+    scene, particles, field, told = story
+    deep = np.full((STEPS, 2, 2), 0.0174)
+    deep[0] = begun
+    found = audit(scene, particles, field, replace(told, ledger=replace(told.ledger, overlap=deep)))
+    (sentence,) = breaches(found)
+    assert sentence.startswith("Objects penetrate each other by up to 1.7 grid cells (17 mm)")
+    assert word in sentence
+
+
+def test_what_is_one_particle_has_no_shape_that_could_change(story):
+    scene, particles, field, told = story
+    alone = np.append(np.flatnonzero(particles.object == 0), -1)
+    rows = ("position", "velocity", "volume", "density", "object", "part")
+    few = replace(particles, **{n: getattr(particles, n)[alone] for n in rows})
+    frames = [
+        replace(f, position=f.position[alone], deformation=f.deformation[alone])
+        for f in told.frames
+    ]
+    seen = outcome(scene, few, field, replace(told, frames=frames))
+    assert seen.objects["stone_0"].shape_error_max == 0.0
+
+
 def test_what_is_lost_and_not_booked_is_told(story):
     known = story[3].ledger
     fall = np.linspace(0, 1.0, STEPS)[:, None] * [0, 2.0]

@@ -3,6 +3,8 @@
 import pytest
 
 from corporeal.stages.describe import describe
+from corporeal.stages.ground import doubts, ground
+from corporeal.stages.segment import segment
 from handmade import plain, scene
 
 
@@ -18,6 +20,13 @@ def test_a_wet_sponge_holds_water_and_a_soaked_one_more():
     assert wet == pytest.approx(3 * 30)
     assert soaked == pytest.approx(5.7 * 30)
     assert density("damp towel") == pytest.approx(2 * 400)
+
+
+def test_the_water_in_a_sponge_does_not_make_its_foam_doubtful():
+    wet = scene(("wet sponge", [("mesh", plain(), {})]))
+    inventory = describe(wet)
+    parts = segment(wet, inventory)
+    assert doubts(ground(wet, parts, inventory), parts, wet) == ()
 
 
 @pytest.mark.parametrize(

@@ -23,6 +23,11 @@ Folder = Annotated[
     tyro.conf.Positional,
     tyro.conf.arg(metavar="FOLDER", help="Models, one object each, or settled scenes."),
 ]
+Runs = Annotated[
+    Path | None,
+    tyro.conf.Positional,
+    tyro.conf.arg(metavar="FOLDER", help="Runs, as evaluate dynamics leaves them."),
+]
 Target = Annotated[
     str,
     tyro.conf.Positional,
@@ -275,7 +280,7 @@ def evaluate_judge() -> None:
 
     @dataclass(frozen=True)
     class Judge:
-        folder: Folder = None
+        folder: Runs = None
         json: Path | None = None
         """File for answers, intervals and marks (JSON)."""
         page: Path | None = None

@@ -43,7 +43,8 @@ def do_second_word(verb: str, verbs: Mapping[str, Callable[[], None]]) -> None:
     """
     word = sys.argv[2] if len(sys.argv) > 2 else "--help"
     if word in ("--help", "-h"):
-        lines = (f"  corporeal {verb} {w:8} {_first_line(v)}" for w, v in verbs.items())
+        width = max(map(len, verbs))
+        lines = (f"  corporeal {verb} {w:{width}}  {_first_line(v)}" for w, v in verbs.items())
         print(*lines, "", f"corporeal {verb} WORD --help tells more.", sep="\n")
         return
     if word not in verbs:

@@ -33,8 +33,8 @@ class FilmConfig:
     colour_by: Literal["itself", "speed"] | Quantity = "itself"
     """Quantity shown by colour, with a colour bar; itself: the objects' own colours."""
     shot: Shot = "wide"
-    """wide: everything, all the time; close: what is struck first, or moves most; follow: the
-    camera goes along with what moves."""
+    """wide: everything, all the time, but for what goes farther than 2.5 sizes of the scene; close:
+    what is struck first, or moves most; follow: the camera goes along with what moves."""
     slow: float = 1.0
     """How many times slower the film is about the first contact."""
     caption: bool = True

@@ -160,11 +160,18 @@ def _material(entry: Entry, words: PartWords) -> Material:
             known = ", ".join(entry.ranges)
             raise UserError(f"{entry.name} has no {field} in the library. It has: {known}.")
         grounds[field] = Ground(value, allowed, "annotation", "stated in the annotation file", 1.0)
-    unfit = contradictions(entry.group, entry.ranges, {f: g.value for f, g in grounds.items()})
+    graded = {f: g.value for f, g in grounds.items() if not _beside(g, entry.ranges.get(f))}
+    unfit = contradictions(entry.group, entry.ranges, graded)
     for field, clause in unfit.items():
         reason = f"{grounds[field].reason} {UNFIT} {clause}."
         grounds[field] = replace(grounds[field], reason=reason)
     return entry.pick(grounds)
+
+
+def _beside(ground: Ground, measured: Range | None) -> bool:
+    """Whether a value has a span of its own: of a wet foam, not of a grade of its material."""
+    low, high = ground.range.low, ground.range.high
+    return low < high and measured is not None and (low, high) != (measured.low, measured.high)
 
 
 def _from_file(stated: Ground, measured: Range) -> Ground:

@@ -72,6 +72,7 @@ def audit(
         max_penetration_dx=max(floor, pair) / cell,
         floor_penetration_m=floor,
         pair_penetration_m=pair,
+        start_penetration_m=float(ledger.overlap[0].max(initial=0.0)),
         parts=part_rows(scene, particles, field),
         breakage=breakage(scene, particles, field, trajectory),
         settling=settling,

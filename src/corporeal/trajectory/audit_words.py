@@ -27,7 +27,15 @@ def breaches(found: Audit) -> list[str]:
     depth = max(found.floor_penetration_m, found.pair_penetration_m)
     gain = found.energy_gain
     whose = f" Most of it is in {gain.object}, from {gain.time:.2f} s on." if gain else ""
+    begun = found.start_penetration_m or 0.0
     into = "the floor" if found.floor_penetration_m == depth else "each other"
+    if (
+        into == "each other"
+        and depth - begun <= ALLOWED["max_penetration_dx"] * found.cell_m < begun
+    ):
+        reason = "they stand in each other at the start. Move them apart in the scene."
+    else:
+        reason = "contact is softer than in reality. A finer --detail reduces it."
     sentences = {
         "nan_count": "{0} values of the result are not finite: the result is invalid. Please "
         "report this.",
@@ -40,7 +48,7 @@ def breaches(found: Audit) -> list[str]:
         "mechanical_growth": "Kinetic and elastic energy grew by {0:.1%}: something rebounded "
         f"higher or moved faster than is physically possible.{whose}",
         "max_penetration_dx": f"Objects penetrate {into} by up to {{0:.1f}} grid cells "
-        f"({depth * 1e3:.2g} mm): contact is softer than in reality. A finer --detail reduces it.",
+        f"({depth * 1e3:.2g} mm): {reason}",
         "mass_error": "The mass of a part's particles differs by {0:.0%} from the part's "
         "estimated mass: its motion is wrong by about as much.",
     }

@@ -85,7 +85,8 @@ class Bodies:
             now, start = position[mine], self.start[b]
             fit = rigid_fit(start, now, np.ones(len(start)))
             shift = np.linalg.norm(fit.undo(now) - start, axis=1)
-            self.error[k, b] = np.sqrt(np.mean(shift**2)) / self.size[b]
+            if self.size[b] > 0.0:  # one particle has no shape
+                self.error[k, b] = np.sqrt(np.mean(shift**2)) / self.size[b]
             self.squeeze[b] = max(self.squeeze[b], reached_by_share(shift))
             if keep:
                 self.last[b].append(now)
