@@ -14,6 +14,7 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.geometry.arrangement import life_sized
+from corporeal.geometry.bedded import all_bedded, loose_parts
 from corporeal.geometry.drawn import coarseness, edge_of_scan
 from corporeal.geometry.make import AS_DRAWN, NINE_IN_TEN, Leeway, weight
 from corporeal.geometry.room import is_vessel, room_of
@@ -111,6 +112,7 @@ class Scale:
         self.forms = [form(m) for m in self.members]
         self.volume = sum(m.volume for m in self.members)
         """Of everything that is enclosed [m³]."""
+        self._beds: dict[frozenset[int], dict[int, Member]] = {}
 
     def mass(self, inventory: Inventory) -> float:
         """Return the mass of the whole scene, described so [kg]."""
@@ -127,10 +129,23 @@ class Scale:
 
         """
         found = np.zeros(len(self.scene.objects))
-        for k, (member, room) in enumerate(zip(self.members, self.rooms, strict=True)):
+        beds = self._bedded(field)
+        for k, (drawn, room) in enumerate(zip(self.members, self.rooms, strict=True)):
+            member = beds.get(drawn.part, drawn)
             leeway = AS_DRAWN if leeways is None else leeways[k]
             found[self.owner[member.part]] += weight(member, field, room, leeway)
         return found
+
+    def _bedded(self, field: MaterialField) -> dict[int, Member]:
+        """Return parts of loose matter that fill what holds them, once for each set of these.
+
+        Walls are as thick then as in the first field in which just these parts are loose.
+        """
+        loose = frozenset(loose_parts(field))
+        if loose not in self._beds:
+            members = [m for a in all_bedded(self.anatomies, field) for m in a.members]
+            self._beds[loose] = {m.part: m for m in members if m.drawn is not None}
+        return self._beds[loose]
 
     def draw(self, inventory: Inventory, number: int) -> Draw:
         """Draw a way for each part, values from their ranges, and what the meshes leave open.

@@ -217,7 +217,7 @@ def rooted(anatomy: Anatomy, materials: tuple[Material, ...]) -> Rooted | None:
             wood = member is not soil and not is_leafy(materials[member.part])
             if wood and member.closed and low < foot < high < top:
                 return Rooted(member.part, soil.part, foot, high, seen=True)
-    for soil in (m for m in soils if not m.closed):
+    for soil in (m for m in soils if m.drawn is not None or not m.closed):
         level = _level(soil)
         for member in anatomy.members:
             low, high = span(member)
@@ -230,7 +230,7 @@ def rooted(anatomy: Anatomy, materials: tuple[Material, ...]) -> Rooted | None:
 
 def _level(soil: Member) -> float:
     """Height below and above which half of a surface lies [m]."""
-    mesh = soil.body if len(soil.body.triangles) else soil.sheet
+    mesh = soil.drawn or (soil.body if len(soil.body.triangles) else soil.sheet)
     middle, areas = mesh.corners.mean(axis=1)[:, 2], mesh.areas
     order = np.argsort(middle)
     half = np.searchsorted(np.cumsum(areas[order]), 0.5 * areas.sum())

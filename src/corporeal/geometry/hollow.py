@@ -3,7 +3,7 @@
 from collections.abc import Sequence
 
 import numpy as np
-from jaxtyping import Bool, Float
+from jaxtyping import Bool, Float, Int
 
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.shape import Shape
@@ -32,11 +32,15 @@ def below_rim(
         found = ~matter.inside(points)
     shapes = [Shape(m) for m in faces if len(m.triangles)]
     found[found] = blocked(shapes, points[found], np.array([0.0, 0.0, -1.0]))
-    turns = 2 * np.pi * np.arange(ROUND) / ROUND
-    around = np.zeros(int(found.sum()), dtype=np.int64)
-    for turn in turns:
-        around += blocked(shapes, points[found], np.array([np.cos(turn), np.sin(turn), 0.0]))
-    found[found] = around >= ROUND - 1
+    found[found] = around(shapes, points[found]) >= ROUND - 1
+    return found
+
+
+def around(shapes: Sequence[Shape], points: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
+    """In how many of ``ROUND`` level directions something lies."""
+    found = np.zeros(len(points), dtype=np.int64)
+    for turn in 2 * np.pi * np.arange(ROUND) / ROUND:
+        found += blocked(shapes, points, np.array([np.cos(turn), np.sin(turn), 0.0]))
     return found
 
 

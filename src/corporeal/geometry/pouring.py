@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 from scipy.ndimage import distance_transform_edt
 from skimage.measure import marching_cubes
 
@@ -52,9 +52,7 @@ def pool(anatomy: Anatomy, member: Member, thickness: float, volume: float) -> P
     axes = [np.arange(a - 1.5 * step, b + 2 * step, step) for a, b in zip(low, high, strict=True)]
     points = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1)
     depth = hollow(anatomy, member, thickness, points.reshape(-1, 3)).reshape(points.shape[:3])
-    # The other face of a thin wall is no part of the hollow, however near it is to a sample.
-    away = np.asarray(distance_transform_edt(depth <= 0.0)) - 1.0
-    depth = np.where(depth > 0.0, depth, np.minimum(depth, -step * away))
+    depth = thin_walled(depth, depth > 0.0, step)
     height = points[..., 2]
     if volume <= 0.0 or taken(depth, step) < volume:
         return None
@@ -62,14 +60,29 @@ def pool(anatomy: Anatomy, member: Member, thickness: float, volume: float) -> P
     first = np.array([axis[0] for axis in axes])
     for _ in range(CORRECTIONS):
         # Corners of the samples' cubes are cut off by the mesh: its level makes up for them.
-        mesh = _meshed(np.minimum(depth, level - height), step, first)
+        mesh = meshed(np.minimum(depth, level - height), step, first)
         wide = taken(np.minimum(depth, level + step - height), step) - volume
         level += step * (volume - signed_volume(mesh)) / wide if wide > 0.0 else 0.0
-    mesh = _meshed(np.minimum(depth, level - height), step, first)
+    mesh = meshed(np.minimum(depth, level - height), step, first)
     return Pool(mesh, volume, level)
 
 
-def _meshed(inside: np.ndarray, step: float, first: Float[np.ndarray, "3"]) -> Mesh:
+def thin_walled(
+    depth: Float[np.ndarray, "X Y Z"], inside: Bool[np.ndarray, "X Y Z"], step: float
+) -> Float[np.ndarray, "X Y Z"]:
+    """Keep the other face of a thin wall out of a hollow, however near it is to a sample.
+
+    Args:
+        depth: Distance from the wall [m]; negative outside of the hollow.
+        inside: Which samples are in the hollow.
+        step: Between samples [m].
+
+    """
+    away = np.asarray(distance_transform_edt(~inside)) - 1.0
+    return np.where(inside, depth, np.minimum(depth, -step * away))
+
+
+def meshed(inside: np.ndarray, step: float, first: Float[np.ndarray, "3"]) -> Mesh:
     """Surface where samples change their sign, ``step`` [m] apart from ``first`` [m] on."""
     vertices, triangles, _, _ = marching_cubes(
         inside, 0.0, spacing=(step,) * 3, gradient_direction="ascent"

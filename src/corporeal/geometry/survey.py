@@ -1,6 +1,6 @@
 """One object taken apart: which triangles enclose which part, how large everything is."""
 
-from collections.abc import Callable, Collection
+from collections.abc import Callable, Collection, Sequence
 from dataclasses import dataclass, replace
 from functools import cached_property
 
@@ -53,6 +53,10 @@ class Member:
     """Extents of its smallest box, shortest first [m]."""
     whole: Shape | None = None
     """All that encloses something, of the object."""
+    drawn: Mesh | None = None
+    """The surface of loose matter that fills what holds it (``bed``); None: ``body`` is drawn."""
+    holder: int = -1
+    """The part that it fills; -1: none."""
 
     @cached_property
     def shape(self) -> Shape:
@@ -186,7 +190,6 @@ def survey(
         build[group] = build_of(shape, oriented_size(shape.mesh.corners.reshape(-1, 3)), rng)
     solid = build != Build.SHEET
     shape = Shape(mesh.only(solid)) if solid.any() else None
-    probes, spacing = probe(shape, rng)
     closed = {k: closes(mesh.only(solid & (part == k))) for k in np.unique(part)}
     alone = [
         Member(int(k), mesh.only(solid & (part == k)), mesh.only(~solid & (part == k)), closed[k],
@@ -195,21 +198,45 @@ def survey(
         for k in np.unique(part)
     ]  # fmt: skip
 
+    return assembled(mesh.vertices, shape, part[solid], alone, rng)
+
+
+def assembled(
+    vertices: Float[np.ndarray, "V 3"],
+    shape: Shape | None,
+    part_of_triangle: Int[np.ndarray, " T"],
+    alone: Sequence[Member],
+    rng: np.random.Generator,
+) -> Anatomy:
+    """Measure what an object's parts enclose, and where they meet the outside.
+
+    Args:
+        vertices: Every corner [m].
+        shape: Everything that encloses something; None: only sheets.
+        part_of_triangle: Of ``shape``.
+        alone: The parts; those that have a volume keep it.
+        rng: Source of the probes.
+
+    """
+    probes, spacing = probe(shape, rng)
+
     def owner_of(points: np.ndarray) -> np.ndarray:
         if shape is None:
             return np.zeros(len(points), dtype=np.int64)
-        return label(points, shape, part[solid], [m for m in alone if m.closed])
+        return label(points, shape, part_of_triangle, [m for m in alone if m.closed])
 
     owner = owner_of(probes)
-    members = tuple(_with_volume(m, owner, spacing, owner_of, rng) for m in alone)
+    members = tuple(
+        m if m.volume else _with_volume(m, owner, spacing, owner_of, rng) for m in alone
+    )
     return Anatomy(
         shape=shape,
         skin=outer_skin(shape, rng) if shape is not None else None,
-        part_of_triangle=part[solid],
+        part_of_triangle=part_of_triangle,
         members=members,
         probes=probes,
         part_of_probe=owner,
-        vertices=mesh.vertices,
+        vertices=vertices,
     )
 
 

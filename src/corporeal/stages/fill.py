@@ -8,6 +8,7 @@ import numpy as np
 from jaxtyping import Float, Int
 
 from corporeal.geometry.arrangement import underside
+from corporeal.geometry.bedded import all_bedded, how_bedded, loose_sheets
 from corporeal.geometry.contact_points import contact_points
 from corporeal.geometry.contents import holders, with_contents
 from corporeal.geometry.foliage import in_leaves, planted
@@ -63,7 +64,8 @@ def fill(
     scene, parts, field = with_contents(scene, parts, field, contents).all
     field = in_scene(field, scale_of_part(scene, parts))
     scene, drawn = drawn_into_ground(scene, parts, field)
-    anatomies = examine(scene, parts, config.seed)
+    # What is loose fills what holds it, of which its surface alone may be drawn.
+    anatomies = all_bedded(examine(scene, parts, config.seed), field)
     # How every part is made; objects weigh what their files state.
     leaf = find("leaf_tissue")
     tissue = leaf.pick(leaf.typical())
@@ -84,6 +86,7 @@ def fill(
     unlike = masses_not_as_named(scene, anatomies, particles.mass_real)
     thick = walls_drawn_too_thick(scene, anatomies, makes, field)
     told = (*by_name(particles.warnings, scene), *drawn, *heavy, *thick, *doubted, *unlike)
+    told += loose_sheets(scene, parts, anatomies, field)
     particles = replace(particles, warnings=told, contents=contents)
     return planted(scene, particles, anatomies, field, tissue)
 
@@ -235,6 +238,7 @@ def describe(
     for k, entry in enumerate(parts.catalogue):
         make, count = bodies.makes[k], int((part_of_particle == k).sum())
         what = how_filled(members[k], make, chosen.treatments[k], chosen.cell)
+        what += how_bedded(members[k], parts)
         shared = f" It weighs what its pieces weigh: {'; '.join(make.pieces)}."
         sentences.append(
             f"{entry.name}: {what}; {count:,} particles, {make.mass:.3g} kg."

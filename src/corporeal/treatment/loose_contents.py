@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from corporeal.geometry.bedded import all_bedded
 from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.sizes import in_scene, scale_of_part
 from corporeal.geometry.wetted import wetted_points
@@ -18,7 +19,8 @@ def pour_out(scene: Scene, parts: Parts, field: MaterialField, seed: int) -> tup
     if not moving(field):
         return ()
     life = in_scene(field, scale_of_part(scene, parts))
-    return pour(scene, parts, life, examine(scene, parts, seed), seed)
+    anatomies = all_bedded(examine(scene, parts, seed), life)
+    return pour(scene, parts, life, anatomies, seed)
 
 
 def in_vessels(parts: Parts, field: MaterialField) -> set[tuple[int, int]]:
