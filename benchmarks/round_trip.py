@@ -70,7 +70,9 @@ Training = Literal["draft", "normal"]
 FOUND = (
     "- Photographs were taken and learned from once; surfaces, masses and motion are of "
     "26 November 2026, after decision "
-    "[105](decisions/0105-faces-without-holes-walls-without-air.md). Before "
+    "[105](decisions/0105-faces-without-holes-walls-without-air.md); those of *ficus-pushed* after "
+    "[107](decisions/0107-soil-does-not-lie-over-air.md) and "
+    "[113](decisions/0113-masses-lie-where-the-matter-is.md). Before "
     "[97](decisions/0097-surfaces-where-photographs-agree.md) the same photographs gave -10.2, "
     "+6.5, -14.7, -4.6, +15.2, -26.7 and -11.5 %, before "
     "[101](decisions/0101-what-no-camera-looks-into-is-not-empty.md) -9.0, +3.6, -16.3, -.8, +5.8, "
@@ -91,8 +93,10 @@ FOUND = (
     "only the description gives it, by height. Its textureless seat is reconstructed only "
     "because some Gaussians begin inside the visual hull ([decision "
     "15](decisions/0015-a-small-training-tells-where-to-begin.md)). Its plywood is weighed by the "
-    "area of its faces: 16.4 of 19.7 kg before decisions 101 and 102, 14.9 now, as faces below are "
-    "fewer; that is most of what the row has lost.",
+    "area of its faces: 16.4 of 19.7 kg before decisions 101 and 102, 14.9 now. Its "
+    "underside and sides are there (2.3 of 2.08 m²), its top, 1.18 m² under the seat, is in no "
+    "picture. The low end of the arms counts as plywood's, too, and the foam lacks 2.5 kg "
+    "([107](decisions/0107-soil-does-not-lie-over-air.md)).",
     "- The lamp lacks 14 %: its foot, reconstructed with a dent, is too light, and its shade, "
     "uneven inside and merged with bulb and wires, too heavy.",
     "- The heap of sand had seven litres of caverns behind faces of faint Gaussians, which "
@@ -100,10 +104,11 @@ FOUND = (
     "then its surface enclosed 91.6 of 95.6 litres instead of 84.5. Its rim is 2 cm too low, "
     "3 litres, because Gaussians "
     "there lie below the face; a pit is left beside the trunk.",
-    "- Of the 2.7 kg that the plant lacks 2.0 are soil. Pot and soil together enclose 10.5 litres "
-    "(9.8 in the model), but each place inside goes with the nearest face: 4.4 litres behind the "
-    "pot's wall are taken for air. As soil, which cannot hang over air, they would weigh 2.6 kg. "
-    "Another .5 kg are the pot's, .2 the trunk's. The model has become heavier since 22 November, "
+    "- The plant's soil fills the pot below its surface since [107](decisions/"
+    "0107-soil-does-not-lie-over-air.md): 6.5 of 6.8 litres, where each place inside went with the "
+    "nearest face and 4.4 litres behind the pot's wall were air (-26.7 %). Of the .9 kg that it "
+    "lacks .5 are the pot's, .2 the trunk's, .2 soil. The model has become heavier since "
+    "22 November, "
     "too. A crown is weighed by the area of its leaves, within a factor of two; feet in sand or a "
     "pot, which no picture shows, are guessed.",
 )
