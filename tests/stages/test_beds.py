@@ -19,6 +19,8 @@ R, T, HIGH, LEVEL = 0.1, 0.008, 0.2, 0.16
 POT = [(0, 0), (R + T, 0), (R + T, HIGH), (R, HIGH), (R, T), (0, T)]
 OUTSIDE = [(0, 0), (R + T, 0), (R + T, HIGH), (0, HIGH)]
 UNTIL_SOIL = [*POT[:4], (R, LEVEL)]
+WITH_LINE = [*POT[:4], (R, LEVEL), *POT[4:]]
+"""With a line on its inside where the soil's rim is."""
 ONE_FACE = [(0, T), (R, T), (R, HIGH)]
 SHEET = [(R, LEVEL), (0, LEVEL)]
 NARROW = [(0.92 * R, LEVEL), (0, LEVEL)]
@@ -51,6 +53,7 @@ INSIDE = cone((R, T), (R, LEVEL))
 WAYS = {
     "an open sheet": (POT, SHEET, INSIDE),
     "a sheet that leaves a gap": (POT, NARROW, INSIDE),
+    "a sheet whose rim is one with the pot's inside": (WITH_LINE, SHEET, INSIDE),
     "a thin disc": (POT, DISC, INSIDE),
     "half of it": (POT, HALF, INSIDE),
     "all of it": (POT, PLUG, INSIDE),
@@ -73,8 +76,9 @@ def test_soil_weighs_the_same_however_it_is_drawn(way):
 
 def test_the_pot_around_it_weighs_what_it_did():
     alone = filled((turned(POT), CLAY, WALL))
-    _, particles = soil_of(POT, SHEET)
-    assert particles.mass_real[0] == alone.mass_real[0]
+    for pot in (POT, WITH_LINE):
+        _, particles = soil_of(pot, SHEET)
+        assert particles.mass_real[0] == pytest.approx(alone.mass_real[0], rel=1e-9)
 
 
 def test_coffee_fills_its_cup():

@@ -52,7 +52,7 @@ def sheets(mesh: Mesh, piece: Int[np.ndarray, " T"]) -> np.ndarray:
     )
     a, b, c = np.swapaxes(corners - middle[piece][:, None], 0, 1)
     volume = np.abs(np.bincount(piece, np.einsum("ij,ij->i", a, np.cross(b, c)) / 6))
-    edges, owner = boundary(mesh)
+    edges, owner = boundary(mesh, piece)
     length = np.linalg.norm(np.diff(mesh.vertices[edges], axis=1)[:, 0], axis=1)
     rim = np.bincount(piece[owner], length, minlength=len(area))
     is_sheet = (rim > 0.5 * np.sqrt(area)) & (2 * volume / area < 0.03 * np.sqrt(area))

@@ -183,7 +183,7 @@ def survey(
     mesh, kept = weld(vertices, triangles, part_of_triangle)
     part = part_of_triangle[kept]
     mesh = orient(mesh)
-    piece = pieces(mesh) if len(kept) else kept
+    piece = hung(mesh, part, pieces(mesh)) if len(kept) else kept
     build = np.where(sheets(mesh, piece), Build.SHEET, Build.BODY) if len(kept) else kept
     for group in groups(piece, part, build != Build.SHEET):
         shape = Shape(mesh.only(group))
@@ -238,6 +238,29 @@ def assembled(
         part_of_probe=owner,
         vertices=vertices,
     )
+
+
+def hung(
+    mesh: Mesh, part: Int[np.ndarray, " T"], piece: Int[np.ndarray, " T"]
+) -> Int[np.ndarray, " T"]:
+    """Take what is open off a part that is closed by itself and shares vertices with it.
+
+    A disc of soil whose rim is one with a line on its pot's inside has three faces at each edge
+    there, and would make an open sheet of both.
+    """
+    found = piece.copy()
+    pairs = np.unique(np.column_stack([piece, part]), axis=0)
+    for k in np.flatnonzero(np.bincount(pairs[:, 0]) > 1):
+        if closes(mesh.only(piece == k)):
+            continue
+        for number in pairs[pairs[:, 0] == k, 1]:
+            own = (piece == k) & (part == number)
+            if closes(mesh.only(own)):
+                found[own] = found.max() + 1
+        rest = found == k
+        if rest.any():
+            found[rest] = found.max() + 1 + pieces(mesh.only(rest))
+    return np.unique(found, return_inverse=True)[1].reshape(-1)
 
 
 def groups(piece: np.ndarray, part: np.ndarray, among: np.ndarray) -> list[np.ndarray]:
