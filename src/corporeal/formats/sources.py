@@ -139,7 +139,7 @@ def photographs_in(folder: Path) -> list[Path]:
 
 
 def _named(path: Path, kinds: Sequence[str]) -> bool:
-    """Whether a file has a suffix, and is none of those that systems hide beside it (``._a.jpg``)."""
+    """Whether a file has a suffix, and is none that systems hide beside it (``._a.jpg``)."""
     return path.suffix.lower() in kinds and not path.name.startswith(".")
 
 
