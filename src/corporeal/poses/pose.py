@@ -245,7 +245,7 @@ def _places(folder: Path, gathered: Gathered, progress: Progress) -> tuple[Gathe
         return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
     kept = np.setdiff1d(np.arange(len(gathered.names)), groups.beside)
     if groups.beside:
-        gathered = without(gathered, groups.beside)
+        gathered = without(gathered, groups)
     fine = not well_joined(looked.shared[np.ix_(kept, kept)], gathered.sizes)
     return replace(gathered, doubled=fine), len(groups.beside)
 
