@@ -68,6 +68,12 @@ def test_nothing_is_learned_under_poses_that_are_certainly_wrong(taken):
         taken(hopeless, UserError("It was learned all the same."))
 
 
+def test_nothing_is_learned_of_the_room_where_masks_are_inverted(taken, monkeypatch):
+    monkeypatch.setattr(intake, "inverted", lambda masks, cameras: bool(masks.all()))
+    with pytest.raises(UserError, match=r"photos: The masks are black in the middle .*: invert"):
+        taken(FINE, UserError("It was learned all the same."))
+
+
 @pytest.mark.parametrize("longest", [128, 512])
 def test_poses_are_checked_in_pictures_of_the_size_that_the_check_was_measured_on(
     longest, monkeypatch

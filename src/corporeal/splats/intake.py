@@ -14,6 +14,7 @@ from corporeal.formats.splats import read_splat
 from corporeal.geometry.agreement import agreement
 from corporeal.geometry.gaussians import AskedUp
 from corporeal.geometry.harmonics import DC
+from corporeal.geometry.inverted_masks import inverted
 from corporeal.geometry.matching import SIDE
 from corporeal.geometry.silhouette_outliers import outliers
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians, similarity
@@ -42,6 +43,10 @@ CUT_OUT = (
 NO_FLOOR = (
     "There were no masks, and no floor to tell objects from: all that most photographs "
     "show was taken for objects. Give masks, or say where the floor is with --floor-at."
+)
+INVERTED = (
+    "The masks are black in the middle of what all cameras look at, and white along the borders of "
+    "the pictures: they are inverted, or of the background. White is what counts: invert them."
 )
 SHOWN = 4
 """Pictures that somebody is shown of the whole scene."""
@@ -148,6 +153,8 @@ def take_in(
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
+    if masks is not None and inverted(masks, shown.views.cameras):
+        raise UserError(f"{source}: {INVERTED}")
     doubt = doubt_of_poses(source, masked_by, shown)
     points = _points(shown)
     # With masks, where sparse points are says less than what masks carve; what they are seen
