@@ -268,12 +268,13 @@ def doubt_of_poses(
         UserError: They are certainly wrong.
 
     """
-    large = shown
-    if shown is None or max(shown.views.rgb.shape[1:3]) < SIDE:
-        large = read_photographs(source, SIDE, masked_by, close=True)
-    if shown is not None:
-        large = large.only([k for k, name in enumerate(large.names) if name in shown.names])
-    found = agreement(large.views, large.masks)
+    looked = shown
+    if looked is None or max(looked.views.rgb.shape[1:3]) < SIDE:
+        looked = read_photographs(source, SIDE, masked_by, close=True)
+        if shown is not None:
+            kept = [k for k, name in enumerate(looked.names) if name in shown.names]
+            looked = looked.only(kept)
+    found = agreement(looked.views, looked.masks)
     if found.hopeless:
         raise UserError(f"{source}: {found.doubt}")
     return () if found.doubt is None else (found.doubt,)
