@@ -6,6 +6,7 @@ from PIL import Image
 
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.sources import photographs_in
+from corporeal.poses.film_frames import write_frames
 from corporeal.poses.gather import gather, lens_stated
 from corporeal.stages.assemble import assemble
 
@@ -104,3 +105,16 @@ def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, g
     (tmp_path / "films" / "a.MOV").touch()
     with pytest.raises(UserError, match=r"holds 1 films and no model\. Name the film itself: .*a"):
         assemble([tmp_path / "films"])
+
+
+@pytest.mark.parametrize(("count", "said"), [(1, "1 photograph is"), (2, "2 photographs are")])
+def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, greys, count, said):
+    saved(tmp_path, greys[:count], ".jpg", Image.fromarray)
+    with pytest.raises(BadFileError, match=f"photos: {said} too few to show a thing"):
+        gathered(tmp_path)
+
+
+def test_half_a_film_is_not_told_to_become_the_kind_it_is(tmp_path):
+    (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + bytes(200))
+    with pytest.raises(BadFileError, match="is damaged, or holds no moving pictures"):
+        write_frames(tmp_path / "a.mp4", tmp_path / "frames", lambda fraction, words: None)

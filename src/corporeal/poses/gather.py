@@ -121,7 +121,10 @@ def lens_stated(picture: Path) -> float:
 def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad]) -> None:
     if good >= max(FEWEST, asked / 2):
         return
-    why = f" The first of the others, {bad[0][0]}, {bad[0][1]}." if bad else ""
+    if not bad:
+        count = "1 photograph is" if good == 1 else f"{good} photographs are"
+        raise BadFileError(source, f"{count} too few to show a thing.", TAKE)
+    why = f" The first of the others, {bad[0][0]}, {bad[0][1]}."
     count = f"only {good}" if good else "none"
     what = f"{count} of {asked} photographs can be used.{why}"
     raise BadFileError(source, what, TAKE)
