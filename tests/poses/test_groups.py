@@ -7,7 +7,7 @@ import pytest
 from PIL import Image
 
 from corporeal.errors import BadFileError
-from corporeal.poses.gather import gather
+from corporeal.poses.gather import Gathered, gather
 from corporeal.poses.groups import (
     SHARED,
     Groups,
@@ -16,6 +16,7 @@ from corporeal.poses.groups import (
     look,
     not_found,
     well_joined,
+    without,
 )
 from corporeal.poses.pose import pose
 from patterned_scene import patterned, photographs, ring
@@ -81,6 +82,17 @@ def test_what_joins_but_a_few_others_is_left_out_with_what_joins_none():
     pieces = [circle(k, 1) for k in (4, 3, 2, 2, 2)]
     found = groups_of(beside(circle(59, 6), circle(18, 4), *pieces, np.zeros((10, 10), int)))
     assert not found.mixed and found.beside == tuple(range(59, 100))
+
+
+def test_why_pictures_are_left_out_is_said_as_far_as_it_is_known():
+    """Ten of 25 of a ball on a white table shared nothing, and 'showed another place'."""
+    names = tuple(f"{k}.jpg" for k in range(25))
+    there = Gathered(names, ((640, 480),) * 25, ())
+    left = without(there, groups_of(beside(circle(15), np.zeros((10, 10), int))))
+    assert left.names == names[:15] and len(left.said) == 1
+    assert left.said[0].startswith("10 photographs share too few points with the others and were")
+    left = without(there, groups_of(beside(circle(19, 6), circle(6, 4))))
+    assert [s[:34] for s in left.said] == ["6 photographs show another place a"]
 
 
 def test_pictures_that_share_much_when_small_need_no_finer_points():

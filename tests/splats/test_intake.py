@@ -68,6 +68,37 @@ def test_nothing_is_learned_under_poses_that_are_certainly_wrong(taken):
         taken(hopeless, UserError("It was learned all the same."))
 
 
+def test_nothing_is_learned_of_the_room_where_masks_are_inverted(taken, monkeypatch):
+    monkeypatch.setattr(intake, "inverted", lambda masks, cameras: bool(masks.all()))
+    with pytest.raises(UserError, match=r"photos: The masks are black in the middle .*: invert"):
+        taken(FINE, UserError("It was learned all the same."))
+
+
+@pytest.mark.parametrize("longest", [128, 512])
+def test_poses_are_checked_in_pictures_of_the_size_that_the_check_was_measured_on(
+    longest, monkeypatch
+):
+    """In draft's pictures of 128 pixels, .45 of what wrong focal lengths contradict still met."""
+    camera, looked, asked = Camera(np.eye(3), np.eye(4), 4, 4), [], []
+
+    def pictured(source, size, *_, **__):
+        asked.append(size)
+        views = Views(np.zeros((3, size // 2, size, 3), np.uint8), (camera,) * 3)
+        return Photographs(views, ("a", "b", "c"), True)
+
+    def said(views, masks):
+        looked.append(views.rgb.shape[:3])
+        return replace(FINE, doubt=DOUBT, hopeless=True)
+
+    monkeypatch.setattr(intake, "read_photographs", pictured)
+    monkeypatch.setattr(intake, "agreement", said)
+    shown = pictured(Path("photos"), longest).only([0, 2])
+    with pytest.raises(UserError, match=DOUBT):
+        intake.doubt_of_poses(Path("photos"), None, shown)
+    size = max(longest, 320)
+    assert looked == [(2, size // 2, size)] and asked == ([128, 320] if longest == 128 else [512])
+
+
 def test_nothing_is_learned_where_instance_masks_are_wanted_and_there_are_none(taken):
     with pytest.raises(UserError, match="photos: There are no instance masks"):
         taken(FINE, UserError("It was learned all the same."), instances=True)

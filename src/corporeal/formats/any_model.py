@@ -9,6 +9,7 @@ from corporeal.formats.glb import Model
 from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
 from corporeal.formats.meshes import read_mesh
 from corporeal.formats.own_objects import own_objects
+from corporeal.formats.picture_names import HEIC, OTHERS, SHOWN
 from corporeal.formats.sources import GLTF
 from corporeal.formats.unit import METRES, Unit
 from corporeal.geometry.arrangement import in_unit
@@ -36,6 +37,7 @@ class Frame:
 
 
 AS_STATED = Frame()
+ALL_AROUND = "Take 40 to 80 photographs from all around, and name the folder that they lie in."
 
 
 def read_model(path: Path, objects: Objects = "auto", frame: Frame = AS_STATED) -> Model:
@@ -83,4 +85,6 @@ def _not_read(path: Path) -> BadFileError:
         words = BLENDER[kind].format(str(path), str(made))
         command = f'blender --background --python-expr "{words}"'
         return BadFileError(path, f"{kind} is read by Blender only.", f"Convert it: {command}")
+    if kind in (*SHOWN, *HEIC, *OTHERS):
+        return BadFileError(path, "is a single picture, which shows no depth.", ALL_AROUND)
     return BadFileError(path, f"is no model ({READ} are read).", "Convert it to .glb.")

@@ -37,7 +37,7 @@ def shrunk(picture: Image.Image, side: int = MAX_SIDE) -> UInt8[np.ndarray, "H W
     if picture.width * picture.height > MAX_PIXELS:
         size = f"{picture.width} × {picture.height}"
         raise ValueError(f"the picture claims {size} pixels, too many to unpack")
-    return np.array(_eight_bit(_small(picture, side)), np.uint8)
+    return np.array(eight_bit(_small(picture, side)), np.uint8)
 
 
 def decode_numbers(data: bytes) -> UInt16[np.ndarray, "H W"]:
@@ -112,7 +112,8 @@ def _small(picture: Image.Image, side: int) -> Image.Image:
     return picture if factor == 1 else picture.reduce(factor)
 
 
-def _eight_bit(picture: Image.Image) -> Image.Image:
+def eight_bit(picture: Image.Image) -> Image.Image:
+    """Return a picture of any kind as one of 8 bits: RGB, or RGBA where it has transparency."""
     if picture.mode.startswith("I"):  # 16 bits a pixel: Pillow would clip instead of scaling
         return Image.fromarray((np.asarray(picture) >> 8).astype(np.uint8)).convert("RGB")
     alpha = "A" in picture.mode or "transparency" in picture.info

@@ -17,6 +17,7 @@ from PIL import Image
 from corporeal.errors import BadFileError
 from corporeal.formats.close_up import CloseUp, close_up, sides_of
 from corporeal.formats.images import FORMATS, MAX_PIXELS, decode_image, decode_instances
+from corporeal.formats.picture_names import OTHERS
 from corporeal.geometry.lens import Lens, straightened
 from corporeal.types import Camera
 
@@ -185,6 +186,8 @@ def unreadable(path: Path) -> str:
     with suppress(OSError), path.open("rb") as file:
         if file.read(12)[4:] in HEIC:
             return "is a HEIC picture: convert it to JPEG"
+    if path.suffix.lower() in OTHERS:
+        return f"is a {path.suffix[1:].upper()} picture: convert it to JPEG"
     return "is no PNG, JPEG or WebP picture"
 
 

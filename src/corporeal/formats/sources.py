@@ -8,15 +8,13 @@ from corporeal.errors import UserError
 from corporeal.formats.gltf_document import Document
 from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
 from corporeal.formats.meshes import companions
-from corporeal.formats.picture_names import IMAGES, SHOWN
+from corporeal.formats.picture_names import HEIC, IMAGES, OTHERS, SHOWN
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
 
 GLTF = (".glb", ".gltf")
 SPLATS = (".ply", ".spz", ".sog", ".splat", ".ksplat")
 FILMS = (".mp4", ".mov", ".m4v", ".avi", ".mkv", ".webm")
-HEIC = (".heic", ".heif")
-"""Photographs that telephones take; they are not read, but known for what they are."""
 SOG = "meta.json"
 """Of an unpacked SOG."""
 Kind = Literal["model", "photographs", "splat"]
@@ -116,18 +114,33 @@ def _gltf_in(folder: Path) -> list[Path]:
 
 
 def pictures_in(folder: Path) -> list[Path]:
-    """Return the pictures that lie in a folder or one below, by name."""
-    found = [*folder.glob("*"), *folder.glob("*/*")]
-    return sorted(p for p in found if p.suffix.lower() in SHOWN and p.is_file())
+    """Return the pictures that lie in a folder or up to two below, by name."""
+    found = [p for depth in ("*", "*/*", "*/*/*") for p in folder.glob(depth)]
+    return sorted(p for p in found if _named(p, (*SHOWN, *HEIC, *OTHERS)) and p.is_file())
+
+
+def films_in(folder: Path) -> list[Path]:
+    """Return the films that lie in a folder, by name."""
+    return sorted(p for p in folder.iterdir() if _named(p, FILMS))
 
 
 def photographs_in(folder: Path) -> list[Path]:
-    """Return the photographs of a folder, by name: its own, or where it has none, of ``images``."""
-    for place in (folder / name for name in ("", *IMAGES) if (folder / name).is_dir()):
-        found = sorted(p for p in place.iterdir() if p.suffix.lower() in (*SHOWN, *HEIC))
-        if found:
-            return found
+    """Return the photographs of a folder, by name: its own, or where it has none, of ``images``.
+
+    Those of a kind that is not read only where there are no others, as beside raw pictures.
+    """
+    places = [folder / name for name in ("", *IMAGES) if (folder / name).is_dir()]
+    for kinds in ((*SHOWN, *HEIC), OTHERS):
+        for place in places:
+            found = sorted(p for p in place.iterdir() if _named(p, kinds))
+            if found:
+                return found
     return []
+
+
+def _named(path: Path, kinds: Sequence[str]) -> bool:
+    """Whether a file has a suffix, and is none that systems hide beside it (``._a.jpg``)."""
+    return path.suffix.lower() in kinds and not path.name.startswith(".")
 
 
 def unposed(path: Path) -> bool:

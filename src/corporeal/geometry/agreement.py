@@ -105,6 +105,7 @@ def agreement(views: Views, masks: UInt8[np.ndarray, "V H W"] | None = None) -> 
         found = f"{share:.0%} of {count} points agree with them"
         if share < AGREES or change is not None:
             hopeless = share < HOPELESS or (share < AGREES and change is not None)
+            hopeless |= change in dict(_conventions())  # one of two is right, nothing between
             doubt = _words(found, error, change)
             return Agreement("matches", count, share, error, doubt, bool(proven) and hopeless)
         doubt = _behind(pairs, views.cameras)
@@ -165,21 +166,26 @@ def _better(pairs: list[_Pair], views: Views, share: float) -> str | None:
 
 def _changes() -> list[tuple[str, Change]]:
     """Return what people get wrong, in words and as what would put it right."""
+    changes = _conventions()
+    for factor in FACTORS:
+        words = f"the focal lengths were {factor:.2g} times as long (pictures of another size?)"
+        changes.append((words, lambda c, f=factor: _lensed((c,), f)[0]))
+    return changes
+
+
+def _conventions() -> list[tuple[str, Change]]:
+    """Return in which ways matrices are written, in words and as what would put them right."""
 
     def posed(change: Callable[[np.ndarray], np.ndarray]) -> Change:
         return lambda c: replace(c, world_from_camera=change(c.world_from_camera))
 
     opposite = "the cameras' y and z axes were opposite (OpenGL's convention against OpenCV's)"
     inverse = "the matrices were inverted (world-from-camera against camera-from-world)"
-    changes: list[tuple[str, Change]] = [
+    return [
         (opposite, posed(lambda W: W @ FLIP)),
         (f"{inverse}, the cameras' axes OpenCV's", posed(np.linalg.inv)),
         (f"{inverse}, the cameras' axes OpenGL's", posed(lambda W: np.linalg.inv(W) @ FLIP)),
     ]
-    for factor in FACTORS:
-        words = f"the focal lengths were {factor:.2g} times as long (pictures of another size?)"
-        changes.append((words, lambda c, f=factor: _lensed((c,), f)[0]))
-    return changes
 
 
 def _pairs(views: Views) -> list[_Pair]:

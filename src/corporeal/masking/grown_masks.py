@@ -142,6 +142,17 @@ def _changes(folder: Path) -> list[str]:
     return [f"{count} of the masks were corrected by hand."] * bool(count)
 
 
+def doubted_in(folder: Path | None) -> str:
+    """Say in a sentence where masks lie that were grown and not believed; "": there are none."""
+    place = None if folder is None else _doubted(folder)
+    if place is None:
+        return ""
+    return (
+        f"Masks that were grown from colours, and not believed, lie in {place / MASKS[0]}: look at "
+        f"them, correct what is wrong, and give them with --masks {place}."
+    )
+
+
 def _doubted(folder: Path) -> Path | None:
     return folder / DOUBTED if (folder / DOUBTED / MASKS[0]).is_dir() else None
 

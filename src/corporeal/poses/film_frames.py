@@ -134,7 +134,9 @@ def _opened(path: Path) -> Film:
         said = next(reading)
         film = Film(path, float(said["duration"]), float(said["fps"]))
     except Exception as problem:  # it raises what ffmpeg says, of several kinds
-        raise BadFileError(path, "cannot be read as a film.", "Convert it to MP4.") from problem
+        what = "cannot be read as a film: it is damaged, or holds no moving pictures."
+        step = "Copy it from the camera again, to its end, or convert it to MP4."
+        raise BadFileError(path, what, step) from problem
     finally:
         with contextlib.suppress(Exception):
             reading.close()

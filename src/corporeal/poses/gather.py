@@ -1,5 +1,6 @@
 """Photographs made ready to be posed: upright, of moderate size, each once, and their masks."""
 
+import numbers
 import re
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -10,7 +11,7 @@ from PIL import Image, ImageOps
 
 from corporeal import store
 from corporeal.errors import BadFileError
-from corporeal.formats.images import FORMATS, MAX_PIXELS
+from corporeal.formats.images import FORMATS, MAX_PIXELS, eight_bit
 from corporeal.formats.photographs import INSTANCES, MASKS, companion
 from corporeal.formats.shots import FEWEST, Bad, left_out, unreadable
 from corporeal.formats.sources import photographs_in
@@ -29,6 +30,14 @@ BLANK = 2.0
 """Standard deviation of a thumbnail, of 255, below which there is nothing on it."""
 EXIF, FILM_FOCAL = 0x8769, 0xA405
 """Tags of EXIF: where its own tags lie; the focal length as on 35 mm film."""
+MAKER = (0x010F, 0x0110)
+"""Tags of who made a camera, and of its model."""
+OF_LENS = (FILM_FOCAL, 0x920A, 0xA20E, 0xA210, 0xA002, 0xA003)
+"""Its own tags that say how long a lens is: in mm, and in pixels of a picture so wide and high."""
+LONGEST_WORD = 64
+"""Of a tag that is copied, in letters: a camera's name has no more."""
+CLEAR = 255
+"""Alpha of what is not transparent."""
 QUALITY = 95
 """Of JPEG copies."""
 IMAGES = "images"
@@ -64,11 +73,12 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     step = max(1, -(-len(found) // MOST))
     taken, bad = found[::step], []
     names: dict[str, tuple[int, int]] = {}
+    cut_out: dict[str, Image.Image] = {}
     known = np.zeros((0, *THUMBNAIL))
     for number, file in enumerate(taken):
         progress(number / len(taken), "reading photographs")
         try:
-            picture = _upright(file)
+            picture, alpha = _upright(file)
             thumbnail = _thumbnail(picture)
             _check(thumbnail, known, list(names))
         except _UnusableError as problem:
@@ -80,6 +90,9 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
         _write(picture, folder / IMAGES / name)
         for kinds in (MASKS, INSTANCES):
             _copy_mask(file, source, kinds, folder, name)
+        if alpha is not None:
+            cut_out[name] = alpha
+    _write_alphas(cut_out, folder / MASKS[0])
     said = [f"Of {len(found)} photographs, one in {step} was used."] if step > 1 else []
     said += left_out(len(taken), bad)
     _refuse_few(source, len(names), len(taken), bad)
@@ -108,7 +121,10 @@ def lens_stated(picture: Path) -> float:
 def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad]) -> None:
     if good >= max(FEWEST, asked / 2):
         return
-    why = f" The first of the others, {bad[0][0]}, {bad[0][1]}." if bad else ""
+    if not bad:
+        count = "1 photograph is" if good == 1 else f"{good} photographs are"
+        raise BadFileError(source, f"{count} too few to show a thing.", TAKE)
+    why = f" The first of the others, {bad[0][0]}, {bad[0][1]}."
     count = f"only {good}" if good else "none"
     what = f"{count} of {asked} photographs can be used.{why}"
     raise BadFileError(source, what, TAKE)
@@ -118,8 +134,8 @@ class _UnusableError(Exception):
     """Why one photograph cannot be used, in a clause."""
 
 
-def _upright(file: Path) -> Image.Image:
-    """Return a photograph turned as it says, reduced, with what it says of its lens."""
+def _upright(file: Path) -> tuple[Image.Image, Image.Image | None]:
+    """Return a photograph turned as it says, reduced, with what it says of its lens; its alpha."""
     why = unreadable(file)
     try:
         with Image.open(file, formats=FORMATS) as opened:
@@ -128,15 +144,36 @@ def _upright(file: Path) -> Image.Image:
                 raise _UnusableError(f"claims {opened.width} × {opened.height} pixels")
             opened.draft("RGB", (LONGEST, LONGEST))
             turned = ImageOps.exif_transpose(opened)
-            exif = turned.getexif()
-            picture = turned.convert("RGB")
+            exif = _of_lens(turned.getexif())
+            picture = eight_bit(turned)
     except _UnusableError:
         raise
     except Exception as problem:  # Pillow's decoders raise almost anything on broken input
         raise _UnusableError(why) from problem
     picture.thumbnail((LONGEST, LONGEST), Image.Resampling.LANCZOS)
-    picture.info["exif"] = exif.tobytes() if exif else b""
-    return picture
+    alpha = picture.getchannel("A") if picture.mode == "RGBA" else None
+    picture = picture.convert("RGB")
+    picture.info["exif"] = exif
+    return picture, alpha
+
+
+def _of_lens(exif: Image.Exif) -> bytes:
+    """Return what EXIF says of camera and lens, as EXIF; b"" where it says nothing.
+
+    The rest is left out: it may be longer than a JPEG can hold, broken, or say where somebody
+    lives.
+    """
+    kept = Image.Exif()
+    own, of_lens = exif.get_ifd(EXIF), kept.get_ifd(EXIF)
+    for tags, stated, copy in ((MAKER, exif, kept), (OF_LENS, own, of_lens)):
+        copy.update({t: stated[t] for t in tags if t in stated and _is_short(stated[t])})
+    return kept.tobytes() if len(kept) or of_lens else b""
+
+
+def _is_short(stated: object) -> bool:
+    return isinstance(stated, numbers.Number) or (
+        isinstance(stated, str) and len(stated) <= LONGEST_WORD
+    )
 
 
 def _thumbnail(picture: Image.Image) -> np.ndarray:
@@ -167,6 +204,24 @@ def _write(picture: Image.Image, path: Path) -> None:
         exif = picture.info["exif"]
         more = {"exif": exif} if exif else {}
         picture.save(path, "JPEG", quality=QUALITY, subsampling=0, **more)
+
+
+def _write_alphas(alphas: dict[str, Image.Image], folder: Path) -> None:
+    """Write masks of photographs that were cut out; nothing where none of them was.
+
+    Args:
+        alphas: By the names of the photographs.
+        folder: Of masks; what lies there already was given beside the photographs, and counts.
+
+    """
+    if all(alpha.getextrema()[0] == CLEAR for alpha in alphas.values()):
+        return
+    for name, alpha in alphas.items():
+        place = folder / f"{Path(name).stem}.png"
+        if not place.exists():
+            with store.writing(place):
+                place.parent.mkdir(parents=True, exist_ok=True)
+                alpha.save(place, "PNG")
 
 
 def _copy_mask(file: Path, source: Path, kinds: tuple[str, ...], folder: Path, name: str) -> None:

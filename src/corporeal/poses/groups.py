@@ -46,6 +46,10 @@ SORT_THEM = (
 MOST_ALONE = 0.2
 """Share of pictures of no place, above which the one that is meant is searched without them: COLMAP
 leaves out fewer itself, and of more it would seem that nothing fits together."""
+ALONE = (
+    "They show another place, or sides from which nothing with a pattern is seen: put a newspaper "
+    "under the thing, and photograph it in steps of at most 15°."
+)
 WALK = (
     "Walk around the thing; a thing that is turned before a camera that stands needs a background "
     "without any pattern, or masks."
@@ -144,16 +148,23 @@ def not_found(doubts: Sequence[str], others: int) -> str:
     return f"{why}; {others} more show another place." if others else f"{why}."
 
 
-def without(gathered: Gathered, beside: tuple[int, ...]) -> Gathered:
-    """Leave out what shows another place, and say so."""
-    kept = [k for k in range(len(gathered.names)) if k not in beside]
-    left_out = tuple(gathered.names[k] for k in beside)
-    said = f"{len(beside)} photographs show another place and were left out: {names_of(left_out)}."
+def without(gathered: Gathered, groups: Groups) -> Gathered:
+    """Leave out what is beside the place that is meant, and say so, and why."""
+    kept = [k for k in range(len(gathered.names)) if k not in groups.beside]
+    elsewhere = tuple(gathered.names[k] for group in groups.certain[1:] for k in group)
+    alone = tuple(gathered.names[k] for k in groups.alone)
+    said = []
+    if elsewhere:
+        what = f"{len(elsewhere)} photographs show another place"
+        said.append(f"{what} and were left out: {names_of(elsewhere)}.")
+    if alone:
+        what = f"{len(alone)} photographs share too few points with the others"
+        said.append(f"{what} and were left out: {names_of(alone)}. {ALONE}")
     return replace(
         gathered,
         names=tuple(gathered.names[k] for k in kept),
         sizes=tuple(gathered.sizes[k] for k in kept),
-        said=(*gathered.said, said),
+        said=(*gathered.said, *said),
     )
 
 

@@ -55,7 +55,7 @@ SAID: dict[Way, str] = {
 LEAST = 6
 """Photographs: fewer that were taken all around are more than 60° apart, and share nothing."""
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
-METHOD = 4
+METHOD = 5
 """Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
@@ -245,7 +245,7 @@ def _places(folder: Path, gathered: Gathered, progress: Progress) -> tuple[Gathe
         return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
     kept = np.setdiff1d(np.arange(len(gathered.names)), groups.beside)
     if groups.beside:
-        gathered = without(gathered, groups.beside)
+        gathered = without(gathered, groups)
     fine = not well_joined(looked.shared[np.ix_(kept, kept)], gathered.sizes)
     return replace(gathered, doubled=fine), len(groups.beside)
 

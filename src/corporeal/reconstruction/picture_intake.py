@@ -15,7 +15,7 @@ from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
-from corporeal.splats.intake import ON, Intake, take_in
+from corporeal.splats.intake import ON, Intake, doubt_of_poses, take_in
 from corporeal.splats.training_schedule import TrainConfig
 
 POSED = 0.5
@@ -62,7 +62,9 @@ def take_pictures(
     posed = posed or Posed(source, (), ())
     found = masks_for(config, posed.folder, folder, within(progress, begun, begun + MASKED))
     if found.incomplete and not config.force:
-        raise BadFileError(source, f"{found.incomplete}.", ALL_OF_IT)
+        # Under wrong poses nothing is found whole: then that is what is to be said.
+        doubt = doubt_of_poses(posed.folder)
+        raise BadFileError(source, " ".join([*doubt, f"{found.incomplete}."]), ALL_OF_IT)
     later = within(progress, begun + MASKED, 1.0)
     taken = take_in(posed.folder, training, kept, later, instances, found.folder)
     made = replace(

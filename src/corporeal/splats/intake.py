@@ -14,6 +14,8 @@ from corporeal.formats.splats import read_splat
 from corporeal.geometry.agreement import agreement
 from corporeal.geometry.gaussians import AskedUp
 from corporeal.geometry.harmonics import DC
+from corporeal.geometry.inverted_masks import inverted
+from corporeal.geometry.matching import SIDE
 from corporeal.geometry.silhouette_outliers import outliers
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians, similarity
 from corporeal.geometry.upright import Stated, Upright, upright
@@ -41,6 +43,10 @@ CUT_OUT = (
 NO_FLOOR = (
     "There were no masks, and no floor to tell objects from: all that most photographs "
     "show was taken for objects. Give masks, or say where the floor is with --floor-at."
+)
+INVERTED = (
+    "The masks are black in the middle of what all cameras look at, and white along the borders of "
+    "the pictures: they are inverted, or of the background. White is what counts: invert them."
 )
 SHOWN = 4
 """Pictures that somebody is shown of the whole scene."""
@@ -147,7 +153,10 @@ def take_in(
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
-    doubt, points = _doubt(source, shown), _points(shown)
+    if masks is not None and inverted(masks, shown.views.cameras):
+        raise UserError(f"{source}: {INVERTED}")
+    doubt = doubt_of_poses(source, masked_by, shown)
+    points = _points(shown)
     # With masks, where sparse points are says less than what masks carve; what they are seen
     # through is empty.
     start = points if masks is None else shown.lines
@@ -241,14 +250,31 @@ def _consistent(shown: Photographs) -> Photographs:
     return replace(shown.only(kept.tolist()), warnings=(*shown.warnings, said))
 
 
-def _doubt(source: Path, shown: Photographs) -> tuple[str, ...]:
+def doubt_of_poses(
+    source: Path, masked_by: Path | None = None, shown: Photographs | None = None
+) -> tuple[str, ...]:
     """Return what seems wrong with the poses, as warnings.
+
+    Points are matched in pictures as large as that was measured on: where little ones are learned
+    from, a third of the points that wrong poses contradict would still be near enough.
+
+    Args:
+        source: A folder of photographs with poses.
+        masked_by: A folder of masks instead of the photographs' own.
+        shown: What was read of them and is used: no other counts, and it serves if it is large
+            enough.
 
     Raises:
         UserError: They are certainly wrong.
 
     """
-    found = agreement(shown.views, shown.masks)
+    looked = shown
+    if looked is None or max(looked.views.rgb.shape[1:3]) < SIDE:
+        looked = read_photographs(source, SIDE, masked_by, close=True)
+        if shown is not None:
+            kept = [k for k, name in enumerate(looked.names) if name in shown.names]
+            looked = looked.only(kept)
+    found = agreement(looked.views, looked.masks)
     if found.hopeless:
         raise UserError(f"{source}: {found.doubt}")
     return () if found.doubt is None else (found.doubt,)

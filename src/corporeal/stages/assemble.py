@@ -11,7 +11,7 @@ from corporeal.errors import BadFileError, UserError
 from corporeal.formats.any_model import READ, Frame, read_model
 from corporeal.formats.likely_unit import LikelyUnit, in_shared_unit, likely_unit, sentences
 from corporeal.formats.scene_file import ObjectEntry, SceneFile, read_scene_file
-from corporeal.formats.sources import models_in, pictures_in
+from corporeal.formats.sources import films_in, models_in, pictures_in
 from corporeal.formats.typical_extents import doubt
 from corporeal.formats.words import safe, unique
 from corporeal.geometry import placing
@@ -97,10 +97,17 @@ def _models_in(folder: Path) -> list[Path]:
     found = models_in(folder)
     if found:
         return found
-    if pictures_in(folder):
-        what = f"the folder holds {len(pictures_in(folder))} pictures and no model."
-        step = "Name the folder in which the photographs lie, to reconstruct what they show."
-        raise BadFileError(folder, what, step)
+    if pictures := pictures_in(folder):
+        places = list(dict.fromkeys(str(picture.parent) for picture in pictures))
+        what = f"the folder holds {len(pictures)} pictures and no model. They lie in {places[0]}"
+        step = "Name that folder, to reconstruct what they show."
+        if len(places) > 1:
+            what += f" and {len(places) - 1} more folders"
+            step = "Put the photographs of one thing into one folder, and name that."
+        raise BadFileError(folder, f"{what}.", step)
+    if films := films_in(folder):
+        what = f"the folder holds {len(films)} films and no model."
+        raise BadFileError(folder, what, f"Name the film itself: {films[0]}.")
     step = "Name a model, or a folder that holds some, or photographs with poses."
     raise BadFileError(folder, f"the folder holds no model ({READ}) and no pictures.", step)
 

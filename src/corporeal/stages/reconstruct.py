@@ -20,6 +20,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.metric import MetricScale
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.geometry.srgb import linear
+from corporeal.masking.grown_masks import doubted_in
 from corporeal.reconstruction.found_objects import FoundObjects, named_objects, recognised
 from corporeal.reconstruction.object_points import drawn_masks, foreground_of, points_on_objects
 from corporeal.reconstruction.picture_intake import take_pictures, within
@@ -92,7 +93,7 @@ def reconstruct(
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
     taken, masked = take_pictures(source, config, folder, within(progress, 0.0, TRAINED))
     grown = taken.masks is not None and not masked  # of what all cameras look at: one thing
-    taken = _upright(source, taken, config)
+    taken = _upright(source, taken, config, doubted_in(folder))
     photographers = taken.cameras
     if not taken.cameras:
         taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
@@ -116,7 +117,7 @@ def reconstruct(
         taken, cloud, closed(taken, front.on_objects, cloud.position, split.object_of_point)
     )
     if not config.force and (why := _why_not(found, photographers, masked)):
-        raise UserError(f"{source}: {why}")
+        raise UserError(f"{source}: {why} {doubted_in(None if masked else folder)}".rstrip())
     # What they are, and so their names and their size in metres.
     objects = recognised(wanted, found, config, viewer)
     names = names_of(objects)
@@ -129,8 +130,14 @@ def reconstruct(
     return Reconstructed(result, _scene(source, found, names, objects, scale))
 
 
-def _upright(source: Path, taken: Intake, config: ReconstructConfig) -> Intake:
+def _upright(source: Path, taken: Intake, config: ReconstructConfig, lie: str) -> Intake:
     """Turn what was learned upright, and tell objects in photographs that have no masks.
+
+    Args:
+        source: Named in errors.
+        taken: What was learned.
+        config: How.
+        lie: Where masks lie that are not believed, for who has to give some.
 
     Raises:
         UserError: These are the room.
@@ -141,7 +148,7 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig) -> Intake:
     if cut_out is not None and not config.force:
         why = goes_beyond(cut_out) or told_otherwise(cut_out, made.coloured)
         if why is not None:
-            raise UserError(f"{source}: {why}")
+            raise UserError(f"{source}: {why} {lie}".rstrip())
     return made
 
 

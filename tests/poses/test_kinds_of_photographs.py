@@ -1,0 +1,120 @@
+"""Photographs of every kind that cameras, telephones and editors write, before poses are found."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from corporeal.errors import BadFileError, UserError
+from corporeal.formats.sources import photographs_in
+from corporeal.poses.film_frames import write_frames
+from corporeal.poses.gather import gather, lens_stated
+from corporeal.stages.assemble import assemble
+
+COUNT = 5
+EXIF, DESCRIPTION, FILM_FOCAL, PLACE = 0x8769, 0x010E, 0xA405, 0x8825
+
+
+@pytest.fixture
+def greys():
+    """Noise that differs from picture to picture, (48, 64) each."""
+    rng = np.random.default_rng(0)
+    coarse = [rng.integers(0, 255, (6, 8)).astype(np.uint8) for _ in range(COUNT)]
+    return [np.kron(grey, np.ones((8, 8), np.uint8)) for grey in coarse]
+
+
+def gathered(tmp_path):
+    return gather(tmp_path / "photos", tmp_path / "poses", lambda fraction, words: None)
+
+
+def saved(tmp_path, greys, suffix, made, **options):
+    (tmp_path / "photos").mkdir(exist_ok=True)
+    for k, grey in enumerate(greys):
+        made(grey).save(tmp_path / "photos" / f"{k}{suffix}", **options)
+
+
+def test_sixteen_bits_are_scaled_not_clipped_to_white(tmp_path, greys):
+    saved(tmp_path, greys, ".png", lambda grey: Image.fromarray(grey.astype(np.uint16) * 257))
+    assert len(gathered(tmp_path).names) == COUNT
+    with Image.open(tmp_path / "poses" / "images" / "0.jpg") as copy:
+        assert np.abs(np.asarray(copy.convert("L"), float) - greys[0]).mean() < 3
+
+
+def test_what_was_cut_out_in_an_editor_is_its_own_mask(tmp_path, greys):
+    inside = np.zeros((48, 64), np.uint8)
+    inside[10:30, 20:50] = 255
+
+    def cut_out(grey):
+        picture = Image.fromarray(grey).convert("RGB")
+        picture.putalpha(Image.fromarray(inside))
+        return picture
+
+    saved(tmp_path, greys, ".png", cut_out)
+    gathered(tmp_path)
+    for k in range(COUNT):
+        with Image.open(tmp_path / "poses" / "masks" / f"{k}.png") as mask:
+            assert (np.asarray(mask) == inside).all()
+
+
+def test_an_alpha_that_hides_nothing_is_no_mask(tmp_path, greys):
+    saved(tmp_path, greys, ".png", lambda grey: Image.fromarray(grey).convert("RGBA"))
+    gathered(tmp_path)
+    assert not (tmp_path / "poses" / "masks").exists()
+
+
+def test_of_exif_only_the_lens_is_copied_however_long_the_rest_is(tmp_path, greys):
+    exif = Image.Exif()
+    exif[DESCRIPTION] = "d" * 70_000  # more than a JPEG can hold
+    exif.get_ifd(PLACE)[1] = "N"
+    exif.get_ifd(EXIF)[FILM_FOCAL] = 26
+    saved(tmp_path, greys, ".png", Image.fromarray, exif=exif)
+    gathered(tmp_path)
+    copy = tmp_path / "poses" / "images" / "0.jpg"
+    assert lens_stated(copy) == 26
+    with Image.open(copy) as picture:
+        assert not picture.getexif().get_ifd(PLACE) and copy.stat().st_size < 20_000
+
+
+def test_files_that_systems_hide_beside_photographs_are_none(tmp_path, greys):
+    saved(tmp_path, greys, ".jpg", Image.fromarray)
+    for k in range(COUNT):
+        (tmp_path / "photos" / f"._{k}.jpg").write_bytes(b"\0\5\x16\7" + bytes(100))
+    (tmp_path / "photos" / "0.jpg").write_bytes(b"broken")  # with it, most would be
+    assert len(gathered(tmp_path).names) == COUNT - 1
+
+
+@pytest.mark.parametrize("suffix", [".tif", ".gif", ".DNG"])
+def test_pictures_of_another_kind_are_named_as_such(tmp_path, greys, suffix):
+    saved(tmp_path, greys, suffix, Image.fromarray, format="TIFF")
+    with pytest.raises(BadFileError, match=f"is a {suffix[1:].upper()} picture: convert it to JP"):
+        gathered(tmp_path)
+    Image.fromarray(greys[0]).save(tmp_path / "photos" / "0.jpg")
+    assert [p.name for p in photographs_in(tmp_path / "photos")] == ["0.jpg"], "raws lie beside it"
+
+
+def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, greys):
+    lost = tmp_path / "DCIM" / "100" / "today"
+    lost.mkdir(parents=True)
+    Image.fromarray(greys[0]).save(lost / "a.jpg")
+    with pytest.raises(UserError, match=r"They lie in .*today\. Name that folder"):
+        assemble([tmp_path / "DCIM" / "100"])
+    with pytest.raises(UserError, match=r"They lie in .*today\. Name that folder"):
+        assemble([tmp_path / "DCIM"])
+    with pytest.raises(UserError, match=r"is a single picture, which shows no depth\. Take 40"):
+        assemble([lost / "a.jpg"])
+    (tmp_path / "films").mkdir()
+    (tmp_path / "films" / "a.MOV").touch()
+    with pytest.raises(UserError, match=r"holds 1 films and no model\. Name the film itself: .*a"):
+        assemble([tmp_path / "films"])
+
+
+@pytest.mark.parametrize(("count", "said"), [(1, "1 photograph is"), (2, "2 photographs are")])
+def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, greys, count, said):
+    saved(tmp_path, greys[:count], ".jpg", Image.fromarray)
+    with pytest.raises(BadFileError, match=f"photos: {said} too few to show a thing"):
+        gathered(tmp_path)
+
+
+def test_half_a_film_is_not_told_to_become_the_kind_it_is(tmp_path):
+    (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + bytes(200))
+    with pytest.raises(BadFileError, match="is damaged, or holds no moving pictures"):
+        write_frames(tmp_path / "a.mp4", tmp_path / "frames", lambda fraction, words: None)

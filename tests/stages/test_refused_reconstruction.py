@@ -1,0 +1,37 @@
+"""What somebody is told whose photographs do not say what the thing is."""
+
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from corporeal.errors import UserError
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.splats.intake import Intake
+from corporeal.stages import reconstruct as stage
+from corporeal.types import Gaussians
+
+ONE = Gaussians(
+    np.zeros((1, 3), np.float32),
+    np.float32([[1, 0, 0, 0]]),
+    np.ones((1, 3), np.float32),
+    np.ones(1, np.float32),
+    np.zeros((1, 1, 3), np.float32),
+)
+
+
+@pytest.mark.parametrize("doubted", [True, False])
+def test_who_must_give_masks_hears_where_doubted_ones_lie(tmp_path, monkeypatch, doubted):
+    """Of a bottle hung before shelves these had .91 of the true masks, and nobody was told."""
+    taken = Intake(ONE)
+    room = np.ones((4, 6, 8), np.bool_)
+    monkeypatch.setattr(stage, "take_pictures", lambda *_: (taken, False))
+    monkeypatch.setattr(stage, "turned_upright", lambda *_: replace(taken, masks=room))
+    if doubted:
+        (tmp_path / "doubted" / "masks").mkdir(parents=True)
+    with pytest.raises(UserError, match="would go on beyond the pictures") as said:
+        stage.reconstruct(Path("photos"), ReconstructConfig(), folder=tmp_path)
+    place = tmp_path / "doubted"
+    assert (f"lie in {place / 'masks'}: look at them" in str(said.value)) == doubted
+    assert str(said.value).endswith(f"--masks {place}.") == doubted
