@@ -39,7 +39,8 @@ BYTES = {name: record.dtype.itemsize for name, record in LISTS.items()}
 BONDED = -1
 """Friction of a pair that is never in contact, to the native piece."""
 BOOKS = (
-    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point impact_loss"
+    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point impact_loss "
+    "impact_of_pair"
 )
 
 

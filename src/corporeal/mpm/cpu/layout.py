@@ -234,7 +234,7 @@ WORLD = Record(
     ("double *", "bounces"),  # how restitution changes with speed: 5 numbers a pair
     ("double *", "rolling"),  # c of every pair [m]; null: nothing brakes what rolls
     ("double *", "plane_impulse pair_impulse friction_loss first_contact last_contact"),
-    ("double *", "contact_point face impact_loss"),
+    ("double *", "contact_point face impact_loss impact_of_pair"),
     ("Blow *", "blow"),
     ("Bond *", "bond"),
     ("Tether *", "tether"),

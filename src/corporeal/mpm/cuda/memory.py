@@ -268,6 +268,7 @@ class Memory:
         s.external = self.zeros(bodies, wp.vec3d)
         s.plane_impulse = self.zeros((planes, bodies), wp.vec3d)
         s.pair_impulse = self.zeros((bodies, bodies), wp.float64)
+        s.impact_of_pair = self.zeros((everything, everything), wp.float64)
         never = np.full((everything, everything), np.nan)
         s.first_contact, s.last_contact = self.put(never, wp.float64), self.put(never, wp.float64)
         s.contact_point = self.put(np.stack([never] * 3, axis=2), wp.vec3d)

@@ -50,8 +50,8 @@ class Meeting:
     """-J on the first and +J on the second of each pair [N s]."""
     friction_loss: float
     """[J]"""
-    impact_loss: float
-    """[J]"""
+    impact_loss: Float[np.ndarray, " E"]
+    """Of each contact [J]."""
     kept: KeptChoices
     """For the next step."""
     moment: Float[np.ndarray, "B 3"]
