@@ -23,7 +23,7 @@ from rich.table import Table
 
 from corporeal.errors import SimulationError
 from corporeal.evaluation.drop_test import Drop, drop
-from corporeal.evaluation.life import Rebound, rebounds, sources
+from corporeal.evaluation.life import Rebound, contradictory, rebounds, sources
 from corporeal.machine import cores
 from corporeal.pipeline import Settings
 from corporeal.vlm.lexicon import heads, tokens_of
@@ -214,6 +214,19 @@ def foretold(found: Sequence[Result]) -> str:
     )
 
 
+def contradicted(found: Sequence[Result]) -> Iterator[str]:
+    """Say which rows measured the same and contradict each other: no value is in all of them."""
+    for rows in contradictory(tuple(dict.fromkeys(r.row for r in found)), LEEWAY):
+        low, high = max(r.low for r in rows), min(r.high for r in rows)
+        names = ", ".join(f"{r.name} {r.low:.2f}–{r.high:.2f}" for r in rows)
+        yield (
+            f"These measured the same and contradict each other: {names}. No value is within "
+            f"{LEEWAY} of all; {0.5 * (low + high):.3f} would be off by {0.5 * (low - high):.3f}. "
+            "They are counted as all others are "
+            "([decision 109](decisions/0109-rows-that-contradict-and-thin-ends.md))."
+        )
+
+
 def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
     """Write the page of the documentation."""
     cited = sources()
@@ -228,6 +241,7 @@ def page(found: Sequence[Result], met: Sequence[tuple[str, bool]]) -> str:
         "",
         foretold(found),
         "",
+        *(line for said in contradicted(found) for line in (said, "")),
         *((blind(found), "") if any(r.row.blind for r in found) else ()),
         "| " + " | ".join((*HEADS, "source")) + " |",
         "|---|---|" + "---:|" * 5 + "---|---:|---:|---:|",

@@ -17,7 +17,9 @@ def ledger(time, objects=1, **given):
     )
     one |= dict.fromkeys(VECTORS, (objects, 3))
     one |= dict.fromkeys(("pair_impulse", "gap", "overlap"), (objects, objects))
-    one |= dict.fromkeys(("first_contact", "last_contact"), (objects + 1, objects + 1))
+    one |= dict.fromkeys(
+        ("first_contact", "last_contact", "impact_of_pair"), (objects + 1, objects + 1)
+    )
     one |= {"contact_point": (objects + 1, objects + 1, 3), "plane_depth": (1, objects)}
     one |= {"plane_impulse": (1, objects, 3)}
     zero = {

@@ -290,6 +290,9 @@ class Audit:
     a run from before it was kept."""
     impact_loss: float | None = field(default=None, kw_only=True)
     """Share of the energy that normal contact took: restitution, and nodes that stop [-]."""
+    impact_gain: float | None = field(default=None, kw_only=True)
+    """What it gave to pairs that have more from it than it took, likewise [-]; None: a run from
+    before it was kept."""
     energy_gain: EnergyGain | None = field(default=None, kw_only=True)
     """Who gained, and when, where ``mechanical_growth`` is beyond what is allowed."""
     surfaces: tuple[PairSurfaces, ...] = field(default=(), kw_only=True)

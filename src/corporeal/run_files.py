@@ -141,7 +141,9 @@ def run_audit(
         peak_memory_mb=peak_memory_mb(),
         settings=spent.settings,
         questions=made.inventory.usage,
-        hints=hints(made.assembled.scene, happened, spent.divided, audit.unbooked_loss),
+        hints=hints(
+            made.assembled.scene, happened, spent.divided, audit.unbooked_loss, audit.parts
+        ),
     )
 
 

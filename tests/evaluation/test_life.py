@@ -5,7 +5,8 @@ from math import pi, sqrt
 
 import pytest
 
-from corporeal.evaluation.life import rebounds, sources
+from corporeal.errors import BadFileError
+from corporeal.evaluation.life import contradictory, rebounds, sources
 from corporeal.materials import find
 
 
@@ -23,6 +24,16 @@ def test_every_row_has_a_source_and_every_source_a_row():
 def test_off_is_the_distance_from_the_range():
     row = replace(rebounds()[0], low=0.7, high=0.8)
     assert [row.off(e) for e in (0.6, 0.7, 0.75, 0.8, 0.85)] == pytest.approx([0.1, 0, 0, 0, 0.05])
+
+
+def test_rows_that_measured_the_same_and_cannot_both_be_met_are_found():
+    """Three groups of one class dropped the same ball on the same cardboard."""
+    (rows,) = contradictory(rebounds(), 0.03)
+    assert len(rows) == 3 and all("cardboard" in row.name for row in rows)
+    assert not list(contradictory(rebounds(), 0.07)), "a value is within .07 of all three"
+    other = replace(rows[0], speed=1.1 * rows[0].speed)
+    with pytest.raises(BadFileError, match="its rows differ"):
+        list(contradictory([other, *rows[1:]], 0.03))
 
 
 def fallen(height, mass, diameter, sign=1.0):

@@ -65,3 +65,20 @@ def test_a_blow_off_the_centre_meets_less_resistance():
     beside = rigid.effective_inverse_mass(1.0, inverse, np.array([1.0, 0.0, 0.0]), z)
     assert through == pytest.approx(1.0)
     assert beside == pytest.approx(1.0 + 1.0 / 0.4)
+
+
+def test_a_wedge_is_thin_where_it_is_thin():
+    """It is a block as a whole: a share of its walls cannot tell its thin end."""
+    slope, cell = np.radians(15), 0.011
+    x, y = np.meshgrid(np.arange(0.0025, 0.5, 0.005), np.arange(-0.0975, 0.1, 0.005))
+    x, y, face = x.ravel(), y.ravel(), np.ones((x.size, 3))
+    above = np.column_stack([x, y, (0.5 - x) * np.tan(slope)])
+    points = np.concatenate([above, above * [1, 1, 0]])
+    out = np.array([np.sin(slope), 0.0, np.cos(slope)])
+    normals = np.concatenate([out * face, [0.0, 0.0, -1.0] * face])
+    assert rigid.thinness(points, normals, cell) == 0
+    height = (0.5 - points[:, 0]) * np.tan(slope)
+    thin = rigid.thin_places(points, normals, cell)
+    assert thin[height < 1.5 * cell].mean() > 0.97
+    assert not thin[height > 2.5 * cell].any()
+    assert not rigid.thin_places(points * [1, 1, 0.1], normals, cell).any(), "it is thin as a whole"

@@ -1,5 +1,6 @@
 """Bodies that meet."""
 
+from dataclasses import replace
 from functools import cache
 
 import numpy as np
@@ -195,3 +196,22 @@ def test_a_rebound_books_what_it_took(patient_engine):
     assert 0.01 * energy < after.impact_loss < 0.12 * energy
     # Transfers take the rest, at eight cells across a tenth; nothing is booked that was not there.
     assert 0.88 * energy < left + after.impact_loss + after.friction_loss < energy
+
+
+def test_what_each_pair_takes_is_booked_apart(patient_engine):
+    """Balls that keep .6 and .9 of their speed on one floor; they never meet each other."""
+    fall = (0.0, 0.0, -2.0)
+    balls = [ball((x, 0.0, 0.06), 0.05, 0.01, rigid=True, velocity=fall) for x in (-0.2, 0.2)]
+    posed = problem(*balls, cell=0.02, planes=(FLOOR,), restitution=0.6)
+    table = posed.restitution.copy()
+    table[1, 2] = table[2, 1] = 0.9
+    run = patient_engine(replace(posed, restitution=table))
+    energy = run.measure().kinetic
+    run.advance(0.03)
+    found = run.measure()
+    taken = found.impact_of_pair
+    assert taken[0, 2] == pytest.approx((1 - 0.6**2) * energy[0], rel=1e-3)
+    assert taken[1, 2] == pytest.approx((1 - 0.9**2) * energy[1], rel=1e-3)
+    assert taken[0, 1] == 0.0
+    assert np.array_equal(taken, taken.T)
+    assert np.triu(taken).sum() == pytest.approx(found.impact_loss, rel=1e-9)

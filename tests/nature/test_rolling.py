@@ -96,6 +96,25 @@ def test_a_ball_rolls_down_a_ramp_without_a_hop(degrees, radius):
     assert way @ out == pytest.approx(0.0, abs=0.005 * radius)
 
 
+def test_a_ball_rolls_over_the_thin_end_of_a_wedge():
+    """The last centimetres before its edge, thinner than a cell, threw the ball up at .36 m/s."""
+    slope, radius, start = np.radians(15), 0.02, 0.42
+    shape, high = ramp(slope, low=0.0)
+    out = np.array([np.sin(slope), 0, np.cos(slope)])
+    at = np.array([start, 0.0, high - start * np.tan(slope)]) + radius * out
+    steel = co.ball("steel", radius, tuple(at))
+    engine = co.build_engine(posed(steel, co.solid("steel", np.array(shape.vertices), shape.faces)))
+    rising = []
+    for time in np.linspace(0.02, 0.36, 18):
+        engine.advance(time)
+        found = engine.measure()
+        rising.append(found.momentum[0, 2] / found.mass[0])
+    assert max(rising) < 0.02
+    along = found.momentum[0, 0] / found.mass[0]
+    at_foot = np.sqrt(2 * 5 / 7 * G * (0.5 - start) * np.tan(slope))
+    assert along == pytest.approx(at_foot * np.cos(slope), rel=0.1)
+
+
 def test_a_marble_rolls_over_the_edge_and_falls():
     marble = co.ball("glass", RADIUS, (0.22, 0.0, THICK + RADIUS), velocity=(0.4, 0.0, 0.0))
     way, _ = moved(posed(marble, BOARD), 0.35)

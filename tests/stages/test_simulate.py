@@ -94,6 +94,7 @@ class Ballistic:
             push_work=0.0,
             friction_loss=0.0,
             impact_loss=0.0,
+            impact_of_pair=np.zeros((everything, everything)),
             plastic_loss=0.0,
             viscous_loss=0.0,
             first_contact=np.full((everything, everything), np.nan),

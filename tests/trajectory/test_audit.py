@@ -9,6 +9,7 @@ import pytest
 from corporeal.trajectory.audit import (
     audit,
     energy_growth,
+    impact_gain,
     impact_loss,
     momentum_residual,
     unbooked_loss,
@@ -97,6 +98,7 @@ def row(t):
         push_work=np.array(0.0),
         friction_loss=np.array(0.0),
         impact_loss=np.array(0.0),
+        impact_of_pair=np.zeros((3, 3)),
         plastic_loss=np.array(0.0),
         viscous_loss=np.array(0.0),
         first_contact=first,
@@ -288,3 +290,19 @@ def test_what_is_lost_and_not_booked_is_told(story):
     assert energy_growth(ledger, SCENE, CELL) < 1e-12
     ledger = replace(ledger, friction_loss=0.2 * fall[:, 1])
     assert unbooked_loss(ledger, SCENE, CELL) == pytest.approx(0.0, abs=1e-12)
+
+
+def test_a_pair_that_gained_hides_nothing_of_what_another_lost(story):
+    """Clay loses 1 J on the floor, the stone gets .4 J from it: net .6 J were told, of 2 J."""
+    known = story[3].ledger
+    fall = np.linspace(0, 1.0, STEPS)[:, None] * [0, 2.0]
+    pairs = np.zeros((STEPS, 3, 3))
+    pairs[-1, 0, 2] = pairs[-1, 2, 0] = 1.0
+    pairs[-1, 1, 2] = pairs[-1, 2, 1] = -0.4
+    net = np.linspace(0, 0.6, STEPS)
+    ledger = replace(known, potential=-fall, impact_loss=net, impact_of_pair=pairs)
+    assert impact_loss(ledger, SCENE, CELL) == pytest.approx(0.5)
+    assert impact_gain(ledger, SCENE, CELL) == pytest.approx(0.2)
+    before = replace(ledger, impact_of_pair=np.full_like(pairs, np.nan))
+    assert impact_gain(before, SCENE, CELL) is None
+    assert impact_loss(before, SCENE, CELL) == pytest.approx(0.3)

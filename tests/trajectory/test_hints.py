@@ -7,7 +7,7 @@ import pytest
 
 from corporeal.trajectory.hints import hints
 from corporeal.types import Finish, Push, Scene, SceneObject, Surface, Wind
-from made_findings import object_outcome, outcome
+from made_findings import object_outcome, outcome, part_audit
 
 CORNERS = np.eye(3)
 FACES = np.array([[0, 1, 2]])
@@ -65,8 +65,27 @@ def test_a_push_or_wind_that_moves_nothing_is_named():
     assert hints(shelf("boards", push=push), seen(**FALLS), divided=False) == ()
 
 
+def part(law, treatment="deformable", thing="shelf_0"):
+    return part_audit(law=law, treatment=treatment, object=thing)
+
+
 @pytest.mark.parametrize(("lost", "told"), [(None, False), (0.02, False), (0.31, True)])
 def test_energy_that_the_grid_took_is_told_where_it_is_much(lost, told):
     """A rubber ring of 2.4 cells fell flat and stayed: nothing said that it should have bounced."""
-    said = hints(shelf("boards"), seen(**FALLS), divided=False, lost=lost)
+    ring = [part("neo_hookean")]
+    said = hints(shelf("boards"), seen(**FALLS), divided=False, lost=lost, parts=ring)
     assert any("31% of the energy was lost" in s for s in said) == told
+
+
+@pytest.mark.parametrize(
+    ("parts", "told"),
+    [
+        ([part("fluid")], ""),
+        ([part("drucker_prager"), part("corotated", "rigid", "cup_0")], ""),
+        ([part("fluid"), part("hencky", "shell", "bottle_0")], "(bottle_0)"),
+    ],
+)
+def test_only_what_springs_back_is_said_to_rebound_too_little(parts, told):
+    """Water that was poured into a glass was said to rebound too little."""
+    said = hints(shelf("boards"), seen(**FALLS), divided=False, lost=0.31, parts=parts)
+    assert [told in s for s in said] == ([True] if told else [])

@@ -463,6 +463,25 @@ def test_a_word_that_only_says_of_what_kind_leaves_no_doubt(surface, thing, mate
     assert seen(surface, thing).material == material
 
 
+@pytest.mark.parametrize(
+    ("name", "words", "file", "surface", "material"),
+    [
+        ("rubber_ball", "steel ball", "steel_ball.ply", "steel_ball", "rubber"),
+        ("rubber_ball", "steel ball", "steel_ball.glb", "geometry_0", "rubber"),
+        ("steel_ball_2", "steel ball", "steel_ball.ply", "steel_ball", "steel"),
+        ("ball", "steel ball", "steel_ball.ply", "steel_ball", "steel"),
+        ("steel_ball_0", "rubber ball", "ball.ply", "ball", "rubber"),
+        ("rubber_ball", "ball", "ball.glb", "steel", "steel"),
+    ],
+)
+def test_what_a_person_calls_an_object_wins_over_the_name_of_its_file(
+    name, words, file, surface, material
+):
+    """A "rubber_ball" whose shape was read from steel_ball.ply was of steel."""
+    thing = SceneObject(name, words, 0.1, source=f"shapes/{file}")
+    assert recognise(replace(about(surface, words), thing=thing)).material == material
+
+
 def test_a_large_statue_of_metal_is_cast_around_a_core():
     def built(name, size):
         known = replace(about("mesh", name), thing=SceneObject("it_0", name, size))

@@ -1,6 +1,7 @@
 """How high real things rebound, as published: ``life.toml``, read."""
 
 import tomllib
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cache
 from importlib.resources import files
@@ -50,6 +51,8 @@ class Rebound:
     """Key of ``sources``."""
     blind: bool = False
     """Whether it was written down before it was tried for the first time."""
+    scene: str = ""
+    """What several rows measured alike, the same thing on the same; "": nobody else did."""
 
     def off(self, restitution: float) -> float:
         """Say how far a restitution is from the range [-]; 0 in it."""
@@ -98,7 +101,23 @@ def _rebound(row: dict) -> Rebound:
         high=high,
         source=row["source"],
         blind=row.get("blind", False),
+        scene=row.get("scene", ""),
     )
+
+
+def contradictory(rows: Sequence[Rebound], leeway: float) -> Iterator[tuple[Rebound, ...]]:
+    """Yield the rows of each scene that no value can meet, each within a leeway [-].
+
+    Raises:
+        BadFileError: Rows of one scene are not the same thing on the same.
+
+    """
+    for scene in dict.fromkeys(row.scene for row in rows if row.scene):
+        alike = tuple(row for row in rows if row.scene == scene)
+        if len({(r.material, r.wall, r.diameter, r.speed, r.floor, r.on) for r in alike}) > 1:
+            raise BadFileError("life.toml", f"{scene}: its rows differ.", "Mend the rows.")
+        if max(r.low for r in alike) - leeway > min(r.high for r in alike) + leeway:
+            yield alike
 
 
 @dataclass(frozen=True)

@@ -64,6 +64,7 @@ SOLIDS: dict[str, str] = {
     "felt": "#7d8f5b",
     "foam": "#e8dcae",
     "packaging_foam": "#f2f2ee",
+    "foam_beads": "#f4f4f1",
     "polymer": "#4f7fb5",
     "elastomer": "#a8433a",
     "food": "#c49a62",

@@ -26,7 +26,8 @@ class Joined:
         found = dict(book)
         found["external_impulse"] = np.insert(book["external_impulse"], at, 0.0, axis=0)
         found["plane_impulse"] = np.insert(book["plane_impulse"], at, 0.0, axis=1)
-        found["pair_impulse"] = _bordered(book["pair_impulse"], at, 0.0)
+        for name in ("pair_impulse", "impact_of_pair"):
+            found[name] = _bordered(book[name], at, 0.0)
         for name in ("first_contact", "last_contact", "contact_point"):
             found[name] = _bordered(book[name], at, np.nan)
         return found

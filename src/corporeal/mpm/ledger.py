@@ -22,6 +22,8 @@ class Ledger:
     """[J]"""
     impact_loss: Float[np.ndarray, ""]
     """Taken by normal contact: by restitution of what is rigid, by nodes of what is soft [J]."""
+    impact_of_pair: Float[np.ndarray, "N N"]
+    """The same of each pair, symmetric [J]; below 0: contact gave it energy."""
     plastic_loss: Float[np.ndarray, ""]
     """[J]"""
     viscous_loss: Float[np.ndarray, ""]
@@ -45,6 +47,7 @@ class Ledger:
             push_work=np.zeros(()),
             friction_loss=np.zeros(()),
             impact_loss=np.zeros(()),
+            impact_of_pair=np.zeros((everything, everything)),
             plastic_loss=np.zeros(()),
             viscous_loss=np.zeros(()),
             first_contact=np.full((everything, everything), np.nan),
@@ -59,6 +62,12 @@ class Ledger:
     def as_measured(self) -> dict:
         """Copy everything, scalars as floats, under the names of ``Measure``."""
         return {k: float(v) if v.ndim == 0 else v for k, v in self.as_arrays().items()}
+
+    def strike(self, pair: Int[np.ndarray, "E 2"], taken: Float[np.ndarray, " E"]) -> None:
+        """Enter the energy [J] that the normal impulses of one step's contacts took."""
+        self.impact_loss += taken.sum()
+        for side in (pair, pair[:, ::-1]):
+            np.add.at(self.impact_of_pair, (side[:, 0], side[:, 1]), taken)
 
     def enter(
         self,

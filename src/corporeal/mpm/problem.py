@@ -244,6 +244,8 @@ class Measure:
     impact_loss: float
     """Taken by normal contact: by restitution of what is rigid, and of what is soft by the nodes of
     the grid, whose mass stops at once [J]."""
+    impact_of_pair: Float[np.ndarray, "B+W B+W"]
+    """The same of each pair, symmetric [J]; below 0: contact gave it energy."""
     plastic_loss: float
     """[J]"""
     viscous_loss: float

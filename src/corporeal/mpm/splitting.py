@@ -69,6 +69,9 @@ class Heirs:
         found["external_impulse"] = book["external_impulse"][self.parent] * by[:, None]
         found["plane_impulse"] = book["plane_impulse"][:, self.parent] * by[:, None]
         found["pair_impulse"] = book["pair_impulse"][square] * by[:, None] * by
+        all_by = np.append(by, np.ones(planes))
+        found["impact_of_pair"] = book["impact_of_pair"][np.ix_(rows, rows)]
+        found["impact_of_pair"] = found["impact_of_pair"] * all_by[:, None] * all_by
         for name in ("first_contact", "last_contact", "contact_point"):
             found[name] = book[name][np.ix_(rows, rows)]
         return found

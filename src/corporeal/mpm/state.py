@@ -98,6 +98,17 @@ class Matter:
             self._thin[cell] = tuple(rigid.thinness(p, rows[:, :3], cell) for p, rows in both)
         return self._thin[cell]
 
+    def thin_places(self, cell: float) -> tuple[Bool[np.ndarray, " S"], ...]:
+        """Surface points of each body where it is thin and not as a whole, were it rigid."""
+        if cell not in self._places:
+            both = zip(self.surface, self.rounding, strict=True)
+            self._places[cell] = tuple(rigid.thin_places(p, r[:, :3], cell) for p, r in both)
+        return self._places[cell]
+
+    @cached_property
+    def _places(self) -> dict[float, tuple[Bool[np.ndarray, " S"], ...]]:
+        return {}
+
     @cached_property
     def _thin(self) -> dict[float, tuple[int, ...]]:
         return {}

@@ -367,6 +367,7 @@ AUDIT_ROWS = (
     ("momentum_residual", "momentum residual, relative", ".2g"),
     ("mechanical_growth", "growth of kinetic and elastic energy, relative", ".2g"),
     ("impact_loss", "energy lost in normal contact, relative", ".2g"),
+    ("impact_gain", "energy given by normal contact, relative", ".2g"),
     ("unbooked_loss", "energy lost in transfers and not booked, relative", ".2g"),
     ("energy_growth", "growth including dissipated energy, relative", ".2g"),
     ("max_penetration_dx", "largest penetration [grid cells]", ".2f"),

@@ -66,6 +66,7 @@ def audit(
         energy_gain=who_gained(ledger, scene, cell),
         unbooked_loss=unbooked_loss(ledger, scene, cell),
         impact_loss=impact_loss(ledger, scene, cell),
+        impact_gain=impact_gain(ledger, scene, cell),
         surfaces=surface_pairs(scene, particles, trajectory),
         mass_error=mass_error(particles),
         max_penetration_m=max(floor, pair),
@@ -158,9 +159,24 @@ def unbooked_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
 
 
 def impact_loss(ledger: Ledger, scene: Scene, cell: float) -> float:
-    """Loss by normal contact over all the energy that there was [-]."""
+    """Loss by normal contact over all the energy that there was [-].
+
+    Pairs that gained hide nothing of it, where it is known what each pair took.
+    """
     whole = given(ledger, scene, cell)
-    return float(ledger.impact_loss[-1]) / whole if whole > 0 else 0.0
+    lost = float(ledger.impact_loss[-1]) + (impact_gain(ledger, scene, cell) or 0.0) * whole
+    return lost / whole if whole > 0 else 0.0
+
+
+def impact_gain(ledger: Ledger, scene: Scene, cell: float) -> float | None:
+    """Energy that normal contact gave to pairs which have more from it than it took, relative [-].
+
+    None: a run from before it was kept by pairs.
+    """
+    taken, whole = np.triu(ledger.impact_of_pair[-1]), given(ledger, scene, cell)
+    if not np.isfinite(taken).all():
+        return None
+    return float(-taken[taken < 0.0].sum()) / whole if whole > 0 else 0.0
 
 
 def energy_balance(

@@ -3,13 +3,13 @@
 Warnings say why a result may not be trusted; hints say what else could have been asked for.
 """
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 
-from corporeal.findings import ObjectOutcome, Outcome
+from corporeal.findings import ObjectOutcome, Outcome, PartAudit
 from corporeal.geometry.identity import words
-from corporeal.types import Scene
+from corporeal.types import Law, Scene
 
 STILL = 0.01
 """Of an object's length: what moves or bends less cannot be seen [-]."""
@@ -17,11 +17,17 @@ STILL_TURN = 1.0
 """The same of its turning [degrees]."""
 LOST = 0.1
 """Energy that no booked loss accounts for, as a share of what there was: more is told [-]."""
+FLOWS = frozenset(law.name.lower() for law in (Law.FLUID, Law.DRUCKER_PRAGER))
+"""Laws of what takes any shape, and stays as it comes to lie."""
 START = "Let it fall (--drop 0.5), throw it (--velocity NAME=1,0,0) or push it (scene.toml)."
 
 
 def hints(
-    scene: Scene, happened: Outcome, divided: bool, lost: float | None = None
+    scene: Scene,
+    happened: Outcome,
+    divided: bool,
+    lost: float | None = None,
+    parts: Sequence[PartAudit] = (),
 ) -> tuple[str, ...]:
     """Return what a person may want to know before the next run, in sentences.
 
@@ -30,20 +36,27 @@ def hints(
         happened: What was seen.
         divided: Whether it was asked for which nodes of a file are objects of their own.
         lost: Share of the energy that no booked loss accounts for [-]; None: it is not known.
+        parts: How each part was simulated.
 
     """
     joined = () if divided else _joined(scene)
-    return (*scene.hints, *joined, *_motionless(scene, happened), *_lost(lost))
+    return (*scene.hints, *joined, *_motionless(scene, happened), *_lost(lost, parts))
 
 
-def _lost(share: float | None) -> Iterator[str]:
-    """Say that coarse cells took energy that nature would have kept."""
-    if share is not None and share > LOST:
+def _lost(share: float | None, parts: Sequence[PartAudit]) -> Iterator[str]:
+    """Say that coarse cells took energy that what is soft would have given back."""
+    soft = dict.fromkeys(p.object for p in parts if p.object and _springs_back(p))
+    if share is not None and share > LOST and soft:
         yield (
             f"{share:.0%} of the energy was lost between material points and grid, and to nothing "
-            "in nature: what is soft and few cells across rebounds and swings too little. A finer "
-            "--detail loses less."
+            f"in nature: what is soft and few cells across ({', '.join(soft)}) rebounds and swings "
+            "too little. A finer --detail loses less."
         )
+
+
+def _springs_back(part: PartAudit) -> bool:
+    """Tell whether a part gives back what strains it: liquids and grains keep nothing to give."""
+    return part.treatment != "rigid" and part.law not in FLOWS
 
 
 def _joined(scene: Scene) -> Iterator[str]:

@@ -109,11 +109,18 @@ def merged(row: dict[str, np.ndarray], group: np.ndarray) -> dict[str, np.ndarra
     found["plane_impulse"] = np.einsum("ob,wbk->wok", share, row["plane_impulse"])
     deepest = [row["plane_depth"][:, group == k].max(axis=1) for k in range(len(share))]
     found["plane_depth"] = np.stack(deepest, axis=1)
-    between = share @ row["pair_impulse"] @ share.T
-    found["pair_impulse"] = between - np.diag(np.diag(between))
+    found["pair_impulse"] = between_objects(row["pair_impulse"], group)
     planes = len(row["first_contact"]) - len(group)
     names = np.concatenate([group, group.max() + 1 + np.arange(planes)])
+    found["impact_of_pair"] = between_objects(row["impact_of_pair"], names)
     return found | meetings(row, names)
+
+
+def between_objects(table: np.ndarray, name: np.ndarray) -> np.ndarray:
+    """Add up what pairs of bodies have by pairs of objects; within one object it is 0."""
+    share = (name == np.arange(name.max() + 1)[:, None]).astype(float)
+    between = share @ table @ share.T
+    return between - np.diag(np.diag(between))
 
 
 ADDED = "mass momentum angular_momentum kinetic elastic potential external_impulse flow".split()

@@ -5,6 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 from corporeal.formats.word_order import of_part
+from corporeal.formats.words import everyday
 from corporeal.geometry.identity import Identity
 from corporeal.types import (
     Finish,
@@ -80,14 +81,30 @@ class Evidence:
     def own(self) -> list[Name]:
         """Names that are the part's own, without what its sibling parts are called too."""
         finishes = [_name(f.name, self.shared[1]) for f in self.finishes]
-        return [*finishes, *(_name(s.name, self.shared[0]) for s in self.surfaces)]
+        named = [*finishes, *(_name(s.name, self.shared[0]) for s in self.surfaces)]
+        overruled = {tokens_of(text) for text in _names(self.thing)} - self._heard
+        return [name for name in named if name.words not in overruled]
 
     @property
     def general(self) -> list[Name]:
         """Names of the whole object."""
-        named = dict.fromkeys([self.thing.class_name, self.thing.name, self.thing.stem])
+        named = [text for text in _names(self.thing) if tokens_of(text) in self._heard]
         whole = (Name(text, of_part(tokens_of(text), phrases())) for text in named)
         return [*whole, *(Name(" ".join(w), w) for w in self.shared if w)]
+
+    @property
+    def _heard(self) -> set[tuple[str, ...]]:
+        """Names of the object that are believed: a "rubber_ball" of steel_ball.ply is no steel."""
+        thing, heard = self.thing, set()
+        by_file = thing.class_name == everyday(thing.stem)
+        first = [thing.name, thing.class_name] if by_file else [thing.class_name, thing.name]
+        matter: set[str] = set()
+        for text in (*first, thing.stem):
+            said = _substances([_name(text)])
+            if not matter or not said or said & matter:
+                heard.add(tokens_of(text))
+            matter = matter or said
+        return heard
 
 
 def evidence(scene: Scene, identity: Identity) -> list[Evidence]:
@@ -128,6 +145,11 @@ def _siblings(scene: Scene, thing: int, surfaces: dict[int, list[int]]) -> dict[
         p: replace(e, claimed=frozenset(m for m, n in times.items() if n > (m in claims[p])))
         for p, e in found.items()
     }
+
+
+def _names(thing: SceneObject) -> list[str]:
+    """Return what an object is called: in words, in the scene, and as its file."""
+    return list(dict.fromkeys([thing.class_name, thing.name, thing.stem]))
 
 
 def _substances(names: Sequence[Name]) -> set[str]:

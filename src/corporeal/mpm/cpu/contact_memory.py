@@ -39,7 +39,8 @@ BYTES = {name: record.dtype.itemsize for name, record in LISTS.items()}
 BONDED = -1
 """Friction of a pair that is never in contact, to the native piece."""
 BOOKS = (
-    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point impact_loss"
+    "plane_impulse pair_impulse friction_loss first_contact last_contact contact_point impact_loss "
+    "impact_of_pair"
 )
 
 
@@ -72,11 +73,13 @@ def rigid_grid(
     wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
     places[:, : len(wetted)] = wetted[:, :3].T
-    thin = rigid.thinness(body.surface, rounding_of(body)[:, :3], cell)
+    normals = rounding_of(body)[:, :3]
+    thin = rigid.thinness(body.surface, normals, cell)
     spacing = rigid.spacing(body.surface)
     # Many nodes ask where a thin body's surface begins: runs of points that are near each other.
     width = max(SHOWN_AROUND * cell, RUN_ACROSS * spacing)
     shown, shows = _clumped(surface if thin else surface[:0], width)
+    slim = surface[: len(body.surface)][rigid.thin_places(body.surface, normals, cell)]
     state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
     arrays = {
         "node": np.zeros((across**3, 64, 8), np.float32),
@@ -94,6 +97,7 @@ def rigid_grid(
         "places": places,
         "shown": shown,
         "show": shows,
+        "slim": np.ascontiguousarray(slim),
         "rigid": state,
     }
     point(record, **arrays)
@@ -104,7 +108,7 @@ def rigid_grid(
     record["rolls"] = bool((rounding[:, 6:8] > 0.0).any())
     record["bends"] = bool(np.any(rounding[:, 10:] != 0.0))
     record["spacing"] = spacing
-    record["thin"] = thin
+    record["thin"], record["slims"] = thin, len(slim)
     return arrays
 
 

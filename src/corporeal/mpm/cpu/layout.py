@@ -183,6 +183,7 @@ FIELD = Record(
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
     ("double *", "shown show"),  # thin: surface points in order of place; [shows][6] as of clumps
+    ("double *", "slim"),  # rigid: [slims][3] surface points where it is thin and not as a whole
     ("double", "spacing"),  # rigid: of its surface points
     ("double", "mass full"),  # full: of a cell full of it
     ("double[3]", "flows_by"),  # of a liquid at a wall: yield stress [Pa], K/d^n [Pa (s/m)^n], n
@@ -191,7 +192,7 @@ FIELD = Record(
     ("int", "floor"),  # the only plane that the window reaches, or -1
     ("float[3]", "level"),  # its normal, or 0
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
-    ("int", "patches wets shows facets"),
+    ("int", "patches wets shows facets slims"),
     ("int", "rolls"),  # rigid: whether any of its surface points is round
     ("int", "bends"),  # rigid: whether it curves outwards or inwards anywhere
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
@@ -234,7 +235,7 @@ WORLD = Record(
     ("double *", "bounces"),  # how restitution changes with speed: 5 numbers a pair
     ("double *", "rolling"),  # c of every pair [m]; null: nothing brakes what rolls
     ("double *", "plane_impulse pair_impulse friction_loss first_contact last_contact"),
-    ("double *", "contact_point face impact_loss"),
+    ("double *", "contact_point face impact_loss impact_of_pair"),
     ("Blow *", "blow"),
     ("Bond *", "bond"),
     ("Tether *", "tether"),

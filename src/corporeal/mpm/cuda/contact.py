@@ -10,6 +10,7 @@ from corporeal.mpm.constants import (
     LIQUID_TOUCHES,
     OTHER_BIAS,
     SHOWN_AROUND,
+    SIGHT,
     STICKS,
     TINY,
     VAST,
@@ -46,6 +47,7 @@ from corporeal.mpm.formulas.one_lane import (
     slopes,
     splines,
     surface_begins,
+    thin_there,
     wall_span,
     wetted_face,
 )
@@ -308,6 +310,13 @@ def begins(r: Rigid, s: Sheet, b: int, x: wp.vec3d, n: wp.vec3):
 
 
 @wp.func
+def is_thin(r: Rigid, s: Sheet, b: int, x: wp.vec3d):
+    """Whether a rigid body is thin near there, though not as a whole."""
+    y = wp.transpose(r.turn[b]) * (x - r.centre[b])
+    return thin_there(r.slim, r.slim_first[b], r.slim_count[b], y, wp.float64(SIGHT) * s.dx)
+
+
+@wp.func
 def face_of(r: Rigid, s: Sheet, b: int, x: wp.vec3d, mean: wp.vec3, number: int):
     """Outward normal of a rigid body's face and the height of a node over it [cells].
 
@@ -330,7 +339,10 @@ def gap_of(c: Contacts, r: Rigid, s: Sheet, t: int, xa: wp.float32, xc: wp.float
     a = c.fa[t]
     b = c.fc[t]
     gap = float(0.0)
-    if r.thin[a] == 0 and r.thin[b] == 0:
+    thin = r.thin[a] > 0 or r.thin[b] > 0
+    if not thin and r.points[a] > 0 and r.points[b] > 0:
+        thin = is_thin(r, s, a, c.point[t]) or is_thin(r, s, b, c.point[t])
+    if not thin:
         gap = gap_between(c.face, xa, xc)
     elif r.points[a] == 0:
         gap = gap_to_thin(xa, begins(r, s, b, c.point[t], c.normal[t]))

@@ -360,7 +360,10 @@ def note(c: Contacts, r: Rigid, s: Sheet, t: int):
         fc = c.fc[t]
         mean = D(0.5) * (c.before[t] + slip_of(c, r, s, t))
         wp.atomic_add(s.loss, RUBBING, t % LANES, wp.dot(J - size * n, mean))
-        wp.atomic_add(s.loss, STRIKING, t % LANES, size * wp.dot(n, mean))
+        taken = size * wp.dot(n, mean)
+        wp.atomic_add(s.loss, STRIKING, t % LANES, taken)
+        wp.atomic_add(s.impact_of_pair, fa, fc, taken)
+        wp.atomic_add(s.impact_of_pair, fc, fa, taken)
         met(s, fa, fc)
         wp.atomic_add(s.step_impulse, fa, fc, size)
         wp.atomic_add(s.step_place, fa, fc, size * c.point[t])

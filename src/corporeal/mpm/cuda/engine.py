@@ -39,7 +39,8 @@ PLACED = tuple("cell place strain motion stress plastic opened relief pressure".
 """What a warm start takes over of particles."""
 RIGID_STATE = "centre turn speed moment inertia spin cell place"
 SHEET_STATE = (
-    "clock fast loss external plane_impulse pair_impulse first_contact last_contact contact_point"
+    "clock fast loss external plane_impulse pair_impulse impact_of_pair first_contact last_contact "
+    "contact_point"
 )
 
 
@@ -321,6 +322,7 @@ class CudaEngine(Interaction):
             push_work=np.array(loss[layout.PUSHING]),
             friction_loss=np.array(loss[layout.RUBBING]),
             impact_loss=np.array(loss[layout.STRIKING]),
+            impact_of_pair=s.impact_of_pair.numpy(),
             plastic_loss=np.array(loss[layout.PLASTIC]),
             viscous_loss=np.array(loss[layout.VISCOUS]),
             first_contact=s.first_contact.numpy(),

@@ -173,6 +173,7 @@ class Sheet:
     external: wp.array(dtype=wp.vec3d)
     plane_impulse: wp.array2d(dtype=wp.vec3d)
     pair_impulse: wp.array2d(dtype=wp.float64)
+    impact_of_pair: wp.array2d(dtype=wp.float64)
     first_contact: wp.array2d(dtype=wp.float64)
     last_contact: wp.array2d(dtype=wp.float64)
     contact_point: wp.array2d(dtype=wp.vec3d)

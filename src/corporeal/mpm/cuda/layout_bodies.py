@@ -72,6 +72,12 @@ class Rigid:
     """Distance of its surface points [m]."""
     thin: wp.array(dtype=wp.int32)
     """See ``physics.rigid.thinness``; 0 for what deforms."""
+    slim: wp.array(dtype=wp.vec3d)
+    """Surface points where a body is thin and not as a whole, see ``physics.rigid`` …"""
+    slim_first: wp.array(dtype=wp.int32)
+    """… of each body the first …"""
+    slim_count: wp.array(dtype=wp.int32)
+    """… and how many."""
     wetted: wp.array(dtype=wp.vec3d)
     """Points that liquids touch, each followed by its normal."""
     wetted_first: wp.array(dtype=wp.int32)

@@ -143,6 +143,13 @@ class Memory:
         count, thin = np.zeros((2, len(matter.surface)), int)
         count[stiff] = [len(p) for p in points]
         thin[stiff] = [matter.thinness(cell)[b] for b in stiff]
+        places = matter.thin_places(cell)
+        slim = [matter.surface[b][places[b]] for b in stiff]
+        slims = np.zeros(len(matter.surface), int)
+        slims[stiff] = [len(p) for p in slim]
+        r.slim = self.put(np.concatenate([np.zeros((0, 3)), *slim]), wp.vec3d)
+        r.slim_first = self.put(np.cumsum(slims) - slims, wp.int32)
+        r.slim_count = self.put(slims, wp.int32)
         r.spacing = self.put(matter.spacing, wp.float64)
         r.first = self.put(np.cumsum(count) - count, wp.int32)
         r.points, r.thin = self.put(count, wp.int32), self.put(thin, wp.int32)
@@ -268,6 +275,7 @@ class Memory:
         s.external = self.zeros(bodies, wp.vec3d)
         s.plane_impulse = self.zeros((planes, bodies), wp.vec3d)
         s.pair_impulse = self.zeros((bodies, bodies), wp.float64)
+        s.impact_of_pair = self.zeros((everything, everything), wp.float64)
         never = np.full((everything, everything), np.nan)
         s.first_contact, s.last_contact = self.put(never, wp.float64), self.put(never, wp.float64)
         s.contact_point = self.put(np.stack([never] * 3, axis=2), wp.vec3d)

@@ -111,6 +111,15 @@ struct Surface {
     }
     return least < VAST ? least : there;
   }
+  // Whether one of the places where a body is thin is as near to x as a node sees.
+  CUDA_CALLABLE static inline bool thin_there(const double *places, int count, const double *x, double far) {
+    for (int i = 0; i < count; i++) {
+      const double *p = places + 3 * i;
+      const double d[3] = {p[0] - x[0], p[1] - x[1], p[2] - x[2]};
+      if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < far * far) return true;
+    }
+    return false;
+  }
 };
 // How far from a rounded surface point of a rigid body its surface goes on in a direction d: twin of
 // physics/rounding.py. row: normal, arc's direction, radii of ball and arc, reach, inside; types.ROUNDING.

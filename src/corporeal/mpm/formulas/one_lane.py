@@ -158,6 +158,15 @@ def surface_begins(
 
 
 @wp.func_native("""
+  const double *from = (const double *)places.data + 3 * first;
+  return mpm::Surface::thin_there(from, count, &x.c[0], far);
+""")
+def thin_there(
+    places: wp.array(dtype=wp.vec3d), first: int, count: int, x: wp.vec3d, far: wp.float64
+) -> bool: ...
+
+
+@wp.func_native("""
   const double *from = (const double *)rows.data + 6 * first;
   mpm::Wetted face[mpm::WETTED_FACES];
   mpm::AllWetted all = {from, &place.c[0], count, 0, face};

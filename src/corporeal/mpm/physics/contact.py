@@ -8,7 +8,7 @@ is transmitted: ``contact_impulses``.
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.mpm.constants import (
@@ -157,6 +157,19 @@ def surface_begins(points: Vectors, node: Vectors, normal: Vectors, around: floa
     least = np.where(aside < around**2, along, np.inf).min(axis=1)
     nearest = np.take_along_axis(along, np.argmin(aside, axis=1)[:, None], axis=1)[:, 0]
     return np.where(np.isfinite(least), least, nearest)
+
+
+def thin_there(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarray, " E"]:
+    """Tell which nodes see a place where a rigid body is thin.
+
+    Args:
+        places: Surface points behind which it is thin [m].
+        node: Where it is looked from [m].
+        far: How far [m].
+
+    """
+    square = np.sum((places[None, :] - node[:, None]) ** 2, axis=2)
+    return np.any(square < far**2, axis=1)
 
 
 def gap_to_surface(mean: Vectors, begins: Scalars, normal: Vectors, cell: float) -> Scalars:

@@ -341,14 +341,14 @@ def _sweep(contacts, rules, masses, motion, impulse, orders):
             _move(c, 1.0, arm_c, change, masses, motion)
 
 
-def impact_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> float:
-    """Kinetic energy [J] that the normal impulses took: Σ J_n · ½ (u_before + u_after).
+def impact_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> Scalars:
+    """Kinetic energy [J] that each normal impulse took: J_n · ½ (u_before + u_after).
 
     Of a rigid rebound ½ m (1 - e²) v². Matter that is soft stops at a node at once, half a cell of
     it: so much the more, the coarser the grid.
     """
     along = np.sum(impulse * normal, axis=1, keepdims=True) * normal
-    return float(np.sum(along * 0.5 * (before + after)))
+    return np.sum(along * 0.5 * (before + after), axis=1)
 
 
 def friction_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> float:

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 from typing import NamedTuple
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float, Int
 from scipy.spatial import KDTree
 
 from corporeal.mpm.constants import (
@@ -166,25 +166,52 @@ def thinness(
 def thin_walls(
     surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], thick: float
 ) -> float:
-    """Share of a surface behind which, less than ``thick`` [m] deep, another side looks away.
+    """Share of a surface behind which its wall is less than ``thick`` [m] deep.
 
     A few hundred points speak for all of those whose normals are known.
     """
     known = np.flatnonzero(np.any(normal != 0.0, axis=1))
     if len(known) == 0:
         return 0.0
+    asked = known[np.arange(0, len(known), len(known) // WALLS_ASKED + 1)]
+    return float(_walled(surface, normal, thick, asked).mean())
+
+
+def thin_places(
+    surface: Float[np.ndarray, "S 3"], normal: Float[np.ndarray, "S 3"], cell: float
+) -> Bool[np.ndarray, " S"]:
+    """Tell behind which surface points a body that is not thin as a whole is thinner than ``THIN``.
+
+    None of a body that is thin as a whole, see ``thinness``, of which every point counts.
+    """
+    places = np.zeros(len(surface), dtype=bool)
+    seldom = 0.0 < thin_walls(surface, normal, THIN * cell) <= MANY_WALLS
+    if seldom and thinness(surface, normal, cell) == 0:
+        known = np.flatnonzero(np.any(normal != 0.0, axis=1))
+        places[known] = _walled(surface, normal, THIN * cell, known)
+    return places
+
+
+def _walled(
+    surface: Float[np.ndarray, "S 3"],
+    normal: Float[np.ndarray, "S 3"],
+    thick: float,
+    asked: Int[np.ndarray, " A"],
+) -> Bool[np.ndarray, " A"]:
+    """Tell behind which of some points, less than ``thick`` [m] deep, another side looks away."""
+    known = np.flatnonzero(np.any(normal != 0.0, axis=1))
     points, out, aside = surface[known], normal[known], spacing(surface)
     tree = KDTree(points)
-    asked = np.arange(0, len(known), len(known) // WALLS_ASKED + 1)
-    behind = tree.query_ball_point(points[asked] - 0.5 * thick * out[asked], 0.5 * thick + aside)
-    walls = 0
-    for k, near in zip(asked, behind, strict=True):
-        apart = points[k] - points[near]
-        depth = apart @ out[k]
-        beside = np.linalg.norm(apart - depth[:, None] * out[k], axis=1)
-        away = out[near] @ out[k] < -FACING_AWAY
-        walls += bool(np.any(away & (depth > 0.0) & (depth < thick) & (beside <= aside)))
-    return walls / len(asked)
+    middle = surface[asked] - 0.5 * thick * normal[asked]
+    behind = tree.query_ball_point(middle, 0.5 * thick + aside)
+    k = np.repeat(np.arange(len(asked)), [len(near) for near in behind])
+    near = np.concatenate([np.zeros(0, int), *(np.array(b, int) for b in behind)])
+    apart, way = surface[asked][k] - points[near], normal[asked][k]
+    depth = np.sum(apart * way, axis=1)
+    beside = np.linalg.norm(apart - depth[:, None] * way, axis=1)
+    away = np.sum(out[near] * way, axis=1) < -FACING_AWAY
+    wall = away & (depth > 0.0) & (depth < thick) & (beside <= aside)
+    return np.bincount(k[wall], minlength=len(asked)) > 0
 
 
 def spacing(surface: Float[np.ndarray, "S 3"]) -> float:

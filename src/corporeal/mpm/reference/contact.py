@@ -8,11 +8,12 @@ from dataclasses import dataclass, replace
 from itertools import combinations
 
 import numpy as np
-from jaxtyping import Float, Int
+from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import (
     HELD_BY_WALL,
     SHOWN_AROUND,
+    SIGHT,
     SWEEPS,
     SWEEPS_OF_A_HIT,
     VAST,
@@ -50,8 +51,8 @@ class Meeting:
     """-J on the first and +J on the second of each pair [N s]."""
     friction_loss: float
     """[J]"""
-    impact_loss: float
-    """[J]"""
+    impact_loss: Float[np.ndarray, " E"]
+    """Of each contact [J]."""
     kept: KeptChoices
     """For the next step."""
     moment: Float[np.ndarray, "B 3"]
@@ -306,6 +307,9 @@ def _between(
         gap = _between_surfaces(scene, look, pair, slots, normal)
     else:
         gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
+        at = _thin_there(scene, pair, index * cell)
+        if at.any():
+            gap[at] = _between_surfaces(scene, look, pair, (a[at], c[at]), normal[at])
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
     movers = scene.mover_of_slot(a), scene.mover_of_slot(c)
     return Touch(pair, *movers, index * cell, normal, gap, kept=kept)
@@ -342,6 +346,18 @@ def _wet(
     return Touch(pair, *movers, node[k], normal, gap, slips, layer)
 
 
+def _thin_there(
+    scene: Scene, pair: tuple[int, int], node: Float[np.ndarray, "E 3"]
+) -> Bool[np.ndarray, " E"]:
+    """Tell at which nodes rigid bodies meet where one is thin, though not as a whole."""
+    there = np.zeros(len(node), dtype=bool)
+    if all(scene.is_rigid(body) and len(scene.surface(body)) for body in pair):
+        for body in pair:
+            places = scene.thin_places(body)
+            there |= contact.thin_there(places, node, SIGHT * scene.problem.cell)
+    return there
+
+
 def _between_surfaces(
     scene: Scene,
     look: Look,
@@ -349,7 +365,10 @@ def _between_surfaces(
     slots: tuple[np.ndarray, np.ndarray],
     normal: Float[np.ndarray, "E 3"],
 ) -> Float[np.ndarray, " E"]:
-    """Open distance where a thin rigid body takes part [m]: surface points say where it begins."""
+    """Open distance where surface points say where a rigid body begins [m].
+
+    They do where it is thin: as a whole, or between two rigid bodies there.
+    """
     cell, node = scene.problem.cell, scene.grid.index[slots[0]] * scene.problem.cell
     found: list[np.ndarray | None] = []
     for body, way in zip(pair, (-normal, normal), strict=True):

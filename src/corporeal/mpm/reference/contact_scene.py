@@ -63,6 +63,10 @@ class Scene:
         turned = self.matter.surface[body] @ self.state.rotation[body].T
         return self.state.centre[body] + turned
 
+    def thin_places(self, body: int) -> Float[np.ndarray, "S 3"]:
+        """Surface points of a rigid body behind which it is thin, and not as a whole, now [m]."""
+        return self.surface(body)[self.matter.thin_places(self.problem.cell)[body]]
+
     def touching(
         self, body: int, towards: Float[np.ndarray, "3"]
     ) -> tuple[Float[np.ndarray, "S 3"], Bool[np.ndarray, " S"]]:

@@ -297,7 +297,7 @@ class ReferenceEngine(Interaction):
         m, s, book = self.matter, self.state, self.ledger
         book.external_impulse += m.total[:, None] * kick
         book.friction_loss += meeting.friction_loss
-        book.impact_loss += meeting.impact_loss
+        book.strike(meeting.pair, meeting.impact_loss)
         for b in np.flatnonzero(np.any(push != 0.0, axis=1)):
             mine = m.body == b
             mean = m.mass[mine] @ s.velocity[mine] / m.total[b] + 0.5 * kick[b]

@@ -379,8 +379,10 @@ struct Books {
     row[1] += e.normal;
     for (int i = 0; i < 3; i++) row[2 + i] += e.place[i];
     *w->friction_loss += e.loss;
+    int bodies = w->names - w->planes, other = e.c < w->fields ? e.c : bodies + e.c - w->fields;
     *w->impact_loss += e.impact;
-    int bodies = w->names - w->planes;
+    w->impact_of_pair[e.a * w->names + other] += e.impact;
+    w->impact_of_pair[other * w->names + e.a] += e.impact;
     if (e.c >= w->fields)
       for (int i = 0; i < 3; i++)
         w->plane_impulse[((e.c - w->fields) * bodies + e.a) * 3 + i] -= e.J[i];

@@ -20,10 +20,31 @@ struct Solver {
       const double mean = F.rigids ? -pc : pa, h = T.gap * inv, full = filled(w, F.rigids ? C : A);
       return T.mu < mpm::STICKS ? Face::gap_of_liquid(mean, h, full) : Face::gap_to_surface(mean, h);
     }
-    if (!F.thin && !G.thin) return Face::gap(w->face, pa, pc);
+    if (!F.thin && !G.thin && !thin_there(w, F, G, T)) return Face::gap(w->face, pa, pc);
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
     if (!F.surfaces) return Face::gap_to_thin(pa, sc);
     return G.surfaces ? sc - sa : Face::gap_to_thin(-pc, -sa);
+  }
+  // Whether two rigid bodies meet at a node where one of them is thin, though not as a whole.
+  static inline bool thin_there(const World *w, const Field &F, const Field &G, const Touch &T) {
+    if ((!F.slims && !G.slims) || !F.surfaces || !G.surfaces) return false;
+    for (int side = 0; side < 2; side++) {
+      const Field &B = side ? G : F;
+      double q[3], d[3];
+      inside(B, T.x, T.normal, q, d);
+      if (mpm::Surface::thin_there(B.slim, B.slims, q, mpm::SIGHT * w->dx)) return true;
+    }
+    return false;
+  }
+  // A place and a direction in a rigid body's frame.
+  static inline void inside(const Field &F, const double *x, const double *n, double *q, double *d) {
+    const double *s = F.rigid;
+    double r[3];
+    for (int i = 0; i < 3; i++) r[i] = x[i] - s[CENTRE + i];
+    for (int i = 0; i < 3; i++) {
+      q[i] = s[TURN + i] * r[0] + s[TURN + 3 + i] * r[1] + s[TURN + 6 + i] * r[2];
+      d[i] = s[TURN + i] * n[0] + s[TURN + 3 + i] * n[1] + s[TURN + 6 + i] * n[2];
+    }
   }
   // How high the node of a liquid is over a wall [m]; 0 for what is no liquid.
   static inline double height(const World *w, const Touch &T) {
@@ -121,14 +142,9 @@ struct Solver {
   // Where a thin rigid body begins along n, or against it for a negative scale; in cells.
   static inline double begins(const World *w, const Field &F, const double *x, const double *n,
                               double scale) {
-    const double *s = F.rigid;
-    double r[3], q[3], d[3];
-    for (int i = 0; i < 3; i++) r[i] = x[i] - s[CENTRE + i];
-    for (int i = 0; i < 3; i++) {
-      q[i] = s[TURN + i] * r[0] + s[TURN + 3 + i] * r[1] + s[TURN + 6 + i] * r[2];
-      d[i] = s[TURN + i] * n[0] + s[TURN + 3 + i] * n[1] + s[TURN + 6 + i] * n[2];
-      if (scale < 0) d[i] = -d[i];
-    }
+    double q[3], d[3];
+    inside(F, x, n, q, d);
+    for (int i = 0; i < 3 && scale < 0; i++) d[i] = -d[i];
     const double around = mpm::SHOWN_AROUND * w->dx, near = first_around(F, q, d, around);
     const double at = near < mpm::VAST ? near : mpm::Surface::begins(F.surface, F.surfaces, q, d, around);
     return at * (scale < 0 ? -scale : scale);
