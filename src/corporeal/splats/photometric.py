@@ -111,8 +111,7 @@ def agreed(
     along = max(1, round(ALONG * fine))
     asked = np.flatnonzero(movable)[:: max(1, int(EVERY * fine))]
     for farthest in FARTHEST:
-        normals = _shared(mesh.vertex_normals, mean, max(1, round(TURN * fine)))
-        normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
+        normals = shared_normals(mesh, mean, fine)
         told = _told(mesh, normals, asked, pictures, farthest, pool)
         # Where places that vertices tell lie above the smoothed surface [px].
         above = ((mesh.vertices - _shared(mesh.vertices, mean, along)) * normals).sum(axis=1)
@@ -134,6 +133,19 @@ class _Told:
     """Where the face is, along the normal [px]."""
     weight: Float[np.ndarray, " A"]
     """How clearly that is so; 0: unknown."""
+
+
+def shared_normals(mesh: Mesh, mean: csr_array, fine: float) -> Float[np.ndarray, "N 3"]:
+    """Return normals of a surface without its bumps.
+
+    Args:
+        mesh: The surface.
+        mean: As ``means`` returns it.
+        fine: Cells of the grid that it was carved from in a square pixel.
+
+    """
+    normals = _shared(mesh.vertex_normals, mean, max(1, round(TURN * fine)))
+    return normals / np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), TINY)
 
 
 def _shared(values: Float[np.ndarray, "N K"], mean: csr_array, rounds: int) -> np.ndarray:

@@ -27,6 +27,7 @@ from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
 from corporeal.splats.mouths import entered
 from corporeal.splats.outline import fitted, outlined
+from corporeal.splats.overhangs import without_overhangs
 from corporeal.splats.photometric import Agreed, agreed, pictured
 from corporeal.splats.sheets import without_sheets
 from corporeal.splats.thread_pool import ThreadPool
@@ -382,11 +383,13 @@ def _agreed(
     cell: float,
     pool: ThreadPool,
 ) -> Agreed:
-    """Move a surface to where photographs agree."""
+    """Move a surface to where photographs agree, and what stands before that back."""
     assert scene.shown is not None and scene.rgb is not None
     mine, rows = scene.shown == k, scene.rendering.rows
     pictures = pictured(scene.rgb, mine, rows, _pixel(scene, k))
-    return agreed(mesh, pictures, movable, cell, scene.floor, pool)
+    close = agreed(mesh, pictures, movable, cell, scene.floor, pool)
+    movable = movable & (close.mesh.vertices[:, 2] >= scene.floor + ON)
+    return without_overhangs(close, movable, pictures.pixel, cell, scene.floor)
 
 
 def _painted(
