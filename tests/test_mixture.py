@@ -11,12 +11,9 @@ from corporeal.geometry.make import Leeway, width_of
 from corporeal.materials.scale import place
 from corporeal.mixture import (
     FORM,
-    PACKAGING,
     Scale,
-    contradiction,
     doubt,
     drawn_given,
-    likelihood,
     quantiles,
     summed,
     weighed,
@@ -38,6 +35,7 @@ from corporeal.types import (
     Swelling,
     in_way,
 )
+from corporeal.vlm.outside_evidence import PACKAGING, contradiction, likelihood
 
 RADIUS = 0.05
 VOLUME = 4 / 3 * np.pi * RADIUS**3

@@ -6,7 +6,7 @@ from corporeal.errors import UserError
 from corporeal.geometry.drawn import mean_thickness
 from corporeal.materials.placement import entry_of
 from corporeal.types import PartWords
-from corporeal.vlm.lexicon import formed, massive, nameless, open_ware
+from corporeal.vlm.lexicon import formed, massive, nameless, open_ware, substances
 from corporeal.vlm.metadata import Evidence
 
 THICKEST = 5.0
@@ -33,6 +33,8 @@ def no_block(words: PartWords, seen: Evidence, library: str) -> PartWords:
     if words.material not in formed() or any(massive(tokens) for tokens in named):
         return words
     if not all(nameless(tokens) or open_ware(tokens) for tokens in named):
+        return words
+    if not any(substances(tokens) for tokens in named):  # a part of a machine: "link_2", of "steel"
         return words
     thickest = THICKEST * _greatest_wall(words.material, library)
     thickness = mean_thickness(seen.surfaces, seen.thing.scale)

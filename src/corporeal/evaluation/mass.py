@@ -30,6 +30,7 @@ from corporeal.types import Inventory, PartWords, Scene
 from corporeal.vlm import LIVE
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.together import together
+from corporeal.vlm.words import leaves
 
 METHODS = {
     "solid_water": "solid water",
@@ -234,7 +235,7 @@ def _solid(words: PartWords) -> PartWords:
 
 
 def _told(inventory: Inventory) -> str:
-    parts = [leaf for o in inventory.objects for p in o.parts for leaf in (p.pieces or (p,))]
+    parts = [leaf for o in inventory.objects for leaf in leaves(o.parts)]
     return "; ".join(_piece_told(p) for p in parts)
 
 

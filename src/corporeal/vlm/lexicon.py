@@ -340,6 +340,11 @@ def nameless(tokens: tuple[str, ...]) -> bool:
     return all(t.kind == "substance" for t in standing) and any(w not in known for w in tokens)
 
 
+def substances(tokens: tuple[str, ...]) -> list[Term]:
+    """Return the words of a name that say what the thing is made of."""
+    return [t for t in heads(tokens) if t.kind == "substance"]
+
+
 def massive(tokens: tuple[str, ...]) -> bool:
     """Tell whether a word of a name says that the thing is solid all through."""
     return bool(set(tokens) & frozenset(map(singular, _table()["massive"])))

@@ -33,6 +33,7 @@ from corporeal.vlm.lexicon import (
     phrases,
     seen_as,
     singular,
+    substances,
     tokens_of,
     wall_of,
 )
@@ -153,7 +154,7 @@ def _names(thing: SceneObject) -> list[str]:
 
 
 def _substances(names: Sequence[Name]) -> set[str]:
-    return {s.material for name in names for s in heads(name.words) if s.kind == "substance"}
+    return {t.material for name in names for t in substances(name.words)}
 
 
 def _name(text: str, shared: tuple[str, ...] = ()) -> Name:

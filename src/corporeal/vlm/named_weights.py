@@ -15,7 +15,7 @@ from corporeal.types import (
     PartWords,
     Scene,
 )
-from corporeal.vlm.lexicon import ends_in, heads, tokens_of
+from corporeal.vlm.lexicon import ends_in, substances, tokens_of
 
 FITS = 1.2
 """Factor of a mass within which the commoner way is taken."""
@@ -53,7 +53,7 @@ def ways_of(scene: Scene, number: int, described: ObjectWords) -> Ways | None:
     row = next((r for r in _table() for n in named if ends_in(n, r["words"])), None)
     if row is None:
         return None
-    own = {t.material for n in named for t in heads(n) if t.kind == "substance"}
+    own = {t.material for n in named for t in substances(n)}
     ways = [way for way in row["ways"] if not own or way["material"] in own]
     return Ways(mass, (part, *(_made(part, way, mass) for way in ways)))
 
