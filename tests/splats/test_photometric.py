@@ -64,15 +64,15 @@ def shown(picture, places):
     return np.stack([map_coordinates(p, at, order=1, mode="grid-wrap") for p in picture.T], axis=1)
 
 
-def heights(colour):
+def heights(colour, movable=True):
     """Heights over the plate before and after [px], away from its rim."""
     begun, rows = bumpy(), camera_rows(eyes())
     rows = np.concatenate([rows, np.full((len(rows), 2), SIZE)], axis=1)
     rgb = photographs(colour)
     pictures = pictured(rgb, np.ones(rgb.shape[:3], bool), rows, PIXEL)
     with ThreadPool(1) as pool:
-        movable = np.ones(len(begun.vertices), bool)
-        made = agreed(begun, pictures, movable, PIXEL, FLOOR, pool)
+        may = np.full(len(begun.vertices), movable)
+        made = agreed(begun, pictures, may, PIXEL, FLOOR, pool)
     inner = np.abs(begun.vertices[:, :2]).max(axis=1) < HALF - 6 * PIXEL
     return begun.vertices[inner, 2] / PIXEL, made.mesh.vertices[inner, 2] / PIXEL
 
@@ -88,6 +88,12 @@ def test_bumps_of_a_patterned_face_go_though_exposures_differ():
 def test_a_plain_face_stays_where_it_is():
     before, after = heights(lambda place, ray: np.full((len(place), 3), 0.5))
     assert np.abs(after - before).max() < 0.5
+
+
+@pytest.mark.filterwarnings("error")
+def test_what_no_photograph_may_move_stays_and_nothing_is_divided_by_nothing():
+    before, after = heights(lambda place, ray: np.full((len(place), 3), 0.5), movable=False)
+    assert np.abs(after - before).max() < 0.1
 
 
 def test_a_mirror_stays_where_it_is():

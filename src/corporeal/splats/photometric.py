@@ -210,7 +210,7 @@ def _face(
     weight = np.maximum(weight, TINY)
     face = first / weight
     scatter = np.maximum(second / weight - face**2, 0)
-    share = knows / np.maximum(every, 0.5 * len(asked) / count)
+    share = knows / np.maximum(every, max(0.5 * len(asked) / count, TINY))  # 0: nothing is seen
     power = (share / (1 + scatter / SCATTER**2)) ** SHARPLY
     return face, power / (power + HALF**SHARPLY)
 
