@@ -57,9 +57,8 @@ def drawn(surfaces: Sequence[Triangles], scale: float = 1.0) -> Drawn:
         scale: Lengths in them over the real ones [-].
 
     """
-    whole = joined(surfaces)
-    mesh = orient(weld(whole.vertices, whole.triangles)[0])
-    if not closes(mesh):
+    mesh = _closed(surfaces)
+    if mesh is None:
         return NOTHING
     volume = abs(signed_volume(mesh))
     return Drawn(_hollowed(mesh, volume), _thin(mesh, volume, scale))
@@ -73,11 +72,17 @@ def mean_thickness(surfaces: Sequence[Triangles], scale: float = 1.0) -> float:
         scale: Lengths in them over the real ones [-].
 
     """
-    whole = joined(surfaces)
-    mesh = orient(weld(whole.vertices, whole.triangles)[0])
-    if not closes(mesh):
+    mesh = _closed(surfaces)
+    if mesh is None:
         return 0.0
     return 2 * abs(signed_volume(mesh)) / float(mesh.areas.sum()) / scale
+
+
+def _closed(surfaces: Sequence[Triangles]) -> Mesh | None:
+    """Return all surfaces of an object as one mesh, normals outward; None: it is open."""
+    whole = joined(surfaces)
+    mesh = orient(weld(whole.vertices, whole.triangles)[0])
+    return mesh if closes(mesh) else None
 
 
 def edge_of_scan(mesh: Mesh) -> float:
