@@ -86,6 +86,15 @@ def test_a_field_at_rest_touches_a_thin_body_where_it_is(height):
     assert 0.003 < above < 0.011
 
 
+@pytest.mark.parametrize(("far", "begins"), [(-2.9, -2.9), (-3.1, 0.5), (None, 0.5)])
+def test_a_thin_body_begins_no_farther_behind_a_node_than_that_sees(far, begins):
+    points = np.array([[0.2, 0.0, 0.5], [0.0, 0.3, 0.7]] + [[0.0, 0.1, far]] * (far is not None))
+    node, up = np.zeros((1, 3)), np.array([[0.0, 0.0, 1.0]])
+    assert contact.surface_begins(points, node, up, 1.0, 3.0) == pytest.approx(begins)
+    beyond = points - np.array([5.0, 0.0, 9.0])
+    assert contact.surface_begins(beyond, node, up, 1.0, 3.0) == np.inf
+
+
 def test_of_three_candidates_the_one_that_separates_is_chosen():
     outward_a = np.array([[1.0, 0.0, 1.0]])  # an edge of a small block
     outward_c = np.array([[0.0, 0.0, -1.0]])  # the flat floor below it

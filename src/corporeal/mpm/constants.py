@@ -158,7 +158,8 @@ SHOWN_AROUND = 1.0
 """They are looked at this far from the normal through the node [cells]."""
 SIGHT = 3.0
 """Between two rigid bodies they say so too where one is thin that is not thin as a whole, as near
-to a node as it sees [cells]: at the thin end of a wedge."""
+to a node as it sees [cells]: at the thin end of a wedge. Points that lie farther behind a node are
+of another wall."""
 RUN_ACROSS = 6.0
 """Width of a run of them that is passed over together, over their spacing [-]: some forty."""
 KEPT_STEPS = 8

@@ -302,10 +302,10 @@ def smoothed(g: Grid, c: Contacts, s: Sheet, t: int):
 def begins(r: Rigid, s: Sheet, b: int, x: wp.vec3d, n: wp.vec3):
     """Where a rigid body's surface begins along n, seen from x [cells]."""
     R = wp.transpose(r.turn[b])
-    around = wp.float64(SHOWN_AROUND) * s.dx
+    around, behind = wp.float64(SHOWN_AROUND) * s.dx, wp.float64(SIGHT) * s.dx
     y = R * (x - r.centre[b])
     m = R * wp.vec3d(n)
-    at = surface_begins(r.surface, r.first[b], r.points[b], y, m, around)
+    at = surface_begins(r.surface, r.first[b], r.points[b], y, m, around, behind)
     return wp.float32(at / s.dx)
 
 

@@ -83,31 +83,32 @@ template <class R> struct Face {
   CUDA_CALLABLE static inline R gap_to_thin(R a, R h) { return h > R(WALL_REACH) ? R(VAST) : lattice(h) - a; }
 };
 // Where the surface of a thin rigid body begins along n, seen from x: the least (p - x) . n of its points
-// around that line; of none, that of the point nearest to the line. Points three by three, in its frame.
+// around that line; of none, that of the point nearest to the line. What is farther behind x than a node
+// sees does not count; without any others it is VAST. Points three by three, in its frame.
 struct Surface {
   // The least of those around the line alone; VAST: there are none.
   CUDA_CALLABLE static inline double around_line(const double *points, int count, const double *x,
-                                                 const double *n, double around) {
+                                                 const double *n, double around, double behind) {
     double least = VAST;
     for (int i = 0; i < count; i++) {
       const double *p = points + 3 * i;
       const double d[3] = {p[0] - x[0], p[1] - x[1], p[2] - x[2]};
       const double along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
       const double aside = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along;
-      if (aside < around * around && along < least) least = along;
+      if (aside < around * around && along > -behind && along < least) least = along;
     }
     return least;
   }
   CUDA_CALLABLE static inline double begins(const double *points, int count, const double *x,
-                                            const double *n, double around) {
-    const double least = around_line(points, count, x, n, around);
+                                            const double *n, double around, double behind) {
+    const double least = around_line(points, count, x, n, around, behind);
     double nearest = VAST, there = VAST;
     for (int i = 0; i < count && least >= VAST; i++) {
       const double *p = points + 3 * i;
       const double d[3] = {p[0] - x[0], p[1] - x[1], p[2] - x[2]};
       const double along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
       const double aside = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along;
-      if (aside < nearest) nearest = aside, there = along;
+      if (aside < nearest && along > -behind) nearest = aside, there = along;
     }
     return least < VAST ? least : there;
   }

@@ -145,7 +145,7 @@ def gap_to_thin(mean: wp.float32, height: wp.float32) -> wp.float32: ...
 
 @wp.func_native("""
   const double *from = (const double *)points.data + 3 * first;
-  return mpm::Surface::begins(from, count, &x.c[0], &n.c[0], around);
+  return mpm::Surface::begins(from, count, &x.c[0], &n.c[0], around, behind);
 """)
 def surface_begins(
     points: wp.array(dtype=wp.vec3d),
@@ -154,6 +154,7 @@ def surface_begins(
     x: wp.vec3d,
     n: wp.vec3d,
     around: wp.float64,
+    behind: wp.float64,
 ) -> wp.float64: ...
 
 

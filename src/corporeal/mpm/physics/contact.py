@@ -138,22 +138,28 @@ def gap_to_plane(mean: Vectors, height: Scalars, normal: Vectors, cell: float) -
     return (-half_space_mean(-h) - xi - touching_distance(h)) * cell
 
 
-def surface_begins(points: Vectors, node: Vectors, normal: Vectors, around: float) -> Scalars:
+def surface_begins(
+    points: Vectors, node: Vectors, normal: Vectors, around: float, behind: float
+) -> Scalars:
     """Where a thin rigid body begins along n, seen from each node [m]: least (p - x)·n.
 
     Its surface points nearer than ``around`` [m] to the line through the node along n count; where
-    there are none, the one nearest to the line does.
+    there are none, the one nearest to the line does. What is farther than ``behind`` [m] behind a
+    node is another wall, and does not count; without any others it is infinite.
 
     Args:
         points: On its surface [m].
         node: Where it is looked from [m].
         normal: Along which, unit.
         around: [m]
+        behind: [m]
 
     """
     offset = points[None, :] - node[:, None]
     along = np.einsum("enk,ek->en", offset, normal)
     aside = np.sum(offset**2, axis=2) - along**2
+    far = along <= -behind
+    aside[far], along[far] = np.inf, np.inf
     least = np.where(aside < around**2, along, np.inf).min(axis=1)
     nearest = np.take_along_axis(along, np.argmin(aside, axis=1)[:, None], axis=1)[:, 0]
     return np.where(np.isfinite(least), least, nearest)

@@ -373,9 +373,9 @@ def _between_surfaces(
     found: list[np.ndarray | None] = []
     for body, way in zip(pair, (-normal, normal), strict=True):
         points = scene.surface(body) if scene.is_rigid(body) else np.zeros((0, 3))
-        around = SHOWN_AROUND * cell
+        limits = SHOWN_AROUND * cell, SIGHT * cell
         shown = len(points) > 0
-        found.append(contact.surface_begins(points, node, way, around) if shown else None)
+        found.append(contact.surface_begins(points, node, way, *limits) if shown else None)
     first, second = found
     if first is None and second is not None:
         return contact.gap_to_thin(look.mean[slots[0]], second, normal, cell)

@@ -127,14 +127,15 @@ struct Solver {
   }
   // The least (p - x) . n of a thin body's points around that line, without a look at runs of points that
   // are all farther from it; VAST: there are none. In its frame [m].
-  static inline double first_around(const Field &F, const double *x, const double *n, double around) {
+  static inline double first_around(const Field &F, const double *x, const double *n, double around,
+                                    double behind) {
     double least = mpm::VAST;
     for (int s = 0; s < F.shows; s++) {
       const double *run = F.show + 6 * s, d[3] = {run[2] - x[0], run[3] - x[1], run[4] - x[2]};
       const double along = Vec::dot(d, n), aside = Vec::dot(d, d) - along * along, reach = around + run[5];
       if (aside > reach * reach * mpm::REACH_MARGIN || along - run[5] * mpm::REACH_MARGIN > least) continue;
       const double *points = F.shown + 3 * (int)run[0];
-      const double at = mpm::Surface::around_line(points, (int)(run[1] - run[0]), x, n, around);
+      const double at = mpm::Surface::around_line(points, (int)(run[1] - run[0]), x, n, around, behind);
       if (at < least) least = at;
     }
     return least;
@@ -145,8 +146,9 @@ struct Solver {
     double q[3], d[3];
     inside(F, x, n, q, d);
     for (int i = 0; i < 3 && scale < 0; i++) d[i] = -d[i];
-    const double around = mpm::SHOWN_AROUND * w->dx, near = first_around(F, q, d, around);
-    const double at = near < mpm::VAST ? near : mpm::Surface::begins(F.surface, F.surfaces, q, d, around);
+    const double around = mpm::SHOWN_AROUND * w->dx, behind = mpm::SIGHT * w->dx;
+    double at = first_around(F, q, d, around, behind);
+    if (at >= mpm::VAST) at = mpm::Surface::begins(F.surface, F.surfaces, q, d, around, behind);
     return at * (scale < 0 ? -scale : scale);
   }
   // Relative velocity as the step began, before its forces: what friction's work is booked with.
