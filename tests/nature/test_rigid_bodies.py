@@ -4,9 +4,11 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import trimesh
 from laws import touching
 from laws.bodies import Stuff, ball, ball_rounding, ball_surface, box, box_surface, floor, problem
 
+import corporeal as co
 from corporeal.mpm.physics import backing
 from corporeal.types import ROUNDING
 
@@ -251,6 +253,22 @@ def test_a_ball_that_is_known_to_be_round_rolls_as_far_as_a_ball(fast_engine):
 def test_a_ball_of_corners_loses_speed_at_each(fast_engine):
     """The control: a wheel without a rim (McGeer 1990)."""
     assert rolled_share(fast_engine, rounded=False) < 0.9
+
+
+def test_a_cube_that_is_let_go_on_its_edge_falls_flat():
+    """It is 3.5 cells across: too large to be thin, and nodes near its edges see no half space."""
+    size, top = 0.04, 0.08
+    cube = trimesh.creation.box((size,) * 3)
+    cube.apply_transform(trimesh.transformations.rotation_matrix(np.radians(15), [0, 1, 0]))
+    cube.apply_translation((0.013, 0.004, top - cube.bounds[0][2] + 0.001))
+    slab = co.box("wood", (0.3, 0.3, top), name="slab")
+    one = co.solid("ice", np.array(cube.vertices), cube.faces, name="cube")
+    given = co.pose_problem(co.prepare(co.build_scene(slab, one)))
+    assert 2.5 < size / given.cell < 4.5
+    run = co.build_engine(given)
+    run.advance(0.25)
+    height = run.measure().centre[1, 2] - top
+    assert height == pytest.approx(size / 2, abs=0.1 * given.cell)
 
 
 def test_a_rigid_body_keeps_its_shape_to_the_last_digit(patient_engine):

@@ -112,6 +112,12 @@ the next."""
 WIDEST_HOLE = 0.8
 """A hole between a face's points whose middle is no farther from them than this, over what they
 stand for [-], is of their scatter and belongs to the face."""
+MOSTLY_FLAT = 0.67
+"""A body of flat faces has more than this share of its surface points on some [-]. Where two such
+bodies meet, surface points say where they begin, however thick they are …"""
+FLAT_APART = 1.2
+"""… unless means alone say that they are farther apart than this [cells]: those misjudge the gap of
+what is thicker than ``THIN`` by less."""
 FACET_NODES = 2.0
 """What is round meets a flat face exactly, and not on nodes that are nearer to there than this
 [cells] and √(r dx/2 + 9 dx²): beyond, the gap of a ball of radius r is larger than what nodes

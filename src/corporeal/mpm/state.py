@@ -12,7 +12,7 @@ from corporeal.mpm.constants import SMALLEST_VOLUME
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import branches, rigid
 from corporeal.mpm.physics.branches import Branches, Memory
-from corporeal.mpm.physics.facets import Facets, facets_of
+from corporeal.mpm.physics.facets import Facets, facets_of, of_flat_faces
 from corporeal.mpm.problem import Body, Problem
 from corporeal.mpm.substance import Substances
 from corporeal.types import ROUNDING
@@ -85,6 +85,11 @@ class Matter:
         """Flat faces of each body at the start, from its centre."""
         both = zip(self.surface, self.rounding, strict=True)
         return tuple(facets_of(points, rows) for points, rows in both)
+
+    @cached_property
+    def flat(self) -> tuple[bool, ...]:
+        """Whether each body is bounded by flat faces for the most part."""
+        return tuple(map(of_flat_faces, self.facets, self.surface))
 
     @cached_property
     def spacing(self) -> Float[np.ndarray, " B"]:

@@ -16,7 +16,7 @@ from corporeal.mpm.cpu.layout import BOX, CENTRE, LANES, PAIR, RADIUS
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.contact import face_table
-from corporeal.mpm.physics.facets import facets_of
+from corporeal.mpm.physics.facets import facets_of, of_flat_faces
 from corporeal.mpm.problem import Body, Problem
 from corporeal.mpm.state import rounding_of
 from corporeal.types import ROUNDING
@@ -76,9 +76,9 @@ def rigid_grid(
     normals = rounding_of(body)[:, :3]
     thin = rigid.thinness(body.surface, normals, cell)
     spacing = rigid.spacing(body.surface)
-    # Many nodes ask where a thin body's surface begins: runs of points that are near each other.
+    # Many nodes ask where a body's surface begins: runs of points that are near each other.
     width = max(SHOWN_AROUND * cell, RUN_ACROSS * spacing)
-    shown, shows = _clumped(surface if thin else surface[:0], width)
+    shown, shows = _clumped(surface, width)
     slim = surface[: len(body.surface)][rigid.thin_places(body.surface, normals, cell)]
     state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
     arrays = {
@@ -109,6 +109,7 @@ def rigid_grid(
     record["bends"] = bool(np.any(rounding[:, 10:] != 0.0))
     record["spacing"] = spacing
     record["thin"], record["slims"] = thin, len(slim)
+    record["flat"] = of_flat_faces(facets, body.surface)
     return arrays
 
 

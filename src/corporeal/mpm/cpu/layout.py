@@ -182,7 +182,7 @@ FIELD = Record(
     ("double *", "patch"),  # rigid: [patches][6] of those, as of clumps
     ("float *", "places"),  # rigid: [3][wets] where they lie, to pass over most of them fast
     ("double *", "clump"),  # rigid: [clumps][6] first and last point, middle, radius
-    ("double *", "shown show"),  # thin: surface points in order of place; [shows][6] as of clumps
+    ("double *", "shown show"),  # rigid: surface points in order of place; [shows][6] as of clumps
     ("double *", "slim"),  # rigid: [slims][3] surface points where it is thin and not as a whole
     ("double", "spacing"),  # rigid: of its surface points
     ("double", "mass full"),  # full: of a cell full of it
@@ -194,6 +194,7 @@ FIELD = Record(
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
     ("int", "patches wets shows facets slims"),
     ("int", "rolls"),  # rigid: whether any of its surface points is round
+    ("int", "flat"),  # rigid: whether it is bounded by flat faces for the most part
     ("int", "bends"),  # rigid: whether it curves outwards or inwards anywhere
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )

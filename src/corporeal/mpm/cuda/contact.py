@@ -6,6 +6,7 @@ Same formulas as ``physics.contact`` and ``reference.contact``, in float32 and r
 from corporeal.mpm.constants import (
     FIELDS_AT_NODE,
     FIRST_BIAS,
+    FLAT_APART,
     HELD_BY_WALL,
     LIQUID_TOUCHES,
     OTHER_BIAS,
@@ -335,15 +336,17 @@ def face_of(r: Rigid, s: Sheet, b: int, x: wp.vec3d, mean: wp.vec3, number: int)
 
 @wp.func
 def gap_of(c: Contacts, r: Rigid, s: Sheet, t: int, xa: wp.float32, xc: wp.float32):
-    """Open distance of two fields along n [cells], of which one may be a thin rigid body."""
+    """Open distance of two fields along n [cells], by surface points of what is thin or flat."""
     a = c.fa[t]
     b = c.fc[t]
-    gap = float(0.0)
-    thin = r.thin[a] > 0 or r.thin[b] > 0
-    if not thin and r.points[a] > 0 and r.points[b] > 0:
-        thin = is_thin(r, s, a, c.point[t]) or is_thin(r, s, b, c.point[t])
-    if not thin:
-        gap = gap_between(c.face, xa, xc)
+    gap = gap_between(c.face, xa, xc)
+    asked = r.thin[a] > 0 or r.thin[b] > 0
+    if not asked:
+        asked = r.flat[a] == 1 and r.flat[b] == 1 and gap <= FLAT_APART
+    if not asked and r.points[a] > 0 and r.points[b] > 0:
+        asked = is_thin(r, s, a, c.point[t]) or is_thin(r, s, b, c.point[t])
+    if not asked:
+        pass
     elif r.points[a] == 0:
         gap = gap_to_thin(xa, begins(r, s, b, c.point[t], c.normal[t]))
     elif r.points[b] == 0:

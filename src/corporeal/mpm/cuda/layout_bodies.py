@@ -72,6 +72,8 @@ class Rigid:
     """Distance of its surface points [m]."""
     thin: wp.array(dtype=wp.int32)
     """See ``physics.rigid.thinness``; 0 for what deforms."""
+    flat: wp.array(dtype=wp.int32)
+    """1: rigid, and bounded by flat faces for the most part."""
     slim: wp.array(dtype=wp.vec3d)
     """Surface points where a body is thin and not as a whole, see ``physics.rigid`` …"""
     slim_first: wp.array(dtype=wp.int32)

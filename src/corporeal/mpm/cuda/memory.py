@@ -140,9 +140,10 @@ class Memory:
         rows = [matter.rounding[b].reshape(-1) for b in stiff]
         r.rounding = self.put(np.concatenate([np.zeros(0), *rows]), wp.float64)
         r.bends = self.put(np.array([np.any(m[:, 10:] != 0.0) for m in matter.rounding]), wp.int32)
-        count, thin = np.zeros((2, len(matter.surface)), int)
+        count, thin, flat = np.zeros((3, len(matter.surface)), int)
         count[stiff] = [len(p) for p in points]
         thin[stiff] = [matter.thinness(cell)[b] for b in stiff]
+        flat[stiff] = [matter.flat[b] for b in stiff]
         places = matter.thin_places(cell)
         slim = [matter.surface[b][places[b]] for b in stiff]
         slims = np.zeros(len(matter.surface), int)
@@ -150,7 +151,7 @@ class Memory:
         r.slim = self.put(np.concatenate([np.zeros((0, 3)), *slim]), wp.vec3d)
         r.slim_first = self.put(np.cumsum(slims) - slims, wp.int32)
         r.slim_count = self.put(slims, wp.int32)
-        r.spacing = self.put(matter.spacing, wp.float64)
+        r.spacing, r.flat = self.put(matter.spacing, wp.float64), self.put(flat, wp.int32)
         r.first = self.put(np.cumsum(count) - count, wp.int32)
         r.points, r.thin = self.put(count, wp.int32), self.put(thin, wp.int32)
 

@@ -89,27 +89,49 @@ struct Surface {
   // The least of those around the line alone; VAST: there are none.
   CUDA_CALLABLE static inline double around_line(const double *points, int count, const double *x,
                                                  const double *n, double around, double behind) {
-    double least = VAST;
-    for (int i = 0; i < count; i++) {
+    double best[4] = {VAST, VAST, VAST, VAST};
+    const double square = around * around;
+    int i = 0;
+    for (; i + 4 <= count; i += 4) {   // four side by side, which become vectors
+      double along[4], aside[4];
+      for (int l = 0; l < 4; l++) {
+        const double *p = points + 3 * (i + l);
+        const double a = p[0] - x[0], b = p[1] - x[1], c = p[2] - x[2];
+        along[l] = a * n[0] + b * n[1] + c * n[2];
+        aside[l] = a * a + b * b + c * c - along[l] * along[l];
+      }
+      for (int l = 0; l < 4; l++) {
+        const double at = ((aside[l] < square) & (along[l] > -behind)) ? along[l] : (double)VAST;
+        best[l] = at < best[l] ? at : best[l];
+      }
+    }
+    for (; i < count; i++) {
       const double *p = points + 3 * i;
       const double d[3] = {p[0] - x[0], p[1] - x[1], p[2] - x[2]};
       const double along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
       const double aside = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along;
-      if (aside < around * around && along > -behind && along < least) least = along;
+      if (aside < square && along > -behind && along < best[0]) best[0] = along;
     }
+    const double one = best[0] < best[1] ? best[0] : best[1], two = best[2] < best[3] ? best[2] : best[3];
+    const double least = one < two ? one : two;
     return least;
   }
-  CUDA_CALLABLE static inline double begins(const double *points, int count, const double *x,
-                                            const double *n, double around, double behind) {
-    const double least = around_line(points, count, x, n, around, behind);
-    double nearest = VAST, there = VAST;
-    for (int i = 0; i < count && least >= VAST; i++) {
+  // How far along the line the point nearest to it is, if it is nearer than the nearest so far (squared).
+  CUDA_CALLABLE static inline void by_line(const double *points, int count, const double *x, const double *n,
+                                           double behind, double &nearest, double &there) {
+    for (int i = 0; i < count; i++) {
       const double *p = points + 3 * i;
       const double d[3] = {p[0] - x[0], p[1] - x[1], p[2] - x[2]};
       const double along = d[0] * n[0] + d[1] * n[1] + d[2] * n[2];
       const double aside = d[0] * d[0] + d[1] * d[1] + d[2] * d[2] - along * along;
       if (aside < nearest && along > -behind) nearest = aside, there = along;
     }
+  }
+  CUDA_CALLABLE static inline double begins(const double *points, int count, const double *x,
+                                            const double *n, double around, double behind) {
+    const double least = around_line(points, count, x, n, around, behind);
+    double nearest = VAST, there = VAST;
+    if (least >= VAST) by_line(points, count, x, n, behind, nearest, there);
     return least < VAST ? least : there;
   }
   // Whether one of the places where a body is thin is as near to x as a node sees.

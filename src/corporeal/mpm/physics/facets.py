@@ -11,6 +11,7 @@ from corporeal.mpm.constants import (
     FACET_SPREAD,
     FACET_TURN,
     FEWEST_ON_FACET,
+    MOSTLY_FLAT,
     SAME_PLANE,
     WIDEST_HOLE,
 )
@@ -59,6 +60,11 @@ def facets_of(surface: Float[np.ndarray, "S 3"], rounding: Float[np.ndarray, "S 
             count += len(held)
         left = left[~mine]
     return Facets(np.array(rows).reshape(-1, FACET_ROW), np.concatenate(points))
+
+
+def of_flat_faces(facets: Facets, surface: Float[np.ndarray, "S 3"]) -> bool:
+    """Tell whether a body is bounded by flat faces: most of its surface points lie on some."""
+    return len(facets.point) > MOSTLY_FLAT * len(surface)
 
 
 def on_facet(

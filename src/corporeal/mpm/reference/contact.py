@@ -11,6 +11,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import (
+    FLAT_APART,
     HELD_BY_WALL,
     SHOWN_AROUND,
     SIGHT,
@@ -303,13 +304,14 @@ def _between(
         kept = KeptChoices.of_pair(pair, index, which)
     normal = contact.taken(candidates, which)
     normal = contact.smooth_normals(normal, np.minimum(scene.mass[a], scene.mass[c]), index)
-    if max(thin) > 0:
-        gap = _between_surfaces(scene, look, pair, slots, normal)
-    else:
-        gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
-        at = _thin_there(scene, pair, index * cell)
-        if at.any():
-            gap[at] = _between_surfaces(scene, look, pair, (a[at], c[at]), normal[at])
+    gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
+    asked = np.full(len(a), max(thin) > 0)
+    if all(map(scene.flat, pair)):
+        asked |= gap <= FLAT_APART * cell
+    if not asked.all():
+        asked |= _thin_there(scene, pair, index * cell)
+    if asked.any():
+        gap[asked] = _between_surfaces(scene, look, pair, (a[asked], c[asked]), normal[asked])
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
     movers = scene.mover_of_slot(a), scene.mover_of_slot(c)
     return Touch(pair, *movers, index * cell, normal, gap, kept=kept)
@@ -367,7 +369,8 @@ def _between_surfaces(
 ) -> Float[np.ndarray, " E"]:
     """Open distance where surface points say where a rigid body begins [m].
 
-    They do where it is thin: as a whole, or between two rigid bodies there.
+    They do where it is thin: as a whole, or between two rigid bodies there, and between two that
+    are bounded by flat faces.
     """
     cell, node = scene.problem.cell, scene.grid.index[slots[0]] * scene.problem.cell
     found: list[np.ndarray | None] = []

@@ -133,6 +133,10 @@ class Scene:
             return 0
         return self.matter.thinness(self.problem.cell)[field]
 
+    def flat(self, field: int) -> bool:
+        """Whether a field is rigid and bounded by flat faces for the most part."""
+        return self.is_rigid(field) and self.matter.flat[field]
+
     @property
     def wall_mover(self) -> int:
         """Movers are the bodies, then the slots, then the planes, of which this is the first."""

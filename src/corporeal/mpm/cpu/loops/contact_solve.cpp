@@ -20,7 +20,11 @@ struct Solver {
       const double mean = F.rigids ? -pc : pa, h = T.gap * inv, full = filled(w, F.rigids ? C : A);
       return T.mu < mpm::STICKS ? Face::gap_of_liquid(mean, h, full) : Face::gap_to_surface(mean, h);
     }
-    if (!F.thin && !G.thin && !thin_there(w, F, G, T)) return Face::gap(w->face, pa, pc);
+    if (!F.thin && !G.thin) {
+      const double apart = Face::gap(w->face, pa, pc);
+      const bool flat = F.flat && G.flat && apart <= mpm::FLAT_APART;
+      if (!flat && !thin_there(w, F, G, T)) return apart;
+    }
     const double sa = F.surfaces ? -begins(w, F, T.x, n, -inv) : 0, sc = G.surfaces ? begins(w, G, T.x, n, inv) : 0;
     if (!F.surfaces) return Face::gap_to_thin(pa, sc);
     return G.surfaces ? sc - sa : Face::gap_to_thin(-pc, -sa);
@@ -125,30 +129,63 @@ struct Solver {
     }
     return found;
   }
-  // The least (p - x) . n of a thin body's points around that line, without a look at runs of points that
-  // are all farther from it; VAST: there are none. In its frame [m].
-  static inline double first_around(const Field &F, const double *x, const double *n, double around,
-                                    double behind) {
-    double least = mpm::VAST;
-    for (int s = 0; s < F.shows; s++) {
+  // Surface::begins of a rigid body, without a look at runs of points none of which may be the one.
+  struct Runs {
+    enum { MOST = 128 };   // more than that are looked at in the order of their place
+    const Field &F;
+    const double *x, *n, around, behind;
+    double along, aside;   // of a run's middle
+    inline const double *look(int s) {
       const double *run = F.show + 6 * s, d[3] = {run[2] - x[0], run[3] - x[1], run[4] - x[2]};
-      const double along = Vec::dot(d, n), aside = Vec::dot(d, d) - along * along, reach = around + run[5];
-      if (aside > reach * reach * mpm::REACH_MARGIN || along - run[5] * mpm::REACH_MARGIN > least) continue;
-      const double *points = F.shown + 3 * (int)run[0];
+      along = Vec::dot(d, n), aside = Vec::dot(d, d) - along * along;
+      return run;
+    }
+    inline void within(int s, double &least) const {
+      const double *run = F.show + 6 * s, *points = F.shown + 3 * (int)run[0];
       const double at = mpm::Surface::around_line(points, (int)(run[1] - run[0]), x, n, around, behind);
       if (at < least) least = at;
     }
-    return least;
-  }
-  // Where a thin rigid body begins along n, or against it for a negative scale; in cells.
+    // Those around the line, first the runs that may begin first.
+    inline double first() {
+      double low[MOST], least = mpm::VAST;
+      int held[MOST], count = 0;
+      for (int s = 0; s < F.shows; s++) {
+        const double *run = look(s), reach = around + run[5], from = along - run[5] * mpm::REACH_MARGIN;
+        if (aside > reach * reach * mpm::REACH_MARGIN || from > least) continue;
+        if (along + run[5] * mpm::REACH_MARGIN < -behind) continue;
+        if (count < MOST)
+          held[count] = s, low[count++] = from;
+        else
+          within(s, least);
+      }
+      for (; count > 0; count--) {
+        int next = 0;
+        for (int i = 1; i < count; i++)
+          if (low[i] < low[next]) next = i;
+        if (low[next] > least) break;
+        within(held[next], least);
+        held[next] = held[count - 1], low[next] = low[count - 1];
+      }
+      return least;
+    }
+    inline double by_line() {
+      double nearest = mpm::VAST, there = mpm::VAST;
+      for (int s = 0; s < F.shows; s++) {
+        const double *run = look(s), off = sqrt(aside > 0 ? aside : 0.0) - run[5] * mpm::REACH_MARGIN;
+        if (off > 0 && off * off > nearest) continue;
+        mpm::Surface::by_line(F.shown + 3 * (int)run[0], (int)(run[1] - run[0]), x, n, behind, nearest, there);
+      }
+      return there;
+    }
+  };
+  // Where a rigid body begins along n, or against it for a negative scale; in cells.
   static inline double begins(const World *w, const Field &F, const double *x, const double *n,
                               double scale) {
     double q[3], d[3];
     inside(F, x, n, q, d);
     for (int i = 0; i < 3 && scale < 0; i++) d[i] = -d[i];
-    const double around = mpm::SHOWN_AROUND * w->dx, behind = mpm::SIGHT * w->dx;
-    double at = first_around(F, q, d, around, behind);
-    if (at >= mpm::VAST) at = mpm::Surface::begins(F.surface, F.surfaces, q, d, around, behind);
+    Runs runs = {F, q, d, mpm::SHOWN_AROUND * w->dx, mpm::SIGHT * w->dx, 0, 0};
+    const double near = runs.first(), at = near < mpm::VAST ? near : runs.by_line();
     return at * (scale < 0 ? -scale : scale);
   }
   // Relative velocity as the step began, before its forces: what friction's work is booked with.
