@@ -81,7 +81,7 @@ def rows(p: Any, name: str) -> np.ndarray:
     """Copy what is kept of all particles by a name to the host, (P, *shape)."""
     shape, _ = STATE[name]
     values = getattr(p, name).numpy().reshape(-1, p.words.shape[1])[:, : p.count]
-    return np.array(values.T, order="C").reshape(p.count, *shape)  # the processor's memory lies bare
+    return np.array(values.T, order="C").reshape(p.count, *shape)  # never a view
 
 
 def put(p: Any, name: str, values: np.ndarray) -> None:
