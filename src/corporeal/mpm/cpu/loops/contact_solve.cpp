@@ -131,7 +131,7 @@ struct Solver {
   }
   // Surface::begins of a rigid body, without a look at runs of points none of which may be the one.
   struct Runs {
-    enum { MOST = 128 };   // more than that are looked at in the order of their place
+    enum { RUNS_HELD = 128 };   // more than that are looked at in the order of their place
     const Field &F;
     const double *x, *n, around, behind;
     double along, aside;   // of a run's middle
@@ -147,13 +147,13 @@ struct Solver {
     }
     // Those around the line, first the runs that may begin first.
     inline double first() {
-      double low[MOST], least = mpm::VAST;
-      int held[MOST], count = 0;
+      double low[RUNS_HELD], least = mpm::VAST;
+      int held[RUNS_HELD], count = 0;
       for (int s = 0; s < F.shows; s++) {
         const double *run = look(s), reach = around + run[5], from = along - run[5] * mpm::REACH_MARGIN;
         if (aside > reach * reach * mpm::REACH_MARGIN || from > least) continue;
         if (along + run[5] * mpm::REACH_MARGIN < -behind) continue;
-        if (count < MOST)
+        if (count < RUNS_HELD)
           held[count] = s, low[count++] = from;
         else
           within(s, least);
