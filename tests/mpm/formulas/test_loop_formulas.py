@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from corporeal.mpm import constants, formulas
-from corporeal.mpm.formulas import one_lane
+from corporeal.mpm.formulas import one_lane, one_lane_contact
 from corporeal.mpm.physics import (
     backing,
     contact,
@@ -102,9 +102,9 @@ def test_splines_and_slopes_are_those_of_float64_at_both_widths(rng):
 @wp.kernel
 def gaps(table: Floats, a: Floats, c: Floats, h: Floats, out: wp.array2d(dtype=wp.float32)):
     i = wp.tid()
-    out[0, i] = one_lane.gap_between(table, a[i], c[i])
-    out[1, i] = one_lane.gap_to_plane(a[i], h[i])
-    out[2, i] = one_lane.gap_to_thin(a[i], h[i])
+    out[0, i] = one_lane_contact.gap_between(table, a[i], c[i])
+    out[1, i] = one_lane_contact.gap_to_plane(a[i], h[i])
+    out[2, i] = one_lane_contact.gap_to_thin(a[i], h[i])
 
 
 @wp.func_native("""
@@ -160,7 +160,7 @@ def test_the_numbers_of_the_method_are_written_from_python():
 @wp.kernel
 def reaches(F: Matrices, n: Vectors, r0: Floats, out: Floats):
     i = wp.tid()
-    out[i] = one_lane.reach_of(F[i], n[i], r0[i])
+    out[i] = one_lane_contact.reach_of(F[i], n[i], r0[i])
 
 
 @wp.func_native("""
@@ -192,7 +192,7 @@ def test_particles_reach_as_far_as_their_stretch_says_at_both_widths(rng):
 
 @wp.kernel
 def steps_kept_in_native_text(travel: Doubles, out: wp.array(dtype=wp.int32)):
-    out[wp.tid()] = one_lane.steps_kept(travel[wp.tid()])
+    out[wp.tid()] = one_lane_contact.steps_kept(travel[wp.tid()])
 
 
 def test_normals_of_what_moves_farther_in_a_step_are_chosen_more_often():
@@ -212,9 +212,9 @@ def projections(
     i = wp.tid()
     un = wp.dot(u[i], n[i])
     old = wp.dot(J[i], n[i])
-    push = one_lane.push_of(old, un, D(0.1), soft[i])
+    push = one_lane_contact.push_of(old, un, D(0.1), soft[i])
     rub = J[i] - old * n[i] + (u[i] - un * n[i]) / soft[i]
-    out[i] = one_lane.within_cone(mu[i], push, n[i], rub)
+    out[i] = one_lane_contact.within_cone(mu[i], push, n[i], rub)
 
 
 def test_one_projection_onto_coulombs_cone_is_that_of_numpy(rng):
@@ -252,7 +252,7 @@ def test_one_projection_onto_coulombs_cone_is_that_of_numpy(rng):
 @wp.kernel
 def spans(m: Doubles, h: Doubles, full: D, dx: D, dt: D, out: Doubles):
     i = wp.tid()
-    out[i] = one_lane.wall_span(m[i], full, h[i], dx, dt)
+    out[i] = one_lane_contact.wall_span(m[i], full, h[i], dx, dt)
 
 
 @wp.kernel
@@ -260,7 +260,7 @@ def drags(
     span: Doubles, soft: Doubles, curve: Vectors64, n: Vectors64, t: Vectors64, out: Vectors64
 ):
     i = wp.tid()
-    out[i] = one_lane.dragged(soft[i], span[i], curve[i], D(0.25), n[i], t[i])
+    out[i] = one_lane_contact.dragged(soft[i], span[i], curve[i], D(0.25), n[i], t[i])
 
 
 def test_what_a_wall_drags_on_a_liquid_is_that_of_numpy(rng):
@@ -293,10 +293,10 @@ def targets(
     e: Doubles, u: Doubles, kick: Doubles, f: Doubles, g: Doubles, dt: D, dx: D, out: Doubles
 ):
     i = wp.tid()
-    approach = one_lane.approach_of(u[i], kick[i], f[i])
-    out[i] = one_lane.closing_speed(g[i], dt)
-    if e[i] > D(0.0) and one_lane.impact_begins(approach, u[i], g[i], dt):
-        out[i] = one_lane.impact_target(e[i], approach, u[i], g[i], dt, dx)
+    approach = one_lane_contact.approach_of(u[i], kick[i], f[i])
+    out[i] = one_lane_contact.closing_speed(g[i], dt)
+    if e[i] > D(0.0) and one_lane_contact.impact_begins(approach, u[i], g[i], dt):
+        out[i] = one_lane_contact.impact_target(e[i], approach, u[i], g[i], dt, dx)
 
 
 def test_what_rebounds_and_how_fast_is_as_in_numpy(rng):
@@ -319,7 +319,7 @@ def test_what_rebounds_and_how_fast_is_as_in_numpy(rng):
 @wp.kernel
 def bounces(e: Doubles, laws: wp.array2d(dtype=D), v: Doubles, out: Doubles):
     i = wp.tid()
-    out[i] = one_lane.bounce_at(e[i], laws, i, v[i])
+    out[i] = one_lane_contact.bounce_at(e[i], laws, i, v[i])
 
 
 def test_restitution_at_the_speed_of_a_blow_is_as_in_numpy(rng):

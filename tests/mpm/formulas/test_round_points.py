@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.mpm.cuda.layout import wp
-from corporeal.mpm.formulas import one_lane, options
+from corporeal.mpm.formulas import one_lane_contact, options
 from corporeal.mpm.physics.rounding import shift_to_contact
 
 wp.set_module_options(options())
@@ -18,7 +18,7 @@ def shifts(
     out: wp.array(dtype=wp.vec4d),
 ):
     i = wp.tid()
-    out[i] = one_lane.shift_to_contact(rows, i, towards[i])
+    out[i] = one_lane_contact.shift_to_contact(rows, i, towards[i])
 
 
 def unit(rows):

@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.mpm.cuda.layout import wp
-from corporeal.mpm.formulas import one_lane, options
+from corporeal.mpm.formulas import one_lane_contact, options
 from corporeal.mpm.physics import contact
 from corporeal.mpm.problem import WettedSurface
 
@@ -24,7 +24,7 @@ def faces(
 ):
     i = wp.tid()
     for number in range(3):
-        out[i, number] = one_lane.wetted_face(rows, 0, count, node[i], place[i], dx, number)
+        out[i, number] = one_lane_contact.wetted_face(rows, 0, count, node[i], place[i], dx, number)
 
 
 @wp.kernel
@@ -35,7 +35,7 @@ def gaps(
     out: wp.array(dtype=wp.float32),
 ):
     i = wp.tid()
-    out[i] = one_lane.gap_of_liquid(mean[i], h[i], full[i])
+    out[i] = one_lane_contact.gap_of_liquid(mean[i], h[i], full[i])
 
 
 @pytest.fixture

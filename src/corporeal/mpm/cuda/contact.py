@@ -38,15 +38,14 @@ from corporeal.mpm.cuda.layout import (
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.cuda.rows import cell_at, matrix_at, vector_at
-from corporeal.mpm.formulas.one_lane import (
+from corporeal.mpm.formulas.one_lane import slopes, splines
+from corporeal.mpm.formulas.one_lane_contact import (
     gap_between,
     gap_of_liquid,
     gap_to_plane,
     gap_to_surface,
     gap_to_thin,
     reach_of,
-    slopes,
-    splines,
     surface_begins,
     thin_there,
     wall_span,

@@ -47,12 +47,7 @@ from corporeal.mpm.cuda.layout import (
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.cuda.rigid import softness_at, speed_at
-from corporeal.mpm.formulas.one_lane import (
-    closing_speed,
-    dragged,
-    push_of,
-    within_cone,
-)
+from corporeal.mpm.formulas.one_lane_contact import closing_speed, dragged, push_of, within_cone
 
 wp.set_module_options(formulas.options(max_unroll=0))
 

@@ -29,7 +29,7 @@ from corporeal.mpm.cuda.layout import (
 )
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
-from corporeal.mpm.formulas.one_lane import (
+from corporeal.mpm.formulas.one_lane_contact import (
     BACKING_ROW,
     BACKING_SUMS,
     BOUNCE,

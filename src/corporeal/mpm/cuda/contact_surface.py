@@ -10,7 +10,7 @@ from corporeal.mpm.cuda.layout import DT, FULL, NODES, STIFF, TOUCHES, D, Sheet,
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.cuda.rigid import speed_at
-from corporeal.mpm.formulas.one_lane import (
+from corporeal.mpm.formulas.one_lane_contact import (
     ball_radius,
     curved_inward,
     curved_may,

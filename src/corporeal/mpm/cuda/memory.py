@@ -10,7 +10,7 @@ from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.layout import Grid, Sheet, wp
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
-from corporeal.mpm.formulas.one_lane import BACKING_ROW, LEAST
+from corporeal.mpm.formulas.one_lane_contact import BACKING_ROW, LEAST
 from corporeal.mpm.physics import prescribed
 from corporeal.mpm.physics.contact import face_table, full_cell
 from corporeal.mpm.physics.springs import longest_step

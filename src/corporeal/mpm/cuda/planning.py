@@ -36,7 +36,8 @@ from corporeal.mpm.cuda.layout import (
     wp,
 )
 from corporeal.mpm.cuda.layout_bodies import Loads, Rigid
-from corporeal.mpm.formulas.one_lane import ramped, steps_kept
+from corporeal.mpm.formulas.one_lane import ramped
+from corporeal.mpm.formulas.one_lane_contact import steps_kept
 
 wp.set_module_options(arena.options(max_unroll=0))
 
