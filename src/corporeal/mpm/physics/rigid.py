@@ -185,8 +185,7 @@ def thin_places(
     None of a body that is thin as a whole, see ``thinness``, of which every point counts.
     """
     places = np.zeros(len(surface), dtype=bool)
-    seldom = 0.0 < thin_walls(surface, normal, THIN * cell) <= MANY_WALLS
-    if seldom and thinness(surface, normal, cell) == 0:
+    if thinness(surface, normal, cell) == 0 and thin_walls(surface, normal, THIN * cell) > 0.0:
         known = np.flatnonzero(np.any(normal != 0.0, axis=1))
         places[known] = _walled(surface, normal, THIN * cell, known)
     return places
