@@ -39,6 +39,7 @@ from corporeal.types import (
     Structure,
     WeighedHypothesis,
 )
+from corporeal.vlm.lexicon import heads, tokens_of
 from corporeal.vlm.named_weights import fitting, ways_of
 from corporeal.vlm.outside_evidence import contradiction, likelihood
 from corporeal.vlm.words import leaves
@@ -100,7 +101,9 @@ class Scale:
         ]
         self.owner = [p.object for p in parts.catalogue]
         self.doubts = [doubt(m) for m in self.members]
-        self.forms = [form(m) for m in self.members]
+        # What is called by no word for a thing differs from no others of its name.
+        called = [bool(heads(tokens_of(o.class_name))) for o in scene.objects]
+        self.forms = [form(m) if called[self.owner[m.part]] else 0.0 for m in self.members]
         self.volume = sum(m.volume for m in self.members)
         """Of everything that is enclosed [m³]."""
         self._beds: dict[frozenset[int], dict[int, Member]] = {}

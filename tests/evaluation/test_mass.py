@@ -172,8 +172,7 @@ def test_what_is_known_is_weighed_and_a_hollow_ball_is_a_shell(weighed):
 def test_what_nobody_recognised_may_weigh_anything(weighed):
     _, found = weighed
     known, unknown = found[0], found[3]
-    # 1.2 before modelled shapes were doubted by .12 (decision 110).
-    assert unknown.high / unknown.low > 10 > 1.6 > known.high / known.low
+    assert unknown.high / unknown.low > 10 > 1.2 > known.high / known.low
 
 
 def test_the_comparison_has_every_method_and_every_group(weighed, tmp_path):
