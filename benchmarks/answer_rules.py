@@ -9,7 +9,7 @@ of one object each, pictured without names, as in ``evaluate mass``.
 
 import argparse
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 
 import numpy as np
@@ -45,6 +45,8 @@ class Drawn:
     pooled: Evidence | None
     own: tuple[Evidence | None, ...]
     """Of each answer."""
+    placed: Float[np.ndarray, " N"] = field(default_factory=lambda: np.ones(0))
+    """Of the ways of each draw, every value where it was placed [kg]."""
 
     def weights(self, evidence: bool, by_its_own: bool) -> Float[np.ndarray, " N"]:
         """Return what each draw counts; they add up to 1."""
@@ -75,15 +77,18 @@ class Drawn:
         return middle * float(np.exp(-down)), middle, middle * float(np.exp(up))
 
 
-def drawn(thing: Weighed, recordings: Path) -> Drawn:
+def drawn(thing: Weighed, recordings: Path, answers: int = ANSWERS) -> Drawn:
     """Draw what an object may weigh by recorded answers, as ``evaluate mass`` does."""
     scene = anonymous(life_sized(assemble([thing.file])), thing.file)
-    said = describe(scene, DescribeConfig(vlm=f"replay:{recordings}", answers=ANSWERS))
+    said = describe(scene, DescribeConfig(vlm=f"replay:{recordings}", answers=answers))
     scale = Scale(scene, segment(scene, said), GroundConfig(), 0)
-    masses = np.array([scale.draw(said, number).masses.sum() for number in range(DRAWS)])
+    draws = [scale.draw(said, number) for number in range(DRAWS)]
+    masses = np.array([draw.masses.sum() for draw in draws])
+    placed = np.array([scale.mass(draw.inventory) for draw in draws])
     (words,) = said.objects
     assert thing.mass is not None, "only measured things are drawn"
-    return Drawn(thing.mass, masses, words.evidence, tuple(a.evidence for a in words.answers))
+    own = tuple(a.evidence for a in words.answers)
+    return Drawn(thing.mass, masses, words.evidence, own, placed)
 
 
 @dataclass(frozen=True)
@@ -109,8 +114,13 @@ class Scored:
 def scored(things: Sequence[Drawn], evidence: bool, by_its_own: bool, few: bool) -> Scored:
     """Score one rule's intervals."""
     found = [one.interval(one.weights(evidence, by_its_own), few) for one in things]
+    return against(found, [one.truth for one in things])
+
+
+def against(found: Sequence[tuple[float, float, float]], truths: Sequence[float]) -> Scored:
+    """Score intervals (5 %, 50 %, 95 %) [kg] against what the scales say [kg]."""
     low, middle, high = np.log(found).T
-    truth = np.log([one.truth for one in things])
+    truth = np.log(truths)
     outside = np.maximum(low - truth, 0) + np.maximum(truth - high, 0)
     inside = (low <= truth) & (truth <= high)
     return Scored(np.abs(middle - truth), high - low, inside, high - low + MISS * outside)
