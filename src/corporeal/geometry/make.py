@@ -123,6 +123,8 @@ class Make:
     """Thickness that its mesh draws [m]; 0: it draws no wall with two faces."""
     whose: str = ""
     """Where its wall's thickness comes from, in a clause."""
+    outside: bool = False
+    """Whether its wall is taken to lie along its outside, as nobody saw how deep it is inside."""
     leaves: float = 0.0
     """Of a crown in bulk: area of one side of its leaves [m²], by which it is weighed; else 0."""
 
@@ -266,10 +268,11 @@ def decide(member: Member, piece: Specified) -> Make:
     thin. n says how its outside closes in (``Member.closing``). A wall whose mesh shows both faces
     is 2 V / A thick unless somebody stated or judged otherwise: thin walls are drawn too thick, in
     scans as in models; of open ware from pictures, whose inside may be plain, only where nobody
-    knows how thick such walls usually are. Open sheets weigh ρ A t. Of a piece, its shares of V and
-    A count, less the volume of what lies inside it; a piece that the mesh lacks is not bounded by
-    the mesh. Of what is packed of parts and air, the share that is matter counts; of what a scan
-    draws too thick, the share that is real.
+    knows how thick such walls usually are. Such ware weighs ρ A t with the area of its outside
+    (``open_ware.sheet_area``), whatever is drawn in its hollow. Open sheets weigh ρ A t. Of a
+    piece, its shares of V and A count, less the volume of what lies inside it; a piece that the
+    mesh lacks is not bounded by the mesh. Of what is packed of parts and air, the share that is
+    matter counts; of what a scan draws too thick, the share that is real.
     """
     structure, material, words = piece.structure, piece.material, piece.words
     wall = member.build is Build.WALL
@@ -284,9 +287,9 @@ def decide(member: Member, piece: Specified) -> Make:
         thickness, whose = wall_of(structure, words, drawn, stated or 0.0, guess)
     elif wall:
         thickness, whose = shown, DRAWN
-    face = (member.face_area if walled or wall else member.body_area) * words.surface_share
+    face = _face(member, words, walled or wall) * words.surface_share
     volume = member.volume * words.volume_share if not only_sheet else face * sheet
-    narrowing = member.narrowing(thickness) if walled else 1.0
+    narrowing = member.narrowing(thickness) if walled and not is_ware(member, words) else 1.0
     if not wall and _both_faces(words, volume, thickness * face):
         face, narrowing = 0.5 * face, 1.0
     sheets = member.sheet_area * words.surface_share
@@ -312,7 +315,15 @@ def decide(member: Member, piece: Specified) -> Make:
         density=material.density * (1.0 if walled else _real(words) * structure.solidity),
         shown=shown,
         whose=whose,
+        outside=is_ware(member, words),
     )
+
+
+def _face(member: Member, words: PartWords, walled: bool) -> float:
+    """Return the area of one face of a wall, or of all faces of what has none [m²]."""
+    if not walled:
+        return member.body_area
+    return member.outer_sheet if is_ware(member, words) else member.face_area
 
 
 def _real(words: PartWords) -> float:
@@ -361,8 +372,17 @@ def as_plate(made: Make, thickness: float) -> Make:
 
 def _both_faces(words: PartWords, volume: float, wall: float) -> bool:
     """Tell whether the mesh draws both faces of an open sheet, whose wall along all would be so."""
-    covers = words.inner_share > 0 or words.missing
-    return words.structure == "sheet" and not covers and 2 * volume < BOTH_FACES * wall
+    return _is_open(words) and not words.wall_unseen and 2 * volume < BOTH_FACES * wall
+
+
+def is_ware(member: Member, words: PartWords) -> bool:
+    """Tell whether a part is open ware whose hollow is not known: pictures showed its outside."""
+    return words.wall_unseen and _is_open(words) and member.volume > 0
+
+
+def _is_open(words: PartWords) -> bool:
+    """Tell whether a part is said to be an open sheet that covers nothing."""
+    return words.structure == "sheet" and not (words.inner_share > 0 or words.missing)
 
 
 def wall_of(
@@ -442,7 +462,9 @@ def how_walled(made: Make) -> str:
         return f"a wall {made.sheet * 1e3:.3g} mm thick"
     wall = f"a wall {made.thickness * 1e3:.3g} mm thick {made.whose}"
     if made.shown and abs(made.shown / made.thickness - 1) > ALIKE:
-        return f"{wall} (its mesh draws {made.shown * 1e3:.3g} mm)"
+        wall += f" (its mesh draws {made.shown * 1e3:.3g} mm)"
+    if made.outside:
+        wall += f" along the {made.area * 1e4:.3g} cm² of its outside, as its inside was not seen"
     return wall
 
 

@@ -21,6 +21,7 @@ from corporeal.geometry.anatomy import (
 from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.hollow import volume_below_rim
 from corporeal.geometry.mesh import Mesh, convergence, openness, orient, signed_volume, weld
+from corporeal.geometry.open_ware import sheet_area
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.spread import scatter
 
@@ -75,6 +76,17 @@ class Member:
             return 0.5 * self.body_area
         rng = np.random.default_rng(self.part)
         return self.body_area * (1 - inner_share(self.whole, self.body, self.size[0], rng))
+
+    @cached_property
+    def outer_sheet(self) -> float:
+        """Of the sheet that it is if it is open ware of which the outside alone is known [m²].
+
+        A wall with two faces is no larger than their mean, as roughness inside adds to its outside.
+        """
+        if self.whole is None or not len(self.body.triangles):
+            return 0.0
+        area = sheet_area(self.whole, self.body, np.random.default_rng(self.part))
+        return min(area, 0.5 * self.body_area) if self.build is Build.WALL else area
 
     @cached_property
     def closing(self) -> float:

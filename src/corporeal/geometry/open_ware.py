@@ -1,0 +1,109 @@
+"""How large the sheet is that open ware is formed from, whatever lies in its hollow.
+
+Pictures show the outside of a bowl well, and its plain inside hardly: between the two a surface
+from pictures holds anything from a wall to a lump with a roof over the rim. So only its outside is
+measured.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.spatial import ConvexHull, Delaunay, KDTree
+
+from corporeal.geometry.mesh import Mesh
+from corporeal.geometry.shape import Shape, sphere_directions
+from corporeal.geometry.spread import sample_surface
+
+SAMPLES, DIRECTIONS = 4000, 64
+"""Places on the surface that are asked, and ways in which each looks."""
+EVEN = 0.05
+"""Radius over which normals are averaged, of the middle extent: what is finer is roughness."""
+LEVEL = 0.05
+"""Share of the height at either end in which the mouth and the foot are looked for."""
+WIDE = 0.25
+"""Share of the plan from which on what lies at the top is a mouth, and no handle or peak."""
+
+
+def sheet_area(shape: Shape, part: Mesh, rng: np.random.Generator) -> float:
+    """Return the area of one side of the sheet that open ware is made of, mouth upward [m²].
+
+    A face counts by what it sees of the open at its own height and below, all of it if that is half
+    of what lies before it: walls and bottom do. The inside of a hollow sees the open above alone,
+    and counts nothing. A roof that slopes by β counts 1 - cos β, so that what closes a mouth adds
+    the area that it has more than the mouth. Where a wide mouth lies at the very top, what closes
+    in on it from outside is wall, too. Roughness is taken off: an area counts as it looks along the
+    mean normal about it.
+
+    Args:
+        shape: All that may hide it; closed, or open below its rim.
+        part: Its surface, normals outward.
+        rng: Source of the places that are asked.
+
+    """
+    points, triangle = sample_surface(part, SAMPLES, rng)
+    normals = part.normals[triangle]
+    below, seen = _open(shape, points, normals)
+    counts = np.minimum(1.0, 2.0 * below)
+    # Half of what there is below, so that the outer side of a mouth is told from its inner one.
+    outside = below > 0.25 * (1.0 - normals[:, 2])
+    counts[outside & _beside_mouth(points, seen > 0.1)] = 1.0
+    reach = EVEN * float(np.sort(np.ptp(points, axis=0))[1])
+    return float(part.areas.sum() * np.mean(counts * _evenness(points, normals, seen, reach)))
+
+
+def _open(
+    shape: Shape, points: Float[np.ndarray, "N 3"], normals: Float[np.ndarray, "N 3"]
+) -> tuple[Float[np.ndarray, " N"], Float[np.ndarray, " N"]]:
+    """Say how much of the open places see below their own height, and in all, of half a sphere."""
+    start = points + 1e-5 * shape.mesh.extent * normals
+    below, seen = np.zeros(len(points)), np.zeros(len(points))
+    for direction in sphere_directions(DIRECTIONS):
+        facing = normals @ direction
+        some = np.flatnonzero(facing > 0.02)
+        free = ~np.isfinite(shape.reach(start[some], np.tile(direction, (len(some), 1))))
+        share = facing[some] * free * 4 / DIRECTIONS
+        seen[some] += share
+        if direction[2] <= 0:
+            below[some] += share
+    return below, seen
+
+
+def _evenness(
+    points: Float[np.ndarray, "N 3"],
+    normals: Float[np.ndarray, "N 3"],
+    seen: Float[np.ndarray, " N"],
+    reach: float,
+) -> Float[np.ndarray, " N"]:
+    """Return each normal's cosine with the mean of those near it that look the same way [-]."""
+    near = KDTree(points).query_pairs(reach, output_type="ndarray")
+    alike = np.einsum("kd,kd->k", normals[near[:, 0]], normals[near[:, 1]]) > 0
+    one, other = near[alike].T
+    mean = seen[:, None] * normals
+    np.add.at(mean, one, seen[other, None] * normals[other])
+    np.add.at(mean, other, seen[one, None] * normals[one])
+    length = np.linalg.norm(mean, axis=1)
+    along = np.einsum("nd,nd->n", mean, normals)
+    return np.divide(along, length, out=np.zeros(len(points)), where=length > 0).clip(0.0)
+
+
+def _beside_mouth(
+    points: Float[np.ndarray, "N 3"], seen: Bool[np.ndarray, " N"]
+) -> Bool[np.ndarray, " N"]:
+    """Tell which places lie outside of a mouth at the top, in plan; none if none is wide enough.
+
+    What is wider at its foot than at its top is a cover: its top is no mouth.
+    """
+    height = points[:, 2]
+    low, high = height[seen].min(), height[seen].max()
+    rim = points[seen & (height > high - LEVEL * (high - low)), :2]
+    foot = points[seen & (height < low + LEVEL * (high - low)), :2]
+    mouth, plan = _plan_area(rim), _plan_area(points[:, :2])
+    if mouth < max(WIDE * plan, _plan_area(foot)):
+        return np.zeros(len(points), dtype=bool)
+    return Delaunay(rim).find_simplex(points[:, :2]) < 0
+
+
+def _plan_area(points: Float[np.ndarray, "N 2"]) -> float:
+    """Return the area inside a taut line around points [m²]; 0: they lie on a line."""
+    if len(points) < 3 or np.linalg.matrix_rank(points - points[0]) < 2:
+        return 0.0
+    return float(ConvexHull(points).volume)
