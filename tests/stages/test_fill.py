@@ -572,6 +572,23 @@ def test_open_ware_from_pictures_has_the_usual_wall_not_the_one_that_is_drawn():
     assert particles.mass_real[0] == pytest.approx(7850 * cup.area / 2 * 1e-3, rel=0.01)
 
 
+@pytest.mark.parametrize("unseen", [True, False])
+def test_a_cup_that_pictures_drew_as_a_lump_has_no_lid(unseen):
+    """A mesh that somebody made is read as it is drawn: a closed shell."""
+    cup = put(trimesh.creation.cylinder(0.05, 0.1, sections=64), 0.5)
+    scene, parts, field = inputs(thing((cup, STEEL, Structure("shell", 3e-3))))
+    words = replace(field.words[0], structure="sheet", wall_unseen=unseen)
+    particles = fill(scene, parts, replace(field, words=(words,)))
+    for points in (particles.position, particles.surface):
+        inside = np.linalg.norm(points[:, :2], axis=1) < 0.03
+        assert (inside & (points[:, 2] > 0.53)).any() != unseen
+        assert (inside & (points[:, 2] < 0.51)).any()
+    assert particles.mass.sum() == pytest.approx(particles.mass_real[0], rel=1e-6)
+    assert ("of its outside: its inside was not seen" in particles.fills[0]) == unseen
+    sheet = 7850 * 3e-3 * np.pi * (0.05**2 + 0.1 * 0.1)
+    assert (particles.mass.sum() == pytest.approx(sheet, rel=0.02)) == unseen
+
+
 def test_what_a_soft_cup_holds_is_as_light_as_it_is():
     outline = [(0, 0), (0.05, 0), (0.05, 0.1), (0.046, 0.1), (0.046, 0.004), (0, 0.004)]
     cup = put(trimesh.creation.revolve(np.array(outline), sections=64), 0.5)

@@ -89,8 +89,8 @@ def open_ware(objects: Sequence[ObjectWords]) -> tuple[str, ...]:
     made = [o.name for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN]
     return tuple(
         f"{name}: pictures need not show how deep it is inside. By its name it is taken for open "
-        "ware, with a wall as thick as its material usually has; annotate structure and "
-        "thickness_mm if that is wrong."
+        "ware, with a wall along its outside as thick as its material usually has, and empty "
+        "inside of that; annotate structure and thickness_mm if that is wrong."
         for name in made
     )
 

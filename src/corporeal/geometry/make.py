@@ -276,7 +276,7 @@ def decide(member: Member, piece: Specified) -> Make:
     """
     structure, material, words = piece.structure, piece.material, piece.words
     wall = member.build is Build.WALL
-    shown = 2 * _real(words) * member.volume / member.body_area if wall else 0.0
+    shown = _shown(member, words)
     stated = structure.thickness or material.shell_thickness
     guess = SHEET_SHARE * (member.size[1] or member.size[2])
     only_sheet = member.volume == 0
@@ -294,7 +294,9 @@ def decide(member: Member, piece: Specified) -> Make:
         face, narrowing = 0.5 * face, 1.0
     sheets = member.sheet_area * words.surface_share
     if walled and not only_sheet:
-        matter = min(face * thickness * narrowing, np.inf if words.missing else volume)
+        matter = min(
+            face * thickness * narrowing, np.inf if words.missing or member.measured else volume
+        )
     else:
         own = max(volume - member.volume * words.inner_share, 0.0)
         matter = _real(words) * structure.solidity * own
@@ -317,6 +319,13 @@ def decide(member: Member, piece: Specified) -> Make:
         whose=whose,
         outside=is_ware(member, words),
     )
+
+
+def _shown(member: Member, words: PartWords) -> float:
+    """Return the thickness of the wall that a mesh draws [m]; 0: none, or one that was guessed."""
+    if member.build is not Build.WALL or member.measured:
+        return 0.0
+    return 2 * _real(words) * member.volume / member.body_area
 
 
 def _face(member: Member, words: PartWords, walled: bool) -> float:
@@ -464,7 +473,7 @@ def how_walled(made: Make) -> str:
     if made.shown and abs(made.shown / made.thickness - 1) > ALIKE:
         wall += f" (its mesh draws {made.shown * 1e3:.3g} mm)"
     if made.outside:
-        wall += f" along the {made.area * 1e4:.3g} cm² of its outside, as its inside was not seen"
+        wall += f" along the {made.area * 1e4:.3g} cm² of its outside: its inside was not seen"
     return wall
 
 

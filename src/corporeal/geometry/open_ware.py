@@ -5,6 +5,8 @@ from pictures holds anything from a wall to a lump with a roof over the rim. So 
 measured.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float
 from scipy.spatial import ConvexHull, Delaunay, KDTree
@@ -23,15 +25,23 @@ WIDE = 0.25
 """Share of the plan from which on what lies at the top is a mouth, and no handle or peak."""
 
 
+@dataclass(frozen=True)
+class Outside:
+    """Places evenly on a surface, and how far each is one of ware's outside; N places."""
+
+    points: Float[np.ndarray, "N 3"]
+    """[m]"""
+    normals: Float[np.ndarray, "N 3"]
+    counts: Float[np.ndarray, " N"]
+    """1: wall or bottom, 0: inside, or what closes the mouth."""
+    evenness: Float[np.ndarray, " N"]
+    """Cosine between the normal and the mean one about it [-]."""
+
+
 def sheet_area(shape: Shape, part: Mesh, rng: np.random.Generator) -> float:
     """Return the area of one side of the sheet that open ware is made of, mouth upward [m²].
 
-    A face counts by what it sees of the open at its own height and below, all of it if that is half
-    of what lies before it: walls and bottom do. The inside of a hollow sees the open above alone,
-    and counts nothing. A roof that slopes by β counts 1 - cos β, so that what closes a mouth adds
-    the area that it has more than the mouth. Where a wide mouth lies at the very top, what closes
-    in on it from outside is wall, too. Roughness is taken off: an area counts as it looks along the
-    mean normal about it.
+    Roughness is taken off: an area counts as it looks along the mean normal about it.
 
     Args:
         shape: All that may hide it; closed, or open below its rim.
@@ -39,15 +49,28 @@ def sheet_area(shape: Shape, part: Mesh, rng: np.random.Generator) -> float:
         rng: Source of the places that are asked.
 
     """
+    found = outside(shape, part, rng)
+    return float(part.areas.sum() * np.mean(found.counts * found.evenness))
+
+
+def outside(shape: Shape, part: Mesh, rng: np.random.Generator) -> Outside:
+    """Tell the outside of open ware, mouth upward, from its inside and from what fills it.
+
+    A face counts by what it sees of the open at its own height and below, all of it if that is half
+    of what lies before it: walls and bottom do. The inside of a hollow sees the open above alone,
+    and counts nothing. A roof that slopes by β counts 1 - cos β, so that what closes a mouth adds
+    the area that it has more than the mouth. Where a wide mouth lies at the very top, what closes
+    in on it from outside is wall, too.
+    """
     points, triangle = sample_surface(part, SAMPLES, rng)
     normals = part.normals[triangle]
     below, seen = _open(shape, points, normals)
     counts = np.minimum(1.0, 2.0 * below)
     # Half of what there is below, so that the outer side of a mouth is told from its inner one.
-    outside = below > 0.25 * (1.0 - normals[:, 2])
-    counts[outside & _beside_mouth(points, seen > 0.1)] = 1.0
+    beside = below > 0.25 * (1.0 - normals[:, 2])
+    counts[beside & _beside_mouth(points, seen > 0.1)] = 1.0
     reach = EVEN * float(np.sort(np.ptp(points, axis=0))[1])
-    return float(part.areas.sum() * np.mean(counts * _evenness(points, normals, seen, reach)))
+    return Outside(points, normals, counts, _evenness(points, normals, seen, reach))
 
 
 def _open(

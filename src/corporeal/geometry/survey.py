@@ -58,6 +58,8 @@ class Member:
     """The surface of loose matter that fills what holds it (``bed``); None: ``body`` is drawn."""
     holder: int = -1
     """The part that it fills; -1: none."""
+    measured: float = 0.0
+    """Area of the sheet that it is [m²], found before it was ``hollowed``; 0: not found."""
 
     @cached_property
     def shape(self) -> Shape:
@@ -83,8 +85,8 @@ class Member:
 
         A wall with two faces is no larger than their mean, as roughness inside adds to its outside.
         """
-        if self.whole is None or not len(self.body.triangles):
-            return 0.0
+        if self.measured or self.whole is None or not len(self.body.triangles):
+            return self.measured
         area = sheet_area(self.whole, self.body, np.random.default_rng(self.part))
         return min(area, 0.5 * self.body_area) if self.build is Build.WALL else area
 

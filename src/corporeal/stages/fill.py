@@ -12,6 +12,7 @@ from corporeal.geometry.bedded import all_bedded, how_bedded, loose_sheets
 from corporeal.geometry.contact_points import contact_points
 from corporeal.geometry.contents import holders, with_contents
 from corporeal.geometry.foliage import in_leaves, planted
+from corporeal.geometry.hollowed import all_hollowed
 from corporeal.geometry.make import Make, compose, how_filled, recipe
 from corporeal.geometry.mass_shares import keep_apart, weigh
 from corporeal.geometry.outer_skin import faces
@@ -65,7 +66,7 @@ def fill(
     field = in_scene(field, scale_of_part(scene, parts))
     scene, drawn = drawn_into_ground(scene, parts, field)
     # What is loose fills what holds it, of which its surface alone may be drawn.
-    anatomies = all_bedded(examine(scene, parts, config.seed), field)
+    anatomies = all_bedded(all_hollowed(examine(scene, parts, config.seed), field), field)
     # How every part is made; objects weigh what their files state.
     leaf = find("leaf_tissue")
     tissue = leaf.pick(leaf.typical())

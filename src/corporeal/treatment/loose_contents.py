@@ -5,6 +5,7 @@ from dataclasses import replace
 import numpy as np
 
 from corporeal.geometry.bedded import all_bedded
+from corporeal.geometry.hollowed import all_hollowed
 from corporeal.geometry.scene_survey import examine
 from corporeal.geometry.sizes import in_scene, scale_of_part
 from corporeal.geometry.wetted import wetted_points
@@ -19,7 +20,7 @@ def pour_out(scene: Scene, parts: Parts, field: MaterialField, seed: int) -> tup
     if not moving(field):
         return ()
     life = in_scene(field, scale_of_part(scene, parts))
-    anatomies = all_bedded(examine(scene, parts, seed), life)
+    anatomies = all_bedded(all_hollowed(examine(scene, parts, seed), life), life)
     return pour(scene, parts, life, anatomies, seed)
 
 
