@@ -70,7 +70,7 @@ def area_found(mesh, words=WARE):
 def rough(mesh, by):
     """Move a finely divided surface in and out along its normals [m]."""
     width = float(np.ptp(mesh.vertices[:, 0]))
-    v, f = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, 0.04 * width)
+    v, f = trimesh.remesh.subdivide_to_size(mesh.vertices, mesh.faces, 0.04 * width)[:2]
     fine = trimesh.Trimesh(v, f)
     rng = np.random.default_rng(0)
     waves, phase = rng.normal(size=(200, 3)) / (0.03 * width), rng.uniform(0, 2 * np.pi, 200)

@@ -9,8 +9,8 @@ from dataclasses import replace
 
 import numpy as np
 from jaxtyping import Bool
-from scipy.ndimage import label as components
 from scipy.spatial import KDTree
+from skimage.measure import label
 
 from corporeal.geometry.anatomy import Build
 from corporeal.geometry.extent import oriented_size
@@ -117,11 +117,11 @@ def _outer_faces(shape: Shape, part: Mesh) -> Mesh:
 
 def _bubbles(empty: Bool[np.ndarray, "X Y Z"]) -> Bool[np.ndarray, "X Y Z"]:
     """Tell which empty places are shut off from the corner of the grid."""
-    number, _ = components(empty)
+    number = np.asarray(label(empty, connectivity=1))
     return empty & (number != number[0, 0, 0])
 
 
 def _crumbs(matter: Bool[np.ndarray, "X Y Z"]) -> Bool[np.ndarray, "X Y Z"]:
     """Tell which places of matter are none of its largest piece."""
-    number, _ = components(matter)
+    number = np.asarray(label(matter, connectivity=1))
     return matter & (number != 1 + np.argmax(np.bincount(number.ravel())[1:]))
