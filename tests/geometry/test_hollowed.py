@@ -47,8 +47,8 @@ def test_a_cup_that_is_filled_in_holds_what_a_cup_of_its_wall_does(filled):
     room = np.pi / 3 * 0.096 * (0.0362**2 + 0.041**2 + 0.0362 * 0.041)
     assert before.members[0].hollow < 0.6 * room
     assert cup.hollow == pytest.approx(room, rel=0.06)
-    assert not cup.whole.inside(np.array([[0, 0, 0.01], [0, 0, 0.08], [0, 0, 0.11]])).any()
-    assert cup.whole.inside(np.array([[0, 0, 0.002], [0.0405, 0, 0.05]])).all()
+    assert not cup.shape.inside(np.array([[0, 0, 0.01], [0, 0, 0.08], [0, 0, 0.11]])).any()
+    assert cup.shape.inside(np.array([[0, 0, 0.002], [0.0405, 0, 0.05]])).all()
 
 
 @pytest.mark.parametrize("filled", FILLED)
