@@ -7,6 +7,7 @@ import pytest
 
 from corporeal import materials
 from corporeal.materials.ensemble import NAMED_WALLS, _shares, otherwise, sample, triangle
+from corporeal.materials.inflated import sealed_air
 from corporeal.types import (
     Hypothesis,
     Inventory,
@@ -140,6 +141,15 @@ def test_walls_contents_and_shares_are_drawn_too():
     stated = replace(words, thickness=4e-4, answered_by="annotation")
     fixed = draws(replace(field, words=(stated,)), [0], 5)
     assert {(f.structures[0].thickness, f.structures[0].fill) for f in fixed} == {(4e-4, 0.9)}
+
+
+def test_sealed_air_is_as_it_was_asked_for_in_every_draw():
+    """Every interval of a mass that had a basketball in it ended the run."""
+    air = Structure("filled", 0.004, contents=sealed_air(55e3), fill=1.0, inflated=True)
+    field = field_of("rubber", structures=(air,), words=(PartWords("ball", "rubber"),))
+    drawn = draws(field, (0,), 20)
+    assert all(d.structures[0] == air for d in drawn)
+    assert len({d.materials[0].density for d in drawn}) > 1
 
 
 def test_friction_stays_within_what_was_published():

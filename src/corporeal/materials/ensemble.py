@@ -264,6 +264,8 @@ def _structure(
     grades: Grades,
     library: str,
 ) -> Structure:
+    if structure.inflated:  # its air is as rules and makers ask, and no material of a library
+        return structure
     thickness = structure.thickness
     if structure.kind != "solid":
         thickness = words.thickness or material.shell_thickness
