@@ -6,6 +6,7 @@ from functools import partial
 
 from corporeal import materials
 from corporeal.description.no_block import no_block
+from corporeal.description.wet import values_when_wet
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.geometry.identity import Identity
 from corporeal.materials.placement import (
@@ -37,7 +38,6 @@ from corporeal.vlm.stated import (
     stated_values,
     walled,
 )
-from corporeal.vlm.wet import density_when_wet
 
 OPEN = ("sheet", "metadata")
 """What an open vessel is by its name, and who says so."""
@@ -75,7 +75,7 @@ def words_of_file(
         stated = _stated_values(seen.surfaces)
         if unasked:
             dry = _density(found.material, library)
-            stated = density_when_wet(seen.general, found.material, dry) | stated
+            stated = values_when_wet(seen.general, found.material, dry) | stated
         found = replace(as_stated(found, seen.surfaces), stated=stated)
         found = sealed(found, stated_inflation(seen.surfaces), usual_inflation(seen))
         found = replace(found, rebound=usual_rebound(seen))

@@ -1,4 +1,4 @@
-"""What is wet by its name weighs more: a wet sponge weighed as a dry one."""
+"""What is wet by its name weighs more and falls dead: a wet sponge weighed as a dry one."""
 
 import pytest
 
@@ -13,6 +13,13 @@ def density(name):
     (part,) = describe(scene((name, [("mesh", plain(), {})]))).objects[0].parts
     found = part.stated.get("density")
     return found and found.value
+
+
+def made(name):
+    """Return what a thing of such a name is made of."""
+    named = scene((name, [("mesh", plain(), {})]))
+    inventory = describe(named)
+    return ground(named, segment(named, inventory), inventory).materials[0]
 
 
 def test_a_wet_sponge_holds_water_and_a_soaked_one_more():
@@ -34,3 +41,10 @@ def test_the_water_in_a_sponge_does_not_make_its_foam_doubtful():
 )
 def test_what_is_dry_or_holds_no_water_weighs_what_it_did(name):
     assert density(name) is None
+
+
+def test_a_wet_sponge_rebounds_less_than_a_dry_one_and_a_soaked_one_least():
+    """Water that is pumped through pores takes what the cells would give back."""
+    dry, wet, soaked = (made(name) for name in ("sponge", "wet sponge", "soaked sponge"))
+    assert soaked.restitution < wet.restitution < 0.6 * dry.restitution
+    assert soaked.loss > wet.loss > 2 * dry.loss
