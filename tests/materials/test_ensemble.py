@@ -152,6 +152,17 @@ def test_sealed_air_is_as_it_was_asked_for_in_every_draw():
     assert len({d.materials[0].density for d in drawn}) > 1
 
 
+def test_what_is_blown_up_by_mouth_may_have_another_wall_and_a_ball_of_rules_not():
+    def walls(kpa):
+        air = Structure("filled", 3e-4, contents=sealed_air(1e3 * kpa), fill=1.0, inflated=True)
+        words = PartWords("x", "soft_PVC", thickness=3e-4, wall_usual=True, inflation=1e3 * kpa)
+        field = field_of("soft_PVC", structures=(air,), words=(words,))
+        return {d.structures[0].thickness for d in draws(field, (0,), 20)}
+
+    assert len(walls(3)) == 20
+    assert walls(80) == {3e-4}
+
+
 def test_friction_stays_within_what_was_published():
     field = field_of("rubber", "steel")
     found = draws(field, [0, 1], 100)

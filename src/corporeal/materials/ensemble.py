@@ -50,6 +50,8 @@ LOOSER = 0.25
 """Standard deviation of the logarithm of a solidity that was judged by eye [-]."""
 SHARES = 0.2
 """Standard deviation of the logarithm of a share that was judged by eye [-]."""
+BY_MOUTH = 10_000.0
+"""What a person can blow up without a pump, above the air around [Pa]: lungs press no harder."""
 NAMED_WALLS = 0.45
 """Standard deviation of the logarithm of a wall that is only usual of things of that name: half the
 interquartile range of what 62 named things weigh in life over what they weighed with such walls, in
@@ -265,7 +267,7 @@ def _structure(
     library: str,
 ) -> Structure:
     if structure.inflated:  # its air is as rules and makers ask, and no material of a library
-        return structure
+        return replace(structure, thickness=words.thickness or structure.thickness)
     thickness = structure.thickness
     if structure.kind != "solid":
         thickness = words.thickness or material.shell_thickness
@@ -291,8 +293,13 @@ def _piece(piece: Piece, words: PartWords, owner: int, grades: Grades, library: 
 
 
 def _walled(words: PartWords, owner: int, grades: Grades) -> PartWords:
-    """Draw a wall that is only usual of such things; rules fix what inflated balls weigh."""
-    if not words.wall_usual or words.thickness is None or words.inflation is not None:
+    """Draw a wall that is only usual of such things; rules fix what inflated balls weigh.
+
+    Nobody rules what is blown up by mouth: an air bed, a beach ball.
+    """
+    by_mouth = 0 < (words.inflation or 0.0) <= BY_MOUTH
+    ruled = words.inflation is not None and not by_mouth
+    if not words.wall_usual or words.thickness is None or ruled:
         return words
     wide = float(np.exp(NAMED_WALLS * grades.normal(owner, words.name, "wall")))
     return replace(words, thickness=words.thickness * wide)
