@@ -38,6 +38,9 @@ TABLES = tomllib.loads(Path(other_languages.__file__).with_suffix(".toml").read_
         ("Стул", "chair"),
         ("ведро_02", "bucket"),
         ("木の椅子", "wood chair"),
+        ("lave-vaisselle", "dishwasher"),
+        ("Muscheln", "seashell"),
+        ("木の本棚", "wood bookshelf"),
         ("红木箱", "wood box"),
     ],
 )

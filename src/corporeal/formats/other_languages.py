@@ -8,14 +8,18 @@ from pathlib import Path
 
 from corporeal.geometry.identity import plain
 
-OF = frozenset("de del di du des da do della dello en".split())
-"""What stands between a thing and what belongs to it: "caja de carton" is a box of cardboard."""
+OF = frozenset("de del di du des da do della dello en au aux".split())
+"""What stands between a thing and what belongs to it: "caja de carton" is a box of cardboard,
+"pot au lait" a milk pot."""
 STATES = frozenset("empty full old small large red blue green white black".split())
 """What stands behind a thing and what belongs to it, and is of the thing: "botella de vino vacía"
 is an empty bottle."""
 UMLAUTS = str.maketrans({"ä": "ae", "ö": "oe", "ü": "ue", "ß": "ss"})
 GAPLESS = ("CJK ", "HIRAGANA ", "KATAKANA ")
 """Letters of languages that are written without gaps."""
+PLURALS = ("s", "es", "n", "en", "x")
+"""How plurals end that only add to a word: Muscheln, llaves, gâteaux; -es, -en to a consonant."""
+VOWELS = frozenset("aeiou")
 SHORTEST = 3
 """Letters before the last word of a compound."""
 
@@ -30,9 +34,12 @@ def in_english(words: Sequence[str]) -> list[str]:
         words: Of a name, in lower case.
 
     """
+    words = _unhyphened(words)
     found = [_translated(plain(word)) for word in words]
     known = [part for k, word in enumerate(words) for part in found[k] or (word,)]
-    where = next((k for k, word in enumerate(words) if word in OF and k and found[k - 1]), None)
+    where = next(
+        (k for k, word in enumerate(words) if plain(word) in OF and k and found[k - 1]), None
+    )
     if where is None:
         return known
     before = [part for k in range(where) for part in found[k] or (words[k],)]
@@ -41,12 +48,25 @@ def in_english(words: Sequence[str]) -> list[str]:
     return behind[:last] + before + behind[last:]
 
 
+def _unhyphened(words: Sequence[str]) -> list[str]:
+    """Join neighbours that are one word of the table: "lave vaisselle", "cerf volant"."""
+    found: list[str] = []
+    for word in words:
+        whole = found and min(len(found[-1]), len(word)) > SHORTEST
+        if whole and plain(found[-1] + word) in _words():
+            found[-1] += word
+        else:
+            found.append(word)
+    return found
+
+
 @cache
 def _translated(word: str) -> tuple[str, ...]:
     """Return what a word, or a compound that ends with it, is in English; (): not known."""
-    whole = _words().get(word) or _words().get(word.removesuffix("s"))
-    if whole:
-        return whole
+    for ending in ("", *PLURALS):
+        stem = word.removesuffix(ending) if word.endswith(ending) else ""
+        if stem in _words() and not (len(ending) > 1 and stem[-1] in VOWELS):
+            return _words()[stem]
     if not word.isascii():
         return _pieced(word)
     for cut in range(SHORTEST, len(word) - SHORTEST):
