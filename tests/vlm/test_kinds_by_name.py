@@ -2,12 +2,13 @@
 
 import pytest
 
+from corporeal.stages.describe import describe
 from corporeal.types import SceneObject
 from corporeal.vlm.annotation import Annotation
 from corporeal.vlm.annotation import built as annotated
 from corporeal.vlm.metadata import Evidence, hollowed, recognise
 from corporeal.vlm.stated import walled
-from handmade import plain
+from handmade import plain, scene
 
 
 class Named:
@@ -130,3 +131,21 @@ def test_a_tank_is_hollow_and_how_large_a_safe_is_tells_its_wall():
     assert built("old copper tank").structure == "shell"
     assert built("scuba tank", 0.6).thickness == 0.012
     assert (built("mini safe", 0.25).thickness, built("safe", 0.8).thickness) == (0.002, 0.005)
+
+
+@pytest.mark.parametrize(
+    ("name", "material", "kpa"),
+    [
+        ("air mattress", "soft_PVC", 2.8),
+        ("inflated mattress", "soft_PVC", 2.8),
+        ("inflatable_sofa", "soft_PVC", 3.0),
+        ("inflated basketball", "rubber", 55.0),
+        ("mattress", "seat_foam", None),
+    ],
+)
+def test_what_is_blown_up_is_a_skin_with_air_in_it(name, material, kpa):
+    """An inflated mattress was a block of foam, and an inflatable one a skin that held no air."""
+    (part,) = describe(scene((name, [("mesh", plain(), {})]))).objects[0].parts
+    assert part.material == material
+    assert part.structure == ("shell" if kpa else None)
+    assert part.inflation == (pytest.approx(1e3 * kpa) if kpa else None)

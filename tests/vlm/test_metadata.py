@@ -98,6 +98,30 @@ def test_what_is_before_a_noun_of_any_material_is_its_purpose(name):
     assert seen("mesh", name).material is None
 
 
+@pytest.mark.parametrize(
+    ("name", "material"),
+    [
+        ("wood fireplace", "brick"),
+        ("coal stove", "steel"),
+        ("charcoal grill", "steel"),
+        ("wood stove", "cast-iron"),
+        ("wooden oven", "wood"),
+    ],
+)
+def test_what_is_burnt_is_not_what_it_is_burnt_in(name, material):
+    assert seen("mesh", name).material == material
+
+
+def test_words_of_a_phrase_that_is_a_purpose_say_nothing_by_themselves():
+    assert seen("mesh", "ice cube").material == "ice"
+    assert seen("mesh", "ice cube bucket").material != "ice"
+
+
+def test_a_part_by_itself_is_of_what_such_parts_are():
+    assert seen("mesh", "desk leg").material == "wood"
+    assert seen("mesh", "tire_car").structure == "shell", "what is a thing, too, stays one"
+
+
 def test_no_phrase_means_two_things():
     told = {}
     for s in lexicon():

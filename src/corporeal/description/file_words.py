@@ -25,8 +25,6 @@ from corporeal.vlm.metadata import (
     evidence,
     hollowed,
     recognise,
-    usual_inflation,
-    usual_rebound,
 )
 from corporeal.vlm.said_contents import as_said
 from corporeal.vlm.stated import (
@@ -38,6 +36,7 @@ from corporeal.vlm.stated import (
     stated_values,
     walled,
 )
+from corporeal.vlm.usual import usual_inflation, usual_rebound
 
 OPEN = ("sheet", "metadata")
 """What an open vessel is by its name, and who says so."""

@@ -21,6 +21,7 @@ from corporeal.formats.typical_extents import classes
 from corporeal.formats.word_order import part_words, thing_last
 from corporeal.geometry.identity import words
 from corporeal.types import Finish
+from corporeal.vlm.goods import sold
 
 LOOSE = frozenset("potting_soil soil_clay mud sand gravel snow ice".split())
 """What no container is made of: a compost bin has some in it."""
@@ -28,6 +29,8 @@ SHAPED = frozenset(("statue", "sculpture", "bust", "figure", "castle", "ball"))
 """Things that are made of it: a snow shoe is not."""
 OF_IT = frozenset(("block", "ring", "bag"))
 """What is all of it even so: a bag of sand is sand."""
+FUELS = frozenset("wood hardwood softwood coal charcoal".split())
+"""What is burnt."""
 KINDS = ("substance", "piece", "thing")
 """The most specific first: "oak", "table leg", "table"."""
 
@@ -104,10 +107,13 @@ def heads(tokens: tuple[str, ...]) -> list[Term]:
 
     A shoe rack is a rack, and a TV cabinet is a cabinet.
     """
+    found = list(_standing_in(tokens))
+    purposes = [(k, t) for k, t in found if not _is_of_it(t, _after(tokens, k, t))]
     standing = [
         (k, term)
-        for k, term in _standing_in(tokens)
-        if _is_of_it(term, _after(tokens, k, term)) and not (term.lone and tokens != term.phrase)
+        for k, term in found
+        if not any(p <= k and k + len(term.phrase) <= p + len(t.phrase) for p, t in purposes)
+        and not (term.lone and tokens != term.phrase)
     ]
     head = _head(tokens)
     if head is not None and tokens[head] in _holders():
@@ -126,7 +132,12 @@ def _head(tokens: tuple[str, ...]) -> int | None:
 
 
 def _is_of_it(term: Term, following: str) -> bool:
-    """Tell whether what follows a word may be of what it names: a steel bin, but no sand bin."""
+    """Tell whether what follows a word may be of what it names: a steel bin, but no sand bin.
+
+    What burns is no stove's matter: a coal stove, but a wooden oven.
+    """
+    if term.material in FUELS and term.phrase != ("wooden",) and following in _burners():
+        return False
     if following not in _holders():
         return True
     if term.kind != "substance":
@@ -143,20 +154,23 @@ def _standing_in(tokens: tuple[str, ...]) -> Iterator[tuple[int, Term]]:
     hushed = _hushed(tokens)
     for k, token in enumerate(tokens):
         for term in _by_first_word().get(token, ()):
-            n = len(term.phrase)
-            if tokens[k : k + n] == term.phrase and not hushed & set(range(k, k + n)):
+            mine = set(range(k, k + len(term.phrase)))
+            said = tokens[k : k + len(mine)] == term.phrase
+            if said and all(words <= mine or not words & mine for words in hushed):
                 yield k, term
 
 
-def _hushed(tokens: tuple[str, ...]) -> set[int]:
-    """Return which words say nothing of matter where they stand: there is no ice in ice cream."""
-    return {
-        k + i
+def _hushed(tokens: tuple[str, ...]) -> list[set[int]]:
+    """Return which words say nothing of matter where they stand: there is no ice in ice cream.
+
+    What is known of the whole phrase, or of a longer one, counts: a wood stove is of iron.
+    """
+    return [
+        set(range(k, k + len(phrase)))
         for phrase in _listed("silent")
         for k in range(len(tokens))
         if tokens[k : k + len(phrase)] == phrase
-        for i in range(len(phrase))
-    }
+    ]
 
 
 @cache
@@ -368,12 +382,15 @@ def metals() -> frozenset[str]:
 @cache
 def lexicon() -> tuple[Term, ...]:
     """Every phrase of the lexicon with what it states."""
-    return tuple(
+    named = [
         _term(kind, phrase, row)
         for kind in KINDS
         for row in _table()[kind]
         for phrase in row["words"]
-    )
+    ]
+    known = {term.phrase for term in named if term.kind == "thing"}
+    goods = (_term("thing", phrase, row) for phrase, row in sold())
+    return (*named, *(term for term in goods if term.phrase not in known))
 
 
 @cache
@@ -403,6 +420,11 @@ def _holders() -> frozenset[str]:
     single = _sizes()
     material = {w for term in lexicon() for w in term.phrase if len(term.phrase) == 1}
     return frozenset(map(singular, _table()["holders"])) | (single - material - _colours())
+
+
+@cache
+def _burners() -> frozenset[str]:
+    return frozenset(map(singular, _table()["burners"]))
 
 
 @cache

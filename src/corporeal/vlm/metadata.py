@@ -88,10 +88,15 @@ class Evidence:
 
     @property
     def general(self) -> list[Name]:
-        """Names of the whole object."""
-        named = [text for text in _names(self.thing) if tokens_of(text) in self._heard]
-        whole = (Name(text, of_part(tokens_of(text), phrases())) for text in named)
+        """Names of the whole object; "desk leg" is a leg."""
+        whole = (Name(n.text, of_part(n.words, phrases())) for n in self.called)
         return [*whole, *(Name(" ".join(w), w) for w in self.shared if w)]
+
+    @property
+    def called(self) -> list[Name]:
+        """The same with what it is a part of."""
+        every = (_name(text) for text in _names(self.thing))
+        return [name for name in every if name.words in self._heard]
 
     @property
     def _heard(self) -> set[tuple[str, ...]]:
@@ -172,24 +177,6 @@ def _prefix(names: Sequence[str]) -> tuple[str, ...]:
     return tokens[0][: same.index(False) if False in same else len(same)]
 
 
-def usual_inflation(evidence: Evidence) -> float | None:
-    """Gauge pressure [Pa] in an object of such a name and one part; None: not sealed."""
-    return _usual(evidence, lambda term: term.inflation)
-
-
-def usual_rebound(evidence: Evidence) -> float | None:
-    """Restitution that rules ask of an object of such a name and one part; None: none is known."""
-    return _usual(evidence, lambda term: term.rebound)
-
-
-def _usual(evidence: Evidence, of: Callable[[Term], float | None]) -> float | None:
-    """Return what all things with the longest of an object's names have; None: they differ."""
-    terms = [t for name in evidence.general for t in heads(name.words) if t.kind == "thing"]
-    longest = max((len(t.phrase) for t in terms), default=0)
-    usual = {of(t) for t in terms if len(t.phrase) == longest}
-    return usual.pop() if evidence.alone and len(usual) == 1 else None
-
-
 def hollowed(
     words: PartWords,
     evidence: Evidence,
@@ -268,6 +255,9 @@ def _own_names(evidence: Evidence) -> PartWords | None:
 def _general_names(evidence: Evidence) -> PartWords | None:
     kinds, names = ("substance", "thing"), evidence.general
     terms, name = _strongest(names, evidence.finishes, kinds, names, evidence.extent)
+    if not terms and evidence.alone and names != evidence.called:  # a part by itself: "desk leg"
+        called = evidence.called
+        terms, name = _strongest(names, evidence.finishes, ("piece",), called, evidence.extent)
     if not terms:
         return None
     if evidence.alone or terms[0].every:
@@ -429,7 +419,7 @@ def _adjectives(name: Name) -> list[Term]:
         beside = next((t for t in things if name.says(term.phrase + t.phrase)), None)
         if beside is None and term.material not in LOOSE and not term.colour:
             beside = next((t for t in things if name.says(t.phrase + term.phrase)), None)
-        if beside and beside.material in term.gives_way:
+        if beside and (beside.material in term.gives_way or (term.inflation and beside.inflation)):
             standing[k] = replace(beside, kind=term.kind, before=len(beside.phrase), narrowed=True)
         elif beside:
             standing[k] = _made_as(term, beside)
@@ -459,8 +449,10 @@ def _made_as(substance: Term, thing: Term) -> Term:
     """Return a substance built as an object is; how thick depends on what it is usually made of.
 
     A ball of rubber is blown up, and one of steel is solid. A sofa of leather is covered with it,
-    as thick as that usually is.
+    as thick as that usually is. What is blown up is a skin, whatever it is.
     """
+    if substance.inflation is not None:
+        return replace(substance, before=len(thing.phrase))
     if substance.material in COVERS and thing.material in STUFFING:
         return replace(
             substance,

@@ -1,15 +1,14 @@
 """What a name says of a vessel's contents: how full it is, and of what."""
 
 import re
-import tomllib
 from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from functools import cache
-from importlib.resources import files
 
 from corporeal.formats.other_languages import in_english
 from corporeal.geometry.identity import words
 from corporeal.types import ObjectWords, PartWords, Scene, SceneObject
+from corporeal.vlm.goods import table
 from corporeal.vlm.lexicon import open_ware, singular
 from corporeal.vlm.metadata import Evidence
 
@@ -60,7 +59,7 @@ def _of_name(name: str) -> Filling | None:
 def _vessel(said: Sequence[str]) -> tuple[Phrase, int]:
     """Return the vessel, the last before what it is of, and where its name ends."""
     stop = next((k for k, w in enumerate(said) if k and w in _told("of")), len(said))
-    known = {p for table in ("drink", "any") for p in _phrases("vessels", table)}
+    known = {p for row in ("drink", "any") for p in _phrases("vessels", row)}
     found = [(k + n, n, p) for k, n, p in _standing(said[:stop], known)]
     if not found:
         return (), 0
@@ -74,7 +73,7 @@ def _share(name: str, said: Sequence[str]) -> float | None:
         return min(int(level[1]) / 100, FULLEST)
     if fraction := FRACTION.search(name):
         return min(int(fraction[1]) / int(fraction[2]), FULLEST)
-    shares = {p: float(share) for share in _table()["share"] for p in _phrases("share", share)}
+    shares = {p: float(share) for share in table()["share"] for p in _phrases("share", share)}
     found = [(n, k, p) for k, n, p in _standing(said, shares) if _is_level(said, k, n)]
     return shares[max(found)[2]] if found else None
 
@@ -87,15 +86,15 @@ def _contents(said: Sequence[str], vessel: Phrase, end: int, levelled: bool) -> 
     """Return what is in a vessel: "bottle of milk", and where its level is told "milk bottle"."""
     if not vessel:
         return None
-    table = {p: name for name in _table()["contents"] for p in _phrases("contents", name)}
-    found = list(_standing(said, table))
+    known = {p: name for name in table()["contents"] for p in _phrases("contents", name)}
+    found = list(_standing(said, known))
     for k, n, phrase in sorted(found, key=lambda row: -row[1]):
         before = said[max(end, k - SKIPPED - 1) : k]
         free = k + n == len(said) or said[k + n] in _told("behind")
         if k >= end and free and any(w in _told("of") for w in before):
-            return table[phrase]
+            return known[phrase]
         if levelled and k + n == end - len(vessel):
-            return table[phrase]
+            return known[phrase]
     return None
 
 
@@ -177,23 +176,17 @@ def _holds(thing: ObjectWords, said: Filling) -> bool:
 
 
 @cache
-def _phrases(table: str, row: str) -> frozenset[Phrase]:
-    rows = _table()[table]
+def _phrases(part: str, row: str) -> frozenset[Phrase]:
+    rows = table()[part]
     return frozenset(tuple(singular(w) for w in p.split()) for p in rows[row])
 
 
 @cache
 def _told(row: str) -> frozenset[str]:
-    rows = _table()["words"]
+    rows = table()["words"]
     return frozenset(rows[row])
-
-
-@cache
-def _table() -> dict:
-    path = files("corporeal.vlm").joinpath("said_contents.toml")
-    return tomllib.loads(path.read_text(encoding="utf-8"))
 
 
 def known_contents() -> frozenset[str]:
     """Materials that names may say is in a vessel."""
-    return frozenset(_table()["contents"])
+    return frozenset(table()["contents"])
