@@ -24,6 +24,7 @@ def built(name):
         ("cinnamon_shaker", "glass", "powder"),
         ("jar of coffee", "glass", "ground_coffee"),
         ("cream_carton", "cardboard", "dairy_cream"),
+        ("tomato_sauce_jar", "glass", "sauce"),
         ("can of tuna", "steel", "packed_food"),
         ("empty pesticide bottle", "plastics-HDPE", None),
         ("jar", "glass", None),

@@ -25,4 +25,5 @@ def sold() -> Iterator[tuple[str, dict]]:
         for phrase, good in ((f"{good} {v}", good) for v in row["vessels"] for good in goods):
             if phrase not in named:
                 named.add(phrase)
-                yield phrase, {**row, "contents": row.get("contents") or inside[good]}
+                contents = row.get("contents") or inside[good]
+                yield phrase, {**row, "contents": contents, "of": ()}
