@@ -118,6 +118,8 @@ bodies meet, surface points say where they begin, however thick they are …"""
 FLAT_APART = 1.2
 """… unless means alone say that they are farther apart than this [cells]: those misjudge the gap of
 what is thicker than ``THIN`` by less."""
+OPPOSITE = 0.01
+"""Edges of two bodies at a node are parallel if the squared sine between them is below this [-]."""
 FACET_NODES = 2.0
 """What is round meets a flat face exactly, and not on nodes that are nearer to there than this
 [cells] and √(r dx/2 + 9 dx²): beyond, the gap of a ball of radius r is larger than what nodes

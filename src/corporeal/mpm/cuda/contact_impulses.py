@@ -47,7 +47,13 @@ from corporeal.mpm.cuda.layout import (
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
 from corporeal.mpm.cuda.rigid import softness_at, speed_at
-from corporeal.mpm.formulas.one_lane_contact import closing_speed, dragged, push_of, within_cone
+from corporeal.mpm.formulas.one_lane_contact import (
+    closing_speed,
+    dragged,
+    push_of,
+    touched,
+    within_cone,
+)
 
 wp.set_module_options(formulas.options(max_unroll=0))
 
@@ -150,10 +156,30 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
 
 
 @wp.func
+def mean_of(c: Contacts, g: Grid, s: Sheet, entry: int):
+    """Mean offset of a field's matter from a node [cells]."""
+    return wp.vec3d(c.mean[entry] / (g.node[c.slot[entry]][0] * s.cell))
+
+
+@wp.func
+def put(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
+    """Put a contact of two rigid bodies that meet at a node where both of them are."""
+    rigid = c.meet[t] >= 0 and c.c[t] >= 0
+    if rigid:
+        rigid = r.stiff[c.fa[t]] == 1 and r.stiff[c.fc[t]] == 1
+    if rigid:
+        a = mean_of(c, g, s, c.a[t])
+        shift = touched(c.face, a, mean_of(c, g, s, c.c[t]), wp.vec3d(c.normal[t]))
+        c.point[t] = c.point[t] + shift * s.dx
+    return 0
+
+
+@wp.func
 def prepare(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
     """Normal speed that a contact may keep, and whether it is of a rigid pair."""
     if replaced(r, c, s, t):
         c.gap[t] = VAST
+    put(c, r, g, s, t)
     if c.gap[t] < VAST or c.span[t] > D(0.0):
         gap = D(c.gap[t])
         fa = c.fa[t]

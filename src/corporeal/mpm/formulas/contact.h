@@ -82,6 +82,33 @@ template <class R> struct Face {
   // The same to what is thin: its surface is exact, and the field a lattice.
   CUDA_CALLABLE static inline R gap_to_thin(R a, R h) { return h > R(WALL_REACH) ? R(VAST) : lattice(h) - a; }
 };
+// Where two rigid bodies touch that meet at a node: in both of them. Twin of contact.touched. R: of the table.
+template <class R> struct Touched {
+  // How far it is along the plane of contact, and which way, to the edge of a body that does not reach the
+  // node; 0 where it does. mean: its mean offset.
+  CUDA_CALLABLE static inline double to_edge(const R *table, const double *mean, const double *n, double *way) {
+    double along = 0, square = 0;
+    for (int i = 0; i < 3; i++) along += mean[i] * n[i];
+    for (int i = 0; i < 3; i++) way[i] = mean[i] - along * n[i], square += way[i] * way[i];
+    const double size = sqrt(square), face = Face<R>::place(table, R(-size));
+    for (int i = 0; i < 3; i++) way[i] = face < 0 ? way[i] / size : 0.0;
+    return face < 0 ? -face : 0.0;
+  }
+  // The shortest way along that plane from the node to where both are; a, c: their mean offsets.
+  CUDA_CALLABLE static inline void shift(const R *table, const double *a, const double *c, const double *n,
+                                         double *out) {
+    double p[3], q[3], cosine = 0;
+    const double far = to_edge(table, a, n, p), other = to_edge(table, c, n, q);
+    for (int i = 0; i < 3; i++) cosine += p[i] * q[i];
+    const double apart = 1.0 - cosine * cosine;
+    double first = far >= other ? far : 0.0, second = far >= other ? 0.0 : other;
+    if (far * cosine < other && other * cosine < far) {   // neither edge is all that counts
+      first = apart > OPPOSITE ? (far - other * cosine) / apart : 0.5 * far;
+      second = apart > OPPOSITE ? (other - far * cosine) / apart : 0.5 * other;
+    }
+    for (int i = 0; i < 3; i++) out[i] = first * p[i] + second * q[i];
+  }
+};
 // Where the surface of a thin rigid body begins along n, seen from x: the least (p - x) . n of its points
 // around that line; of none, that of the point nearest to the line. What is farther behind x than a node
 // sees does not count; without any others it is VAST. Points three by three, in its frame.

@@ -186,6 +186,16 @@ def facet_replaces(
 ) -> bool: ...
 
 
+@wp.func_native("""
+  wp::vec_t<3, wp::float64> out;
+  mpm::Touched<float>::shift((const float *)table.data, &a.c[0], &c.c[0], &n.c[0], &out.c[0]);
+  return out;
+""")
+def touched(
+    table: wp.array(dtype=wp.float32), a: wp.vec3d, c: wp.vec3d, n: wp.vec3d
+) -> wp.vec3d: ...
+
+
 @wp.func_native("return mpm::Face<float>::gap_of_liquid(mean, height, full);")
 def gap_of_liquid(mean: wp.float32, height: wp.float32, full: wp.float32) -> wp.float32: ...
 

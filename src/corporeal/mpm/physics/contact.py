@@ -24,6 +24,7 @@ from corporeal.mpm.constants import (
     LATTICE_SLOPE,
     LATTICE_START,
     LIKE_HALF_SPACE,
+    OPPOSITE,
     OTHER_BIAS,
     PARTICLE_RADIUS,
     SMALLEST_WEIGHT,
@@ -176,6 +177,42 @@ def thin_there(places: Vectors, node: Vectors, far: float) -> Bool[np.ndarray, "
     """
     square = np.sum((places[None, :] - node[:, None]) ** 2, axis=2)
     return np.any(square < far**2, axis=1)
+
+
+def touched(mean_a: Vectors, mean_c: Vectors, normal: Vectors, cell: float) -> Vectors:
+    """Say how far from a node two rigid bodies touch that meet there [m].
+
+    A node is felt up to 1½ cells beyond a body's edge, where nothing can be pushed at. So the
+    place is the one nearest to the node, along the plane of contact, that lies in both bodies,
+    each a half space that ends at D(-|t|) along its mean offset t in that plane.
+
+    Args:
+        mean_a: X̄ of one body [m].
+        mean_c: Of the other [m].
+        normal: n, unit.
+        cell: dx [m].
+
+    """
+    (far, p), (other, q) = (_to_edge(mean / cell, normal) for mean in (mean_a, mean_c))
+    cosine = np.sum(p * q, axis=1)
+    apart = 1.0 - cosine**2
+    both = (far * cosine < other) & (other * cosine < far)
+    crossing = both & (apart > OPPOSITE)
+    share = np.where(crossing, apart, 1.0)
+    first = np.where(both, 0.5 * far, np.where(far >= other, far, 0.0))
+    second = np.where(both, 0.5 * other, np.where(far >= other, 0.0, other))
+    first = np.where(crossing, (far - other * cosine) / share, first)
+    second = np.where(crossing, (other - far * cosine) / share, second)
+    return (first[:, None] * p + second[:, None] * q) * cell
+
+
+def _to_edge(mean: Vectors, normal: Vectors) -> tuple[Scalars, Vectors]:
+    """How far the edge of a body is that does not reach a node [cells], else 0; and which way."""
+    aside = mean - np.sum(mean * normal, axis=1)[:, None] * normal
+    size = np.linalg.norm(aside, axis=1)
+    far = np.maximum(-half_space_face(-size), 0.0)
+    way = aside / np.maximum(size, TINY)[:, None]
+    return far, np.where(far[:, None] > 0.0, way, 0.0)
 
 
 def gap_to_surface(mean: Vectors, begins: Scalars, normal: Vectors, cell: float) -> Scalars:

@@ -190,7 +190,8 @@ def find(scene: Scene) -> list[Touch]:
     touches = [_between(scene, look, p, slots) for p, slots in pairs.items() if len(slots[0])]
     touches += [_on_wall(scene, look, p, slot) for p, slot in walls.items() if len(slot)]
     faces = on_facets(scene) + on_curves(scene)
-    return instead_of_nodes(scene, touches, faces) + in_order(faces + on_planes(scene))
+    nodes = [touch.placed for touch in instead_of_nodes(scene, touches, faces)]
+    return nodes + in_order(faces + on_planes(scene))
 
 
 def _common(
@@ -290,10 +291,8 @@ def _between(
         return wet
     a, c = slots
     cell, index = scene.problem.cell, scene.grid.index[a]
-    candidates = contact.candidate_normals(look.outward[a], look.outward[c])
     thin = [scene.thinness(body) for body in pair]
-    if (thin[0] == 2) != (thin[1] == 2):  # what is small against the cell has no face of its own
-        candidates[:, [0, 1 if thin[0] == 2 else 2]] = 0.0
+    candidates = _candidates(look, slots, thin)
     reach_a = look.reach(scene, a, candidates)
     reach_c = -look.reach(scene, c, -candidates)
     which = contact.widest(candidates, reach_a, reach_c, cell)
@@ -313,8 +312,20 @@ def _between(
     if asked.any():
         gap[asked] = _between_surfaces(scene, look, pair, (a[asked], c[asked]), normal[asked])
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
-    movers = scene.mover_of_slot(a), scene.mover_of_slot(c)
-    return Touch(pair, *movers, index * cell, normal, gap, kept=kept)
+    movers, acts = (scene.mover_of_slot(a), scene.mover_of_slot(c)), None
+    if all(map(scene.is_rigid, pair)):
+        acts = index * cell + contact.touched(look.mean[a], look.mean[c], normal, cell)
+    return Touch(pair, *movers, index * cell, normal, gap, kept=kept, acts=acts)
+
+
+def _candidates(
+    look: Look, slots: tuple[np.ndarray, np.ndarray], thin: list[int]
+) -> Float[np.ndarray, "E 3 3"]:
+    """Candidate normals; what is small against the cell has no face of its own."""
+    found = contact.candidate_normals(*(look.outward[slot] for slot in slots))
+    if (thin[0] == 2) != (thin[1] == 2):
+        found[:, [0, 1 if thin[0] == 2 else 2]] = 0.0
+    return found
 
 
 def _wet(

@@ -123,4 +123,5 @@ def _some(touch: Touch, chosen: np.ndarray) -> Touch:
     columns = {name: getattr(touch, name)[chosen] for name in _ALL}
     slips = None if touch.slips is None else touch.slips[chosen]
     layer = None if touch.layer is None else touch.layer[chosen]
-    return replace(touch, **columns, slips=slips, layer=layer)
+    acts = None if touch.acts is None else touch.acts[chosen]
+    return replace(touch, **columns, slips=slips, layer=layer, acts=acts)

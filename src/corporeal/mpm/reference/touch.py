@@ -1,6 +1,6 @@
 """Some possible contacts of one pair, as the reference engine lists them."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int
@@ -33,6 +33,13 @@ class Touch:
     """The body whose surface points they are; -1: they are on nodes."""
     corner: Bool[np.ndarray, " E"] | None = None
     """Which of these points are not round; None: all are."""
+    acts: Float[np.ndarray, "E 3"] | None = None
+    """Where each acts [m], which is beyond no edge; None: at its point."""
+
+    @property
+    def placed(self) -> "Touch":
+        """The same, each at the place where it acts."""
+        return self if self.acts is None else replace(self, point=self.acts, acts=None)
 
     @property
     def grips(self) -> Float[np.ndarray, " E"]:

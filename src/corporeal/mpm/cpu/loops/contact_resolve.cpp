@@ -156,6 +156,13 @@ struct List {
 struct Rounds {
   static_assert(PAIR == Backing::ROW, "one row of a pair");
   static inline bool both_rigid(const Line &R) { return R.ma < 0 && (R.mc < 0 || !R.c); }
+  // Where two rigid bodies touch that meet at a node: not beyond the edge of one of them.
+  static inline void place(const World *w, const Side *sides, Touch &T, double dx) {
+    double a[3], c[3], shift[3];
+    for (int i = 0; i < 3; i++) a[i] = sides[T.a].mean[i], c[i] = sides[T.c].mean[i];
+    mpm::Touched<double>::shift(w->face, a, c, T.normal, shift);
+    for (int i = 0; i < 3; i++) T.x[i] += shift[i] * dx;
+  }
   // Note the pairs that approach as things move now, and what holds them from behind; whether there are any.
   static inline bool find(const World *w, Stage *stage, int n, int all, double dt, double dx) {
     double *pair = stage->pair, approach;
@@ -224,6 +231,7 @@ for (int t = world->turns ? 0 : stage->touches; t < nt; t++) {   // where none i
     R.n[i] = T.normal[i];
     R.J[i] = 0;
   }
+  if (kind == 0 && world->field[T.fa].rigids && world->field[T.fc].rigids) Rounds::place(world, sides, T, dx);
   List::side(world, sides, T.fa, T.a, T.x, R.a, R.ma, R.ra, R.K);
   List::side(world, sides, T.fc, T.c, T.x, R.c, R.mc, R.rc, R.K);
   R.inverse = List::along(R.K, R.n);
