@@ -106,3 +106,39 @@ def test_a_ball_leaves_a_sheet_straight_up(engine):
     left = found.momentum[0] / found.mass[0]
     assert left[2] > 2.0
     assert np.abs(left[:2]).max() < 0.03
+
+
+def valley(turned):
+    """Two heavy boards as one body, whose faces meet at a right angle below a ball."""
+    size = np.array([0.16, 0.4, 0.06])
+    first = board(np.zeros(3), size)
+    halves = []
+    for side in (-1.0, 1.0):
+        c = np.sqrt(0.5)
+        turn = np.array([[c, 0.0, -side * c], [0.0, 1.0, 0.0], [side * c, 0.0, c]])
+        # The end of each lies at the origin, its upper face towards the other one.
+        shift = np.array([side * 0.08, 0.0, -0.03])
+        rows = first.rounding.copy()
+        rows[:, :3] = rows[:, :3] @ turn.T
+        halves.append([(first.position + shift) @ turn.T, (first.surface + shift) @ turn.T, rows])
+    points, surface, rows = (np.concatenate(both) for both in zip(*halves, strict=True))
+    below = body(points, rigid=True, surface=surface, rounding=rows, density=8000.0, name="valley")
+    ball = round_body(
+        (0.0, 0.01, 0.05 * np.sqrt(2) + 5e-4), velocity=(0.1, 0.4, -0.3), density=2000.0
+    )
+    return (below, ball) if turned else (ball, below)
+
+
+@pytest.mark.parametrize("turned", [False, True], ids=["ball first", "valley first"])
+@pytest.mark.parametrize("engine", ["cpu", "cuda"])
+def test_a_ball_in_a_valley_meets_both_faces_and_nothing_else(engine, turned):
+    """As in the reference; and what it loses along the valley is what friction takes."""
+    given = problem(*valley(turned), planes=(), gravity=(0.0, 0.0, -9.81), friction=0.0)
+    ours, sure = ENGINES[engine](given), ReferenceEngine(given)
+    step_together(ours, sure, 20)
+    mine, theirs = ours.measure(), sure.measure()
+    one = int(turned)
+    assert theirs.pair_impulse[0, 1] > 0
+    assert mine.momentum[one] == pytest.approx(theirs.momentum[one], rel=1e-3, abs=1e-4)
+    for now in (mine, theirs):
+        assert now.momentum[one, 1] == pytest.approx(0.4 * now.mass[one], rel=1e-6)

@@ -1,4 +1,4 @@
-"""Where rigid bodies end."""
+"""Where rigid bodies end, and between two of their faces."""
 
 from dataclasses import replace
 
@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 import corporeal as co
+from corporeal.mpm.state import Matter
 
 G = 9.81
 SIDE, TOP = 0.04, 0.06
@@ -45,3 +46,33 @@ def test_a_cube_falls_off_a_slab_once_its_middle_is_beyond_the_edge(degrees, bey
         assert way[2] < -0.1 * SIDE
     else:
         assert np.linalg.norm(way) < 0.01 * SIDE
+
+
+def gutter(length=0.4):
+    """Two faces at 45°, 15 mm over its underside."""
+    flat = [(0, 0), (0.06, 0), (0.06, 0.06), (0.045, 0.06)]
+    flat += [(0, 0.015), (-0.045, 0.06), (-0.06, 0.06), (-0.06, 0)]
+    cap = np.array([(0, 1, 4), (1, 2, 3), (1, 3, 4), (0, 4, 7), (4, 5, 7), (5, 6, 7)])
+    n = len(flat)
+    corners = [(x, y, z) for y in (-length / 2, length / 2) for x, z in flat]
+    ring = [(k, (k + 1) % n) for k in range(n)]
+    sides = [t for k, m in ring for t in ((k, m, n + m), (k, n + m, n + k))]
+    mesh = trimesh.Trimesh(corners, np.concatenate([cap[:, ::-1], cap + n, sides]))
+    mesh.fix_normals()
+    assert mesh.is_watertight
+    return mesh
+
+
+def test_a_ball_rolls_down_a_gutter_slower_than_on_a_plane():
+    """It turns about a line r cos 45° below its middle: a = g sin θ/(1 + 2 I/(m r²))."""
+    slope, radius, time = np.radians(5.0), 0.02, 0.5
+    gravity = (0.0, G * np.sin(slope), -G * np.cos(slope))
+    ball = trimesh.creation.icosphere(3, radius)
+    ball.apply_translation((0.0, -0.12, 0.015 + np.sqrt(2) * radius + 1e-5))
+    solids = solid("softwood", gutter(), "gutter"), solid("steel", ball, "ball")
+    engine, way = run_of(*solids, gravity=gravity, time=time)
+    matter = Matter.of(engine.problem)
+    share = matter.inertia[1][0, 0] / (matter.total[1] * radius**2)
+    ideal = 0.5 * G * np.sin(slope) * time**2 / (1.0 + 2.0 * share)
+    assert way[1] == pytest.approx(ideal, rel=0.02)
+    assert np.abs(way[[0, 2]]).max() < 5e-4

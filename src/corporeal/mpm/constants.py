@@ -127,6 +127,9 @@ misjudge, as they take it for a plane within the 3 cells that each sees …"""
 FACET_ALIKE = 0.95
 """… and on which they meet along nearly the same normal: the least cosine [-]. On what is ``THIN``
 normals of nodes lean, since mass lies around them on both sides: there ``ROUND_ALIKE`` counts."""
+VALLEY_TURNS = 6
+"""How often a normal of a face is taken off that of a node, to see whether that lies between such
+normals: what is round and lies in a valley meets the faces, and not nodes that see both."""
 NEAREST_MIDDLE = 0.05
 """Least distance of what meets a hollow from its centre of curvature, over the radius [-]: at the
 centre all of the hollow is equally near."""

@@ -31,6 +31,7 @@ ROUNDING = wp.constant(constants.ROUNDING)
 FACET_ROW = wp.constant(constants.FACET_ROW)
 FACET_ALIKE = wp.constant(D(constants.FACET_ALIKE))
 ROUND_ALIKE = wp.constant(D(constants.ROUND_ALIKE))
+VALLEY_TURNS = wp.constant(constants.VALLEY_TURNS)
 
 
 @wp.func
@@ -191,6 +192,37 @@ def list_curves(r: Rigid, c: Contacts, s: Sheet, tid: int, stride: int):
 
 
 @wp.func
+def instead_at(r: Rigid, c: Contacts, s: Sheet, q: int):
+    """How far around a contact with a face nodes are not asked [m]."""
+    reach = c.instead[q]
+    if reach == D(0.0):
+        rolls = c.fa[q]
+        if c.facet[q] == 1:
+            rolls = c.fc[q]
+        reach = facet_misjudged(r.radius[rolls], s.dx)
+    return reach
+
+
+@wp.func
+def in_valley(r: Rigid, c: Contacts, s: Sheet, t: int):
+    """Whether the normal on a node lies between those of several faces near it."""
+    rest = wp.vec3d(c.normal[t])
+    for _ in range(VALLEY_TURNS):
+        most = D(0.0)
+        best = int(-1)
+        for q in range(s.flag[NODES], s.flag[TOUCHES]):
+            if c.fa[q] == c.fa[t] and c.fc[q] == c.fc[t]:
+                cosine = wp.dot(rest, wp.vec3d(c.normal[q]))
+                near = wp.length(c.point[t] - c.point[q]) < instead_at(r, c, s, q)
+                if near and cosine > most:
+                    most = cosine
+                    best = q
+        if best >= 0:
+            rest = rest - most * wp.vec3d(c.normal[best])
+    return wp.length_sq(rest) < D(1.0) - FACET_ALIKE * FACET_ALIKE
+
+
+@wp.func
 def replaced(r: Rigid, c: Contacts, s: Sheet, t: int):
     """Whether a contact on a node is one of those on flat or curved faces, less well known."""
     found = int(0)
@@ -200,21 +232,18 @@ def replaced(r: Rigid, c: Contacts, s: Sheet, t: int):
     if rigid:
         for q in range(s.flag[NODES], s.flag[TOUCHES]):
             if c.fa[q] == c.fa[t] and c.fc[q] == c.fc[t]:
-                rolls = c.fa[q]
                 flat = c.fc[q]
                 if c.facet[q] == 1:
-                    rolls = c.fc[q]
                     flat = c.fa[q]
                 cosine = D(wp.dot(c.normal[t], c.normal[q]))
                 apart = c.point[t] - c.point[q]
-                reach = c.instead[q]
                 alike = ROUND_ALIKE
-                if reach == D(0.0):
-                    reach = facet_misjudged(r.radius[rolls], s.dx)
-                    if r.thin[flat] == 0:
-                        alike = FACET_ALIKE
-                if facet_replaces(apart, cosine, reach, alike):
+                if c.instead[q] == D(0.0) and r.thin[flat] == 0:
+                    alike = FACET_ALIKE
+                if facet_replaces(apart, cosine, instead_at(r, c, s, q), alike):
                     found = 1
+        if found == 0 and in_valley(r, c, s, t):
+            found = 1
     return found == 1
 
 

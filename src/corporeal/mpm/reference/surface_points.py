@@ -5,7 +5,7 @@ from dataclasses import replace
 from itertools import permutations
 
 import numpy as np
-from jaxtyping import Float
+from jaxtyping import Bool, Float
 
 from corporeal.mpm.constants import (
     BENT_NODES,
@@ -13,6 +13,7 @@ from corporeal.mpm.constants import (
     FACET_NODES,
     POINT_REACH,
     ROUND_ALIKE,
+    VALLEY_TURNS,
 )
 from corporeal.mpm.physics.facets import on_facet
 from corporeal.mpm.reference.contact_scene import Scene
@@ -85,6 +86,7 @@ def instead_of_nodes(scene: Scene, nodes: list[Touch], faces: list[Touch]) -> li
     cell, kept = scene.problem.cell, []
     for touch in nodes:
         left = np.ones(len(touch.gap), dtype=bool)
+        met = [(np.zeros((len(left), 0), dtype=bool), np.zeros((0, 3)))]
         for face in (f for f in faces if f.pair == touch.pair):
             reach, alike = face.instead, ROUND_ALIKE
             if reach is None:
@@ -95,8 +97,28 @@ def instead_of_nodes(scene: Scene, nodes: list[Touch], faces: list[Touch]) -> li
             apart = np.linalg.norm(touch.point[:, None] - face.point, axis=2)
             same = (touch.normal @ face.normal.T > alike) & (apart < reach)
             left &= ~same.any(axis=1)
+            met.append((apart < reach, face.normal))
+        near, normals = np.concatenate([n for n, _ in met], axis=1), [m for _, m in met]
+        left &= ~in_valley(touch.normal, np.concatenate(normals), near)
         kept.append(touch if left.all() else _some(touch, left))
     return kept
+
+
+def in_valley(
+    normal: Float[np.ndarray, "E 3"], faces: Float[np.ndarray, "F 3"], near: Bool[np.ndarray, "E F"]
+) -> Bool[np.ndarray, " E"]:
+    """Tell which normals on nodes are sums of those of faces near them, as far as they are known.
+
+    What is round and touches two faces of a body touches nothing between them, but nodes there see
+    both, and look halfway. The face that a normal looks at most is taken off it, again and again.
+    """
+    rest = normal.copy()
+    for _ in range(VALLEY_TURNS if near.any() else 0):
+        cosine = np.where(near, rest @ faces.T, 0.0)
+        best = np.argmax(cosine, axis=1)
+        most = np.take_along_axis(cosine, best[:, None], axis=1)
+        rest -= np.maximum(most, 0.0) * faces[best]
+    return near.any(axis=1) & (np.sum(rest**2, axis=1) < 1.0 - FACET_ALIKE**2)
 
 
 def in_order(touches: list[Touch]) -> list[Touch]:

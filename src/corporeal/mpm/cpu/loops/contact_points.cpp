@@ -225,12 +225,15 @@ struct Points {
     }
     return count;
   }
+  // How far around a contact with a face nodes are not asked [m].
+  static inline double instead(const World *w, const Touch &P) {
+    return P.instead > 0 ? P.instead : mpm::Facet::misjudged(rolls(w, P)->rigid[RADIUS], w->dx);
+  }
   // Contacts on nodes that are those on flat and curved faces, less well known, transmit nothing.
-  MPM_RARE static void instead_of_nodes(const World *w, Touch *touches, int nodes, int all) {
-    for (int q = nodes; q < all; q++) {
+  MPM_RARE static void instead_of_nodes(const World *w, Touch *touches, int nodes, int first, int all) {
+    for (int q = first; q < all; q++) {
       const Touch &P = touches[q];
-      if (P.fc >= w->fields) continue;
-      const double reach = P.instead > 0 ? P.instead : mpm::Facet::misjudged(rolls(w, P)->rigid[RADIUS], w->dx);
+      const double reach = instead(w, P);
       const bool bent = P.instead > 0 || w->field[P.face ? P.fa : P.fc].thin;
       const double alike = bent ? mpm::ROUND_ALIKE : mpm::FACET_ALIKE;
       for (int t = 0; t < nodes; t++) {
@@ -240,6 +243,29 @@ struct Points {
         for (int i = 0; i < 3; i++) d[i] = T.x[i] - P.x[i];
         if (mpm::Facet::replaces(d, Vec::dot(T.normal, P.normal), reach, alike)) T.active = 0;
       }
+    }
+  }
+  // Nor do those whose normals lie between the normals of several such faces: in a valley.
+  MPM_RARE static void nor_in_valleys(const World *w, Touch *touches, int nodes, int first, int all) {
+    for (int t = 0; t < nodes && all - first > 1; t++) {
+      Touch &T = touches[t];
+      if (!T.active || T.c < 0 || !w->field[T.fa].rigids || !w->field[T.fc].rigids) continue;
+      double rest[3] = {T.normal[0], T.normal[1], T.normal[2]};
+      for (int turn = 0; turn < mpm::VALLEY_TURNS; turn++) {
+        const Touch *best = 0;
+        double most = 0;
+        for (int q = first; q < all; q++) {
+          const Touch &P = touches[q];
+          if (P.fa != T.fa || P.fc != T.fc) continue;
+          const double cosine = Vec::dot(rest, P.normal), reach = instead(w, P);
+          double d[3];
+          for (int i = 0; i < 3; i++) d[i] = T.x[i] - P.x[i];
+          if (cosine > most && Vec::dot(d, d) < reach * reach) most = cosine, best = &P;
+        }
+        if (!best) break;
+        for (int i = 0; i < 3; i++) rest[i] -= most * best->normal[i];
+      }
+      if (Vec::dot(rest, rest) < 1.0 - mpm::FACET_ALIKE * mpm::FACET_ALIKE) T.active = 0;
     }
   }
 };

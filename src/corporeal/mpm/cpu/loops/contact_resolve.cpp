@@ -206,10 +206,12 @@ Line *lines = stage->line;
 int nt = stage->touches, n = 0, stacked = 0;
 double *pair = stage->pair;   // [all][all][PAIR]
 nt += Points::on_planes(world, touches + nt);
+const int faces = nt;   // contacts of what is round with faces of others begin here
 nt += Points::on_facets(world, touches + nt, stage->most_touches - nt);
 nt += Points::on_curves(world, touches + nt, stage->most_touches - nt);
 stage->points = nt - stage->touches;
-Points::instead_of_nodes(world, touches, stage->touches, nt);
+Points::instead_of_nodes(world, touches, stage->touches, faces, nt);
+Points::nor_in_valleys(world, touches, stage->touches, faces, nt);
 Bonds::join(world);
 for (int t = world->turns ? 0 : stage->touches; t < nt; t++) {   // where none is rigid no node moves one
   Touch &T = touches[t];
