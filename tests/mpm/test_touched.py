@@ -53,10 +53,9 @@ def test_a_node_beyond_two_edges_acts_where_they_cross():
 @pytest.mark.parametrize("turned", [False, True], ids=["block first", "board first"])
 def test_a_block_over_an_edge_moves_as_in_the_reference(turned):
     """The board ends .4 cells behind the next nodes."""
-    bare = {"rounding": np.zeros((0, 12)), "surface": np.zeros((0, 3))}
-    below = board(np.array([0.008, 0.0, -0.04]), size=np.array([0.4, 0.12, 0.08]), **bare)
+    below = board(np.array([0.008, 0.0, -0.04]), size=np.array([0.4, 0.12, 0.08]))
     start, size = np.array([0.26, 0.02, 0.0755]), np.array([0.2, 0.15, 0.15])
-    one = board(start, size=size, velocity=(0.1, 0.05, -0.2), **bare)
+    one = board(start, size=size, velocity=(0.1, 0.05, -0.2))
     bodies = (below, one) if turned else (one, below)
     given = problem(*bodies, planes=(), gravity=(0.0, 0.0, -9.81), restitution=0.0)
     ours, sure = CpuEngine(given, threads=1), ReferenceEngine(given)

@@ -12,7 +12,7 @@ from corporeal.mpm.constants import SMALLEST_VOLUME
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import branches, rigid
 from corporeal.mpm.physics.branches import Branches, Memory
-from corporeal.mpm.physics.facets import Facets, facets_of, of_flat_faces
+from corporeal.mpm.physics.facets import Facets, facets_of, has_edges, of_flat_faces
 from corporeal.mpm.problem import Body, Problem
 from corporeal.mpm.substance import Substances
 from corporeal.types import ROUNDING
@@ -90,6 +90,11 @@ class Matter:
     def flat(self) -> tuple[bool, ...]:
         """Whether each body is bounded by flat faces for the most part."""
         return tuple(map(of_flat_faces, self.facets, self.surface))
+
+    @cached_property
+    def edged(self) -> tuple[bool, ...]:
+        """Whether each body is known to have edges."""
+        return tuple(map(has_edges, self.rounding))
 
     @cached_property
     def spacing(self) -> Float[np.ndarray, " B"]:

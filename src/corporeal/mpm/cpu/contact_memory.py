@@ -16,7 +16,7 @@ from corporeal.mpm.cpu.layout import BOX, CENTRE, LANES, PAIR, RADIUS
 from corporeal.mpm.ledger import Ledger
 from corporeal.mpm.physics import rigid
 from corporeal.mpm.physics.contact import face_table
-from corporeal.mpm.physics.facets import facets_of, of_flat_faces
+from corporeal.mpm.physics.facets import facets_of, has_edges, of_flat_faces
 from corporeal.mpm.problem import Body, Problem
 from corporeal.mpm.state import rounding_of
 from corporeal.types import ROUNDING
@@ -110,6 +110,7 @@ def rigid_grid(
     record["spacing"] = spacing
     record["thin"], record["slims"] = thin, len(slim)
     record["flat"] = of_flat_faces(facets, body.surface)
+    record["edged"] = has_edges(rounding)
     return arrays
 
 

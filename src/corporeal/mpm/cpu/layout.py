@@ -195,6 +195,7 @@ FIELD = Record(
     ("int", "patches wets shows facets slims"),
     ("int", "rolls"),  # rigid: whether any of its surface points is round
     ("int", "flat"),  # rigid: whether it is bounded by flat faces for the most part
+    ("int", "edged"),  # rigid: whether it is known to have edges
     ("int", "bends"),  # rigid: whether it curves outwards or inwards anywhere
     ("int", "side clumps"),  # side: of the two sets of nodes, which this step reads
 )

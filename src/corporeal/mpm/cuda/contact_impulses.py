@@ -168,8 +168,10 @@ def put(c: Contacts, r: Rigid, g: Grid, s: Sheet, t: int):
     if rigid:
         rigid = r.stiff[c.fa[t]] == 1 and r.stiff[c.fc[t]] == 1
     if rigid:
-        a = mean_of(c, g, s, c.a[t])
-        shift = touched(c.face, a, mean_of(c, g, s, c.c[t]), wp.vec3d(c.normal[t]))
+        # What is round all over has no edges.
+        a = mean_of(c, g, s, c.a[t]) * D(r.edged[c.fa[t]])
+        other = mean_of(c, g, s, c.c[t]) * D(r.edged[c.fc[t]])
+        shift = touched(c.face, a, other, wp.vec3d(c.normal[t]))
         c.point[t] = c.point[t] + shift * s.dx
     return 0
 

@@ -74,6 +74,8 @@ class Rigid:
     """See ``physics.rigid.thinness``; 0 for what deforms."""
     flat: wp.array(dtype=wp.int32)
     """1: rigid, and bounded by flat faces for the most part."""
+    edged: wp.array(dtype=wp.int32)
+    """1: known to have edges."""
     slim: wp.array(dtype=wp.vec3d)
     """Surface points where a body is thin and not as a whole, see ``physics.rigid`` …"""
     slim_first: wp.array(dtype=wp.int32)

@@ -152,6 +152,7 @@ class Memory:
         r.slim_first = self.put(np.cumsum(slims) - slims, wp.int32)
         r.slim_count = self.put(slims, wp.int32)
         r.spacing, r.flat = self.put(matter.spacing, wp.float64), self.put(flat, wp.int32)
+        r.edged = self.put(np.array(matter.edged, dtype=int), wp.int32)
         r.first = self.put(np.cumsum(count) - count, wp.int32)
         r.points, r.thin = self.put(count, wp.int32), self.put(thin, wp.int32)
 

@@ -67,6 +67,17 @@ def of_flat_faces(facets: Facets, surface: Float[np.ndarray, "S 3"]) -> bool:
     return len(facets.point) > MOSTLY_FLAT * len(surface)
 
 
+def has_edges(rows: Float[np.ndarray, "S W"]) -> bool:
+    """Tell whether a body has any: whether it is known not to be round all over.
+
+    Args:
+        rows: How its surface curves at its points, ``types.ROUNDING``; without normals where that
+            is not known.
+
+    """
+    return bool(np.any(rows[:, :3].any(axis=1) & (rows[:, 6:8].sum(axis=1) <= 0.0)))
+
+
 def on_facet(
     points: Float[np.ndarray, "N 3"],
     normal: Float[np.ndarray, "3"],

@@ -314,7 +314,7 @@ def _between(
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
     movers, acts = (scene.mover_of_slot(a), scene.mover_of_slot(c)), None
     if all(map(scene.is_rigid, pair)):
-        acts = index * cell + contact.touched(look.mean[a], look.mean[c], normal, cell)
+        acts = index * cell + contact.touched(*_to_edges(scene, look, pair, slots), normal, cell)
     return Touch(pair, *movers, index * cell, normal, gap, kept=kept, acts=acts)
 
 
@@ -326,6 +326,14 @@ def _candidates(
     if (thin[0] == 2) != (thin[1] == 2):
         found[:, [0, 1 if thin[0] == 2 else 2]] = 0.0
     return found
+
+
+def _to_edges(
+    scene: Scene, look: Look, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
+) -> list[Float[np.ndarray, "E 3"]]:
+    """Mean offsets that lead to edges: none of what is round all over."""
+    both = zip(pair, slots, strict=True)
+    return [scene.matter.edged[body] * look.mean[slot] for body, slot in both]
 
 
 def _wet(

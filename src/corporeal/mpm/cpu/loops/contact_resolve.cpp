@@ -159,7 +159,10 @@ struct Rounds {
   // Where two rigid bodies touch that meet at a node: not beyond the edge of one of them.
   static inline void place(const World *w, const Side *sides, Touch &T, double dx) {
     double a[3], c[3], shift[3];
-    for (int i = 0; i < 3; i++) a[i] = sides[T.a].mean[i], c[i] = sides[T.c].mean[i];
+    for (int i = 0; i < 3; i++) {   // what is round all over has no edges
+      a[i] = w->field[T.fa].edged ? sides[T.a].mean[i] : 0.0;
+      c[i] = w->field[T.fc].edged ? sides[T.c].mean[i] : 0.0;
+    }
     mpm::Touched<double>::shift(w->face, a, c, T.normal, shift);
     for (int i = 0; i < 3; i++) T.x[i] += shift[i] * dx;
   }
