@@ -314,7 +314,7 @@ def _between(
     gap = np.where(np.any(normal != 0.0, axis=1), gap, np.inf)
     movers, acts = (scene.mover_of_slot(a), scene.mover_of_slot(c)), None
     if all(map(scene.is_rigid, pair)):
-        acts = index * cell + contact.touched(*_to_edges(scene, look, pair, slots), normal, cell)
+        acts = index * cell + _to_edges(scene, look, pair, slots, normal)
     return Touch(pair, *movers, index * cell, normal, gap, kept=kept, acts=acts)
 
 
@@ -329,11 +329,16 @@ def _candidates(
 
 
 def _to_edges(
-    scene: Scene, look: Look, pair: tuple[int, int], slots: tuple[np.ndarray, np.ndarray]
-) -> list[Float[np.ndarray, "E 3"]]:
-    """Mean offsets that lead to edges: none of what is round all over."""
-    both = zip(pair, slots, strict=True)
-    return [scene.matter.edged[body] * look.mean[slot] for body, slot in both]
+    scene: Scene,
+    look: Look,
+    pair: tuple[int, int],
+    slots: tuple[np.ndarray, np.ndarray],
+    normal: Float[np.ndarray, "E 3"],
+) -> Float[np.ndarray, "E 3"]:
+    """How far from nodes two rigid bodies touch [m]; what is round all over has no edges."""
+    edged = scene.matter.edged
+    first, second = (edged[b] * look.mean[slot] for b, slot in zip(pair, slots, strict=True))
+    return contact.touched(first, second, normal, scene.problem.cell)
 
 
 def _wet(
