@@ -11,14 +11,17 @@ BELT, ASIDE = 0.25, 36
 """Half the width of a belt; how far from the middle a picture shows another thing [px]."""
 DISCS = 0.95
 """From the ball to the middles of discs."""
+OTHER, OTHER_RADIUS, BLUE = (0.85, -0.3, FLOOR + 0.2), 0.2, (0.1, 0.2, 0.7)
+"""Middle, radius and colour of a second thing."""
 RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
 
 
-def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0):
+def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=None):
     """Photographs of a ball on a mottled floor, its true masks, and points on both.
 
     belt: colour of a belt about the ball, and of what both sides of all pictures show; flat: radius
-    of three discs of the ball's colour that lie on the floor around it.
+    of three discs of the ball's colour that lie on the floor around it; other: a blue "ball" beside
+    it, or a blue "disc" that lies there.
     """
     random = np.random.default_rng(seed)
     mottled = random.uniform(-1, 1, (64, 64, 64))
@@ -38,10 +41,17 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0):
         with np.errstate(divide="ignore"):
             down = np.where(rays[..., 2] < 0, (FLOOR - eye[2]) / rays[..., 2], 30.0)
         far = np.where(on, -b - np.sqrt(np.maximum(inside, 0)), np.minimum(down, 30.0))
+        blue, near = _met(rays, eye, far)
+        if other == "ball":
+            on, far = on & ~blue, np.where(blue, near, far)
         place = eye + far[..., None] * rays
+        if other == "disc":
+            blue = ~on & (np.linalg.norm(place - OTHER, axis=-1) < 1.5 * OTHER_RADIUS)
         at = (np.floor(place * 16).astype(int) % 64).reshape(-1, 3).T
         tone = mottled[tuple(at)].reshape(HIGH, WIDE)
         colour = np.where((on | on_discs(place, flat))[..., None], ball, ground)
+        if other is not None:
+            colour[blue] = BLUE
         if belt is not None:
             aside = np.abs(u - WIDE / 2) > ASIDE
             colour[aside | (on & (np.abs(place[..., 2]) < BELT))] = belt
@@ -53,6 +63,15 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0):
         near = np.abs(place).max(axis=-1) < 2
         seen.append(place[near][random.permutation(near.sum())[:60]])
     return Views(np.stack(pictures), cameras), np.stack(masks), np.concatenate(seen)
+
+
+def _met(rays, eye, far):
+    """Which rays meet the second ball before anything else, and where."""
+    away = eye - np.array(OTHER)
+    b = rays @ away
+    inside = b * b - (away @ away - OTHER_RADIUS**2)
+    near = -b - np.sqrt(np.maximum(inside, 0))
+    return (inside > 0) & (near < far), near
 
 
 def on_discs(place, radius):

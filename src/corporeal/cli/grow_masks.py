@@ -53,6 +53,6 @@ def verb_masks() -> None:
         made = grown_masks(asked.photographs, out, pointed, tell("masks"))
     if made.folder is None:
         raise UserError(f"{' '.join(made.said)} Point at the object with --at or --box.")
-    print(*made.said, sep="\n")
+    print(*made.said, *filter(None, [made.beside]), sep="\n")
     photographs, masks = quote(str(asked.photographs)), quote(str(out))
     print(f"Look at {out}. Go on with: corporeal run {photographs} --masks {masks}")

@@ -40,6 +40,8 @@ class MaskRecord:
     """Of every file, as it was written."""
     incomplete: str = ""
     """Why they are not of all that the photographs are of, in a clause; empty: they are."""
+    beside: str = ""
+    """What stands beside what they show, in sentences; empty: nothing is known of it."""
 
 
 def file_names(shots: Sequence[Shot]) -> list[str]:
@@ -79,10 +81,13 @@ def write_instances(folder: Path, name: str, number: Int[np.ndarray, "H W"]) -> 
     Image.fromarray(np.minimum(number, MOST).astype(np.uint8)).save(path)
 
 
-def write_record(folder: Path, made_by: str, said: Sequence[str], incomplete: str = "") -> None:
+def write_record(
+    folder: Path, made_by: str, said: Sequence[str], incomplete: str = "", beside: str = ""
+) -> None:
     """Note what lies in the folder now; until then nothing in it counts as made."""
     digests = {str(p.relative_to(folder)): store.digest(p) for p in _files(folder)}
-    store.write_json(folder / RECORD, MaskRecord(made_by, tuple(said), digests, incomplete))
+    made = MaskRecord(made_by, tuple(said), digests, incomplete, beside)
+    store.write_json(folder / RECORD, made)
 
 
 def read_record(folder: Path) -> MaskRecord | None:

@@ -51,7 +51,8 @@ def shaded_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.n
         return nowhere
     ground = square(views.cameras, floor, around)
     pairs = zip(views.rgb, views.cameras, strict=True)
-    light, ratios = _parted(_evened(np.stack([_seen(rgb, c, ground) for rgb, c in pairs])))
+    colours = np.stack([colours_on(ground, rgb, c, PATCH, 1.0) for rgb, c in pairs])
+    light, ratios = parted(evened(colours))
     like = _like_floor(light, ratios)
     if like is None:
         return nowhere
@@ -65,18 +66,29 @@ def shaded_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.n
     return witnessed(views.cameras, floor, around, agreeing)
 
 
-def _seen(rgb: np.ndarray, camera: Camera, ground: Square) -> Float[np.ndarray, "n n 3"]:
-    """Return the logarithm of the colour around each cell; nan: not in the picture."""
+def colours_on(
+    ground: Square, rgb: np.ndarray, camera: Camera, patch: int, darkest: float
+) -> Float[np.ndarray, "n n 3"]:
+    """Return the logarithm of the colour around each cell; nan: not in the picture.
+
+    Args:
+        ground: The cells.
+        rgb: A picture.
+        camera: That took it.
+        patch: Cells along each side whose mean it is.
+        darkest: Of 255; what is darker counts as that, so that noise is not a ratio.
+
+    """
     size, at = (ground.count, ground.count), ground.seen_by(camera)
     out = np.empty((*size, 3))
     for k in range(3):
         one = map_coordinates(rgb[..., k].astype(float), at, order=1, cval=np.nan).reshape(size)
-        shown = minimum_filter(np.isfinite(one), PATCH)
-        out[..., k] = np.where(shown, uniform_filter(np.nan_to_num(one), PATCH), np.nan)
-    return np.log(np.maximum(out, 1.0) / 255)
+        shown = minimum_filter(np.isfinite(one), patch)
+        out[..., k] = np.where(shown, uniform_filter(np.nan_to_num(one), patch), np.nan)
+    return np.log(np.maximum(out, darkest) / 255)
 
 
-def _evened(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 3"]:
+def evened(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 3"]:
     """Take every picture's own exposure and white balance off, as the floor shows them."""
     few = colour[:, ::APART, ::APART].reshape(len(colour), -1, 3)
     few = few[:, np.isfinite(few).all(axis=-1).sum(axis=0) >= WITNESSES]
@@ -91,7 +103,7 @@ def _evened(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 3"
     return colour - gain[:, None]
 
 
-def _parted(
+def parted(
     colour: Float[np.ndarray, "V n n 3"],
 ) -> tuple[Float[np.ndarray, "V n n"], Float[np.ndarray, "V n n 2"]]:
     """Return lightness, and red and blue against green, all as logarithms."""

@@ -15,6 +15,7 @@ from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
 from corporeal.geometry.cropped import cropped
+from corporeal.masking.beside import Beside, beside
 from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
 from corporeal.masking.floor_colour import shaded_floor
 from corporeal.masking.floor_pattern import shows_floor
@@ -72,6 +73,8 @@ class Grown:
     """Share of the pictures' pixels that is inside."""
     left_over: float
     """What has their colours on the floor in the middle, but is none of them, over what is."""
+    beside: Beside | None = None
+    """Something of other colours that stands on the floor beside them."""
 
 
 @dataclass(frozen=True)
@@ -147,6 +150,7 @@ def grow(
         cropped=float(cropped(state.masks).mean()),
         share=float(state.masks.mean()),
         left_over=left_over(by_colour, state.masks, middle),
+        beside=beside(rough, state.masks, _widened(state.masks), seeds.floor, seeds.around),
     )
 
 

@@ -1,7 +1,7 @@
 """Masks of photographs that have none, grown, and written where people can correct them."""
 
 import shutil
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -30,6 +30,10 @@ DOUBTED = "doubted"
 """Folder of masks that are not to be believed: what colours alone would take for objects."""
 METHOD = 8
 """Raised when other masks would be grown: those of an older method are grown again."""
+HAVE_IT = (
+    "If it is meant, too, paint it white in the masks, or give masks of all (a folder 'masks' with "
+    "the names of the pictures); 'corporeal masks' with --at grows masks of it alone."
+)
 GROWN = 0.8
 """Share of the work that is done when masks are grown."""
 
@@ -46,6 +50,9 @@ class GrownMasks:
     """Holds masks that are not to be believed, if there are any."""
     incomplete: str = ""
     """Why nobody can tell all of what the photographs are of, in a clause; empty: masks do."""
+    beside: str = ""
+    """What stands on the floor beside what they show, in sentences; empty: nothing is known of it,
+    or somebody corrected them."""
 
 
 def grown_masks(
@@ -71,9 +78,9 @@ def grown_masks(
     record = read_record(folder)
     if record is not None and record.made_by == made_by:
         changes = _changes(folder)
-        lacking = "" if changes else record.incomplete
+        lacking, other = ("", "") if changes else (record.incomplete, record.beside)
         believed = folder if record.digest_of else None
-        return GrownMasks(believed, (*record.said, *changes), _doubted(folder), lacking)
+        return GrownMasks(believed, (*record.said, *changes), _doubted(folder), lacking, other)
     progress(0.0, "reading photographs")
     shown = read_photographs(source, FINE, bare=True)
     rough = reduced(shown.views, ROUGH)
@@ -97,8 +104,9 @@ def grown_masks(
         *([FLAT] if flat else []),
         *(f"Check them: {w}." for w in (why, lacking) if w),
     )
-    write_record(folder, made_by, said, lacking)
-    return GrownMasks(folder, said, incomplete=lacking)
+    other = _beside(grown, shown.names) if pointed is None else ""
+    write_record(folder, made_by, said, lacking, other)
+    return GrownMasks(folder, said, incomplete=lacking, beside=other)
 
 
 def _grown(views: Views, seeds: Seeds, progress: Progress) -> tuple[Grown | None, bool]:
@@ -134,6 +142,16 @@ def _told(grown: Grown, pointed: Pointed | None) -> str:
     return (
         f"Masks were grown from colours and the visual hull of {what}; {grown.coherence:.0%} of "
         "them and of the silhouettes of their hull agree."
+    )
+
+
+def _beside(grown: Grown, names: Sequence[str]) -> str:
+    if (other := grown.beside) is None:
+        return ""
+    return (
+        f"Something else stands on the floor beside it and was left out: about {other.as_large:.0%}"
+        f" as large in the pictures, in {names[other.view]} at {other.across:.0%} of the width from"
+        f" the left and {other.down:.0%} of the height from the top. {HAVE_IT}"
     )
 
 

@@ -38,23 +38,34 @@ class Volume:
     """How far a cell reaches beside the pixel of its middle [px]."""
     outer: Bool[np.ndarray, " M"]
     """Whether a cell is at the edge of the ball."""
-    tall: Bool[np.ndarray, " M"]
-    """Whether a cell is so high above the floor that before it no floor is seen."""
+    height: Float[np.ndarray, " M"]
+    """Above the floor, in radii of the ball; 0 where nobody knows it."""
+
+    @property
+    def tall(self) -> Bool[np.ndarray, " M"]:
+        """Whether a cell is so high above the floor that before it no floor is seen."""
+        return self.height > TALL
 
     def carved(self, masks: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, " M"]:
         """Return which cells masks leave, without small pieces.
 
         As few views may see a cell beside the masks as ``geometry.silhouettes.outside`` forgives.
         """
-        flat = masks.reshape(len(masks), -1)
+        beside, looking = self.votes(masks)
+        kept = ~outside(beside, looking) & (looking >= SEEN * len(masks))
+        return self._without_crumbs(kept)
+
+    def votes(
+        self, masks: Bool[np.ndarray, "V H W"]
+    ) -> tuple[Int32[np.ndarray, " M"], Int32[np.ndarray, " M"]]:
+        """Return how many views see each cell beside masks, and how many see it at all."""
         beside = np.zeros(len(self.index), np.int32)
         looking = np.zeros(len(self.index), np.int32)
-        for mask, pixel in zip(flat, self.pixel, strict=True):
+        for mask, pixel in zip(masks.reshape(len(masks), -1), self.pixel, strict=True):
             sees = pixel >= 0
             looking += sees
             beside += sees & ~mask[pixel]
-        kept = ~outside(beside, looking) & (looking >= SEEN * len(flat))
-        return self._without_crumbs(kept)
+        return beside, looking
 
     def silhouettes(self, filled: Bool[np.ndarray, " M"]) -> Bool[np.ndarray, "V H W"]:
         """Return the pixels in which filled cells are seen."""
@@ -66,15 +77,22 @@ class Volume:
         pairs = zip(made.reshape(self.shape), self.footprint, strict=True)
         return np.stack([binary_dilation(one, iterations=int(n)) for one, n in pairs])
 
-    def _without_crumbs(self, kept: np.ndarray) -> np.ndarray:
-        if not kept.any():
-            return kept
+    def pieces(self, kept: Bool[np.ndarray, " M"]) -> tuple[Int[np.ndarray, " M"], int]:
+        """Return the number of the piece that each cell is of, from 1 on, and how many there are.
+
+        0: it is not kept.
+        """
         cube = np.zeros(ACROSS**3, bool)
         cube[self.index[kept]] = True
         found = label(cube.reshape(ACROSS, ACROSS, ACROSS), np.ones((3, 3, 3)))
         assert isinstance(found, tuple)
-        piece = found[0].ravel()[self.index]
-        sizes = np.bincount(piece, minlength=found[1] + 1)
+        return found[0].ravel()[self.index], found[1]
+
+    def _without_crumbs(self, kept: np.ndarray) -> np.ndarray:
+        if not kept.any():
+            return kept
+        piece, count = self.pieces(kept)
+        sizes = np.bincount(piece, minlength=count + 1)
         sizes[0] = 0
         return kept & (sizes >= PIECE * sizes.max())[piece]
 
@@ -115,8 +133,7 @@ def volume(
     footprint = np.maximum(np.ceil(side / 2), 1).astype(np.int64)
     shape = len(cameras), cameras[0].height, cameras[0].width
     outer = far[index] > 1 - 4 / ACROSS
-    tall = height[index] > TALL
-    return Volume(index, pixel.astype(np.int32), shape, footprint, outer, tall)
+    return Volume(index, pixel.astype(np.int32), shape, footprint, outer, height[index])
 
 
 def lowered(floor: Plane | None, around: Region) -> Plane | None:

@@ -109,7 +109,8 @@ def masks_for(
     if grown.folder is None:
         return _Masks(None, (), grown.said, False, grown.doubted, grown.incomplete)
     said = " ".join(("There were no masks.", *grown.said, CORRECT))
-    return _Masks(grown.folder, (), (said,), True, incomplete=grown.incomplete)
+    warnings = (said, *filter(None, [grown.beside]))
+    return _Masks(grown.folder, (), warnings, True, incomplete=grown.incomplete)
 
 
 def _sized(taken: Intake, source: Path, folder: Path) -> Bool[np.ndarray, "V H W"] | None:
