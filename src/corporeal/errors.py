@@ -1,11 +1,32 @@
 """What can go wrong for a user. Each error says what happened, where, and what to do next."""
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from difflib import get_close_matches
 
 
 class UserError(Exception):
-    """Something the user can put right; the CLI prints it in one line and exits with code 2."""
+    """Something the user can put right; the CLI prints it in one line and exits with code 2.
+
+    What was noticed before it may follow, as its notes.
+    """
+
+
+@contextmanager
+def noticed(before: Iterable[str]) -> Iterator[None]:
+    """Add what was noticed before, in sentences, to an error of the user's that ends the block."""
+    try:
+        yield
+    except UserError as error:
+        with_notes(error, before)
+        raise
+
+
+def with_notes(error: UserError, before: Iterable[str]) -> UserError:
+    """Return the error, with what was noticed before it, in sentences, added to its notes."""
+    for sentence in before:
+        error.add_note(sentence)
+    return error
 
 
 NEAR = 3

@@ -3,7 +3,7 @@
 import os
 import sys
 import traceback
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from shlex import quote
@@ -348,7 +348,7 @@ def _do(verb: Callable[[], None]) -> int:
         verb()
         return 0
     except UserError as error:
-        return _complain(str(error))
+        return _complain(str(error), getattr(error, "__notes__", ()))
     except KeyboardInterrupt:
         _complain("Stopped. What was finished is kept: the same command goes on from there.")
         return 130
@@ -361,8 +361,11 @@ def _do(verb: Callable[[], None]) -> int:
         return _confess(error)
 
 
-def _complain(message: str) -> int:
+def _complain(message: str, notes: Sequence[str] = ()) -> int:
+    """Print what went wrong in a line, and in one each what was noticed before."""
     print(f"corporeal: {message}", file=sys.stderr)
+    for note in dict.fromkeys(notes):
+        print(f"  Noticed before: {note}", file=sys.stderr)
     return 2
 
 

@@ -49,7 +49,7 @@ SURE = 0.8
 LOWEST = 2
 """Percentile of the heights of a hull's cells that is near the floor then."""
 TRIED = np.linspace(-0.12, 0.12, 9)
-"""Heights about it, in radii of the ball, of which that is the floor's at which views agree most."""
+"""Heights about it, in radii of the ball; at the floor's views agree most."""
 
 
 @dataclass(frozen=True)

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from corporeal import store
-from corporeal.errors import BadFileError
+from corporeal.errors import BadFileError, noticed
 from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
 from corporeal.poses.attempt import Attempt, Way, attempt, require
@@ -116,7 +116,8 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
         kept = _found(source, folder, progress)
         store.write_json(folder / FOUND, kept)
     if kept.refused:
-        raise BadFileError(source, kept.refused, kept.what_to_do)
+        with noticed(kept.warnings):
+            raise BadFileError(source, kept.refused, kept.what_to_do)
     return Posed(folder, kept.statements, kept.warnings, kept.doubt)
 
 
@@ -178,7 +179,7 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     said, gathered = _gathered(source, folder, _within(progress, 0.0, GATHERED))
     if (count := len(gathered.names)) < LEAST:
         few = f"{count} photographs are too few to find where they were taken from."
-        return _Kept((), (), few, (), TAKE)
+        return _Kept((), gathered.said, few, (), TAKE)
     looked = _places(folder, gathered, _within(progress, GATHERED, LOOKED))
     if isinstance(looked, _Kept):
         return looked
@@ -204,7 +205,7 @@ def _refused(
     if smeared:
         why = [*why, f"{len(smeared)} of {total} pictures are blurred ({names_of(smeared)})"]
     what_to_do = HOLD_STILL if len(smeared) >= MOST_BLURRED * total else WHAT_TO_DO
-    return _Kept((), (), not_found(why, others), tried, what_to_do)
+    return _Kept((), gathered.said, not_found(why, others), tried, what_to_do)
 
 
 def _tried(
@@ -239,10 +240,10 @@ def _places(folder: Path, gathered: Gathered, progress: Progress) -> tuple[Gathe
     if (why := hopeless(looked.shared)) is not None:
         return _refused([why], gathered, blurred(folder / IMAGES, gathered.names))
     if (why := looked.stood_still) is not None:
-        return _Kept((), (), not_found([why], 0), (), WALK)
+        return _Kept((), gathered.said, not_found([why], 0), (), WALK)
     groups = groups_of(looked.shared)
     if groups.mixed:
-        return _Kept((), (), told_apart(groups, gathered.names), (), SORT_THEM)
+        return _Kept((), gathered.said, told_apart(groups, gathered.names), (), SORT_THEM)
     kept = np.setdiff1d(np.arange(len(gathered.names)), groups.beside)
     if groups.beside:
         gathered = without(gathered, groups)

@@ -7,7 +7,7 @@ from pathlib import Path
 import numpy as np
 from jaxtyping import Bool
 
-from corporeal.errors import BadFileError
+from corporeal.errors import BadFileError, noticed
 from corporeal.features.learned_masks import learned_masks
 from corporeal.features.maskers import connect_masker, split
 from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
@@ -60,13 +60,15 @@ def take_pictures(
     posed = _posed(source, config, folder, progress)
     begun = 0.0 if posed is None else POSED
     posed = posed or Posed(source, (), ())
-    found = masks_for(config, posed.folder, folder, within(progress, begun, begun + MASKED))
-    if found.incomplete and not config.force:
-        # Under wrong poses nothing is found whole: then that is what is to be said.
-        doubt = doubt_of_poses(posed.folder)
-        raise BadFileError(source, " ".join([*doubt, f"{found.incomplete}."]), ALL_OF_IT)
-    later = within(progress, begun + MASKED, 1.0)
-    taken = take_in(posed.folder, training, kept, later, instances, found.folder)
+    with noticed(posed.warnings):
+        found = masks_for(config, posed.folder, folder, within(progress, begun, begun + MASKED))
+    with noticed((*posed.warnings, *found.warnings)):
+        if found.incomplete and not config.force:
+            # Under wrong poses nothing is found whole: then that is what is to be said.
+            doubt = doubt_of_poses(posed.folder)
+            raise BadFileError(source, " ".join([*doubt, f"{found.incomplete}."]), ALL_OF_IT)
+        later = within(progress, begun + MASKED, 1.0)
+        taken = take_in(posed.folder, training, kept, later, instances, found.folder)
     made = replace(
         taken,
         coloured=None if found.doubted is None else _sized(taken, posed.folder, found.doubted),
@@ -137,10 +139,23 @@ def _posed(
     posed = pose(source, place / POSES, within(progress, 0.0, POSED * WHOLE))
     if config.masks != AUTO or has_masks(listed(posed.folder).shots):
         return posed
+    with noticed(posed.warnings):
+        return _seen_to_agree(source, posed, config.force, place, progress)
+
+
+def _seen_to_agree(
+    source: Path, posed: Posed, force: bool, place: Path, progress: Progress
+) -> Posed:
+    """Ask masks that are grown under found poses whether the object kept its place, too.
+
+    Raises:
+        BadFileError: It did not.
+
+    """
     later = within(progress, POSED * WHOLE, POSED)
     grown = grown_masks(posed.folder, place / SEEN, progress=later)
     if grown.folder is None:
-        return _doubted(source, posed, config.force)
+        return _doubted(source, posed, force)
     masks = grown.folder / MASKS[0]
     if (why := moved_within(posed, masks)) is None:
         return _doubted(source, posed, force=True)
@@ -149,7 +164,7 @@ def _posed(
     if again is not None:
         how = f"{said}. Where each was taken from was found from points on the object alone."
         return replace(again, warnings=(how, *again.warnings))
-    if not config.force:
+    if not force:
         raise BadFileError(source, f"{why}, and it has too few points of its own.", STAND_STILL)
     return replace(posed, warnings=(f"{said}.", *posed.warnings))
 

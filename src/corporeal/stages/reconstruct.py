@@ -10,7 +10,7 @@ from pathlib import Path
 
 import numpy as np
 
-from corporeal.errors import UserError
+from corporeal.errors import UserError, with_notes
 from corporeal.features.clouds import with_features
 from corporeal.formats.sources import called
 from corporeal.formats.words import safe
@@ -117,7 +117,7 @@ def reconstruct(
         taken, cloud, closed(taken, front.on_objects, cloud.position, split.object_of_point)
     )
     if not config.force and (why := _why_not(found, photographers, masked)):
-        raise UserError(f"{source}: {why} {doubted_in(None if masked else folder)}".rstrip())
+        raise _refusal(source, why, doubted_in(None if masked else folder), taken)
     # What they are, and so their names and their size in metres.
     objects = recognised(wanted, found, config, viewer)
     names = names_of(objects)
@@ -148,8 +148,13 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig, lie: str) -
     if cut_out is not None and not config.force:
         why = goes_beyond(cut_out) or told_otherwise(cut_out, made.coloured)
         if why is not None:
-            raise UserError(f"{source}: {why} {lie}".rstrip())
+            raise _refusal(source, why, lie, taken)
     return made
+
+
+def _refusal(source: Path, why: str, lie: str, taken: Intake) -> UserError:
+    """Make an error of why things are not worth simulating, with what was noticed before."""
+    return with_notes(UserError(f"{source}: {why} {lie}".rstrip()), taken.warnings)
 
 
 def _why_not(found: FoundObjects, photographers: Sequence[Camera], masked: bool) -> str | None:
