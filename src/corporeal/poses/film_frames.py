@@ -18,6 +18,7 @@ from PIL import Image
 from scipy.ndimage import laplace
 
 from corporeal.errors import BadFileError
+from corporeal.poses.scrolled import scrolled
 from corporeal.poses.standstill import Standstill
 
 Progress = Callable[[float, str], None]
@@ -67,7 +68,8 @@ def write_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
         progress: Told the fraction done and what is being done.
 
     Raises:
-        BadFileError: It cannot be read, is too long, or fewer than 20 frames of it are of use.
+        BadFileError: It cannot be read, is too long, fewer than 20 frames of it are of use, or it
+            is a recording of a screen.
 
     """
     film = _opened(path)
@@ -95,6 +97,9 @@ def write_frames(path: Path, folder: Path, progress: Progress) -> list[str]:
         raise BadFileError(path, what, f"{TAKE} Do not turn the thing instead.")
     progress(0.7, "writing frames")
     _write(film, chosen, folder)
+    if scrolled(sorted(folder.glob("frame_*.png"))):
+        what = "what it shows is pushed aside as a whole, many times as far as a picture is long: "
+        raise BadFileError(path, f"{what}it is a recording of a page that is scrolled.", TAKE)
     return [
         f"{len(chosen)} frames of {len(sharp)} that were looked at in {path.name} were chosen: "
         "sharp ones, at equal steps of change."
