@@ -7,7 +7,7 @@ from PIL import Image
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.sources import photographs_in
 from corporeal.poses.film_frames import write_frames
-from corporeal.poses.gather import gather, lens_stated
+from corporeal.poses.gather import gather, lens_stated, spread
 from corporeal.stages.assemble import assemble
 
 COUNT = 5
@@ -118,3 +118,14 @@ def test_half_a_film_is_not_told_to_become_the_kind_it_is(tmp_path):
     (tmp_path / "a.mp4").write_bytes(b"\0\0\0\x20ftypisom" + bytes(200))
     with pytest.raises(BadFileError, match="is damaged, or holds no moving pictures"):
         write_frames(tmp_path / "a.mp4", tmp_path / "frames", lambda fraction, words: None)
+
+
+@pytest.mark.parametrize("turns", [2, 3, 5])
+def test_things_by_turns_are_all_among_the_photographs_that_are_used(turns, tmp_path):
+    """Of two photographs at a time, or of five, at equal steps one thing only was looked at."""
+    found = [tmp_path / f"{k:03d}" for k in range(500)]
+    used = spread(found, 5)
+    assert len(used) == 100 and used == sorted(set(used))
+    shares = np.bincount([int(file.name) % turns for file in used], minlength=turns) / 100
+    assert shares.min() > 0.6 / turns and shares.max() < 1.5 / turns
+    assert all(int(file.name) // 5 == k for k, file in enumerate(used))

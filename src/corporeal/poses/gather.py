@@ -2,7 +2,7 @@
 
 import numbers
 import re
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,7 +22,9 @@ Progress = Callable[[float, str], None]
 LONGEST = 1600
 """Longer side of what points are looked for in [px]."""
 MOST = 120
-"""Photographs; of more, some are taken at equal steps."""
+"""Photographs; of more, one is taken of each so many."""
+GOLDEN = (5**0.5 - 1) / 2
+"""Multiples of it, less their whole numbers, fill 0 to 1 evenly and never repeat."""
 THUMBNAIL = (24, 24)
 SAME = 0.5
 """Mean difference of thumbnails, of 255, below which two show the same from the same place."""
@@ -71,7 +73,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     """
     found = photographs_in(source)
     step = max(1, -(-len(found) // MOST))
-    taken, bad = found[::step], []
+    taken, bad = spread(found, step), []
     names: dict[str, tuple[int, int]] = {}
     cut_out: dict[str, Image.Image] = {}
     known = np.zeros((0, *THUMBNAIL))
@@ -97,6 +99,17 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     said += left_out(len(taken), bad)
     _refuse_few(source, len(names), len(taken), bad)
     return Gathered(tuple(names), tuple(names.values()), tuple(said))
+
+
+def spread(found: Sequence[Path], step: int) -> list[Path]:
+    """Return one of each so many that follow one another, at no fixed place among them.
+
+    Two cameras, or two things by turns, would lie at equal steps, and one of them at all places.
+    """
+    firsts = range(0, len(found), step)
+    offsets = (int(step * (k * GOLDEN % 1)) for k in range(len(firsts)))
+    ends = (min(first + k, len(found) - 1) for first, k in zip(firsts, offsets, strict=True))
+    return [found[k] for k in ends]
 
 
 def as_gathered(folder: Path) -> Gathered:
