@@ -121,7 +121,7 @@ def _standing(views: Views, floor: Plane, around: Region) -> Bool[np.ndarray, "V
     ground = square(views.cameras, floor, around)
     pairs = zip(views.rgb, views.cameras, strict=True)
     seen = evened(np.stack([colours_on(ground, rgb, c, PATCH, DARKEST) for rgb, c in pairs]))
-    known = np.isfinite(seen).all(axis=-1)
+    known = np.asarray(np.isfinite(seen).all(axis=-1))
     usual = np.zeros(seen.shape[1:])
     some = known.any(axis=0)
     usual[some] = np.nanmedian(seen[:, some], axis=0)

@@ -9,6 +9,7 @@ import numpy as np
 
 from corporeal import store
 from corporeal.errors import BadFileError, noticed
+from corporeal.formats.colmap import read_colmap
 from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
 from corporeal.poses.attempt import Attempt, Way, attempt, require
@@ -41,6 +42,7 @@ from corporeal.poses.judge import (
     unseen_side,
 )
 from corporeal.poses.look_alikes import checked_by_neighbours
+from corporeal.poses.mirrored import TWO_KINDS, mirrored
 from corporeal.typed import typed
 
 Progress = Callable[[float, str], None]
@@ -55,7 +57,7 @@ SAID: dict[Way, str] = {
 LEAST = 6
 """Photographs: fewer that were taken all around are more than 60° apart, and share nothing."""
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
-METHOD = 5
+METHOD = 6
 """Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
@@ -188,6 +190,8 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     believed = [told for told in tried if not doubts(told)]
     if believed:  # the first of those that masks agree with best: masks may be poor
         best = max(believed, key=lambda told: told.filled)
+        if (why := mirrored(read_colmap(folder / best.way / "sparse" / "0"))) is not None:
+            return _Kept((), gathered.said, not_found([why], others), tuple(tried), TWO_KINDS)
         return _told(folder, gathered, tuple(said), tuple(tried), best)
     best = max(tried, key=lambda told: told.registered)
     return _refused(doubts(best), gathered, smeared, others, tuple(tried))
