@@ -70,6 +70,23 @@ def test_a_thin_board_that_is_moved_has_its_own_surface(engine, known):
 
 
 @pytest.mark.parametrize("engine", ["cpu", "cuda", "reference"])
+def test_a_thin_board_lies_on_what_is_held_still_and_has_no_mesh(engine):
+    """It has no surface points: the processor's engine gave it one, in its middle."""
+    still = Keyframes((0.0, 1.0), ((0.0, 0.0, 0.0),) * 2, ((0.0, 0.0, 0.0),) * 2)
+    deep = np.array([0.2, 0.12, 0.12])
+    held = board(np.array([0.0, 0.0, -deep[2] / 2]), deep, path=still, pivot=(0.0, 0.0, 0.0))
+    held = replace(held, surface=np.zeros((0, 3)), rounding=np.zeros((0, 12)))
+    thick = 0.5 * CELL
+    lies = board(np.array([0.0, 0.0, 0.2 * CELL + thick / 2]), np.array([0.16, 0.1, thick]))
+    run = (ENGINES | {"reference": ReferenceEngine})[engine](
+        problem(lies, held, planes=(), restitution=0.0, gravity=(0.0, 0.0, -9.81))
+    )
+    run.advance(0.08)
+    under = run.measure().centre[0, 2] - thick / 2
+    assert under == pytest.approx(0.0, abs=0.06 * CELL)
+
+
+@pytest.mark.parametrize("engine", ["cpu", "cuda", "reference"])
 def test_a_tiny_ball_is_not_held_by_the_far_face_of_a_sheet(engine):
     """That face lies less than the reach of contact behind its top, and looks the other way."""
     radius, size = 0.05 * CELL, np.array([0.2, 0.12, 0.05 * CELL])

@@ -19,7 +19,6 @@ from corporeal.mpm.physics.contact import face_table
 from corporeal.mpm.physics.facets import facets_of, has_edges, of_flat_faces
 from corporeal.mpm.problem import Body, Problem
 from corporeal.mpm.state import rounding_of
-from corporeal.types import ROUNDING
 
 LISTS = {
     "junction": layout.JUNCTION,
@@ -65,21 +64,18 @@ def rigid_grid(
     """
     across = int(np.ceil((2.0 * state[RADIUS] / cell + 4.0) / 4.0)) + 3
     surface, rounding = body.surface - state[CENTRE : CENTRE + 3], rounding_of(body)
-    if body.path is not None and not len(surface):
-        # It never meets a plane: neither on points of its own nor, since it has one, on nodes.
-        surface, rounding = np.zeros((1, 3)), np.zeros((1, ROUNDING))
-    facets = facets_of(body.surface - state[CENTRE : CENTRE + 3], rounding_of(body))
+    facets = facets_of(surface, rounding)
     points, clumps = _clumped(points, 4.0 * cell)
     wetted, patches = _wetted(body, state[CENTRE : CENTRE + 3], cell)
     places = np.full((3, len(wetted) + LANES), VAST, np.float32)
     places[:, : len(wetted)] = wetted[:, :3].T
-    normals = rounding_of(body)[:, :3]
+    normals = rounding[:, :3]
     thin = rigid.thinness(body.surface, normals, cell)
     spacing = rigid.spacing(body.surface)
     # Many nodes ask where a body's surface begins: runs of points that are near each other.
     width = max(SHOWN_AROUND * cell, RUN_ACROSS * spacing)
     shown, shows = _clumped(surface, width)
-    slim = surface[: len(body.surface)][rigid.thin_places(body.surface, normals, cell)]
+    slim = surface[rigid.thin_places(body.surface, normals, cell)]
     state[BOX : BOX + 3], state[BOX + 3 : BOX + 6] = points[:, :3].min(0), points[:, :3].max(0)
     arrays = {
         "node": np.zeros((across**3, 64, 8), np.float32),
@@ -103,6 +99,7 @@ def rigid_grid(
     point(record, **arrays)
     record["dim"], record["rigids"], record["floor"] = across, 1, -1
     record["points"], record["surfaces"] = len(points), len(surface)
+    record["pointed"] = len(surface) > 0 or body.path is not None
     record["clumps"], record["patches"], record["shows"] = len(clumps), len(patches), len(shows)
     record["wets"], record["facets"] = places.shape[1], len(facets.row)
     record["rolls"] = bool((rounding[:, 6:8] > 0.0).any())

@@ -193,6 +193,7 @@ FIELD = Record(
     ("float[3]", "level"),  # its normal, or 0
     ("int", "thin pours"),  # of a rigid body: see physics/rigid.py; pours: whether it is liquid
     ("int", "patches wets shows facets slims"),
+    ("int", "pointed"),  # rigid: no node of it meets a plane: points of its own do, or nothing does
     ("int", "rolls"),  # rigid: whether any of its surface points is round
     ("int", "flat"),  # rigid: whether it is bounded by flat faces for the most part
     ("int", "edged"),  # rigid: whether it is known to have edges

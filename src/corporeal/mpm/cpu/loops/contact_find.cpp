@@ -88,10 +88,9 @@ for (int f = 0; f < fields; f++) {
       lone = false;
     }
   }
-  const bool pointed = F.rigids && F.surfaces;
   for (int w = 0; w < planes && walls < WALLS; w++) {
     const double *P = world->plane + 4 * w;
-    if (!pointed && F.floor < 0 && Find::lowest(P, F, dx) <= Grid::reach(world, f) * dx)
+    if (!F.pointed && F.floor < 0 && Find::lowest(P, F, dx) <= Grid::reach(world, f) * dx)
       wall_of[walls++] = w;
   }
   if (lone && !walls) continue;
@@ -142,12 +141,12 @@ for (int f = 0; f < fields; f++) {
     const Walls wall(world, J.at);
     for (int q = 0; q < J.fields; q++) {
       const Field &G = world->field[J.field[q]];
-      if (G.floor >= 0 || (G.rigids && G.surfaces)) continue;
+      if (G.floor >= 0 || G.pointed) continue;
       for (int v = 0; v < wall.count; v++) J.mask |= wall.of(world, J.field[q], v, J.several) & J.have[q];
     }
     for (int q = 0; q < J.fields; q++) {
       const Field &G = world->field[J.field[q]];
-      if (G.rigids && G.surfaces) continue;
+      if (G.pointed) continue;
       for (int v = 0; v < wall.count; v++)
         found += Grid::count(wall.of(world, J.field[q], v, J.several) & J.have[q] & J.mask);
     }

@@ -62,7 +62,7 @@ for (int j = from; j < to; j++) {
         Touch &T = touches[t];
         T.face = 0;
         if (w >= 0) {
-          if (!(wall.of(world, A.field, w, J.several) >> i & 1) || (F.rigids && F.surfaces)) continue;
+          if (!(wall.of(world, A.field, w, J.several) >> i & 1) || F.pointed) continue;
           T.c = -1 - wall.plane[w];
           T.fc = fields + wall.plane[w];
         } else {

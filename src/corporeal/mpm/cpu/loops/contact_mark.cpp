@@ -117,7 +117,7 @@ for (int g = 0; g < fields; g++) {
         if (Marks::near(s, mid, dx)) marks.add(F, x, y, z);
       }
 }
-for (int w = 0; w < planes && !F.surfaces; w++) {
+for (int w = 0; w < planes && !F.pointed; w++) {
   const double *P = world->plane + 4 * w;
   if (Vec::dot(P, s + CENTRE) - P[3] > s[RADIUS] + 3 * dx) continue;
   soft = true;
