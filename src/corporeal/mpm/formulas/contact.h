@@ -154,12 +154,10 @@ struct Surface {
       if (aside < nearest && along > -behind) nearest = aside, there = along;
     }
   }
-  CUDA_CALLABLE static inline double begins(const double *points, int count, const double *x,
-                                            const double *n, double around, double behind) {
-    const double least = around_line(points, count, x, n, around, behind);
-    double nearest = VAST, there = VAST;
-    if (least >= VAST) by_line(points, count, x, n, behind, nearest, there);
-    return least < VAST ? least : there;
+  // Where it begins, by a search that knows the first point around the line and the one nearest to it.
+  template <class Search> CUDA_CALLABLE static inline double begins(Search &search) {
+    const double least = search.first();
+    return least < VAST ? least : search.by_line();
   }
   // Whether one of the places where a body is thin is as near to x as a node sees.
   CUDA_CALLABLE static inline bool thin_there(const double *places, int count, const double *x, double far) {
@@ -169,6 +167,19 @@ struct Surface {
       if (d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < far * far) return true;
     }
     return false;
+  }
+};
+// A search that looks at all points.
+struct AllShown {
+  const double *points;
+  int count;
+  const double *x, *n;
+  double around, behind;
+  CUDA_CALLABLE inline double first() const { return Surface::around_line(points, count, x, n, around, behind); }
+  CUDA_CALLABLE inline double by_line() const {
+    double nearest = VAST, there = VAST;
+    Surface::by_line(points, count, x, n, behind, nearest, there);
+    return there;
   }
 };
 // How far from a rounded surface point of a rigid body its surface goes on in a direction d: twin of

@@ -23,7 +23,8 @@ def gap_to_thin(mean: wp.float32, height: wp.float32) -> wp.float32: ...
 
 @wp.func_native("""
   const double *from = (const double *)points.data + 3 * first;
-  return mpm::Surface::begins(from, count, &x.c[0], &n.c[0], around, behind);
+  const mpm::AllShown all = {from, count, &x.c[0], &n.c[0], around, behind};
+  return mpm::Surface::begins(all);
 """)
 def surface_begins(
     points: wp.array(dtype=wp.vec3d),
