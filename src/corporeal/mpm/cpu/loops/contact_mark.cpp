@@ -75,16 +75,26 @@ struct Mates {
       out[15 + i] = g[BOX + 3 + i] + e;
     }
   }
-  static inline bool any(const double (*other)[18], int mates, const double *q, double radius) {
-    for (int m = 0; m < mates; m++) {
-      const double *o = other[m];
-      bool in = true;
-      for (int i = 0; i < 3; i++) {
-        double y = o[9 + i] + Vec::dot(o + 3 * i, q);
-        in &= y + radius >= o[12 + i] && y - radius <= o[15 + i];
-      }
-      if (in) return true;
+  // Whether a ball reaches a mate's box.
+  static inline bool reach(const double *o, const double *q, double radius) {
+    bool in = true;
+    for (int i = 0; i < 3; i++) {
+      double y = o[9 + i] + Vec::dot(o + 3 * i, q);
+      in &= y + radius >= o[12 + i] && y - radius <= o[15 + i];
     }
+    return in;
+  }
+  // Those whose boxes it reaches; how many.
+  static inline int near(const double (*other)[18], int mates, const double *q, double radius, int *found) {
+    int count = 0;
+    for (int m = 0; m < mates; m++)
+      if (reach(other[m], q, radius)) found[count++] = m;
+    return count;
+  }
+  // Whether a point lies in the box of any of some.
+  static inline bool any(const double (*other)[18], const int *some, int count, const double *q) {
+    for (int k = 0; k < count; k++)
+      if (reach(other[some[k]], q, 0.0)) return true;
     return false;
   }
 };
@@ -132,13 +142,15 @@ for (int w = 0; w < planes && !F.pointed; w++) {
 if (marks.high[0] < 0) return;
 for (int c = 0; c < F.clumps; c++) {
   const double *clump = F.clump + 6 * c;
-  if (!soft && !Mates::any(other, mates, clump + 2, clump[5])) continue;
+  int close[MATES];          // no point of the clump lies in another's box
+  const int closes = soft ? 0 : Mates::near(other, mates, clump + 2, clump[5], close);
+  if (!soft && !closes) continue;
   double mid[3];
   for (int i = 0; i < 3; i++) mid[i] = s[CENTRE + i] + Vec::dot(s + TURN + 3 * i, clump + 2);
   if (!marks.reach(F, mid, clump[5], inv)) continue;
   for (int p = (int)clump[0]; p < (int)clump[1]; p++) {
     const double *q = F.point + 5 * p;
-    if (!soft && !Mates::any(other, mates, q, 0.0)) continue;
+    if (!soft && !Mates::any(other, close, closes, q)) continue;
     int base[3], out = 0;
     float fr[3];
     f8 w[3][3];

@@ -98,15 +98,16 @@ struct List {
   // of two rigid bodies go forwards, then backwards: with one order for all sweeps the first would
   // carry more, and stacks creep to one side. So do the planes below a stack; a lone block on a
   // plane, which has few sweeps, would creep if they turned about.
-  static inline int sweep(Line *lines, const int *order, int n, int most_sweeps, int least, double still,
-                          bool stacked) {
+  // ends: where each group of contacts ends in that order.
+  static inline int sweep(Line *lines, const int *order, const int *ends, int n, int most_sweeps, int least,
+                          double still, bool stacked) {
     double u[3];
     for (int s = 0; s < most_sweeps; s++) {
       double most = 0;
       for (int first = 0, last; first < n; first = last) {
         const Line &F = lines[order[first]];
         const bool turned = s & 1 && F.ma < 0 && (F.c ? F.mc < 0 : stacked);
-        for (last = first; last < n && lines[order[last]].group == F.group; last++) {}
+        last = ends[F.group];
         if (F.waits) continue;
         const int count = last - first, stride = Scatter::stride(count);
         for (int i = 0; i < count; i++) {
@@ -268,7 +269,7 @@ if (n) {
   for (int i = 0; i <= groups; i++) place[i] = 0;
   for (int i = 0; i < n; i++) place[lines[i].group + 1]++;
   for (int i = 0; i < groups; i++) place[i + 1] += place[i];
-  for (int i = 0; i < n; i++) order[place[lines[i].group]++] = i;
+  for (int i = 0; i < n; i++) order[place[lines[i].group]++] = i;   // place: where each group ends, from now on
   List::sort(lines, order, n);
   // Impacts of rigid bodies, one after the other: what is hit passes the blow on to what it touches.
   // In every round the pairs that approach now rebound together, those behind hold what is light, and
@@ -291,7 +292,7 @@ if (n) {
       R.target = Impact::target(row[Backing::BOUNCE], approach, speed, T.gap, dt, dx);
     }
     const int most = holds ? mpm::SWEEPS_OF_A_HOLD : mpm::SWEEPS_OF_A_HIT;
-    List::sweep(lines, order, n, most, mpm::SWEEPS, mpm::STILL_OF_A_HIT * dx, stacked);
+    List::sweep(lines, order, place, n, most, mpm::SWEEPS, mpm::STILL_OF_A_HIT * dx, stacked);
     for (int i = 0; i < n; i++)
       for (int d = 0; d < 3 && !lines[i].waits; d++) touches[lines[i].touch].J[d] += lines[i].J[d];
   }
@@ -321,7 +322,7 @@ if (n) {
   }
   const int least = known && !impacts ? mpm::SWEEPS_REMEMBERED : mpm::SWEEPS;
   const double still = (impacts ? mpm::STILL_OF_A_HIT : mpm::STILL) * dx;
-  stage->sweeps = List::sweep(lines, order, n, sweeps, least, still, stacked);
+  stage->sweeps = List::sweep(lines, order, place, n, sweeps, least, still, stacked);
   stage->pasts = 0;
   for (int i = 0; i < n; i++) {
     Touch &T = touches[lines[i].touch];
