@@ -212,6 +212,9 @@ AS_LAYER = 1.5707963267948966
 (decision 96)."""
 SWEEPS_OF_A_HOLD = 1000
 """Gauss–Seidel sweeps of such a round: what is heavy presses on what is light."""
+SWEEPS_AT_ONCE = 30
+"""Sweeps of all contacts at once, where those in order do not come to rest and a rigid body meets
+one that moves as told: two that close leave it no room, and the last would have its way."""
 RESTING = 1e-3
 """Contacts that open faster than this [m/s] rest on nothing."""
 IMPACTS = 50

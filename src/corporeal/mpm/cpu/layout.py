@@ -338,7 +338,7 @@ LINE = Record(  # a contact in the list of those that move rigid bodies
     ("double[3]", "n ra rc"),
     ("double[6]", "K"),
     ("double", "inverse target mu e span"),  # e: of restitution; span: as of its touch
-    ("double[3]", "J"),
+    ("double[3]", "J change"),  # change: of J, while all contacts are solved at once
     ("unsigned long long", "key"),
     ("int", "touch group waits spare"),  # waits: not in this round of impacts
 )

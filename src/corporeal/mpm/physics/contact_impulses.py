@@ -17,6 +17,7 @@ from corporeal.mpm.constants import (
     SCATTER,
     SLOWEST_BOUNCE,
     SMALLEST_SLIP,
+    SWEEPS_AT_ONCE,
     SWEEPS_OF_A_HIT,
     SWEEPS_OF_A_HOLD,
 )
@@ -70,6 +71,8 @@ class Contacts(NamedTuple):
     layer: Float[np.ndarray, "E 4"] | None = None
     """Of walls that drag on a liquid (``wall_stress``): span [m² s], yield stress [Pa], drag and
     index; without a span it is Coulomb's friction. None: none does."""
+    guided: Bool[np.ndarray, " E"] | None = None
+    """Which are of a rigid body with one that moves as told; None: none is."""
 
     def approach(self, movers: Movers) -> Vectors:
         """Slip and approach together: u = v_a - v_c [m/s]."""
@@ -192,14 +195,17 @@ def solve(
     if only is not None:
         orders = np.stack([order[only[order]] for order in orders])
     layer = np.zeros((len(target), 4)) if contacts.layer is None else contacts.layer
-    _sweep(
+    given = (
         (contacts.a, contacts.c, contacts.point, contacts.normal),
         (contacts.friction, target, layer),
         (movers.inverse_mass, movers.inverse_inertia, movers.centre),
         (movers.velocity, movers.spin),
         impulse,
-        orders,
     )
+    _sweep(*given, orders)
+    # What moves as told may leave no room between: sweeps then end as the last contacts have it.
+    if contacts.guided is not None and contacts.guided[orders[0]].any():
+        _at_once(*given, orders[0])
     return impulse
 
 
@@ -339,6 +345,29 @@ def _sweep(contacts, rules, masses, motion, impulse, orders):
                 impulse[e, k] = now[k]
             _move(a, -1.0, arm_a, change, masses, motion)
             _move(c, 1.0, arm_c, change, masses, motion)
+
+
+@njit(cache=True)
+def _at_once(contacts, rules, masses, motion, impulse, order):
+    """Solve all contacts from the same motion, each with an equal share of what it would change."""
+    first, second, point, _ = contacts
+    velocity, spin = motion
+    one = np.zeros((1, 1), np.int64)
+    for _ in range(SWEEPS_AT_ONCE):
+        before, many = impulse.copy(), 0
+        for e in order:
+            a, c, one[0, 0] = first[e], second[e], e
+            held = velocity[a].copy(), velocity[c].copy(), spin[a].copy(), spin[c].copy()
+            _sweep(contacts, rules, masses, motion, impulse, one)
+            velocity[a], velocity[c], spin[a], spin[c] = held
+            many += np.any(impulse[e] != before[e])
+        if many == 0:
+            return
+        for e in order:
+            change = (impulse[e] - before[e]) / many
+            impulse[e] = before[e] + change
+            for mover, sign in ((first[e], -1.0), (second[e], 1.0)):
+                _move(mover, sign, _minus(point[e], masses[2][mover]), change, masses, motion)
 
 
 def impact_loss(impulse: Vectors, normal: Vectors, before: Vectors, after: Vectors) -> Scalars:

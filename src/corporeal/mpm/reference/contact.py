@@ -72,6 +72,7 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         friction=friction_table(problem)[pair[:, 0], pair[:, 1]]
         * _joined([t.grips for t in touches], (0,)).astype(np.float64),
         group=_groups(touches),
+        guided=_guided(scene, pair),
         layer=_joined([t.layers for t in touches], (0, 4)),
     )
     movers = scene.movers(velocity)
@@ -102,6 +103,14 @@ def resolve(scene: Scene, velocity: Float[np.ndarray, "A 3"], dt: float) -> Meet
         kept=KeptChoices.of_all(touch.kept for touch in possible),
         moment=braked.moment,
     )
+
+
+def _guided(scene: Scene, pair: Int[np.ndarray, "E 2"]) -> Bool[np.ndarray, " E"]:
+    """Tell which contacts are of a rigid body with one that moves as told."""
+    bodies, walls = scene.problem.bodies, len(scene.problem.planes)
+    rigid = np.array([scene.is_rigid(b) for b in range(len(bodies))] + [False] * walls)
+    told = np.array([body.path is not None for body in bodies] + [False] * walls)
+    return rigid[pair].all(axis=1) & told[pair].any(axis=1)
 
 
 def _groups(touches: list[Touch]) -> Int[np.ndarray, " E"]:

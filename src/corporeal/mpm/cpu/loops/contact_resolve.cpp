@@ -48,7 +48,7 @@ struct List {
     }
   }
   // One projection of one contact onto its Coulomb cone; by how much it changed the velocity.
-  static inline double relax(Line &R, double *u) {
+  static MPM_INLINE double relax(Line &R, double *u) {   // in line, or sweeps would round otherwise
     slip(R, u);
     double un = Vec::dot(u, R.n), old = Vec::dot(R.J, R.n), d[3], t[3];
     double jn = Coulomb::push(old, un, R.target, R.inverse), next[3];
@@ -118,7 +118,44 @@ struct List {
       }
       if (most == 0 || (s >= least && most < still)) return s + 1;
     }
+    at_once(lines, n);
     return most_sweeps;
+  }
+  // Whether a rigid body meets one there that moves as told.
+  static inline bool guided(const Line &R) {
+    return !R.waits && R.ma < 0 && R.c && R.mc < 0 && (R.a[LIGHT] == 0 || R.c[LIGHT] == 0);
+  }
+  // What moves as told may leave no room between: then sweeps do not come to rest, and end as the last
+  // contacts have it. All contacts at once give what is in between the same from all sides.
+  MPM_RARE static void at_once(Line *lines, int n) {
+    bool any = false;
+    for (int i = 0; i < n && !any; i++) any = guided(lines[i]);
+    for (int s = 0; s < mpm::SWEEPS_AT_ONCE && any; s++) {
+      double u[3];
+      int count = 0;
+      for (int i = 0; i < n; i++)
+        if (!lines[i].waits) {
+          Line &R = lines[i];
+          for (int d = 0; d < 3; d++) R.change[d] = -R.J[d];
+          relax(R, u);
+          for (int d = 0; d < 3; d++) R.change[d] += R.J[d];
+          hit(R.a, R.ma, R.ra, R.change, 1.0);   // and back: the others start from the same motion
+          hit(R.c, R.mc, R.rc, R.change, -1.0);
+          count += Vec::dot(R.change, R.change) > 0;
+        }
+      any = count > 0;
+      for (int i = 0; i < n && any; i++) {
+        Line &R = lines[i];
+        if (R.waits) continue;
+        for (int d = 0; d < 3; d++) {
+          R.J[d] -= R.change[d];
+          R.change[d] /= count;
+          R.J[d] += R.change[d];
+        }
+        hit(R.a, R.ma, R.ra, R.change, -1.0);
+        hit(R.c, R.mc, R.rc, R.change, 1.0);
+      }
+    }
   }
   // Along n: how fast a contact closes, and how fast without what forces added in this step.
   static inline double closing(const Line &R, const Field *body, double &approach) {
