@@ -2,6 +2,7 @@
 
 from math import inf, sqrt
 
+from corporeal.geometry.bending import INVISIBLE_STRAIN, tip_shift
 from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.stability import bounded_poisson, p_wave_speed, yield_speed
 from corporeal.treatment.filled import judge_filled
@@ -15,9 +16,6 @@ from corporeal.treatment.part import (
     width,
 )
 from corporeal.types import Material
-
-INVISIBLE_STRAIN = 5e-3
-"""Half a percent of strain is not seen."""
 
 
 def judge(part: PartGeometry, motion: Motion) -> Verdict:
@@ -75,8 +73,7 @@ def resistance(material: Material) -> float | None:
 def sag(part: PartGeometry, acceleration: float) -> float:
     """Tip shift over length of the part as a cantilever in a uniform acceleration [-].
 
-    δ/L = (3 ρ a L² / 2 E h) (L / h) for a solid bar of depth h (Euler–Bernoulli). The second moment
-    of a thin tube, A d²/8, is that of a bar with h = √1.5 d.
+    The second moment of a thin tube, A d²/8, is that of a solid bar with the depth h = √1.5 d.
     """
     length, depth = part.size[2], sqrt(1.5) * tube(part) or 2 / 3 * width(part)
     if depth <= 0 or length < 4 * depth:
@@ -84,4 +81,4 @@ def sag(part: PartGeometry, acceleration: float) -> float:
     density, young = part.material.density, part.material.young
     # A load at the tip bends 8/3 as much as one spread along.
     loaded = 1.0 + 8 / 3 * part.burden
-    return 1.5 * loaded * density * acceleration * length**3 / (young * depth**2)
+    return tip_shift(loaded * density * acceleration, young, length, depth)

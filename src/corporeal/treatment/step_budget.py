@@ -12,6 +12,7 @@ from math import sqrt
 
 from scipy.optimize import brentq
 
+from corporeal.geometry.bending import INVISIBLE_STRAIN
 from corporeal.mpm.constants import COURANT, POISSON_FLOOR
 from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.branches import stiffening
@@ -31,7 +32,6 @@ from corporeal.treatment.part import (
     is_flat_wall,
     is_trinket,
 )
-from corporeal.treatment.rigidity import INVISIBLE_STRAIN
 from corporeal.types import Treatment
 
 
