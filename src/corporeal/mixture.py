@@ -6,7 +6,7 @@ inside measured ranges, and its parts fit each other.
 """
 
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Hashable, Sequence
 from dataclasses import dataclass, replace
 from math import exp, log
 
@@ -16,6 +16,7 @@ from jaxtyping import Float
 from corporeal.geometry.arrangement import life_sized
 from corporeal.geometry.bedded import all_bedded, loose_parts
 from corporeal.geometry.drawn import coarseness, edge_of_scan
+from corporeal.geometry.lids import Border, lidded, lids_of
 from corporeal.geometry.make import AS_DRAWN, Leeway, weight
 from corporeal.geometry.room import is_vessel, room_of
 from corporeal.geometry.scene_survey import examine
@@ -106,7 +107,9 @@ class Scale:
         self.forms = [form(m) if called[self.owner[m.part]] else 0.0 for m in self.members]
         self.volume = sum(m.volume for m in self.members)
         """Of everything that is enclosed [m³]."""
-        self._beds: dict[frozenset[int], dict[int, Member]] = {}
+        self._beds: dict[frozenset[int], list[Anatomy]] = {}
+        self._borders: dict[frozenset[int], list[dict[int, tuple[Border, ...]]]] = {}
+        self._built: dict[Hashable, dict[int, Member]] = {}
 
     def mass(self, inventory: Inventory) -> float:
         """Return the mass of the whole scene, described so [kg]."""
@@ -123,23 +126,31 @@ class Scale:
 
         """
         found = np.zeros(len(self.scene.objects))
-        beds = self._bedded(field)
+        built = self._as_built(field)
         for k, (drawn, room) in enumerate(zip(self.members, self.rooms, strict=True)):
-            member = beds.get(drawn.part, drawn)
+            member = built.get(drawn.part, drawn)
             leeway = AS_DRAWN if leeways is None else leeways[k]
             found[self.owner[member.part]] += weight(member, field, room, leeway)
         return found
 
-    def _bedded(self, field: MaterialField) -> dict[int, Member]:
-        """Return parts of loose matter that fill what holds them, once for each set of these.
+    def _as_built(self, field: MaterialField) -> dict[int, Member]:
+        """Return parts that are not as they are drawn, once for each set of these.
 
-        Walls are as thick then as in the first field in which just these parts are loose.
+        What is loose fills what holds it; walls are as thick then as in the first field in which
+        just these parts are loose. What is hollow is closed below what is soft.
         """
         loose = frozenset(loose_parts(field))
         if loose not in self._beds:
-            members = [m for a in all_bedded(self.anatomies, field) for m in a.members]
-            self._beds[loose] = {m.part: m for m in members if m.drawn is not None}
-        return self._beds[loose]
+            self._beds[loose] = all_bedded(self.anatomies, field)
+            self._borders[loose] = [{} for _ in self.anatomies]
+        pairs = zip(self._beds[loose], self._borders[loose], strict=True)
+        found = [(anatomy, lids_of(anatomy, field, known)) for anatomy, known in pairs]
+        closed = frozenset((k, b.upper) for _, lids in found for k in lids for b in lids[k])
+        if (loose, closed) not in self._built:
+            members = [m for anatomy, lids in found for m in lidded(anatomy, lids).members]
+            unlike = [m for m in members if m.drawn is not None or m.lid is not None]
+            self._built[loose, closed] = {m.part: m for m in unlike}
+        return self._built[loose, closed]
 
     def draw(self, inventory: Inventory, number: int) -> Draw:
         """Draw a way for each part, values from their ranges, and what the meshes leave open.

@@ -93,6 +93,9 @@ def pack(
             )
         elif len(face.triangles) and not (lumps[0].part == member.part).any():
             lumps.append(_lump(fill_wall(face, spacing, 0.0, rng), member, sheet=False))
+        if member.lid is not None and 0 < recipe.depth < np.inf:
+            lid = fill_wall(member.lid, spacing, recipe.depth, rng)
+            lumps.append(_lump(lid, member, sheet=False))
         if recipe.vessel:
             lumps.append(_poured(anatomy, member, recipe, spacing * (1 + coarse), rng))
         if member.sheet_area > 1e-3 * member.body_area:

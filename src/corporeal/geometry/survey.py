@@ -60,6 +60,8 @@ class Member:
     """The part that it fills; -1: none."""
     measured: float = 0.0
     """Area of the sheet that it is [m²], found before it was ``hollowed``; 0: not found."""
+    lid: Mesh | None = None
+    """What of ``body`` is drawn nowhere: the wall below what is soft and lies on it (``lids``)."""
 
     @cached_property
     def shape(self) -> Shape:

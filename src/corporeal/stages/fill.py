@@ -13,6 +13,7 @@ from corporeal.geometry.contact_points import contact_points
 from corporeal.geometry.contents import holders, with_contents
 from corporeal.geometry.foliage import in_leaves, planted
 from corporeal.geometry.hollowed import all_hollowed
+from corporeal.geometry.lids import all_lidded, how_lidded
 from corporeal.geometry.make import Make, compose, how_filled, recipe
 from corporeal.geometry.mass_shares import keep_apart, weigh
 from corporeal.geometry.outer_skin import faces
@@ -65,8 +66,10 @@ def fill(
     scene, parts, field = with_contents(scene, parts, field, contents).all
     field = in_scene(field, scale_of_part(scene, parts))
     scene, drawn = drawn_into_ground(scene, parts, field)
-    # What is loose fills what holds it, of which its surface alone may be drawn.
-    anatomies = all_bedded(all_hollowed(examine(scene, parts, config.seed), field), field)
+    # What is loose fills what holds it, of which its surface alone may be drawn; what is hollow is
+    # closed below what is soft.
+    bedded = all_bedded(all_hollowed(examine(scene, parts, config.seed), field), field)
+    anatomies = all_lidded(bedded, field)
     # How every part is made; objects weigh what their files state.
     leaf = find("leaf_tissue")
     tissue = leaf.pick(leaf.typical())
@@ -239,7 +242,7 @@ def describe(
     for k, entry in enumerate(parts.catalogue):
         make, count = bodies.makes[k], int((part_of_particle == k).sum())
         what = how_filled(members[k], make, chosen.treatments[k], chosen.cell)
-        what += how_bedded(members[k], parts)
+        what += how_bedded(members[k], parts) + how_lidded(members[k])
         shared = f" It weighs what its pieces weigh: {'; '.join(make.pieces)}."
         sentences.append(
             f"{entry.name}: {what}; {count:,} particles, {make.mass:.3g} kg."
