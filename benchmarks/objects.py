@@ -234,7 +234,8 @@ Points lie on the surface seen in 24 pictures of 256², colours come from the pi
 are the [descriptor](features.md), which needs no weights. Numbers are the mean IoU of objects after
 Hungarian matching. "Ours" is given the number of objects; "not counted" estimates it (in brackets).
 Masks are exact, numbered anew in each view. `corporeal evaluate objects SCENES` does the same for
-any settled scenes.
+any settled scenes. Points on surfaces are of the evening of 26 November 2026 (decision
+[119](decisions/0119-what-is-soft-bridges-no-hollow.md)), Gaussians and seconds of its morning.
 
 {surface}
 
@@ -257,11 +258,13 @@ together):
 - **Teddy on couch** fails: both are off-white without texture, and the couch is made of loose
   cushions. **Cat on table** is borderline: the cat nearly covers the table's width, and whether it
   or half the table is cut off depends on the sampled points. **Duck on armchair** fails: cushions
-  differ more from the frame than from the duck. All three warn, and instance masks resolve them.
+  differ more from the frame than from the duck. Instance masks resolve all three; two of them warn.
 - **What warns is not reproducible.** With 19,000 to 22,000 points (`corporeal evaluate objects
   SCENES --surface-points N`, 26 November 2026) three packets are separated with .39 to .99, cat on
   table with .33 to .51, duck on armchair with .34 to .48. Ball on box, which does not warn, keeps
-  .98 to .99, but its objects, where their number is not given, are counted as 2 to 4.
+  .98 to .99, but its objects, where their number is not given, are counted as 2 to 4. Of
+  pairs composed anew, cat on table had .39 and warned that morning, and does not with .33; lamp
+  beside armchair warns now, and three packets went from .81 to .98.
 - **Normals** matter. Without them they are estimated from the points and oriented upwards at the
   highest point. That is as good for most pairs, and much worse for some (bottle beside box, cat on
   table): give normals where cameras tell the outside.
