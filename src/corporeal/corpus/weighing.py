@@ -20,7 +20,7 @@ from corporeal.stages.segment import segment
 
 FOLDER = "matter"
 """Of a pool: what its objects weigh."""
-VERSION = 5
+VERSION = 6
 """Of the way objects are weighed: kept results of another version are made anew."""
 
 
