@@ -1,4 +1,4 @@
-"""Ten things that no data set publishes, on the scales: two sets of answers, written blind.
+"""Ten things that no data set publishes, on the scales: three sets of answers, written blind.
 
 Whoever answered saw anonymous pictures and nothing of how the things are built.
 """
@@ -15,7 +15,7 @@ from corporeal.stages.describe import DescribeConfig
 from corporeal.stages.ground import GroundConfig
 
 RECORDINGS = Path(__file__).parents[1] / "recordings"
-SETS = ("own_a", "own_b")
+SETS = ("own_a", "own_b", "own_d")
 SCATTER = 0.01
 """By how much ALDE of a median scatters with its draws: .006 between 200 and 1,600 of them."""
 
