@@ -139,7 +139,8 @@ def transfer_native(memory: Memory, index: int): ...
 
 def _contact() -> str:
     """Text of all pieces of contact: what they share, then one branch for each."""
-    text = [native("bond", "contact_shared", "contact_points", "contact_begins")]
+    shared = ("contact_shared", "contact_points", "contact_begins", "contact_lines")
+    text = [native("bond", *shared)]
     for number, name in enumerate(TOUCHING.split()):
         piece = _text(f"contact_{name}")
         text.append(f"if (piece == {number}) {{\n{piece}}}")
