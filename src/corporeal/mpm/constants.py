@@ -127,6 +127,11 @@ misjudge, as they take it for a plane within the 3 cells that each sees …"""
 FACET_ALIKE = 0.95
 """… and on which they meet along nearly the same normal: the least cosine [-]. On what is ``THIN``
 normals of nodes lean, since mass lies around them on both sides: there ``ROUND_ALIKE`` counts."""
+FACES_MEET = 0.5
+"""Where normals of nodes lean farther than ``FACET_ALIKE`` from all faces, around edges of both
+bodies, they are of two that look at one another so nearly and lean no farther than that [-]."""
+SEEN_ASIDE = 0.03
+"""What a node sees aside of a face is no edge, but the scatter of particles [cells]."""
 VALLEY_TURNS = 6
 """How often a normal of a face is taken off that of a node, to see whether that lies between such
 normals: what is round and lies in a valley meets the faces, and not nodes that see both."""

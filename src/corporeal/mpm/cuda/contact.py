@@ -37,9 +37,12 @@ from corporeal.mpm.cuda.layout import (
 )
 from corporeal.mpm.cuda.layout_bodies import Rigid
 from corporeal.mpm.cuda.layout_contact import Contacts
+from corporeal.mpm.cuda.rigid import speed_at
 from corporeal.mpm.cuda.rows import cell_at, matrix_at, vector_at
 from corporeal.mpm.formulas.one_lane import slopes, splines
 from corporeal.mpm.formulas.one_lane_contact import (
+    SEEN,
+    along_faces,
     gap_between,
     gap_of_liquid,
     gap_to_plane,
@@ -357,6 +360,36 @@ def gap_of(c: Contacts, r: Rigid, s: Sheet, t: int, xa: wp.float32, xc: wp.float
 
 
 @wp.func
+def mean_of(c: Contacts, g: Grid, s: Sheet, entry: int):
+    """Mean offset of a field's matter from a node [cells]."""
+    return wp.vec3d(c.mean[entry] / (g.node[c.slot[entry]][0] * s.cell))
+
+
+@wp.func
+def seen(g: Grid, c: Contacts, r: Rigid, s: Sheet, t: int, b: int, e: int):
+    """Give the flat faces of a rigid body as a node sees them."""
+    x = wp.transpose(r.turn[b]) * (c.point[t] - r.centre[b])
+    m = mean_of(c, g, s, e)
+    first = D(r.facet_first[b])
+    return SEEN(x[0], x[1], x[2], m[0], m[1], m[2], first, D(r.facet_count[b]))
+
+
+@wp.func
+def of_faces(g: Grid, c: Contacts, r: Rigid, s: Sheet, t: int, n: wp.vec3):
+    """Normal of a node, or of faces that meet there where its lean feigns an approach."""
+    a = c.fa[t]
+    b = c.fc[t]
+    found = n
+    if r.flat[a] == 1 and r.flat[b] == 1:
+        one = seen(g, c, r, s, t, a, c.a[t])
+        two = seen(g, c, r, s, t, b, c.c[t])
+        way = wp.vec3d(n)
+        u = speed_at(r, a, c.point[t]) - speed_at(r, b, c.point[t])
+        found = wp.vec3(along_faces(r.facet, one, r.turn[a], two, r.turn[b], u, s.dx, way))
+    return found
+
+
+@wp.func
 def span_of(s: Sheet, xi: wp.float32, h: wp.float32, mass: wp.float32, full: wp.float32):
     """Over which a wall drags on a node of a liquid that sticks to it [m² s]; xi, h [cells]."""
     span = D(0.0)
@@ -422,6 +455,8 @@ def measure_gaps(g: Grid, c: Contacts, r: Rigid, s: Sheet, stride: int):
                     c.gap[t] = gap * s.cell
         else:
             n = smoothed(g, c, s, t)
+            if wp.length_sq(n) > 0.0:
+                n = of_faces(g, c, r, s, t, n)
             c.normal[t] = n
             if wp.length_sq(n) > 0.0:
                 xa = wp.dot(c.mean[a], n) / (g.node[c.slot[a]][0] * s.cell)

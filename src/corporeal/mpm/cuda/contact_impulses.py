@@ -19,6 +19,7 @@ from corporeal.mpm.constants import (
     VAST,
 )
 from corporeal.mpm.cuda.arena import meet
+from corporeal.mpm.cuda.contact import mean_of
 from corporeal.mpm.cuda.contact_nodes import curve_of
 from corporeal.mpm.cuda.contact_surface import replaced
 from corporeal.mpm.cuda.layout import (
@@ -153,12 +154,6 @@ def relax(c: Contacts, r: Rigid, s: Sheet, t: int):
 
 
 # ---------------------------------------------------------------- before
-
-
-@wp.func
-def mean_of(c: Contacts, g: Grid, s: Sheet, entry: int):
-    """Mean offset of a field's matter from a node [cells]."""
-    return wp.vec3d(c.mean[entry] / (g.node[c.slot[entry]][0] * s.cell))
 
 
 @wp.func

@@ -63,7 +63,11 @@ class Rigid:
     facet_point: wp.array(dtype=wp.vec3d)
     """… points on them …"""
     facet_body: wp.array(dtype=wp.int32)
-    """… and whose each is."""
+    """… and whose each is …"""
+    facet_first: wp.array(dtype=wp.int32)
+    """… of each body the first …"""
+    facet_count: wp.array(dtype=wp.int32)
+    """… and how many."""
     first: wp.array(dtype=wp.int32)
     """Of each body: its first surface point …"""
     points: wp.array(dtype=wp.int32)

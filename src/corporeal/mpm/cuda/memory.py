@@ -170,6 +170,9 @@ class Memory:
         r.facet = self.put(np.concatenate(rows).reshape(-1), wp.float64)
         r.facet_point = self.put(np.concatenate(points), wp.vec3d)
         r.facet_body = self.put(np.array(body, dtype=int), wp.int32)
+        faces = np.bincount(np.array(body, dtype=int), minlength=len(matter.facets))
+        r.facet_first = self.put(np.cumsum(faces) - faces, wp.int32)
+        r.facet_count = self.put(faces, wp.int32)
 
     def _wetted(self, r: Struct, problem: Problem, matter: Matter, stiff: np.ndarray) -> None:
         rows, count = [np.zeros((0, 3))], np.zeros(len(stiff), int)

@@ -355,6 +355,69 @@ struct Facet {
     return cosine > alike && d[0] * d[0] + d[1] * d[1] + d[2] * d[2] < reach * reach;
   }
 };
+// Flat faces of a rigid body as a node sees them: rows of Facet, how the body is turned, where the node is in
+// its frame, and its mean offset from there in the world [cells].
+struct SeenFaces {
+  const double *rows;
+  int count;
+  const double *turn;
+  double x[3], mean[3];
+  CUDA_CALLABLE inline const double *row(int k) const { return rows + FACET_ROW * k; }
+  CUDA_CALLABLE inline void outward(int k, double *out) const { Curved::turn(turn, row(k), out); }
+  static CUDA_CALLABLE inline double dot(const double *a, const double *b) { return a[0] * b[0] + a[1] * b[1] + a[2] * b[2]; }
+  CUDA_CALLABLE inline double height(int k) const { return dot(row(k), x) - row(k)[Facet::OFFSET]; }
+  // Which face looks most along sign times n, and how much it does.
+  CUDA_CALLABLE inline int most(const double *n, double sign, double &cosine) const {
+    double d[3];
+    Curved::turn_back(turn, n, d);
+    int best = 0;
+    cosine = -2.0;
+    for (int k = 0; k < count; k++) {
+      const double c = sign * dot(row(k), d);
+      if (c > cosine) cosine = c, best = k;
+    }
+    return best;
+  }
+  // How far its mean offset lies aside from a normal, squared, and what any may.
+  CUDA_CALLABLE inline double aside(const double *n) const {
+    const double along = dot(mean, n);
+    return dot(mean, mean) - along * along + SEEN_ASIDE * SEEN_ASIDE;
+  }
+  // Two faces that look at one another, from which n leans less than FACES_MEET, and which are farthest apart
+  // by value; whether there are any.
+  CUDA_CALLABLE static inline bool facing(const SeenFaces &A, const SeenFaces &C, const double *n, double dx, int &a, int &c) {
+    double best = -VAST, p[3], d[3];
+    for (int i = 0; i < A.count; i++) {
+      A.outward(i, p);
+      const double cosine = dot(p, n);
+      if (cosine <= FACES_MEET) continue;
+      Curved::turn_back(C.turn, p, d);
+      for (int k = 0; k < C.count; k++) {
+        if (dot(C.row(k), d) >= -FACET_ALIKE) continue;
+        const double apart = (A.height(i) + C.height(k)) / dx;
+        if (apart < FLAT_APART && apart + cosine > best) best = apart + cosine, a = i, c = k;
+      }
+    }
+    return best > -VAST;
+  }
+  // Normal from a to c of the faces along which they meet, in place of a node's whose lean feigns more approach
+  // than there is: twin of facets.along_faces. u: speed of a over c.
+  CUDA_CALLABLE static inline void along(const SeenFaces &A, const SeenFaces &C, const double *u, double dx, double *n) {
+    double cosine, other, p[3], q[3], found[3], square = 0;
+    int a = A.most(n, 1.0, cosine), c = C.most(n, -1.0, other);
+    if (cosine <= FACET_ALIKE && other <= FACET_ALIKE) {
+      if (!facing(A, C, n, dx, a, c)) return;
+      cosine = other = 1.0;
+    }
+    A.outward(a, p), C.outward(c, q);
+    const double one = cosine > FACET_ALIKE ? C.aside(q) : 0.0, two = other > FACET_ALIKE ? A.aside(p) : 0.0;
+    for (int i = 0; i < 3; i++) found[i] = one * p[i] - two * q[i], square += found[i] * found[i];
+    const double size = sqrt(square);
+    const double approach = dot(u, n), real = dot(u, found) / size;
+    if (approach <= 0.0 || approach <= 2.0 * real) return;
+    for (int i = 0; i < 3; i++) n[i] = found[i] / size;
+  }
+};
 // Where the surface of a rigid body lies for a liquid: twin of physics/contact.py wetted_faces. Rows of
 // six: point and outward normal; X is the liquid's place, x the node.
 struct Wetted {

@@ -94,6 +94,34 @@ def facet_holds(
 ) -> bool: ...
 
 
+SEEN = wp.types.vector(length=8, dtype=wp.float64)
+"""Where a node is in a body's frame [m]; the body's mean offset from there in the world [cells];
+its first flat face, and how many it has."""
+
+
+@wp.func_native("""
+  const double *some = (const double *)rows.data;
+  mpm::SeenFaces A = {some + mpm::FACET_ROW * (int)a[6], (int)a[7], &R.data[0][0]};
+  mpm::SeenFaces C = {some + mpm::FACET_ROW * (int)c[6], (int)c[7], &S.data[0][0]};
+  for (int i = 0; i < 3; i++) {
+    A.x[i] = a[i], A.mean[i] = a[3 + i];
+    C.x[i] = c[i], C.mean[i] = c[3 + i];
+  }
+  mpm::SeenFaces::along(A, C, &u.c[0], dx, &n.c[0]);
+  return n;
+""")
+def along_faces(
+    rows: wp.array(dtype=wp.float64),
+    a: SEEN,
+    R: wp.mat33d,
+    c: SEEN,
+    S: wp.mat33d,
+    u: wp.vec3d,
+    dx: wp.float64,
+    n: wp.vec3d,
+) -> wp.vec3d: ...
+
+
 MET = wp.types.vector(length=7, dtype=wp.float64)
 """Place of a contact in the frame of what is round, normal of the face in the world, and gap."""
 

@@ -7,12 +7,16 @@ from jaxtyping import Bool, Float
 from scipy.spatial import Delaunay, QhullError
 
 from corporeal.mpm.constants import (
+    FACES_MEET,
+    FACET_ALIKE,
     FACET_ROW,
     FACET_SPREAD,
     FACET_TURN,
     FEWEST_ON_FACET,
+    FLAT_APART,
     MOSTLY_FLAT,
     SAME_PLANE,
+    SEEN_ASIDE,
     WIDEST_HOLE,
 )
 
@@ -88,6 +92,67 @@ def on_facet(
     apart = place[:, None] - points
     along = apart @ normal
     return np.any(np.sum(apart**2, axis=2) - along**2 <= reach**2, axis=1)
+
+
+class SeenFaces(NamedTuple):
+    """Flat faces of one of two bodies that meet at E nodes, now; F of them."""
+
+    outward: Float[np.ndarray, "F 3"]
+    height: Float[np.ndarray, "E F"]
+    """Of the nodes over their planes [cells]."""
+    mean: Float[np.ndarray, "E 3"]
+    """X̄ of the body [cells]."""
+
+
+def along_faces(
+    normal: Float[np.ndarray, "E 3"],
+    slip: Float[np.ndarray, "E 3"],
+    first: SeenFaces,
+    second: SeenFaces,
+) -> Float[np.ndarray, "E 3"]:
+    """Give the normals along which two bodies of flat faces meet at nodes, a to c.
+
+    Near an edge the normal of a node leans, and what slides along a face seems to come nearer:
+    where the lean feigns more of that than there is, the normal becomes that of the face, which is
+    known. It is of each body the one that looks most along the node's normal, or, where that leans
+    far from all, those two that look at one another. Of these the two count that are farthest
+    apart, in cells and by how much they look along the normal. Of two faces, each weighs as much as
+    the node sees of an edge of the other body, by how far that one's mean offset lies aside from
+    its face's normal. A node whose normal is of no face is of two edges, and keeps it.
+
+    Args:
+        normal: Unit, of the nodes.
+        slip: Speed of a over c there [m/s].
+        first: Faces of a.
+        second: Faces of c.
+
+    """
+    cosine, other = normal @ first.outward.T, -normal @ second.outward.T
+    one, two = np.argmax(cosine, axis=1), np.argmax(other, axis=1)
+    limit = np.full(len(normal), FACET_ALIKE)
+    far = np.flatnonzero(np.maximum(cosine.max(axis=1), other.max(axis=1)) <= FACET_ALIKE)
+    facing = first.outward @ second.outward.T < -FACET_ALIKE
+    apart = first.height[far, :, None] + second.height[far, None, :]
+    met = facing & (cosine[far, :, None] > FACES_MEET) & (apart < FLAT_APART)
+    value = np.where(met, apart + cosine[far, :, None], -np.inf).reshape(len(far), facing.size)
+    best, there = np.argmax(value, axis=1), np.isfinite(value.max(axis=1))
+    one[far[there]], two[far[there]] = np.divmod(best[there], facing.shape[1])
+    limit[far[there]] = -1.0
+    row = np.arange(len(normal))
+    p, q = first.outward[one], second.outward[two]
+    weight = np.where(cosine[row, one] > limit, _aside(second.mean, q), 0.0)
+    counter = np.where(other[row, two] > limit, _aside(first.mean, p), 0.0)
+    found = weight[:, None] * p - counter[:, None] * q
+    size = np.linalg.norm(found, axis=1, keepdims=True)
+    found /= np.where(size > 0.0, size, 1.0)
+    approach, real = np.sum(slip * normal, axis=1), np.sum(slip * found, axis=1)
+    feigns = approach > np.maximum(2.0 * real, 0.0)
+    return np.where(feigns[:, None] & (size > 0.0), found, normal)
+
+
+def _aside(mean: Float[np.ndarray, "E 3"], face: Float[np.ndarray, "E 3"]) -> np.ndarray:
+    """How far mean offsets lie aside from faces' normals, squared [cells²], and what any may."""
+    return np.sum(mean**2, axis=1) - np.sum(mean * face, axis=1) ** 2 + SEEN_ASIDE**2
 
 
 def _widest_hole(

@@ -22,6 +22,7 @@ from corporeal.mpm.constants import (
 )
 from corporeal.mpm.laws.kinematics import determinant
 from corporeal.mpm.physics import backing, contact, contact_impulses
+from corporeal.mpm.physics.facets import along_faces
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.reference.contact_scene import Scene, friction_table
 from corporeal.mpm.reference.kept_choices import KeptChoices
@@ -312,6 +313,7 @@ def _between(
         kept = KeptChoices.of_pair(pair, index, which)
     normal = contact.taken(candidates, which)
     normal = contact.smooth_normals(normal, np.minimum(scene.mass[a], scene.mass[c]), index)
+    normal = _along_faces(scene, look, pair, slots, normal)
     gap = contact.gap_between(look.mean[a], look.mean[c], normal, cell)
     asked = np.full(len(a), max(thin) > 0)
     if all(map(scene.flat, pair)):
@@ -335,6 +337,26 @@ def _candidates(
     if (thin[0] == 2) != (thin[1] == 2):
         found[:, [0, 1 if thin[0] == 2 else 2]] = 0.0
     return found
+
+
+def _along_faces(
+    scene: Scene,
+    look: Look,
+    pair: tuple[int, int],
+    slots: tuple[np.ndarray, np.ndarray],
+    normal: Float[np.ndarray, "E 3"],
+) -> Float[np.ndarray, "E 3"]:
+    """Take the normals of faces where those of nodes feign an approach."""
+    if not all(map(scene.flat, pair)):
+        return normal
+    node = scene.grid.index[slots[0]] * scene.problem.cell
+    first, second = (
+        scene.seen_faces(body, node, look.mean[slot])
+        for body, slot in zip(pair, slots, strict=True)
+    )
+    slip = scene.speed_at(pair[0], node) - scene.speed_at(pair[1], node)
+    known = np.any(normal != 0.0, axis=1)[:, None]
+    return np.where(known, along_faces(normal, slip, first, second), normal)
 
 
 def _to_edges(

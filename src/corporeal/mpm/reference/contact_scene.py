@@ -8,6 +8,7 @@ from jaxtyping import Bool, Float, Int
 
 from corporeal.mpm.constants import STICKS, TINY_DOUBLE
 from corporeal.mpm.physics import contact, contact_impulses, wall_stress
+from corporeal.mpm.physics.facets import SeenFaces
 from corporeal.mpm.physics.rounding import shift_to_contact
 from corporeal.mpm.physics.spline import Stencil
 from corporeal.mpm.problem import Problem, WettedSurface
@@ -136,6 +137,20 @@ class Scene:
     def flat(self, field: int) -> bool:
         """Whether a field is rigid and bounded by flat faces for the most part."""
         return self.is_rigid(field) and self.matter.flat[field]
+
+    def seen_faces(
+        self, body: int, node: Float[np.ndarray, "E 3"], mean: Float[np.ndarray, "E 3"]
+    ) -> SeenFaces:
+        """Flat faces of a rigid body now, from some nodes [m] with its mean offsets there [m]."""
+        rows, cell = self.matter.facets[body].row, self.problem.cell
+        outward = rows[:, :3] @ self.state.rotation[body].T
+        height = ((node - self.state.centre[body]) @ outward.T - rows[:, 3]) / cell
+        return SeenFaces(outward, height, mean / cell)
+
+    def speed_at(self, body: int, node: Float[np.ndarray, "E 3"]) -> Float[np.ndarray, "E 3"]:
+        """Velocity of a rigid body at some places [m/s]."""
+        spin = self.state.spin(self.matter)[body]
+        return self.state.speed[body] + np.cross(spin, node - self.state.centre[body])
 
     @property
     def wall_mover(self) -> int:

@@ -50,6 +50,22 @@ struct Solver {
       d[i] = s[TURN + i] * n[0] + s[TURN + 3 + i] * n[1] + s[TURN + 6 + i] * n[2];
     }
   }
+  // The flat faces of a side, from its node.
+  static inline mpm::SeenFaces seen(const World *w, const Side &S, const double *x) {
+    const Field &F = w->field[S.field];
+    mpm::SeenFaces seen = {F.facet, F.facets, F.rigid + TURN, {}, {S.mean[0], S.mean[1], S.mean[2]}};
+    double d[3];
+    inside(F, x, x, seen.x, d);
+    return seen;
+  }
+  // Where two bodies of flat faces meet and a node leans and so feigns an approach, its normal is that of faces.
+  static inline void along_faces(const World *w, const Side *sides, Touch &T) {
+    double u[3], v[3];
+    Body6::velocity(w->field[T.fa].rigid, T.x, u);
+    Body6::velocity(w->field[T.fc].rigid, T.x, v);
+    for (int i = 0; i < 3; i++) u[i] -= v[i];
+    mpm::SeenFaces::along(seen(w, sides[T.a], T.x), seen(w, sides[T.c], T.x), u, w->dx, T.normal);
+  }
   // How high the node of a liquid is over a wall [m]; 0 for what is no liquid.
   static inline double height(const World *w, const Touch &T) {
     if (T.choice >= 0) return 0.0;
@@ -374,6 +390,8 @@ if (from < to) {
           T.gap = face[T.face].height;
         } else if (Vec::unit(T.normal) <= mpm::TINY) {
           continue;
+        } else if (world->field[T.fa].flat && world->field[T.fc].flat) {
+          Solver::along_faces(world, sides, T);
         }
         double u[3];
         Solver::slip(sides, T, u);
