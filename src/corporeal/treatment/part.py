@@ -52,6 +52,8 @@ class PartGeometry:
     """Size here over the real object's [-]."""
     prescribed: bool = False
     """Whether the motion of its object is prescribed: it is rigid then, whatever it is made of."""
+    pressed: float = 0.0
+    """Strain that other objects' prescribed motion forces on it [-]: ``pressed``."""
 
 
 @dataclass(frozen=True)
@@ -112,6 +114,8 @@ class Verdict:
     """Strain that its own weight causes as long as it rests [-]."""
     impact: float = 0.0
     """Strain that the impact causes [-]."""
+    pressed: float = 0.0
+    """Strain that prescribed motion of other objects forces on it [-]."""
 
 
 def life_sized(part: PartGeometry) -> PartGeometry:

@@ -22,6 +22,7 @@ from corporeal.treatment.part import (
     PartGeometry,
     is_grain,
 )
+from corporeal.treatment.pressed_parts import pressed_wrongly, unyielding
 from corporeal.treatment.rigidity import judge
 from corporeal.treatment.step_budget import (
     OUTRUN,
@@ -70,12 +71,15 @@ class Quality:
     cell: float | None = None
     """Grid spacing of a scene that runs, for what joins it [m]; None: it is chosen."""
 
-    def steps(self, particles: float) -> float:
-        """Say how many steps per simulated second a scene of so many particles may take."""
-        return min(
-            self.steps_per_second,
-            max(self.work / particles, 0.4 * self.steps_per_second),
-        )
+    def steps(self, particles: float, pressed: bool = False) -> float:
+        """Say how many steps per simulated second a scene of so many particles may take.
+
+        Where prescribed motion presses something soft, its stiffness is the force that is asked
+        for: then only the work counts, where it is counted.
+        """
+        affordable = max(self.work / particles, 0.4 * self.steps_per_second)
+        whole = pressed and affordable < inf
+        return affordable if whole else min(self.steps_per_second, affordable)
 
 
 QUALITIES: dict[str, Quality] = {
@@ -112,11 +116,15 @@ def plan(
         treatments = draft.plan.treatments
         why = nearer_rigid(parts, met, judged.verdicts, draft.unslowed, treatments)
         why |= torn_walls(parts, judged.verdicts, treatments)
+        if not why:
+            why = unyielding(parts, judged.verdicts, draft.unslowed, treatments)
         if not why:  # first what strikes, then what is struck
             why = pressed_slabs(parts, motions, treatments)
         if stiffness == "capped" or not why:
             laid = laid_sheets(parts, motions, treatments)
-            return replace(draft.plan, treatments=tuned_to_blows(parts, motions, laid))
+            told = (*draft.plan.warnings, *pressed_wrongly(parts, draft.unslowed, laid))
+            tuned = tuned_to_blows(parts, motions, laid)
+            return replace(draft.plan, treatments=tuned, warnings=told)
         verdicts = [
             replace(v, rigid=True, reason=why[k]) if k in why else v
             for k, v in enumerate(judged.verdicts)
@@ -169,7 +177,7 @@ def _plan(
         warnings.append("Stiffness is capped by the published rule: a control, not a prediction.")
     else:
         unslowed = calm_trinkets(parts, treatments, cell)
-        steps = quality.steps(particles_needed(parts, cell))
+        steps = quality.steps(particles_needed(parts, cell), any(p.pressed for p in soft))
         fitted = fit_budget(unslowed, cell, steps, quality.outrun)
         treatments = calmed(parts, motions, unslowed, fitted.treatments, cell)
         warnings.extend(fitted.warnings)

@@ -10,9 +10,11 @@ from corporeal.geometry.foliage import is_leafy, leaves_of
 from corporeal.geometry.make import Make, as_plate, plate_thickness
 from corporeal.geometry.rods import Rod
 from corporeal.geometry.survey import Anatomy, Member
+from corporeal.treatment.filled import as_contents
 from corporeal.treatment.impact_speeds import motions
 from corporeal.treatment.part import PartGeometry
 from corporeal.treatment.plan import Detail, Plan, Quality, plan
+from corporeal.treatment.pressed import pressures
 from corporeal.types import MaterialField, Scene
 
 
@@ -66,10 +68,40 @@ def resolve(bodies: Bodies, accuracy: Accuracy) -> tuple[Bodies, Plan]:
 def _plan(bodies: Bodies, accuracy: Accuracy) -> Plan:
     anatomies = enumerate(bodies.anatomies)
     geometries = {m.part: _geometry(m, bodies, n) for n, a in anatomies for m in a.members}
-    ordered = [geometries[k] for k in sorted(geometries)]
+    ordered = with_pressure(bodies, [geometries[k] for k in sorted(geometries)], accuracy.seed)
     masses = [sum(bodies.makes[m.part].mass for m in a.members) for a in bodies.anatomies]
     moved = motions(bodies.scene, bodies.anatomies, masses, accuracy.seed, bodies.vessels)
     return plan(ordered, moved, accuracy.detail, accuracy.stiffness, bodies.field.floor)
+
+
+def with_pressure(bodies: Bodies, parts: list[PartGeometry], seed: int) -> list[PartGeometry]:
+    """Add the strain that prescribed motion forces on parts.
+
+    The parts of an object share its pressure: the stiffer a part, the less it strains.
+
+    Args:
+        bodies: As measured.
+        parts: All of the scene's, of which the strain is not known.
+        seed: Of the points by which gaps are measured.
+
+    """
+    compliances = [0.0] * len(bodies.anatomies)
+    volumes = [0.0] * len(compliances)
+    for part in parts:
+        compliances[part.object] += part.volume / stiffness(part)
+        volumes[part.object] += part.volume
+    whole = [c / max(v, 1e-30) for c, v in zip(compliances, volumes, strict=True)]
+    found = pressures(bodies.scene, bodies.anatomies, whole, seed)
+    return [replace(p, pressed=found[p.object] / stiffness(p)) for p in parts]
+
+
+def stiffness(part: PartGeometry) -> float:
+    """E of a part as a whole [Pa]: of what fills it, or of a wall by its share of the volume."""
+    inside = as_contents(part)
+    if inside.structure.kind != "shell" or part.volume <= 0.0:
+        return max(inside.material.young, 1.0)
+    share = part.narrowing * part.area * (part.structure.thickness or 0.0) / part.volume
+    return max(part.material.young * min(1.0, share), 1.0)
 
 
 def _geometry(member: Member, bodies: Bodies, number: int) -> PartGeometry:

@@ -21,10 +21,11 @@ from corporeal.types import Material
 def judge(part: PartGeometry, motion: Motion) -> Verdict:
     """Say whether a part would yield or visibly flex.
 
-    ε = max(v/c, ρ a L/E, tip shift of a cantilever / L) and v_y = σ_y/(ρ c); rigid when ε is below
-    half a percent and v below v_y. A thin wall is judged by its mapped values at a tenth of the
-    part's width, which is the wall the finest detail would simulate: so the verdict depends neither
-    on the detail nor on what else is in the scene. A tube is judged as the bar that it is.
+    ε = max(v/c, ρ a L/E, tip shift of a cantilever / L, what prescribed motion presses it by) and
+    v_y = σ_y/(ρ c); rigid when ε is below half a percent and v below v_y. A thin wall is judged by
+    its mapped values at a tenth of the part's width, which is the wall the finest detail would
+    simulate: so the verdict depends neither on the detail nor on what else is in the scene, but for
+    what presses it. A tube is judged as the bar that it is.
     """
     if part.prescribed:
         return Verdict(0.0, inf, True, "the motion of its object is prescribed, as one rigid body")
@@ -48,10 +49,14 @@ def judge(part: PartGeometry, motion: Motion) -> Verdict:
         sag(part, motion.driven if part.burden else motion.acceleration),
     )
     impact = speed / (real * sqrt(mapped))
-    strain = max(impact, weight)
+    by_itself = max(impact, weight)
+    strain = max(by_itself, part.pressed)
     yields_at = yield_speed(resistance(material), real, density)
     rigid = strain < INVISIBLE_STRAIN and speed < yields_at
-    return Verdict(strain, yields_at, rigid, explain(strain, speed, yields_at), weight, impact)
+    reason = explain(by_itself, speed, yields_at)
+    if part.pressed > max(by_itself, INVISIBLE_STRAIN):
+        reason = f"prescribed motion presses it by about {part.pressed:.2g} of its thickness"
+    return Verdict(strain, yields_at, rigid, reason, weight, impact, part.pressed)
 
 
 def explain(strain: float, speed: float, yields_at: float) -> str:
