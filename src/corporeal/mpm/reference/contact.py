@@ -111,7 +111,8 @@ def _guided(scene: Scene, pair: Int[np.ndarray, "E 2"]) -> Bool[np.ndarray, " E"
     bodies, walls = scene.problem.bodies, len(scene.problem.planes)
     rigid = np.array([scene.is_rigid(b) for b in range(len(bodies))] + [False] * walls)
     told = np.array([body.path is not None for body in bodies] + [False] * walls)
-    return rigid[pair].all(axis=1) & told[pair].any(axis=1)
+    one, other = pair.T
+    return rigid[one] & rigid[other] & (told[one] | told[other])
 
 
 def _groups(touches: list[Touch]) -> Int[np.ndarray, " E"]:
