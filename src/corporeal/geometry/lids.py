@@ -20,6 +20,7 @@ from corporeal.geometry.room import corners_of, is_vessel
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.mpm.laws import MENU
+from corporeal.mpm.problem import GRAVITY
 from corporeal.types import Material, MaterialField
 
 ACROSS = 48
@@ -28,8 +29,6 @@ LEVEL = 0.7
 """Cosine of the steepest border to the level on which something lies."""
 SHALLOW = 0.1
 """What lies on a hollow is no less deep than this share of the hollow's width."""
-GRAVITY = 9.81
-"""[m/s²]"""
 
 
 @dataclass(frozen=True)
