@@ -17,11 +17,19 @@ from corporeal.geometry.arrangement import intersecting
 from corporeal.geometry.creases import creased
 from corporeal.materials import Entry, find
 from corporeal.materials.looks import finish_of
-from corporeal.types import Finish, Keyframes, Push, Scene, SceneObject, Surface, Vector, Wind
+from corporeal.types import (
+    DOWNWARDS,
+    Finish,
+    Keyframes,
+    Push,
+    Scene,
+    SceneObject,
+    Surface,
+    Vector,
+    Wind,
+)
 
 STILL: Vector = (0.0, 0.0, 0.0)
-DOWN: Vector = (0.0, 0.0, -9.81)
-"""Gravity [m/s²]."""
 ROUNDNESS = 3
 """How often the twenty triangles of a ball are divided: its volume is 0.9 % too small."""
 SECTIONS = 48
@@ -177,7 +185,7 @@ def build_scene(
     name: str = "scene",
     duration: float = 1.0,
     fps: int = 60,
-    gravity: Vector = DOWN,
+    gravity: Vector = DOWNWARDS,
 ) -> Scene:
     """Put solids into a scene above the floor.
 

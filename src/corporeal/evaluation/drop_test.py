@@ -9,7 +9,7 @@ from corporeal.in_memory import build_engine, pose_problem, prepare
 from corporeal.mpm.problem import Engine, Measure
 from corporeal.pipeline import Settings
 from corporeal.scene_building import ball, box, build_scene
-from corporeal.types import Scene
+from corporeal.types import GRAVITY, Scene
 
 GAP = 0.1
 """How far above what it strikes a ball begins, over its diameter [-]."""
@@ -41,7 +41,7 @@ def scene_of(row: Rebound) -> Scene:
     """Put the ball just above what it strikes, as fast as its fall has made it there."""
     radius, gap = 0.5 * row.diameter, GAP * row.diameter
     ground = row.on.size[2] if row.on else 0.0
-    speed = np.sqrt(max(row.speed**2 - 2.0 * 9.81 * gap, 0.0))
+    speed = np.sqrt(max(row.speed**2 - 2.0 * GRAVITY * gap, 0.0))
     material = row.material or "rubber"
     thing = ball(material, radius, (0.0, 0.0, ground + gap + radius), (0.0, 0.0, -speed), row.name)
     below = [box(row.on.material, row.on.size, name="block")] if row.on else []
@@ -73,7 +73,7 @@ def drop(row: Rebound, settings: Settings) -> Drop:
     last = bounce(engine, row.diameter / speed / LOOKS * 10, 30.0 * row.diameter / speed)
     treatment = prepared.particles.treatments[0]
     met = touch(last)
-    after = last.momentum[0, 2] / last.mass[0] + 9.81 * (last.time - met[1])
+    after = last.momentum[0, 2] / last.mass[0] + GRAVITY * (last.time - met[1])
     rigid = treatment.kind == "rigid"
     return Drop(
         row.name,

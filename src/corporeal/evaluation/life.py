@@ -8,9 +8,8 @@ from importlib.resources import files
 from math import exp, pi, sqrt
 
 from corporeal.errors import BadFileError
+from corporeal.types import GRAVITY
 
-GRAVITY = 9.81
-"""[m/s²]"""
 AIR = 1.2
 """Density of air [kg/m³]."""
 SPHERE_DRAG = 0.47

@@ -7,7 +7,7 @@ from corporeal.formats.credits import Credit, credit_in
 from corporeal.formats.glb_writer import GENERATOR
 from corporeal.formats.gltf_document import Document, Entry
 from corporeal.formats.words import everyday, safe
-from corporeal.types import Keyframes, Push, SceneObject, Wind
+from corporeal.types import DOWNWARDS, Keyframes, Push, SceneObject, Wind
 
 NO_MOTION = (0.0, 0.0, 0.0)
 SMALLEST_SCALE = 1e-6
@@ -26,7 +26,7 @@ def scene_of_extras(document: Document, root: Entry) -> dict:
         return {}
     extras = root.needed("extras")
     return {
-        "gravity": extras.numbers("gravity_m_s2", (0.0, 0.0, -9.81)),
+        "gravity": extras.numbers("gravity_m_s2", DOWNWARDS),
         "duration": extras.number("duration_s", 2.0),
         "fps": extras.whole("fps", 60, most=1000) or 60,
         "settled": extras.flag("settled"),

@@ -20,8 +20,7 @@ from corporeal.geometry.room import corners_of, is_vessel
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.survey import Anatomy, Member
 from corporeal.mpm.laws import MENU
-from corporeal.mpm.problem import GRAVITY
-from corporeal.types import Material, MaterialField
+from corporeal.types import GRAVITY, Material, MaterialField
 
 ACROSS = 48
 """Samples along the longest side of the hollow part."""

@@ -311,7 +311,7 @@ coefficients from the constant on); the rotation as it begins (9); and how many 
 
 # ---------------------------------------------------------------- air and gravity
 
-GRAVITY = 9.81
+GRAVITY = types.GRAVITY
 """[m/s²]"""
 AIR_DENSITY = 1.2
 """ρ_air at 20 °C and sea level [kg/m³]."""

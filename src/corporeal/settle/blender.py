@@ -21,13 +21,13 @@ import numpy as np
 from corporeal.errors import UserError
 from corporeal.settle.body import FRICTION, Body, Pose, unit_of
 from corporeal.settle.mujoco import Dropped
+from corporeal.types import GRAVITY
 
 SCRIPT = Path(__file__).with_name("blender_script.py")
 SIZE = 10.0
 """Of the scene's unit, in Blender's."""
 MARGIN = 5e-4
 """Around pieces, in Blender's unit: objects hover by this."""
-GRAVITY = 9.81
 UNIT = 1e-3
 """How far the norm of a quaternion may be from one."""
 LAST_WORDS = 5

@@ -10,8 +10,8 @@ from corporeal.geometry.air import AIR_DENSITY, drag_areas
 from corporeal.settle.arrange import standing_alone
 from corporeal.settle.body import Body, Pose
 from corporeal.settle.hull import FOOT
+from corporeal.types import GRAVITY
 
-GRAVITY = 9.81
 FIRM = 0.1
 """What is round hardly rolls on a grid: it stands as on a foot that reaches this share of its size
 beyond its centre (two cells of a draft)."""

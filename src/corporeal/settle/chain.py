@@ -15,8 +15,8 @@ from jaxtyping import Float
 
 from corporeal.settle.rehearsal import hops, rehearse
 from corporeal.settle.standing import Standing
+from corporeal.types import GRAVITY
 
-GRAVITY = 9.81
 LAST = (0.15, 0.3)
 """Speed with which the last of the row is struck, over √(g L)."""
 FASTEST = 3.0

@@ -21,7 +21,7 @@ from corporeal.settle.body import Body, Pose
 from corporeal.settle.breeze import headings, wind_that_moves
 from corporeal.settle.chain import chain
 from corporeal.settle.standing import Standing, meet, size
-from corporeal.types import Vector, Wind
+from corporeal.types import GRAVITY, Vector, Wind
 
 Kind = Literal["fall", "fall-onto", "collision", "chain", "wind"]
 KINDS: tuple[Kind, ...] = get_args(Kind)
@@ -36,7 +36,6 @@ STANDING: dict[Kind, tuple[Arrangement, ...]] = {
 }
 """How several objects may stand before it begins."""
 
-GRAVITY = 9.81
 FALL = (0.5, 1.5)
 """Height of a fall, over the falling object's own size."""
 SPEED = (0.5, 0.9)

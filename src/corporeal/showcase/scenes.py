@@ -13,10 +13,8 @@ import numpy as np
 from corporeal.errors import UnknownChoiceError
 from corporeal.showcase.mesh import STILL, Model, Part, Point, cut, together
 from corporeal.showcase.models import MODELS
-from corporeal.types import MATTER, SUBSTANCE, Push, Scene, SceneObject, Surface
+from corporeal.types import DOWNWARDS, GRAVITY, MATTER, SUBSTANCE, Push, Scene, SceneObject, Surface
 
-GRAVITY = 9.81
-"""[m/s²]"""
 CUSHIONS = ("seat_cushion", "back_cushion")
 """Of the armchair."""
 
@@ -283,7 +281,7 @@ def scene_of(
         objects=objects,
         surfaces=surfaces,
         finishes=tuple(finishes.values()),
-        gravity=(0.0, 0.0, -GRAVITY),
+        gravity=DOWNWARDS,
         duration=duration,
         fps=60,
     )

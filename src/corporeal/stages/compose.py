@@ -38,6 +38,7 @@ from corporeal.settle.decompose import decompose
 from corporeal.settle.interactions import KINDS, NEEDS, STANDING, STORM, WIND, Action, Kind
 from corporeal.settle.mass_properties import MassProperties
 from corporeal.settle.rest import RestConfig, SettlingEngine
+from corporeal.types import DOWNWARDS
 from corporeal.vlm.sizes import RealExtent, real_extent, usual_sizes
 
 Progress = Callable[[float, str], None]
@@ -301,7 +302,7 @@ def _write(
     action = settled.action
     duration = action.duration if action else AT_REST
     members = [_member(t, p) for t, p in zip(objects, settled.poses, strict=True)]
-    extras = {"gravity_m_s2": [0.0, 0.0, -9.81], "duration_s": duration, "fps": 30, "settled": True}
+    extras = {"gravity_m_s2": list(DOWNWARDS), "duration_s": duration, "fps": 30, "settled": True}
     warnings = merge(folder / "scene.glb", members, "scene", extras)
     scene_file = SceneFile(
         folder / "scene.toml",

@@ -9,14 +9,12 @@ from math import inf, pi
 from corporeal.mpm.laws import MENU
 from corporeal.mpm.physics.stability import closed_wall, limp_wall, thin_wall
 from corporeal.treatment.dents import dent_of_wall
-from corporeal.types import Material, Structure
+from corporeal.types import GRAVITY, Material, Structure
 
 TRINKET_CELLS, TRINKET_LENGTH = 8.0, 5.0
 """A part of fewer cells than the first, and nowhere longer than the second [cells], is a trinket:
 its own stiffness cannot be seen."""
 
-GRAVITY = 9.81
-"""[m/s²]"""
 COMPACT = 0.5
 """Least shortest over longest side of what bounces as a ball does [-]; what is thinner than so much
 of its width is a sheet."""

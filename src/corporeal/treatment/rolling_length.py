@@ -18,8 +18,8 @@ from jaxtyping import Float
 
 from corporeal.materials.blow import compliance_of
 from corporeal.materials.rebound import rebound
-from corporeal.mpm.problem import GRAVITY, Body
-from corporeal.types import Material
+from corporeal.mpm.problem import Body
+from corporeal.types import GRAVITY, Material
 
 BALL, CYLINDER = 3.0 / 16.0, 2.0 / (3.0 * pi)
 """c over α a where contact is a point and where it is a line [-]."""

@@ -41,6 +41,8 @@ from corporeal.types.matter import (
     WeighedHypothesis,
 )
 from corporeal.types.scene import (
+    DOWNWARDS,
+    GRAVITY,
     MATTER,
     SUBSTANCE,
     Camera,
@@ -73,6 +75,8 @@ from corporeal.types.simulated import (
 )
 
 __all__ = [
+    "DOWNWARDS",
+    "GRAVITY",
     "MATTER",
     "NOTHING_ASKED",
     "ROUNDING",

@@ -7,6 +7,10 @@ import numpy as np
 from jaxtyping import Float, Int, UInt8
 
 Vector = tuple[float, float, float]
+GRAVITY = 9.81
+"""Where nobody states another [m/s²]."""
+DOWNWARDS: Vector = (0.0, 0.0, -GRAVITY)
+"""The same as a vector [m/s²]."""
 SUBSTANCE, MATTER = "substance", "stated_matter"
 """Keys of a surface's extras: the name of what a file says that it is made of, and all that the
 file says of it (``values``, ``words``)."""
@@ -156,7 +160,7 @@ class Scene:
     finishes: tuple[Finish, ...]
     metres_per_unit: float = 1.0
     """What one unit of the file was taken to be [m]."""
-    gravity: Vector = (0.0, 0.0, -9.81)
+    gravity: Vector = DOWNWARDS
     """[m/s²]"""
     walls: tuple[Wall, ...] = ()
     """Beside the floor, which is always there."""
