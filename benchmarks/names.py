@@ -106,20 +106,23 @@ class Weighed:
         return [w for tell in told for w in tell(self.scene, self.anatomies, self.masses)]
 
 
-def weigh(mesh: trimesh.Trimesh, path: Path, metres_per_unit: float = 1.0) -> Weighed:
+def weigh(
+    mesh: trimesh.Trimesh, path: Path, metres_per_unit: float = 1.0, from_pictures: bool = False
+) -> Weighed:
     """Write a mesh [m], upright along z, to a file and take it through the pipeline's functions.
 
     Args:
         mesh: Is left as it is.
         path: Of a GLB, whose name tells what it is.
         metres_per_unit: In which unit its file is, which does not say so.
+        from_pictures: Its shape is its outside, as photographs show it.
 
     """
     written = mesh.copy().apply_transform(UP).apply_scale(1 / metres_per_unit)
     written.visual = TextureVisuals(material=PBRMaterial(name="material", metallicFactor=0.0))
     trimesh.Scene({"mesh": written}).export(path)
     scene = load_scene(path)
-    inventory = describe(scene)
+    inventory = describe(scene, from_pictures=from_pictures)
     parts = segment(scene, inventory)
     anatomies = examine(scene, parts, 0)
     field, leaf = ground_weighed(scene, parts, inventory, GroundConfig()), find("leaf_tissue")

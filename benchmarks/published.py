@@ -1,12 +1,15 @@
 """Weigh everyday things of published size and mass by their names alone: nobody is asked.
 
-    python benchmarks/published.py [--second] [--rows] [--only NAME ...] [--held-rows]
+    python benchmarks/published.py [--second | --ware | --ware-meshes] [--rows] [--only NAME ...]
+                                   [--held-rows]
 
 The lists (recognition/published.toml, sixty things; --second: published_second.toml, forty of other
-classes) were written with sizes, masses and sources before the program had weighed any of it, and
-were halved by a coin. ``--rows`` prints the things of the open half, which rules may be mended by;
-of the other half only figures are printed, unless ``--held-rows`` asks for its things, too, which
-ends its worth. Intervals are those of ``evaluate mass``; their score is that of ln m.
+classes; --ware: ware.toml, 52 pieces of open ware, of which the outside is given, as photographs
+show it; --ware-meshes: the same as meshes that fill their hollow) were written with sizes, masses
+and sources before the program had weighed any of it, and were halved by a coin. ``--rows`` prints
+the things of the open half, which rules may be mended by; of the other half only figures are
+printed, unless ``--held-rows`` asks for its things, too, which ends its worth. Intervals are those
+of ``evaluate mass``; their score is that of ln m.
 """
 
 import argparse
@@ -28,6 +31,7 @@ from corporeal.treatment.object_masses import walls_drawn_too_thick
 
 FOLDER = Path(__file__).parent / "recognition"
 LIST, SECOND = FOLDER / "published.toml", FOLDER / "published_second.toml"
+WARE = FOLDER / "ware.toml"
 HALVES = ("open", "held")
 DRAWS = 200
 MISS = 20.0
@@ -76,9 +80,10 @@ class Found:
         return abs(self.off) < log(NEAR) and self.warned
 
 
-def look_at(row: dict, folder: Path) -> Found:
+def look_at(row: dict, folder: Path, from_pictures: bool = False) -> Found:
     """Take one thing of the list through the pipeline's functions by its name and shape."""
-    seen = weigh(shape(row["shape"]), folder / f"{row['name']}.glb")
+    mesh, path = shape(row["shape"]), folder / f"{row['name']}.glb"
+    seen = weigh(mesh, path, from_pictures=from_pictures)
     words = seen.field.words[0]
     low, high = interval(seen)
     wall = walls_drawn_too_thick(seen.scene, seen.anatomies, seen.makes, seen.field)
@@ -127,16 +132,20 @@ def main() -> None:
     parser = argparse.ArgumentParser(
         description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter
     )
-    parser.add_argument("--second", action="store_true", help="weigh the second list")
+    which = parser.add_mutually_exclusive_group()
+    which.add_argument("--second", action="store_true", help="weigh the second list")
+    which.add_argument("--ware", action="store_true", help="weigh open ware as from photographs")
+    which.add_argument("--ware-meshes", action="store_true", help="weigh it as full meshes")
     parser.add_argument("--rows", action="store_true", help="print the things of the open half")
     parser.add_argument("--held-rows", action="store_true", help="print those of the other, too")
     parser.add_argument("--only", nargs="+", help="these things of the open half alone")
     asked = parser.parse_args()
-    rows = tomllib.loads((SECOND if asked.second else LIST).read_text(encoding="utf-8"))["things"]
+    listed = WARE if asked.ware or asked.ware_meshes else SECOND if asked.second else LIST
+    rows = tomllib.loads(listed.read_text(encoding="utf-8"))["things"]
     if asked.only:
         rows = [r for r in rows if r["name"] in asked.only and r["half"] == "open"]
     with TemporaryDirectory() as folder:
-        found = [look_at(row, Path(folder)) for row in rows]
+        found = [look_at(row, Path(folder), asked.ware) for row in rows]
     shown = [h for h, asks in zip(HALVES, (asked.rows, asked.held_rows), strict=True) if asks]
     for one in sorted(found, key=lambda f: -abs(f.off)):
         if one.half in shown or asked.only:
