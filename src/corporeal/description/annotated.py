@@ -1,24 +1,26 @@
 """A person's annotations, before which every other answer gives way."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
 from corporeal import materials
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.description.file_words import OPEN
+from corporeal.description.ware import with_usual_wall
 from corporeal.geometry.identity import Identity
 from corporeal.types import (
     PartWords,
     Scene,
 )
 from corporeal.vlm.annotation import Annotation, built, named_pieces, read_annotations
+from corporeal.vlm.lexicon import tokens_of
 from corporeal.vlm.words import (
     gathered,
 )
 
 SHARES = ("volume_share", "surface_share")
-BUILT = ("structure", "built_by")
+BUILT = ("structure", "built_by", "wall_unseen")
 """Kept of open ware, which is no solid whatever it is made of."""
 
 
@@ -54,16 +56,30 @@ def with_annotations(
     config: DescribeConfig,
 ) -> list[PartWords]:
     """Return one object's parts as a person says they are; pieces of one mesh are gathered."""
-    own = [_annotated(annotations.get((obj, w.name)), w, config.annotations) for w in words]
+    path, called = config.annotations, [tokens_of(obj)]
+    own = [_annotated(annotations.get((obj, w.name)), w, path, called) for w in words]
     pieces = named_pieces(annotations, obj, [w.name for w in own])
     if not pieces:
         return own
-    known = [_annotated(annotations[obj, p.name], p, config.annotations) for p in pieces]
+    known = [_annotated(annotations[obj, p.name], p, path, called) for p in pieces]
     return [gathered(own[0].name, known)]
 
 
-def _annotated(annotation: Annotation | None, words: PartWords, path: Path | None) -> PartWords:
-    """Let an annotation replace what was found; what it leaves open stays."""
+def _annotated(
+    annotation: Annotation | None,
+    words: PartWords,
+    path: Path | None,
+    called: Sequence[tuple[str, ...]],
+) -> PartWords:
+    """Let an annotation replace what was found; what it leaves open stays.
+
+    Args:
+        annotation: None: nobody says anything.
+        words: What was found.
+        path: Of the file that says it.
+        called: What the object is called.
+
+    """
     if annotation is None:
         return words
     where = f"Stated in {Path(str(path)).name}."
@@ -72,6 +88,8 @@ def _annotated(annotation: Annotation | None, words: PartWords, path: Path | Non
         is_open = (words.structure, words.built_by) == OPEN
         kept = SHARES + BUILT if is_open else SHARES
         words = replace(found, **{s: getattr(words, s) for s in kept})
+        if is_open:
+            words = with_usual_wall(words, called)
     if (
         annotation.material is not None
         or annotation.structure is not None

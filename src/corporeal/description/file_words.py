@@ -6,6 +6,7 @@ from functools import partial
 
 from corporeal import materials
 from corporeal.description.no_block import no_block
+from corporeal.description.ware import sheet_if_full, with_usual_wall
 from corporeal.description.wet import values_when_wet
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.geometry.identity import Identity
@@ -64,8 +65,10 @@ def words_of_file(
         found = stated_material(list(seen.surfaces), library) or hollowed(
             recognise(seen), seen, walls, from_pictures
         )
+        if unasked:
+            found = with_usual_wall(found, [name.words for name in seen.general])
         if unasked and not from_pictures:
-            found = no_block(found, seen, library)
+            found = sheet_if_full(no_block(found, seen, library), seen, library)
         if not from_pictures:
             found = as_said(found, seen, found.material is None or walls(found.material))
         by = "metadata" if found.material else "unknown"
@@ -88,7 +91,7 @@ def open_ware(objects: Sequence[ObjectWords]) -> tuple[str, ...]:
     made = [o.name for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN]
     return tuple(
         f"{name}: pictures need not show how deep it is inside. By its name it is taken for open "
-        "ware, with a wall along its outside as thick as its material usually has, and empty "
+        "ware, with a wall along its outside as thick as such ware usually has, and empty "
         "inside of that; annotate structure and thickness_mm if that is wrong."
         for name in made
     )

@@ -5,7 +5,7 @@ from dataclasses import replace
 from corporeal.errors import UserError
 from corporeal.geometry.drawn import mean_thickness
 from corporeal.materials.placement import entry_of
-from corporeal.types import PartWords
+from corporeal.types import PartWords, Range
 from corporeal.vlm.lexicon import formed, massive, nameless, open_ware, substances
 from corporeal.vlm.metadata import Evidence
 
@@ -47,10 +47,21 @@ def no_block(words: PartWords, seen: Evidence, library: str) -> PartWords:
     return replace(words, structure="shell", reason=f"{words.reason} {told}")
 
 
+def usual_wall(material: str | None, library: str) -> float:
+    """Return the usual thickness of walls of a material [m]; 0: none was measured."""
+    wall = _walls(material, library)
+    return wall.typical if wall else 0.0
+
+
 def _greatest_wall(material: str, library: str) -> float:
     """Return the greatest measured thickness of walls of a material [m]; 0: none was."""
-    try:
-        wall = entry_of(material, library).ranges.get("shell_thickness")
-    except UserError:
-        return 0.0
+    wall = _walls(material, library)
     return wall.high if wall else 0.0
+
+
+def _walls(material: str | None, library: str) -> Range | None:
+    """Return the measured thicknesses of walls of a material [m]; None: there are none."""
+    try:
+        return entry_of(material, library).ranges.get("shell_thickness") if material else None
+    except UserError:
+        return None

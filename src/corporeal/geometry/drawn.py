@@ -8,6 +8,7 @@ import numpy as np
 from scipy.spatial import ConvexHull, QhullError
 
 from corporeal.geometry.anatomy import wall_behind
+from corporeal.geometry.hollow import volume_below_rim
 from corporeal.geometry.mesh import Mesh, Triangles, joined, orient, signed_volume, weld
 from corporeal.geometry.shape import Shape
 from corporeal.geometry.survey import closes
@@ -18,6 +19,11 @@ HOLLOWED = 0.75
 """What encloses less than this share of its convex hull shows holes, gaps or hollows."""
 IN_DOUBT = 0.1
 """A scan is thin where its edges alone leave the logarithm of its volume open by so much [-]."""
+FULL = 2.5
+"""A mean thickness over the usual wall, from which a vessel may be a lump [-]: walls are drawn up
+to twice as thick as they are, and a filled saucer, the flattest ware, is 2.9 times as thick."""
+ROOM = 0.5
+"""Of what a vessel encloses: as much room below its rim shows that its hollow is drawn [-]."""
 SHARES = (10, 25, 50)
 """Of the surface [%], behind which it is said how far the opposite face lies."""
 
@@ -76,6 +82,24 @@ def mean_thickness(surfaces: Sequence[Triangles], scale: float = 1.0) -> float:
     if mesh is None:
         return 0.0
     return 2 * abs(signed_volume(mesh)) / float(mesh.areas.sum()) / scale
+
+
+def drawn_full(surfaces: Sequence[Triangles], wall: float, scale: float = 1.0) -> bool:
+    """Tell whether a vessel is drawn as a lump: far thicker than its wall, and with no room.
+
+    Args:
+        surfaces: All of the object's, upright.
+        wall: As such vessels have [m].
+        scale: Lengths in them over the real ones [-].
+
+    """
+    mesh = _closed(surfaces)
+    if mesh is None:
+        return False
+    volume, shape = abs(signed_volume(mesh)), Shape(mesh)
+    if not 2 * volume / float(mesh.areas.sum()) > FULL * wall * scale:
+        return False
+    return volume_below_rim(shape, mesh, np.random.default_rng(0)) < ROOM * volume
 
 
 def _closed(surfaces: Sequence[Triangles]) -> Mesh | None:

@@ -191,7 +191,8 @@ def _list(names: Any) -> str:
 def built(annotation: Annotation, words: PartWords) -> PartWords:
     """Take over from a person's annotation how a part is built."""
     walled = annotation.thickness is not None or annotation.inflation is not None
-    packed = "packed" if annotation.solidity else "shell" if walled else None
+    wall = "sheet" if words.structure == "sheet" and annotation.inflation is None else "shell"
+    packed = "packed" if annotation.solidity else wall if walled else None
     implied = "filled" if annotation.contents else packed
     structure = annotation.structure or implied
     if structure is None:

@@ -241,15 +241,21 @@ def hollow(tokens: tuple[str, ...]) -> bool:
     return _is_one(tokens, "hollow")
 
 
-def wall_of(tokens: tuple[str, ...], material: str) -> float | None:
-    """Return the wall [m] of what is hollow where it is of such a material; None: it is not.
+def wall_of(tokens: tuple[str, ...], material: str, table: str = "walls") -> float | None:
+    """Return the wall [m] of things of a table where they are of such a material; None: of none.
 
     A chair of plastic is moulded, one of steel is of tubes.
+
+    Args:
+        tokens: Of a name.
+        material: What the thing is of.
+        table: "walls": of what is hollow where it is of it; "ware": of open ware.
+
     """
-    for row in _table()["walls"]:
+    for row in _table()[table]:
         if material in row["of"] and _ends_in(tokens, _singulars(row["words"])):
-            solid = _ends_in(tokens, _singulars(row["but"]))
-            return None if solid else row["thickness_mm"] * 1e-3
+            other = _ends_in(tokens, _singulars(row.get("but", ())))
+            return None if other else row["thickness_mm"] * 1e-3
     return None
 
 

@@ -192,6 +192,9 @@ def hollowed(
         from_pictures: Whether its shape is from pictures, which need not show how deep a vessel is.
 
     """
+    ware = from_pictures and any(open_ware(name.words) for name in evidence.general)
+    if ware and words.structure == "shell" and words.inflation is None:
+        words = replace(words, structure=None)  # with a mouth, where the name's wall has none
     if words.structure is not None and words.thickness is not None:
         return words
     bare = words.material is not None and not walled(words.material)
@@ -207,7 +210,7 @@ def hollowed(
             thickness=words.thickness or wall,
             wall_usual=words.wall_usual or words.thickness is None,
         )
-    if from_pictures and any(open_ware(name.words) for name in evidence.general):
+    if ware:
         return replace(words, structure="sheet")
     named = evidence.general
     called = evidence.alone and any("hollow" in name.words for name in named)
