@@ -148,9 +148,11 @@ def run_audit(
 
 
 def _warnings(made: Results, audit: Audit) -> tuple[str, ...]:
-    """Return what every verb warns of, each sentence once, in the order of the verbs."""
+    """Return what every verb warns of, each sentence once, in the order of the verbs.
+
+    What was noticed of photographs comes last: it is most, and the terminal shows the first.
+    """
     groups = (
-        made.reconstruct.warnings if made.reconstruct else (),
         still_doubted(made.scene, made.inventory),
         made.inventory.warnings,
         made.parts.warnings,
@@ -158,6 +160,7 @@ def _warnings(made: Results, audit: Audit) -> tuple[str, ...]:
         tuple(m.warning for m in made.field.mixtures if m.warning),
         made.particles.warnings,
         audit.warnings,
+        made.reconstruct.warnings if made.reconstruct else (),
     )
     return tuple(dict.fromkeys(w for group in groups for w in group))
 

@@ -64,6 +64,8 @@ class Photographs:
     """Which pictures show which points; None: nobody says."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
+    done: tuple[str, ...] = ()
+    """Those of the warnings that say what was done to pictures of which none is wrong."""
 
     def only(self, which: Sequence[int]) -> "Photographs":
         """Return some of the pictures, by number, with all points."""
@@ -133,6 +135,7 @@ def read_photographs(
         colours=seen.colours if seen else None,
         lines=None if seen is None else _lines_of(seen, done.names),
         warnings=done.warnings,
+        done=done.done,
     )
 
 

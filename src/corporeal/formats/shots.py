@@ -7,7 +7,7 @@ import warnings
 from collections import Counter
 from collections.abc import Callable
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -79,6 +79,8 @@ class Developed:
     elsewhere."""
     names: tuple[str, ...]
     warnings: tuple[str, ...]
+    done: tuple[str, ...] = ()
+    """Those of the warnings that say what was done to pictures of which none is wrong."""
 
 
 class _UnusableError(Exception):
@@ -134,11 +136,12 @@ def develop(source: Path, shots: list[Shot], longest: int, close: bool = False) 
                 bad.append((shot.name, str(problem)))
     prints = _masked_alike(prints, bad)
     _refuse_most(source, len(shots), bad)
-    warnings = [*left_out(len(shots), bad), *_changes(prints, Counter(known), frame)]
-    return _developed(prints, tuple(warnings))
+    done = tuple(_changes(prints, Counter(known), frame))
+    warnings = (*left_out(len(shots), bad), *done, *_oddities(prints))
+    return replace(_developed(prints), warnings=warnings, done=done)
 
 
-def _developed(prints: list[_Print], warnings: tuple[str, ...]) -> Developed:
+def _developed(prints: list[_Print]) -> Developed:
     rgba = np.stack([p.rgba for p in prints])
     masked = bool(prints[0].masked and (rgba[..., 3] < 255).any())
     nobody = np.zeros(rgba.shape[1:3], np.int32)
@@ -150,7 +153,7 @@ def _developed(prints: list[_Print], warnings: tuple[str, ...]) -> Developed:
         masks=np.ascontiguousarray(rgba[..., 3]) if masked else None,
         object_of_pixel=np.stack(numbers) - 1 if known else None,
         names=tuple(p.name for p in prints),
-        warnings=warnings,
+        warnings=(),
     )
 
 
@@ -393,17 +396,23 @@ def _changes(prints: list[_Print], sizes: Counter[tuple[int, int]], frame: Close
     bent = sum(p.straightened for p in prints)
     if bent:
         changes.append(f"{bent} pictures were straightened: their lenses bend straight lines.")
+    return changes
+
+
+def _oddities(prints: list[_Print]) -> list[str]:
+    """Return what is odd about the pictures themselves, in sentences."""
+    odd = []
     grey = sum(int(np.ptp(p.rgba[..., :3], axis=-1).max()) <= GREY for p in prints)
     if 0 < grey < len(prints):
-        changes.append(f"{grey} of {len(prints)} pictures are grey: colours will be paler.")
+        odd.append(f"{grey} of {len(prints)} pictures are grey: colours will be paler.")
     asking = sum(p.asks for p in prints)
     if asking:
-        changes.append(
+        odd.append(
             f"{asking} pictures note in their EXIF data that they are to be turned. Their pixels "
             "were taken as they are stored, as COLMAP takes them; if the poses belong to turned "
             "pictures, turn the files."
         )
-    return changes
+    return odd
 
 
 def _sized(size: tuple[int, int]) -> str:

@@ -62,10 +62,17 @@ class ReconstructConfig:
 DEFAULT = ReconstructConfig()
 
 
-def validate(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool = False) -> None:
+def validate(
+    config: ReconstructConfig, extents: Sequence[str] = (), asked: bool = False, source: str = ""
+) -> None:
     """Raise UserError where a setting cannot be right, whatever the pictures.
 
-    asked: whether somebody will be asked what there is.
+    Args:
+        config: What was asked for.
+        extents: Real largest extents, such as "duck=0.1" [m].
+        asked: Whether somebody will be asked what there is.
+        source: What the pictures are called.
+
     """
     # A person who asks for help needs neither what trains nor what answers.
     from corporeal.splats import training_schedule
@@ -80,7 +87,7 @@ def validate(config: ReconstructConfig, extents: Sequence[str] = (), asked: bool
             "--count out, or name all of them."
         )
     if config.things or not asked:
-        check_extents(extents, [usual(name) for name in config.things])
+        check_extents(extents, [usual(name) for name in config.things], source)
     for spec in (config.semantic, config.structural):
         connect(spec)  # who is to look must be there before anything is learned
     training_schedule.validate(config.rasteriser)

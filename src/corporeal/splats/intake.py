@@ -157,6 +157,7 @@ def take_in(
         raise UserError(f"{source}: {INVERTED}")
     doubt = doubt_of_poses(source, masked_by, shown)
     points = _points(shown)
+    wrong = [said for said in shown.warnings if said not in shown.done]
     # With masks, where sparse points are says less than what masks carve; what they are seen
     # through is empty.
     start = points if masks is None else shown.lines
@@ -172,8 +173,8 @@ def take_in(
         z_up=shown.z_up,
         seen=None if points is None else points.position,
         quality=trained.quality,
-        statements=_learned_how(trained, len(shown.views.cameras)),
-        warnings=(*shown.warnings, *doubt, *_badly_learned(trained, len(shown.names))),
+        statements=(*shown.done, *_learned_how(trained, len(shown.views.cameras))),
+        warnings=(*wrong, *doubt, *_badly_learned(trained, len(shown.names))),
     )
 
 

@@ -13,7 +13,7 @@ import numpy as np
 from corporeal.errors import UserError, with_notes
 from corporeal.features.clouds import with_features
 from corporeal.formats.sources import called
-from corporeal.formats.words import safe
+from corporeal.formats.words import everyday, safe
 from corporeal.geometry.gaussians import only
 from corporeal.geometry.local_shape import neighbours, normals
 from corporeal.geometry.mesh import Mesh
@@ -39,10 +39,14 @@ from corporeal.splats.intake import Intake, turned_upright
 from corporeal.splats.worth import goes_beyond, not_worth, told_otherwise, unlike_masks
 from corporeal.types import Camera, Finish, Reconstruction, Scene, SceneObject, Surface
 from corporeal.vlm.seen_objects import (
+    UNKNOWN,
     SeenObject,
     Viewer,
     metres,
     names_of,
+    of_name,
+    said_by_name,
+    telling,
 )
 
 ROUGHNESS = 0.8
@@ -89,7 +93,7 @@ def reconstruct(
             does not fit it.
 
     """
-    validate(config, extents, asked=viewer.model is not None)
+    validate(config, extents, viewer.model is not None, called(source))
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
     taken, masked = take_pictures(source, config, folder, within(progress, 0.0, TRAINED))
     grown = taken.masks is not None and not masked  # of what all cameras look at: one thing
@@ -119,15 +123,60 @@ def reconstruct(
     if not config.force and (why := _why_not(found, photographers, masked)):
         raise _refusal(source, why, doubted_in(None if masked else folder), taken)
     # What they are, and so their names and their size in metres.
-    objects = recognised(wanted, found, config, viewer)
+    known = _known(source, found, recognised(wanted, found, config, viewer), config, extents)
+    warnings = [*known.warnings, *viewer.asked().warnings, *taken.warnings, *split.warnings]
+    statements = (*taken.statements, *placed.statements, split.statement, *known.statements)
+    result = _in_metres(found, known, statements, tuple(dict.fromkeys(warnings)))
+    return Reconstructed(result, _scene(source, found, known))
+
+
+@dataclass(frozen=True)
+class _Known:
+    """What objects are, and how large."""
+
+    objects: Sequence[SeenObject]
+    names: Sequence[str]
+    scale: MetricScale
+    warnings: Sequence[str]
+    """What to read first: what a person can state, then what is wrong with surfaces."""
+
+    @property
+    def statements(self) -> list[str]:
+        """Say how large they are, where no warning does."""
+        return [self.scale.reason] * (self.scale.source != "nobody")
+
+
+def _known(
+    source: Path,
+    found: FoundObjects,
+    objects: Sequence[SeenObject],
+    config: ReconstructConfig,
+    extents: Sequence[str],
+) -> _Known:
+    """Name objects, and decide how large they are; a lone one may be called as its folder.
+
+    Args:
+        source: The folder of photographs, the film or the splat.
+        found: Objects, in order of size.
+        objects: What each is, as far as anybody said.
+        config: What was asked for.
+        extents: Real largest extents, such as "duck=0.1" [m].
+
+    """
+    measured, z_up, title = metric_scale(config), found.taken.z_up, called(source)
+    unnamed = [obj.class_name for obj in objects] == [UNKNOWN]
+    by_name = of_name(title) if unnamed else None
+    if by_name is not None:
+        if extents or measured is not None or z_up:
+            by_name = replace(by_name, extent=None)  # somebody knows better
+        objects = [by_name]
     names = names_of(objects)
     sizes = dict(zip(names, found.extents, strict=True))
-    scale = metres(sizes, objects, extents, metric_scale(config), taken.z_up)
-    warnings = [*taken.warnings, *split.warnings, *viewer.asked().warnings, *scale.warnings]
-    warnings += [f"{n}: {w}" for n, s in zip(names, found.solids, strict=True) for w in s.warnings]
-    statements = (*taken.statements, *placed.statements, split.statement, scale.reason)
-    result = _in_metres(found, names, scale, statements, tuple(dict.fromkeys(warnings)))
-    return Reconstructed(result, _scene(source, found, names, objects, scale))
+    scale = metres(sizes, objects, extents, measured, z_up)
+    told = [] if by_name is None else [said_by_name(title, by_name, names[0])]
+    pairs = zip(names, found.solids, strict=True)
+    unsound = [f"{name}: {why}" for name, solid in pairs for why in solid.warnings]
+    return _Known(objects, names, scale, [*scale.warnings, *told, *unsound])
 
 
 def _upright(source: Path, taken: Intake, config: ReconstructConfig, lie: str) -> Intake:
@@ -168,12 +217,9 @@ def _why_not(found: FoundObjects, photographers: Sequence[Camera], masked: bool)
 
 
 def _in_metres(
-    found: FoundObjects,
-    names: Sequence[str],
-    scale: MetricScale,
-    statements: tuple[str, ...],
-    warnings: tuple[str, ...],
+    found: FoundObjects, known: _Known, statements: tuple[str, ...], warnings: tuple[str, ...]
 ) -> Reconstruction:
+    scale = known.scale
     made = similarity(scale=scale.metres_per_unit)
     boxes = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in found.solids]
     kept = ~sunk(found.taken.gaussians, found.closed.owner, float(max(found.extents)))
@@ -182,7 +228,7 @@ def _in_metres(
         object_of_gaussian=found.closed.owner[kept],
         cloud=replace(found.cloud, position=moved_points(found.cloud.position, made)),
         object_of_point=found.closed.object_of_point,
-        names=tuple(names),
+        names=tuple(known.names),
         boxes=scale.metres_per_unit * np.array(boxes),
         metres_per_unit=scale.metres_per_unit,
         world_from_file=made @ found.taken.world_from_file,
@@ -191,19 +237,17 @@ def _in_metres(
     )
 
 
-def _scene(
-    source: Path,
-    found: FoundObjects,
-    names: Sequence[str],
-    named: Sequence[SeenObject],
-    scale: MetricScale,
-) -> Scene:
+def _scene(source: Path, found: FoundObjects, known: _Known) -> Scene:
     """Make one object of each solid, coloured as its Gaussians are."""
-    factor = scale.metres_per_unit
+    factor, by = known.scale.metres_per_unit, known.scale.reason
+    said = telling(called(source))
+    # A folder called "photos" makes nothing one of paper.
+    own = str(source) if said == everyday(called(source)) else said or UNKNOWN
     objects, surfaces = [], []
-    for k, (name, obj, solid) in enumerate(zip(names, named, found.solids, strict=True)):
-        extent, by = factor * found.extents[k], scale.reason
-        objects.append(SceneObject(name, obj.class_name, extent, source=str(source), sized_by=by))
+    things = zip(known.names, known.objects, found.solids, strict=True)
+    for k, (name, obj, solid) in enumerate(things):
+        extent = factor * found.extents[k]
+        objects.append(SceneObject(name, obj.class_name, extent, source=own, sized_by=by))
         colours, vertices = linear(solid.colours), factor * solid.vertices
         surfaces.append(Surface(name, k, 0, vertices, solid.triangles, colours=colours))
     return Scene(

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from corporeal.errors import UserError
-from corporeal.formats.typical_extents import typical_extent
-from corporeal.formats.words import safe, unique
+from corporeal.formats.typical_extents import length, one_of, typical_extent, words_in
+from corporeal.formats.words import everyday, safe, unique
 from corporeal.geometry.metric import Extent, MetricScale, chosen, implausible, of_file
 from corporeal.geometry.sizes import said_extent
 from corporeal.types import NOTHING_ASKED, Usage
@@ -24,6 +24,11 @@ PERSON = "the command line"
 
 UNKNOWN = "object"
 """What nobody has a name for."""
+TAKEN_WITH = frozenset(
+    "camera card computer drone image laptop phone photo photograph picture snapshot tablet video "
+    "webcam".split()
+)
+"""Words for what photographs are, are taken with or are kept on: folders are called so."""
 
 
 @dataclass(frozen=True)
@@ -142,20 +147,61 @@ def usual(class_name: str) -> SeenObject:
     )
 
 
+def telling(source: str) -> str:
+    """Return the words of a folder's name, or a film's, that can be of what the pictures show.
+
+    Not those for what they are or were taken with: "photos" are no paper, and "Camera" no camera.
+    """
+    return " ".join(w for w in everyday(source).split() if not TAKEN_WITH & set(words_in(w)))
+
+
+def of_name(source: str) -> SeenObject | None:
+    """Return what the name of a folder or a film says is in it, as large as it usually is.
+
+    None: it says nothing that has a usual size.
+    """
+    known = typical_extent(telling(source))
+    if known is None or known.part:
+        return None
+    return SeenObject(known.words, extent=known.usual, sized_by=TABLE)
+
+
+def said_by_name(source: str, seen: SeenObject, name: str) -> str:
+    """Say what was taken from the name of the pictures, and how to say it better.
+
+    Args:
+        source: What the pictures are called.
+        seen: What it was taken for; with an extent where that was, too.
+        name: What it is called in the scene.
+
+    """
+    size, more = "", ""
+    if seen.extent is not None:
+        usually = one_of(seen.class_name, "usually is", "usually are")
+        size = f", and made as large as {usually}, {length(seen.extent)}"
+        more = f", and how large with --extent {name}=METRES"
+    return (
+        f"Nobody said what it is: by the name {source!r} it was called {seen.class_name}{size}. "
+        f"Say what it is with --things{more}."
+    )
+
+
 def names_of(objects: Sequence[SeenObject]) -> list[str]:
     """Return what objects are called."""
     return unique([safe(one.class_name) or UNKNOWN for one in objects])
 
 
-def check_extents(stated: Sequence[str], objects: Sequence[SeenObject]) -> None:
+def check_extents(stated: Sequence[str], objects: Sequence[SeenObject], source: str = "") -> None:
     """Raise UserError where a size is stated of what no object can be called.
 
     Args:
         stated: Sizes that a person gave for some, such as "duck=0.1" [m].
         objects: What there is, as far as anybody will say; others are objects.
+        source: What the pictures are called, by which a lone object may be called.
 
     """
-    known = names_of(objects)
+    by_name = None if objects else of_name(source)
+    known = names_of(objects or [obj for obj in [by_name] if obj])
     for text in stated:
         name, _ = said_extent(text, (known or [UNKNOWN])[0])
         if name not in known and not name.startswith(UNKNOWN):
@@ -185,6 +231,7 @@ def metres(
     """
     only = next(iter(sizes)) if len(sizes) == 1 else ""
     wanted = [said_extent(text, only) for text in stated]
+    wanted = [(only if name == UNKNOWN and only else name, size) for name, size in wanted]
     strange = [name for name, _ in wanted if name not in sizes]
     if strange:
         raise UserError(f"--extent: no object {strange[0]!r}. Choose one of: {', '.join(sizes)}.")

@@ -1,0 +1,99 @@
+"""What the name of a folder of photographs says of what they show, and what it cannot say."""
+
+import numpy as np
+import pytest
+
+from corporeal.errors import UserError
+from corporeal.formats.splat_ply import write_splat
+from corporeal.geometry.gaussians import placed
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.splats import solid
+from corporeal.stages import reconstruct as stage
+from corporeal.stages.reconstruct import reconstruct
+from corporeal.vlm.seen_objects import check_extents, metres, of_name, telling, usual
+from gaussian_boxes import DOWN, box
+
+SIDES = (0.4, 0.2, 0.2)
+
+
+@pytest.fixture(autouse=True)
+def fewer_cameras(monkeypatch):
+    """Look at splats in fewer and smaller pictures, and carve more coarsely, than for people."""
+    monkeypatch.setattr(stage, "OWN_VIEWS", 16)
+    monkeypatch.setattr(stage, "OWN_SIZE", (96, 96))
+    monkeypatch.setattr(solid, "CELLS", 60_000)
+
+
+def made(folder, name, extents=(), **settings):
+    """Reconstruct one box of a file that is called so."""
+    scene = box(SIDES, (0.0, 0.0, 0.1), (0.7, 0.6, 0.1))
+    write_splat(folder / f"{name}.ply", placed(scene, DOWN, 2.0, (0.0, 0.0, 5.0)))
+    return reconstruct(folder / f"{name}.ply", ReconstructConfig(**settings), extents)
+
+
+@pytest.mark.parametrize(
+    ("name", "class_name"),
+    [
+        ("banana", "banana"),
+        ("IMG_banana_01", "banana"),
+        ("photos of a mug", "mug"),
+        ("Foto Tasse", "cup"),
+        ("photos", None),
+        ("Fotos", None),
+        ("Camera", None),
+        ("iPhone_photos", None),
+        ("pictures", None),
+        ("IMG_1234", None),
+        ("views", None),
+    ],
+)
+def test_a_name_says_what_is_shown_unless_it_is_of_the_photographs(name, class_name):
+    found = of_name(name)
+    assert (found and found.class_name) == class_name
+    assert found is None or found.extent == usual(class_name).extent
+
+
+def test_a_lone_thing_is_called_and_sized_by_the_name_of_its_folder(tmp_path):
+    came = made(tmp_path, "banana")
+    (thing,), found = came.scene.objects, came.found
+    assert thing.name == thing.class_name == "banana"
+    assert np.ptp(found.boxes[0], axis=0).max() == pytest.approx(0.19, rel=0.05)
+    (said,) = [w for w in found.warnings if "banana" in w]
+    assert "19 cm" in said
+    assert "--extent banana=METRES" in said
+    assert "--things" in said
+    assert not any("0.5 m" in w for w in found.warnings)
+
+
+def test_a_size_that_somebody_states_is_the_size_whatever_the_name_says(tmp_path):
+    came = made(tmp_path, "axe", ("axe=0.103",))
+    assert np.ptp(came.found.boxes[0], axis=0).max() == pytest.approx(0.103, rel=0.05)
+    (said,) = [w for w in came.found.warnings if "axe" in w]
+    assert "scale" not in said
+    assert "METRES" not in said, "they did"
+    assert made(tmp_path, "axe", ("object=0.103",)).scene.objects[0].name == "axe"
+
+
+def test_what_somebody_names_is_not_called_as_the_folder(tmp_path):
+    came = made(tmp_path, "banana", things=("crate",))
+    assert [o.name for o in came.scene.objects] == ["crate"]
+    assert not any("banana" in w for w in came.found.warnings)
+
+
+def test_a_folder_of_photographs_makes_nothing_one_of_paper(tmp_path):
+    came = made(tmp_path, "photos")
+    (thing,) = came.scene.objects
+    assert thing.name == "object"
+    assert thing.stem == "object"
+    assert telling("old teapot photos") == "old teapot"
+    first, *_ = came.found.warnings
+    assert "0.5 m" in first, "what a person can state comes first"
+    assert not any("0.5 m" in s for s in came.found.statements), "said once"
+
+
+def test_sizes_of_what_nobody_named_can_be_stated():
+    check_extents(["banana=0.2"], [], "banana")
+    check_extents(["object=0.2"], [], "banana")
+    with pytest.raises(UserError, match="no object 'duck'"):
+        check_extents(["duck=0.2"], [], "banana")
+    assert metres({"axe": 2.0}, [usual("axe")], ["object=0.5"]).metres_per_unit == 0.25
