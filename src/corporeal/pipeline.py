@@ -469,10 +469,15 @@ class _Run:
         """Name the figures that the reconstruction left, by what they show."""
         if self.made.reconstruct is None:
             return {}
+        from corporeal.masking import masks_figure
         from corporeal.poses.pose import FIGURE, POSES
 
-        seen = self.folder / FOLDERS["reconstruct"] / POSES / FIGURE
-        return {"Where the photographs were taken from": seen} if seen.exists() else {}
+        folder = self.folder / FOLDERS["reconstruct"]
+        figures = {
+            "What was taken for objects, in some of the photographs": folder / masks_figure.FIGURE,
+            "Where the photographs were taken from": folder / POSES / FIGURE,
+        }
+        return {caption: path for caption, path in figures.items() if path.exists()}
 
 
 def _modelled(asked: Path, folder: Path) -> Path:

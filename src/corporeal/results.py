@@ -115,6 +115,15 @@ class Results:
         )
 
     @property
+    def filmed(self) -> Reconstruction | None:
+        """The same, to be filmed: None where others stand beside it, which have no Gaussians."""
+        found = self.reconstruction
+        whole = found is not None and len(found.names) == len(
+            _made(self.assemble, "assemble").objects
+        )
+        return found if whole else None
+
+    @property
     def prepared(self) -> Prepared:
         """All up to fill."""
         return Prepared(self.scene, self.inventory, self.parts, self.field, self.particles)
@@ -122,7 +131,7 @@ class Results:
     @property
     def played(self) -> Played:
         """All up to simulate."""
-        return Played(self.prepared, self.trajectory, self.reconstruction)
+        return Played(self.prepared, self.trajectory, self.filmed)
 
 
 def _made(value: T | None, verb: str) -> T:

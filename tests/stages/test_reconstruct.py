@@ -16,6 +16,7 @@ from corporeal.geometry.gaussians import placed
 from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.similarity import moved_points
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.results import Results
 from corporeal.splats import hull, radiance, solid
 from corporeal.stages import reconstruct as stage
 from corporeal.stages.reconstruct import reconstruct
@@ -109,6 +110,25 @@ def test_gaussians_follow_their_objects(made):
     np.testing.assert_allclose(shift, up, atol=1e-5)
     with pytest.raises(UserError, match="Reconstruct it again"):
         followed(found, replace(scene, objects=scene.objects[:1]))
+
+
+def test_gaussians_follow_their_objects_beside_others(made):
+    found, scene = made.found, made.scene
+    ball = replace(scene.objects[0], name="ball")
+    surfaces = [replace(s, object=s.object + 1) for s in scene.surfaces]
+    more = replace(scene, objects=(ball, *scene.objects), surfaces=(scene.surfaces[0], *surfaces))
+    there = followed(found, moved(more, (0.0, 0.0, 1.0), 2))
+    np.testing.assert_array_equal(
+        there.object_of_gaussian,
+        np.where(found.object_of_gaussian < 0, -1, found.object_of_gaussian + 1),
+    )
+    np.testing.assert_array_equal(there.object_of_point, found.object_of_point + 1)
+    shift = there.gaussians.mean - found.gaussians.mean
+    np.testing.assert_allclose(shift[:, 2], found.object_of_gaussian == 1, atol=1e-5)
+    results = Results(reconstruct=found, assemble=more)
+    assert results.reconstruction is not None
+    assert results.filmed is None, "the ball has no Gaussians"
+    assert Results(reconstruct=found, assemble=scene).filmed is not None
 
 
 def test_the_report_is_told_how_it_came_about(made):

@@ -99,6 +99,7 @@ def read_photographs(
     masks: Path | None = None,
     bare: bool = False,
     close: bool = False,
+    most: int | None = None,
 ) -> Photographs:
     """Read a folder of posed photographs, or the ``transforms.json`` of one.
 
@@ -112,6 +113,7 @@ def read_photographs(
             ``instances`` or both.
         bare: Whether masks and instances beside the photographs are ignored.
         close: Whether larger pictures are cut out about what masks show, before they are reduced.
+        most: How many are read, at equal steps; None: all.
 
     Raises:
         BadFileError: There are no poses, a pose or camera is bad, or too few pictures can be used;
@@ -124,6 +126,9 @@ def read_photographs(
         shots = [replace(shot, mask=None, instances=None) for shot in shots]
     if masks is not None:
         shots = _masked_by(masks, shots)
+    if most is not None:
+        steps = np.linspace(0, len(shots) - 1, min(most, len(shots))).round()
+        shots = [shots[k] for k in steps.astype(int)]
     done = develop(found.source, shots, longest, close)
     seen = found.model if found.model is not None and len(found.model.points) else None
     return Photographs(

@@ -10,21 +10,23 @@ from corporeal.types import Reconstruction, Scene
 
 
 def followed(found: Reconstruction, scene: Scene) -> Reconstruction:
-    """Return Gaussians and points where a scene's objects stand now.
+    """Return Gaussians and points where a scene's objects stand now, by the scene's numbers.
 
-    Objects may have been moved and resized, but not turned. Floor and background stay.
+    Objects may have been moved and resized, but not turned. Floor and background stay. Others may
+    stand beside those that were found.
 
     Raises:
-        UserError: The scene's objects are not those that were found.
+        UserError: Not all that were found are in the scene.
 
     """
-    names = tuple(o.name for o in scene.objects)
-    if names != found.names:
+    names = [o.name for o in scene.objects]
+    if not set(found.names) <= set(names):
         raise UserError(
             f"The scene has {', '.join(names)}, the reconstruction {', '.join(found.names)}. "
             "Reconstruct it again."
         )
-    before, after = found.boxes, boxes_of(scene)
+    number = np.array([names.index(name) for name in found.names])
+    before, after = found.boxes, boxes_of(scene)[number]
     factor = np.ptp(after, axis=1).max(axis=1) / np.ptp(before, axis=1).max(axis=1)
     shift = after[:, 0] - factor[:, None] * before[:, 0]
     # The last row is for what is no object's: -1.
@@ -35,8 +37,11 @@ def followed(found: Reconstruction, scene: Scene) -> Reconstruction:
     scale = factor[of_gaussian, None] * gaussians.scale
     kind = gaussians.mean.dtype
     position = factor[of_point, None] * cloud.position + shift[of_point]
+    owner = np.append(number, -1)
     return replace(
         found,
+        object_of_gaussian=owner[of_gaussian],
+        object_of_point=owner[of_point],
         gaussians=replace(gaussians, mean=mean.astype(kind), scale=scale.astype(kind)),
         cloud=replace(cloud, position=position),
         boxes=after,

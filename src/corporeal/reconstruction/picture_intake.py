@@ -13,6 +13,7 @@ from corporeal.features.maskers import connect_masker, split
 from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
+from corporeal.masking.masks_figure import FIGURE, masks_figure
 from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
 from corporeal.splats.intake import ON, Intake, doubt_of_poses, take_in
@@ -68,6 +69,9 @@ def take_pictures(
             doubt = doubt_of_poses(posed.folder)
             raise BadFileError(source, " ".join([*doubt, f"{found.incomplete}."]), ALL_OF_IT)
         later = within(progress, begun + MASKED, 1.0)
+        if folder is not None:
+            (folder / FIGURE).unlink(missing_ok=True)
+            masks_figure(posed.folder, found.folder, folder / FIGURE)
         taken = take_in(posed.folder, training, kept, later, instances, found.folder)
     made = replace(
         taken,

@@ -21,6 +21,7 @@ from corporeal.geometry.metric import MetricScale
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.geometry.srgb import linear
 from corporeal.masking.grown_masks import doubted_in
+from corporeal.masking.masks_figure import FIGURE, drawn_over
 from corporeal.reconstruction.found_objects import FoundObjects, named_objects, recognised
 from corporeal.reconstruction.object_points import drawn_masks, foreground_of, points_on_objects
 from corporeal.reconstruction.picture_intake import take_pictures, within
@@ -97,7 +98,7 @@ def reconstruct(
     # Gaussians: trained on photographs or read, upright, with cameras to look from.
     taken, masked = take_pictures(source, config, folder, within(progress, 0.0, TRAINED))
     grown = taken.masks is not None and not masked  # of what all cameras look at: one thing
-    taken = _upright(source, taken, config, doubted_in(folder))
+    taken = _upright(source, taken, config, folder)
     photographers = taken.cameras
     if not taken.cameras:
         taken = replace(taken, cameras=cameras_around(taken.solid, OWN_VIEWS, OWN_SIZE))
@@ -179,14 +180,14 @@ def _known(
     return _Known(objects, names, scale, [*scale.warnings, *told, *unsound])
 
 
-def _upright(source: Path, taken: Intake, config: ReconstructConfig, lie: str) -> Intake:
+def _upright(source: Path, taken: Intake, config: ReconstructConfig, folder: Path | None) -> Intake:
     """Turn what was learned upright, and tell objects in photographs that have no masks.
 
     Args:
         source: Named in errors.
         taken: What was learned.
         config: How.
-        lie: Where masks lie that are not believed, for who has to give some.
+        folder: Where masks lie that are not believed, and a figure of others is drawn.
 
     Raises:
         UserError: These are the room.
@@ -197,7 +198,10 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig, lie: str) -
     if cut_out is not None and not config.force:
         why = goes_beyond(cut_out) or told_otherwise(cut_out, made.coloured)
         if why is not None:
-            raise _refusal(source, why, lie, taken)
+            raise _refusal(source, why, doubted_in(folder), taken)
+    if cut_out is not None and made.views is not None and folder is not None:
+        numbers = [f"photograph {k + 1}" for k in range(len(cut_out))]
+        drawn_over(list(made.views.rgb), cut_out, numbers, folder / FIGURE)
     return made
 
 

@@ -62,7 +62,9 @@ def segment(
     if found is None:
         return parts
     middle = np.concatenate([s.vertices[s.triangles].mean(axis=1) for s in scene.surfaces])
-    for number, obj in enumerate(inventory.objects):
+    pictured = np.unique(found.object_of_point)  # others beside them came as models
+    shown = [(number, obj) for number, obj in enumerate(inventory.objects) if number in pictured]
+    for number, obj in shown:
         pieces = obj.parts[0].pieces if len(obj.parts) == 1 else ()
         if len(pieces) > 1:
             obj = replace(obj, parts=pieces)
@@ -70,7 +72,7 @@ def segment(
             vectors = _vectors(semantic, obj)
             named = name_parts(cloud, obj, vectors, PartsConfig(config.position_weight))
             parts = _taken_apart(parts, number, obj, named, cloud, middle)
-    return replace(parts, warnings=(*parts.warnings, *_unparted(inventory)))
+    return replace(parts, warnings=(*parts.warnings, *_unparted([obj for _, obj in shown])))
 
 
 def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
@@ -85,11 +87,11 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 # ---------------------------------------------------------------- objects from pictures
 
 
-def _unparted(inventory: Inventory) -> list[str]:
+def _unparted(objects: Sequence[ObjectWords]) -> list[str]:
     """Say which objects have unknown pieces: a chair from pictures may be all foam."""
     names = [
         obj.name
-        for obj in inventory.objects
+        for obj in objects
         if not any(p.pieces or p.answered_by not in UNSEEN for p in obj.parts)
     ]
     if not names:

@@ -134,13 +134,11 @@ def read(run: Path) -> Read:
         raise UserError(f"{run} has no {NEEDED} yet: nothing of it can be shown in 3D.")
     cast = cast_of(made.prepared)
     if made.simulate is None:
-        return Read(made, playback(made.prepared, cast, found=made.reconstruction))
+        return Read(made, playback(made.prepared, cast, found=made.filmed))
     audit = run / AUDIT
     whole = typed(RunAudit, store.read_json(audit)) if audit.exists() else None
     recording = recorded(cast, made.trajectory, SMOOTH)
-    shown = playback(
-        made.prepared, cast, made.played.outcome, recording, whole, found=made.reconstruction
-    )
+    shown = playback(made.prepared, cast, made.played.outcome, recording, whole, found=made.filmed)
     return Read(made, shown)
 
 
