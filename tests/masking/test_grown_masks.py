@@ -182,7 +182,9 @@ def test_photographs_without_poses_are_referred(tmp_path, monkeypatch, capsys):
     for k, picture in enumerate(views.rgb):
         Image.fromarray(picture).save(tmp_path / "bare" / f"{k}.png")
     assert type_in(monkeypatch, "masks", tmp_path / "bare") == 2
-    assert "has no poses" in capsys.readouterr().err.replace("\n", " ")
+    told = capsys.readouterr().err.replace("\n", " ")
+    assert "has no poses" in told
+    assert "corporeal masks runs/bare/0-reconstruct/poses" in told, "to be typed as it is"
 
 
 def test_a_run_grows_masks_where_there_are_none(photos, tmp_path):

@@ -41,9 +41,11 @@ def verb_masks() -> None:
     if not asked.photographs.exists():
         raise UserError(f"No such file: {asked.photographs}. Check the path.")
     if unposed(asked.photographs):
+        poses = Path("runs", called(asked.photographs), "0-reconstruct", "poses")
         raise UserError(
             f"{asked.photographs} has no poses, by which a mask is carried from one photograph to "
-            "the others. Let `corporeal run` find them first, and name RUN/0-reconstruct/poses."
+            f"the others. Let `corporeal run {quote(str(asked.photographs))}` find them, and go on "
+            f"with `corporeal masks {quote(str(poses))}`."
         )
     pointed = None
     if asked.at is not None or asked.box is not None:
