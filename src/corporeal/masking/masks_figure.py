@@ -60,8 +60,9 @@ def drawn_over(
         path: A PNG.
 
     """
-    which = np.unique(np.linspace(0, len(names) - 1, min(len(names), MOST)).round().astype(int))
-    tiles = [Tile(_over(pictures[k], masks[k]), names[k]) for k in which.tolist()]
+    steps = np.linspace(0, len(names) - 1, min(len(names), MOST)).round()
+    which: list[int] = np.unique(steps.astype(int)).tolist()
+    tiles = [Tile(_over(pictures[k], masks[k]), names[k]) for k in which]
     with writing(path):
         sheet(tiles, path)
 
