@@ -469,8 +469,8 @@ class _Run:
         """Name the figures that the reconstruction left, by what they show."""
         if self.made.reconstruct is None:
             return {}
-        from corporeal.masking import masks_figure
         from corporeal.poses.pose import FIGURE, POSES
+        from corporeal.reconstruction import masks_figure
 
         folder = self.folder / FOLDERS["reconstruct"]
         figures = {

@@ -13,8 +13,8 @@ from corporeal.features.maskers import connect_masker, split
 from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
-from corporeal.masking.masks_figure import FIGURE, masks_figure
 from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
+from corporeal.reconstruction.masks_figure import FIGURE, masks_figure
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
 from corporeal.splats.intake import ON, Intake, doubt_of_poses, take_in
 from corporeal.splats.training_schedule import TrainConfig

@@ -5,7 +5,7 @@ import json
 import numpy as np
 from PIL import Image
 
-from corporeal.masking.masks_figure import EDGE, FAINT, drawn_over, masks_figure
+from corporeal.reconstruction.masks_figure import EDGE, FAINT, drawn_over, masks_figure
 from corporeal.render.sheet import GAP
 
 GREY = 100
