@@ -2,7 +2,7 @@ import numpy as np
 import pytest
 
 from corporeal.errors import UserError
-from corporeal.regions.objects import components, objects
+from corporeal.regions.objects import TOUCHING_IS_ONE, components, objects
 from corporeal.types import Cloud
 
 
@@ -73,6 +73,8 @@ def test_a_number_that_nobody_gave_is_said_to_be_counted():
     split = objects(cloud, None, normal)
     assert split.object_of_point.max() == 1 and agreement(owner, split.object_of_point) > 0.97
     assert "2 were counted" in split.warnings[0]
+    alone, normal, _ = scene(TWINS[:1], [[1, 0]])
+    assert "1 was counted" in objects(alone, None, normal, config=TOUCHING_IS_ONE).warnings[0]
 
 
 @pytest.mark.parametrize("count", [0, -1, 201])

@@ -66,6 +66,9 @@ def test_an_unknown_part_gets_a_stated_stand_in_and_a_warning():
     assert "Nobody knows" in field.materials[0].grounds["young"].reason
     (warning,) = doubts(field, parts, made)
     assert warning.startswith("riddle_0: riddle is of unknown material")
+    named = replace(made, objects=tuple(replace(o, name="riddle") for o in made.objects))
+    (warning,) = doubts(field, parts, named)
+    assert warning.startswith("riddle is of unknown material"), "not twice by one name"
 
 
 def test_a_person_may_choose_a_value_inside_the_range_and_never_outside(tmp_path):

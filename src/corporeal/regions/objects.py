@@ -225,8 +225,9 @@ def _counted(count: int | None, instance: np.ndarray, config: ObjectsConfig) -> 
         by = "where the scene is narrow, appearance and notches"
         if not config.apart:
             by = "the space between them; what touches was taken for one"
+        was = "was" if found == 1 else "were"
         return [
-            f"The number of objects was not given: {found} were counted, by {by}. Say the number "
+            f"The number of objects was not given: {found} {was} counted, by {by}. Say the number "
             "where it is known."
         ]
     if found < count:

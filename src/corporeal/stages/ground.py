@@ -104,7 +104,8 @@ def doubts(field: MaterialField, parts: Parts, scene: Scene) -> tuple[str, ...]:
     """Say, one sentence each, which materials nobody knew and which values are to be doubted."""
     doubts = list(field.notes)
     for k, part in enumerate(parts.catalogue):
-        where = f"{scene.objects[part.object].name}: {part.name}"
+        owner = scene.objects[part.object].name
+        where = owner if owner == part.name else f"{owner}: {part.name}"
         pieces = field.pieces[k] if field.pieces else ()
         rows = [(f"{where}: {p.words.name}", p.material, p.words) for p in pieces]
         for row in rows or [(where, field.materials[k], field.words[k])]:

@@ -88,11 +88,15 @@ def _agree(scene: Scene, inventory: Inventory, names: list[str]) -> None:
 
 
 def _unparted(objects: Sequence[ObjectWords]) -> list[str]:
-    """Say which objects have unknown pieces: a chair from pictures may be all foam."""
+    """Say which objects have unknown pieces: a chair from pictures may be all foam.
+
+    Where nothing is known of the matter, ``ground`` says so, and how to say it.
+    """
     names = [
         obj.name
         for obj in objects
         if not any(p.pieces or p.answered_by not in UNSEEN for p in obj.parts)
+        and any(p.answered_by != "unknown" for p in obj.parts)
     ]
     if not names:
         return []
