@@ -1,5 +1,7 @@
 """Photographs of every kind that cameras, telephones and editors write, before poses are found."""
 
+import os
+
 import numpy as np
 import pytest
 from PIL import Image
@@ -27,7 +29,7 @@ def gathered(tmp_path):
 
 
 def saved(tmp_path, greys, suffix, made, **options):
-    (tmp_path / "photos").mkdir(exist_ok=True)
+    (tmp_path / "photos").mkdir(parents=True, exist_ok=True)
     for k, grey in enumerate(greys):
         made(grey).save(tmp_path / "photos" / f"{k}{suffix}", **options)
 
@@ -74,6 +76,14 @@ def test_of_exif_only_the_lens_is_copied_however_long_the_rest_is(tmp_path, grey
         assert not picture.getexif().get_ifd(PLACE) and copy.stat().st_size < 20_000
 
 
+def test_what_else_a_photograph_says_stays_in_it(tmp_path, greys):
+    said = {"comment": b"of mine", "xmp": b"<x>of mine</x>"}
+    saved(tmp_path, greys, ".jpg", Image.fromarray, **said)
+    assert b"of mine" in (tmp_path / "photos" / "0.jpg").read_bytes()
+    gathered(tmp_path)
+    assert b"of mine" not in (tmp_path / "poses" / "images" / "0.jpg").read_bytes()
+
+
 def test_files_that_systems_hide_beside_photographs_are_none(tmp_path, greys):
     saved(tmp_path, greys, ".jpg", Image.fromarray)
     for k in range(COUNT):
@@ -89,6 +99,48 @@ def test_pictures_of_another_kind_are_named_as_such(tmp_path, greys, suffix):
         gathered(tmp_path)
     Image.fromarray(greys[0]).save(tmp_path / "photos" / "0.jpg")
     assert [p.name for p in photographs_in(tmp_path / "photos")] == ["0.jpg"], "raws lie beside it"
+
+
+def test_what_is_not_read_beside_photographs_is_said_unless_it_is_their_raw_picture(tmp_path, greys):
+    saved(tmp_path, greys, ".jpg", Image.fromarray)
+    (tmp_path / "photos" / "0.DNG").touch()
+    assert gathered(tmp_path).said == ()
+    (tmp_path / "photos" / "anders.tif").touch()
+    assert gathered(tmp_path).said == (
+        "1 more picture is of a kind that is not read (TIF), such as anders.tif: convert what is "
+        "to be used to JPEG.",
+    )
+
+
+def test_copies_under_other_names_do_not_outnumber_what_they_are_copies_of(tmp_path, greys):
+    for copy in ("", " (1)", " copy"):
+        saved(tmp_path, greys, f"{copy}.jpg", Image.fromarray)
+    found = gathered(tmp_path)
+    assert len(found.names) == COUNT and "10 of 15 pictures were left out" in found.said[0]
+
+
+def test_what_is_no_file_is_named_and_not_waited_for(tmp_path, greys):
+    saved(tmp_path, greys, ".jpg", Image.fromarray)
+    os.mkfifo(tmp_path / "photos" / "pipe.jpg")
+    (tmp_path / "photos" / "lost.jpg").symlink_to("nowhere.jpg")
+    (tmp_path / "photos" / "round.jpg").symlink_to("round.jpg")
+    found = gathered(tmp_path)
+    assert len(found.names) == COUNT
+    assert all(f"{name}.jpg is no file" in found.said[0] for name in ("pipe", "lost", "round"))
+
+
+def test_a_sentence_is_one_line_whatever_photographs_are_called(tmp_path, greys):
+    saved(tmp_path, greys, ".jpg", Image.fromarray)
+    (tmp_path / "photos" / "two\nlines \udcff.jpg").write_bytes(b"")
+    said = gathered(tmp_path).said[0]
+    assert "two lines ?.jpg is no PNG" in said and "\n" not in said
+
+
+def test_one_picture_beside_a_folder_of_photographs_is_told_where_these_are(tmp_path, greys):
+    saved(tmp_path / "mine", greys, ".jpg", Image.fromarray)
+    Image.fromarray(greys[0]).save(tmp_path / "mine" / "cover.jpg")
+    with pytest.raises(BadFileError, match=r"5 more lie in folders of it: name .*photos\.$"):
+        gather(tmp_path / "mine", tmp_path / "poses", lambda fraction, words: None)
 
 
 def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, greys):

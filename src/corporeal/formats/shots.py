@@ -162,7 +162,7 @@ def _developed(prints: list[_Print]) -> Developed:
 
 def _size(shot: Shot, bad: list[Bad]) -> tuple[int, int] | None:
     """Return width and height without unpacking; None where it is bad."""
-    if shot.picture is None:
+    if shot.picture is None or not shot.picture.is_file():  # a pipe would be waited for
         bad.append((shot.name, "is not there"))
         return None
     try:

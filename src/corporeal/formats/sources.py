@@ -11,6 +11,7 @@ from corporeal.formats.meshes import companions
 from corporeal.formats.picture_names import HEIC, IMAGES, OTHERS, SHOWN
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
+from corporeal.formats.words import writable
 
 GLTF = (".glb", ".gltf")
 SPLATS = (".ply", ".spz", ".sog", ".splat", ".ksplat")
@@ -136,6 +137,26 @@ def photographs_in(folder: Path) -> list[Path]:
             if found:
                 return found
     return []
+
+
+def not_read_beside(photographs: Sequence[Path]) -> list[str]:
+    """Say which pictures of a kind that is not read lie beside photographs, if they are no copies.
+
+    Args:
+        photographs: Of one folder; what has the name of one but for its suffix is its raw picture.
+
+    """
+    if not photographs:
+        return []
+    known = {file.stem for file in photographs}
+    folder = photographs[0].parent
+    others = sorted(p for p in folder.iterdir() if _named(p, OTHERS) and p.stem not in known)
+    if not others:
+        return []
+    kinds = ", ".join(sorted({p.suffix[1:].upper() for p in others}))
+    count = "1 more picture is" if len(others) == 1 else f"{len(others)} more pictures are"
+    what = f"{count} of a kind that is not read ({kinds}), such as {writable(others[0].name)}"
+    return [f"{what}: convert what is to be used to JPEG."]
 
 
 def _named(path: Path, kinds: Sequence[str]) -> bool:

@@ -14,8 +14,8 @@ from corporeal.errors import BadFileError
 from corporeal.formats.images import FORMATS, MAX_PIXELS, eight_bit
 from corporeal.formats.photographs import INSTANCES, MASKS, companion
 from corporeal.formats.shots import FEWEST, Bad, left_out, unreadable
-from corporeal.formats.sources import photographs_in
-from corporeal.formats.words import safe
+from corporeal.formats.sources import not_read_beside, photographs_in, pictures_in
+from corporeal.formats.words import safe, writable
 
 Progress = Callable[[float, str], None]
 
@@ -73,7 +73,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     """
     found = photographs_in(source)
     step = max(1, -(-len(found) // MOST))
-    taken, bad = spread(found, step), []
+    taken, bad, twins = spread(found, step), [], 0
     names: dict[str, tuple[int, int]] = {}
     cut_out: dict[str, Image.Image] = {}
     known = np.zeros((0, *THUMBNAIL))
@@ -84,7 +84,8 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
             thumbnail = _thumbnail(picture)
             _check(thumbnail, known, list(names))
         except _UnusableError as problem:
-            bad.append((file.name, str(problem)))
+            bad.append((writable(file.name), str(problem)))
+            twins += isinstance(problem, _TwinError)
             continue
         known = np.concatenate([known, thumbnail[None]])
         name = _name(file, set(names))
@@ -97,7 +98,8 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     _write_alphas(cut_out, folder / MASKS[0])
     said = [f"Of {len(found)} photographs, one in {step} was used."] if step > 1 else []
     said += left_out(len(taken), bad)
-    _refuse_few(source, len(names), len(taken), bad)
+    said += not_read_beside(found)
+    _refuse_few(source, len(names), len(taken), bad, twins)
     return Gathered(tuple(names), tuple(names.values()), tuple(said))
 
 
@@ -131,24 +133,54 @@ def lens_stated(picture: Path) -> float:
         return 0.0
 
 
-def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad]) -> None:
-    if good >= max(FEWEST, asked / 2):
+def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad], twins: int) -> None:
+    """Refuse what shows too little; that some show the same as others says nothing against these.
+
+    Args:
+        source: The folder.
+        good: Photographs that can be used.
+        asked: Those that were looked at.
+        bad: Why the others cannot be used.
+        twins: How many of them show the same as others.
+
+    Raises:
+        BadFileError: Too few are left, or most are broken or blank.
+
+    """
+    if good >= max(FEWEST, (asked - twins) / 2):
         return
     if not bad:
         count = "1 photograph is" if good == 1 else f"{good} photographs are"
-        raise BadFileError(source, f"{count} too few to show a thing.", TAKE)
+        raise BadFileError(source, f"{count} too few to show a thing.", _elsewhere(source) or TAKE)
     why = f" The first of the others, {bad[0][0]}, {bad[0][1]}."
     count = f"only {good}" if good else "none"
     what = f"{count} of {asked} photographs can be used.{why}"
     raise BadFileError(source, what, TAKE)
 
 
+def _elsewhere(source: Path) -> str:
+    """Say where more pictures lie than in the folder itself; empty: nowhere."""
+    own = photographs_in(source)
+    used = {file.parent for file in own}
+    aside = (*MASKS, *INSTANCES)
+    more = [p for p in pictures_in(source) if p.parent not in used and p.parent.name not in aside]
+    if len(more) <= len(own):
+        return ""
+    return f"{len(more)} more lie in folders of it: name the one that is meant: {more[0].parent}."
+
+
 class _UnusableError(Exception):
     """Why one photograph cannot be used, in a clause."""
 
 
+class _TwinError(_UnusableError):
+    """It shows the same as another, which is used."""
+
+
 def _upright(file: Path) -> tuple[Image.Image, Image.Image | None]:
     """Return a photograph turned as it says, reduced, with what it says of its lens; its alpha."""
+    if not file.is_file():
+        raise _UnusableError("is no file, or a link to none")
     why = unreadable(file)
     try:
         with Image.open(file, formats=FORMATS) as opened:
@@ -166,7 +198,7 @@ def _upright(file: Path) -> tuple[Image.Image, Image.Image | None]:
     picture.thumbnail((LONGEST, LONGEST), Image.Resampling.LANCZOS)
     alpha = picture.getchannel("A") if picture.mode == "RGBA" else None
     picture = picture.convert("RGB")
-    picture.info["exif"] = exif
+    picture.info = {"exif": exif}  # nothing else that the file says: Pillow would copy comments
     return picture, alpha
 
 
@@ -199,7 +231,7 @@ def _check(thumbnail: np.ndarray, known: np.ndarray, names: list[str]) -> None:
         raise _UnusableError("shows nothing but one colour")
     apart = np.abs(known - thumbnail).mean(axis=(1, 2))
     if len(apart) and apart.min() < SAME:
-        raise _UnusableError(f"shows the same as {names[int(apart.argmin())]}")
+        raise _TwinError(f"shows the same as {names[int(apart.argmin())]}")
 
 
 def _name(file: Path, taken: set[str]) -> str:
