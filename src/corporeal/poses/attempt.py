@@ -23,6 +23,7 @@ from corporeal.errors import UserError
 from corporeal.formats.photographs import MASKS
 from corporeal.machine import cores
 from corporeal.poses.gather import IMAGES, LONGEST, Gathered, lens_stated
+from corporeal.poses.stamped import FOLDER as STAMPS
 
 Progress = Callable[[float, str], None]
 
@@ -181,6 +182,7 @@ class _Work:
         self.pycolmap, self.images, self.out = pycolmap, folder / IMAGES, out
         self.gathered, self.thorough = gathered, way == "thorough"
         self.masks = folder / MASKS[0] if way == "masked" else None
+        self.stamps = folder / STAMPS
         self.least = 10 if self.thorough else 15
         self.database = out / DATABASE
         self.models: Any = {}
@@ -192,6 +194,8 @@ class _Work:
         reading.camera_model = "SIMPLE_RADIAL"
         if self.masks is not None:
             reading.mask_path = _points_allowed(self.masks, self.out, self.gathered)
+        elif self.stamps.is_dir():  # what it holds is on no object, so that masks need no part of it
+            reading.mask_path = self.stamps
         sift = self.pycolmap.FeatureExtractionOptions()
         sift.num_threads, sift.use_gpu, sift.max_image_size = cores(), False, LONGEST
         sift.sift.max_num_features = MOST_POINTS

@@ -7,8 +7,9 @@ circles of pictures, each well joined within; where they share few, nothing is s
 far apart, fall into groups of 7, 4 and 3 whose median is 2.
 """
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+import shutil
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -22,6 +23,8 @@ from corporeal.poses.attempt import require
 from corporeal.poses.gather import IMAGES, Gathered
 from corporeal.poses.judge import names_of
 from corporeal.poses.one_viewpoint import same_viewpoint, stood_still
+from corporeal.poses.stamped import FOLDER as STAMPS
+from corporeal.poses.stamped import Size, Stamps, write_stamps
 
 LONGEST, MOST_POINTS = 480, 1024
 """Longer side of the copies [px]; points of each."""
@@ -176,6 +179,10 @@ class Looked:
     """Points that each two share."""
     same: Bool[np.ndarray, "N N"]
     """Whether both were taken from one viewpoint."""
+    stamps: Mapping[Size, Bool[np.ndarray, "R C"]] = field(default_factory=dict)
+    """Cells of pictures of a size about what stands at the same place of all of them."""
+    said: str = ""
+    """What is to be said of that, and that nothing was looked for there; empty: nothing stands."""
 
     @property
     def stood_still(self) -> str | None:
@@ -186,13 +193,26 @@ class Looked:
 def look(folder: Path, gathered: Gathered, told: Callable[[float], None]) -> Looked:
     """Look for points that each two of the pictures share, in small copies.
 
+    Where something stands at the same place of all of them, they are looked at again without it.
+
     Args:
-        folder: Holds ``images``.
+        folder: Holds ``images``; gets ``stamps`` where there are some.
         gathered: What lies there.
         told: Told the share that is done.
 
     """
     pycolmap = require()
+    shutil.rmtree(folder / STAMPS, ignore_errors=True)
+    first = _looked(pycolmap, folder, gathered)
+    told(0.5)
+    if first.stamps:
+        said = write_stamps(first.stamps, gathered.names, gathered.sizes, folder / STAMPS)
+        first = replace(_looked(pycolmap, folder, gathered), said=said)
+    told(1.0)
+    return first
+
+
+def _looked(pycolmap: Any, folder: Path, gathered: Gathered) -> Looked:
     pycolmap.set_random_seed(0)
     database = folder / "small.db"
     database.unlink(missing_ok=True)
@@ -202,6 +222,8 @@ def look(folder: Path, gathered: Gathered, told: Callable[[float], None]) -> Loo
     sift.sift.max_num_features, sift.sift.first_octave = MOST_POINTS, 0
     reading = pycolmap.ImageReaderOptions()
     reading.camera_model = "SIMPLE_RADIAL"
+    if (folder / STAMPS).is_dir():
+        reading.mask_path = folder / STAMPS
     pycolmap.extract_features(
         database,
         folder / IMAGES,
@@ -211,7 +233,6 @@ def look(folder: Path, gathered: Gathered, told: Callable[[float], None]) -> Loo
         extraction_options=sift,
         device=pycolmap.Device.cpu,
     )
-    told(0.5)
     matching = pycolmap.FeatureMatchingOptions()
     matching.num_threads, matching.use_gpu = cores(), False
     checking = pycolmap.TwoViewGeometryOptions()
@@ -222,25 +243,30 @@ def look(folder: Path, gathered: Gathered, told: Callable[[float], None]) -> Loo
         verification_options=checking,
         device=pycolmap.Device.cpu,
     )
-    found = _read(pycolmap, database, gathered.names)
+    found = _read(pycolmap, database, gathered)
     database.unlink()
-    told(1.0)
     return found
 
 
-def _read(pycolmap: Any, database: Path, names: Sequence[str]) -> Looked:
+def _read(pycolmap: Any, database: Path, gathered: Gathered) -> Looked:
     opened = pycolmap.Database.open(str(database))
-    number = {name: k for k, name in enumerate(names)}
-    place = {image.image_id: number[image.name] for image in opened.read_all_images()}
-    points = {i: np.asarray(opened.read_keypoints(i))[:, :2].astype(float) for i in place}
-    shared = np.zeros((len(names), len(names)), np.int64)
+    number = {name: k for k, name in enumerate(gathered.names)}
+    images = {number[image.name]: image.image_id for image in opened.read_all_images()}
+    points = [
+        np.asarray(opened.read_keypoints(images[k]))[:, :2].astype(float) for k in sorted(images)
+    ]
+    place = {image: k for k, image in images.items()}
+    shared = np.zeros((len(number), len(number)), np.int64)
     same = np.zeros(shared.shape, np.bool_)
+    stamps = Stamps(gathered.sizes, points)
     for pair, geometry in zip(*opened.read_two_view_geometries(), strict=True):
         own = pycolmap.pair_id_to_image_pair(pair)
         a, b = (place[k] for k in own)
+        possible = np.asarray(opened.read_matches(*own)).reshape(-1, 2)
+        stamps.look(a, b, points[a][possible[:, 0]], points[b][possible[:, 1]])
         shared[a, b] = shared[b, a] = len(geometry.inlier_matches)
         if shared[a, b] >= SHARED:
-            both = (points[k][n] for k, n in zip(own, geometry.inlier_matches.T, strict=True))
+            both = (points[k][n] for k, n in zip((a, b), geometry.inlier_matches.T, strict=True))
             same[a, b] = same[b, a] = same_viewpoint(*both, longest=LONGEST)
     opened.close()
-    return Looked(shared, same)
+    return Looked(shared, same, stamps.found())

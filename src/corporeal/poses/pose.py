@@ -245,6 +245,7 @@ def _places(folder: Path, gathered: Gathered, progress: Progress) -> tuple[Gathe
         return _refused([why], gathered, blurred(folder / IMAGES, gathered.names))
     if (why := looked.stood_still) is not None:
         return _Kept((), gathered.said, not_found([why], 0), (), WALK)
+    gathered = replace(gathered, said=(*gathered.said, *filter(None, [looked.said])))
     groups = groups_of(looked.shared)
     if groups.mixed:
         return _Kept((), gathered.said, told_apart(groups, gathered.names), (), SORT_THEM)
