@@ -312,7 +312,7 @@ def _judged(models: Any, out: Path, gathered: Gathered, way: Way) -> Attempt:
     if best is None:
         return Attempt(way, total, left_out=gathered.names)
     if best.num_reg_images() >= SHARE * total:  # of two pictures nothing can be adjusted
-        _adjust(best)
+        adjust(best)
     place = out / "sparse" / "0"
     place.mkdir(parents=True, exist_ok=True)
     best.write_text(str(place))
@@ -354,11 +354,16 @@ def beside_first(first: Any, other: Any) -> int:
     return len(both[1]) - len(common)
 
 
-def _adjust(model: Any) -> None:
+def adjust(model: Any, middles_alone: bool = False) -> None:
     """Adjust cameras and points once more, so that wrong matches count for little.
 
     COLMAP's last adjustment is one of least squares, which points that are 4 px off pull with 64
     times the weight of those that are half a pixel off.
+
+    Args:
+        model: A reconstruction of pycolmap.
+        middles_alone: Whether of lenses the middle is adjusted, and nothing else.
+
     """
     pycolmap = require()
     options = pycolmap.BundleAdjustmentOptions()
@@ -366,6 +371,8 @@ def _adjust(model: Any) -> None:
     options.ceres.solver_options.num_threads = cores()
     options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
     options.ceres.loss_function_scale = EXACT
+    options.refine_principal_point = middles_alone
+    options.refine_focal_length = options.refine_extra_params = not middles_alone
     chosen = pycolmap.BundleAdjustmentConfig()
     for number in model.reg_image_ids():
         chosen.add_image(number)

@@ -42,6 +42,7 @@ from corporeal.poses.judge import (
     unseen_side,
 )
 from corporeal.poses.look_alikes import checked_by_neighbours
+from corporeal.poses.middles import AS_TAKEN, CROPPED, SLIGHTLY_CROPPED, apart, clause, sentence
 from corporeal.poses.mirrored import TWO_KINDS, mirrored
 from corporeal.typed import typed
 
@@ -190,8 +191,14 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     believed = [told for told in tried if not doubts(told)]
     if believed:  # the first of those that masks agree with best: masks may be poor
         best = max(believed, key=lambda told: told.filled)
-        if (why := mirrored(read_colmap(folder / best.way / "sparse" / "0"))) is not None:
+        place = folder / best.way / "sparse" / "0"
+        if (why := mirrored(read_colmap(place))) is not None:
             return _Kept((), gathered.said, not_found([why], others), tuple(tried), TWO_KINDS)
+        if (spread := apart(place)) >= CROPPED:
+            why = not_found([clause(spread)], others)
+            return _Kept((), gathered.said, why, tuple(tried), AS_TAKEN)
+        if spread >= SLIGHTLY_CROPPED:
+            gathered = replace(gathered, said=(*gathered.said, sentence(spread)))
         return _told(folder, gathered, tuple(said), tuple(tried), best)
     best = max(tried, key=lambda told: told.registered)
     return _refused(doubts(best), gathered, smeared, others, tuple(tried))
