@@ -9,7 +9,8 @@ from PIL import Image
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.sources import photographs_in
 from corporeal.poses.film_frames import write_frames
-from corporeal.poses.gather import gather, lens_stated, spread
+from corporeal.poses.gather import Gathered, gather, lens_stated, spread
+from corporeal.poses.pose import _refused
 from corporeal.stages.assemble import assemble
 
 COUNT = 5
@@ -181,3 +182,21 @@ def test_things_by_turns_are_all_among_the_photographs_that_are_used(turns, tmp_
     shares = np.bincount([int(file.name) % turns for file in used], minlength=turns) / 100
     assert shares.min() > 0.6 / turns and shares.max() < 1.5 / turns
     assert all(int(file.name) // 5 == k for k, file in enumerate(used))
+
+
+def test_photographs_that_were_cropped_one_by_one_are_told_by_their_sizes(tmp_path, greys):
+    saved(tmp_path, greys, ".jpg", Image.fromarray)
+    with Image.open(tmp_path / "photos" / "0.jpg") as level:
+        level.transpose(Image.Transpose.ROTATE_90).save(tmp_path / "photos" / "0.jpg")
+    assert gathered(tmp_path).said == (), "held upright or level"
+    for k, grey in enumerate(greys[:4]):
+        Image.fromarray(grey[: 40 - k]).save(tmp_path / "photos" / f"{k}.jpg")
+    assert gathered(tmp_path).said[0].startswith("5 of 5 photographs have a size that no other has")
+
+
+def test_who_cropped_photographs_is_not_told_to_put_down_a_newspaper():
+    names = tuple(f"{k}.jpg" for k in range(COUNT))
+    cropped = Gathered(names, tuple((64, 40 + k) for k in range(COUNT)), ())
+    whole = Gathered(names, ((64, 48),) * COUNT, ())
+    assert "as the camera took them" in _refused(["why"], cropped, ()).what_to_do
+    assert "newspaper" in _refused(["why"], whole, ()).what_to_do

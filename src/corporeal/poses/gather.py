@@ -2,6 +2,7 @@
 
 import numbers
 import re
+from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -99,6 +100,10 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     said = [f"Of {len(found)} photographs, one in {step} was used."] if step > 1 else []
     said += left_out(len(taken), bad)
     said += not_read_beside(found)
+    if (alone := sized_alone(tuple(names.values()))) > 0:
+        what = f"{alone} of {len(names)} photographs have a size that no other has"
+        why = "of a picture that was cropped the middle is not where its lens looked"
+        said.append(f"{what}: {why}, and poses are found less well.")
     _refuse_few(source, len(names), len(taken), bad, twins)
     return Gathered(tuple(names), tuple(names.values()), tuple(said))
 
@@ -131,6 +136,18 @@ def lens_stated(picture: Path) -> float:
         return float(stated)
     except (TypeError, ValueError, ZeroDivisionError):
         return 0.0
+
+
+def sized_alone(sizes: Sequence[tuple[int, int]]) -> int:
+    """Return how many pictures have a size of their own, if they are most; 0: cameras made them.
+
+    Args:
+        sizes: Width and height of each; held upright or level is one size.
+
+    """
+    counts = Counter((min(size), max(size)) for size in sizes)
+    alone = sum(count == 1 for count in counts.values())
+    return alone if alone >= FEWEST and alone > len(sizes) / 2 else 0
 
 
 def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad], twins: int) -> None:

@@ -17,7 +17,7 @@ from corporeal.poses.blur import blurred
 from corporeal.poses.by_masks import checked_by_masks, filled_share
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
-from corporeal.poses.gather import IMAGES, TAKE, Gathered, as_gathered, gather
+from corporeal.poses.gather import IMAGES, TAKE, Gathered, as_gathered, gather, sized_alone
 from corporeal.poses.groups import (
     SORT_THEM,
     WALK,
@@ -216,6 +216,7 @@ def _refused(
     if smeared:
         why = [*why, f"{len(smeared)} of {total} pictures are blurred ({names_of(smeared)})"]
     what_to_do = HOLD_STILL if len(smeared) >= MOST_BLURRED * total else WHAT_TO_DO
+    what_to_do = AS_TAKEN if sized_alone(gathered.sizes) else what_to_do
     return _Kept((), gathered.said, not_found(why, others), tried, what_to_do)
 
 
