@@ -102,7 +102,7 @@ def test_pictures_of_another_kind_are_named_as_such(tmp_path, greys, suffix):
     assert [p.name for p in photographs_in(tmp_path / "photos")] == ["0.jpg"], "raws lie beside it"
 
 
-def test_what_is_not_read_beside_photographs_is_said_unless_it_is_their_raw_picture(tmp_path, greys):
+def test_what_is_not_read_beside_photographs_is_said_if_no_raw_picture(tmp_path, greys):
     saved(tmp_path, greys, ".jpg", Image.fromarray)
     (tmp_path / "photos" / "0.DNG").touch()
     assert gathered(tmp_path).said == ()

@@ -194,7 +194,7 @@ class _Work:
         reading.camera_model = "SIMPLE_RADIAL"
         if self.masks is not None:
             reading.mask_path = _points_allowed(self.masks, self.out, self.gathered)
-        elif self.stamps.is_dir():  # what it holds is on no object, so that masks need no part of it
+        elif self.stamps.is_dir():
             reading.mask_path = self.stamps
         sift = self.pycolmap.FeatureExtractionOptions()
         sift.num_threads, sift.use_gpu, sift.max_image_size = cores(), False, LONGEST

@@ -99,11 +99,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     _write_alphas(cut_out, folder / MASKS[0])
     said = [f"Of {len(found)} photographs, one in {step} was used."] if step > 1 else []
     said += left_out(len(taken), bad)
-    said += not_read_beside(found)
-    if (alone := sized_alone(tuple(names.values()))) > 0:
-        what = f"{alone} of {len(names)} photographs have a size that no other has"
-        why = "of a picture that was cropped the middle is not where its lens looked"
-        said.append(f"{what}: {why}, and poses are found less well.")
+    said += [*not_read_beside(found), *_cropped(tuple(names.values()))]
     _refuse_few(source, len(names), len(taken), bad, twins)
     return Gathered(tuple(names), tuple(names.values()), tuple(said))
 
@@ -148,6 +144,15 @@ def sized_alone(sizes: Sequence[tuple[int, int]]) -> int:
     counts = Counter((min(size), max(size)) for size in sizes)
     alone = sum(count == 1 for count in counts.values())
     return alone if alone >= FEWEST and alone > len(sizes) / 2 else 0
+
+
+def _cropped(sizes: Sequence[tuple[int, int]]) -> list[str]:
+    """Say what sizes say of how pictures were cropped, if they do."""
+    if not (alone := sized_alone(sizes)):
+        return []
+    what = f"{alone} of {len(sizes)} photographs have a size that no other has"
+    why = "of a picture that was cropped the middle is not where its lens looked"
+    return [f"{what}: {why}, and poses are found less well."]
 
 
 def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad], twins: int) -> None:

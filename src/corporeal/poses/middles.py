@@ -84,9 +84,7 @@ def _each_with_its_own(pycolmap: Any, model: Any) -> Any:
         camera.camera_id = number
         made.add_camera_with_trivial_rig(camera)
         seen = np.array([point.xy for point in image.points2D]).reshape(-1, 2)
-        own = pycolmap.Image(
-            name=image.name, keypoints=seen, camera_id=number, image_id=number
-        )
+        own = pycolmap.Image(name=image.name, keypoints=seen, camera_id=number, image_id=number)
         made.add_image_with_trivial_frame(own, image.cam_from_world())
     order = sorted(model.points3D, key=lambda k: (-model.points3D[k].track.length(), k))
     for number in order[:MOST_POINTS]:
