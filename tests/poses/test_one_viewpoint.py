@@ -6,7 +6,7 @@ from PIL import Image
 from scipy.spatial.transform import Rotation
 
 from corporeal.errors import BadFileError
-from corporeal.poses.one_viewpoint import same_viewpoint, stood_still
+from corporeal.poses.one_viewpoint import same_viewpoint, stood_still, turned
 from corporeal.poses.pose import pose
 
 LONGEST = 480
@@ -43,6 +43,29 @@ def test_pieces_of_one_picture_are_of_one_viewpoint(floor, rng):
     there[::5] += rng.normal(0, 40, there[::5].shape)
     assert same_viewpoint(here, there, LONGEST), "some points are matched wrongly"
     assert not same_viewpoint(np.ones((20, 2)), there[:20], LONGEST), "points of one place"
+
+
+def pairs_of(pictures):
+    return [(a / LONGEST, b / LONGEST) for k, a in enumerate(pictures) for b in pictures[k + 1 :]]
+
+
+def test_a_camera_that_turns_on_the_spot_is_told_although_its_lens_is_not_known(rng):
+    room = rng.uniform((-6, -6, 2), (6, 6, 9), (400, 3))
+    turns = Rotation.from_euler("YX", [[8 * k, 3 * (k % 3)] for k in range(6)], degrees=True)
+    local = [room @ turn.as_matrix() for turn in turns]
+    pictures = [1.15 * LONGEST * p[:, :2] / p[:, 2:] + rng.normal(0, 0.4, (400, 2)) for p in local]
+    pairs = pairs_of(pictures)
+    seen_by_both = [np.abs(np.c_[a, b]).max(axis=1) < 0.5 for a, b in pairs]
+    assert turned([(a[s], b[s]) for (a, b), s in zip(pairs, seen_by_both, strict=True)]).all()
+    moved = [(a, 1.02 * b + 0.02 * rng.normal(size=b.shape)) for a, b in pairs]
+    assert not turned(moved).any()
+    assert turned([]).shape == (0,)
+
+
+@pytest.mark.parametrize("step", [5, 15])
+def test_a_walk_is_no_turn_on_the_spot_even_around_a_flat_floor(floor, step):
+    walk = [seen(floor, step * k, 40) for k in range(8)]
+    assert not turned(pairs_of(walk)).any()
 
 
 def test_bursts_on_a_way_around_a_thing_are_no_standstill():

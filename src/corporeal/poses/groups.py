@@ -22,7 +22,7 @@ from corporeal.machine import cores
 from corporeal.poses.attempt import require
 from corporeal.poses.gather import IMAGES, Gathered
 from corporeal.poses.judge import names_of
-from corporeal.poses.one_viewpoint import same_viewpoint, stood_still
+from corporeal.poses.one_viewpoint import Pair, same_viewpoint, stood_still, turned
 from corporeal.poses.stamped import FOLDER as STAMPS
 from corporeal.poses.stamped import Size, Stamps, write_stamps
 
@@ -179,6 +179,8 @@ class Looked:
     """Points that each two share."""
     same: Bool[np.ndarray, "N N"]
     """Whether both were taken from one viewpoint."""
+    turned: Bool[np.ndarray, "N N"]
+    """Whether both were, by a camera that turned on the spot."""
     stamps: Mapping[Size, Bool[np.ndarray, "R C"]] = field(default_factory=dict)
     """Cells of pictures of a size about what stands at the same place of all of them."""
     said: str = ""
@@ -187,7 +189,10 @@ class Looked:
     @property
     def stood_still(self) -> str | None:
         """Say in a clause that all were, if they were."""
-        return stood_still(self.shared >= SHARED, self.same)
+        joined = self.shared >= SHARED
+        return stood_still(joined, self.same) or stood_still(
+            joined, self.same | self.turned, "how a camera turns on the spot"
+        )
 
 
 def look(folder: Path, gathered: Gathered, told: Callable[[float], None]) -> Looked:
@@ -258,6 +263,8 @@ def _read(pycolmap: Any, database: Path, gathered: Gathered) -> Looked:
     place = {image: k for k, image in images.items()}
     shared = np.zeros((len(number), len(number)), np.int64)
     same = np.zeros(shared.shape, np.bool_)
+    pairs: dict[tuple[int, int], Pair] = {}
+    sizes = np.array(gathered.sizes, float)
     stamps = Stamps(gathered.sizes, points)
     for pair, geometry in zip(*opened.read_two_view_geometries(), strict=True):
         own = pycolmap.pair_id_to_image_pair(pair)
@@ -266,7 +273,14 @@ def _read(pycolmap: Any, database: Path, gathered: Gathered) -> Looked:
         stamps.look(a, b, points[a][possible[:, 0]], points[b][possible[:, 1]])
         shared[a, b] = shared[b, a] = len(geometry.inlier_matches)
         if shared[a, b] >= SHARED:
-            both = (points[k][n] for k, n in zip((a, b), geometry.inlier_matches.T, strict=True))
-            same[a, b] = same[b, a] = same_viewpoint(*both, longest=LONGEST)
+            m, n = geometry.inlier_matches.T
+            same[a, b] = same[b, a] = same_viewpoint(points[a][m], points[b][n], longest=LONGEST)
+            own, other = (
+                (points[k][i] - sizes[k] / 2) / max(sizes[k]) for k, i in ((a, m), (b, n))
+            )
+            pairs[a, b] = own, other
     opened.close()
-    return Looked(shared, same, stamps.found())
+    spun = np.zeros(same.shape, np.bool_)
+    for (a, b), by_turning in zip(pairs, turned(list(pairs.values())), strict=True):
+        spun[a, b] = spun[b, a] = by_turning
+    return Looked(shared, same, spun, stamps.found())

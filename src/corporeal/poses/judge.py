@@ -87,7 +87,7 @@ def doubt_of_neighbours(told: Attempt) -> str:
     sizes = " and ".join(str(n) for n in told.parted[:3])
     return (
         f"pictures that would have been taken side by side, in groups of {sizes}, share too little "
-        "of what both show: two sides look alike, or something was moved"
+        "of what both show: two sides look alike, something was moved, or they show several things"
     )
 
 

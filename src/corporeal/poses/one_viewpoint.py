@@ -3,7 +3,10 @@
 There nothing is nearer than anything else. What two such pictures share differs by a shift, a turn
 and a scale alone, and COLMAP looks for depth in vain, or finds what is not there. Whoever takes but
 five degrees around a thing, or above it, shortens what lies on its floor: that is no similarity.
+Where a camera turns on the spot, its pictures differ by a rotation in space, seen through one lens.
 """
+
+from collections.abc import Sequence
 
 import numpy as np
 from jaxtyping import Bool, Float
@@ -22,6 +25,12 @@ HALF = 0.5
 """Of all pictures that must be of that place."""
 ROUNDS = 3
 """Of fitting again to the half that agrees best."""
+FOCALS = (0.5, 0.6, 0.7, 0.8, 0.9, 1.0, 1.1, 1.2, 1.4, 1.7, 2.0, 2.5, 3.0)
+"""Focal lengths that are tried, in the longer side: the right one is not known."""
+SAMPLED = 200
+"""Pairs by which one of them is chosen for all."""
+Pair = tuple[Float[np.ndarray, "M 2"], Float[np.ndarray, "M 2"]]
+"""Points of one picture and the same of another, from the middle of each, in its longer side."""
 
 
 def same_viewpoint(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], longest: int) -> bool:
@@ -46,12 +55,38 @@ def same_viewpoint(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], lon
     return float(np.median(off)) < EXACT * longest
 
 
-def stood_still(joined: Bool[np.ndarray, "N N"], same: Bool[np.ndarray, "N N"]) -> str | None:
+def turned(pairs: Sequence[Pair]) -> Bool[np.ndarray, " P"]:
+    """Tell which pairs a rotation of one camera explains, whose focal length explains the most."""
+    some = pairs[:: max(1, len(pairs) // SAMPLED)]
+    counts = [sum(_off_turned(a, b, focal) < EXACT for a, b in some) for focal in FOCALS]
+    focal = FOCALS[int(np.argmax(counts))]
+    return np.array([_off_turned(a, b, focal) < EXACT for a, b in pairs], bool)
+
+
+def _off_turned(a: Float[np.ndarray, "M 2"], b: Float[np.ndarray, "M 2"], focal: float) -> float:
+    """Return the median distance after the best rotation, in the longer side."""
+    x, y = (np.c_[points / focal, np.ones(len(points))] for points in (a, b))
+    x, y = (rays / np.linalg.norm(rays, axis=1, keepdims=True) for rays in (x, y))
+    kept, off = np.ones(len(x), bool), np.zeros(len(x))
+    for _ in range(ROUNDS):
+        left, _, right = np.linalg.svd(y[kept].T @ x[kept])  # Kabsch 1976
+        proper = np.diag([1.0, 1.0, np.sign(np.linalg.det(left @ right))])
+        off = focal * np.linalg.norm(y - x @ (left @ proper @ right).T, axis=1)
+        kept = off <= np.median(off)
+    return float(np.median(off))
+
+
+def stood_still(
+    joined: Bool[np.ndarray, "N N"],
+    same: Bool[np.ndarray, "N N"],
+    by: str = "a shift, a turn and a scale alone",
+) -> str | None:
     """Return in a clause that most of N pictures are from one place, if they are.
 
     Args:
         joined: Which two share points.
         same: Which two were taken from one viewpoint.
+        by: What these differ by, in words.
 
     """
     pairs, alike = (int(np.triu(which, 1).sum()) for which in (joined, joined & same))
@@ -61,7 +96,4 @@ def stood_still(joined: Bool[np.ndarray, "N N"], same: Bool[np.ndarray, "N N"]) 
     together = int(np.bincount(label).max())
     if together < HALF * len(joined):
         return None
-    return (
-        f"{together} of {len(joined)} were taken from one place: what they share differs by a "
-        "shift, a turn and a scale alone"
-    )
+    return f"{together} of {len(joined)} were taken from one place: what they share differs by {by}"
