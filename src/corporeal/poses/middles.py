@@ -1,7 +1,7 @@
 """Whether lenses looked through the middles of the pictures, as they do unless somebody cropped.
 
 Photographs that were cropped, each in another way, fit together as if their lenses were longer and
-stood elsewhere: 25 of 25 were placed, 8° wrong, with a reprojection error below 1 px. Where each
+stood elsewhere: 25 of 25 were placed, 6° wrong, with a reprojection error below 1 px. Where each
 may have a middle of its own, middles of cropped ones move apart, and their points then agree much
 better. Of whole ones they stay, or move for nothing: then points do not say where they are.
 """
