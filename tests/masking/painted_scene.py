@@ -13,6 +13,8 @@ DISCS = 0.95
 """From the ball to the middles of discs."""
 OTHER, OTHER_RADIUS, BLUE = (0.85, -0.3, FLOOR + 0.2), 0.2, (0.1, 0.2, 0.7)
 """Middle, radius and colour of a second thing."""
+HEAD = (0.6, -0.2, FLOOR + OTHER_RADIUS)
+"""Its middle where it touches the ball."""
 RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
 
 
@@ -21,7 +23,8 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
 
     belt: colour of a belt about the ball, and of what both sides of all pictures show; flat: radius
     of three discs of the ball's colour that lie on the floor around it; other: a blue "ball" beside
-    it, or a blue "disc" that lies there.
+    it, or a blue "disc" that lies there, or a "head", the blue ball where it touches, which is in
+    the masks, too: both sides of all pictures are blue then.
     """
     random = np.random.default_rng(seed)
     mottled = random.uniform(-1, 1, (64, 64, 64))
@@ -41,8 +44,8 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
         with np.errstate(divide="ignore"):
             down = np.where(rays[..., 2] < 0, (FLOOR - eye[2]) / rays[..., 2], 30.0)
         far = np.where(on, -b - np.sqrt(np.maximum(inside, 0)), np.minimum(down, 30.0))
-        blue, near = _met(rays, eye, far)
-        if other == "ball":
+        blue, near = _met(rays, eye, far, HEAD if other == "head" else OTHER)
+        if other in ("ball", "head"):
             on, far = on & ~blue, np.where(blue, near, far)
         place = eye + far[..., None] * rays
         if other == "disc":
@@ -50,6 +53,8 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
         at = (np.floor(place * 16).astype(int) % 64).reshape(-1, 3).T
         tone = mottled[tuple(at)].reshape(HIGH, WIDE)
         colour = np.where((on | on_discs(place, flat))[..., None], ball, ground)
+        if other == "head":
+            colour[np.abs(u - WIDE / 2) > ASIDE] = BLUE
         if other is not None:
             colour[blue] = BLUE
         if belt is not None:
@@ -59,15 +64,15 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
         light = np.where(on, 0.75 + 0.25 * place[..., 2] / RADIUS, 1.0)
         noisy = colour * light[..., None] + random.normal(scale=0.01, size=colour.shape)
         pictures.append(np.round(255 * np.clip(noisy, 0, 1)).astype(np.uint8))
-        masks.append(on)
+        masks.append(on | blue if other == "head" else on)
         near = np.abs(place).max(axis=-1) < 2
         seen.append(place[near][random.permutation(near.sum())[:60]])
     return Views(np.stack(pictures), cameras), np.stack(masks), np.concatenate(seen)
 
 
-def _met(rays, eye, far):
+def _met(rays, eye, far, middle):
     """Which rays meet the second ball before anything else, and where."""
-    away = eye - np.array(OTHER)
+    away = eye - np.array(middle)
     b = rays @ away
     inside = b * b - (away @ away - OTHER_RADIUS**2)
     near = -b - np.sqrt(np.maximum(inside, 0))

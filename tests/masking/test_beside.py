@@ -9,18 +9,25 @@ from corporeal.geometry.epipolar import projection
 from corporeal.geometry.ground_plane import Plane
 from corporeal.geometry.region import region
 from corporeal.masking.beside import beside
-from corporeal.masking.grow import _widened
+from corporeal.masking.grow import widened
 from corporeal.masking.grown_masks import grown_masks
+from corporeal.masking.standing import standing
 from corporeal.reconstruction.picture_intake import masks_for
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 
 GROUND = Plane(np.array([0.0, 0.0, 1.0]), FLOOR, 1.0, 0.01)
 
 
+def told(views, masks, floor):
+    stands = standing(views, masks, floor, region(views.cameras))
+    assert stands is not None
+    return beside(stands, masks, widened(masks))
+
+
 @pytest.mark.parametrize("floor", [GROUND, None], ids=["floor", "no floor"])
 def test_what_stands_beside_it_is_told_and_where(floor):
     views, masks, _ = scene(other="ball")
-    found = beside(views, masks, _widened(masks), floor, region(views.cameras))
+    found = told(views, masks, floor)
     assert found is not None and 0.1 < found.as_large < 0.7  # (.2 / .5)², and a hull is fat
     camera = views.cameras[found.view]
     u, v, depth = projection(camera) @ [*OTHER, 1.0]
@@ -32,14 +39,14 @@ def test_what_stands_beside_it_is_told_and_where(floor):
 @pytest.mark.parametrize("floor", [GROUND, None], ids=["floor", "no floor"])
 def test_a_floor_and_a_print_on_it_are_no_things(floor, other):
     views, masks, _ = scene(other=other)
-    assert beside(views, masks, _widened(masks), floor, region(views.cameras)) is None
+    assert told(views, masks, floor) is None
 
 
 def test_what_masks_hold_is_not_beside_them():
     views, masks, _ = scene(other="ball")
     blue = views.rgb[..., 2].astype(int) > 1.5 * views.rgb[..., 0]
     both = masks | blue
-    assert beside(views, both, _widened(both), GROUND, region(views.cameras)) is None
+    assert told(views, both, GROUND) is None
 
 
 def test_a_run_says_what_was_left_out_until_masks_are_corrected(tmp_path):

@@ -1,6 +1,7 @@
 """Whether masks that nobody drew are of what the photographs are of."""
 
 from corporeal.masking.grow import SETTLED, Grown
+from corporeal.masking.standing import as_large
 
 ALIKE = 0.2
 """Overlap of the colours of objects and of what is around them, above which the outline is chance:
@@ -18,6 +19,10 @@ SMALLEST, LARGEST = 0.005, 0.7
 LEFT_OVER = 0.25
 """As much again as masks hold, with their colours and on the floor in the middle, above which masks
 are not of all of the thing: they would overlap with right ones by less than .8."""
+
+HANGING = 0.5
+"""The same of what stands there in other colours and borders on it. Of its pixels .4 to .85 were
+the thing's, the rest shadows and edges beside it, so that masks lack as much."""
 
 
 def doubt(grown: Grown | None) -> str | None:
@@ -43,4 +48,17 @@ def incomplete(grown: Grown | None) -> str | None:
     return (
         "not all of it can be told from its ground: beside what was taken for the thing, "
         f"{grown.left_over:.1f} times as much with its colours is seen on the floor in the middle"
+    )
+
+
+def lacking(grown: Grown | None) -> str | None:
+    """Return in a clause what borders on masks and is not of them; None: not much does."""
+    if grown is None or grown.hanging is None:
+        return None
+    much = as_large(grown.hanging, grown.masks)
+    if much <= HANGING:
+        return None
+    return (
+        "not all of it can be told from its ground: beside what was taken for the thing, "
+        f"{much:.1f} times as much in other colours stands on the floor and borders on it"
     )

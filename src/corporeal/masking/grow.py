@@ -19,10 +19,12 @@ from corporeal.masking.beside import Beside, beside
 from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
 from corporeal.masking.floor_colour import shaded_floor
 from corporeal.masking.floor_pattern import shows_floor
+from corporeal.masking.hanging import hanging
 from corporeal.masking.holes import closed
 from corporeal.masking.left_over import before_the_floor, left_over
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds
+from corporeal.masking.standing import standing
 from corporeal.masking.total_variation import Cutter
 from corporeal.masking.volume import Volume, lowered, volume
 from corporeal.types import Views
@@ -73,6 +75,10 @@ class Grown:
     """Share of the pictures' pixels that is inside."""
     left_over: float
     """What has their colours on the floor in the middle, but is none of them, over what is."""
+    masks: Bool[np.ndarray, "V H W"]
+    """The pixels that are inside, at ROUGH pixels."""
+    hanging: Bool[np.ndarray, "V H W"] | None = None
+    """Pixels beside these that show what stands on the floor and borders on them."""
     beside: Beside | None = None
     """Something of other colours that stands on the floor beside them."""
 
@@ -139,8 +145,10 @@ def grow(
     assert state is not None
     progress(MOST / (MOST + 1), "drawing their outlines")
     middle = ~seeds.never & before_the_floor(rough.cameras, seeds.floor, seeds.around)
-    middle &= ~_widened(state.silhouettes) & (_shrunk(shaded, rough.rgb.shape[1:3]) < HALF)
+    middle &= ~widened(state.silhouettes) & (_shrunk(shaded, rough.rgb.shape[1:3]) < HALF)
     by_colour = side.cut(replace(state.evidence, prior=np.zeros_like(on_floor))) > HALF
+    stands = standing(rough, state.masks, seeds.floor, seeds.around)
+    near = widened(state.masks)
     return Grown(
         inside=closed(_drawn(views, state, floor), rough.cameras, room),
         coherence=_agreement(state.masks, state.silhouettes),
@@ -150,7 +158,9 @@ def grow(
         cropped=float(cropped(state.masks).mean()),
         share=float(state.masks.mean()),
         left_over=left_over(by_colour, state.masks, middle),
-        beside=beside(rough, state.masks, _widened(state.masks), seeds.floor, seeds.around),
+        masks=state.masks,
+        hanging=None if stands is None else hanging(stands, state.masks),
+        beside=None if stands is None else beside(stands, state.masks, near),
     )
 
 
@@ -178,11 +188,11 @@ def _round(side: _Side, room: Volume, evidence: Evidence) -> _Round | None:
     if not hull.any():
         return None
     seen = room.silhouettes(hull)
-    band = _widened(seen)
+    band = widened(seen)
     masks &= band
     inside = histogram(side.bins, masks & seen)
     beside = ~band | ~(seen | masks)
-    outside = histogram(side.bins, _widened(seen, NEARBY) & beside)
+    outside = histogram(side.bins, widened(seen, NEARBY) & beside)
     alike = min(overlap(inside, outside), overlap(inside, histogram(side.bins, beside)))
     prior = np.where(seen, IN_HULL, np.where(band, 0, BESIDE_HULL)).astype(np.float32)
     outer = float(room.outer[hull].mean())
@@ -227,7 +237,7 @@ def _shrunk(
     return np.stack([np.asarray(p) for p in made])
 
 
-def _widened(seen: Bool[np.ndarray, "V H W"], by: float = MARGIN) -> Bool[np.ndarray, "V H W"]:
+def widened(seen: Bool[np.ndarray, "V H W"], by: float = MARGIN) -> Bool[np.ndarray, "V H W"]:
     """Add what is within so many widths of the picture to silhouettes."""
     steps = max(1, round(by * seen.shape[2]))
     return np.stack([binary_dilation(one, iterations=steps) for one in seen])
@@ -235,7 +245,7 @@ def _widened(seen: Bool[np.ndarray, "V H W"], by: float = MARGIN) -> Bool[np.nda
 
 def _told(masks: Bool[np.ndarray, "V H W"], on_floor: Float32[np.ndarray, "V H W"]) -> float:
     """Return the share of the pixels around masks that are on the floor for certain."""
-    around = _widened(masks) & ~masks
+    around = widened(masks) & ~masks
     return float((on_floor[around] > 0).mean()) if around.any() else 0.0
 
 

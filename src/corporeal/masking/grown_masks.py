@@ -16,19 +16,21 @@ from corporeal.formats.mask_files import (
     write_record,
 )
 from corporeal.formats.photographs import MASKS, Photographs, listed, read_photographs
-from corporeal.masking.doubt import doubt, incomplete
+from corporeal.masking.doubt import doubt, incomplete, lacking
 from corporeal.masking.grow import FINE, ROUGH, Grown, grow
 from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds, looked_at
+from corporeal.masking.taken_in import taken_in
 from corporeal.types import Views
 
 Progress = Callable[[float, str], None]
 
 FLAT = "What has their colours and lies flat on the floor was taken for objects, too."
+OTHER_COLOURS = "What stands there and borders on it in other colours was taken in."
 DOUBTED = "doubted"
 """Folder of masks that are not to be believed: what colours alone would take for objects."""
-METHOD = 8
+METHOD = 9
 """Raised when other masks would be grown: those of an older method are grown again."""
 HAVE_IT = (
     "If it is meant, too, paint it white in the masks, or give masks of all (a folder 'masks' with "
@@ -78,9 +80,9 @@ def grown_masks(
     record = read_record(folder)
     if record is not None and record.made_by == made_by:
         changes = _changes(folder)
-        lacking, other = ("", "") if changes else (record.incomplete, record.beside)
+        lacks, other = ("", "") if changes else (record.incomplete, record.beside)
         believed = folder if record.digest_of else None
-        return GrownMasks(believed, (*record.said, *changes), _doubted(folder), lacking, other)
+        return GrownMasks(believed, (*record.said, *changes), _doubted(folder), lacks, other)
     progress(0.0, "reading photographs")
     shown = read_photographs(source, FINE, bare=True)
     rough = reduced(shown.views, ROUGH)
@@ -88,39 +90,48 @@ def grown_masks(
         seeds = looked_at(rough, shown.points)
     else:
         seeds = pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
-    grown, flat = _grown(shown.views, seeds, lambda f, words: progress(GROWN * f, words))
-    why, lacking = doubt(grown), incomplete(grown) or ""
+    alone = pointed is not None
+    grown, more = _grown(shown.views, seeds, alone, lambda f, words: progress(GROWN * f, words))
+    why = doubt(grown)
+    lacks = incomplete(grown) or ("" if alone or why else lacking(grown)) or ""
     for name in (MASKS[0], DOUBTED, RECORD):
         _forget(folder / name)
     if grown is None or (why is not None and pointed is None):
         said = (f"No masks were grown from what all photographs show: {why}.",)
         if grown is not None:
             _written(source, shown, grown, folder / DOUBTED, progress)
-        write_record(folder, made_by, said, lacking)
-        return GrownMasks(None, said, _doubted(folder), lacking)
+        write_record(folder, made_by, said, lacks)
+        return GrownMasks(None, said, _doubted(folder), lacks)
     _written(source, shown, grown, folder, progress)
     said = (
         _told(grown, pointed),
-        *([FLAT] if flat else []),
-        *(f"Check them: {w}." for w in (why, lacking) if w),
+        *more,
+        *(f"Check them: {w}." for w in (why, lacks) if w),
     )
     other = _beside(grown, shown.names) if pointed is None else ""
-    write_record(folder, made_by, said, lacking, other)
-    return GrownMasks(folder, said, incomplete=lacking, beside=other)
+    write_record(folder, made_by, said, lacks, other)
+    return GrownMasks(folder, said, incomplete=lacks, beside=other)
 
 
-def _grown(views: Views, seeds: Seeds, progress: Progress) -> tuple[Grown | None, bool]:
-    """Grow masks, and say whether what lies flat on the floor is in them.
+def _grown(
+    views: Views, seeds: Seeds, alone: bool, progress: Progress
+) -> tuple[Grown | None, list[str]]:
+    """Grow masks, and say what is in them beside what has their colours and stands.
 
     Plates are as flat as print on paper, which is no object. Where so much of the colours of
     objects lies beside them, colours decide, if masks are complete and not doubted then.
+    What hangs on it in other colours is taken in unless it is asked for alone.
     """
-    grown = grow(views, seeds, progress)
-    if grown is None or incomplete(grown) is None:
-        return grown, False
-    wider = grow(views, seeds, progress, flat=True)
-    flat = doubt(wider) is None and incomplete(wider) is None
-    return (wider if flat else grown), flat
+    grown, flat = grow(views, seeds, progress), False
+    if incomplete(grown) is not None:
+        wider = grow(views, seeds, progress, flat=True)
+        flat = doubt(wider) is None and incomplete(wider) is None
+        grown = wider if flat else grown
+    said = [FLAT] if flat else []
+    if grown is None or alone or doubt(grown) is not None or incomplete(grown) is not None:
+        return grown, said
+    whole = taken_in(views, seeds, grown, progress, flat)
+    return whole, said if whole is grown else [*said, OTHER_COLOURS]
 
 
 def _written(

@@ -1,0 +1,70 @@
+"""Masks of one colour, grown again with what hangs on them in others.
+
+What stands on the floor and borders on masks is an example of what objects look like, as they are.
+Growing decides about it as about any seed: what has the colours of its surroundings too, a shadow
+or a piece of wall, does not last. New masks are taken if they hold all of the old ones and more,
+most of which hangs on these, and agree with their hull as well as before.
+"""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+
+from corporeal.masking.doubt import doubt, incomplete
+from corporeal.masking.grow import NEARBY, Grown, grow, widened
+from corporeal.masking.seeds import Seeds
+from corporeal.masking.standing import AS_LARGE
+from corporeal.types import Views
+
+Progress = Callable[[float, str], None]
+
+HELD = 0.95
+"""Share of the masks before that new ones must hold, in the median view."""
+HANGS = 0.5
+"""Of what new masks hold beside these, how much must hang on them, in all views together."""
+AS_WELL = 0.01
+"""Agreement of masks with their hull that may be lost: where growing again changes nothing to
+speak of it moves by .001."""
+
+
+def taken_in(
+    views: Views, seeds: Seeds, grown: Grown, progress: Progress, flat: bool = False
+) -> Grown:
+    """Return masks of what was found and of what hangs on it, or those that were given.
+
+    Args:
+        views: The pictures.
+        seeds: Where the given masks began.
+        grown: Masks that are not doubted.
+        progress: Told the fraction done and what is being done.
+        flat: As in ``grow``.
+
+    """
+    if grown.hanging is None:
+        return grown
+    wider = grow(views, _with(seeds, grown.masks | grown.hanging), progress, flat)
+    if wider is None or doubt(wider) is not None or incomplete(wider) is not None:
+        return grown
+    return wider if _better(wider, grown) else grown
+
+
+def _better(wider: Grown, grown: Grown) -> bool:
+    assert grown.hanging is not None
+    before = np.maximum(grown.masks.sum(axis=(1, 2)), 1)
+    held = (wider.masks & grown.masks).sum(axis=(1, 2)) / before
+    more = wider.masks & ~grown.masks
+    gained = more.sum(axis=(1, 2)) / before
+    hangs = (more & widened(grown.hanging)).sum() / max(more.sum(), 1)
+    return bool(
+        np.median(held) >= HELD
+        and np.median(gained) >= AS_LARGE
+        and hangs >= HANGS
+        and wider.coherence >= grown.coherence - AS_WELL
+    )
+
+
+def _with(seeds: Seeds, inside: np.ndarray) -> Seeds:
+    """Begin at pixels (V, H, W), told from what is near them."""
+    outside = widened(inside, NEARBY) & ~inside
+    return replace(seeds, inside=inside.astype(np.float32), outside=outside.astype(np.float32))
