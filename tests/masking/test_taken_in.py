@@ -12,6 +12,7 @@ from corporeal.masking import grown_masks as module
 from corporeal.masking.doubt import lacking
 from corporeal.masking.grow import grow
 from corporeal.masking.grown_masks import OTHER_COLOURS
+from corporeal.masking.hanging import Hanging
 from corporeal.masking.seeds import looked_at
 from corporeal.masking.taken_in import taken_in
 from corporeal.reconstruction.picture_intake import masks_for, take_pictures
@@ -50,7 +51,7 @@ def test_what_is_not_held_in_the_end_is_not_taken():
     grown = grow(views, seeds)
     assert grown is not None
     beside = np.roll(grown.masks, 20, axis=2) & ~grown.masks
-    grown = replace(grown, hanging=beside)
+    grown = replace(grown, hanging=Hanging(beside, beside))
     assert taken_in(views, seeds, grown, unheard) is grown
 
 
@@ -71,7 +72,7 @@ def test_much_that_borders_on_it_and_was_not_taken_in_ends_the_run(tmp_path, mon
     rows = np.arange(len(grown.masks[0]))[:, None]
     above = np.cumsum(grown.masks.sum(axis=2), axis=1) / grown.masks.sum(axis=(1, 2))[:, None]
     some = np.roll(grown.masks & (above < share)[:, rows], 20, axis=2) & ~grown.masks
-    grown = replace(grown, hanging=some)
+    grown = replace(grown, hanging=Hanging(some, some))
     why = lacking(grown)
     assert (why is not None) == (share > 0.5)
     monkeypatch.setattr(module, "grow", lambda *_: grown)

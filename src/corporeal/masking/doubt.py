@@ -55,7 +55,7 @@ def lacking(grown: Grown | None) -> str | None:
     """Return in a clause what borders on masks and is not of them; None: not much does."""
     if grown is None or grown.hanging is None:
         return None
-    much = as_large(grown.hanging, grown.masks)
+    much = as_large(grown.hanging.shown, grown.masks)
     if much <= HANGING:
         return None
     return (

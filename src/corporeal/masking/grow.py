@@ -19,7 +19,7 @@ from corporeal.masking.beside import Beside, beside
 from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
 from corporeal.masking.floor_colour import shaded_floor
 from corporeal.masking.floor_pattern import shows_floor
-from corporeal.masking.hanging import hanging
+from corporeal.masking.hanging import Hanging, hanging
 from corporeal.masking.holes import closed
 from corporeal.masking.left_over import before_the_floor, left_over
 from corporeal.masking.reduced import reduced
@@ -77,8 +77,8 @@ class Grown:
     """What has their colours on the floor in the middle, but is none of them, over what is."""
     masks: Bool[np.ndarray, "V H W"]
     """The pixels that are inside, at ROUGH pixels."""
-    hanging: Bool[np.ndarray, "V H W"] | None = None
-    """Pixels beside these that show what stands on the floor and borders on them."""
+    hanging: Hanging | None = None
+    """What stands on the floor beside these and borders on them."""
     beside: Beside | None = None
     """Something of other colours that stands on the floor beside them."""
 

@@ -128,7 +128,7 @@ def _grown(
         flat = doubt(wider) is None and incomplete(wider) is None
         grown = wider if flat else grown
     said = [FLAT] if flat else []
-    if grown is None or alone or doubt(grown) is not None or incomplete(grown) is not None:
+    if grown is None or alone:
         return grown, said
     whole = taken_in(views, seeds, grown, progress, flat)
     return whole, said if whole is grown else [*said, OTHER_COLOURS]

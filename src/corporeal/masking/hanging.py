@@ -5,14 +5,26 @@ Of the hull of all that stands, which knows no colours, it is the part beside ma
 theirs.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool
 
 from corporeal.masking.standing import AS_LARGE, Standing, as_large
 
 
-def hanging(stands: Standing, masks: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, "V H W"] | None:
-    """Return the pixels beside masks that show what hangs on them; None: nothing does.
+@dataclass(frozen=True)
+class Hanging:
+    """What hangs on masks; V views of H × W."""
+
+    shown: Bool[np.ndarray, "V H W"]
+    """Pixels beside masks that show it."""
+    within: Bool[np.ndarray, "V H W"]
+    """Silhouettes of its hull, which no view's colours make smaller."""
+
+
+def hanging(stands: Standing, masks: Bool[np.ndarray, "V H W"]) -> Hanging | None:
+    """Find what hangs on masks; None: nothing does.
 
     Args:
         stands: All that stands on the floor.
@@ -23,9 +35,10 @@ def hanging(stands: Standing, masks: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarr
     whole, _ = room.pieces(stands.cells | own)
     joined = np.isin(whole, whole[own])
     piece, count = room.pieces(stands.beside(masks) & ~own & joined)
-    shown = np.zeros_like(masks)
+    within = np.zeros_like(masks)
     for k in range(1, count + 1):
         if stands.free(piece == k):
             seen = room.silhouettes(piece == k)
-            shown |= seen & stands.shown & ~masks & (as_large(seen, masks) >= AS_LARGE)
-    return shown if as_large(shown, masks) >= AS_LARGE else None
+            within |= seen & (as_large(seen, masks) >= AS_LARGE)
+    shown = within & stands.shown & ~masks
+    return Hanging(shown, within) if as_large(shown, masks) >= AS_LARGE else None

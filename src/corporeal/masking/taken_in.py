@@ -10,11 +10,13 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
+from jaxtyping import Bool
 
 from corporeal.masking.doubt import doubt, incomplete
 from corporeal.masking.grow import NEARBY, Grown, grow, widened
+from corporeal.masking.hanging import Hanging
 from corporeal.masking.seeds import Seeds
-from corporeal.masking.standing import AS_LARGE
+from corporeal.masking.standing import AS_LARGE, as_large
 from corporeal.types import Views
 
 Progress = Callable[[float, str], None]
@@ -36,35 +38,42 @@ def taken_in(
     Args:
         views: The pictures.
         seeds: Where the given masks began.
-        grown: Masks that are not doubted.
+        grown: What came of them.
         progress: Told the fraction done and what is being done.
         flat: As in ``grow``.
 
     """
     if grown.hanging is None:
         return grown
-    wider = grow(views, _with(seeds, grown.masks | grown.hanging), progress, flat)
+    wider = grow(views, _begun_again(seeds, grown.masks, grown.hanging), progress, flat)
     if wider is None or doubt(wider) is not None or incomplete(wider) is not None:
         return grown
-    return wider if _better(wider, grown) else grown
+    return wider if _better(wider, grown, grown.hanging) else grown
 
 
-def _better(wider: Grown, grown: Grown) -> bool:
-    assert grown.hanging is not None
+def _better(wider: Grown, grown: Grown, more: Hanging) -> bool:
     before = np.maximum(grown.masks.sum(axis=(1, 2)), 1)
     held = (wider.masks & grown.masks).sum(axis=(1, 2)) / before
-    more = wider.masks & ~grown.masks
-    gained = more.sum(axis=(1, 2)) / before
-    hangs = (more & widened(grown.hanging)).sum() / max(more.sum(), 1)
+    new = wider.masks & ~grown.masks
+    hangs = (new & widened(more.shown)).sum() / max(new.sum(), 1)
     return bool(
         np.median(held) >= HELD
-        and np.median(gained) >= AS_LARGE
+        and as_large(new, grown.masks) >= AS_LARGE
         and hangs >= HANGS
         and wider.coherence >= grown.coherence - AS_WELL
     )
 
 
-def _with(seeds: Seeds, inside: np.ndarray) -> Seeds:
-    """Begin at pixels (V, H, W), told from what is near them."""
+def _begun_again(seeds: Seeds, masks: Bool[np.ndarray, "V H W"], more: Hanging) -> Seeds:
+    """Begin at what is known to be inside, told from what is near it, and do not go far beyond.
+
+    What is farther off has its colours by chance: the grey of a head is a wall's, too.
+    """
+    inside, cone = masks | more.shown, widened(masks | more.within)
     outside = widened(inside, NEARBY) & ~inside
-    return replace(seeds, inside=inside.astype(np.float32), outside=outside.astype(np.float32))
+    return replace(
+        seeds,
+        inside=inside.astype(np.float32),
+        outside=outside.astype(np.float32),
+        cone=cone if seeds.cone is None else cone & seeds.cone,
+    )
