@@ -11,7 +11,7 @@ from corporeal.geometry.region import region
 from corporeal.masking.beside import beside
 from corporeal.masking.grow import widened
 from corporeal.masking.grown_masks import grown_masks
-from corporeal.masking.standing import standing
+from corporeal.masking.parallax import standing
 from corporeal.reconstruction.picture_intake import masks_for
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 

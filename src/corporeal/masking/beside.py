@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from corporeal.masking.standing import AS_LARGE, Standing, as_large
+from corporeal.masking.parallax import AS_LARGE, Standing, as_large
 
 ASIDE = 0.6
 """Of the pixels of a piece, in the median view, that are beside masks: what masks lack of a thing

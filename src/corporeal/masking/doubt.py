@@ -1,7 +1,7 @@
 """Whether masks that nobody drew are of what the photographs are of."""
 
 from corporeal.masking.grow import SETTLED, Grown
-from corporeal.masking.standing import as_large
+from corporeal.masking.parallax import as_large
 
 ALIKE = 0.2
 """Overlap of the colours of objects and of what is around them, above which the outline is chance:

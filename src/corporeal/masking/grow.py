@@ -22,9 +22,9 @@ from corporeal.masking.floor_pattern import shows_floor
 from corporeal.masking.hanging import Hanging, hanging
 from corporeal.masking.holes import closed
 from corporeal.masking.left_over import before_the_floor, left_over
+from corporeal.masking.parallax import standing
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds
-from corporeal.masking.standing import standing
 from corporeal.masking.total_variation import Cutter
 from corporeal.masking.volume import Volume, lowered, volume
 from corporeal.types import Views

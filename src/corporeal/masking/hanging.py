@@ -10,7 +10,7 @@ from dataclasses import dataclass
 import numpy as np
 from jaxtyping import Bool
 
-from corporeal.masking.standing import AS_LARGE, Standing, as_large
+from corporeal.masking.parallax import AS_LARGE, Standing, as_large
 
 
 @dataclass(frozen=True)

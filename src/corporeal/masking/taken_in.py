@@ -15,8 +15,8 @@ from jaxtyping import Bool
 from corporeal.masking.doubt import doubt, incomplete
 from corporeal.masking.grow import NEARBY, Grown, grow, widened
 from corporeal.masking.hanging import Hanging
+from corporeal.masking.parallax import AS_LARGE, as_large
 from corporeal.masking.seeds import Seeds
-from corporeal.masking.standing import AS_LARGE, as_large
 from corporeal.types import Views
 
 Progress = Callable[[float, str], None]
