@@ -1,7 +1,7 @@
 """Make captured views look as if somebody had photographed them in a room.
 
     python benchmarks/as_photographed.py SCENE OUT [--seed 0] [--pictures 24] [--wall] [--clutter]
-        [--flash] [--rolled]
+        [--flash] [--rolled] [--stop] [--turned] [--on table|cloth|newspaper|grass]
 
 SCENE is a folder that ``corporeal assemble`` wrote, with ``views``. In OUT they have a floor of
 planks and four papered walls behind the things, the same from all sides, in place of the plain
@@ -12,27 +12,34 @@ from by ``benchmarks/splats.py OUT --sources pictures``.
 ``--wall`` puts a wall close behind the things and keeps the views from before it; ``--clutter``
 puts painted balls on the floor around them; ``--flash`` lights everything from the camera, so that
 what is near is bright; ``--rolled`` turns every second picture by a quarter, as telephones are
-held (all are cropped to squares); ``--pictures`` keeps so many.
+held (all are cropped to squares); ``--stop`` gives them exposures up to a stop apart; with
+``--turned`` the things and what they stand on were turned by hand before a room that stands still;
+``--on`` says what that is, and where (``grounds.py``); ``--pictures`` keeps so many.
 """
 
 import argparse
 import io
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
+from grounds import FLOOR, GROUNDS, Ground, noise
 from PIL import Image
-from scipy.ndimage import gaussian_filter, map_coordinates, uniform_filter1d
+from scipy.ndimage import gaussian_filter, uniform_filter1d
 
 from corporeal.formats.transforms import read_views, write_views
 from corporeal.types import Camera, Views
 
-ROOM = 1.5
-"""Half the room's side, in distances of the farthest camera from its middle."""
+SWITCHES = ("wall", "clutter", "flash", "rolled", "stop", "turned")
+"""Of how pictures are taken."""
 GRID = 3
 """Looks per pixel along x and y."""
 EXPOSURE, BALANCE = 0.12, 0.03
 """Standard deviations of the logarithms of what pictures and their channels are multiplied by."""
+STOPS, BESIDE = 1.0, 3.0
+"""Exposures between the darkest and the brightest picture [stops]; standard deviation of where
+somebody stands who turns things [deg]."""
 BLUR, SHAKEN = (0.4, 0.9), 2
 """Standard deviations of blur [px]; of every fourth picture, length of the smear [px]."""
 NOISE = 2.0
@@ -47,12 +54,6 @@ LIT = 0.9
 """Distance, in these distances, at which flash light is as bright as the room's."""
 GREY = (0.66, 0.65, 0.63)
 OAK, PAPER, STRIPE = (0.62, 0.46, 0.32), (0.70, 0.72, 0.66), (0.45, 0.52, 0.56)
-
-
-def noise(points: np.ndarray, wave: float, seed: int) -> np.ndarray:
-    """Return smooth noise in [-1, 1] at points (N, 3) with features of such a size [m]."""
-    cells = np.random.default_rng(seed).uniform(-1, 1, (48, 48, 48))
-    return map_coordinates(cells, (points / wave).T % 48, order=1, mode="grid-wrap")
 
 
 def paint(points: np.ndarray, floor: np.ndarray, size: float, plain: bool = False) -> np.ndarray:
@@ -87,6 +88,10 @@ class Look:
     """Whether floor and walls have one colour each."""
     grid: int = GRID
     """Looks per pixel along x and y."""
+    stop: bool = False
+    turned: bool = False
+    on: str | None = None
+    """One of ``GROUNDS``; None: the floor of the room."""
 
 
 @dataclass(frozen=True)
@@ -101,25 +106,20 @@ class Room:
     """Middle and radius of each ball (B, 4) [m]."""
     plain: bool = False
     grid: int = GRID
+    ground: Ground = FLOOR
+    turn: float = 0.0
+    """How far things and what they stand on were turned in it, against the sun [rad]."""
 
 
 def backdrop(camera: Camera, room: Room) -> tuple[np.ndarray, np.ndarray]:
     """Return what a camera sees of a room without the things (H, W, 3), and how far away (H, W)."""
     size, grid = room.size, room.grid
-    half = np.full((2, 2), ROOM * size)
-    half[1, 1] = CLOSE * size if room.wall else half[1, 1]
     h, w = camera.height * grid, camera.width * grid
     v, u = (np.indices((h, w)).reshape(2, -1) + 0.5) / grid
     K, pose = camera.K, camera.world_from_camera
     local = np.stack([(u - K[0, 2]) / K[0, 0], (v - K[1, 2]) / K[1, 1], np.ones(h * w)], axis=1)
     ray, eye = local @ pose[:3, :3].T, pose[:3, 3]
-    with np.errstate(divide="ignore"):
-        down = np.where(ray[:, 2] < 0, -eye[2] / ray[:, 2], np.inf)
-        ahead = np.where(ray[:, :2] > 0, half[:, 1] - eye[:2], -half[:, 0] - eye[:2])
-        out = np.min(ahead / ray[:, :2], axis=1)
-    far = np.minimum(down, out)
-    there = eye + far[:, None] * ray
-    colours = paint(there, down < out, size, room.plain)
+    far, colours = _still(eye, ray, room)
     for k, (*middle, radius) in enumerate(room.balls):
         met = _met(eye - middle, ray, radius)
         near = met < far
@@ -131,6 +131,36 @@ def backdrop(camera: Camera, room: Room) -> tuple[np.ndarray, np.ndarray]:
     return colours.mean(axis=(1, 3)), far.mean(axis=(1, 3))
 
 
+def _still(eye: np.ndarray, ray: np.ndarray, room: Room) -> tuple[np.ndarray, np.ndarray]:
+    """Return how far along rays (N, 3) ground, floor and walls are (N,), and their colours."""
+    size, ground, turn = room.size, room.ground, _turned(room.turn)
+    half = np.full((2, 2), ground.room * size)
+    half[1, 1] = CLOSE * size if room.wall else half[1, 1]
+    low = np.array([0.0, 0.0, ground.drop * size])
+    stands, still = turn @ eye, ray @ turn.T
+    with np.errstate(divide="ignore"):
+        down = np.where(ray[:, 2] < 0, -eye[2] / ray[:, 2], np.inf)
+        here = eye + np.where(np.isfinite(down), down, 0.0)[:, None] * ray
+        on = np.isfinite(down) & ground.covers(here / size)
+        down = np.where(on, down, np.where(ray[:, 2] < 0, -(eye + low)[2] / ray[:, 2], np.inf))
+        ahead = np.where(still[:, :2] > 0, half[:, 1] - stands[:2], -half[:, 0] - stands[:2])
+        out = np.min(ahead / still[:, :2], axis=1)
+    far, floor = np.minimum(down, out), down < out
+    there = stands + low + far[:, None] * still
+    colours = paint(there, floor, size, room.plain or ground.plain)
+    if ground.walls is not None:
+        colours[~floor] = ground.walls(there[~floor] / size)
+    if ground.paint is not None:
+        colours[on & floor] = ground.paint(here[on & floor] / size)
+    return far, colours
+
+
+def _turned(angle: float) -> np.ndarray:
+    """Return the rotation about z by an angle [rad]."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+
+
 def _met(eye: np.ndarray, ray: np.ndarray, radius: float) -> np.ndarray:
     """Return how far along rays a ball about the origin is, in lengths of the ray; inf: beside."""
     a, b, c = (ray * ray).sum(axis=1), ray @ eye, eye @ eye - radius**2
@@ -140,8 +170,14 @@ def _met(eye: np.ndarray, ray: np.ndarray, radius: float) -> np.ndarray:
     return np.where((inside > 0) & (far > 0), far, np.inf)
 
 
-def photographed(rgb: np.ndarray, k: int, rng: np.random.Generator) -> np.ndarray:
-    """Return a picture (H, W, 3) in [0, 1] as a careless photographer gets it, in bytes."""
+def photographed(
+    rgb: np.ndarray, k: int, rng: np.random.Generator, stops: float = 0.0
+) -> np.ndarray:
+    """Return a picture (H, W, 3) in [0, 1] as a careless photographer gets it, in bytes.
+
+    Exposures are so many stops apart, beside what they differ by anyway.
+    """
+    rgb = rgb * 2 ** rng.uniform(-stops / 2, stops / 2) if stops else rgb
     gain = np.exp(EXPOSURE * rng.normal() + BALANCE * rng.normal(size=3))
     blurred = gaussian_filter(rgb, (*[rng.uniform(*BLUR)] * 2, 0))
     if k % 4 == 1:
@@ -165,18 +201,23 @@ def degraded(views: Views, asked: Look) -> Views:
     assert views.object_of_pixel is not None and views.depth is not None
     rng, rgb = np.random.default_rng(asked.seed), views.rgb.copy()
     balls = _balls(size, rng) if asked.clutter else np.zeros((0, 4))
-    room = Room(size, asked.wall, balls, asked.plain, asked.grid)
+    ground = FLOOR if asked.on is None else GROUNDS[asked.on]
+    room = Room(size, asked.wall, balls, asked.plain, asked.grid, ground)
     plain = np.median(views.rgb[views.object_of_pixel < 0].mean(axis=-1))
     for k, camera in enumerate(views.cameras):
         real = views.rgb[k] / 255
         shade = np.minimum(real.mean(axis=-1, keepdims=True) * 255 / plain, 1)
+        if asked.turned:
+            x, y, _ = camera.world_from_camera[:3, 3]
+            stands = np.radians(BESIDE) * rng.normal() - np.pi / 2
+            room = replace(room, turn=stands - np.arctan2(y, x))
         around, far = backdrop(camera, room)
         on = views.object_of_pixel[k] >= 0
         seen = np.where(on[..., None], real, around if asked.flash else around * shade)
         if asked.flash:
             away = np.where(on, views.depth[k], far) / (LIT * size)
             seen = np.clip(seen / np.maximum(away, 0.3)[..., None] ** 2, 0, 1)
-        rgb[k] = photographed(seen, k, rng)
+        rgb[k] = photographed(seen, k, rng, STOPS if asked.stop else 0.0)
     made = Views(rgb, views.cameras, object_of_pixel=views.object_of_pixel)
     return rolled(made) if asked.rolled else made
 
@@ -216,6 +257,19 @@ def rolled(views: Views) -> Views:
     return Views(rgb, tuple(cameras), object_of_pixel=owners)
 
 
+def add_switches(parser: argparse.ArgumentParser) -> None:
+    """Let somebody say how pictures are taken, and where."""
+    parser.add_argument("--on", choices=GROUNDS)
+    for name in SWITCHES:
+        parser.add_argument(f"--{name}", action="store_true")
+
+
+def look_of(asked: argparse.Namespace, **more: Any) -> Look:
+    """Return what somebody said."""
+    chosen = {name: getattr(asked, name) for name in SWITCHES}
+    return Look(seed=asked.seed, on=asked.on, **chosen, **more)
+
+
 def main() -> None:
     """Read, change, write."""
     parser = argparse.ArgumentParser(
@@ -225,10 +279,9 @@ def main() -> None:
     parser.add_argument("out", type=Path)
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--pictures", type=int)
-    for name in ("wall", "clutter", "flash", "rolled"):
-        parser.add_argument(f"--{name}", action="store_true")
+    add_switches(parser)
     asked = parser.parse_args()
-    look = Look(asked.seed, asked.pictures, asked.wall, asked.clutter, asked.flash, asked.rolled)
+    look = look_of(asked, pictures=asked.pictures)
     write_views(asked.out / "views", degraded(read_views(asked.scene / "views"), look))
 
 

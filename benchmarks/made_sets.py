@@ -1,7 +1,8 @@
 """Sets of photographs of models, as a stranger takes them: walking around, in a furnished room.
 
     python benchmarks/made_sets.py MODEL OUT [--pictures 30] [--rounds 20 45] [--size 640 480]
-        [--seed 0] [--plain] [--wall] [--clutter] [--flash] [--rolled] [--film] [--zoomed 1.6]
+        [--seed 0] [--plain] [--wall] [--clutter] [--flash] [--rolled] [--stop] [--turned]
+        [--on table|cloth|newspaper|grass] [--film] [--zoomed 1.6]
 
 MODEL is what ``corporeal run`` takes. Somebody walks around it once for each of the rounds, at such
 an angle above the floor [deg], with unsteady hands and at no constant pace. The room and how badly
@@ -20,7 +21,7 @@ from pathlib import Path
 
 import imageio_ffmpeg
 import numpy as np
-from as_photographed import Look, degraded
+from as_photographed import add_switches, degraded, look_of
 from PIL import Image
 
 from corporeal.formats.colmap import write_colmap
@@ -41,6 +42,8 @@ RATE = 10
 """Frames of a film a second."""
 QUALITY = 92
 """Of the photographs."""
+FINE = 2
+"""Looks per pixel along x and y at grounds, whose prints and blades are finer than pixels."""
 
 
 def way_around(
@@ -157,22 +160,15 @@ def main() -> None:
     parser.add_argument("--size", type=int, nargs=2, default=[640, 480])
     parser.add_argument("--seed", type=int, default=0)
     parser.add_argument("--zoomed", type=float, default=1.0)
-    for name in ("plain", "wall", "clutter", "flash", "rolled", "film"):
+    add_switches(parser)
+    for name in ("plain", "film"):
         parser.add_argument(f"--{name}", action="store_true")
     asked = parser.parse_args()
     scene, rng = assemble(asked.model), np.random.default_rng(asked.seed)
     boxes = boxes_of(scene)
     aims = way_around(boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0), asked, rng)
     views = pictures(scene, aims)
-    look = Look(
-        seed=asked.seed,
-        wall=asked.wall,
-        clutter=asked.clutter,
-        flash=asked.flash,
-        rolled=asked.rolled,
-        plain=asked.plain,
-        grid=1,
-    )
+    look = look_of(asked, plain=asked.plain, grid=FINE if asked.on else 1)
     options = [word for word in sys.argv[1:] if word not in map(str, (*asked.model, asked.out))]
     note = f"{', '.join(p.name for p in asked.model)}, {' '.join(options)}"
     write_set(
