@@ -9,6 +9,7 @@ from scipy.ndimage import gaussian_filter
 from corporeal.geometry.epipolar import projection
 from corporeal.geometry.ground_plane import Plane, Search, ground_plane
 from corporeal.geometry.region import Region, region
+from corporeal.masking.swept_floor import swept_floor
 from corporeal.masking.volume import pixels_of
 from corporeal.types import Camera, Views
 
@@ -50,8 +51,9 @@ class Seeds:
 def looked_at(views: Views, points: Float[np.ndarray, "N 3"] | None) -> Seeds:
     """Take for an object what all cameras look at (Campbell et al., volumetric graph cuts, 2010).
 
-    Where points say where the floor is, those above it are on objects and those on it are not;
-    otherwise the middle of the ball that all look at is, and what is beside it is not.
+    Where points say where the floor is, or a pattern that is seen on a level plane, points above it
+    are on objects and those on it are not; otherwise the middle of the ball that all look at is,
+    and what is beside it is not.
 
     Args:
         views: The pictures.
@@ -63,7 +65,7 @@ def looked_at(views: Views, points: Float[np.ndarray, "N 3"] | None) -> Seeds:
     inside = np.exp(-np.square(far / CENTRAL))
     outside = np.where(far > 1, 1.0, ANYWHERE)
     known = np.zeros((0, 3)) if points is None else near(points, around, ABOUT)
-    floor = floor_of(views.cameras, known, around)
+    floor = floor_of(views.cameras, known, around) or swept_floor(views, around)
     if floor is not None:
         height = (known @ floor.normal - floor.offset) / around.radius
         above = near(known[height > ABOVE], around, WITHIN)
