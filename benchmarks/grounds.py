@@ -61,7 +61,7 @@ def _birch(points: np.ndarray) -> np.ndarray:
 
 
 def _rectangle(sides: tuple[float, float]) -> Callable[[np.ndarray], np.ndarray]:
-    return lambda points: (np.abs(points[:, :2]) < sides).all(axis=1)
+    return lambda points: np.abs(points[:, :2] / sides).max(axis=1) < 1
 
 
 def _disc(points: np.ndarray) -> np.ndarray:
