@@ -7,9 +7,11 @@ import pytest
 
 from corporeal.formats.colmap import ColmapCamera, ColmapImage, ColmapModel
 from corporeal.poses import look_alikes as check
-from corporeal.poses.attempt import Attempt, pairs_of
+from corporeal.poses.attempt import Attempt
+from corporeal.poses.gather import Gathered
 from corporeal.poses.judge import doubt_of_neighbours, doubts
 from corporeal.poses.look_alikes import checked_by_neighbours, groups_of, look_alikes
+from corporeal.poses.pairs import pairs_of
 from corporeal.render.camera import camera_of
 from patterned_scene import ring
 
@@ -17,6 +19,7 @@ COUNT, STEP = 24, 15
 SEEN = 0.7
 """Share of the points in a picture that are found in it."""
 NAMES = tuple(f"{k:02d}.jpg" for k in range(COUNT))
+ALBUM = Gathered(NAMES, ((400, 300),) * COUNT, ())
 ALL = [(NAMES[a], NAMES[b]) for a, b in pairs_of(COUNT)]
 
 
@@ -110,7 +113,7 @@ def test_few_that_are_misplaced_are_taken_out_and_many_are_not(half, tmp_path, m
     monkeypatch.setattr(check, "read_colmap", lambda place: model)
     monkeypatch.setattr(check, "look_alikes", lambda model, compared: groups)
     monkeypatch.setattr(check, "without_pictures", lambda place, names: (24 - len(names), 900))
-    told = checked_by_neighbours(Attempt("plain", 24, 24, 1000, focal=0.8), tmp_path, NAMES)
+    told = checked_by_neighbours(Attempt("plain", 24, 24, 1000, focal=0.8), tmp_path, ALBUM)
     if half:
         assert told.parted == (12, 12) and told.registered == 24 and told.misplaced == ()
     else:
@@ -119,4 +122,4 @@ def test_few_that_are_misplaced_are_taken_out_and_many_are_not(half, tmp_path, m
 
 def test_nothing_is_looked_for_where_nothing_was_found():
     told = Attempt("plain", 24)
-    assert checked_by_neighbours(told, Path("nowhere"), NAMES) is told
+    assert checked_by_neighbours(told, Path("nowhere"), ALBUM) is told

@@ -25,6 +25,7 @@ from corporeal.machine import cores
 from corporeal.poses.gather import IMAGES, LONGEST, Gathered, lens_stated
 from corporeal.poses.stamped import FOLDER as STAMPS
 
+from corporeal.poses.pairs import Pairs, pairs_of
 Progress = Callable[[float, str], None]
 
 Way = Literal["plain", "masked", "thorough"]
@@ -39,10 +40,6 @@ WORDS: dict[Way, str] = {
 
 MOST_POINTS = 4096
 """Points of a picture that are matched, the largest ones. Twice as many take four times as long."""
-EXHAUSTIVE = 80
-"""Pictures up to which all pairs are matched; beyond, each with its neighbours by name."""
-OVERLAP = (*range(1, 11), 16, 32, 64)
-"""Distances by name at which they are then matched."""
 BATCH, BLOCK = 4, 100
 """Pictures and pairs that are worked on before progress is told."""
 SHARE = 0.7
@@ -163,10 +160,14 @@ def without_pictures(place: Path, names: Collection[str]) -> tuple[int, int]:
     return model.num_reg_images(), model.num_points3D()
 
 
-def pairs_of(total: int) -> list[tuple[int, int]]:
-    """Return which of so many pictures, in order of their names, are matched with one another."""
-    apart = range(1, total) if total <= EXHAUSTIVE else OVERLAP
-    return [(k, k + d) for k in range(total) for d in apart if k + d < total]
+def matched(gathered: Gathered, way: Way) -> Pairs:
+    """Return which pictures are matched with one another, by number.
+
+    The thorough attempt finds what small copies do not.
+    """
+    if gathered.pairs is None or way == "thorough":
+        return pairs_of(len(gathered.names))
+    return list(gathered.pairs)
 
 
 class _Work:
@@ -180,7 +181,7 @@ class _Work:
         self, pycolmap: Any, folder: Path, out: Path, gathered: Gathered, way: Way
     ) -> None:
         self.pycolmap, self.images, self.out = pycolmap, folder / IMAGES, out
-        self.gathered, self.thorough = gathered, way == "thorough"
+        self.gathered, self.way, self.thorough = gathered, way, way == "thorough"
         self.masks = folder / MASKS[0] if way == "masked" else None
         self.stamps = folder / STAMPS
         self.least = 10 if self.thorough else 15
@@ -229,7 +230,7 @@ class _Work:
         matching.guided_matching = self.thorough
         checking = self.pycolmap.TwoViewGeometryOptions()
         checking.ransac.random_seed = 0
-        names, pairs = self.gathered.names, pairs_of(len(self.gathered.names))
+        names, pairs = self.gathered.names, matched(self.gathered, self.way)
         pairing = self.pycolmap.ImportedPairingOptions()
         pairing.match_list_path = str(self.out / "pairs.txt")
         for first in range(0, len(pairs), BLOCK):

@@ -58,6 +58,8 @@ class Gathered:
     """What was left out, and why, in sentences."""
     doubled: bool = True
     """Whether points are looked for in pictures of twice their size, too, where small ones are."""
+    pairs: tuple[tuple[int, int], ...] | None = None
+    """Numbers of pictures that are matched with one another; None: as many as time allows."""
 
 
 def gather(source: Path, folder: Path, progress: Progress) -> Gathered:

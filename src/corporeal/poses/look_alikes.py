@@ -16,7 +16,8 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.formats.colmap import ColmapModel, read_colmap
-from corporeal.poses.attempt import SHARE, Attempt, pairs_of, without_pictures
+from corporeal.poses.attempt import SHARE, Attempt, matched, without_pictures
+from corporeal.poses.gather import Gathered
 from corporeal.poses.judge import doubts
 
 NEAR = 18.0
@@ -37,7 +38,7 @@ GAIN = 1e-9
 """Below it nothing is gained by moving a picture to another group."""
 
 
-def checked_by_neighbours(told: Attempt, place: Path, names: Collection[str]) -> Attempt:
+def checked_by_neighbours(told: Attempt, place: Path, gathered: Gathered) -> Attempt:
     """Take pictures that stand where they cannot out of a model; return what is left of it.
 
     Where these are too many, it is left as it is: a thing that was turned over between two rounds
@@ -46,13 +47,13 @@ def checked_by_neighbours(told: Attempt, place: Path, names: Collection[str]) ->
     Args:
         told: What came of the attempt.
         place: Holds the model, which is changed.
-        names: Of all pictures, in the order in which they were matched.
+        gathered: All pictures.
 
     """
     if doubts(told):
         return told
-    order = list(names)
-    compared = [(order[a], order[b]) for a, b in pairs_of(len(order))]
+    order = gathered.names
+    compared = [(order[a], order[b]) for a, b in matched(gathered, told.way)]
     groups = look_alikes(read_colmap(place), compared)
     misplaced = tuple(sorted(name for group in groups[1:] for name in group))
     if not misplaced:

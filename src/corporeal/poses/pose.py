@@ -44,6 +44,7 @@ from corporeal.poses.judge import (
 from corporeal.poses.look_alikes import checked_by_neighbours
 from corporeal.poses.middles import AS_TAKEN, CROPPED, SLIGHTLY_CROPPED, apart, clause, sentence
 from corporeal.poses.mirrored import TWO_KINDS, mirrored
+from corporeal.poses.pairs import partners_of
 from corporeal.typed import typed
 
 Progress = Callable[[float, str], None]
@@ -260,14 +261,16 @@ def _places(folder: Path, gathered: Gathered, progress: Progress) -> tuple[Gathe
     kept = np.setdiff1d(np.arange(len(gathered.names)), groups.beside)
     if groups.beside:
         gathered = without(gathered, groups)
-    fine = not well_joined(looked.shared[np.ix_(kept, kept)], gathered.sizes)
-    return replace(gathered, doubled=fine), len(groups.beside)
+    shared = looked.shared[np.ix_(kept, kept)]
+    fine = not well_joined(shared, gathered.sizes)
+    pairs = tuple(partners_of(shared))
+    return replace(gathered, doubled=fine, pairs=pairs), len(groups.beside)
 
 
 def _checked(told: Attempt, folder: Path, gathered: Gathered) -> Attempt:
     """Take out of a model which pictures cannot be where it has them, by neighbours and masks."""
     place = folder / told.way / "sparse" / "0"
-    return checked_by_masks(checked_by_neighbours(told, place, gathered.names), folder, place)
+    return checked_by_masks(checked_by_neighbours(told, place, gathered), folder, place)
 
 
 def _worth_trying(way: Way, folder: Path, tried: list[Attempt], smeared: int) -> bool:
