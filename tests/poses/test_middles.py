@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 from corporeal.poses import pose as posing
-from corporeal.poses.attempt import Attempt, adjust
+from corporeal.poses.adjust import adjust
+from corporeal.poses.attempt import Attempt
 from corporeal.poses.gather import Gathered
 from corporeal.poses.middles import AS_TAKEN, CROPPED, apart
 
@@ -53,7 +54,7 @@ def model(folder, middles, rng):
             track.add_element(k + 1, n)
     for point, track in zip(points, tracks, strict=True):
         made.add_point3D(point, track)
-    adjust(made)
+    adjust(pycolmap, made)
     folder.mkdir(parents=True, exist_ok=True)
     made.write_text(str(folder))
     return folder

@@ -6,7 +6,7 @@ no vocabulary tree (loop detection).
 """
 
 import shutil
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from functools import partial
@@ -22,10 +22,11 @@ from scipy.sparse.csgraph import connected_components
 from corporeal.errors import UserError
 from corporeal.formats.photographs import MASKS
 from corporeal.machine import cores
+from corporeal.poses.adjust import Taken, adjusted
 from corporeal.poses.gather import IMAGES, LONGEST, Gathered, lens_stated
+from corporeal.poses.pairs import Pairs, pairs_of
 from corporeal.poses.stamped import FOLDER as STAMPS
 
-from corporeal.poses.pairs import Pairs, pairs_of
 Progress = Callable[[float, str], None]
 
 Way = Literal["plain", "masked", "thorough"]
@@ -46,8 +47,6 @@ SHARE = 0.7
 """Of the pictures that must be registered."""
 CONTRADICTS = 5.0
 """Median angle by which two groups turn pictures apart, from which on one is wrong [deg]."""
-EXACT = 0.5
-"""Reprojection error [px] from which on a point counts for less (Cauchy's loss)."""
 HALF = 127
 """Of 255: more than that in a mask is on the object."""
 DATABASE = "database.db"
@@ -134,7 +133,8 @@ def attempt(folder: Path, out: Path, gathered: Gathered, way: Way, progress: Pro
             progress(begin + (end - begin) * share, WORDS[way] + what)
 
         _watched(pycolmap, partial(step, told))
-    return replace(_judged(work.models, out, gathered, way), joined=work.joined)
+    taken = how_taken(folder / IMAGES, gathered)
+    return replace(_judged(work.models, out, gathered, way, taken), joined=work.joined)
 
 
 def _watched(pycolmap: Any, work: Callable[[Any], None]) -> None:
@@ -181,7 +181,8 @@ class _Work:
         self, pycolmap: Any, folder: Path, out: Path, gathered: Gathered, way: Way
     ) -> None:
         self.pycolmap, self.images, self.out = pycolmap, folder / IMAGES, out
-        self.gathered, self.way, self.thorough = gathered, way, way == "thorough"
+        self.gathered, self.thorough = gathered, way == "thorough"
+        self.way: Way = way
         self.masks = folder / MASKS[0] if way == "masked" else None
         self.stamps = folder / STAMPS
         self.least = 10 if self.thorough else 15
@@ -290,6 +291,13 @@ def by_camera(images: Path, gathered: Gathered) -> list[list[str]]:
     return list(made.values())
 
 
+def how_taken(images: Path, gathered: Gathered) -> dict[str, Taken]:
+    """Return what is known of how each picture was taken, by its name."""
+    reduced = gathered.reduced or (1.0,) * len(gathered.names)
+    each = zip(gathered.names, reduced, strict=True)
+    return {name: Taken(lens_stated(images / name), share) for name, share in each}
+
+
 def _points_allowed(masks: Path, out: Path, gathered: Gathered) -> Path:
     """Write masks as COLMAP looks for them: named after pictures, and as large as these.
 
@@ -307,18 +315,20 @@ def _points_allowed(masks: Path, out: Path, gathered: Gathered) -> Path:
     return place
 
 
-def _judged(models: Any, out: Path, gathered: Gathered, way: Way) -> Attempt:
+def _judged(
+    models: Any, out: Path, gathered: Gathered, way: Way, taken: Mapping[str, Taken]
+) -> Attempt:
     total = len(gathered.names)
-    best = max(models.values(), key=lambda m: m.num_reg_images(), default=None)
+    first = best = max(models.values(), key=lambda m: m.num_reg_images(), default=None)
     if best is None:
         return Attempt(way, total, left_out=gathered.names)
     if best.num_reg_images() >= SHARE * total:  # of two pictures nothing can be adjusted
-        adjust(best)
+        best = adjusted(require(), best, taken)
     place = out / "sparse" / "0"
     place.mkdir(parents=True, exist_ok=True)
     best.write_text(str(place))
     placed = _placed(best)
-    beside = (beside_first(best, m) for m in models.values() if m is not best)
+    beside = (beside_first(best, m) for m in models.values() if m is not first)
     focal, bent = _lens([c for c in best.cameras.values()])
     return Attempt(
         way,
@@ -353,34 +363,6 @@ def beside_first(first: Any, other: Any) -> int:
     if len(cosine) and np.degrees(np.arccos(np.median(cosine))) > CONTRADICTS:
         return len(both[1])
     return len(both[1]) - len(common)
-
-
-def adjust(model: Any, middles_alone: bool = False) -> None:
-    """Adjust cameras and points once more, so that wrong matches count for little.
-
-    COLMAP's last adjustment is one of least squares, which points that are 4 px off pull with 64
-    times the weight of those that are half a pixel off.
-
-    Args:
-        model: A reconstruction of pycolmap.
-        middles_alone: Whether of lenses the middle is adjusted, and nothing else.
-
-    """
-    pycolmap = require()
-    options = pycolmap.BundleAdjustmentOptions()
-    options.print_summary = False
-    options.ceres.solver_options.num_threads = cores()
-    options.ceres.loss_function_type = pycolmap.LossFunctionType.CAUCHY
-    options.ceres.loss_function_scale = EXACT
-    options.refine_principal_point = middles_alone
-    options.refine_focal_length = options.refine_extra_params = not middles_alone
-    chosen = pycolmap.BundleAdjustmentConfig()
-    for number in model.reg_image_ids():
-        chosen.add_image(number)
-    chosen.fix_gauge(pycolmap.BundleAdjustmentGauge.TWO_CAMS_FROM_WORLD)
-    # Not pycolmap.bundle_adjustment, which writes to the terminal whatever the level.
-    pycolmap.create_default_bundle_adjuster(options, chosen, model).solve()
-    model.update_point_3d_errors()
 
 
 def _joined(pycolmap: Any, database: Path, least: int) -> int:

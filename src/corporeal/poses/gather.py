@@ -60,6 +60,8 @@ class Gathered:
     """Whether points are looked for in pictures of twice their size, too, where small ones are."""
     pairs: tuple[tuple[int, int], ...] | None = None
     """Numbers of pictures that are matched with one another; None: as many as time allows."""
+    reduced: tuple[float, ...] = ()
+    """Length of each over that of its photograph [-]; none: all were as large."""
 
 
 def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
@@ -78,6 +80,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     step = max(1, -(-len(found) // MOST))
     taken, bad, twins = spread(found, step), [], 0
     names: dict[str, tuple[int, int]] = {}
+    reduced: list[float] = []
     cut_out: dict[str, Image.Image] = {}
     known = np.zeros((0, *THUMBNAIL))
     for number, file in enumerate(taken):
@@ -93,6 +96,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
         known = np.concatenate([known, thumbnail[None]])
         name = _name(file, set(names))
         names[name] = picture.size
+        reduced.append(picture.info["reduced"])
         _write(picture, folder / IMAGES / name)
         for kinds in (MASKS, INSTANCES):
             _copy_mask(file, source, kinds, folder, name)
@@ -103,7 +107,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     said += left_out(len(taken), bad)
     said += [*not_read_beside(found), *_cropped(tuple(names.values()))]
     _refuse_few(source, len(names), len(taken), bad, twins)
-    return Gathered(tuple(names), tuple(names.values()), tuple(said))
+    return Gathered(tuple(names), tuple(names.values()), tuple(said), reduced=tuple(reduced))
 
 
 def spread(found: Sequence[Path], step: int) -> list[Path]:
@@ -211,6 +215,7 @@ def _upright(file: Path) -> tuple[Image.Image, Image.Image | None]:
             why = "is damaged: its pixels cannot be read to the end"
             if opened.width * opened.height > MAX_PIXELS:
                 raise _UnusableError(f"claims {opened.width} × {opened.height} pixels")
+            longest = max(opened.size)
             opened.draft("RGB", (LONGEST, LONGEST))
             turned = ImageOps.exif_transpose(opened)
             exif = _of_lens(turned.getexif())
@@ -222,7 +227,8 @@ def _upright(file: Path) -> tuple[Image.Image, Image.Image | None]:
     picture.thumbnail((LONGEST, LONGEST), Image.Resampling.LANCZOS)
     alpha = picture.getchannel("A") if picture.mode == "RGBA" else None
     picture = picture.convert("RGB")
-    picture.info = {"exif": exif}  # nothing else that the file says: Pillow would copy comments
+    # Nothing else that the file says: Pillow would copy comments.
+    picture.info = {"exif": exif, "reduced": max(picture.size) / longest}
     return picture, alpha
 
 

@@ -167,6 +167,7 @@ def without(gathered: Gathered, groups: Groups) -> Gathered:
         gathered,
         names=tuple(gathered.names[k] for k in kept),
         sizes=tuple(gathered.sizes[k] for k in kept),
+        reduced=tuple(gathered.reduced[k] for k in kept if gathered.reduced),
         said=(*gathered.said, *said),
     )
 

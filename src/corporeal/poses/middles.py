@@ -12,7 +12,8 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
-from corporeal.poses.attempt import adjust, require
+from corporeal.poses.adjust import adjust
+from corporeal.poses.attempt import require
 
 MOST_POINTS = 1500
 """Points that are asked, those that most pictures show: enough for 150 in each picture."""
@@ -38,7 +39,7 @@ def apart(place: Path) -> float:
     pycolmap = require()
     model = _each_with_its_own(pycolmap, pycolmap.Reconstruction(str(place)))
     before = _error(model)
-    adjust(model, middles_alone=True)
+    adjust(pycolmap, model, middles_alone=True)
     spread = float(NORMAL * _off(_middles(model)).max())
     return spread if _error(model) < BETTER * before else 0.0
 

@@ -36,7 +36,8 @@ def partners_of(shared: Int[np.ndarray, "N N"]) -> Pairs:
     total = len(shared)
     few = ((shared > 0).sum(axis=1) < FEW).tolist()
     best = np.argsort(-shared, axis=1, kind="stable")[:, :PARTNERS].tolist()
-    alike = {tuple(sorted((a, b))) for a, row in enumerate(best) for b in row if shared[a, b] > 0}
+    kept = [(a, b) for a, row in enumerate(best) for b in row if shared[a, b] > 0]
+    alike = {(min(a, b), max(a, b)) for a, b in kept}
     unsure = {(a, b) for a, b in pairs_of(total) if few[a] or few[b]}
     return sorted(alike | unsure | set(_at(range(1, BESIDE + 1), total)))
 
