@@ -13,7 +13,7 @@ from corporeal.geometry.harmonics import DC
 from corporeal.geometry.mesh import Mesh, signed_volume
 from corporeal.geometry.shape import Shape
 from corporeal.splats.solid import _without_specks, solids
-from corporeal.types import Gaussians
+from corporeal.types import Gaussians, Views
 
 PIXEL = 3.5 / 168
 """Of the pictures, at the things [m]."""
@@ -146,6 +146,21 @@ def test_a_bowl_stays_open():
 
 
 @pytest.mark.slow
+def test_what_a_mirror_shows_deep_inside_takes_nothing_that_outlines_need(monkeypatch):
+    """A mirror image lies behind the face, and photographs agree on where."""
+
+    def mirrored(rendering, *_):
+        return replace(rendering, depth=rendering.depth + np.float32(0.2))
+
+    monkeypatch.setattr("corporeal.splats.solid.deepened", mirrored)
+    ball = trimesh.creation.icosphere(4, 0.5).apply_translation([0, 0, 0.5])
+    gaussians, owner = together(clad(ball))
+    mine = masks(eyes(), ball)
+    views = Views(np.zeros((*mine.shape, 3), np.uint8), eyes())
+    (solid,) = solids(gaussians, owner, eyes(), mine, views, threads=1)
+    assert solid.volume == pytest.approx(ball.volume, rel=0.05)
+
+
 def test_what_stands_on_legs_is_hollow_below():
     legs = [box([x - 0.04, y - 0.04, 0], [x + 0.04, y + 0.04, 0.6]) for x, y in LEGS]
     table = trimesh.boolean.union([box([-0.5, -0.5, 0.6], [0.5, 0.5, 0.7]), *legs])

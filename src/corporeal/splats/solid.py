@@ -26,6 +26,7 @@ from corporeal.splats.disjoint import disjoint
 from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
 from corporeal.splats.mouths import entered
+from corporeal.splats.needed import needed
 from corporeal.splats.outline import fitted, outlined
 from corporeal.splats.overhangs import without_overhangs
 from corporeal.splats.photometric import Agreed, agreed, pictured
@@ -249,7 +250,10 @@ def _emptied(
     """Carve an object; return its distance [m], where it meets others, and warnings."""
     distance = carved(grid, scene.rendering, scene.floor, pool)
     if scene.shallow is not None:
+        assert scene.shown is not None
         shallow, mouth = carved(grid, scene.shallow, scene.floor, pool), MOUTH * _pixel(scene, k)
+        rows = scene.rendering.rows
+        distance = needed(shallow, distance, grid, scene.shown == k, rows, pool)
         distance = entered(shallow, distance, mouth / grid.cell)
     cut = _share(distance, grid, scene, k, survey)
     warnings = _cleaned(distance)
