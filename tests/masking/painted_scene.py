@@ -15,6 +15,9 @@ OTHER, OTHER_RADIUS, BLUE = (0.85, -0.3, FLOOR + 0.2), 0.2, (0.1, 0.2, 0.7)
 """Middle, radius and colour of a second thing."""
 HEAD = (0.6, -0.2, FLOOR + OTHER_RADIUS)
 """Its middle where it touches the ball."""
+CLOSE = (0.68, -0.2, FLOOR + OTHER_RADIUS)
+"""Its middle where it all but does."""
+MIDDLES = {"head": HEAD, "close": CLOSE}
 RED, GREY = (0.75, 0.15, 0.1), (0.5, 0.5, 0.45)
 
 
@@ -23,8 +26,8 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
 
     belt: colour of a belt about the ball, and of what both sides of all pictures show; flat: radius
     of three discs of the ball's colour that lie on the floor around it; other: a blue "ball" beside
-    it, or a blue "disc" that lies there, or a "head", the blue ball where it touches, which is in
-    the masks, too: both sides of all pictures are blue then.
+    it, or a blue "disc" that lies there, or a "head", the blue ball where it touches, or "close",
+    where it all but does, which is in the masks, too: both sides of all pictures are blue then.
     """
     random = np.random.default_rng(seed)
     mottled = random.uniform(-1, 1, (64, 64, 64))
@@ -44,8 +47,8 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
         with np.errstate(divide="ignore"):
             down = np.where(rays[..., 2] < 0, (FLOOR - eye[2]) / rays[..., 2], 30.0)
         far = np.where(on, -b - np.sqrt(np.maximum(inside, 0)), np.minimum(down, 30.0))
-        blue, near = _met(rays, eye, far, HEAD if other == "head" else OTHER)
-        if other in ("ball", "head"):
+        blue, near = _met(rays, eye, far, MIDDLES[other] if other in MIDDLES else OTHER)
+        if other in ("ball", *MIDDLES):
             on, far = on & ~blue, np.where(blue, near, far)
         place = eye + far[..., None] * rays
         if other == "disc":
@@ -53,7 +56,7 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
         at = (np.floor(place * 16).astype(int) % 64).reshape(-1, 3).T
         tone = mottled[tuple(at)].reshape(HIGH, WIDE)
         colour = np.where((on | on_discs(place, flat))[..., None], ball, ground)
-        if other == "head":
+        if other in MIDDLES:
             colour[np.abs(u - WIDE / 2) > ASIDE] = BLUE
         if other is not None:
             colour[blue] = BLUE
@@ -64,7 +67,7 @@ def scene(ball=RED, ground=GREY, seed=0, count=14, belt=None, flat=0.0, other=No
         light = np.where(on, 0.75 + 0.25 * place[..., 2] / RADIUS, 1.0)
         noisy = colour * light[..., None] + random.normal(scale=0.01, size=colour.shape)
         pictures.append(np.round(255 * np.clip(noisy, 0, 1)).astype(np.uint8))
-        masks.append(on | blue if other == "head" else on)
+        masks.append(on | blue if other in MIDDLES else on)
         near = np.abs(place).max(axis=-1) < 2
         seen.append(place[near][random.permutation(near.sum())[:60]])
     return Views(np.stack(pictures), cameras), np.stack(masks), np.concatenate(seen)

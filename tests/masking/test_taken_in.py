@@ -37,6 +37,14 @@ def test_a_head_of_another_colour_is_taken_in():
     assert agreement(after.inside, masks).mean() > 0.93
 
 
+def test_a_small_thing_close_beside_it_is_taken_in():
+    """Its hull is a piece of its own, of less than a tenth of the ball's, and no crumb."""
+    views, masks, _ = scene(other="close")
+    before, after = before_and_after(views, looked_at(views, None))
+    assert agreement(before.inside, masks).mean() < 0.9, "colours alone do not tell"
+    assert agreement(after.inside, masks).mean() > 0.93
+
+
 @pytest.mark.parametrize("other", [None, "ball", "disc"])
 def test_what_does_not_touch_it_or_lies_there_is_not(other):
     views, _, _ = scene(other=other)

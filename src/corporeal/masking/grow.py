@@ -136,7 +136,7 @@ def grow(
     while turn < ROUNDS or (turn < MOST and settled < SETTLED):
         progress(turn / (MOST + 1), f"growing masks, round {turn + 1}")
         before = before if state is None else state.masks
-        state = _round(side, room, evidence)
+        state = _round(side, room, evidence, seeds.piece)
         if state is None:
             return None
         settled, turn = _agreement(state.masks, before), turn + 1
@@ -181,10 +181,10 @@ class _Round:
     """For the next round."""
 
 
-def _round(side: _Side, room: Volume, evidence: Evidence) -> _Round | None:
+def _round(side: _Side, room: Volume, evidence: Evidence, piece: float | None) -> _Round | None:
     """Cut all pictures, carve, and learn colours anew; None: nothing is left."""
     masks = side.cut(evidence) > HALF
-    hull = room.carved(masks)
+    hull = room.carved(masks, piece)
     if not hull.any():
         return None
     seen = room.silhouettes(hull)

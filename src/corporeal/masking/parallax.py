@@ -34,9 +34,6 @@ MOST = 0.5
 AS_LARGE = 0.08
 """Of the pixels of masks that a piece shows, in the median view: noise and edges of a print have up
 to .05."""
-AT_EDGE = 0.15
-"""Share of a piece at the edge of the ball that cameras look at, above which it is a
-wall: .27 of one behind a chair, up to .06 of things."""
 HIGH = 0.05
 """Height of its upper end, in radii of the ball."""
 SURE = 0.8
@@ -64,8 +61,7 @@ class Standing:
 
     def free(self, piece: Bool[np.ndarray, " M"]) -> bool:
         """Tell whether a piece of the hull rises above the floor, and is no wall."""
-        room = self.room
-        return bool(room.outer[piece].mean() <= AT_EDGE and room.height[piece].max() > HIGH)
+        return not self.room.wall(piece) and bool(self.room.height[piece].max() > HIGH)
 
 
 def standing(

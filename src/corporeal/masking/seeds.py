@@ -46,6 +46,8 @@ class Seeds:
     """Pixels that show no object."""
     cone: Bool[np.ndarray, "V H W"] | None = None
     """Pixels in which objects must be seen; None: any."""
+    piece: float | None = None
+    """Smaller pieces of the hull, as shares of the largest, are chance; None: as ever."""
 
 
 def looked_at(views: Views, points: Float[np.ndarray, "N 3"] | None) -> Seeds:

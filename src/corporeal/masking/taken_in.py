@@ -76,4 +76,5 @@ def _begun_again(seeds: Seeds, masks: Bool[np.ndarray, "V H W"], more: Hanging) 
         inside=inside.astype(np.float32),
         outside=outside.astype(np.float32),
         cone=cone if seeds.cone is None else cone & seeds.cone,
+        piece=AS_LARGE**1.5,  # what covers that share of pixels has that of the volume
     )

@@ -20,6 +20,9 @@ PIECE = 0.1
 """Pieces of a hull smaller than that share of the largest are chance."""
 TALL = 0.15
 """Height above the floor, in radii of the ball, of cells that surely hide the floor."""
+AT_EDGE = 0.15
+"""Share of a piece at the edge of the ball that cameras look at, above which it is a
+wall: .27 of one behind a chair, 1.0 of others, up to .06 of things."""
 ON_FLOOR = 0.01
 """Height of the layer that is the floor, in radii of the ball."""
 
@@ -46,14 +49,18 @@ class Volume:
         """Whether a cell is so high above the floor that before it no floor is seen."""
         return self.height > TALL
 
-    def carved(self, masks: Bool[np.ndarray, "V H W"]) -> Bool[np.ndarray, " M"]:
-        """Return which cells masks leave, without small pieces.
+    def carved(
+        self, masks: Bool[np.ndarray, "V H W"], piece: float | None = None
+    ) -> Bool[np.ndarray, " M"]:
+        """Return which cells masks leave, without pieces smaller than a share of the largest.
 
+        That share is ``piece``, or PIECE.
         As few views may see a cell beside the masks as ``geometry.silhouettes.outside`` forgives.
+        Where something is above the floor, what hovers at the edge of the ball is not of it.
         """
         beside, looking = self.votes(masks)
         kept = ~outside(beside, looking) & (looking >= SEEN * len(masks))
-        return self._without_crumbs(kept)
+        return self._without_walls(self._without_crumbs(kept, PIECE if piece is None else piece))
 
     def votes(
         self, masks: Bool[np.ndarray, "V H W"]
@@ -88,13 +95,30 @@ class Volume:
         assert isinstance(found, tuple)
         return found[0].ravel()[self.index], found[1]
 
-    def _without_crumbs(self, kept: np.ndarray) -> np.ndarray:
+    def _without_crumbs(self, kept: np.ndarray, least: float) -> np.ndarray:
         if not kept.any():
             return kept
         piece, count = self.pieces(kept)
         sizes = np.bincount(piece, minlength=count + 1)
         sizes[0] = 0
-        return kept & (sizes >= PIECE * sizes.max())[piece]
+        return kept & (sizes >= least * sizes.max())[piece]
+
+    def _without_walls(self, kept: np.ndarray) -> np.ndarray:
+        """Leave out pieces that hover, and lie at the edge of the ball, if others do not.
+
+        Things stand on the floor; what is as high as that there is a wall of their colours.
+        """
+        piece, count = self.pieces(kept)
+        made = np.zeros_like(kept)
+        for k in range(1, count + 1):
+            one = piece == k
+            if not (self.wall(one) and self.tall[one].all()):
+                made |= one
+        return made if made.any() else kept
+
+    def wall(self, piece: Bool[np.ndarray, " M"]) -> bool:
+        """Tell whether a piece goes on beyond the edge of the ball that cameras look at."""
+        return bool(self.outer[piece].mean() > AT_EDGE)
 
 
 def volume(
