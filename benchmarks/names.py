@@ -122,7 +122,7 @@ def weigh(
     written.visual = TextureVisuals(material=PBRMaterial(name="material", metallicFactor=0.0))
     trimesh.Scene({"mesh": written}).export(path)
     scene = load_scene(path)
-    inventory = describe(scene, from_pictures=from_pictures)
+    inventory = describe(scene, from_pictures=[0] if from_pictures else ())
     parts = segment(scene, inventory)
     anatomies = examine(scene, parts, 0)
     field, leaf = ground_weighed(scene, parts, inventory, GroundConfig()), find("leaf_tissue")

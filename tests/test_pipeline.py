@@ -1,15 +1,17 @@
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import pytest
 
 from corporeal import pipeline, run_files, store
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UserError
-from corporeal.pipeline import Settings, reopen, run
+from corporeal.pipeline import Settings, _Run, reopen, run
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.stages.fill import FillConfig
 from corporeal.types import Film, Inventory, ObjectWords
+from glb_maker import cube
 from handmade import plain, scene
 
 
@@ -126,3 +128,16 @@ def test_a_scene_that_cannot_be_kept_is_built_each_time(building, tmp_path):
     for run_name in ("a", "b"):
         assert pipeline.kept_showcase("duck-on-mud", tmp_path / run_name).exists()
     assert len(built) == 2
+
+
+def test_a_scene_file_keeps_its_name_beside_photographs(tmp_path):
+    """It was called 0-reconstruct, as the folder that what was reconstructed lies in."""
+    made = tmp_path / "run" / "0-reconstruct"
+    made.mkdir(parents=True)
+    cube().save(made / "bananas.glb")
+    (tmp_path / "fall.toml").write_text('file = "bananas"\n')
+    (tmp_path / "bananas").mkdir()
+    (tmp_path / "bananas" / "transforms.json").touch()
+    asked = _Run([tmp_path / "fall.toml"], tmp_path / "run", Settings(), silent)
+    asked.made = asked.made.having("reconstruct", SimpleNamespace(names=("bananas",)))
+    assert asked._assemble(tmp_path / "run" / "1-assemble", lambda *_: None).name == "fall"

@@ -399,14 +399,17 @@ class _Run:
         return self._keep(folder, made)
 
     def _assemble(self, folder: Path, progress: Progress) -> Scene:
-        from corporeal.stages.assemble import assemble
+        from corporeal.stages.assemble import assemble, titled
 
         progress(0.0, "reading the scene")
         inputs, config = self.inputs, self.settings.assemble
         if self.made.reconstruct is not None:
             inputs = [_modelled(self.inputs[0], self.folder / FOLDERS["reconstruct"])]
             config = replace(config, extent=())  # the reconstruction has its size from them
-            return self._keep(folder, assemble(inputs, config))
+            scene = assemble(inputs, config)
+            if self.inputs[0].suffix.lower() == ".toml":
+                scene = replace(scene, name=titled(self.inputs[0]))
+            return self._keep(folder, scene)
         return self._keep(folder, assemble(inputs, config, axis(self.settings.reconstruct.up)))
 
     def _describe(self, folder: Path, progress: Progress) -> Inventory:
@@ -414,8 +417,9 @@ class _Run:
 
         progress(0.0, "recognising")
         config, library = self.settings.describe, self.settings.ground.library
-        pictures = self.made.reconstruct is not None
-        made = describe(self.made.scene, config, library, progress, pictures)
+        found = self.made.reconstruct
+        shown = range(0 if found is None else len(found.names))  # models beside them come after
+        made = describe(self.made.scene, config, library, progress, shown)
         if made.transcript:
             store.write_json(folder / "transcript.json", made.transcript)
         return self._keep(folder, made)

@@ -87,7 +87,7 @@ def test_a_wall_is_that_of_what_a_person_says_it_is_made_of(tmp_path, said, wall
     (tmp_path / "said.yaml").write_text(f"bowl_0: {said}\n")
     config = DescribeConfig(annotations=tmp_path / "said.yaml")
     bowl = scene(("bowl_0", [("mesh", plain(), {})]))
-    (thing,) = describe(bowl, config, from_pictures=True).objects
+    (thing,) = describe(bowl, config, from_pictures=[0]).objects
     (words,) = thing.parts
     assert words.structure == "sheet"
     assert words.thickness == (wall and pytest.approx(wall))
@@ -96,7 +96,7 @@ def test_a_wall_is_that_of_what_a_person_says_it_is_made_of(tmp_path, said, wall
 
 @pytest.mark.parametrize("name", ["wine glass", "pint glass", "teacup", "glass tumbler"])
 def test_glasses_are_open_ware(name):
-    (thing,) = describe(scene((name, [("mesh", plain(), {})])), from_pictures=True).objects
+    (thing,) = describe(scene((name, [("mesh", plain(), {})])), from_pictures=[0]).objects
     assert [p.structure for p in thing.parts] == ["sheet"]
 
 

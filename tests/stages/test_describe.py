@@ -45,13 +45,13 @@ def test_a_stated_thickness_of_zero_means_solid():
 def test_open_ware_from_pictures_is_no_solid_and_that_is_said():
     """What is plain inside looks solid; a model of the same shows its wall itself."""
     bowl = scene(("bowl_0", [("mesh", plain(), {})]))
-    made = describe(bowl, from_pictures=True)
+    made = describe(bowl, from_pictures=[0])
     said = words(made)[("bowl_0", "bowl")]
     assert (said.structure, said.built_by, said.wall_unseen) == ("sheet", "metadata", True)
     assert "By its name it is taken for open ware" in made.warnings[0]
     drawn = describe(bowl)
     assert words(drawn)[("bowl_0", "bowl")].structure is None and not drawn.warnings
-    assert not describe(scene(THING), from_pictures=True).warnings
+    assert not describe(scene(THING), from_pictures=[0]).warnings
 
 
 def test_open_ware_from_pictures_stays_so_whatever_a_person_says_it_is_made_of(tmp_path):
@@ -59,11 +59,11 @@ def test_open_ware_from_pictures_stays_so_whatever_a_person_says_it_is_made_of(t
     (tmp_path / "said.yaml").write_text("bowl_0: steel\n")
     config = DescribeConfig(annotations=tmp_path / "said.yaml")
     bowl = scene(("bowl_0", [("mesh", plain(), {})]))
-    said = words(describe(bowl, config, from_pictures=True))[("bowl_0", "bowl")]
+    said = words(describe(bowl, config, from_pictures=[0]))[("bowl_0", "bowl")]
     assert (said.material, said.answered_by) == ("steel", "annotation")
     assert (said.structure, said.wall_unseen) == ("sheet", True)
     (tmp_path / "said.yaml").write_text("bowl_0: { material: steel, structure: solid }\n")
-    said = words(describe(bowl, config, from_pictures=True))[("bowl_0", "bowl")]
+    said = words(describe(bowl, config, from_pictures=[0]))[("bowl_0", "bowl")]
     assert said.structure == "solid"
     (tmp_path / "said.yaml").write_text("bowl_0: steel\n")
     assert words(describe(bowl, config))[("bowl_0", "bowl")].structure is None
@@ -72,14 +72,14 @@ def test_open_ware_from_pictures_stays_so_whatever_a_person_says_it_is_made_of(t
 def test_no_wall_from_pictures_is_believed_whoever_says_that_there_is_one(tmp_path):
     (tmp_path / "said.yaml").write_text("thing_0: { material: steel, structure: sheet }\n")
     config = DescribeConfig(annotations=tmp_path / "said.yaml")
-    said = words(describe(scene(THING), config, from_pictures=True))[("thing_0", "thing")]
+    said = words(describe(scene(THING), config, from_pictures=[0]))[("thing_0", "thing")]
     assert (said.structure, said.built_by, said.wall_unseen) == ("sheet", "annotation", True)
     assert not words(describe(scene(THING), config))[("thing_0", "thing")].wall_unseen
 
 
 @pytest.mark.parametrize("name", ["frypan", "iron skillet", "steel frying pan"])
 def test_pans_are_open_ware(name):
-    said = describe(scene((name, [("mesh", plain(), {})])), from_pictures=True)
+    said = describe(scene((name, [("mesh", plain(), {})])), from_pictures=[0])
     assert [p.structure for o in said.objects for p in o.parts] == ["sheet"]
 
 
@@ -160,7 +160,7 @@ def test_a_person_may_name_pieces_of_an_object_from_pictures(tmp_path):
         "vase_0: { parts: { foot: ABS, bowl: { material: glass, thickness_mm: 3 } } }\n"
     )
     config = DescribeConfig(annotations=path)
-    said = words(describe(scene(VASE), config, from_pictures=True))[("vase_0", "vase")]
+    said = words(describe(scene(VASE), config, from_pictures=[0]))[("vase_0", "vase")]
     assert [(p.name, p.material) for p in said.pieces] == [("foot", "ABS"), ("bowl", "glass")]
     assert said.pieces[1].thickness == pytest.approx(0.003)
     assert sum(p.volume_share for p in said.pieces) == 1
@@ -655,3 +655,14 @@ def test_real_files_are_recognised_as_the_facts_recorded_about_them_say(shared_a
         seen |= {(path.stem, w.name): w.material for w in told}
     assert len(seen) == 79
     assert seen == {key: recorded[key] for key in seen}
+
+
+def test_a_model_beside_photographs_is_no_object_from_pictures():
+    """A mug as a model is told by its own faces; only the bowl that was photographed is unseen."""
+    both = scene(("bowl_0", [("mesh", plain(), {})]), ("mug_0", [("mesh", plain(), {})]))
+    made = describe(both, from_pictures=[0])
+    assert [w.split(":")[0] for w in made.warnings] == ["bowl_0"]
+    bowl, mug = (thing.parts[0] for thing in made.objects)
+    alone = describe(scene(("mug_0", [("mesh", plain(), {})]))).objects[0].parts[0]
+    assert (bowl.structure, bowl.wall_unseen) == ("sheet", True)
+    assert (mug.structure, mug.wall_unseen) == (alone.structure, alone.wall_unseen)

@@ -1,6 +1,6 @@
 """A person's annotations, before which every other answer gives way."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from dataclasses import replace
 from pathlib import Path
 
@@ -25,7 +25,11 @@ BUILT = ("structure", "built_by", "wall_unseen")
 
 
 def annotations_of(
-    scene: Scene, identity: Identity, config: DescribeConfig, library: str, from_pictures: bool
+    scene: Scene,
+    identity: Identity,
+    config: DescribeConfig,
+    library: str,
+    from_pictures: Collection[int],
 ) -> dict[tuple[str, str], Annotation]:
     """Return what the annotation file says, by object and part; names as the library spells them.
 
@@ -39,7 +43,8 @@ def annotations_of(
         obj.name: [p.name for p in identity.catalogue if p.object == number]
         for number, obj in enumerate(scene.objects)
     }
-    read = read_annotations(Path(config.annotations), names, names if from_pictures else ())
+    whole = [obj.name for number, obj in enumerate(scene.objects) if number in from_pictures]
+    read = read_annotations(Path(config.annotations), names, whole)
     return {key: _spelt(one, library) for key, one in read.items()}
 
 

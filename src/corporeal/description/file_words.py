@@ -1,6 +1,6 @@
 """What names and statements in the file say of each part."""
 
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 from dataclasses import replace
 from functools import partial
 
@@ -44,7 +44,11 @@ OPEN = ("sheet", "metadata")
 
 
 def words_of_file(
-    scene: Scene, identity: Identity, library: str, from_pictures: bool, unasked: bool
+    scene: Scene,
+    identity: Identity,
+    library: str,
+    from_pictures: Collection[int],
+    unasked: bool,
 ) -> list[list[PartWords]]:
     """Return what the file says of each part of each object: stated, or recognised by its names.
 
@@ -52,7 +56,7 @@ def words_of_file(
         scene: What was assembled.
         identity: Its parts.
         library: Where materials are looked up.
-        from_pictures: Surfaces need not show how deep a vessel is.
+        from_pictures: Objects, by number, whose surfaces need not show how deep a vessel is.
         unasked: No model looks: that a name says wet counts, and what is too thick for a block.
 
     Raises:
@@ -62,14 +66,15 @@ def words_of_file(
     words: list[list[PartWords]] = [[] for _ in scene.objects]
     walls = partial(has_wall, library)
     for entry, seen in zip(identity.catalogue, evidence(scene, identity), strict=True):
+        pictured = entry.object in from_pictures
         found = stated_material(list(seen.surfaces), library) or hollowed(
-            recognise(seen), seen, walls, from_pictures
+            recognise(seen), seen, walls, pictured
         )
         if unasked:
             found = with_usual_wall(found, [name.words for name in seen.general])
-        if unasked and not from_pictures:
+        if unasked and not pictured:
             found = sheet_if_full(no_block(found, seen, library), seen, library)
-        if not from_pictures:
+        if not pictured:
             found = as_said(found, seen, found.material is None or walls(found.material))
         by = "metadata" if found.material else "unknown"
         found = replace(found, name=entry.name, answered_by=by)

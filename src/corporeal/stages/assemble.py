@@ -340,9 +340,13 @@ def _merged(plan: SceneFile, blocks: list[_Block]) -> Scene:
 def _title(plan: SceneFile, blocks: list[_Block]) -> str:
     """Return the scene's name: the scene file's, or its folder's, or the models'."""
     if plan.path.suffix.lower() == ".toml":
-        stem = plan.path.stem
-        return safe(plan.path.resolve().parent.name if stem == "scene" else stem) or "scene"
+        return titled(plan.path)
     return safe("-".join(b.scene.name for b in blocks))[:60] or "scene"
+
+
+def titled(path: Path) -> str:
+    """Return what the scene of a scene file is called."""
+    return safe(path.resolve().parent.name if path.stem == "scene" else path.stem) or "scene"
 
 
 def _timed(scene: Scene, blocks: list[_Block], plan: SceneFile, config: AssembleConfig) -> Scene:

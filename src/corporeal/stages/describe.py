@@ -1,6 +1,6 @@
 """Describe: say in words what is in the scene and what each part is made of."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import replace
 
 from corporeal.description.annotated import annotations_of, with_annotations
@@ -28,7 +28,7 @@ def describe(
     config: DescribeConfig = DEFAULT,
     library: str = "default",
     progress: Progress = lambda fraction, words: None,
-    from_pictures: bool = False,
+    from_pictures: Collection[int] = (),
 ) -> Inventory:
     """Name every object's parts and their materials.
 
@@ -41,8 +41,9 @@ def describe(
         config: Whom to ask.
         library: The library whose names and ranges a model is offered.
         progress: Told the fraction done and what is being done.
-        from_pictures: Objects are one surface each; an annotation may name the pieces of one, and
-            how thick the surface draws a wall tells nothing, whoever says that there is one.
+        from_pictures: Which objects are, by number: one surface each. An annotation may name the
+            pieces of one, and how thick the surface draws a wall tells nothing, whoever says that
+            there is one. Models beside them show their walls.
 
     Raises:
         UserError: An annotation or a recording does not fit the scene, nobody can be asked, or
@@ -50,9 +51,8 @@ def describe(
 
     """
     made = _described(scene, config, library, progress, from_pictures)
-    if not from_pictures:
-        return made
-    return replace(made, objects=tuple(_pictured(thing) for thing in made.objects))
+    told = (_pictured(o) if k in from_pictures else o for k, o in enumerate(made.objects))
+    return replace(made, objects=tuple(told))
 
 
 def _pictured(thing: ObjectWords) -> ObjectWords:
@@ -66,7 +66,11 @@ def _unseen(words: PartWords) -> PartWords:
 
 
 def _described(
-    scene: Scene, config: DescribeConfig, library: str, progress: Progress, from_pictures: bool
+    scene: Scene,
+    config: DescribeConfig,
+    library: str,
+    progress: Progress,
+    from_pictures: Collection[int],
 ) -> Inventory:
     validate(config)
     identity = identify(scene, matter_hint)
@@ -82,7 +86,7 @@ def _described(
             )
             for obj, words in zip(scene.objects, file, strict=True)
         ]
-        open_made = open_ware(objects) if from_pictures else ()
+        open_made = open_ware([o for k, o in enumerate(objects) if k in from_pictures])
         return Inventory(tuple(objects), warnings=(*open_made, *not_filled(scene, objects)))
     critic = connect(critic_of(config.vlm, config.critic), config.record) or model
     asking = Asking(scene, identity, config, library, model, critic)
