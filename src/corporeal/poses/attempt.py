@@ -12,6 +12,8 @@ from dataclasses import dataclass, replace
 from functools import partial
 from itertools import count
 from pathlib import Path
+from signal import SIG_DFL, SIGTERM, getsignal, signal
+from threading import current_thread, main_thread
 from typing import Any, Literal
 
 import numpy as np
@@ -102,6 +104,9 @@ def require() -> Any:
             "'corporeal[poses]'; or pose them, for example with COLMAP."
         ) from missing
     pycolmap.logging.minloglevel = pycolmap.logging.FATAL.value
+    # With it comes a handler of its log's, which prints the stack of whoever is asked to end.
+    if current_thread() is main_thread():
+        signal(SIGTERM, getsignal(SIGTERM) or SIG_DFL)
     return pycolmap
 
 
