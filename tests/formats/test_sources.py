@@ -4,6 +4,7 @@ import pytest
 
 from corporeal.errors import UserError
 from corporeal.formats.sources import called, kind_of, pictured, sources
+from corporeal.stages.assemble import assemble
 from glb_maker import cube
 
 
@@ -58,3 +59,17 @@ def test_names_tell_what_an_input_is(tmp_path):
     assert pictured([models / "a.glb"]) is None
     with pytest.raises(UserError, match=r"a\.ply is a whole scene \(splat\), which stands alone"):
         kind_of([models / "a.glb", tmp_path / "a.ply"])
+
+
+@pytest.mark.parametrize("how", ["beside", "as an object"])
+def test_photographs_among_models_are_told_how_they_come_together(tmp_path, how):
+    """A scene file said of a folder of photographs: is no model, convert it to .glb."""
+    (tmp_path / "bananas").mkdir()
+    (tmp_path / "bananas" / "transforms.json").touch()
+    said = r"bananas is a whole scene \(photographs\).*runs/bananas/0-reconstruct/bananas\.glb"
+    with pytest.raises(UserError, match=said):
+        if how == "beside":
+            kind_of([tmp_path / "bananas", cube().save(tmp_path / "ball.glb")])
+        else:
+            (tmp_path / "scene.toml").write_text('[[object]]\nfile = "bananas"\n')
+            assemble([tmp_path / "scene.toml"])

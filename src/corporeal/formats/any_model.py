@@ -3,14 +3,14 @@
 from dataclasses import dataclass, replace
 from pathlib import Path
 
-from corporeal.errors import BadFileError
+from corporeal.errors import BadFileError, UserError
 from corporeal.formats import glb
 from corporeal.formats.glb import Model
 from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
 from corporeal.formats.meshes import read_mesh
 from corporeal.formats.own_objects import own_objects
 from corporeal.formats.picture_names import HEIC, OTHERS, SHOWN
-from corporeal.formats.sources import GLTF
+from corporeal.formats.sources import GLTF, kind_of, stands_alone
 from corporeal.formats.unit import METRES, Unit
 from corporeal.geometry.arrangement import in_unit
 from corporeal.geometry.gaussians import Up
@@ -75,8 +75,10 @@ def _read(path: Path, objects: Objects, frame: Frame) -> Model:
     return Model(scene, ours=False, stated=mesh.stated)
 
 
-def _not_read(path: Path) -> BadFileError:
+def _not_read(path: Path) -> UserError:
     kind = path.suffix.lower()
+    if path.is_dir() and kind_of([path]) != "model":
+        return stands_alone(path)
     if kind == ".ply":
         held = "a Gaussian splat" if kind_of_ply(path) == "splat" else "points without triangles"
         return BadFileError(path, f"holds {held}, not a mesh.", "Name a mesh.")

@@ -11,7 +11,7 @@ from corporeal.formats.meshes import companions
 from corporeal.formats.picture_names import HEIC, IMAGES, OTHERS, SHOWN
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
-from corporeal.formats.words import writable
+from corporeal.formats.words import safe, writable
 
 GLTF = (".glb", ".gltf")
 SPLATS = (".ply", ".spz", ".sog", ".splat", ".ksplat")
@@ -31,9 +31,18 @@ def kind_of(inputs: Sequence[Path]) -> Kind:
     kinds: list[Kind] = [_kind(Path(path)) for path in inputs]
     if len(kinds) > 1 and set(kinds) != {"model"}:
         strange = next(p for p, kind in zip(inputs, kinds, strict=True) if kind != "model")
-        what = f"{strange} is a whole scene ({_kind(strange)}), which stands alone."
-        raise UserError(f"{what} Name it by itself.")
+        raise stands_alone(strange)
     return kinds[0] if kinds else "model"
+
+
+def stands_alone(path: Path) -> UserError:
+    """Return what to say of photographs or a splat among models, and how they come together."""
+    name = called(path)
+    return UserError(
+        f"{path} is a whole scene ({_kind(path)}), which stands alone. Name it by itself; or run "
+        f"it, and name what that writes, runs/{name}/0-reconstruct/{safe(name)}.glb, in its place. "
+        "One such scene may be the `file` of a scene.toml, with models as its [[object]]s."
+    )
 
 
 def pictured(inputs: Sequence[Path]) -> Path | None:
