@@ -30,3 +30,14 @@ def test_what_would_break_is_said_where_the_film_shows_it_whole(tmp_path, capsys
     text = said.out + said.err
     assert all(words in text for words in told)
     assert ("break" in text) == bool(told)
+
+
+@pytest.mark.parametrize(
+    ("count", "told"), [(6, "and 1 warning more:"), (7, "and 2 warnings more:")]
+)
+def test_warnings_that_are_left_out_are_counted_as_one_counts(tmp_path, capsys, count, told):
+    warnings = tuple(f"Number {k}." for k in range(count))
+    store.write_json(tmp_path / AUDIT, store.plain(run_audit(warnings=warnings)))
+    show_summary(tmp_path)
+    said = capsys.readouterr()
+    assert told in said.out + said.err

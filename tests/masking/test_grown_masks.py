@@ -12,11 +12,11 @@ from corporeal.cli import main
 from corporeal.errors import UserError
 from corporeal.formats.colmap import write_colmap
 from corporeal.formats.mask_files import corrected
-from corporeal.formats.photographs import read_photographs
+from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.transforms import write_views
 from corporeal.masking import grown_masks as module
 from corporeal.masking.grow import grow
-from corporeal.masking.grown_masks import grown_masks
+from corporeal.masking.grown_masks import GrownMasks, grown_masks
 from corporeal.masking.pointed import Pointed
 from corporeal.masking.seeds import looked_at
 from corporeal.pipeline import Settings, _Run, quiet
@@ -161,7 +161,9 @@ def type_in(monkeypatch, *words):
 def test_the_command_says_how_to_go_on(photos, tmp_path, monkeypatch, capsys):
     out = tmp_path / "masks"
     assert type_in(monkeypatch, "masks", photos[0], "--out", out) == 0
-    assert f"corporeal run {photos[0]} --masks {out}" in capsys.readouterr().out.replace("\n", " ")
+    told = capsys.readouterr().out.replace("\n", " ")
+    assert f"Look at {out / MASKS[0]}." in told, "they lie there"
+    assert f"corporeal run {photos[0]} --masks {out}" in told
 
 
 @pytest.mark.parametrize(
@@ -174,6 +176,21 @@ def test_the_command_says_how_to_go_on(photos, tmp_path, monkeypatch, capsys):
 def test_bad_words_get_one_sentence(photos, monkeypatch, capsys, words, said):
     assert type_in(monkeypatch, "masks", photos[0], *words) == 2
     assert said in capsys.readouterr().err.replace("\n", " ")
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [((), "Point at the object with --at or --box"), (("--box", "1", "2", "9", "9"), "--on")],
+)
+def test_who_pointed_is_not_told_to_point(photos, monkeypatch, capsys, words, said):
+    """A box around a thing that was found nowhere was answered with: point at it with --box."""
+    monkeypatch.setattr(
+        "corporeal.masking.grown_masks.grown_masks",
+        lambda *_: GrownMasks(None, ("No masks were grown.",)),
+    )
+    assert type_in(monkeypatch, "masks", photos[0], *words) == 2
+    assert said in (told := capsys.readouterr().err.replace("\n", " "))
+    assert ("Point at the object" in told) == (not words)
 
 
 def test_photographs_without_poses_are_referred(tmp_path, monkeypatch, capsys):

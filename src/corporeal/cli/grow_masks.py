@@ -19,6 +19,7 @@ def verb_masks() -> None:
     a point and a box it begins at what all cameras look at. The masks are PNG pictures with the
     names of the photographs, to be looked at, corrected, and given to `corporeal run --masks`.
     """
+    from corporeal.formats.photographs import MASKS
     from corporeal.formats.sources import called, unposed
     from corporeal.masking.grown_masks import grown_masks
     from corporeal.masking.pointed import Pointed
@@ -54,7 +55,13 @@ def verb_masks() -> None:
     with progress_bars() as tell:
         made = grown_masks(asked.photographs, out, pointed, tell("masks"))
     if made.folder is None:
-        raise UserError(f"{' '.join(made.said)} Point at the object with --at or --box.")
+        if pointed is None:
+            raise UserError(f"{' '.join(made.said)} Point at the object with --at or --box.")
+        raise UserError(
+            "What was pointed at was found in no place in space: the other photographs do not show "
+            "its colours where their poses have it. Point at another place of it, in another "
+            "photograph (--on), or at a part of one colour (--at)."
+        )
     print(*made.said, *filter(None, [made.beside]), sep="\n")
     photographs, masks = quote(str(asked.photographs)), quote(str(out))
-    print(f"Look at {out}. Go on with: corporeal run {photographs} --masks {masks}")
+    print(f"Look at {out / MASKS[0]}. Go on with: corporeal run {photographs} --masks {masks}")

@@ -49,7 +49,8 @@ def _listed(word: str, sentences: Sequence[str]) -> None:
     for sentence in sentences[:MOST_WARNINGS]:
         _say(f"{word}: {sentence}")
     if len(sentences) > MOST_WARNINGS:
-        _say(f"and {len(sentences) - MOST_WARNINGS} {word}s more: see the report.")
+        more = len(sentences) - MOST_WARNINGS
+        _say(f"and {more} {word}{'s' * (more > 1)} more: see the report.")
 
 
 def _say(line: str) -> None:
