@@ -24,6 +24,7 @@ import numpy as np
 from as_photographed import add_switches, degraded, look_of
 from PIL import Image
 
+from corporeal.errors import UserError
 from corporeal.formats.colmap import write_colmap
 from corporeal.geometry.arrangement import boxes_of
 from corporeal.render.camera import Aim
@@ -164,7 +165,13 @@ def main() -> None:
     for name in ("plain", "film"):
         parser.add_argument(f"--{name}", action="store_true")
     asked = parser.parse_args()
-    scene, rng = assemble(asked.model), np.random.default_rng(asked.seed)
+    if asked.pictures < 3:
+        parser.error("--pictures: 3 are the fewest that anything can be learned from.")
+    rng = np.random.default_rng(asked.seed)
+    try:
+        scene = assemble(asked.model)
+    except UserError as problem:
+        parser.error(str(problem))
     boxes = boxes_of(scene)
     aims = way_around(boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0), asked, rng)
     views = pictures(scene, aims)

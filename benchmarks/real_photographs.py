@@ -22,9 +22,9 @@ import argparse
 import json
 import shutil
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from pathlib import Path
-from typing import Any, Literal, get_args
+from typing import Any, Literal, NoReturn, get_args
 
 import numpy as np
 import real_measures as measure
@@ -34,6 +34,7 @@ from corporeal.errors import UserError
 from corporeal.poses.pose import POSES
 from corporeal.reconstruction.picture_intake import OBJECT_POSES
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.splats.training_schedule import PRESETS
 from corporeal.stages.reconstruct import Reconstructed, reconstruct
 from corporeal.terminal import progress_bars, show_table
 
@@ -227,6 +228,17 @@ def write_docs(
     (DOCS / f"{kind}-photographs.md").write_text("\n".join(lines) + "\n", encoding="utf-8")
 
 
+def sets_in(folder: Path, only: Sequence[str], refuse: Callable[[str], NoReturn]) -> list[Path]:
+    """Return the sets of a folder that are asked for; none named: all."""
+    found = sorted(p.parent.parent for p in folder.glob("*/sparse/0") if p.is_dir())
+    if not found:
+        refuse(f"{folder} holds no set: a folder with images and sparse/0 in it.")
+    if strange := set(only) - {f.name for f in found}:
+        there = ", ".join(f.name for f in found)
+        refuse(f"{folder} has no set {', '.join(sorted(strange))}. It has {there}.")
+    return [f for f in found if not only or f.name in only]
+
+
 def main() -> None:
     """Reconstruct all sets asked for."""
     parser = argparse.ArgumentParser(
@@ -235,13 +247,12 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--only", nargs="*", help="sets, by the names of their folders")
     parser.add_argument("--cases", nargs="*", choices=get_args(Case))
-    parser.add_argument("--training", nargs="+", default=["draft"])
+    parser.add_argument("--training", nargs="+", choices=tuple(PRESETS), default=["draft"])
     parser.add_argument("--out", type=Path, default=Path("runs/real"))
     parser.add_argument("--json", type=Path, help="rows as data")
     parser.add_argument("--docs", nargs="?", const="real", choices=TITLES, help="write its page")
     asked = parser.parse_args()
-    folders = sorted(p.parent.parent for p in asked.folder.glob("*/sparse/0") if p.is_dir())
-    folders = [f for f in folders if not asked.only or f.name in asked.only]
+    folders = sets_in(asked.folder, asked.only or (), parser.error)
     rows, table = [], []
     for folder in folders:
         pictures = sum(1 for _ in (folder / "images").iterdir())

@@ -25,6 +25,7 @@ from PIL import Image, ImageOps
 from corporeal import store
 from corporeal.reconstruction.picture_intake import MASKED, POSED
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.splats.training_schedule import PRESETS
 from corporeal.stages.reconstruct import TRAINED, reconstruct
 from corporeal.terminal import show_table
 
@@ -89,7 +90,7 @@ def main() -> None:
     parser.add_argument("folder", type=Path)
     parser.add_argument("--photographs", nargs="+", type=int, default=[20, 40])
     parser.add_argument("--long-side", type=int, default=640)
-    parser.add_argument("--training", default="normal")
+    parser.add_argument("--training", choices=tuple(PRESETS), default="normal")
     parser.add_argument("--threads", nargs="+", type=int, default=[2])
     parser.add_argument("--out", type=Path, default=Path("runs/speed"))
     parser.add_argument("--json", type=Path, help="rows as data")
@@ -98,6 +99,11 @@ def main() -> None:
     if asked.one is not None:
         print(json.dumps(timed(asked.folder, asked.training, asked.one)))
         return
+    if not (asked.folder / "images").is_dir():
+        parser.error(f"{asked.folder} has no folder images, in which photographs lie.")
+    there = sum(1 for _ in (asked.folder / "images").iterdir())
+    if not 3 <= min(asked.photographs) <= max(asked.photographs) <= there:
+        parser.error(f"--photographs: {asked.folder} has {there}; 3 of them are the fewest.")
     rows = []
     for count in asked.photographs:
         name = f"{asked.folder.name}-{count}"
