@@ -86,7 +86,7 @@ def _motionless(scene: Scene, happened: Outcome) -> Iterator[str]:
     if blown:
         yield f"{', '.join(blown)}: the wind is too weak to move it visibly."
     if len(held) == len(scene.objects) and not pushed and not blown:
-        yield f"Nothing moves: everything stands at rest, as in the file. {START}"
+        yield f"Nothing moves: everything stands at rest, as it did at the start. {START}"
 
 
 def _is_still(what: ObjectOutcome | None) -> bool:
