@@ -52,6 +52,7 @@ def test_what_pictures_cut_off_is_the_room():
     assert goes_beyond(masks) is None, "many photographs may be from near"
     masks[10, 20:40] = True
     why = goes_beyond(masks)
+    assert why is not None and "corporeal masks" in why, "it grows them from a point"
     assert why is not None and "11 of 20 photographs show but a part" in why and "--force" in why
 
 

@@ -89,3 +89,9 @@ def test_only_what_springs_back_is_said_to_rebound_too_little(parts, told):
     """Water that was poured into a glass was said to rebound too little."""
     said = hints(shelf("boards"), seen(**FALLS), divided=False, lost=0.31, parts=parts)
     assert [told in s for s in said] == ([True] if told else [])
+
+
+def test_what_stands_still_need_not_be_of_a_file():
+    """Of photographs it was said that everything stands at rest as in the file."""
+    (said,) = hints(shelf("boards"), seen(moved_m=(0.0, 0.0, 0.0)), divided=False)
+    assert said.startswith("Nothing moves: everything stands at rest, as it did at the start.")

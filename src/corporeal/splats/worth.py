@@ -33,7 +33,8 @@ COMPARED = 12
 GO_ON = "--force goes on all the same."
 SAY_WHAT = (
     "What the thing is was not told from the room: give masks (a folder 'masks' with the names of "
-    f"the pictures), or say where the floor is with --floor-at. {GO_ON}"
+    "the pictures), or grow them with 'corporeal masks' from a point or a box and correct them, or "
+    f"say where the floor is with --floor-at. {GO_ON}"
 )
 
 
