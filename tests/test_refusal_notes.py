@@ -61,7 +61,7 @@ def test_a_room_that_is_refused_says_why_masks_were_doubted(tmp_path, monkeypatc
     room = Intake(nothing, masks=np.ones((4, 6, 8), bool))
     monkeypatch.setattr(reconstruct, "turned_upright", lambda *_: room)
     with pytest.raises(UserError, match="go on beyond the pictures") as refusal:
-        reconstruct._upright(tmp_path, taken, ReconstructConfig(), "")
+        reconstruct._upright(tmp_path, taken, ReconstructConfig(), None)
     assert notes_of(refusal) == [DOUBTED]
 
 
