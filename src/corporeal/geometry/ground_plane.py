@@ -11,6 +11,7 @@ from jaxtyping import Float
 from scipy.spatial import ConvexHull, QhullError
 
 from corporeal.geometry.resting_pose import together
+from corporeal.geometry.robust import NORMAL
 
 SAMPLES = 3000
 """Planes through three points that are tried."""
@@ -124,7 +125,7 @@ def _refined(points: np.ndarray, normal: np.ndarray, offset: float, search: Sear
         normal = turned if turned @ normal > 0 else -turned
         offset = float(normal @ middle)
         heights = np.abs(points @ normal - offset)
-        typical = 1.4826 * float(np.median(heights[weight > 0]))
+        typical = NORMAL * float(np.median(heights[weight > 0]))
         near = np.clip(4 * typical, FINEST * search.radius, near)
     heights = np.abs(points @ normal - offset)
     on = heights < near

@@ -14,6 +14,7 @@ from scipy.ndimage import map_coordinates, minimum_filter, uniform_filter
 
 from corporeal.geometry.ground_plane import Plane
 from corporeal.geometry.region import Region
+from corporeal.geometry.robust import NORMAL
 from corporeal.masking.floor_square import WITNESSES, Square, square, witnessed
 from corporeal.types import Camera, Views
 
@@ -119,7 +120,7 @@ def _like_floor(
     if not len(few):
         return None
     usual = np.median(few, axis=0)
-    spread = SPREAD * np.maximum(1.4826 * np.median(np.abs(few - usual), axis=0), LEAST)
+    spread = SPREAD * np.maximum(NORMAL * np.median(np.abs(few - usual), axis=0), LEAST)
     if (np.abs(usual[1:]) < COLOURFUL * spread[1:]).all():
         return None
     with np.errstate(invalid="ignore"):

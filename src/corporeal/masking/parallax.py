@@ -18,6 +18,7 @@ from corporeal.geometry.region import Region
 from corporeal.geometry.silhouettes import outside
 from corporeal.masking.floor_colour import colours_on, evened, parted
 from corporeal.masking.floor_square import WITNESSES, met, square
+from corporeal.masking.swept_floor import SURE, level_plane
 from corporeal.masking.volume import Volume, volume
 from corporeal.types import Views
 
@@ -36,8 +37,8 @@ AS_LARGE = 0.08
 to .05."""
 HIGH = 0.05
 """Height of its upper end, in radii of the ball."""
-SURE = 0.8
-"""How well level cameras must agree about up where points do not say where the floor is."""
+DEEP = 2.0
+"""Below the middle of the ball, in its radii, from where heights are measured then: under all."""
 LOWEST = 2
 """Percentile of the heights of a hull's cells that is near the floor then."""
 TRIED = np.linspace(-0.12, 0.12, 9)
@@ -100,13 +101,12 @@ def _below(views: Views, masks: Bool[np.ndarray, "V H W"], around: Region) -> Pl
     found = level(views.cameras)
     if found.sure < SURE:
         return None
-    deep = float(found.up @ np.array(around.centre)) - 2 * around.radius
-    room = volume(views.cameras, around, Plane(found.up, deep, 0.0, 0.0))
+    room = volume(views.cameras, around, level_plane(found.up, -DEEP, around))
     hull = room.carved(masks)
     if not hull.any():
         return None
-    heights = TRIED + np.percentile(room.height[hull], LOWEST)
-    planes = [Plane(found.up, float(deep + h * around.radius), 0.0, 0.0) for h in heights]
+    heights = TRIED + np.percentile(room.height[hull], LOWEST) - DEEP
+    planes = [level_plane(found.up, h, around) for h in heights.tolist()]
     return min(planes, key=lambda plane: _contradicting(views, plane, around).sum())
 
 

@@ -40,16 +40,17 @@ def swept_floor(views: Views, around: Region) -> Plane | None:
     found = level(views.cameras)
     if found.sure < SURE:
         return None
-    shares = np.array([_shown(views, _plane(found.up, h, around), around) for h in HEIGHTS])
+    shares = np.array([_shown(views, level_plane(found.up, h, around), around) for h in HEIGHTS])
     height, share = float(HEIGHTS[shares.argmax()]), float(shares.max())
     if share < SHOWN or share < SHARP * np.median(shares):
         return None
     near = np.array([height - FINER, height, height + FINER])
-    shares = np.array([_shown(views, _plane(found.up, h, around), around) for h in near])
-    return _plane(found.up, float(near[shares.argmax()]), around)
+    shares = np.array([_shown(views, level_plane(found.up, h, around), around) for h in near])
+    return level_plane(found.up, float(near[shares.argmax()]), around)
 
 
-def _plane(up: Float[np.ndarray, "3"], height: float, around: Region) -> Plane:
+def level_plane(up: Float[np.ndarray, "3"], height: float, around: Region) -> Plane:
+    """Return the level plane that is so high over the middle of a ball, in its radii."""
     return Plane(up, float(up @ np.array(around.centre)) + height * around.radius, 0.0, 0.0)
 
 

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 from jaxtyping import Float
 
+from corporeal.geometry.robust import NORMAL
 from corporeal.poses.adjust import adjust
 from corporeal.poses.attempt import require
 
@@ -24,8 +25,6 @@ SLIGHTLY_CROPPED = 0.02
 """Spread of the middles, in the longer side, from which on it is said: it turns a view by 1.3°."""
 CROPPED = 0.05
 """The same, from which on poses are not believed: 3.3°."""
-NORMAL = 1.4826
-"""Standard deviation over median distance from the median, where errors are normal."""
 AS_TAKEN = "Give the photographs as the camera took them; crop none, or all in the same way."
 
 

@@ -9,6 +9,7 @@ from jaxtyping import Bool, UInt8
 from corporeal.errors import UserError
 from corporeal.formats.photographs import read_photographs
 from corporeal.render.sheet import Tile, sheet
+from corporeal.splats.intake import ON
 from corporeal.store import writing
 
 FIGURE = "objects.png"
@@ -21,8 +22,6 @@ FAINT = 0.25
 """Of its contrast, what is no object keeps so much, on white."""
 EDGE = (230, 60, 40)
 """sRGB of outlines."""
-ON = 128
-"""Of a mask, from which on a pixel is an object's."""
 
 
 def masks_figure(source: Path, masked_by: Path | None, path: Path) -> None:
