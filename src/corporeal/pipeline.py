@@ -467,21 +467,12 @@ class _Run:
         audit = read_audit(self.folder / FOLDERS["simulate"])
         divided = self.settings.assemble.objects != "auto"
         spent = Spent(_spoken(self.settings), self.seconds, divided)
-        write_results(self.folder, self.made, audit, spent, progress, self._figures())
+        figures: dict[str, Path] = {}
+        if self.made.reconstruct is not None:
+            from corporeal.reconstruction.figures_left import figures_in
 
-    def _figures(self) -> dict[str, Path]:
-        """Name the figures that the reconstruction left, by what they show."""
-        if self.made.reconstruct is None:
-            return {}
-        from corporeal.poses.pose import FIGURE, POSES
-        from corporeal.reconstruction import masks_figure
-
-        folder = self.folder / FOLDERS["reconstruct"]
-        figures = {
-            "What was taken for objects, in some of the photographs": folder / masks_figure.FIGURE,
-            "Where the photographs were taken from": folder / POSES / FIGURE,
-        }
-        return {caption: path for caption, path in figures.items() if path.exists()}
+            figures = figures_in(self.folder / FOLDERS["reconstruct"])
+        write_results(self.folder, self.made, audit, spent, progress, figures)
 
 
 def _modelled(asked: Path, folder: Path) -> Path:
