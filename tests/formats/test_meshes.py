@@ -12,6 +12,7 @@ from PIL import Image
 
 from corporeal.errors import BadFileError
 from corporeal.formats import meshes
+from corporeal.formats.mesh_raw import MOST_PIECES
 from corporeal.formats.mesh_suffixes import MESHES, kind_of_ply
 from corporeal.formats.meshes import companions, read_mesh
 from corporeal.geometry.srgb import linear
@@ -183,6 +184,23 @@ def test_named_things_are_objects_where_asked(tmp_path):
     assert {o.class_name for o in scene.objects} == {"chair", "cup"}
     assert sorted(len(s.triangles) for s in scene.surfaces) == [1, 2]
     assert {s.object for s in scene.surfaces} == {0, 1}
+
+
+@pytest.mark.parametrize("order", ["usemtl wax\ng {}", "g {}\nusemtl wax"])
+def test_groups_are_things_where_an_obj_has_no_objects(tmp_path, order):
+    faces = zip(("chair_1", "cup"), ("f 1 2 3 4", "f 1 2 5"), strict=True)
+    text = CORNERS + "".join(f"{order.format(name)}\n{face}\n" for name, face in faces)
+    (tmp_path / "room.obj").write_text(text)
+    scene = read_mesh(tmp_path / "room.obj", "nodes").scene
+    assert {o.class_name for o in scene.objects} == {"chair", "cup"}
+    (tmp_path / "one.obj").write_text(f"o room\n{text}")
+    assert len(read_mesh(tmp_path / "one.obj", "nodes").scene.objects) == 1
+
+
+def test_patches_of_a_surface_are_no_things(tmp_path):
+    groups = "".join(f"g patch{k}\nf 1 2 3\n" for k in range(MOST_PIECES + 1))
+    (tmp_path / "scan.obj").write_text(CORNERS + groups)
+    assert len(read_mesh(tmp_path / "scan.obj").scene.surfaces) == 1
 
 
 def test_a_splat_a_mesh_and_points_are_told_by_the_header(tmp_path):

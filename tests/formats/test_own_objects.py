@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.formats.any_model import read_model
-from corporeal.formats.own_objects import MOST
+from corporeal.formats.mesh_raw import MOST_PIECES
 from glb_maker import Maker
 
 UNDER, ON, BESIDE = (0, 0, 0), (0, 1, 0), (3, 0, 0)
@@ -84,7 +84,7 @@ def test_what_a_file_states_stands(tmp_path):
 
 
 def test_a_machine_of_hundreds_of_pieces_stays_one(tmp_path):
-    screws = [(f"m{k}", (3 * k, 0, 0)) for k in range(MOST + 1)]
+    screws = [(f"m{k}", (3 * k, 0, 0)) for k in range(MOST_PIECES + 1)]
     assert len(read(tmp_path, "machine.glb", *screws).objects) == 1
 
 

@@ -11,6 +11,8 @@ from corporeal.types import Finish, Surface
 
 ALONG = "along"
 """Key in a surface's extras under which the names from the file's root to it stand."""
+MOST_PIECES = 300
+"""Files with more pieces stay one object: a building, or a machine with its screws."""
 EXPORT_AGAIN = "Export the model again, best as .glb."
 
 

@@ -3,6 +3,7 @@
 Companions (.mtl, pictures) are taken from the file's own folder only.
 """
 
+import re
 import zipfile
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
@@ -19,7 +20,7 @@ from corporeal.errors import BadFileError
 from corporeal.formats.gltf_container import MAX_FILE, read_whole
 from corporeal.formats.gltf_finishes import PLAIN
 from corporeal.formats.images import shrunk
-from corporeal.formats.mesh_raw import ALONG, EXPORT_AGAIN, RawMesh
+from corporeal.formats.mesh_raw import ALONG, EXPORT_AGAIN, MOST_PIECES, RawMesh
 from corporeal.formats.resources import read_beside
 from corporeal.geometry.srgb import linear
 from corporeal.types import Finish, Surface
@@ -49,8 +50,15 @@ class _Beside(Resolver):
 
 
 def read_obj(path: Path) -> RawMesh:
-    """Read a Wavefront OBJ with its materials; nobody says its unit, +y is up."""
-    scene = _loaded(path, "obj", split_objects=True)
+    """Read a Wavefront OBJ with its materials; nobody says its unit, +y is up.
+
+    Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write
+    but one of the two.
+    """
+    data = read_whole(path)
+    named = b"o" if _names_in_obj(data, b"o") else b"g"
+    few = len(_names_in_obj(data, named)) <= MOST_PIECES
+    scene = _loaded(path, "obj", split_objects=named == b"o", split_groups=named == b"g" and few)
     return RawMesh(*_dressed(scene, _object_and_material), up="+y")
 
 
@@ -137,8 +145,13 @@ def _asset_of_dae(path: Path) -> tuple[float | None, str]:
 # ---------------------------------------------------------------- what it holds
 
 
+def _names_in_obj(data: bytes, keyword: bytes) -> set[bytes]:
+    """Return the names that stand after a keyword of an OBJ."""
+    return set(re.findall(rb"(?m)^" + keyword + rb"[ \t]+(\S[^\r\n]*)", data))
+
+
 def _object_and_material(node: str, mesh: trimesh.Trimesh) -> tuple[str, ...]:
-    """Return the names of an OBJ's object and surface: trimesh joins them with the material's."""
+    """Return the names of an OBJ's thing and surface: trimesh joins them with the material's."""
     material = str(getattr(getattr(mesh.visual, "material", None), "name", None) or "")
     owner = node.removesuffix(f"_{material}")
     return (node,) if owner in ("", node) else (owner, node)

@@ -14,6 +14,7 @@ import numpy as np
 from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
+from corporeal.formats.mesh_raw import MOST_PIECES
 from corporeal.formats.typical_extents import typical_extent, words_in
 from corporeal.formats.words import everyday
 from corporeal.geometry import placing
@@ -25,8 +26,6 @@ from corporeal.types import Scene
 NEAR = 0.05
 """Pieces closer than this touch, over the longest side of the smaller: models have gaps where
 things are glued, and pieces that hang in the air are farther apart than that [-]."""
-MOST = 300
-"""Files with more pieces stay one object: a building, or a machine with its screws."""
 SAMPLES = 1500
 """Points on a piece, beside its vertices, whose distances to another are measured."""
 PARTS = frozenset({"wheel", "tire", "drawer", "mirror", "key", "light bulb", "foam"})
@@ -41,7 +40,7 @@ def own_objects(whole: Scene, pieces: Scene) -> Scene:
         pieces: The same file with one object for every piece; surfaces in any order.
 
     """
-    if not 1 < len(pieces.objects) <= MOST:
+    if not 1 < len(pieces.objects) <= MOST_PIECES:
         return whole
     group = _groups(pieces)
     return whole if not group.any() else _gathered(pieces, group)
