@@ -12,6 +12,7 @@ from PIL import Image
 
 from corporeal.errors import BadFileError
 from corporeal.formats import meshes
+from corporeal.formats.gltf_finishes import PLAIN
 from corporeal.formats.mesh_raw import MOST_PIECES
 from corporeal.formats.mesh_suffixes import MESHES, kind_of_ply
 from corporeal.formats.meshes import companions, read_mesh
@@ -250,6 +251,24 @@ def test_companions_are_named_and_come_from_the_same_folder_only(chair, tmp_path
     inner.write_text(f"mtllib ../look.mtl\n{CORNERS}usemtl red\n{FACES}")
     assert companions(inner) == []
     assert read_mesh(inner).scene.finishes[0].colour != (1, 0, 0, 1)
+
+
+def test_materials_keep_their_names_without_their_library(chair):
+    (chair.parent / "look.mtl").unlink()
+    scene = read_mesh(chair).scene
+    assert {f.name for f in scene.finishes} == {"red", "blue"}
+    assert {f.colour for f in scene.finishes} == {PLAIN.colour}
+    assert "colours and pictures ('look.mtl' is not there" in scene.warnings[0]
+
+
+def test_a_material_that_its_library_has_not_keeps_its_name(chair):
+    (chair.parent / "look.mtl").write_text("newmtl red\nKd 1 0 0\n")
+    scene = read_mesh(chair).scene
+    assert {f.name: f.colour for f in scene.finishes} == {
+        "red": (1, 0, 0, 1),
+        "blue": PLAIN.colour,
+    }
+    assert not scene.warnings
 
 
 def test_a_missing_or_broken_picture_leaves_a_plain_colour(chair, tmp_path):

@@ -49,6 +49,28 @@ class _Beside(Resolver):
         return [p.name for p in self.folder.iterdir()]
 
 
+class _Looks(_Beside):
+    """Also what an OBJ calls materials that its .mtl does not have, if there is one."""
+
+    def __init__(self, folder: Path, used: set[bytes]) -> None:
+        super().__init__(folder)
+        self.used = used
+        self.lost: list[str] = []
+
+    def get(self, key: str) -> bytes:
+        if not key.strip().lower().endswith(".mtl"):
+            return super().get(key)
+        try:
+            text = super().get(key)
+        except ValueError as problem:
+            self.lost.append(f"colours and pictures ({problem})")
+            text = b""
+        colour = " ".join(f"{c:g}" for c in PLAIN.colour[:3])
+        unknown = self.used - _names_in_obj(text, b"newmtl")
+        named = [b"newmtl %b\nKd %b" % (name, colour.encode()) for name in sorted(unknown)]
+        return b"\n".join([text, *named])
+
+
 def read_obj(path: Path) -> RawMesh:
     """Read a Wavefront OBJ with its materials; nobody says its unit, +y is up.
 
@@ -58,8 +80,10 @@ def read_obj(path: Path) -> RawMesh:
     data = read_whole(path)
     named = b"o" if _names_in_obj(data, b"o") else b"g"
     few = len(_names_in_obj(data, named)) <= MOST_PIECES
-    scene = _loaded(path, "obj", split_objects=named == b"o", split_groups=named == b"g" and few)
-    return RawMesh(*_dressed(scene, _object_and_material), up="+y")
+    looks = _Looks(path.parent, _names_in_obj(data, b"usemtl"))
+    split = {"split_objects": named == b"o", "split_groups": named == b"g" and few}
+    scene = _loaded(path, "obj", resolver=looks, **split)
+    return RawMesh(*_dressed(scene, _object_and_material), up="+y", lost=tuple(looks.lost))
 
 
 def read_ply(path: Path) -> RawMesh:
@@ -117,9 +141,8 @@ def _loaded(path: Path, kind: str, **options) -> trimesh.Scene:
     return trimesh.load_scene(
         trimesh.util.wrap_as_stream(bytes(data)),
         file_type=kind,
-        resolver=_Beside(path.parent),
         process=False,
-        **options,
+        **{"resolver": _Beside(path.parent)} | options,
     )
 
 
@@ -147,7 +170,7 @@ def _asset_of_dae(path: Path) -> tuple[float | None, str]:
 
 def _names_in_obj(data: bytes, keyword: bytes) -> set[bytes]:
     """Return the names that stand after a keyword of an OBJ."""
-    return set(re.findall(rb"(?m)^" + keyword + rb"[ \t]+(\S[^\r\n]*)", data))
+    return set(re.findall(rb"(?m)^" + keyword + rb"[ \t]+(\S[^\r\n]*?)[ \t\r]*$", data))
 
 
 def _object_and_material(node: str, mesh: trimesh.Trimesh) -> tuple[str, ...]:
