@@ -153,6 +153,41 @@ def test_one_block_has_the_same_extents_as_every_kind_of_file(kind, tmp_path):
     np.testing.assert_allclose(unit * thing.real_extent, 0.045, rtol=1e-4)
 
 
+@pytest.mark.parametrize("geometry", ['id="ID2"', 'id="geom-Box001" name="Box001"'])
+def test_nodes_and_materials_of_a_collada_keep_their_names(tmp_path, geometry):
+    path = tmp_path / "yard.dae"
+    write_dae(path, block(), 1, "Z_UP")
+    own = geometry.split('"')[1]
+    text = path.read_text().replace('id="block"', geometry).replace("#block", f"#{own}")
+    text = text.replace('<material id="m">', '<material id="m" name="Oak">')
+    start, end = text.index('<node id="n">'), text.index("</visual_scene>")
+    node = text[start:end].replace('id="n"', 'id="{0}" name="{0}"')
+    nodes = "".join(node.format(name) for name in ("Table", "Bench"))
+    path.write_text(f'{text[:start]}<node id="all" name="All">{nodes}</node>{text[end:]}')
+    scene = read_mesh(path, "nodes").scene
+    assert [o.class_name for o in scene.objects] == ["table", "bench"]
+    assert [s.name for s in scene.surfaces] == ["Table", "Bench"]
+    assert {scene.finishes[s.finish].name for s in scene.surfaces} == {"Oak"}
+
+
+def test_materials_tell_pieces_of_one_node_of_a_collada_apart(tmp_path):
+    path = tmp_path / "chair.dae"
+    write_dae(path, block(), 1, "Z_UP")
+    text = path.read_text().replace('<node id="n">', '<node id="n" name="Chair">')
+    start, end = text.index("<triangles"), text.index("</mesh>")
+    text = text[:end] + text[start:end].replace('"s"', '"t"') + text[end:]
+    for other, name in (("m", "Oak"), ("m2", "Leather")):
+        made = f'<material id="{other}" name="{name}"><instance_effect url="#e"/></material>'
+        text = text.replace("</library_materials>", f"{made}</library_materials>")
+    text = text.replace('<material id="m"><instance_effect url="#e"/></material>', "")
+    bound = '<instance_material symbol="t" target="#m2"/>'
+    path.write_text(text.replace('target="#m"/>', f'target="#m"/>{bound}'))
+    scene = read_mesh(path).scene
+    assert [o.class_name for o in scene.objects] == ["chair"]
+    assert [s.name for s in scene.surfaces] == ["Oak", "Leather"]
+    assert [scene.finishes[s.finish].name for s in scene.surfaces] == ["Oak", "Leather"]
+
+
 @pytest.mark.parametrize("kind", [".dae", ".usda"])
 def test_plain_colours_come_along(kind, tmp_path):
     pytest.importorskip("pxr" if kind == ".usda" else "collada")

@@ -17,6 +17,7 @@ from trimesh.visual.color import to_rgba
 from trimesh.visual.material import PBRMaterial, SimpleMaterial
 
 from corporeal.errors import BadFileError
+from corporeal.formats.dae_names import names_in_dae
 from corporeal.formats.gltf_container import MAX_FILE, read_whole
 from corporeal.formats.gltf_finishes import PLAIN
 from corporeal.formats.images import shrunk
@@ -123,7 +124,13 @@ def read_dae(path: Path) -> RawMesh:
     unit, axis = _asset_of_dae(path)
     if axis not in UP_AXES:
         raise BadFileError(path, f"states an unknown up axis {axis[:20]!r}.", EXPORT_AGAIN)
-    return RawMesh(*_dressed(scene), up=UP_AXES[axis], unit=unit)  # pyright: ignore[reportArgumentType]
+    names = names_in_dae(bytes(read_whole(path)))
+    for piece, (_, look) in names.items():
+        material = getattr(getattr(scene.geometry.get(piece), "visual", None), "material", None)
+        if material is not None and look:
+            material.name = look
+    named = _dressed(scene, lambda piece, _: names[piece][0])
+    return RawMesh(*named, up=UP_AXES[axis], unit=unit)  # pyright: ignore[reportArgumentType]
 
 
 # ---------------------------------------------------------------- the file

@@ -1,0 +1,53 @@
+"""What a COLLADA file calls its pieces and their materials, which trimesh leaves behind."""
+
+import io
+from collections.abc import Iterable, Iterator
+from typing import Any
+
+import trimesh
+
+Named = tuple[tuple[str, ...], str]
+"""Names from the file's root to a piece, and that of its material; "": it states none."""
+
+
+def names_in_dae(data: bytes) -> dict[str, Named]:
+    """Return the names of each piece, by what trimesh calls it: the id of its geometry, counted.
+
+    A piece is called as the node that places it; where a geometry has several materials, each is
+    a piece, called as its material. Nodes beside each other that have one name are numbered.
+    """
+    import collada
+
+    document = collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
+    solid = collada.polylist.Polylist, collada.triangleset.TriangleSet
+    found: dict[str, Named] = {}
+    counts: dict[str, int] = {}
+    for along, placed in _placed(document.scene.nodes, ()):
+        geometry = placed.geometry
+        looks = {m.symbol: str(m.target.name or "") for m in placed.materials}
+        pieces = [p for p in geometry.primitives if isinstance(p, solid) and p.vertex is not None]
+        own = along or (str(geometry.name or geometry.id),)
+        for piece in pieces:
+            key = trimesh.util.unique_name(geometry.id, contains=found, counts=counts)
+            look = looks.get(piece.material, "")
+            last = (look or key,) if len(pieces) > 1 else ()
+            found[key] = ((*own, *last), look)
+    return found
+
+
+def _placed(nodes: Iterable[Any], along: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
+    """Return every place of a geometry, and the names of the nodes above it."""
+    import collada
+
+    taken: dict[str, int] = {}
+    seen: set[str] = set()
+    for node in nodes:
+        if isinstance(node, collada.scene.GeometryNode):
+            yield along, node
+        elif isinstance(node, collada.scene.Node):
+            said = node.node if isinstance(node, collada.scene.NodeNode) else node
+            name = str(said.name or "")
+            if name:
+                name = trimesh.util.unique_name(name, contains=seen, counts=taken)
+                seen.add(name)
+            yield from _placed(node.children or (), (*along, name) if name else along)
