@@ -16,16 +16,18 @@ def names_in_dae(data: bytes) -> dict[str, Named]:
     A piece is called as the node that places it; where a geometry has several materials, each is
     a piece, called as its material. Nodes beside each other that have one name are numbered.
     """
-    import collada
+    from collada import Collada
+    from collada.common import DaeError
+    from collada.polylist import Polylist
+    from collada.triangleset import TriangleSet
 
-    document = collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
-    solid = collada.polylist.Polylist, collada.triangleset.TriangleSet
-    found: dict[str, Named] = {}
-    counts: dict[str, int] = {}
+    document: Any = Collada(io.BytesIO(data), ignore=[DaeError])
+    shapes, found = (Polylist, TriangleSet), dict[str, Named]()
+    counts: dict[str | None, int] = {}
     for along, placed in _placed(document.scene.nodes, ()):
         geometry = placed.geometry
         looks = {m.symbol: str(m.target.name or "") for m in placed.materials}
-        pieces = [p for p in geometry.primitives if isinstance(p, solid) and p.vertex is not None]
+        pieces = [p for p in geometry.primitives if isinstance(p, shapes) and p.vertex is not None]
         own = along or (str(geometry.name or geometry.id),)
         for piece in pieces:
             key = trimesh.util.unique_name(geometry.id, contains=found, counts=counts)
@@ -37,15 +39,15 @@ def names_in_dae(data: bytes) -> dict[str, Named]:
 
 def _placed(nodes: Iterable[Any], along: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
     """Return every place of a geometry, and the names of the nodes above it."""
-    import collada
+    from collada.scene import GeometryNode, Node, NodeNode
 
-    taken: dict[str, int] = {}
+    taken: dict[str | None, int] = {}
     seen: set[str] = set()
     for node in nodes:
-        if isinstance(node, collada.scene.GeometryNode):
+        if isinstance(node, GeometryNode):
             yield along, node
-        elif isinstance(node, collada.scene.Node):
-            said = node.node if isinstance(node, collada.scene.NodeNode) else node
+        elif isinstance(node, Node):
+            said = node.node if isinstance(node, NodeNode) else node
             name = str(said.name or "")
             if name:
                 name = trimesh.util.unique_name(name, contains=seen, counts=taken)

@@ -8,6 +8,7 @@ import zipfile
 from collections.abc import Callable, Iterator
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import trimesh
@@ -78,7 +79,7 @@ def read_obj(path: Path) -> RawMesh:
     Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write
     but one of the two.
     """
-    data = read_whole(path)
+    data = bytes(read_whole(path))
     named = b"o" if _names_in_obj(data, b"o") else b"g"
     few = len(_names_in_obj(data, named)) <= MOST_PIECES
     looks = _Looks(path.parent, _names_in_obj(data, b"usemtl"))
@@ -143,13 +144,16 @@ def _require(path: Path, *packages: str) -> None:
         raise BadFileError(path, what, "Install with: pip install 'corporeal[meshes]'.")
 
 
-def _loaded(path: Path, kind: str, **options) -> trimesh.Scene:
+def _loaded(
+    path: Path, kind: str, resolver: Resolver | None = None, **options: Any
+) -> trimesh.Scene:
     data = read_whole(path)
     return trimesh.load_scene(
         trimesh.util.wrap_as_stream(bytes(data)),
         file_type=kind,
+        resolver=resolver or _Beside(path.parent),
         process=False,
-        **{"resolver": _Beside(path.parent)} | options,
+        **options,
     )
 
 
