@@ -324,6 +324,7 @@ def stl(path, extent):
         ("chair.stl", 90.0, 0.9, "in centimetres"),
         ("chair.off", 900.0, 0.9, "in millimetres"),
         ("duck.obj", 2.0, 0.0508, "in inches"),
+        ("hammer.stl", 13.0, 0.3302, "in inches"),  # of 13 cm it would be but nearly a hammer
         ("chair.obj", 3e6, 0.9, "as large as a chair usually is"),
     ],
 )

@@ -37,6 +37,7 @@ class LikelyUnit:
 def likely_unit(file: Path, class_name: str, extent: float) -> LikelyUnit | None:
     """Return the first usual unit in which a thing is as large as such things are.
 
+    One in which it is within the table's own range comes before one in which it is but nearly so.
     Where there is none, a thing of the table gets its usual size; else None.
 
     Args:
@@ -45,11 +46,14 @@ def likely_unit(file: Path, class_name: str, extent: float) -> LikelyUnit | None
         extent: Its largest extent, in the file's unit.
 
     """
-    for name in PRINTED if file.suffix.lower() == ".stl" else UNITS:
-        size = extent * UNITS[name]
-        if doubt("it", class_name, size) is None:
-            return LikelyUnit(file, size, UNITS[name], name)
+    order = PRINTED if file.suffix.lower() == ".stl" else UNITS
+    sizes = {name: extent * UNITS[name] for name in order}
+    likely = [name for name, size in sizes.items() if doubt("it", class_name, size) is None]
     known = typical_extent(class_name)
+    within = [name for name in likely if known is None or known.low <= sizes[name] <= known.high]
+    if likely:
+        name = (within or likely)[0]
+        return LikelyUnit(file, sizes[name], UNITS[name], name)
     if known is None:
         return None
     return LikelyUnit(file, known.usual, known.usual / extent, "", known.words)
