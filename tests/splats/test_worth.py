@@ -90,3 +90,23 @@ def test_a_surface_that_is_not_what_masks_show_is_refused():
     why = unlike_masks([eaten], cameras, masks)
     assert why is not None and "overlap by" in why and "--force" in why
     assert unlike_masks([eaten], cameras, np.zeros_like(masks)) is None, "nobody said anything"
+
+
+def test_masks_that_no_surface_can_fill_are_of_something_else_too():
+    """Masks of a helmet held pieces of the wall behind it, each in some of the photographs."""
+    aims = ring(np.arange(20) * 18, (160, 120))
+    stage, cameras = Stage(patterned()), [camera_of(aim) for aim in aims]
+    masks = np.stack([identify(stage, aim)[0] >= OF_SLAB for aim in aims])
+    block = [Mesh(*made_box((-0.05, -0.04, 0), (0.05, 0.04, 0.12))[:2])]
+    assert unlike_masks(block, cameras, masks, given=False) is None
+    # A quarter as much as the block is seen above it.
+    wall = np.zeros_like(masks)
+    for one, mask in zip(wall, masks, strict=True):
+        rows, columns = np.nonzero(mask)
+        high = (rows.max() - rows.min()) // 4
+        one[rows.min() - high : rows.min(), columns.min() : columns.max()] = True
+    few = np.where(np.arange(20)[:, None, None] % 5 == 0, wall, False)
+    assert unlike_masks(block, cameras, masks | few, given=False) is None, "few photographs err"
+    why = unlike_masks(block, cameras, masks | wall, given=False)
+    assert why is not None and "The shape contradicts the photographs" in why and "--force" in why
+    assert unlike_masks(block, cameras, masks | wall) is None, "somebody said that it is the thing"

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from corporeal.errors import UserError
+from corporeal.masking.grown_masks import lying_in
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.splats.intake import Intake
 from corporeal.stages import reconstruct as stage
@@ -35,3 +36,12 @@ def test_who_must_give_masks_hears_where_doubted_ones_lie(tmp_path, monkeypatch,
     place = tmp_path / "doubted"
     assert (f"lie in {place / 'masks'}: look at them" in str(said.value)) == doubted
     assert str(said.value).endswith(f"--masks {place}.") == doubted
+
+
+def test_who_must_correct_grown_masks_hears_where_they_lie(tmp_path):
+    assert lying_in(None) == lying_in(tmp_path) == ""
+    (tmp_path / "doubted" / "masks").mkdir(parents=True)
+    assert f"not believed, lie in {tmp_path / 'doubted' / 'masks'}" in lying_in(tmp_path)
+    (tmp_path / "masks").mkdir()
+    assert f"colours lie in {tmp_path / 'masks'}" in lying_in(tmp_path), "those that were used"
+    assert lying_in(tmp_path).endswith(f"--masks {tmp_path}.")

@@ -6,14 +6,12 @@ with each view left out, and forgives a few of the rest, so that one wrong view 
 what the right ones agree on.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from scipy.ndimage import binary_dilation
 
 from corporeal.geometry.epipolar import projection
-from corporeal.geometry.silhouettes import cells_of, cube_around, small
+from corporeal.geometry.silhouettes import Compared, cells_of, cube_around, shares, small
 from corporeal.types import Camera
 
 SIDE = 128
@@ -32,16 +30,6 @@ more, turned by 25 degrees 0.91 and less. A right view may still overlap little 
 sees that a place is empty."""
 MOST = 0.34
 """Share of the views from which on nobody can say which ones are right."""
-
-
-@dataclass(frozen=True)
-class Compared:
-    """Masks beside the hull of the others; NaN: a mask is empty."""
-
-    overlap: Float[np.ndarray, " V"]
-    """Intersection over union."""
-    filled: Float[np.ndarray, " V"]
-    """Share of the mask that the hull fills."""
 
 
 def outliers(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> tuple[int, ...]:
@@ -105,10 +93,7 @@ def _finest(points: Float[np.ndarray, "N 3"], cameras: tuple[Camera, ...]) -> in
 
 
 def _shares(mask: Bool[np.ndarray, "h w"], cell: np.ndarray) -> tuple[float, float]:
-    """Return how much of both is common, and how much of the mask is."""
-    if not mask.any():
-        return float("nan"), float("nan")
+    """Compare a mask with pixels that are shown."""
     shown = np.zeros(mask.size, bool)
     shown[cell[cell >= 0]] = True
-    common = float((shown & mask.ravel()).sum())
-    return common / float((shown | mask.ravel()).sum()), common / float(mask.sum())
+    return shares(shown.reshape(mask.shape), mask)

@@ -6,7 +6,7 @@ import numpy as np
 from jaxtyping import Float, UInt8
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.geometry.silhouettes import cells_of, small
+from corporeal.geometry.silhouettes import Compared, cells_of, shares, small
 from corporeal.types import Camera
 
 SIDE = 256
@@ -25,6 +25,19 @@ def silhouette_overlaps(
 ) -> Float[np.ndarray, " V"]:
     """Return the intersection over union of surfaces and mask in each view; NaN: an empty mask.
 
+    Args are those of ``compared``.
+    """
+    return compared(meshes, cameras, masks, rng).overlap
+
+
+def compared(
+    meshes: Sequence[Mesh],
+    cameras: Sequence[Camera],
+    masks: Sequence[UInt8[np.ndarray, "H W"]],
+    rng: np.random.Generator,
+) -> Compared:
+    """Compare silhouettes of surfaces with a mask in each view.
+
     Args:
         meshes: In the frame and unit of the cameras.
         cameras: One or more.
@@ -40,9 +53,9 @@ def silhouette_overlaps(
         count = np.bincount(cell[cell >= 0], minlength=real.size)
         usual = np.median(count[count > 0]) if count.any() else 0
         drawn = (count > usual / FAINTEST).reshape(real.shape)
-        union = (drawn | real).sum() if real.any() else np.nan
-        found.append((drawn & real).sum() / union)
-    return np.array(found)
+        found.append(shares(drawn, real))
+    overlap, filled = np.array(found).T
+    return Compared(overlap, filled)
 
 
 def sampled(

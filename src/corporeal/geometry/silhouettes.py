@@ -29,6 +29,24 @@ it to be outside, where outlines are off by some pixels. Half of that share eats
 four balls where outlines err by 10 of 640 px, against 5 %), twice of it leaves a fifth too much."""
 
 
+@dataclass(frozen=True)
+class Compared:
+    """Masks beside silhouettes of a shape; NaN: a mask is empty."""
+
+    overlap: Float[np.ndarray, " V"]
+    """Intersection over union."""
+    filled: Float[np.ndarray, " V"]
+    """Share of the mask that the shape fills."""
+
+
+def shares(shown: Bool[np.ndarray, "h w"], mask: Bool[np.ndarray, "h w"]) -> tuple[float, float]:
+    """Return the overlap of a shape with a mask, and how much of the mask it fills; NaN: empty."""
+    if not mask.any():
+        return float("nan"), float("nan")
+    common = float((shown & mask).sum())
+    return common / float((shown | mask).sum()), common / float(mask.sum())
+
+
 def outside(
     beside: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],
     looking: Int[np.ndarray, " N"] | Float[np.ndarray, " N"],

@@ -171,14 +171,17 @@ def _changes(folder: Path) -> list[str]:
     return [f"{count} of the masks were corrected by hand."] * bool(count)
 
 
-def doubted_in(folder: Path | None) -> str:
-    """Say in a sentence where masks lie that were grown and not believed; "": there are none."""
-    place = None if folder is None else _doubted(folder)
+def lying_in(folder: Path | None) -> str:
+    """Say in a sentence where masks lie that were grown, for correction; "": there are none."""
+    if folder is None:
+        return ""
+    place = folder if (folder / MASKS[0]).is_dir() else _doubted(folder)
     if place is None:
         return ""
+    how = "" if place == folder else ", and not believed,"
     return (
-        f"Masks that were grown from colours, and not believed, lie in {place / MASKS[0]}: look at "
-        f"them, correct what is wrong, and give them with --masks {place}."
+        f"Masks that were grown from colours{how} lie in {place / MASKS[0]}: look at them, correct "
+        f"what is wrong, and give them with --masks {place}."
     )
 
 

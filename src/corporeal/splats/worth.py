@@ -8,7 +8,7 @@ from jaxtyping import Bool, Float
 from corporeal.geometry.cropped import cropped
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.region import region
-from corporeal.geometry.silhouette_overlap import silhouette_overlaps
+from corporeal.geometry.silhouette_overlap import compared
 from corporeal.splats.quality import Quality
 from corporeal.types import Camera
 
@@ -28,6 +28,11 @@ more is in dispute than agreed on: wrong cuts have .05 to .5, right ones .64 to 
 UNLIKE = 0.35
 """Median overlap of surfaces with masks below which they are no shape of what masks show: 0.9 for
 most objects; foliage and wires, whose gaps close, have less."""
+FILLED = 0.9
+"""Share of masks that nobody gave which surfaces must fill, the median of all views: as much as the
+hull of masks must under right poses (``poses.judge.FILLED``). What no surface can fill is in some
+views only: .86 of a helmet with pieces of the wall behind it was filled, .87 of two things whose
+pictures were half placed wrongly, .93 and more of all others."""
 COMPARED = 12
 """Views in which that is compared."""
 GO_ON = "--force goes on all the same."
@@ -112,7 +117,10 @@ def told_otherwise(
 
 
 def unlike_masks(
-    meshes: Sequence[Mesh], cameras: Sequence[Camera], masks: Bool[np.ndarray, "V H W"]
+    meshes: Sequence[Mesh],
+    cameras: Sequence[Camera],
+    masks: Bool[np.ndarray, "V H W"],
+    given: bool = True,
 ) -> str | None:
     """Return in a sentence or two why surfaces are not worth simulating; None: they may be.
 
@@ -120,6 +128,7 @@ def unlike_masks(
         meshes: Closed, of all things, in the cameras' frame and unit.
         cameras: That took the photographs.
         masks: Which pixels show things, as somebody said or was found.
+        given: Whether somebody, or a model that knows things, said it.
 
     """
     shown = [k for k in range(len(cameras)) if masks[k].any()]
@@ -128,11 +137,19 @@ def unlike_masks(
         return None
     drawn = [np.uint8(255) * masks[k] for k in chosen]
     seen = [cameras[k] for k in chosen]
-    overlap = float(np.median(silhouette_overlaps(meshes, seen, drawn, np.random.default_rng(0))))
-    if overlap >= UNLIKE:
+    found = compared(meshes, seen, drawn, np.random.default_rng(0))
+    overlap, filled = float(np.median(found.overlap)), float(np.median(found.filled))
+    if overlap < UNLIKE:
+        return (
+            "The closed surfaces are not what masks show: their silhouettes overlap by "
+            f"{overlap:.0%} only. Look whether masks and poses belong to the pictures, and take "
+            f"more photographs from more sides. {GO_ON}"
+        )
+    if given or filled >= FILLED:
         return None
     return (
-        f"The closed surfaces are not what masks show: their silhouettes overlap by {overlap:.0%} "
-        "only. Look whether masks and poses belong to the pictures, and take more photographs from "
-        f"more sides. {GO_ON}"
+        f"The shape contradicts the photographs: it fills {filled:.0%} of what was taken for the "
+        "thing in them. The rest is something else, such as what is behind it, or some were placed "
+        "wrongly. Correct the masks, or photograph the thing from all sides, where nothing else "
+        f"stands close behind it. {GO_ON}"
     )

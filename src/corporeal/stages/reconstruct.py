@@ -20,7 +20,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.metric import MetricScale
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.geometry.srgb import linear
-from corporeal.masking.grown_masks import doubted_in
+from corporeal.masking.grown_masks import lying_in
 from corporeal.reconstruction.found_objects import FoundObjects, named_objects, recognised
 from corporeal.reconstruction.masks_figure import FIGURE, drawn_over
 from corporeal.reconstruction.object_points import drawn_masks, foreground_of, points_on_objects
@@ -122,7 +122,7 @@ def reconstruct(
         taken, cloud, closed(taken, front.on_objects, cloud.position, split.object_of_point)
     )
     if not config.force and (why := _why_not(found, photographers, masked)):
-        raise _refusal(source, why, doubted_in(None if masked else folder), taken)
+        raise _refusal(source, why, lying_in(None if masked else folder), taken)
     # What they are, and so their names and their size in metres.
     known = _known(source, found, recognised(wanted, found, config, viewer), config, extents)
     warnings = [*known.warnings, *viewer.asked().warnings, *taken.warnings, *split.warnings]
@@ -198,7 +198,7 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig, folder: Pat
     if cut_out is not None and not config.force:
         why = goes_beyond(cut_out) or told_otherwise(cut_out, made.coloured)
         if why is not None:
-            raise _refusal(source, why, doubted_in(folder), taken)
+            raise _refusal(source, why, lying_in(folder), taken)
     if cut_out is not None and made.views is not None and folder is not None:
         numbers = [f"photograph {k + 1}" for k in range(len(cut_out))]
         drawn_over(list(made.views.rgb), cut_out, numbers, folder / FIGURE)
@@ -217,7 +217,7 @@ def _why_not(found: FoundObjects, photographers: Sequence[Camera], masked: bool)
     if why is not None or taken.masks is None or not photographers:
         return why
     meshes = [Mesh(solid.vertices, solid.triangles) for solid in found.solids]
-    return unlike_masks(meshes, photographers, taken.masks)
+    return unlike_masks(meshes, photographers, taken.masks, given=masked)
 
 
 def _in_metres(
