@@ -4,7 +4,7 @@ import resource
 import shutil
 import sys
 import time
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from dataclasses import dataclass, fields, replace
 from pathlib import Path
 
@@ -22,7 +22,7 @@ from corporeal.stages.report import Story, report
 from corporeal.trajectory.audit import believed
 from corporeal.trajectory.audit_file import write_audit
 from corporeal.trajectory.hints import hints
-from corporeal.types import Film, Inventory, Scene
+from corporeal.types import Film, Inventory, Reconstruction, Scene
 
 Progress = Callable[[float, str], None]
 
@@ -148,7 +148,7 @@ def run_audit(
 
 
 def _warnings(made: Results, audit: Audit) -> tuple[str, ...]:
-    """Return what every verb warns of, each sentence once, in the order of the verbs.
+    """Return what every verb warns of, in the order of the verbs.
 
     What was noticed of photographs comes last: it is most, and the terminal shows the first.
     """
@@ -162,7 +162,13 @@ def _warnings(made: Results, audit: Audit) -> tuple[str, ...]:
         audit.warnings,
         made.reconstruct.warnings if made.reconstruct else (),
     )
-    return tuple(dict.fromkeys(w for group in groups for w in group))
+    return doubts_first(made.reconstruct, (w for group in groups for w in group))
+
+
+def doubts_first(found: Reconstruction | None, warnings: Iterable[str]) -> tuple[str, ...]:
+    """Return each warning once, before all others where shapes are not to be believed."""
+    doubted = () if found is None else found.doubts
+    return tuple(dict.fromkeys((*doubted, *warnings)))
 
 
 def still_doubted(scene: Scene, inventory: Inventory) -> tuple[str, ...]:

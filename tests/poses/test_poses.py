@@ -22,7 +22,7 @@ from corporeal.poses.attempt import Attempt, beside_first, by_camera
 from corporeal.poses.by_masks import checked_by_masks
 from corporeal.poses.film_frames import choose, write_frames
 from corporeal.poses.gather import gather
-from corporeal.poses.judge import FILLED, doubts, in_vain, names_of, unseen_side
+from corporeal.poses.judge import FILLED, doubts, in_vain, names_of
 from corporeal.poses.pose import FIGURE, moved_within, pose, pose_object
 from corporeal.poses.standstill import Standstill
 from corporeal.reconstruction import picture_intake as reconstructing
@@ -34,7 +34,6 @@ from corporeal.render.video import reel
 from patterned_scene import (
     OF_SLAB,
     blots,
-    on_its_side,
     patterned,
     photographs,
     pose_errors,
@@ -433,17 +432,6 @@ def test_only_pictures_that_points_join_can_be_placed():
     assert in_vain(told, 0) and not in_vain(replace(told, joined=20), 0)
     assert in_vain(replace(told, joined=20), 12), "most are blurred"
     assert doubts(replace(told, joined=20)) == ["no two pictures share enough points"]
-
-
-def test_a_side_that_nobody_photographed_is_named_by_its_neighbours():
-    names = tuple(f"{k:02d}.jpg" for k in range(25))
-    half = tuple(camera_of(a) for a in ring(np.linspace(0, 240, 25)))
-    said = unseen_side(half, names)
-    assert said is not None and "Between 24.jpg and 00.jpg lie 120°" in said
-    upside_down = tuple(on_its_side(on_its_side(c)) for c in half)
-    assert "lie 120°" in (unseen_side(upside_down, names) or "")
-    around = tuple(camera_of(a) for a in ring(np.arange(25) * 360 / 25))
-    assert unseen_side(around, names) is None
 
 
 def test_eight_names_are_enough():

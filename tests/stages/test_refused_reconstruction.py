@@ -9,9 +9,10 @@ import pytest
 from corporeal.errors import UserError
 from corporeal.masking.grown_masks import lying_in
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.run_files import doubts_first
 from corporeal.splats.intake import Intake
 from corporeal.stages import reconstruct as stage
-from corporeal.types import Gaussians
+from corporeal.types import Cloud, Gaussians, Reconstruction
 
 ONE = Gaussians(
     np.zeros((1, 3), np.float32),
@@ -20,6 +21,9 @@ ONE = Gaussians(
     np.ones(1, np.float32),
     np.zeros((1, 1, 3), np.float32),
 )
+
+NONE = np.zeros((0, 3))
+NOTHING = Cloud(NONE, NONE, NONE, NONE, np.zeros(0, int))
 
 
 @pytest.mark.parametrize("doubted", [True, False])
@@ -45,3 +49,23 @@ def test_who_must_correct_grown_masks_hears_where_they_lie(tmp_path):
     (tmp_path / "masks").mkdir()
     assert f"colours lie in {tmp_path / 'masks'}" in lying_in(tmp_path), "those that were used"
     assert lying_in(tmp_path).endswith(f"--masks {tmp_path}.")
+
+
+def test_where_shapes_are_made_up_is_read_first_and_said_before_a_refusal(tmp_path, monkeypatch):
+    """It was the ninth warning of a helmet before a wall; the terminal shows five."""
+    half = "Its shape is known from one side only: there is no other."
+    doubted = Reconstruction(
+        ONE, np.zeros(1, int), NOTHING, np.zeros(0, int), (), np.zeros((0, 2, 3)), 1.0, np.eye(4),
+        warnings=("It has no size.", half), doubts=(half,),
+    )  # fmt: skip
+    others = ("What is it?", *doubted.warnings)
+    assert doubts_first(doubted, others) == (half, "What is it?", "It has no size.")
+    assert doubts_first(None, others[:1]) == others[:1]
+
+    taken = replace(Intake(ONE), half=half)
+    room = replace(taken, masks=np.ones((4, 6, 8), np.bool_))
+    monkeypatch.setattr(stage, "take_pictures", lambda *_: (taken, False))
+    monkeypatch.setattr(stage, "turned_upright", lambda *_: room)
+    with pytest.raises(UserError, match="would go on beyond") as said:
+        stage.reconstruct(Path("photos"), ReconstructConfig(), folder=tmp_path)
+    assert half in said.value.__notes__

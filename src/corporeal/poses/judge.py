@@ -4,13 +4,7 @@ A wrong model looks like a model: low reprojection error says nothing. What spea
 found on right and wrong models of the same pictures, docs/inputs.md, "Photographs without poses".
 """
 
-import numpy as np
-from jaxtyping import Float
-
-from corporeal.geometry.level import level
-from corporeal.geometry.region import region
 from corporeal.poses.attempt import SHARE, Attempt
-from corporeal.types import Camera
 
 POINTS = 30
 """Points per registered picture, at least."""
@@ -33,8 +27,6 @@ HOLD_STILL = (
     "full size before you leave."
 )
 NAMED = 8
-GAP = 60.0
-"""Angle between neighbouring cameras, about what they look at, that leaves a side unseen [deg]."""
 WHAT_TO_DO = (
     "Neighbouring pictures share too few points. Put the thing on something with a pattern, such "
     "as a newspaper; take 40 to 80 pictures at most 15° apart; move neither thing nor light."
@@ -110,34 +102,3 @@ def names_of(left_out: tuple[str, ...]) -> str:
     """Return up to eight names and how many more there are."""
     more = f" and {len(left_out) - NAMED} more" if len(left_out) > NAMED else ""
     return ", ".join(left_out[:NAMED]) + more
-
-
-def unseen_side(cameras: tuple[Camera, ...], names: tuple[str, ...]) -> str | None:
-    """Say between which pictures a side was not photographed, if there is a wide gap.
-
-    Args:
-        cameras: That were found.
-        names: Of their pictures.
-
-    """
-    angle, order = _around(cameras)
-    gaps = np.degrees(np.diff(np.append(angle[order], angle[order[0]] + 2 * np.pi)))
-    widest = int(gaps.argmax())
-    if gaps[widest] < GAP:
-        return None
-    ends = names[order[widest]], names[order[(widest + 1) % len(order)]]
-    return (
-        f"Between {ends[0]} and {ends[1]} lie {gaps[widest]:.0f}° from which nobody looked: what "
-        "faces there is made up. Photograph that side next time."
-    )
-
-
-def _around(cameras: tuple[Camera, ...]) -> tuple[Float[np.ndarray, " V"], np.ndarray]:
-    """Return the angle of each camera about the axis that is up [rad], and their order."""
-    up = level(cameras).up
-    ahead = np.cross(up, np.eye(3)[np.abs(up).argmin()])
-    ahead /= np.linalg.norm(ahead)
-    eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras])
-    away = eyes - np.array(region(cameras).centre)
-    angle = np.arctan2(away @ np.cross(up, ahead), away @ ahead)
-    return angle, np.argsort(angle)

@@ -12,6 +12,7 @@ from corporeal.errors import BadFileError, noticed
 from corporeal.formats.colmap import read_colmap
 from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
+from corporeal.geometry.unseen_side import unseen_side
 from corporeal.poses.attempt import Attempt, Way, attempt, require
 from corporeal.poses.blur import blurred
 from corporeal.poses.by_masks import checked_by_masks, filled_share
@@ -39,7 +40,6 @@ from corporeal.poses.judge import (
     doubts,
     in_vain,
     names_of,
-    unseen_side,
 )
 from corporeal.poses.look_alikes import checked_by_neighbours
 from corporeal.poses.middles import AS_TAKEN, CROPPED, SLIGHTLY_CROPPED, apart, clause, sentence

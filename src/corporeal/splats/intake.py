@@ -18,6 +18,7 @@ from corporeal.geometry.inverted_masks import inverted
 from corporeal.geometry.matching import SIDE
 from corporeal.geometry.silhouette_outliers import outliers
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians, similarity
+from corporeal.geometry.unseen_side import unseen_half
 from corporeal.geometry.upright import Stated, Upright, upright
 from corporeal.splats.cutout import cut_out
 from corporeal.splats.lowest import lowest
@@ -78,6 +79,8 @@ class Intake:
     """How it was turned and shifted since it was read."""
     seen: Float[np.ndarray, "N 3"] | None = None
     """Sparse points on all that the photographs show, the floor too; None: the file has none."""
+    half: str | None = None
+    """That half of the circle around it was not photographed, in a sentence; None: more was."""
     quality: Quality | None = None
     """How well pictures of the Gaussians agree with photographs held back; None: none was."""
     statements: tuple[str, ...] = ()
@@ -172,6 +175,7 @@ def take_in(
         masks,
         z_up=shown.z_up,
         seen=None if points is None else points.position,
+        half=unseen_half(shown.views.cameras, shown.names),
         quality=trained.quality,
         statements=(*shown.done, *_learned_how(trained, len(shown.views.cameras))),
         warnings=(*wrong, *doubt, *_badly_learned(trained, len(shown.names))),

@@ -140,6 +140,8 @@ class _Known:
     scale: MetricScale
     warnings: Sequence[str]
     """What to read first: what a person can state, then what is wrong with surfaces."""
+    doubts: tuple[str, ...]
+    """The latter."""
 
     @property
     def statements(self) -> list[str]:
@@ -177,7 +179,8 @@ def _known(
     told = [] if by_name is None else [said_by_name(title, by_name, names[0])]
     pairs = zip(names, found.solids, strict=True)
     unsound = [f"{name}: {why}" for name, solid in pairs for why in solid.warnings]
-    return _Known(objects, names, scale, [*scale.warnings, *told, *unsound])
+    doubts = [*filter(None, [found.taken.half]), *unsound]
+    return _Known(objects, names, scale, [*scale.warnings, *told, *doubts], tuple(doubts))
 
 
 def _upright(source: Path, taken: Intake, config: ReconstructConfig, folder: Path | None) -> Intake:
@@ -207,7 +210,8 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig, folder: Pat
 
 def _refusal(source: Path, why: str, lie: str, taken: Intake) -> UserError:
     """Make an error of why things are not worth simulating, with what was noticed before."""
-    return with_notes(UserError(f"{source}: {why} {lie}".rstrip()), taken.warnings)
+    noticed = [*filter(None, [taken.half]), *taken.warnings]
+    return with_notes(UserError(f"{source}: {why} {lie}".rstrip()), noticed)
 
 
 def _why_not(found: FoundObjects, photographers: Sequence[Camera], masked: bool) -> str | None:
@@ -238,6 +242,7 @@ def _in_metres(
         world_from_file=made @ found.taken.world_from_file,
         statements=statements,
         warnings=warnings,
+        doubts=known.doubts,
     )
 
 

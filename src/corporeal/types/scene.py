@@ -295,3 +295,5 @@ class Reconstruction:
     """How it was made and how sure that is, in sentences, for the report."""
     warnings: tuple[str, ...] = ()
     """What a reader of the report should know about the input, in sentences."""
+    doubts: tuple[str, ...] = ()
+    """Those of the warnings that say where shapes are not to be believed."""
