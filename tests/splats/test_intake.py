@@ -127,8 +127,10 @@ def test_doubts_stay_with_what_is_learned_and_with_why_nothing_can_be(taken):
     ],
 )
 def test_what_was_badly_learned_or_not_checked_is_said(taken, quality, said):
-    told = taken(FINE, learned(quality)).warnings
+    made = taken(FINE, learned(quality))
+    told = made.warnings
     assert len(told) == len(said)
+    assert set(told) <= set(made.doubts), "it is read first"
     assert all(words in warning for words, warning in zip(said, told, strict=True))
 
 

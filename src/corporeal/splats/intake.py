@@ -79,8 +79,8 @@ class Intake:
     """How it was turned and shifted since it was read."""
     seen: Float[np.ndarray, "N 3"] | None = None
     """Sparse points on all that the photographs show, the floor too; None: the file has none."""
-    half: str | None = None
-    """That half of the circle around it was not photographed, in a sentence; None: more was."""
+    doubts: tuple[str, ...] = ()
+    """Where shapes are not to be believed, in sentences."""
     quality: Quality | None = None
     """How well pictures of the Gaussians agree with photographs held back; None: none was."""
     statements: tuple[str, ...] = ()
@@ -168,6 +168,7 @@ def take_in(
         trained = train(shown.views, masks, start, training, checkpoint, progress)
     except UserError as problem:
         raise UserError(" ".join([str(problem), *doubt])) from problem
+    poor = _badly_learned(trained, len(shown.names))
     return Intake(
         trained.gaussians,
         shown.views.cameras,
@@ -175,10 +176,10 @@ def take_in(
         masks,
         z_up=shown.z_up,
         seen=None if points is None else points.position,
-        half=unseen_half(shown.views.cameras, shown.names),
+        doubts=tuple(filter(None, [unseen_half(shown.views.cameras, shown.names), *poor])),
         quality=trained.quality,
         statements=(*shown.done, *_learned_how(trained, len(shown.views.cameras))),
-        warnings=(*wrong, *doubt, *_badly_learned(trained, len(shown.names))),
+        warnings=(*wrong, *doubt, *poor),
     )
 
 

@@ -31,8 +31,8 @@ most objects; foliage and wires, whose gaps close, have less."""
 FILLED = 0.9
 """Share of masks that nobody gave which surfaces must fill, the median of all views: as much as the
 hull of masks must under right poses (``poses.judge.FILLED``). What no surface can fill is in some
-views only: .86 of a helmet with pieces of the wall behind it was filled, .87 of two things whose
-pictures were half placed wrongly, .93 and more of all others."""
+views only: .84 of a helmet with pieces of the wall behind it was filled, .87 of two things whose
+pictures were half placed wrongly, .94 and more of all others."""
 COMPARED = 12
 """Views in which that is compared."""
 GO_ON = "--force goes on all the same."

@@ -56,6 +56,7 @@ OWN_VIEWS, OWN_SIZE = 48, (384, 384)
 """Of a splat that comes without cameras."""
 AROUND = 16
 """Points that a normal is found from."""
+BY_PLACE = "What belongs to it was told by where it is alone, without masks."
 NOBODY = Viewer("", "metadata")
 TRAINED, LOOKED, FOUND = 0.75, 0.85, 0.9
 """Share of the work that is done after each step."""
@@ -179,7 +180,7 @@ def _known(
     told = [] if by_name is None else [said_by_name(title, by_name, names[0])]
     pairs = zip(names, found.solids, strict=True)
     unsound = [f"{name}: {why}" for name, solid in pairs for why in solid.warnings]
-    doubts = [*filter(None, [found.taken.half]), *unsound]
+    doubts = [*found.taken.doubts, *unsound]
     return _Known(objects, names, scale, [*scale.warnings, *told, *doubts], tuple(doubts))
 
 
@@ -205,12 +206,15 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig, folder: Pat
     if cut_out is not None and made.views is not None and folder is not None:
         numbers = [f"photograph {k + 1}" for k in range(len(cut_out))]
         drawn_over(list(made.views.rgb), cut_out, numbers, folder / FIGURE)
+    if cut_out is not None and made.coloured is not None:
+        told = f"{BY_PLACE} {lying_in(folder)}".rstrip()
+        made = replace(made, doubts=(*made.doubts, told))
     return made
 
 
 def _refusal(source: Path, why: str, lie: str, taken: Intake) -> UserError:
     """Make an error of why things are not worth simulating, with what was noticed before."""
-    noticed = [*filter(None, [taken.half]), *taken.warnings]
+    noticed = dict.fromkeys((*taken.doubts, *taken.warnings))
     return with_notes(UserError(f"{source}: {why} {lie}".rstrip()), noticed)
 
 
