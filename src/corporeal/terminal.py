@@ -1,7 +1,10 @@
-"""What a person sees in the terminal while verbs work: bars with the time left, and tables."""
+"""What a person sees while verbs work: bars with the time left or lines of a log, and tables."""
 
+import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import dataclass
+from threading import Event, Thread
 
 from rich.console import Console
 from rich.markup import escape
@@ -9,6 +12,16 @@ from rich.progress import BarColumn, Progress, TaskProgressColumn, TextColumn, T
 from rich.table import Table
 
 console = Console(stderr=True)
+
+Tell = Callable[[str], Callable[[float, str], None]]
+"""Given a verb, returns whom to tell the fraction done and what is being done."""
+
+EVERY = 30.0
+"""Seconds between two lines of a log on one verb [s]."""
+TELLS = 0.05
+"""Share of a verb that has to be done while somebody looks before its time left is told [-]."""
+MINUTE, HOUR, BRIEF = 60.0, 3600.0, 90.0
+"""[s]; what is brief is told in seconds."""
 
 
 def show_table(
@@ -31,9 +44,20 @@ def print_table(
     where.print(table)
 
 
+def print_line(line: str, where: Console = console) -> None:
+    """Print a line whose words are taken as they are, however long it is."""
+    where.print(line, markup=False, highlight=False, soft_wrap=True)
+
+
 @contextmanager
-def progress_bars() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
-    """Draw one bar per verb, with the time left; in a log, one line per verb."""
+def progress_bars() -> Iterator[Tell]:
+    """Draw one bar per verb, with the time left; where nobody watches, say it in lines of a log."""
+    with _bars() if console.is_terminal else log_lines(console) as tell:
+        yield tell
+
+
+@contextmanager
+def _bars() -> Iterator[Tell]:
     columns = (
         TextColumn("[bold]{task.fields[verb]:>9}"),
         BarColumn(30),
@@ -41,14 +65,12 @@ def progress_bars() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
         TimeRemainingColumn(),
         TextColumn("[dim]{task.description}"),
     )
-    with Progress(*columns, console=console, disable=not console.is_terminal) as bars:
+    with Progress(*columns, console=console) as bars:
 
         def tell(verb: str) -> Callable[[float, str], None]:
             for task in bars.task_ids:
                 bars.update(task, completed=1.0, description="")
             task = bars.add_task("", total=1.0, verb=verb)
-            if not console.is_terminal:
-                console.print(verb)
 
             def progress(fraction: float, words: str) -> None:
                 bars.update(task, completed=fraction, description=words)
@@ -58,3 +80,87 @@ def progress_bars() -> Iterator[Callable[[str], Callable[[float, str], None]]]:
         yield tell
         for task in bars.task_ids:
             bars.update(task, completed=1.0, description="")
+
+
+@dataclass
+class Doing:
+    """How far a verb is."""
+
+    verb: str
+    begun: float
+    """When [s]."""
+    fraction: float = 0.0
+    words: str = ""
+    first: tuple[float, float] | None = None
+    """When something was told first [s], and the fraction that was done then: what an interrupted
+    run left counts for no speed."""
+
+    def told(self, fraction: float, words: str, now: float) -> None:
+        """Take note of what was told."""
+        self.fraction, self.words = fraction, words
+        self.first = self.first or (now, fraction)
+
+    def line(self, now: float) -> str:
+        """Say how far it is, and how long it will last if it goes on as it did."""
+        left = f", about {lasting(self._left(now))} left" if self._speed(now) > 0 else ""
+        words = f": {self.words}" if self.words else ""
+        return f"{self.verb} {self.fraction:.0%} after {lasting(now - self.begun)}{left}{words}"
+
+    def _speed(self, now: float) -> float:
+        """Return the share that is done in a second; 0: nobody knows yet [1/s]."""
+        since, begun = self.first or (now, 0.0)
+        done = self.fraction - begun
+        return done / (now - since) if done >= TELLS and now > since else 0.0
+
+    def _left(self, now: float) -> float:
+        return (1 - self.fraction) / self._speed(now)
+
+
+def lasting(seconds: float) -> str:
+    """Say how long something lasts, as people do."""
+    if seconds < BRIEF:
+        return f"{seconds:.0f} s"
+    if seconds < BRIEF * MINUTE:
+        return f"{seconds / MINUTE:.0f} min"
+    return f"{seconds / HOUR:.1f} h"
+
+
+@contextmanager
+def log_lines(
+    where: Console, every: float = EVERY, now: Callable[[], float] = time.monotonic
+) -> Iterator[Tell]:
+    """Say when a verb begins and ends, and every so often how far it is.
+
+    Args:
+        where: Gets the lines.
+        every: Seconds between two lines on one verb [s].
+        now: The clock [s].
+
+    """
+    doing: list[Doing] = []  # the last one goes on
+    over = Event()
+
+    def ended() -> None:
+        for verb in doing:
+            print_line(f"{verb.verb} done in {lasting(now() - verb.begun)}", where)
+        doing.clear()
+
+    def tell(verb: str) -> Callable[[float, str], None]:
+        ended()
+        doing.append(one := Doing(verb, now()))
+        print_line(f"{verb} begins", where)
+        return lambda fraction, words: one.told(fraction, words, now())
+
+    def go_on() -> None:
+        while not over.wait(every):
+            for verb in tuple(doing):
+                print_line(verb.line(now()), where)
+
+    watch = Thread(target=go_on, daemon=True)
+    watch.start()
+    try:
+        yield tell
+        ended()
+    finally:
+        over.set()
+        watch.join()

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from pathlib import Path
 
 from corporeal.findings import Breakage, PartAudit
-from corporeal.terminal import console, print_table
+from corporeal.terminal import console, print_line, print_table
 from corporeal.trajectory.audit_file import read_run_audit
 from corporeal.trajectory.audit_words import breakage_words
 
@@ -23,10 +23,10 @@ def show_summary(folder: Path) -> None:
     rows = [_row(part) for part in audit.parts]
     print_table(HEADS, rows[:MOST_PARTS], console)
     if len(rows) > MOST_PARTS:
-        _say(f"and {len(rows) - MOST_PARTS} parts more: see the report.")
+        print_line(f"and {len(rows) - MOST_PARTS} parts more: see the report.")
     _listed("warning", audit.warnings)
     for hint in audit.hints:
-        _say(f"hint: {hint}")
+        print_line(f"hint: {hint}")
     _breaking(audit.breakage)
 
 
@@ -34,11 +34,11 @@ def _breaking(found: Sequence[Breakage]) -> None:
     """Say what the film shows whole although it would break, and how to see it break."""
     doubted = [b for b in found if b.word != "holds" and not b.pieces]
     for blow in doubted[:MOST_BLOWS]:
-        _say(f"hint: {breakage_words(blow)}")
+        print_line(f"hint: {breakage_words(blow)}")
     if len(doubted) > MOST_BLOWS:
-        _say(f"and {len(doubted) - MOST_BLOWS} more that may break: see the report.")
+        print_line(f"and {len(doubted) - MOST_BLOWS} more that may break: see the report.")
     if any(b.word == "would break" for b in doubted):
-        _say("hint: with --breaking what would break falls into pieces.")
+        print_line("hint: with --breaking what would break falls into pieces.")
 
 
 def _row(part: PartAudit) -> tuple[str, ...]:
@@ -47,11 +47,7 @@ def _row(part: PartAudit) -> tuple[str, ...]:
 
 def _listed(word: str, sentences: Sequence[str]) -> None:
     for sentence in sentences[:MOST_WARNINGS]:
-        _say(f"{word}: {sentence}")
+        print_line(f"{word}: {sentence}")
     if len(sentences) > MOST_WARNINGS:
         more = len(sentences) - MOST_WARNINGS
-        _say(f"and {more} {word}{'s' * (more > 1)} more: see the report.")
-
-
-def _say(line: str) -> None:
-    console.print(line, markup=False, highlight=False, soft_wrap=True)
+        print_line(f"and {more} {word}{'s' * (more > 1)} more: see the report.")
