@@ -12,7 +12,7 @@ import corporeal
 
 ROOT = Path(corporeal.__file__).parent
 FLOORS = [
-    {"errors", "machine", "typed", "types", "version"},
+    {"errors", "machine", "progress", "typed", "types", "version"},
     {"mpm"},  # a library of its own, whose laws the rest of the house asks
     {"findings"},
     {"geometry", "backends", "store"},

@@ -1,7 +1,7 @@
 """Masks of photographs that have none, grown, and written where people can correct them."""
 
 import shutil
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -22,9 +22,8 @@ from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds, looked_at
 from corporeal.masking.taken_in import taken_in
+from corporeal.progress import Progress, within
 from corporeal.types import Views
-
-Progress = Callable[[float, str], None]
 
 FLAT = "What has their colours and lies flat on the floor was taken for objects, too."
 OTHER_COLOURS = "What stands there and borders on it in other colours was taken in."
@@ -38,6 +37,8 @@ HAVE_IT = (
 )
 GROWN = 0.8
 """Share of the work that is done when masks are grown."""
+ONCE, TWICE = 0.5, 0.75
+"""Share of growing them that is done when they were grown once, and with what lies flat."""
 
 
 @dataclass(frozen=True)
@@ -91,7 +92,7 @@ def grown_masks(
     else:
         seeds = pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
     alone = pointed is not None
-    grown, more = _grown(shown.views, seeds, alone, lambda f, words: progress(GROWN * f, words))
+    grown, more = _grown(shown.views, seeds, alone, within(progress, 0.0, GROWN))
     why = doubt(grown)
     lacks = incomplete(grown) or ("" if alone or why else lacking(grown)) or ""
     for name in (MASKS[0], DOUBTED, RECORD):
@@ -122,15 +123,17 @@ def _grown(
     objects lies beside them, colours decide, if masks are complete and not doubted then.
     What hangs on it in other colours is taken in unless it is asked for alone.
     """
-    grown, flat = grow(views, seeds, progress), False
+    grown, flat = grow(views, seeds, within(progress, 0.0, ONCE)), False
     if incomplete(grown) is not None:
-        wider = grow(views, seeds, progress, flat=True)
+        again = within(progress, ONCE, TWICE, ", with what lies flat on the floor")
+        wider = grow(views, seeds, again, flat=True)
         flat = doubt(wider) is None and incomplete(wider) is None
         grown = wider if flat else grown
     said = [FLAT] if flat else []
     if grown is None or alone:
         return grown, said
-    whole = taken_in(views, seeds, grown, progress, flat)
+    last = within(progress, TWICE, 1.0, ", with what borders on it in other colours")
+    whole = taken_in(views, seeds, grown, last, flat)
     return whole, said if whole is grown else [*said, OTHER_COLOURS]
 
 

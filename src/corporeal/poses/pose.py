@@ -1,7 +1,6 @@
 """Find where photographs were taken from, in up to three attempts, or say why that cannot be."""
 
 import shutil
-from collections.abc import Callable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -45,9 +44,8 @@ from corporeal.poses.look_alikes import checked_by_neighbours
 from corporeal.poses.middles import AS_TAKEN, CROPPED, SLIGHTLY_CROPPED, apart, clause, sentence
 from corporeal.poses.mirrored import TWO_KINDS, mirrored
 from corporeal.poses.pairs import partners_of
+from corporeal.progress import Progress, within
 from corporeal.typed import typed
-
-Progress = Callable[[float, str], None]
 
 POSES = "poses"
 """Folder of a reconstruction in which they are kept."""
@@ -180,11 +178,11 @@ def pose_object(posed: Posed, masks: Path, folder: Path, progress: Progress) -> 
 
 
 def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
-    said, gathered = _gathered(source, folder, _within(progress, 0.0, GATHERED))
+    said, gathered = _gathered(source, folder, within(progress, 0.0, GATHERED))
     if (count := len(gathered.names)) < LEAST:
         few = f"{count} photographs are too few to find where they were taken from."
         return _Kept((), gathered.said, few, (), TAKE)
-    looked = _places(folder, gathered, _within(progress, GATHERED, LOOKED))
+    looked = _places(folder, gathered, within(progress, GATHERED, LOOKED))
     if isinstance(looked, _Kept):
         return looked
     gathered, others = looked
@@ -232,7 +230,7 @@ def _tried(
         share, before = (before, until), until
         if not _worth_trying(way, folder, tried, len(smeared)):
             continue
-        told = attempt(folder, folder / way, gathered, way, _within(progress, *share))
+        told = attempt(folder, folder / way, gathered, way, within(progress, *share))
         tried.append(_checked(told, folder, gathered))
         if not doubts(tried[-1]) and doubt_of_masks(tried[-1]) is None:
             break
@@ -286,14 +284,10 @@ def _gathered(source: Path, folder: Path, progress: Progress) -> tuple[list[str]
     if source.suffix.lower() not in FILMS:
         return [], gather(source, folder, progress)
     frames = folder / "frames"
-    said = write_frames(source, frames, _within(progress, 0.0, 0.7))
-    gathered = gather(frames, folder, _within(progress, 0.7, 1.0))
+    said = write_frames(source, frames, within(progress, 0.0, 0.7))
+    gathered = gather(frames, folder, within(progress, 0.7, 1.0))
     shutil.rmtree(frames)
     return said, gathered
-
-
-def _within(progress: Progress, begin: float, end: float) -> Progress:
-    return lambda fraction, words: progress(begin + (end - begin) * fraction, words)
 
 
 def _accept(out: Path, folder: Path) -> None:

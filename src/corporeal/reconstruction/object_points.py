@@ -14,7 +14,8 @@ from corporeal.features.clouds import Placed, projected
 from corporeal.features.descriptor import LET_THROUGH, seen_from
 from corporeal.features.lifting import Lifted, known, uplift
 from corporeal.geometry.harmonics import DC
-from corporeal.reconstruction.reconstruct_config import Progress, ReconstructConfig
+from corporeal.progress import Progress
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.regions.masks import lifted
 from corporeal.splats.depth_rendering import render_depth
 from corporeal.splats.feature_distillation import distilled

@@ -14,8 +14,9 @@ from corporeal.formats.photographs import MASKS, has_masks, listed, read_photogr
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
+from corporeal.progress import Progress, within
 from corporeal.reconstruction.masks_figure import FIGURE, masks_figure
-from corporeal.reconstruction.reconstruct_config import AUTO, NONE, Progress, ReconstructConfig
+from corporeal.reconstruction.reconstruct_config import AUTO, NONE, ReconstructConfig
 from corporeal.splats.intake import ON, Intake, doubt_of_poses, take_in
 from corporeal.splats.training_schedule import TrainConfig
 
@@ -23,8 +24,9 @@ POSED = 0.5
 """Share of learning from pictures that is done when poses that nobody gave are found."""
 MASKED = 0.1
 """The same, of finding masks."""
-WHOLE = 0.7
-"""Share of finding poses that is done when whole pictures fit together."""
+WHOLE, TESTED = 0.7, 0.85
+"""Share of finding poses that is done when whole pictures fit together, and when masks were asked
+about it."""
 SEEN, OBJECT_POSES = "poses-seen", "poses-object"
 """Folders of masks that found poses are tested by, and of poses that are found from them."""
 STAND_STILL = (
@@ -156,13 +158,14 @@ def _seen_to_agree(
         BadFileError: It did not.
 
     """
-    later = within(progress, POSED * WHOLE, POSED)
-    grown = grown_masks(posed.folder, place / SEEN, progress=later)
+    asking = within(progress, POSED * WHOLE, POSED * TESTED, ", to test the poses")
+    grown = grown_masks(posed.folder, place / SEEN, progress=asking)
     if grown.folder is None:
         return _doubted(source, posed, force)
     masks = grown.folder / MASKS[0]
     if (why := moved_within(posed, masks)) is None:
         return _doubted(source, posed, force=True)
+    later = within(progress, POSED * TESTED, POSED)
     again = pose_object(posed, masks, place / OBJECT_POSES, later)
     said = f"{why[0].upper()}{why[1:]}"
     if again is not None:
@@ -191,8 +194,3 @@ def _doubted(source: Path, posed: Posed, force: bool) -> Posed:
         raise BadFileError(source, f"{posed.doubt}.", STAND_STILL)
     said = f"{posed.doubt[0].upper()}{posed.doubt[1:]}."
     return replace(posed, warnings=(said, *posed.warnings))
-
-
-def within(progress: Progress, begin: float, end: float) -> Progress:
-    """Tell of a part of the work as of the whole."""
-    return lambda fraction, words: progress(begin + (end - begin) * fraction, words)

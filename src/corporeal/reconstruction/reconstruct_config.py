@@ -1,6 +1,6 @@
 """How photographs or a splat are made objects, and which settings cannot be right."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Literal
@@ -13,7 +13,6 @@ from corporeal.geometry.gaussians import LARGEST, AskedUp
 from corporeal.geometry.metric import MetricScale, TwoPoints, measured
 from corporeal.regions.rule import Rule
 
-Progress = Callable[[float, str], None]
 AUTO, NONE = "auto", "none"
 
 

@@ -21,13 +21,13 @@ from corporeal.geometry.metric import MetricScale
 from corporeal.geometry.similarity import moved_gaussians, moved_points, similarity
 from corporeal.geometry.srgb import linear
 from corporeal.masking.grown_masks import lying_in
+from corporeal.progress import Progress, within
 from corporeal.reconstruction.found_objects import FoundObjects, named_objects, recognised
 from corporeal.reconstruction.masks_figure import FIGURE, drawn_over
 from corporeal.reconstruction.object_points import drawn_masks, foreground_of, points_on_objects
-from corporeal.reconstruction.picture_intake import take_pictures, within
+from corporeal.reconstruction.picture_intake import take_pictures
 from corporeal.reconstruction.reconstruct_config import (
     DEFAULT,
-    Progress,
     ReconstructConfig,
     metric_scale,
     validate,

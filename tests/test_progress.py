@@ -1,0 +1,115 @@
+"""What is said of work that goes on: in a log, and of a part as of the whole."""
+
+import io
+import threading
+
+import numpy as np
+import pytest
+from rich.console import Console
+
+from corporeal import terminal
+from corporeal.masking import grown_masks as module
+from corporeal.progress import within
+from corporeal.terminal import Doing, lasting, log_lines
+
+
+def test_a_part_is_told_as_of_the_whole():
+    told = []
+    part = within(lambda *what: told.append(what), 0.5, 0.75, ", once more")
+    part(0.0, "growing")
+    part(1.0, "drawing")
+    assert told == [(0.5, "growing, once more"), (0.75, "drawing, once more")]
+
+
+@pytest.mark.parametrize(
+    ("told", "now", "said"),
+    [
+        ([], 40.0, "film 0% after 40 s"),
+        ([(0.01, 3.0)], 40.0, "film 1% after 40 s: drawing"),
+        ([(0.0, 0.0), (0.25, 40.0)], 40.0, "film 25% after 40 s, about 2 min left: drawing"),
+        # Goes on from what an interrupted run left: that took no time now.
+        ([(0.6, 0.0), (0.7, 40.0)], 40.0, "film 70% after 40 s, about 2 min left: drawing"),
+        ([(0.6, 0.0)], 40.0, "film 60% after 40 s: drawing"),
+    ],
+)
+def test_the_time_left_is_told_by_what_was_done_since_somebody_looks(told, now, said):
+    verb = Doing("film", 0.0)
+    for fraction, when in told:
+        verb.told(fraction, "drawing", when)
+    assert verb.line(now) == said
+
+
+@pytest.mark.parametrize(
+    ("seconds", "said"), [(1.4, "1 s"), (89.0, "89 s"), (90.0, "2 min"), (9000.0, "2.5 h")]
+)
+def test_times_are_said_as_people_say_them(seconds, said):
+    assert lasting(seconds) == said
+
+
+def test_a_log_has_a_line_where_a_verb_begins_and_ends():
+    where = io.StringIO()
+    with log_lines(Console(file=where), now=lambda: 0.0) as tell:
+        tell("fill")(0.5, "[b]half[/b]")
+        tell("film")
+    assert where.getvalue().splitlines() == [
+        "fill begins",
+        "fill done in 0 s",
+        "film begins",
+        "film done in 0 s",
+    ]
+
+
+def test_what_failed_is_not_said_to_be_done():
+    where = io.StringIO()
+    with pytest.raises(ValueError), log_lines(Console(file=where)) as tell:
+        tell("fill")
+        raise ValueError
+    assert where.getvalue() == "fill begins\n"
+
+
+def test_a_log_says_so_while_nothing_is_told_either():
+    """Of a call into another library nobody hears anything for minutes."""
+
+    class Heard(io.StringIO):
+        again = threading.Event()
+
+        def write(self, text):
+            if "40%" in text:
+                self.again.set()
+            return super().write(text)
+
+    where = Heard()
+    with log_lines(Console(file=where), every=0.01) as tell:
+        tell("reconstruct")(0.4, "matching [3/4]")
+        assert where.again.wait(20)
+    assert "reconstruct 40% after 0 s: matching [3/4]" in where.getvalue()
+
+
+def test_nobody_watches_a_pipe(capsys, monkeypatch):
+    monkeypatch.setattr(terminal, "console", Console(stderr=True))
+    with terminal.progress_bars() as tell:
+        tell("masks")(0.5, "growing masks")
+    assert capsys.readouterr().err == "masks begins\nmasks done in 0 s\n"
+
+
+def test_masks_that_are_grown_again_are_told_apart_and_never_go_back(monkeypatch):
+    """The bar began again, with the same words."""
+    told = []
+
+    def grow(views, seeds, progress, flat=False):
+        for fraction in (0.0, 0.5, 1.0):
+            progress(fraction, "growing masks")
+        return object()
+
+    def taken_in(views, seeds, grown, progress, flat):
+        grow(views, seeds, progress)
+        return grown
+
+    monkeypatch.setattr(module, "grow", grow)
+    monkeypatch.setattr(module, "taken_in", taken_in)
+    monkeypatch.setattr(module, "incomplete", lambda grown: "a part")
+    monkeypatch.setattr(module, "doubt", lambda grown: None)
+    module._grown(None, None, alone=False, progress=lambda *what: told.append(what))  # type: ignore
+    fractions, words = zip(*told, strict=True)
+    assert (np.diff(fractions) >= 0).all() and fractions[-1] == 1.0
+    assert len(set(words)) == 3
