@@ -8,13 +8,13 @@ import numpy as np
 from jaxtyping import Bool
 
 from corporeal.errors import BadFileError, noticed
-from corporeal.features.learned_masks import learned_masks
-from corporeal.features.maskers import connect_masker, split
+from corporeal.features.maskers import split
 from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
 from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
 from corporeal.progress import Progress, within
+from corporeal.reconstruction.masks_by_model import CORRECT, masks_by_model
 from corporeal.reconstruction.masks_figure import FIGURE, masks_figure
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, ReconstructConfig
 from corporeal.splats.intake import ON, Intake, doubt_of_poses, take_in
@@ -37,9 +37,6 @@ ALL_OF_IT = (
     "Give masks (a folder 'masks' with the names of the pictures), or grow them with 'corporeal "
     "masks' and correct them; or photograph it on a ground of another colour, from more sides. "
     "--force goes on with what was found."
-)
-CORRECT = (
-    "They lie in 0-reconstruct/masks of the run: what is corrected there is taken by the next run."
 )
 
 
@@ -110,9 +107,7 @@ def masks_for(
         return _Masks()
     place = folder or Path(tempfile.mkdtemp(prefix="corporeal-"))
     if config.masks != AUTO:
-        masker = connect_masker(config.masks)
-        learned = learned_masks(source, place, masker, config.things, progress)
-        return _Masks(learned.folder, (*learned.said, CORRECT))
+        return _Masks(*masks_by_model(config, source, place, progress))
     grown = grown_masks(source, place, progress=progress)
     if grown.folder is None:
         return _Masks(None, (), grown.said, False, grown.doubted, grown.incomplete)

@@ -215,8 +215,11 @@ def _surveyed(scene: _Scene, count: int, pool: ThreadPool) -> _Survey:
 
 
 def _missing(k: int) -> UserError:
-    what = f"Nothing solid is found of object {k}"
-    return UserError(f"{what}: no camera sees it, or its Gaussians are haze.")
+    return UserError(
+        f"Nothing solid is found of object {k + 1}: no camera sees it, or its Gaussians are haze. "
+        "Look whether masks, where there are some, show one thing in all photographs; say the "
+        "number of objects with --count; or photograph it from more sides."
+    )
 
 
 def _solid(scene: _Scene, k: int, survey: _Survey, pool: ThreadPool) -> Solid:
