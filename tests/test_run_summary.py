@@ -1,8 +1,10 @@
 """What a finished run says in the terminal."""
 
 import pytest
+from rich.console import Console
 
 from corporeal import store
+from corporeal.cli import run_summary
 from corporeal.cli.run_summary import show_summary
 from corporeal.findings import Breakage
 from corporeal.trajectory.audit_file import AUDIT
@@ -41,3 +43,28 @@ def test_warnings_that_are_left_out_are_counted_as_one_counts(tmp_path, capsys, 
     show_summary(tmp_path)
     said = capsys.readouterr()
     assert told in said.out + said.err
+
+
+def test_what_a_run_says_last_is_in_order_of_weight(tmp_path, capsys):
+    warnings = ("1 picture was left out: a.jpg.", "Say more with --vlm.", "It may be wrong.")
+    store.write_json(tmp_path / AUDIT, store.plain(run_audit(warnings=warnings, hints=("Still.",))))
+    show_summary(tmp_path)
+    said = capsys.readouterr()
+    assert (said.out + said.err).splitlines()[-4:] == [
+        "warning: It may be wrong.",
+        "hint: Say more with --vlm.",
+        "hint: Still.",
+        "left out: 1 picture was left out: a.jpg.",
+    ]
+
+
+def test_in_a_terminal_sentences_stand_beside_their_word(tmp_path, capsys, monkeypatch):
+    where = Console(stderr=True, force_terminal=True, width=40, color_system=None)
+    monkeypatch.setattr(run_summary, "console", where)
+    warnings = ("It may be wrong by a factor. Measure one of its sides by hand.",)
+    store.write_json(tmp_path / AUDIT, store.plain(run_audit(warnings=warnings)))
+    show_summary(tmp_path)
+    lines = [line.rstrip() for line in capsys.readouterr().err.splitlines()]
+    begun = next(k for k, line in enumerate(lines) if line.startswith("warning: It may"))
+    assert len(lines) > begun + 1, "40 columns do not hold it"
+    assert all(line.startswith(" " * 9) for line in lines[begun + 1 :])

@@ -165,3 +165,27 @@ def test_a_long_reason_that_all_values_share_is_said_once(page):
     assert told.count(reason) == 1
     usual = page(PartWords("", "steel", answered_by="metadata"))
     assert "Reason where none" not in usual and usual.count("the usual value in the") > 3
+
+
+def test_the_page_begins_with_what_may_be_wrong_as_a_list(page):
+    """It began with a wall of text, and doubts stood below the film."""
+    warnings = (
+        "2 of 10 photographs were left out: a.jpg.",
+        "thing_0: nobody looked into it. With --vlm somebody does.",
+        "The scale may be wrong. Measure it.",
+    )
+    told = page(PartWords("", "steel", "solid"), warnings=warnings, hints=("Nothing moves.",))
+    above = told[: told.index("<video")]
+    heads = re.findall("<h3>(.*?)</h3>", above)
+    assert heads == [
+        "What may be wrong", "What was assumed, and what changes it", "What was left out"
+    ]  # fmt: skip
+    items = re.findall("<li>(.*?)</li>", above)
+    assert items[0] == "The scale may be wrong. <span>Measure it.</span>"
+    assert '<a href="#part-0">' in items[1] and items[2] == "Nothing moves."
+    assert 'href="#said"' in told and 'id="said"' in above
+
+
+def test_a_page_of_which_nothing_is_to_be_said_has_no_lists(page):
+    told = page(PartWords("", "steel", "solid"))
+    assert "<h3>What" not in told and "The audit found no violations." in told

@@ -18,6 +18,7 @@ from corporeal.render.mass_tables import weighed
 from corporeal.render.page import cells, figure, inlined, page, safe
 from corporeal.render.subject import parts_named
 from corporeal.trajectory.audit_words import breakage_words, equilibrium_words
+from corporeal.trajectory.closing_words import Kind, closing_words, parted
 from corporeal.types import (
     Film,
     Ground,
@@ -126,30 +127,57 @@ def report(story: Story, path: Path) -> None:
 
 
 def _summary(story: Story) -> str:
+    """Say in a line or two what was simulated, and in lists what to think of it, by weight."""
+    lists = "".join(_said(k, s, story) for k, s in closing_words(story.audit).items() if s)
+    return (
+        f'<p class="lead">{_lead(story)}</p>'
+        + (f'<div class="said" id="said">{lists}</div>' if lists else "")
+        + _how(story)
+    )
+
+
+def _lead(story: Story) -> str:
     scene, field = story.scene, story.field
     objects = ", ".join(safe(o.name.replace("_", " ")) for o in scene.objects)
-    unknown = sum(w.answered_by == "unknown" for w in field.words)
     seen = any(w.answered_by in ("model", "recording") for w in field.words)
-    sentences = [
+    counted = (
         f"{len(scene.objects)} object{'s' * (len(scene.objects) != 1)} ({objects}), "
         f"{len(field.materials)} part{'s' * (len(field.materials) != 1)}, "
-        f"{scene.duration:g} s simulated with {story.particles.count:,} particles.",
-        _looked(story.audit.questions, max((len(m.answers) for m in field.mixtures), default=0))
-        if seen
-        else "No vision-language model was asked: materials come from annotations and from "
-        "metadata of the file.",
-    ]
-    sentences += map(safe, story.origin)
-    sentences += [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
-    settled = equilibrium_words(story.audit.settling)
-    sentences += filter(None, [safe(how_scaled(scene.objects)), safe(settled)])
-    sentences += map(safe, story.audit.hints)
-    if unknown:
-        sentences.append(
-            f"<b>{unknown} part{'s' * (unknown != 1)} could not be recognised</b> and got the "
-            "neutral material. State materials with --annotations."
+        f"{scene.duration:g} s simulated with {story.particles.count:,} particles."
+    )
+    if not seen:
+        return (
+            f"{counted} No vision-language model was asked: materials come from annotations and "
+            "from metadata of the file."
         )
-    return " ".join(sentences)
+    answers = max((len(m.answers) for m in field.mixtures), default=0)
+    return f"{counted} {_looked(story.audit.questions, answers)}"
+
+
+def _said(kind: Kind, sentences: Sequence[str], story: Story) -> str:
+    """List sentences of a kind: what is the matter, then why and what to do, and of which part."""
+    rows = "".join(f"<li>{_item(sentence, story)}</li>" for sentence in sentences)
+    return f"<h3>{safe(kind.head)}</h3><ul>{rows}</ul>"
+
+
+def _item(sentence: str, story: Story) -> str:
+    first, rest = parted(sentence)
+    following = f" <span>{safe(rest)}</span>" if rest else ""
+    return f"{safe(first)}{following}{_subject(sentence, story)}"
+
+
+def _how(story: Story) -> str:
+    """List how the scene came about, for whoever wants to know."""
+    scene = story.scene
+    forced = [_forced(o) for o in scene.objects if o.push or o.wind or o.path]
+    settled = equilibrium_words(story.audit.settling)
+    told = [
+        *map(safe, story.origin),
+        *forced,
+        *map(safe, filter(None, [how_scaled(scene.objects), settled])),
+    ]
+    rows = "".join(f"<li>{sentence}</li>" for sentence in told)
+    return f"<details><summary>How it came about</summary><ul>{rows}</ul></details>" * bool(told)
 
 
 def _looked(questions: Usage, answers: int) -> str:
@@ -202,17 +230,14 @@ def _struck(story: Story, k: int) -> str:
 def _verdict(story: Story) -> str:
     if not story.audit.warnings:
         return '<p class="good">The audit found no violations.</p>'
-    items = "".join(f"<li>{safe(w)} {_subject(w, story)}</li>" for w in story.audit.warnings)
-    return (
-        f'<div class="warn"><b>The audit found the following limitations.</b><ul>{items}</ul></div>'
-    )
+    return '<p>What limits this result stands at the <a href="#said">top of the page</a>.</p>'
 
 
-def _subject(warning: str, story: Story) -> str:
-    """Link a warning to the parts that it names, or else to the audit."""
-    named = parts_named(warning, story.scene, story.parts)
-    links = [(f"part-{k}", story.parts.catalogue[k].name) for k in named] or [("audit", "audit")]
-    return ", ".join(f'<a href="#{place}">{safe(name)}</a>' for place, name in links)
+def _subject(sentence: str, story: Story) -> str:
+    """Link a sentence to the parts that it names."""
+    named = parts_named(sentence, story.scene, story.parts)
+    links = [f'<a href="#part-{k}">{safe(story.parts.catalogue[k].name)}</a>' for k in named]
+    return f" ({', '.join(links)})" if links else ""
 
 
 def _expectations(expectations: Sequence[Expectation]) -> str:
