@@ -149,3 +149,20 @@ def test_what_is_blown_up_is_a_skin_with_air_in_it(name, material, kpa):
     assert part.material == material
     assert part.structure == ("shell" if kpa else None)
     assert part.inflation == (pytest.approx(1e3 * kpa) if kpa else None)
+
+
+@pytest.mark.parametrize(
+    ("name", "material"),
+    [
+        ("axe", "steel"),
+        ("hatchet", "steel"),
+        ("axe head", "steel"),
+        ("bronze axe", "bronze"),
+        ("stone axe", "granite"),
+        ("wooden axe", "wood"),
+        ("plastic toy axe", "hard_plastic"),
+    ],
+)
+def test_an_axe_is_of_what_its_head_is_of(name, material):
+    """Nobody knew it: a reconstructed one that came into a scene was of plastic."""
+    assert built(name, 0.1).material == material

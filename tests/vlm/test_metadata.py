@@ -406,10 +406,10 @@ def test_what_is_no_compound_of_known_words_stays_whole(name):
 
 def test_a_substance_in_a_name_counts_where_the_thing_is_unknown():
     painted = Finish("texture", texture=np.zeros((2, 2, 3), dtype=np.uint8))
-    head = seen("mesh", "bronze axe head", painted)
-    assert head.material == "bronze"
-    assert head.margin < seen("mesh", "axe head", Finish("bronze", metallic=1.0)).margin
-    assert seen("mesh", "gold axe head", painted).material is None, "gold is as often a colour"
+    cast = seen("mesh", "bronze talisman", painted)
+    assert cast.material == "bronze"
+    assert cast.margin < seen("mesh", "talisman", Finish("bronze", metallic=1.0)).margin
+    assert seen("mesh", "gold talisman", painted).material is None, "gold is as often a colour"
     assert seen("mesh", "bronze car", painted).material == "steel", "here it is a colour"
     assert seen("mesh", "plush doll").material == "fibre_fill"
     assert seen("mesh", "doll").material == "PVC"
