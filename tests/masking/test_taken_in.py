@@ -13,6 +13,7 @@ from corporeal.masking.doubt import lacking
 from corporeal.masking.grow import grow
 from corporeal.masking.grown_masks import OTHER_COLOURS
 from corporeal.masking.hanging import Hanging
+from corporeal.masking.pointed import Pointed
 from corporeal.masking.seeds import looked_at
 from corporeal.masking.taken_in import taken_in
 from corporeal.reconstruction.picture_intake import masks_for, take_pictures
@@ -89,3 +90,19 @@ def test_much_that_borders_on_it_and_was_not_taken_in_ends_the_run(tmp_path, mon
     if why is not None:
         with pytest.raises(BadFileError, match="borders on it"):
             take_pictures(tmp_path / "photos", ReconstructConfig(), tmp_path, unheard)
+
+
+def test_who_points_at_a_part_hears_that_something_borders_on_it(tmp_path, monkeypatch):
+    """Of a flowerpot that was pointed at masks held the lower half, without a word."""
+    views, masks, _ = scene()
+    write_views(tmp_path / "photos", views)
+    grown = grow(views, looked_at(views, None))
+    assert grown is not None
+    more = np.roll(grown.masks, grown.masks.shape[2] // 3, axis=2) & ~grown.masks
+    for hangs, told in ((Hanging(more, more), True), (None, False)):
+        made = replace(grown, hanging=hangs)
+        monkeypatch.setattr(module, "grow", lambda *_, made=made: made)
+        row, column = np.argwhere(masks[0] > 0).mean(axis=0)
+        at = Pointed("", (float(column), float(row)), None)
+        said = module.grown_masks(tmp_path / "photos", tmp_path / f"{told}", at).said
+        assert any("It may be a part" in sentence for sentence in said) == told

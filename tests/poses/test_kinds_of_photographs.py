@@ -160,6 +160,20 @@ def test_folders_of_folders_and_single_files_are_told_where_to_go_on(tmp_path, g
         assemble([tmp_path / "films"])
 
 
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("a.jpg", r"is no PNG, JPEG or WebP picture\. Take 40"),
+        ("a.gif", "is a GIF. Convert it to MP4"),
+    ],
+)
+def test_what_only_its_name_calls_a_picture_is_not_called_one(tmp_path, name, said):
+    """A text called .jpg was "a single picture, which shows no depth"."""
+    (tmp_path / name).write_text("text")
+    with pytest.raises(UserError, match=said):
+        assemble([tmp_path / name])
+
+
 @pytest.mark.parametrize(("count", "said"), [(1, "1 photograph is"), (2, "2 photographs are")])
 def test_good_photographs_that_are_too_few_are_not_said_to_be_bad(tmp_path, greys, count, said):
     saved(tmp_path, greys[:count], ".jpg", Image.fromarray)

@@ -1,11 +1,15 @@
 """Read a model of any kind: glTF, or a mesh file in a child process."""
 
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
+
+from PIL import Image
 
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats import glb
 from corporeal.formats.glb import Model
+from corporeal.formats.images import FORMATS
 from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
 from corporeal.formats.meshes import read_mesh
 from corporeal.formats.own_objects import own_objects
@@ -87,6 +91,19 @@ def _not_read(path: Path) -> UserError:
         words = BLENDER[kind].format(str(path), str(made))
         command = f'blender --background --python-expr "{words}"'
         return BadFileError(path, f"{kind} is read by Blender only.", f"Convert it: {command}")
+    if kind == ".gif":
+        return BadFileError(path, "is a GIF.", f"Convert it to MP4 if it moves. {ALL_AROUND}")
+    if kind in SHOWN and not _opens(path):
+        from corporeal.formats.shots import unreadable  # with it come lenses, which models lack
+
+        return BadFileError(path, f"{unreadable(path)}.", ALL_AROUND)
     if kind in (*SHOWN, *HEIC, *OTHERS):
         return BadFileError(path, "is a single picture, which shows no depth.", ALL_AROUND)
     return BadFileError(path, f"is no model ({READ} are read).", "Convert it to .glb.")
+
+
+def _opens(path: Path) -> bool:
+    """Whether a file begins as a picture that is read."""
+    with suppress(Exception), Image.open(path, formats=FORMATS):  # Pillow raises almost anything
+        return True
+    return False

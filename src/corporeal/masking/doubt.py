@@ -53,12 +53,16 @@ def incomplete(grown: Grown | None) -> str | None:
 
 def lacking(grown: Grown | None) -> str | None:
     """Return in a clause what borders on masks and is not of them; None: not much does."""
-    if grown is None or grown.hanging is None:
-        return None
-    much = as_large(grown.hanging.shown, grown.masks)
-    if much <= HANGING:
+    if (much := bordering(grown)) <= HANGING:
         return None
     return (
         "not all of it can be told from its ground: beside what was taken for the thing, "
         f"{much:.1f} times as much in other colours stands on the floor and borders on it"
     )
+
+
+def bordering(grown: Grown | None) -> float:
+    """Return how large what borders on masks and is not of them is, over what they hold."""
+    if grown is None or grown.hanging is None:
+        return 0.0
+    return as_large(grown.hanging.shown, grown.masks)

@@ -16,7 +16,7 @@ from corporeal.formats.mask_files import (
     write_record,
 )
 from corporeal.formats.photographs import MASKS, Photographs, listed, read_photographs
-from corporeal.masking.doubt import doubt, incomplete, lacking
+from corporeal.masking.doubt import bordering, doubt, incomplete, lacking
 from corporeal.masking.grow import FINE, ROUGH, Grown, grow
 from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
@@ -130,11 +130,23 @@ def _grown(
         flat = doubt(wider) is None and incomplete(wider) is None
         grown = wider if flat else grown
     said = [FLAT] if flat else []
-    if grown is None or alone:
-        return grown, said
+    if grown is None:
+        return None, said
+    if alone:
+        return grown, [*said, *_part(bordering(grown))]
     last = within(progress, TWICE, 1.0, ", with what borders on it in other colours")
     whole = taken_in(views, seeds, grown, last, flat)
     return whole, said if whole is grown else [*said, OTHER_COLOURS]
+
+
+def _part(much: float) -> list[str]:
+    """Say that what was pointed at may be a part of something."""
+    if not much:
+        return []
+    return [
+        f"It may be a part: {much:.0%} as much in other colours stands on the floor and borders "
+        "on it. If that is meant, too, give a box around all of it (--box), or paint it white."
+    ]
 
 
 def _written(
