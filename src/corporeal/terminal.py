@@ -137,30 +137,44 @@ def log_lines(
         now: The clock [s].
 
     """
-    doing: list[Doing] = []  # the last one goes on
-    over = Event()
+    watched: list[_Watched] = []  # the one that goes on
 
     def ended() -> None:
-        for verb in doing:
-            print_line(f"{verb.verb} done in {lasting(now() - verb.begun)}", where)
-        doing.clear()
+        for one in watched:
+            one.leave()
+            lasted = lasting(now() - one.doing.begun)
+            print_line(f"{one.doing.verb} done in {lasted}", where)
+        watched.clear()
 
     def tell(verb: str) -> Callable[[float, str], None]:
         ended()
-        doing.append(one := Doing(verb, now()))
+        doing = Doing(verb, now())
         print_line(f"{verb} begins", where)
-        return lambda fraction, words: one.told(fraction, words, now())
+        watched.append(_Watched(doing, lambda: print_line(doing.line(now()), where), every))
+        return lambda fraction, words: doing.told(fraction, words, now())
 
-    def go_on() -> None:
-        while not over.wait(every):
-            for verb in tuple(doing):
-                print_line(verb.line(now()), where)
-
-    watch = Thread(target=go_on, daemon=True)
-    watch.start()
     try:
         yield tell
         ended()
     finally:
-        over.set()
-        watch.join()
+        for one in watched:
+            one.leave()
+
+
+class _Watched:
+    """A verb of which something is said every so often, whether or not it tells anything."""
+
+    def __init__(self, doing: Doing, say: Callable[[], None], every: float) -> None:
+        self.doing, self._say, self._every = doing, say, every
+        self._over = Event()
+        self._watch = Thread(target=self._go_on, daemon=True)
+        self._watch.start()
+
+    def leave(self) -> None:
+        """Say nothing any more."""
+        self._over.set()
+        self._watch.join()
+
+    def _go_on(self) -> None:
+        while not self._over.wait(self._every):
+            self._say()
