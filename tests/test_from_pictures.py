@@ -69,6 +69,7 @@ def test_photographs_become_a_film_of_things_that_fall(typed, views, tmp_path):
     run = tmp_path / "runs" / "photos"
     report, audit = (run / "report.html").read_text(), json.loads((run / "audit.json").read_text())
     assert "Gaussians were learned from 20 photographs" in report
+    assert "discs were laid along the closed surface" in report
     assert (run / "film.mp4").stat().st_size > 1000
     assert (run / "0-reconstruct" / "gaussians.ply").stat().st_size > 10_000
     moved = audit["outcome"]["objects"]

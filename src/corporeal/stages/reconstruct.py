@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
+from jaxtyping import Int
 
 from corporeal.errors import UserError, with_notes
 from corporeal.features.clouds import with_features
@@ -34,11 +35,14 @@ from corporeal.reconstruction.reconstruct_config import (
 )
 from corporeal.regions.instance_assignment import assign_instances
 from corporeal.render.camera import cameras_around
+from corporeal.splats.backing import backed
 from corporeal.splats.closed import closed
+from corporeal.splats.depth_rendering import render_depth
 from corporeal.splats.foreground import sunk
 from corporeal.splats.intake import Intake, turned_upright
+from corporeal.splats.thread_pool import ThreadPool
 from corporeal.splats.worth import goes_beyond, not_worth, told_otherwise, unlike_masks
-from corporeal.types import Camera, Finish, Reconstruction, Scene, SceneObject, Surface
+from corporeal.types import Camera, Finish, Gaussians, Reconstruction, Scene, SceneObject, Surface
 from corporeal.vlm.seen_objects import (
     UNKNOWN,
     SeenObject,
@@ -58,6 +62,11 @@ AROUND = 16
 """Points that a normal is found from."""
 BY_PLACE = "What belongs to it was told by where it is alone, without masks."
 NOBODY = Viewer("", "metadata")
+DISCS = (
+    "were laid along the closed surface, below what was learned: they show where that is thin, "
+    "and what no photograph shows."
+)
+"""Said of the film, and of gaussians.ply."""
 TRAINED, LOOKED, FOUND = 0.75, 0.85, 0.9
 """Share of the work that is done after each step."""
 
@@ -127,8 +136,10 @@ def reconstruct(
     # What they are, and so their names and their size in metres.
     known = _known(source, found, recognised(wanted, found, config, viewer), config, extents)
     warnings = [*known.warnings, *viewer.asked().warnings, *taken.warnings, *split.warnings]
-    statements = (*taken.statements, *placed.statements, split.statement, *known.statements)
-    result = _in_metres(found, known, statements, tuple(dict.fromkeys(warnings)))
+    shown = _shown(found, photographers)
+    said = (*placed.statements, split.statement, *shown.statements, *known.statements)
+    statements = (*taken.statements, *said)
+    result = _in_metres(found, shown, known, statements, tuple(dict.fromkeys(warnings)))
     return Reconstructed(result, _scene(source, found, known))
 
 
@@ -228,16 +239,44 @@ def _why_not(found: FoundObjects, photographers: Sequence[Camera], masked: bool)
     return unlike_masks(meshes, photographers, taken.masks, given=masked)
 
 
+@dataclass(frozen=True)
+class _Shown:
+    """What films show of objects and of what is about them."""
+
+    gaussians: Gaussians
+    owner: Int[np.ndarray, " N"]
+    statements: tuple[str, ...] = ()
+
+
+def _shown(found: FoundObjects, photographers: tuple[Camera, ...]) -> _Shown:
+    """Leave out what is below the floor, and fill what photographs leave thin.
+
+    A splat stays as it came.
+    """
+    own, owner = found.taken.gaussians, found.closed.owner
+    kept = ~sunk(own, owner, float(max(found.extents)))
+    if not photographers:
+        return _Shown(only(own, kept), owner[kept])
+    with ThreadPool() as pool:
+        rendering = render_depth(only(own, owner >= 0), photographers, pool)
+    gaussians, whose = backed(only(own, kept), owner[kept], found.solids, rendering)
+    said = f"{gaussians.count - np.count_nonzero(kept):,} discs {DISCS}"
+    return _Shown(gaussians, whose, (said,))
+
+
 def _in_metres(
-    found: FoundObjects, known: _Known, statements: tuple[str, ...], warnings: tuple[str, ...]
+    found: FoundObjects,
+    shown: _Shown,
+    known: _Known,
+    statements: tuple[str, ...],
+    warnings: tuple[str, ...],
 ) -> Reconstruction:
     scale = known.scale
     made = similarity(scale=scale.metres_per_unit)
     boxes = [[s.vertices.min(axis=0), s.vertices.max(axis=0)] for s in found.solids]
-    kept = ~sunk(found.taken.gaussians, found.closed.owner, float(max(found.extents)))
     return Reconstruction(
-        gaussians=moved_gaussians(only(found.taken.gaussians, kept), made),
-        object_of_gaussian=found.closed.owner[kept],
+        gaussians=moved_gaussians(shown.gaussians, made),
+        object_of_gaussian=shown.owner,
         cloud=replace(found.cloud, position=moved_points(found.cloud.position, made)),
         object_of_point=found.closed.object_of_point,
         names=tuple(known.names),
