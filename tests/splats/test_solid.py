@@ -255,3 +255,22 @@ def test_an_object_that_is_only_haze_is_named():
     gaussians, owner = together(solid, haze)
     with pytest.raises(UserError, match="object 1"):
         solids(gaussians, owner, eyes(8), threads=1)
+
+
+def test_what_nobody_sees_is_coloured_without_patches():
+    cube = box([-0.4, -0.4, 0], [0.4, 0.4, 0.8])
+    whole, owner = together(clad(cube))
+    red = whole.mean[:, :1] < 0
+    sh = (np.where(red, (0.8, 0.1, 0.1), (0.1, 0.1, 0.8)) - 0.5)[:, None] / DC
+    (solid,) = solids(replace(whole, sh=sh), owner, eyes(), masks(eyes(), cube), threads=1)
+    x, y, z = solid.vertices.T
+    below = (z < 0.5 * solid.cell) & (np.maximum(abs(x), abs(y)) < 0.25)
+    edges = np.concatenate([solid.triangles[:, [a, b]] for a, b in ((0, 1), (1, 2), (2, 0))])
+    edges = edges[below[edges].all(axis=1)]
+    assert len(edges) > 100
+    steps = np.abs(solid.colours[edges[:, 0]] - solid.colours[edges[:, 1]]).max(axis=1)
+    assert steps.max() < 0.2, "from red to blue at once"
+    assert (
+        solid.colours[below & (x < -0.15), 0].mean()
+        > solid.colours[below & (x > 0.15), 0].mean() + 0.15
+    )

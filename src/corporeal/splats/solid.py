@@ -12,6 +12,7 @@ import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
 from scipy.ndimage import distance_transform_edt
 from scipy.spatial import KDTree
+from scipy.spatial.distance import cdist
 from skimage import measure
 
 from corporeal.errors import UserError
@@ -60,6 +61,12 @@ AGAIN = 2
 """How often it is moved to outlines after it was moved to where photographs agree."""
 SEEN = 1e-3
 """Weight of views from which on a vertex is seen."""
+SAMPLES = 500
+"""Seen vertices that others are coloured by, about."""
+FALL = 4
+"""Power of the distance by which one counts less."""
+TINY = 1e-9
+"""Shares of the thing's extent that can be divided by."""
 CHECKED = 4000
 """Places at which the winding number is compared."""
 MOVED = 2.0
@@ -420,13 +427,19 @@ def _painted(
 def _coloured(
     mesh: Mesh, scene: _Scene, gaussian: np.ndarray, painted: Float[np.ndarray, "V 4"]
 ) -> Float[np.ndarray, "V 3"]:
-    """Return what the cameras see of each vertex; where none does, its neighbour's colour."""
+    """Return what the cameras see of each vertex; where none does, the mean of seen ones about.
+
+    They count by a power of their distance (Shepard 1968): of the nearest alone an underside would
+    be patches.
+    """
     seen = painted[:, 3] > SEEN
     colour = np.clip(0.5 + DC * scene.gaussians.sh[gaussian, 0].astype(np.float64), 0, 1)
     colour[seen] = painted[seen, :3] / painted[seen, 3:]
-    if seen.any():
-        _, near = KDTree(mesh.vertices[seen]).query(mesh.vertices[~seen])
-        colour[~seen] = colour[seen][near]
+    some = np.flatnonzero(seen)[:: max(1, np.count_nonzero(seen) // SAMPLES)]
+    if len(some) and not seen.all():
+        away = cdist(mesh.vertices[~seen], mesh.vertices[some])
+        share = 1 / np.maximum(away, TINY * np.ptp(mesh.vertices)) ** FALL
+        colour[~seen] = share @ colour[some] / share.sum(axis=1, keepdims=True)
     return colour
 
 
