@@ -218,6 +218,21 @@ def test_the_picture_follows_the_motion(films):
     assert first[:, 0].min() > last[:, 0].min() + 5, "the second cube was lifted"
 
 
+def test_what_stands_still_is_carried_and_lit_once(tmp_path, monkeypatch):
+    """As in most films of photographs that say nothing of what is to happen."""
+    carried, carry = [], stage.MovingGaussians.at
+    monkeypatch.setattr(
+        stage.MovingGaussians, "at", lambda *given: carried.append(1) or carry(*given)
+    )
+    played = made_of(play(np.eye(3), (0.0, 0.0, 0.0), 5), *together(clad(0), clad(1)))
+    film(played, SMALL, tmp_path / "still")
+    assert len(carried) == 1
+    np.testing.assert_array_equal(still(tmp_path / "still", 0), still(tmp_path / "still", 4))
+    played = made_of(play(np.eye(3), (0.0, 0.0, 0.6), 3), *together(clad(0), clad(1)))
+    film(played, SMALL, tmp_path / "lifted")
+    assert len(carried) == 3, "once before it moves, and once after"
+
+
 def test_colours_can_tell_what_things_are(tmp_path):
     played = made_of(play(), *together(clad(0), clad(1)))
     film(played, replace(SMALL, colour_by="object"), tmp_path)

@@ -425,9 +425,9 @@ class _Troupe:
 
     @property
     def holds(self) -> bool:
-        """Whether its surfaces in their pose are all that there is to see."""
+        """Whether its surfaces, or what moves with them, are all that there is to see."""
         painted = self.paint is not None and self.paint.of_particle is None
-        return self.puppet is None and not self.liquids.bodies and not painted
+        return not self.liquids.bodies and not painted
 
     def at(self, number: int, frame: Frame, pose: tuple[np.ndarray, np.ndarray]) -> _Scenery:
         stage = self.stage.posed(*pose)
