@@ -35,9 +35,9 @@ from corporeal.reconstruction.reconstruct_config import (
 )
 from corporeal.regions.instance_assignment import assign_instances
 from corporeal.render.camera import cameras_around
-from corporeal.splats.backing import backed
 from corporeal.splats.closed import closed
 from corporeal.splats.depth_rendering import render_depth
+from corporeal.splats.discs import backed
 from corporeal.splats.foreground import sunk
 from corporeal.splats.intake import Intake, turned_upright
 from corporeal.splats.thread_pool import ThreadPool

@@ -9,8 +9,8 @@ from splat_scenes import around
 
 from corporeal.geometry.gaussians import only
 from corporeal.geometry.harmonics import DC
-from corporeal.splats.backing import backed
 from corporeal.splats.depth_rendering import render_depth
+from corporeal.splats.discs import backed
 from corporeal.splats.raster import render
 from corporeal.splats.solid import Solid
 from corporeal.splats.thread_pool import ThreadPool
