@@ -25,8 +25,8 @@ APART = 1.5
 """From disc to disc [cells of the solid's grid]."""
 WIDE, FLAT = 0.6, 0.1
 """Standard deviations of a disc along and across the surface, in that distance."""
-DEEP, SHALLOW = 2.0, 0.25
-"""How far below the surface discs lie, in that distance: the second where a wall is thin."""
+DEPTHS = (0.25, 0.5, 1.0, 2.0)
+"""How far below the surface discs lie, in that distance: where a wall is thin, the less."""
 BESIDE = 0.1
 """Share of the views that see a place which may see nothing there."""
 OPAQUE = 0.95
@@ -90,9 +90,12 @@ def _discs(solid: Solid, rendering: DepthRendering, like: Gaussians) -> Gaussian
     cubes = np.floor(solid.vertices / apart).astype(np.int64)
     some = np.unique(cubes, axis=0, return_index=True)[1]
     place, normal = solid.vertices[some], mesh.vertex_normals[some]
-    # Below the surface, and not out of the other side.
-    thick = Shape(mesh).winding(place - 2 * DEEP * apart * normal) > 0.5
-    place = place - apart * np.where(thick, DEEP, SHALLOW)[:, None] * normal
+    # Below the surface, and at most half-way to the other side.
+    shape, deep, inside = Shape(mesh), np.full(len(some), DEPTHS[0]), np.ones(len(some), bool)
+    for depth in DEPTHS[1:]:
+        inside &= shape.winding(place - 2 * depth * apart * normal) > 0.5
+        deep[inside] = depth
+    place = place - apart * deep[:, None] * normal
     kept = ~looked_past(place, rendering, TRUST * solid.cell)
     some, place, normal = some[kept], place[kept], normal[kept]
     sh = np.zeros((len(some), *like.sh.shape[1:]))
