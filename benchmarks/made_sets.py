@@ -9,9 +9,10 @@ an angle above the floor [deg], with unsteady hands and at no constant pace. The
 the pictures are taken are those of ``as_photographed.py``; with ``--plain`` floor and walls have
 one colour each. With ``--wall`` half of each round is walked, before it.
 OUT is a set for ``real_photographs.py``: ``images``, true ``masks``, true poses in ``sparse/0``,
-and ``known.toml`` with up and the sides of what is seen. With ``--film`` the way is walked
-once, in frames of a film, ``film.mp4``, whose numbers are those of the images. With ``--zoomed``
-every second picture is taken through a lens so many times as long; pictures state theirs in EXIF.
+and ``known.toml`` with up, the sides of what is seen, and those of all that is there: nobody sees
+the underside of a ball. With ``--film`` the way is walked once, in frames of a film, ``film.mp4``,
+whose numbers are those of the images. With ``--zoomed`` every second picture is taken through a
+lens so many times as long; pictures state theirs in EXIF.
 """
 
 import argparse
@@ -108,7 +109,7 @@ def write_set(
     Args:
         out: The set.
         views: Photographs.
-        sides: Of what is seen (3,) [m].
+        sides: Of what is seen, and of all that is there (2, 3) [m].
         note: How it was made.
         film: Whether photographs are frames of a film, which is written, too.
         zoomed: Whether photographs state their lenses.
@@ -126,9 +127,9 @@ def write_set(
         photograph.save(out / "images" / f"{name}.jpg", quality=QUALITY, subsampling=0, exif=exif)
         Image.fromarray(np.uint8(255) * (owner >= 0)).save(out / "masks" / f"{name}.png")
     write_colmap(out / "sparse" / "0", views.cameras, tuple(f"{name}.jpg" for name in names))
-    shown = ", ".join(f"{side:.4f}" for side in sides)
-    facts = f"unit = 1.0\nup = [0.0, 0.0, 1.0]\nsides = [{shown}]\nnote = {json.dumps(note)}\n"
-    (out / "known.toml").write_text(facts, encoding="utf-8")
+    seen, there = (", ".join(f"{side:.4f}" for side in three) for three in sides)
+    facts = f"unit = 1.0\nup = [0.0, 0.0, 1.0]\nsides = [{seen}]\nall_sides = [{there}]\n"
+    (out / "known.toml").write_text(f"{facts}note = {json.dumps(note)}\n", encoding="utf-8")
     if film:
         _write_film(out / "film.mp4", views.rgb)
 
@@ -173,14 +174,14 @@ def main() -> None:
     except UserError as problem:
         parser.error(str(problem))
     boxes = boxes_of(scene)
-    aims = way_around(boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0), asked, rng)
+    low, high = boxes[:, 0].min(axis=0), boxes[:, 1].max(axis=0)
+    aims = way_around(low, high, asked, rng)
     views = pictures(scene, aims)
     look = look_of(asked, plain=asked.plain, grid=FINE if asked.on else 1)
     options = [word for word in sys.argv[1:] if word not in map(str, (*asked.model, asked.out))]
     note = f"{', '.join(p.name for p in asked.model)}, {' '.join(options)}"
-    write_set(
-        asked.out, degraded(views, look), sides_of(views), note, asked.film, asked.zoomed != 1
-    )
+    sides, zoomed = np.stack([sides_of(views), high - low]), asked.zoomed != 1
+    write_set(asked.out, degraded(views, look), sides, note, asked.film, zoomed)
 
 
 if __name__ == "__main__":

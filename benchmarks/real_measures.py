@@ -173,11 +173,15 @@ def came(made: Reconstructed, given_from_file: Float[np.ndarray, "4 4"]) -> Came
 
 
 def sizes(result: Came, facts: Known) -> dict[str, Any]:
-    """Return size and volume of the largest thing [m], [m³], and how far off they are [-]."""
+    """Return sides of all things together, height and volume of the largest one, and how far off.
+
+    Lengths in m, volumes in m³, what they are off as a share.
+    """
     if facts.unit is None:
         return {}
     mesh, unit = result.upright[0], facts.unit
-    sides = (unit * np.ptp(result.meshes[0].vertices, axis=0)).tolist()
+    places = np.concatenate([m.vertices for m in result.meshes])
+    sides = (unit * np.ptp(places, axis=0)).tolist()
     height = unit * float(np.ptp(mesh.vertices[:, 2]))
     volume = unit**3 * float(trimesh.Trimesh(mesh.vertices, mesh.triangles).volume)
     row: dict[str, Any] = {"sides_m": sides, "height_m": height, "volume_m3": volume}

@@ -9,13 +9,14 @@ its poses, and from the photographs alone (bare); or, where it has ``film.mp4`` 
 the numbers of its images, from the film. Measured are: photographs registered, of these the
 share within 1.5° and 3 % of the given poses, and the medians; quality on photographs held out,
 whole and on objects; the angle between up and the normal of the plane with the most sparse points,
-where the object is known to stand on one; size against what the set's ``known.toml`` or
-``real_sets.toml`` states, and against a second yardstick where these have one; intersection
-over union of the closed surfaces' silhouettes with the masks of the set, mean and worst; minutes of
-the processor, all threads together. A set that is refused or fails is a row that says why. Rows
-that are there already are kept, and a training or a search for poses that was interrupted is
-continued. The page is written whole from rows: the table, what is known of each set, and what the
-runs from photographs alone said.
+where the object is known to stand on one; sides of all things together against what the set's
+``known.toml`` or ``real_sets.toml`` states, the one that is farthest off, and against a second
+yardstick where these have one (for made sets all that is there, what nobody sees included);
+intersection over union of the closed surfaces' silhouettes with the masks of the set, mean and
+worst; minutes of the processor, all threads together. A set that is refused or fails is a row that
+says why. Rows that are there already are kept, and a training or a search for poses that was
+interrupted is continued. The page is written whole from rows: the table, what is known of each set,
+and what the runs from photographs alone said.
 """
 
 import argparse

@@ -53,12 +53,12 @@ LOOKS = [
 
 @pytest.mark.parametrize("look", LOOKS)
 def test_a_set_is_read_as_it_was_written(walked, look, tmp_path):
-    write_set(
-        tmp_path / "block", degraded(walked, look), SIDES, "a block", film=False, zoomed=False
-    )
+    pictured, sides = degraded(walked, look), np.stack([SIDES, SIDES + 0.01])
+    write_set(tmp_path / "block", pictured, sides, "a block", film=False, zoomed=False)
     facts = measure.known(tmp_path / "block")
     assert facts.note == "a block" and facts.unit == 1 and facts.up == (0, 0, 1)
     np.testing.assert_allclose(facts.sides, SIDES, atol=1e-4)
+    np.testing.assert_allclose(facts.all_sides, SIDES + 0.01, atol=1e-4)
     given = read_colmap(tmp_path / "block" / "sparse" / "0")
     names = [image.name for image in given.images]
     assert names == sorted(p.name for p in (tmp_path / "block" / "images").iterdir())

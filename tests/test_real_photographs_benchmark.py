@@ -99,6 +99,17 @@ def test_a_size_is_compared_with_both_yardsticks():
     assert "+5.3%, -1.0%" in benchmark.cells(row, 0)
 
 
+def test_sides_are_of_all_things_together_and_volume_is_of_the_largest():
+    box = trimesh.creation.box((1, 1, 1))
+    things = tuple(
+        Mesh(np.array(box.vertices) * size + [x, 0, size / 2], np.array(box.faces))
+        for size, x in ((1.0, 0), (0.5, 2))
+    )
+    came = measure.Came(things, np.array([0, 0, 1.0]), things)
+    row = measure.sizes(came, measure.Known(unit=0.1, sides=(0.275, 0.1, 0.1)))
+    assert row["size_off"] == pytest.approx(0) and row["volume_m3"] == pytest.approx(0.001)
+
+
 def test_the_floor_is_the_plane_with_most_points(sets):
     given = read_colmap(sets / "block" / "sparse" / "0")
     normal = measure.floor_normal(given, np.random.default_rng(0))
