@@ -6,7 +6,7 @@ no vocabulary tree (loop detection).
 """
 
 import shutil
-from collections.abc import Callable, Collection, Mapping, Sequence
+from collections.abc import Callable, Collection, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait
 from dataclasses import dataclass, replace
 from functools import partial
@@ -138,8 +138,7 @@ def attempt(folder: Path, out: Path, gathered: Gathered, way: Way, progress: Pro
             progress(begin + (end - begin) * share, WORDS[way] + what)
 
         _watched(pycolmap, partial(step, told))
-    taken = how_taken(folder / IMAGES, gathered)
-    return replace(_judged(work.models, out, gathered, way, taken), joined=work.joined)
+    return replace(_judged(work.models, folder / IMAGES, out, gathered, way), joined=work.joined)
 
 
 def _watched(pycolmap: Any, work: Callable[[Any], None]) -> None:
@@ -320,15 +319,13 @@ def _points_allowed(masks: Path, out: Path, gathered: Gathered) -> Path:
     return place
 
 
-def _judged(
-    models: Any, out: Path, gathered: Gathered, way: Way, taken: Mapping[str, Taken]
-) -> Attempt:
+def _judged(models: Any, images: Path, out: Path, gathered: Gathered, way: Way) -> Attempt:
     total = len(gathered.names)
     first = best = max(models.values(), key=lambda m: m.num_reg_images(), default=None)
     if best is None:
         return Attempt(way, total, left_out=gathered.names)
     if best.num_reg_images() >= SHARE * total:  # of two pictures nothing can be adjusted
-        best = adjusted(require(), best, taken)
+        best = adjusted(require(), best, how_taken(images, gathered), images)
     place = out / "sparse" / "0"
     place.mkdir(parents=True, exist_ok=True)
     best.write_text(str(place))

@@ -37,8 +37,9 @@ def apart(place: Path) -> float:
     """
     pycolmap = require()
     model = _each_with_its_own(pycolmap, pycolmap.Reconstruction(str(place)))
+    adjust(pycolmap, model, of_lens="nothing")  # as they are found, points on edges count less
     before = _error(model)
-    adjust(pycolmap, model, middles_alone=True)
+    adjust(pycolmap, model, of_lens="middle")
     spread = float(NORMAL * _off(_middles(model)).max())
     return spread if _error(model) < BETTER * before else 0.0
 
