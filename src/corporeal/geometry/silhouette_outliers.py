@@ -6,6 +6,8 @@ with each view left out, and forgives a few of the rest, so that one wrong view 
 what the right ones agree on.
 """
 
+from dataclasses import dataclass
+
 import numpy as np
 from jaxtyping import Bool, Float, UInt8
 from scipy.ndimage import binary_dilation
@@ -21,30 +23,49 @@ FORGIVEN = 0.1
 """Share of the views that may deny a point of the hull, at least one."""
 FEWEST = 8
 """Views from which on a hull tells one that is wrong from those that are right."""
-OUTLIER = 0.75
-"""Overlap with the hull of the others, over the median of all views, below which a view is wrong.
-Measured on real sets: right views 0.9 and more, wrong ones 0.7 and less."""
-FILLED = 0.95
-"""Share of its mask that the hull of the others fills in a wrong view, at most; right ones 0.97 and
-more, turned by 25 degrees 0.91 and less. A right view may still overlap little where it alone
-sees that a place is empty."""
 MOST = 0.34
 """Share of the views from which on nobody can say which ones are right."""
 
 
-def outliers(masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...]) -> tuple[int, ...]:
+@dataclass(frozen=True)
+class Bounds:
+    """Below both of which a view is wrong.
+
+    A right view may overlap little where it alone sees that a place is empty.
+    """
+
+    overlap: float
+    """With the hull of the others, over the median of all views [-]."""
+    filled: float
+    """Share of its mask that the hull of the others fills [-]."""
+
+
+GIVEN = Bounds(0.75, 0.95)
+"""Of masks that somebody gave. Measured on real sets: overlaps of right views 0.9 and more, of
+wrong ones 0.7 and less; right ones are filled by 0.97 and more, turned by 25 degrees 0.91 and less.
+"""
+GROWN = Bounds(0.85, 0.8)
+"""Of grown masks that are believed, which vary more: of 17 sets of one thing every right view is
+filled by 0.91 and more; views that show another thing on the same floor by 0.68 and less, at
+overlaps of 0.8 and less."""
+
+
+def outliers(
+    masks: UInt8[np.ndarray, "V H W"], cameras: tuple[Camera, ...], bounds: Bounds = GIVEN
+) -> tuple[int, ...]:
     """Return the numbers of views that do not show what the others see; (): of none that is known.
 
     Args:
         masks: 255: the object; views with an empty one say nothing.
         cameras: In any frame and unit.
+        bounds: Of what is right.
 
     """
     if len(cameras) < FEWEST:
         return ()
     found = compare(masks, cameras)
-    apart = found.overlap < OUTLIER * np.nanmedian(found.overlap)
-    wrong = np.flatnonzero(apart & (found.filled < FILLED))
+    apart = found.overlap < bounds.overlap * np.nanmedian(found.overlap)
+    wrong = np.flatnonzero(apart & (found.filled < bounds.filled))
     return tuple(wrong.tolist()) if len(wrong) <= MOST * len(cameras) else ()
 
 

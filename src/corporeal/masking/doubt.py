@@ -37,7 +37,8 @@ def doubt(grown: Grown | None) -> str | None:
     if grown.outer > OUTER or grown.cropped > CROPPED:
         return "it reaches beyond what all cameras look at"
     if grown.coherence < COHERENT or grown.settled < SETTLED:
-        return f"its outlines contradict each other ({grown.coherence:.0%} agree)"
+        agree = f"its outlines contradict each other ({grown.coherence:.0%} agree)"
+        return f"{agree}, as where some photographs show something else, or it was moved"
     return None
 
 

@@ -14,7 +14,7 @@ from PIL import Image
 
 from corporeal.formats.colmap import ColmapImage, ColmapModel, read_colmap
 from corporeal.formats.photographs import MASKS
-from corporeal.geometry.silhouette_outliers import FEWEST, filled_by_others, outliers
+from corporeal.geometry.silhouette_outliers import FEWEST, GROWN, filled_by_others, outliers
 from corporeal.geometry.silhouettes import coherence
 from corporeal.poses.attempt import Attempt, without_pictures
 from corporeal.types import Camera
@@ -53,6 +53,21 @@ def checked_by_masks(told: Attempt, folder: Path, place: Path) -> Attempt:
         astray=astray,
         filled=round(filled, 3),
     )
+
+
+def strangers(place: Path, masks: Path) -> tuple[str, ...]:
+    """Return the names of pictures that show something else where the others show the object.
+
+    Args:
+        place: Holds the model.
+        masks: That were grown, and are believed: PNG pictures with the names of its pictures.
+
+    """
+    compared = _compared(place, masks)
+    if compared is None:
+        return ()
+    wrong = outliers(compared.drawn, compared.cameras, GROWN)
+    return tuple(sorted(compared.shown[k].name for k in wrong))
 
 
 def filled_share(place: Path, masks: Path) -> float:

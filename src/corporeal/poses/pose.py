@@ -12,9 +12,9 @@ from corporeal.formats.colmap import read_colmap
 from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
 from corporeal.geometry.unseen_side import unseen_side
-from corporeal.poses.attempt import Attempt, Way, attempt, require
+from corporeal.poses.attempt import Attempt, Way, attempt, require, without_pictures
 from corporeal.poses.blur import blurred
-from corporeal.poses.by_masks import checked_by_masks, filled_share
+from corporeal.poses.by_masks import checked_by_masks, filled_share, strangers
 from corporeal.poses.cameras_figure import cameras_figure
 from corporeal.poses.film_frames import write_frames
 from corporeal.poses.gather import IMAGES, TAKE, Gathered, as_gathered, gather, sized_alone
@@ -57,7 +57,7 @@ SAID: dict[Way, str] = {
 LEAST = 6
 """Photographs: fewer that were taken all around are more than 60° apart, and share nothing."""
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
-METHOD = 7
+METHOD = 8
 """Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
@@ -137,8 +137,34 @@ def moved_within(posed: Posed, masks: Path) -> str | None:
     return (
         "the pictures fit together by what is around the object, but its outlines contradict one "
         f"another (together they leave {share:.0%} of what each shows): it was moved or turned "
-        "over between the pictures"
+        "over between the pictures, or some of them show something else"
     )
+
+
+def without_strangers(posed: Posed, masks: Path) -> Posed:
+    """Leave out pictures that show something else where the others show the object, and say so.
+
+    What stood on the same floor is placed by this, as well as the object is. It is kept with the
+    poses that they were left out.
+
+    Args:
+        posed: Poses that were found from whole pictures, of an object that kept its place.
+        masks: Of the object, grown under these, with the names of its pictures.
+
+    """
+    place = posed.folder / "sparse" / "0"
+    names = strangers(place, masks)
+    if not names:
+        return posed
+    without_pictures(place, names)
+    said = (
+        f"{len(names)} photographs show something else where the others show the object: their "
+        f"outlines contradict those of the others. They were left out: {names_of(names)}."
+    )
+    kept = typed(_Kept, store.read_json(posed.folder / FOUND))
+    kept = replace(kept, warnings=(*kept.warnings, said))
+    store.write_json(posed.folder / FOUND, kept)
+    return replace(posed, warnings=kept.warnings)
 
 
 def pose_object(posed: Posed, masks: Path, folder: Path, progress: Progress) -> Posed | None:

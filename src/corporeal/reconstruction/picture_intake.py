@@ -12,7 +12,14 @@ from corporeal.features.maskers import split
 from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import grown_masks
-from corporeal.poses.pose import POSES, Posed, moved_within, pose, pose_object
+from corporeal.poses.pose import (
+    POSES,
+    Posed,
+    moved_within,
+    pose,
+    pose_object,
+    without_strangers,
+)
 from corporeal.progress import Progress, within
 from corporeal.reconstruction.masks_by_model import CORRECT, masks_by_model
 from corporeal.reconstruction.masks_figure import FIGURE, masks_figure
@@ -159,7 +166,7 @@ def _seen_to_agree(
         return _doubted(source, posed, force)
     masks = grown.folder / MASKS[0]
     if (why := moved_within(posed, masks)) is None:
-        return _doubted(source, posed, force=True)
+        return _doubted(source, without_strangers(posed, masks), force=True)
     later = within(progress, POSED * TESTED, POSED)
     again = pose_object(posed, masks, place / OBJECT_POSES, later)
     said = f"{why[0].upper()}{why[1:]}"

@@ -1,0 +1,63 @@
+"""Pictures of something else on the same floor, which the floor places as well as the object."""
+
+import numpy as np
+import pytest
+from PIL import Image
+
+from corporeal import store
+from corporeal.poses.pose import FOUND, Posed, _Kept, without_strangers
+from corporeal.render.camera import camera_of
+from corporeal.render.embree import identify
+from corporeal.render.stage import Stage
+from corporeal.typed import typed
+from patterned_scene import OF_SLAB, box, on_slab, patterned, ring
+
+pycolmap = pytest.importorskip("pycolmap")
+COUNT, SIZE = 15, (100, 75)
+OTHER = on_slab(box((-0.12, -0.12, 0), (0.12, 0.12, 0.03)))
+"""A plate where the others show a block."""
+
+
+def placed(folder, strangers):
+    """Poses of pictures around a block of which some show a plate, and masks of what they show."""
+    model, masks = pycolmap.Reconstruction(), folder / "masks"
+    masks.mkdir()
+    block, plate = Stage(patterned()), Stage(OTHER)
+    for k, aim in enumerate(ring(np.arange(COUNT) * 360 / COUNT, SIZE)):
+        camera = camera_of(aim)
+        if not k:
+            lens = [camera.K[0, 0], *camera.K[:2, 2], 0.0]
+            made = {"model": "SIMPLE_RADIAL", "width": SIZE[0], "height": SIZE[1]}
+            model.add_camera_with_trivial_rig(pycolmap.Camera(**made, params=lens, camera_id=1))
+        pose = pycolmap.Rigid3d(np.linalg.inv(camera.world_from_camera)[:3])
+        image = pycolmap.Image(name=f"{k:02d}.jpg", camera_id=1, image_id=k + 1)
+        model.add_image_with_trivial_frame(image, pose)
+        shown = identify(plate if k in strangers else block, aim)[0] >= OF_SLAB
+        Image.fromarray(np.uint8(255) * shown).save(masks / f"{k:02d}.png")
+    place = folder / "sparse" / "0"
+    place.mkdir(parents=True)
+    model.write_text(str(place))
+    store.write_json(folder / FOUND, _Kept(("found",), ("before",), "", ()))
+    return Posed(folder, ("found",), ("before",), "doubt"), masks
+
+
+def test_what_shows_something_else_on_the_same_floor_is_left_out_and_named(tmp_path):
+    posed, masks = placed(tmp_path, (2, 7, 11))
+    left = without_strangers(posed, masks)
+    assert left.warnings[0] == "before" and left.doubt == "doubt"
+    assert left.warnings[1].startswith("3 photographs show something else")
+    assert "02.jpg, 07.jpg, 11.jpg" in left.warnings[1]
+    assert pycolmap.Reconstruction(str(tmp_path / "sparse" / "0")).num_reg_images() == COUNT - 3
+    kept = typed(_Kept, store.read_json(tmp_path / FOUND))
+    assert kept.warnings == left.warnings
+    assert without_strangers(left, masks) == left  # it is not said twice
+
+
+def test_of_one_thing_nothing_is_left_out(tmp_path):
+    posed, masks = placed(tmp_path, ())
+    assert without_strangers(posed, masks) == posed
+
+
+def test_nobody_is_blamed_where_half_show_something_else(tmp_path):
+    posed, masks = placed(tmp_path, range(0, COUNT, 2))
+    assert without_strangers(posed, masks) == posed
