@@ -1,11 +1,16 @@
 """Pictures of something else on the same floor, which the floor places as well as the object."""
 
+import shutil
+
 import numpy as np
 import pytest
 from PIL import Image
 
 from corporeal import store
+from corporeal.masking.grown_masks import GrownMasks
 from corporeal.poses.pose import FOUND, Posed, _Kept, without_strangers
+from corporeal.reconstruction import picture_intake
+from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.render.camera import camera_of
 from corporeal.render.embree import identify
 from corporeal.render.stage import Stage
@@ -61,3 +66,37 @@ def test_of_one_thing_nothing_is_left_out(tmp_path):
 def test_nobody_is_blamed_where_half_show_something_else(tmp_path):
     posed, masks = placed(tmp_path, range(0, COUNT, 2))
     assert without_strangers(posed, masks) == posed
+
+
+class _Shots:
+    shots = ()
+
+
+@pytest.mark.parametrize("why", ["outlines", "colours", "still doubted"])
+def test_doubted_masks_speak_against_pictures_if_those_of_the_others_are_believed(
+    tmp_path, monkeypatch, why
+):
+    (tmp_path / "poses").mkdir()
+    posed, masks = placed(tmp_path / "poses", (2, 7, 11))
+    posed = Posed(posed.folder, posed.statements, posed.warnings)
+    doubted, believed = tmp_path / "doubted", tmp_path / "believed"
+    for folder in (doubted, believed):
+        shutil.copytree(masks, folder / "masks")
+    first = GrownMasks(None, (), doubted, contradict=why != "colours")
+    after = GrownMasks(None if why == "still doubted" else believed, ())
+    answers = iter([first, after])
+    monkeypatch.setattr(picture_intake, "unposed", lambda source: True)
+    monkeypatch.setattr(picture_intake, "pose", lambda *what: posed)
+    monkeypatch.setattr(picture_intake, "listed", lambda folder: _Shots())
+    monkeypatch.setattr(picture_intake, "has_masks", lambda shots: False)
+    monkeypatch.setattr(picture_intake, "grown_masks", lambda *what, **more: next(answers))
+    run = tmp_path / "run"
+    found = picture_intake._posed(tmp_path, ReconstructConfig(), run, lambda share, words: None)
+    assert found is not None
+    count = pycolmap.Reconstruction(str(found.folder / "sparse" / "0")).num_reg_images()
+    if why == "outlines":
+        assert count == COUNT - 3 and found.folder != posed.folder
+        assert found.warnings[1].startswith("3 photographs show something else")
+    else:
+        assert found == posed and count == COUNT
+        assert not (run / picture_intake.ALIKE).exists()

@@ -42,6 +42,8 @@ class MaskRecord:
     """Why they are not of all that the photographs are of, in a clause; empty: they are."""
     beside: str = ""
     """What stands beside what they show, in sentences; empty: nothing is known of it."""
+    contradict: bool = False
+    """Whether they are not believed because their outlines contradict each other."""
 
 
 def file_names(shots: Sequence[Shot]) -> list[str]:
@@ -82,11 +84,16 @@ def write_instances(folder: Path, name: str, number: Int[np.ndarray, "H W"]) -> 
 
 
 def write_record(
-    folder: Path, made_by: str, said: Sequence[str], incomplete: str = "", beside: str = ""
+    folder: Path,
+    made_by: str,
+    said: Sequence[str],
+    incomplete: str = "",
+    beside: str = "",
+    contradict: bool = False,
 ) -> None:
     """Note what lies in the folder now; until then nothing in it counts as made."""
     digests = {str(p.relative_to(folder)): store.digest(p) for p in _files(folder)}
-    made = MaskRecord(made_by, tuple(said), digests, incomplete, beside)
+    made = MaskRecord(made_by, tuple(said), digests, incomplete, beside, contradict)
     store.write_json(folder / RECORD, made)
 
 

@@ -25,6 +25,9 @@ HANGING = 0.5
 the thing's, the rest shadows and edges beside it, so that masks lack as much."""
 
 
+CONTRADICT = "its outlines contradict each other"
+
+
 def doubt(grown: Grown | None) -> str | None:
     """Return in a clause why masks are not to be believed; None: they are."""
     if grown is None:
@@ -37,9 +40,14 @@ def doubt(grown: Grown | None) -> str | None:
     if grown.outer > OUTER or grown.cropped > CROPPED:
         return "it reaches beyond what all cameras look at"
     if grown.coherence < COHERENT or grown.settled < SETTLED:
-        agree = f"its outlines contradict each other ({grown.coherence:.0%} agree)"
+        agree = f"{CONTRADICT} ({grown.coherence:.0%} agree)"
         return f"{agree}, as where some photographs show something else, or it was moved"
     return None
+
+
+def contradict(grown: Grown | None) -> bool:
+    """Tell whether masks are not to be believed because their outlines contradict each other."""
+    return (doubt(grown) or "").startswith(CONTRADICT)
 
 
 def incomplete(grown: Grown | None) -> str | None:

@@ -16,7 +16,7 @@ from corporeal.formats.mask_files import (
     write_record,
 )
 from corporeal.formats.photographs import MASKS, Photographs, listed, read_photographs
-from corporeal.masking.doubt import bordering, doubt, incomplete, lacking
+from corporeal.masking.doubt import bordering, contradict, doubt, incomplete, lacking
 from corporeal.masking.grow import FINE, ROUGH, Grown, grow
 from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
@@ -56,6 +56,8 @@ class GrownMasks:
     beside: str = ""
     """What stands on the floor beside what they show, in sentences; empty: nothing is known of it,
     or somebody corrected them."""
+    contradict: bool = False
+    """Whether they are not to be believed because their outlines contradict each other."""
 
 
 def grown_masks(
@@ -83,7 +85,8 @@ def grown_masks(
         changes = _changes(folder)
         lacks, other = ("", "") if changes else (record.incomplete, record.beside)
         believed = folder if record.digest_of else None
-        return GrownMasks(believed, (*record.said, *changes), _doubted(folder), lacks, other)
+        said, apart = (*record.said, *changes), record.contradict
+        return GrownMasks(believed, said, _doubted(folder), lacks, other, apart)
     progress(0.0, "reading photographs")
     shown = read_photographs(source, FINE, bare=True)
     rough = reduced(shown.views, ROUGH)
@@ -101,8 +104,9 @@ def grown_masks(
         said = (f"No masks were grown from what all photographs show: {why}.",)
         if grown is not None:
             _written(source, shown, grown, folder / DOUBTED, progress)
-        write_record(folder, made_by, said, lacks)
-        return GrownMasks(None, said, _doubted(folder), lacks)
+        apart = contradict(grown)
+        write_record(folder, made_by, said, lacks, contradict=apart)
+        return GrownMasks(None, said, _doubted(folder), lacks, contradict=apart)
     _written(source, shown, grown, folder, progress)
     said = (
         _told(grown, pointed),

@@ -136,8 +136,8 @@ def moved_within(posed: Posed, masks: Path) -> str | None:
         return None
     return (
         "the pictures fit together by what is around the object, but its outlines contradict one "
-        f"another (together they leave {share:.0%} of what each shows): it was moved or turned "
-        "over between the pictures, or some of them show something else"
+        f"another (together they leave {share:.0%} of what each shows): some of them show "
+        "something else, or it was moved or turned over between the pictures"
     )
 
 
@@ -148,7 +148,7 @@ def without_strangers(posed: Posed, masks: Path) -> Posed:
     poses that they were left out.
 
     Args:
-        posed: Poses that were found from whole pictures, of an object that kept its place.
+        posed: Poses that were found from whole pictures.
         masks: Of the object, grown under these, with the names of its pictures.
 
     """
@@ -158,8 +158,9 @@ def without_strangers(posed: Posed, masks: Path) -> Posed:
         return posed
     without_pictures(place, names)
     said = (
-        f"{len(names)} photographs show something else where the others show the object: their "
-        f"outlines contradict those of the others. They were left out: {names_of(names)}."
+        f"{len(names)} photographs show something else where the others show the object, or show "
+        "it moved: their outlines contradict those of the others. They were left out: "
+        f"{names_of(names)}."
     )
     kept = typed(_Kept, store.read_json(posed.folder / FOUND))
     kept = replace(kept, warnings=(*kept.warnings, said))

@@ -1,5 +1,6 @@
 """What pictures or a splat give: poses and masks where nobody gave them, and Gaussians."""
 
+import shutil
 import tempfile
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -11,7 +12,7 @@ from corporeal.errors import BadFileError, noticed
 from corporeal.features.maskers import split
 from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
 from corporeal.formats.sources import kind_of, unposed
-from corporeal.masking.grown_masks import grown_masks
+from corporeal.masking.grown_masks import GrownMasks, grown_masks
 from corporeal.poses.pose import (
     POSES,
     Posed,
@@ -31,11 +32,14 @@ POSED = 0.5
 """Share of learning from pictures that is done when poses that nobody gave are found."""
 MASKED = 0.1
 """The same, of finding masks."""
-WHOLE, TESTED = 0.7, 0.85
-"""Share of finding poses that is done when whole pictures fit together, and when masks were asked
-about it."""
+WHOLE, TESTED, AGAIN = 0.7, 0.8, 0.9
+"""Share of finding poses that is done when whole pictures fit together, when masks were asked about
+it, and when they were asked again without pictures of something else."""
 SEEN, OBJECT_POSES = "poses-seen", "poses-object"
 """Folders of masks that found poses are tested by, and of poses that are found from them."""
+ALIKE, ALIKE_SEEN = "poses-alike", "poses-alike-seen"
+"""The same of poses without pictures that show something else, where masks were in doubt by these.
+"""
 STAND_STILL = (
     "Photograph it while neither it nor what is around it moves, give masks (a folder 'masks' with "
     "the names of the pictures), or go on all the same with --force."
@@ -162,12 +166,15 @@ def _seen_to_agree(
     """
     asking = within(progress, POSED * WHOLE, POSED * TESTED, ", to test the poses")
     grown = grown_masks(posed.folder, place / SEEN, progress=asking)
+    if grown.contradict and grown.doubted is not None:
+        less = within(progress, POSED * TESTED, POSED * AGAIN, ", without what is something else")
+        posed, grown = _less_strangers(posed, grown, grown.doubted / MASKS[0], place, less)
     if grown.folder is None:
         return _doubted(source, posed, force)
     masks = grown.folder / MASKS[0]
     if (why := moved_within(posed, masks)) is None:
         return _doubted(source, without_strangers(posed, masks), force=True)
-    later = within(progress, POSED * TESTED, POSED)
+    later = within(progress, POSED * AGAIN, POSED)
     again = pose_object(posed, masks, place / OBJECT_POSES, later)
     said = f"{why[0].upper()}{why[1:]}"
     if again is not None:
@@ -176,6 +183,31 @@ def _seen_to_agree(
     if not force:
         raise BadFileError(source, f"{why}, and it has too few points of its own.", STAND_STILL)
     return replace(posed, warnings=(f"{said}.", *posed.warnings))
+
+
+def _less_strangers(
+    posed: Posed, grown: GrownMasks, doubted: Path, place: Path, progress: Progress
+) -> tuple[Posed, GrownMasks]:
+    """Leave out pictures that doubted masks speak against, if masks of the others are believed.
+
+    Args:
+        posed: Where pictures were taken from.
+        grown: What is returned otherwise, with the poses.
+        doubted: The masks, whose outlines contradict each other.
+        place: Gets the other poses and masks.
+        progress: Told the fraction done and what is being done.
+
+    """
+    other = replace(posed, folder=place / ALIKE)
+    shutil.rmtree(other.folder, ignore_errors=True)
+    shutil.copytree(posed.folder, other.folder)
+    left = without_strangers(other, doubted)
+    if left != other:
+        again = grown_masks(left.folder, place / ALIKE_SEEN, progress=progress)
+        if again.folder is not None:
+            return left, again
+    shutil.rmtree(other.folder)
+    return posed, grown
 
 
 def _doubted(source: Path, posed: Posed, force: bool) -> Posed:
