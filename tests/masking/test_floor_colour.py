@@ -9,7 +9,7 @@ from corporeal.geometry.ground_plane import Plane
 from corporeal.geometry.region import region
 from corporeal.masking.doubt import doubt
 from corporeal.masking.floor_colour import shaded_floor
-from corporeal.masking.floor_square import met
+from corporeal.masking.floor_square import met, partners
 from corporeal.masking.grow import grow
 from corporeal.masking.seeds import looked_at
 from corporeal.types import Views
@@ -74,3 +74,13 @@ def test_of_a_grey_floor_nothing_is_said():
 def test_without_a_floor_nothing_is_said():
     views, _, _, _ = shadowed(RED, GREY)
     assert not shaded_floor(views, None, region(views.cameras)).any()
+
+
+def test_views_from_any_other_side_are_asked_about_shades():
+    """Of half a circle the nearest see a shadow hidden behind what casts it."""
+    turns = np.linspace(0, np.pi, 30)
+    slant = 1.7 * np.stack([np.cos(turns), np.sin(turns)], axis=-1)
+    near, wide = partners(slant, 0), partners(slant, 0, wide=True)
+    assert np.array_equal(wide[: len(near)], near)
+    assert near.max() < 15 and wide.max() == 29
+    assert len(wide) == 2 * len(near)

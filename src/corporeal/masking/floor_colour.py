@@ -64,7 +64,7 @@ def shaded_floor(views: Views, floor: Plane | None, around: Region) -> Bool[np.n
             agreed &= (np.abs(ratios[others] - ratios[k]) < 2 * SHADE).all(axis=-1)
         return agreed & like[k]
 
-    return witnessed(views.cameras, floor, around, agreeing)
+    return witnessed(views.cameras, floor, around, agreeing, wide=True)
 
 
 def colours_on(
@@ -91,17 +91,22 @@ def colours_on(
 
 def evened(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V n n 3"]:
     """Take every picture's own exposure and white balance off, as the floor shows them."""
+    return colour - gains(colour)[:, None, None]
+
+
+def gains(colour: Float[np.ndarray, "V n n 3"]) -> Float[np.ndarray, "V 3"]:
+    """Return by how much pictures differ from the median of all, in logarithms."""
     few = colour[:, ::APART, ::APART].reshape(len(colour), -1, 3)
     few = few[:, np.isfinite(few).all(axis=-1).sum(axis=0) >= WITNESSES]
-    if not few.size:
-        return colour
     gain = np.zeros((len(colour), 1, 3))
+    if not few.size:
+        return gain[:, 0]
     for _ in range(ROUNDS):
         usual = np.nanmedian(few - gain, axis=0)
         away = few - usual
         some = np.isfinite(away).any(axis=(1, 2))
         gain[some, 0] = np.nanmedian(away[some], axis=1)
-    return colour - gain[:, None]
+    return gain[:, 0]
 
 
 def parted(

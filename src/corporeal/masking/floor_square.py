@@ -74,6 +74,7 @@ def witnessed(
     floor: Plane,
     around: Region,
     agreeing: Callable[[int, Int[np.ndarray, " P"]], Bool[np.ndarray, "P n n"]],
+    wide: bool = False,
 ) -> Bool[np.ndarray, "V H W"]:
     """Tell which pixels show a place of the floor about which enough views agree.
 
@@ -82,12 +83,13 @@ def witnessed(
         floor: The plane that objects stand on, its normal up.
         around: The ball that all look at.
         agreeing: Says of a view in which cells of the square others agree with it.
+        wide: Whether as many views are asked, too, that look from any other side.
 
     """
     made = np.zeros((len(cameras), cameras[0].height, cameras[0].width), np.bool_)
     ground, slant = square(cameras, floor, around), slants(cameras, floor, around)
     for k, camera in enumerate(cameras):
-        others = partners(slant, k)
+        others = partners(slant, k, wide)
         if len(others) < WITNESSES:
             continue
         on_floor = np.sum(agreeing(k, others), axis=0) >= WITNESSES
@@ -117,8 +119,16 @@ def met(camera: Camera, floor: Plane) -> Float[np.ndarray, "N 3"]:
         return np.where(np.isfinite(far)[:, None], eye + far[:, None] * rays, np.inf)
 
 
-def partners(slant: Float[np.ndarray, "V 2"], k: int) -> Int[np.ndarray, " P"]:
-    """Return the views that view k is compared with: those that look the least otherwise."""
+def partners(slant: Float[np.ndarray, "V 2"], k: int, wide: bool = False) -> Int[np.ndarray, " P"]:
+    """Return the views that view k is compared with: those that look the least otherwise.
+
+    With ``wide`` as many of the rest, from the nearest to the farthest, come to these.
+    """
     apart = np.linalg.norm(slant - slant[k], axis=1)
     enough = np.flatnonzero(apart >= APART)
-    return enough[np.argsort(apart[enough], kind="stable")][:PARTNERS]
+    enough = enough[np.argsort(apart[enough], kind="stable")]
+    near, rest = enough[:PARTNERS], enough[PARTNERS:]
+    if not wide or not len(rest):
+        return near
+    spread = np.linspace(0, len(rest) - 1, min(PARTNERS, len(rest))).round().astype(int)
+    return np.concatenate([near, rest[spread]])
