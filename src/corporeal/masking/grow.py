@@ -17,6 +17,7 @@ from scipy.ndimage import binary_dilation, label
 from corporeal.geometry.cropped import cropped
 from corporeal.masking.beside import Beside, beside
 from corporeal.masking.colour_likelihood import against, bins_of, histogram, overlap
+from corporeal.masking.even_exposure import evenly_exposed
 from corporeal.masking.floor_colour import shaded_floor
 from corporeal.masking.floor_pattern import shows_floor
 from corporeal.masking.hanging import Hanging, hanging
@@ -122,6 +123,7 @@ def grow(
         flat: Whether what lies flat on the floor may be objects, too: only colours tell then.
 
     """
+    views = evenly_exposed(views, seeds.floor, seeds.around, ROUGH)
     rough = reduced(views, ROUGH)
     bottom = lowered(seeds.floor, seeds.around) if flat else seeds.floor
     side, room = _Side(rough), volume(rough.cameras, seeds.around, bottom, seeds.cone)

@@ -29,7 +29,7 @@ FLAT = "What has their colours and lies flat on the floor was taken for objects,
 OTHER_COLOURS = "What stands there and borders on it in other colours was taken in."
 DOUBTED = "doubted"
 """Folder of masks that are not to be believed: what colours alone would take for objects."""
-METHOD = 12
+METHOD = 13
 """Raised when other masks would be grown: those of an older method are grown again."""
 HAVE_IT = (
     "If it is meant, too, paint it white in the masks, or give masks of all (a folder 'masks' with "
