@@ -6,6 +6,7 @@ import pytest
 from painted_scene import FLOOR, scene
 
 from corporeal.geometry.region import region
+from corporeal.masking import swept_floor as module
 from corporeal.masking.seeds import looked_at
 from corporeal.masking.swept_floor import swept_floor
 from corporeal.types import Camera, Views
@@ -43,3 +44,24 @@ def test_cameras_that_lean_anyhow_know_no_level_plane():
         pose[:3, :3] = pose[:3, :3] @ roll
         leaning.append(Camera(camera.K, pose, camera.width, camera.height))
     assert swept_floor(Views(views.rgb, tuple(leaning)), region(tuple(leaning))) is None
+
+
+def test_a_floor_between_two_heights_that_are_tried_is_found(monkeypatch):
+    """Under a flash the share of the nearest of them was below what a floor needs."""
+    views, _, _ = scene(count=20)
+    around = region(views.cameras)
+    off = 0.012
+    true = (FLOOR - around.centre[2]) / around.radius
+    monkeypatch.setattr(module, "HEIGHTS", true + off + np.linspace(-0.4, 0.4, 9))
+    monkeypatch.setattr(
+        module, "SHOWN", 0.5 * (shown(views, true, around) + shown(views, true + off, around))
+    )
+    found = swept_floor(views, around)
+    assert found is not None
+    assert found.offset == pytest.approx(FLOOR, abs=0.005 * around.radius)
+
+
+def shown(views, height, around):
+    return module._shown(
+        views, module.level_plane(np.array([0.0, 0.0, 1.0]), height, around), around
+    )

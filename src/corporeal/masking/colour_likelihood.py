@@ -11,6 +11,8 @@ from skimage.color import rgb2lab
 
 BINS = 24
 """Along each axis of CIELAB."""
+LEVELS = 4
+"""Of how well a pixel fits something else that is known of its place; not known: 0."""
 LOW, SPAN = (0.0, -60.0, -60.0), (100.0, 120.0, 120.0)
 """Of L*, a* and b*; more saturated colours fall into the last bins."""
 SMOOTH = 0.8
@@ -21,22 +23,25 @@ SUREST = 3.0
 """Largest log-likelihood ratio that one pixel's colour may have."""
 
 
-def bins_of(rgb: UInt8[np.ndarray, "V H W 3"]) -> Int32[np.ndarray, "V H W"]:
-    """Return the number of the bin that each pixel's colour falls into."""
+def bins_of(
+    rgb: UInt8[np.ndarray, "V H W 3"], level: UInt8[np.ndarray, "V H W"]
+) -> Int32[np.ndarray, "V H W"]:
+    """Return the number of the bin that each pixel's colour falls into, at its level."""
     made = np.empty(rgb.shape[:3], np.int32)
     for one, picture in zip(made, rgb, strict=True):
         place = (rgb2lab(picture) - LOW) / SPAN * BINS
         lightness, a, b = np.clip(place, 0, BINS - 1).astype(np.int32).transpose(2, 0, 1)
         one[:] = (lightness * BINS + a) * BINS + b
-    return made
+    return made + BINS**3 * level.astype(np.int32)
 
 
 def histogram(
     bins: Int32[np.ndarray, "V H W"], weight: Float[np.ndarray, "V H W"]
 ) -> Float[np.ndarray, " K"]:
     """Return the share of the weight that falls into each bin."""
-    counts = np.bincount(bins.ravel(), weight.ravel().astype(float), BINS**3)
-    smooth = gaussian_filter(counts.reshape(BINS, BINS, BINS), SMOOTH).ravel()
+    counts = np.bincount(bins.ravel(), weight.ravel().astype(float), LEVELS * BINS**3)
+    counts = counts.reshape(LEVELS, BINS, BINS, BINS)
+    smooth = gaussian_filter(counts, (0, SMOOTH, SMOOTH, SMOOTH)).ravel()
     return smooth / max(smooth.sum(), RARE)
 
 

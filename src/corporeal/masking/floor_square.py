@@ -47,6 +47,10 @@ class Square:
         at[:, depth <= 0] = -9
         return at
 
+    def at(self, places: Float[np.ndarray, "*N 3"]) -> Float[np.ndarray, "*N 2"]:
+        """Return at which row and column places on the floor are; cells begin at whole ones."""
+        return (places - self.corner) @ self.along.T / self.side
+
     def cells(self, places: Float[np.ndarray, "N 3"]) -> Int[np.ndarray, " N"]:
         """Return in which cell places on the floor are; -1: beside the square."""
         away = np.where(np.isfinite(places), places - self.corner, -1.0)

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Bool, Float, Float32
+from jaxtyping import Bool, Float, Float32, UInt8
 from PIL import Image
 from scipy.ndimage import binary_dilation, label
 
@@ -20,6 +20,7 @@ from corporeal.masking.colour_likelihood import against, bins_of, histogram, ove
 from corporeal.masking.even_exposure import evenly_exposed
 from corporeal.masking.floor_colour import shaded_floor
 from corporeal.masking.floor_pattern import shows_floor
+from corporeal.masking.floor_texture import floor_fit
 from corporeal.masking.hanging import Hanging, hanging
 from corporeal.masking.holes import closed
 from corporeal.masking.left_over import before_the_floor, left_over
@@ -99,8 +100,8 @@ class Evidence:
 class _Side:
     """Pictures of one size, ready to be cut in two again and again."""
 
-    def __init__(self, views: Views) -> None:
-        self.bins, self.cutter = bins_of(views.rgb), Cutter(views.rgb)
+    def __init__(self, views: Views, level: UInt8[np.ndarray, "V H W"]) -> None:
+        self.bins, self.cutter = bins_of(views.rgb, level), Cutter(views.rgb)
 
     def cut(self, evidence: Evidence) -> Float32[np.ndarray, "V H W"]:
         """Return how far each pixel is inside."""
@@ -113,6 +114,7 @@ def grow(
     seeds: Seeds,
     progress: Progress = lambda fraction, words: None,
     flat: bool = False,
+    fitting: bool = False,
 ) -> Grown | None:
     """Grow masks; None: nothing is left.
 
@@ -121,15 +123,20 @@ def grow(
         seeds: For the same pictures at ROUGH pixels, as ``reduced`` returns them.
         progress: Told the fraction done and what is being done.
         flat: Whether what lies flat on the floor may be objects, too: only colours tell then.
+        fitting: Whether colours count together with how well they fit the floor at their place.
+            Outlines are then a pixel wide of the thing, since what is mixed does not fit.
 
     """
     views = evenly_exposed(views, seeds.floor, seeds.around, ROUGH)
     rough = reduced(views, ROUGH)
     bottom = lowered(seeds.floor, seeds.around) if flat else seeds.floor
-    side, room = _Side(rough), volume(rough.cameras, seeds.around, bottom, seeds.cone)
+    room = volume(rough.cameras, seeds.around, bottom, seeds.cone)
     shaded = shaded_floor(views, seeds.floor, seeds.around)
     floor = shaded if flat else shaded | shows_floor(views, seeds.floor, seeds.around)
-    on_floor = np.float32(FLOOR) * _shrunk(floor, rough.rgb.shape[1:3])
+    on_floor = _shrunk(floor, rough.rgb.shape[1:3])
+    known = seeds.floor if fitting else None
+    level = floor_fit(rough, known, seeds.around, on_floor >= HALF)
+    on_floor, side = np.float32(FLOOR) * on_floor, _Side(rough, level)
     inside, outside = (histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
     never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0)) + on_floor
     state: _Round | None = None
@@ -152,7 +159,7 @@ def grow(
     stands = standing(rough, state.masks, seeds.floor, seeds.around)
     near = widened(state.masks)
     return Grown(
-        inside=closed(_drawn(views, state, floor), rough.cameras, room),
+        inside=closed(_drawn(views, level, state, floor), rough.cameras, room),
         coherence=_agreement(state.masks, state.silhouettes),
         settled=settled,
         alike=state.alike * (1 - _told(state.masks, on_floor)),
@@ -203,14 +210,19 @@ def _round(side: _Side, room: Volume, evidence: Evidence, piece: float | None) -
 
 
 def _drawn(
-    views: Views, state: _Round, floor: Bool[np.ndarray, "V h w"]
+    views: Views,
+    level: UInt8[np.ndarray, "V H W"],
+    state: _Round,
+    floor: Bool[np.ndarray, "V h w"],
 ) -> Float32[np.ndarray, "V h w"]:
     """Cut the pictures at their full size, and keep what hangs together with silhouettes."""
     size, seen = views.rgb.shape[1:3], state.silhouettes
     floor = floor & (_enlarged(state.hiding.astype(np.float32), size) <= HALF)
     prior = _enlarged(state.evidence.prior, size) + np.float32(FLOOR) * floor.astype(np.float32)
     fine = replace(state.evidence, prior=prior)
-    inside = _Side(views).cut(fine)
+    wide = size[1], size[0]
+    fit = [Image.fromarray(p).resize(wide, Image.Resampling.NEAREST) for p in level]
+    inside = _Side(views, np.stack([np.asarray(p) for p in fit])).cut(fine)
     for one, hull in zip(inside, _enlarged(seen.astype(np.float32), size), strict=True):
         pieces = label(one > HALF)
         assert isinstance(pieces, tuple)

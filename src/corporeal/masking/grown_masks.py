@@ -27,6 +27,7 @@ from corporeal.types import Views
 
 FLAT = "What has their colours and lies flat on the floor was taken for objects, too."
 OTHER_COLOURS = "What stands there and borders on it in other colours was taken in."
+BY_FLOOR = "It was told from a floor of its colours by what the floor shows at each of its places."
 DOUBTED = "doubted"
 """Folder of masks that are not to be believed: what colours alone would take for objects."""
 METHOD = 13
@@ -37,8 +38,9 @@ HAVE_IT = (
 )
 GROWN = 0.8
 """Share of the work that is done when masks are grown."""
-ONCE, TWICE = 0.5, 0.75
-"""Share of growing them that is done when they were grown once, and with what lies flat."""
+ONCE, TWICE, THRICE = 0.4, 0.6, 0.8
+"""Share of growing them that is done when they were grown once, with what lies flat, and with what
+borders on them."""
 
 
 @dataclass(frozen=True)
@@ -125,7 +127,9 @@ def _grown(
 
     Plates are as flat as print on paper, which is no object. Where so much of the colours of
     objects lies beside them, colours decide, if masks are complete and not doubted then.
-    What hangs on it in other colours is taken in unless it is asked for alone.
+    What hangs on it in other colours is taken in unless it is asked for alone. Where masks are then
+    still doubted, or lack what has other colours, the floor has the colours of the thing, and how
+    well these fit it at their place counts, too, if masks are right by it.
     """
     grown, flat = grow(views, seeds, within(progress, 0.0, ONCE)), False
     if incomplete(grown) is not None:
@@ -134,13 +138,21 @@ def _grown(
         flat = doubt(wider) is None and incomplete(wider) is None
         grown = wider if flat else grown
     said = [FLAT] if flat else []
-    if grown is None:
-        return None, said
-    if alone:
+    if grown is not None and alone:
         return grown, [*said, *_part(bordering(grown))]
-    last = within(progress, TWICE, 1.0, ", with what borders on it in other colours")
-    whole = taken_in(views, seeds, grown, last, flat)
+    last = within(progress, TWICE, THRICE, ", with what borders on it in other colours")
+    whole = grown and taken_in(views, seeds, grown, last, flat)
+    lacks = incomplete(whole) is None and lacking(whole) is not None
+    if doubt(whole) is not None or lacks:
+        by_floor = within(progress, THRICE, 1.0, ", by what the floor shows at each place")
+        fitted = grow(views, seeds, by_floor, fitting=True)
+        if _sound(fitted):
+            return fitted, [BY_FLOOR]
     return whole, said if whole is grown else [*said, OTHER_COLOURS]
+
+
+def _sound(grown: Grown | None) -> bool:
+    return doubt(grown) is None and incomplete(grown) is None and lacking(grown) is None
 
 
 def _part(much: float) -> list[str]:

@@ -141,7 +141,7 @@ def cut_around(
         inside = (u >= left) & (u <= right) & (v >= top) & (v <= bottom)
         outside = ~inside
         prior[0, outside] = SURE
-    bins, cutter = bins_of(rgb[None]), Cutter(rgb[None])
+    bins, cutter = bins_of(rgb[None], np.zeros((1, *rgb.shape[:2]), np.uint8)), Cutter(rgb[None])
     fixed = outside
     for _ in range(ROUNDS):
         colours = against(bins, *(histogram(bins, w[None]) for w in (inside, outside)))

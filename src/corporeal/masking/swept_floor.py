@@ -40,13 +40,16 @@ def swept_floor(views: Views, around: Region) -> Plane | None:
     found = level(views.cameras)
     if found.sure < SURE:
         return None
-    shares = np.array([_shown(views, level_plane(found.up, h, around), around) for h in HEIGHTS])
-    height, share = float(HEIGHTS[shares.argmax()]), float(shares.max())
-    if share < SHOWN or share < SHARP * np.median(shares):
+
+    def shares(heights: Float[np.ndarray, " N"]) -> Float[np.ndarray, " N"]:
+        return np.array([_shown(views, level_plane(found.up, h, around), around) for h in heights])
+
+    coarse = shares(HEIGHTS)
+    near = HEIGHTS[coarse.argmax()] + FINER * np.array([-1, 0, 1])
+    fine = shares(near)
+    if fine.max() < max(SHOWN, SHARP * np.median(coarse)):
         return None
-    near = np.array([height - FINER, height, height + FINER])
-    shares = np.array([_shown(views, level_plane(found.up, h, around), around) for h in near])
-    return level_plane(found.up, float(near[shares.argmax()]), around)
+    return level_plane(found.up, float(near[fine.argmax()]), around)
 
 
 def level_plane(up: Float[np.ndarray, "3"], height: float, around: Region) -> Plane:
