@@ -8,8 +8,10 @@ from painted_scene import FLOOR, scene
 from corporeal.geometry.region import region
 from corporeal.masking import swept_floor as module
 from corporeal.masking.seeds import looked_at
-from corporeal.masking.swept_floor import swept_floor
+from corporeal.masking.swept_floor import _shown, level_plane, swept_floor
 from corporeal.types import Camera, Views
+
+UP = np.array([0.0, 0.0, 1.0])
 
 
 @pytest.fixture(autouse=True)
@@ -53,15 +55,8 @@ def test_a_floor_between_two_heights_that_are_tried_is_found(monkeypatch):
     off = 0.012
     true = (FLOOR - around.centre[2]) / around.radius
     monkeypatch.setattr(module, "HEIGHTS", true + off + np.linspace(-0.4, 0.4, 9))
-    monkeypatch.setattr(
-        module, "SHOWN", 0.5 * (shown(views, true, around) + shown(views, true + off, around))
-    )
+    shares = [_shown(views, level_plane(UP, h, around), around) for h in (true, true + off)]
+    monkeypatch.setattr(module, "SHOWN", sum(shares) / 2)
     found = swept_floor(views, around)
     assert found is not None
     assert found.offset == pytest.approx(FLOOR, abs=0.005 * around.radius)
-
-
-def shown(views, height, around):
-    return module._shown(
-        views, module.level_plane(np.array([0.0, 0.0, 1.0]), height, around), around
-    )
