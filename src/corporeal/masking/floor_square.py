@@ -19,6 +19,8 @@ are compared. Steep views from opposite sides do not do: both see a pot's floor 
 PARTNERS, WITNESSES = 6, 3
 """Views that each is compared with, and how many of them must agree: two may by chance, along an
 edge."""
+GRAZING = 1e-3
+"""Height over the floor of a camera that is not above it, in distances from the middle."""
 
 
 @dataclass(frozen=True)
@@ -106,7 +108,7 @@ def slants(cameras: tuple[Camera, ...], floor: Plane, around: Region) -> Float[n
     """Return how far along the floor a ray to the middle goes for each unit that it goes down."""
     along = np.linalg.svd(floor.normal[None])[2][1:]
     eyes = np.stack([c.world_from_camera[:3, 3] for c in cameras]) - np.array(around.centre)
-    height = np.maximum(eyes @ floor.normal, np.finfo(float).tiny)
+    height = np.maximum(eyes @ floor.normal, GRAZING * np.linalg.norm(eyes, axis=1))
     return eyes @ along.T / height[:, None]
 
 

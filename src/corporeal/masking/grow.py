@@ -47,6 +47,9 @@ IN_HULL, BESIDE_HULL = -0.5, 2.0
 MARGIN = 0.03
 """Width of the band around silhouettes in which only colours and edges count, in widths of the
 picture."""
+REACH = 0.06
+"""How far beyond silhouettes masks are drawn, in the same widths: what the hull lacks may be a thin
+leg that some pictures lost, but no wall of the same colour that touches outlines."""
 NEARBY = 0.2
 """How far around silhouettes colours are learned that objects are told from, in the same widths:
 what pictures show farther away, such as a wall of their colour, does not border on them."""
@@ -137,21 +140,10 @@ def grow(
     known = seeds.floor if fitting else None
     level = floor_fit(rough, known, seeds.around, on_floor >= HALF)
     on_floor, side = np.float32(FLOOR) * on_floor, _Side(rough, level)
-    inside, outside = (histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
-    never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0)) + on_floor
-    state: _Round | None = None
-    evidence, before = Evidence(inside, outside, never), seeds.never
-    settled, turn = 0.0, 0
-    while turn < ROUNDS or (turn < MOST and settled < SETTLED):
-        progress(turn / (MOST + 1), f"growing masks, round {turn + 1}")
-        before = before if state is None else state.masks
-        state = _round(side, room, evidence, seeds.piece)
-        if state is None:
-            return None
-        settled, turn = _agreement(state.masks, before), turn + 1
-        on_floor = np.where(state.hiding, np.float32(0), on_floor)
-        evidence = replace(state.evidence, prior=state.evidence.prior + on_floor)
-    assert state is not None
+    found = _rounds(side, room, seeds, on_floor, progress)
+    if found is None:
+        return None
+    state, settled, on_floor = found
     progress(MOST / (MOST + 1), "drawing their outlines")
     middle = ~seeds.never & before_the_floor(rough.cameras, seeds.floor, seeds.around)
     middle &= ~widened(state.silhouettes) & (_shrunk(shaded, rough.rgb.shape[1:3]) < HALF)
@@ -209,13 +201,42 @@ def _round(side: _Side, room: Volume, evidence: Evidence, piece: float | None) -
     return _Round(masks, seen, hiding, outer, alike, Evidence(inside, outside, prior))
 
 
+def _rounds(
+    side: _Side,
+    room: Volume,
+    seeds: Seeds,
+    on_floor: Float32[np.ndarray, "V H W"],
+    progress: Progress,
+) -> tuple[_Round, float, Float32[np.ndarray, "V H W"]] | None:
+    """Cut, carve and learn until masks settle; None: nothing is left.
+
+    Returns the last round, how much of the one before it has, and evidence of the floor that is
+    left where nothing tall hides it.
+    """
+    inside, outside = (histogram(side.bins, w) for w in (seeds.inside, seeds.outside))
+    never = np.where(seeds.never, np.float32(BESIDE_HULL), np.float32(0)) + on_floor
+    evidence, before = Evidence(inside, outside, never), seeds.never
+    settled, turn = 0.0, 0
+    while True:
+        progress(turn / (MOST + 1), f"growing masks, round {turn + 1}")
+        state = _round(side, room, evidence, seeds.piece)
+        if state is None:
+            return None
+        settled, turn = _agreement(state.masks, before), turn + 1
+        on_floor = np.where(state.hiding, np.float32(0), on_floor)
+        if turn >= MOST or (turn >= ROUNDS and settled >= SETTLED):
+            return state, settled, on_floor
+        evidence = replace(state.evidence, prior=state.evidence.prior + on_floor)
+        before = state.masks
+
+
 def _drawn(
     views: Views,
     level: UInt8[np.ndarray, "V H W"],
     state: _Round,
     floor: Bool[np.ndarray, "V h w"],
 ) -> Float32[np.ndarray, "V h w"]:
-    """Cut the pictures at their full size, and keep what hangs together with silhouettes."""
+    """Cut the pictures at their full size, and keep what hangs together about silhouettes."""
     size, seen = views.rgb.shape[1:3], state.silhouettes
     floor = floor & (_enlarged(state.hiding.astype(np.float32), size) <= HALF)
     prior = _enlarged(state.evidence.prior, size) + np.float32(FLOOR) * floor.astype(np.float32)
@@ -223,6 +244,7 @@ def _drawn(
     wide = size[1], size[0]
     fit = [Image.fromarray(p).resize(wide, Image.Resampling.NEAREST) for p in level]
     inside = _Side(views, np.stack([np.asarray(p) for p in fit])).cut(fine)
+    inside[_enlarged(widened(seen, REACH).astype(np.float32), size) <= HALF] = 0
     for one, hull in zip(inside, _enlarged(seen.astype(np.float32), size), strict=True):
         pieces = label(one > HALF)
         assert isinstance(pieces, tuple)
