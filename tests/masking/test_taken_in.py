@@ -84,7 +84,7 @@ def test_much_that_borders_on_it_and_was_not_taken_in_ends_the_run(tmp_path, mon
     grown = replace(grown, hanging=Hanging(some, some))
     why = lacking(grown)
     assert (why is not None) == (share > 0.5)
-    monkeypatch.setattr(module, "grow", lambda *_: grown)
+    monkeypatch.setattr(module, "grow", lambda *_, fitting=False: grown)
     monkeypatch.setattr(module, "taken_in", lambda *given: given[2])
     write_views(tmp_path / "photos", views)
     if why is not None:

@@ -16,7 +16,7 @@ from corporeal.formats.mask_files import (
     write_record,
 )
 from corporeal.formats.photographs import MASKS, Photographs, listed, read_photographs
-from corporeal.masking.doubt import bordering, contradict, doubt, incomplete, lacking
+from corporeal.masking.doubt import ALIKE, bordering, contradict, doubt, incomplete, lacking
 from corporeal.masking.grow import FINE, ROUGH, Grown, grow
 from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
@@ -36,6 +36,8 @@ HAVE_IT = (
     "If it is meant, too, paint it white in the masks, or give masks of all (a folder 'masks' with "
     "the names of the pictures); 'corporeal masks' with --at grows masks of it alone."
 )
+UNSURE = 0.5
+"""Share of the overlap of colours that is doubted, from which on the floor is asked, too."""
 GROWN = 0.8
 """Share of the work that is done when masks are grown."""
 ONCE, TWICE, THRICE = 0.4, 0.6, 0.8
@@ -128,8 +130,9 @@ def _grown(
     Plates are as flat as print on paper, which is no object. Where so much of the colours of
     objects lies beside them, colours decide, if masks are complete and not doubted then.
     What hangs on it in other colours is taken in unless it is asked for alone. Where masks are then
-    still doubted, or lack what has other colours, the floor has the colours of the thing, and how
-    well these fit it at their place counts, too, if masks are right by it.
+    still doubted, or lack what has other colours, or are near to being doubted for their colours,
+    the floor has the colours of the thing, and how well these fit it at their place counts, too, if
+    masks are right by it, and better than masks that were not doubted.
     """
     grown, flat = grow(views, seeds, within(progress, 0.0, ONCE)), False
     if incomplete(grown) is not None:
@@ -142,17 +145,25 @@ def _grown(
         return grown, [*said, *_part(bordering(grown))]
     last = within(progress, TWICE, THRICE, ", with what borders on it in other colours")
     whole = grown and taken_in(views, seeds, grown, last, flat)
-    lacks = incomplete(whole) is None and lacking(whole) is not None
-    if doubt(whole) is not None or lacks:
+    doubted = doubt(whole) is not None
+    bad = doubted or lacking(whole) is not None
+    flat_left = incomplete(whole) is not None and not doubted
+    if whole is None or (not flat_left and (bad or whole.alike > UNSURE * ALIKE)):
         by_floor = within(progress, THRICE, 1.0, ", by what the floor shows at each place")
         fitted = grow(views, seeds, by_floor, fitting=True)
-        if _sound(fitted):
-            return fitted, [BY_FLOOR]
+        if fitted is not None and _sound(fitted):
+            if whole is None or bad or _better(fitted, whole):
+                return fitted, [BY_FLOOR]
     return whole, said if whole is grown else [*said, OTHER_COLOURS]
 
 
-def _sound(grown: Grown | None) -> bool:
+def _sound(grown: Grown) -> bool:
     return doubt(grown) is None and incomplete(grown) is None and lacking(grown) is None
+
+
+def _better(one: Grown, other: Grown) -> bool:
+    """Tell whether colours are told apart better, and masks agree better with their hull."""
+    return one.alike < other.alike and one.coherence > other.coherence
 
 
 def _part(much: float) -> list[str]:
