@@ -91,3 +91,16 @@ def test_poses_of_cropped_pictures_are_refused_or_a_warning(spread, refused, tmp
     assert (said in kept.refused) == refused
     assert (kept.what_to_do == AS_TAKEN) == refused
     assert any(said in one for one in kept.warnings) == (spread == 0.03)
+
+
+def test_a_folder_of_which_most_was_left_out_is_refused(tmp_path, monkeypatch):
+    """8 of 18 photographs of a television, 7 of which had been left out before the search."""
+    names = tuple(f"{k}.jpg" for k in range(11))
+    gathered = Gathered(names, ((640, 480),) * 11, ())
+    told = Attempt("plain", 11, 8, 2000, 0.5, focal=0.9)
+    monkeypatch.setattr(posing, "_gathered", lambda *_: ([], gathered))
+    monkeypatch.setattr(posing, "_places", lambda *_: (gathered, 7))
+    monkeypatch.setattr(posing, "_tried", lambda *_: ([told], ()))
+    kept = posing._found(tmp_path, tmp_path, lambda share, words: None)
+    assert "only 8 of 18 pictures fit together" in kept.refused
+    assert "newspaper" in kept.what_to_do

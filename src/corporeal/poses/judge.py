@@ -17,6 +17,9 @@ RIVAL = 1 / 3
 FILLED = 0.9
 """Share of a mask that the visual hull fills: 1.00 under right poses of two real sets, 0.85 under
 those of the card that an axe head lay on before and after it was turned over."""
+MOST = 0.5
+"""Share of all photographs of a folder that must be placed, those counted, too, that were left out
+before the search: of a television 8 of 18 were, from a fifth of the circle."""
 HOPELESS = 0.4
 """Share of the pictures that the plain attempt must join by points, or the thorough one is in vain:
 of sets that it posed alone all 15, 20 and 24 were joined."""
@@ -57,6 +60,20 @@ def doubts(told: Attempt) -> list[str]:
         groups = " and ".join(str(n) for n in (told.registered, *told.others)[:3])
         found.append(f"the pictures fall into groups of {groups} that share nothing")
     return found
+
+
+def too_few(told: Attempt, others: int) -> str | None:
+    """Say in a clause that most of a folder was not placed, if so.
+
+    Args:
+        told: An attempt that is believed.
+        others: Photographs that were left out before it.
+
+    """
+    total = told.pictures + others
+    if told.registered >= MOST * total:
+        return None
+    return f"only {told.registered} of {total} pictures fit together"
 
 
 def in_vain(told: Attempt, blurred: int) -> bool:

@@ -48,7 +48,8 @@ def clause(spread: float) -> str:
     """Say what it means that middles lie so far apart."""
     return (
         "lenses would have looked past the middles of the pictures, each by another "
-        f"{spread:.0%} of their width: the photographs were cropped, each in another way"
+        f"{spread:.0%} of their width: the photographs were cropped, each in another way, or many "
+        "were placed wrongly"
     )
 
 

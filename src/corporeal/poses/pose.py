@@ -39,6 +39,7 @@ from corporeal.poses.judge import (
     doubts,
     in_vain,
     names_of,
+    too_few,
 )
 from corporeal.poses.look_alikes import checked_by_neighbours
 from corporeal.poses.middles import AS_TAKEN, CROPPED, SLIGHTLY_CROPPED, apart, clause, sentence
@@ -217,6 +218,8 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
     believed = [told for told in tried if not doubts(told)]
     if believed:  # the first of those that masks agree with best: masks may be poor
         best = max(believed, key=lambda told: told.filled)
+        if (why := too_few(best, others)) is not None:
+            return _refused([why], gathered, smeared, tried=tuple(tried))
         place = folder / best.way / "sparse" / "0"
         if (why := mirrored(read_colmap(place))) is not None:
             return _Kept((), gathered.said, not_found([why], others), tuple(tried), TWO_KINDS)
