@@ -106,3 +106,24 @@ def test_who_points_at_a_part_hears_that_something_borders_on_it(tmp_path, monke
         at = Pointed("", (float(column), float(row)), None)
         said = module.grown_masks(tmp_path / "photos", tmp_path / f"{told}", at).said
         assert any("It may be a part" in sentence for sentence in said) == told
+
+
+def test_masks_that_test_poses_do_not_ask_the_floor_that_these_know(monkeypatch):
+    """Of an axe head that was turned over, poses of the card under it were believed so."""
+    views, _, _ = scene()
+    seeds = looked_at(views, None)
+    grown = grow(views, seeds)
+    assert grown is not None
+    asked = []
+
+    def again(*_, fitting=False):
+        asked.append(fitting)
+        return replace(grown, alike=0.15 - 0.1 * fitting, coherence=0.8 + 0.1 * fitting)
+
+    monkeypatch.setattr(module, "grow", again)
+    monkeypatch.setattr(module, "taken_in", lambda *given: given[2])
+    for unsure, found in ((module.UNSURE, 0.9), (1.0, 0.8)):
+        asked.clear()
+        masks, _ = module._grown(views, seeds, False, unheard, unsure)
+        assert masks is not None and masks.coherence == found
+        assert any(asked) == (found == 0.9)

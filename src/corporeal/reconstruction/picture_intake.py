@@ -165,7 +165,7 @@ def _seen_to_agree(
 
     """
     asking = within(progress, POSED * WHOLE, POSED * TESTED, ", to test the poses")
-    grown = grown_masks(posed.folder, place / SEEN, progress=asking)
+    grown = grown_masks(posed.folder, place / SEEN, progress=asking, testing=True)
     if grown.contradict and grown.doubted is not None:
         less = within(progress, POSED * TESTED, POSED * AGAIN, ", without what is something else")
         posed, grown = _less_strangers(posed, grown, grown.doubted / MASKS[0], place, less)
@@ -203,7 +203,7 @@ def _less_strangers(
     shutil.copytree(posed.folder, other.folder)
     left = without_strangers(other, doubted)
     if left != other:
-        again = grown_masks(left.folder, place / ALIKE_SEEN, progress=progress)
+        again = grown_masks(left.folder, place / ALIKE_SEEN, progress=progress, testing=True)
         if again.folder is not None:
             return left, again
     shutil.rmtree(other.folder)
