@@ -18,6 +18,9 @@ Tell = Callable[[str], Callable[[float, str], None]]
 
 EVERY = 30.0
 """Seconds between two lines of a log on one verb [s]."""
+SOON = 2.0
+"""Seconds after which a log says that a verb began: what is over before then is not worth a line,
+and an error stands alone [s]."""
 TELLS = 0.05
 """Share of a verb that has to be done while somebody looks before its time left is told [-]."""
 MINUTE, HOUR, BRIEF = 60.0, 3600.0, 90.0
@@ -127,14 +130,18 @@ def lasting(seconds: float) -> str:
 
 @contextmanager
 def log_lines(
-    where: Console, every: float = EVERY, now: Callable[[], float] = time.monotonic
+    where: Console,
+    every: float = EVERY,
+    now: Callable[[], float] = time.monotonic,
+    soon: float = SOON,
 ) -> Iterator[Tell]:
-    """Say when a verb begins and ends, and every so often how far it is.
+    """Say when a verb that lasts begins and ends, and every so often how far it is.
 
     Args:
         where: Gets the lines.
         every: Seconds between two lines on one verb [s].
         now: The clock [s].
+        soon: Seconds that it takes for a verb to be said to begin [s].
 
     """
     watched: list[_Watched] = []  # the one that goes on
@@ -142,15 +149,15 @@ def log_lines(
     def ended() -> None:
         for one in watched:
             one.leave()
-            lasted = lasting(now() - one.doing.begun)
-            print_line(f"{one.doing.verb} done in {lasted}", where)
+            if one.lasts:
+                lasted = lasting(now() - one.doing.begun)
+                print_line(f"{one.doing.verb} done in {lasted}", where)
         watched.clear()
 
     def tell(verb: str) -> Callable[[float, str], None]:
         ended()
         doing = Doing(verb, now())
-        print_line(f"{verb} begins", where)
-        watched.append(_Watched(doing, lambda: print_line(doing.line(now()), where), every))
+        watched.append(_Watched(doing, lambda line: print_line(line, where), now, soon, every))
         return lambda fraction, words: doing.told(fraction, words, now())
 
     try:
@@ -164,8 +171,17 @@ def log_lines(
 class _Watched:
     """A verb of which something is said every so often, whether or not it tells anything."""
 
-    def __init__(self, doing: Doing, say: Callable[[], None], every: float) -> None:
-        self.doing, self._say, self._every = doing, say, every
+    def __init__(
+        self,
+        doing: Doing,
+        say: Callable[[str], None],
+        now: Callable[[], float],
+        soon: float,
+        every: float,
+    ) -> None:
+        self.doing, self._say, self._now = doing, say, now
+        self._soon, self._every = soon, every
+        self.lasts = False
         self._over = Event()
         self._watch = Thread(target=self._go_on, daemon=True)
         self._watch.start()
@@ -176,5 +192,9 @@ class _Watched:
         self._watch.join()
 
     def _go_on(self) -> None:
+        if self._over.wait(self._soon):
+            return
+        self.lasts = True
+        self._say(f"{self.doing.verb} begins")
         while not self._over.wait(self._every):
-            self._say()
+            self._say(self.doing.line(self._now()))

@@ -151,16 +151,18 @@ def _grown(
         return grown, [*said, *_part(bordering(grown))]
     last = within(progress, TWICE, THRICE, ", with what borders on it in other colours")
     whole = grown and taken_in(views, seeds, grown, last, flat)
+    said = said if whole is grown else [*said, OTHER_COLOURS]
     doubted = doubt(whole) is not None
+    if incomplete(whole) is not None and not doubted:
+        return whole, said
     bad = doubted or lacking(whole) is not None
-    flat_left = incomplete(whole) is not None and not doubted
-    if whole is None or (not flat_left and (bad or whole.alike > unsure * ALIKE)):
+    if whole is None or bad or whole.alike > unsure * ALIKE:
         by_floor = within(progress, THRICE, 1.0, ", by what the floor shows at each place")
         fitted = grow(views, seeds, by_floor, fitting=True)
         if fitted is not None and _sound(fitted):
             if whole is None or bad or _better(fitted, whole):
                 return fitted, [BY_FLOOR]
-    return whole, said if whole is grown else [*said, OTHER_COLOURS]
+    return whole, said
 
 
 def _sound(grown: Grown) -> bool:
