@@ -253,7 +253,7 @@ def test_an_object_that_is_only_haze_is_named():
     haze = clad(ball.copy().apply_translation([0.8, 0, 0.3]), 800)
     haze = replace(haze, opacity=np.full(haze.count, 1e-4))
     gaussians, owner = together(solid, haze)
-    with pytest.raises(UserError, match="object 1"):
+    with pytest.raises(UserError, match="object 2"):
         solids(gaussians, owner, eyes(8), threads=1)
 
 
