@@ -15,6 +15,7 @@ from corporeal.errors import BadFileError, UserError
 from corporeal.formats.colmap import write_colmap
 from corporeal.formats.photographs import read_photographs
 from corporeal.formats.sources import kind_of, photographs_in, sources, unposed
+from corporeal.geometry.silhouettes import FILLED
 from corporeal.masking.grown_masks import GrownMasks
 from corporeal.poses import film_frames
 from corporeal.poses import pose as posing
@@ -22,7 +23,7 @@ from corporeal.poses.attempt import Attempt, beside_first, by_camera
 from corporeal.poses.by_masks import checked_by_masks
 from corporeal.poses.film_frames import choose, write_frames
 from corporeal.poses.gather import gather
-from corporeal.poses.judge import FILLED, doubts, in_vain, names_of
+from corporeal.poses.judge import doubts, in_vain, names_of
 from corporeal.poses.pose import FIGURE, moved_within, pose, pose_object
 from corporeal.poses.standstill import Standstill
 from corporeal.reconstruction import picture_intake as reconstructing

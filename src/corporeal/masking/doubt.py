@@ -23,8 +23,6 @@ are not of all of the thing: they would overlap with right ones by less than .8.
 HANGING = 0.5
 """The same of what stands there in other colours and borders on it. Of its pixels .4 to .85 were
 the thing's, the rest shadows and edges beside it, so that masks lack as much."""
-
-
 CONTRADICT = "its outlines contradict each other"
 
 

@@ -11,13 +11,10 @@ import numpy as np
 
 from corporeal.geometry.ground_plane import Plane
 from corporeal.geometry.region import Region
-from corporeal.masking.floor_colour import PATCH, colours_on, gains
+from corporeal.masking.floor_colour import DARK, PATCH, colours_on, gains
 from corporeal.masking.floor_square import WITNESSES, square
 from corporeal.masking.reduced import reduced
 from corporeal.types import Views
-
-DARKEST = 4.0
-"""What is darker [of 255] is as dark: noise says nothing of exposures."""
 
 
 def evenly_exposed(views: Views, floor: Plane | None, around: Region, longest: int) -> Views:
@@ -35,7 +32,7 @@ def evenly_exposed(views: Views, floor: Plane | None, around: Region, longest: i
     rough = reduced(views, longest)
     ground = square(rough.cameras, floor, around)
     pairs = zip(rough.rgb, rough.cameras, strict=True)
-    gain = gains(np.stack([colours_on(ground, rgb, c, PATCH, DARKEST) for rgb, c in pairs]))
+    gain = gains(np.stack([colours_on(ground, rgb, c, PATCH, DARK) for rgb, c in pairs]))
     rgb = np.empty_like(views.rgb)
     for one, picture, g in zip(rgb, views.rgb, gain, strict=True):
         one[:] = np.clip(np.round(picture * np.exp(-g)), 0, 255)

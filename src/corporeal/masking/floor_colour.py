@@ -28,6 +28,8 @@ COLOURFUL = 2.0
 """A floor is grey if no ratio of its channels is so many times farther off 1 than shades may be."""
 SHADE = 0.12
 """Difference of lightness, and half of that of ratios, up to which views agree, in logarithms."""
+DARK = 4.0
+"""What is darker [of 255] is as dark where logarithms are compared: noise has no ratios."""
 DARKEST = -1.6
 """Logarithm of the least share of the floor's light that a shadow leaves."""
 APART = 4

@@ -18,7 +18,7 @@ from skimage.color import rgb2lab
 from corporeal.geometry.ground_plane import Plane
 from corporeal.geometry.region import Region
 from corporeal.geometry.robust import NORMAL
-from corporeal.masking.floor_colour import DARKEST, colours_on
+from corporeal.masking.floor_colour import DARK, DARKEST, colours_on
 from corporeal.masking.floor_light import lit_floor, median_of
 from corporeal.masking.floor_square import WITNESSES, met, square
 from corporeal.types import Views
@@ -28,8 +28,6 @@ UNKNOWN, FITS, PARTLY, CONTRADICTS = range(4)
 WIDE = 1.6
 """How much of the floor is looked at, in radii of the ball that all cameras look at: before what
 lies beyond the ball, the upper half of a thing is seen."""
-DARK = 4.0
-"""Of 255; what is darker is as dark: noise has no ratios."""
 SPARE = 2.0
 """Least standard deviation of what a place of the floor shows, in CIELAB."""
 PLAIN, EDGED = 30, 70

@@ -4,6 +4,7 @@ A wrong model looks like a model: low reprojection error says nothing. What spea
 found on right and wrong models of the same pictures, docs/inputs.md, "Photographs without poses".
 """
 
+from corporeal.geometry.silhouettes import FILLED
 from corporeal.poses.attempt import SHARE, Attempt
 
 POINTS = 30
@@ -14,9 +15,6 @@ BENT = 0.25
 """Largest |k1| of a lens that is no fisheye."""
 RIVAL = 1 / 3
 """Share of the first group from which on a second one rivals it."""
-FILLED = 0.9
-"""Share of a mask that the visual hull fills: 1.00 under right poses of two real sets, 0.85 under
-those of the card that an axe head lay on before and after it was turned over."""
 MOST = 0.5
 """Share of all photographs of a folder that must be placed, those counted, too, that were left out
 before the search: of a television 8 of 18 were, from a fifth of the circle."""

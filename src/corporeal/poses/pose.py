@@ -11,6 +11,7 @@ from corporeal.errors import BadFileError, noticed
 from corporeal.formats.colmap import read_colmap
 from corporeal.formats.photographs import MASKS, read_photographs
 from corporeal.formats.sources import FILMS
+from corporeal.geometry.silhouettes import FILLED
 from corporeal.geometry.unseen_side import unseen_side
 from corporeal.poses.attempt import Attempt, Way, attempt, require, without_pictures
 from corporeal.poses.blur import blurred
@@ -30,7 +31,6 @@ from corporeal.poses.groups import (
     without,
 )
 from corporeal.poses.judge import (
-    FILLED,
     HOLD_STILL,
     MOST_BLURRED,
     WHAT_TO_DO,

@@ -9,6 +9,7 @@ from corporeal.geometry.cropped import cropped
 from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.region import region
 from corporeal.geometry.silhouette_overlap import compared
+from corporeal.geometry.silhouettes import FILLED
 from corporeal.splats.quality import Quality
 from corporeal.types import Camera
 
@@ -28,11 +29,6 @@ more is in dispute than agreed on: wrong cuts have .05 to .5, right ones .64 to 
 UNLIKE = 0.35
 """Median overlap of surfaces with masks below which they are no shape of what masks show: 0.9 for
 most objects; foliage and wires, whose gaps close, have less."""
-FILLED = 0.9
-"""Share of masks that nobody gave which surfaces must fill, the median of all views: as much as the
-hull of masks must under right poses (``poses.judge.FILLED``). What no surface can fill is in some
-views only: .84 of a helmet with pieces of the wall behind it was filled, .87 of two things whose
-pictures were half placed wrongly, .94 and more of all others."""
 COMPARED = 12
 """Views in which that is compared."""
 GO_ON = "--force goes on all the same."
