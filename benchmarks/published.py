@@ -1,7 +1,7 @@
 """Weigh everyday things of published size and mass by their names alone: nobody is asked.
 
-    python benchmarks/published.py [--second | --ware | --ware-meshes] [--rows] [--only NAME ...]
-                                   [--held-rows]
+    python benchmarks/published.py [--second | --ware | --ware-meshes | --ware-second] [--rows]
+                                   [--only NAME ...] [--held-rows]
 
 The lists (recognition/published.toml, sixty things; --second: published_second.toml, forty of other
 classes; --ware: ware.toml, 52 pieces of open ware, of which the outside is given, as photographs
@@ -31,7 +31,7 @@ from corporeal.treatment.object_masses import walls_drawn_too_thick
 
 FOLDER = Path(__file__).parent / "recognition"
 LIST, SECOND = FOLDER / "published.toml", FOLDER / "published_second.toml"
-WARE = FOLDER / "ware.toml"
+WARE, MORE_WARE = FOLDER / "ware.toml", FOLDER / "ware_second.toml"
 HALVES = ("open", "held")
 DRAWS = 200
 MISS = 20.0
@@ -136,16 +136,19 @@ def main() -> None:
     which.add_argument("--second", action="store_true", help="weigh the second list")
     which.add_argument("--ware", action="store_true", help="weigh open ware as from photographs")
     which.add_argument("--ware-meshes", action="store_true", help="weigh it as full meshes")
+    which.add_argument("--ware-second", action="store_true", help="weigh more ware, as --ware")
     parser.add_argument("--rows", action="store_true", help="print the things of the open half")
     parser.add_argument("--held-rows", action="store_true", help="print those of the other, too")
     parser.add_argument("--only", nargs="+", help="these things of the open half alone")
     asked = parser.parse_args()
     listed = WARE if asked.ware or asked.ware_meshes else SECOND if asked.second else LIST
+    listed = MORE_WARE if asked.ware_second else listed
     rows = tomllib.loads(listed.read_text(encoding="utf-8"))["things"]
     if asked.only:
         rows = [r for r in rows if r["name"] in asked.only and r["half"] == "open"]
+    pictured = asked.ware or asked.ware_second
     with TemporaryDirectory() as folder:
-        found = [look_at(row, Path(folder), asked.ware) for row in rows]
+        found = [look_at(row, Path(folder), pictured) for row in rows]
     shown = [h for h, asks in zip(HALVES, (asked.rows, asked.held_rows), strict=True) if asks]
     for one in sorted(found, key=lambda f: -abs(f.off)):
         if one.half in shown or asked.only:

@@ -59,14 +59,15 @@ def with_annotations(
     annotations: Mapping[tuple[str, str], Annotation],
     obj: str,
     config: DescribeConfig,
+    extent: float,
 ) -> list[PartWords]:
     """Return one object's parts as a person says they are; pieces of one mesh are gathered."""
-    path, called = config.annotations, [tokens_of(obj)]
-    own = [_annotated(annotations.get((obj, w.name)), w, path, called) for w in words]
+    path, thing = config.annotations, ([tokens_of(obj)], extent)
+    own = [_annotated(annotations.get((obj, w.name)), w, path, thing) for w in words]
     pieces = named_pieces(annotations, obj, [w.name for w in own])
     if not pieces:
         return own
-    known = [_annotated(annotations[obj, p.name], p, path, called) for p in pieces]
+    known = [_annotated(annotations[obj, p.name], p, path, thing) for p in pieces]
     return [gathered(own[0].name, known)]
 
 
@@ -74,7 +75,7 @@ def _annotated(
     annotation: Annotation | None,
     words: PartWords,
     path: Path | None,
-    called: Sequence[tuple[str, ...]],
+    thing: tuple[Sequence[tuple[str, ...]], float],
 ) -> PartWords:
     """Let an annotation replace what was found; what it leaves open stays.
 
@@ -82,7 +83,7 @@ def _annotated(
         annotation: None: nobody says anything.
         words: What was found.
         path: Of the file that says it.
-        called: What the object is called.
+        thing: What the object is called, and its longest side [m].
 
     """
     if annotation is None:
@@ -94,7 +95,7 @@ def _annotated(
         kept = SHARES + BUILT if is_open else SHARES
         words = replace(found, **{s: getattr(words, s) for s in kept})
         if is_open:
-            words = with_usual_wall(words, called)
+            words = with_usual_wall(words, *thing)
     if (
         annotation.material is not None
         or annotation.structure is not None

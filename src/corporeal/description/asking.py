@@ -178,7 +178,7 @@ class Asking:
             if asks:
                 words = self._materials(interview, names, pieces, file)
                 words = self._swollen(interview, words)
-            words = with_annotations(words, annotations, obj.name, self.config)
+            words = with_annotations(words, annotations, obj.name, self.config, obj.real_extent)
             return self._placed(interview, words)
 
         answers = told_several_times(interview, self.config.answers, described, self.config.direct)

@@ -71,7 +71,7 @@ def words_of_file(
             recognise(seen), seen, walls, pictured
         )
         if unasked:
-            found = with_usual_wall(found, [name.words for name in seen.general])
+            found = with_usual_wall(found, [name.words for name in seen.general], seen.extent)
         if unasked and not pictured:
             found = sheet_if_full(no_block(found, seen, library), seen, library)
         if not pictured:
@@ -93,13 +93,21 @@ def words_of_file(
 
 def open_ware(objects: Sequence[ObjectWords]) -> tuple[str, ...]:
     """Say of which objects from pictures the name decided that they are no solids."""
-    made = [o.name for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN]
+    made = [(o.name, p) for o in objects for p in o.parts if (p.structure, p.built_by) == OPEN]
     return tuple(
         f"{name}: pictures need not show how deep it is inside. By its name it is taken for open "
-        "ware, with a wall along its outside as thick as such ware usually has, and empty "
+        f"ware, with a wall along its outside {_how_thick(part)}, and empty "
         "inside of that; annotate structure and thickness_mm if that is wrong."
-        for name in made
+        for name, part in made
     )
+
+
+def _how_thick(part: PartWords) -> str:
+    """Say how thick the wall of open ware is taken to be, and why."""
+    if part.thickness is None or not part.wall_usual:
+        return "as thick as such walls usually are"
+    why = f" ({part.wall_why})" if part.wall_why else ""
+    return f"as thick as such ware usually has: {part.thickness * 1e3:.2g} mm{why}"
 
 
 def has_wall(library: str, name: str) -> bool:

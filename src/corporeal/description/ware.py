@@ -1,29 +1,69 @@
 """Open ware: how thick such a wall usually is, and what of it is drawn full."""
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
+
+import numpy as np
 
 from corporeal.description.no_block import usual_wall
 from corporeal.formats.word_order import is_several
 from corporeal.geometry.drawn import drawn_full
 from corporeal.geometry.identity import words as written
 from corporeal.types import PartWords
-from corporeal.vlm.lexicon import Name, formed, hollow, massive, open_ware, wall_of
+from corporeal.vlm.lexicon import Name, formed, hollow, massive, open_ware, wall_row
 from corporeal.vlm.metadata import Evidence
 
 
-def with_usual_wall(words: PartWords, names: Sequence[tuple[str, ...]]) -> PartWords:
-    """Give open ware the wall that pieces of its name and material have, where nobody states one.
+@dataclass(frozen=True)
+class WareWall:
+    """The wall that pieces of a name, a material and a size have."""
+
+    thickness: float
+    """[m]"""
+    why: str
+    """What says so."""
+
+
+def with_usual_wall(words: PartWords, names: Sequence[tuple[str, ...]], extent: float) -> PartWords:
+    """Give open ware the wall that such pieces have, where nobody states one.
 
     Args:
         words: Of a part.
         names: What it is called.
+        extent: Its longest side [m].
 
     """
     if words.thickness is not None and not words.wall_usual:
         return words
-    wall = _wall(words.material, names)
-    return words if wall is None else replace(words, thickness=wall, wall_usual=True)
+    wall = ware_wall(words.material, names, extent)
+    if wall is None:
+        return words
+    return replace(words, thickness=wall.thickness, wall_usual=True, wall_why=wall.why)
+
+
+def ware_wall(
+    material: str | None, names: Sequence[tuple[str, ...]], extent: float
+) -> WareWall | None:
+    """Return the wall of open ware that is called so; None: not known.
+
+    Args:
+        material: What it is of.
+        names: What it is called.
+        extent: Its longest side [m]: where walls grow with it, they are interpolated between sizes
+            in logarithms, and are those of the least and the largest beyond.
+
+    """
+    if material is None:
+        return None
+    rows = (wall_row(tokens, material, "ware") for tokens in names)
+    row = next((r for r in rows if r is not None), None)
+    if row is None:
+        return None
+    if "walls_mm" not in row:
+        return WareWall(1e-3 * row["thickness_mm"], row["why"])
+    sizes, walls = np.log(1e-3 * np.array(row["walls_mm"], dtype=float)).T
+    thickness = float(np.exp(np.interp(np.log(extent), sizes, walls)))
+    return WareWall(thickness, f"{row['why']}, at {extent * 100:.0f} cm")
 
 
 def sheet_if_full(words: PartWords, seen: Evidence, library: str) -> PartWords:
@@ -44,7 +84,8 @@ def sheet_if_full(words: PartWords, seen: Evidence, library: str) -> PartWords:
     if any(_is_else(name) for name in seen.general):
         return words
     named = [name.words for name in seen.general]
-    wall = _wall(words.material, named)
+    known = ware_wall(words.material, named, seen.extent)
+    wall = known.thickness if known else None
     if wall is None and words.material in formed() and not any(map(massive, named)):
         wall = usual_wall(words.material, library)
     if not wall or not drawn_full(seen.surfaces, wall, seen.thing.scale):
@@ -57,9 +98,3 @@ def _is_else(name: Name) -> bool:
     """Tell whether a name is not that of one piece of ware that is open by what it is."""
     tokens = name.words
     return not open_ware(tokens) or hollow(tokens) or is_several(written(name.text))
-
-
-def _wall(material: str | None, names: Sequence[tuple[str, ...]]) -> float | None:
-    """Return the wall of open ware that is called so, of such a material [m]; None: not known."""
-    walls = (wall_of(tokens, material, "ware") for tokens in names if material is not None)
-    return next((w for w in walls if w is not None), None)

@@ -82,7 +82,7 @@ def _described(
             ObjectWords(
                 obj.name,
                 obj.class_name,
-                tuple(with_annotations(words, annotations, obj.name, config)),
+                tuple(with_annotations(words, annotations, obj.name, config, obj.real_extent)),
             )
             for obj, words in zip(scene.objects, file, strict=True)
         ]

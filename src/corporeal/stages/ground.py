@@ -338,6 +338,8 @@ class _Wall:
 def _wall(material: Material, words: PartWords) -> _Wall:
     if words.thickness:
         whose = "usual of such things" if words.wall_usual else "stated"
+        if words.wall_usual and words.wall_why:
+            whose += f": {words.wall_why}"
         return _Wall(words.thickness, f"Its thickness, {_mm(words.thickness)} mm, is {whose}.")
     if material.shell_thickness:
         ground = material.grounds["shell_thickness"]

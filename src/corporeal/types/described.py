@@ -177,6 +177,8 @@ class PartWords:
     is plain: how thick the surface draws it tells nothing."""
     wall_usual: bool = False
     """Whether ``thickness`` is that of most things of its name: nobody stated it of this one."""
+    wall_why: str = ""
+    """Where such a usual thickness is from; "": its table does not say."""
 
     @property
     def alternatives(self) -> tuple[tuple[str, float], ...]:

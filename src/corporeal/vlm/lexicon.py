@@ -249,13 +249,19 @@ def wall_of(tokens: tuple[str, ...], material: str, table: str = "walls") -> flo
     Args:
         tokens: Of a name.
         material: What the thing is of.
-        table: "walls": of what is hollow where it is of it; "ware": of open ware.
+        table: "walls", of what is hollow where it is of it.
 
     """
+    row = wall_row(tokens, material, table)
+    return None if row is None else row["thickness_mm"] * 1e-3
+
+
+def wall_row(tokens: tuple[str, ...], material: str | None, table: str) -> dict | None:
+    """Return what a table says of the walls of things of such a material; None: nothing."""
     for row in _table()[table]:
         if material in row["of"] and _ends_in(tokens, _singulars(row["words"])):
             other = _ends_in(tokens, _singulars(row.get("but", ())))
-            return None if other else row["thickness_mm"] * 1e-3
+            return None if other else row
     return None
 
 

@@ -198,7 +198,7 @@ def hollowed(
     if words.structure is not None and words.thickness is not None:
         return words
     bare = words.material is not None and not walled(words.material)
-    if bare:
+    if bare and words.thickness is None:
         return replace(words, structure=None, contents=None, fill=None)
     if words.structure is not None:
         return words
