@@ -9,7 +9,7 @@ from published import MORE_WARE
 from recognition.shapes import shape
 
 from corporeal.description.describe_config import DescribeConfig
-from corporeal.description.ware import ware_wall
+from corporeal.description.ware import Called, ware_wall
 from corporeal.stages.describe import describe
 from corporeal.vlm.lexicon import tokens_of
 from handmade import plain, scene
@@ -21,7 +21,9 @@ BASKET = "turned 0 0 .13 0 .15 .2 0 .2"
 
 
 def wall(name, material, extent):
-    return ware_wall(material, [tokens_of(name)], extent)
+    found = ware_wall(material, Called([tokens_of(name)], extent))
+    assert found is not None
+    return found
 
 
 @pytest.mark.parametrize("name", ["copper saucepan", "copper frying pan", "copper pot"])

@@ -1,13 +1,13 @@
 """A person's annotations, before which every other answer gives way."""
 
-from collections.abc import Collection, Mapping, Sequence
+from collections.abc import Collection, Mapping
 from dataclasses import replace
 from pathlib import Path
 
 from corporeal import materials
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.description.file_words import OPEN
-from corporeal.description.ware import with_usual_wall
+from corporeal.description.ware import Called, with_usual_wall
 from corporeal.geometry.identity import Identity
 from corporeal.types import (
     PartWords,
@@ -62,12 +62,12 @@ def with_annotations(
     extent: float,
 ) -> list[PartWords]:
     """Return one object's parts as a person says they are; pieces of one mesh are gathered."""
-    path, thing = config.annotations, ([tokens_of(obj)], extent)
-    own = [_annotated(annotations.get((obj, w.name)), w, path, thing) for w in words]
+    path, called = config.annotations, Called([tokens_of(obj)], extent)
+    own = [_annotated(annotations.get((obj, w.name)), w, path, called) for w in words]
     pieces = named_pieces(annotations, obj, [w.name for w in own])
     if not pieces:
         return own
-    known = [_annotated(annotations[obj, p.name], p, path, thing) for p in pieces]
+    known = [_annotated(annotations[obj, p.name], p, path, called) for p in pieces]
     return [gathered(own[0].name, known)]
 
 
@@ -75,7 +75,7 @@ def _annotated(
     annotation: Annotation | None,
     words: PartWords,
     path: Path | None,
-    thing: tuple[Sequence[tuple[str, ...]], float],
+    called: Called,
 ) -> PartWords:
     """Let an annotation replace what was found; what it leaves open stays.
 
@@ -83,7 +83,7 @@ def _annotated(
         annotation: None: nobody says anything.
         words: What was found.
         path: Of the file that says it.
-        thing: What the object is called, and its longest side [m].
+        called: The object.
 
     """
     if annotation is None:
@@ -95,7 +95,7 @@ def _annotated(
         kept = SHARES + BUILT if is_open else SHARES
         words = replace(found, **{s: getattr(words, s) for s in kept})
         if is_open:
-            words = with_usual_wall(words, *thing)
+            words = with_usual_wall(words, called)
     if (
         annotation.material is not None
         or annotation.structure is not None

@@ -6,7 +6,7 @@ from functools import partial
 
 from corporeal import materials
 from corporeal.description.no_block import no_block
-from corporeal.description.ware import sheet_if_full, with_usual_wall
+from corporeal.description.ware import Called, sheet_if_full, with_usual_wall
 from corporeal.description.wet import values_when_wet
 from corporeal.errors import UnknownChoiceError, UserError
 from corporeal.geometry.identity import Identity
@@ -71,7 +71,8 @@ def words_of_file(
             recognise(seen), seen, walls, pictured
         )
         if unasked:
-            found = with_usual_wall(found, [name.words for name in seen.general], seen.extent)
+            called = Called([name.words for name in seen.general], seen.extent)
+            found = with_usual_wall(found, called)
         if unasked and not pictured:
             found = sheet_if_full(no_block(found, seen, library), seen, library)
         if not pictured:

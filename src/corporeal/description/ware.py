@@ -15,6 +15,16 @@ from corporeal.vlm.metadata import Evidence
 
 
 @dataclass(frozen=True)
+class Called:
+    """What a thing is called, and how large it is."""
+
+    names: Sequence[tuple[str, ...]]
+    """Words of each."""
+    extent: float
+    """Longest side [m]."""
+
+
+@dataclass(frozen=True)
 class WareWall:
     """The wall that pieces of a name, a material and a size have."""
 
@@ -24,46 +34,44 @@ class WareWall:
     """What says so."""
 
 
-def with_usual_wall(words: PartWords, names: Sequence[tuple[str, ...]], extent: float) -> PartWords:
+def with_usual_wall(words: PartWords, called: Called) -> PartWords:
     """Give open ware the wall that such pieces have, where nobody states one.
 
     Args:
         words: Of a part.
-        names: What it is called.
-        extent: Its longest side [m].
+        called: The thing.
 
     """
     if words.thickness is not None and not words.wall_usual:
         return words
-    wall = ware_wall(words.material, names, extent)
+    wall = ware_wall(words.material, called)
     if wall is None:
         return words
     return replace(words, thickness=wall.thickness, wall_usual=True, wall_why=wall.why)
 
 
-def ware_wall(
-    material: str | None, names: Sequence[tuple[str, ...]], extent: float
-) -> WareWall | None:
+def ware_wall(material: str | None, called: Called) -> WareWall | None:
     """Return the wall of open ware that is called so; None: not known.
+
+    Where walls grow with the longest side they are interpolated between sizes in logarithms, and
+    are those of the least and the largest beyond.
 
     Args:
         material: What it is of.
-        names: What it is called.
-        extent: Its longest side [m]: where walls grow with it, they are interpolated between sizes
-            in logarithms, and are those of the least and the largest beyond.
+        called: The thing.
 
     """
     if material is None:
         return None
-    rows = (wall_row(tokens, material, "ware") for tokens in names)
+    rows = (wall_row(tokens, material, "ware") for tokens in called.names)
     row = next((r for r in rows if r is not None), None)
     if row is None:
         return None
     if "walls_mm" not in row:
         return WareWall(1e-3 * row["thickness_mm"], row["why"])
     sizes, walls = np.log(1e-3 * np.array(row["walls_mm"], dtype=float)).T
-    thickness = float(np.exp(np.interp(np.log(extent), sizes, walls)))
-    return WareWall(thickness, f"{row['why']}, at {extent * 100:.0f} cm")
+    thickness = float(np.exp(np.interp(np.log(called.extent), sizes, walls)))
+    return WareWall(thickness, f"{row['why']}, at {called.extent * 100:.0f} cm")
 
 
 def sheet_if_full(words: PartWords, seen: Evidence, library: str) -> PartWords:
@@ -84,7 +92,7 @@ def sheet_if_full(words: PartWords, seen: Evidence, library: str) -> PartWords:
     if any(_is_else(name) for name in seen.general):
         return words
     named = [name.words for name in seen.general]
-    known = ware_wall(words.material, named, seen.extent)
+    known = ware_wall(words.material, Called(named, seen.extent))
     wall = known.thickness if known else None
     if wall is None and words.material in formed() and not any(map(massive, named)):
         wall = usual_wall(words.material, library)
