@@ -13,7 +13,7 @@ from corporeal.render.camera import camera_of
 from corporeal.render.embree import identify
 from corporeal.render.stage import Stage
 from corporeal.splats import intake
-from corporeal.splats.intake import take_in
+from corporeal.splats.intake import Masked, take_in
 from corporeal.splats.quality import Quality
 from corporeal.splats.train import Trained
 from corporeal.splats.training_schedule import TrainConfig
@@ -152,6 +152,43 @@ def test_a_photograph_that_contradicts_the_masks_of_all_others_is_left_out(monke
     assert len(taken.masks) == 11
     before, said = taken.warnings
     assert before == "before" and "1 of 12 photographs were left out" in said and "07.jpg" in said
+
+
+@pytest.mark.parametrize(("odd", "times"), [(0, 1), (1, 1), (6, 2)])
+def test_grown_masks_are_learned_from_again_without_what_no_other_photograph_shows(
+    monkeypatch, tmp_path, odd, times
+):
+    camera, given, told = Camera(np.eye(3), np.eye(4), 16, 16), [], []
+    views = Views(np.zeros((3, 16, 16, 3), np.uint8), (camera,) * 3)
+    shown = Photographs(views, ("a", "b", "c"), True, np.full((3, 16, 16), 255, np.uint8))
+    strange = np.zeros((3, 16, 16), bool)
+    strange[1, 0, :odd] = strange[2, 0, :odd] = True  # 12 of 768 are more than a hundredth
+
+    def train(views, masks, points, config, checkpoint, progress):
+        given.append((masks.copy(), checkpoint.name))
+        progress(1.0, "learned")
+        return learned(GOOD)
+
+    monkeypatch.setattr(intake, "read_photographs", lambda *_, **__: shown)
+    monkeypatch.setattr(intake, "kind_of", lambda _: "photographs")
+    monkeypatch.setattr(intake, "agreement", lambda *_: FINE)
+    monkeypatch.setattr(intake, "train", train)
+    monkeypatch.setattr(intake, "unexplained", lambda *_: strange)
+
+    def take(grown):
+        given.clear()
+        kept, tell = tmp_path / "training.npz", lambda f, w: told.append(f)
+        return take_in(Path("photos"), TrainConfig("draft"), kept, tell, masked=Masked(None, grown))
+
+    made = take(grown=True)
+    assert len(given) == times and given[0][0].all() and told == sorted(told)
+    assert len({name for _, name in given}) == times, "neither is learned anew when run again"
+    assert np.array_equal(given[-1][0], ~strange if times == 2 else np.ones_like(strange))
+    assert np.array_equal(made.masks, given[-1][0])
+    said = any("1.6% of what masks hold shows in 2 of 3 photographs" in s for s in made.statements)
+    assert said == (times == 2)
+    made = take(grown=False)
+    assert np.all(made.masks) and len(given) == 1, "masks that somebody gave are right"
 
 
 def test_with_masks_no_floor_is_among_what_is_learned_though_sparse_points_show_one():

@@ -10,6 +10,7 @@ from jaxtyping import Bool
 
 from corporeal.errors import BadFileError, noticed
 from corporeal.features.maskers import split
+from corporeal.formats.mask_files import corrected
 from corporeal.formats.photographs import MASKS, has_masks, listed, read_photographs
 from corporeal.formats.sources import kind_of, unposed
 from corporeal.masking.grown_masks import GrownMasks, grown_masks
@@ -25,7 +26,7 @@ from corporeal.progress import Progress, within
 from corporeal.reconstruction.masks_by_model import CORRECT, masks_by_model
 from corporeal.reconstruction.masks_figure import FIGURE, masks_figure
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, ReconstructConfig
-from corporeal.splats.intake import ON, Intake, doubt_of_poses, take_in
+from corporeal.splats.intake import ON, Intake, Masked, doubt_of_poses, take_in
 from corporeal.splats.training_schedule import TrainConfig
 
 POSED = 0.5
@@ -82,7 +83,10 @@ def take_pictures(
         if folder is not None:
             (folder / FIGURE).unlink(missing_ok=True)
             masks_figure(posed.folder, found.folder, folder / FIGURE)
-        taken = take_in(posed.folder, training, kept, later, instances, found.folder)
+        # What somebody corrected is to be believed.
+        grown = found.grown and found.folder is not None and not corrected(found.folder)
+        masked = Masked(found.folder, grown)
+        taken = take_in(posed.folder, training, kept, later, instances, masked)
     made = replace(
         taken,
         coloured=None if found.doubted is None else _sized(taken, posed.folder, found.doubted),

@@ -1,6 +1,6 @@
 """Gaussians from whatever a person has: photographs that they are learned from, or a splat."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 
@@ -15,11 +15,13 @@ from corporeal.geometry.agreement import agreement
 from corporeal.geometry.gaussians import AskedUp
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.inverted_masks import inverted
+from corporeal.geometry.lines_of_sight import LinesOfSight
 from corporeal.geometry.matching import SIDE
 from corporeal.geometry.silhouette_outliers import outliers
 from corporeal.geometry.similarity import moved_cameras, moved_gaussians, similarity
 from corporeal.geometry.unseen_side import unseen_half
 from corporeal.geometry.upright import Stated, Upright, upright
+from corporeal.progress import Progress, within
 from corporeal.splats.cutout import cut_out
 from corporeal.splats.lowest import lowest
 from corporeal.splats.quality import Quality
@@ -27,9 +29,8 @@ from corporeal.splats.raster import render
 from corporeal.splats.start import Points
 from corporeal.splats.train import GAIN, Trained, train
 from corporeal.splats.training_schedule import PRESETS, TrainConfig
+from corporeal.splats.unexplained import unexplained
 from corporeal.types import Camera, Gaussians, Vector, Views
-
-Progress = Callable[[float, str], None]
 
 SOLID = 0.5
 """Opacity from which on a Gaussian says where something is."""
@@ -49,6 +50,13 @@ INVERTED = (
     "The masks are black in the middle of what all cameras look at, and white along the borders of "
     "the pictures: they are inverted, or of the background. White is what counts: invert them."
 )
+ODD = 0.01
+"""Share of masks that nobody gave from which on it is worth learning again without: no outline is
+as wrong."""
+AGAIN = "training-again"
+"""Name of the file in which that is kept."""
+ONCE = 0.5
+"""Share of the work that is done when such masks were learned from once."""
 SHOWN = 4
 """Pictures that somebody is shown of the whole scene."""
 AXES = {"x": (1.0, 0.0, 0.0), "y": (0.0, 1.0, 0.0), "z": (0.0, 0.0, 1.0)}
@@ -120,13 +128,27 @@ def picture(gaussians: Gaussians, camera: Camera) -> UInt8[np.ndarray, "H W 3"]:
     return np.round(255 * np.clip(rgb, 0, 1)).astype(np.uint8)
 
 
+@dataclass(frozen=True)
+class Masked:
+    """By what it is said which pixels of photographs are on objects."""
+
+    by: Path | None = None
+    """A folder of masks; None: the photographs' own, if there are any."""
+    grown: bool = False
+    """Whether nobody, and no model, made these: what is in them that no other photograph shows is
+    left out."""
+
+
+OWN_MASKS = Masked()
+
+
 def take_in(
     source: Path,
     training: TrainConfig,
     checkpoint: Path | None = None,
     progress: Progress = lambda fraction, words: None,
     instances: bool = False,
-    masked_by: Path | None = None,
+    masked: Masked = OWN_MASKS,
 ) -> Intake:
     """Read a splat, or photographs and learn Gaussians from them, in the file's own frame and unit.
 
@@ -136,7 +158,7 @@ def take_in(
         checkpoint: Where a training that is cut off leaves what it has.
         progress: Called with the fraction done and what is being done.
         instances: Whether masks must segment objects.
-        masked_by: A folder of masks instead of the photographs' own.
+        masked: By what.
 
     Raises:
         UserError: The input cannot be used.
@@ -152,20 +174,24 @@ def take_in(
         read = (f"{given.count:,} Gaussians were read from {source.name}.",)
         return Intake(given, usual=usual, statements=read, warnings=given.warnings)
     longest = PRESETS[training.preset].longest
-    shown = _consistent(read_photographs(source, longest, masked_by, close=True))
+    shown = _consistent(read_photographs(source, longest, masked.by, close=True))
     if instances and shown.views.object_of_pixel is None:
         raise UserError(f"{source}: {NO_INSTANCES}")
     masks = None if shown.masks is None else shown.masks >= ON
     if masks is not None and inverted(masks, shown.views.cameras):
         raise UserError(f"{source}: {INVERTED}")
-    doubt = doubt_of_poses(source, masked_by, shown)
+    doubt = doubt_of_poses(source, masked.by, shown)
     points = _points(shown)
     wrong = [said for said in shown.warnings if said not in shown.done]
     # With masks, where sparse points are says less than what masks carve; what they are seen
     # through is empty.
     start = points if masks is None else shown.lines
+    learning = _Learning(shown.views, start, training, checkpoint, progress)
     try:
-        trained = train(shown.views, masks, start, training, checkpoint, progress)
+        if masks is None or not masked.grown:
+            trained, cut = learning.of(masks), ()
+        else:
+            trained, masks, cut = learning.of_grown(masks)
     except UserError as problem:
         raise UserError(" ".join([str(problem), *doubt])) from problem
     poor = _badly_learned(trained, len(shown.names))
@@ -178,9 +204,48 @@ def take_in(
         seen=None if points is None else points.position,
         doubts=tuple(filter(None, [unseen_half(shown.views.cameras, shown.names), *poor])),
         quality=trained.quality,
-        statements=(*shown.done, *_learned_how(trained, len(shown.views.cameras))),
+        statements=(*shown.done, *cut, *_learned_how(trained, len(shown.views.cameras))),
         warnings=(*wrong, *doubt, *poor),
     )
+
+
+@dataclass(frozen=True)
+class _Learning:
+    """What Gaussians are learned from beside masks, and how; as ``train`` is given it."""
+
+    views: Views
+    start: Points | LinesOfSight | None
+    how: TrainConfig
+    checkpoint: Path | None
+    progress: Progress
+
+    def of(self, masks: Bool[np.ndarray, "V H W"] | None) -> Trained:
+        """Learn from masks that are right, or without any."""
+        return train(self.views, masks, self.start, self.how, self.checkpoint, self.progress)
+
+    def of_grown(
+        self, masks: Bool[np.ndarray, "V H W"]
+    ) -> tuple[Trained, Bool[np.ndarray, "V H W"], tuple[str, ...]]:
+        """Learn from masks that nobody made, without what no other photograph shows in them.
+
+        Returns:
+            What was learned, from which masks, and what was left out of these, in a sentence.
+
+        """
+        trained = replace(self, progress=within(self.progress, 0.0, ONCE)).of(masks)
+        odd = unexplained(trained.gaussians, self.views, masks)
+        share = np.count_nonzero(odd) / max(np.count_nonzero(masks), 1)
+        if share <= ODD:
+            return trained, masks, ()
+        kept = None if self.checkpoint is None else self.checkpoint.with_stem(AGAIN)
+        later = within(self.progress, ONCE, 1.0, ", without what is not the thing")
+        left = masks & ~odd
+        views = np.count_nonzero(odd.any(axis=(1, 2)))
+        said = (
+            f"{share:.1%} of what masks hold shows in {views} of {len(masks)} photographs what no "
+            "other shows at the same place: it stands behind, and was left out."
+        )
+        return replace(self, checkpoint=kept, progress=later).of(left), left, (said,)
 
 
 def turned_upright(taken: Intake, up: AskedUp = "auto", floor: float | None = None) -> Intake:

@@ -1,0 +1,98 @@
+"""Parts of masks that show what no other photograph shows there.
+
+Masks that are grown from colours take in pieces of what stands behind an object, where these have
+its colours. If every view that could see past such a place has a piece of something there, the
+hull of all masks holds it, though each view shows something else in it. Gaussians learned from
+all photographs know: what is at one place has about one colour, so that they mostly show nothing
+there (the colour consistency of Seitz and Dyer, "Photorealistic scene reconstruction by voxel
+coloring", 1999, asked of what was learned in place of voxels).
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float
+from scipy.ndimage import binary_dilation, distance_transform_edt, label, shift
+
+from corporeal.splats.depth_rendering import render_depth
+from corporeal.splats.thread_pool import ThreadPool
+from corporeal.types import Gaussians, Views
+
+TIMES = 3.0
+"""A pixel is of another colour if it differs by so many root mean squares of all differences."""
+NEAR = 1.5
+"""What is so near to a pixel that is explained may be its outline, which is as wrong [px]."""
+BARE = 0.5
+"""Share of a piece that Gaussians leave bare, at least: what they cover in another colour may be a
+highlight, or what is mirrored there."""
+MOST = 0.25
+"""Share of a view's mask. Where more is unexplained, that view is placed wrongly, or shows the
+object in another light, which says nothing of its mask."""
+BESIDE = np.argwhere(np.ones((3, 3))) - 1
+"""Pixels that a colour is looked for in: what was learned is as sharp as that."""
+
+
+def unexplained(
+    gaussians: Gaussians,
+    views: Views,
+    masks: Bool[np.ndarray, "V H W"],
+    threads: int | None = None,
+) -> Bool[np.ndarray, "V H W"]:
+    """Return the pieces of masks that reach their rim and show what Gaussians do not.
+
+    Args:
+        gaussians: Learned from the photographs and the masks.
+        views: The photographs.
+        masks: Their pixels on objects, as far as is known.
+        threads: None: one per core that this process may use.
+
+    """
+    with ThreadPool(threads) as pool:
+        seen = render_depth(gaussians, views.cameras, pool)
+    covered, real = np.isfinite(seen.depth), views.rgb.astype(np.float32) / 255
+    shown = zip(real, seen.rgb, covered, masks, strict=True)
+    off = np.stack([_differences(*one) for one in shown])
+    known = off[masks & np.isfinite(off)]
+    if not len(known):
+        return np.zeros_like(masks)
+    same = off < TIMES * np.sqrt(np.mean(known**2))
+    pairs = zip(masks, masks & same, covered, strict=True)
+    return np.stack([_beyond(*one) for one in pairs])
+
+
+def _differences(
+    real: Float[np.ndarray, "H W 3"],
+    made: Float[np.ndarray, "H W 3"],
+    covered: Bool[np.ndarray, "H W"],
+    mask: Bool[np.ndarray, "H W"],
+) -> Float[np.ndarray, "H W"]:
+    """Return how far each pixel is from the most alike of those beside it; inf: none is covered.
+
+    Root mean square of the channels of sRGB, after the gain of each that suits the picture.
+    """
+    both = mask & covered
+    power = np.square(made[both]).sum(axis=0)
+    gain = (made[both] * real[both]).sum(axis=0) / np.maximum(power, np.finfo(np.float32).tiny)
+    shown = np.where(covered[..., None], gain * made, np.inf)
+    best = np.full(mask.shape, np.inf)
+    for down, right in BESIDE:
+        moved = shift(shown, (down, right, 0), order=0, cval=np.inf)
+        best = np.minimum(best, np.sqrt(np.square(real - moved).mean(axis=-1)))
+    return best
+
+
+def _beyond(
+    mask: Bool[np.ndarray, "H W"], same: Bool[np.ndarray, "H W"], covered: Bool[np.ndarray, "H W"]
+) -> Bool[np.ndarray, "H W"]:
+    """Return what of a mask is farther from explained pixels than an outline errs, and its rim."""
+    none = np.zeros_like(mask)
+    if not same.any():
+        return none
+    other = mask & ~same
+    far = mask & (distance_transform_edt(~same) > NEAR)
+    number = np.asarray(label(other)[0])
+    # What is enclosed is a highlight, or a pattern that was learned badly.
+    outer = np.intersect1d(number[far], number[other & binary_dilation(~mask)])
+    found = np.isin(number, outer) & other & binary_dilation(far, iterations=2)
+    piece, count = label(found)
+    every, bare = (np.bincount(piece[which], minlength=count + 1) for which in (found, ~covered))
+    found &= (bare > BARE * every)[piece]
+    return found if np.count_nonzero(found) <= MOST * np.count_nonzero(mask) else none
