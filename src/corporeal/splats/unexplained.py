@@ -10,7 +10,8 @@ coloring", 1999, asked of what was learned in place of voxels).
 
 import numpy as np
 from jaxtyping import Bool, Float
-from scipy.ndimage import binary_dilation, distance_transform_edt, label, shift
+from scipy.ndimage import binary_dilation, distance_transform_edt, shift
+from skimage import measure
 
 from corporeal.splats.depth_rendering import render_depth
 from corporeal.splats.thread_pool import ThreadPool
@@ -87,12 +88,15 @@ def _beyond(
     if not same.any():
         return none
     other = mask & ~same
-    far = mask & (distance_transform_edt(~same) > NEAR)
-    number = np.asarray(label(other)[0])
+    rim = np.asarray(binary_dilation(~mask))
+    far = mask & (np.asarray(distance_transform_edt(~same)) > NEAR)
+    number = np.asarray(measure.label(other, connectivity=1))
     # What is enclosed is a highlight, or a pattern that was learned badly.
-    outer = np.intersect1d(number[far], number[other & binary_dilation(~mask)])
-    found = np.isin(number, outer) & other & binary_dilation(far, iterations=2)
-    piece, count = label(found)
-    every, bare = (np.bincount(piece[which], minlength=count + 1) for which in (found, ~covered))
+    outer = np.intersect1d(number[far], number[np.logical_and(other, rim)])
+    found = other & np.isin(number, outer)
+    found = np.logical_and(found, binary_dilation(far, iterations=2))
+    piece = np.asarray(measure.label(found, connectivity=1))
+    count = int(piece.max()) + 1
+    every, bare = (np.bincount(piece[which], minlength=count) for which in (found, ~covered))
     found &= (bare > BARE * every)[piece]
     return found if np.count_nonzero(found) <= MOST * np.count_nonzero(mask) else none
