@@ -1,6 +1,8 @@
 """What masks hold of what stands behind is no part of the thing, since each photograph shows other
 things there."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from scipy.ndimage import binary_dilation
@@ -8,7 +10,7 @@ from splat_scenes import around, blobs, pictured
 
 from corporeal.splats import unexplained as module
 from corporeal.splats.intake import ODD
-from corporeal.splats.unexplained import unexplained
+from corporeal.splats.unexplained import unexplained, wide
 from corporeal.types import Views
 
 THING = blobs(40)
@@ -43,7 +45,7 @@ def test_pieces_of_what_stands_behind_are_found_and_little_else(scene):
     views, masks = scene
     pieces = beside(masks)
     odd = found(views, masks | pieces)
-    assert np.count_nonzero(odd) > ODD * np.count_nonzero(masks)
+    assert np.count_nonzero(wide(odd, masks | pieces)) > ODD * np.count_nonzero(masks)
     assert np.count_nonzero(odd & pieces) > 0.8 * np.count_nonzero(pieces)
     assert np.count_nonzero(odd & masks) < 0.1 * np.count_nonzero(pieces)
 
@@ -59,6 +61,16 @@ def test_right_masks_stay_and_outlines_that_err_by_a_pixel(scene, exposed):
         assert np.count_nonzero(found(shown, some)) < ODD * np.count_nonzero(some)
 
 
+def test_what_is_thin_is_not_learned_and_is_no_reason_to_learn_again(scene):
+    """Of the legs of a chair Gaussians show nothing: these alone are no reason to learn again."""
+    views, masks = scene
+    legs = np.zeros_like(masks)
+    legs[:, :30, 30:33] = True  # from the top of the picture into the thing
+    assert np.count_nonzero(legs & ~masks) > 8 * 3 * 5
+    odd = found(views, masks | legs)
+    assert (odd & legs)[:, :10].any() and not (wide(odd, masks | legs) & legs)[:, :10].any()
+
+
 def test_a_highlight_within_is_the_things(scene):
     views, masks = scene
     rgb = views.rgb.copy()
@@ -66,6 +78,22 @@ def test_a_highlight_within_is_the_things(scene):
     assert masks[:, 27:37, 27:37].all()
     odd = found(Views(rgb, views.cameras), masks)
     assert not odd[:, 27:37, 27:37].any()
+
+
+@pytest.mark.parametrize(
+    ("paint", "strange"), [((75, 75, 75), False), ((-75, -75, -75), False), ((85, -85, 0), True)]
+)
+def test_what_is_but_lighter_or_darker_at_the_rim_is_the_things(paint, strange):
+    dull = replace(THING, sh=0.3 * THING.sh)
+    views, masks = pictured(dull, around(8, (64, 64), focal=80.0), (0.5, 0.5, 0.5))
+    row = int(masks[0].sum(axis=1).argmax())
+    end = int(np.flatnonzero(masks[0][row])[-1]) + 1
+    place = 0, slice(row - 4, row + 4), slice(end - 8, end)
+    rgb = views.rgb.astype(int)
+    rgb[place] += np.array(paint)
+    assert rgb.min() >= 0 and rgb.max() <= 255
+    odd = unexplained(dull, Views(rgb.astype(np.uint8), views.cameras), masks, threads=1)
+    assert (np.count_nonzero(odd[place]) > 20) == strange
 
 
 def test_a_view_of_which_much_is_unexplained_says_nothing_of_its_mask(scene):

@@ -29,7 +29,7 @@ from corporeal.splats.raster import render
 from corporeal.splats.start import Points
 from corporeal.splats.train import GAIN, Trained, train
 from corporeal.splats.training_schedule import PRESETS, TrainConfig
-from corporeal.splats.unexplained import unexplained
+from corporeal.splats.unexplained import unexplained, wide
 from corporeal.types import Camera, Gaussians, Vector, Views
 
 SOLID = 0.5
@@ -51,8 +51,8 @@ INVERTED = (
     "the pictures: they are inverted, or of the background. White is what counts: invert them."
 )
 ODD = 0.01
-"""Share of masks that nobody gave from which on it is worth learning again without: no outline is
-as wrong."""
+"""Share of masks that nobody gave from which on it is worth learning again without: of pieces that
+are not thin."""
 AGAIN = "training-again"
 """Name of the file in which that is kept."""
 ONCE = 0.5
@@ -234,12 +234,12 @@ class _Learning:
         """
         trained = replace(self, progress=within(self.progress, 0.0, ONCE)).of(masks)
         odd = unexplained(trained.gaussians, self.views, masks)
-        share = np.count_nonzero(odd) / max(np.count_nonzero(masks), 1)
-        if share <= ODD:
+        if np.count_nonzero(wide(odd, masks)) <= ODD * np.count_nonzero(masks):
             return trained, masks, ()
         kept = None if self.checkpoint is None else self.checkpoint.with_stem(AGAIN)
         later = within(self.progress, ONCE, 1.0, ", without what is not the thing")
         left = masks & ~odd
+        share = np.count_nonzero(odd) / np.count_nonzero(masks)
         views = np.count_nonzero(odd.any(axis=(1, 2)))
         said = (
             f"{share:.1%} of what masks hold shows in {views} of {len(masks)} photographs what no "

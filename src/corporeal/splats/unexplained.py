@@ -21,9 +21,12 @@ TIMES = 3.0
 """A pixel is of another colour if it differs by so many root mean squares of all differences."""
 NEAR = 1.5
 """What is so near to a pixel that is explained may be its outline, which is as wrong [px]."""
-BARE = 0.5
-"""Share of a piece that Gaussians leave bare, at least: what they cover in another colour may be a
-highlight, or what is mirrored there."""
+THIN = 2.0
+"""Where masks reach no deeper [px], they are four wide: legs and wires so thin are not learned."""
+BARE, HUE = 0.5, 0.1
+"""Share of a piece that Gaussians leave bare, at least; or of the square of its mean difference,
+what is not the same in all channels: what they cover and is but lighter, or darker, may be a
+highlight, or a shade."""
 MOST = 0.25
 """Share of a view's mask. Where more is unexplained, that view is placed wrongly, or shows the
 object in another light, which says nothing of its mask."""
@@ -49,39 +52,55 @@ def unexplained(
     with ThreadPool(threads) as pool:
         seen = render_depth(gaussians, views.cameras, pool)
     covered, real = np.isfinite(seen.depth), views.rgb.astype(np.float32) / 255
-    shown = zip(real, seen.rgb, covered, masks, strict=True)
-    off = np.stack([_differences(*one) for one in shown])
+    compared = zip(real, seen.rgb, masks & covered, strict=True)
+    more = np.stack([_more(*one) for one in compared])
+    off = np.stack([_differences(*one) for one in zip(real, more, strict=True)])
     known = off[masks & np.isfinite(off)]
     if not len(known):
         return np.zeros_like(masks)
     same = off < TIMES * np.sqrt(np.mean(known**2))
-    pairs = zip(masks, masks & same, covered, strict=True)
-    return np.stack([_beyond(*one) for one in pairs])
+    return np.stack([_beyond(*one) for one in zip(masks, masks & same, more, strict=True)])
+
+
+def wide(
+    pieces: Bool[np.ndarray, "V H W"], masks: Bool[np.ndarray, "V H W"]
+) -> Bool[np.ndarray, "V H W"]:
+    """Return those pieces of masks that are not thin, as legs are that no Gaussians show."""
+    out = np.zeros_like(pieces)
+    for made, found, mask in zip(out, pieces, masks, strict=True):
+        number = np.asarray(measure.label(found, connectivity=1))
+        deep = np.asarray(distance_transform_edt(mask)) > THIN
+        made[:] = np.isin(number, number[np.logical_and(found, deep)]) & found
+    return out
+
+
+def _more(
+    real: Float[np.ndarray, "H W 3"],
+    made: Float[np.ndarray, "H W 3"],
+    both: Bool[np.ndarray, "H W"],
+) -> Float[np.ndarray, "H W 3"]:
+    """Return a photograph less a picture after the gain that suits it, in sRGB; inf: bare."""
+    power = np.square(made[both]).sum(axis=0)
+    gain = (made[both] * real[both]).sum(axis=0) / np.maximum(power, np.finfo(np.float32).tiny)
+    return np.where(both[..., None], real - gain * made, np.inf)
 
 
 def _differences(
-    real: Float[np.ndarray, "H W 3"],
-    made: Float[np.ndarray, "H W 3"],
-    covered: Bool[np.ndarray, "H W"],
-    mask: Bool[np.ndarray, "H W"],
+    real: Float[np.ndarray, "H W 3"], more: Float[np.ndarray, "H W 3"]
 ) -> Float[np.ndarray, "H W"]:
-    """Return how far each pixel is from the most alike of those beside it; inf: none is covered.
+    """Return how far each pixel is from the most alike of those beside it; inf: all are bare.
 
-    Root mean square of the channels of sRGB, after the gain of each that suits the picture.
+    Root mean square of the channels.
     """
-    both = mask & covered
-    power = np.square(made[both]).sum(axis=0)
-    gain = (made[both] * real[both]).sum(axis=0) / np.maximum(power, np.finfo(np.float32).tiny)
-    shown = np.where(covered[..., None], gain * made, np.inf)
-    best = np.full(mask.shape, np.inf)
+    shown, best = real - more, np.full(real.shape[:2], np.inf)
     for down, right in BESIDE:
-        moved = shift(shown, (down, right, 0), order=0, cval=np.inf)
+        moved = shift(shown, (down, right, 0), order=0, cval=-np.inf)
         best = np.minimum(best, np.sqrt(np.square(real - moved).mean(axis=-1)))
     return best
 
 
 def _beyond(
-    mask: Bool[np.ndarray, "H W"], same: Bool[np.ndarray, "H W"], covered: Bool[np.ndarray, "H W"]
+    mask: Bool[np.ndarray, "H W"], same: Bool[np.ndarray, "H W"], more: Float[np.ndarray, "H W 3"]
 ) -> Bool[np.ndarray, "H W"]:
     """Return what of a mask is farther from explained pixels than an outline errs, and its rim."""
     none = np.zeros_like(mask)
@@ -96,7 +115,15 @@ def _beyond(
     found = other & np.isin(number, outer)
     found = np.logical_and(found, binary_dilation(far, iterations=2))
     piece = np.asarray(measure.label(found, connectivity=1))
-    count = int(piece.max()) + 1
-    every, bare = (np.bincount(piece[which], minlength=count) for which in (found, ~covered))
-    found &= (bare > BARE * every)[piece]
+    strange = np.zeros(int(piece.max()) + 1, bool)
+    for k in range(1, len(strange)):
+        off = more[piece == k]
+        shown = off[np.isfinite(off).all(axis=1)]
+        strange[k] = len(off) - len(shown) > BARE * len(off) or _of_other_hue(shown.mean(axis=0))
+    found = strange[piece]
     return found if np.count_nonzero(found) <= MOST * np.count_nonzero(mask) else none
+
+
+def _of_other_hue(off: Float[np.ndarray, "3"]) -> bool:
+    """Tell whether a difference is not one of light alone."""
+    return bool(np.square(off - off.mean()).sum() > HUE * np.square(off).sum())
