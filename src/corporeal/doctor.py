@@ -47,9 +47,15 @@ def _machine() -> list[Finding]:
     free = shutil.disk_usage(".").free / 1e9
     return [
         Finding("system", True, system),
-        Finding("processor", True, f"{cores()} cores"),
+        Finding("processor", True, _cores(cores(), os.cpu_count() or 1)),
         Finding("disk", free > 1, f"{free:.0f} GB free", "" if free > 1 else "Free some space."),
     ]
+
+
+def _cores(used: int, all_of_them: int) -> str:
+    """Say how many cores are used, and of how many where that is fewer than there are."""
+    said = f"{used} core{'s' * (used != 1)}"
+    return said if used >= all_of_them else f"{said} of the {all_of_them} that the machine has"
 
 
 def _engines() -> list[Finding]:
