@@ -183,3 +183,38 @@ def test_a_lost_context_is_drawn_anew_without_a_touch(report, tmp_path):
         tab.run("lost.restoreContext()")
         tab.until(f"viewer.stats.drawn > {drawn} && !viewer.dirty")
         assert colours_in(tab.picture(tmp_path / "after.png")) > 0.9 * before
+
+
+REFUSING = """{
+  const given = HTMLCanvasElement.prototype.getContext
+  HTMLCanvasElement.prototype.getContext = function (kind, ...more) {
+    return /webgl/.test(kind) && ASKED ? null : given.call(this, kind, ...more) }
+}"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("asked", ["true", "this.isConnected"])
+def test_a_browser_that_draws_no_3d_says_so_in_a_sentence(report, tmp_path, asked):
+    """It refuses at once, or only once the page asks for its picture."""
+    with browser(tmp_path) as tab:
+        script = REFUSING.replace("ASKED", asked)
+        tab.ask("Page.addScriptToEvaluateOnNewDocument", source=script)
+        tab.open(report.as_uri())
+        tab.until("window.viewer?.stats.ready")
+        assert "shows no 3D" in tab.run("document.querySelector('#view .none').innerText")
+        assert tab.run("document.querySelectorAll('#view canvas').length") == 0
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("without", ["scripts", "streams"])
+def test_a_browser_that_cannot_run_the_view_says_so_in_a_sentence(report, tmp_path, without):
+    with browser(tmp_path) as tab:
+        if without == "scripts":
+            tab.ask("Emulation.setScriptExecutionDisabled", value=True)
+        else:
+            source = "delete window.DecompressionStream"
+            tab.ask("Page.addScriptToEvaluateOnNewDocument", source=source)
+        tab.open(report.as_uri())
+        said = "document.querySelector('#view')?.innerText ?? ''"
+        tab.until(f"/film below/.test({said})")
+        assert ("DecompressionStream" in tab.run(said)) == (without == "streams")

@@ -14,6 +14,8 @@ const HELP = [['space', 'play or pause'], ['← →', 'one picture back or on'],
   ['click a part', 'its card'], ['Escape', 'closes the card'], ['drag', 'look around'], ['wheel, pinch', 'nearer or farther'], ['right drag, two fingers', 'move sideways'],
   ['?', 'this list']]
 
+const NO_3D = 'This browser shows no 3D (WebGL 2 is off). Everything else on this page works.'
+
 export class Viewer {
   constructor(root, takes, options = {}) {
     this.root = root
@@ -33,7 +35,7 @@ export class Viewer {
     this.stages = takes.map(take => new Stage(take, shadows))
     for (const stage of this.stages) stage.changed = () => this.touch()
     this.build(gpu)
-    if (gpu) this.open(hard, shadows)
+    if (gpu) this.tryToOpen(hard, shadows)
     // Telephones and software renderers begin with surfaces.
     if (hard && takes.some(take => take.header.splats) && matchMedia('(min-width: 800px) and (pointer: fine)').matches) this.soft.click()
     this.paint('itself')
@@ -48,8 +50,7 @@ export class Viewer {
     this.legend = el('div', {class: 'legend', hidden: true})
     this.hud = el('div', {class: 'hud'})
     this.help = el('div', {class: 'help', hidden: true}, el('h3', {}, 'Keys and pointer'), table(HELP))
-    this.see = el('div', {class: 'see'}, gpu ? this.canvas : el('p', {class: 'none'},
-      'This browser shows no 3D (WebGL 2 is off). Everything else on this page works.'), this.hud, this.legend, this.help,
+    this.see = el('div', {class: 'see'}, gpu ? this.canvas : el('p', {class: 'none'}, NO_3D), this.hud, this.legend, this.help,
       this.takes.length > 1 ? this.takes.map((take, k) => el('div', {class: `caption of${k}`}, this.options.names?.[k] ?? take.header.name)) : null)
     this.names = this.takes.map((take, k) => el('b', {}, this.options.names?.[k] ?? take.header.name))
     this.rest = first.film ? 'recorded' : 'not simulated yet' // what is shown while nobody touches
@@ -229,6 +230,14 @@ export class Viewer {
   }
 
   // ---------------------------------------------------------------- the picture
+
+  // A browser may say that it draws in 3D and then refuse to: too many pages do, or its driver is barred.
+  tryToOpen(hard, shadows) {
+    try { this.open(hard, shadows) } catch (error) {
+      this.stats.errors.push(error.message)
+      this.canvas.replaceWith(el('p', {class: 'none'}, NO_3D))
+    }
+  }
 
   open(hard, shadows) {
     this.renderer = new THREE.WebGLRenderer({canvas: this.canvas, antialias: hard})
