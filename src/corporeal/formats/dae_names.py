@@ -14,7 +14,8 @@ def names_in_dae(data: bytes) -> dict[str, Named]:
     """Return the names of each piece, by what trimesh calls it: the id of its geometry, counted.
 
     A piece is called as the node that places it; where a geometry has several materials, each is
-    a piece, called as its material. Nodes beside each other that have one name are numbered.
+    a piece, called as its material. Nodes beside each other that have one name are numbered, and so
+    are the places of a geometry that no node names.
     """
     from collada import Collada
     from collada.common import DaeError
@@ -24,17 +25,25 @@ def names_in_dae(data: bytes) -> dict[str, Named]:
     document: Any = Collada(io.BytesIO(data), ignore=[DaeError])
     shapes, found = (Polylist, TriangleSet), dict[str, Named]()
     counts: dict[str | None, int] = {}
+    unnamed, numbers = set[str](), dict[str | None, int]()
     for along, placed in _placed(document.scene.nodes, ()):
         geometry = placed.geometry
         looks = {m.symbol: str(m.target.name or "") for m in placed.materials}
         pieces = [p for p in geometry.primitives if isinstance(p, shapes) and p.vertex is not None]
-        own = along or (str(geometry.name or geometry.id),)
+        own = along or _numbered(str(geometry.name or geometry.id), unnamed, numbers)
         for piece in pieces:
             key = trimesh.util.unique_name(geometry.id, contains=found, counts=counts)
             look = looks.get(piece.material, "")
             last = (look or key,) if len(pieces) > 1 else ()
             found[key] = ((*own, *last), look)
     return found
+
+
+def _numbered(name: str, taken: set[str], counts: dict[str | None, int]) -> tuple[str]:
+    """Return a name that nothing has yet, and note it."""
+    own = trimesh.util.unique_name(name, contains=taken, counts=counts)
+    taken.add(own)
+    return (own,)
 
 
 def _placed(nodes: Iterable[Any], along: tuple[str, ...]) -> Iterator[tuple[tuple[str, ...], Any]]:
@@ -50,6 +59,5 @@ def _placed(nodes: Iterable[Any], along: tuple[str, ...]) -> Iterator[tuple[tupl
             said = node.node if isinstance(node, NodeNode) else node
             name = str(said.name or "")
             if name:
-                name = trimesh.util.unique_name(name, contains=seen, counts=taken)
-                seen.add(name)
+                (name,) = _numbered(name, seen, taken)
             yield from _placed(node.children or (), (*along, name) if name else along)

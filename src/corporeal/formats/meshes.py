@@ -19,6 +19,7 @@ import numpy as np
 from corporeal import store
 from corporeal.errors import BadFileError
 from corporeal.formats.gltf_container import read_whole
+from corporeal.formats.likely_up import HEAD, likelier_up, said_z_up
 from corporeal.formats.mesh_raw import ALONG, EXPORT_AGAIN, RawMesh, read_raw
 from corporeal.formats.mesh_reader import LISTERS, LISTING, NAMED, RAW, REFUSED
 from corporeal.formats.mesh_suffixes import MOST_MEMORY, MOST_SECONDS
@@ -33,6 +34,8 @@ MOST_TEXT = 2**26
 """Of a text that is looked through for companions [bytes]."""
 LARGEST = 1e12
 """Coordinates beyond which a file is broken, in its own unit."""
+UP_UNSTATED = (".obj", ".ply", ".stl", ".off")
+"""Kinds of file that do not state what is up."""
 NAMES = {
     ".obj": (r"mtllib",),
     ".mtl": (r"map_\w+", r"bump", r"norm", r"disp", r"decal"),
@@ -75,11 +78,13 @@ def read_mesh(path: Path, objects: Objects = "one", up: Up | None = None) -> Mes
         _in_child(path, Path(folder), [])
         raw = read_raw(Path(folder) / RAW)
     _check(path, raw)
-    turn = upright(up or raw.up)
+    taken, of_up = (up, ()) if up else _upwards(path, raw)
+    turn = upright(taken)
     turned = _turned(raw, turn, raw.unit or 1.0)
     bodies = raw.bodies if objects == "auto" else {}
     owners = _bodies_of(turned, bodies) if bodies else _owners(turned, objects == "nodes")
     scene = _scene(path, turned, owners, raw)
+    scene = replace(scene, warnings=(*scene.warnings, *of_up))
     if bodies:
         scene = with_bodies(scene, list(dict.fromkeys(owners)), bodies, turn)
     ours = bool(raw.custom) and objects == "auto"
@@ -163,9 +168,9 @@ def _named_in_dae(path: Path) -> list[Path]:
     return [file for name in names if (file := beside(path.parent, name)) is not None]
 
 
-def _text(path: Path) -> str:
+def _text(path: Path, most: int = MOST_TEXT) -> str:
     with path.open("rb") as stream:
-        return stream.read(MOST_TEXT).decode(errors="replace")
+        return stream.read(most).decode(errors="replace")
 
 
 # ---------------------------------------------------------------- what it read
@@ -192,6 +197,25 @@ def _check(path: Path, raw: RawMesh) -> None:
         raise BadFileError(path, "has vertices at impossible places.", EXPORT_AGAIN)
     if not np.ptp(places, axis=0).max() > 0:
         raise BadFileError(path, "has no size.", EXPORT_AGAIN)
+
+
+def _upwards(path: Path, raw: RawMesh) -> tuple[Up, tuple[str, ...]]:
+    """Return what is taken for up where nobody says it, and what there is to say of that."""
+    kind = path.suffix.lower()
+    if kind not in UP_UNSTATED:
+        return raw.up, ()
+    if kind == ".obj" and said_z_up(_text(path, HEAD)):
+        return "+z", (f"{path.name}: +z is up, as a comment in it says; --up y takes another.",)
+    before = np.cumsum([0, *(len(s.vertices) for s in raw.surfaces)])
+    vertices = np.concatenate([s.vertices for s in raw.surfaces])
+    pairs = zip(raw.surfaces, before, strict=False)
+    triangles = np.concatenate([s.triangles + n for s, n in pairs])
+    likelier = likelier_up(vertices, triangles, raw.up)
+    if likelier is None:
+        return raw.up, ()
+    axis, why = likelier
+    said = f"{path.name} does not state what is up. {raw.up} was taken, as is usual in {kind}, "
+    return raw.up, (f"{said}{why}. If it lies on its side, say --up {axis[1]}.",)
 
 
 def _turned(raw: RawMesh, turn: np.ndarray, unit: float) -> list[Surface]:
