@@ -2,7 +2,8 @@
 
 import numpy as np
 import pytest
-from test_cuda import CELL, ball, body, on_processor, problem, same
+from laws.asked import on_device
+from test_cuda import AS_IT_WAS, CELL, ball, body, problem, same
 
 from corporeal.mpm.problem import Plane
 from corporeal.mpm.reference.engine import ReferenceEngine
@@ -31,7 +32,7 @@ def test_a_collision_conserves_momentum_and_never_gains_energy(rigid):
     one = body(ball(shift), velocity=(1.0, 0, 0), rigid=rigid[0], loss=0.0)
     two = body(ball(shift + far), velocity=(-1, 0, 0), rigid=rigid[1], density=2e3, loss=0.0)
     given = problem(one, two, planes=(), gravity=REST, friction=0.3, transfer="apic")
-    engine = on_processor(given)
+    engine = on_device(given)
     before = engine.measure()
     exact = 1e-12 if all(rigid) else 1e-6
     whole = np.abs(before.angular_momentum.sum(axis=0)).max()
@@ -51,7 +52,7 @@ def test_a_rigid_ball_rebounds_with_its_coefficient_of_restitution():
     points = ball((0, 0, 0.06))
     down = np.array([[0.0, 0.0, 0.01]])
     stone = body(points, rigid=True, surface=down, velocity=(0, 0, -1.0))
-    engine = on_processor(problem(stone, restitution=0.6, gravity=REST))
+    engine = on_device(problem(stone, restitution=0.6, gravity=REST))
     engine.advance(0.02)
     measure = engine.measure()
     assert measure.momentum[0] == pytest.approx([0, 0, 0.6 * measure.mass[0]], rel=1e-6, abs=1e-9)
@@ -65,7 +66,7 @@ def test_a_rigid_block_on_an_incline_slides_as_coulomb_says(friction):
     slope = np.radians(30.0)
     block = brick((0, 0, 0.05), (0.2, 0.2, 0.1), rigid=True)
     down = (G * np.sin(slope), 0.0, -G * np.cos(slope))
-    engine = on_processor(problem(block, friction=friction, gravity=down, restitution=0.0))
+    engine = on_device(problem(block, friction=friction, gravity=down, restitution=0.0))
     engine.advance(0.25)
     pull = max(0.0, np.sin(slope) - friction * np.cos(slope))
     measure = engine.measure()
@@ -84,7 +85,7 @@ def test_a_rigid_block_on_an_incline_slides_as_coulomb_says(friction):
 
 def test_a_soft_block_comes_to_rest_on_the_floor_and_is_borne_by_it():
     block = brick((0.005, 0.003, 0.05), (0.1, 0.1, 0.1), young=3e5, loss=1.0)
-    engine = on_processor(problem(block, gravity_ramp=0.05, friction=0.5))
+    engine = on_device(problem(block, gravity_ramp=0.05, friction=0.5))
     engine.advance(0.2)
     measure = engine.measure()
     weight = measure.mass[0] * G * (0.2 - 0.025)
@@ -97,7 +98,7 @@ def test_a_tall_stack_of_rigid_cubes_stands_still():
     """Jacobi sweeps with a pace: nothing creeps, as no contact comes before another."""
     size = (0.1, 0.1, 0.1)
     cubes = [brick((0.005, 0.01, 0.05 + 0.1 * k), size, rigid=True) for k in range(4)]
-    engine = on_processor(problem(*cubes, gravity_ramp=0.05, friction=0.5, restitution=0.0))
+    engine = on_device(problem(*cubes, gravity_ramp=0.05, friction=0.5, restitution=0.0))
     engine.advance(0.2)
     moved = engine.measure().centre - [[0.005, 0.01, 0.05 + 0.1 * k] for k in range(4)]
     assert np.abs(moved).max() < 1e-3 * CELL
@@ -106,7 +107,7 @@ def test_a_tall_stack_of_rigid_cubes_stands_still():
 def test_walls_hold_whichever_way_they_face():
     wall = Plane((1.0, 0.0, 0.0), 0.0)
     soft = body(ball((0.06, 0, 0)), Law.COROTATED, velocity=(-2.0, 0, 0))
-    engine = on_processor(problem(soft, planes=(wall,), gravity=REST))
+    engine = on_device(problem(soft, planes=(wall,), gravity=REST))
     engine.advance(0.05)
     measure = engine.measure()
     assert measure.plane_impulse[0, 0, 0] > 2.0 * measure.mass[0]
@@ -121,7 +122,7 @@ def test_the_control_glues_what_separate_fields_let_go():
     ]
     away = []
     for contact in ("multi", "single"):
-        engine = on_processor(problem(*cubes, planes=(), gravity=REST, contact=contact))
+        engine = on_device(problem(*cubes, planes=(), gravity=REST, contact=contact))
         engine.advance(0.08)
         centre = engine.measure().centre
         away.append((centre[1, 0] - centre[0, 0] - 0.1) / CELL)
@@ -129,12 +130,13 @@ def test_the_control_glues_what_separate_fields_let_go():
     assert abs(away[1]) < 0.3
 
 
+@AS_IT_WAS
 def test_two_runs_on_the_processor_are_the_same():
     def heap():
         low = brick((0, 0, 0.05), (0.1, 0.1, 0.1))
         return problem(low, body(ball((0.01, 0, 0.16)), rigid=True, velocity=(0, 0, -2)))
 
-    first, second = on_processor(heap()), on_processor(heap())
+    first, second = on_device(heap()), on_device(heap())
     for engine in (first, second):
         engine.advance(0.03)
     assert first.measure().pair_impulse[0, 1] > 0
@@ -146,7 +148,7 @@ def test_what_a_pair_that_never_touches_leaves_room_for_is_not_booked():
     one = body(ball((0, 0, 0.055)), velocity=(1.0, 0, -1.0))
     two = body(ball((0.02, 0.03, 0.055)), velocity=(-1.0, 0.5, -1.0))
     given = problem(one, two, apart=((0, 1),))
-    ours, sure = on_processor(given), ReferenceEngine(given)
+    ours, sure = on_device(given), ReferenceEngine(given)
     for engine in (ours, sure):
         for _ in range(40):
             engine.step(5e-4)

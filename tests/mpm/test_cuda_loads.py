@@ -4,7 +4,8 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from test_cuda import CELL, ball, body, on_processor, problem, side_by_side
+from laws.asked import on_device
+from test_cuda import CELL, ball, body, problem, side_by_side
 
 from corporeal.errors import UserError
 from corporeal.mpm.problem import Faces, Interactive, Joint, Tether
@@ -86,7 +87,7 @@ def test_a_rigid_frame_holds_its_cushion_as_in_the_reference():
 @pytest.mark.parametrize("rigid", [False, True])
 def test_blows_and_drags_reach_a_body_as_in_the_reference(rigid):
     given = problem(body(ball((0, 0, 0.3)), rigid=rigid, young=3e4))
-    ours, sure = on_processor(given), ReferenceEngine(given)
+    ours, sure = on_device(given), ReferenceEngine(given)
     assert isinstance(ours, Interactive)
     start = ours.measure().potential.sum()
     for engine in (ours, sure):

@@ -2,17 +2,17 @@
 
 import numpy as np
 import pytest
+from laws.asked import on_device
 from point_bodies import CELL, ball, body, problem, step_together
 
 from corporeal.mpm.constants import KEPT_STEPS
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.reference.engine import ReferenceEngine
 
 ENGINES = {
     "cpu": lambda given: CpuEngine(given, threads=1),
     "reference": ReferenceEngine,
-    "cuda": lambda given: CudaEngine(given, "cpu"),
+    "cuda": on_device,
 }
 SAVED = {"cpu": "choices", "reference": "kept.candidate", "cuda": "choices"}
 

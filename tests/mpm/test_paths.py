@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from laws.asked import on_device
 from laws.bodies import box, problem
 from point_bodies import CELL, board
 from point_bodies import problem as posed
@@ -11,7 +12,6 @@ from point_bodies import problem as posed
 from corporeal.errors import UserError
 from corporeal.mpm import formulas
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.formulas import one_lane
 from corporeal.mpm.physics import prescribed, rigid
 from corporeal.mpm.problem import Joint
@@ -150,7 +150,7 @@ def test_what_two_fingers_close_on_stays_in_the_middle_and_upright(engine):
     """By symmetry; the finger whose contacts were solved last had its way, and tilted it by .7°."""
     engines = {
         "cpu": lambda p: CpuEngine(p, threads=1),
-        "cuda": lambda p: CudaEngine(p, "cpu"),
+        "cuda": on_device,
         "reference": ReferenceEngine,
     }
     given = gripped()

@@ -4,10 +4,10 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from laws.asked import on_device
 from point_bodies import CELL, SIZE, board, problem, round_body, step_together
 
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.cuda.layout import wp
 from corporeal.mpm.formulas import one_lane, options
 from corporeal.mpm.physics.rolling import RollingSide, brake
@@ -17,7 +17,7 @@ from corporeal.types import Keyframes, Push
 
 wp.set_module_options(options())
 COUNT, RADIUS, G = 100, 0.05, 9.81
-ENGINES = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": lambda p: CudaEngine(p, "cpu")}
+ENGINES = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": on_device}
 
 
 @wp.kernel

@@ -2,16 +2,16 @@
 
 import numpy as np
 import pytest
+from laws.asked import on_device
 from point_bodies import CELL, body, problem, round_body, step_together
 
 from corporeal.geometry.roundness import reach_of
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.physics import curved
 from corporeal.mpm.reference.engine import ReferenceEngine
 
 RADIUS, HOLLOW = 0.05, 0.2
-ENGINES = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": lambda p: CudaEngine(p, "cpu")}
+ENGINES = {"cpu": lambda p: CpuEngine(p, threads=1), "cuda": on_device}
 
 
 def sphere(count):

@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 import warp as wp
+from laws.asked import on_device
 from point_bodies import board, problem, step_together
 
 from corporeal.mpm import formulas
 from corporeal.mpm.cpu.engine import CpuEngine
-from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.formulas import one_lane_contact
 from corporeal.mpm.physics import contact
 from corporeal.mpm.reference.engine import ReferenceEngine
@@ -136,7 +136,7 @@ def test_a_board_that_slides_below_an_edge_throws_nothing_up_as_in_the_reference
     fall, block = (0.0, 0.0, -0.02), np.array([0.15, 0.15, 0.15])
     one = board(np.array([-0.11, 0.01, 0.07501]), size=block, velocity=fall)
     given = problem(below, one, planes=(), gravity=(0.0, 0.0, 0.0))
-    ours = CpuEngine(given, threads=1) if fast == "cpu" else CudaEngine(given, "cpu")
+    ours = CpuEngine(given, threads=1) if fast == "cpu" else on_device(given)
     sure = ReferenceEngine(given)
     step_together(ours, sure, 20)
     mine, theirs = ours.measure(), sure.measure()

@@ -1,16 +1,18 @@
 """Every law of nature is asked of every engine."""
 
-from functools import cache, partial
+from functools import cache
 
 import jaxtyping
 import pytest
+from laws.asked import CARD, on_device
 from laws.suite import CASES
 
 from corporeal.backends import load
 from corporeal.mpm.problem import MENU
 
 ROUND_OFF = {"reference": 1e-12, "cpu": 1e-5, "cuda": 1e-5}
-SLOWLY = {name: pytest.param(name, marks=pytest.mark.slow) for name in ROUND_OFF}
+SLOW = () if CARD else (pytest.mark.slow,)
+SLOWLY = {name: pytest.param(name, marks=SLOW) for name in ROUND_OFF}
 
 
 @pytest.fixture(autouse=True)
@@ -26,32 +28,35 @@ def unchecked():
 
 @cache
 def built(name):
-    """Give a function that builds an engine; the one for cards runs on the processor."""
-    chosen = load("engine", name, MENU)
+    """Give a function that builds an engine; the one for cards is on the processor, or on CARD."""
+    chosen = on_device if name == "cuda" else load("engine", name, MENU)
     chosen.round_off = ROUND_OFF[name]
-    if name != "cuda":
-        return chosen
-    here = partial(chosen, device="cpu")
-    here.round_off = ROUND_OFF[name]
-    return here
+    return chosen
+
+
+def asked(name):
+    """Give the engine that a test is to ask; a card that is named is asked alone."""
+    if CARD and name != "cuda":
+        pytest.skip(f"{CARD} is asked alone: CORPOREAL_CARD")
+    return built(name)
 
 
 @pytest.fixture(params=["reference", "cpu", SLOWLY["cuda"]])
 def engine(request):
     """Give a function that builds an engine from a problem."""
-    return built(request.param)
+    return asked(request.param)
 
 
 @pytest.fixture(params=["cpu", SLOWLY["reference"], SLOWLY["cuda"]])
 def patient_engine(request):
     """Give any engine, most only in slow runs: for experiments of many steps."""
-    return built(request.param)
+    return asked(request.param)
 
 
 @pytest.fixture
 def fast_engine():
-    """Only the production engine: for experiments of many steps."""
-    return load("engine", "cpu", MENU)
+    """Only the production engine, or the card: for experiments of many steps."""
+    return built("cuda" if CARD else "cpu")
 
 
 @pytest.fixture
