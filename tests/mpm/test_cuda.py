@@ -180,6 +180,16 @@ def test_too_little_room_is_enlarged_and_nothing_is_lost_or_done_twice():
     assert mine.viscous_loss == pytest.approx(theirs.viscous_loss, rel=1e-4)
 
 
+def test_a_table_of_blocks_that_is_full_is_searched_once_and_then_enlarged():
+    """A table of eight for more blocks than that: who looked for one went round in it for ever."""
+    engine = on_device(fall())
+    engine.arrays.grid = engine.memory.grid(engine.problem, 2)
+    engine.program.forget()
+    engine.advance(0.002)
+    assert engine.arrays.grid.room > 16
+    assert engine.measure().mass.sum() > 0 and engine.time == 0.002
+
+
 def test_a_body_may_travel_as_far_as_it_likes():
     engine = on_device(problem(body(ball((0, 0, 0), 0.03), velocity=(30, 0, 0)), planes=()))
     engine.advance(0.5)

@@ -47,26 +47,29 @@ def find(g: Grid, field: int, block: wp.vec3i):
     """Slot of a block; -1: it has none."""
     key = key_of(field, block)
     h = start_of(key, g.mask)
-    slot = int(-2)
-    while slot == -2:
+    for _ in range(g.mask + 1):
         there = g.keys[h]
         if there == key:
-            slot = g.slots[h]
-        elif there == EMPTY:
-            slot = -1
+            return g.slots[h]
+        if there == EMPTY:
+            break
         h = (h + 1) & g.mask
-    return slot
+    return int(-1)
 
 
 @wp.func
 def claim(s: Sheet, g: Grid, field: int, block: wp.vec3i):
-    """Give a block a slot, if it has none."""
+    """Give a block a slot, if it has none.
+
+    One look at each place at most: what another thread found to be full may not be seen here.
+    """
     key = key_of(field, block)
     h = start_of(key, g.mask)
-    looking = int(1)
-    while looking == 1:
+    for _ in range(g.mask + 1):
         there = g.keys[h]
         if there == EMPTY:
+            if s.flag[FULL] == 1:
+                break
             there = wp.atomic_cas(g.keys, h, EMPTY, key)
             if there == EMPTY:
                 slot = wp.atomic_add(s.flag, BLOCKS, 1)
@@ -78,9 +81,9 @@ def claim(s: Sheet, g: Grid, field: int, block: wp.vec3i):
                 else:
                     wp.atomic_sub(s.flag, BLOCKS, 1)
                     s.flag[FULL] = 1
-                looking = 0
-        if there == key or s.flag[FULL] == 1:
-            looking = 0
+                break
+        if there == key:
+            break
         h = (h + 1) & g.mask
     return 0
 
