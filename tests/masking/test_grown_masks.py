@@ -232,3 +232,14 @@ def test_a_folder_without_masks_of_these_photographs_is_refused(photos, tmp_path
     Image.fromarray(np.zeros((HIGH, WIDE), np.uint8)).save(tmp_path / "empty" / "other.png")
     with pytest.raises(UserError, match="no mask with the name of a photograph"):
         read_photographs(photos[0], WIDE, tmp_path / "empty")
+
+
+@pytest.mark.parametrize("doubted", [True, False])
+def test_growing_ends_where_outlines_contradict_each_other_under_doubted_poses(
+    monkeypatch, doubted
+):
+    grown, told = [], lambda share, words: None
+    monkeypatch.setattr(module, "grow", lambda *what, **more: grown.append(more))
+    monkeypatch.setattr(module, "contradict", lambda made: True)
+    module._grown(None, None, False, told, doubted_poses=doubted)  # type: ignore[arg-type]
+    assert len(grown) == (1 if doubted else 2)

@@ -7,6 +7,7 @@ import pytest
 from PIL import Image
 
 from corporeal import store
+from corporeal.errors import BadFileError
 from corporeal.masking.grown_masks import GrownMasks
 from corporeal.poses.pose import FOUND, Posed, _Kept, without_strangers
 from corporeal.reconstruction import picture_intake
@@ -100,3 +101,27 @@ def test_doubted_masks_speak_against_pictures_if_those_of_the_others_are_believe
     else:
         assert found == posed and count == COUNT
         assert not (run / picture_intake.ALIKE).exists()
+
+
+def test_poses_that_neighbours_and_outlines_speak_against_are_refused_at_once(
+    tmp_path, monkeypatch
+):
+    """Less than seven tenths agree: to leave out a third at most cannot mend that."""
+    (tmp_path / "poses").mkdir()
+    posed, masks = placed(tmp_path / "poses", (2, 7, 11))
+    doubted, asked = tmp_path / "doubted", []
+    shutil.copytree(masks, doubted / "masks")
+
+    def grown(*what, **more):
+        asked.append(more["doubted"])
+        return GrownMasks(None, (), doubted, contradict=True)
+
+    monkeypatch.setattr(picture_intake, "unposed", lambda source: True)
+    monkeypatch.setattr(picture_intake, "pose", lambda *what: posed)
+    monkeypatch.setattr(picture_intake, "listed", lambda folder: _Shots())
+    monkeypatch.setattr(picture_intake, "has_masks", lambda shots: False)
+    monkeypatch.setattr(picture_intake, "grown_masks", grown)
+    run = tmp_path / "run"
+    with pytest.raises(BadFileError, match="doubt"):
+        picture_intake._posed(tmp_path, ReconstructConfig(), run, lambda share, words: None)
+    assert asked == [True], "masks are not grown again"

@@ -71,6 +71,7 @@ def grown_masks(
     pointed: Pointed | None = None,
     progress: Progress = lambda fraction, words: None,
     testing: bool = False,
+    doubted: bool = False,
 ) -> GrownMasks:
     """Grow masks of posed photographs, and write them.
 
@@ -82,12 +83,16 @@ def grown_masks(
         progress: Told the fraction done and what is being done.
         testing: Whether poses are tested by them: places of the floor, which these poses know, are
             asked less.
+        doubted: Whether something else speaks against these poses, too: where outlines then
+            contradict each other, growing ends.
 
     Raises:
         UserError: The photographs cannot be used, or nothing is at the place that is pointed at.
 
     """
-    made_by = store.key(f"grown masks {METHOD}", (pointed, testing), [store.digest(source)])
+    made_by = store.key(
+        f"grown masks {METHOD}", (pointed, testing, *("doubted",) * doubted), [store.digest(source)]
+    )
     record = read_record(folder)
     if record is not None and record.made_by == made_by:
         changes = _changes(folder)
@@ -98,14 +103,10 @@ def grown_masks(
     progress(0.0, "reading photographs")
     shown = read_photographs(source, FINE, bare=True)
     rough = reduced(shown.views, ROUGH)
-    if pointed is None:
-        seeds = looked_at(rough, shown.points)
-    else:
-        seeds = pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
+    seeds = _seeds(source, shown, rough, pointed)
     alone = pointed is not None
-    grown, more = _grown(
-        shown.views, seeds, alone, within(progress, 0.0, GROWN), 1.0 if testing else UNSURE
-    )
+    growing, unsure = within(progress, 0.0, GROWN), 1.0 if testing else UNSURE
+    grown, more = _grown(shown.views, seeds, alone, growing, unsure, doubted)
     why = doubt(grown)
     lacks = incomplete(grown) or ("" if alone or why else lacking(grown)) or ""
     for name in (MASKS[0], DOUBTED, RECORD):
@@ -128,8 +129,19 @@ def grown_masks(
     return GrownMasks(folder, said, incomplete=lacks, beside=other)
 
 
+def _seeds(source: Path, shown: Photographs, rough: Views, pointed: Pointed | None) -> Seeds:
+    if pointed is None:
+        return looked_at(rough, shown.points)
+    return pointed_at(rough, shown.points, spot_of(source, shown, rough, pointed))
+
+
 def _grown(
-    views: Views, seeds: Seeds, alone: bool, progress: Progress, unsure: float = UNSURE
+    views: Views,
+    seeds: Seeds,
+    alone: bool,
+    progress: Progress,
+    unsure: float = UNSURE,
+    doubted_poses: bool = False,
 ) -> tuple[Grown | None, list[str]]:
     """Grow masks, and say what is in them beside what has their colours and stands.
 
@@ -138,9 +150,12 @@ def _grown(
     What hangs on it in other colours is taken in unless it is asked for alone. Where masks are then
     still doubted, or lack what has other colours, or are near to being doubted for their colours,
     the floor has the colours of the thing, and how well these fit it at their place counts, too, if
-    masks are right by it, and better than masks that were not doubted.
+    masks are right by it, and better than masks that were not doubted. None of that mends outlines
+    that contradict each other under poses that something else speaks against, too.
     """
     grown, flat = grow(views, seeds, within(progress, 0.0, ONCE)), False
+    if doubted_poses and contradict(grown):
+        return grown, []
     if incomplete(grown) is not None:
         again = within(progress, ONCE, TWICE, ", with what lies flat on the floor")
         wider = grow(views, seeds, again, flat=True)
