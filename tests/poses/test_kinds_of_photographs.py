@@ -64,6 +64,56 @@ def test_an_alpha_that_hides_nothing_is_no_mask(tmp_path, greys):
     assert not (tmp_path / "poses" / "masks").exists()
 
 
+@pytest.mark.parametrize("hidden", ["few in parts", "all over"])
+def test_an_alpha_that_few_have_or_that_hides_all_is_no_mask_and_said(tmp_path, greys, hidden):
+    def made(k, grey):
+        picture = Image.fromarray(grey).convert("RGBA")
+        if hidden == "all over":
+            picture.putalpha(0)
+        elif k < 2:
+            picture.paste((0, 0, 0, 0), (0, 0, 20, 20))
+        return picture
+
+    for k, grey in enumerate(greys):
+        saved(tmp_path / str(k), [grey], ".png", lambda grey, k=k: made(k, grey))
+        (tmp_path / "photos").mkdir(exist_ok=True)
+        (tmp_path / str(k) / "photos" / "0.png").rename(tmp_path / "photos" / f"{k}.png")
+    found = gathered(tmp_path)
+    assert len(found.names) == COUNT and not (tmp_path / "poses" / "masks").exists()
+    many = COUNT if hidden == "all over" else 2
+    assert found.said[0].startswith(f"{many} of {COUNT} photographs are transparent")
+    assert "Cut out all of them, or none" in found.said[0]
+
+
+@pytest.mark.parametrize("strips", [1, COUNT])
+def test_a_panorama_among_photographs_is_left_out_and_named(tmp_path, greys, strips):
+    saved(tmp_path, greys, ".jpg", Image.fromarray)
+    for k in range(strips):
+        wide = Image.fromarray(greys[k]).resize((600, 48))
+        wide.save(tmp_path / "photos" / f"{k}.jpg")
+    found = gathered(tmp_path)
+    if strips == 1:
+        assert "0.jpg" not in found.names and len(found.names) == COUNT - 1
+        assert "0.jpg is a strip, as a panorama is" in found.said[0]
+    else:
+        assert len(found.names) == COUNT, "somebody cut all of them"
+
+
+def test_pictures_in_folders_below_are_said_unless_they_are_copies_or_masks(tmp_path, greys):
+    saved(tmp_path, greys, ".jpg", Image.fromarray)
+    photos = tmp_path / "photos"
+    for place in ("masks", "images_2", ".thumbnails", "__MACOSX"):
+        (photos / place).mkdir()
+        Image.fromarray(greys[0]).save(photos / place / "0.jpg")
+    Image.fromarray(greys[0]).save(photos / ".thumbnails" / "small.jpg")
+    Image.fromarray(greys[0]).save(photos / "masks" / "0_object.png")
+    assert gathered(tmp_path).said == ()
+    (photos / "second round").mkdir()
+    Image.fromarray(greys[0]).save(photos / "second round" / "b.jpg")
+    (said,) = gathered(tmp_path).said
+    assert said.startswith("1 more picture lies in folders below and was left out, such as second")
+
+
 def test_of_exif_only_the_lens_is_copied_however_long_the_rest_is(tmp_path, greys):
     exif = Image.Exif()
     exif[DESCRIPTION] = "d" * 70_000  # more than a JPEG can hold

@@ -12,7 +12,7 @@ from PIL import Image
 from corporeal.errors import BadFileError
 from corporeal.formats.colmap import ColmapModel, is_colmap, read_colmap
 from corporeal.formats.images import FORMATS
-from corporeal.formats.picture_names import IMAGES
+from corporeal.formats.picture_names import IMAGES, INSTANCES, MASKS
 from corporeal.formats.projections import check_focal, parted, projections_in, read_projection
 from corporeal.formats.resources import beside
 from corporeal.formats.shots import Shot, develop
@@ -32,8 +32,6 @@ MODELS = (
     "undistorted/sparse",
 )
 SUFFIXES = ("", ".png", ".jpg", ".jpeg", ".webp", ".PNG", ".JPG", ".JPEG")
-MASKS = ("masks", "mask")
-INSTANCES = ("instances", "objects")
 LONGEST = 1024
 """Of a picture's sides, unless more is asked for [px]."""
 NO_INSTANCES = (

@@ -8,3 +8,6 @@ OTHERS = (".tif", ".tiff", ".gif", ".bmp", ".avif", ".jxl", ".dng", ".cr2", ".cr
 """Pictures of other kinds and of raw sensors, the same."""
 IMAGES = ("images", "", "input", "rgb", "images_2", "images_4", "images_8")
 """Folders that pictures lie in, beside their poses."""
+MASKS = ("masks", "mask")
+INSTANCES = ("instances", "objects")
+"""Folders of masks of objects, and of each by number, beside pictures."""

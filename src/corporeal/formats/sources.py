@@ -8,7 +8,7 @@ from corporeal.errors import UserError
 from corporeal.formats.gltf_document import Document
 from corporeal.formats.mesh_suffixes import is_mesh, kind_of_ply
 from corporeal.formats.meshes import companions
-from corporeal.formats.picture_names import HEIC, IMAGES, OTHERS, SHOWN
+from corporeal.formats.picture_names import HEIC, IMAGES, INSTANCES, MASKS, OTHERS, SHOWN
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
 from corporeal.formats.words import safe, writable
@@ -166,6 +166,50 @@ def not_read_beside(photographs: Sequence[Path]) -> list[str]:
     count = "1 more picture is" if len(others) == 1 else f"{len(others)} more pictures are"
     what = f"{count} of a kind that is not read ({kinds}), such as {writable(others[0].name)}"
     return [f"{what}: convert what is to be used to JPEG."]
+
+
+def below(folder: Path, photographs: Sequence[Path]) -> list[Path]:
+    """Return the pictures in folders of a folder that are neither its photographs nor masks.
+
+    Args:
+        folder: What lies in it, up to two below, is looked at; not where systems hide copies.
+        photographs: Those that are used, all of one place.
+
+    """
+    aside = {file.parent for file in photographs}
+    return [
+        file
+        for file in pictures_in(folder)
+        if file.parent not in (folder, *aside)
+        and not any(_set_aside(name) for name in file.relative_to(folder).parts[:-1])
+    ]
+
+
+def _set_aside(name: str) -> bool:
+    return name in (*MASKS, *INSTANCES) or name.startswith((".", "__"))
+
+
+def not_read_below(folder: Path, photographs: Sequence[Path]) -> list[str]:
+    """Say which pictures lie in folders below photographs and are not used, if they are no copies.
+
+    Args:
+        folder: Of the photographs.
+        photographs: Those that are used; what has the name of one is it in another size or kind.
+
+    """
+    known = {file.stem for file in photographs}
+    more = [file for file in below(folder, photographs) if file.stem not in known]
+    if not more:
+        return []
+    one = len(more) == 1
+    count, left = (
+        ("1 more picture lies", "was") if one else (f"{len(more)} more pictures lie", "were")
+    )
+    where = writable(str(more[0].relative_to(folder)))
+    return [
+        f"{count} in folders below and {left} left out, such as {where}: what shows the same thing "
+        "belongs beside the others."
+    ]
 
 
 def _named(path: Path, kinds: Sequence[str]) -> bool:

@@ -15,7 +15,7 @@ from corporeal.errors import BadFileError
 from corporeal.formats.images import FORMATS, MAX_PIXELS, eight_bit
 from corporeal.formats.photographs import INSTANCES, MASKS, companion
 from corporeal.formats.shots import FEWEST, Bad, left_out, unreadable
-from corporeal.formats.sources import not_read_beside, photographs_in, pictures_in
+from corporeal.formats.sources import below, not_read_below, not_read_beside, photographs_in
 from corporeal.formats.words import safe, writable
 
 Progress = Callable[[float, str], None]
@@ -41,6 +41,11 @@ LONGEST_WORD = 64
 """Of a tag that is copied, in letters: a camera's name has no more."""
 CLEAR = 255
 """Alpha of what is not transparent."""
+HALF = 127
+"""Alpha above which it is rather seen than not."""
+STRIP = 2.4
+"""Longer side over the shorter, above which a picture is no camera's: films have 21 : 9. For one
+of 1600 × 120 a lens was found that nobody has, and 24 good photographs were refused with it."""
 QUALITY = 95
 """Of JPEG copies."""
 IMAGES = "images"
@@ -82,11 +87,12 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
     names: dict[str, tuple[int, int]] = {}
     reduced: list[float] = []
     cut_out: dict[str, Image.Image] = {}
+    strips = _strips(taken)
     known = np.zeros((0, *THUMBNAIL))
     for number, file in enumerate(taken):
         progress(number / len(taken), "reading photographs")
         try:
-            picture, alpha = _upright(file)
+            picture, alpha = _upright(file, file in strips)
             thumbnail = _thumbnail(picture)
             _check(thumbnail, known, list(names))
         except _UnusableError as problem:
@@ -102,10 +108,14 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
             _copy_mask(file, source, kinds, folder, name)
         if alpha is not None:
             cut_out[name] = alpha
-    _write_alphas(cut_out, folder / MASKS[0])
-    said = [f"Of {len(found)} photographs, one in {step} was used."] if step > 1 else []
-    said += left_out(len(taken), bad)
-    said += [*not_read_beside(found), *_cropped(tuple(names.values()))]
+    said = [
+        *([f"Of {len(found)} photographs, one in {step} was used."] if step > 1 else []),
+        *left_out(len(taken), bad),
+        *not_read_beside(found),
+        *not_read_below(source, found),
+        *_cropped(tuple(names.values())),
+        *_write_alphas(cut_out, len(names), folder),
+    ]
     _refuse_few(source, len(names), len(taken), bad, twins)
     return Gathered(tuple(names), tuple(names.values()), tuple(said), reduced=tuple(reduced))
 
@@ -119,6 +129,23 @@ def spread(found: Sequence[Path], step: int) -> list[Path]:
     offsets = (int(step * (k * GOLDEN % 1)) for k in range(len(firsts)))
     ends = (min(first + k, len(found) - 1) for first, k in zip(firsts, offsets, strict=True))
     return [found[k] for k in ends]
+
+
+def _strips(files: Sequence[Path]) -> set[Path]:
+    """Return the pictures that are too long for a camera's, if most are not."""
+    long, known = set(), 0
+    for file in files:
+        if not file.is_file():  # a pipe would be waited for
+            continue
+        try:
+            with Image.open(file, formats=FORMATS) as opened:
+                size = opened.size
+        except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
+            continue  # whoever reads it says why
+        known += 1
+        if max(size) > STRIP * min(size):
+            long.add(file)
+    return long if len(long) < known / 2 else set()
 
 
 def as_gathered(folder: Path) -> Gathered:
@@ -189,9 +216,7 @@ def _refuse_few(source: Path, good: int, asked: int, bad: list[Bad], twins: int)
 def _elsewhere(source: Path) -> str:
     """Say where more pictures lie than in the folder itself; empty: nowhere."""
     own = photographs_in(source)
-    used = {file.parent for file in own}
-    aside = (*MASKS, *INSTANCES)
-    more = [p for p in pictures_in(source) if p.parent not in used and p.parent.name not in aside]
+    more = below(source, own)
     if len(more) <= len(own):
         return ""
     return f"{len(more)} more lie in folders of it: name the one that is meant: {more[0].parent}."
@@ -205,10 +230,12 @@ class _TwinError(_UnusableError):
     """It shows the same as another, which is used."""
 
 
-def _upright(file: Path) -> tuple[Image.Image, Image.Image | None]:
+def _upright(file: Path, strip: bool = False) -> tuple[Image.Image, Image.Image | None]:
     """Return a photograph turned as it says, reduced, with what it says of its lens; its alpha."""
     if not file.is_file():
         raise _UnusableError("is no file, or a link to none")
+    if strip:
+        raise _UnusableError("is a strip, as a panorama is, which no one lens takes")
     why = unreadable(file)
     try:
         with Image.open(file, formats=FORMATS) as opened:
@@ -281,22 +308,35 @@ def _write(picture: Image.Image, path: Path) -> None:
         picture.save(path, "JPEG", quality=QUALITY, subsampling=0, **more)
 
 
-def _write_alphas(alphas: dict[str, Image.Image], folder: Path) -> None:
-    """Write masks of photographs that were cut out; nothing where none of them was.
+def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> list[str]:
+    """Write masks of photographs that were cut out, if most were; say so where few are.
+
+    Of an alpha that hides all, or nothing, nobody can tell what is meant.
 
     Args:
         alphas: By the names of the photographs.
-        folder: Of masks; what lies there already was given beside the photographs, and counts.
+        total: Photographs, those without alpha, too.
+        folder: Gets masks; what lies there already was given beside the photographs, and counts.
 
     """
-    if all(alpha.getextrema()[0] == CLEAR for alpha in alphas.values()):
-        return
+    extremes = {name: alpha.getextrema() for name, alpha in alphas.items()}
+    clear = [name for name, (least, _) in extremes.items() if least == CLEAR]
+    parted = [name for name, (least, most) in extremes.items() if least <= HALF < most]
+    if len(clear) == len(alphas):
+        return []
+    if len(parted) <= total / 2:
+        return [
+            f"{len(alphas) - len(clear)} of {total} photographs are transparent in parts or all "
+            "over, and most were not cut out: this was not taken for masks. Cut out all of them, "
+            "or none."
+        ]
     for name, alpha in alphas.items():
-        place = folder / f"{Path(name).stem}.png"
+        place = folder / MASKS[0] / f"{Path(name).stem}.png"
         if not place.exists():
             with store.writing(place):
                 place.parent.mkdir(parents=True, exist_ok=True)
                 alpha.save(place, "PNG")
+    return []
 
 
 def _copy_mask(file: Path, source: Path, kinds: tuple[str, ...], folder: Path, name: str) -> None:
