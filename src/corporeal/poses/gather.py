@@ -319,9 +319,9 @@ def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> l
         folder: Gets masks; what lies there already was given beside the photographs, and counts.
 
     """
-    extremes = {name: alpha.getextrema() for name, alpha in alphas.items()}
-    clear = [name for name, (least, _) in extremes.items() if least == CLEAR]
-    parted = [name for name, (least, most) in extremes.items() if least <= HALF < most]
+    opaque = {name: np.asarray(alpha) for name, alpha in alphas.items()}
+    clear = [name for name, own in opaque.items() if own.min() == CLEAR]
+    parted = [name for name, own in opaque.items() if own.min() <= HALF < own.max()]
     if len(clear) == len(alphas):
         return []
     if len(parted) <= total / 2:
