@@ -1,7 +1,7 @@
 """Whether masks that nobody drew are of what the photographs are of."""
 
 from corporeal.masking.grow import SETTLED, Grown
-from corporeal.masking.parallax import as_large
+from corporeal.masking.parallax import HIGH, as_large
 
 ALIKE = 0.2
 """Overlap of the colours of objects and of what is around them, above which the outline is chance:
@@ -23,6 +23,12 @@ are not of all of the thing: they would overlap with right ones by less than .8.
 HANGING = 0.5
 """The same of what stands there in other colours and borders on it. Of its pixels .4 to .85 were
 the thing's, the rest shadows and edges beside it, so that masks lack as much."""
+FAINT = 0.1
+"""Share of the outlines along which no edge is seen, above which they are chance: as large as what
+hulls forgive of views."""
+THINNEST = 0.2
+"""Share of masks that are their outermost pixels: if masks are but a pixel too wide, as they were
+where colours tell best, they overlap with right ones by less than .8."""
 CONTRADICT = "its outlines contradict each other"
 
 
@@ -37,6 +43,8 @@ def doubt(grown: Grown | None) -> str | None:
         return f"it would fill {grown.share:.1%} of the photographs"
     if grown.outer > OUTER or grown.cropped > CROPPED:
         return "it reaches beyond what all cameras look at"
+    if grown.faint > FAINT:
+        return f"along {grown.faint:.0%} of its outline the photographs show no edge"
     if grown.coherence < COHERENT or grown.settled < SETTLED:
         agree = f"{CONTRADICT} ({grown.coherence:.0%} agree)"
         return f"{agree}, as where some photographs show something else, or it was moved"
@@ -59,12 +67,30 @@ def incomplete(grown: Grown | None) -> str | None:
 
 
 def lacking(grown: Grown | None) -> str | None:
-    """Return in a clause what borders on masks and is not of them; None: not much does."""
-    if (much := bordering(grown)) <= HANGING:
+    """Return in a clause what borders on masks and is not of them; None: not much does.
+
+    Nothing hovers: what stands under masks that do is of the thing, and no shadow beside it.
+    """
+    if grown is None:
+        return None
+    hovers = grown.lowest > HIGH
+    if (much := bordering(grown)) <= (LEFT_OVER if hovers else HANGING):
+        return None
+    taken = "what was taken for the thing" + (", which hovers above the floor" if hovers else "")
+    return (
+        f"not all of it can be told from its ground: beside {taken}, "
+        f"{much:.1f} times as much in other colours stands on the floor and borders on it"
+    )
+
+
+def too_thin(grown: Grown | None) -> str | None:
+    """Return in a clause why masks do not tell how thick things are; None: they do."""
+    if grown is None or grown.thinness <= THINNEST:
         return None
     return (
-        "not all of it can be told from its ground: beside what was taken for the thing, "
-        f"{much:.1f} times as much in other colours stands on the floor and borders on it"
+        "it is too thin in the photographs: of what was taken for the thing "
+        f"{grown.thinness:.0%} are the pixels along its outline, and these are not sure, so "
+        "photograph it from nearer"
     )
 
 

@@ -24,6 +24,7 @@ from corporeal.masking.floor_texture import floor_fit
 from corporeal.masking.hanging import Hanging, hanging
 from corporeal.masking.holes import closed
 from corporeal.masking.left_over import before_the_floor, left_over
+from corporeal.masking.outlines import faint, thinness
 from corporeal.masking.parallax import standing
 from corporeal.masking.reduced import reduced
 from corporeal.masking.seeds import Seeds
@@ -80,6 +81,13 @@ class Grown:
     """Share of the pictures' pixels that is inside."""
     left_over: float
     """What has their colours on the floor in the middle, but is none of them, over what is."""
+    faint: float
+    """Share of the outlines along which pictures show no edge."""
+    thinness: float
+    """Share of masks that their outermost pixels are."""
+    lowest: float
+    """Height of their hull's lowest cell above the floor, in radii of the ball; 0 where nobody
+    knows the floor, or what lies flat on it may be objects."""
     masks: Bool[np.ndarray, "V H W"]
     """The pixels that are inside, at ROUGH pixels."""
     hanging: Hanging | None = None
@@ -150,8 +158,9 @@ def grow(
     by_colour = side.cut(replace(state.evidence, prior=np.zeros_like(on_floor))) > HALF
     stands = standing(rough, state.masks, seeds.floor, seeds.around)
     near = widened(state.masks)
+    inside = closed(_drawn(views, level, state, floor), rough.cameras, room)
     return Grown(
-        inside=closed(_drawn(views, level, state, floor), rough.cameras, room),
+        inside=inside,
         coherence=_agreement(state.masks, state.silhouettes),
         settled=settled,
         alike=state.alike * (1 - _told(state.masks, on_floor)),
@@ -159,6 +168,9 @@ def grow(
         cropped=float(cropped(state.masks).mean()),
         share=float(state.masks.mean()),
         left_over=left_over(by_colour, state.masks, middle),
+        faint=faint(views.rgb, inside),
+        thinness=thinness(inside),
+        lowest=0.0 if flat else state.lowest,
         masks=state.masks,
         hanging=None if stands is None else hanging(stands, state.masks),
         beside=None if stands is None else beside(stands, state.masks, near),
@@ -174,6 +186,8 @@ class _Round:
     """Of what of the hull is high above the floor, which is not seen there."""
     outer: float
     """As in ``Grown``."""
+    lowest: float
+    """Height of the hull's lowest cell, in radii of the ball."""
     alike: float
     """Overlap of the colours of objects with what is near them, or with all that is around them,
     whichever is less: either tells them apart. Outlines that contradict one another, of what was
@@ -198,7 +212,8 @@ def _round(side: _Side, room: Volume, evidence: Evidence, piece: float | None) -
     prior = np.where(seen, IN_HULL, np.where(band, 0, BESIDE_HULL)).astype(np.float32)
     outer = float(room.outer[hull].mean())
     hiding = room.silhouettes(hull & room.tall)
-    return _Round(masks, seen, hiding, outer, alike, Evidence(inside, outside, prior))
+    lowest = float(room.height[hull].min())
+    return _Round(masks, seen, hiding, outer, lowest, alike, Evidence(inside, outside, prior))
 
 
 def _rounds(

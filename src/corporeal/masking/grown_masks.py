@@ -16,7 +16,15 @@ from corporeal.formats.mask_files import (
     write_record,
 )
 from corporeal.formats.photographs import MASKS, Photographs, listed, read_photographs
-from corporeal.masking.doubt import ALIKE, bordering, contradict, doubt, incomplete, lacking
+from corporeal.masking.doubt import (
+    ALIKE,
+    bordering,
+    contradict,
+    doubt,
+    incomplete,
+    lacking,
+    too_thin,
+)
 from corporeal.masking.grow import FINE, ROUGH, Grown, grow
 from corporeal.masking.pointed import Pointed, pointed_at, spot_of
 from corporeal.masking.reduced import reduced
@@ -30,7 +38,7 @@ OTHER_COLOURS = "What stands there and borders on it in other colours was taken 
 BY_FLOOR = "It was told from a floor of its colours by what the floor shows at each of its places."
 DOUBTED = "doubted"
 """Folder of masks that are not to be believed: what colours alone would take for objects."""
-METHOD = 14
+METHOD = 15
 """Raised when other masks would be grown: those of an older method are grown again."""
 HAVE_IT = (
     "If it is meant, too, paint it white in the masks, or give masks of all (a folder 'masks' with "
@@ -108,7 +116,7 @@ def grown_masks(
     growing, unsure = within(progress, 0.0, GROWN), 1.0 if testing else UNSURE
     grown, more = _grown(shown.views, seeds, alone, growing, unsure, doubted)
     why = doubt(grown)
-    lacks = incomplete(grown) or ("" if alone or why else lacking(grown)) or ""
+    lacks = incomplete(grown) or ("" if alone or why else lacking(grown) or too_thin(grown)) or ""
     for name in (MASKS[0], DOUBTED, RECORD):
         _forget(folder / name)
     if grown is None or (why is not None and pointed is None):

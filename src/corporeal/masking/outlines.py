@@ -1,0 +1,86 @@
+"""What outlines of masks are worth: whether photographs show an edge there, and how thin they are.
+
+A cut through a table, where the light of a flash falls off, has colours of its own on either side
+and agrees with its hull as well as any. But nothing changes across it.
+"""
+
+import numpy as np
+from jaxtyping import Bool, Float, Float32, UInt8
+from scipy.ndimage import (
+    binary_erosion,
+    find_objects,
+    gaussian_filter,
+    gaussian_filter1d,
+    maximum_filter,
+)
+from skimage.color import rgb2lab
+
+SEEN = 2.3
+"""Step of colour in CIELAB that is just noticed (Mahy, Van Eycken and Oosterlinck 1994)."""
+SIGMA = 1.0
+"""Of the Gaussian by which pictures are smoothed before they are derived [px]."""
+NEAR = 2
+"""How far beside an outline its edge may lie [px]."""
+HALF = 0.5
+"""Of a pixel: from here on it is inside."""
+
+
+def faint(rgb: UInt8[np.ndarray, "V H W 3"], inside: Float32[np.ndarray, "V H W"]) -> float:
+    """Return along which share of the outlines no edge is seen, the median of all views.
+
+    Args:
+        rgb: The pictures.
+        inside: How far each pixel is inside masks.
+
+    """
+    shares = []
+    for picture, mask in zip(rgb, inside > HALF, strict=True):
+        box = find_objects(mask.astype(np.uint8))
+        if not box:
+            continue
+        about = tuple(slice(max(s.start - 4 * NEAR, 0), s.stop + 4 * NEAR) for s in box[0])
+        rim = _rim(mask[about]) & ~_at_border(mask.shape)[about]
+        if rim.any():
+            shares.append(float((_step(picture[about], mask[about])[rim] < SEEN).mean()))
+    return float(np.median(shares)) if shares else 0.0
+
+
+def thinness(inside: Float32[np.ndarray, "V H W"]) -> float:
+    """Return which share of masks their outermost pixels are, the median of all views.
+
+    Masks that are a pixel too wide overlap with right ones by 1 less that.
+    """
+    masks = inside > HALF
+    shares = [_rim(mask).sum() / mask.sum() for mask in masks if mask.any()]
+    return float(np.median(shares)) if shares else 0.0
+
+
+def _rim(mask: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
+    return mask & ~binary_erosion(mask, border_value=1)
+
+
+def _at_border(shape: tuple[int, ...]) -> Bool[np.ndarray, "H W"]:
+    """Tell which pixels are so near the border that an edge of theirs may lie beyond."""
+    border = np.ones(shape, np.bool_)
+    border[NEAR:-NEAR, NEAR:-NEAR] = False
+    return border
+
+
+def _step(
+    picture: UInt8[np.ndarray, "h w 3"], mask: Bool[np.ndarray, "h w"]
+) -> Float[np.ndarray, "h w"]:
+    """Return the highest step of colour across the outline near each pixel, in CIELAB.
+
+    A step of height h that is smoothed is h / (σ √(2π)) steep. What crosses an outline, such as the
+    grain of a table, is no edge of it.
+    """
+    across = np.array(np.gradient(gaussian_filter(mask.astype(float), NEAR)))
+    across /= np.maximum(np.linalg.norm(across, axis=0), np.finfo(float).tiny)
+    lab = np.moveaxis(np.asarray(rgb2lab(picture)), -1, 0)
+    slopes = [across[0] * _slope(one, 0) + across[1] * _slope(one, 1) for one in lab]
+    steep = np.linalg.norm(slopes, axis=0)
+    return np.sqrt(2 * np.pi) * SIGMA * maximum_filter(steep, 2 * NEAR + 1)
+
+
+def _slope(one: Float[np.ndarray, "h w"], axis: int) -> Float[np.ndarray, "h w"]:
+    return gaussian_filter1d(gaussian_filter1d(one, SIGMA, axis, order=1), SIGMA, 1 - axis)
