@@ -4,7 +4,7 @@ import numpy as np
 import pytest
 
 from corporeal.geometry.mesh import Mesh
-from corporeal.render.camera import camera_of
+from corporeal.render.camera import Aim, camera_of
 from corporeal.render.embree import identify
 from corporeal.render.stage import Stage
 from corporeal.splats.quality import Quality
@@ -110,3 +110,12 @@ def test_masks_that_no_surface_can_fill_are_of_something_else_too():
     why = unlike_masks(block, cameras, masks | wall, given=False)
     assert why is not None and "The shape contradicts the photographs" in why and "--force" in why
     assert unlike_masks(block, cameras, masks | wall) is None, "somebody said that it is the thing"
+
+
+def test_what_was_seen_from_one_side_only_is_refused():
+    """A television from a fifth of the circle became a block, and was filmed."""
+    turns = np.radians(np.linspace(0, 60, 12))
+    eyes = np.stack([3 * np.cos(turns), 3 * np.sin(turns), np.full(12, 0.8)], axis=-1)
+    few = tuple(camera_of(Aim(tuple(e), (0.0, 0.0, 0.0), 40.0, 64, 48)) for e in eyes)
+    why = not_worth(np.array([box(0.1, 0.1)]), few, masked=True)
+    assert why is not None and "nothing says how deep it is" in why and "--force" in why

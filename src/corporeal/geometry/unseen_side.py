@@ -15,6 +15,13 @@ GAP = 60.0
 HALF = 180.0
 """Such an angle from which on a flat face that looks to its middle is in no photograph [deg]."""
 
+QUARTER = 90.0
+"""Angle of the circle around a thing, below which outlines leave its depth open [deg]: between two
+tangent cones that are so far apart a ball reaches 1 / sin 45° = 1.4 times as deep as it is."""
+STEEP = 45.0
+"""Height of a camera over the floor's horizon from which on a thing that stands there seems no
+deeper than it is by its height [deg]."""
+
 
 @dataclass(frozen=True)
 class _Gap:
@@ -63,9 +70,39 @@ def unseen_half(cameras: Sequence[Camera], names: Sequence[str]) -> str | None:
     )
 
 
+def hardly_round(cameras: Sequence[Camera]) -> str | None:
+    """Say in a clause that photographs leave open how deep things are; None: they do not.
+
+    Args:
+        cameras: Of the photographs.
+
+    """
+    angle, order = _around(tuple(cameras))
+    seen = 360 - float(_gaps(angle, order).max())
+    if seen >= QUARTER or _steepest(tuple(cameras)) >= STEEP:
+        return None
+    return (
+        f"all photographs were taken from {seen:.0f}° of the circle around it, and none from "
+        "steeply above, so that nothing says how deep it is"
+    )
+
+
+def _steepest(cameras: tuple[Camera, ...]) -> float:
+    """Return how high the highest camera stands over the middle of what all look at [deg]."""
+    away = np.stack([c.world_from_camera[:3, 3] for c in cameras])
+    away -= np.array(region(cameras).centre)
+    sine = away @ level(cameras).up / np.maximum(np.linalg.norm(away, axis=1), np.finfo(float).tiny)
+    return float(np.degrees(np.arcsin(np.clip(sine, -1, 1))).max())
+
+
+def _gaps(angle: Float[np.ndarray, " V"], order: np.ndarray) -> Float[np.ndarray, " V"]:
+    """Return the angle from each camera to the next around the circle [deg]."""
+    return np.degrees(np.diff(np.append(angle[order], angle[order[0]] + 2 * np.pi)))
+
+
 def _widest(cameras: Sequence[Camera], names: Sequence[str]) -> _Gap:
     angle, order = _around(tuple(cameras))
-    gaps = np.degrees(np.diff(np.append(angle[order], angle[order[0]] + 2 * np.pi)))
+    gaps = _gaps(angle, order)
     widest = int(gaps.argmax())
     first, second = int(order[widest]), int(order[(widest + 1) % len(order)])
     return _Gap(float(gaps[widest]), f"{names[first]} and {names[second]}")

@@ -10,6 +10,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.region import region
 from corporeal.geometry.silhouette_overlap import compared
 from corporeal.geometry.silhouettes import FILLED
+from corporeal.geometry.unseen_side import hardly_round
 from corporeal.splats.quality import Quality
 from corporeal.types import Camera
 
@@ -56,6 +57,8 @@ def not_worth(
     """
     if not cameras:
         return None
+    if (why := hardly_round(cameras)) is not None:
+        return f"The shape would be made up: {why}. Photograph it from all sides. {GO_ON}"
     if quality is not None and quality.psnr < GREY:
         return (
             f"The shapes would be made up: photographs that were not learned from look otherwise "
