@@ -97,3 +97,13 @@ def test_sizes_of_what_nobody_named_can_be_stated():
     with pytest.raises(UserError, match="no object 'duck'"):
         check_extents(["duck=0.2"], [], "banana")
     assert metres({"axe": 2.0}, [usual("axe")], ["object=0.5"]).metres_per_unit == 0.25
+
+
+def test_a_size_that_nobody_stated_is_said_of_who_names_the_thing(tmp_path):
+    (said,) = [w for w in made(tmp_path, "one", things=("banana",)).found.warnings if "large" in w]
+    assert said == (
+        "Nobody said how large it is: made as large as a banana usually is, 19 cm. "
+        "State a size with --extent banana=METRES."
+    )
+    stated = made(tmp_path, "two", ("banana=0.2",), things=("banana",)).found.warnings
+    assert not any("how large" in w for w in stated)

@@ -186,6 +186,24 @@ def said_by_name(source: str, seen: SeenObject, name: str) -> str:
     )
 
 
+def said_by_class(objects: Sequence[SeenObject], names: Sequence[str]) -> str:
+    """Say that nobody stated a size, what was taken for it, and how to say it better.
+
+    Args:
+        objects: What there is, as far as it is known.
+        names: What they are called in the scene.
+
+    """
+    sized = [(o, name) for o, name in zip(objects, names, strict=True) if o.extent is not None]
+    usually = (one_of(one.class_name, "usually is", "usually are") for one, _ in sized)
+    large = (f"{u}, {length(one.extent or 0)}" for u, (one, _) in zip(usually, sized, strict=True))
+    them = "it is" if len(objects) == 1 else "they are"
+    return (
+        f"Nobody said how large {them}: made as large as {'; '.join(dict.fromkeys(large))}. "
+        f"State a size with --extent {sized[0][1]}=METRES."
+    )
+
+
 def names_of(objects: Sequence[SeenObject]) -> list[str]:
     """Return what objects are called."""
     return unique([safe(one.class_name) or UNKNOWN for one in objects])
