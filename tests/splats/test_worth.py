@@ -8,7 +8,14 @@ from corporeal.render.camera import Aim, camera_of
 from corporeal.render.embree import identify
 from corporeal.render.stage import Stage
 from corporeal.splats.quality import Quality
-from corporeal.splats.worth import GREY, goes_beyond, not_worth, told_otherwise, unlike_masks
+from corporeal.splats.worth import (
+    GREY,
+    falls_apart,
+    goes_beyond,
+    not_worth,
+    told_otherwise,
+    unlike_masks,
+)
 from patterned_scene import OF_SLAB, patterned, ring
 from patterned_scene import box as made_box
 
@@ -42,6 +49,15 @@ def test_without_masks_a_thing_that_fills_the_pictures_is_all_there_is():
     why = refused(box(0.6, 0.2))
     assert why is not None and "as long as the ball" in why and "--floor-at" in why
     assert refused(box(0.6, 0.2), masked=True) is None, "somebody said that it is the thing"
+
+
+def test_what_falls_apart_and_was_seen_from_one_side_is_refused():
+    half = CAMERAS[:10]  # of 20 all around: 198 degrees are left
+    why = falls_apart(2, half)
+    assert why is not None and "in 2 pieces, and from 198°" in why and "--force" in why
+    assert falls_apart(1, half) is None, "one thing in one piece"
+    assert falls_apart(2, CAMERAS) is None, "a warning says it where all sides were seen"
+    assert falls_apart(2, []) is None, "a splat without cameras"
 
 
 def test_what_pictures_cut_off_is_the_room():

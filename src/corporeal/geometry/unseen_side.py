@@ -70,6 +70,11 @@ def unseen_half(cameras: Sequence[Camera], names: Sequence[str]) -> str | None:
     )
 
 
+def mostly_unseen(cameras: Sequence[Camera]) -> float:
+    """Return the widest angle of the circle around what cameras look at that none is in [deg]."""
+    return float(_gaps(*_around(tuple(cameras))).max())
+
+
 def hardly_round(cameras: Sequence[Camera]) -> str | None:
     """Say in a clause that photographs leave open how deep things are; None: they do not.
 
@@ -77,8 +82,7 @@ def hardly_round(cameras: Sequence[Camera]) -> str | None:
         cameras: Of the photographs.
 
     """
-    angle, order = _around(tuple(cameras))
-    seen = 360 - float(_gaps(angle, order).max())
+    seen = 360 - mostly_unseen(cameras)
     if seen >= QUARTER or _steepest(tuple(cameras)) >= STEEP:
         return None
     return (

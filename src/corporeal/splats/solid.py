@@ -6,7 +6,7 @@ and where objects touch every place inside belongs to the nearer one's Gaussians
 both are drawn back to a common face.
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 from jaxtyping import Bool, Float, Int, UInt8
@@ -88,8 +88,16 @@ class Solid:
     """The nearest of the object's own."""
     cell: float
     """Of the grid that it was carved from [m]."""
-    warnings: tuple[str, ...] = field(default=())
-    """What a reader of the report should know, in sentences."""
+    pieces: int = 1
+    """How many separate ones it is in."""
+    unsound: tuple[str, ...] = ()
+    """What is wrong with the surface, in sentences."""
+
+    @property
+    def warnings(self) -> tuple[str, ...]:
+        """What a reader of the report should know, in sentences."""
+        apart = (f"It was reconstructed in {self.pieces} separate pieces.",)
+        return (*apart * (self.pieces > 1), *self.unsound)
 
     @property
     def volume(self) -> float:
@@ -231,12 +239,12 @@ def _missing(k: int) -> UserError:
 
 def _solid(scene: _Scene, k: int, survey: _Survey, pool: ThreadPool) -> Solid:
     grid = survey.grids[k]
-    distance, cut, warnings = _emptied(grid, scene, k, survey, pool)
+    distance, cut, count = _emptied(grid, scene, k, survey, pool)
     mesh = _surface(distance, grid)
     finer = _finer(mesh, grid, scene, k)
     if finer is not None:
         grid = finer
-        distance, cut, warnings = _emptied(grid, scene, k, survey, pool)
+        distance, cut, count = _emptied(grid, scene, k, survey, pool)
         mesh = _surface(distance, grid)
     mesh = _without_specks(mesh)
     contact = cut[*grid.at(mesh.vertices).T]
@@ -250,14 +258,15 @@ def _solid(scene: _Scene, k: int, survey: _Survey, pool: ThreadPool) -> Solid:
         colours=_coloured(mesh, scene, gaussian, _painted(mesh, scene.rendering, grid.cell, pool)),
         gaussian_of_vertex=gaussian,
         cell=grid.cell,
-        warnings=(*warnings, *_checked(mesh, distance, grid)),
+        pieces=count,
+        unsound=_checked(mesh, distance, grid),
     )
 
 
 def _emptied(
     grid: Grid, scene: _Scene, k: int, survey: _Survey, pool: ThreadPool
-) -> tuple[Float[np.ndarray, "X Y Z"], Bool[np.ndarray, "X Y Z"], tuple[str, ...]]:
-    """Carve an object; return its distance [m], where it meets others, and warnings."""
+) -> tuple[Float[np.ndarray, "X Y Z"], Bool[np.ndarray, "X Y Z"], int]:
+    """Carve an object; return its distance [m], where it meets others, and its pieces."""
     distance = carved(grid, scene.rendering, scene.floor, pool)
     if scene.shallow is not None:
         assert scene.shown is not None
@@ -266,10 +275,10 @@ def _emptied(
         distance = needed(shallow, distance, grid, scene.shown == k, rows, pool)
         distance = entered(shallow, distance, mouth / grid.cell)
     cut = _share(distance, grid, scene, k, survey)
-    warnings = _cleaned(distance)
+    count = _cleaned(distance)
     if not (distance < 0).any():
         raise _missing(k)
-    return distance, cut, warnings
+    return distance, cut, count
 
 
 def _finer(mesh: Mesh, grid: Grid, scene: _Scene, k: int) -> Grid | None:
@@ -349,16 +358,15 @@ def _apart(mean: Float[np.ndarray, "N 3"], places: Float[np.ndarray, "M 3"]) -> 
     return np.asarray(found).reshape(len(places), -1).mean(axis=1)
 
 
-def _cleaned(distance: Float[np.ndarray, "X Y Z"]) -> tuple[str, ...]:
-    """Remove crumbs that hang in the air; say so where an object is in pieces."""
+def _cleaned(distance: Float[np.ndarray, "X Y Z"]) -> int:
+    """Remove crumbs that hang in the air; return how many pieces are left."""
     pieces = np.asarray(measure.label(distance < 0, connectivity=1))
     count = int(pieces.max())
     sizes = np.bincount(pieces.ravel(), minlength=count + 1)[1:]
     small = np.flatnonzero(sizes < CRUMB * sizes.sum()) + 1
     gone = np.isin(pieces, small)
     distance[gone] = np.abs(distance[gone])
-    left = count - len(small)
-    return (f"It was reconstructed in {left} separate pieces.",) if left > 1 else ()
+    return count - len(small)
 
 
 def _fitted(

@@ -10,7 +10,7 @@ from corporeal.geometry.mesh import Mesh
 from corporeal.geometry.region import region
 from corporeal.geometry.silhouette_overlap import compared
 from corporeal.geometry.silhouettes import FILLED
-from corporeal.geometry.unseen_side import hardly_round
+from corporeal.geometry.unseen_side import HALF, hardly_round, mostly_unseen
 from corporeal.splats.quality import Quality
 from corporeal.types import Camera
 
@@ -77,6 +77,26 @@ def not_worth(
             what = f"{longest / radius / 2:.1f} times as long as the ball that the cameras look at"
             return f"The thing would be all that is in the pictures, {what}. {SAY_WHAT}"
     return None
+
+
+def falls_apart(pieces: int, cameras: Sequence[Camera]) -> str | None:
+    """Return in a sentence or two why a surface that nobody masked is not to be believed; None.
+
+    One object is in one piece. Where half of the circle around it was not seen, nothing but colours
+    told it from what stands behind it.
+
+    Args:
+        pieces: That one object came out in.
+        cameras: That took the photographs; (): nobody knows, and nothing is said.
+
+    """
+    if pieces < 2 or not cameras or (unseen := mostly_unseen(cameras)) < HALF:
+        return None
+    return (
+        f"The shape contradicts itself: one thing came out in {pieces} pieces, and from "
+        f"{unseen:.0f}° of the circle around it nobody looked. Photograph it from there, too. "
+        f"{SAY_WHAT}"
+    )
 
 
 def goes_beyond(masks: Bool[np.ndarray, "V H W"]) -> str | None:

@@ -41,7 +41,7 @@ from corporeal.splats.discs import backed
 from corporeal.splats.foreground import sunk
 from corporeal.splats.intake import Intake, turned_upright
 from corporeal.splats.thread_pool import ThreadPool
-from corporeal.splats.worth import goes_beyond, not_worth, told_otherwise, unlike_masks
+from corporeal.splats.worth import falls_apart, goes_beyond, not_worth, told_otherwise, unlike_masks
 from corporeal.types import Camera, Finish, Gaussians, Reconstruction, Scene, SceneObject, Surface
 from corporeal.vlm.seen_objects import (
     UNKNOWN,
@@ -240,7 +240,9 @@ def _why_not(found: FoundObjects, photographers: Sequence[Camera], masked: bool)
     if why is not None or taken.masks is None or not photographers:
         return why
     meshes = [Mesh(solid.vertices, solid.triangles) for solid in found.solids]
-    return unlike_masks(meshes, photographers, taken.masks, given=masked)
+    most = max(solid.pieces for solid in found.solids)
+    apart = None if masked else falls_apart(most, photographers)
+    return apart or unlike_masks(meshes, photographers, taken.masks, given=masked)
 
 
 @dataclass(frozen=True)
