@@ -1,5 +1,6 @@
 """Pictures of another side that looks alike are told by the floor that they do not share."""
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -7,10 +8,11 @@ import pytest
 
 from corporeal.formats.colmap import ColmapCamera, ColmapImage, ColmapModel
 from corporeal.poses import look_alikes as check
+from corporeal.poses import pose as posing
 from corporeal.poses.attempt import Attempt
 from corporeal.poses.gather import Gathered
 from corporeal.poses.judge import doubt_of_neighbours, doubts
-from corporeal.poses.look_alikes import checked_by_neighbours, groups_of, look_alikes
+from corporeal.poses.look_alikes import borne_out, checked_by_neighbours, groups_of, look_alikes
 from corporeal.poses.pairs import pairs_of
 from corporeal.render.camera import camera_of
 from patterned_scene import ring
@@ -123,3 +125,47 @@ def test_few_that_are_misplaced_are_taken_out_and_many_are_not(half, tmp_path, m
 def test_nothing_is_looked_for_where_nothing_was_found():
     told = Attempt("plain", 24)
     assert checked_by_neighbours(told, Path("nowhere"), ALBUM) is told
+
+
+SPARSE = Attempt("plain", COUNT, COUNT, 500, 0.9, focal=0.8)
+"""What is told of few points, where each picture sees some hundreds."""
+
+
+def test_few_points_are_enough_where_neighbours_agree(tmp_path, monkeypatch):
+    monkeypatch.setattr(check, "read_colmap", lambda place: model_of(AROUND, np.zeros(COUNT)))
+    assert doubts(SPARSE) != []
+    assert borne_out(SPARSE, tmp_path, ALBUM)
+    also = replace(SPARSE, focal=4.0)
+    assert not borne_out(also, tmp_path, ALBUM), "no lens is like that"
+    assert not borne_out(replace(SPARSE, points=900), tmp_path, ALBUM), "it is believed anyway"
+
+
+@pytest.mark.parametrize("why", ["folded", "apart", "few"])
+def test_few_points_are_not_where_nothing_speaks_for_them(why, tmp_path, monkeypatch):
+    model = model_of(AROUND * (1 + (why == "apart")), np.zeros(COUNT))
+    if why == "folded":
+        model = model_of(FOLDED, FOLDED != AROUND)
+    if why == "few":
+        model = replace(model, sightings=model.sightings[::40])
+    monkeypatch.setattr(check, "read_colmap", lambda place: model)
+    album = replace(ALBUM, pairs=()) if why == "apart" else ALBUM  # none was compared
+    assert not borne_out(SPARSE, tmp_path, album)
+
+
+@pytest.mark.parametrize("sure", [True, False])
+def test_a_search_for_more_points_is_left_where_its_neighbours_contradict(
+    sure, tmp_path, monkeypatch
+):
+    around, folded = model_of(AROUND, np.zeros(COUNT)), model_of(FOLDED, FOLDED != AROUND)
+    more = Attempt("thorough", COUNT, COUNT, 5000, 1.2, focal=0.6, parted=(12, 12))
+    monkeypatch.setattr(check, "read_colmap", lambda place: around if sure else folded)
+    monkeypatch.setattr(posing, "_gathered", lambda *_: ([], ALBUM))
+    monkeypatch.setattr(posing, "_places", lambda *_: (ALBUM, 0))
+    monkeypatch.setattr(posing, "_tried", lambda *_: ([SPARSE, more], ()))
+    monkeypatch.setattr(posing, "read_colmap", lambda place: around)
+    monkeypatch.setattr(posing, "mirrored", lambda model: None)
+    monkeypatch.setattr(posing, "apart", lambda place: 0.0)
+    monkeypatch.setattr(posing, "_told", lambda *what: what)
+    *_, best = posing._found(tmp_path, tmp_path, lambda share, words: None)
+    assert best == (SPARSE if sure else more)
+    assert (doubt_of_neighbours(best) == "") == sure

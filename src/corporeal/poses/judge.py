@@ -4,6 +4,8 @@ A wrong model looks like a model: low reprojection error says nothing. What spea
 found on right and wrong models of the same pictures, docs/inputs.md, "Photographs without poses".
 """
 
+from dataclasses import replace
+
 from corporeal.geometry.silhouettes import FILLED
 from corporeal.poses.attempt import SHARE, Attempt
 
@@ -60,6 +62,12 @@ def doubts(told: Attempt) -> list[str]:
     return found
 
 
+def sparse_alone(told: Attempt) -> bool:
+    """Tell whether nothing speaks against a model but that its points are few."""
+    enough = replace(told, points=POINTS * told.registered)
+    return bool(doubts(told)) and not doubts(enough)
+
+
 def too_few(told: Attempt, others: int) -> str | None:
     """Say in a clause that most of a folder was not placed, if so.
 
@@ -94,7 +102,8 @@ def doubt_of_neighbours(told: Attempt) -> str:
     sizes = " and ".join(str(n) for n in told.parted[:3])
     return (
         f"pictures that would have been taken side by side, in groups of {sizes}, share too little "
-        "of what both show: two sides look alike, something was moved, or they show several things"
+        "of what both show: they were put in wrong places, as where a pattern repeats or two sides "
+        "look alike; or they show several things, or one that was moved"
     )
 
 
@@ -107,9 +116,10 @@ def doubt_of_masks(told: Attempt) -> str | None:
     """
     if told.filled >= FILLED:
         return None
+    placed = "some pictures were put in wrong places, " if told.parted else ""
     return (
-        f"All masks together leave {told.filled:.0%} of what each shows: the object was moved or "
-        "turned over between the pictures, or masks miss parts of it. Look at the masks."
+        f"All masks together leave {told.filled:.0%} of what each shows: {placed}the object was "
+        "moved or turned over between the pictures, or masks miss parts of it. Look at the masks."
     )
 
 

@@ -14,11 +14,13 @@ from pathlib import Path
 
 import numpy as np
 from jaxtyping import Float
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import connected_components
 
 from corporeal.formats.colmap import ColmapModel, read_colmap
 from corporeal.poses.attempt import SHARE, Attempt, matched, without_pictures
 from corporeal.poses.gather import Gathered
-from corporeal.poses.judge import doubts
+from corporeal.poses.judge import POINTS, doubts, sparse_alone
 
 NEAR = 18.0
 """Largest angle between the lines of sight of two pictures that are compared, the median [deg]. At
@@ -77,14 +79,44 @@ def look_alikes(
     names = [image.name for image in model.images]
     if not len(model.sightings):
         return (tuple(names),)
+    groups = groups_of(np.nan_to_num(_agreed(model, compared)))
+    return tuple(tuple(sorted(names[k] for k in group)) for group in groups)
+
+
+def borne_out(told: Attempt, place: Path, gathered: Gathered) -> bool:
+    """Tell whether neighbours speak for a model against which only is that its points are few.
+
+    Many pictures of little that has a pattern share few points, of which each sees enough: what
+    places it are those. That nothing contradicts is not enough: neighbours must agree, and join all
+    that must be placed.
+
+    Args:
+        told: What came of the attempt.
+        place: Holds its model.
+        gathered: All pictures.
+
+    """
+    if not sparse_alone(told):
+        return False
+    model, order = read_colmap(place), gathered.names
+    if len(model.sightings) < POINTS * len(model.images):
+        return False
+    compared = [(order[a], order[b]) for a, b in matched(gathered, told.way)]
+    agreed = _agreed(model, compared)
+    _, label = connected_components(csr_array(agreed > 0), directed=False)
+    joined = int(np.bincount(label).max())
+    return len(groups_of(np.nan_to_num(agreed))) == 1 and joined >= SHARE * told.pictures
+
+
+def _agreed(model: ColmapModel, compared: Collection[tuple[str, str]]) -> Float[np.ndarray, "N N"]:
+    """Return how far pairs speak for one place; NaN: they are no neighbours, or not compared."""
+    names = [image.name for image in model.images]
     place = {name: k for k, name in enumerate(names)}
     known = np.zeros((len(names), len(names)), bool)
     for a, b in compared:
         if a in place and b in place:
             known[place[a], place[b]] = known[place[b], place[a]] = True
-    agreed = np.where(known, covered(model) - COVERED, np.nan)
-    groups = groups_of(np.nan_to_num(agreed))
-    return tuple(tuple(sorted(names[k] for k in group)) for group in groups)
+    return np.where(known, covered(model) - COVERED, np.nan)
 
 
 def covered(model: ColmapModel) -> Float[np.ndarray, "N N"]:

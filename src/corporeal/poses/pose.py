@@ -41,7 +41,7 @@ from corporeal.poses.judge import (
     names_of,
     too_few,
 )
-from corporeal.poses.look_alikes import checked_by_neighbours
+from corporeal.poses.look_alikes import borne_out, checked_by_neighbours
 from corporeal.poses.middles import AS_TAKEN, CROPPED, SLIGHTLY_CROPPED, apart, clause, sentence
 from corporeal.poses.mirrored import TWO_KINDS, mirrored
 from corporeal.poses.pairs import partners_of
@@ -58,12 +58,16 @@ SAID: dict[Way, str] = {
 LEAST = 6
 """Photographs: fewer that were taken all around are more than 60° apart, and share nothing."""
 FOUND, BEGUN, FIGURE = "poses.json", "begun.json", "cameras.png"
-METHOD = 8
+METHOD = 9
 """Raised when other poses would be found: those of an older method are looked for again."""
 GATHERED = 0.1
 """Share of the work that is done when photographs are read."""
 LOOKED = 0.15
 """The same, when it is known whether they show one place."""
+SPARSE = (
+    "Points that pictures share are few, but they agree with what neighbours show. A search for "
+    "more was not believed."
+)
 LOOKING = "looking whether all show one place"
 UNTIL: dict[Way, float] = {"plain": 0.5, "masked": 0.7, "thorough": 1.0}
 """The same, after each attempt, in their order."""
@@ -135,9 +139,10 @@ def moved_within(posed: Posed, masks: Path) -> str | None:
     share = filled_share(posed.folder / "sparse" / "0", masks)
     if share >= FILLED:
         return None
+    wrong = "they were put in wrong places, as where a pattern repeats, " if posed.doubt else ""
     return (
         "the pictures fit together by what is around the object, but its outlines contradict one "
-        f"another (together they leave {share:.0%} of what each shows): some of them show "
+        f"another (together they leave {share:.0%} of what each shows): {wrong}some of them show "
         "something else, or it was moved or turned over between the pictures"
     )
 
@@ -215,9 +220,8 @@ def _found(source: Path, folder: Path, progress: Progress) -> _Kept:
         return looked
     gathered, others = looked
     tried, smeared = _tried(folder, gathered, progress)
-    believed = [told for told in tried if not doubts(told)]
-    if believed:  # the first of those that masks agree with best: masks may be poor
-        best = max(believed, key=lambda told: told.filled)
+    best = _best_of(tried, folder, gathered)
+    if best is not None:
         if (why := too_few(best, others)) is not None:
             return _refused([why], gathered, smeared, tried=tuple(tried))
         place = folder / best.way / "sparse" / "0"
@@ -301,6 +305,23 @@ def _checked(told: Attempt, folder: Path, gathered: Gathered) -> Attempt:
     return checked_by_masks(checked_by_neighbours(told, place, gathered), folder, place)
 
 
+def _best_of(tried: list[Attempt], folder: Path, gathered: Gathered) -> Attempt | None:
+    """Return the first attempt of those that masks agree with best, as masks may be poor; or None.
+
+    Where its neighbours contradict, one that was doubted for few points alone, and with which
+    neighbours and masks agree, is taken.
+    """
+    believed = [told for told in tried if not doubts(told)]
+    best = max(believed, key=lambda told: told.filled, default=None)
+    if best is None or not best.parted:
+        return best
+    for told in tried:
+        place = folder / told.way / "sparse" / "0"
+        if doubt_of_masks(told) is None and borne_out(told, place, gathered):
+            return told
+    return best
+
+
 def _worth_trying(way: Way, folder: Path, tried: list[Attempt], smeared: int) -> bool:
     """Tell whether an attempt can better those before: thorough where none is believed."""
     if way == "masked":
@@ -342,6 +363,8 @@ def _told(
         f"{last.reprojection:.2f} px reprojection error, focal length {last.focal:.2f} × the "
         "longer side."
     )
+    if doubts(last):
+        said = (*said, SPARSE)
     warnings = list(gathered.said)
     if last.left_out:
         warnings.append(
