@@ -176,4 +176,6 @@ def adjust_by_edges(pycolmap: Any, model: Any, images: Path) -> None:
         model.cameras[number].params = numbers_of
     for number, where in zip(numbers, found.points, strict=True):
         model.points3D[number].xyz = where
+    # Points may have passed behind a camera, of which a reprojection error says nothing.
+    pycolmap.ObservationManager(model).filter_observations_with_negative_depth()
     model.update_point_3d_errors()
