@@ -1,6 +1,7 @@
 """Pictures of something else on the same floor, which the floor places as well as the object."""
 
 import shutil
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -125,3 +126,23 @@ def test_poses_that_neighbours_and_outlines_speak_against_are_refused_at_once(
     with pytest.raises(BadFileError, match="doubt"):
         picture_intake._posed(tmp_path, ReconstructConfig(), run, lambda share, words: None)
     assert asked == [True], "masks are not grown again"
+
+
+@pytest.mark.parametrize("masks", ["agree", "contradict", "forced", "not asked"])
+def test_masks_that_were_given_are_asked_about_poses_that_neighbours_doubt(
+    masks, tmp_path, monkeypatch
+):
+    wrong = range(0, COUNT, 2) if masks != "agree" else ()
+    posed, _ = placed(tmp_path, wrong)
+    monkeypatch.setattr(picture_intake, "unposed", lambda source: True)
+    monkeypatch.setattr(picture_intake, "pose", lambda *_: posed)
+    monkeypatch.setattr(picture_intake, "listed", lambda folder: SimpleNamespace(shots=()))
+    monkeypatch.setattr(picture_intake, "has_masks", lambda shots: True)
+    how = "none" if masks == "not asked" else "auto"
+    config = ReconstructConfig(masks=how, force=masks == "forced")
+    if masks == "contradict":
+        with pytest.raises(BadFileError, match=r"doubt\. Put it on something with a pattern"):
+            picture_intake._posed(tmp_path, config, tmp_path / "run", lambda share, words: None)
+        return
+    found = picture_intake._posed(tmp_path, config, tmp_path / "run", lambda share, words: None)
+    assert found is not None and found.warnings == ("Doubt.", "before")

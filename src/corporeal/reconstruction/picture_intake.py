@@ -45,6 +45,13 @@ STAND_STILL = (
     "Photograph it while neither it nor what is around it moves, give masks (a folder 'masks' with "
     "the names of the pictures), or go on all the same with --force."
 )
+STAND_OUT = (
+    "Put it on something with a pattern that does not repeat, such as a newspaper, and photograph "
+    "it in steps of at most 15°. "
+)
+"""What helps where pictures may have been put in wrong places."""
+LOOK_AT_MASKS = "Look at the masks, too. --force goes on all the same."
+"""What else helps, where somebody gave masks."""
 ALL_OF_IT = (
     "Give masks (a folder 'masks' with the names of the pictures), or grow them with 'corporeal "
     "masks' and correct them; or photograph it on a ground of another colour, from more sides. "
@@ -153,9 +160,13 @@ def _posed(
         return None
     place = Path(tempfile.mkdtemp(prefix="corporeal-")) if folder is None else folder
     posed = pose(source, place / POSES, within(progress, 0.0, POSED * WHOLE))
-    if config.masks != AUTO or has_masks(listed(posed.folder).shots):
-        return posed
     with noticed(posed.warnings):
+        if config.masks != AUTO:
+            return _doubted(source, posed, force=True)
+        if has_masks(listed(posed.folder).shots):
+            masks = posed.folder / MASKS[0]
+            sure = config.force or not posed.doubt or moved_within(posed, masks) is None
+            return _doubted(source, posed, sure, LOOK_AT_MASKS)
         return _seen_to_agree(source, posed, config.force, place, progress)
 
 
@@ -190,7 +201,8 @@ def _seen_to_agree(
         how = f"{said}. Where each was taken from was found from points on the object alone."
         return replace(again, warnings=(how, *again.warnings))
     if not force:
-        raise BadFileError(source, f"{why}, and it has too few points of its own.", STAND_STILL)
+        step = STAND_OUT + STAND_STILL if posed.doubt else STAND_STILL
+        raise BadFileError(source, f"{why}, and it has too few points of its own.", step)
     return replace(posed, warnings=(f"{said}.", *posed.warnings))
 
 
@@ -219,13 +231,14 @@ def _less_strangers(
     return posed, grown
 
 
-def _doubted(source: Path, posed: Posed, force: bool) -> Posed:
+def _doubted(source: Path, posed: Posed, force: bool, step: str = STAND_STILL) -> Posed:
     """Refuse poses in which neighbours share too little, or say so in a warning.
 
     Args:
         source: The photographs.
         posed: Where they were taken from.
         force: Whether masks agree with that, or somebody wants to go on.
+        step: What to do beside showing more of a pattern.
 
     Raises:
         BadFileError: They are such, and nothing speaks for them.
@@ -234,6 +247,6 @@ def _doubted(source: Path, posed: Posed, force: bool) -> Posed:
     if not posed.doubt:
         return posed
     if not force:
-        raise BadFileError(source, f"{posed.doubt}.", STAND_STILL)
+        raise BadFileError(source, f"{posed.doubt}.", STAND_OUT + step)
     said = f"{posed.doubt[0].upper()}{posed.doubt[1:]}."
     return replace(posed, warnings=(said, *posed.warnings))
