@@ -165,7 +165,9 @@ def test_a_search_for_more_points_is_left_where_its_neighbours_contradict(
     monkeypatch.setattr(posing, "read_colmap", lambda place: around)
     monkeypatch.setattr(posing, "mirrored", lambda model: None)
     monkeypatch.setattr(posing, "apart", lambda place: 0.0)
-    monkeypatch.setattr(posing, "_told", lambda *what: what)
-    *_, best = posing._found(tmp_path, tmp_path, lambda share, words: None)
+    taken: list[Attempt] = []
+    monkeypatch.setattr(posing, "_told", lambda *what: taken.append(what[-1]))
+    posing._found(tmp_path, tmp_path, lambda share, words: None)
+    (best,) = taken
     assert best == (SPARSE if sure else more)
     assert (doubt_of_neighbours(best) == "") == sure
