@@ -1,6 +1,6 @@
 """Every law of nature is asked of every engine."""
 
-from functools import cache
+from functools import cache, partial
 
 import jaxtyping
 import pytest
@@ -29,9 +29,13 @@ def unchecked():
 @cache
 def built(name):
     """Give a function that builds an engine; the one for cards is on the processor, or on CARD."""
-    chosen = on_device if name == "cuda" else load("engine", name, MENU)
+    chosen = load("engine", name, MENU)
     chosen.round_off = ROUND_OFF[name]
-    return chosen
+    if name != "cuda":
+        return chosen
+    here = partial(on_device)
+    here.round_off = ROUND_OFF[name]
+    return here
 
 
 def asked(name):

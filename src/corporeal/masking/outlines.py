@@ -56,7 +56,7 @@ def thinness(inside: Float32[np.ndarray, "V H W"]) -> float:
 
 
 def _rim(mask: Bool[np.ndarray, "h w"]) -> Bool[np.ndarray, "h w"]:
-    return mask & ~binary_erosion(mask, border_value=1)
+    return mask & ~np.asarray(binary_erosion(mask, border_value=1), np.bool_)
 
 
 def _at_border(shape: tuple[int, ...]) -> Bool[np.ndarray, "H W"]:
