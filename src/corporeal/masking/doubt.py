@@ -29,6 +29,7 @@ hulls forgive of views."""
 THINNEST = 0.2
 """Share of masks that are their outermost pixels: if masks are but a pixel too wide, as they were
 where colours tell best, they overlap with right ones by less than .8."""
+TAKEN = "what was taken for the thing"
 CONTRADICT = "its outlines contradict each other"
 
 
@@ -60,10 +61,8 @@ def incomplete(grown: Grown | None) -> str | None:
     """Return in a clause why nobody can tell all of what the photographs are of; None: masks do."""
     if grown is None or grown.left_over <= LEFT_OVER:
         return None
-    return (
-        "not all of it can be told from its ground: beside what was taken for the thing, "
-        f"{grown.left_over:.1f} times as much with its colours is seen on the floor in the middle"
-    )
+    more = "with its colours is seen on the floor in the middle"
+    return _not_all(TAKEN, grown.left_over, more)
 
 
 def lacking(grown: Grown | None) -> str | None:
@@ -76,11 +75,13 @@ def lacking(grown: Grown | None) -> str | None:
     hovers = grown.lowest > HIGH
     if (much := bordering(grown)) <= (LEFT_OVER if hovers else HANGING):
         return None
-    taken = "what was taken for the thing" + (", which hovers above the floor" if hovers else "")
-    return (
-        f"not all of it can be told from its ground: beside {taken}, "
-        f"{much:.1f} times as much in other colours stands on the floor and borders on it"
-    )
+    taken = f"{TAKEN}, which hovers above the floor" if hovers else TAKEN
+    return _not_all(taken, much, "in other colours stands on the floor and borders on it")
+
+
+def _not_all(taken: str, much: float, more: str) -> str:
+    ground = "not all of it can be told from its ground"
+    return f"{ground}: beside {taken}, {much:.1f} times as much {more}"
 
 
 def too_thin(grown: Grown | None) -> str | None:
@@ -88,7 +89,7 @@ def too_thin(grown: Grown | None) -> str | None:
     if grown is None or grown.thinness <= THINNEST:
         return None
     return (
-        "it is too thin in the photographs: of what was taken for the thing "
+        f"it is too thin in the photographs: of {TAKEN} "
         f"{grown.thinness:.0%} are the pixels along its outline, and these are not sure, so "
         "photograph it from nearer"
     )

@@ -241,18 +241,17 @@ def hollow(tokens: tuple[str, ...]) -> bool:
     return _is_one(tokens, "hollow")
 
 
-def wall_of(tokens: tuple[str, ...], material: str, table: str = "walls") -> float | None:
-    """Return the wall [m] of things of a table where they are of such a material; None: of none.
+def wall_of(tokens: tuple[str, ...], material: str) -> float | None:
+    """Return the wall [m] of what is hollow where it is of such a material; None: of none.
 
     A chair of plastic is moulded, one of steel is of tubes.
 
     Args:
         tokens: Of a name.
         material: What the thing is of.
-        table: "walls", of what is hollow where it is of it.
 
     """
-    row = wall_row(tokens, material, table)
+    row = wall_row(tokens, material, "walls")
     return None if row is None else row["thickness_mm"] * 1e-3
 
 
