@@ -59,12 +59,27 @@ class Inbox:
                     return path
         raise UserError("There is no such upload.")
 
-    def room(self) -> int:
-        """Return how much may still come [bytes]."""
+    def room(self) -> tuple[int, str]:
+        """Return how much may still come [bytes], at least 0, and what to say if more does."""
         self.folder.mkdir(parents=True, exist_ok=True)
         held = sum(p.stat().st_size for p in self.folder.rglob("*") if p.is_file())
         free = shutil.disk_usage(self.folder).free
-        return min(LARGEST, ALL - held, free - SPARE)
+        spare, most = in_gib(SPARE), in_gib(ALL)
+        room, reason = min(
+            (
+                LARGEST,
+                f"More than {in_gib(LARGEST)}, the most that a page takes: corporeal run FILE.",
+            ),
+            (
+                ALL - held,
+                f"Uploads may have {most} together: delete what is not needed in {INBOX}.",
+            ),
+            (
+                free - SPARE,
+                f"The disk is nearly full: {in_gib(free)} are free, and {spare} stay so.",
+            ),
+        )
+        return max(room, 0), reason
 
     def sorted_in(self, folder: Path) -> Upload:
         """Look what a file is, by its first bytes, and unpack photographs.
@@ -85,10 +100,15 @@ class Inbox:
         path, size = folder / known, raw.stat().st_size
         raw.rename(path)
         if known.endswith(".zip"):
-            unpack(path, folder / "photos", max(self.room() * 4, 0) or 1)
+            unpack(path, folder / "photos", self.room()[0] * 4 or 1)
             path.unlink()
             path = folder / "photos"
         return Upload(folder.name, path, known.rpartition(".")[2], size)
+
+
+def in_gib(size: int) -> str:
+    """Return a size [bytes] as a person reads it."""
+    return f"{size / (1 << 30):.3g} GiB"
 
 
 def upload_route(inbox: Inbox) -> Route:
@@ -106,7 +126,7 @@ def upload_route(inbox: Inbox) -> Route:
 
 async def _taken(request: Request, inbox: Inbox) -> Response:
     """Take a file in, counting; whatever is refused leaves nothing behind."""
-    room = await run_in_threadpool(inbox.room)
+    room, reason = await run_in_threadpool(inbox.room)
     folder = inbox.folder / secrets.token_hex(8)
     folder.mkdir()
     try:
@@ -115,7 +135,7 @@ async def _taken(request: Request, inbox: Inbox) -> Response:
             async for block in request.stream():
                 size += len(block)
                 if size > room:
-                    raise UserError(f"The file is too large: {max(room, 0):,} bytes may come.")
+                    raise UserError(reason)
                 await run_in_threadpool(file.write, block)
         found = await run_in_threadpool(inbox.sorted_in, folder)
     except (UserError, ClientDisconnect) as error:
