@@ -51,4 +51,5 @@ def run_audit(**what):
         "seconds": {"simulate": 40.0, "total": 60.0}, "peak_memory_mb": 400.0,
         "settings": {"detail": "draft"}, "questions": NOTHING_ASKED,
     }  # fmt: skip
-    return RunAudit(**said | what)
+    made = RunAudit(**said | what)
+    return made.noting(made.warnings)

@@ -8,6 +8,7 @@ from corporeal.cli import run_summary
 from corporeal.cli.run_summary import show_summary
 from corporeal.findings import Breakage
 from corporeal.trajectory.audit_file import AUDIT
+from corporeal.types import Note, NoteKind
 from made_findings import run_audit
 
 
@@ -46,7 +47,11 @@ def test_warnings_that_are_left_out_are_counted_as_one_counts(tmp_path, capsys, 
 
 
 def test_what_a_run_says_last_is_in_order_of_weight(tmp_path, capsys):
-    warnings = ("1 picture was left out: a.jpg.", "Say more with --vlm.", "It may be wrong.")
+    warnings = (
+        Note("1 picture was left out: a.jpg.", NoteKind.LEFT_OUT),
+        Note("Say more with --vlm.", NoteKind.ASSUMED),
+        "It may be wrong.",
+    )
     store.write_json(tmp_path / AUDIT, store.plain(run_audit(warnings=warnings, hints=("Still.",))))
     show_summary(tmp_path)
     said = capsys.readouterr()

@@ -6,11 +6,11 @@ its unit where JSON needs one: ``_m``, ``_s``, ``_deg``, ``_kg``, and ``_dx`` fo
 stands for what did not happen.
 """
 
-from collections.abc import Mapping
-from dataclasses import dataclass, field
-from typing import Literal
+from collections.abc import Iterable, Mapping
+from dataclasses import dataclass, field, replace
+from typing import Literal, Self
 
-from corporeal.types import Usage, Vector
+from corporeal.types import Note, NoteKind, Usage, Vector, kinds_of, with_kinds
 
 FLOOR = "floor"
 """The other body of a pair, where it is no object."""
@@ -316,8 +316,20 @@ class Audit:
     """None: nothing was left to settle before time 0."""
     warnings: tuple[str, ...]
     """What to read before trusting the film, in sentences."""
+    kind_of_warning: tuple[NoteKind, ...] = field(default=(), kw_only=True)
+    """One for each; none: a run from before they were kept."""
     breakage: tuple[Breakage, ...] = field(default=(), kw_only=True)
     """One per brittle rigid part that something struck."""
+
+    @property
+    def notes(self) -> tuple[Note, ...]:
+        """The warnings, each with its kind."""
+        return with_kinds(self.warnings, self.kind_of_warning)
+
+    def noting(self, notes: Iterable[str]) -> Self:
+        """Return the same with these for warnings."""
+        told = tuple(notes)
+        return replace(self, warnings=tuple(map(str, told)), kind_of_warning=kinds_of(told))
 
 
 @dataclass(frozen=True)

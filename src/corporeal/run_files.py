@@ -5,7 +5,7 @@ import shutil
 import sys
 import time
 from collections.abc import Callable, Iterable, Mapping
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, fields
 from pathlib import Path
 
 from corporeal import materials, store
@@ -132,7 +132,7 @@ def run_audit(
     spent: Spent,
 ) -> RunAudit:
     """Put beside a simulation's audit what happened and what the whole run took."""
-    audit = replace(audit, warnings=_warnings(made, audit))
+    audit = audit.noting(_warnings(made, audit))
     return RunAudit(
         **{f.name: getattr(audit, f.name) for f in fields(Audit)},
         outcome=happened,
@@ -159,7 +159,7 @@ def _warnings(made: Results, audit: Audit) -> tuple[str, ...]:
         doubts(made.field, made.parts, made.scene),
         tuple(m.warning for m in made.field.mixtures if m.warning),
         made.particles.warnings,
-        audit.warnings,
+        audit.notes,
         made.reconstruct.warnings if made.reconstruct else (),
     )
     return doubts_first(made.reconstruct, (w for group in groups for w in group))

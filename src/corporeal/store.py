@@ -27,6 +27,7 @@ import numpy as np
 from corporeal import types
 from corporeal.errors import BadFileError, UserError
 from corporeal.typed import typed
+from corporeal.types import Note, NoteKind
 from corporeal.version import __version__
 
 META = "meta.json"
@@ -281,6 +282,8 @@ def _encode(value: Any, arrays: dict[str, Any]) -> Any:
         return {"dict": [[k, _encode(v, arrays)] for k, v in value.items()]}
     if isinstance(value, Enum):
         return {"type": type(value).__name__, "member": value.name}
+    if isinstance(value, Note):
+        return {"note": str(value), "kind": value.kind.name}
     return {"path": str(value)} if isinstance(value, Path) else {"value": _plain_number(value)}
 
 
@@ -300,6 +303,8 @@ def _decode(tree: dict, arrays: Any) -> Any:
         return {k: _decode(v, arrays) for k, v in tree["dict"]}
     if "path" in tree:
         return Path(tree["path"])
+    if "note" in tree:
+        return Note(tree["note"], NoteKind[tree["kind"]])
     kind = KNOWN[tree["type"]]
     if "member" in tree:
         return kind[tree["member"]]

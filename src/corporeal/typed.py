@@ -7,6 +7,7 @@ of older and newer versions open.
 
 from collections.abc import Mapping
 from dataclasses import MISSING, Field, fields, is_dataclass
+from enum import Enum
 from math import nan
 from pathlib import Path
 from types import UnionType
@@ -19,8 +20,8 @@ def typed(kind: type[T], data: Mapping[str, Any]) -> T:
     """Make a dataclass from plain data.
 
     Args:
-        kind: A dataclass whose fields are numbers, strings, paths, dataclasses, or tuples, lists
-            and mappings by name of these.
+        kind: A dataclass whose fields are numbers, strings, paths, enums, dataclasses, or tuples,
+            lists and mappings by name of these.
         data: Field → value; null stands for a number that is not finite.
 
     Raises:
@@ -64,4 +65,14 @@ def _row(origin: type, inner: tuple[Any, ...], data: Any) -> Any:
 def _leaf(hint: Any, data: Any) -> Any:
     if hint is Path:
         return Path(data)
+    if isinstance(hint, type) and issubclass(hint, Enum):
+        return _member(hint, data)
     return nan if hint is float and data is None else data
+
+
+def _member(kind: type[Enum], data: Any) -> Enum:
+    """Return what was written as its name in lower case."""
+    name = str(data).upper()
+    if name not in kind.__members__:
+        raise ValueError(f"{data!r} is no {kind.__name__}")
+    return kind[name]

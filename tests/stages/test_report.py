@@ -15,6 +15,8 @@ from corporeal.types import (
     Hypothesis,
     Law,
     Material,
+    Note,
+    NoteKind,
     ObjectWords,
     PartWords,
     Placement,
@@ -170,9 +172,9 @@ def test_a_long_reason_that_all_values_share_is_said_once(page):
 def test_the_page_begins_with_what_may_be_wrong_as_a_list(page):
     """It began with a wall of text, and doubts stood below the film."""
     warnings = (
-        "2 of 10 photographs were left out: a.jpg.",
-        "thing_0: nobody looked into it. With --vlm somebody does.",
-        "The scale may be wrong. Measure it.",
+        Note("2 of 10 photographs were left out: a.jpg.", NoteKind.LEFT_OUT),
+        Note("thing_0: nobody looked into it. With --vlm somebody does.", NoteKind.ASSUMED),
+        Note("The scale may be wrong. Measure it.", NoteKind.GRAVE),
     )
     told = page(PartWords("", "steel", "solid"), warnings=warnings, hints=("Nothing moves.",))
     above = told[: told.index("<video")]

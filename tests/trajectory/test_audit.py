@@ -23,12 +23,14 @@ from corporeal.types import (
     Ledger,
     Material,
     MaterialField,
+    NoteKind,
     Particles,
     PartWords,
     Scene,
     SceneObject,
     Structure,
     Treatment,
+    kind_of,
 )
 
 CELL, FPS, STEPS = 0.01, 50, 41
@@ -255,6 +257,8 @@ def test_every_breach_is_said_in_plain_words(story, key, value, word):
     (sentence,) = breaches(found)
     assert word in sentence
     assert sentence.endswith(".")
+    wrong = key in ("nan_count", "momentum_residual", "mass_error")
+    assert kind_of(sentence) is (NoteKind.GRAVE if wrong else NoteKind.DOUBT)
 
 
 @pytest.mark.parametrize(("begun", "word"), [(0.0173, "at the start"), (0.002, "--detail")])

@@ -11,13 +11,13 @@ from corporeal.errors import BadFileError
 from corporeal.findings import Expectation, Settled, SettledObject
 from corporeal.trajectory.audit_file import AUDIT, read_audit, read_run_audit, write_audit
 from corporeal.typed import typed
-from corporeal.types import NOTHING_ASKED, Inventory, Usage
+from corporeal.types import NOTHING_ASKED, Inventory, Note, NoteKind, Usage
 from made_findings import object_outcome, outcome, pair_outcome, part_audit, run_audit
 
 WHOLE = run_audit(
     parts=(part_audit(), part_audit(object=None, real_mass_kg=None)),
     settling=Settled(0.5, True, (SettledObject("a_0", (0.0, 0.0, -0.01), 1.0, 0.02),)),
-    warnings=("Objects sink.",),
+    warnings=("Objects sink.", Note("a.jpg was left out.", NoteKind.LEFT_OUT)),
     outcome=outcome(
         {"a_0": object_outcome(dent_place=(0.0, 1.0, 2.0), dent_from_contact_m={"floor": None})},
         {"a_0|floor": pair_outcome(first_contact_s=0.25, contact_point=(0.0, 0.0, 0.0))},
@@ -65,6 +65,16 @@ def test_an_audit_is_read_back_as_it_was(tmp_path):
     write_audit(tmp_path, WHOLE)
     assert read_run_audit(tmp_path) == WHOLE
     assert read_audit(tmp_path).settling == WHOLE.settling
+    assert [n.kind for n in read_run_audit(tmp_path).notes] == [NoteKind.DOUBT, NoteKind.LEFT_OUT]
+    plain = json.loads((tmp_path / AUDIT).read_text())
+    assert plain["warnings"] == ["Objects sink.", "a.jpg was left out."]
+    assert plain["kind_of_warning"] == ["doubt", "left_out"]
+
+
+def test_a_kind_that_there_is_not_is_refused(tmp_path):
+    store.write_json(tmp_path / AUDIT, store.plain(WHOLE) | {"kind_of_warning": ["dire", "doubt"]})
+    with pytest.raises(BadFileError, match="'dire' is no NoteKind"):
+        read_run_audit(tmp_path)
 
 
 def test_a_run_from_before_opens_and_its_keys_are_still_those(tmp_path):
@@ -74,6 +84,7 @@ def test_a_run_from_before_opens_and_its_keys_are_still_those(tmp_path):
     assert found.outcome.pair("floor", "can_0").contact_point == (0.0, 0.0, 0.0)
     assert found.outcome.objects["can_0"].moved_m == (0.0, 0.0, -0.1)
     assert found.questions == NOTHING_ASKED
+    assert [(str(n), n.kind) for n in found.notes] == [("It sinks.", NoteKind.DOUBT)]
     write_audit(tmp_path, found)
     again = json.loads((tmp_path / AUDIT).read_text())
     assert again.pop("questions")["models"] == []
@@ -85,6 +96,7 @@ def test_a_run_from_before_opens_and_its_keys_are_still_those(tmp_path):
     assert again.pop("breakage") == []
     assert again.pop("surfaces") == []
     assert again.pop("hints") == []
+    assert again.pop("kind_of_warning") == []
     assert again == {key: value for key, value in BEFORE.items() if key != "questions"}
 
 

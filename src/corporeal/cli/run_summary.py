@@ -10,12 +10,12 @@ from corporeal.findings import Breakage, PartAudit
 from corporeal.terminal import console, print_line, print_table
 from corporeal.trajectory.audit_file import read_run_audit
 from corporeal.trajectory.audit_words import breakage_words
-from corporeal.trajectory.closing_words import DOUBT, LEFT_OUT, Kind, closing_words, parted
+from corporeal.trajectory.closing_words import DOUBT, LEFT_OUT, Section, closing_words, parted
 
 MOST_PARTS = 12
 """Rows of the table; a scene of more parts is in the report."""
 MOST_WARNINGS = 5
-"""Sentences of a kind that are printed whole."""
+"""Sentences of a section that are printed whole."""
 MOST_BLOWS = 3
 """Blows that may break something and are printed."""
 HEADS = ("object", "part", "material", "mass", "simulated as")
@@ -28,8 +28,8 @@ def show_summary(folder: Path) -> None:
     print_table(HEADS, rows[:MOST_PARTS], console)
     if len(rows) > MOST_PARTS:
         print_line(f"and {len(rows) - MOST_PARTS} parts more: see the report.")
-    for kind, sentences in closing_words(audit).items():
-        _listed(kind, sentences)
+    for section, sentences in closing_words(audit).items():
+        _listed(section, sentences)
     _breaking(audit.breakage)
 
 
@@ -48,13 +48,13 @@ def _row(part: PartAudit) -> tuple[str, ...]:
     return (part.object or "", part.name, part.material, f"{part.mass_kg:.3g} kg", part.treatment)
 
 
-def _listed(kind: Kind, sentences: Sequence[str]) -> None:
+def _listed(section: Section, sentences: Sequence[str]) -> None:
     for sentence in sentences[:MOST_WARNINGS]:
-        _say(kind.word, sentence)
+        _say(section.word, sentence)
     more = len(sentences) - MOST_WARNINGS
     if more > 0:
-        what = kind.word if more == 1 else kind.several
-        what = f"more {what}" if kind is LEFT_OUT else f"{what} more"
+        what = section.word if more == 1 else section.several
+        what = f"more {what}" if section is LEFT_OUT else f"{what} more"
         print_line(f"and {more} {what}: see the report.")
 
 

@@ -30,6 +30,8 @@ from corporeal.materials.placement import (
 from corporeal.render.portrait import Portrait, colour_of_part, portraits
 from corporeal.types import (
     Inventory,
+    Note,
+    NoteKind,
     ObjectWords,
     PartWords,
     Scene,
@@ -127,7 +129,10 @@ class Asking:
         against_file = "; ".join(filter(None, clauses))
         if not against_file:
             return ""
-        return f"{words.name}: {against_file}. The latter was believed; --annotations decides."
+        return Note(
+            f"{words.name}: {against_file}. The latter was believed; --annotations decides.",
+            NoteKind.ASSUMED,
+        )
 
     def _about(self, subject: Subject) -> Interview:
         return Interview(self.model, self.critic, self.prompts, subject)

@@ -18,7 +18,7 @@ from corporeal.formats.gltf_pose import Skeletons, posed
 from corporeal.formats.gltf_primitives import Piece, read_primitive
 from corporeal.formats.words import everyday, numbered, safe, unique
 from corporeal.geometry.creases import creased
-from corporeal.types import Objects, Scene, Surface
+from corporeal.types import NoteKind, Objects, Scene, Surface
 
 READABLE = (
     "KHR_materials_",
@@ -128,7 +128,7 @@ def _shapes(document: Document, tree: list[Placed], wardrobe: Wardrobe) -> list[
         for dressed in pieces[mesh.pointer]:
             there = posed(dressed.piece, placed, bones)
             if not np.ptp(there.vertices, axis=0).any():
-                document.warn(f"surface {name!r} has no size; it is left out.")
+                document.warn(f"surface {name!r} has no size; it is left out.", NoteKind.LEFT_OUT)
                 continue
             kept = dict(extras) if isinstance(extras, dict) else {}
             shapes.append(_Shape(placed.number, name, dressed.finish, there, kept))
@@ -144,7 +144,9 @@ def _say_what_is_not_shown(document: Document, tree: list[Placed]) -> None:
         names = ", ".join(safe(n.text("name")) or "nameless" for n in left[:3])
         more = ", …" if len(left) > 3 else ""
         are = "nodes with meshes are" if len(left) > 1 else "node with a mesh is"
-        document.warn(f"{len(left)} {are} not in its scene and left out: {names}{more}.")
+        document.warn(
+            f"{len(left)} {are} not in its scene and left out: {names}{more}.", NoteKind.LEFT_OUT
+        )
 
 
 def _check_total(document: Document, shown: list[list[_Dressed]]) -> None:

@@ -21,7 +21,7 @@ from corporeal.formats.gltf_container import pack_glb
 from corporeal.formats.gltf_document import Document, Entry
 from corporeal.formats.gltf_nodes import Placed, node_numbers, walk
 from corporeal.formats.words import everyday
-from corporeal.types import Vector
+from corporeal.types import NoteKind, Vector
 
 IDLE = ("animations", "cameras")
 """Lists of a file that are left behind."""
@@ -104,7 +104,7 @@ class _Model:
         self.assets = Assets(self.document, merged)
         for group in IDLE:
             if self.document.root.has(group):
-                self.document.warn(f"its {group} are left out.")
+                self.document.warn(f"its {group} are left out.", NoteKind.LEFT_OUT)
 
     def placed(self, member: Member) -> dict:
         """Copy the file's tree; return the node of the object above it."""
@@ -156,7 +156,9 @@ class _Model:
         """Copy a skeleton onto the copied nodes; None where some of its joints are not shown."""
         joints = node_numbers(skin, "joints", len(self.document.entries("nodes")))
         if not joints or not all(j in number for j in joints):
-            self.document.warn("a skeleton is left out: its joints are not in the scene.")
+            self.document.warn(
+                "a skeleton is left out: its joints are not in the scene.", NoteKind.LEFT_OUT
+            )
             return None
         item = kept(skin, "skeleton") | {"joints": [number[j] for j in joints]}
         inverse = skin.refer("inverseBindMatrices", "accessors")

@@ -11,6 +11,7 @@ from typing import Any
 from corporeal.errors import BadFileError, UserError
 from corporeal.formats.gltf_container import MAX_FILE
 from corporeal.formats.gltf_document import Document, Entry
+from corporeal.types import NoteKind
 
 SIGNATURES = {
     b"\x89PNG\r\n\x1a\n": "image/png",
@@ -138,7 +139,9 @@ class Assets:
         except BadFileError as problem:
             self.document.warn_of("a material", problem)
         except RecursionError:
-            self.document.warn("a material is left out: it is nested too deeply.")
+            self.document.warn(
+                "a material is left out: it is nested too deeply.", NoteKind.LEFT_OUT
+            )
         return {}
 
     def _material(self, entry: Entry) -> dict:

@@ -20,6 +20,7 @@ from corporeal.formats.gltf_container import (
     split_glb,
 )
 from corporeal.formats.resources import decode_data_uri, read_beside
+from corporeal.types import Note, NoteKind
 
 MAX_ROWS = 60_000_000
 """Indices, vertices and triangles together that are unpacked from one file, copies included;
@@ -149,16 +150,16 @@ class Document:
         """Where the file's companions may lie."""
         return self.path.parent
 
-    def warn(self, sentence: str) -> None:
+    def warn(self, sentence: str, kind: NoteKind = NoteKind.DOUBT) -> None:
         """Remember, once, something a reader of the report should know."""
-        warning = f"{self.path.name}: {sentence}"
+        warning = Note(f"{self.path.name}: {sentence}", kind)
         if warning not in self.warnings:
             self.warnings.append(warning)
 
     def warn_of(self, what: str, problem: BadFileError) -> None:
         """Remember that something was left out, and the problem behind it."""
         reason = str(problem).removeprefix(f"{self.path}: ").removesuffix(EXPORT_AGAIN).strip()
-        self.warn(f"{what} is left out: {reason}")
+        self.warn(f"{what} is left out: {reason}", NoteKind.LEFT_OUT)
 
     def spend(self, entry: Entry, rows: int) -> None:
         """Count the rows to be unpacked: a small file can ask for the same ones a million times."""

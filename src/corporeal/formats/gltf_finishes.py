@@ -12,7 +12,7 @@ import numpy as np
 from corporeal.errors import BadFileError
 from corporeal.formats.gltf_document import Document, Entry
 from corporeal.formats.images import decode_image
-from corporeal.types import Finish
+from corporeal.types import Finish, NoteKind
 
 PLAIN = Finish("plain", colour=(0.8, 0.8, 0.8, 1.0), roughness=0.8)
 """For a surface without any material."""
@@ -107,7 +107,7 @@ class Wardrobe:
             return decode_image(bytes(image.document.view(view)))
         except ValueError as problem:
             words = f"texture {image.text('name')!r} ({image.pointer})"
-            self.document.warn(f"{words} is left out: {problem}.")
+            self.document.warn(f"{words} is left out: {problem}.", NoteKind.LEFT_OUT)
             return None
 
 

@@ -9,6 +9,7 @@ from corporeal.formats.draco import decode_draco
 from corporeal.formats.gltf_accessors import as_real, rows_of
 from corporeal.formats.gltf_document import Entry
 from corporeal.formats.gltf_finishes import Dress
+from corporeal.types import NoteKind
 
 POINTS_AND_LINES = {0: "points", 1: "lines", 2: "a line loop", 3: "a line strip"}
 TRIANGLES, STRIP, FAN = 4, 5, 6
@@ -49,11 +50,15 @@ def read_primitive(primitive: Entry, mesh: str, dress: Dress) -> Piece | None:
         document.warn(f"mesh {mesh!r} can morph; its rest shape is used.")
     source = _Source(primitive, mesh)
     if source.count == 0:
-        document.warn(f"mesh {mesh!r} has a primitive without vertices; it is left out.")
+        document.warn(
+            f"mesh {mesh!r} has a primitive without vertices; it is left out.", NoteKind.LEFT_OUT
+        )
         return None
     triangles = _without_degenerate(source.triangles(mode))
     if not len(triangles):
-        document.warn(f"mesh {mesh!r} has a primitive without triangles; it is left out.")
+        document.warn(
+            f"mesh {mesh!r} has a primitive without triangles; it is left out.", NoteKind.LEFT_OUT
+        )
         return None
     used, triangles = _compact(triangles, source.count, primitive)
     document.spend(primitive, len(used))
@@ -110,7 +115,7 @@ class _Source:
         values = stored.real(used) if len(stored.rows) == self.count else None
         if values is None or not np.isfinite(values).all():
             why = "it does not fit" if values is None else "it holds NaN"
-            document.warn(f"{name} of mesh {self.mesh!r} is left out: {why}.")
+            document.warn(f"{name} of mesh {self.mesh!r} is left out: {why}.", NoteKind.LEFT_OUT)
             return None
         return values
 

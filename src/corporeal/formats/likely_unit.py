@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from corporeal.formats.typical_extents import doubt, length, one_of, typical_extent
+from corporeal.types import Note, NoteKind
 
 UNITS = {"metres": 1.0, "centimetres": 1e-2, "millimetres": 1e-3, "inches": 0.0254}
 """What programs usually model in [m]."""
@@ -97,22 +98,31 @@ def _told(unit: str, rows: list[LikelyUnit]) -> list[str]:
     names = list(dict.fromkeys(row.file.name for row in rows))
     if not unit:
         return [
-            f"{row.file.name} states no unit: it was made as large as "
-            f"{one_of(row.usual, 'usually is', 'usually are')}, {length(row.extent)}. {ADVICE}"
+            Note(
+                f"{row.file.name} states no unit: it was made as large as "
+                f"{one_of(row.usual, 'usually is', 'usually are')}, {length(row.extent)}. {ADVICE}",
+                NoteKind.ASSUMED,
+            )
             for row in rows
         ]
     also = ", as the other meshes are" if rows[0].shared else ""
     if len(names) == 1:
         size = length(rows[0].extent)
         return [
-            f"{names[0]} states no unit: it was taken to be in {unit}{also}, so that it is {size} "
-            f"large. {ADVICE}"
+            Note(
+                f"{names[0]} states no unit: it was taken to be in {unit}{also}, so that it is "
+                f"{size} large. {ADVICE}",
+                NoteKind.ASSUMED,
+            )
         ]
     shown = names if len(names) <= MOST_NAMES + 1 else names[:MOST_NAMES]
     rest = [f"{len(names) - len(shown)} more"] if len(shown) < len(names) else []
     *first, last = [*shown, *rest]
     sizes = [row.extent for row in rows]
     return [
-        f"{', '.join(first)} and {last} state no unit: they were taken to be in {unit}{also}, so "
-        f"that they are {length(min(sizes))} to {length(max(sizes))} large. {ADVICE}"
+        Note(
+            f"{', '.join(first)} and {last} state no unit: they were taken to be in {unit}{also}, "
+            f"so that they are {length(min(sizes))} to {length(max(sizes))} large. {ADVICE}",
+            NoteKind.ASSUMED,
+        )
     ]

@@ -28,7 +28,7 @@ from corporeal.formats.stated_bodies import with_bodies, with_scene
 from corporeal.formats.words import everyday, numbered, safe
 from corporeal.geometry.creases import creased
 from corporeal.geometry.gaussians import Up, upright
-from corporeal.types import Objects, Scene, SceneObject, Surface
+from corporeal.types import Note, NoteKind, Objects, Scene, SceneObject, Surface
 
 MOST_TEXT = 2**26
 """Of a text that is looked through for companions [bytes]."""
@@ -205,7 +205,12 @@ def _upwards(path: Path, raw: RawMesh) -> tuple[Up, tuple[str, ...]]:
     if kind not in UP_UNSTATED:
         return raw.up, ()
     if kind == ".obj" and said_z_up(_text(path, HEAD)):
-        return "+z", (f"{path.name}: +z is up, as a comment in it says; --up y takes another.",)
+        return "+z", (
+            Note(
+                f"{path.name}: +z is up, as a comment in it says; --up y takes another.",
+                NoteKind.ASSUMED,
+            ),
+        )
     before = np.cumsum([0, *(len(s.vertices) for s in raw.surfaces)])
     vertices = np.concatenate([s.vertices for s in raw.surfaces])
     pairs = zip(raw.surfaces, before, strict=False)
@@ -215,7 +220,9 @@ def _upwards(path: Path, raw: RawMesh) -> tuple[Up, tuple[str, ...]]:
         return raw.up, ()
     axis, why = likelier
     said = f"{path.name} does not state what is up. {raw.up} was taken, as is usual in {kind}, "
-    return raw.up, (f"{said}{why}. If it lies on its side, say --up {axis[1]}.",)
+    return raw.up, (
+        Note(f"{said}{why}. If it lies on its side, say --up {axis[1]}.", NoteKind.ASSUMED),
+    )
 
 
 def _turned(raw: RawMesh, turn: np.ndarray, unit: float) -> list[Surface]:
@@ -275,7 +282,9 @@ def _scene(path: Path, surfaces: list[Surface], owners: list[str], raw: RawMesh)
         ),
         raw.finishes,
         metres_per_unit=raw.unit or 1.0,
-        warnings=(f"{path.name}: left out: {', '.join(raw.lost)}.",) if raw.lost else (),
+        warnings=(Note(f"{path.name}: left out: {', '.join(raw.lost)}.", NoteKind.LEFT_OUT),)
+        if raw.lost
+        else (),
     )
 
 

@@ -6,6 +6,7 @@ from functools import cache
 from pathlib import Path
 
 from corporeal.formats.words import everyday
+from corporeal.types import Note, NoteKind
 
 WITHIN = 1.5
 """Factor between a mass that a name states and the one that comes out which needs no telling: three
@@ -74,8 +75,9 @@ def doubt_said_mass(name: str, mass: float, *names: str) -> str | None:
     said = said_mass(*names)
     if said is None or mass <= 0.0 or 1 / WITHIN <= mass / said <= WITHIN:
         return None
-    return (
+    return Note(
         f"{name}: its name says {said:.3g} kg, and it weighs {mass:.3g} kg. Check how large it is "
         "(--extent), what it is made of and whether it is hollow or filled (--annotations); or the "
-        "name means something else."
+        "name means something else.",
+        NoteKind.ASSUMED,
     )

@@ -19,7 +19,7 @@ from corporeal.formats.close_up import CloseUp, close_up, sides_of
 from corporeal.formats.images import FORMATS, MAX_PIXELS, decode_image, decode_instances
 from corporeal.formats.picture_names import OTHERS
 from corporeal.geometry.lens import Lens, straightened
-from corporeal.types import Camera
+from corporeal.types import Camera, Note, NoteKind
 
 FEWEST = 3
 """Pictures: two show no more than one depth per pixel, and nothing checks it."""
@@ -373,7 +373,9 @@ def _refuse_most(source: Path, total: int, bad: list[Bad]) -> None:
 
 def left_out(total: int, bad: list[Bad]) -> list[str]:
     """Say which of so many pictures were left out, and why; nothing where all are used."""
-    return [f"{len(bad)} of {total} pictures were left out: {_listed(bad)}."] * bool(bad)
+    return [
+        Note(f"{len(bad)} of {total} pictures were left out: {_listed(bad)}.", NoteKind.LEFT_OUT)
+    ] * bool(bad)
 
 
 def _listed(bad: list[Bad]) -> str:

@@ -12,6 +12,7 @@ from corporeal.formats.picture_names import HEIC, IMAGES, INSTANCES, MASKS, OTHE
 from corporeal.formats.resources import beside
 from corporeal.formats.scene_file import read_scene_file
 from corporeal.formats.words import safe, writable
+from corporeal.types import Note, NoteKind
 
 GLTF = (".glb", ".gltf")
 SPLATS = (".ply", ".spz", ".sog", ".splat", ".ksplat")
@@ -207,8 +208,11 @@ def not_read_below(folder: Path, photographs: Sequence[Path]) -> list[str]:
     )
     where = writable(str(more[0].relative_to(folder)))
     return [
-        f"{count} in folders below and {left} left out, such as {where}: what shows the same thing "
-        "belongs beside the others."
+        Note(
+            f"{count} in folders below and {left} left out, such as {where}: what shows the same "
+            "thing belongs beside the others.",
+            NoteKind.LEFT_OUT,
+        )
     ]
 
 

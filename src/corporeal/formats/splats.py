@@ -13,7 +13,7 @@ from corporeal.formats.splat_ply import from_vertices
 from corporeal.formats.splat_records import looks_like_records, read_records
 from corporeal.formats.spz import GZIP, MAGIC, read_spz
 from corporeal.geometry.gaussians import Up, placed, sound, upright
-from corporeal.types import Gaussians
+from corporeal.types import Gaussians, Note, NoteKind
 
 KINDS = "PLY (INRIA's layout or compressed), SPZ, SOG, .splat and .ksplat are read."
 MOST_BAD = 0.5
@@ -47,7 +47,10 @@ def read_splat(path: Path, up: Up | None = None) -> Gaussians:
         what = f"{lost:,} of {raw.count:,} Gaussians cannot be used: {reasons}."
         raise BadFileError(path, what, "Train or export it again.")
     if lost:
-        words = f"{path.name}: {lost:,} of {raw.count:,} Gaussians were left out: {reasons}."
+        words = Note(
+            f"{path.name}: {lost:,} of {raw.count:,} Gaussians were left out: {reasons}.",
+            NoteKind.LEFT_OUT,
+        )
         gaussians = replace(gaussians, warnings=(*gaussians.warnings, words))
     return gaussians if up is None else placed(gaussians, upright(up))
 

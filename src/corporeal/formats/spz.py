@@ -15,7 +15,7 @@ import numpy as np
 from corporeal.errors import BadFileError
 from corporeal.formats.ply import AGAIN
 from corporeal.formats.splat_ply import exponential
-from corporeal.types import Gaussians
+from corporeal.types import Gaussians, Note, NoteKind
 
 MAGIC = b"NGSP"
 GZIP = b"\x1f\x8b"
@@ -80,7 +80,12 @@ def read_spz(path: Path, data: memoryview) -> Gaussians:
         scale=exponential(scale.reshape(-1, 3) / np.float32(16) - 10),
         opacity=(opacity / np.float32(255)),
         sh=np.concatenate([band0, (higher.astype(np.float32) - 128) / 128], axis=1),
-        warnings=("Colour: harmonics of degree 4 were left out; up to 3 are used.",) * lost,
+        warnings=(
+            Note(
+                "Colour: harmonics of degree 4 were left out; up to 3 are used.", NoteKind.LEFT_OUT
+            ),
+        )
+        * lost,
     )
 
 

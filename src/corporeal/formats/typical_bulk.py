@@ -7,6 +7,7 @@ from pathlib import Path
 from typing import Any, Literal
 
 from corporeal.formats.typical_extents import fit, joined, nouns, one_of, singular_words
+from corporeal.types import Note, NoteKind
 
 MARGIN = 2.0
 """How far beyond the table an object may be before it is reported, as a factor."""
@@ -74,14 +75,17 @@ def doubt_mass(
     if known is None:
         heavy = (deep >= LARGE and bulk > HEAVIEST) or (across >= THICK and bulk > SOLID)
         found = _weighs(name, mass, bulk, "box")
-        return f"{found}, more than nearly all things. {ADVICE}" * heavy or None
+        told = Note(f"{found}, more than nearly all things. {ADVICE}", NoteKind.ASSUMED)
+        return told if heavy else None
     found = mass / face if known.measure == "face" else bulk
     if known.low / MARGIN <= found <= known.high * MARGIN:
         return None
     large = f"longer than {known.longer:g} m " if known.longer else ""
     usual = one_of(known.words, f"{large}has", f"{large}have")
     usual = f"{usual} {known.low:g} to {known.high:g}"
-    return f"{_weighs(name, mass, found, known.measure)}, and {usual}. {ADVICE}"
+    return Note(
+        f"{_weighs(name, mass, found, known.measure)}, and {usual}. {ADVICE}", NoteKind.ASSUMED
+    )
 
 
 ADVICE = "Check how large it is (--extent), what it is made of and whether it is hollow."

@@ -10,6 +10,7 @@ from pathlib import Path
 from corporeal.formats.other_languages import in_english, substances
 from corporeal.formats.spelling import Vocabulary, by_squeezing, mended, spelt, unaccented
 from corporeal.formats.word_order import is_several, of_part, thing_last
+from corporeal.types import Note, NoteKind
 
 MARGIN = 1.5
 """How far beyond the table an object may be before it is reported."""
@@ -108,9 +109,14 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
         return None
     size = f"{name} is {length(extent)} large"
     if known is None:
-        return f"{size}: is the file in metres? Give its real size with --extent {name}=METRES."
+        return Note(
+            f"{size}: is the file in metres? Give its real size with --extent {name}=METRES.",
+            NoteKind.ASSUMED,
+        )
     usual = f"{one_of(known.words, 'is', 'are')} usually about {length(known.usual)}"
-    return f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}."
+    return Note(
+        f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}.", NoteKind.ASSUMED
+    )
 
 
 def _normalised(extent: float, known: TypicalExtent | None) -> bool:

@@ -14,7 +14,7 @@ from jaxtyping import UInt8
 from corporeal.geometry.epipolar import consensus, depths, fundamental, sampson
 from corporeal.geometry.matching import SIDE, features, likeness, matches
 from corporeal.geometry.silhouettes import coherence
-from corporeal.types import Camera, Views
+from corporeal.types import Camera, Note, NoteKind, Views
 
 SEEDS = 5
 """Pictures whose neighbours are looked at."""
@@ -318,5 +318,9 @@ def _words(found: str, error: float, change: str | None) -> str:
     median = "" if np.isnan(error) else f" (median error {error:.1f} px)"
     first = f"The poses do not agree with the pictures: only {found}{median}. "
     if change:
-        return f"{first}They would if {change}: is the file in the wrong convention?"
-    return f"{first}Look at the order of the pictures, the focal length and the poses."
+        return Note(
+            f"{first}They would if {change}: is the file in the wrong convention?", NoteKind.GRAVE
+        )
+    return Note(
+        f"{first}Look at the order of the pictures, the focal length and the poses.", NoteKind.GRAVE
+    )

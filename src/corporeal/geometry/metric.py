@@ -8,7 +8,7 @@ from typing import Literal
 import numpy as np
 
 from corporeal.errors import UserError
-from corporeal.types import Vector
+from corporeal.types import Note, NoteKind, Vector
 
 DOUBT = 2.0
 """Factor between two scales from which on somebody must be told."""
@@ -100,8 +100,11 @@ def of_extents(extents: Sequence[Extent]) -> MetricScale | None:
     warnings = ()
     if odd:
         warnings = (
-            f"At one unit = {scale:.4g} m the sizes of {', '.join(odd)} are off by more than a "
-            f"factor of {DOUBT:g}. State the size of one object with --extent NAME=METRES.",
+            Note(
+                f"At one unit = {scale:.4g} m the sizes of {', '.join(odd)} are off by more than a "
+                f"factor of {DOUBT:g}. State the size of one object with --extent NAME=METRES.",
+                NoteKind.ASSUMED,
+            ),
         )
     return MetricScale(scale, "extent", f"One unit is {scale:.4g} m: {told}.", warnings)
 
@@ -109,7 +112,9 @@ def of_extents(extents: Sequence[Extent]) -> MetricScale | None:
 def _stand_in(size: float) -> MetricScale:
     scale = _ratio(NEUTRAL, size, "The whole")
     words = f"Nobody knows how large it is: the whole was taken as {NEUTRAL:g} m."
-    warning = f"{words} State the size of one object with --extent NAME=METRES."
+    warning = Note(
+        f"{words} State the size of one object with --extent NAME=METRES.", NoteKind.ASSUMED
+    )
     return MetricScale(scale, "nobody", words, (warning,))
 
 
@@ -117,10 +122,11 @@ def _against(believed: MetricScale, other: MetricScale) -> str:
     if not _differ(believed.metres_per_unit, other.metres_per_unit):
         return ""
     ratio = other.metres_per_unit / believed.metres_per_unit
-    return (
+    return Note(
         f"The scale may be wrong. Otherwise told: {other.reason} By that everything would be "
         f"{ratio:.3g} times as large. Say which is right with --metres-per-unit, or with --extent "
-        "NAME=METRES."
+        "NAME=METRES.",
+        NoteKind.GRAVE,
     )
 
 
@@ -186,9 +192,10 @@ def implausible(extent: float) -> str | None:
     low, high = PLAUSIBLE
     if low <= extent <= high:
         return None
-    return (
+    return Note(
         f"The whole would be {extent:.3g} m large, which is hardly meant. State the size of one "
-        "object with --extent NAME=METRES, or what one unit is with --metres-per-unit."
+        "object with --extent NAME=METRES, or what one unit is with --metres-per-unit.",
+        NoteKind.ASSUMED,
     )
 
 

@@ -8,7 +8,7 @@ from jaxtyping import Float
 
 from corporeal.geometry.level import level
 from corporeal.geometry.region import region
-from corporeal.types import Camera
+from corporeal.types import Camera, Note, NoteKind
 
 GAP = 60.0
 """Angle between neighbouring cameras, about what they look at, that leaves a side unseen [deg]."""
@@ -46,9 +46,10 @@ def unseen_side(cameras: Sequence[Camera], names: Sequence[str]) -> str | None:
     gap = _widest(cameras, names)
     if not GAP <= gap.angle < HALF:
         return None
-    return (
+    return Note(
         f"Between {gap.ends} lie {gap.angle:.0f}° from which nobody looked: what "
-        "faces there is made up. Photograph that side next time."
+        "faces there is made up. Photograph that side next time.",
+        NoteKind.GRAVE,
     )
 
 
@@ -63,10 +64,11 @@ def unseen_half(cameras: Sequence[Camera], names: Sequence[str]) -> str | None:
     gap = _widest(cameras, names)
     if gap.angle < HALF:
         return None
-    return (
+    return Note(
         f"Its shape is known from one side only: between {gap.ends} lie {gap.angle:.0f}° of the "
         "circle around it, from which nobody looked, and all that faces there is made up. "
-        "Photograph it from there, too."
+        "Photograph it from there, too.",
+        NoteKind.GRAVE,
     )
 
 

@@ -15,7 +15,7 @@ from corporeal.geometry.level import Level, level
 from corporeal.geometry.region import Region, region
 from corporeal.geometry.resting_pose import rest, together
 from corporeal.geometry.similarity import moved_points, similarity
-from corporeal.types import Camera, Vector
+from corporeal.types import Camera, Note, NoteKind, Vector
 
 STRONG = 0.6
 """From here on a direction is believed unless something stronger speaks."""
@@ -114,7 +114,7 @@ def upright(
     elif z_up or cameras:
         told = _told(cameras, z_up)
     else:
-        told = _Up(_unit(usual or Z), "custom", 0.4, np.inf, f"Up is {AXIS}.", (LOOK,))
+        told = _Up(_unit(usual or Z), "custom", 0.4, np.inf, f"Up is {AXIS}.", (_looked(""),))
     plane = _floor(told, cameras, near, around)
     if plane is None and told.found_by == "custom":
         told = _rested(told, near)
@@ -167,7 +167,12 @@ def _rested(told: _Up, points: np.ndarray) -> _Up:
         return told
     fell = "" if axis is usual else f" Up is not {AXIS}: the objects would fall over."
     reason = f"Up is as the objects would rest on a floor, {_degrees(stood.tilt)} from an axis."
-    return _Up(stood.up, "rest", 0.5, np.inf, reason + fell, (LOOK + fell,))
+    return _Up(stood.up, "rest", 0.5, np.inf, reason + fell, (_looked(fell),))
+
+
+def _looked(more: str) -> Note:
+    """Say that nobody said what is up, and more of it."""
+    return Note(LOOK + more, NoteKind.ASSUMED)
 
 
 def _others(up: np.ndarray) -> list[np.ndarray]:

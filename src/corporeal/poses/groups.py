@@ -25,6 +25,7 @@ from corporeal.poses.judge import names_of
 from corporeal.poses.one_viewpoint import Pair, same_viewpoint, stood_still, turned
 from corporeal.poses.stamped import FOLDER as STAMPS
 from corporeal.poses.stamped import Size, Stamps, write_stamps
+from corporeal.types import Note, NoteKind
 
 LONGEST, MOST_POINTS = 480, 1024
 """Longer side of the copies [px]; points of each."""
@@ -159,10 +160,12 @@ def without(gathered: Gathered, groups: Groups) -> Gathered:
     said = []
     if elsewhere:
         what = f"{len(elsewhere)} photographs show another place"
-        said.append(f"{what} and were left out: {names_of(elsewhere)}.")
+        said.append(Note(f"{what} and were left out: {names_of(elsewhere)}.", NoteKind.LEFT_OUT))
     if alone:
         what = f"{len(alone)} photographs share too few points with the others"
-        said.append(f"{what} and were left out: {names_of(alone)}. {ALONE}")
+        said.append(
+            Note(f"{what} and were left out: {names_of(alone)}. {ALONE}", NoteKind.LEFT_OUT)
+        )
     return replace(
         gathered,
         names=tuple(gathered.names[k] for k in kept),

@@ -8,6 +8,7 @@ from dataclasses import replace
 
 from corporeal.geometry.silhouettes import FILLED
 from corporeal.poses.attempt import SHARE, Attempt
+from corporeal.types import Note, NoteKind
 
 POINTS = 30
 """Points per registered picture, at least."""
@@ -117,9 +118,10 @@ def doubt_of_masks(told: Attempt) -> str | None:
     if told.filled >= FILLED:
         return None
     placed = "some pictures were put in wrong places, " if told.parted else ""
-    return (
+    return Note(
         f"All masks together leave {told.filled:.0%} of what each shows: {placed}the object was "
-        "moved or turned over between the pictures, or masks miss parts of it. Look at the masks."
+        "moved or turned over between the pictures, or masks miss parts of it. Look at the masks.",
+        NoteKind.GRAVE,
     )
 
 

@@ -47,6 +47,7 @@ from corporeal.poses.mirrored import TWO_KINDS, mirrored
 from corporeal.poses.pairs import partners_of
 from corporeal.progress import Progress, within
 from corporeal.typed import typed
+from corporeal.types import Note, NoteKind, kinds_of, with_kinds
 
 POSES = "poses"
 """Folder of a reconstruction in which they are kept."""
@@ -96,6 +97,16 @@ class _Kept:
     attempts: tuple[Attempt, ...]
     what_to_do: str = WHAT_TO_DO
     doubt: str = ""
+    kind_of_warning: tuple[NoteKind, ...] = ()
+
+
+def _keep(folder: Path, found: _Kept) -> None:
+    store.write_json(folder / FOUND, replace(found, kind_of_warning=kinds_of(found.warnings)))
+
+
+def _kept(folder: Path) -> _Kept:
+    found = typed(_Kept, store.read_json(folder / FOUND))
+    return replace(found, warnings=with_kinds(found.warnings, found.kind_of_warning))
 
 
 def pose(source: Path, folder: Path, progress: Progress) -> Posed:
@@ -118,10 +129,10 @@ def pose(source: Path, folder: Path, progress: Progress) -> Posed:
         shutil.rmtree(folder, ignore_errors=True)
         store.write_json(folder / BEGUN, begun)
     if (folder / FOUND).exists():
-        kept = typed(_Kept, store.read_json(folder / FOUND))
+        kept = _kept(folder)
     else:
         kept = _found(source, folder, progress)
-        store.write_json(folder / FOUND, kept)
+        _keep(folder, kept)
     if kept.refused:
         with noticed(kept.warnings):
             raise BadFileError(source, kept.refused, kept.what_to_do)
@@ -163,14 +174,15 @@ def without_strangers(posed: Posed, masks: Path) -> Posed:
     if not names:
         return posed
     without_pictures(place, names)
-    said = (
+    said = Note(
         f"{len(names)} photographs show something else where the others show the object, or show "
         "it moved: their outlines contradict those of the others. They were left out: "
-        f"{names_of(names)}."
+        f"{names_of(names)}.",
+        NoteKind.LEFT_OUT,
     )
-    kept = typed(_Kept, store.read_json(posed.folder / FOUND))
+    kept = _kept(posed.folder)
     kept = replace(kept, warnings=(*kept.warnings, said))
-    store.write_json(posed.folder / FOUND, kept)
+    _keep(posed.folder, kept)
     return replace(posed, warnings=kept.warnings)
 
 
@@ -192,7 +204,7 @@ def pose_object(posed: Posed, masks: Path, folder: Path, progress: Progress) -> 
         shutil.rmtree(folder, ignore_errors=True)
         store.write_json(folder / BEGUN, begun)
     if (folder / FOUND).exists():
-        kept = typed(_Kept, store.read_json(folder / FOUND))
+        kept = _kept(folder)
     else:
         for name, place in ((IMAGES, posed.folder / IMAGES), (MASKS[0], masks)):
             shutil.copytree(place, folder / name, dirs_exist_ok=True)
@@ -206,7 +218,7 @@ def pose_object(posed: Posed, masks: Path, folder: Path, progress: Progress) -> 
             kept = _Kept((), (), "; ".join(why), (told,))
         else:
             kept = _told(folder, gathered, (), (told,), told)
-        store.write_json(folder / FOUND, kept)
+        _keep(folder, kept)
     return None if kept.refused else Posed(folder, kept.statements, kept.warnings)
 
 
@@ -368,19 +380,28 @@ def _told(
     warnings = list(gathered.said)
     if last.left_out:
         warnings.append(
-            f"{len(last.left_out)} of {last.pictures} photographs do not fit the others and were "
-            f"left out: {names_of(last.left_out)}."
+            Note(
+                f"{len(last.left_out)} of {last.pictures} photographs do not fit the others and "
+                f"were left out: {names_of(last.left_out)}.",
+                NoteKind.LEFT_OUT,
+            )
         )
     if last.misplaced:
         warnings.append(
-            f"{len(last.misplaced)} photographs look like others that were taken from another side "
-            f"of what looks alike, and were left out: {names_of(last.misplaced)}."
+            Note(
+                f"{len(last.misplaced)} photographs look like others that were taken from another "
+                f"side of what looks alike, and were left out: {names_of(last.misplaced)}.",
+                NoteKind.LEFT_OUT,
+            )
         )
     if last.astray:
         warnings.append(
-            f"{len(last.astray)} photographs fit the others by what is around the object, but not "
-            f"by their masks, and were left out: {names_of(last.astray)}. The floor's pattern "
-            "repeats, or the mask shows something else."
+            Note(
+                f"{len(last.astray)} photographs fit the others by what is around the object, but "
+                f"not by their masks, and were left out: {names_of(last.astray)}. The floor's "
+                "pattern repeats, or the mask shows something else.",
+                NoteKind.LEFT_OUT,
+            )
         )
     warnings += filter(None, [doubt_of_masks(last)])
     seen = read_photographs(folder, longest=64)

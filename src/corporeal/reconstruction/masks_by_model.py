@@ -21,7 +21,7 @@ from corporeal.masking.doubt import CROPPED
 from corporeal.progress import Progress
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.splats.intake import ON
-from corporeal.types import Camera
+from corporeal.types import Camera, Note, NoteKind
 
 DISPUTED = 0.5
 """Share of a mask that is of all masks' hull, below which more is in dispute than agreed on: masks
@@ -63,9 +63,9 @@ def masks_by_model(
                 "words, or leave --masks out, and masks are grown. --force goes on all the same."
             )
             raise BadFileError(source, what, advice)
-    doubts = [] if why is None else [f"Masks are of no one thing: {why}."]
+    doubts = [] if why is None else [Note(f"Masks are of no one thing: {why}.", NoteKind.GRAVE)]
     if why is None and share < INCOHERENT:
-        doubts = [f"Masks may be wrong: {_contradict(share)}. Look at them."]
+        doubts = [Note(f"Masks may be wrong: {_contradict(share)}. Look at them.", NoteKind.GRAVE)]
     return learned.folder, said, tuple(doubts)
 
 

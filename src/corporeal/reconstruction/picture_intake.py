@@ -28,6 +28,7 @@ from corporeal.reconstruction.masks_figure import FIGURE, masks_figure
 from corporeal.reconstruction.reconstruct_config import AUTO, NONE, ReconstructConfig
 from corporeal.splats.intake import ON, Intake, Masked, doubt_of_poses, take_in
 from corporeal.splats.training_schedule import TrainConfig
+from corporeal.types import Note, NoteKind
 
 POSED = 0.5
 """Share of learning from pictures that is done when poses that nobody gave are found."""
@@ -133,8 +134,9 @@ def masks_for(
     grown = grown_masks(source, place, progress=progress)
     if grown.folder is None:
         return _Masks(None, (), grown.said, False, grown.doubted, grown.incomplete)
-    said = " ".join(("There were no masks.", *grown.said, CORRECT))
-    warnings = (said, *filter(None, [grown.beside]))
+    kind = NoteKind.GRAVE if grown.incomplete else NoteKind.ASSUMED
+    said = Note(" ".join(("There were no masks.", *grown.said, CORRECT)), kind)
+    warnings = (said, *[Note(grown.beside, NoteKind.LEFT_OUT)] * bool(grown.beside))
     return _Masks(grown.folder, (), warnings, True, incomplete=grown.incomplete)
 
 
@@ -196,14 +198,14 @@ def _seen_to_agree(
         return _doubted(source, without_strangers(posed, masks), force=True)
     later = within(progress, POSED * AGAIN, POSED)
     again = pose_object(posed, masks, place / OBJECT_POSES, later)
-    said = f"{why[0].upper()}{why[1:]}"
+    said = f"{why[0].upper()}{why[1:]}."
     if again is not None:
-        how = f"{said}. Where each was taken from was found from points on the object alone."
-        return replace(again, warnings=(how, *again.warnings))
+        said += " Where each was taken from was found from points on the object alone."
+        return replace(again, warnings=(Note(said, NoteKind.GRAVE), *again.warnings))
     if not force:
         step = STAND_OUT + STAND_STILL if posed.doubt else STAND_STILL
         raise BadFileError(source, f"{why}, and it has too few points of its own.", step)
-    return replace(posed, warnings=(f"{said}.", *posed.warnings))
+    return replace(posed, warnings=(Note(said, NoteKind.GRAVE), *posed.warnings))
 
 
 def _less_strangers(
@@ -248,5 +250,5 @@ def _doubted(source: Path, posed: Posed, force: bool, step: str = STAND_STILL) -
         return posed
     if not force:
         raise BadFileError(source, f"{posed.doubt}.", STAND_OUT + step)
-    said = f"{posed.doubt[0].upper()}{posed.doubt[1:]}."
+    said = Note(f"{posed.doubt[0].upper()}{posed.doubt[1:]}.", NoteKind.GRAVE)
     return replace(posed, warnings=(said, *posed.warnings))

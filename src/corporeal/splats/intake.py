@@ -30,7 +30,7 @@ from corporeal.splats.start import Points
 from corporeal.splats.train import GAIN, Trained, train
 from corporeal.splats.training_schedule import PRESETS, TrainConfig
 from corporeal.splats.unexplained import unexplained, wide
-from corporeal.types import Camera, Gaussians, Vector, Views
+from corporeal.types import Camera, Gaussians, Note, NoteKind, Vector, Views
 
 SOLID = 0.5
 """Opacity from which on a Gaussian says where something is."""
@@ -42,9 +42,10 @@ CUT_OUT = (
     "There were no masks: what is above the floor was taken for objects. What lies on it and is "
     "thinner than 0.5 % of the scene is lost."
 )
-NO_FLOOR = (
+NO_FLOOR = Note(
     "There were no masks, and no floor to tell objects from: all that most photographs "
-    "show was taken for objects. Give masks, or say where the floor is with --floor-at."
+    "show was taken for objects. Give masks, or say where the floor is with --floor-at.",
+    NoteKind.ASSUMED,
 )
 INVERTED = (
     "The masks are black in the middle of what all cameras look at, and white along the borders of "
@@ -314,9 +315,10 @@ def _consistent(shown: Photographs) -> Photographs:
     if not wrong:
         return shown
     names = ", ".join(shown.names[k] for k in wrong)
-    said = (
+    said = Note(
         f"{len(wrong)} of {len(shown.names)} photographs were left out, as they show the object "
-        f"where the others' masks do not have it: {names}. Their poses, or their masks, are wrong."
+        f"where the others' masks do not have it: {names}. Their poses, or their masks, are wrong.",
+        NoteKind.LEFT_OUT,
     )
     kept = np.setdiff1d(np.arange(len(shown.names)), wrong)
     return replace(shown.only(kept.tolist()), warnings=(*shown.warnings, said))
@@ -356,15 +358,21 @@ def _badly_learned(trained: Trained, photographs: int) -> tuple[str, ...]:
     """Say where what was learned is not what photographs show, or where none was left to tell."""
     if trained.quality is None:
         return (
-            f"{photographs} photographs are so few that none was held back to compare with: what "
-            "they do not show is made up. Take 20 to 50, from all sides.",
+            Note(
+                f"{photographs} photographs are so few that none was held back to compare with: "
+                "what they do not show is made up. Take 20 to 50, from all sides.",
+                NoteKind.GRAVE,
+            ),
         )
     if trained.quality.psnr >= POOR:
         return ()
     return (
-        f"Photographs that were not learned from look otherwise ({trained.quality.psnr:.1f} dB): "
-        "shapes are not to be trusted. Look at poses and lenses, at what moved, and take more "
-        "pictures.",
+        Note(
+            "Photographs that were not learned from look otherwise "
+            f"({trained.quality.psnr:.1f} dB): shapes are not to be trusted. Look at poses and "
+            "lenses, at what moved, and take more pictures.",
+            NoteKind.GRAVE,
+        ),
     )
 
 

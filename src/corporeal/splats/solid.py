@@ -33,7 +33,7 @@ from corporeal.splats.overhangs import without_overhangs
 from corporeal.splats.photometric import Agreed, agreed, pictured
 from corporeal.splats.sheets import without_sheets
 from corporeal.splats.thread_pool import ThreadPool
-from corporeal.types import Camera, Gaussians, Views
+from corporeal.types import Camera, Gaussians, Note, NoteKind, Views
 
 FLOOR = 0.0
 """Height that nothing is below [m]."""
@@ -461,4 +461,9 @@ def _checked(mesh: Mesh, distance: Float[np.ndarray, "X Y Z"], grid: Grid) -> tu
     astray = np.mean(inside != (distance[some] < 0))
     if astray <= ASTRAY:
         return ()
-    return (f"Its surface is not sound: {astray:.1%} of space is on the wrong side of it.",)
+    return (
+        Note(
+            f"Its surface is not sound: {astray:.1%} of space is on the wrong side of it.",
+            NoteKind.GRAVE,
+        ),
+    )

@@ -35,7 +35,16 @@ from corporeal.treatment.object_masses import (
 )
 from corporeal.treatment.plan import Plan, Quality
 from corporeal.treatment.resolution import Accuracy, Bodies, resolve
-from corporeal.types import ROUNDING, Material, MaterialField, Particles, Parts, Scene, Treatment
+from corporeal.types import (
+    ROUNDING,
+    Material,
+    MaterialField,
+    Particles,
+    Parts,
+    Scene,
+    Treatment,
+    reworded,
+)
 
 DEFAULT = FillConfig()
 COUNTED = re.compile(r"Object (\d+) of the scene")
@@ -98,7 +107,8 @@ def fill(
 def by_name(warnings: Iterable[str], scene: Scene) -> tuple[str, ...]:
     """Return sentences with the names of objects in place of their numbers."""
     return tuple(
-        COUNTED.sub(lambda found: scene.objects[int(found[1]) - 1].name, w) for w in warnings
+        reworded(w, COUNTED.sub(lambda found: scene.objects[int(found[1]) - 1].name, w))
+        for w in warnings
     )
 
 

@@ -29,6 +29,8 @@ from corporeal.types import (
     Inventory,
     Material,
     MaterialField,
+    Note,
+    NoteKind,
     Parts,
     PartWords,
     Piece,
@@ -114,9 +116,10 @@ def doubts(field: MaterialField, parts: Parts, scene: Scene) -> tuple[str, ...]:
 
 
 def _doubts(where: str, material: Material, words: PartWords) -> list[str]:
-    unknown = (
+    unknown = Note(
         f"{where} is of unknown material; {material.name} stands in. Say what it is with "
-        "--annotations."
+        "--annotations.",
+        NoteKind.GRAVE,
     )
     return ([unknown] if words.material is None else []) + [
         f"{where}: {name} of {material.name}: {ground.reason[ground.reason.index(UNFIT) :]}"

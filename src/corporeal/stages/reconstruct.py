@@ -42,7 +42,18 @@ from corporeal.splats.foreground import sunk
 from corporeal.splats.intake import Intake, turned_upright
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.splats.worth import falls_apart, goes_beyond, not_worth, told_otherwise, unlike_masks
-from corporeal.types import Camera, Finish, Gaussians, Reconstruction, Scene, SceneObject, Surface
+from corporeal.types import (
+    Camera,
+    Finish,
+    Gaussians,
+    Note,
+    NoteKind,
+    Reconstruction,
+    Scene,
+    SceneObject,
+    Surface,
+    reworded,
+)
 from corporeal.vlm.seen_objects import (
     UNKNOWN,
     SeenObject,
@@ -194,7 +205,7 @@ def _known(
     if scale.source == "extent" and not extents and by_name is None:
         told = [said_by_class(objects, names)]
     pairs = zip(names, found.solids, strict=True)
-    unsound = [f"{name}: {why}" for name, solid in pairs for why in solid.warnings]
+    unsound = [reworded(w, f"{name}: {w}") for name, solid in pairs for w in solid.warnings]
     doubts = [*found.taken.doubts, *unsound]
     return _Known(objects, names, scale, [*scale.warnings, *told, *doubts], tuple(doubts))
 
@@ -222,7 +233,7 @@ def _upright(source: Path, taken: Intake, config: ReconstructConfig, folder: Pat
         numbers = [f"photograph {k + 1}" for k in range(len(cut_out))]
         drawn_over(list(made.views.rgb), cut_out, numbers, folder / FIGURE)
     if cut_out is not None and made.coloured is not None:
-        told = f"{BY_PLACE} {lying_in(folder)}".rstrip()
+        told = Note(f"{BY_PLACE} {lying_in(folder)}".rstrip(), NoteKind.GRAVE)
         made = replace(made, doubts=(*made.doubts, told))
     return made
 

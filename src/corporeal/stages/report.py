@@ -18,7 +18,7 @@ from corporeal.render.mass_tables import weighed
 from corporeal.render.page import cells, figure, inlined, page, safe
 from corporeal.render.subject import parts_named
 from corporeal.trajectory.audit_words import breakage_words, equilibrium_words
-from corporeal.trajectory.closing_words import Kind, closing_words, parted
+from corporeal.trajectory.closing_words import Section, closing_words, parted
 from corporeal.types import (
     Film,
     Ground,
@@ -154,10 +154,10 @@ def _lead(story: Story) -> str:
     return f"{counted} {_looked(story.audit.questions, answers)}"
 
 
-def _said(kind: Kind, sentences: Sequence[str], story: Story) -> str:
-    """List sentences of a kind: what is the matter, then why and what to do, and of which part."""
+def _said(section: Section, sentences: Sequence[str], story: Story) -> str:
+    """List the sentences of a section: what is the matter, then why, what to do, which part."""
     rows = "".join(f"<li>{_item(sentence, story)}</li>" for sentence in sentences)
-    return f"<h3>{safe(kind.head)}</h3><ul>{rows}</ul>"
+    return f"<h3>{safe(section.head)}</h3><ul>{rows}</ul>"
 
 
 def _item(sentence: str, story: Story) -> str:

@@ -13,7 +13,18 @@ from corporeal.geometry.identity import identify
 from corporeal.regions.naming import Named, name_parts, phrases
 from corporeal.regions.parts import PartsConfig
 from corporeal.settings.segment_config import SegmentConfig
-from corporeal.types import Cloud, Inventory, ObjectWords, Part, Parts, Reconstruction, Scene
+from corporeal.types import (
+    Cloud,
+    Inventory,
+    Note,
+    NoteKind,
+    ObjectWords,
+    Part,
+    Parts,
+    Reconstruction,
+    Scene,
+    reworded,
+)
 from corporeal.vlm.metadata import matter_hint
 
 VOTERS = 5
@@ -102,9 +113,12 @@ def _unparted(objects: Sequence[ObjectWords]) -> list[str]:
         return []
     several = len(names) > 1
     return [
-        f"{', '.join(names)}: nobody looked what {'these are' if several else 'it is'} made up of. "
-        f"{'Each is' if several else 'It is'} one material throughout; --vlm or --annotations "
-        "name pieces."
+        Note(
+            f"{', '.join(names)}: nobody looked what {'these are' if several else 'it is'} made up "
+            f"of. {'Each is' if several else 'It is'} one material throughout; --vlm or "
+            "--annotations name pieces.",
+            NoteKind.ASSUMED,
+        )
     ]
 
 
@@ -148,7 +162,8 @@ def _taken_apart(
     of_point[own] = place + np.searchsorted(kept, best)
     confidence = parts.confidence.copy()
     confidence[own] = share[np.arange(len(own)), best]
-    doubts = [f"{obj.name}: {words}" for words in _doubts(named, obj, kept.tolist())]
+    told = _doubts(named, obj, kept.tolist())
+    doubts = [reworded(words, f"{obj.name}: {words}") for words in told]
     return replace(
         parts,
         part_of_point=of_point,
@@ -176,5 +191,7 @@ def _voted(
 
 def _doubts(named: Named, obj: ObjectWords, kept: Sequence[int]) -> list[str]:
     lost = [p.name for k, p in enumerate(obj.parts) if k not in kept]
-    gone = f"{', '.join(lost)} has no place on its surface, and is left out."
+    gone = Note(
+        f"{', '.join(lost)} has no place on its surface, and is left out.", NoteKind.LEFT_OUT
+    )
     return [*named.warnings, *([gone] if lost and not named.warnings else [])]

@@ -85,7 +85,7 @@ def audit(
         *breaches(found),
         *surface_warnings(found.surfaces),
     )
-    return replace(found, warnings=warnings)
+    return found.noting(warnings)
 
 
 # ------------------------------------------------------------------ laws

@@ -11,6 +11,7 @@ from corporeal.findings import (
     Settled,
     SettledObject,
 )
+from corporeal.types import Note, NoteKind
 
 ALLOWED = {
     "momentum_residual": 1e-3,
@@ -20,6 +21,10 @@ ALLOWED = {
     "mass_error": 0.01,
 }
 """Beyond these, a sentence in the report says what it means for the result."""
+
+
+GRAVE_BREACHES = ("nan_count", "momentum_residual", "mass_error")
+"""Those by which what is seen is wrong by as much."""
 
 
 def breaches(found: Audit) -> list[str]:
@@ -55,7 +60,11 @@ def breaches(found: Audit) -> list[str]:
     limits = ALLOWED | {"nan_count": 0, "particles_out_of_domain": 0}
     values = {name: getattr(found, name) for name in sentences}
     return [
-        text.format(values[name]) for name, text in sentences.items() if values[name] > limits[name]
+        Note(
+            text.format(values[name]), NoteKind.GRAVE if name in GRAVE_BREACHES else NoteKind.DOUBT
+        )
+        for name, text in sentences.items()
+        if values[name] > limits[name]
     ]
 
 
@@ -71,8 +80,11 @@ def surface_warnings(pairs: Iterable[PairSurfaces]) -> list[str]:
     for pair in pairs:
         if pair.passed:
             found.append(
-                f"{passage(pair)[0].upper()}{passage(pair)[1:]}: the result is not physical from "
-                "there on. A finer --detail resolves thin parts better."
+                Note(
+                    f"{passage(pair)[0].upper()}{passage(pair)[1:]}: the result is not physical "
+                    "from there on. A finer --detail resolves thin parts better.",
+                    NoteKind.GRAVE,
+                )
             )
         elif pair.hovers and pair.gap_end_m is not None:
             found.append(

@@ -1,20 +1,20 @@
 """What a finished run says last, by weight: what may be wrong, what was assumed, what was left out.
 
-Sentences are written where something is noticed; here they are only put in order, for the report
-and for the terminal. A sentence tells by its own words which it is: what was left out says so, and
-what was assumed names the option, or the file, that changes it.
+Sentences get their kind where something is noticed (``types.notes``); here they are only put in
+order, for the report and for the terminal.
 """
 
 import re
-from collections.abc import Iterable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 from corporeal.findings import RunAudit
+from corporeal.types import Note, NoteKind
 
 
 @dataclass(frozen=True)
-class Kind:
-    """One kind of sentence."""
+class Section:
+    """Sentences that are listed together."""
 
     word: str
     """Before each of them in a log."""
@@ -22,28 +22,21 @@ class Kind:
     """Above them in the report."""
     several: str
     """More than one of them."""
+    kinds: tuple[NoteKind, ...]
+    """Which they are, the gravest first."""
 
 
-DOUBT = Kind("warning", "What may be wrong", "warnings")
-ASSUMED = Kind("hint", "What was assumed, and what changes it", "hints")
-LEFT_OUT = Kind("left out", "What was left out", "left out")
-KINDS = (DOUBT, ASSUMED, LEFT_OUT)
+DOUBT = Section("warning", "What may be wrong", "warnings", (NoteKind.GRAVE, NoteKind.DOUBT))
+ASSUMED = Section("hint", "What was assumed, and what changes it", "hints", (NoteKind.ASSUMED,))
+LEFT_OUT = Section("left out", "What was left out", "left out", (NoteKind.LEFT_OUT,))
+SECTIONS = (DOUBT, ASSUMED, LEFT_OUT)
 """The gravest first."""
 
-OMITS = re.compile(r"\bleft out\b")
-GRAVE = re.compile(
-    r"\b(wrong|invalid|unknown|contradict|Check them|made up(?! of)|not (physical|to be trusted))\b"
-)
-"""What a sentence says that doubts the result itself."""
-OFFERS = re.compile(r"(?<!\w)--(?!detail\b|force\b)[a-z]|\bscene\.toml\b|0-reconstruct/")
-"""What a sentence says that tells how to have it otherwise. A finer --detail is what errors of the
-simulation ask for, and --force is no other way."""
 
-
-def closing_words(audit: RunAudit) -> dict[Kind, tuple[str, ...]]:
-    """Return what a run says last, each sentence once, kinds and sentences by weight."""
-    told = [*((_kind(w), w) for w in audit.warnings), *_hints(audit.hints)]
-    return {kind: _by_weight(s for k, s in told if k == kind) for kind in KINDS}
+def closing_words(audit: RunAudit) -> dict[Section, tuple[str, ...]]:
+    """Return what a run says last, each sentence once, sections and sentences by weight."""
+    told = (*audit.notes, *(Note(hint, NoteKind.ASSUMED) for hint in audit.hints))
+    return {s: tuple(dict.fromkeys(_of(s, told))) for s in SECTIONS}
 
 
 def parted(sentences: str) -> tuple[str, str]:
@@ -52,16 +45,6 @@ def parted(sentences: str) -> tuple[str, str]:
     return first, " ".join(rest)
 
 
-def _hints(hints: Iterable[str]) -> Iterator[tuple[Kind, str]]:
-    for hint in hints:
-        yield (LEFT_OUT if OMITS.search(hint) else ASSUMED), hint
-
-
-def _kind(warning: str) -> Kind:
-    if OMITS.search(warning):
-        return LEFT_OUT
-    return ASSUMED if OFFERS.search(warning) and not GRAVE.search(warning) else DOUBT
-
-
-def _by_weight(sentences: Iterable[str]) -> tuple[str, ...]:
-    return tuple(sorted(dict.fromkeys(sentences), key=lambda s: GRAVE.search(s) is None))
+def _of(section: Section, told: tuple[Note, ...]) -> Iterator[str]:
+    for kind in section.kinds:
+        yield from (str(note) for note in told if note.kind is kind)

@@ -9,7 +9,7 @@ from corporeal.geometry.extent import oriented_size
 from corporeal.geometry.make import DRAWN, Make, heavier
 from corporeal.geometry.survey import Anatomy
 from corporeal.materials.quantities import QUANTITIES
-from corporeal.types import Material, MaterialField, PartWords, Scene, SceneObject
+from corporeal.types import Material, MaterialField, Note, NoteKind, PartWords, Scene, SceneObject
 
 NOTABLE = 0.01
 """Relative difference between a stated mass and the computed one that is reported."""
@@ -152,10 +152,11 @@ def _thick_wall(obj: SceneObject, made: Make, words: PartWords, material: Materi
     if drawn <= usual.high * THICK:
         return ""
     low, typical, high = (f"{1e3 * x:.2g}" for x in (usual.low, usual.typical, usual.high))
-    return (
+    return Note(
         f"{obj.name}: the mesh of {words.name} draws a wall {1e3 * drawn:.2g} mm thick, and such "
         f"walls of {material.name} have {low} to {high} mm, usually {typical}: it may be "
-        f"{drawn / usual.typical:.2g} times too heavy. Say how thick it is with --annotations."
+        f"{drawn / usual.typical:.2g} times too heavy. Say how thick it is with --annotations.",
+        NoteKind.ASSUMED,
     )
 
 
@@ -164,8 +165,9 @@ def _thick_block(obj: SceneObject, made: Make, words: PartWords, thickest: float
     through = 2.0 * made.volume / made.area / obj.scale if made.area > 0 else 0.0
     if through <= LAYERS * thickest:
         return ""
-    return (
+    return Note(
         f"{obj.name}: {words.name} is {words.material} all through, {100 * through:.2g} cm thick, "
         f"and that comes in sheets of up to {1e3 * thickest:.2g} mm: it may be many times too "
-        "heavy. Say what is behind the sheet with --annotations."
+        "heavy. Say what is behind the sheet with --annotations.",
+        NoteKind.ASSUMED,
     )

@@ -6,7 +6,7 @@ is an index array: for each y, which x. Letters in shapes: V vertices, T triangl
 N points, K parts.
 
 ``scene`` is what comes in, ``described`` what it is in words, ``matter`` what it is made of,
-``simulated`` what is simulated. All are imported from here.
+``simulated`` what is simulated; ``notes`` what was noticed. All are imported from here.
 """
 
 from corporeal.types.described import (
@@ -40,6 +40,7 @@ from corporeal.types.matter import (
     Structure,
     WeighedHypothesis,
 )
+from corporeal.types.notes import Note, NoteKind, kind_of, kinds_of, reworded, with_kinds
 from corporeal.types.scene import (
     DOWNWARDS,
     GRAVITY,
@@ -103,6 +104,8 @@ __all__ = [
     "MassMixture",
     "Material",
     "MaterialField",
+    "Note",
+    "NoteKind",
     "ObjectWords",
     "Objects",
     "Part",
@@ -131,4 +134,8 @@ __all__ = [
     "WeighedHypothesis",
     "Wind",
     "in_way",
+    "kind_of",
+    "kinds_of",
+    "reworded",
+    "with_kinds",
 ]

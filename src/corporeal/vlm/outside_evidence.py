@@ -9,7 +9,7 @@ import numpy as np
 from jaxtyping import Float
 
 from corporeal.geometry.make import NINE_IN_TEN
-from corporeal.types import Evidence, ObjectWords
+from corporeal.types import Evidence, Note, NoteKind, ObjectWords
 from corporeal.vlm.words import leaves
 
 JUDGED = 0.25
@@ -61,10 +61,11 @@ def contradiction(words: ObjectWords, masses: Float[np.ndarray, " N"]) -> str:
         return ""
     estimate, _ = max(clauses, key=lambda row: abs(row[1]))
     low, high = float(masses.min()), float(masses.max())
-    return (
+    return Note(
         f"{words.name}: everything that it was taken for weighs {low:.3g} to {high:.3g} kg, but "
         f"its mass was estimated at {estimate:.3g} kg. {_reconciled(words, masses, estimate)} "
-        "--annotations decides."
+        "--annotations decides.",
+        NoteKind.ASSUMED,
     )
 
 

@@ -7,7 +7,7 @@ from functools import cache
 
 from corporeal.formats.other_languages import in_english
 from corporeal.geometry.identity import words
-from corporeal.types import ObjectWords, PartWords, Scene, SceneObject
+from corporeal.types import Note, NoteKind, ObjectWords, PartWords, Scene, SceneObject
 from corporeal.vlm.goods import table
 from corporeal.vlm.lexicon import open_ware, singular
 from corporeal.vlm.metadata import Evidence
@@ -138,8 +138,12 @@ def not_filled(scene: Scene, objects: Sequence[ObjectWords]) -> tuple[str, ...]:
     """Say of which objects it was not used how full their names say they are."""
     said = [(o, said_contents(thing)) for o, thing in zip(objects, scene.objects, strict=True)]
     return tuple(
-        f"{o.name}: its name says how full it is ({_in_words(filling)}), and that was not used: "
-        f"{_why(o, filling)}. Say it with --annotations: structure filled, contents and fill."
+        Note(
+            f"{o.name}: its name says how full it is ({_in_words(filling)}), and that was not used"
+            f": {_why(o, filling)}. Say it with --annotations: structure filled, contents and "
+            "fill.",
+            NoteKind.ASSUMED,
+        )
         for o, filling in said
         if filling and filling.share != 0 and not _holds(o, filling)
     )

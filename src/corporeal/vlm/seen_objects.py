@@ -12,7 +12,7 @@ from corporeal.formats.typical_extents import length, one_of, typical_extent, wo
 from corporeal.formats.words import everyday, safe, unique
 from corporeal.geometry.metric import Extent, MetricScale, chosen, implausible, of_file
 from corporeal.geometry.sizes import said_extent
-from corporeal.types import NOTHING_ASKED, Usage
+from corporeal.types import NOTHING_ASKED, Note, NoteKind, Usage
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.interview import Interview, Subject
 from corporeal.vlm.sizes import ANSWERED, TABLE
@@ -180,9 +180,10 @@ def said_by_name(source: str, seen: SeenObject, name: str) -> str:
         usually = one_of(seen.class_name, "usually is", "usually are")
         size = f", and made as large as {usually}, {length(seen.extent)}"
         more = f", and how large with --extent {name}=METRES"
-    return (
+    return Note(
         f"Nobody said what it is: by the name {source!r} it was called {seen.class_name}{size}. "
-        f"Say what it is with --things{more}."
+        f"Say what it is with --things{more}.",
+        NoteKind.ASSUMED,
     )
 
 
@@ -198,9 +199,10 @@ def said_by_class(objects: Sequence[SeenObject], names: Sequence[str]) -> str:
     usually = (one_of(one.class_name, "usually is", "usually are") for one, _ in sized)
     large = (f"{u}, {length(one.extent or 0)}" for u, (one, _) in zip(usually, sized, strict=True))
     them = "it is" if len(objects) == 1 else "they are"
-    return (
+    return Note(
         f"Nobody said how large {them}: made as large as {'; '.join(dict.fromkeys(large))}. "
-        f"State a size with --extent {sized[0][1]}=METRES."
+        f"State a size with --extent {sized[0][1]}=METRES.",
+        NoteKind.ASSUMED,
     )
 
 

@@ -12,7 +12,7 @@ from pathlib import Path
 from typing import Literal
 
 from corporeal.formats.typical_extents import MARGIN, typical_extent
-from corporeal.types import NOTHING_ASKED, Usage
+from corporeal.types import NOTHING_ASKED, Note, NoteKind, Usage
 from corporeal.vlm import Vlm, connect
 from corporeal.vlm.by_hand import all_answered, is_more
 from corporeal.vlm.interview import Interview, Subject
@@ -126,9 +126,10 @@ def real_extent(
         return RealExtent(extent, "file", "its file", "The file is in metres.", warnings)
     if known is not None:
         return RealExtent(known.usual, known.said_by, _whose(known), known.reason)
-    warning = (
+    warning = Note(
         f"Nobody knows how large {name} ({class_name}) is: its file is not in metres, and its "
-        f"class is not in {TABLE}. It is taken as {length(NEUTRAL)}. Name a model with --vlm."
+        f"class is not in {TABLE}. It is taken as {length(NEUTRAL)}. Name a model with --vlm.",
+        NoteKind.ASSUMED,
     )
     return RealExtent(NEUTRAL, "nobody", "nobody", "A neutral stand-in.", (warning,))
 

@@ -10,6 +10,8 @@ from corporeal.types import (
     NOTHING_ASKED,
     Evidence,
     Hypothesis,
+    Note,
+    NoteKind,
     ObjectWords,
     PartWords,
     Placement,
@@ -288,9 +290,12 @@ def strange_shares(answer: ThicknessAnswer, doubt: float) -> list[str]:
         away = abs(log(part.likely) + doubt / 2) / hypot(doubt, width_of(said))
         if away > STRANGE:
             found.append(
-                f"{part.part} is said to take up {part.likely:.0%} of what its scan draws, which "
-                f"is fine enough for {exp(-doubt / 2):.0%} ± {doubt:.0%}. The former was believed; "
-                "--annotations decides."
+                Note(
+                    f"{part.part} is said to take up {part.likely:.0%} of what its scan draws, "
+                    f"which is fine enough for {exp(-doubt / 2):.0%} ± {doubt:.0%}. The former was "
+                    "believed; --annotations decides.",
+                    NoteKind.ASSUMED,
+                )
             )
     return found
 
@@ -318,9 +323,12 @@ def with_extents(
         sized.append(replace(words, usual_extent=usually))
         if usually and not 1 / FAR <= size / usually <= FAR:
             doubts.append(
-                f"{thing.name} is {length(size)} large, but the model says that an object like "
-                f"that ({kind}) is usually about {length(usually)}. Set its size with --extent "
-                f"{thing.name}={float(f'{usually:.3g}'):g}."
+                Note(
+                    f"{thing.name} is {length(size)} large, but the model says that an object like "
+                    f"that ({kind}) is usually about {length(usually)}. Set its size with --extent "
+                    f"{thing.name}={float(f'{usually:.3g}'):g}.",
+                    NoteKind.ASSUMED,
+                )
             )
     return sized, doubts
 
