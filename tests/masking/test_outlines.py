@@ -8,7 +8,7 @@ from painted_scene import scene
 
 from corporeal.formats.transforms import write_views
 from corporeal.masking import grown_masks as module
-from corporeal.masking.doubt import doubt, lacking, too_thin
+from corporeal.masking.doubt import contradict, doubt, lacking, too_thin
 from corporeal.masking.grow import grow
 from corporeal.masking.hanging import Hanging
 from corporeal.masking.outlines import faint, thinness
@@ -59,6 +59,18 @@ def test_right_masks_have_edges_and_stand_on_the_floor(grown):
     assert grown.faint < 0.02 and doubt(grown) is None
     assert lacking(grown) is None and too_thin(grown) is None
     assert "show no edge" in (doubt(replace(grown, faint=0.2)) or "")
+
+
+@pytest.mark.parametrize(
+    ("of", "told"),
+    [({}, False), ({"coherence": 0.6}, True), ({"settled": 0.0}, True),
+     ({"coherence": 0.6, "alike": 0.5}, False)],
+)  # fmt: skip
+def test_outlines_that_contradict_each_other_are_told_from_all_else(grown, of, told):
+    """By what was found: it went by how the sentence begins."""
+    assert contradict(replace(grown, **of)) == told
+    assert (doubt(replace(grown, **of)) is None) == (not of)
+    assert not contradict(None) and doubt(None)
 
 
 def test_of_what_hovers_less_needs_to_stand_under_it(grown):

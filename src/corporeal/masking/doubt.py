@@ -30,13 +30,30 @@ THINNEST = 0.2
 """Share of masks that are their outermost pixels: if masks are but a pixel too wide, as they were
 where colours tell best, they overlap with right ones by less than .8."""
 TAKEN = "what was taken for the thing"
-CONTRADICT = "its outlines contradict each other"
 
 
 def doubt(grown: Grown | None) -> str | None:
     """Return in a clause why masks are not to be believed; None: they are."""
     if grown is None:
         return "no place in space looks like the middle of all photographs"
+    why = _otherwise(grown)
+    if why is None and _outlines_disagree(grown):
+        agree = f"its outlines contradict each other ({grown.coherence:.0%} agree)"
+        return f"{agree}, as where some photographs show something else, or it was moved"
+    return why
+
+
+def contradict(grown: Grown | None) -> bool:
+    """Tell whether masks are not to be believed because their outlines contradict each other."""
+    return grown is not None and _otherwise(grown) is None and _outlines_disagree(grown)
+
+
+def _outlines_disagree(grown: Grown) -> bool:
+    return grown.coherence < COHERENT or grown.settled < SETTLED
+
+
+def _otherwise(grown: Grown) -> str | None:
+    """Return in a clause what speaks against masks before their outlines are compared."""
     if grown.alike > ALIKE:
         what = f"{grown.alike:.0%} of the colours of what is in their middle"
         return f"what is around it has {what}, too"
@@ -46,15 +63,7 @@ def doubt(grown: Grown | None) -> str | None:
         return "it reaches beyond what all cameras look at"
     if grown.faint > FAINT:
         return f"along {grown.faint:.0%} of its outline the photographs show no edge"
-    if grown.coherence < COHERENT or grown.settled < SETTLED:
-        agree = f"{CONTRADICT} ({grown.coherence:.0%} agree)"
-        return f"{agree}, as where some photographs show something else, or it was moved"
     return None
-
-
-def contradict(grown: Grown | None) -> bool:
-    """Tell whether masks are not to be believed because their outlines contradict each other."""
-    return (doubt(grown) or "").startswith(CONTRADICT)
 
 
 def incomplete(grown: Grown | None) -> str | None:
