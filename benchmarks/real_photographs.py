@@ -16,13 +16,14 @@ intersection over union of the closed surfaces' silhouettes with the masks of th
 worst; minutes of the processor, all threads together. A set that is refused or fails is a row that
 says why. Rows that are there already are kept, and a training or a search for poses that was
 interrupted is continued. The page is written whole from rows: the table, what is known of each set,
-and what the runs from photographs alone said.
+and what the runs from photographs alone said; with what ``photograph_notes.toml`` says of it.
 """
 
 import argparse
 import json
 import shutil
 import time
+import tomllib
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import Any, Literal, NoReturn, get_args
@@ -60,6 +61,8 @@ TITLES = {"real": "Real photographs", "made": "Made photographs"}
 MADE = (
     "`python benchmarks/made_sets.py MODEL FOLDER/NAME …` makes sets; model and options are below."
 )
+NOTES = Path(__file__).with_name("photograph_notes.toml")
+"""For each kind of page: what stands in its head (``page``), and beside sets by name (``sets``)."""
 EVERY = 2.0
 """Between two readings of the clock that are kept [s]."""
 Progress = Callable[[float, str], None]
@@ -204,6 +207,11 @@ def cells(row: dict[str, Any], pictures: int) -> tuple[str, ...]:
     )
 
 
+def with_more(note: str, more: str) -> str:
+    """Return what is known of a set, and what there is to say beside."""
+    return f"{note.removesuffix('.')}. {more}" if note and more else note or more
+
+
 def write_docs(
     rows: list[dict[str, Any]],
     table: list[tuple[str, ...]],
@@ -213,13 +221,16 @@ def write_docs(
 ) -> None:
     """Write the page, whole."""
     about = (__doc__ or "").split("\n\n")
-    lines = [f"# {TITLES[kind]}", "", f"Written by `{said}`."]
+    beside = tomllib.loads(NOTES.read_text(encoding="utf-8")).get(kind, {})
+    written = " ".join(filter(None, [f"Written by `{said}`.", beside.get("page")]))
+    lines = [f"# {TITLES[kind]}", "", written]
     lines += [MADE] * (kind == "made")
     lines += [" ".join(about[2].replace("``", "`").split()), ""]
     lines += ["| " + " | ".join(HEADS) + " |", "|---" * len(HEADS) + "|"]
     lines += ["| " + " | ".join(cell.replace("|", "/") for cell in row) + " |" for row in table]
     lines += ["", "## What is known of the sets", ""]
-    notes = {folder.name: measure.known(folder).note for folder in folders}
+    more = beside.get("sets", {})
+    notes = {f.name: with_more(measure.known(f).note, more.get(f.name, "")) for f in folders}
     lines += [f"- *{name}*: {note}" for name, note in notes.items() if note]
     lines += ["", "## What runs from photographs alone said", ""]
     for row in rows:

@@ -1,6 +1,8 @@
 """The table of real photographs: what is measured of a set whose truth is known, and what fails."""
 
 import json
+import re
+import tomllib
 
 import numpy as np
 import pytest
@@ -114,3 +116,45 @@ def test_the_floor_is_the_plane_with_most_points(sets):
     given = read_colmap(sets / "block" / "sparse" / "0")
     normal = measure.floor_normal(given, np.random.default_rng(0))
     np.testing.assert_allclose(normal, (0, -1, 0), atol=1e-6)
+
+
+PAGE = r"- \*(?P<set>[^*]+)\*(?: at (?P<training>\w+))?: (?P<said>.*)"
+
+
+def read_page(kind):
+    """Return rows, lines of the table, and notes of sets that make a page, as the page has them."""
+    lines = (benchmark.DOCS / f"{kind}-photographs.md").read_text(encoding="utf-8").splitlines()
+    table = [tuple(line[2:-2].split(" | ")) for line in lines if line.startswith("| ")][1:]
+    listed = [match.groupdict() for line in lines if (match := re.fullmatch(PAGE, line))]
+    rows = [
+        {"set": m["set"], "case": "bare", "training": m["training"], "warnings": [m["said"]]}
+        for m in listed
+        if m["training"]
+    ]
+    return rows, table, {m["set"]: m["said"] for m in listed if not m["training"]}
+
+
+@pytest.mark.parametrize("kind", benchmark.TITLES)
+def test_writing_a_page_again_gives_the_page(kind, tmp_path, monkeypatch):
+    """What had been added to its head by hand was lost by that."""
+    rows, table, told = read_page(kind)
+    more = tomllib.loads(benchmark.NOTES.read_text(encoding="utf-8")).get(kind, {}).get("sets", {})
+    assert more.keys() <= told.keys(), "each note has its set on the page"
+    own = {name: note.removesuffix(f". {more.get(name)}") for name, note in told.items()}
+    known = lambda folder: measure.Known(note=own.get(folder.name, ""))  # noqa: E731
+    monkeypatch.setattr(measure, "known", known)
+    page = benchmark.DOCS / f"{kind}-photographs.md"
+    monkeypatch.setattr(benchmark, "DOCS", tmp_path)
+    said = re.search("Written by `(.*?)`", page.read_text(encoding="utf-8"))
+    names = dict.fromkeys(row[0] for row in table)
+    benchmark.write_docs(rows, table, [tmp_path / name for name in names], kind, said[1])
+    assert (tmp_path / page.name).read_text("utf-8") == page.read_text("utf-8")
+
+
+@pytest.mark.parametrize(
+    ("note", "more", "both"),
+    [("A pot.", "It is new.", "A pot. It is new."), ("--wall", "Half.", "--wall. Half."),
+     ("", "Half.", "Half."), ("A pot.", "", "A pot."), ("", "", "")],
+)  # fmt: skip
+def test_what_is_said_beside_follows_what_is_known(note, more, both):
+    assert benchmark.with_more(note, more) == both
