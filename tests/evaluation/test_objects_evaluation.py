@@ -1,5 +1,6 @@
 import numpy as np
 import pytest
+from PIL import Image
 
 from corporeal.errors import UserError
 from corporeal.evaluation import objects, objects_figure
@@ -58,6 +59,10 @@ def test_a_scene_is_judged_by_what_its_pictures_show(scene, tmp_path):
     assert row.components < 0.6 and row.things == ("tall", "low")
     objects_figure.draw([judged], tmp_path / "figure.png")
     assert (tmp_path / "figure.png").stat().st_size > 10_000
+    with Image.open(tmp_path / "figure.png") as drawn:
+        assert drawn.mode == "P", "a byte for each pixel: the page's picture was 1.1 MB"
+    objects_figure.draw([judged], tmp_path / "figure.svg")
+    assert "<svg" in (tmp_path / "figure.svg").read_text(encoding="utf-8")
     table = objects.tables([row])[0]
     assert (
         len(table.heads) == len(table.rows[0]) and objects.record([row])["rows"][0]["identity"] == 1

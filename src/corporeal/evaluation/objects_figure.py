@@ -6,7 +6,7 @@ from pathlib import Path
 import numpy as np
 from matplotlib.figure import Figure
 
-from corporeal.evaluation.figure import keep
+from corporeal.evaluation.figure import keep_points
 from corporeal.evaluation.objects import Judged
 from corporeal.evaluation.overlap import iou
 from corporeal.evaluation.parts_figure import seen, tinted
@@ -42,7 +42,7 @@ def draw(found: Sequence[Judged], path: Path) -> None:
         axes[0].set_ylabel(row.scene.replace("_", " "), fontsize=9)
     for axis, title in zip(grid[0], COLUMNS, strict=True):
         axis.set_title(title, fontsize=9)
-    keep(figure, path)
+    keep_points(figure, path)
 
 
 def _as(truth: np.ndarray, found: np.ndarray) -> np.ndarray:

@@ -8,7 +8,7 @@ import numpy as np
 from matplotlib import colormaps
 from matplotlib.figure import Figure
 
-from corporeal.evaluation.figure import keep
+from corporeal.evaluation.figure import keep_points
 from corporeal.evaluation.parts import Judged
 
 FROM = (0.75, -0.55, 0.38)
@@ -45,7 +45,7 @@ def draw(found: Sequence[Judged], path: Path) -> None:
         axes[0].set_ylabel(row.object, fontsize=9)
     for axis, title in zip(grid[0], COLUMNS, strict=True):
         axis.set_title(title, fontsize=9)
-    keep(figure, path)
+    keep_points(figure, path)
 
 
 def seen(position: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
