@@ -101,13 +101,8 @@ def grown_masks(
     made_by = store.key(
         f"grown masks {METHOD}", (pointed, testing, *("doubted",) * doubted), [store.digest(source)]
     )
-    record = read_record(folder)
-    if record is not None and record.made_by == made_by:
-        changes = _changes(folder)
-        lacks, other = ("", "") if changes else (record.incomplete, record.beside)
-        believed = folder if record.digest_of else None
-        said, apart = (*record.said, *changes), record.contradict
-        return GrownMasks(believed, said, _doubted(folder), lacks, other, apart)
+    if (kept := _kept(folder, made_by)) is not None:
+        return kept
     progress(0.0, "reading photographs")
     shown = read_photographs(source, FINE, bare=True)
     rough = reduced(shown.views, ROUGH)
@@ -135,6 +130,18 @@ def grown_masks(
     other = _beside(grown, shown.names) if pointed is None else ""
     write_record(folder, made_by, said, lacks, other)
     return GrownMasks(folder, said, incomplete=lacks, beside=other)
+
+
+def _kept(folder: Path, made_by: str) -> GrownMasks | None:
+    """Return masks that lie there and were made so, with what somebody corrected; None: others."""
+    record = read_record(folder)
+    if record is None or record.made_by != made_by:
+        return None
+    changes = _changes(folder)
+    lacks, other = ("", "") if changes else (record.incomplete, record.beside)
+    believed = folder if record.digest_of else None
+    said = (*record.said, *changes)
+    return GrownMasks(believed, said, _doubted(folder), lacks, other, record.contradict)
 
 
 def _seeds(source: Path, shown: Photographs, rough: Views, pointed: Pointed | None) -> Seeds:

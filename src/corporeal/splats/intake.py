@@ -167,21 +167,11 @@ def take_in(
 
     """
     progress(0.0, f"reading {source.name}")
-    splat = kind_of([source]) == "splat"
-    if splat and instances:
-        raise UserError(f"{source} is a splat, which has no instance masks. Leave --apart out.")
-    if splat:
-        given = read_splat(source)
-        usual = USUAL.get(source.suffix.lower(), (0.0, -1.0, 0.0))
-        read = (f"{given.count:,} Gaussians were read from {source.name}.",)
-        return Intake(given, usual=usual, statements=read, warnings=given.warnings)
-    longest = PRESETS[training.preset].longest
-    shown = _consistent(read_photographs(source, longest, masked.by, close=True))
-    if instances and shown.views.object_of_pixel is None:
-        raise UserError(f"{source}: {NO_INSTANCES}")
-    masks = None if shown.masks is None else shown.masks >= ON
-    if masks is not None and inverted(masks, shown.views.cameras):
-        raise UserError(f"{source}: {INVERTED}")
+    if kind_of([source]) == "splat":
+        if instances:
+            raise UserError(f"{source} is a splat, which has no instance masks. Leave --apart out.")
+        return _of_splat(source)
+    shown, masks = _photographed(source, PRESETS[training.preset].longest, instances, masked)
     doubt = doubt_of_poses(source, masked.by, shown)
     points = _points(shown)
     wrong = [said for said in shown.warnings if said not in shown.done]
@@ -209,6 +199,31 @@ def take_in(
         statements=(*shown.done, *cut, *_learned_how(trained, len(shown.views.cameras))),
         warnings=(*wrong, *doubt, *poor),
     )
+
+
+def _of_splat(source: Path) -> Intake:
+    given = read_splat(source)
+    usual = USUAL.get(source.suffix.lower(), (0.0, -1.0, 0.0))
+    read = (f"{given.count:,} Gaussians were read from {source.name}.",)
+    return Intake(given, usual=usual, statements=read, warnings=given.warnings)
+
+
+def _photographed(
+    source: Path, longest: int, instances: bool, masked: Masked
+) -> tuple[Photographs, Bool[np.ndarray, "V H W"] | None]:
+    """Return photographs that agree with one another, and masks, if there are any.
+
+    Raises:
+        UserError: They cannot be used, lack masks that segment objects, or these are inverted.
+
+    """
+    shown = _consistent(read_photographs(source, longest, masked.by, close=True))
+    if instances and shown.views.object_of_pixel is None:
+        raise UserError(f"{source}: {NO_INSTANCES}")
+    masks = None if shown.masks is None else shown.masks >= ON
+    if masks is not None and inverted(masks, shown.views.cameras):
+        raise UserError(f"{source}: {INVERTED}")
+    return shown, masks
 
 
 @dataclass(frozen=True)
