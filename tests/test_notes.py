@@ -23,6 +23,8 @@ GONE = Note("a.jpg was left out.", NoteKind.LEFT_OUT)
 @pytest.mark.parametrize("again", [copy.deepcopy, lambda n: pickle.loads(pickle.dumps(n))])
 def test_a_copy_has_the_kind(again):
     assert (again(GONE), kind_of(again(GONE))) == (GONE, NoteKind.LEFT_OUT)
+    large = doubt("duck_0", "duck", 100.0)
+    assert again(large).size_of == "duck_0"
 
 
 def test_what_a_verb_keeps_has_the_kinds(tmp_path):
@@ -30,6 +32,9 @@ def test_what_a_verb_keeps_has_the_kinds(tmp_path):
     kept = store.load(tmp_path / "data.npz").warnings
     assert kept == (GONE, "It sinks.")
     assert kinds_of(kept) == (NoteKind.LEFT_OUT, NoteKind.DOUBT)
+    large = doubt("duck_0", "duck", 100.0)
+    store.save(tmp_path / "data.npz", Inventory((), warnings=(large,)))
+    assert store.load(tmp_path / "data.npz").warnings[0].size_of == "duck_0"
 
 
 def test_what_was_kept_before_there_were_kinds_is_a_doubt(tmp_path):

@@ -7,6 +7,7 @@ import pytest
 from corporeal import pipeline, run_files, store
 from corporeal.description.describe_config import DescribeConfig
 from corporeal.errors import UserError
+from corporeal.formats.typical_extents import doubt
 from corporeal.pipeline import Settings, _Run, reopen, run
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
 from corporeal.stages.fill import FillConfig
@@ -80,7 +81,7 @@ def test_memory_is_counted_in_megabytes():
 
 def test_a_size_that_a_model_has_judged_is_doubted_once():
     objects = [(name, [("mesh", plain(), {})]) for name in ("vase_0", "vase_01", "hut_0")]
-    table = [f"{name} is 9 m large. Set its size with --extent {name}=0.3." for name, _ in objects]
+    table = [doubt(name, "vase", 9.0) for name, _ in objects]
     made = replace(scene(*objects), warnings=("vase_0 and hut_0 overlap at the start.", *table))
     words = [ObjectWords(name, "", (), usual_extent=None) for name, _ in objects]
     assert run_files.still_doubted(made, Inventory(tuple(words))) == made.warnings

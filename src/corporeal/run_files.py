@@ -22,7 +22,7 @@ from corporeal.stages.report import Story, report
 from corporeal.trajectory.audit import believed
 from corporeal.trajectory.audit_file import write_audit
 from corporeal.trajectory.hints import hints
-from corporeal.types import Film, Inventory, Reconstruction, Scene
+from corporeal.types import Film, Inventory, Note, Reconstruction, Scene
 
 Progress = Callable[[float, str], None]
 
@@ -173,8 +173,8 @@ def doubts_first(found: Reconstruction | None, warnings: Iterable[str]) -> tuple
 
 def still_doubted(scene: Scene, inventory: Inventory) -> tuple[str, ...]:
     """Return a scene's warnings, less doubts about sizes that a model has judged since."""
-    judged = [f"--extent {o.name}=" for o in inventory.objects if o.usual_extent]
-    return tuple(w for w in scene.warnings if not any(words in w for words in judged))
+    judged = {o.name for o in inventory.objects if o.usual_extent}
+    return tuple(w for w in scene.warnings if not (isinstance(w, Note) and w.size_of in judged))
 
 
 def peak_memory_mb() -> float:

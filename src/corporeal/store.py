@@ -283,7 +283,7 @@ def _encode(value: Any, arrays: dict[str, Any]) -> Any:
     if isinstance(value, Enum):
         return {"type": type(value).__name__, "member": value.name}
     if isinstance(value, Note):
-        return {"note": str(value), "kind": value.kind.name}
+        return {"note": str(value), "kind": value.kind.name, "size_of": value.size_of}
     return {"path": str(value)} if isinstance(value, Path) else {"value": _plain_number(value)}
 
 
@@ -304,7 +304,7 @@ def _decode(tree: dict, arrays: Any) -> Any:
     if "path" in tree:
         return Path(tree["path"])
     if "note" in tree:
-        return Note(tree["note"], NoteKind[tree["kind"]])
+        return Note(tree["note"], NoteKind[tree["kind"]], tree["size_of"])
     kind = KNOWN[tree["type"]]
     if "member" in tree:
         return kind[tree["member"]]

@@ -112,10 +112,13 @@ def doubt(name: str, class_name: str, extent: float) -> str | None:
         return Note(
             f"{size}: is the file in metres? Give its real size with --extent {name}=METRES.",
             NoteKind.ASSUMED,
+            name,
         )
     usual = f"{one_of(known.words, 'is', 'are')} usually about {length(known.usual)}"
     return Note(
-        f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}.", NoteKind.ASSUMED
+        f"{size}, but {usual}. Set its size with --extent {name}={known.usual:g}.",
+        NoteKind.ASSUMED,
+        name,
     )
 
 

@@ -25,16 +25,18 @@ class Note(str):
     """
 
     kind: NoteKind
+    size_of: str
+    """Name of the object whose size it doubts; empty: it is about something else."""
 
-    def __new__(cls, text: str, kind: NoteKind = NoteKind.DOUBT) -> "Note":
+    def __new__(cls, text: str, kind: NoteKind = NoteKind.DOUBT, size_of: str = "") -> "Note":
         """Return the text as a note of that kind."""
         note = super().__new__(cls, text)
-        note.kind = kind
+        note.kind, note.size_of = kind, size_of
         return note
 
-    def __getnewargs__(self) -> tuple[str, NoteKind]:  # type: ignore[override]
+    def __getnewargs__(self) -> tuple[str, NoteKind, str]:  # type: ignore[override]
         """Return what a copy in another process is made of."""
-        return str(self), self.kind
+        return str(self), self.kind, self.size_of
 
 
 def kind_of(sentence: str) -> NoteKind:
@@ -43,8 +45,8 @@ def kind_of(sentence: str) -> NoteKind:
 
 
 def reworded(sentence: str, text: str) -> Note:
-    """Return another text of the same kind."""
-    return Note(text, kind_of(sentence))
+    """Return another text of the same kind, about the same."""
+    return Note(text, kind_of(sentence), sentence.size_of if isinstance(sentence, Note) else "")
 
 
 def kinds_of(sentences: Iterable[str]) -> tuple[NoteKind, ...]:
