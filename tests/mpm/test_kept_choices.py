@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from laws.asked import on_device
+from laws.asked import in_fixed_order, on_device
 from point_bodies import CELL, ball, body, problem, step_together
 
 from corporeal.mpm.constants import KEPT_STEPS
@@ -14,6 +14,8 @@ ENGINES = {
     "reference": ReferenceEngine,
     "cuda": on_device,
 }
+ROUND_OFF = {"position": 2e-6 * CELL, "velocity": 2e-5, "deformation": 2e-6}
+"""What runs on a card may differ by: as from the reference."""
 SAVED = {"cpu": "choices", "reference": "kept.candidate", "cuda": "choices"}
 
 
@@ -61,10 +63,14 @@ def test_choices_are_saved_and_going_on_from_them_changes_nothing(engine):
     for one in (straight, again):
         for _ in range(KEPT_STEPS):
             one.step(2e-4)
-    for name in ("position", "velocity", "deformation"):
+    same = engine != "cuda" or in_fixed_order()
+    for name, apart in ROUND_OFF.items():
         ours, theirs = getattr(straight.snapshot(), name), getattr(again.snapshot(), name)
-        assert np.array_equal(ours, theirs), name
-    assert np.array_equal(straight.save()[SAVED[engine]], again.save()[SAVED[engine]])
+        assert np.abs(ours - theirs).max() <= (0.0 if same else apart), name
+    ours, theirs = straight.save()[SAVED[engine]], again.save()[SAVED[engine]]
+    if not same:
+        ours, theirs = (rows[np.lexsort(rows.T)] for rows in (ours, theirs))
+    assert np.array_equal(ours, theirs)
 
 
 def test_a_checkpoint_of_before_there_were_choices_is_gone_on_from():

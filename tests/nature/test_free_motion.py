@@ -2,6 +2,7 @@
 
 import numpy as np
 import pytest
+from laws.asked import in_fixed_order
 from laws.bodies import RUBBER, Stuff, ball, box, problem
 
 from corporeal.mpm.cpu.engine import CpuEngine
@@ -93,9 +94,14 @@ def test_a_body_that_was_saved_goes_on_as_if_nothing_had_happened(engine):
     resumed.restore(saved)
     resumed.advance(0.04)
     a, b = straight.snapshot(), resumed.snapshot()
+    within = 0.0 if in_fixed_order() else engine.round_off
     for name in ("position", "velocity", "deformation", "motion", "plastic_strain"):
-        assert np.array_equal(getattr(a, name), getattr(b, name)), name
-    assert straight.steps == resumed.steps
+        one, other = getattr(a, name), getattr(b, name)
+        assert np.abs(one - other).max() <= within * np.abs(one).max(), name
+    assert straight.steps.count == resumed.steps.count
+    for name in ("smallest", "largest"):
+        one, other = getattr(straight.steps, name), getattr(resumed.steps, name)
+        assert abs(one - other) <= within * one, name
 
 
 def test_rotating_a_body_costs_no_stress(holds):
