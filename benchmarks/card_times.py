@@ -8,6 +8,7 @@ the card, launched one by one and not in a graph.
 """
 
 import argparse
+import re
 from collections import defaultdict
 from dataclasses import replace
 
@@ -66,12 +67,17 @@ def kernels(engine: object) -> dict[str, float]:
         run._step()
         once: dict[str, float] = defaultdict(float)
         for result in wp.timing_end():
-            once[result.name.split()[-1].split("_cuda_kernel")[0]] += 1e3 * result.elapsed
+            once[kernel_name(result.name)] += 1e3 * result.elapsed
         for name, us in once.items():
             spent[name].append(us)
     medians = {name: float(np.median(all_)) for name, all_ in spent.items()}
     ranked = sorted(medians.items(), key=lambda pair: -pair[1])
     return {**dict(ranked), "all kernels": sum(medians.values())}
+
+
+def kernel_name(full: str) -> str:
+    """Leave out what Warp adds to a kernel's name."""
+    return re.sub(r"_[0-9a-f]{8}$", "", full.split()[-1].split("_cuda_kernel")[0])
 
 
 def main() -> None:
