@@ -10,7 +10,7 @@ from point_bodies import CELL, ball, body, problem
 from test_cuda import fall
 
 from corporeal.mpm.constants import OUT_OF_BLOCK_SHARE
-from corporeal.mpm.cuda import layout, particle_memory, scatter, step
+from corporeal.mpm.cuda import arena, layout, particle_memory, scatter, step
 from corporeal.mpm.cuda.engine import CudaEngine
 from corporeal.mpm.cuda.layout import wp
 from corporeal.types import Push
@@ -64,12 +64,16 @@ def test_a_particle_adds_a_few_numbers_to_memory_where_it_added_216(drop, most):
 
 
 def test_the_sums_of_a_node_are_seven_and_none_is_a_zero_that_is_added(tmp_path):
-    """27 nodes of 7 sums in the arena, or in memory for what strayed; 7 a node; a rigid mass 27."""
+    """A cell's layer of 9 nodes, of 7 sums, in the arena; in memory what strayed gives to its 27;
+
+    7 a node; and a rigid mass 27.
+    """
     made = wp.compile_aot_module(scatter, arch=86, module_dir=tmp_path, use_ptx=True)
     text = next(path for path in made if path.suffix == ".ptx").read_text()
     added = re.findall(r"\b(?:red|atom)\.(?:\w+\.)*?(global|shared)\.add\.f32", text)
     each = 27 * layout.ARENA_SUMS
-    assert added.count("shared") == each and added.count("global") == each + layout.ARENA_SUMS + 27
+    assert added.count("shared") == arena.SUMS == each / 3
+    assert added.count("global") == each + layout.ARENA_SUMS + 27
     assert ".local" not in text
 
 

@@ -1,5 +1,6 @@
 // Nodes that the particles of one block reach, 6 along each axis, while a group of threads works on that block:
-// in shared memory on a card, where each sum leaves by one atomic a node instead of one a particle.
+// in shared memory on a card, where each sum leaves by one atomic a node instead of one a particle. A thread sums the particles
+// of a cell in its registers first: adds of float32 in shared memory are loops, which wait for each other at one address.
 #pragma once
 #include "lanes.h"
 #include "spline.h"
@@ -14,6 +15,25 @@ struct Arena {
     return own;
 #else
     return given;
+#endif
+  }
+  // Lists of a group's particles by cell: the first of each of the block's 64 cells, then the next of each particle; -1: no more.
+  CUDA_CALLABLE static MPM_INLINE int *lists(float *given) {
+#if defined(__CUDA_ARCH__)
+    __shared__ int own[NODES_OF_BLOCK + TASK];
+    return own;
+#else
+    return (int *)(given + ARENA_SUMS * ARENA_NODES);
+#endif
+  }
+  // Put a number in a place, and give what was there.
+  CUDA_CALLABLE static MPM_INLINE int exchange(int *place, int number) {
+#if defined(__CUDA_ARCH__)
+    return atomicExch(place, number);
+#else
+    const int before = *place;
+    *place = number;
+    return before;
 #endif
   }
   CUDA_CALLABLE static MPM_INLINE void add(float *sum, float value) {
@@ -80,6 +100,39 @@ struct Gift {
           for (int c = 0; c < 6; c++)
             Arena::add(sums + place.sum(node, 1 + c), n * (first[c] + i * more[0][c] + j * more[1][c] + k * more[2][c]));
         }
+  }
+};
+
+// What the particles of one cell give to a layer of nine nodes, summed in registers; layer: which along x.
+struct Layer {
+  static constexpr int SUMS = 9 * ARENA_SUMS;
+  CUDA_CALLABLE static MPM_INLINE void add(float *sums, const Gift &gift, int layer, const float *f) {
+    float n[3][3];
+#pragma unroll
+    for (int d = 0; d < 3; d++) Spline<float>::weights(f[d], n[d]);
+    const float here = layer == 0 ? n[0][0] : layer == 1 ? n[0][1] : n[0][2];
+#pragma unroll
+    for (int j = 0; j < 3; j++)
+#pragma unroll
+      for (int k = 0; k < 3; k++) {
+        const float w = here * n[1][j] * n[2][k];
+        float *sum = sums + ARENA_SUMS * (3 * j + k);
+        sum[0] += w * gift.mass;
+#pragma unroll
+        for (int c = 0; c < 6; c++)
+          sum[1 + c] += w * (gift.first[c] + layer * gift.more[0][c] + j * gift.more[1][c] + k * gift.more[2][c]);
+      }
+  }
+  // Add them to the arena.
+  CUDA_CALLABLE static MPM_INLINE void leave(float *own, const float *sums, int cell, int layer) {
+    const int first = Arena::at((cell >> 4) + layer, cell >> 2 & 3, cell & 3);
+#pragma unroll
+    for (int j = 0; j < 3; j++)
+#pragma unroll
+      for (int k = 0; k < 3; k++)
+#pragma unroll
+        for (int c = 0; c < ARENA_SUMS; c++)
+          Arena::add(own + ARENA_NODES * c + first + ARENA_SIDE * j + k, sums[ARENA_SUMS * (3 * j + k) + c]);
   }
 };
 

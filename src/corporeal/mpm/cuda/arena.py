@@ -12,11 +12,14 @@ from corporeal.mpm.cuda import layout
 from corporeal.mpm.cuda.layout import wp
 
 HEADER = Path(__file__).with_name("arena.h").resolve()
-NUMBERS = "ARENA_SIDE ARENA_NODES NODES_OF_BLOCK ARENA_SUMS ARENA_MOTION"
+NUMBERS = "ARENA_SIDE ARENA_NODES NODES_OF_BLOCK ARENA_SUMS ARENA_MOTION TASK"
 """What the header knows of ``layout``."""
 SEEN = 24
 """Numbers that a particle receives: v, ∇v, u, ∇u, gradients of dx v in row order times 4."""
 Seen = wp.types.vector(length=SEEN, dtype=wp.float32)
+SUMS = 9 * int(layout.ARENA_SUMS)
+Sums = wp.types.vector(length=SUMS, dtype=wp.float32)
+"""Sums of a layer of nine nodes, node by node: see ``Layer`` in ``arena.h``."""
 
 
 def options(**others: Any) -> dict[str, Any]:
@@ -54,29 +57,62 @@ def sum_at(node: int, kind: int) -> int:
 
 @wp.func_native("""
   float *own = mpm::Arena::memory((float *)arena.data);
+  int *lists = mpm::Arena::lists((float *)arena.data);
   for (int k = lane; k < mpm::ARENA_SUMS * mpm::ARENA_NODES; k += lanes) own[k] = 0.0f;
+  for (int k = lane; k < mpm::NODES_OF_BLOCK; k += lanes) lists[k] = -1;
 """)
 def empty(arena: wp.array(dtype=wp.float32), lane: int, lanes: int):
-    """Begin with sums of zero."""
+    """Begin with sums of zero, and no particle in any cell."""
     ...
 
 
 @wp.func_native("""
+  int *lists = mpm::Arena::lists((float *)arena.data);
+  const int at = 16 * (cell.c[0] & 3) + 4 * (cell.c[1] & 3) + (cell.c[2] & 3);
+  lists[mpm::NODES_OF_BLOCK + number] = mpm::Arena::exchange(lists + at, number);
+""")
+def enlist(arena: wp.array(dtype=wp.float32), cell: wp.vec3i, number: int):
+    """Put a particle of the group's task, by its number there, on the list of its cell."""
+    ...
+
+
+@wp.func_native("return mpm::Arena::lists((float *)arena.data)[cell];")
+def first_in(arena: wp.array(dtype=wp.float32), cell: int) -> int:
+    """Number of the first particle of a cell of the group's block; -1: none."""
+    ...
+
+
+@wp.func_native("return mpm::Arena::lists((float *)arena.data)[mpm::NODES_OF_BLOCK + number];")
+def next_of(arena: wp.array(dtype=wp.float32), number: int) -> int:
+    """Number of the one after it; -1: none."""
+    ...
+
+
+@wp.func_native(f"""
   mpm::Gift gift(m, &momentum.c[0], &B.data[0][0], &impulse.c[0], &S.data[0][0], &f.c[0]);
-  const mpm::Reach to(&cell.c[0], &f.c[0]);
-  gift.scatter(to, mpm::Arena::memory((float *)arena.data), mpm::Here());
+  wp::vec_t<{SUMS}, wp::float32> r = sums;
+  mpm::Layer::add(&r.c[0], gift, layer, &f.c[0]);
+  return r;
 """)
 def give(
-    arena: wp.array(dtype=wp.float32),
-    cell: wp.vec3i,
+    sums: Sums,
+    layer: int,
     f: wp.vec3,
     m: wp.float32,
     momentum: wp.vec3,
     B: wp.mat33,
     impulse: wp.vec3,
     S: wp.mat33,
-):
-    """Add a particle of the group's block to the arena."""
+) -> Sums:
+    """Add what a particle gives to one layer of its nodes."""
+    ...
+
+
+@wp.func_native(
+    "mpm::Layer::leave(mpm::Arena::memory((float *)arena.data), &sums.c[0], cell, layer);"
+)
+def leave(arena: wp.array(dtype=wp.float32), sums: Sums, cell: int, layer: int):
+    """Add a cell's sums of one layer to the arena."""
     ...
 
 
@@ -135,6 +171,8 @@ def give_mass(
     }
     for (int c = 0; c < mpm::ARENA_SUMS; c++) own[mpm::ARENA_NODES * c + k] = 0.0f;
   }
+  int *lists = mpm::Arena::lists((float *)arena.data);
+  for (int k = lane; k < mpm::NODES_OF_BLOCK; k += lanes) lists[k] = -1;
 """)
 def hand_over(
     arena: wp.array(dtype=wp.float32),

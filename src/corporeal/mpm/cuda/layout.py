@@ -264,7 +264,7 @@ class Grid:
     task_last: wp.array(dtype=wp.int32)
     """… and its particles, from the first to before the last."""
     arena: wp.array(dtype=wp.float32)
-    """Sums of a group where it has no memory of its own, on the processor."""
+    """Sums and lists of a group where it has no memory of its own, on the processor."""
     sum: wp.array(dtype=wp.float32)
     """Mass [kg], momentum and impulse [kg m/s] of nodes: see ``arena.h``; 0 between steps."""
     node: wp.array(dtype=wp.vec4)

@@ -61,7 +61,8 @@ class Memory:
         particles = sum(len(b.position) for b in problem.bodies)
         for name in ("task_home", "task_first", "task_last"):
             setattr(g, name, self.zeros(room + particles // int(layout.TASK), wp.int32))
-        g.arena = self.zeros(int(layout.ARENA_SUMS) * layout.ARENA_NODES, wp.float32)
+        sums, lists = int(layout.ARENA_SUMS) * layout.ARENA_NODES, layout.NODES_OF_BLOCK
+        g.arena = self.zeros(sums + lists + int(layout.TASK), wp.float32)
         g.sum = self.zeros(int(layout.ARENA_SUMS) * layout.NODES_OF_BLOCK * room, wp.float32)
         g.node, g.old = self.zeros(64 * room, wp.vec4), self.zeros(64 * room, wp.vec4)
         g.pool = self.zeros((3, 8 * room), wp.float32)
