@@ -116,8 +116,8 @@ def moved() -> dict[str, int]:
 
 
 def sectors(by_channel: bool) -> int:
-    """Sectors that a warp asks for in a step, word by word, for rows by channel or one by one."""
-    rows = [*words(f"{SCATTER_READS} {GATHER_READS} {GATHER_WRITES}"), 1, 1]
+    """Sectors that a warp asks for in a gather, word by word, for rows by channel or one by one."""
+    rows = [*words(f"{GATHER_READS} {GATHER_WRITES}"), 1]
     spread = [1 if by_channel else row for row in rows]
     return sum(
         row * min(WARP, WARP * WORD * apart // SECTOR)
@@ -218,7 +218,7 @@ def main() -> None:
     for name, drop in DROPS.items():
         report(name, drop)
     print("\nan elastic particle [bytes]:", *(f"{k} {v}" for k, v in moved().items()))
-    print(f"sectors of a warp in a step: {sectors(True)}; of rows one by one: {sectors(False)}")
+    print(f"sectors of a warp in a gather: {sectors(True)}; of rows one by one: {sectors(False)}")
 
 
 if __name__ == "__main__":
