@@ -495,3 +495,47 @@ def test_the_readers_of_meshes_may_be_absent(tmp_path, monkeypatch):
     monkeypatch.setattr(mesh_trimesh, "find_spec", lambda name: None)
     with pytest.raises(BadFileError, match=r"needs lxml and networkx.*'corporeal\[meshes\]'"):
         mesh_trimesh.read_3mf(tmp_path / "a.3mf")
+
+
+# ---------------------------------------------------------------- as other programs write them
+
+
+def test_an_obj_may_count_corners_back_from_where_they_stand(tmp_path):
+    """Each triangle after its own vertices, as some programs write all of them."""
+    box, path = block(), tmp_path / "crate.obj"
+    lines = ["o crate", "vt 0 0"]
+    for triangle in box.triangles:
+        lines += [f"v {x} {y} {z}" for x, y, z in triangle]
+        lines += ["f -3/-1 -2/-1 \\", " -1/-1"]
+    path.write_text("\r\n".join(lines))
+    surface = read_mesh(path, up="+z").scene.surfaces[0]
+    made = trimesh.Trimesh(surface.vertices, surface.triangles)
+    assert np.allclose(np.ptp(surface.vertices, axis=0), SIZE)
+    assert made.volume == pytest.approx(SIZE.prod())
+
+
+@pytest.mark.parametrize("order", ["<", ">"])
+@pytest.mark.parametrize("mixed", [True, False])
+@pytest.mark.parametrize("flagged", [False, True])
+def test_a_ply_in_bytes_may_mix_triangles_and_quads(tmp_path, order, mixed, flagged):
+    box, path = trimesh.creation.box((2, 3, 4)), tmp_path / "crate.ply"
+    written = [face.tolist() for face in box.faces]
+    if mixed:  # the first and the third are one side
+        written = [[0, 1, 3, 2], written[1], *written[3:]]
+    kind = {"<": "little", ">": "big"}[order]
+    head = [f"ply\nformat binary_{kind}_endian 1.0\nelement vertex 8"]
+    head += [f"property double {axis}" for axis in "xyz"]
+    head += [f"element face {len(written)}\nproperty list uchar uint vertex_indices"]
+    head += ["property uchar flags"] * flagged
+    body = b"".join(struct.pack(f"{order}3d", *place) for place in box.vertices)
+    for face in written:
+        body += struct.pack(f"{order}B{len(face)}I", len(face), *face) + b"\7" * flagged
+    path.write_bytes(("\n".join(head) + "\nend_header\n").encode() + body)
+    made = read_mesh(path)
+    surface = made.scene.surfaces[0]
+    shape = trimesh.Trimesh(surface.vertices, surface.triangles)
+    assert np.allclose(np.ptp(surface.vertices, axis=0), (2, 3, 4))
+    assert shape.area == pytest.approx(52)
+    path.write_bytes(path.read_bytes()[:-9])
+    with pytest.raises(BadFileError, match=r"PLY|faces"):
+        read_mesh(path)

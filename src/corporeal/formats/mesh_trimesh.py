@@ -23,6 +23,8 @@ from corporeal.formats.gltf_container import MAX_FILE, read_whole
 from corporeal.formats.gltf_finishes import PLAIN
 from corporeal.formats.images import shrunk
 from corporeal.formats.mesh_raw import ALONG, EXPORT_AGAIN, MOST_PIECES, RawMesh
+from corporeal.formats.obj_numbers import numbered_forwards
+from corporeal.formats.ply_faces import of_equal_faces
 from corporeal.formats.resources import read_beside
 from corporeal.geometry.srgb import linear
 from corporeal.types import Finish, Surface
@@ -79,18 +81,20 @@ def read_obj(path: Path) -> RawMesh:
     Its objects (``o``) have names; where it has none, its groups (``g``) have: most programs write
     but one of the two.
     """
-    data = bytes(read_whole(path))
+    data = numbered_forwards(bytes(read_whole(path)))
     named = b"o" if _names_in_obj(data, b"o") else b"g"
     few = len(_names_in_obj(data, named)) <= MOST_PIECES
     looks = _Looks(path.parent, _names_in_obj(data, b"usemtl"))
     split = {"split_objects": named == b"o", "split_groups": named == b"g" and few}
-    scene = _loaded(path, "obj", resolver=looks, **split)
+    scene = _loaded(path, "obj", data, resolver=looks, **split)
     return RawMesh(*_dressed(scene, _object_and_material), up="+y", lost=tuple(looks.lost))
 
 
 def read_ply(path: Path) -> RawMesh:
     """Read a PLY with faces; nobody says its unit, +z is up."""
-    return RawMesh(*_dressed(_loaded(path, "ply"), lambda *_: (path.stem,)), up="+z")
+    data, lost = of_equal_faces(path, read_whole(path))
+    scene = _loaded(path, "ply", data)
+    return RawMesh(*_dressed(scene, lambda *_: (path.stem,)), up="+z", lost=lost)
 
 
 def read_stl(path: Path) -> RawMesh:
@@ -145,11 +149,15 @@ def _require(path: Path, *packages: str) -> None:
 
 
 def _loaded(
-    path: Path, kind: str, resolver: Resolver | None = None, **options: Any
+    path: Path,
+    kind: str,
+    data: bytes | None = None,
+    resolver: Resolver | None = None,
+    **options: Any,
 ) -> trimesh.Scene:
-    data = read_whole(path)
+    data = bytes(read_whole(path)) if data is None else data
     return trimesh.load_scene(
-        trimesh.util.wrap_as_stream(bytes(data)),
+        trimesh.util.wrap_as_stream(data),
         file_type=kind,
         resolver=resolver or _Beside(path.parent),
         process=False,
