@@ -170,6 +170,25 @@ def test_nodes_and_materials_of_a_collada_keep_their_names(tmp_path, geometry):
     assert {scene.finishes[s.finish].name for s in scene.surfaces} == {"Oak"}
 
 
+def test_components_of_a_collada_give_their_names_to_nodes_that_are_but_counted(tmp_path):
+    """As SketchUp writes two chairs, of which somebody named the second."""
+    path = tmp_path / "yard.dae"
+    write_dae(path, block(), 1, "Z_UP")
+    text = path.read_text()
+    start, end = text.index('<node id="n">'), text.index("</visual_scene>")
+    component = text[start:end].replace('id="n"', 'id="c" name="Chair"')
+    places = "".join(
+        f'<node id="{name}" name="{name}"><translate>{x} 0 0</translate>'
+        '<instance_node url="#c"/></node>'
+        for x, name in ((0, "instance_0"), (9, "instance_1"), (18, "Garden_Chair"))
+    )
+    text = f'{text[:start]}<node id="all" name="SketchUp">{places}</node>{text[end:]}'
+    library = f"<library_nodes>{component}</library_nodes><library_visual_scenes>"
+    path.write_text(text.replace("<library_visual_scenes>", library))
+    scene = read_mesh(path, "nodes").scene
+    assert [o.class_name for o in scene.objects] == ["chair", "chair", "garden chair"]
+
+
 def test_materials_tell_pieces_of_one_node_of_a_collada_apart(tmp_path):
     path = tmp_path / "chair.dae"
     write_dae(path, block(), 1, "Z_UP")

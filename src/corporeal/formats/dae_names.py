@@ -1,10 +1,14 @@
 """What a COLLADA file calls its pieces and their materials, which trimesh leaves behind."""
 
 import io
+import re
 from collections.abc import Iterable, Iterator
 from typing import Any
 
 import trimesh
+
+COUNTED = re.compile(r"(?i)(?:instance|group|component)(?:[_ #]?\d+)?")
+"""What programs call a node that places a component, when nobody named it (SketchUp)."""
 
 Named = tuple[tuple[str, ...], str]
 """Names from the file's root to a piece, and that of its material; "": it states none."""
@@ -13,8 +17,9 @@ Named = tuple[tuple[str, ...], str]
 def names_in_dae(data: bytes) -> dict[str, Named]:
     """Return the names of each piece, by what trimesh calls it: the id of its geometry, counted.
 
-    A piece is called as the node that places it; where a geometry has several materials, each is
-    a piece, called as its material. Nodes beside each other that have one name are numbered, and so
+    A piece is called as the node that places it, or, where that one is but counted, as the
+    component that it places; where a geometry has several materials, each is a piece, called as its
+    material. Nodes beside each other that have one name are numbered, and so
     are the places of a geometry that no node names.
     """
     from collada import Collada
@@ -58,6 +63,17 @@ def _placed(nodes: Iterable[Any], along: tuple[str, ...]) -> Iterator[tuple[tupl
         elif isinstance(node, Node):
             said = node.node if isinstance(node, NodeNode) else node
             name = str(said.name or "")
+            if COUNTED.fullmatch(name):
+                name = _component(node) or name
             if name:
                 (name,) = _numbered(name, seen, taken)
             yield from _placed(node.children or (), (*along, name) if name else along)
+
+
+def _component(node: Any) -> str:
+    """Return the name of the one component that a node places; "": it places none, or several."""
+    from collada.scene import NodeNode
+
+    children = node.children or ()
+    placed = [child.node.name for child in children if isinstance(child, NodeNode)]
+    return str(placed[0] or "") if len(placed) == len(children) == 1 else ""

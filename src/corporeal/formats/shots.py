@@ -190,7 +190,8 @@ def unreadable(path: Path) -> str:
         if file.read(12)[4:] in HEIC:
             return "is a HEIC picture: convert it to JPEG"
     if path.suffix.lower() in OTHERS:
-        return f"is a {path.suffix[1:].upper()} picture: convert it to JPEG"
+        kind = path.suffix[1:].upper()
+        return f"is {'an' if kind[:1] == 'A' else 'a'} {kind} picture: convert it to JPEG"
     return "is no PNG, JPEG or WebP picture"
 
 
