@@ -244,7 +244,14 @@ def test_what_is_transparent_is_masked_and_white(tmp_path):
 
 
 @pytest.mark.parametrize(
-    "name", ["masks/r_{}.png", "train/masks/r_{}.png", "masks/r_{}.png.png", "mask/r_{}.jpg"]
+    "name",
+    [
+        "masks/r_{}.png",
+        "train/masks/r_{}.png",
+        "masks/r_{}.png.png",
+        "mask/r_{}.jpg",
+        "masks/r_{}_mask.png",
+    ],
 )
 def test_masks_may_lie_in_a_folder(tmp_path, name):
     said(tmp_path)
@@ -269,6 +276,17 @@ def test_a_picture_without_a_mask_among_masked_ones_is_left_out(tmp_path):
     read = read_photographs(tmp_path)
     assert read.names == ("./train/r_0", "./train/r_1", "./train/r_3")
     assert "1 of 4 pictures were left out: ./train/r_2 has no mask" in read.warnings[0]
+
+
+def test_masks_under_names_of_no_photograph_are_said_to_be_none(tmp_path):
+    said(tmp_path)
+    (tmp_path / "masks").mkdir()
+    Image.fromarray(np.eye(12, 16, dtype=np.uint8) * 255).save(tmp_path / "masks" / "m1.png")
+    read = read_photographs(tmp_path)
+    assert read.masks is None
+    assert "None of the 1 pictures in masks" in read.warnings[0]
+    assert "m1.png is the first of them, where r_0.png would be one" in read.warnings[0]
+    assert read_photographs(tmp_path, bare=True).warnings == ()
 
 
 def test_opaque_pictures_are_not_masked(tmp_path):

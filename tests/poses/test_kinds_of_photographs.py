@@ -264,3 +264,12 @@ def test_who_cropped_photographs_is_not_told_to_put_down_a_newspaper():
     whole = Gathered(names, ((64, 48),) * COUNT, ())
     assert "as the camera took them" in _refused(["why"], cropped, ()).what_to_do
     assert "newspaper" in _refused(["why"], whole, ()).what_to_do
+
+
+def test_masks_under_names_of_no_photograph_are_said_to_be_none(tmp_path, greys):
+    saved(tmp_path, greys, ".png", Image.fromarray)
+    place = tmp_path / "photos" / "masks"
+    place.mkdir()
+    Image.fromarray(greys[0]).save(place / "m1.png")
+    (said,) = gathered(tmp_path).said
+    assert said.startswith("None of the 1 pictures in masks has the name of a photograph")

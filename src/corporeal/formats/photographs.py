@@ -12,11 +12,12 @@ from PIL import Image
 from corporeal.errors import BadFileError
 from corporeal.formats.colmap import ColmapModel, is_colmap, read_colmap
 from corporeal.formats.images import FORMATS
-from corporeal.formats.picture_names import IMAGES, INSTANCES, MASKS
+from corporeal.formats.picture_names import IMAGES, INSTANCES, MASKS, SHOWN
 from corporeal.formats.projections import check_focal, parted, projections_in, read_projection
 from corporeal.formats.resources import beside
 from corporeal.formats.shots import Shot, develop
 from corporeal.formats.transforms_frame import FILE, Frame, frames_of
+from corporeal.formats.words import writable
 from corporeal.geometry.lens import Lens
 from corporeal.geometry.lines_of_sight import LinesOfSight
 from corporeal.types import Views
@@ -127,6 +128,9 @@ def read_photographs(
     if most is not None:
         steps = np.linspace(0, len(shots) - 1, min(most, len(shots))).round()
         shots = [shots[k] for k in steps.astype(int)]
+    own = found.source.parent if found.source.is_file() else found.source
+    pictures = [shot.picture for shot in shots if shot.picture is not None]
+    unused = [] if bare or masks is not None else unused_masks(own, pictures)
     done = develop(found.source, shots, longest, close)
     seen = found.model if found.model is not None and len(found.model.points) else None
     return Photographs(
@@ -137,7 +141,7 @@ def read_photographs(
         points=seen.points if seen else None,
         colours=seen.colours if seen else None,
         lines=None if seen is None else _lines_of(seen, done.names),
-        warnings=done.warnings,
+        warnings=(*unused, *done.warnings),
         done=done.done,
     )
 
@@ -217,7 +221,7 @@ def _named(shot: Shot, folders: list[Path]) -> Path | None:
         return None
     name = PurePath(shot.name.lstrip("./"))
     files = [name.as_posix(), name.with_suffix("").as_posix(), f"{name.as_posix()}.png"]
-    files += [shot.picture.name, shot.picture.stem, f"{shot.picture.name}.png"]
+    files += _companions(shot.picture)
     return next((p for base in folders for f in files if (p := _found(base, f)) is not None), None)
 
 
@@ -261,11 +265,29 @@ def companion(picture: Path | None, folder: Path, names: tuple[str, ...]) -> Pat
         return None
     for base in dict.fromkeys((picture.parent, picture.parent.parent, folder)):
         for name in names:
-            for file in (picture.name, picture.stem, f"{picture.name}.png"):
+            for file in _companions(picture):
                 found = _found(base / name, file) if (base / name).is_dir() else None
                 if found is not None and found != picture:
                     return found
     return None
+
+
+def _companions(picture: Path) -> tuple[str, ...]:
+    """Return the names that masks of a picture have, Metashape's last; suffixes may be missing."""
+    return (picture.name, picture.stem, f"{picture.name}.png", f"{picture.stem}_mask")
+
+
+def unused_masks(folder: Path, pictures: Sequence[Path]) -> list[str]:
+    """Say that a folder has masks whose names fit none of its photographs, if it has such."""
+    for place in (folder / name for name in MASKS):
+        held = [p for p in sorted(place.rglob("*")) if p.suffix.lower() in SHOWN]
+        if held and pictures and not any(companion(p, folder, (place.name,)) for p in pictures):
+            return [
+                f"None of the {len(held)} pictures in {place.name} has the name of a photograph, "
+                f"so that they are no masks: {writable(held[0].name)} is the first of them, where "
+                f"{writable(pictures[0].stem)}.png would be one. Rename them."
+            ]
+    return []
 
 
 # ---------------------------------------------------------------- COLMAP

@@ -13,7 +13,7 @@ from PIL import Image, ImageOps
 from corporeal import store
 from corporeal.errors import BadFileError
 from corporeal.formats.images import FORMATS, MAX_PIXELS, eight_bit
-from corporeal.formats.photographs import INSTANCES, MASKS, companion
+from corporeal.formats.photographs import INSTANCES, MASKS, companion, unused_masks
 from corporeal.formats.shots import FEWEST, Bad, left_out, unreadable
 from corporeal.formats.sources import below, not_read_below, not_read_beside, photographs_in
 from corporeal.formats.words import safe, writable
@@ -113,6 +113,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
         *left_out(len(taken), bad),
         *not_read_beside(found),
         *not_read_below(source, found),
+        *unused_masks(source, found),
         *_cropped(tuple(names.values())),
         *_write_alphas(cut_out, len(names), folder),
     ]
