@@ -143,10 +143,12 @@ def test_files_that_systems_hide_beside_photographs_are_none(tmp_path, greys):
     assert len(gathered(tmp_path).names) == COUNT - 1
 
 
-@pytest.mark.parametrize("suffix", [".tif", ".gif", ".DNG"])
+@pytest.mark.parametrize("suffix", [".tif", ".gif", ".DNG", ".avif"])
 def test_pictures_of_another_kind_are_named_as_such(tmp_path, greys, suffix):
     saved(tmp_path, greys, suffix, Image.fromarray, format="TIFF")
-    with pytest.raises(BadFileError, match=f"is a {suffix[1:].upper()} picture: convert it to JP"):
+    article = "an" if suffix == ".avif" else "a"
+    said = f"is {article} {suffix[1:].upper()} picture: convert it to JP"
+    with pytest.raises(BadFileError, match=said):
         gathered(tmp_path)
     Image.fromarray(greys[0]).save(tmp_path / "photos" / "0.jpg")
     assert [p.name for p in photographs_in(tmp_path / "photos")] == ["0.jpg"], "raws lie beside it"
@@ -273,3 +275,12 @@ def test_masks_under_names_of_no_photograph_are_said_to_be_none(tmp_path, greys)
     Image.fromarray(greys[0]).save(place / "m1.png")
     (said,) = gathered(tmp_path).said
     assert said.startswith("None of the 1 pictures in masks has the name of a photograph")
+
+
+@pytest.mark.parametrize("kind", ["webp", "png"])
+def test_a_picture_that_moves_is_no_single_one(tmp_path, greys, kind):
+    path = tmp_path / f"spin.{kind}"
+    frames = [Image.fromarray(grey) for grey in greys[:3]]
+    frames[0].save(path, save_all=True, append_images=frames[1:])
+    with pytest.raises(BadFileError, match=r"is a picture that moves\. Convert it to MP4"):
+        assemble([path])

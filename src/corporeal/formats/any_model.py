@@ -97,6 +97,8 @@ def _not_read(path: Path) -> UserError:
         from corporeal.formats.shots import unreadable  # with it come lenses, which models lack
 
         return BadFileError(path, f"{unreadable(path)}.", ALL_AROUND)
+    if kind in SHOWN and _moves(path):
+        return BadFileError(path, "is a picture that moves.", f"Convert it to MP4. {ALL_AROUND}")
     if kind in (*SHOWN, *HEIC, *OTHERS):
         return BadFileError(path, "is a single picture, which shows no depth.", ALL_AROUND)
     return BadFileError(path, f"is no model ({READ} are read).", "Convert it to .glb.")
@@ -106,4 +108,11 @@ def _opens(path: Path) -> bool:
     """Whether a file begins as a picture that is read."""
     with suppress(Exception), Image.open(path, formats=FORMATS):  # Pillow raises almost anything
         return True
+    return False
+
+
+def _moves(path: Path) -> bool:
+    """Whether a picture that is read has several frames, as an animated WebP or PNG has."""
+    with suppress(Exception), Image.open(path, formats=FORMATS) as picture:
+        return getattr(picture, "n_frames", 1) > 1
     return False
