@@ -75,6 +75,28 @@ def _cover(seen, triangles, mask):
 
 
 @numba.njit(**JIT)
+def covers(first, last, vertices, triangles, cameras, out):
+    """Mark in out (V, H, W), views first to last, the pixels that triangles (T, 3) cover.
+
+    vertices (N, 3) [m]; cameras (V, 18): ``DepthRendering.rows``.
+    """
+    seen = np.empty((len(vertices), 3))
+    for view in range(first, last):
+        _project(vertices, cameras[view], seen)
+        _cover(seen, triangles, out[view])
+
+
+@numba.njit(**JIT)
+def _project(vertices, c, seen):
+    """Fill seen (N, 3) with where a camera sees vertices: u, v [px], and depth [m]."""
+    for n in range(len(vertices)):
+        right, down, ahead = from_camera(c, vertices[n, 0], vertices[n, 1], vertices[n, 2])
+        seen[n, 2] = ahead
+        if ahead > 0:
+            seen[n, 0], seen[n, 1] = pixel(c, right, down, ahead)
+
+
+@numba.njit(**JIT)
 def stray(first, last, vertices, triangles, normals, cameras, outlines, rule, out):
     """Fill out (V, N) with how far a surface's outline is inside the pictures' [m] at vertices.
 
@@ -87,11 +109,7 @@ def stray(first, last, vertices, triangles, normals, cameras, outlines, rule, ou
     seen = np.empty((count, 3))
     for view in range(first, last):
         c = cameras[view]
-        for n in range(count):
-            right, down, ahead = from_camera(c, vertices[n, 0], vertices[n, 1], vertices[n, 2])
-            seen[n, 2] = ahead
-            if ahead > 0:
-                seen[n, 0], seen[n, 1] = pixel(c, right, down, ahead)
+        _project(vertices, c, seen)
         mask = np.zeros((height, width), np.bool_)
         _cover(seen, triangles, mask)
         for n in range(count):

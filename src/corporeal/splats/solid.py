@@ -31,6 +31,7 @@ from corporeal.splats.needed import needed
 from corporeal.splats.outline import fitted, outlined
 from corporeal.splats.overhangs import without_overhangs
 from corporeal.splats.photometric import Agreed, agreed, pictured
+from corporeal.splats.roof import Roof, lowered
 from corporeal.splats.sheets import without_sheets
 from corporeal.splats.thread_pool import ThreadPool
 from corporeal.types import Camera, Gaussians, Note, NoteKind, Views
@@ -73,6 +74,7 @@ MOVED = 2.0
 """Cells by which a surface may be moved after carving."""
 ASTRAY = 0.01
 """Share of them that may differ."""
+NO_ROOF = Roof()
 
 
 @dataclass(frozen=True)
@@ -92,12 +94,14 @@ class Solid:
     """How many separate ones it is in."""
     unsound: tuple[str, ...] = ()
     """What is wrong with the surface, in sentences."""
+    roof: Roof = NO_ROOF
+    """What nothing holds of its height."""
 
     @property
     def warnings(self) -> tuple[str, ...]:
         """What a reader of the report should know, in sentences."""
         apart = (f"It was reconstructed in {self.pieces} separate pieces.",)
-        return (*apart * (self.pieces > 1), *self.unsound)
+        return (*apart * (self.pieces > 1), *self.unsound, *self.roof.warnings)
 
     @property
     def volume(self) -> float:
@@ -248,7 +252,11 @@ def _solid(scene: _Scene, k: int, survey: _Survey, pool: ThreadPool) -> Solid:
         mesh = _surface(distance, grid)
     mesh = _without_specks(mesh)
     contact = cut[*grid.at(mesh.vertices).T]
-    mesh = _fitted(mesh, scene, k, contact, grid.cell, pool)
+    mesh, belief = _fitted(mesh, scene, k, contact, grid.cell, pool)
+    unsound, over = _checked(mesh, distance, grid), NO_ROOF
+    if belief is not None:
+        rows, shape = scene.rendering.rows, scene.rendering.depth.shape[1:]
+        mesh, over = lowered(mesh, belief, contact, rows, shape, pool)
     mine = np.flatnonzero(scene.object_of_gaussian == k)
     _, nearest = KDTree(scene.gaussians.mean[mine]).query(mesh.vertices)
     gaussian = mine[np.asarray(nearest)]
@@ -259,7 +267,8 @@ def _solid(scene: _Scene, k: int, survey: _Survey, pool: ThreadPool) -> Solid:
         gaussian_of_vertex=gaussian,
         cell=grid.cell,
         pieces=count,
-        unsound=_checked(mesh, distance, grid),
+        unsound=unsound,
+        roof=over,
     )
 
 
@@ -376,9 +385,14 @@ def _fitted(
     contact: Bool[np.ndarray, " V"],
     cell: float,
     pool: ThreadPool,
-) -> Mesh:
-    """Take noise off a surface, give it the outlines that masks show, and close it where unseen."""
-    rendering, mean = scene.rendering, means(mesh)
+) -> tuple[Mesh, Float[np.ndarray, " V"] | None]:
+    """Take noise off a surface, give it the outlines that masks show, and close it where unseen.
+
+    Returns:
+        It, and how far photographs know each vertex; None: there are none.
+
+    """
+    rendering, mean, belief = scene.rendering, means(mesh), None
     mesh = smoothed(mesh, scene.floor, PASSES, mean)
     seen = _painted(mesh, rendering, cell, pool)[:, 3] > SEEN
     if scene.shown is not None:
@@ -387,6 +401,7 @@ def _fitted(
         if scene.rgb is not None:
             mesh = without_sheets(mesh, _pixel(scene, k), scene.floor)
             close = _agreed(mesh, scene, k, seen & ~contact, cell, pool)
+            belief = close.belief
             lines = replace(lines, rounds=AGAIN)
             again = fitted(close.mesh, lines, seen, contact, scene.floor, pool)
             # Where photographs agree outlines, of which faces have none, have nothing to add.
@@ -394,7 +409,7 @@ def _fitted(
             mesh = replace(again, vertices=close.mesh.vertices + way)
     lies = mesh.vertices[:, 2] < scene.floor + ON
     still = lies | contact
-    return continued(mesh, ~(seen | still), still, cell, scene.floor, mean)
+    return continued(mesh, ~(seen | still), still, cell, scene.floor, mean), belief
 
 
 def _agreed(
