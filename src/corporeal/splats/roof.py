@@ -86,7 +86,7 @@ def lowered(
     vertices = mesh.vertices.copy()
     vertices[over, 2] = (z[over] + eaves) / 2
     top = (high + eaves) / 2
-    return Mesh(vertices, mesh.triangles), Roof((top - eaves) / (top - low), lowest)
+    return Mesh(vertices, mesh.triangles), Roof(float((top - eaves) / (top - low)), lowest)
 
 
 def _unmissed(
@@ -102,8 +102,8 @@ def _unmissed(
         vertices = mesh.vertices.copy()
         vertices[:, 2] = np.minimum(z, z.max() - share * np.ptp(z))
         cut = _silhouettes(Mesh(vertices, mesh.triangles), cameras, own.shape[1:], pool)
-        lacks = (own & ~binary_dilation(cut, BESIDE)).any(axis=(1, 2))
-        much = _many(np.count_nonzero(lacks), np.count_nonzero(looks))
+        lacks = (own & ~np.asarray(binary_dilation(cut, BESIDE), bool)).any(axis=(1, 2))
+        much = _many(int(lacks.sum()), int(looks.sum()))
         lost, most = (lost, share) if much else (share, most)
     return lost
 
@@ -122,7 +122,7 @@ def _bounded(
     v = np.floor(cameras[:, 13] * down / ahead + cameras[:, 15]).astype(int)
     looks = (ahead > 0) & (u >= 0) & (u < width) & (v >= 0) & (v < height)
     within = own[np.flatnonzero(looks), v[looks], u[looks]]
-    return _many(np.count_nonzero(~within), len(within))
+    return _many(int((~within).sum()), len(within))
 
 
 def _many(views: int, looking: int) -> bool:
