@@ -7,6 +7,7 @@ import pytest
 
 from corporeal.errors import UserError
 from corporeal.regions.instance_assignment import assign_instances
+from corporeal.regions.space import Space
 from corporeal.types import Cloud
 
 RNG = np.random.default_rng(0)
@@ -110,23 +111,22 @@ def test_masks_that_are_forgotten_or_missing(pair):
 
 
 @pytest.mark.parametrize(
-    ("rule", "count", "gap", "found"),
+    ("rule", "count", "pieces", "found"),
     [
-        ("auto", None, -0.3, 1),
-        ("look", None, -0.3, 2),
-        ("auto", 2, -0.3, 2),
-        ("auto", None, 1.0, 2),
+        ("auto", None, 1, 1),
+        ("look", None, 1, 2),
+        ("auto", 2, 1, 2),
+        ("auto", None, 2, 2),
     ],
     ids=["touching", "asked to look", "told", "space between"],
 )
-def test_where_one_thing_was_photographed_what_touches_is_one(pair, rule, count, gap, found):
+def test_where_one_thing_was_photographed_what_touches_is_one(pair, rule, count, pieces, found):
     cloud, normal, owner = pair
-    looks, shifted = (
-        np.eye(2, dtype=np.float32)[owner],
-        cloud.position + np.outer(owner, [gap, 0, 0]),
-    )
+    looks = np.eye(2, dtype=np.float32)[owner]
+    shifted = cloud.position + np.outer(owner, [1.0 if pieces > 1 else -0.3, 0, 0])
     unlike = replace(cloud, position=shifted, semantic=looks)
-    split = assign_instances(unlike, rule, count, normal, None, touching_is_one=True)
+    space = Space(owner * (pieces > 1), alone=True)
+    split = assign_instances(unlike, rule, count, normal, None, space)
     assert split.object_of_point.max() + 1 == found
     if found > 1:
         assert same(split.object_of_point, owner) > 0.95

@@ -5,8 +5,7 @@ from dataclasses import replace
 import numpy as np
 import pytest
 import trimesh
-from scipy.spatial.transform import Rotation
-from splat_scenes import around
+from splat_scenes import clad, eyes, together
 
 from corporeal.errors import UserError
 from corporeal.geometry.harmonics import DC
@@ -24,39 +23,6 @@ CELLS = {"CELLS": 60_000, "ROUGH": 20_000}
 def small(monkeypatch):
     for name, value in CELLS.items():
         monkeypatch.setattr(f"corporeal.splats.solid.{name}", value)
-
-
-def clad(mesh, count=5000, colour=(0.8, 0.3, 0.1), seed=0):
-    """Flat Gaussians on a mesh's surface."""
-    points, face = trimesh.sample.sample_surface_even(mesh, count, seed=seed)
-    normal = mesh.face_normals[face]
-    across = np.cross(normal, np.where(np.abs(normal[:, :1]) < 0.9, [1.0, 0, 0], [0, 1.0, 0]))
-    across /= np.linalg.norm(across, axis=1, keepdims=True)
-    axes = np.stack([across, np.cross(normal, across), normal], axis=2)
-    wide = 0.8 * np.sqrt(mesh.area / count)
-    sh = np.tile((np.array(colour) - 0.5) / DC, (len(points), 1, 1))
-    return Gaussians(
-        mean=np.asarray(points),
-        rotation=Rotation.from_matrix(axes).as_quat(scalar_first=True),
-        scale=np.tile([wide, wide, 0.1 * wide], (len(points), 1)),
-        opacity=np.full(len(points), 0.95),
-        sh=sh,
-    )
-
-
-def together(*some):
-    owner = np.repeat(np.arange(len(some)), [g.count for g in some])
-    names = ("mean", "rotation", "scale", "opacity", "sh")
-    whole = {n: np.concatenate([getattr(g, n) for g in some]) for n in names}
-    return Gaussians(**whole), owner
-
-
-def eyes(count=16, focal=168.0, centre=(0.0, 0.0, 0.5)):
-    return tuple(
-        c
-        for c in around(2 * count, (192, 192), 3.5, focal, np.array(centre))
-        if c.world_from_camera[2, 3] > 0.8
-    )
 
 
 def shape(solid):

@@ -9,7 +9,7 @@ published pipelines.
 
 import time
 from collections.abc import Callable, Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Literal
 
@@ -26,6 +26,7 @@ from corporeal.features.lifting import back_projection, visible
 from corporeal.formats.splat_ply import write_splat
 from corporeal.formats.splats import read_splat
 from corporeal.geometry.arrangement import moved
+from corporeal.geometry.gaussians import only
 from corporeal.geometry.harmonics import DC
 from corporeal.geometry.local_shape import neighbours, normals
 from corporeal.geometry.mesh import joined
@@ -33,6 +34,8 @@ from corporeal.geometry.spread import sample_surface
 from corporeal.regions.instance_assignment import assign_instances
 from corporeal.regions.masks import lifted
 from corporeal.regions.objects import Split, components, objects
+from corporeal.regions.space import Space
+from corporeal.splats.clear_space import pieces_in_space
 from corporeal.splats.foreground import foreground, shown
 from corporeal.splats.raster import weights
 from corporeal.splats.train import train
@@ -104,6 +107,8 @@ class Touching:
     normals: Float[np.ndarray, "N 3"]
     object_of_point: Int[np.ndarray, " N"]
     masks: Int[np.ndarray, "V N"]
+    space: Space | None = None
+    """Of Gaussians; points on surfaces were brought together, and there is none between them."""
 
 
 @dataclass(frozen=True)
@@ -154,10 +159,11 @@ def judged(name: str, taken: Touching) -> Judged:
     present = np.unique(truth)
     count = len(present)
     start = time.process_time()
-    ours = objects(cloud, count, taken.normals)
+    pieces = None if taken.space is None else taken.space.piece_of_point
+    ours = objects(cloud, count, taken.normals, piece_of_point=pieces)
     seconds = time.process_time() - start
-    masked = assign_instances(cloud, "masks", count, taken.normals, taken.masks)
-    uncounted = objects(cloud, None, taken.normals)
+    masked = assign_instances(cloud, "masks", count, taken.normals, taken.masks, taken.space)
+    uncounted = objects(cloud, None, taken.normals, piece_of_point=pieces)
     published = components(cloud.position)
     row = ObjectsRow(
         scene=name,
@@ -272,7 +278,12 @@ def _of_gaussians(scene: Scene, views: Views, gaussians: Gaussians) -> Touching:
     surface = [_on(scene, k) for k in range(len(scene.objects))]
     nearest = KDTree(np.concatenate(surface)).query(position)[1]
     truth = np.repeat(np.arange(len(surface)), DENSE)[nearest]
-    return _taken(scene, views, _Seen(position, colour, towards, truth, shares))
+    taken = _taken(scene, views, _Seen(position, colour, towards, truth, shares))
+    of_object, seen = np.isin(np.arange(gaussians.count), kept), views.object_of_pixel >= 0
+    pieces = pieces_in_space(
+        position, only(gaussians, of_object), of_object[kept], views.cameras, seen
+    )
+    return replace(taken, space=Space(pieces))
 
 
 @dataclass(frozen=True)

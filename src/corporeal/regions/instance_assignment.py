@@ -9,6 +9,7 @@ from corporeal.formats.photographs import NO_INSTANCES
 from corporeal.regions.masks import renumbered
 from corporeal.regions.objects import DEFAULT, MOST, TOUCHING_IS_ONE, Split, components, objects
 from corporeal.regions.rule import Rule
+from corporeal.regions.space import Space
 from corporeal.types import Cloud
 
 SAME = 0.9
@@ -27,7 +28,7 @@ def assign_instances(
     count: int | None = None,
     normals: Float[np.ndarray, "N 3"] | None = None,
     masks: Int[np.ndarray, "V N"] | None = None,
-    touching_is_one: bool = False,
+    space: Space | None = None,
 ) -> Split:
     """Segment objects.
 
@@ -37,8 +38,8 @@ def assign_instances(
         count: How many objects there are, if known.
         normals: Unit, outward; None: found from the points.
         masks: What each view takes each point for; -1: unknown. None: nobody drew any.
-        touching_is_one: Whether appearance and concavity segment nothing that touches, unless the
-            rule asks for it or ``count`` is given.
+        space: What space tells; where that alone does, appearance and concavity segment nothing
+            that touches, unless the rule asks for it or ``count`` is given. None: nothing.
 
     Raises:
         UserError: Masks are asked for and there are none, there are no points, or more objects than
@@ -49,12 +50,14 @@ def assign_instances(
         return _by_neighbours(cloud, count)
     if rule == "masks" and masks is None:
         raise UserError(NO_INSTANCES)
+    pieces = None if space is None else space.piece_of_point
     if masks is None or rule == "look":
-        whole = touching_is_one and rule == "auto"
-        return objects(cloud, count, normals, config=TOUCHING_IS_ONE if whole else DEFAULT)
+        whole = space is not None and space.alone and rule == "auto"
+        config = TOUCHING_IS_ONE if whole else DEFAULT
+        return objects(cloud, count, normals, config=config, piece_of_point=pieces)
     named = by_numbers(cloud, masks, count, NUMBERED)
     named = named or by_numbers(cloud, renumbered(masks), count, MATCHED)
-    return named or _by_masks(cloud, masks, count, normals)
+    return named or _by_masks(cloud, masks, count, normals, pieces)
 
 
 def by_numbers(
@@ -89,11 +92,12 @@ def _by_masks(
     masks: Int[np.ndarray, "V N"],
     count: int | None,
     normals: Float[np.ndarray, "N 3"] | None,
+    pieces: Int[np.ndarray, " N"] | None,
 ) -> Split:
     """Let masks whose numbers differ from view to view say where patches hold together."""
     seen = max((len(np.unique(view[view >= 0])) for view in masks), default=0)
     most = min(seen, MOST, cloud.count) or None
-    return objects(cloud, count or most, normals, masks)
+    return objects(cloud, count or most, normals, masks, piece_of_point=pieces)
 
 
 def _by_neighbours(cloud: Cloud, count: int | None) -> Split:

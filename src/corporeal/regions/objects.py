@@ -20,7 +20,7 @@ from corporeal.regions.cuts import Cut, cut
 from corporeal.regions.masks import agreement
 from corporeal.regions.patches import Borders, Patches, concavity, difference, joined, patches
 from corporeal.regions.reduce import reduced
-from corporeal.regions.space import with_space_between
+from corporeal.regions.space import at_most
 from corporeal.regions.stacks import stacked
 from corporeal.types import Cloud
 
@@ -85,6 +85,7 @@ def objects(
     normals: Float[np.ndarray, "N 3"] | None = None,
     masks: Int[np.ndarray, "V N"] | None = None,
     config: ObjectsConfig = DEFAULT,
+    piece_of_point: Int[np.ndarray, " N"] | None = None,
 ) -> Split:
     """Segment objects that may touch.
 
@@ -95,6 +96,8 @@ def objects(
         masks: What each view takes each point for, where somebody drew instance masks (see
             ``masks.lifted``); -1: unknown.
         config: How objects are segmented.
+        piece_of_point: Which connected piece each is of, from 0, where somebody saw empty space
+            between these; None: all may be one.
 
     Raises:
         UserError: There are no points, or more objects than can be.
@@ -119,7 +122,9 @@ def objects(
         found.appearance.astype(np.float64),
     )
     # What has space between is apart already; the rest is cut where that costs least.
-    start = _of_patches(with_space_between(cloud.position, count), found)
+    start = np.zeros(len(found.size), np.int64)
+    if piece_of_point is not None:
+        start = _of_patches(at_most(piece_of_point, cloud.position, count), found)
     instance, cuts = _cut(graph, count, config, start)
     spaces = int(start.max()) + 1
     instance = _by_size(instance, found.size)

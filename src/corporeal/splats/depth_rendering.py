@@ -1,9 +1,9 @@
 """Depth of Gaussians: of the surface that each pixel's ray meets first, not a mean of depths."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
-from jaxtyping import Float, Float32, Int
+from jaxtyping import Bool, Float, Float32, Int
 from scipy.spatial.transform import Rotation
 
 from corporeal.splats.kernels_carve import meet, slopes
@@ -56,6 +56,25 @@ def render_depth(
         rest = drawing.first, drawing.ids, drawing.ellipses, slope, *found
         pool.each(meet, [(t, *rest) for t in dealt(drawing.first, pool)])
     return DepthRendering(rgb, depth, far, met, np.stack([_row(eye) for eye in eyes]))
+
+
+def within(
+    rendering: DepthRendering,
+    of_object: Bool[np.ndarray, " N"],
+    masks: Bool[np.ndarray, "V H W"] | None,
+) -> DepthRendering:
+    """Let only what is of objects be met; where masks have none, nothing is there.
+
+    Args:
+        rendering: Of N Gaussians.
+        of_object: Which of them are objects'; the others hide these.
+        masks: Pixels that show objects; None: nobody says it.
+
+    """
+    met = np.where(of_object[rendering.met], rendering.met, -1)
+    spilt = np.zeros(met.shape, bool) if masks is None else (met >= 0) & ~masks
+    depth = np.where(spilt, np.float32(np.inf), rendering.depth)
+    return replace(rendering, depth=depth, met=np.where(spilt, -1, met))
 
 
 def covariances(gaussians: Gaussians) -> Float[np.ndarray, "N 3 3"]:

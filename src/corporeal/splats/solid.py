@@ -22,7 +22,7 @@ from corporeal.geometry.mesh import Mesh, signed_volume, volumes_under
 from corporeal.geometry.shape import Shape
 from corporeal.splats.carve import Grid, carved, gridded
 from corporeal.splats.deepened import deepened
-from corporeal.splats.depth_rendering import DepthRendering, render_depth
+from corporeal.splats.depth_rendering import DepthRendering, render_depth, within
 from corporeal.splats.disjoint import disjoint
 from corporeal.splats.fairing import ON, continued, means, smoothed
 from corporeal.splats.kernels_carve import paint
@@ -142,8 +142,8 @@ def solids(
         raise UserError(f"No Gaussian belongs to object {lacking[0]}.")
     with ThreadPool(threads) as pool:
         rendering = render_depth(gaussians, cameras, pool)
-        own = np.where(object_of_gaussian[rendering.met] < 0, -1, rendering.met)
-        rendering, shown = _shown(replace(rendering, met=own), object_of_gaussian, masks)
+        rendering = within(rendering, object_of_gaussian >= 0, masks)
+        shown = None if masks is None else _shown(rendering, object_of_gaussian, masks)
         shallow, rgb = None, None if views is None else views.rgb
         if views is not None and masks is not None:
             shallow, rendering = rendering, deepened(rendering, views, masks, pool)
@@ -178,26 +178,16 @@ class _Scene:
 def _shown(
     rendering: DepthRendering,
     object_of_gaussian: np.ndarray,
-    masks: Bool[np.ndarray, "V H W"] | None,
-) -> tuple[DepthRendering, Int[np.ndarray, "V H W"] | None]:
-    """Return what is seen but for objects where masks have none, and whose each pixel is.
-
-    What only a mask gives to objects goes with what is next to it.
-    """
-    if masks is None:
-        return rendering, None
-    spilt = (rendering.met >= 0) & ~masks
-    met = np.where(spilt, -1, rendering.met)
-    rendering = replace(
-        rendering, depth=np.where(spilt, np.float32(np.inf), rendering.depth), met=met
-    )
-    shown = np.where(met >= 0, object_of_gaussian[met], -1)
+    masks: Bool[np.ndarray, "V H W"],
+) -> Int[np.ndarray, "V H W"]:
+    """Return whose each pixel is: what only masks give to objects goes with what is next to it."""
+    shown = np.where(rendering.met >= 0, object_of_gaussian[rendering.met], -1)
     for own, mask in zip(shown, masks, strict=True):
         if (own >= 0).any():
             nearest = distance_transform_edt(own < 0, return_distances=False, return_indices=True)
             y, x = np.asarray(nearest)
             own[:] = np.where(mask, own[y, x], -1)
-    return rendering, shown
+    return shown
 
 
 @dataclass(frozen=True)

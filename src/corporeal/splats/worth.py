@@ -80,22 +80,22 @@ def not_worth(
 
 
 def falls_apart(pieces: int, cameras: Sequence[Camera]) -> str | None:
-    """Return in a sentence or two why a surface that nobody masked is not to be believed; None.
+    """Return in a sentence or two why surfaces that nobody masked are not to be believed; None.
 
     One object is in one piece. Where half of the circle around it was not seen, nothing but colours
     told it from what stands behind it.
 
     Args:
-        pieces: That one object came out in.
+        pieces: That all came out in where nobody said of how many objects, else the most of one.
         cameras: That took the photographs; (): nobody knows, and nothing is said.
 
     """
     if pieces < 2 or not cameras or (unseen := mostly_unseen(cameras)) < HALF:
         return None
     return (
-        f"The shape contradicts itself: one thing came out in {pieces} pieces, and from "
-        f"{unseen:.0f}° of the circle around it nobody looked. Photograph it from there, too. "
-        f"{SAY_WHAT}"
+        f"The shape contradicts itself: what was looked at came out in {pieces} pieces, and from "
+        f"{unseen:.0f}° of the circle around it nobody looked. Photograph it from there, too; or, "
+        f"if these are several objects, say how many with --count. {SAY_WHAT}"
     )
 
 

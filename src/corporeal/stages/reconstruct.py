@@ -34,8 +34,9 @@ from corporeal.reconstruction.reconstruct_config import (
     validate,
 )
 from corporeal.regions.instance_assignment import assign_instances
+from corporeal.regions.space import Space
 from corporeal.render.camera import cameras_around
-from corporeal.splats.closed import closed
+from corporeal.splats.closed import apart, closed
 from corporeal.splats.depth_rendering import render_depth
 from corporeal.splats.discs import backed
 from corporeal.splats.foreground import sunk
@@ -138,13 +139,14 @@ def reconstruct(
     wanted = named_objects(config, viewer, taken)
     normal = normals(cloud.position, neighbours(cloud.position, AROUND), placed.outside)
     count, drawn = config.count or len(wanted) or None, drawn_masks(taken, cloud, front.on_objects)
-    split = assign_instances(cloud, config.apart, count, normal, drawn, grown)
+    space = Space(apart(taken, front.on_objects, cloud.position), alone=grown)
+    split = assign_instances(cloud, config.apart, count, normal, drawn, space)
     # One closed surface for each object.
     progress(FOUND, "closing surfaces")
     found = FoundObjects(
         taken, cloud, closed(taken, front.on_objects, cloud.position, split.object_of_point)
     )
-    if not config.force and (why := _why_not(found, photographers, masked)):
+    if not config.force and (why := _why_not(found, photographers, masked, count)):
         raise _refusal(source, why, lying_in(None if masked else folder), taken)
     # What they are, and so their names and their size in metres.
     known = _known(source, found, recognised(wanted, found, config, viewer), config, extents)
@@ -244,14 +246,25 @@ def _refusal(source: Path, why: str, lie: str, taken: Intake) -> UserError:
     return with_notes(UserError(f"{source}: {why} {lie}".rstrip()), noticed)
 
 
-def _why_not(found: FoundObjects, photographers: Sequence[Camera], masked: bool) -> str | None:
-    """Say why what was found is not worth simulating, if it is not."""
+def _why_not(
+    found: FoundObjects, photographers: Sequence[Camera], masked: bool, count: int | None
+) -> str | None:
+    """Say why what was found is not worth simulating, if it is not.
+
+    Args:
+        found: Objects.
+        photographers: Cameras that took the photographs; (): nobody knows.
+        masked: Whether somebody said which pixels are objects.
+        count: How many objects somebody said there are; None: nobody did.
+
+    """
     taken = found.taken
     why = not_worth(found.boxes, photographers, masked, taken.quality)
     if why is not None or taken.masks is None or not photographers:
         return why
     meshes = [Mesh(solid.vertices, solid.triangles) for solid in found.solids]
-    most = max(solid.pieces for solid in found.solids)
+    pieces = [solid.pieces for solid in found.solids]
+    most = sum(pieces) if count is None else max(pieces)
     apart = None if masked else falls_apart(most, photographers)
     return apart or unlike_masks(meshes, photographers, taken.masks, given=masked)
 
