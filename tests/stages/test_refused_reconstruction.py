@@ -5,12 +5,17 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+import trimesh
 
 from corporeal.errors import UserError
 from corporeal.masking.grown_masks import lying_in
+from corporeal.reconstruction.found_objects import FoundObjects
 from corporeal.reconstruction.reconstruct_config import ReconstructConfig
+from corporeal.render.camera import cameras_around
 from corporeal.run_files import doubts_first
+from corporeal.splats.closed import Closed
 from corporeal.splats.intake import Intake
+from corporeal.splats.solid import Solid
 from corporeal.stages import reconstruct as stage
 from corporeal.types import Cloud, Gaussians, Reconstruction, Views
 
@@ -87,3 +92,22 @@ def test_who_goes_on_without_masks_hears_where_doubted_ones_lie(tmp_path, monkey
         stage.reconstruct(Path("photos"), ReconstructConfig(), folder=tmp_path)
     (said,) = went_on[0].doubts
     assert "without masks" in said and said.endswith(f"--masks {tmp_path / 'doubted'}.")
+
+
+@pytest.mark.parametrize(("count", "refused"), [(None, True), (2, False)])
+def test_two_pieces_seen_from_one_side_are_believed_if_somebody_said_two(
+    monkeypatch, count, refused
+):
+    """Apart from each other, either may be a piece of the wall behind."""
+    views = cameras_around(np.eye(3), 20, (8, 6))[:10]
+    mesh = trimesh.creation.box()
+    solid = Solid(
+        np.asarray(mesh.vertices), np.asarray(mesh.faces), np.zeros((8, 3)), np.zeros(8, int), 0.1
+    )
+    taken = Intake(ONE, masks=np.ones((len(views), 6, 8), np.bool_))
+    found = FoundObjects(taken, NOTHING, Closed((solid, solid), np.zeros(1, int), np.zeros(0, int)))
+    for other in ("not_worth", "unlike_masks"):
+        monkeypatch.setattr(stage, other, lambda *_, **__: None)
+    monkeypatch.setattr("corporeal.splats.worth.mostly_unseen", lambda _: 200.0)
+    assert (stage._why_not(found, views, False, count) is not None) == refused
+    assert stage._why_not(found, views, True, None) is None, "somebody gave masks"
