@@ -278,6 +278,20 @@ def test_a_picture_without_a_mask_among_masked_ones_is_left_out(tmp_path):
     assert "1 of 4 pictures were left out: ./train/r_2 has no mask" in read.warnings[0]
 
 
+def test_masks_that_lie_across_their_pictures_are_refused_and_squares_stretched(tmp_path):
+    said(tmp_path)
+    (tmp_path / "masks").mkdir()
+    for k in range(4):
+        path = tmp_path / "masks" / f"r_{k}.png"
+        Image.fromarray(np.eye(24, dtype=np.uint8) * 255).save(path)
+    assert len(read_photographs(tmp_path).masks) == 4
+    for k in range(4):
+        path = tmp_path / "masks" / f"r_{k}.png"
+        Image.fromarray(np.eye(16, 12, dtype=np.uint8) * 255).save(path)
+    with pytest.raises(BadFileError, match="12 × 16 pixels, which lies across its 16 × 12: turn"):
+        read_photographs(tmp_path)
+
+
 def test_masks_under_names_of_no_photograph_are_said_to_be_none(tmp_path):
     said(tmp_path)
     (tmp_path / "masks").mkdir()

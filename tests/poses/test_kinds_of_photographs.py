@@ -277,6 +277,15 @@ def test_masks_under_names_of_no_photograph_are_said_to_be_none(tmp_path, greys)
     assert said.startswith("None of the 1 pictures in masks has the name of a photograph")
 
 
+def test_masks_that_lie_across_their_photographs_are_refused_at_once(tmp_path, greys):
+    saved(tmp_path, greys, ".png", Image.fromarray)
+    (tmp_path / "photos" / "masks").mkdir()
+    for k, grey in enumerate(greys):
+        Image.fromarray(grey.T.copy()).save(tmp_path / "photos" / "masks" / f"{k}.png")
+    with pytest.raises(BadFileError, match="a mask of 48 × 64 pixels, which lies across its 64"):
+        gathered(tmp_path)
+
+
 @pytest.mark.parametrize("kind", ["webp", "png"])
 def test_a_picture_that_moves_is_no_single_one(tmp_path, greys, kind):
     path = tmp_path / f"spin.{kind}"

@@ -265,6 +265,23 @@ def _fits(width: int, height: int, lens: Lens) -> bool:
     return abs(width * lens.height / (height * lens.width) - 1) <= PROPORTION
 
 
+def across(mask: tuple[int, int], picture: tuple[int, int]) -> str | None:
+    """Return what is wrong with a mask that lies across its picture; None: it does not.
+
+    Args:
+        mask: Width and height [px]; of other proportions it is stretched, as some models have it.
+        picture: Likewise.
+
+    """
+    (width, height), (wide, high) = mask, picture
+    ratio, swapped = width * high / (height * wide), width * wide / (height * high)
+    if abs(swapped - 1) > PROPORTION or abs(ratio - 1) <= PROPORTION:
+        return None
+    return (
+        f"has a mask of {width} × {height} pixels, which lies across its {wide} × {high}: turn it"
+    )
+
+
 def _turned(shot: Shot, width: int, height: int, asked: int) -> bool:
     """Tell whether a picture is to be turned: it asks for it, and only then fits its camera."""
     if asked % 2 == 0 or not width or not height:
@@ -328,6 +345,8 @@ def _alpha(shot: Shot, picture: np.ndarray, numbers: np.ndarray | None) -> np.nd
         mask = _decoded(shot.mask)[..., 0]
     except _UnusableError as problem:
         raise _UnusableError(f"has a mask that {problem}") from None
+    if wrong := across(mask.shape[1::-1], picture.shape[1::-1]):
+        raise _UnusableError(wrong)
     return mask if mask.shape == picture.shape[:2] else _resized(mask, picture.shape[1::-1])
 
 

@@ -14,7 +14,7 @@ from corporeal import store
 from corporeal.errors import BadFileError
 from corporeal.formats.images import FORMATS, MAX_PIXELS, eight_bit
 from corporeal.formats.photographs import INSTANCES, MASKS, companion, unused_masks
-from corporeal.formats.shots import FEWEST, Bad, left_out, unreadable
+from corporeal.formats.shots import FEWEST, Bad, across, left_out, unreadable
 from corporeal.formats.sources import below, not_read_below, not_read_beside, photographs_in
 from corporeal.formats.words import safe, writable
 
@@ -95,6 +95,7 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
             picture, alpha = _upright(file, file in strips)
             thumbnail = _thumbnail(picture)
             _check(thumbnail, known, list(names))
+            masks = [_mask_of(file, source, kinds, picture.size) for kinds in (MASKS, INSTANCES)]
         except _UnusableError as problem:
             bad.append((writable(file.name), str(problem)))
             twins += isinstance(problem, _TwinError)
@@ -104,8 +105,9 @@ def gather(source: Path, folder: Path, progress: Progress) -> Gathered:
         names[name] = picture.size
         reduced.append(picture.info["reduced"])
         _write(picture, folder / IMAGES / name)
-        for kinds in (MASKS, INSTANCES):
-            _copy_mask(file, source, kinds, folder, name)
+        for kinds, mask in zip((MASKS, INSTANCES), masks, strict=True):
+            if mask is not None:
+                _write_mask(mask, folder / kinds[0] / f"{Path(name).stem}.png")
         if alpha is not None:
             cut_out[name] = alpha
     said = [
@@ -309,6 +311,12 @@ def _write(picture: Image.Image, path: Path) -> None:
         picture.save(path, "JPEG", quality=QUALITY, subsampling=0, **more)
 
 
+def _write_mask(mask: Image.Image, path: Path) -> None:
+    with store.writing(path):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        mask.save(path, "PNG")
+
+
 def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> list[str]:
     """Write masks of photographs that were cut out, if most were; say so where few are.
 
@@ -334,17 +342,22 @@ def _write_alphas(alphas: dict[str, Image.Image], total: int, folder: Path) -> l
     for name, alpha in alphas.items():
         place = folder / MASKS[0] / f"{Path(name).stem}.png"
         if not place.exists():
-            with store.writing(place):
-                place.parent.mkdir(parents=True, exist_ok=True)
-                alpha.save(place, "PNG")
+            _write_mask(alpha, place)
     return []
 
 
-def _copy_mask(file: Path, source: Path, kinds: tuple[str, ...], folder: Path, name: str) -> None:
-    """Copy what goes with a photograph, turned with it where it is as the camera stored it."""
+def _mask_of(
+    file: Path, source: Path, kinds: tuple[str, ...], size: tuple[int, int]
+) -> Image.Image | None:
+    """Return what goes with a photograph, turned with it where it is as the camera stored it.
+
+    Raises:
+        _UnusableError: It lies across the photograph.
+
+    """
     mask = companion(file, source, kinds)
     if mask is None:
-        return
+        return None
     try:
         with Image.open(file, formats=FORMATS) as stored, Image.open(mask, formats=FORMATS) as own:
             wide = stored.width > stored.height
@@ -353,9 +366,9 @@ def _copy_mask(file: Path, source: Path, kinds: tuple[str, ...], folder: Path, n
             copy = own.copy()
         copy.getexif().clear()
         copy.getexif().update({0x0112: turn.get(0x0112, 1)})
-        place = folder / kinds[0] / f"{Path(name).stem}.png"
-        with store.writing(place):
-            place.parent.mkdir(parents=True, exist_ok=True)
-            ImageOps.exif_transpose(copy).save(place, "PNG")
+        upright = ImageOps.exif_transpose(copy)
     except (OSError, ValueError, SyntaxError, Image.DecompressionBombError):
-        return  # a photograph without its mask is left out where the others have one
+        return None  # a photograph without its mask is left out where the others have one
+    if wrong := across(upright.size, size):
+        raise _UnusableError(wrong)
+    return upright
