@@ -17,7 +17,10 @@ WIDE, WALL = 0.5, 0.25
 RISE = AWAY * np.sin(np.radians(STEEP)) - WALL
 GRAZES = float(np.degrees(np.arctan2(RISE, AWAY * np.cos(np.radians(STEEP)) + WIDE)))
 """Slope of the rays that graze the far eaves from across the box [deg]."""
-PIXEL = 2 * AWAY * np.tan(np.radians(15)) / SIDE / np.cos(np.radians(STEEP))
+WIDTH = 2 * AWAY * np.tan(np.radians(15)) / SIDE
+"""Of a pixel."""
+PIXEL = WIDTH / np.cos(np.radians(STEEP))
+"""Height that makes a pixel's difference."""
 
 
 def rows(steep):
@@ -48,7 +51,7 @@ def halved(mesh, known=0.0, still=False, steep=STEEP):
     """Ask about a surface that photographs know so far."""
     count = len(mesh.vertices)
     with ThreadPool(1) as pool:
-        belief, stays = np.full(count, known), np.full(count, still)
+        belief, stays = np.broadcast_to(known, count), np.full(count, still)
         return lowered(mesh, belief, stays, rows(steep), (SIDE, SIDE), pool)
 
 
@@ -91,6 +94,27 @@ def test_what_something_holds_stays(mesh, how):
     lost = mesh.vertices[:, 2].max() - made.vertices[:, 2].max()
     assert lost <= PIXEL
     assert roof.share <= SAID and not roof.warnings
+
+
+def test_nothing_goes_below_what_photographs_know_of_a_roof():
+    mesh = tent(GRAZES)
+    z, known = mesh.vertices[:, 2], WALL + 0.8 * WIDE * np.tan(np.radians(GRAZES))
+    patch = (mesh.vertices[:, 0] > 0) & (z > WALL) & (z <= known)
+    made, roof = halved(mesh, known=patch.astype(float))
+    reached, top = z[patch].max(), made.vertices[:, 2].max()
+    assert np.array_equal(made.vertices[z < reached - PIXEL], mesh.vertices[z < reached - PIXEL])
+    assert top == pytest.approx((reached + z.max()) / 2, abs=PIXEL)
+    assert 0 < roof.share < SAID < halved(mesh)[1].share
+
+
+def test_a_speck_that_photographs_know_holds_no_roof():
+    mesh = tent(GRAZES)
+    area = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3, 3))
+    high = np.flatnonzero(mesh.vertices[:, 2] > WALL + 0.9 * WIDE * np.tan(np.radians(GRAZES)))
+    speck = np.zeros(len(mesh.vertices))
+    speck[high[area[high].argmin()]] = 1.0
+    assert 0 < speck @ area < WIDTH**2
+    assert halved(mesh, known=speck)[1] == halved(mesh)[1]
 
 
 def test_little_doubt_is_not_said():

@@ -6,8 +6,8 @@ somewhere between its eaves and its ridge (Franco, Lapierre and Boyer 2006), and
 where. How much that is comes from cutting the surface off, level, until its outlines lack more than
 a pixel in some views: a roof is cut down to its eaves, a flat face at once lacks its far edge. All
 heights between are as good, so that the top goes to the middle, and what is between goes along.
-Nothing is in doubt where photographs agree on where the top is (``photometric.py``), or where it
-lies lower than outlines allow: something else than these held it there.
+Nothing is in doubt where photographs agree on where the top is (``photometric.py``), below what
+they know of it, or where it lies lower than outlines allow: something else held it there.
 """
 
 from dataclasses import dataclass
@@ -25,7 +25,7 @@ from corporeal.splats.thread_pool import ThreadPool
 HALVINGS = 6
 """Of what may be cut off: a 64th of the height is finer than any outline."""
 KNOWN = 0.5
-"""Mean belief from which on photographs know the top."""
+"""Belief from which on photographs know a vertex, and mean belief from which on the top."""
 SAID = 0.1
 """Share of the height from which on it is said: mass changes by as much."""
 BESIDE = np.ones((1, 3, 3), bool)
@@ -74,19 +74,28 @@ def lowered(
     """
     z, lowest = mesh.vertices[:, 2], _lowest(mesh, cameras)
     low, high = float(z.min()), float(z.max())
-    pixel = pixel_width(cameras, mesh.vertices.mean(axis=0)) / np.cos(np.radians(lowest))
+    wide = pixel_width(cameras, mesh.vertices.mean(axis=0))
+    pixel = wide / np.cos(np.radians(lowest))
     own = _silhouettes(mesh, cameras, shape, pool)
     # What cutting off a pixel's worth too much would leave of outlines is no roof.
     eaves = high - _unmissed(mesh, own, cameras, pool) * (high - low) + pixel
+    area = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas / 3, 3), len(z))
     over = z > eaves
-    area = np.bincount(mesh.triangles.ravel(), np.repeat(mesh.areas, 3), len(z))[over]
-    known = belief[over] @ area > KNOWN * area.sum()
+    known = belief[over] @ area[over] > KNOWN * area[over].sum()
     if not over.any() or known or still[over].any() or not _bounded(mesh, own, cameras, pixel):
         return mesh, Roof(0.0, lowest)
+    eaves = max(eaves, _reached(z, area * (belief > KNOWN), wide**2))
     vertices = mesh.vertices.copy()
-    vertices[over, 2] = (z[over] + eaves) / 2
+    vertices[:, 2] = np.where(z > eaves, (z + eaves) / 2, z)
     top = (high + eaves) / 2
     return Mesh(vertices, mesh.triangles), Roof(float((top - eaves) / (top - low)), lowest)
+
+
+def _reached(z: Float[np.ndarray, " N"], known: Float[np.ndarray, " N"], pixel: float) -> float:
+    """Return the height above which photographs know a pixel of surface [m²]; -inf: nowhere."""
+    falling = np.argsort(-z)
+    enough = np.flatnonzero(np.cumsum(known[falling]) >= pixel)
+    return float(z[falling[enough[0]]]) if len(enough) else -np.inf
 
 
 def _unmissed(
